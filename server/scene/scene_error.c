@@ -1,6 +1,7 @@
 /* The errors of answers (scene.h): of their own emission where the store states errors by group. */
 #include "server/scene/scene.h"
 
+#include "solver/operator/emitters.h"
 #include "solver/operator/sky_light.h"
 
 #include <math.h>
@@ -82,10 +83,10 @@ static void take_error(const answer_error *one, answer_notes *notes) {
     if (is_larger(one->relative, notes->relative_mean)) notes->relative_mean = one->relative;
 }
 
-static void take_names(const reduce_request *reduce, const name_error *one, double emitters,
+static void take_names(const reduce_request *reduce, const name_error *one, double number,
                        answer_notes *notes, name_error *names) {
     for (size_t k = 0; k < reduce->n_names; k++) {
-        const answer_error mean = {one[k].relative, one[k].mean, emitters};
+        const answer_error mean = {one[k].relative, one[k].mean, number};
         take_error(&mean, notes);
         if (is_larger(one[k].mean, names[k].mean)) names[k].mean = one[k].mean;
         if (is_larger(one[k].elements, names[k].elements)) names[k].elements = one[k].elements;
@@ -135,6 +136,32 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     if (good) *notes = made;
     if (good) *names = kept;
     if (!good) free(kept);
+    return good;
+}
+
+bool scene_note_emitters_error(const scene *s, const radiosity_request *request, const float *W,
+                               const float *values, answer_notes *notes) {
+    const error_scene about = scene_for_errors(s);
+    const size_t C = s->n_channels, vector = C * s->n;
+    answer_notes made = *notes;
+    if (s->errors.emitters.s == 0 || request->select || request->reduce.on || !notes->has_error) return true;
+    float *light = memory_allocate(2, vector * sizeof *light, "errors", NULL);
+    bool good = light != NULL;
+    begin_own(&request->reduce, NULL, &made);
+    for (size_t v = 0; good && v < request->n_rhs; v++) {
+        const float *weights = W + v * C * s->n_emitters;
+        const error_answer of = {.quantity = request->quantity,
+                                 .E = light,
+                                 .H0 = light + vector,
+                                 .count = s->n,
+                                 .values = values + v * vector};
+        good = operator_emitters_light(s->op, 1, weights, light, light + vector, NULL) == LAM_OK;
+        if (!good) break;
+        const answer_error one = emitters_error_of(&s->errors.emitters, &about, &of, weights);
+        take_error(&one, &made);
+    }
+    if (good) *notes = made;
+    free(light);
     return good;
 }
 

@@ -179,7 +179,7 @@ static double ratio(double error2, double light2) {
  * and of each channel A r and A B. */
 typedef struct value_sums {
     double area, reflected2, radiosity2;
-    double *reflected, *radiosity; /* [C] */
+    double *reflected, *radiosity; /* [C]; NULL: not wanted */
 } value_sums;
 
 /* Adds values first ... last - 1 of the answer, whose elements are in one bin: sums in registers, as those in
@@ -206,9 +206,9 @@ static void add_run(const error_scene *scene, const error_answer *of, size_t fir
             radiosity2 += a * b * b;
         }
         if (c == 0) to->area += area;
-        to->reflected[c] += reflected;
+        if (to->reflected != NULL) to->reflected[c] += reflected;
+        if (to->radiosity != NULL) to->radiosity[c] += radiosity;
         to->reflected2 += reflected2;
-        to->radiosity[c] += radiosity;
         to->radiosity2 += radiosity2;
     }
 }
@@ -232,6 +232,12 @@ static value_sums *sum_values(const error_by_group *e, const error_scene *scene,
         add_run(scene, of, first, last, &sums[bin]);
     }
     return sums;
+}
+
+answer_error answer_error_of_square(const error_scene *scene, const error_answer *of, double off2) {
+    value_sums sums = {.area = 0};
+    add_run(scene, of, 0, of->count, &sums);
+    return (answer_error){.relative = ratio(off2, sums.radiosity2), .indirect = ratio(off2, sums.reflected2)};
 }
 
 bool answer_error_of(const error_by_group *e, const error_scene *scene, const error_answer *of,

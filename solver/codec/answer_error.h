@@ -74,7 +74,9 @@ typedef struct answer_error {
     double emitters; /* effective number */
 } answer_error;
 
-/* The error of all values. Cost: O(C count). False when memory is short. */
+/* The error of all values. Cost: O(C count). False when memory is short. Where the square of the error is
+ * known, sum A |B~ - B|^2 over channels and the values, without a law. */
+answer_error answer_error_of_square(const error_scene *scene, const error_answer *of, double error2);
 bool answer_error_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                      answer_error *out);
 

@@ -4,6 +4,7 @@
 
 #include "solver/codec/answer.h"
 #include "solver/codec/answer_error.h"
+#include "solver/codec/emitters_error.h"
 #include "store/store.h"
 
 /* Of the scene's own lights, else of single elements, against the independent sample. */
@@ -22,14 +23,17 @@ typedef struct stated_errors {
     bool *read;             /* [n], true of receivers; NULL: the store was built for all elements */
     bool *emits; /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */
     error_by_group by_group; /* n_bins is 0 where the store states none */
+    emitters_error emitters; /* s is 0 where the store states none */
     size_t n;
 } stated_errors;
 
 void stated_errors_free(stated_errors *e);
 
-/* Reads those of a store of this scene, `read` of which is not used. A figure that is missing or no finite
- * number is not known. Errors: those of importance_load and error_by_group_read; LAM_ERR_MEMORY. */
-lam_status stated_errors_read(store *s, const error_scene *scene, stated_errors *out, lam_error *error);
+/* Reads those of a store of this scene, `read` of which is not used, and of its operator's n_emitters
+ * emitters. A figure that is missing or no finite number is not known. Errors: those of importance_load and
+ * error_by_group_read; LAM_ERR_MEMORY. */
+lam_status stated_errors_read(store *s, const error_scene *scene, size_t n_emitters, stated_errors *out,
+                              lam_error *error);
 
 /* The number among count elements that are no receivers; selected NULL: the first count elements. 0 where
  * the store was built for all. O(count). */

@@ -350,7 +350,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     /* With --reduce only figures are written, also with -o. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     about.groups = &lit.scene.groups;
-    TRY(stated_errors_read(s, &about, &stated, error));
+    TRY(stated_errors_read(s, &about, lam_operator_emitters(lit.op), &stated, error));
     about.read = stated.read;
     if (f->weather != NULL) {
         const weather_options hours = {.path = f->weather,
