@@ -19,6 +19,8 @@ static void setup(void) {
 /* Everything in double; T is rho' H. */
 typedef struct problem {
     float rho[C * N], first_bounce[M * N], L[C * S * M], E[C * S * N];
+    bool outside; /* they give direct light from outside the mesh too: */
+    float direct[S * N], exitance[C];
     double T[C * S * N];
 } problem;
 
@@ -43,6 +45,8 @@ static problem *make_problem(void) {
         p->E[(c * S + 5) * N + 59] = .25f;
     }
     for (size_t k = 0; k < (size_t)C * S * N; k++) p->T[k] = .3 * random_lcg_unit(&state);
+    for (size_t k = 0; k < S * N; k++) p->direct[k] = (float)(.1 * random_lcg_unit(&state));
+    for (size_t c = 0; c < C; c++) p->exitance[c] = (float)(c + 2);
     return p;
 }
 
@@ -75,6 +79,12 @@ static lam_status make_operator(const problem *p, size_t s, lam_operator **op, l
             memcpy(a.L + (c * s + k) * M, p->L + (c * S + k) * M, M * sizeof *a.L);
         }
     TRY(sky_create(M, N, p->first_bounce, &a.sky, cause));
+    if (p->outside) {
+        a.direct = test_allocate(s * N, sizeof *a.direct);
+        a.exitance = test_allocate(C, sizeof *a.exitance);
+        memcpy(a.direct, p->direct, s * N * sizeof *a.direct);
+        memcpy(a.exitance, p->exitance, sizeof p->exitance);
+    }
     TRY(operator_emitters_create(N, C, p->rho, &a, op, cause));
 done:
     emitter_arrays_free(&a);
@@ -91,7 +101,7 @@ static lam_operator *good_operator(const problem *p, size_t s) {
 /* d quantity_i / d w_k, in double. */
 static double derivative(const problem *p, size_t c, size_t k, size_t i, lam_quantity quantity) {
     const double T = p->T[(c * S + k) * N + i], rho = (double)p->rho[c * N + i];
-    double H0 = 0;
+    double H0 = p->outside ? (double)p->exitance[c] * (double)p->direct[k * N + i] : 0;
     for (size_t t = 0; t < M; t++)
         H0 += (double)p->L[(c * S + k) * M + t] * (double)p->first_bounce[t * N + i];
     if (quantity == LAM_IRRADIANCE) return T / rho_or_one((float)rho);
@@ -114,6 +124,7 @@ static area work_area(const lam_operator *op, size_t n_rhs) {
 
 START_TEST(answers_are_sums) {
     problem *p = make_problem();
+    p->outside = _i > 0;
     lam_operator *op = good_operator(p, S);
     float *W = random_vectors((size_t)MANY * C * S, 3),
           *out = test_allocate((size_t)MANY * C * N, sizeof *out);
@@ -159,6 +170,7 @@ END_TEST
 /* The adjoint against the derivative itself. */
 START_TEST(adjoint_is_the_transpose) {
     problem *p = make_problem();
+    p->outside = _i > 0;
     lam_operator *op = good_operator(p, S);
     float *g = random_vectors((size_t)MANY * C * N, 7), *W = test_allocate((size_t)MANY * C * S, sizeof *W);
     for (size_t k = 0; k < (size_t)MANY * C * N; k += 3) g[k] = -g[k];
@@ -297,6 +309,7 @@ done:
 
 START_TEST(what_is_saved_comes_back_bit_for_bit) {
     problem *p = make_problem();
+    p->outside = _i > 0;
     lam_operator *op = good_operator(p, S), *loaded = NULL;
     float *W = random_vectors((size_t)MANY * C * S, 3);
     float *before = test_allocate((size_t)MANY * C * N, sizeof *before),
@@ -328,6 +341,7 @@ START_TEST(memory_that_fails_is_not_lost) {
     problem *p = make_problem();
     lam_operator *op = good_operator(p, S);
     int failures[3] = {0};
+    p->outside = true;
     ck_ok(save(p, op, &error));
     for (int what = 0; what < 3; what++)
         for (long k = 0;; k++) {
@@ -348,12 +362,49 @@ START_TEST(memory_that_fails_is_not_lost) {
 }
 END_TEST
 
+/* Light from outside the mesh comes out as direct light, in single precision and in double, and no emission
+ * shows its weight. */
+START_TEST(light_from_outside_is_direct) {
+    problem *p = make_problem();
+    p->outside = true;
+    lam_operator *op = good_operator(p, S);
+    float *W = random_vectors((size_t)C * S, 3), E[C * N], H0[C * N], L[C * M] = {0};
+    double E2[C * N], H2[C * N];
+    ck_ok(operator_emitters_light(op, 1, W, E, H0, &error));
+    ck_ok(operator_emitters_light_double(op, 1, W, E2, H2, &error));
+    for (size_t c = 0; c < C; c++)
+        for (size_t i = 0; i < N; i++) {
+            double sum = 0;
+            for (size_t k = 0; k < S; k++) {
+                double one = (double)p->exitance[c] * (double)p->direct[k * N + i];
+                for (size_t t = 0; t < M; t++)
+                    one += (double)p->L[(c * S + k) * M + t] * (double)p->first_bounce[t * N + i];
+                sum += (double)W[c * S + k] * one;
+            }
+            ck_assert_double_eq_tol((double)H0[c * N + i], sum, 1e-5 * fabs(sum) + 1e-6);
+            ck_assert_double_eq_tol(H2[c * N + i], sum, 1e-12 * fabs(sum) + 1e-12);
+            ck_assert_double_eq_tol((double)E[c * N + i], E2[c * N + i], 1e-5 * fabs(E2[c * N + i]) + 1e-6);
+        }
+    ck_assert(lam_operator_weights(op, 1, E, M, L, W, &error) == LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "no part of its mesh"));
+    free(W);
+    lam_operator_close(op);
+    free(p);
+}
+END_TEST
+
 /* Files that hold no operator of this kind. */
 START_TEST(what_does_not_fit_is_refused) {
     problem *p = make_problem();
-    for (int what = 0; what < 6; what++) {
-        static const char *const wanted[] = {"the value -1",      "the value 0",   "element 61",
-                                             "/operator/L[3] = ", "is of 5 tiles", "names is empty"};
+    for (int what = 0; what < 8; what++) {
+        static const char *const wanted[] = {"the value -1",
+                                             "the value 0",
+                                             "element 61",
+                                             "/operator/L[3] = ",
+                                             "is of 5 tiles",
+                                             "names is empty",
+                                             "/operator/direct[7] = nan",
+                                             "/operator/exitance[1] = -2"};
         emitter_arrays a = {.s = what == 5 ? 0 : 1, .n_tiles = M};
         lam_operator *op = NULL;
         a.T = test_allocate((size_t)C * N, sizeof *a.T);
@@ -367,6 +418,12 @@ START_TEST(what_does_not_fit_is_refused) {
             a.values[c] = what == 0 ? -1 : what == 1 ? 0 : 1;
         }
         if (what == 3) a.L[3] = -1;
+        if (what > 5) {
+            a.direct = test_allocate(N, sizeof *a.direct);
+            a.exitance = test_allocate(C, sizeof *a.exitance);
+            if (what == 6) a.direct[7] = NAN;
+            if (what == 7) a.exitance[1] = -2;
+        }
         if (what != 4) ck_ok(sky_create(M, N, p->first_bounce, &a.sky, &error));
         ck_assert(operator_emitters_create(N, C, p->rho, &a, &op, &error) != LAM_OK);
         ck_assert_msg(strstr(error.message, wanted[what]) != NULL, "%s", error.message);
@@ -381,11 +438,12 @@ int main(void) {
     Suite *suite = suite_create("emitters");
     TCase *cases = tcase_create("emitters");
     tcase_add_checked_fixture(cases, setup, operator_file_teardown);
-    tcase_add_test(cases, answers_are_sums);
-    tcase_add_test(cases, adjoint_is_the_transpose);
+    tcase_add_loop_test(cases, answers_are_sums, 0, 2);
+    tcase_add_loop_test(cases, adjoint_is_the_transpose, 0, 2);
     tcase_add_test(cases, weights_follow_from_light);
     tcase_add_test(cases, wrong_calls_are_refused);
-    tcase_add_test(cases, what_is_saved_comes_back_bit_for_bit);
+    tcase_add_loop_test(cases, what_is_saved_comes_back_bit_for_bit, 0, 2);
+    tcase_add_test(cases, light_from_outside_is_direct);
     tcase_add_test(cases, memory_that_fails_is_not_lost);
     tcase_add_test(cases, what_does_not_fit_is_refused);
     suite_add_tcase(suite, cases);
