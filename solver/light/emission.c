@@ -153,8 +153,13 @@ static lam_status fill_item(const emission_scene *scene, const char *item, float
         for (size_t c = 0; c < C; c++) values[c] = all;
     }
     snprintf(what, sizeof what, "--emit %s", item);
-    if (W == NULL || !fill_emitter(scene, name, values, W))
-        TRY(emission_fill_group(scene, what, name, values, E, error));
+    if (W != NULL && fill_emitter(scene, name, values, W)) goto done;
+    status = emission_fill_group(scene, what, name, values, E, error);
+    if (status != LAM_OK && W != NULL) {
+        char miss[GROUP_MISS];
+        group_index_miss(&scene->emitters, name, strlen(name), miss);
+        FAIL(error, LAM_ERR_ARGUMENT, "%.200s: the store has no such group and %s", what, miss);
+    }
 done:
     free(name);
     free(values);

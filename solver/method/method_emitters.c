@@ -179,13 +179,13 @@ static lam_status check(const void *own, lam_error *error) {
     lam_status status = LAM_OK;
     const emitters_options *o = own;
     const int ways = (o->emitters != NULL) + (o->positions != NULL) + (o->path != NULL);
-    if (ways == 0) FAIL(error, LAM_ERR_ARGUMENT, "%s", missing);
     if (ways > 1)
         FAIL(error, LAM_ERR_ARGUMENT, "--emitters, --positions and --path exclude each other: give one");
     if (o->path != NULL && o->frames == 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--path: give --frames N too, the number of positions along it");
     if (o->path == NULL && o->frames > 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--frames: is for --path FILE.json, which is not given");
+    if (ways == 0) FAIL(error, LAM_ERR_ARGUMENT, "%s", missing);
 done:
     return status;
 }

@@ -131,11 +131,31 @@ done:
     return status;
 }
 
+/* The light itself: its polygon, and turn and move of every position side by side. */
+static lam_status save_light(const moving_light *l, size_t n_channels, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t corners[2] = {l->n_corners, 3}, poses[3] = {l->n, 3, 4};
+    double *pose = memory_allocate(l->n, 12 * sizeof *pose, "positions", error);
+    if (pose == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < l->n; k++)
+        for (size_t d = 0; d < 3; d++) {
+            for (size_t e = 0; e < 3; e++) pose[12 * k + 4 * d + e] = l->pose[k].turn[d][e];
+            pose[12 * k + 4 * d + 3] = l->pose[k].move[d];
+        }
+    TRY(store_write(s, "/positions/polygon", STORE_F64, 2, corners, l->corner, error));
+    TRY(store_write(s, "/positions/emission", STORE_F64, 1, &n_channels, l->emission, error));
+    TRY(store_write(s, "/positions/pose", STORE_F64, 3, poses, pose, error));
+done:
+    free(pose);
+    return status;
+}
+
 lam_status state_save_positions(const precompute_state *state, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const reuse_estimates *e = &state->paths;
     const size_t positions = e->n_positions, dims[2] = {positions, positions};
     if (state->position_errors == NULL) return LAM_OK;
+    TRY(save_light(&state->light, e->n_channels, s, error));
     TRY(store_write(s, "/error/emitters/covariance", STORE_F64, 2, dims, e->covariance, error));
     TRY(store_write(s, "/error/emitters/relative", STORE_F64, 1, &positions, state->position_errors, error));
     TRY(store_write(s, "/error/emitters/indirect", STORE_F64, 1, &positions,

@@ -1,5 +1,6 @@
 #include "solver/verbs/light_options.h"
 
+#include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
 
@@ -54,6 +55,12 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
     if (out->sky != NULL) TRY(store_get_text(s, "/sky", "tiling", &tiling, error));
     if (tiling != NULL) snprintf(out->scene.tiling, sizeof out->scene.tiling, "%s", tiling);
     TRY(emission_choose(&out->scene, &given, &out->light, &out->own, error));
+    const emitters *few = operator_emitters_of(out->op);
+    if (out->own && few != NULL && few->a.direct != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s answers for positions of a light that is no part of the scene: give --emit %.60s=1, or "
+             "several",
+             store_path(s), few->a.names[0]);
     lam_operator_set_threads(out->op, (size_t)omp_get_max_threads());
 done:
     free(tiling);
