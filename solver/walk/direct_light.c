@@ -2,6 +2,7 @@
 
 #include "solver/base/vector3.h"
 #include "solver/formfactor/visibility/sample.h"
+#include "solver/walk/spherical_triangle.h"
 #include "solver/walk/walk_steps.h"
 
 #include <math.h>
@@ -11,13 +12,23 @@
 /* A light is nearer than what is hit at this part of the distance to it, or behind. */
 static const float near_part = 1e-4f;
 
+/* Samples of an element and a position: of the pilot, which are not used again, and at least; at most. */
+enum { PILOT = 16, MOST = 4096 };
+
+/* The spread of samples over their mean that is assumed at least: few may have missed what varies. */
+static const double least_spread = .05;
+
 /* Elements between two looks at the progress. */
 enum { ELEMENTS_AT_ONCE = 64 };
 
-/* One position: its corners in metres, its front, and what lifts points off a face that it lies in. */
+/* Lights nearer than this many times their size are sampled by solid angle. */
+static const double near_sizes = 3;
+
+/* One position: its corners in metres, its front, what lifts points off a face that it lies in, and the
+ * sphere around it. */
 typedef struct placed_light {
     double (*corner)[3]; /* [n_corners] */
-    double normal[3], lift[3];
+    double normal[3], lift[3], centre[3], radius;
 } placed_light;
 
 typedef struct direct_run {
@@ -25,6 +36,7 @@ typedef struct direct_run {
     const direct_light_problem *problem;
     placed_light *placed; /* [s] */
     double *corners;      /* of all of them */
+    const double *all;    /* [s]: sum over elements of the root of A times variance; NULL: in the pilot */
 } direct_run;
 
 /* True if no point of the element sees the front of the light, by their corners. */
@@ -47,13 +59,80 @@ static bool faces_away(const direct_run *r, size_t element, const placed_light *
     return !above || !before;
 }
 
-/* Sum over the packet of cos cos V / r^2 for points of the element and of the light. */
+/* True if 1 / r^2 may vary much between points of the element and of the light. */
+static bool is_near(const direct_run *r, size_t element, const placed_light *p) {
+    const mesh *m = r->scene->m;
+    double least = INFINITY, radius = 0, centroid[3];
+    mesh_centroid(m, element, centroid);
+    for (size_t k = 0; k < mesh_corners(m, element); k++) {
+        double to[3];
+        subtract3(m->vertices[m->elements[element][k]], centroid, to);
+        radius = fmax(radius, sqrt(dot3(to, to)));
+    }
+    double to[3];
+    subtract3(p->centre, centroid, to);
+    least = sqrt(dot3(to, to)) - radius;
+    return least < near_sizes * p->radius;
+}
+
+/* The way from y (metres) to the light, uniform in solid angle; returns cos times that angle over the area of
+ * the light, in place of cos cos / r^2 of a point that is uniform in area. */
+static double aim(const direct_run *r, const placed_light *p, const float *normal, const double y[3],
+                  double u, double w, double way[3]) {
+    const size_t triangles = r->problem->light->n_corners - 2;
+    double all = 0, to[3], direction[3];
+    spherical_triangle t = {.solid_angle = 0};
+    subtract3(y, p->corner[0], to);
+    const double above = dot3(to, p->normal); /* of y over the light */
+    memset(way, 0, 3 * sizeof *way);
+    if (!(above > 0)) return 0;
+    for (size_t k = 0; k < triangles; k++) {
+        spherical_triangle_set(y, p->corner[0], p->corner[k + 1], p->corner[k + 2], &t);
+        all += t.solid_angle;
+    }
+    double left = u * all;
+    for (size_t k = 0; k < triangles; k++) {
+        spherical_triangle_set(y, p->corner[0], p->corner[k + 1], p->corner[k + 2], &t);
+        if (left < t.solid_angle) break;
+        left -= t.solid_angle;
+    }
+    if (!(t.solid_angle > 0)) return 0;
+    spherical_triangle_direction(&t, fmin(left / t.solid_angle, 1), w, direction);
+    const double towards = -dot3(direction, p->normal);
+    if (!(towards > 0)) return 0;
+    for (int d = 0; d < 3; d++) way[d] = above / towards * direction[d];
+    const double cosine = (double)normal[0] * direction[0] + (double)normal[1] * direction[1] +
+                          (double)normal[2] * direction[2];
+    return cosine > 0 ? cosine * all / r->problem->light->area : 0;
+}
+
+/* The way from y (recentred) to the point of the light at (u, w); returns cos cos / r^2. */
+static float reach(const direct_run *r, size_t position, const float *normal, const float y[3], double u,
+                   double w, float way[3]) {
+    const placed_light *p = &r->placed[position];
+    double local[3], at[3];
+    float x[3], cos_element = 0, cos_light = 0, square = 0;
+    moving_light_point(r->problem->light, u, w, local);
+    light_pose_point(&r->problem->light->pose[position], local, at);
+    for (int d = 0; d < 3; d++) at[d] += p->lift[d];
+    visibility_recentre(r->scene->v, at, x);
+    for (int d = 0; d < 3; d++) {
+        way[d] = x[d] - y[d];
+        cos_element += normal[d] * way[d];
+        cos_light -= (float)p->normal[d] * way[d];
+        square += way[d] * way[d];
+    }
+    return cos_element > 0 && cos_light > 0 && square > 0 ? cos_element * cos_light / (square * square) : 0;
+}
+
+/* Sum over the packet of cos cos V / r^2 for points of the element and of the light; adds their squares. */
 static double shine(const direct_run *r, const element_sampler *sampler, size_t element, size_t position,
-                    double place[4][VISIBILITY_PACKET]) {
+                    double place[4][VISIBILITY_PACKET], double *squares) {
     const visibility *v = r->scene->v;
-    const moving_light *light = r->problem->light;
     const placed_light *p = &r->placed[position];
     const float *normal = r->scene->m->normal[element];
+    const double *centre = visibility_centre(v);
+    const bool near = is_near(r, element, p);
     float kernel[VISIBILITY_PACKET], length[VISIBILITY_PACKET];
     uint32_t self[VISIBILITY_PACKET];
     ray_packet rays;
@@ -61,26 +140,23 @@ static double shine(const direct_run *r, const element_sampler *sampler, size_t 
     double sum = 0;
     bool any = false;
     for (size_t k = 0; k < VISIBILITY_PACKET; k++) {
-        double local[3], at[3];
-        float y[3], x[3], cos_element = 0, cos_light = 0, square = 0;
+        float y[3], way[3];
         element_sampler_point(sampler, (float)place[0][k], (float)place[1][k], y);
-        moving_light_point(light, place[2][k], place[3][k], local);
-        light_pose_point(&light->pose[position], local, at);
-        for (int d = 0; d < 3; d++) at[d] += p->lift[d];
-        visibility_recentre(v, at, x);
-        for (int d = 0; d < 3; d++) {
-            const float to = x[d] - y[d];
-            rays.origin[d][k] = y[d];
-            rays.direction[d][k] = to;
-            cos_element += normal[d] * to;
-            cos_light -= (float)p->normal[d] * to;
-            square += to * to;
+        if (near) {
+            double at[3], there[3];
+            for (int d = 0; d < 3; d++) at[d] = (double)y[d] + centre[d];
+            kernel[k] = (float)aim(r, p, normal, at, place[2][k], place[3][k], there);
+            for (int d = 0; d < 3; d++) way[d] = (float)there[d];
+        } else {
+            kernel[k] = reach(r, position, normal, y, place[2][k], place[3][k], way);
         }
-        const bool open = cos_element > 0 && cos_light > 0 && square > 0;
-        kernel[k] = open ? cos_element * cos_light / (square * square) : 0;
-        length[k] = sqrtf(square);
+        for (int d = 0; d < 3; d++) {
+            rays.origin[d][k] = y[d];
+            rays.direction[d][k] = way[d];
+        }
+        length[k] = sqrtf(way[0] * way[0] + way[1] * way[1] + way[2] * way[2]);
         self[k] = (uint32_t)element;
-        any = any || open;
+        any = any || kernel[k] > 0;
     }
     if (!any) return 0;
     const float rounding = (float)visibility_rounding(v);
@@ -88,33 +164,51 @@ static double shine(const direct_run *r, const element_sampler *sampler, size_t 
     for (size_t k = 0; k < VISIBILITY_PACKET; k++) {
         const bool free = hits.element[k] == VISIBILITY_NOTHING ||
                           hits.distance[k] > 1 - near_part - 4 * rounding / length[k];
-        if (free) sum += (double)kernel[k];
+        if (!free) continue;
+        sum += (double)kernel[k];
+        *squares += (double)kernel[k] * (double)kernel[k];
     }
     return sum;
 }
 
+/* Samples of a half for element i and position l: those of equal size in the pilot, later as many as lower
+ * the error of the position most (Neyman 1934): by the root of A_i times the variance that the pilot found.
+ */
+static size_t half_for(const direct_run *r, size_t i, size_t l, double variance) {
+    if (r->all == NULL) return PILOT / 2;
+    const double wanted = .5 * (double)(r->problem->samples * r->scene->m->n) *
+                          sqrt(r->scene->m->area[i] * variance) / fmax(r->all[l], 1e-300);
+    size_t half = PILOT / 2;
+    while (half < MOST / 2 && (double)half < wanted) half *= 2;
+    return half;
+}
+
+/* Of the pilot, variance is that of single samples; later it is that of F. Samples of the two are apart. */
 static void light_element(const direct_run *r, size_t element, float *F, float *variance) {
     const direct_light_problem *problem = r->problem;
-    const size_t s = problem->light->n, half = problem->samples / 2;
-    const double scale = problem->light->area * M_1_PI / (double)half;
+    const size_t s = problem->light->n;
     element_sampler sampler;
     element_sampler_init(&sampler, r->scene->m, r->scene->v, element, problem->seed);
     for (size_t l = 0; l < s; l++) {
-        double sums[2] = {0, 0};
+        const size_t half = half_for(r, element, l, (double)variance[l]);
+        const double scale = problem->light->area * M_1_PI / (double)half;
+        double sums[2] = {0, 0}, squares = 0;
         F[l] = variance[l] = 0;
         if (faces_away(r, element, &r->placed[l])) continue;
         for (uint64_t h = 0; h < 2; h++) {
             pair_sampler places;
-            pair_sampler_init(&places, problem->seed + h, element, l);
+            pair_sampler_init(&places, problem->seed + 2 * (r->all == NULL) + h, element, l);
             for (uint32_t k = 0; k < half; k += VISIBILITY_PACKET) {
                 double place[4][VISIBILITY_PACKET];
                 pair_sampler_packet(&places, k, place);
-                sums[h] += shine(r, &sampler, element, l, place);
+                sums[h] += shine(r, &sampler, element, l, place, &squares);
             }
         }
-        const double difference = scale * (sums[0] - sums[1]) / 2;
-        F[l] = (float)(scale * (sums[0] + sums[1]) / 2);
-        variance[l] = (float)(difference * difference);
+        const double mean = scale * (sums[0] + sums[1]) / 2, difference = scale * (sums[0] - sums[1]) / 2;
+        const double of_one = scale * scale * (double)half * squares / 2 - mean * mean;
+        F[l] = (float)mean;
+        variance[l] = (float)(r->all == NULL ? fmax(of_one, least_spread * least_spread * mean * mean)
+                                             : difference * difference);
     }
 }
 
@@ -129,23 +223,30 @@ static lam_status place_lights(direct_run *r, lam_error *error) {
         placed_light *p = &r->placed[l];
         p->corner = (double(*)[3])(void *)(r->corners + 3 * n * l);
         light_pose_direction(&light->pose[l], light->normal, p->normal);
+        memset(p->centre, 0, sizeof p->centre);
+        p->radius = 0;
         for (int d = 0; d < 3; d++) p->lift[d] = off * p->normal[d];
         for (size_t k = 0; k < n; k++) {
             light_pose_point(&light->pose[l], light->corner[k], p->corner[k]);
             for (int d = 0; d < 3; d++) p->corner[k][d] += p->lift[d];
+            for (int d = 0; d < 3; d++) p->centre[d] += p->corner[k][d] / (double)n;
+        }
+        for (size_t k = 0; k < n; k++) {
+            double to[3];
+            subtract3(p->corner[k], p->centre, to);
+            p->radius = fmax(p->radius, sqrt(dot3(to, to)));
         }
     }
     return LAM_OK;
 }
 
-lam_status walk_direct_light(const walk_scene *s, const direct_light_problem *problem, float *F,
-                             float *variance, lam_error *error) {
+/* All elements once. */
+static lam_status light_all(const direct_run *r, float *F, float *variance, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = s->m->n, positions = problem->light->n;
-    direct_run r = {.scene = s, .problem = problem};
+    const size_t n = r->scene->m->n, positions = r->problem->light->n;
+    const double before = r->all == NULL ? 0 : .25;
     size_t done = 0;
     bool stop = false;
-    TRY(place_lights(&r, error));
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t first = 0; first < n; first += ELEMENTS_AT_ONCE) {
         bool skip;
@@ -154,12 +255,13 @@ lam_status walk_direct_light(const walk_scene *s, const direct_light_problem *pr
         if (skip) continue;
         const size_t last = first + ELEMENTS_AT_ONCE < n ? first + ELEMENTS_AT_ONCE : n;
         for (size_t i = first; i < last; i++)
-            light_element(&r, i, F + i * positions, variance + i * positions);
+            light_element(r, i, F + i * positions, variance + i * positions);
 #pragma omp critical(direct_progress)
         {
             done += last - first;
-            progress_report(problem->progress, problem->stage, (double)done / (double)n);
-            if (progress_cancelled(problem->progress)) {
+            progress_report(r->problem->progress, r->problem->stage,
+                            before + (r->all == NULL ? .25 : .75) * (double)done / (double)n);
+            if (progress_cancelled(r->problem->progress)) {
 #pragma omp atomic write
                 stop = true;
             }
@@ -167,6 +269,24 @@ lam_status walk_direct_light(const walk_scene *s, const direct_light_problem *pr
     }
     if (stop) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
 done:
+    return status;
+}
+
+lam_status walk_direct_light(const walk_scene *s, const direct_light_problem *problem, float *F,
+                             float *variance, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = s->m->n, positions = problem->light->n;
+    direct_run r = {.scene = s, .problem = problem};
+    double *all = memory_allocate(positions, sizeof *all, "positions", error);
+    if (all == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(place_lights(&r, error));
+    TRY(light_all(&r, F, variance, error));
+    for (size_t k = 0; k < n * positions; k++)
+        all[k % positions] += sqrt(s->m->area[k / positions] * (double)variance[k]);
+    r.all = all;
+    TRY(light_all(&r, F, variance, error));
+done:
+    free(all);
     free(r.placed);
     free(r.corners);
     return status;
