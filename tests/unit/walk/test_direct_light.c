@@ -151,6 +151,7 @@ END_TEST
 int main(void) {
     Suite *suite = suite_create("direct light");
     TCase *tests = tcase_create("direct light");
+    tcase_set_timeout(tests, 120);
     tcase_add_test(tests, agrees_with_closed_forms);
     tcase_add_test(tests, directions_are_uniform);
     tcase_add_test(tests, thin_triangles_have_no_directions);
