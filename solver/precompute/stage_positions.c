@@ -84,6 +84,7 @@ static lam_status walk(precompute_state *state, const emitters_options *how, lam
     const reuse_problem problem = {.light = &state->light,
                                    .way = way,
                                    .paths = (size_t)how->paths,
+                                   .even = true,
                                    .resolution = way == REUSE_CUBES ? CUBE_PIXELS : MAP_CELLS,
                                    .seed = precompute_seed(state->options->seed, SEED_POSITIONS),
                                    .progress = &state->progress,

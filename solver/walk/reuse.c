@@ -370,8 +370,8 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
         e.maps_seconds = clock_processor_seconds() - begun;
         r.maps = &maps;
     }
-    if (problem->even && problem->way != REUSE_NONE &&
-        problem->way != REUSE_ELEMENTS) TRY(count_paths(&r, of_batch, error));
+    if (problem->even && problem->way != REUSE_NONE && problem->way != REUSE_ELEMENTS)
+        TRY(count_paths(&r, of_batch, error));
     for (size_t l = 0; l < r.s; l++) e.count[l] = r.of_batch[l] * WALK_BATCHES;
     TRY(problem->way == REUSE_ELEMENTS ? reuse_elements(s, problem, &e, error) : run_batches(&r, &e, error));
     TRY(check_reach(&r, &e, error));

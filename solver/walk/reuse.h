@@ -48,7 +48,8 @@ void reuse_estimates_free(reuse_estimates *e);
 
 /* With even the counts N_l of paths come from first hits of a pilot, of a twentieth of the paths at most,
  * whose own light is not used, so that nothing is biased; REUSE_NONE and REUSE_ELEMENTS leave them equal.
- * These two and REUSE_EXACT are unbiased; the bias of the others goes with the size of the light and of the cells. Cost: s
+ * These two and REUSE_EXACT are unbiased; the bias of the others goes with the size of the light and of the
+ * cells. Cost: s
  * * paths walks, for REUSE_EXACT s - 1 more rays for each; memory 8 ((T + 2) C + T + 1) n s bytes for T
  * threads. Errors: LAM_ERR_ARGUMENT names a position that reaches nothing, LAM_ERR_MEMORY, LAM_ERR_CANCELLED.
  */

@@ -444,8 +444,7 @@ START_TEST(counts_even_out_errors) {
 END_TEST
 
 START_TEST(bits_do_not_depend_on_threads) {
-    static const reuse_way ways[] = {REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES,
-                                     REUSE_ELEMENTS};
+    static const reuse_way ways[] = {REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES, REUSE_ELEMENTS};
     mesh m = cornell();
     moving_light l = falling_light(&m);
     const int threads = omp_get_max_threads();
