@@ -102,6 +102,11 @@ worst_group judge_worst_group(const group_errors *e);
 typedef struct judged_sky {
     size_t n_tiles;
     const float *own, *samples[2];
+    /* first [count][n]: rows of a sample, 0 or 1, closer than by that, independent of the other's. NULL:
+     * there are none. */
+    lam_status (*tiles)(void *context, int sample, size_t count, const size_t *tiles, float *first,
+                        lam_error *error);
+    void *tiles_context;
 } judged_sky;
 
 /* Skies by which it is judged: two that shine from everywhere, and single tiles. */

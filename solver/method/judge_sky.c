@@ -16,10 +16,13 @@ static const double darkest_cloud = .2;
 /* Means over groups are stored up to so many numbers. */
 static const size_t means_most = (size_t)1 << 20;
 
-/* Skies [SKIES][m], their emissions rho H0 by one first bounce, [SKIES][C][n]. */
+/* Skies [SKIES][m], of which suns are single tiles, their emissions rho H0 by one first bounce,
+ * [SKIES][C][n]. */
 typedef struct skies {
     size_t count;
+    size_t tile[JUDGE_SUNS];
     float *L;
+    float *sun;  /* [JUDGE_SUNS][n], a closer first bounce of these tiles */
     float *E[3]; /* by the operator's own, and by each sample */
     float *B;
     double *x[3]; /* by the independent reference and each sample; by the other one and the mean of both */
@@ -27,6 +30,7 @@ typedef struct skies {
 
 static void skies_free(skies *s) {
     free(s->L);
+    free(s->sun);
     for (int k = 0; k < 3; k++) free(s->E[k]);
     free(s->B);
     for (int k = 0; k < 3; k++) free(s->x[k]);
@@ -64,23 +68,42 @@ static bool draw(size_t m, double *weight, uint64_t state, skies *s) {
         }
         if (drawn == m) break;
         s->L[s->count * m + drawn] = 1;
+        s->tile[s->count - JUDGE_EVEN_SKIES] = drawn;
         weight[drawn] = 0;
     }
     return s->count > JUDGE_EVEN_SKIES;
 }
 
-/* E = rho H0, [count][C][n], with H0 = sum_t L_t first_bounce_t. */
-static void light(const judge_input *input, const float *first, const skies *s, float *E) {
+/* E = rho H0, [count][C][n], with H0 = sum_t L_t first_bounce_t, that of suns by what is known closer. */
+static void light(const judge_input *input, const float *first, bool closer, const skies *s, float *E) {
     const build_problem *p = input->problem;
     const size_t n = p->n, C = p->n_channels, m = input->sky->n_tiles;
 #pragma omp parallel for schedule(static)
     for (size_t i = 0; i < n; i++)
         for (size_t v = 0; v < s->count; v++) {
             double H = 0;
-            for (size_t t = 0; t < m; t++) H += (double)s->L[v * m + t] * (double)first[t * n + i];
+            if (closer && v >= JUDGE_EVEN_SKIES)
+                H = (double)s->sun[(v - JUDGE_EVEN_SKIES) * n + i];
+            else
+                for (size_t t = 0; t < m; t++) H += (double)s->L[v * m + t] * (double)first[t * n + i];
             for (size_t c = 0; c < C; c++)
                 E[(v * C + c) * n + i] = (float)(H * (double)p->reflectance[c * n + i]);
         }
+}
+
+/* E[k] of the operator's first bounce, k = 0, and of the samples, 1 and 2. */
+static lam_status light_all(const judge_input *input, skies *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const judged_sky *sky = input->sky;
+    const bool closer = sky->tiles != NULL;
+    light(input, sky->own, false, s, s->E[0]);
+    for (int k = 0; k < 2; k++) {
+        if (closer)
+            TRY(sky->tiles(sky->tiles_context, k, s->count - JUDGE_EVEN_SKIES, s->tile, s->sun, error));
+        light(input, sky->samples[k], closer, s, s->E[k + 1]);
+    }
+done:
+    return status;
 }
 
 typedef struct corrections {
@@ -135,7 +158,8 @@ static lam_status allocate(const judge_input *input, skies *s, lam_error *error)
     const size_t vector = input->problem->n * input->problem->n_channels;
     s->L = memory_allocate(SKIES, input->sky->n_tiles * sizeof *s->L, "skies", error);
     s->B = memory_allocate(SKIES, vector * sizeof *s->B, "skies", error);
-    if (s->L == NULL || s->B == NULL) return LAM_ERR_MEMORY;
+    s->sun = memory_allocate(JUDGE_SUNS, input->problem->n * sizeof *s->sun, "skies", error);
+    if (s->L == NULL || s->B == NULL || s->sun == NULL) return LAM_ERR_MEMORY;
     for (int k = 0; k < 3; k++)
         if ((s->E[k] = memory_allocate(SKIES, vector * sizeof *s->E[k], "skies", error)) == NULL)
             return LAM_ERR_MEMORY;
@@ -150,7 +174,6 @@ lam_status judge_sky_add(const lam_operator *op, const judge_input *input, figur
     lam_status status = LAM_OK;
     const build_problem *p = input->problem;
     const size_t m = input->sky->n_tiles, vector = p->n * p->n_channels;
-    const float *const firsts[3] = {input->sky->own, input->sky->samples[0], input->sky->samples[1]};
     const bool twins = input->relation == REFERENCE_TWIN && input->other.n > 0;
     const bool apart = input->other.n > 0 && !twins;
     skies s = {.count = 0};
@@ -163,7 +186,7 @@ lam_status judge_sky_add(const lam_operator *op, const judge_input *input, figur
     find_powers(input, power);
     for (size_t k = 0; k < m * p->n_channels; k++) weight[k % m] += power[k];
     if (!draw(m, weight, input->seed + 3, &s)) goto done;
-    for (int k = 0; k < 3; k++) light(input, firsts[k], &s, s.E[k]);
+    TRY(light_all(input, &s, error));
     TRY(answer(op, &s, error));
     TRY(solve(op, input, &input->independent, &s, s.E[1], s.x[0], error));
     TRY(solve(op, input, twins ? &input->other : &input->independent, &s, s.E[2], s.x[1], error));

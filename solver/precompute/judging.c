@@ -25,9 +25,10 @@ struct judge_references {
     block_light *by_blocks;
     size_t n;
     bool keeps;
-    sky_bounce sky[2]; /* samples of the first bounce; n = 0: none */
-    judged_sky light;  /* a view of these, and of the first bounce that is judged */
-    light_kept lamp;   /* of several elements, which takes as long as that of many single ones */
+    sky_bounce sky[2];     /* samples of the first bounce; n = 0: none */
+    judged_sky light;      /* a view of these, and of the first bounce that is judged */
+    const judging *judged; /* by whom the sky is asked for */
+    light_kept lamp;       /* of several elements, which takes as long as that of many single ones */
 };
 
 static void light_kept_free(light_kept *l) {
@@ -169,9 +170,22 @@ static bool fits(const judging *j, const judge_references *r) {
            !trial_recipes_differ(&r->halves[1], &j->halves[1]);
 }
 
-/* Rays of each of the two samples from an element. Their noise is taken out; what is left of it, in the error
- * of an answer that they share, falls with the number of elements. */
-enum { SKY_RAYS = 512 };
+/* Rays of each of the two samples from an element, and towards each single tile by which it is judged. Their
+ * noise is taken out; what is left of it, in the error of an answer that they share, falls with the number of
+ * elements. */
+enum { SKY_RAYS = 512, TILE_RAYS = 32 };
+
+/* Of the samples 0 and 1, and of single tiles. */
+static uint64_t seed_of_sky(const judging *j, int sample, bool tiles) {
+    return random_mix(j->first_light_seed + 1 + (uint64_t)sample + (tiles ? 2 : 0));
+}
+
+static lam_status sample_tiles(void *context, int sample, size_t count, const size_t *tiles, float *first,
+                               lam_error *error) {
+    const judge_references *r = context;
+    return sky_sample_tiles(r->judged->m, &r->sky[sample], TILE_RAYS, seed_of_sky(r->judged, sample, true),
+                            count, tiles, first, error);
+}
 
 /* True where the sky is judged: one whose light is in the scene. */
 static bool has_sky(const judging *j) {
@@ -194,18 +208,20 @@ static lam_status make_references(const judging *j, judge_references *r, lam_err
         TRY(first_light_create(j->m, j->first_light_seed, &r->by_rays, error));
     if (!has_sky(j)) goto done;
     for (int h = 0; h < 2; h++) {
-        const form_factor_options how = {
-            .recipe = {.rays = SKY_RAYS, .seed = random_mix(j->first_light_seed + 1 + (uint64_t)h)},
-            .portals = j->portals,
-            .n_portals = j->n_portals,
-            .progress = j->progress,
-            .stage = "the sky for the judge"};
+        const form_factor_options how = {.recipe = {.rays = SKY_RAYS, .seed = seed_of_sky(j, h, false)},
+                                         .portals = j->portals,
+                                         .n_portals = j->n_portals,
+                                         .progress = j->progress,
+                                         .stage = "the sky for the judge"};
         if (r->sky[h].first_bounce == NULL)
             TRY(sky_sample_make(j->m, j->order, &j->f->sky, &how, &r->sky[h], error));
     }
     r->light = (judged_sky){.n_tiles = j->f->sky.tiling.n_tiles,
                             .own = j->f->sky.first_bounce,
-                            .samples = {r->sky[0].first_bounce, r->sky[1].first_bounce}};
+                            .samples = {r->sky[0].first_bounce, r->sky[1].first_bounce},
+                            .tiles = sample_tiles,
+                            .tiles_context = r};
+    r->judged = j;
 done:
     return status;
 }

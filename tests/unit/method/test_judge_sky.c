@@ -61,7 +61,7 @@ static lam_operator *make_operator(double F) {
 static size_t judge(const two_elements *s, reference_relation relation, figure_group *figures,
                     double *rms_of_wall) {
     static const build_problem problem = {.n = N, .n_channels = 1, .area = area, .reflectance = reflectance};
-    const judged_sky sky = {TILES, s->first[0], {s->first[1], s->first[2]}};
+    const judged_sky sky = {.n_tiles = TILES, .own = s->first[0], .samples = {s->first[1], s->first[2]}};
     const judge_input input = {.problem = &problem,
                                .group = group,
                                .n_groups = N,
@@ -192,7 +192,7 @@ END_TEST
 START_TEST(powers_of_tiles) {
     two_elements s = {.F = {.4, .4, .4}};
     static const build_problem problem = {.n = N, .n_channels = 1, .area = area, .reflectance = reflectance};
-    const judged_sky sky = {TILES, s.first[0], {s.first[1], s.first[2]}};
+    const judged_sky sky = {.n_tiles = TILES, .own = s.first[0], .samples = {s.first[1], s.first[2]}};
     const judge_input input = {.problem = &problem, .group = group, .n_groups = N, .sky = &sky};
     group_errors made = {.n_groups = N};
     figure_group figures;
