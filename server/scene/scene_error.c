@@ -60,13 +60,19 @@ static bool has_own_error(const scene *s, const radiosity_request *request, cons
            (request->sky.values == NULL || (whole && e->n_tiles == lam_sky_tiles(s->sky)));
 }
 
+/* The radiances of the sky of vector v, [C][m]; NULL: it has none. */
+static const float *sky_of(const scene *s, const radiosity_request *request, size_t v) {
+    const side_rows *sky = &request->sky;
+    return sky->values != NULL && v < sky->n ? sky->values + v * s->n_channels * lam_sky_tiles(s->sky) : NULL;
+}
+
 /* The size of the sky of vector v. */
 static emission_size size_of_sky(const scene *s, const radiosity_request *request, size_t v) {
     const error_by_group *e = &s->errors.by_group;
     const size_t C = s->n_channels, m = e->n_tiles;
+    const float *L = sky_of(s, request, v);
     emission_size size = {.power2 = 0};
-    for (size_t c = 0; v < request->sky.n && request->sky.values != NULL && c < C; c++)
-        emission_size_add(&size, m, e->sky_power + c * m, request->sky.values + (v * C + c) * m);
+    for (size_t c = 0; L != NULL && c < C; c++) emission_size_add(&size, m, e->sky_power + c * m, L + c * m);
     return size;
 }
 
@@ -120,7 +126,8 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
                            .H0 = H0 != NULL ? H0 + v * vector : NULL,
                            .count = count,
                            .selected = request->select ? request->selected : NULL,
-                           .values = values + v * C * count};
+                           .values = values + v * C * count,
+                           .L = sky_of(s, request, v)};
         answer_error one;
         for (size_t c = 0; c < C; c++) emission_size_add(&of.size, s->n, s->area, of.E + c * s->n);
         of.sky = size_of_sky(s, request, v);
@@ -280,6 +287,7 @@ void scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
         const name_means of = {.quantity = request->quantity,
                                .size = to->sizes[v],
                                .sky = size_of_sky(s, request, v),
+                               .L = sky_of(s, request, v),
                                .value = means + v * C,
                                .emission = to->emission + v * C,
                                .direct = direct + v * C};

@@ -1,23 +1,38 @@
 #include "solver/codec/answer_error.h"
 
+#include "solver/base/weighted.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define GROUP "/error/by_group"
 
-static void law_free(error_law *law) {
-    free(law->one);
-    free(law->many);
-    free(law->even);
-    free(law->mean_one);
-    free(law->mean_many);
-    free(law->mean_even);
+/* Figures by bin of a law: names in a store, and where they go. */
+enum { LAW_FIGURES = 6, SKY_LAW_FIGURES = 4 };
+typedef struct law_figure {
+    const char *name;
+    double **to;
+} law_figure;
+
+static void figures_of(error_by_group *e, law_figure law[LAW_FIGURES], law_figure sky[SKY_LAW_FIGURES]) {
+    const law_figure all[LAW_FIGURES] = {{"rms_one", &e->law.one},         {"rms_many", &e->law.many},
+                                         {"rms_even", &e->law.even},       {"mean_one", &e->law.mean_one},
+                                         {"mean_many", &e->law.mean_many}, {"mean_even", &e->law.mean_even}};
+    const law_figure of_sky[SKY_LAW_FIGURES] = {{"sky_rms_tiles", &e->sky.tiles},
+                                                {"sky_rms_even", &e->sky.even},
+                                                {"sky_mean_tiles", &e->sky.mean_tiles},
+                                                {"sky_mean_even", &e->sky.mean_even}};
+    memcpy(law, all, sizeof all);
+    memcpy(sky, of_sky, sizeof of_sky);
 }
 
 void error_by_group_free(error_by_group *e) {
-    law_free(&e->law);
-    law_free(&e->sky);
+    law_figure law[LAW_FIGURES], sky[SKY_LAW_FIGURES];
+    figures_of(e, law, sky);
+    for (size_t k = 0; k < LAW_FIGURES; k++) free(*law[k].to);
+    for (size_t k = 0; k < SKY_LAW_FIGURES; k++) free(*sky[k].to);
     free(e->sky_power);
     free(e->sky_first);
     free(e->area);
@@ -43,39 +58,35 @@ done:
     return status;
 }
 
-/* The figures of emissions, or, with the prefix "sky_", of skies. */
-static lam_status read_law(store *s, const char *prefix, error_by_group *e, error_law *law,
-                           lam_error *error) {
+static lam_status read_figures(store *s, size_t count, const law_figure *figures, error_by_group *e,
+                               lam_error *error) {
     lam_status status = LAM_OK;
-    char name[32];
-    struct {
-        const char *name;
-        double **to;
-    } figures[] = {{"rms_one", &law->one},         {"rms_many", &law->many},
-                   {"rms_even", &law->even},       {"mean_one", &law->mean_one},
-                   {"mean_many", &law->mean_many}, {"mean_even", &law->mean_even}};
-    for (size_t k = 0; k < sizeof figures / sizeof *figures; k++) {
+    for (size_t k = 0; k < count; k++) {
         size_t dims[2] = {e->n_bins > 0 ? e->n_bins / e->n_groups : SIZE_MAX, e->n_groups};
-        snprintf(name, sizeof name, "%s%s", prefix, figures[k].name);
-        TRY(read_numbers(s, name, dims, figures[k].to, error));
+        TRY(read_numbers(s, figures[k].name, dims, figures[k].to, error));
         if (dims[0] < 1 || dims[0] > 2)
             FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP "/%s has %zu rows, must have 1 or 2", store_path(s),
-                 name, dims[0]);
+                 figures[k].name, dims[0]);
         e->n_bins = dims[0] * dims[1];
     }
 done:
     return status;
 }
 
-static lam_status read_sky(store *s, error_by_group *e, lam_error *error) {
+/* Stores of before have other figures of skies, which are not read. */
+static lam_status read_sky(store *s, const law_figure *figures, error_by_group *e, lam_error *error) {
     lam_status status = LAM_OK;
     size_t dims[2] = {e->n_channels, SIZE_MAX};
-    if (!store_has(s, GROUP "/sky_power")) return LAM_OK;
-    TRY(read_law(s, "sky_", e, &e->sky, error));
+    if (!store_has(s, GROUP "/sky_power") || !store_has_attribute(s, GROUP, "sky_direct")) return LAM_OK;
+    TRY(read_figures(s, SKY_LAW_FIGURES, figures, e, error));
     TRY(read_numbers(s, "sky_power", dims, &e->sky_power, error));
-    e->n_tiles = dims[1];
+    TRY(store_get_number(s, GROUP, "sky_direct", &e->sky.direct, error));
+    if (!(e->sky.direct >= 0 && isfinite(e->sky.direct)))
+        FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP " attribute sky_direct is %g, must be at least 0",
+             store_path(s), e->sky.direct);
     if (store_has(s, GROUP "/sky_first"))
-        TRY(read_numbers(s, "sky_first", (size_t[]){e->n_groups, e->n_tiles}, &e->sky_first, error));
+        TRY(read_numbers(s, "sky_first", (size_t[]){e->n_groups, dims[1]}, &e->sky_first, error));
+    e->n_tiles = dims[1];
 done:
     return status;
 }
@@ -105,9 +116,11 @@ static void find_sums(const error_scene *scene, error_by_group *e) {
 lam_status error_by_group_read(store *s, const error_scene *scene, error_by_group *out, lam_error *error) {
     lam_status status = LAM_OK;
     error_by_group e = {.n_groups = scene->groups->n_groups, .n_channels = scene->n_channels};
+    law_figure law[LAW_FIGURES], sky[SKY_LAW_FIGURES];
     if (!store_has(s, GROUP)) return LAM_OK;
-    TRY(read_law(s, "", &e, &e.law, error));
-    TRY(read_sky(s, &e, error));
+    figures_of(&e, law, sky);
+    TRY(read_figures(s, LAW_FIGURES, law, &e, error));
+    TRY(read_sky(s, sky, &e, error));
     e.area = memory_allocate(e.n_bins, sizeof *e.area, "errors of groups", error);
     e.squares = memory_allocate(e.n_groups, sizeof *e.squares, "errors of groups", error);
     e.reflectance =
@@ -149,23 +162,60 @@ static double error2(const emission_size *size, double one, double many, double 
            (one * one * share * share + many * many * share * fmax(0, 1 - share) + even * even);
 }
 
-/* The emission and the sky of an answer. */
+/* The emission and the sky of an answer: P^2 and S of that (sky_law). */
 typedef struct light_sizes {
-    emission_size size, sky;
+    emission_size size;
+    const float *L; /* NULL: no sky, or nothing is stated of skies */
+    double power2, spread;
 } light_sizes;
 
-static double elements_error2(const error_by_group *e, const light_sizes *of, size_t bin) {
-    const error_law *law = &e->law, *sky = &e->sky;
-    double sum = error2(&of->size, law->one[bin], law->many[bin], law->even[bin]);
-    if (of->sky.power2 > 0) sum += error2(&of->sky, sky->one[bin], sky->many[bin], sky->even[bin]);
+static weighted_sums sky_channel(const error_by_group *e, const float *L, size_t c) {
+    return weighted_sums_of(e->n_tiles, e->sky_power + c * e->n_tiles, L + c * e->n_tiles);
+}
+
+static light_sizes light_sizes_of(const error_by_group *e, const emission_size *size, const float *L) {
+    light_sizes of = {.size = *size, .L = e->n_tiles > 0 ? L : NULL};
+    for (size_t c = 0; of.L != NULL && c < e->n_channels; c++) {
+        const weighted_sums sums = sky_channel(e, L, c);
+        of.power2 += sums.sum * sums.sum;
+        of.spread += sums.spread;
+    }
+    return of;
+}
+
+/* D of a group. */
+static double direct_of(const error_by_group *e, const float *L, size_t group) {
+    const size_t m = e->n_tiles;
+    double sum = 0;
+    for (size_t c = 0; e->sky_first != NULL && c < e->n_channels; c++) {
+        const double rho = e->reflectance[c * e->n_groups + group];
+        const double spread =
+            weighted_spread(m, e->sky_first + group * m, L + c * m, sky_channel(e, L, c).mean);
+        sum += rho * rho * spread;
+    }
     return sum;
 }
 
-static double mean_error2(const error_by_group *e, const light_sizes *of, size_t bin) {
-    const error_law *law = &e->law, *sky = &e->sky;
-    double sum = error2(&of->size, law->mean_one[bin], law->mean_many[bin], law->mean_even[bin]);
-    if (of->sky.power2 > 0)
-        sum += error2(&of->sky, sky->mean_one[bin], sky->mean_many[bin], sky->mean_even[bin]);
+/* Squares of the errors of a bin: of its elements, and of its mean. */
+typedef struct bin_error {
+    double elements2, mean2;
+} bin_error;
+
+static bin_error error_in(const error_by_group *e, const light_sizes *of, size_t bin) {
+    const error_law *law = &e->law;
+    const size_t group = bin % e->n_groups;
+    bin_error sum = {error2(&of->size, law->one[bin], law->many[bin], law->even[bin]),
+                     error2(&of->size, law->mean_one[bin], law->mean_many[bin], law->mean_even[bin])};
+    if (of->L == NULL) return sum;
+    const sky_law *sky = &e->sky;
+    double area = 0;
+    for (size_t k = group; k < e->n_bins; k += e->n_groups) area += e->area[k];
+    const double direct = sky->direct * sky->direct * direct_of(e, of->L, group);
+    const double alone = area > 0 ? e->squares[group] / (area * area) : 1;
+    sum.elements2 += direct + sky->tiles[bin] * sky->tiles[bin] * of->spread +
+                     sky->even[bin] * sky->even[bin] * of->power2;
+    sum.mean2 += direct * alone + sky->mean_tiles[bin] * sky->mean_tiles[bin] * of->spread +
+                 sky->mean_even[bin] * sky->mean_even[bin] * of->power2;
     return sum;
 }
 
@@ -243,12 +293,13 @@ answer_error answer_error_of_square(const error_scene *scene, const error_answer
 bool answer_error_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                      answer_error *out) {
     double off = 0, reflected = 0, radiosity = 0;
-    const light_sizes sizes = {of->size, of->sky};
+    const light_sizes sizes = light_sizes_of(e, &of->size, of->L);
     const emission_size both = emission_size_sum(&of->size, &of->sky);
     value_sums *sums = sum_values(e, scene, of);
     if (sums == NULL) return false;
     for (size_t b = 0; b < e->n_bins; b++) {
-        off += sums[b].area * elements_error2(e, &sizes, b);
+        if (!(sums[b].area > 0)) continue;
+        off += sums[b].area * error_in(e, &sizes, b).elements2;
         reflected += sums[b].reflected2;
         radiosity += sums[b].radiosity2;
     }
@@ -266,9 +317,11 @@ typedef struct name_sums {
 
 static void add_bin(const error_by_group *e, const light_sizes *size, size_t bin, double area,
                     name_sums *to) {
+    if (!(area > 0)) return;
+    const bin_error error = error_in(e, size, bin);
     to->area += area;
-    to->mean2 += area * mean_error2(e, size, bin);
-    to->elements2 += area * elements_error2(e, size, bin);
+    to->mean2 += area * error.mean2;
+    to->elements2 += area * error.elements2;
 }
 
 /* reflected2, radiosity2: squares of the means over the name. */
@@ -282,7 +335,7 @@ static name_error finish_name(const name_sums *s, double reflected2, double radi
 bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                     const reduce_request *names, name_error *errors) {
     const size_t n_rows = e->n_bins / e->n_groups;
-    const light_sizes sizes = {of->size, of->sky};
+    const light_sizes sizes = light_sizes_of(e, &of->size, of->L);
     value_sums *sums = sum_values(e, scene, of);
     if (sums == NULL) return false;
     for (size_t k = 0; k < names->n_names; k++) {
@@ -316,7 +369,7 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
 
 name_error name_error_of_means(const error_by_group *e, const reduce_name *name, const name_means *means) {
     const size_t n_rows = e->n_bins / e->n_groups;
-    const light_sizes sizes = {means->size, means->sky};
+    const light_sizes sizes = light_sizes_of(e, &means->size, means->L);
     name_sums s = {.area = 0};
     double reflected2 = 0, radiosity2 = 0;
     for (size_t g = 0; g < name->n_groups; g++)

@@ -23,17 +23,28 @@ typedef struct error_law {
     double *mean_one, *mean_many, *mean_even;
 } error_law;
 
+/* An error of sqrt(direct^2 D + tiles^2 S + even^2 P^2) of a sky L: with M the mean of its radiances weighted
+ * by the powers Q of the tiles, P = sum_t L_t Q_t, S = sum_t Q_t (L_t - M)^2, and D = rho^2 sum_t f_t (L_t -
+ * M)^2 by the mean first bounce f and reflectance rho of a group, or, of its mean, sum A^2 / (sum A)^2 times
+ * that. P^2, S and D are summed over channels. */
+typedef struct sky_law {
+    double direct;
+    double *tiles, *even; /* [n_bins] */
+    double *mean_tiles, *mean_even;
+} sky_law;
+
 /* A bin is the elements of a group, or of those that are read, and in a second row the others. Zeroed: a
  * store that states nothing by group. */
 typedef struct error_by_group {
     size_t n_groups, n_bins, n_channels, n_tiles; /* tiles: 0: none of skies is stated */
-    error_law law, sky;                           /* of emissions, of skies */
-    double *area;                                 /* [n_bins] */
-    double *squares;                              /* [n_groups], sum A^2 */
-    double *reflectance;                          /* [C][n_groups], mean */
-    uint32_t *bin;                                /* [n] */
-    double *sky_power;                            /* [C][n_tiles], sum A rho first_bounce */
-    double *sky_first; /* [n_groups][n_tiles], mean first_bounce; NULL: not stored */
+    error_law law;                                /* of emissions */
+    sky_law sky;
+    double *area;        /* [n_bins] */
+    double *squares;     /* [n_groups], sum A^2 */
+    double *reflectance; /* [C][n_groups], mean */
+    uint32_t *bin;       /* [n] */
+    double *sky_power;   /* [C][n_tiles], sum A rho first_bounce */
+    double *sky_first;   /* [n_groups][n_tiles], mean first_bounce; NULL: not stored, and sky.direct is 0 */
 } error_by_group;
 
 void error_by_group_free(error_by_group *e);
@@ -64,6 +75,7 @@ typedef struct error_answer {
     const float *values;      /* [C][count], or, where they are whole, [C][n] in mesh order */
     bool whole;
     emission_size size, sky; /* of the emission, and of the sky: of tiles in place of elements */
+    const float *L;          /* [C][n_tiles], radiances of the sky; NULL: none */
 } error_answer;
 
 /* The root of the mean squared error over the light that is left where that error is taken out of the light
@@ -74,9 +86,12 @@ typedef struct answer_error {
     double emitters; /* effective number */
 } answer_error;
 
-/* The error of all values. Cost: O(C count). False when memory is short. Where the square of the error is
- * known, sum A |B~ - B|^2 over channels and the values, without a law. */
+/* The error of all values where its square is known, sum A |B~ - B|^2 over channels and the values, without a
+ * law. O(C count). */
 answer_error answer_error_of_square(const error_scene *scene, const error_answer *of, double error2);
+
+/* The error of all values. Cost: O(C count), and under a sky C n_tiles for each group of them. False when
+ * memory is short. */
 bool answer_error_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                      answer_error *out);
 
@@ -92,10 +107,11 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
                     const reduce_request *names, name_error *errors);
 
 /* The same of one name, by its means, [C] each, of the quantity, of the emission, and of the direct light of
- * the sky. Cost: O(C groups of the name). */
+ * the sky. Cost: O(C groups of the name), and under a sky n_tiles times as much. */
 typedef struct name_means {
     lam_quantity quantity;
     emission_size size, sky;
+    const float *L; /* [C][n_tiles]; NULL: no sky */
     const double *value, *emission, *direct;
 } name_means;
 name_error name_error_of_means(const error_by_group *e, const reduce_name *name, const name_means *means);

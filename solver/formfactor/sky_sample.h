@@ -16,9 +16,9 @@ lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounc
 
 /* first [n_tiles][n]: the rows of the first bounce of some tiles, by `rays` rays (a multiple of
  * VISIBILITY_PACKET) from each element, even in the solid angle of the tile: where few of an element's other
- * rays meet a tile, all of these do. What the ground reflects is by the shares of `sampled`, whose tiling
- * they have. Cost: n_tiles n rays rays at most, as none leave an element below its horizon. Errors:
- * LAM_ERR_MEMORY. */
+ * rays meet a tile, all of these do. The shares of the ground, for the light that it reflects, are those
+ * of `sampled`, whose tiling is meant. Cost: n_tiles n rays rays at most, as none leave an element below its
+ * horizon. Errors: LAM_ERR_MEMORY. */
 lam_status sky_sample_tiles(const mesh *m, const sky_bounce *sampled, size_t rays, uint64_t seed,
                             size_t n_tiles, const size_t *tiles, float *first, lam_error *error);
 

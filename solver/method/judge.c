@@ -50,9 +50,9 @@ done:
 static lam_status group_sums_finish(const group_sums *s, group_errors *out, lam_error *error) {
     lam_status status = LAM_OK;
     double *same[GROUP_FIGURES] = {NULL};
-    TRY(by_group_finish(&s->total, GROUP_FIGURES, out->of, error));
-    TRY(by_group_finish(&s->own, GROUP_FIGURES, out->of_operator, error));
-    TRY(by_group_finish(&s->same, GROUP_FIGURES, same, error));
+    TRY(by_group_finish(&s->total, out->of, error));
+    TRY(by_group_finish(&s->own, out->of_operator, error));
+    TRY(by_group_finish(&s->same, same, error));
     for (int f = 0; f < GROUP_FIGURES; f++)
         for (size_t k = 0; k < s->total.n_rows * s->total.n_groups; k++)
             out->of_operator[f][k] *= same[f][k] > 0 ? out->of[f][k] / same[f][k] : 1;
@@ -269,7 +269,7 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
             for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
                 const figure_probe one = probe_of(m, v, m->x, NULL, false);
                 figures_add(&one, &t[g].own);
-                if (by_group->own.n > 0) by_group_add(&one, g, 0, &by_group->own);
+                if (by_group->own.n > 0) by_group_add(&one, g, &by_group->own);
                 if (input->read != NULL) receivers_add(&one, input->read, &t[g].own_receivers);
                 t[g].n_operator++;
             }
@@ -288,8 +288,8 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             const figure_probe one = probe_of(m, v, m->x, noisy && v < n_noisy ? m->y : NULL, true);
             figures_add(&one, &t[g].total);
-            if (by_group->total.n > 0) by_group_add(&one, g, 0, &by_group->total);
-            if (by_group->total.n > 0 && own) by_group_add(&one, g, 0, &by_group->same);
+            if (by_group->total.n > 0) by_group_add(&one, g, &by_group->total);
+            if (by_group->total.n > 0 && own) by_group_add(&one, g, &by_group->same);
             if (input->read != NULL) receivers_add(&one, input->read, &t[g].total_receivers);
         }
 done:
@@ -369,19 +369,24 @@ static lam_status measure_sky(const lam_operator *op, const judge_input *input, 
                               error_group *found, group_errors *made, lam_error *error) {
     lam_status status = LAM_OK;
     group_tally t = {.done = 0};
+    sky_law_sums law = {.n_bins = 0};
     if (by_group->n > 0) {
-        by_group_free(by_group);
-        TRY(by_group_begin(input, by_group, error));
+        TRY(judge_sky_powers(input, made, error));
+        TRY(sky_law_begin(input, made, &law, error));
     }
-    TRY(judge_sky_add(op, input, &t.total, by_group, &t.done, error));
+    TRY(judge_sky_add(op, input, &t.total, by_group, &law, &t.done, error));
     if (t.done == 0) goto done;
     found->probes = t.done;
     found->probes_noise = figures_spread(&t.total.indirect, 0);
     finish_total(&t, 0, found);
-    if (by_group->n == 0) goto done;
-    TRY(by_group_finish(by_group, GROUP_SKY_FIGURES, made->sky, error));
-    TRY(judge_sky_powers(input, made, error));
+    if (by_group->n > 0) TRY(sky_law_finish(&law, made, error));
 done:
+    if (t.done == 0) { /* of a dark sky nothing is stated */
+        free(made->sky_power);
+        free(made->sky_first);
+        made->sky_power = made->sky_first = NULL;
+    }
+    sky_law_free(&law);
     return status;
 }
 

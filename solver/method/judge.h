@@ -70,18 +70,26 @@ enum {
     GROUP_NEAR_LARGEST,
     GROUP_FAR,
     GROUP_FAR_LARGEST,
-    GROUP_FIGURES,
-    GROUP_SKY_FIGURES = GROUP_UNIFORM
+    GROUP_FIGURES
 };
+
+/* The same of skies. With Q_t the power that radiance 1 of tile t sends into the scene after the first
+ * bounce, M the mean of radiances L weighted by Q, and f_t the mean first bounce of a group, let P = sum_t
+ * L_t Q_t,  S = sum_t Q_t (L_t - M)^2,  D = rho^2 sum_t f_t (L_t - M)^2, their squares and S, D added up over
+ * channels, rho the mean reflectance of the group. The error is about sqrt(direct^2 D + tiles^2 S + even^2
+ * P^2). Rays that meet a tile, and with them the noise of the direct light, are as many as it is bright, so
+ * that squared errors of direct light grow as D; where all of a window is seen, what one tile has too much
+ * another has not, and an even sky is off by far less. Of the mean of a group D counts sum A^2 / (sum A)^2
+ * times. */
+enum { SKY_MEAN_TILES, SKY_MEAN_EVEN, SKY_RMS_TILES, SKY_RMS_EVEN, SKY_FIGURES };
 typedef struct group_errors {
     size_t n_groups, n_rows;
     double *of[GROUP_FIGURES];
     /* The part of them that is against the very F of the operator, by its share of the error of those probes
      * that are compared with it. Not stored. */
     double *of_operator[GROUP_FIGURES];
-    /* The first figures once more, of skies: P = sum_t L_t Q_t with the power Q_t that radiance 1 of tile t
-     * sends into the scene after the first bounce, and N = P^2 / sum (L_t Q_t)^2. NULL: no sky was judged. */
-    double *sky[GROUP_SKY_FIGURES];
+    double *sky[SKY_FIGURES]; /* [n_rows][n_groups]; NULL: no sky was judged */
+    double sky_direct;        /* of all groups alike; 0 where sky_first is NULL: tiles have it all */
     size_t n_channels, n_tiles;
     double *sky_power; /* [C][n_tiles], Q_t = sum A rho first_bounce_t, m^2 sr */
     double *sky_first; /* [n_groups][n_tiles], mean first_bounce_t over a group, sr; NULL: too many numbers */
@@ -102,6 +110,7 @@ worst_group judge_worst_group(const group_errors *e);
 typedef struct judged_sky {
     size_t n_tiles;
     const float *own, *samples[2];
+    double own_share; /* of its variance in that of the mean of both samples; 1: nobody knows */
     /* first [count][n]: rows of a sample, 0 or 1, closer than by that, independent of the other's. NULL:
      * there are none. */
     lam_status (*tiles)(void *context, int sample, size_t count, const size_t *tiles, float *first,
@@ -110,7 +119,7 @@ typedef struct judged_sky {
 } judged_sky;
 
 /* Skies by which it is judged: two that shine from everywhere, and single tiles. */
-enum { JUDGE_EVEN_SKIES = 2, JUDGE_SUNS = 4 };
+enum { JUDGE_EVEN_SKIES = 2, JUDGE_SUNS = 6 };
 
 typedef struct error_report {
     error_group single, lights, random;

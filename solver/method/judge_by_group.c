@@ -10,8 +10,6 @@ static const double noise_most = 1. / 9;
 /* Light below this share of that in the whole scene is none: its ratios are all noise. */
 static const double dark = 1e-6;
 
-/* Numbers of a bin for one probe: the squared error of its mean, the mean square error, and the noise. */
-enum { BIN_MEAN, BIN_MEAN_NOISE, BIN_RMS, BIN_RMS_NOISE, BIN_LIGHT, BIN_NUMBERS };
 enum { SORT_UNIFORM, SORT_NEAR, SORT_FAR };
 
 static size_t bins_of(const by_group_sums *s) {
@@ -66,9 +64,12 @@ static channel_sums add_channel(const figure_probe *p, size_t c, const by_group_
         const double a = p->problem->area[i], E = a * (double)p->E[c * n + i];
         double *to = s->work + BIN_NUMBERS * bin_of(s, i);
         to[BIN_MEAN] += a * one.off;
+        const double off2 = one.off * one.off, noise = one.noise * one.noise + one.light * one.light;
         to[BIN_MEAN_NOISE] += a * (one.noise + one.light);
-        to[BIN_RMS] += a * one.off * one.off;
-        to[BIN_RMS_NOISE] += a * (one.noise * one.noise + one.light * one.light);
+        to[BIN_MEAN_APART] += a * a * noise;
+        to[BIN_RMS] += a * off2;
+        to[BIN_RMS_NOISE] += a * noise;
+        to[BIN_RMS_SPREAD] += a * a * (off2 - noise) * (off2 - noise);
         to[BIN_LIGHT] += a * one.bounced;
         sum.power += E;
         sum.squares += E * E;
@@ -126,30 +127,44 @@ static void stack(const by_group_sums *s, const double *channel, double *stacked
         if (!(area > 0)) continue;
         to[BIN_MEAN] += from[BIN_MEAN] * from[BIN_MEAN] / (area * area);
         to[BIN_MEAN_NOISE] += from[BIN_MEAN_NOISE] * from[BIN_MEAN_NOISE] / (area * area);
+        to[BIN_MEAN_APART] += from[BIN_MEAN_APART] / (area * area);
         to[BIN_RMS] += from[BIN_RMS] / area;
         to[BIN_RMS_NOISE] += from[BIN_RMS_NOISE] / area;
+        to[BIN_RMS_SPREAD] += from[BIN_RMS_SPREAD] / (area * area);
         to[BIN_LIGHT] += from[BIN_LIGHT] * from[BIN_LIGHT] / (area * area);
     }
 }
 
-void by_group_add(const figure_probe *p, int kind, double number, by_group_sums *to) {
+/* The numbers of all bins, [n_bins][BIN_NUMBERS], in to->work, and the power of the probe. */
+static const double *find_numbers(const figure_probe *p, by_group_sums *to, probe_power *power) {
     const size_t n_bins = bins_of(to), bytes = n_bins * BIN_NUMBERS * sizeof *to->work;
     double *const stacked = to->work + n_bins * BIN_NUMBERS;
     double area = 0, squares = 0;
-    probe_power power = {.P2 = 0};
+    *power = (probe_power){.P2 = 0};
     for (size_t k = 0; k < n_bins; k++) area += to->bins[k].area;
     memset(stacked, 0, bytes);
     for (size_t c = 0; c < p->problem->n_channels; c++) {
         memset(to->work, 0, bytes);
         const channel_sums sum = add_channel(p, c, to);
         stack(to, to->work, stacked);
-        power.P2 += sum.power * sum.power;
-        power.light2 += sum.light * sum.light / (area * area);
+        power->P2 += sum.power * sum.power;
+        power->light2 += sum.light * sum.light / (area * area);
         squares += sum.squares;
     }
+    if (power->P2 > 0) power->N = power->P2 / squares;
+    return stacked;
+}
+
+const double *by_group_numbers(const figure_probe *p, by_group_sums *with) {
+    probe_power power;
+    return find_numbers(p, with, &power);
+}
+
+void by_group_add(const figure_probe *p, int kind, by_group_sums *to) {
+    probe_power power;
+    const double *stacked = find_numbers(p, to, &power);
     if (!(power.P2 > 0)) return;
-    power.N = number > 0 ? number : power.P2 / squares;
-    for (size_t k = 0; k < n_bins; k++) add_bin(stacked + BIN_NUMBERS * k, &power, kind, k, to);
+    for (size_t k = 0; k < bins_of(to); k++) add_bin(stacked + BIN_NUMBERS * k, &power, kind, k, to);
     if (kind == JUDGE_SINGLE) {
         to->n_single++;
         to->power += power.P2 / power.N;
@@ -170,7 +185,7 @@ static double ratio_of(const bin_sums *b, int sort) {
     return b->light[sort] > 0 ? sqrt(without_noise(b->off[sort], b->noise[sort]) / b->light[sort]) : NAN;
 }
 
-static void finish_bin(const by_group_sums *s, size_t k, int n_figures, double **of) {
+static void finish_bin(const by_group_sums *s, size_t k, double **of) {
     const bin_sums *b = &s->bins[k];
     const double m = (double)s->n_single;
     double mean_one = 0, mean_many = 0, rms_one = 0, rms_many = 0;
@@ -191,22 +206,22 @@ static void finish_bin(const by_group_sums *s, size_t k, int n_figures, double *
     of[GROUP_RMS_MANY][k] = rms_many;
     of[GROUP_RMS_EVEN][k] = even_of(s, k, true, rms_many * rms_many);
     const int sorts[] = {GROUP_UNIFORM, GROUP_NEAR, GROUP_FAR};
-    for (int sort = 0; sort < 3 && sorts[sort] < n_figures; sort++) {
+    for (int sort = 0; sort < 3; sort++) {
         of[sorts[sort]][k] = ratio_of(b, sort);
         of[sorts[sort] + 1][k] = b->light[sort] > 0 ? b->largest[sort] : NAN;
     }
 }
 
-lam_status by_group_finish(const by_group_sums *sums, int n_figures, double **of, lam_error *error) {
+lam_status by_group_finish(const by_group_sums *sums, double **of, lam_error *error) {
     double *made[GROUP_FIGURES] = {NULL};
-    for (int f = 0; f < n_figures; f++) {
+    for (int f = 0; f < GROUP_FIGURES; f++) {
         made[f] = memory_allocate(bins_of(sums), sizeof *made[f], "errors of groups", error);
         if (made[f] != NULL) continue;
         while (f-- > 0) free(made[f]);
         return LAM_ERR_MEMORY;
     }
-    for (size_t k = 0; k < bins_of(sums); k++) finish_bin(sums, k, n_figures, made);
-    memcpy(of, made, (size_t)n_figures * sizeof *of);
+    for (size_t k = 0; k < bins_of(sums); k++) finish_bin(sums, k, made);
+    memcpy(of, made, sizeof made);
     return LAM_OK;
 }
 
@@ -230,7 +245,7 @@ worst_group judge_worst_group(const group_errors *e) {
 void group_errors_free(group_errors *e) {
     for (int f = 0; f < GROUP_FIGURES; f++) free(e->of[f]);
     for (int f = 0; f < GROUP_FIGURES; f++) free(e->of_operator[f]);
-    for (int f = 0; f < GROUP_SKY_FIGURES; f++) free(e->sky[f]);
+    for (int f = 0; f < SKY_FIGURES; f++) free(e->sky[f]);
     free(e->sky_power);
     free(e->sky_first);
     *e = (group_errors){.n_groups = 0};

@@ -34,16 +34,31 @@ typedef struct by_group_sums {
     size_t n_even;
 } by_group_sums;
 
+/* Numbers of a bin for one probe, channels stacked: the squared error of its mean, the noise in it, and the
+ * same noise where that of its elements is independent; the mean square error of its elements, the noise, and
+ * the square of what the rest may be off by it; the squared mean of the reflected light. */
+enum {
+    BIN_MEAN,
+    BIN_MEAN_NOISE,
+    BIN_MEAN_APART,
+    BIN_RMS,
+    BIN_RMS_NOISE,
+    BIN_RMS_SPREAD,
+    BIN_LIGHT,
+    BIN_NUMBERS
+};
+
 /* Errors: LAM_ERR_MEMORY. */
 lam_status by_group_begin(const judge_input *input, by_group_sums *out, lam_error *error);
 
-/* Adds a probe of a group of probes, JUDGE_...; number: the effective number of emitters, 0: of elements that
- * emit. Cost: O(C n). */
-void by_group_add(const figure_probe *p, int kind, double number, by_group_sums *to);
+/* Adds a probe of a group of probes, JUDGE_... Cost: O(C n). */
+void by_group_add(const figure_probe *p, int kind, by_group_sums *to);
 
-/* The first n_figures of [GROUP_FIGURES] or [GROUP_SKY_FIGURES], each [n_rows][n_groups]. Errors:
- * LAM_ERR_MEMORY, after which of is untouched. */
-lam_status by_group_finish(const by_group_sums *sums, int n_figures, double **of, lam_error *error);
+/* The numbers of a probe that is not added, [n_bins][BIN_NUMBERS]; valid until the next one. Cost: O(C n). */
+const double *by_group_numbers(const figure_probe *p, by_group_sums *with);
+
+/* of [GROUP_FIGURES], each [n_rows][n_groups]. Errors: LAM_ERR_MEMORY, after which of is untouched. */
+lam_status by_group_finish(const by_group_sums *sums, double **of, lam_error *error);
 void by_group_free(by_group_sums *sums);
 
 #endif

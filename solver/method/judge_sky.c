@@ -10,6 +10,9 @@
 
 enum { SKIES = JUDGE_EVEN_SKIES + JUDGE_SUNS };
 
+/* Tiles whose direct light is judged, the suns and others: at most, and as many numbers as that takes. */
+enum { TILES_MOST = 24, TILE_ELEMENTS = 24 * 1024 };
+
 /* Clouds are this bright at least, relative to the brightest. */
 static const double darkest_cloud = .2;
 
@@ -20,9 +23,10 @@ static const size_t means_most = (size_t)1 << 20;
  * [SKIES][C][n]. */
 typedef struct skies {
     size_t count;
-    size_t tile[JUDGE_SUNS];
+    size_t n_tiles, tile[TILES_MOST]; /* the suns first */
     float *L;
-    float *sun;  /* [JUDGE_SUNS][n], a closer first bounce of these tiles */
+    float
+        *row[2]; /* [n_tiles][n], closer first bounces of these tiles by each sample; NULL: there are none */
     float *E[3]; /* by the operator's own, and by each sample */
     float *B;
     double *x[3]; /* by the independent reference and each sample; by the other one and the mean of both */
@@ -30,7 +34,7 @@ typedef struct skies {
 
 static void skies_free(skies *s) {
     free(s->L);
-    free(s->sun);
+    for (int k = 0; k < 2; k++) free(s->row[k]);
     for (int k = 0; k < 3; k++) free(s->E[k]);
     free(s->B);
     for (int k = 0; k < 3; k++) free(s->x[k]);
@@ -51,39 +55,52 @@ static void find_powers(const judge_input *input, double *power) {
         }
 }
 
-/* Draws skies; false where no tile sends any light. weight [m] is used up. */
-static bool draw(size_t m, double *weight, uint64_t state, skies *s) {
+/* Draws a tile by weight [m], which is 0 then; m where none has any. */
+static size_t draw_tile(size_t m, double *weight, uint64_t *state) {
+    double all = 0;
+    for (size_t t = 0; t < m; t++) all += weight[t];
+    double left = random_unit(state) * all;
     for (size_t t = 0; t < m; t++) {
+        if (weight[t] > 0 && left <= weight[t]) {
+            weight[t] = 0;
+            return t;
+        }
+        left -= weight[t];
+    }
+    return m;
+}
+
+/* Draws skies and up to n_tiles tiles; false where no tile sends any light. Suns are drawn by the root of the
+ * power, as bright ones count most and dim ones err most, the other tiles evenly. weight [m], the power, is
+ * used up. */
+static bool draw(size_t m, size_t n_tiles, double *weight, uint64_t state, skies *s) {
+    for (size_t t = 0; t < m; t++) {
+        weight[t] = sqrt(weight[t]);
         s->L[t] = 1;
         s->L[m + t] = (float)(darkest_cloud + (1 - darkest_cloud) * random_unit(&state));
     }
-    for (s->count = JUDGE_EVEN_SKIES; s->count < SKIES; s->count++) {
-        double all = 0;
-        size_t drawn = m;
-        for (size_t t = 0; t < m; t++) all += weight[t];
-        double left = random_unit(&state) * all;
-        for (size_t t = 0; t < m && drawn == m; t++) {
-            if (weight[t] > 0 && left <= weight[t]) drawn = t;
-            left -= weight[t];
-        }
+    for (s->n_tiles = 0; s->n_tiles < n_tiles; s->n_tiles++) {
+        if (s->n_tiles == JUDGE_SUNS)
+            for (size_t t = 0; t < m; t++) weight[t] = weight[t] > 0;
+        const size_t drawn = draw_tile(m, weight, &state);
         if (drawn == m) break;
-        s->L[s->count * m + drawn] = 1;
-        s->tile[s->count - JUDGE_EVEN_SKIES] = drawn;
-        weight[drawn] = 0;
+        s->tile[s->n_tiles] = drawn;
+        if (s->n_tiles < JUDGE_SUNS) s->L[(JUDGE_EVEN_SKIES + s->n_tiles) * m + drawn] = 1;
     }
-    return s->count > JUDGE_EVEN_SKIES;
+    s->count = JUDGE_EVEN_SKIES + (s->n_tiles < JUDGE_SUNS ? s->n_tiles : JUDGE_SUNS);
+    return s->n_tiles > 0;
 }
 
 /* E = rho H0, [count][C][n], with H0 = sum_t L_t first_bounce_t, that of suns by what is known closer. */
-static void light(const judge_input *input, const float *first, bool closer, const skies *s, float *E) {
+static void light(const judge_input *input, const float *first, const float *row, const skies *s, float *E) {
     const build_problem *p = input->problem;
     const size_t n = p->n, C = p->n_channels, m = input->sky->n_tiles;
 #pragma omp parallel for schedule(static)
     for (size_t i = 0; i < n; i++)
         for (size_t v = 0; v < s->count; v++) {
             double H = 0;
-            if (closer && v >= JUDGE_EVEN_SKIES)
-                H = (double)s->sun[(v - JUDGE_EVEN_SKIES) * n + i];
+            if (row != NULL && v >= JUDGE_EVEN_SKIES)
+                H = (double)row[(v - JUDGE_EVEN_SKIES) * n + i];
             else
                 for (size_t t = 0; t < m; t++) H += (double)s->L[v * m + t] * (double)first[t * n + i];
             for (size_t c = 0; c < C; c++)
@@ -95,15 +112,28 @@ static void light(const judge_input *input, const float *first, bool closer, con
 static lam_status light_all(const judge_input *input, skies *s, lam_error *error) {
     lam_status status = LAM_OK;
     const judged_sky *sky = input->sky;
-    const bool closer = sky->tiles != NULL;
-    light(input, sky->own, false, s, s->E[0]);
+    const size_t n = input->problem->n;
+    light(input, sky->own, NULL, s, s->E[0]);
     for (int k = 0; k < 2; k++) {
-        if (closer)
-            TRY(sky->tiles(sky->tiles_context, k, s->count - JUDGE_EVEN_SKIES, s->tile, s->sun, error));
-        light(input, sky->samples[k], closer, s, s->E[k + 1]);
+        if (sky->tiles != NULL) {
+            s->row[k] = memory_allocate(s->n_tiles, n * sizeof *s->row[k], "skies", error);
+            if (s->row[k] == NULL) TRY(LAM_ERR_MEMORY);
+            TRY(sky->tiles(sky->tiles_context, k, s->n_tiles, s->tile, s->row[k], error));
+        }
+        light(input, sky->samples[k], s->row[k], s, s->E[k + 1]);
     }
 done:
     return status;
+}
+
+static void add_direct(const judge_input *input, const skies *s, sky_law_sums *law) {
+    const size_t n = input->problem->n;
+    for (size_t k = 0; k < s->n_tiles; k++) {
+        const float *of[2];
+        for (int h = 0; h < 2; h++)
+            of[h] = s->row[h] != NULL ? s->row[h] + k * n : input->sky->samples[h] + s->tile[k] * n;
+        sky_law_add_direct(law, s->tile[k], of[0], of[1]);
+    }
 }
 
 typedef struct corrections {
@@ -122,7 +152,8 @@ static lam_status solve(const lam_operator *op, const judge_input *input, const 
     const build_problem *p = input->problem;
     const reference_system system = {p->n, p->n_channels, F, p->area, p->reflectance};
     const reference_answers answers = {.op = op, .E = E, .B = s->B, .progress = input->progress};
-    const size_t all[SKIES] = {0, 1, 2, 3, 4, 5};
+    size_t all[SKIES];
+    for (size_t v = 0; v < s->count; v++) all[v] = v;
     corrections to = {p->n, p->n_channels, x};
     return guided_reference_each(&system, &answers, s->count, all, keep, &to, error);
 }
@@ -138,28 +169,11 @@ done:
     return status;
 }
 
-/* The effective number of tiles of sky v. */
-static double number_of(const judge_input *input, const skies *s, const double *power, size_t v) {
-    const size_t m = input->sky->n_tiles, C = input->problem->n_channels;
-    double whole = 0, squares = 0;
-    for (size_t c = 0; c < C; c++) {
-        double sum = 0;
-        for (size_t t = 0; t < m; t++) {
-            const double part = (double)s->L[v * m + t] * power[c * m + t];
-            sum += part;
-            squares += part * part;
-        }
-        whole += sum * sum;
-    }
-    return squares > 0 ? whole / squares : 0;
-}
-
 static lam_status allocate(const judge_input *input, skies *s, lam_error *error) {
     const size_t vector = input->problem->n * input->problem->n_channels;
     s->L = memory_allocate(SKIES, input->sky->n_tiles * sizeof *s->L, "skies", error);
     s->B = memory_allocate(SKIES, vector * sizeof *s->B, "skies", error);
-    s->sun = memory_allocate(JUDGE_SUNS, input->problem->n * sizeof *s->sun, "skies", error);
-    if (s->L == NULL || s->B == NULL || s->sun == NULL) return LAM_ERR_MEMORY;
+    if (s->L == NULL || s->B == NULL) return LAM_ERR_MEMORY;
     for (int k = 0; k < 3; k++)
         if ((s->E[k] = memory_allocate(SKIES, vector * sizeof *s->E[k], "skies", error)) == NULL)
             return LAM_ERR_MEMORY;
@@ -169,8 +183,13 @@ static lam_status allocate(const judge_input *input, skies *s, lam_error *error)
     return LAM_OK;
 }
 
+static size_t tiles_of(size_t n) {
+    const size_t tiles = TILE_ELEMENTS / n;
+    return tiles < JUDGE_SUNS ? JUDGE_SUNS : tiles > TILES_MOST ? TILES_MOST : tiles;
+}
+
 lam_status judge_sky_add(const lam_operator *op, const judge_input *input, figure_group *figures,
-                         by_group_sums *sums, size_t *done, lam_error *error) {
+                         by_group_sums *bins, sky_law_sums *law, size_t *done, lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem *p = input->problem;
     const size_t m = input->sky->n_tiles, vector = p->n * p->n_channels;
@@ -185,11 +204,12 @@ lam_status judge_sky_add(const lam_operator *op, const judge_input *input, figur
     TRY(allocate(input, &s, error));
     find_powers(input, power);
     for (size_t k = 0; k < m * p->n_channels; k++) weight[k % m] += power[k];
-    if (!draw(m, weight, input->seed + 3, &s)) goto done;
+    if (!draw(m, tiles_of(p->n), weight, input->seed + 3, &s)) goto done;
     TRY(light_all(input, &s, error));
     TRY(answer(op, &s, error));
     TRY(solve(op, input, &input->independent, &s, s.E[1], s.x[0], error));
     TRY(solve(op, input, twins ? &input->other : &input->independent, &s, s.E[2], s.x[1], error));
+    if (law->n_bins > 0) add_direct(input, &s, law);
     for (size_t k = 0; k < s.count * vector; k++) s.E[1][k] = .5f * (s.E[1][k] + s.E[2][k]);
     if (apart) {
         TRY(solve(op, input, &input->other, &s, s.E[1], s.x[2], error));
@@ -209,9 +229,8 @@ lam_status judge_sky_add(const lam_operator *op, const judge_input *input, figur
                                   .relation = apart ? input->relation : REFERENCE_TWIN,
                                   .other_share = input->other_share};
         figures_add(&one, figures);
-        if (sums->n > 0)
-            by_group_add(&one, v < JUDGE_EVEN_SKIES ? JUDGE_WHOLE : JUDGE_SINGLE,
-                         number_of(input, &s, power, v), sums);
+        if (law->n_bins > 0)
+            sky_law_add(law, &one, s.L + v * m, v < JUDGE_EVEN_SKIES ? input->sky->own_share : 1, bins);
     }
     *done = s.count;
 done:

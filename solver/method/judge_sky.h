@@ -2,7 +2,7 @@
 #ifndef LAMBERT_METHOD_JUDGE_SKY_H
 #define LAMBERT_METHOD_JUDGE_SKY_H
 
-#include "solver/method/judge_by_group.h"
+#include "solver/method/judge_sky_law.h"
 
 /* Adds an even sky, a cloudy one of random radiances, and tiles drawn by the power that they send into the
  * scene, to the figures, and to sums where these are begun. The answer is the operator's to rho H0 by its own
@@ -12,7 +12,7 @@
  * shows. Nothing is added where no tile sends any light. Errors:
  * those of guided_reference_each and of the operator. */
 lam_status judge_sky_add(const lam_operator *op, const judge_input *input, figure_group *figures,
-                         by_group_sums *sums, size_t *done, lam_error *error);
+                         by_group_sums *bins, sky_law_sums *law, size_t *done, lam_error *error);
 
 /* Fills the power of the tiles and, where they are not too many, the means over groups. Errors:
  * LAM_ERR_MEMORY. */

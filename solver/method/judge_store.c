@@ -78,15 +78,21 @@ lam_status judge_save_groups(const group_errors *e, store *s, lam_error *error) 
                                                      [GROUP_NEAR_LARGEST] = "near_largest",
                                                      [GROUP_FAR] = "far",
                                                      [GROUP_FAR_LARGEST] = "far_largest"};
+    static const char *const of_sky[SKY_FIGURES] = {[SKY_MEAN_TILES] = "sky_mean_tiles",
+                                                    [SKY_MEAN_EVEN] = "sky_mean_even",
+                                                    [SKY_RMS_TILES] = "sky_rms_tiles",
+                                                    [SKY_RMS_EVEN] = "sky_rms_even"};
     lam_status status = LAM_OK;
     char path[64];
     for (int k = 0; k < GROUP_FIGURES && e->n_rows > 0; k++) {
         snprintf(path, sizeof path, "/error/by_group/%s", names[k]);
         TRY(store_write(s, path, STORE_F64, 2, (size_t[]){e->n_rows, e->n_groups}, e->of[k], error));
-        if (k >= GROUP_SKY_FIGURES || e->sky[k] == NULL) continue;
-        snprintf(path, sizeof path, "/error/by_group/sky_%s", names[k]);
+    }
+    for (int k = 0; k < SKY_FIGURES && e->sky[k] != NULL; k++) {
+        snprintf(path, sizeof path, "/error/by_group/%s", of_sky[k]);
         TRY(store_write(s, path, STORE_F64, 2, (size_t[]){e->n_rows, e->n_groups}, e->sky[k], error));
     }
+    if (e->sky[0] != NULL) TRY(store_set_number(s, "/error/by_group", "sky_direct", e->sky_direct, error));
     if (e->sky_power != NULL)
         TRY(store_write(s, "/error/by_group/sky_power", STORE_F64, 2, (size_t[]){e->n_channels, e->n_tiles},
                         e->sky_power, error));

@@ -7,6 +7,7 @@
 #include "solver/operator/blocks/block_store.h"
 #include "solver/precompute/trial.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -171,9 +172,13 @@ static bool fits(const judging *j, const judge_references *r) {
 }
 
 /* Rays of each of the two samples from an element, and towards each single tile by which it is judged. Their
- * noise is taken out; what is left of it, in the error of an answer that they share, falls with the number of
- * elements. */
-enum { SKY_RAYS = 512, TILE_RAYS = 32 };
+ * noise is taken out, and what is left of it falls with the number of elements: few have more rays. */
+enum { SKY_RAYS_LEAST = 512, SKY_RAYS_MOST = 2048, SKY_RAYS_OF_ALL = 1 << 21, TILE_RAYS = 32 };
+
+static size_t sky_rays(size_t n) {
+    const size_t rays = SKY_RAYS_OF_ALL / n;
+    return rays < SKY_RAYS_LEAST ? SKY_RAYS_LEAST : rays > SKY_RAYS_MOST ? SKY_RAYS_MOST : rays;
+}
 
 /* Of the samples 0 and 1, and of single tiles. */
 static uint64_t seed_of_sky(const judging *j, int sample, bool tiles) {
@@ -185,6 +190,13 @@ static lam_status sample_tiles(void *context, int sample, size_t count, const si
     const judge_references *r = context;
     return sky_sample_tiles(r->judged->m, &r->sky[sample], TILE_RAYS, seed_of_sky(r->judged, sample, true),
                             count, tiles, first, error);
+}
+
+/* The share of the variance of an operator's own first bounce in that of the mean of both samples: by the
+ * rays of each. Hemicubes have no rays. */
+static double own_share(const recipe *own, size_t n) {
+    const bool by_rays = own->method != RECIPE_HEMICUBE && own->rays > 0;
+    return by_rays ? fmin(1, 2 * (double)sky_rays(n) / (double)own->rays) : 1;
 }
 
 /* True where the sky is judged: one whose light is in the scene. */
@@ -208,17 +220,19 @@ static lam_status make_references(const judging *j, judge_references *r, lam_err
         TRY(first_light_create(j->m, j->first_light_seed, &r->by_rays, error));
     if (!has_sky(j)) goto done;
     for (int h = 0; h < 2; h++) {
-        const form_factor_options how = {.recipe = {.rays = SKY_RAYS, .seed = seed_of_sky(j, h, false)},
-                                         .portals = j->portals,
-                                         .n_portals = j->n_portals,
-                                         .progress = j->progress,
-                                         .stage = "the sky for the judge"};
+        const form_factor_options how = {
+            .recipe = {.rays = sky_rays(j->m->n), .seed = seed_of_sky(j, h, false)},
+            .portals = j->portals,
+            .n_portals = j->n_portals,
+            .progress = j->progress,
+            .stage = "the sky for the judge"};
         if (r->sky[h].first_bounce == NULL)
             TRY(sky_sample_make(j->m, j->order, &j->f->sky, &how, &r->sky[h], error));
     }
     r->light = (judged_sky){.n_tiles = j->f->sky.tiling.n_tiles,
                             .own = j->f->sky.first_bounce,
                             .samples = {r->sky[0].first_bounce, r->sky[1].first_bounce},
+                            .own_share = own_share(&j->f->recipe, j->m->n),
                             .tiles = sample_tiles,
                             .tiles_context = r};
     r->judged = j;

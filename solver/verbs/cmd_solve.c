@@ -211,7 +211,8 @@ static lam_status take_own_error(const stated_errors *stated, const error_scene 
                            .count = selected != NULL ? n_selected : n,
                            .selected = selected,
                            .values = out->values + v * row,
-                           .whole = true};
+                           .whole = true,
+                           .L = light->L != NULL ? light->L + v * C * m : NULL};
         for (size_t c = 0; c < scene->n_channels; c++)
             emission_size_add(&of.size, n, scene->area, of.E + c * n);
         for (size_t c = 0; light->L != NULL && c < C; c++)

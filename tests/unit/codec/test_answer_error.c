@@ -17,7 +17,8 @@ static const error_scene scene = {N, C, area, rho, &groups, NULL};
 /* Figures of the groups, as a store states them. */
 static double one[] = {.03, .01}, many[] = {.04, .005}, even[] = {.01, .02};
 static double mean_one[] = {.03, .01}, mean_many[] = {.02, .005}, mean_even[] = {.001, .002};
-static double sky_one[] = {.07, .06}, sky_many[] = {.05, .04}, sky_even[] = {.01, .02};
+static double sky_tiles[] = {.07, .06}, sky_even[] = {.01, .02}, sky_mean_tiles[] = {.03, .04},
+              sky_mean_even[] = {.002, .003};
 static double bin_area[] = {3, 4}, squares[] = {5, 16}, mean_rho[] = {.5, .25, .5, .75};
 static uint32_t bin[] = {0, 0, 1};
 static double sky_power[] = {2, 1, 3, 1}, sky_first[] = {.1, .2, .3, .4};
@@ -27,7 +28,7 @@ static const error_by_group stated = {
     .n_channels = C,
     .n_tiles = TILES,
     .law = {one, many, even, mean_one, mean_many, mean_even},
-    .sky = {sky_one, sky_many, sky_even, sky_one, sky_many, sky_even},
+    .sky = {.5, sky_tiles, sky_even, sky_mean_tiles, sky_mean_even},
     .area = bin_area,
     .squares = squares,
     .reflectance = mean_rho,
@@ -39,6 +40,17 @@ static const error_by_group stated = {
 /* P^2 (a^2 / N^2 + b^2 (1 - 1 / N) / N + c^2). */
 static double law(double P2, double number, double a, double b, double c) {
     return P2 * (a * a / number / number + b * b / number * (1 - 1 / number) + c * c);
+}
+
+/* A sky: P_c = 2 + 3 and 6 + 2, P^2 = 89, sum (L Q)^2 = 4 + 9 + 36 + 4; the mean radiances are 5/3 and 2, so
+ * that S = 2 (2/3)^2 + (4/3)^2 = 8/3, and D = rho^2 (f_0 (2/3)^2 + f_1 (4/3)^2) = .25 * .4 and .0625 * 7.6
+ * / 9. */
+static const float L[C * TILES] = {1, 3, 2, 2};
+static const double sky_P2 = 89, sky_squares = 53, sky_S = 8. / 3, sky_D[G] = {.25 * .4, .0625 * 7.6 / 9};
+
+/* direct^2 D + tiles^2 S + even^2 P^2. */
+static double law_of_sky(double D, double tiles, double evenly) {
+    return .25 * D + tiles * tiles * sky_S + evenly * evenly * sky_P2;
 }
 
 /* Emission of elements 0 and 2 and the direct light of a sky; the reflected light r. */
@@ -71,11 +83,12 @@ START_TEST(all_elements_count_by_their_group) {
     fill(quantity, lit, values);
     error_answer of = answer_of(quantity, values);
     double off = 3 * law(P2, P2 / A2E2, .03, .04, .01) + 4 * law(P2, P2 / A2E2, .01, .005, .02);
-    if (lit) { /* both tiles shine with 1 in each channel: P_c = 3, 4; squares 4 + 1 + 9 + 1 */
-        const float L[TILES] = {1, 1};
+    if (lit) {
         of.H0 = H0;
-        for (size_t c = 0; c < C; c++) emission_size_add(&of.sky, TILES, sky_power + c * TILES, L);
-        off += 3 * law(25, 25. / 15, .07, .05, .01) + 4 * law(25, 25. / 15, .06, .04, .02);
+        of.L = L;
+        for (size_t c = 0; c < C; c++)
+            emission_size_add(&of.sky, TILES, sky_power + c * TILES, L + c * TILES);
+        off += 3 * law_of_sky(sky_D[0], .07, .01) + 4 * law_of_sky(sky_D[1], .06, .02);
     }
     double reflected = 0, radiosity = 0;
     for (size_t k = 0; k < C * N; k++) {
@@ -86,8 +99,8 @@ START_TEST(all_elements_count_by_their_group) {
     ck_assert(answer_error_of(&stated, &scene, &of, &found));
     ck_assert_double_eq_tol(found.indirect, sqrt(off / (reflected - off)), 1e-5 * found.indirect);
     ck_assert_double_eq_tol(found.relative, sqrt(off / (radiosity - off)), 1e-5 * found.relative);
-    const double power = sqrt(P2) + (lit ? 5 : 0);
-    ck_assert_double_eq_tol(found.emitters, power * power / (A2E2 + (lit ? 15 : 0)), 1e-9);
+    const double power = sqrt(P2) + (lit ? sqrt(sky_P2) : 0);
+    ck_assert_double_eq_tol(found.emitters, power * power / (A2E2 + (lit ? sky_squares : 0)), 1e-6);
 }
 END_TEST
 
@@ -148,6 +161,35 @@ START_TEST(names_have_errors_of_their_means) {
 }
 END_TEST
 
+/* The direct light of elements adds up in a mean as independent errors do: sum A^2 / (sum A)^2 of D. */
+START_TEST(means_have_less_of_direct_errors) {
+    const uint32_t desk[] = {0};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}};
+    const double direct[C] = {.1, .2}, none[C] = {0}, value[C] = {1, 2};
+    const name_means means = {
+        .quantity = LAM_INDIRECT, .L = L, .value = value, .emission = none, .direct = direct};
+    const name_error found = name_error_of_means(&stated, &list[0], &means);
+    const double mean = law_of_sky(sky_D[0] * 5 / 9, .03, .002), rms = law_of_sky(sky_D[0], .07, .01);
+    ck_assert_double_eq_tol(found.mean, sqrt(mean / (5 - mean)), 1e-6);
+    ck_assert_double_eq_tol(found.elements, sqrt(rms / (5 - rms)), 1e-6);
+}
+END_TEST
+
+/* A sky of a store that states nothing of skies adds nothing. */
+START_TEST(unknown_skies_are_left) {
+    float values[C * N];
+    answer_error found, again;
+    error_by_group none = stated;
+    none.n_tiles = 0;
+    fill(LAM_RADIOSITY, false, values);
+    error_answer of = answer_of(LAM_RADIOSITY, values);
+    ck_assert(answer_error_of(&none, &scene, &of, &found));
+    of.L = L;
+    ck_assert(answer_error_of(&none, &scene, &of, &again));
+    ck_assert(again.indirect == found.indirect);
+}
+END_TEST
+
 START_TEST(darkness_has_no_error_and_no_light_no_ratio) {
     const float dark[C * N] = {0};
     answer_error found;
@@ -166,6 +208,8 @@ int main(void) {
     tcase_add_loop_test(cases, all_elements_count_by_their_group, 0, 6);
     tcase_add_test(cases, selected_elements_are_those_of_the_answer);
     tcase_add_loop_test(cases, names_have_errors_of_their_means, 0, 3);
+    tcase_add_test(cases, means_have_less_of_direct_errors);
+    tcase_add_test(cases, unknown_skies_are_left);
     tcase_add_test(cases, darkness_has_no_error_and_no_light_no_ratio);
     suite_add_tcase(suite, cases);
     return suite_run(suite);

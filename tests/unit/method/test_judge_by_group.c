@@ -33,8 +33,8 @@ static void judge_single(const float *E, const float *B, const double *x, const 
     by_group_sums sums = {.n = 0};
     lam_error error = {.message = ""};
     ck_ok(by_group_begin(&input, &sums, &error));
-    by_group_add(&one, JUDGE_SINGLE, 0, &sums);
-    ck_ok(by_group_finish(&sums, GROUP_FIGURES, of, &error));
+    by_group_add(&one, JUDGE_SINGLE, &sums);
+    ck_ok(by_group_finish(&sums, of, &error));
     by_group_free(&sums);
 }
 
@@ -126,7 +126,7 @@ START_TEST(whole_groups_show_what_does_not_average_out) {
         memset(E, 0, sizeof E);
         E[j] = 1;
         const figure_probe one = {.problem = &many, .E = E, .B = B, .x = off[j], .relation = REFERENCE_TWIN};
-        by_group_add(&one, JUDGE_SINGLE, 0, &sums);
+        by_group_add(&one, JUDGE_SINGLE, &sums);
     }
     double *x = memory_allocate(MANY, sizeof *x, "errors", &error);
     ck_assert_ptr_nonnull(x);
@@ -135,8 +135,8 @@ START_TEST(whole_groups_show_what_does_not_average_out) {
         for (size_t j = 0; j < MANY; j++) x[i] += E[j] > 0 ? off[j][i] : 0;
     }
     const figure_probe whole = {.problem = &many, .E = E, .B = B, .x = x, .relation = REFERENCE_TWIN};
-    by_group_add(&whole, JUDGE_WHOLE, 0, &sums);
-    ck_ok(by_group_finish(&sums, GROUP_FIGURES, of, &error));
+    by_group_add(&whole, JUDGE_WHOLE, &sums);
+    ck_ok(by_group_finish(&sums, of, &error));
     const double one = sqrt(1. / 12 + shared * shared);
     for (int g = 0; g < GROUPS; g++) {
         ck_assert_double_eq_tol(of[GROUP_RMS_ONE][g], one, .01);
@@ -162,8 +162,8 @@ START_TEST(receivers_have_a_row_of_their_own) {
     input.read = read;
     ck_ok(by_group_begin(&input, &sums, &error));
     ck_assert_uint_eq(sums.n_rows, 2);
-    by_group_add(&one, JUDGE_SINGLE, 0, &sums);
-    ck_ok(by_group_finish(&sums, GROUP_FIGURES, of, &error));
+    by_group_add(&one, JUDGE_SINGLE, &sums);
+    ck_ok(by_group_finish(&sums, of, &error));
     ck_assert_double_eq_tol(of[GROUP_RMS_ONE][0], sqrt(.02 / 8), 1e-12);
     ck_assert_double_eq_tol(of[GROUP_RMS_ONE][GROUPS], sqrt(.18 / 8), 1e-12);
     ck_assert(of[GROUP_RMS_ONE][1] == 0); /* group 1 has no receiver */

@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-enum { N = 2, TILES = 7, SKIES = JUDGE_EVEN_SKIES + JUDGE_SUNS };
+enum { N = 2, TILES = 6, SKIES = JUDGE_EVEN_SKIES + JUDGE_SUNS };
 static const double area[N] = {1, 3};
 static const float reflectance[N] = {.5f, .8f};
 static const uint32_t group[N] = {0, 1};
@@ -57,11 +57,12 @@ static lam_operator *make_operator(double F) {
     return op;
 }
 
-/* The figures of skies, and sqrt of the sum of squared errors of the second group, all over all. */
+/* The figures of skies, and the law of each group; law is freed with group_errors_free. */
 static size_t judge(const two_elements *s, reference_relation relation, figure_group *figures,
-                    double *rms_of_wall) {
+                    group_errors *law) {
     static const build_problem problem = {.n = N, .n_channels = 1, .area = area, .reflectance = reflectance};
-    const judged_sky sky = {.n_tiles = TILES, .own = s->first[0], .samples = {s->first[1], s->first[2]}};
+    const judged_sky sky = {
+        .n_tiles = TILES, .own = s->first[0], .samples = {s->first[1], s->first[2]}, .own_share = .25};
     const judge_input input = {.problem = &problem,
                                .group = group,
                                .n_groups = N,
@@ -72,19 +73,25 @@ static size_t judge(const two_elements *s, reference_relation relation, figure_g
                                .relation = relation,
                                .other_share = .5,
                                .seed = 9};
-    by_group_sums sums = {.n = 0};
-    double *of[GROUP_FIGURES] = {NULL};
+    by_group_sums bins = {.n = 0};
+    sky_law_sums sums = {.n_bins = 0};
+    group_errors made = {.n_groups = N};
     lam_error error = {.message = ""};
     size_t done = 0;
     lam_operator *op = make_operator(s->F[0]);
     *figures = (figure_group){.relative = {.tried = 0}};
-    ck_ok(by_group_begin(&input, &sums, &error));
-    ck_ok(judge_sky_add(op, &input, figures, &sums, &done, &error));
-    ck_ok(by_group_finish(&sums, GROUP_SKY_FIGURES, of, &error));
-    if (rms_of_wall != NULL) *rms_of_wall = of[GROUP_RMS_ONE][1];
-    for (int f = 0; f < GROUP_FIGURES; f++) free(of[f]);
-    by_group_free(&sums);
+    ck_ok(by_group_begin(&input, &bins, &error));
+    ck_ok(judge_sky_powers(&input, &made, &error));
+    ck_ok(sky_law_begin(&input, &made, &sums, &error));
+    ck_ok(judge_sky_add(op, &input, figures, &bins, &sums, &done, &error));
+    if (done > 0) ck_ok(sky_law_finish(&sums, &made, &error));
+    sky_law_free(&sums);
+    by_group_free(&bins);
     lam_operator_close(op);
+    if (law != NULL)
+        *law = made;
+    else
+        group_errors_free(&made);
     return done;
 }
 
@@ -127,12 +134,13 @@ END_TEST
 START_TEST(wall_beside) {
     two_elements s = {.F = {.4, .4, .4}};
     const double off[N] = {-.05, 0};
-    double B[N], own[N], x[N], bounced[N], of_wall;
+    double B[N], own[N], x[N], bounced[N];
     figure_group figures;
+    group_errors law;
     fill(off, s.first[0]);
     fill(none, s.first[1]);
     fill(none, s.first[2]);
-    ck_assert_uint_eq(judge(&s, (reference_relation)_i, &figures, &of_wall), SKIES);
+    ck_assert_uint_eq(judge(&s, (reference_relation)_i, &figures, &law), SKIES);
     lit(.4, none, B);
     lit(.4, off, own);
     for (size_t i = 0; i < N; i++) {
@@ -142,10 +150,122 @@ START_TEST(wall_beside) {
     const double relative = ratio(x, B), indirect = ratio(x, bounced);
     ck_assert_double_eq_tol(figures.relative.less.f / SKIES, relative, relative * converged + rounded);
     ck_assert_double_eq_tol(figures.indirect.less.f / SKIES, indirect, indirect * converged + 10 * rounded);
-    /* Of suns the power is that of a tile: P = sum A rho H0. */
+    /* All skies are off alike, by their power P = sum A rho H0 as the operator has it: nothing is left for
+     * single tiles. */
+    double power = 0;
+    for (size_t i = 0; i < N; i++) power += area[i] * (double)reflectance[i] * seen[i] * (1 + off[i]);
+    for (size_t g = 0; g < N; g++) {
+        ck_assert_double_eq_tol(law.sky[SKY_RMS_EVEN][g], fabs(x[g]) / power, fabs(x[g]) / power * .01);
+        ck_assert_double_eq_tol(law.sky[SKY_MEAN_EVEN][g], law.sky[SKY_RMS_EVEN][g], 1e-9);
+        ck_assert_double_le(law.sky[SKY_RMS_TILES][g], .1 * fabs(x[g]) / power);
+    }
+    group_errors_free(&law);
+}
+END_TEST
+
+/* Tiles w = 1 ... 6 that have too much and too little of the same light delta in turn, so that an even sky is
+ * exact. All six are drawn. Nothing bounces: with q = sum A rho seen a tile k has M = w_k / 21,
+ * sum_t w_t (L_t - M)^2 = w_k - w_k^2 / 21, together 21 - 91 / 21. */
+START_TEST(single_tiles_have_errors_of_their_own) {
+    two_elements s = {.F = {0, 0, 0}};
+    const double delta = .05, spread = 21 - 91. / 21;
+    double off = 0, off2 = 0, D = 0, q = 0;
+    figure_group figures;
+    group_errors law;
+    fill(none, s.first[1]);
+    fill(none, s.first[2]);
+    for (size_t t = 0; t < TILES; t++)
+        for (size_t i = 0; i < N; i++)
+            s.first[0][t * N + i] = (float)(seen[i] * (1. + (double)t + (t % 2 == 0 ? delta : -delta)));
+    ck_assert_uint_eq(judge(&s, REFERENCE_TWIN, &figures, &law), SKIES);
+    for (size_t i = 0; i < N; i++) {
+        const double rho = (double)reflectance[i], one = area[i] * pow(rho * seen[i] * delta, 2);
+        off += one;
+        off2 += one * one;
+        D += area[i] * rho * rho * seen[i];
+        q += area[i] * rho * seen[i];
+    }
+    double roots = 0, less = 0, less2 = 0;
+    for (size_t t = 0; t < TILES; t++) {
+        const double w = 1. + (double)t, of_tile = D * (w - w * w / 21);
+        roots += sqrt(of_tile);
+        less += off / sqrt(of_tile);
+        less2 += off2 / of_tile;
+    }
+    /* Sizes are by the operator's own bounce, which is off by delta in w. */
+    const double direct2 = (less + sqrt(less2)) / roots;
+    ck_assert_double_eq_tol(law.sky_direct, sqrt(direct2), .02 * sqrt(direct2));
+    for (size_t g = 0; g < N; g++) {
+        const double rho2 = pow((double)reflectance[g], 2);
+        const double left = TILES * rho2 * pow(seen[g] * delta, 2) - direct2 * rho2 * seen[g] * spread;
+        const double tiles = sqrt(fmax(0, left) / (q * spread));
+        ck_assert_double_le(law.sky[SKY_RMS_EVEN][g], 1e-5);
+        ck_assert_double_eq_tol(law.sky[SKY_RMS_TILES][g], tiles, .02 * sqrt(direct2));
+        ck_assert_double_eq_tol(law.sky[SKY_MEAN_TILES][g], law.sky[SKY_RMS_TILES][g], 1e-6);
+    }
+    group_errors_free(&law);
+}
+END_TEST
+
+/* Of an error that is all noise the law has the part that the operator's own first bounce may have. */
+START_TEST(noise_counts_by_the_own_share) {
+    two_elements s = {.F = {0, 0, 0}};
+    const double up[N] = {.02, .02}, down[N] = {-.02, -.02};
+    figure_group figures;
+    group_errors law;
+    fill(none, s.first[0]);
+    fill(up, s.first[1]);
+    fill(down, s.first[2]);
+    ck_assert_uint_eq(judge(&s, REFERENCE_TWIN, &figures, &law), SKIES);
     double power = 0;
     for (size_t i = 0; i < N; i++) power += area[i] * (double)reflectance[i] * seen[i];
-    ck_assert_double_eq_tol(of_wall, fabs(x[1]) / power, fabs(x[1]) / power * .01);
+    for (size_t g = 0; g < N; g++) {
+        const double noise = .02 * (double)reflectance[g] * seen[g] / power, own = sqrt(.25) * noise;
+        ck_assert_double_eq_tol(law.sky[SKY_RMS_EVEN][g], own, .01 * own);
+        ck_assert_double_eq_tol(law.sky[SKY_MEAN_EVEN][g], own, .01 * own);
+    }
+    group_errors_free(&law);
+}
+END_TEST
+
+/* Where closer rows of single tiles are known, suns are judged by these, and other skies by the samples. */
+static lam_status half_of_tiles(void *context, int sample, size_t count, const size_t *tiles, float *first,
+                                lam_error *error) {
+    size_t *asked = context;
+    (void)error;
+    (void)sample;
+    for (size_t k = 0; k < count; k++)
+        for (size_t i = 0; i < N; i++) first[k * N + i] = (float)(.5 * (1. + (double)tiles[k]) * seen[i]);
+    *asked += count;
+    return LAM_OK;
+}
+
+START_TEST(tiles_are_judged_by_their_own_rows) {
+    two_elements s = {.F = {0, 0, 0}};
+    static const build_problem problem = {.n = N, .n_channels = 1, .area = area, .reflectance = reflectance};
+    size_t asked = 0, done = 0;
+    const judged_sky sky = {.n_tiles = TILES,
+                            .own = s.first[0],
+                            .samples = {s.first[1], s.first[2]},
+                            .tiles = half_of_tiles,
+                            .tiles_context = &asked};
+    const judge_input input = {.problem = &problem,
+                               .sky = &sky,
+                               .own = {.n = N, .multiply = multiply, .context = &s.F[0]},
+                               .independent = {.n = N, .multiply = multiply, .context = &s.F[1]},
+                               .seed = 9};
+    by_group_sums bins = {.n = 0};
+    sky_law_sums law = {.n_bins = 0};
+    figure_group figures = {.relative = {.tried = 0}};
+    lam_error error = {.message = ""};
+    lam_operator *op = make_operator(0);
+    for (int k = 0; k < 3; k++) fill(none, s.first[k]);
+    ck_ok(judge_sky_add(op, &input, &figures, &bins, &law, &done, &error));
+    ck_assert_uint_eq(done, SKIES);
+    ck_assert_uint_eq(asked, 2 * JUDGE_SUNS);
+    /* Twice as bright as they should be: an error of 1 of all suns, none of the two others. */
+    ck_assert_double_eq_tol(figures.relative.less.f, JUDGE_SUNS, JUDGE_SUNS * converged);
+    lam_operator_close(op);
 }
 END_TEST
 
@@ -217,6 +337,9 @@ int main(void) {
     tcase_add_test(tc, open_hemisphere);
     tcase_add_loop_test(tc, wall_beside, 0, REFERENCE_COARSER + 1);
     tcase_add_loop_test(tc, noise_of_both_is_known, 0, REFERENCE_COARSER + 1);
+    tcase_add_test(tc, single_tiles_have_errors_of_their_own);
+    tcase_add_test(tc, noise_counts_by_the_own_share);
+    tcase_add_test(tc, tiles_are_judged_by_their_own_rows);
     tcase_add_test(tc, powers_of_tiles);
     suite_add_tcase(suite, tc);
     return suite_run(suite);
