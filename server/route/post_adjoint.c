@@ -149,6 +149,7 @@ void post_adjoint(call *in, answer *out) {
     const double parsed = clock_ms();
     notes.parse_ms = parsed - start;
     notes.quantity = request.quantity;
+    notes.by_luminance = request.light.by_luminance;
     in->n_rhs = 1;
     good = good && solve(in->scene, &request, &memory, in->service->metrics, &why);
     notes.solve_ms = clock_ms() - parsed;

@@ -106,6 +106,7 @@ static bool begin(call *in, answer *out) {
     const radiosity_request *request = &s->request;
     s->notes = call_notes(in);
     s->notes.quantity = request->quantity;
+    s->notes.by_luminance = request->by_luminance;
     s->notes.parse_ms = clock_ms() - start;
     s->shape = (answer_shape){.n = of->n,
                               .n_channels = of->n_channels,

@@ -59,7 +59,8 @@ static bool write_error(buffer *b, const answer_notes *notes) {
 }
 
 bool answer_tail(buffer *b, const answer_notes *notes) {
-    return (notes->certificates != NULL || write_error(b, notes)) &&
+    return (!notes->by_luminance || buffer_append_text(b, ",\"sky\":\"luminance\"")) &&
+           (notes->certificates != NULL || write_error(b, notes)) &&
            (!notes->has_time ||
             buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}", notes->parse_ms,
                           notes->solve_ms, notes->encode_ms)) &&

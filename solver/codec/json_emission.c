@@ -192,8 +192,36 @@ static bool read_groups(parser *p) {
     return p->why->status == 0;
 }
 
-/* Inside an array that was not entered yet: width values into row [C][width], each a number or C of them. */
-static bool read_side(parser *p, size_t width, const char *each, float *row) {
+/* The radiance of a tile: as a colour is read; of a store of one channel also red, green and blue, which
+ * count by their luminance. */
+static bool read_radiance(parser *p, float *colour) {
+    const size_t mark = p->pointer_length;
+    float rgb[3] = {0};
+    size_t k = 0;
+    if (p->scene->n_channels != 1 || json_peek(&p->r) != JSON_ARRAY) return read_colour(p, colour);
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    for (; json_next_element(&p->r); k++) {
+        if (k == 3)
+            return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more than 3 values", parser_here(p));
+        parser_point_index(p, k);
+        if (!read_value(p, &rgb[k])) return false;
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    if (k != 1 && k != 3)
+        return parser_refuse(p, PROBLEM_WRONG_LENGTH,
+                             "%s holds %zu values, must be one for the channel, or red, green and blue",
+                             parser_here(p), k);
+    const bool grey = k == 1 || (rgb[0] == rgb[1] && rgb[1] == rgb[2]);
+    colour[0] = grey ? rgb[0] : codec_luminance(rgb);
+    p->request->by_luminance = p->request->by_luminance || !grey;
+    return true;
+}
+
+typedef bool read_item(parser *p, float *colour);
+
+/* Inside an array that was not entered yet: width items into row [C][width]. */
+static bool read_side(parser *p, size_t width, const char *each, read_item *read, float *row) {
     const size_t C = p->scene->n_channels, mark = p->pointer_length;
     size_t t = 0;
     if (!json_enter_array(&p->r)) return parser_fault(p);
@@ -202,7 +230,7 @@ static bool read_side(parser *p, size_t width, const char *each, float *row) {
             return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more than %zu values, one for each %s",
                                  parser_here(p), width, each);
         parser_point_index(p, t);
-        if (!read_colour(p, p->colour)) return false;
+        if (!read(p, p->colour)) return false;
         for (size_t c = 0; c < C; c++) row[c * width + t] = p->colour[c];
         p->pointer_length = mark;
     }
@@ -220,7 +248,7 @@ static bool read_sky(parser *p) {
                              parser_here(p));
     if (!parser_expect(p, JSON_ARRAY, "an array of radiances")) return false;
     if (!radiosity_request_sky(p->request, p->scene, &L, p->why)) return refused_here(p);
-    return read_side(p, p->scene->n_tiles, "tile", L);
+    return read_side(p, p->scene->n_tiles, "tile", read_radiance, L);
 }
 
 /* {"pose-1": w, ...} into row [C][s]: the others are 0. */
@@ -261,7 +289,7 @@ static bool read_emitters(parser *p) {
     if (!named && !parser_expect(p, JSON_ARRAY, "an array of weights, or an object of names and weights"))
         return false;
     if (!radiosity_request_emitters(p->request, p->scene, &W, p->why)) return refused_here(p);
-    return named ? read_named_emitters(p, W) : read_side(p, p->scene->n_emitters, "emitter", W);
+    return named ? read_named_emitters(p, W) : read_side(p, p->scene->n_emitters, "emitter", read_colour, W);
 }
 
 static bool read_emission_object(parser *p) {

@@ -60,6 +60,7 @@ typedef struct radiosity_request {
 
     reduce_request reduce; /* figures of groups in place of vectors */
     side_rows sky;         /* radiances of its tiles */
+    bool by_luminance;     /* some are the luminance of a colour, for a store of one channel */
     side_rows emitters;    /* their weights */
 
     size_t n_dense, dense_capacity; /* vectors that E holds, and has room for */
@@ -104,6 +105,10 @@ bool radiosity_request_expand(radiosity_request *request, const codec_scene *sce
 bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene, float **row, problem *why);
 bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
                                 problem *why);
+
+/* The luminance of a colour by which a store of one channel takes coloured skies, Radiance's: .265 R + .670 G
+ * + .065 B. */
+float codec_luminance(const float rgb[3]);
 
 /* The contract's word for a quantity, and the quantity of a word: false for any other word. */
 const char *codec_quantity_name(lam_quantity quantity);

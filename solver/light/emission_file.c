@@ -62,6 +62,7 @@ lam_status emission_read(const char *path, const emission_scene *scene, emission
                       .batch = read.batch,
                       .E = read.E,
                       .L = read.sky.values,
+                      .by_luminance = read.by_luminance,
                       .W = read.emitters.values};
     read.E = read.sky.values = read.emitters.values = NULL;
 done:
@@ -101,12 +102,11 @@ done:
 
 /* Puts [n_skies][3][n_tiles] into one channel: the luminance of Radiance's colours. */
 static void take_luminance(size_t n_skies, size_t n_tiles, float *L) {
-    static const double weights[3] = {.265, .670, .065};
     for (size_t v = 0; v < n_skies; v++)
         for (size_t t = 0; t < n_tiles; t++) {
-            double sum = 0;
-            for (size_t c = 0; c < 3; c++) sum += weights[c] * (double)L[(3 * v + c) * n_tiles + t];
-            L[v * n_tiles + t] = (float)sum; /* at or before what is read later */
+            const float *from = L + 3 * v * n_tiles + t;
+            const float rgb[3] = {from[0], from[n_tiles], from[2 * n_tiles]};
+            L[v * n_tiles + t] = codec_luminance(rgb); /* at or before all that is read later */
         }
 }
 

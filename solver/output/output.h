@@ -46,6 +46,7 @@ typedef struct solution {
     const char *error_of, *error_from; /* of answer_notes */
     const char *error_light;           /* likewise */
     double emitters;                   /* likewise */
+    bool by_luminance;                 /* likewise */
     const name_error *name_errors;     /* [n_reductions], of error_light "own"; or NULL */
 } solution;
 

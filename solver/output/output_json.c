@@ -148,6 +148,7 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .error_of = s->error_of,
                                 .error_from = s->error_from,
                                 .error_light = s->error_light,
+                                .by_luminance = s->by_luminance,
                                 .emitters = s->emitters,
                                 .n_name_errors = s->name_errors != NULL ? s->n_reductions : 0,
                                 .name_errors = s->name_errors,

@@ -368,6 +368,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     TRY(terminal_check(error));
     codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
     solution out = {.m = &m,
+                    .by_luminance = lit.light.by_luminance,
                     .groups = &lit.scene.groups,
                     .scene = scene,
                     .quantity = quantity,

@@ -409,6 +409,28 @@ class Answers(unittest.TestCase):
                 self.check(name, {"emissions": emissions, "quantity": quantity}, np.tile(lamp, (40, 1, 1)), quantity,
                            L=skies)
 
+    def test_coloured_skies_over_one_channel(self):
+        rng = np.random.default_rng(4)
+        scene, m = self.grey, self.SKIES["grey"]
+        colours = rng.random((m, 3)).round(6)
+        luminance = (colours @ [.265, .670, .065])[None]
+        none = np.zeros((1, scene.n))
+        for select in {}, {"select": {"elements": [0, 7]}}:
+            answer = self.check("grey", {"emission": {"sky": colours.tolist()}, **select}, none, "radiosity", L=luminance,
+                                **({"take": [0, 7]} if select else {}))
+            self.assertEqual(answer["sky"], "luminance")
+        reduced = self.daemon.radiosity("grey", {"emission": {"sky": colours.tolist()},
+                                                 "reduce": {"groups": ["lamp"], "with": ["mean"]}}).json()
+        self.assertEqual(reduced["sky"], "luminance")
+        mixed = [1.5, *colours[1:].tolist()]  # a number stays a number
+        self.check("grey", {"emission": {"sky": mixed}}, none, "radiosity", L=np.array([[1.5, *luminance[0, 1:]]]))
+        # Neither a grey sky nor three equal numbers need a word, nor does a store of three channels.
+        for name, sky in (("grey", [1] * m), ("grey", [[2, 2, 2]] * m), ("exact3", [[1, 2, 3]] * self.SKIES["exact3"])):
+            self.assertNotIn("sky", self.daemon.radiosity(name, {"emission": {"sky": sky}}).json())
+        # Emissions of elements and groups have the channels of the store.
+        for emission in {"groups": {"lamp": [1, 2, 3]}}, {"elements": [1], "values": [[1, 2, 3]]}:
+            self.assertEqual(self.daemon.radiosity("grey", {"emission": emission}).status, 422)
+
     def test_health(self):
         for path in "/healthz", "/readyz":
             self.assertEqual(self.daemon.get(path).status, 200)

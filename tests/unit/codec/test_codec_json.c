@@ -106,6 +106,8 @@ START_TEST(skies_are_read) {
     static const char three[] = "{\"emission\":{\"sky\":[1,[2,3,4],5]}}";
     static const char many[] = "{\"emissions\":[[1,2,3,4,5],{\"groups\":{}},{\"sky\":[1,2,3]},[1,2,3,4,5],"
                                "{\"elements\":[1],\"sky\":[4,5,6],\"values\":[2]},[1,2,3,4,5]]}";
+    static const char coloured[] = "{\"emission\":{\"sky\":[1,[2,3,4],[3e38,3e38,2.9e38]]}}";
+    static const char alike[] = "{\"emission\":{\"sky\":[[0.1,0.1,0.1],[2],3]}}";
     fixture grey = make_scene(1), colour = make_scene(3);
     radiosity_request request = {0};
     ck_assert_uint_eq(status_of(&grey, one, strlen(one), &request), 0);
@@ -118,6 +120,18 @@ START_TEST(skies_are_read) {
     ck_assert_uint_eq(status_of(&grey, many, strlen(many), &request), 0);
     ck_assert_uint_eq(request.n_rhs, 6);
     ck_assert_mem_eq(request.sky.values, ((float[18]){[6] = 1, 2, 3, [12] = 4, 5, 6}), 18 * sizeof(float));
+    radiosity_request_free(&request);
+    ck_assert(!request.by_luminance);
+    /* A store of one channel takes a colour by its luminance, and equal numbers as they are. */
+    ck_assert_uint_eq(status_of(&grey, coloured, strlen(coloured), &request), 0);
+    ck_assert(request.by_luminance);
+    ck_assert_float_eq(request.sky.values[0], 1);
+    ck_assert_float_eq_tol(request.sky.values[1], .265f * 2 + .67f * 3 + .065f * 4, 1e-6f);
+    ck_assert_float_eq_tol(request.sky.values[2], 2.9935e38f, 1e33f);
+    radiosity_request_free(&request);
+    ck_assert_uint_eq(status_of(&grey, alike, strlen(alike), &request), 0);
+    ck_assert(!request.by_luminance);
+    ck_assert_mem_eq(request.sky.values, ((float[]){.1f, 2, 3}), 3 * sizeof(float));
     radiosity_request_free(&request);
     ck_assert_uint_eq(status_of(&grey, "{\"emission\":[1,2,3,4,5]}", 24, &request), 0);
     ck_assert_ptr_null(request.sky.values);
