@@ -35,7 +35,11 @@ lam_status by_group_begin(const judge_input *input, by_group_sums *out, lam_erro
         if (s.even[k].mean == NULL) TRY(LAM_ERR_MEMORY);
         s.even[k].rms = s.even[k].mean + bins_of(&s);
     }
-    for (size_t i = 0; i < s.n; i++) s.bins[bin_of(&s, i)].area += input->problem->area[i];
+    for (size_t i = 0; i < s.n; i++) {
+        bin_sums *b = &s.bins[bin_of(&s, i)];
+        b->area += input->problem->area[i];
+        b->squares += input->problem->area[i] * input->problem->area[i];
+    }
     *out = s;
     s = (by_group_sums){.n = 0};
 done:
@@ -199,12 +203,16 @@ static void finish_bin(const by_group_sums *s, size_t k, double **of) {
         mean_many = pow(mean * without_noise(b->mean_all, b->mean_all_noise) / s->power, .25);
         rms_many = pow(rms * without_noise(b->rms_all, b->rms_all_noise) / s->power, .25);
     }
-    of[GROUP_MEAN_ONE][k] = mean_one;
-    of[GROUP_MEAN_MANY][k] = mean_many;
-    of[GROUP_MEAN_EVEN][k] = even_of(s, k, false, mean_many * mean_many);
+    /* The few probes may all be right on average where the elements are off: no mean is known better than
+     * independent errors of these leave it. */
+    const double least = b->area > 0 ? sqrt(b->squares) / b->area : 0;
+    const double rms_even = even_of(s, k, true, rms_many * rms_many);
+    of[GROUP_MEAN_ONE][k] = fmax(mean_one, least * rms_one);
+    of[GROUP_MEAN_MANY][k] = fmax(mean_many, least * rms_many);
+    of[GROUP_MEAN_EVEN][k] = fmax(even_of(s, k, false, mean_many * mean_many), least * rms_even);
     of[GROUP_RMS_ONE][k] = rms_one;
     of[GROUP_RMS_MANY][k] = rms_many;
-    of[GROUP_RMS_EVEN][k] = even_of(s, k, true, rms_many * rms_many);
+    of[GROUP_RMS_EVEN][k] = rms_even;
     const int sorts[] = {GROUP_UNIFORM, GROUP_NEAR, GROUP_FAR};
     for (int sort = 0; sort < 3; sort++) {
         of[sorts[sort]][k] = ratio_of(b, sort);

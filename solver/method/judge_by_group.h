@@ -7,7 +7,7 @@
 
 /* Sums over probes in one bin, a row of one group: of squares of errors and of the noise in them. */
 typedef struct bin_sums {
-    double area;
+    double area, squares; /* sum A, sum A^2 */
     /* By single elements: e^2 N / P^2, and e^2; of the mean of the bin, and of the mean square in it. */
     double mean_one, mean_one_noise, mean_all, mean_all_noise;
     double rms_one, rms_one_noise, rms_all, rms_all_noise;

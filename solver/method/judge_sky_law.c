@@ -158,6 +158,13 @@ static void finish_bin(const sky_law_sums *s, size_t bin, bool of_mean, double d
         }
     }
     *tiles = spread > 0 ? (fmax(off - known, 0) + sqrt(least2)) / spread : 0;
+    /* A mean may be right under one sky by chance: the cloudy one counts as much, less its own tiles. */
+    if (s->count > 1) {
+        const sky_probe *of = &s->of[1];
+        const double at = (of_mean ? of->mean : of->rms)[bin];
+        const double tiled = direct2 * (of_mean ? of->direct_mean : of->direct)[bin] + *tiles * of->spread;
+        *even = fmax(*even, .5 * (*even + (at - tiled) / of->power2));
+    }
     *tiles = sqrt(*tiles);
     *even = sqrt(*even);
 }
@@ -173,6 +180,10 @@ lam_status sky_law_finish(const sky_law_sums *s, group_errors *errors, lam_error
     for (size_t bin = 0; bin < s->n_bins; bin++) {
         finish_bin(s, bin, true, direct2, &made[SKY_MEAN_TILES][bin], &made[SKY_MEAN_EVEN][bin]);
         finish_bin(s, bin, false, direct2, &made[SKY_RMS_TILES][bin], &made[SKY_RMS_EVEN][bin]);
+        /* No mean is known better than independent errors of the elements leave it. */
+        const double least = sqrt(s->square[group_of(s, bin)]);
+        made[SKY_MEAN_TILES][bin] = fmax(made[SKY_MEAN_TILES][bin], least * made[SKY_RMS_TILES][bin]);
+        made[SKY_MEAN_EVEN][bin] = fmax(made[SKY_MEAN_EVEN][bin], least * made[SKY_RMS_EVEN][bin]);
     }
     errors->sky_direct = sqrt(direct2);
     memcpy(errors->sky, made, sizeof made);
