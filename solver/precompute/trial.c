@@ -88,7 +88,8 @@ static double rest_of(double wanted, double other) {
 
 bool trial_turn(double asked, const trial_errors *errors, const trial_limits *limits, const trial_knobs *from,
                 trial_knobs *next) {
-    const double wanted = aimed_share * asked, half = wanted * sqrt(.5);
+    const double aimed = limits->aimed_share > 0 ? limits->aimed_share : aimed_share;
+    const double wanted = aimed * asked, half = wanted * sqrt(.5);
     const double C = errors->compression, F = errors->factors;
     *next = *from;
     /* Compression then follows the rays. */

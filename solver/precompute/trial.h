@@ -19,6 +19,8 @@ typedef struct trial_limits {
     bool fixed_epsilon; /* the operator does not follow epsilon */
     double power;       /* of epsilon in the compression, as measured; 0: not known */
     double finest;
+    double aimed_share; /* of the error asked for, that the next trial aims at; 0: .9, as laws are no exact
+                           ones */
 } trial_limits;
 
 /* The stated error of a trial, and its parts, which add up in squares: compression is the error against the
@@ -57,9 +59,7 @@ void trial_describe_worst(const worst_group *worst, const char *name, char text[
  * squared error asked for; a part without a free knob stays, and the other is not pushed below half of it.
  * Laws: the noise of rays falls as N^-1/2; an error of pairs as their accuracy; of blocks as the root of
  * theirs (at most); compression as epsilon^.6 (.58 to 1.03 in a Cornell box of 641 elements), or as
- * two trials have it.
- * No knob is
- * turned by more than a factor of 64. */
+ * two trials have it. No knob is turned by more than a factor of 64. */
 bool trial_turn(double asked, const trial_errors *errors, const trial_limits *limits, const trial_knobs *from,
                 trial_knobs *next);
 

@@ -99,6 +99,16 @@ class GroupError(Case):
         printed = must("info", self.kept).stdout
         self.assertIn("error of the worst group", printed)
 
+    def test_receivers_keep_it_too(self):
+        """The last trial aims below the limit: the worst of six groups is another one in every trial."""
+        for receivers, limit in ((",".join(f"a{k}" for k in range(6)), .05), ("b0", .02)):
+            store = self.path("receivers.h5")
+            must("precompute", self.rooms, "-o", store, "--method", "hierarchical", "--probes", 16, "--receivers", receivers,
+                 "--group-error", limit, threads=2)
+            after, attributes = self.worst(store)
+            self.assertLessEqual(after, limit)
+            self.assertEqual(attributes["group_error_stated"], after)
+
     def dark(self, store):
         """The means of the groups of room a, for each wall of room b as the lamp."""
         means = []
