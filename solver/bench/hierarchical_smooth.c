@@ -48,8 +48,10 @@ static lam_status compare(const mesh *coarse, const float *H, const mesh *fine, 
                           double out[3], lam_error *error) {
     lam_status status = LAM_OK;
     shade *smooth = NULL;
+    smooth_nodes nodes = {0};
     double off[3] = {0}, all = 0;
-    TRY(shade_create(coarse, 1, H, NULL, true, &smooth, error));
+    TRY(smooth_nodes_create(coarse, &nodes, error));
+    TRY(shade_create(coarse, 1, H, NULL, &nodes, &smooth, error));
     for (uint32_t i = 0; i < coarse->n; i++) {
         double mean = 0, area = 0;
         for (size_t j = FINER * (size_t)i; j < FINER * ((size_t)i + 1); j++) {
@@ -69,6 +71,7 @@ static lam_status compare(const mesh *coarse, const float *H, const mesh *fine, 
     for (int k = 0; k < 3; k++) out[k] = sqrt(off[k] / all);
 done:
     shade_destroy(smooth);
+    smooth_nodes_free(&nodes);
     return status;
 }
 

@@ -149,7 +149,7 @@ static bool read_layout(const npy_header *h, const codec_scene *scene, layout *f
     const size_t *shape = h->shape;
     if (h->rank == 1 && shape[0] == n) {
         *found = (layout){1, 1, false};
-    } else if (h->rank == 2 && C == 1 && shape[1] == n) {
+    } else if (h->rank == 2 && (C == 1 || scene->frames) && shape[1] == n) {
         *found = (layout){shape[0], 1, true};
     } else if (h->rank == 2 && C > 1 && shape[0] == C && shape[1] == n) {
         *found = (layout){1, C, false};
@@ -163,6 +163,11 @@ static bool read_layout(const npy_header *h, const codec_scene *scene, layout *f
         if (h->rank > MAX_RANK)
             return problem_set(why, PROBLEM_WRONG_LENGTH, "the array's shape has more than %d axes",
                                MAX_RANK);
+        if (scene->frames)
+            return problem_set(why, PROBLEM_WRONG_LENGTH,
+                               "the array's shape is (%s), must be (frames, %zu), alike in all channels, or "
+                               "(frames, %zu, %zu), one value for each %s",
+                               given, n, C, n, item);
         if (C == 1)
             return problem_set(
                 why, PROBLEM_WRONG_LENGTH,

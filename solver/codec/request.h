@@ -23,6 +23,7 @@ typedef struct codec_scene {
     size_t max_rows;    /* adjoint rows that the scene keeps: at most so many groups are reduced by them */
     const char *source; /* the word for the bytes in messages; NULL: "the body" */
     const char *item;   /* the word for one of the n values of an NPY row; NULL: "element" */
+    bool frames;        /* an array of two axes is always a batch, of vectors that all channels share */
 } codec_scene;
 
 #define CODEC_BATCH_MOST ((size_t)UINT32_MAX)

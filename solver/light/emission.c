@@ -200,8 +200,11 @@ lam_status emission_choose(const emission_scene *scene, const emission_options *
                            bool *own, lam_error *error) {
     lam_status status = LAM_OK;
     emission e = {.n_vectors = 1};
-    *own = options->items->count == 0 && options->path == NULL && options->sky == NULL && !options->other;
-    if (*own)
+    *own = options->items->count == 0 && options->path == NULL && options->frames == NULL &&
+           options->sky == NULL && !options->other;
+    if (options->frames != NULL)
+        TRY(emission_read_frames(options->frames, scene, &e, error));
+    else if (*own)
         TRY(emission_of_scene(scene->m, &e, error));
     else if (options->items->count > 0)
         TRY(emission_from_groups(scene, options->items, &e, error));

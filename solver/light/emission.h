@@ -8,7 +8,8 @@
 #include "solver/codec/groups.h"
 #include "solver/scene/mesh.h"
 
-/* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2, never negative. */
+/* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2, never negative; NULL: W is all there is.
+ */
 typedef struct emission {
     size_t n_vectors;
     bool batch;  /* given as a batch (also of one), so answered as one */
@@ -59,6 +60,14 @@ lam_status emission_check_items(const option_list *items, lam_error *error);
  * Errors name the file, the place, the value and the limit. */
 lam_status emission_read(const char *path, const emission_scene *scene, emission *out, lam_error *error);
 
+/* Reads the frames of an animation, always a batch: JSON as above; NPY of shape (f, n) or (f, C, n), and of a
+ * scene with s emitters also their weights, (f, s) or (f, C, s); or, for the word EMISSION_EMITTERS, every
+ * emitter alone, in order. Weights make W without E. Errors as emission_read, and LAM_ERR_ARGUMENT for the
+ * word where there are no emitters. */
+#define EMISSION_EMITTERS "emitters"
+lam_status emission_read_frames(const char *path, const emission_scene *scene, emission *out,
+                                lam_error *error);
+
 /* Puts e under the sky of an NPY file, shaped as an emission of m tiles, or of a matrix of Radiance (.mtx,
  * .smx) on the tiles of the scene. One sky goes with every emission, one emission with every sky (steady);
  * else there must be as many of both. A coloured sky lights a grey store by its luminance, .265 R + .670 G +
@@ -81,11 +90,13 @@ lam_status emission_of_scene(const mesh *m, emission *out, lam_error *error);
 typedef struct emission_options {
     const option_list *items; /* --emit */
     const char *path;         /* --emission, or NULL */
+    const char *frames;       /* for emission_read_frames in place of both, or NULL */
     const char *sky;          /* --sky, or NULL */
     bool other;               /* light is added later: the scene's own is not the preset */
 } emission_options;
 
-/* Groups when there are items, else the file, else none beside a sky, else the scene's own, which sets *own.
+/* Frames when there are any, else groups when there are items, else the file, else none beside a sky, else
+ * the scene's own, which sets *own.
  */
 lam_status emission_choose(const emission_scene *scene, const emission_options *options, emission *out,
                            bool *own, lam_error *error);

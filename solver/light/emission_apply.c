@@ -41,8 +41,9 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
                        .work_bytes = lam_operator_work_bytes(op, most)};
     p.work = memory_allocate(p.work_bytes, 1, "the work area of a solve", error);
     if (p.work == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(reserve(most * C, n, "emissions", &p.E, error));
-    for (size_t k = 0; light->steady && k < most; k++) memcpy(p.E + k * C * n, light->E, C * n * sizeof *p.E);
+    if (light->E != NULL) TRY(reserve(most * C, n, "emissions", &p.E, error));
+    for (size_t k = 0; light->steady && p.E != NULL && k < most; k++)
+        memcpy(p.E + k * C * n, light->E, C * n * sizeof *p.E);
     if (light->L != NULL) TRY(reserve(most * C, lam_sky_tiles(sky), "skies", &p.L, error));
     if (s > 0)
         TRY(reserve(most * C, s, "weights of emitters", &p.W, error));
@@ -112,7 +113,7 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
     lam_status status = LAM_OK;
     const emission *e = p->light;
     const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
-    if (!e->steady) gather(n, vectors, C * n_elements, e->E, p->E);
+    if (!e->steady && p->E != NULL) gather(n, vectors, C * n_elements, e->E, p->E);
     if (e->L != NULL) gather(n, vectors, C * lam_sky_tiles(p->sky), e->L, p->L);
     if (p->W != NULL) {
         TRY(find_weights(p, n, vectors, error));
@@ -137,7 +138,7 @@ lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors
     const emission *e = p->light;
     const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
     double *L = NULL;
-    if (!e->steady) gather(n, vectors, C * n_elements, e->E, p->E);
+    if (!e->steady && p->E != NULL) gather(n, vectors, C * n_elements, e->E, p->E);
     if (e->L != NULL) gather(n, vectors, C * lam_sky_tiles(p->sky), e->L, p->L);
     *H0_there = p->W != NULL || p->H0 != NULL;
     if (p->W != NULL) {
@@ -151,7 +152,7 @@ lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors
                                         p->work_bytes, error));
         goto done;
     }
-    for (size_t k = 0; k < n * C * n_elements; k++) E[k] = (double)p->E[k];
+    for (size_t k = 0; k < n * C * n_elements; k++) E[k] = p->E != NULL ? (double)p->E[k] : 0;
     if (!*H0_there) goto done;
     memset(H0, 0, n * C * n_elements * sizeof *H0);
     if (p->L != NULL) {

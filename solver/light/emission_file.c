@@ -22,9 +22,9 @@ static lam_status refuse(const char *path, problem *why, lam_error *error) {
     return status_fail(error, status, "%.200s: %s", path, why->detail);
 }
 
-/* Reads path against about, to which it adds what holds for every file. */
-static lam_status read_with(codec_reader *reader, const char *path, codec_scene about, radiosity_request *out,
-                            lam_error *error) {
+/* Reads path against about, to which it adds what holds for every file. *kind is of its refusal. */
+static lam_status read_kind(codec_reader *reader, const char *path, codec_scene about, radiosity_request *out,
+                            problem_kind *kind, lam_error *error) {
     lam_status status = LAM_OK;
     problem why = {0};
     radiosity_request made = {0};
@@ -34,13 +34,21 @@ static lam_status read_with(codec_reader *reader, const char *path, codec_scene 
     about.max_batch = CODEC_BATCH_MOST;
     about.max_bytes = SIZE_MAX / 4;
     TRY(file_text(path, &bytes, &length, error));
-    if (!reader(&about, bytes, length, &made, &why)) TRY(refuse(path, &why, error));
+    const bool good = reader(&about, bytes, length, &made, &why);
+    *kind = why.kind;
+    if (!good) TRY(refuse(path, &why, error));
     *out = made;
     made = (radiosity_request){0};
 done:
     radiosity_request_free(&made);
     free(bytes);
     return status;
+}
+
+static lam_status read_with(codec_reader *reader, const char *path, codec_scene about, radiosity_request *out,
+                            lam_error *error) {
+    problem_kind ignored;
+    return read_kind(reader, path, about, out, &ignored, error);
 }
 
 lam_status emission_read(const char *path, const emission_scene *scene, emission *out, lam_error *error) {
@@ -67,6 +75,68 @@ lam_status emission_read(const char *path, const emission_scene *scene, emission
     read.E = read.sky.values = read.emitters.values = NULL;
 done:
     radiosity_request_free(&read);
+    return status;
+}
+
+/* The weights that let every emitter shine alone, in all channels alike. */
+static lam_status every_emitter(const emission_scene *scene, emission *out, lam_error *error) {
+    const size_t s = scene->n_emitters, C = scene->m->n_channels;
+    float *W = NULL;
+    if (s == 0)
+        return status_fail(error, LAM_ERR_ARGUMENT,
+                           "the store has no named emitters; precompute it with --emitters, or give a file");
+    const lam_status status = emission_allocate("weights of emitters", C, s, s, &W, error);
+    if (status != LAM_OK) return status;
+    for (size_t row = 0; row < s * C; row++) W[row * s + row / C] = 1;
+    *out = (emission){.n_vectors = s, .batch = true, .W = W};
+    return LAM_OK;
+}
+
+/* An array of emissions, else one of weights where there are emitters. */
+static lam_status read_arrays(const char *path, const emission_scene *scene, emission *out,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    codec_scene about = {.n = scene->m->n, .n_channels = scene->m->n_channels, .frames = true};
+    radiosity_request read = {0};
+    lam_error why = {.message = ""}, other = {.message = ""};
+    problem_kind kind = PROBLEM_NONE, other_kind = PROBLEM_NONE;
+    status = read_kind(codec_read_npy, path, about, &read, &kind, &why);
+    const bool weights = kind == PROBLEM_WRONG_LENGTH && scene->n_emitters > 0;
+    if (weights) {
+        radiosity_request_free(&read);
+        read = (radiosity_request){0};
+        about.n = scene->n_emitters;
+        about.item = "emitter";
+        status = read_kind(codec_read_npy, path, about, &read, &other_kind, &other);
+        if (other_kind == PROBLEM_WRONG_LENGTH)
+            FAIL(error, status, "%s; or weights of the %zu emitters", why.message, about.n);
+    }
+    if (status != LAM_OK) FAIL(error, status, "%s", weights ? other.message : why.message);
+    *out = (emission){.n_vectors = read.n_rhs};
+    if (weights)
+        out->W = read.E;
+    else
+        out->E = read.E;
+    read.E = NULL;
+done:
+    radiosity_request_free(&read);
+    return status;
+}
+
+lam_status emission_read_frames(const char *path, const emission_scene *scene, emission *out,
+                                lam_error *error) {
+    lam_status status = LAM_OK;
+    char extension[16];
+    if (strcmp(path, EMISSION_EMITTERS) == 0) return every_emitter(scene, out, error);
+    atomic_file_extension(path, extension);
+    if (strcmp(extension, "npy") == 0)
+        TRY(read_arrays(path, scene, out, error));
+    else if (strcmp(extension, "json") == 0)
+        TRY(emission_read(path, scene, out, error));
+    else
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: must end in .npy or .json", path);
+    out->batch = true;
+done:
     return status;
 }
 

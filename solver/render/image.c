@@ -42,6 +42,9 @@ void image_free(image *picture) {
     *picture = (image){0};
 }
 
+/* The level of zlib: of smooth light a quarter of the time of its preset, 6, for a ninth more bytes. */
+enum { COMPRESSION = 4 };
+
 /* The state that libpng's callbacks share with encode_to. */
 typedef struct png_writer {
     FILE *file;
@@ -79,6 +82,7 @@ static bool encode(png_structp png, png_infop info, const image *picture) {
     png_set_IHDR(png, info, (png_uint_32)picture->width, (png_uint_32)picture->height, 8,
                  picture->channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_compression_level(png, COMPRESSION);
     png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
     png_write_info(png, info);
     for (size_t y = 0; y < picture->height; y++)

@@ -46,8 +46,11 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
                       lam_error *error) {
     lam_status status = LAM_OK;
     char *tiling = NULL;
-    const emission_options given = {
-        .items = &options->emit, .path = options->emission, .sky = options->sky, .other = other};
+    const emission_options given = {.items = &options->emit,
+                                    .path = options->emission,
+                                    .frames = options->frames,
+                                    .sky = options->sky,
+                                    .other = other};
     TRY(emission_scene_create(m, &out->scene, error));
     TRY(sky_load(s, m->n, &out->sky, error));
     TRY(operator_load(s, &out->op, error));

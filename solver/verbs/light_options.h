@@ -11,6 +11,7 @@
 typedef struct light_options {
     option_list emit;
     const char *emission, *sky;
+    const char *frames; /* of an animation, in place of --emit and --emission; no row of the table */
 } light_options;
 
 /* The rows of a table that fills light_options. */

@@ -162,7 +162,6 @@ class Render(unittest.TestCase):
                 (1, "has no patches", [self.cornell, "-o", image, "--quantity", "patch"]),
                 (1, "precompute it with --keep-form-factors", [self.cornell, "-o", image, "--quantity", "visible"]),
                 (1, "has no sky", [self.cornell, "-o", image, "--sky", "a.npy"]),
-                (2, "no such option", [self.cornell, "-o", image, "--animate", "a.npy"]),
                 (2, "both", [self.cornell, "-o", image, "--emit", "lamp=1", "--emission", "a.npy"]),
                 (2, "--frobnicate", [self.cornell, "-o", image, "--frobnicate"]),
                 (1, "nonexistent", [self.path("nonexistent.h5"), "-o", image]),

@@ -231,6 +231,56 @@ START_TEST(test_npy) {
 }
 END_TEST
 
+START_TEST(test_frames) {
+    /* Two axes are frames by elements, also where a scene has as many channels as there are rows; else
+     * weights of its 5 emitters. */
+    const mesh m = hand_made(1), colour = hand_made(3);
+    const struct {
+        const mesh *m;
+        size_t rank, shape[3], n_vectors;
+        bool weights, alike;
+    } cases[] = {{&m, 1, {4}, 1, false, true},
+                 {&m, 2, {3, 4}, 3, false, true},
+                 {&m, 2, {3, 5}, 3, true, true},
+                 {&colour, 2, {3, 4}, 3, false, true},
+                 {&colour, 2, {6, 5}, 6, true, true},
+                 {&colour, 3, {2, 3, 4}, 2, false, false},
+                 {&colour, 3, {2, 3, 5}, 2, true, false},
+                 {&colour, 2, {3, 6}, 0, false, false}};
+    lam_error error;
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char path[] = "/tmp/test-emission-XXXXXX.npy";
+        const size_t C = cases[k].m->n_channels, width = cases[k].weights ? 5 : N;
+        emission_scene scene = scene_of(cases[k].m);
+        emission e = {0};
+        scene.n_emitters = 5;
+        write_counting(mkstemps(path, 4), cases[k].rank, cases[k].shape);
+        const lam_status status = emission_read_frames(path, &scene, &e, &error);
+        ck_assert_int_eq(status, cases[k].n_vectors > 0 ? LAM_OK : LAM_ERR_ARGUMENT);
+        ck_assert_uint_eq(e.n_vectors, cases[k].n_vectors);
+        const float *values = cases[k].weights ? e.W : e.E;
+        ck_assert((e.E != NULL) == (status == LAM_OK && !cases[k].weights));
+        for (size_t i = 0; i < e.n_vectors * C * width; i++)
+            ck_assert_float_eq(values[i],
+                               (float)(cases[k].alike ? i / (C * width) * width + i % width : i) + 1);
+        if (status != LAM_OK) ck_assert_ptr_nonnull(strstr(error.message, "weights of the 5 emitters"));
+        emission_free(&e);
+        emission_scene_free(&scene);
+        unlink(path);
+    }
+    emission_scene scene = scene_of(&colour);
+    emission e = {0};
+    ck_assert_int_eq(emission_read_frames("emitters", &scene, &e, &error), LAM_ERR_ARGUMENT);
+    scene.n_emitters = 2;
+    ck_assert_int_eq(emission_read_frames("emitters", &scene, &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 2 && e.batch && e.E == NULL);
+    ck_assert_mem_eq(e.W, ((float[]){1, 0, 1, 0, 1, 0, 0, 1, 0, 1, 0, 1}), 12 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(emission_read_frames("a.txt", &scene, &e, &error), LAM_ERR_ARGUMENT);
+    emission_scene_free(&scene);
+}
+END_TEST
+
 /* Puts three dark emissions, or one, under a sky of this shape whose values count from 1. */
 static lam_status under_sky(const mesh *m, size_t n_vectors, size_t rank, const size_t *dims, emission *e,
                             lam_error *error) {
@@ -308,6 +358,7 @@ int main(void) {
     tcase_add_test(c, test_groups);
     tcase_add_test(c, test_many_channels);
     tcase_add_test(c, test_npy);
+    tcase_add_test(c, test_frames);
     tcase_add_test(c, test_json);
     tcase_add_test(c, test_json_skies);
     tcase_add_test(c, test_skies_from_files);

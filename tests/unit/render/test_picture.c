@@ -47,13 +47,15 @@ START_TEST(test_smooth_joins_and_separates) {
     mesh m = {0};
     lam_error error = {0};
     shade *s = NULL;
+    smooth_nodes nodes = {0};
     add_tile(&m, 0, 0, 1, 1);
     add_tile(&m, 1, 0, 1, 1);
     const double wall[4][3] = {{2, 0, 0}, {2, 0, 1}, {2, 1, 1}, {2, 1, 0}};
     mesh_add_quad(&m, wall);
     mesh_finish(&m, .5f);
     const float values[3] = {1, 3, 100};
-    ck_assert_msg(shade_create(&m, 1, values, NULL, true, &s, &error) == LAM_OK, "%s", error.message);
+    ck_assert_int_eq(smooth_nodes_create(&m, &nodes, NULL), LAM_OK);
+    ck_assert_msg(shade_create(&m, 1, values, NULL, &nodes, &s, &error) == LAM_OK, "%s", error.message);
     /* The common edge has the mean; light goes on along the line through both, whatever the wall has. */
     ck_assert_float_eq_tol(shown_at(s, 0, 1, .5), 2, 1e-6f);
     ck_assert_float_eq_tol(shown_at(s, 1, 1, .5), 2, 1e-6f);
@@ -63,26 +65,31 @@ START_TEST(test_smooth_joins_and_separates) {
     shade_destroy(s);
     /* Another group: no mixing. */
     m.group[1] = 1;
-    ck_assert_msg(shade_create(&m, 1, values, NULL, true, &s, &error) == LAM_OK, "%s", error.message);
+    smooth_nodes_free(&nodes);
+    ck_assert_int_eq(smooth_nodes_create(&m, &nodes, NULL), LAM_OK);
+    ck_assert_msg(shade_create(&m, 1, values, NULL, &nodes, &s, &error) == LAM_OK, "%s", error.message);
     ck_assert_float_eq_tol(shown_at(s, 0, 1, .5), 1, 1e-6f);
     shade_destroy(s);
     m.group[1] = 0;
+    smooth_nodes_free(&nodes);
+    ck_assert_int_eq(smooth_nodes_create(&m, &nodes, NULL), LAM_OK);
     /* Emission stays in its element; what else there is, 1 and 1, does not vary. */
     const float E[3] = {0, 2, 0};
-    ck_assert_msg(shade_create(&m, 1, values, E, true, &s, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(shade_create(&m, 1, values, E, &nodes, &s, &error) == LAM_OK, "%s", error.message);
     ck_assert_float_eq_tol(shown_at(s, 0, 1, .5), 1, 1e-6f);
     ck_assert_float_eq_tol(shown_at(s, 1, 1, .5), 3, 1e-6f);
     shade_destroy(s);
     /* Light is never negative: 0 at x = 0, where the line through both has -1. */
     const float steep[3] = {1, 5, 0};
-    ck_assert_msg(shade_create(&m, 1, steep, NULL, true, &s, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(shade_create(&m, 1, steep, NULL, &nodes, &s, &error) == LAM_OK, "%s", error.message);
     ck_assert_float_eq_tol(shown_at(s, 0, 0, .5), 0, 1e-6f);
     ck_assert_float_eq_tol(shown_at(s, 1, 2, .5), 7, 1e-6f);
     shade_destroy(s);
     /* Not smooth: every element its own value everywhere. */
-    ck_assert_msg(shade_create(&m, 1, values, NULL, false, &s, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(shade_create(&m, 1, values, NULL, NULL, &s, &error) == LAM_OK, "%s", error.message);
     ck_assert_float_eq(shown_at(s, 0, 1, .5), 1);
     shade_destroy(s);
+    smooth_nodes_free(&nodes);
     mesh_free(&m);
 }
 END_TEST
@@ -93,6 +100,7 @@ START_TEST(test_smooth_has_no_cracks) {
     mesh m = {0};
     lam_error error = {0};
     shade *s = NULL;
+    smooth_nodes nodes = {0};
     add_tile(&m, 0, 0, 3, 3);
     add_tile(&m, 3, 0, 1, 1);
     add_tile(&m, 3, 1, .5, .4);
@@ -101,7 +109,8 @@ START_TEST(test_smooth_has_no_cracks) {
     add_tile(&m, 3, 2, 1, 1);
     mesh_finish(&m, .5f);
     const float values[6] = {1, 7, 2, 9, 4, 6};
-    ck_assert_msg(shade_create(&m, 1, values, NULL, true, &s, &error) == LAM_OK, "%s", error.message);
+    ck_assert_int_eq(smooth_nodes_create(&m, &nodes, NULL), LAM_OK);
+    ck_assert_msg(shade_create(&m, 1, values, NULL, &nodes, &s, &error) == LAM_OK, "%s", error.message);
     for (int i = 1; i < 300; i++) {
         const double y = i / 100.0;
         const uint32_t beside = y <= 1 ? 1 : y <= 1.4 ? 2 : y <= 2 ? 4 : 5;
@@ -113,6 +122,7 @@ START_TEST(test_smooth_has_no_cracks) {
         ck_assert_float_eq_tol(shown_at(s, x <= 3.5 ? 2 : 3, x, 1.4), shown_at(s, 4, x, 1.4), 1e-5f);
     }
     shade_destroy(s);
+    smooth_nodes_free(&nodes);
     mesh_free(&m);
 }
 END_TEST
