@@ -60,7 +60,7 @@ lam_status city_light_errors(const city *c, const city_light *d, const lam_opera
 
 /* The scenes of figure 5.1, of which the first MAP_MAIN are those of the thesis, as `lambert generate` makes
  * them. Cities have the reflectance .7 of the thesis, the others their own. */
-enum { MAP_SCENES = 10, MAP_MAIN = 4, FALL_SCENES = 4 };
+enum { MAP_SCENES = 10, MAP_MAIN = 4, FALL_SCENES = 6 };
 extern const char *const map_scenes[MAP_SCENES];
 
 /* One of them with its form factors: by lowrank_recipe, in a quick run by rays. */
@@ -80,8 +80,8 @@ lam_status cities_inverse(const bench_run *run, lam_error *error);
 /* Figures 4.1, 4.4 and 5.1 and the table of kinds, of scenes that are opened once for all of them. */
 lam_status cities_figures(const bench_run *run, lam_error *error);
 
-/* Figure 4.1: how singular values fall, and how many are above .1. The Cornell box and the three cities of a
- * size, in this order, and again of other sizes: n_sizes times FALL_SCENES. */
+/* Figure 4.1: how singular values fall, and how many are above .1. The Cornell box, the three cities, rooms
+ * and an anechoic chamber of a size, in this order, and again of other sizes: n_sizes times FALL_SCENES. */
 lam_status cities_spectra(const bench_run *run, const lowrank_scene *const *scenes, size_t n_sizes,
                           lam_error *error);
 

@@ -256,14 +256,14 @@ const char *const map_scenes[MAP_SCENES] = {"city 1", "rooms", "anechoic", "corn
                                             "city 3", "patio", "atrium",   "maze",    "canopy"};
 
 /* The scenes of figure 4.1, as indices into map_scenes. */
-static const size_t fall_scenes[FALL_SCENES] = {3, 0, 4, 5};
+static const size_t fall_scenes[FALL_SCENES] = {3, 0, 4, 5, 1, 2};
 
 /* In a quick run form factors pair by pair would take most of the time. */
 enum { RAYS_QUICK = 1024 };
 
 typedef struct figure_scenes {
     lowrank_scene map[MAP_SCENES];
-    lowrank_scene other[FALL_SCENES]; /* the cities of figure 4.1, larger or smaller */
+    lowrank_scene other[FALL_SCENES]; /* those of figure 4.1, larger or smaller */
 } figure_scenes;
 
 static void scenes_free(figure_scenes *s) {

@@ -97,7 +97,7 @@ static size_t add_wall(scene_piece *pieces, const double corner[3], const double
     return n;
 }
 
-lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error) {
+lam_status lowrank_bare_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error) {
     /* floor, ceiling, left, right, back: fronts inside */
     static const double walls[5][3][3] = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
                                           {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},
@@ -112,10 +112,23 @@ lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *o
     for (int w = 0; w < 5; w++)
         n += add_wall(pieces + n, walls[w][0], walls[w][1], walls[w][2], divisions, divisions, true);
     TRY(scene_of_pieces(pieces, n, &m, error));
-    TRY(open_usual(run, "open room", &m, out, error));
+    TRY(lowrank_open(run, "open room", &m, NULL, out, error));
 done:
     free(pieces);
     mesh_free(&m);
+    return status;
+}
+
+lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    lowrank_scene s = {.name = NULL};
+    TRY(lowrank_bare_room(run, divisions, &s, error));
+    const recipe how = lowrank_recipe(run, s.m.n);
+    TRY(lowrank_trace(run, &s, &how, error));
+    *out = s;
+    s = (lowrank_scene){.name = NULL};
+done:
+    lowrank_scene_free(&s);
     return status;
 }
 
@@ -424,6 +437,7 @@ lam_status bench_lowrank(const bench_run *run, lam_error *error) {
     TRY(lowrank_of_order(run, all, n, error));
     TRY(lowrank_of_factorizers(run, all, n < 3 ? n : 3, error));
     TRY(lowrank_of_rank(run, all, n, error));
+    TRY(lowrank_of_streamed(run, error));
     TRY(lowrank_of_radiosity(run, error));
     TRY(lowrank_of_methods(run, error));
     TRY(lowrank_of_two_meshes(run, error));

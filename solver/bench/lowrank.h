@@ -37,6 +37,9 @@ build_problem lowrank_problem(const lowrank_scene *s);
  * which are the sizes of the thesis' Cornell box, 640 x 4^k. */
 lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error);
 
+/* The same without form factors. */
+lam_status lowrank_bare_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error);
+
 /* The Cornell box with its blocks; a courtyard of two storeys with galleries. About so many elements. */
 lam_status lowrank_cornell(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
 lam_status lowrank_patio(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
@@ -113,6 +116,9 @@ lam_status lowrank_of_levels(const bench_run *run, const lowrank_scene *const *s
                              lam_error *error);
 lam_status lowrank_of_rank(const bench_run *run, const lowrank_scene *const *scenes, size_t n,
                            lam_error *error);
+
+/* HF of rows that are not kept, and its memory (tables 3.2 and 3.3). */
+lam_status lowrank_of_streamed(const bench_run *run, lam_error *error);
 
 /* Tables 3.6 and 3.7: radiosity. */
 lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error);
