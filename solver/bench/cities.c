@@ -157,9 +157,7 @@ enum {
     ROWS_FULL = 1024
 };
 
-/* A stratified sample of rows: one at random out of each of count parts of the mesh, whose elements are
- * ordered by group and by building. */
-static void spread_rows(size_t n, size_t count, uint64_t seed, uint32_t *rows) {
+void cities_spread_rows(size_t n, size_t count, uint64_t seed, uint32_t *rows) {
     for (size_t k = 0; k < count; k++) {
         const double place = (double)k + random_lcg_unit(&seed);
         rows[k] = (uint32_t)(place * (double)n / (double)count);
@@ -201,7 +199,7 @@ static lam_status add_city(const bench_run *run, unsigned variant, size_t size, 
     rows = memory_allocate(count, sizeof *rows, "rows of form factors", error);
     seen = memory_allocate(count, sizeof *seen, "rows of form factors", error);
     if (rows == NULL || seen == NULL) TRY(LAM_ERR_MEMORY);
-    spread_rows(m.n, count, run->seed, rows);
+    cities_spread_rows(m.n, count, run->seed, rows);
     TRY(density_of(run, &m, &by_cubes, rows, count, seen, &cubes, &deviation, error));
     TRY(density_of(run, &m, &by_rays, rows, count, seen, &rays, &unread, error));
     const double wanted = quick ? NAN : theirs[variant - 1][size][terrain];
@@ -254,6 +252,7 @@ lam_status bench_cities(const bench_run *run, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(cities_inverse(run, error));
     TRY(cities_density(run, error));
+    TRY(cities_resolution(run, error));
     TRY(cities_radiosity(run, error));
     TRY(cities_figures(run, error));
 done:

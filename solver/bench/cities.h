@@ -74,6 +74,13 @@ lam_status map_spectrum(const bench_run *run, const lowrank_scene *s, spectrum *
 /* Tables 4.1 and 4.5: densities of F. */
 lam_status cities_density(const bench_run *run, lam_error *error);
 
+/* Table 4.6: densities, times and errors of hemicubes of falling resolution. */
+lam_status cities_resolution(const bench_run *run, lam_error *error);
+
+/* A stratified sample of the rows of n elements: one at random out of each of count parts of the mesh, whose
+ * elements are ordered by group and by building. */
+void cities_spread_rows(size_t n, size_t count, uint64_t seed, uint32_t *rows);
+
 /* Tables 4.1 to 4.4 and 4.7: M~, its time beside Jacobi, its error; and few emitters (section 4.4.3). */
 lam_status cities_inverse(const bench_run *run, lam_error *error);
 

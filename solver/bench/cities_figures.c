@@ -263,7 +263,7 @@ enum { RAYS_QUICK = 1024 };
 
 typedef struct figure_scenes {
     lowrank_scene map[MAP_SCENES];
-    lowrank_scene other[FALL_SCENES]; /* those of figure 4.1, larger or smaller */
+    lowrank_scene other[FALL_SCENES]; /* the scenes of figure 4.1, larger or smaller */
 } figure_scenes;
 
 static void scenes_free(figure_scenes *s) {

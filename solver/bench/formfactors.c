@@ -103,8 +103,7 @@ static const table_column resolution_columns[] = {
     {"error_3", "", "thesis, city 3"},
 };
 
-/* |A - B| / |A| in the Frobenius norm. */
-static double distance(const csr *A, const csr *B) {
+double formfactors_distance(const csr *A, const csr *B) {
     double difference = 0, norm = 0;
     for (size_t i = 0; i < A->n; i++) {
         uint64_t p = A->indptr[i], q = B->indptr[i];
@@ -156,7 +155,7 @@ lam_status formfactors_resolution(const bench_run *run, lam_error *error) {
         TRY(formfactors_make_timed(run, &m, order, &how, "resolution of hemicubes", made, &seconds, error));
         if (r == first) finest_seconds = seconds;
         add_resolution(&out, name, r, made, seconds, finest_seconds,
-                       r == first ? 0 : distance(&finest.F, &f.F));
+                       r == first ? 0 : formfactors_distance(&finest.F, &f.F));
         form_factors_free(&f);
     }
     TRY(bench_table(run, &out, error));

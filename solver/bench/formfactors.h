@@ -17,6 +17,9 @@ lam_status formfactors_make_timed(const bench_run *run, const mesh *m, const uin
 /* F[i][j], by search in the row. */
 double formfactors_entry(const csr *F, size_t i, size_t j);
 
+/* |A - B| / |A| in the Frobenius norm. */
+double formfactors_distance(const csr *A, const csr *B);
+
 /* The Z-order of a mesh as a fresh array. */
 lam_status formfactors_order(const mesh *m, uint32_t **order, lam_error *error);
 

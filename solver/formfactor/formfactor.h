@@ -177,6 +177,10 @@ lam_status form_factors_try_rays(const mesh *m, const uint32_t *order, ray_trial
 lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
                                    const progress *steps, const char *stage, size_t *seen, lam_error *error);
 
+/* The same rows themselves, out [n], of which all others are empty; freed by csr_free. Errors as above. */
+lam_status form_factors_some_rows(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
+                                  const progress *steps, const char *stage, csr *out, lam_error *error);
+
 /* /form_factors of a store, rows or the upper triangle as they are; sky_bounce_save and sky_bounce_load
  * handle /sky. large as above. */
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error);

@@ -266,12 +266,12 @@ done:
     return status;
 }
 
-lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
-                                   const progress *steps, const char *stage, size_t *seen, lam_error *error) {
+/* The rows of some elements before the two estimates of a pair are merged, freed by packed_rows_free. */
+static lam_status find_some(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
+                            const progress *steps, const char *stage, packed_rows *rows, lam_error *error) {
     lam_status status = LAM_OK;
     visibility *v = NULL;
     hemicube h = {0};
-    packed_rows rows = {0};
     double *outside = memory_allocate(m->n, 2 * sizeof *outside, "rows of form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
     const form_factor_options options = {
@@ -284,15 +284,56 @@ lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint3
     TRY(visibility_create(m, &v, error));
     if (how->method == RECIPE_HEMICUBE) {
         TRY(hemicube_create(how->resolution, &h, error));
-        TRY(hemicube_trace(&h, m, v, elements, &options, &rows, outside, outside + m->n, error));
+        TRY(hemicube_trace(&h, m, v, elements, &options, rows, outside, outside + m->n, error));
     } else {
-        TRY(rays_count(m, v, elements, &options, &rows, outside, outside + m->n, error));
+        TRY(rays_count(m, v, elements, &options, rows, outside, outside + m->n, error));
     }
-    for (size_t k = 0; k < count; k++) seen[k] = rows.rows[elements[k]].n_entries;
 done:
     free(outside);
-    packed_rows_free(&rows);
     hemicube_free(&h);
     visibility_destroy(v);
+    return status;
+}
+
+lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
+                                   const progress *steps, const char *stage, size_t *seen, lam_error *error) {
+    lam_status status = LAM_OK;
+    packed_rows rows = {0};
+    TRY(find_some(m, how, elements, count, steps, stage, &rows, error));
+    for (size_t k = 0; k < count; k++) seen[k] = rows.rows[elements[k]].n_entries;
+done:
+    packed_rows_free(&rows);
+    return status;
+}
+
+lam_status form_factors_some_rows(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
+                                  const progress *steps, const char *stage, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    packed_rows rows = {0};
+    csr made = {.n = m->n};
+    TRY(find_some(m, how, elements, count, steps, stage, &rows, error));
+    made.indptr = memory_allocate(m->n + 1, sizeof *made.indptr, "rows of form factors", error);
+    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < count; k++) made.indptr[elements[k] + 1] = rows.rows[elements[k]].n_entries;
+    TRY(csr_begin_rows(&made, "rows of form factors", error));
+    const double each = rows.kind == ROW_COUNTS ? 1 / (double)how->rays : 1;
+    for (size_t k = 0; k < count; k++) {
+        const packed_row *row = &rows.rows[elements[k]];
+        const uint8_t *from = row->bytes;
+        uint32_t column = 0, gap;
+        float value;
+        for (size_t p = 0; p < row->n_entries; p++) {
+            from = row_get(rows.kind, from, &gap, &value);
+            column += gap;
+            made.indices[made.indptr[elements[k]]] = column++;
+            made.data[made.indptr[elements[k]]++] = (float)(each * (double)value);
+        }
+    }
+    csr_end_rows(&made);
+    *out = made;
+    made = (csr){0};
+done:
+    csr_free(&made);
+    packed_rows_free(&rows);
     return status;
 }

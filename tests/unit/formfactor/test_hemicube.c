@@ -266,6 +266,37 @@ START_TEST(bad_requests_are_refused) {
 }
 END_TEST
 
+/* Rows of form_factors_some_rows: one for each chosen element, as long as was counted. In a closed box their
+ * entries sum to 1. Those by 64 rays are whole numbers of rays; those of a hemicube are near the closed form,
+ * from which they differ as one point does from a mean over an element. */
+static void check_rows(const mesh *m, const recipe *how, const uint32_t *chosen, size_t count,
+                       const size_t *seen) {
+    csr rows = {0}, exact = box_form_factors((const double[3]){2, 1, 1}, 3, m->area);
+    lam_error error = {0};
+    size_t total = 0;
+    ck_assert_msg(form_factors_some_rows(m, how, chosen, count, NULL, "some", &rows, &error) == LAM_OK, "%s",
+                  error.message);
+    ck_assert_int_eq(csr_check(&rows, rows.indptr[m->n], "rows", &error), LAM_OK);
+    for (size_t k = 0; k < count; k++) {
+        const size_t i = chosen[k];
+        double sum = 0;
+        ck_assert_uint_eq(rows.indptr[i + 1] - rows.indptr[i], seen[k]);
+        total += seen[k];
+        for (uint64_t p = rows.indptr[i]; p < rows.indptr[i + 1]; p++) {
+            const double x = (double)rows.data[p], truth = csr_entry(&exact, i, rows.indices[p]);
+            sum += x;
+            if (how->method == RECIPE_RAYS)
+                ck_assert_double_eq_tol(x * 64, round(x * 64), 1e-9);
+            else
+                ck_assert_double_eq_tol(x, truth, .02);
+        }
+        ck_assert_double_eq_tol(sum, 1, 1e-5);
+    }
+    ck_assert_uint_eq(rows.indptr[m->n], total);
+    csr_free(&rows);
+    csr_free(&exact);
+}
+
 /* form_factors_count_seen of some rows in any order agrees with the one-sided rows of all elements. */
 START_TEST(some_rows_are_those_of_all) {
     mesh m = box_mesh((const double[3]){2, 1, 1}, 3, .5f);
@@ -286,6 +317,7 @@ START_TEST(some_rows_are_those_of_all) {
                           LAM_OK,
                       "%s", error.message);
         for (size_t k = 0; k < CHOSEN; k++) ck_assert_uint_eq(some[k], all[chosen[k]]);
+        check_rows(&m, &ways[w], chosen, CHOSEN, some);
         if (w == 0) /* all but its own wall, nine elements, and every one is larger than a pixel */
             for (size_t i = 0; i < 54; i++) ck_assert_uint_eq(all[i], 45);
     }
