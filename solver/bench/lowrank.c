@@ -439,6 +439,7 @@ lam_status bench_lowrank(const bench_run *run, lam_error *error) {
     TRY(lowrank_of_rank(run, all, n, error));
     TRY(lowrank_of_streamed(run, error));
     TRY(lowrank_of_radiosity(run, error));
+    TRY(lowrank_of_frames(run, error));
     TRY(lowrank_of_methods(run, error));
     TRY(lowrank_of_two_meshes(run, error));
     TRY(lowrank_of_relaxation(run, error));

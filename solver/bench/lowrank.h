@@ -123,6 +123,9 @@ lam_status lowrank_of_streamed(const bench_run *run, lam_error *error);
 /* Tables 3.6 and 3.7: radiosity. */
 lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error);
 
+/* Table 3.6: time of a factorization and radiosities a second, also at the size of Sponza. */
+lam_status lowrank_of_frames(const bench_run *run, lam_error *error);
+
 /* Every method: run time and memory against error, and two meshes against the SVD at equal k. */
 lam_status lowrank_of_methods(const bench_run *run, lam_error *error);
 
