@@ -122,10 +122,8 @@ static void listen_to(int reading, pid_t child, const progress *waiting, char *l
     last[length] = '\0';
 }
 
-static lam_status run(char *const *arguments, const frame_names *names, const progress *waiting,
-                      lam_error *error) {
+static lam_status run(char *const *arguments, const char *path, const progress *waiting, lam_error *error) {
     lam_status status = LAM_OK;
-    const char *path = names->path;
     lam_error why = {.message = ""};
     char last[240] = "";
     pid_t child = 0;
@@ -134,7 +132,7 @@ static lam_status run(char *const *arguments, const frame_names *names, const pr
     status = start(arguments, &child, &reading, &there, &why);
     if (!there)
         FAIL(error, LAM_ERR_UNSUPPORTED,
-             "%s: ffmpeg, which makes videos, is not installed; its %zu frames are there", path, names->n);
+             "%s: ffmpeg, which makes videos, is not installed; the numbered pictures are there", path);
     if (status != LAM_OK) FAIL(error, status, "%s: %s", path, why.message);
     listen_to(reading, child, waiting, last, sizeof last);
     close(reading);
@@ -143,9 +141,9 @@ static lam_status run(char *const *arguments, const frame_names *names, const pr
     if (progress_cancelled(waiting)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
     if (WIFEXITED(ended) && WEXITSTATUS(ended) == 0) goto done;
     if (WIFSIGNALED(ended))
-        FAIL(error, LAM_ERR_IO, "%s: ffmpeg was ended by signal %d; its %zu frames are there", path,
-             WTERMSIG(ended), names->n);
-    FAIL(error, LAM_ERR_IO, "%s: ffmpeg failed, its %zu frames are there: %s", path, names->n,
+        FAIL(error, LAM_ERR_IO, "%s: ffmpeg was ended by signal %d; the numbered pictures are there", path,
+             WTERMSIG(ended));
+    FAIL(error, LAM_ERR_IO, "%s: ffmpeg failed, the numbered pictures are there: %s", path,
          last[0] != '\0' ? last : "it does not say why");
 done:
     return status;
@@ -177,7 +175,7 @@ lam_status video_write(const frame_names *names, double fps, const progress *wai
     arguments[n++] = (char *)(uintptr_t)kind->name;
     arguments[n++] = target;
     arguments[n] = NULL;
-    TRY(run(arguments, names, waiting, error));
+    TRY(run(arguments, names->path, waiting, error));
     TRY(atomic_file_commit(&out, error));
 done:
     atomic_file_abort(&out);

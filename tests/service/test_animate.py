@@ -288,7 +288,7 @@ class Animate(unittest.TestCase):
             self.assertEqual(done.returncode, 1, done.stderr)
             said = [line for line in done.stderr.splitlines() if line.startswith("lambert render: ")]
             self.assertEqual(len(said), 1, done.stderr)
-            for word in words, name, "its 1 frames are there":
+            for word in words, name, "the numbered pictures are there":
                 self.assertIn(word, said[0])
             self.assertEqual((self.at / name).read_text(), "older")
             self.assertTrue((self.at / name.replace(".mp4", "-0001.png")).exists())
