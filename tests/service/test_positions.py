@@ -147,6 +147,9 @@ class Positions(Case):
         weights = self.of_file(self.path("w.json"), {"emission": {"emitters": {"door": .5, "window": 2}}})
         must("solve", self.lit, "--emission", weights, "-o", out)
         np.testing.assert_allclose(np.load(out), w @ B, rtol=1e-5)
+        got = json.loads(must("solve", self.lit, "--emit", "door=.5", "--emit", "window=2", "--json").stdout)["error"]
+        for name in "light", "relative_mean", "indirect_mean", "emitters":
+            np.testing.assert_allclose(got[name], error[name], rtol=1e-5) if name != "light" else self.assertEqual(got[name], "own")
         self.failed("no emitter \"dor\"", "solve", self.lit, "--emit", "dor=1", "-o", out)
         self.failed("--emit door=1", "solve", self.lit)
 

@@ -1,0 +1,116 @@
+#include "solver/verbs/own_error.h"
+
+#include "solver/operator/emitters.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* The error of one vector, or of the names that are reduced: the larger figures stay. */
+static lam_status add_own_error(const stated_errors *stated, const error_scene *scene, const error_answer *of,
+                                solution *out, name_error *names, lam_error *error) {
+    const emission_size both = emission_size_sum(&of->size, &of->sky);
+    const double number = emission_size_number(&both);
+    answer_error one = {.relative = 0};
+    bool good = true;
+    if (out->n_reductions == 0) good = answer_error_of(&stated->by_group, scene, of, &one);
+    for (size_t r = 0; good && r < out->n_reductions; r++) {
+        name_error name;
+        good = name_errors_of(&stated->by_group, scene, of, &out->reductions[r].request, &name);
+        if (!good) break;
+        names[r].mean = fmax(names[r].mean, name.mean);
+        names[r].elements = fmax(names[r].elements, name.elements);
+        one.indirect = fmax(one.indirect, name.mean);
+        one.relative = fmax(one.relative, name.relative);
+    }
+    if (!good) return status_fail(error, LAM_ERR_MEMORY, "not enough memory for the error of the answer");
+    if (one.indirect >= out->indirect) out->emitters = number;
+    out->indirect = fmax(out->indirect, one.indirect);
+    out->relative = fmax(out->relative, one.relative);
+    return LAM_OK;
+}
+
+/* Replaces the error of the store by that of the answer's own light, of a batch the largest over its vectors,
+ * unless the sun itself shines or nothing is stated. */
+static lam_status take_emission(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
+                                size_t n_selected, const uint32_t *selected, solution *out,
+                                name_error **names, lam_error *error) {
+    lam_status status = LAM_OK;
+    const emission *light = &lit->light;
+    const lam_sky *sky = lit->sky;
+    const size_t n = scene->n, row = n * scene->n_channels;
+    const error_by_group *by = &stated->by_group;
+    const size_t m = sky != NULL ? lam_sky_tiles(sky) : 0, C = scene->n_channels;
+    float *H0 = NULL;
+    if (by->n_bins == 0 || out->relative < 0 || light->sun != NULL || light->E == NULL ||
+        (light->L != NULL && by->n_tiles != m))
+        return LAM_OK;
+    name_error *made = memory_allocate(out->n_reductions, sizeof *made, "errors", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    if (light->L != NULL) {
+        H0 = memory_allocate(row, sizeof *H0, "the light of the sky", error);
+        if (H0 == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    out->relative = out->indirect = 0;
+    for (size_t r = 0; r < out->n_reductions; r++) made[r].name = out->reductions[r].group;
+    for (size_t v = 0; v < out->n_vectors; v++) {
+        error_answer of = {.quantity = out->quantity,
+                           .E = light->E + (light->steady ? 0 : v * row),
+                           .H0 = H0,
+                           .count = selected != NULL ? n_selected : n,
+                           .selected = selected,
+                           .values = out->values + v * row,
+                           .whole = true,
+                           .L = light->L != NULL ? light->L + v * C * m : NULL};
+        for (size_t c = 0; c < scene->n_channels; c++)
+            emission_size_add(&of.size, n, scene->area, of.E + c * n);
+        for (size_t c = 0; light->L != NULL && c < C; c++)
+            emission_size_add(&of.sky, m, by->sky_power + c * m, light->L + (v * C + c) * m);
+        if (light->L != NULL) lam_sky_irradiance(sky, C, light->L + v * C * m, H0);
+        TRY(add_own_error(stated, scene, &of, out, made, error));
+    }
+    out->error_light = "own";
+    if (out->n_reductions > 0) out->name_errors = made;
+    *names = made;
+    made = NULL;
+done:
+    free(H0);
+    free(made);
+    return status;
+}
+
+/* The same of mixtures of emitters whose covariance is stated. */
+static lam_status take_mixture(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
+                               solution *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = scene->n, C = scene->n_channels, s = lam_operator_emitters(lit->op);
+    const emission *given = &lit->light;
+    if (stated->emitters.s == 0 || given->W == NULL || out->n_reductions > 0 || out->relative < 0)
+        return LAM_OK;
+    float *light = memory_allocate(2 * C, n * sizeof *light, "errors", error);
+    if (light == NULL) return LAM_ERR_MEMORY;
+    out->relative = out->indirect = 0;
+    for (size_t v = 0; v < out->n_vectors; v++) {
+        const float *weights = given->W + (given->steady ? 0 : v * C * s);
+        const error_answer of = {.quantity = out->quantity,
+                                 .E = light,
+                                 .H0 = light + C * n,
+                                 .count = n,
+                                 .values = out->values + v * C * n};
+        TRY(operator_emitters_light(lit->op, 1, weights, light, light + C * n, error));
+        const answer_error one = emitters_error_of(&stated->emitters, scene, &of, weights);
+        if (one.indirect >= out->indirect) out->emitters = one.emitters;
+        out->indirect = fmax(out->indirect, one.indirect);
+        out->relative = fmax(out->relative, one.relative);
+    }
+    out->error_light = "own";
+done:
+    free(light);
+    return status;
+}
+
+lam_status own_error_take(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
+                          size_t n_selected, const uint32_t *selected, solution *out, name_error **names,
+                          lam_error *error) {
+    if (lam_operator_emitters(lit->op) > 0) return take_mixture(stated, scene, lit, out, error);
+    return take_emission(stated, scene, lit, n_selected, selected, out, names, error);
+}
