@@ -20,8 +20,8 @@ void reuse_estimates_free(reuse_estimates *e) {
     *e = (reuse_estimates){.n = 0};
 }
 
-/* First rays of each position that a pilot has at most. */
-enum { PILOT = 512 };
+/* First rays of each position that a pilot has at most, and about as many of all together. */
+enum { PILOT = 512, PILOT_ALL = 30 * PILOT, PILOT_LEAST = 8 };
 
 /* All that batches share. */
 typedef struct reuse {
@@ -237,7 +237,10 @@ static void set_counts(reuse *r, size_t of_batch, const double *part) {
 /* Sets the counts of paths by a pilot of first hits, a batch that no estimate has. */
 static lam_status count_paths(reuse *r, size_t of_batch, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t twentieth = of_batch * WALK_BATCHES / 20, pilot = twentieth < PILOT ? twentieth : PILOT;
+    const size_t share = PILOT_ALL / r->s, most = share > PILOT         ? PILOT
+                                                  : share < PILOT_LEAST ? PILOT_LEAST
+                                                                        : share;
+    const size_t twentieth = of_batch * WALK_BATCHES / 20, pilot = twentieth < most ? twentieth : most;
     size_t known = 0;
     reuse_batch b = {.r = r};
     double *part = memory_allocate(r->s, sizeof *part, "paths", error);
