@@ -31,7 +31,7 @@ typedef struct answer_notes {
                              for receivers; NULL: it was built for all */
     const char *error_from; /* "sources" where a store was built for these and they alone emit; "others": not
                                they alone, and no error is stated; NULL: it was built for any emission */
-    bool by_luminance; /* a coloured sky lights a store of one channel by its luminance */
+    bool by_luminance;      /* a coloured sky lights a store of one channel by its luminance */
     bool has_time;
     double parse_ms, solve_ms, encode_ms;
     /* [n_rhs] of a refined answer, in place of the store's error, else NULL: the bound on the error of every
