@@ -13,7 +13,7 @@
 #include <string.h>
 
 /* Cells along the side of a map (C), and pixels along the top of a hemicube (D). */
-enum { MAP_CELLS = 64, CUBE_PIXELS = 256 };
+enum { MAP_CELLS = 256, CUBE_PIXELS = 256 };
 
 /* A grey scene under a coloured light has the channels of the light. */
 static lam_status take_colours(mesh *m, lam_error *error) {

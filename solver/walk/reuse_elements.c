@@ -187,16 +187,16 @@ lam_status reuse_elements(const walk_scene *s, const reuse_problem *problem, reu
     straight = memory_allocate(r.n, r.s * sizeof *straight, "paths", error);
     power = memory_allocate(r.s, sizeof *power, "paths", error);
     if (straight == NULL || power == NULL) TRY(LAM_ERR_MEMORY);
-    double begun = clock_seconds();
+    double begun = clock_processor_seconds();
     TRY(walk_direct_light(s, &direct, r.F, r.variance, error));
-    e->reuse_seconds = clock_seconds() - begun;
+    e->reuse_seconds = clock_processor_seconds() - begun;
     for (size_t k = 0; k < r.n * r.s; k++)
         straight[k] = (double)r.F[k] * m->area[k / r.s] / problem->light->area;
     if (!choose_shares(&r, power)) r.of_batch = 0; /* nothing is reflected */
     TRY(reuse_sums_create(m, problem->light, true, &sums, error));
-    begun = clock_seconds();
+    begun = clock_processor_seconds();
     TRY(run_batches(&r, straight, &sums, &rays, error));
-    e->trace_seconds = clock_seconds() - begun;
+    e->trace_seconds = clock_processor_seconds() - begun;
     reuse_sums_end(&sums, e);
     add_variance(&r, e);
     e->rays = rays / ((double)e->paths * (double)r.s);
