@@ -1,6 +1,7 @@
 #include "solver/walk/reuse.h"
 
 #include "solver/base/clock.h"
+#include "solver/base/vector3.h"
 #include "solver/walk/light_frames.h"
 #include "solver/walk/reuse_counts.h"
 #include "solver/walk/reuse_elements.h"
@@ -331,6 +332,30 @@ done:
     return status;
 }
 
+/* Times the radius of the scene: beyond, single precision has no place for points of the light. */
+static const double far_most = 1000;
+
+static lam_status check_places(const mesh *m, const moving_light *l, lam_error *error) {
+    lam_status status = LAM_OK;
+    double centre[3], radius;
+    mesh_bounds(m, centre, &radius);
+    for (size_t p = 0; p < l->n; p++)
+        for (size_t k = 0; k < l->n_corners; k++) {
+            double at[3], to[3];
+            light_pose_point(&l->pose[p], l->corner[k], at);
+            subtract3(at, centre, to);
+            const double away = sqrt(dot3(to, to));
+            if (!(away <= far_most * radius))
+                FAIL(error, LAM_ERR_ARGUMENT,
+                     "position %zu (%s): corner %zu of the light is %.3g m from the middle of the scene, "
+                     "must be "
+                     "within %.3g m",
+                     p, l->pose[p].name, k, away, far_most * radius);
+        }
+done:
+    return status;
+}
+
 lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_estimates *out,
                       lam_error *error) {
     lam_status status = LAM_OK;
@@ -342,6 +367,7 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
     if (problem->paths == 0 || light->n == 0)
         FAIL(error, LAM_ERR_ARGUMENT, "%zu paths of %zu positions: must be at least 1", problem->paths,
              light->n);
+    TRY(check_places(s->m, light, error));
     e.paths = ((problem->paths - 1) / WALK_BATCHES + 1) * WALK_BATCHES;
     const size_t of_batch = e.paths / WALK_BATCHES;
     if (!size_multiply(e.n_channels, e.n_positions, &rows) || !size_multiply(rows, e.n, &size))

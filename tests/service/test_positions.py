@@ -207,6 +207,10 @@ class Positions(Case):
         outside = [{"move": [.5, .5, .5]}, {"name": "lost", "move": [.5, .5, 3]}]
         given(light(positions=outside), "position 1 (lost)")
         given(light(positions=[{"move": [.5, .5, 1.5]}]), "inside a wall")
+        for far in 1e4, 1e30:
+            given(light(positions=[POSITIONS[0], {"name": "far", "move": [.5, .5, far]}]), "position 1 (far): corner 0")
+        large = [[-1e9, -1e9, 0], [1e9, -1e9, 0], [1e9, 1e9, 0], [-1e9, 1e9, 0]]
+        given({"light": {"polygon": large, "emission": 1}, "positions": POSITIONS}, "position 0 (door): corner 0")
         given({"light": {"polygon": [[0, 0, 0], [1, 0, 0], [2, 0, 0]], "emission": 1}, "positions": POSITIONS}, "no area")
         given({"light": {"polygon": SQUARE[:2], "emission": 1}, "positions": POSITIONS}, "3 to")
         given({"light": {"polygon": SQUARE[:3] + [[0, 0, .3]], "emission": 1}, "positions": POSITIONS}, "off the plane")
