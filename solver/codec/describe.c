@@ -141,6 +141,35 @@ done:
     return status;
 }
 
+/* The errors of every emitter, where they are stated. */
+static lam_status add_emitter_errors(store *s, json_t *figures, lam_error *error) {
+    static const char *const names[] = {"relative", "indirect"};
+    lam_status status = LAM_OK;
+    json_t *errors = NULL;
+    void *data = NULL;
+    if (!store_has(s, "/error/emitters")) return LAM_OK;
+    errors = json_object();
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
+        char path[64];
+        size_t count = SIZE_MAX;
+        snprintf(path, sizeof path, "/error/emitters/%s", names[k]);
+        TRY(store_read(s, path, STORE_F64, 1, &count, &data, error));
+        json_t *list = json_array();
+        for (size_t i = 0; i < count; i++) { /* what is no number becomes null */
+            const double x = ((const double *)data)[i];
+            json_array_append_new(list, isfinite(x) ? json_real(x) : json_null());
+        }
+        json_object_set_new(errors, names[k], list);
+        free(data);
+        data = NULL;
+    }
+    json_object_set(figures, "emitters", errors);
+done:
+    json_decref(errors);
+    free(data);
+    return status;
+}
+
 static lam_status add_error(store *s, json_t *out, lam_error *error) {
     static const char *const groups[] = {"single", "lights", "random", "whole", "sky", "mesh"};
     lam_status status = LAM_OK;
@@ -158,6 +187,7 @@ static lam_status add_error(store *s, json_t *out, lam_error *error) {
         TRY(attributes_of(s, path, &group, error));
         json_object_set_new(figures, groups[i], group);
     }
+    TRY(add_emitter_errors(s, figures, error));
     TRY(add_error_by_group(s, figures, json_object_get(out, "groups"), error));
     json_object_set(out, "error", figures);
 done:

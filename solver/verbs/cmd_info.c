@@ -167,12 +167,27 @@ static void print_error(const json_t *figures, bool sources) {
         puts("  receivers: of the light that is read, all probes together; total: of the light of all "
              "elements");
     if (sources) puts("  single, lights, random: of emissions of the sources alone");
+    if (json_object_get(figures, "emitters") != NULL) {
+        puts("  total: standard errors of random walks, of each position, of all together and of mixtures");
+        return;
+    }
     puts("  total: against an independent sample of the form factors; at most: its noise is more than a "
          "third\n"
          "  operator: against the sample that it was built from\n"
          "  +-: standard errors of the mean indirect error, by the noise of that sample and by the choice of "
          "probes");
     print_error_by_group(json_object_get(figures, "by_group"));
+}
+
+/* The first names of emitters, and how many there are. */
+static void print_emitters(const json_t *emitters) {
+    enum { MOST = 6 };
+    const size_t count = json_array_size(emitters);
+    if (count == 0) return;
+    printf("%-18s%zu:", "emitters", count);
+    for (size_t k = 0; k < count && k < MOST; k++)
+        printf("%s %s", k > 0 ? "," : "", json_string_value(json_array_get(emitters, k)));
+    puts(count > MOST ? ", ... (--json names them all)" : "");
 }
 
 /* Prints as many groups as fit on a screen: a city has hundreds of them. */
@@ -215,6 +230,7 @@ static void print_text(const json_t *about) {
     print_bytes(json_number_value(json_object_get(about, "bytes")));
     print_report(json_object_get(about, "report"));
     print_groups(json_object_get(about, "groups"));
+    print_emitters(json_object_get(about, "emitters"));
     print_sky(json_object_get(about, "sky"));
     print_elements("read", json_object_get(about, "importance"), "the light of others is only roughly right");
     print_elements("emit", json_object_get(about, "sources"),

@@ -122,6 +122,12 @@ class Positions(Case):
             named = ask({"emitters": {"window": 2, "door": .5}})
             listed = ask({"emitters": [.5, 0, 2]})
             self.assertEqual(named["radiosity"], listed["radiosity"])
+            about = d.get("/v1/scenes/box").json()
+            self.assertEqual(about["emitters"], ["door", "pose-1", "window"])
+            np.testing.assert_allclose(about["error"]["emitters"]["relative"], np.sqrt(np.diag(K)) / self.norm(B), rtol=.05)
+            text = must("info", self.lit).stdout
+            self.assertIn("standard errors of random walks", text)
+            self.assertRegex(text, "emitters +3: door, pose-1, window\n")
             np.testing.assert_allclose(named["radiosity"], w @ B, rtol=1e-5)
             error = named["error"]
             self.assertEqual(error["light"], "own")

@@ -1,35 +1,9 @@
-#include "solver/formfactor/visibility/visibility.h"
-
-#include "solver/base/clock.h"
-#include "solver/scene/facet/facet_grid.h"
-
-#include <embree3/rtcore.h>
+#include "solver/formfactor/visibility/visibility_private.h"
 
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Triangles and quads are two Embree geometries; primitives maps (geometry, primitive) to facets and
- * elements. */
-enum { TRIANGLES, QUADS, N_GEOMETRIES };
-
-/* element: the only element of its facet, else MESH_NO_VERTEX: then the piece's grid finds the element. */
-typedef struct primitive {
-    uint32_t piece, facet, element;
-} primitive;
-
-struct visibility {
-    RTCDevice device;
-    RTCScene scene;
-    const mesh *mesh;
-    size_t n_fronts; /* elements in the scene: n, or n/2 when two-sided */
-    facets facets;   /* the primitives of the acceleration structure */
-    facet_grids grids;
-    primitive *primitives[N_GEOMETRIES];
-    double centre[3];
-    float rounding; /* see visibility_rounding */
-};
 
 static lam_status device_error(const visibility *v, const char *what, lam_error *error) {
     enum RTCError code = rtcGetDeviceError(v->device);
@@ -162,12 +136,6 @@ typedef struct cast_context {
     bool cull_back;
 } cast_context;
 
-/* The component of a direction along a facet's normal: negative where the ray hits the front. */
-static float along_normal(const visibility *v, uint32_t facet, float x, float y, float z) {
-    const float *normal = v->facets.normal[facet];
-    return normal[0] * x + normal[1] * y + normal[2] * z;
-}
-
 /* The places of the arrays in Embree's packets, in units of the width: the same for packets of any width. */
 enum {
     RAY_DIRECTION = offsetof(struct RTCRay8, dir_x) / (8 * sizeof(float)),
@@ -176,10 +144,6 @@ enum {
     HIT_PRIMITIVE = offsetof(struct RTCHit8, primID) / (8 * sizeof(unsigned)),
     HIT_GEOMETRY = offsetof(struct RTCHit8, geomID) / (8 * sizeof(unsigned)),
 };
-
-static uint32_t facet_of(const visibility *v, unsigned geometry, unsigned id) {
-    return v->primitives[geometry][id].facet;
-}
 
 /* True for a hit in the ray's own plane at its origin: either the element's other side, modelled as a face of
  * its own, or the bottom of an object that stands on the element and occludes the ray by its other faces
@@ -208,24 +172,6 @@ static void refuse_own_and_culled(const struct RTCFilterFunctionNArguments *args
         if (facet == own[i] || (context->cull_back && cosine >= 0) ||
             (own[i] != VISIBILITY_NOTHING && in_own_plane(v, facet, own[i], distance[i] * fabsf(cosine))))
             args->valid[i] = 0;
-    }
-}
-
-static void packet_set(struct RTCRayHit8 *ray, const ray_packet *rays) {
-    memcpy(ray->ray.org_x, rays->origin[0], sizeof rays->origin[0]);
-    memcpy(ray->ray.org_y, rays->origin[1], sizeof rays->origin[1]);
-    memcpy(ray->ray.org_z, rays->origin[2], sizeof rays->origin[2]);
-    memcpy(ray->ray.dir_x, rays->direction[0], sizeof rays->direction[0]);
-    memcpy(ray->ray.dir_y, rays->direction[1], sizeof rays->direction[1]);
-    memcpy(ray->ray.dir_z, rays->direction[2], sizeof rays->direction[2]);
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-        ray->ray.tnear[i] = 0;
-        ray->ray.tfar[i] = INFINITY;
-        ray->ray.time[i] = 0;
-        ray->ray.mask[i] = 0xFFFFFFFFu;
-        ray->ray.flags[i] = 0;
-        ray->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-        ray->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
 }
 
@@ -492,47 +438,4 @@ unsigned visibility_between(const visibility *v, const ray_packet *segments, siz
     rtcOccluded8(active, v->scene, &context, &packet.ray);
     for (size_t i = 0; i < n_segments; i++) blocked |= (unsigned)(packet.ray.tfar[i] < 0) << i;
     return blocked;
-}
-
-/* One packet of the bare loop; with count, returns how many rays hit their own facet. */
-static size_t cast_bare(const visibility *v, const ray_packet *rays, const float nearest[VISIBILITY_PACKET],
-                        uint32_t self, bool count) {
-    static const int active[VISIBILITY_PACKET]
-        __attribute__((aligned(32))) = {-1, -1, -1, -1, -1, -1, -1, -1};
-    struct RTCRayHit8 packet __attribute__((aligned(32)));
-    struct RTCIntersectContext context;
-    size_t own = 0;
-    rtcInitIntersectContext(&context);
-    packet_set(&packet, rays);
-    memcpy(packet.ray.tnear, nearest, sizeof packet.ray.tnear);
-    rtcIntersect8(active, v->scene, &context, &packet);
-    for (size_t i = 0; i < VISIBILITY_PACKET && count; i++)
-        own += packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID &&
-               facet_of(v, packet.hit.geomID[i], packet.hit.primID[i]) == v->facets.of_element[self];
-    return own;
-}
-
-lam_status visibility_bare_seconds(const visibility *v, const ray_packet *packets, const uint32_t *self,
-                                   size_t n_packets, double *seconds, size_t *own, lam_error *error) {
-    float(*nearest)[VISIBILITY_PACKET] = memory_allocate(n_packets, sizeof *nearest, "rays", error);
-    if (nearest == NULL) return LAM_ERR_MEMORY;
-#pragma omp parallel for schedule(static)
-    for (size_t p = 0; p < n_packets; p++)
-        for (size_t i = 0; i < VISIBILITY_PACKET && self != NULL; i++) {
-            const float cosine = along_normal(v, v->facets.of_element[self[p]], packets[p].direction[0][i],
-                                              packets[p].direction[1][i], packets[p].direction[2][i]);
-            nearest[p][i] = 2 * v->rounding / fmaxf(cosine, 1e-3f);
-        }
-    const double started = clock_seconds();
-#pragma omp parallel for schedule(dynamic, 256)
-    for (size_t p = 0; p < n_packets; p++) cast_bare(v, &packets[p], nearest[p], 0, false);
-    *seconds = clock_seconds() - started;
-    if (own != NULL) {
-        size_t count = 0;
-#pragma omp parallel for schedule(dynamic, 256) reduction(+ : count)
-        for (size_t p = 0; p < n_packets; p++) count += cast_bare(v, &packets[p], nearest[p], self[p], true);
-        *own = count;
-    }
-    free(nearest);
-    return LAM_OK;
 }

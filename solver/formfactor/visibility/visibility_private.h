@@ -1,0 +1,62 @@
+/* The inside of visibility, private to visibility*.c. */
+#ifndef LAMBERT_FORMFACTOR_VISIBILITY_VISIBILITY_PRIVATE_H
+#define LAMBERT_FORMFACTOR_VISIBILITY_VISIBILITY_PRIVATE_H
+
+#include "solver/formfactor/visibility/visibility.h"
+#include "solver/scene/facet/facet_grid.h"
+
+#include <embree3/rtcore.h>
+
+#include <math.h>
+#include <string.h>
+
+/* Triangles and quads are two Embree geometries; primitives maps (geometry, primitive) to facets and
+ * elements. */
+enum { TRIANGLES, QUADS, N_GEOMETRIES };
+
+/* element: the only element of its facet, else MESH_NO_VERTEX: then the piece's grid finds the element. */
+typedef struct primitive {
+    uint32_t piece, facet, element;
+} primitive;
+
+struct visibility {
+    RTCDevice device;
+    RTCScene scene;
+    const mesh *mesh;
+    size_t n_fronts; /* elements in the scene: n, or n/2 when two-sided */
+    facets facets;   /* the primitives of the acceleration structure */
+    facet_grids grids;
+    primitive *primitives[N_GEOMETRIES];
+    double centre[3];
+    float rounding; /* see visibility_rounding */
+};
+
+/* The component of a direction along a facet's normal: negative where the ray hits the front. */
+static inline float along_normal(const visibility *v, uint32_t facet, float x, float y, float z) {
+    const float *normal = v->facets.normal[facet];
+    return normal[0] * x + normal[1] * y + normal[2] * z;
+}
+
+static inline uint32_t facet_of(const visibility *v, unsigned geometry, unsigned id) {
+    return v->primitives[geometry][id].facet;
+}
+
+static inline void packet_set(struct RTCRayHit8 *ray, const ray_packet *rays) {
+    memcpy(ray->ray.org_x, rays->origin[0], sizeof rays->origin[0]);
+    memcpy(ray->ray.org_y, rays->origin[1], sizeof rays->origin[1]);
+    memcpy(ray->ray.org_z, rays->origin[2], sizeof rays->origin[2]);
+    memcpy(ray->ray.dir_x, rays->direction[0], sizeof rays->direction[0]);
+    memcpy(ray->ray.dir_y, rays->direction[1], sizeof rays->direction[1]);
+    memcpy(ray->ray.dir_z, rays->direction[2], sizeof rays->direction[2]);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        ray->ray.tnear[i] = 0;
+        ray->ray.tfar[i] = INFINITY;
+        ray->ray.time[i] = 0;
+        ray->ray.mask[i] = 0xFFFFFFFFu;
+        ray->ray.flags[i] = 0;
+        ray->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        ray->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+}
+
+#endif
