@@ -9,7 +9,7 @@
 #include "solver/scene/mesh.h"
 
 /* Samples of a half of an estimate: rays, and places on lamps. */
-enum { GATHER_HALVES = 2, GATHER_RAYS = 32, GATHER_LAMP_SAMPLES = 32 };
+enum { GATHER_HALVES = 2, GATHER_RAYS = 64, GATHER_LAMP_SAMPLES = 32 };
 
 /* At most so many lights, and channels of all of them. */
 enum { GATHER_VALUES_MOST = 9 };
@@ -27,7 +27,7 @@ size_t gather_values(const gather *g); /* n_lights C */
 
 /* H [n_points][GATHER_HALVES][n_lights C] at points of the plane of an element. The halves are independent.
  * All points share the directions of rays and the places on lamps, which the key chooses, so that differences
- * between near points have little noise. Cost: for each point 64 rays and 16 segments. */
+ * between near points have little noise. Cost: for each point 128 rays and 64 segments. */
 void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
                double *H);
 

@@ -4,78 +4,92 @@
 #include "solver/scene/face_grid.h"
 #include "solver/scene/mesh_refined.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 mesh_cell mesh_cell_of(const mesh *m, size_t face) {
-    enum { S = MESH_CELL_STEPS };
-    const size_t n = mesh_corners(m, face);
-    if (n == 4) return (mesh_cell){(uint32_t)face, 4, {{0, 0}, {S, 0}, {S, S}, {0, S}}};
-    return (mesh_cell){(uint32_t)face, 3, {{0, 0}, {S, 0}, {0, S}, {0, 0}}};
+    mesh_cell c = {.face = (uint32_t)face, .n = (uint32_t)mesh_corners(m, face), .share = 1};
+    for (size_t k = 0; k < c.n; k++)
+        memcpy(c.corner[k], m->vertices[m->elements[face][k]], sizeof c.corner[k]);
+    return c;
 }
 
-/* False where the middle is none of the steps. */
-static bool middle(const uint16_t a[2], const uint16_t b[2], uint16_t out[2]) {
-    for (int d = 0; d < 2; d++) {
-        const unsigned sum = (unsigned)a[d] + b[d];
-        if (sum % 2 == 1) return false;
-        out[d] = (uint16_t)(sum / 2);
+enum { QUARTERS = MESH_CELL_QUARTERS };
+
+size_t mesh_cell_cuts(size_t corners, mesh_cut cuts[MESH_CUTS_MOST]) {
+    const size_t places = QUARTERS * corners;
+    size_t n = 0;
+    for (size_t from = 0; from < places; from++)
+        for (size_t to = from + 1; to < places; to++) {
+            /* corners after `from` and before `to`, and those outside */
+            const size_t between = (to + QUARTERS - 1) / QUARTERS - from / QUARTERS - 1;
+            const size_t ends = (from % QUARTERS == 0) + (to % QUARTERS == 0);
+            const size_t outside = corners - between - ends;
+            if (between < 1 || between > 2 || outside < 1 || outside > 2) continue;
+            cuts[n++] = (mesh_cut){(uint8_t)from, (uint8_t)to};
+        }
+    return n;
+}
+
+void mesh_cell_place(const mesh_cell *c, size_t place, double out[3]) {
+    const size_t k = place / QUARTERS;
+    edge_point(c->corner[k], c->corner[(k + 1) % c->n], place % QUARTERS, QUARTERS, out);
+}
+
+/* The part of a cell on the way from one place to another along its border. */
+static mesh_cell part(const mesh_cell *c, size_t from, size_t to) {
+    const size_t end = to > from ? to : to + QUARTERS * c->n;
+    mesh_cell out = {.face = c->face};
+    mesh_cell_place(c, from, out.corner[out.n++]);
+    for (size_t k = from / QUARTERS + 1; QUARTERS * k < end; k++) {
+        assert(out.n < 3);
+        memcpy(out.corner[out.n++], c->corner[k % c->n], sizeof *out.corner);
     }
+    mesh_cell_place(c, to, out.corner[out.n++]);
+    return out;
+}
+
+bool mesh_cell_cut(const mesh_cell *c, mesh_cut cut, mesh_cell out[2]) {
+    mesh_cell parts[2] = {part(c, cut.from, cut.to), part(c, cut.to, cut.from)};
+    const double first = mesh_cell_area(&parts[0]), second = mesh_cell_area(&parts[1]);
+    parts[0].share = c->share * first / (first + second);
+    parts[1].share = c->share * second / (first + second);
+    if (!(parts[0].share >= MESH_CELL_LEAST && parts[1].share >= MESH_CELL_LEAST)) return false;
+    memcpy(out, parts, sizeof parts);
     return true;
 }
 
 bool mesh_cell_halve(const mesh_cell *c, size_t side, mesh_cell out[2]) {
-    const size_t n = c->n, a = side, b = (side + 1) % n, across = n == 4 ? (side + 3) % n : 0;
-    uint16_t near[2], far[2];
-    if (!middle(c->at[a], c->at[b], near)) return false;
-    if (n == 4 && !middle(c->at[(side + 2) % n], c->at[across], far)) return false;
-    out[0] = out[1] = *c;
-    memcpy(out[0].at[b], near, sizeof near);
-    memcpy(out[1].at[a], near, sizeof near);
-    if (n == 4) {
-        memcpy(out[0].at[(side + 2) % n], far, sizeof far);
-        memcpy(out[1].at[across], far, sizeof far);
-    }
-    return true;
+    const size_t middle = QUARTERS * side + QUARTERS / 2;
+    const size_t opposite =
+        c->n == 4 ? (middle + 2 * QUARTERS) % (4 * QUARTERS) : QUARTERS * ((side + 2) % 3);
+    return mesh_cell_cut(c, (mesh_cut){(uint8_t)middle, (uint8_t)opposite}, out);
 }
 
-void mesh_cell_corners(const mesh *m, const mesh_cell *c, double corners[4][3]) {
-    double face[4][3];
-    const size_t n = c->n == 4 ? 4 : 3;
-    for (size_t k = 0; k < n; k++) memcpy(face[k], m->vertices[m->elements[c->face][k]], sizeof face[k]);
-    for (size_t k = 0; k < n; k++) {
-        const uint16_t *at = c->at[k];
-        if (n == 4)
-            grid_point(face, at[0], MESH_CELL_STEPS, at[1], MESH_CELL_STEPS, corners[k]);
-        else
-            triangle_point(face, at[0], at[1], MESH_CELL_STEPS, corners[k]);
-    }
-}
-
-double mesh_cell_area(const double corners[4][3], size_t n) {
+double mesh_cell_area(const mesh_cell *c) {
     double sum[3] = {0};
-    for (size_t k = 1; k + 1 < n; k++) {
+    for (size_t k = 1; k + 1 < c->n; k++) {
         double a[3], b[3], product[3];
-        subtract3(corners[k], corners[0], a);
-        subtract3(corners[k + 1], corners[0], b);
+        subtract3(c->corner[k], c->corner[0], a);
+        subtract3(c->corner[k + 1], c->corner[0], b);
         cross3(a, b, product);
         for (int d = 0; d < 3; d++) sum[d] += product[d] / 2;
     }
     return sqrt(dot3(sum, sum));
 }
 
-void mesh_cell_edges(const double corners[4][3], size_t n, double length[4]) {
-    for (size_t k = 0; k < n; k++) length[k] = point_distance(corners[k], corners[(k + 1) % n]);
+void mesh_cell_edges(const mesh_cell *c, double length[4]) {
+    for (size_t k = 0; k < c->n; k++) length[k] = point_distance(c->corner[k], c->corner[(k + 1) % c->n]);
 }
 
 /* Halves a cell that is larger than an area; false where it is not, or is too small. */
-static bool halve_large(const mesh *m, const mesh_cell *c, double area, mesh_cell out[2]) {
-    double corners[4][3], length[4];
+static bool halve_large(const mesh_cell *c, double area, mesh_cell out[2]) {
+    double length[4];
     size_t side = 0;
-    mesh_cell_corners(m, c, corners);
-    if (mesh_cell_area((const double(*)[3])corners, c->n) <= area) return false;
-    mesh_cell_edges((const double(*)[3])corners, c->n, length);
+    if (mesh_cell_area(c) <= area) return false;
+    mesh_cell_edges(c, length);
     for (size_t k = 1; k < (c->n == 4 ? 2u : 3u); k++)
         if (length[k] > length[side]) side = k;
     return mesh_cell_halve(c, side, out);
@@ -94,7 +108,7 @@ lam_status mesh_cells_even(const mesh *m, double area, size_t most, mesh_cell **
         next = memory_allocate(count, 2 * sizeof *next, "cells of a mesh", error);
         if (next == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t i = 0; i < count; i++) {
-            if (count + halved < most && halve_large(m, &cells[i], area, next + at)) {
+            if (count + halved < most && halve_large(&cells[i], area, next + at)) {
                 at += 2;
                 halved++;
             } else {
@@ -120,10 +134,8 @@ lam_status mesh_of_cells(const mesh *m, size_t n, const mesh_cell *cells, mesh *
     refined_mesh fine = {.n = 0};
     TRY(refined_mesh_begin(m, n, &fine, error));
     for (size_t i = 0; i < n; i++) {
-        double corners[4][3];
-        mesh_cell_corners(m, &cells[i], corners);
         fine.face[i] = cells[i].face;
-        TRY(refined_mesh_add(&fine, i, cells[i].n, (const double(*)[3])corners, error));
+        TRY(refined_mesh_add(&fine, i, cells[i].n, (const double(*)[3])cells[i].corner, error));
     }
     TRY(refined_mesh_end(&fine, m, out, error));
 done:

@@ -1,32 +1,49 @@
-/* Cells: parts of a mesh's faces, made by halving, from which a mesh of unequal elements is made. A cell
- * keeps the plane of its face. Corners that lie on a side of a neighbour stay as they are (T-vertices). */
+/* Cells: parts of a mesh's faces, made by straight cuts, from which a mesh of unequal elements is made. A
+ * cell keeps the plane of its face. Corners that lie on a side of a neighbour stay as they are (T-vertices).
+ */
 #ifndef LAMBERT_SCENE_MESH_CELLS_H
 #define LAMBERT_SCENE_MESH_CELLS_H
 
 #include "solver/scene/mesh.h"
 
-/* Corners in steps of the face: of a quad (i, j) of its bilinear grid, of a triangle towards its second and
- * third corner. */
-enum { MESH_CELL_STEPS = 1 << 15 };
 typedef struct mesh_cell {
     uint32_t face;
-    uint16_t n; /* corners, 3 or 4 */
-    uint16_t at[4][2];
+    uint32_t n;          /* corners, 3 or 4 */
+    double corner[4][3]; /* m */
+    double share;        /* of the face's area */
 } mesh_cell;
+
+/* No cell has less of its face. */
+#define MESH_CELL_LEAST 0x1p-28
 
 /* The whole of a face. */
 mesh_cell mesh_cell_of(const mesh *m, size_t face);
+
+/* A straight cut between two places on the border of a cell: place 4 k + q is q quarters of the way from
+ * corner k to the next one. */
+enum { MESH_CELL_QUARTERS = 4 };
+typedef struct mesh_cut {
+    uint8_t from, to; /* below 4 n */
+} mesh_cut;
+
+/* All cuts of a cell of 3 or 4 corners into two such cells: those between two sides, between a corner and a
+ * side, and the diagonals of a quad. Returns their number. */
+enum { MESH_CUTS_MOST = 44 };
+size_t mesh_cell_cuts(size_t corners, mesh_cut cuts[MESH_CUTS_MOST]);
+
+/* Cuts a cell. False where it is too small for it. */
+bool mesh_cell_cut(const mesh_cell *c, mesh_cut cut, mesh_cell out[2]);
 
 /* Halves a cell: a quad across its first (side 0) or its second edge (side 1), a triangle from the middle of
  * its edge `side` to the corner opposite. False where the cell is too small for it. */
 bool mesh_cell_halve(const mesh_cell *c, size_t side, mesh_cell out[2]);
 
-/* Its corners in the scene. */
-void mesh_cell_corners(const mesh *m, const mesh_cell *c, double corners[4][3]);
+/* A place on the border of a cell; from either side of an edge it has the same bits. */
+void mesh_cell_place(const mesh_cell *c, size_t place, double out[3]);
 
-/* Its area, and the lengths of its edges. */
-double mesh_cell_area(const double corners[4][3], size_t n);
-void mesh_cell_edges(const double corners[4][3], size_t n, double length[4]);
+/* The area of a cell, and the lengths of its edges. */
+double mesh_cell_area(const mesh_cell *c);
+void mesh_cell_edges(const mesh_cell *c, double length[4]);
 
 /* All faces, halved across their longest edges until no cell has more than an area, or there are `most`. The
  * cells of a face follow each other, in the order of faces. *out is freed with free(). Errors:

@@ -1,5 +1,6 @@
 #include "support/suite.h"
 
+#include "solver/base/vector3.h"
 #include "solver/scene/mesh.h"
 #include "solver/scene/mesh_cells.h"
 #include "support/scene.h"
@@ -445,26 +446,69 @@ START_TEST(dropped_elements) {
 }
 END_TEST
 
-static double cell_area(const mesh *m, const mesh_cell *c) {
-    double corners[4][3];
-    mesh_cell_corners(m, c, corners);
-    return mesh_cell_area((const double(*)[3])corners, c->n);
-}
-
-/* Halves have half of the area of a cell each, whichever side is halved, down to cells of one step. */
+/* Halves have half of the area of a cell each, whichever side is halved, down to tiny cells. */
 START_TEST(halves_of_cells_are_equal) {
     mesh m = _i == 0 ? make_cube() : make_octahedron();
     for (size_t side = 0; side < (_i == 0 ? 2u : 3u); side++) {
         mesh_cell cell = mesh_cell_of(&m, 1), halves[2];
         const double whole = m.area[1];
-        ck_assert_double_eq_tol(cell_area(&m, &cell), whole, 1e-15);
+        ck_assert_double_eq_tol(mesh_cell_area(&cell), whole, 1e-15);
         for (size_t step = 0; mesh_cell_halve(&cell, (side + step) % (_i == 0 ? 2u : 3u), halves); step++) {
-            const double area = cell_area(&m, &cell);
+            const double area = mesh_cell_area(&cell);
             for (int k = 0; k < 2; k++)
-                ck_assert_double_eq_tol(cell_area(&m, &halves[k]), area / 2, 1e-12 * whole);
+                ck_assert_double_eq_tol(mesh_cell_area(&halves[k]), area / 2, 1e-12 * whole);
             cell = halves[step % 2];
         }
-        ck_assert_double_lt(cell_area(&m, &cell), whole / (1 << 14)); /* 15 halvings of a side, at least */
+        ck_assert_double_lt(mesh_cell_area(&cell), whole * 4 * MESH_CELL_LEAST);
+        ck_assert_double_ge(cell.share, MESH_CELL_LEAST);
+    }
+    mesh_free(&m);
+}
+END_TEST
+
+/* All turns at the corners of a cell have the same sense: it is convex, and has no corner twice. */
+static void check_convex(const mesh *m, const mesh_cell *c) {
+    for (size_t k = 0; k < c->n; k++) {
+        double a[3], b[3], turn[3], along = 0;
+        subtract3(c->corner[(k + 1) % c->n], c->corner[k], a);
+        subtract3(c->corner[(k + 2) % c->n], c->corner[(k + 1) % c->n], b);
+        cross3(a, b, turn);
+        for (int d = 0; d < 3; d++) along += turn[d] * (double)m->normal[c->face][d];
+        ck_assert_double_gt(along, 0);
+    }
+}
+
+/* Every cut of a quad, of a trapezoid and of a triangle leaves two convex cells of 3 or 4 corners with the
+ * normal of the face, whose areas and shares add up and whose common side has the same bits; there are as
+ * many cuts as counted by hand: 3 x 3 between each two sides that may be joined, 3 from a corner to each side
+ * that is not its own, and two diagonals. */
+START_TEST(cuts_of_cells_add_up) {
+    mesh m = _i == 2 ? make_octahedron() : make_cube();
+    mesh_cell cell = mesh_cell_of(&m, 1), of[2], parts[2];
+    mesh_cut cuts[MESH_CUTS_MOST];
+    if (_i == 1) {
+        ck_assert(mesh_cell_cut(&cell, (mesh_cut){1, 9}, of));
+        cell = of[0];
+    }
+    const size_t n = mesh_cell_cuts(cell.n, cuts);
+    ck_assert_uint_eq(n, _i == 2 ? 3 * 9 + 3 * 3 : 2 * 9 + 4 * 2 * 3 + 2);
+    const double area = mesh_cell_area(&cell);
+    for (size_t k = 0; k < n; k++) {
+        double from[3], to[3];
+        ck_assert(mesh_cell_cut(&cell, cuts[k], parts));
+        const double first = mesh_cell_area(&parts[0]), second = mesh_cell_area(&parts[1]);
+        ck_assert_double_eq_tol(first + second, area, 1e-14 * area);
+        ck_assert_double_eq_tol(parts[0].share, cell.share * first / area, 1e-14);
+        ck_assert_double_eq_tol(parts[0].share + parts[1].share, cell.share, 1e-14);
+        mesh_cell_place(&cell, cuts[k].from, from);
+        mesh_cell_place(&cell, cuts[k].to, to);
+        for (int side = 0; side < 2; side++) {
+            ck_assert(parts[side].n == 3 || parts[side].n == 4);
+            ck_assert_uint_eq(parts[side].face, 1);
+            check_convex(&m, &parts[side]);
+            ck_assert_mem_eq(parts[side].corner[0], side == 0 ? from : to, sizeof from);
+            ck_assert_mem_eq(parts[side].corner[parts[side].n - 1], side == 0 ? to : from, sizeof from);
+        }
     }
     mesh_free(&m);
 }
@@ -523,6 +567,7 @@ int main(void) {
     tcase_add_test(tests, store_keeps_every_bit);
     tcase_add_loop_test(tests, loading_refuses_bad_values, 0, 11);
     tcase_add_loop_test(tests, halves_of_cells_are_equal, 0, 2);
+    tcase_add_loop_test(tests, cuts_of_cells_add_up, 0, 3);
     tcase_add_loop_test(tests, meshes_of_cells_cover_faces, 0, 2);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
