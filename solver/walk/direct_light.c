@@ -12,10 +12,12 @@
 /* A light is nearer than what is hit at this part of the distance to it, or behind. */
 static const float near_part = 1e-4f;
 
-/* Samples of an element and a position: of the pilot, which are not used again, and at least; at most. */
-enum { PILOT = 16, MOST = 4096 };
+/* Samples of an element and a position: of the pilot, which are not used again, and at least; at least of
+ * lights that are near, of which a pilot may miss a sliver that shines on the element; at most. */
+enum { PILOT = 16, NEAR_LEAST = 256, MOST = 4096 };
 
-/* The spread of samples over their mean that is assumed at least: few may have missed what varies. */
+/* The spread of samples over the mean without anything in between that is assumed at least: few may have
+ * missed what varies, or the only gap that light comes through. */
 static const double least_spread = .05;
 
 /* Elements between two looks at the progress. */
@@ -36,7 +38,7 @@ typedef struct direct_run {
     const direct_light_problem *problem;
     placed_light *placed; /* [s] */
     double *corners;      /* of all of them */
-    const double *all;    /* [s]: sum over elements of the root of A times variance; NULL: in the pilot */
+    const double *all;    /* [s]: see share_samples; NULL: in the pilot */
 } direct_run;
 
 /* True if no point of the element sees the front of the light, by their corners. */
@@ -125,19 +127,22 @@ static float reach(const direct_run *r, size_t position, const float *normal, co
     return cos_element > 0 && cos_light > 0 && square > 0 ? cos_element * cos_light / (square * square) : 0;
 }
 
-/* Sum over the packet of cos cos V / r^2 for points of the element and of the light; adds their squares. */
-static double shine(const direct_run *r, const element_sampler *sampler, size_t element, size_t position,
-                    double place[4][VISIBILITY_PACKET], double *squares) {
+/* Sums of cos cos V / r^2, of its square, and of cos cos / r^2. */
+typedef struct light_sums {
+    double seen, squares, open;
+} light_sums;
+
+/* Adds a packet of points of the element and of the light. */
+static void shine(const direct_run *r, const element_sampler *sampler, size_t element, size_t position,
+                  bool near, double place[4][VISIBILITY_PACKET], light_sums *sums) {
     const visibility *v = r->scene->v;
     const placed_light *p = &r->placed[position];
     const float *normal = r->scene->m->normal[element];
     const double *centre = visibility_centre(v);
-    const bool near = is_near(r, element, p);
     float kernel[VISIBILITY_PACKET], length[VISIBILITY_PACKET];
     uint32_t self[VISIBILITY_PACKET];
     ray_packet rays;
     hit_packet hits;
-    double sum = 0;
     bool any = false;
     for (size_t k = 0; k < VISIBILITY_PACKET; k++) {
         float y[3], way[3];
@@ -158,27 +163,27 @@ static double shine(const direct_run *r, const element_sampler *sampler, size_t 
         self[k] = (uint32_t)element;
         any = any || kernel[k] > 0;
     }
-    if (!any) return 0;
+    if (!any) return;
     const float rounding = (float)visibility_rounding(v);
     visibility_cast(v, &rays, VISIBILITY_PACKET, self, VISIBILITY_TOGETHER, &hits);
     for (size_t k = 0; k < VISIBILITY_PACKET; k++) {
         const bool free = hits.element[k] == VISIBILITY_NOTHING ||
                           hits.distance[k] > 1 - near_part - 4 * rounding / length[k];
+        sums->open += (double)kernel[k];
         if (!free) continue;
-        sum += (double)kernel[k];
-        *squares += (double)kernel[k] * (double)kernel[k];
+        sums->seen += (double)kernel[k];
+        sums->squares += (double)kernel[k] * (double)kernel[k];
     }
-    return sum;
 }
 
 /* Samples of a half for element i and position l: those of equal size in the pilot, later as many as lower
- * the error of the position most (Neyman 1934): by the root of A_i times the variance that the pilot found.
+ * the errors of all positions most (Neyman 1934): by the root of A_i times the variance that the pilot found.
  */
-static size_t half_for(const direct_run *r, size_t i, size_t l, double variance) {
+static size_t half_for(const direct_run *r, size_t i, size_t l, bool near, double variance) {
     if (r->all == NULL) return PILOT / 2;
     const double wanted = .5 * (double)(r->problem->samples * r->scene->m->n) *
                           sqrt(r->scene->m->area[i] * variance) / fmax(r->all[l], 1e-300);
-    size_t half = PILOT / 2;
+    size_t half = (near ? NEAR_LEAST : PILOT) / 2;
     while (half < MOST / 2 && (double)half < wanted) half *= 2;
     return half;
 }
@@ -190,25 +195,30 @@ static void light_element(const direct_run *r, size_t element, float *F, float *
     element_sampler sampler;
     element_sampler_init(&sampler, r->scene->m, r->scene->v, element, problem->seed);
     for (size_t l = 0; l < s; l++) {
-        const size_t half = half_for(r, element, l, (double)variance[l]);
+        if (faces_away(r, element, &r->placed[l])) {
+            F[l] = variance[l] = 0;
+            continue;
+        }
+        const bool near = is_near(r, element, &r->placed[l]);
+        const size_t half = half_for(r, element, l, near, (double)variance[l]);
         const double scale = problem->light->area * M_1_PI / (double)half;
-        double sums[2] = {0, 0}, squares = 0;
-        F[l] = variance[l] = 0;
-        if (faces_away(r, element, &r->placed[l])) continue;
+        light_sums sums[2] = {{.seen = 0}, {.seen = 0}};
         for (uint64_t h = 0; h < 2; h++) {
             pair_sampler places;
             pair_sampler_init(&places, problem->seed + 2 * (r->all == NULL) + h, element, l);
             for (uint32_t k = 0; k < half; k += VISIBILITY_PACKET) {
                 double place[4][VISIBILITY_PACKET];
                 pair_sampler_packet(&places, k, place);
-                sums[h] += shine(r, &sampler, element, l, place, &squares);
+                shine(r, &sampler, element, l, near, place, &sums[h]);
             }
         }
-        const double mean = scale * (sums[0] + sums[1]) / 2, difference = scale * (sums[0] - sums[1]) / 2;
-        const double of_one = scale * scale * (double)half * squares / 2 - mean * mean;
+        const double mean = scale * (sums[0].seen + sums[1].seen) / 2,
+                     difference = scale * (sums[0].seen - sums[1].seen) / 2,
+                     least = least_spread * scale * (sums[0].open + sums[1].open) / 2;
+        const double of_one =
+            scale * scale * (double)half * (sums[0].squares + sums[1].squares) / 2 - mean * mean;
         F[l] = (float)mean;
-        variance[l] = (float)(r->all == NULL ? fmax(of_one, least_spread * least_spread * mean * mean)
-                                             : difference * difference);
+        variance[l] = (float)(r->all == NULL ? fmax(of_one, least * least) : difference * difference);
     }
 }
 
@@ -272,17 +282,36 @@ done:
     return status;
 }
 
+/* all [s]: with N_l = |F_l| the squared errors over N_l^2 of all positions are least in sum if a position's
+ * element has the mean number of samples times n (A v)^1/2 / all_l, where
+ *     all_l = N_l / s sum_l' (1 / N_l') sum_i (A_i v_il')^1/2. */
+static lam_status share_samples(const direct_run *r, const float *F, const float *variance, double *all,
+                                lam_error *error) {
+    const double *area = r->scene->m->area;
+    const size_t n = r->scene->m->n, s = r->problem->light->n;
+    double *norm = memory_allocate(s, sizeof *norm, "positions", error), sum = 0;
+    if (norm == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < n * s; k++) {
+        all[k % s] += sqrt(area[k / s] * (double)variance[k]);
+        norm[k % s] += area[k / s] * (double)F[k] * (double)F[k];
+    }
+    for (size_t l = 0; l < s; l++)
+        if (norm[l] > 0) sum += all[l] / sqrt(norm[l]);
+    for (size_t l = 0; l < s; l++) all[l] = sqrt(norm[l]) * sum / (double)s;
+    free(norm);
+    return LAM_OK;
+}
+
 lam_status walk_direct_light(const walk_scene *s, const direct_light_problem *problem, float *F,
                              float *variance, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = s->m->n, positions = problem->light->n;
+    const size_t positions = problem->light->n;
     direct_run r = {.scene = s, .problem = problem};
     double *all = memory_allocate(positions, sizeof *all, "positions", error);
     if (all == NULL) TRY(LAM_ERR_MEMORY);
     TRY(place_lights(&r, error));
     TRY(light_all(&r, F, variance, error));
-    for (size_t k = 0; k < n * positions; k++)
-        all[k % positions] += sqrt(s->m->area[k / positions] * (double)variance[k]);
+    TRY(share_samples(&r, F, variance, all, error));
     r.all = all;
     TRY(light_all(&r, F, variance, error));
 done:
