@@ -155,7 +155,7 @@ static lam_status add_emitter_errors(store *s, json_t *figures, lam_error *error
         snprintf(path, sizeof path, "/error/emitters/%s", names[k]);
         TRY(store_read(s, path, STORE_F64, 1, &count, &data, error));
         json_t *list = json_array();
-        for (size_t i = 0; i < count; i++) { /* what is no number becomes null */
+        for (size_t i = 0; i < count; i++) { /* an error that is no number becomes null */
             const double x = ((const double *)data)[i];
             json_array_append_new(list, isfinite(x) ? json_real(x) : json_null());
         }
