@@ -67,19 +67,6 @@ static const char missing[] =
 /* Residual at which the light of an emitter counts as converged: a few units of single precision. */
 static const double tolerance = 1e-6;
 
-static lam_status copy_names(const emitter_source *from, char ***names, lam_error *error) {
-    size_t bytes = from->s * sizeof(char *);
-    for (size_t k = 0; k < from->s; k++) bytes += strlen(from->names[k]) + 1;
-    *names = memory_allocate(bytes, 1, "names of emitters", error);
-    if (*names == NULL) return LAM_ERR_MEMORY;
-    char *text = (char *)(*names + from->s);
-    for (size_t k = 0; k < from->s; k++) {
-        (*names)[k] = text;
-        text = stpcpy(text, from->names[k]) + 1;
-    }
-    return LAM_OK;
-}
-
 /* The emission of the elements themselves, without the zeros. */
 static lam_status gather_emission(const build_problem *problem, emitter_arrays *a, lam_error *error) {
     const size_t n = problem->n, C = problem->n_channels, s = a->s;
@@ -136,7 +123,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     (void)own;
     if (problem->emitters == NULL) FAIL(error, LAM_ERR_ARGUMENT, "%s", missing);
     const size_t s = a.s = problem->emitters->s;
-    TRY(copy_names(problem->emitters, &a.names, error));
+    TRY(emitter_names_copy(s, problem->emitters->names, &a.names, error));
     TRY(gather_emission(problem, &a, error));
     TRY(gather_sky(problem, &a, error));
     a.T = memory_allocate(C * s, n * sizeof *a.T, "light of emitters", error);

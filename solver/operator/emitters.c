@@ -11,6 +11,19 @@
 #include <stdlib.h>
 #include <string.h>
 
+lam_status emitter_names_copy(size_t s, const char *const *names, char ***out, lam_error *error) {
+    size_t bytes = s * sizeof(char *);
+    for (size_t k = 0; k < s; k++) bytes += strlen(names[k]) + 1;
+    *out = memory_allocate(bytes, 1, "names of emitters", error);
+    if (*out == NULL) return LAM_ERR_MEMORY;
+    char *text = (char *)(*out + s);
+    for (size_t k = 0; k < s; k++) {
+        (*out)[k] = text;
+        text = stpcpy(text, names[k]) + 1;
+    }
+    return LAM_OK;
+}
+
 void emitter_arrays_free(emitter_arrays *a) {
     free(a->names);
     free(a->T);

@@ -21,6 +21,9 @@ typedef struct emitter_arrays {
     float *exitance; /* [C], with direct: W/m^2 of such an emitter of weight 1 */
 } emitter_arrays;
 
+/* Copies s names into one block, freed by one free(). Errors: LAM_ERR_MEMORY. */
+lam_status emitter_names_copy(size_t s, const char *const *names, char ***out, lam_error *error);
+
 void emitter_arrays_free(emitter_arrays *arrays);
 
 /* The answer to weights w is sum_k w_k B_k. Takes over what arrays points to, also on an error, and zeroes

@@ -100,16 +100,12 @@ done:
 }
 
 static lam_status copy_names(const moving_light *l, char ***names, lam_error *error) {
-    size_t bytes = l->n * sizeof(char *);
-    for (size_t k = 0; k < l->n; k++) bytes += strlen(l->pose[k].name) + 1;
-    *names = memory_allocate(bytes, 1, "names of positions", error);
-    if (*names == NULL) return LAM_ERR_MEMORY;
-    char *text = (char *)(*names + l->n);
-    for (size_t k = 0; k < l->n; k++) {
-        (*names)[k] = text;
-        text = stpcpy(text, l->pose[k].name) + 1;
-    }
-    return LAM_OK;
+    const char **list = memory_allocate(l->n, sizeof *list, "names of positions", error);
+    if (list == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < l->n; k++) list[k] = l->pose[k].name;
+    const lam_status status = emitter_names_copy(l->n, list, names, error);
+    free(list);
+    return status;
 }
 
 /* No element emits: the light is no part of the mesh. */
