@@ -17,6 +17,8 @@ void reuse_estimates_free(reuse_estimates *e) {
     free(e->error);
     free(e->direct);
     free(e->covariance);
+    free(e->of_groups);
+    free(e->of_means);
     free(e->count);
     *e = (reuse_estimates){.n = 0};
 }
@@ -375,6 +377,12 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
     e.H = memory_allocate(size, sizeof *e.H, "paths", error);
     e.error = memory_allocate(size, sizeof *e.error, "paths", error);
     e.direct = memory_allocate(e.n_positions, e.n * sizeof *e.direct, "paths", error);
+    const size_t by_group = reuse_sums_groups(s->m, e.n_positions);
+    if (by_group > 0) {
+        e.of_groups = memory_allocate(by_group, sizeof *e.of_groups, "paths", error);
+        e.of_means = memory_allocate(by_group, sizeof *e.of_means, "paths", error);
+        if (e.of_groups == NULL || e.of_means == NULL) TRY(LAM_ERR_MEMORY);
+    }
     e.covariance = memory_allocate(e.n_positions, e.n_positions * sizeof *e.covariance, "paths", error);
     r.frames = memory_allocate(e.n_positions, sizeof *r.frames, "paths", error);
     r.of_batch = memory_allocate(e.n_positions, sizeof *r.of_batch, "paths", error);

@@ -40,6 +40,9 @@ typedef struct reuse_estimates {
      * from batches. The radiosity of a mix of the positions with weights w has the standard error sqrt(w' K
      * w) in the norm |B|^2 = sum over channels and elements of area B^2. */
     double *covariance;
+    double *of_groups; /* [groups][s][s]: the same of each group of the mesh, which add up to it; and of the
+                          mean radiosity of a group, summed over channels. NULL: there are too many groups */
+    double *of_means;
     double rays;                                       /* of a path, mean, the first one included */
     double maps_seconds, trace_seconds, reuse_seconds; /* processor time of all threads */
 } reuse_estimates;

@@ -68,15 +68,19 @@ static bool choose_shares(const shared *r, double *power) {
     return walk_accumulate(r->n, r->share, r->before) > 0;
 }
 
+/* The weight of a walk that leaves element i has all of its power but the parts of positions, F[i]. */
 static bool start(void *context, walker *w) {
     shared_batch *b = context;
-    const mesh *m = b->r->scene->m;
+    const shared *r = b->r;
+    const mesh *m = r->scene->m;
     size_t k = 0;
     double most = 0;
-    if (!walk_starts_next(&b->starts, b->r->before, b->r->n, w, &k)) return false;
+    if (!walk_starts_next(&b->starts, r->before, r->n, w, &k)) return false;
+    const double power =
+        m->area[k] * r->before[r->n] / (r->share[k] * (double)r->of_batch * r->problem->light->area);
     w->at = w->path = (uint32_t)k;
-    for (size_t c = 0; c < b->r->C; c++) {
-        w->weight[c] = (double)m->reflectance[c * m->n + k];
+    for (size_t c = 0; c < r->C; c++) {
+        w->weight[c] = power * (double)m->reflectance[c * m->n + k];
         most = fmax(most, w->weight[c]);
     }
     return most > 0;
@@ -84,22 +88,7 @@ static bool start(void *context, walker *w) {
 
 static void arrive(void *context, size_t n, const walker *w, const uint32_t *element) {
     const shared_batch *b = context;
-    const shared *r = b->r;
-    const size_t s = r->s, C = r->C;
-    for (size_t k = 0; k < n; k++) {
-        const size_t i = w[k].path;
-        const float *const F = r->F + i * s;
-        const double scale = r->scene->m->area[i] * r->before[r->n] /
-                             (r->share[i] * (double)r->of_batch * r->problem->light->area);
-        if (element[k] == VISIBILITY_NOTHING) continue;
-        double *const later = b->later + (size_t)element[k] * C * s;
-        for (size_t c = 0; c < C; c++) {
-            const double power = scale * w[k].weight[c];
-            double *const out = later + c * s;
-#pragma omp simd
-            for (size_t l = 0; l < s; l++) out[l] += power * (double)F[l];
-        }
-    }
+    reuse_deposit(n, b->r->s, b->r->C, w, element, b->r->F, b->later);
 }
 
 /* straight [n][s]: the direct light as reuse_sums takes it. */
@@ -143,8 +132,11 @@ done:
 }
 
 /* The error of the direct light comes to that of the walks, independent for every element and position. */
-static void add_variance(const shared *r, reuse_estimates *e) {
+static lam_status add_variance(const shared *r, reuse_estimates *e, lam_error *error) {
     const mesh *m = r->scene->m;
+    double *area = memory_allocate(m->n_groups, sizeof *area, "paths", error);
+    if (area == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; e->of_groups != NULL && i < r->n; i++) area[m->group[i]] += m->area[i];
     for (size_t i = 0; i < r->n; i++)
         for (size_t c = 0; c < r->C; c++) {
             const double power = r->problem->light->emission[c];
@@ -153,9 +145,16 @@ static void add_variance(const shared *r, reuse_estimates *e) {
                 const double variance = power * power * (double)r->variance[i * r->s + l];
                 float *const at = &e->error[(c * r->s + l) * r->n + i];
                 *at = (float)sqrt((double)*at * (double)*at + variance);
-                e->covariance[l * r->s + l] += m->area[i] * rho * rho * variance;
+                const double square = m->area[i] * rho * rho * variance;
+                e->covariance[l * r->s + l] += square;
+                if (e->of_groups == NULL) continue;
+                const size_t at_group = (m->group[i] * r->s + l) * r->s + l;
+                e->of_groups[at_group] += square;
+                e->of_means[at_group] += square * m->area[i] / (area[m->group[i]] * area[m->group[i]]);
             }
         }
+    free(area);
+    return LAM_OK;
 }
 
 static lam_status shared_create(shared *r, lam_error *error) {
@@ -198,7 +197,7 @@ lam_status reuse_elements(const walk_scene *s, const reuse_problem *problem, reu
     TRY(run_batches(&r, straight, &sums, &rays, error));
     e->trace_seconds = clock_processor_seconds() - begun;
     reuse_sums_end(&sums, e);
-    add_variance(&r, e);
+    TRY(add_variance(&r, e, error));
     e->rays = rays / ((double)e->paths * (double)r.s);
 done:
     free(r.F);

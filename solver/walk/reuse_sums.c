@@ -8,8 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows that go into the covariance together: one pass over it for all. */
-enum { SUMS_ROWS = 8 };
+/* Rows that go into the covariance together: one pass over it for all. Numbers of the covariances of groups
+ * at most. */
+enum { SUMS_ROWS = 8, SUMS_GROUPS_MOST = 1 << 18 };
 
 #define CPU_KERNELS "solver/walk/reuse_sums_kernels.inc"
 #include "solver/base/cpu_kernels.inc"
@@ -28,9 +29,20 @@ void reuse_sums_free(reuse_sums *t) {
     free(t->square);
     free(t->direct);
     free(t->covariance);
+    free(t->means);
+    free(t->group_area);
+    free(t->deviation);
     free(t->left);
     free(t->right);
     *t = (reuse_sums){.s = 0};
+}
+
+size_t reuse_sums_groups(const mesh *m, size_t s) {
+    return m->n_groups > 0 && s * s <= SUMS_GROUPS_MOST / m->n_groups ? m->n_groups * s * s : 0;
+}
+
+static size_t group_of(const reuse_sums *t, size_t element) {
+    return t->groups > 1 ? t->m->group[element] : 0;
 }
 
 lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shared, reuse_sums *out,
@@ -42,11 +54,16 @@ lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shar
     t.mean = memory_allocate(size, sizeof *t.mean, "paths", error);
     t.square = memory_allocate(size, sizeof *t.square, "paths", error);
     t.direct = memory_allocate(m->n, s * sizeof *t.direct, "paths", error);
-    t.covariance = memory_allocate(s, s * sizeof *t.covariance, "paths", error);
+    t.groups = reuse_sums_groups(m, s) > 0 ? m->n_groups : 1;
+    t.covariance = memory_allocate(t.groups, s * s * sizeof *t.covariance, "paths", error);
+    t.means = memory_allocate(t.groups, s * s * sizeof *t.means, "paths", error);
+    t.group_area = memory_allocate(t.groups, sizeof *t.group_area, "paths", error);
+    t.deviation = memory_allocate(t.groups, m->n_channels * s * sizeof *t.deviation, "paths", error);
     t.left = memory_allocate(SUMS_ROWS, s * sizeof *t.left, "paths", error);
     t.right = memory_allocate(SUMS_ROWS, s * sizeof *t.right, "paths", error);
     if (t.gain == NULL || t.norm == NULL || t.mean == NULL || t.square == NULL || t.direct == NULL ||
-        t.covariance == NULL || t.left == NULL || t.right == NULL) {
+        t.covariance == NULL || t.means == NULL || t.group_area == NULL || t.deviation == NULL ||
+        t.left == NULL || t.right == NULL) {
         reuse_sums_free(&t);
         return LAM_ERR_MEMORY;
     }
@@ -56,8 +73,25 @@ lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shar
             t.gain[i * m->n_channels + c] = light->emission[c] * light->area / m->area[i];
             t.norm[i * m->n_channels + c] = m->area[i] * rho * rho;
         }
+    for (size_t i = 0; i < m->n; i++) t.group_area[group_of(&t, i)] += m->area[i];
     *out = t;
     return LAM_OK;
+}
+
+/* The batch's deviations of the means of groups. */
+static void add_means(reuse_sums *t) {
+    const size_t s = t->s, C = t->m->n_channels;
+    const double step = 1 / (double)t->batches;
+    for (size_t g = 0; g < t->groups; g++)
+        for (size_t c = 0; c < C; c++) {
+            const double *d = t->deviation + (g * C + c) * s;
+            const double factor = (1 - step) / (t->group_area[g] * t->group_area[g]);
+            double *const K = t->means + g * s * s;
+            for (size_t j = 0; j < s; j++)
+                for (size_t l = j; l < s && t->shared; l++) K[j * s + l] += factor * d[j] * d[l];
+            for (size_t l = 0; l < s && !t->shared; l++) K[l * s + l] += factor * d[l] * d[l];
+        }
+    memset(t->deviation, 0, t->groups * C * s * sizeof *t->deviation);
 }
 
 static void add_alone(reuse_sums *t, const double *first, const double *later) {
@@ -66,8 +100,10 @@ static void add_alone(reuse_sums *t, const double *first, const double *later) {
     for (size_t l = 0; l < t->s; l++) {
         const double *const straight = first + l * n, *const reflected = later + l * n * C;
         double *const mean = t->mean + l * n * C, *const square = t->square + l * n * C;
-        double *const direct = t->direct + l * n, spread = 0;
+        double *const direct = t->direct + l * n;
         for (size_t i = 0; i < n; i++) {
+            const size_t g = group_of(t, i);
+            double spread = 0;
             direct[i] += straight[i];
             for (size_t k = i * C; k < (i + 1) * C; k++) {
                 const double off = t->gain[k] * (straight[i] + reflected[k]) - mean[k];
@@ -75,24 +111,38 @@ static void add_alone(reuse_sums *t, const double *first, const double *later) {
                 mean[k] += step * off;
                 square[k] += more;
                 spread += t->norm[k] * more;
+                t->deviation[(g * C + k - i * C) * t->s + l] += sqrt(t->norm[k] * t->m->area[i]) * off;
             }
+            t->covariance[(g * t->s + l) * t->s + l] += spread;
         }
-        t->covariance[l * t->s + l] += spread;
     }
+}
+
+typedef void outer(size_t, const double *, const double *, double *);
+
+/* The rows that wait go into the covariance of a group. */
+static void add_rows(reuse_sums *t, outer *product, size_t group, size_t *rows) {
+    const size_t s = t->s;
+    if (*rows == 0) return;
+    memset(t->left + *rows * s, 0, (SUMS_ROWS - *rows) * s * sizeof *t->left);
+    product(s, t->left, t->right, t->covariance + group * s * s);
+    *rows = 0;
 }
 
 static void add_shared(reuse_sums *t, const double *first, const double *later) {
     typedef void move_mean(size_t, double, double, const double *, const double *, double *, double *,
                            double *);
-    typedef void outer(size_t, const double *, const double *, double *);
     static move_mean *const moves[] = CPU_TABLE(move_portable, move_avx2, move_avx512);
     static outer *const outers[] = CPU_TABLE(outer_portable, outer_avx2, outer_avx512);
     const cpu_level level = cpu_best();
     const mesh *m = t->m;
     const size_t s = t->s, C = m->n_channels;
     const double step = 1 / (double)t->batches;
-    size_t rows = 0;
+    size_t rows = 0, group = 0;
     for (size_t i = 0; i < m->n; i++) {
+        const size_t own = group_of(t, i);
+        if (own != group) add_rows(t, outers[level], group, &rows);
+        group = own;
         for (size_t l = 0; l < s; l++) t->direct[i * s + l] += first[i * s + l];
         for (size_t c = 0; c < C; c++) {
             const size_t at = (i * C + c) * s;
@@ -100,15 +150,14 @@ static void add_shared(reuse_sums *t, const double *first, const double *later) 
             double *const left = t->left + rows * s, *const right = t->right + rows * s;
             moves[level](s, t->gain[i * C + c], step, first + i * s, later + at, t->mean + at, t->square + at,
                          right);
+            double *const deviation = t->deviation + (group * C + c) * s;
+            const double share = sqrt(t->norm[i * C + c] * m->area[i]);
             for (size_t l = 0; l < s; l++) left[l] = factor * right[l];
-            if (++rows < SUMS_ROWS) continue;
-            outers[level](s, t->left, t->right, t->covariance);
-            rows = 0;
+            for (size_t l = 0; l < s; l++) deviation[l] += share * right[l];
+            if (++rows == SUMS_ROWS) add_rows(t, outers[level], group, &rows);
         }
     }
-    if (rows == 0) return;
-    memset(t->left + rows * s, 0, (SUMS_ROWS - rows) * s * sizeof *t->left);
-    outers[level](s, t->left, t->right, t->covariance);
+    add_rows(t, outers[level], group, &rows);
 }
 
 void reuse_sums_add(reuse_sums *t, const double *first, const double *later) {
@@ -117,6 +166,7 @@ void reuse_sums_add(reuse_sums *t, const double *first, const double *later) {
         add_shared(t, first, later);
     else
         add_alone(t, first, later);
+    add_means(t);
 }
 
 void reuse_sums_end(const reuse_sums *t, reuse_estimates *e) {
@@ -135,7 +185,16 @@ void reuse_sums_end(const reuse_sums *t, reuse_estimates *e) {
                 e->error[to] = (float)sqrt(t->square[from] * of_mean);
             }
     }
-    for (size_t j = 0; j < s; j++)
-        for (size_t l = j; l < s; l++)
-            e->covariance[j * s + l] = e->covariance[l * s + j] = t->covariance[j * s + l] * of_mean;
+    memset(e->covariance, 0, s * s * sizeof *e->covariance);
+    for (size_t g = 0; g < t->groups; g++)
+        for (size_t j = 0; j < s; j++)
+            for (size_t l = j; l < s; l++) {
+                const size_t from = (g * s + j) * s + l, mirror = (g * s + l) * s + j;
+                const double own = t->covariance[from] * of_mean;
+                e->covariance[j * s + l] += own;
+                e->covariance[l * s + j] = e->covariance[j * s + l];
+                if (e->of_groups == NULL) continue;
+                e->of_groups[from] = e->of_groups[mirror] = own;
+                e->of_means[from] = e->of_means[mirror] = t->means[from] * of_mean;
+            }
 }

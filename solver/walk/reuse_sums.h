@@ -14,13 +14,17 @@ typedef struct reuse_sums {
     const mesh *m;
     const moving_light *light;
     size_t s, batches;
-    bool shared;          /* positions share paths: without that no two of them are correlated */
-    double *gain;         /* [n][C] power of the light over the area of the element */
-    double *norm;         /* [n][C] area rho^2 */
-    double *mean;         /* [n][C][s] or [s][n][C] W/m2 */
-    double *square;       /* the same: the diagonal */
-    double *direct;       /* [n][s] or [s][n]: sum over batches */
-    double *covariance;   /* [s][s]: sum over channels and elements with area rho^2, upper triangle */
+    bool shared;        /* positions share paths: without that no two of them are correlated */
+    double *gain;       /* [n][C] power of the light over the area of the element */
+    double *norm;       /* [n][C] area rho^2 */
+    double *mean;       /* [n][C][s] or [s][n][C] W/m2 */
+    double *square;     /* the same: the diagonal */
+    double *direct;     /* [n][s] or [s][n]: sum over batches */
+    size_t groups;      /* of the mesh, or 1 where they are too many to be kept apart */
+    double *covariance; /* [groups][s][s]: sum over channels and elements with area rho^2, upper triangle */
+    double *means; /* [groups][s][s] of the mean radiosity of a group, summed over channels; NULL with 1 */
+    double *group_area;   /* [groups] */
+    double *deviation;    /* [groups][C][s]: of a batch, sum A rho d */
     double *left, *right; /* [SUMS_ROWS][s]: rows of d that wait for the covariance, left with its factor */
 } reuse_sums;
 
@@ -38,7 +42,10 @@ void reuse_sums_add(reuse_sums *t, const double *first, const double *later);
 void reuse_deposit(size_t n, size_t s, size_t C, const walker *w, const uint32_t *element,
                    const float *weight, double *later);
 
-/* Writes H, error, covariance and direct of the estimates, which the caller has allocated. */
+/* Numbers of the covariances of the groups of a mesh; 0 where they are not kept apart. */
+size_t reuse_sums_groups(const mesh *m, size_t s);
+
+/* Writes H, error, direct and covariances of the estimates, which the caller has allocated. */
 void reuse_sums_end(const reuse_sums *t, reuse_estimates *e);
 
 #endif
