@@ -3,6 +3,7 @@
 #include "server/queue/batch.h"
 #include "server/scene/map_guard.h"
 #include "solver/codec/describe.h"
+#include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
 #include "store/store.h"
@@ -107,7 +108,11 @@ static lam_status find_groups(const scene *made,
 static lam_status read_errors(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     const error_scene about = scene_for_errors(made);
-    TRY(stated_errors_read(s, &about, made->n_emitters, &made->errors, error));
+    const emitters *few = operator_emitters_of(made->op);
+    emitters_light light = {.s = 0};
+    if (few != NULL)
+        light = (emitters_light){.s = few->a.s, .direct = few->a.direct, .exitance = few->a.exitance};
+    TRY(stated_errors_read(s, &about, &light, &made->errors, error));
     if (made->errors.read != NULL) TRY(find_groups(made, stated_errors_others, &made->group_read, error));
     if (made->errors.emits != NULL)
         TRY(find_groups(made, stated_errors_strangers, &made->group_emits, error));

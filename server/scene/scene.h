@@ -96,10 +96,10 @@ error_scene scene_for_errors(const scene *s);
 bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0,
                           const float *values, answer_notes *notes, name_error **names);
 
-/* The same of a store of emitters that states their covariance, for weights W [n_rhs][C][s] and whole
- * answers, [n_rhs][C][n]. O(n_rhs (C n s + s^2)). False when memory is short. */
+/* The same of a store of emitters that states their covariance, for weights W [n_rhs][C][s]. O(n_rhs (C n s +
+ * g s^2)). False when memory is short. */
 bool scene_note_emitters_error(const scene *s, const radiosity_request *request, const float *W,
-                               const float *values, answer_notes *notes);
+                               const float *values, answer_notes *notes, name_error **names);
 
 /* The same of a linear reduction, name by name; means are [n_rhs][C]. The notes refer to it until it is
  * freed. */

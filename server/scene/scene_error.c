@@ -146,29 +146,77 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     return good;
 }
 
+static bool is_in_name(const reduce_name *name, size_t group) {
+    for (size_t g = 0; g < name->n_groups; g++)
+        if (name->groups[g] == group) return true;
+    return false;
+}
+
+/* The means [C] over a name of values [C][count] of the elements selected, or of all. */
+static void mean_of_values(const scene *s, const radiosity_request *request, const reduce_name *name,
+                           const float *values, double *mean) {
+    const size_t C = s->n_channels, count = request->select ? request->n_selected : s->n;
+    const emitters_error *e = &s->errors.emitters;
+    double area = 0;
+    for (size_t c = 0; c < C; c++) mean[c] = 0;
+    for (size_t k = 0; k < count; k++) {
+        const size_t i = request->select ? request->selected[k] : k;
+        if (!is_in_name(name, e->group[i])) continue;
+        area += s->area[i];
+        for (size_t c = 0; c < C; c++) mean[c] += s->area[i] * (double)values[c * count + k];
+    }
+    for (size_t c = 0; area > 0 && c < C; c++) mean[c] /= area;
+}
+
+static void take_name(const emitters_error *e, size_t n_channels, const float *weights, const name_error *one,
+                      size_t k, name_error *names, answer_notes *notes) {
+    const answer_error mean = {one->relative, one->mean, emitters_error_number(e, n_channels, weights)};
+    take_error(&mean, notes);
+    if (is_larger(one->mean, names[k].mean)) names[k].mean = one->mean;
+    if (is_larger(one->elements, names[k].elements)) names[k].elements = one->elements;
+}
+
 bool scene_note_emitters_error(const scene *s, const radiosity_request *request, const float *W,
-                               const float *values, answer_notes *notes) {
+                               const float *values, answer_notes *notes, name_error **names) {
     const error_scene about = scene_for_errors(s);
-    const size_t C = s->n_channels, vector = C * s->n;
+    const emitters_error *e = &s->errors.emitters;
+    const reduce_request *reduce = &request->reduce;
+    const size_t C = s->n_channels, vector = C * s->n, count = request->select ? request->n_selected : s->n;
     answer_notes made = *notes;
-    if (s->errors.emitters.s == 0 || request->select || request->reduce.on || !notes->has_error) return true;
+    *names = NULL;
+    if (e->s == 0 || !notes->has_error ||
+        ((request->select || reduce->on) && !emitters_error_knows_groups(e)))
+        return true;
     float *light = memory_allocate(2, vector * sizeof *light, "errors", NULL);
-    bool good = light != NULL;
-    begin_own(&request->reduce, NULL, &made);
+    double *mean = memory_allocate(C, sizeof *mean, "errors", NULL);
+    name_error *const kept = memory_allocate(reduce->n_names, sizeof *kept, "errors", NULL);
+    bool good = light != NULL && mean != NULL && kept != NULL;
+    if (good) begin_own(reduce, kept, &made);
     for (size_t v = 0; good && v < request->n_rhs; v++) {
-        const float *weights = W + v * C * s->n_emitters;
+        const float *weights = W + v * C * s->n_emitters, *own = values + v * C * count;
+        for (size_t k = 0; reduce->on && k < reduce->n_names; k++) {
+            mean_of_values(s, request, &reduce->names[k], own, mean);
+            const name_error one =
+                emitters_error_of_name(e, C, request->quantity, &reduce->names[k], weights, mean);
+            take_name(e, C, weights, &one, k, kept, &made);
+        }
+        if (reduce->on) continue;
         const error_answer of = {.quantity = request->quantity,
                                  .E = light,
                                  .H0 = light + vector,
-                                 .count = s->n,
-                                 .values = values + v * vector};
+                                 .count = count,
+                                 .selected = request->select ? request->selected : NULL,
+                                 .values = own};
         good = operator_emitters_light(s->op, 1, weights, light, light + vector, NULL) == LAM_OK;
         if (!good) break;
-        const answer_error one = emitters_error_of(&s->errors.emitters, &about, &of, weights);
+        const answer_error one = emitters_error_of(e, &about, &of, weights);
         take_error(&one, &made);
     }
     if (good) *notes = made;
+    if (good) *names = kept;
+    if (!good) free(kept);
     free(light);
+    free(mean);
     return good;
 }
 
@@ -198,12 +246,6 @@ static void size_of_spots(const scene *s, const radiosity_request *request, doub
         for (size_t c = 0; c < C; c++)
             emission_size_add(&size[v], s->n, s->area, request->E + (v * C + c) * s->n);
     }
-}
-
-static bool is_in_name(const reduce_name *name, size_t group) {
-    for (size_t g = 0; g < name->n_groups; g++)
-        if (name->groups[g] == group) return true;
-    return false;
 }
 
 /* emission [n_rhs][C]: means over the name. */
@@ -260,6 +302,13 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
     const reduce_request *reduce = &request->reduce;
     mean_errors made = {.names = NULL};
     *out = made;
+    if (emitters_error_knows_groups(&s->errors.emitters) && notes->has_error) {
+        made.names = memory_allocate(reduce->n_names, sizeof *made.names, "errors", NULL);
+        if (made.names == NULL) return false;
+        begin_own(reduce, made.names, notes);
+        *out = made;
+        return true;
+    }
     if (!has_own_error(s, request, notes)) return true;
     const size_t rows = request->n_rhs * s->n_channels;
     made.names = memory_allocate(reduce->n_names, sizeof *made.names, "errors", NULL);
@@ -280,6 +329,16 @@ void scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
     const reduce_name *name = &request->reduce.names[k];
     const size_t C = s->n_channels;
     if (to->names == NULL) return;
+    if (s->n_emitters > 0) {
+        const emitters_error *e = &s->errors.emitters;
+        for (size_t v = 0; v < request->emitters.n; v++) {
+            const float *weights = request->emitters.values + v * C * s->n_emitters;
+            const name_error one =
+                emitters_error_of_name(e, C, request->quantity, name, weights, means + v * C);
+            take_name(e, C, weights, &one, k, to->names, notes);
+        }
+        return;
+    }
     double *const direct = to->emission + request->n_rhs * C;
     emission_of_name(s, request, name, to->emission);
     direct_of_name(s, request, name, direct);

@@ -325,11 +325,15 @@ static void add_bin(const error_by_group *e, const light_sizes *size, size_t bin
 }
 
 /* reflected2, radiosity2: squares of the means over the name. */
+name_error name_error_of_squares(double mean2, double elements2, double reflected2, double radiosity2) {
+    return (name_error){.mean = ratio(mean2, reflected2),
+                        .elements = ratio(elements2, reflected2),
+                        .relative = ratio(mean2, radiosity2)};
+}
+
 static name_error finish_name(const name_sums *s, double reflected2, double radiosity2) {
     if (!(s->area > 0)) return (name_error){.mean = 0};
-    return (name_error){.mean = ratio(s->mean2 / s->area, reflected2),
-                        .elements = ratio(s->elements2 / s->area, reflected2),
-                        .relative = ratio(s->mean2 / s->area, radiosity2)};
+    return name_error_of_squares(s->mean2 / s->area, s->elements2 / s->area, reflected2, radiosity2);
 }
 
 bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,

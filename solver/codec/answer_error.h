@@ -106,6 +106,9 @@ typedef struct name_error {
 bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                     const reduce_request *names, name_error *errors);
 
+/* Of squared errors of the mean and of the elements of a name, and of the squares of its mean light. */
+name_error name_error_of_squares(double mean2, double elements2, double reflected2, double radiosity2);
+
 /* The same of one name, by its means, [C] each, of the quantity, of the emission, and of the direct light of
  * the sky. Cost: O(C groups of the name), and under a sky n_tiles times as much. */
 typedef struct name_means {

@@ -1,50 +1,174 @@
 #include "solver/codec/emitters_error.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
-#define COVARIANCE "/error/emitters/covariance"
+#define GROUP "/error/emitters"
 
 void emitters_error_free(emitters_error *e) {
     free(e->covariance);
+    free(e->of_groups);
+    free(e->of_means);
+    free(e->area);
+    free(e->reflectance);
+    free(e->direct);
+    free(e->exitance);
+    free(e->group);
     *e = (emitters_error){.s = 0};
 }
 
-lam_status emitters_error_read(store *s, size_t n_emitters, emitters_error *out, lam_error *error) {
+static lam_status read_finite(store *s, const char *name, int rank, size_t *dims, double **out,
+                              lam_error *error) {
     lam_status status = LAM_OK;
+    char path[64];
     void *data = NULL;
-    size_t dims[STORE_MAX_RANK] = {n_emitters, n_emitters};
-    *out = (emitters_error){.s = 0};
-    if (n_emitters == 0 || !store_has(s, COVARIANCE)) return LAM_OK;
-    TRY(store_read(s, COVARIANCE, STORE_F64, 2, dims, &data, error));
-    const double *K = data;
-    for (size_t k = 0; k < n_emitters * n_emitters; k++)
-        if (!isfinite(K[k]))
-            FAIL(error, LAM_ERR_FORMAT, "%s: " COVARIANCE "[%zu] is not finite", store_path(s), k);
-    *out = (emitters_error){.s = n_emitters, .covariance = data};
-    data = NULL;
+    size_t count = 1;
+    snprintf(path, sizeof path, GROUP "/%s", name);
+    TRY(store_read(s, path, STORE_F64, rank, dims, &data, error));
+    *out = data;
+    for (int d = 0; d < rank; d++) count *= dims[d];
+    for (size_t k = 0; k < count; k++)
+        if (!isfinite((*out)[k]))
+            FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu] is not finite", store_path(s), path, k);
 done:
-    free(data);
     return status;
+}
+
+/* What is known of groups beside their covariances. */
+static lam_status sum_groups(const error_scene *scene, const emitters_light *light, emitters_error *e,
+                             lam_error *error) {
+    const group_index *groups = scene->groups;
+    const size_t G = e->n_groups = groups->n_groups, C = scene->n_channels, s = e->s, n = scene->n;
+    e->area = memory_allocate(G, sizeof *e->area, "errors of emitters", error);
+    e->reflectance = memory_allocate(G, C * sizeof *e->reflectance, "errors of emitters", error);
+    e->direct = memory_allocate(G, s * sizeof *e->direct, "errors of emitters", error);
+    e->exitance = memory_allocate(C, sizeof *e->exitance, "errors of emitters", error);
+    e->group = memory_allocate(n, sizeof *e->group, "errors of emitters", error);
+    if (e->area == NULL || e->reflectance == NULL || e->direct == NULL || e->exitance == NULL ||
+        e->group == NULL)
+        return LAM_ERR_MEMORY;
+    for (size_t c = 0; c < C; c++) e->exitance[c] = (double)light->exitance[c];
+    for (size_t g = 0; g < G; g++) {
+        for (uint32_t at = groups->start[g]; at < groups->start[g + 1]; at++) {
+            const size_t i = groups->elements[at];
+            e->group[i] = (uint32_t)g;
+            e->area[g] += scene->area[i];
+            for (size_t c = 0; c < C; c++)
+                e->reflectance[c * G + g] += scene->area[i] * (double)scene->reflectance[c * n + i];
+            for (size_t k = 0; k < s; k++)
+                e->direct[g * s + k] += scene->area[i] * (double)light->direct[k * n + i];
+        }
+        for (size_t c = 0; e->area[g] > 0 && c < C; c++) e->reflectance[c * G + g] /= e->area[g];
+        for (size_t k = 0; e->area[g] > 0 && k < s; k++) e->direct[g * s + k] /= e->area[g];
+    }
+    return LAM_OK;
+}
+
+lam_status emitters_error_read(store *s, const error_scene *scene, const emitters_light *light,
+                               emitters_error *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t count = light->s;
+    emitters_error e = {.s = count};
+    *out = (emitters_error){.s = 0};
+    if (light->direct == NULL || !store_has(s, GROUP "/covariance")) return LAM_OK;
+    TRY(read_finite(s, "covariance", 2, (size_t[]){count, count}, &e.covariance, error));
+    if (store_has(s, GROUP "/groups")) {
+        const size_t G = scene->groups->n_groups;
+        TRY(read_finite(s, "groups", 3, (size_t[]){G, count, count}, &e.of_groups, error));
+        TRY(read_finite(s, "group_means", 3, (size_t[]){G, count, count}, &e.of_means, error));
+        TRY(sum_groups(scene, light, &e, error));
+    }
+    *out = e;
+    e = (emitters_error){.s = 0};
+done:
+    emitters_error_free(&e);
+    return status;
+}
+
+bool emitters_error_knows_groups(const emitters_error *e) {
+    return e->of_groups != NULL;
+}
+
+static double weight(const emitters_error *e, size_t n_channels, const float *W, size_t k) {
+    double most = 0;
+    for (size_t c = 0; c < n_channels; c++) most = fmax(most, (double)W[c * e->s + k]);
+    return most;
+}
+
+/* w' K w */
+static double square(const emitters_error *e, size_t n_channels, const double *K, const float *W) {
+    const size_t s = e->s;
+    double sum = 0;
+    for (size_t j = 0; j < s; j++) {
+        const double own = weight(e, n_channels, W, j);
+        double row = 0;
+        for (size_t l = 0; own > 0 && l < s; l++) {
+            const double other = weight(e, n_channels, W, l);
+            if (other > 0) row += K[j * s + l] * other;
+        }
+        sum += own * row;
+    }
+    return fmax(sum, 0);
+}
+
+double emitters_error_number(const emitters_error *e, size_t n_channels, const float *W) {
+    double power = 0, squares = 0;
+    for (size_t k = 0; k < e->s; k++) {
+        const double own = weight(e, n_channels, W, k);
+        power += own;
+        squares += own * own;
+    }
+    return squares > 0 ? power * power / squares : 0;
+}
+
+/* The squared error of the elements of a group that are selected, with their areas. */
+static double selected_square(const emitters_error *e, const error_scene *scene, const error_answer *of,
+                              const float *W) {
+    const size_t s = e->s;
+    double sum = 0;
+    for (size_t g = 0; g < e->n_groups; g++) {
+        double area = 0;
+        for (size_t k = 0; k < of->count; k++)
+            if (e->group[of->selected[k]] == g) area += scene->area[of->selected[k]];
+        if (area > 0) sum += area / e->area[g] * square(e, scene->n_channels, e->of_groups + g * s * s, W);
+    }
+    return sum;
 }
 
 answer_error emitters_error_of(const emitters_error *e, const error_scene *scene, const error_answer *of,
                                const float *W) {
-    const size_t s = e->s, C = scene->n_channels;
-    double off = 0, power = 0, squares = 0;
-    for (size_t j = 0; j < s; j++) {
-        double row = 0, own = 0;
-        for (size_t c = 0; c < C; c++) own = fmax(own, (double)W[c * s + j]);
-        for (size_t l = 0; own > 0 && l < s; l++) {
-            double other = 0;
-            for (size_t c = 0; c < C; c++) other = fmax(other, (double)W[c * s + l]);
-            row += e->covariance[j * s + l] * other;
-        }
-        off += own * row;
-        power += own;
-        squares += own * own;
-    }
-    answer_error made = answer_error_of_square(scene, of, fmax(off, 0));
-    made.emitters = squares > 0 ? power * power / squares : 0;
+    const double off = of->selected != NULL ? selected_square(e, scene, of, W)
+                                            : square(e, scene->n_channels, e->covariance, W);
+    answer_error made = answer_error_of_square(scene, of, off);
+    made.emitters = emitters_error_number(e, scene->n_channels, W);
     return made;
+}
+
+name_error emitters_error_of_name(const emitters_error *e, size_t n_channels, lam_quantity quantity,
+                                  const reduce_name *name, const float *W, const double *mean) {
+    const size_t s = e->s, G = e->n_groups;
+    double area = 0, off = 0, elements2 = 0, reflected2 = 0, radiosity2 = 0;
+    for (size_t k = 0; k < name->n_groups; k++) {
+        const size_t g = name->groups[k];
+        area += e->area[g];
+        off += e->area[g] * sqrt(square(e, n_channels, e->of_means + g * s * s, W));
+        elements2 += square(e, n_channels, e->of_groups + g * s * s, W);
+    }
+    if (!(area > 0)) return (name_error){.mean = 0};
+    for (size_t c = 0; c < n_channels; c++) {
+        double direct = 0, rho = 0;
+        for (size_t k = 0; k < name->n_groups; k++) {
+            const size_t g = name->groups[k];
+            rho += e->area[g] / area * e->reflectance[c * G + g];
+            for (size_t l = 0; l < s; l++)
+                direct += e->area[g] / area * (double)W[c * s + l] * e->exitance[c] * e->direct[g * s + l];
+        }
+        const double r = quantity == LAM_INDIRECT     ? mean[c]
+                         : quantity == LAM_IRRADIANCE ? rho * (mean[c] - direct)
+                                                      : mean[c] - rho * direct;
+        reflected2 += r * r;
+        radiosity2 += (r + rho * direct) * (r + rho * direct);
+    }
+    return name_error_of_squares(off * off / (area * area), elements2 / area, reflected2, radiosity2);
 }

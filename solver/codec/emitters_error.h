@@ -1,23 +1,52 @@
-/* The errors of mixtures of the emitters of a store, from the covariance that it states (/error/emitters). */
+/* The errors of mixtures of the emitters of a store, from the covariances that it states (/error/emitters).
+ */
 #ifndef LAMBERT_CODEC_EMITTERS_ERROR_H
 #define LAMBERT_CODEC_EMITTERS_ERROR_H
 
 #include "solver/codec/answer_error.h"
 
-/* Zeroed: a store that states none. */
+/* Weights w have the mean squared error w' K w, channels stacked, of all elements (K, with areas), of those
+ * of a group (K_g), and of the mean of a group (M_g). Zeroed: a store that states none. */
 typedef struct emitters_error {
-    size_t s;
-    double *covariance; /* [s][s], (W/m^2)^2 m^2: w' K w is the mean of |B~ - B|^2 of weights w */
+    size_t s, n_groups;
+    double *covariance; /* [s][s] */
+    double *of_groups;  /* [n_groups][s][s]; NULL: the store does not have them */
+    double *of_means;   /* the same, with it */
+    /* Of groups, with of_groups: areas, mean reflectances [C][n_groups], and the mean irradiance that
+     * emitters outside the mesh give directly, [n_groups][s] of 1 W/m^2. */
+    double *area, *reflectance, *direct;
+    double *exitance; /* [C], W/m^2 of weight 1 */
+    uint32_t *group;  /* [n] */
 } emitters_error;
+
+/* The light of emitters outside the mesh, as the operator has it. */
+typedef struct emitters_light {
+    size_t s;
+    const float *direct, *exitance; /* [s][n], [C]; NULL: there are none */
+} emitters_light;
 
 void emitters_error_free(emitters_error *e);
 
-/* Errors: LAM_ERR_FORMAT, LAM_ERR_MEMORY. *out is zeroed where the store has no such figures. */
-lam_status emitters_error_read(store *s, size_t n_emitters, emitters_error *out, lam_error *error);
+/* Errors: LAM_ERR_FORMAT, LAM_ERR_MEMORY. *out is zeroed where the store has no such figures, or the emitters
+ * are elements or tiles. O(n s). */
+lam_status emitters_error_read(store *s, const error_scene *scene, const emitters_light *light,
+                               emitters_error *out, lam_error *error);
 
-/* The error of an answer for all elements to weights W [C][s]: of each emitter the largest over channels. The
- * size of the emission in `of` is not used. O(C n + s^2). */
+/* True if the error of an answer for some elements or of names can be told, too. */
+bool emitters_error_knows_groups(const emitters_error *e);
+
+/* The error of an answer to weights W [C][s]: of each emitter the largest over channels. The size of the
+ * emission in `of` is not used; of elements that are selected, those of a group have the error that its
+ * elements have on average. O(C count + g s^2). */
 answer_error emitters_error_of(const emitters_error *e, const error_scene *scene, const error_answer *of,
                                const float *W);
+
+/* The effective number of emitters, (sum w)^2 / sum w^2. */
+double emitters_error_number(const emitters_error *e, size_t n_channels, const float *W);
+
+/* The error of one name of a reduction, by the mean [C] of the quantity over it. Errors of the means of
+ * several groups add up. O(s^2 groups of the name). */
+name_error emitters_error_of_name(const emitters_error *e, size_t n_channels, lam_quantity quantity,
+                                  const reduce_name *name, const float *W, const double *mean);
 
 #endif

@@ -46,8 +46,8 @@ static lam_status find_members(const float *weights, size_t n, bool **out, lam_e
     return LAM_OK;
 }
 
-lam_status stated_errors_read(store *s, const error_scene *scene, size_t n_emitters, stated_errors *out,
-                              lam_error *error) {
+lam_status stated_errors_read(store *s, const error_scene *scene, const emitters_light *light,
+                              stated_errors *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = scene->n;
     error_scene about = *scene;
@@ -61,7 +61,7 @@ lam_status stated_errors_read(store *s, const error_scene *scene, size_t n_emitt
     if (made.read != NULL) made.receivers = read_error(s, "receivers_relative", "receivers_indirect");
     about.read = made.read;
     TRY(error_by_group_read(s, &about, &made.by_group, error));
-    TRY(emitters_error_read(s, n_emitters, &made.emitters, error));
+    TRY(emitters_error_read(s, &about, light, &made.emitters, error));
     *out = made;
     made = (stated_errors){.n = 0};
 done:

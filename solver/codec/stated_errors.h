@@ -29,11 +29,11 @@ typedef struct stated_errors {
 
 void stated_errors_free(stated_errors *e);
 
-/* Reads those of a store of this scene, `read` of which is not used, and of its operator's n_emitters
+/* Reads those of a store of this scene, `read` of which is not used, and of the light of its operator's
  * emitters. A figure that is missing or no finite number is not known. Errors: those of importance_load and
  * error_by_group_read; LAM_ERR_MEMORY. */
-lam_status stated_errors_read(store *s, const error_scene *scene, size_t n_emitters, stated_errors *out,
-                              lam_error *error);
+lam_status stated_errors_read(store *s, const error_scene *scene, const emitters_light *light,
+                              stated_errors *out, lam_error *error);
 
 /* The number among count elements that are no receivers; selected NULL: the first count elements. 0 where
  * the store was built for all. O(count). */

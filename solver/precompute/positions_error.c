@@ -157,6 +157,11 @@ lam_status state_save_positions(const precompute_state *state, store *s, lam_err
     if (state->position_errors == NULL) return LAM_OK;
     TRY(save_light(&state->light, e->n_channels, s, error));
     TRY(store_write(s, "/error/emitters/covariance", STORE_F64, 2, dims, e->covariance, error));
+    if (e->of_groups != NULL) {
+        const size_t by_group[3] = {state->m.n_groups, positions, positions};
+        TRY(store_write(s, "/error/emitters/groups", STORE_F64, 3, by_group, e->of_groups, error));
+        TRY(store_write(s, "/error/emitters/group_means", STORE_F64, 3, by_group, e->of_means, error));
+    }
     TRY(store_write(s, "/error/emitters/relative", STORE_F64, 1, &positions, state->position_errors, error));
     TRY(store_write(s, "/error/emitters/indirect", STORE_F64, 1, &positions,
                     state->position_errors + positions, error));

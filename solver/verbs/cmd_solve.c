@@ -281,7 +281,8 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     /* With --reduce only figures are written, also with -o. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     about.groups = &lit.scene.groups;
-    TRY(stated_errors_read(s, &about, lam_operator_emitters(lit.op), &stated, error));
+    const emitters_light outside = own_error_light(lit.op);
+    TRY(stated_errors_read(s, &about, &outside, &stated, error));
     about.read = stated.read;
     if (f->weather != NULL) {
         const weather_options hours = {.path = f->weather,

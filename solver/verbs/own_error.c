@@ -78,32 +78,73 @@ done:
     return status;
 }
 
+emitters_light own_error_light(const lam_operator *op) {
+    const emitters *few = operator_emitters_of(op);
+    if (few == NULL) return (emitters_light){.s = 0};
+    return (emitters_light){.s = few->a.s, .direct = few->a.direct, .exitance = few->a.exitance};
+}
+
+/* Means [C] of the values of a vector over a name. */
+static void mean_of_name(const error_scene *scene, const reduce_name *name, const float *values,
+                         double *mean) {
+    double area = 0;
+    for (size_t c = 0; c < scene->n_channels; c++) mean[c] = 0;
+    for (size_t g = 0; g < name->n_groups; g++)
+        for (uint32_t at = scene->groups->start[name->groups[g]];
+             at < scene->groups->start[name->groups[g] + 1]; at++) {
+            const size_t i = scene->groups->elements[at];
+            area += scene->area[i];
+            for (size_t c = 0; c < scene->n_channels; c++)
+                mean[c] += scene->area[i] * (double)values[c * scene->n + i];
+        }
+    for (size_t c = 0; area > 0 && c < scene->n_channels; c++) mean[c] /= area;
+}
+
 /* The same of mixtures of emitters whose covariance is stated. */
 static lam_status take_mixture(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
-                               solution *out, lam_error *error) {
+                               solution *out, name_error **names, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = scene->n, C = scene->n_channels, s = lam_operator_emitters(lit->op);
+    const emitters_error *e = &stated->emitters;
     const emission *given = &lit->light;
-    if (stated->emitters.s == 0 || given->W == NULL || out->n_reductions > 0 || out->relative < 0)
+    if (e->s == 0 || given->W == NULL || out->relative < 0 ||
+        (out->n_reductions > 0 && !emitters_error_knows_groups(e)))
         return LAM_OK;
+    name_error *made = memory_allocate(out->n_reductions, sizeof *made, "errors", error);
+    double *mean = memory_allocate(C, sizeof *mean, "errors", error);
     float *light = memory_allocate(2 * C, n * sizeof *light, "errors", error);
-    if (light == NULL) return LAM_ERR_MEMORY;
+    if (made == NULL || mean == NULL || light == NULL) TRY(LAM_ERR_MEMORY);
     out->relative = out->indirect = 0;
+    for (size_t r = 0; r < out->n_reductions; r++) made[r].name = out->reductions[r].group;
     for (size_t v = 0; v < out->n_vectors; v++) {
-        const float *weights = given->W + (given->steady ? 0 : v * C * s);
-        const error_answer of = {.quantity = out->quantity,
-                                 .E = light,
-                                 .H0 = light + C * n,
-                                 .count = n,
-                                 .values = out->values + v * C * n};
-        TRY(operator_emitters_light(lit->op, 1, weights, light, light + C * n, error));
-        const answer_error one = emitters_error_of(&stated->emitters, scene, &of, weights);
+        const float *weights = given->W + (given->steady ? 0 : v * C * s), *values = out->values + v * C * n;
+        const error_answer of = {
+            .quantity = out->quantity, .E = light, .H0 = light + C * n, .count = n, .values = values};
+        answer_error one = {.emitters = emitters_error_number(e, C, weights)};
+        if (out->n_reductions == 0) {
+            TRY(operator_emitters_light(lit->op, 1, weights, light, light + C * n, error));
+            one = emitters_error_of(e, scene, &of, weights);
+        }
+        for (size_t r = 0; r < out->n_reductions; r++) {
+            const reduce_name *name = &out->reductions[r].request.names[0];
+            mean_of_name(scene, name, values, mean);
+            const name_error own = emitters_error_of_name(e, C, out->quantity, name, weights, mean);
+            made[r].mean = fmax(made[r].mean, own.mean);
+            made[r].elements = fmax(made[r].elements, own.elements);
+            one.indirect = fmax(one.indirect, own.mean);
+            one.relative = fmax(one.relative, own.relative);
+        }
         if (one.indirect >= out->indirect) out->emitters = one.emitters;
         out->indirect = fmax(out->indirect, one.indirect);
         out->relative = fmax(out->relative, one.relative);
     }
     out->error_light = "own";
+    if (out->n_reductions > 0) out->name_errors = made;
+    *names = made;
+    made = NULL;
 done:
+    free(made);
+    free(mean);
     free(light);
     return status;
 }
@@ -111,6 +152,6 @@ done:
 lam_status own_error_take(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
                           size_t n_selected, const uint32_t *selected, solution *out, name_error **names,
                           lam_error *error) {
-    if (lam_operator_emitters(lit->op) > 0) return take_mixture(stated, scene, lit, out, error);
+    if (lam_operator_emitters(lit->op) > 0) return take_mixture(stated, scene, lit, out, names, error);
     return take_emission(stated, scene, lit, n_selected, selected, out, names, error);
 }

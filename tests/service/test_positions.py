@@ -159,6 +159,49 @@ class Positions(Case):
         self.failed("no emitter \"dor\"", "solve", self.lit, "--emit", "dor=1", "-o", out)
         self.failed("--emit door=1", "solve", self.lit)
 
+    def test_errors_of_what_is_selected_and_reduced(self):
+        with h5py.File(self.lit) as h5:
+            B, direct = h5["operator/B"][0], h5["operator/direct"][:]
+            K, M = h5["error/emitters/groups"][:], h5["error/emitters/group_means"][:]
+            whole, group = h5["error/emitters/covariance"][:], h5["mesh/group"][:]
+            names = list(h5["mesh/group_names"].asstr())
+        np.testing.assert_allclose(K.sum(0), whole, rtol=1e-9)
+        w = np.array([.5, 0, 2])
+        g, h = names.index("floor"), names.index("wall-x0")
+        inside, other = group == g, group == h
+        bounced = w @ (B - .5 * 4 * direct)
+
+        def of_mean(squares, groups):
+            area = self.area[np.isin(group, groups)]
+            return np.sqrt(squares / max((self.area * bounced)[np.isin(group, groups)].sum()**2 / area.sum()**2 - squares, 0))
+        mean = of_mean(w @ M[g] @ w, [g])
+        elements = of_mean(w @ K[g] @ w / self.area[inside].sum(), [g])
+        with Daemon(self.lit) as d:
+            def ask(**more):
+                answer = d.radiosity("box", {"emission": {"emitters": {"door": .5, "window": 2}}, **more})
+                self.assertEqual(answer.status, 200, answer)
+                self.assertEqual(answer.json()["error"]["light"], "own")
+                return answer.json()["error"]
+            for figures in ["mean"], ["max", "mean"]:  # by adjoint rows, and by values
+                for quantity in "radiosity", "irradiance", "indirect":
+                    error = ask(reduce={"groups": ["floor"], "with": figures}, quantity=quantity)
+                    np.testing.assert_allclose(error["groups"]["floor"]["mean"], mean, rtol=1e-3)
+                    np.testing.assert_allclose(error["groups"]["floor"]["elements"], elements, rtol=1e-3)
+                    np.testing.assert_allclose(error["indirect_mean"], mean, rtol=1e-3)
+            some = np.flatnonzero(inside)[:5].tolist() + np.flatnonzero(other)[:3].tolist()
+            off2 = (w @ K[g] @ w * self.area[some[:5]].sum() / self.area[inside].sum()
+                    + w @ K[h] @ w * self.area[some[5:]].sum() / self.area[other].sum())
+            error = ask(select={"elements": some})
+            light2 = (self.area * (w @ B)**2)[some].sum()
+            np.testing.assert_allclose(error["relative_mean"], np.sqrt(off2 / (light2 - off2)), rtol=1e-3)
+        got = json.loads(must("solve", self.lit, "--emit", "door=.5", "--emit", "window=2", "--reduce", "floor=mean", "--json").stdout)
+        np.testing.assert_allclose(got["error"]["groups"]["floor"]["mean"], mean, rtol=1e-3)
+        # The truth lies within what is stated: of means the error of 20,000 paths, four standard errors.
+        for k in range(len(names)):
+            members = group == k
+            off = (self.area * (w @ (B - 2 * self.truth)))[members].sum() / self.area[members].sum()
+            self.assertLess(abs(off), 4 * np.sqrt(w @ M[k] @ w) + 2e-3 * (w @ B)[members].mean(), names[k])
+
     def test_paths_are_divided_evenly(self):
         path = [{"move": [.2, .2, .8], "turn": DOWN}, {"move": [.8, .2, .8], "turn": DOWN},
                 {"move": [.8, .8, .6], "turn": {"axis": [1, 0, 0], "degrees": 90}}]
