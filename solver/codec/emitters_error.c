@@ -35,7 +35,7 @@ done:
     return status;
 }
 
-/* What is known of groups beside their covariances. */
+/* The areas, reflectances and direct light of groups. */
 static lam_status sum_groups(const error_scene *scene, const emitters_light *light, emitters_error *e,
                              lam_error *error) {
     const group_index *groups = scene->groups;

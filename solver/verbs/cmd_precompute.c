@@ -202,21 +202,36 @@ static bool unused_by_form_factors(const char *name, const precompute_options *o
     return false;
 }
 
+/* The same of positions of a light. */
+static bool unused_by_positions(const char *name) {
+    static const char *const names[] = {"form-factors", "resolution", "quality",         "ground-albedo",
+                                        "rays",         "epsilon",    "store-precision", "scratch",
+                                        "probes",       "trials"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strcmp(name, names[i]) == 0) return true;
+    return false;
+}
+
 /* Names the options that had no effect. */
 static void log_unused(terminal *t, const option_result *given, const precompute_options *o,
                        const precompute_result *result) {
     char list[256] = "";
+    const bool walked = emitters_are_positions(emitters_options_of(&o->build));
     size_t length = 0;
     for (size_t i = 0; i < given->n_given; i++) {
         const char *name = given->given[i];
-        if (!unused_by_form_factors(name, o) || length + strlen(name) + 5 > sizeof list) continue;
+        if (!(walked ? unused_by_positions(name) : unused_by_form_factors(name, o)) ||
+            length + strlen(name) + 5 > sizeof list)
+            continue;
         length += (size_t)sprintf(list + length, "%s--%s", length > 0 ? ", " : "", name);
     }
     if (length > 0)
         terminal_log(t, "%s%s does not use %s",
-                     o->from_store ? "a store with form factors" : "--form-factors ",
-                     o->from_store ? "" : o->form_factors, list);
-    if (result->unused[0] != '\0')
+                     walked          ? "a light that moves"
+                     : o->from_store ? "a store with form factors"
+                                     : "--form-factors ",
+                     walked || o->from_store ? "" : o->form_factors, list);
+    if (result->unused[0] != '\0' && !walked)
         terminal_log(t, "%s does not use %s", result->report.method, result->unused);
 }
 

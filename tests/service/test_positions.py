@@ -231,6 +231,12 @@ class Positions(Case):
         with h5py.File(one) as a, h5py.File(two) as b:
             for name in "operator/B", "operator/direct", "error/emitters/covariance":
                 np.testing.assert_array_equal(a[name][:], b[name][:])
+        done = must("precompute", self.box, "--positions", self.file, "--paths", 320, "--rays", 64, "--epsilon", .1, "--two-sided", "-o", two)
+        self.assertIn("a light that moves does not use --rays, --epsilon", done.stderr)
+        with h5py.File(two) as b:
+            sides = b["operator/direct"][:].reshape(3, 2, -1)
+        self.assertFalse(sides[:, 1].any())
+        np.testing.assert_allclose(self.norm(sides[:, 0]), self.norm(self.direct), rtol=.05)
         coloured = self.of_file(self.path("c.json"), light([4, 0, 2], positions=POSITIONS))
         must("precompute", self.box, "--positions", coloured, "--paths", 320, "-o", two)
         with h5py.File(one) as a, h5py.File(two) as b:
