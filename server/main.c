@@ -53,11 +53,22 @@ done:
     return status;
 }
 
+/* True if a signal that ends the program waits beside others: sigwait gives the lowest number first, which is
+ * SIGHUP. */
+static bool is_ended(void) {
+    const struct timespec now = {.tv_nsec = 0};
+    sigset_t ends;
+    sigemptyset(&ends);
+    sigaddset(&ends, SIGINT);
+    sigaddset(&ends, SIGTERM);
+    return sigtimedwait(&ends, NULL, &now) > 0;
+}
+
 /* Reads the stores again on every SIGHUP until another signal comes. */
 static void serve_until_signal(service *s, const sigset_t *signals) {
     int signal_number = 0;
     for (;;) {
-        if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP) return;
+        if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP || is_ended()) return;
         size_t served = catalog_reload(s->catalog);
         printf("reloaded: %zu scene%s\n", served, served == 1 ? "" : "s");
         fflush(stdout);
@@ -80,7 +91,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     service s = {.config = c};
     http *h = NULL;
     int listen_fd = -1;
-    bool bound = false;
+    unix_socket own = {.path = NULL};
     char where[256];
     const char **labels = memory_allocate(route_label_count(), sizeof *labels, "routes", error);
     if (labels == NULL) return LAM_ERR_MEMORY;
@@ -93,9 +104,8 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     TRY(variants_start(c, s.catalog, &s.variants, error));
     TRY(batch_start(c->threads, c->max_inflight, &s.queue, error));
     TRY(c->unix_path != NULL
-            ? connections_listen_unix(c->unix_path, &listen_fd, where, sizeof where, error)
+            ? connections_listen_unix(c->unix_path, &listen_fd, where, sizeof where, &own, error)
             : connections_listen_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
-    bound = true;
     TRY(http_start(&s, listen_fd, &h, error));
     if (catalog_reload(s.catalog) == 0) FAIL(error, LAM_ERR_IO, "no store can be served");
     atomic_store(&s.state, SERVICE_READY);
@@ -103,6 +113,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     fflush(stdout);
     serve_until_signal(&s, signals);
     http_quiesce(h);
+    connections_unlink(&own);
     atomic_store(&s.state, SERVICE_DRAINING);
     variants_close(s.variants);
     drain(&s, signals);
@@ -114,7 +125,7 @@ done:
     catalog_destroy(s.catalog);
     metrics_destroy(s.metrics);
     if (s.access_log != NULL && s.access_log != stdout) fclose(s.access_log);
-    if (bound && c->unix_path != NULL) unlink(c->unix_path);
+    connections_unlink(&own);
     free(labels);
     return status;
 }

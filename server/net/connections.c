@@ -79,7 +79,7 @@ done:
 }
 
 lam_status connections_listen_unix(const char *path, int *fd, char *where, size_t where_size,
-                                   lam_error *error) {
+                                   unix_socket *own, lam_error *error) {
     lam_status status = LAM_OK;
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     struct stat there;
@@ -98,11 +98,21 @@ lam_status connections_listen_unix(const char *path, int *fd, char *where, size_
     if (s < 0 || bind(s, (struct sockaddr *)&address, sizeof address) != 0 || listen(s, BACKLOG) != 0)
         FAIL(error, LAM_ERR_IO, "cannot listen on %s: %s", path, strerror(errno));
     snprintf(where, where_size, "unix:%s", path);
+    if (lstat(path, &there) == 0)
+        *own = (unix_socket){.path = path, .device = there.st_dev, .inode = there.st_ino};
     *fd = s;
     s = -1;
 done:
     if (s >= 0) close(s);
     return status;
+}
+
+void connections_unlink(unix_socket *own) {
+    struct stat there;
+    if (own->path != NULL && lstat(own->path, &there) == 0 && there.st_dev == own->device &&
+        there.st_ino == own->inode)
+        unlink(own->path);
+    own->path = NULL;
 }
 
 /* Descriptors for other than connections: standard streams, the listening socket, epoll, stores being read,

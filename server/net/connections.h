@@ -34,9 +34,20 @@ lam_status connections_affordable(size_t wanted, size_t *most, lam_error *error)
 lam_status connections_listen_tcp(const char *address, int *fd, char *where, size_t where_size,
                                   lam_error *error);
 
-/* Listens on a socket at path, which the caller unlinks in the end; one without a listener is replaced. */
+/* A socket in the file system: its path, and the file that was bound there. */
+typedef struct unix_socket {
+    const char *path; /* NULL: none */
+    uint64_t device, inode;
+} unix_socket;
+
+/* Listens on a socket at path; one without a listener is replaced. own is for connections_unlink; its path is
+ * the caller's. */
 lam_status connections_listen_unix(const char *path, int *fd, char *where, size_t where_size,
-                                   lam_error *error);
+                                   unix_socket *own, lam_error *error);
+
+/* Removes the socket, once, unless the path is that of another one by now: a successor may have taken it over
+ * as soon as this program stopped to listen. */
+void connections_unlink(unix_socket *own);
 
 /* Starts a thread that checks all connections once a second. */
 lam_status connections_start(const connection_limits *limits, connections **out, lam_error *error);

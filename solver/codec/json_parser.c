@@ -6,19 +6,29 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 
 #define LEAST_SIZE ((size_t)64)
 
-/* The slot of an index, or the free one where it belongs: the high bits of a multiplicative hash, then one
- * after the other. At most half of the slots are taken, so that there is one. */
+/* The slot of an index, or the free one where it belongs: the highest bits of its product with the factor,
+ * then one after the other. At most half of the slots are taken, so that there is one. */
 static size_t slot_of(const index_set *set, uint32_t index) {
-    size_t at = (size_t)((uint64_t)index * 0x9E3779B97F4A7C15u >> 20) & (set->size - 1);
+    size_t at = (size_t)((uint64_t)index * set->factor >> (64 - __builtin_ctzll(set->size)));
     while (set->slots[at] != UINT32_MAX && set->slots[at] != index) at = (at + 1) & (set->size - 1);
     return at;
 }
 
+static uint64_t random_factor(void) {
+    uint64_t factor = 0;
+    /* Without entropy an address that the system chose has to do. */
+    if (getrandom(&factor, sizeof factor, GRND_NONBLOCK) != (ssize_t)sizeof factor)
+        factor = (uint64_t)(uintptr_t)&factor * 0x9E3779B97F4A7C15u;
+    return factor | 1;
+}
+
 static bool grow(index_set *set) {
-    index_set larger = {.size = set->size == 0 ? LEAST_SIZE : 2 * set->size};
+    index_set larger = {.size = set->size == 0 ? LEAST_SIZE : 2 * set->size,
+                        .factor = set->size == 0 ? random_factor() : set->factor};
     larger.slots = malloc(larger.size * sizeof *larger.slots);
     if (larger.slots == NULL) return false;
     memset(larger.slots, 0xff, larger.size * sizeof *larger.slots);

@@ -11,6 +11,7 @@
 typedef struct index_set {
     uint32_t *slots; /* [size], a power of two; UINT32_MAX: free */
     size_t size, count;
+    uint64_t factor; /* of its hash, odd and random: nobody can choose indices that meet in few slots */
 } index_set;
 
 typedef enum index_set_result { INDEX_SET_ADDED, INDEX_SET_KNOWN, INDEX_SET_NO_MEMORY } index_set_result;

@@ -5,6 +5,8 @@ import os
 import pathlib
 import shutil
 import signal
+import socket
+import subprocess
 import threading
 import time
 import unittest
@@ -227,6 +229,50 @@ class Life(Case):
             watch.close()
             self.assertEqual(daemon.wait(), 0)
         self.assertEqual(answers, [200] * count)
+
+    def test_reloads_do_not_keep_sigterm_waiting(self):
+        path, _ = self.store()
+        with Daemon(path) as daemon:
+            storm = subprocess.Popen(["sh", "-c", f"while kill -HUP {daemon.process.pid} 2>/dev/null; do :; done"])
+            try:
+                time.sleep(.5)
+                daemon.signal(signal.SIGTERM)
+                self.assertEqual(daemon.process.wait(30), 0)  # the storm goes on until then
+            finally:
+                storm.kill()
+                storm.wait()
+
+    def test_the_socket_of_a_successor_stays(self):
+        path, _ = self.store()
+        socket_path = os.path.join(self.folder, "u.sock")
+
+        def healthy():
+            with socket.socket(socket.AF_UNIX) as s:
+                s.connect(socket_path)
+                s.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+                return s.recv(64).startswith(b"HTTP/1.1 200")
+        with Daemon(path, "--unix", socket_path, listen=None) as first:
+            slow = socket.socket(socket.AF_UNIX)
+            slow.connect(socket_path)
+            slow.sendall(b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\n"
+                         b"Content-Type: application/json\r\nContent-Length: 100\r\n\r\n{")
+            time.sleep(.3)
+            first.signal(signal.SIGTERM)
+            deaf = False
+            while not deaf:  # its path may stay or not
+                time.sleep(.01)
+                try:
+                    deaf = not healthy()
+                except (ConnectionRefusedError, FileNotFoundError):
+                    deaf = True
+            with Daemon(path, "--unix", socket_path, listen=None) as second:
+                self.assertTrue(healthy())
+                slow.close()
+                first.signal(signal.SIGTERM)
+                self.assertEqual(first.wait(), 0)
+                self.assertTrue(healthy())
+                second.stop()
+            self.assertFalse(os.path.exists(socket_path))
 
     def test_a_second_signal_does_not_wait(self):
         path, _ = self.store()

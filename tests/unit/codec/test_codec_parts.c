@@ -121,10 +121,31 @@ START_TEST(problems_are_written) {
 }
 END_TEST
 
+/* Indices that all fall into a tenth of the slots of a hash that somebody knows: a set of 2^17 slots of its
+ * own factor has no long run of them, so that each is found in a few steps. */
+START_TEST(chosen_indices_do_not_meet) {
+    enum { ELEMENTS = 655418, SIZE = 1 << 17 };
+    index_set set = {0};
+    size_t run = 0, longest = 0;
+    for (uint32_t i = 0; i < ELEMENTS && set.count < SIZE / 2; i++)
+        if (((uint64_t)i * 0x9E3779B97F4A7C15u >> 20 & (SIZE - 1)) < SIZE / 10)
+            ck_assert_int_eq(index_set_add(&set, i), INDEX_SET_ADDED);
+    ck_assert_uint_gt(set.count, SIZE / 3);
+    ck_assert_uint_eq(set.size, SIZE);
+    for (size_t k = 0; k < set.size; k++) {
+        run = set.slots[k] != UINT32_MAX ? run + 1 : 0;
+        longest = run > longest ? run : longest;
+    }
+    ck_assert_msg(longest < 2000, "%zu slots in a row", longest);
+    index_set_free(&set);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("codec_parts");
     TCase *tests = tcase_create("codec_parts");
     tcase_add_test(tests, a_set_knows_what_it_holds);
+    tcase_add_test(tests, chosen_indices_do_not_meet);
     tcase_add_test(tests, a_miss_suggests_or_lists);
     tcase_add_test(tests, a_miss_fits);
     tcase_add_test(tests, every_problem_has_a_section);
