@@ -43,16 +43,6 @@ static sigset_t block_signals(void) {
     return set;
 }
 
-static lam_status open_access_log(const char *path, FILE **out, lam_error *error) {
-    lam_status status = LAM_OK;
-    if (path == NULL) return LAM_OK;
-    FILE *log = strcmp(path, "-") == 0 ? stdout : fopen(path, "ae");
-    if (log == NULL) FAIL(error, LAM_ERR_IO, "%s: cannot be opened: %s", path, strerror(errno));
-    *out = log;
-done:
-    return status;
-}
-
 /* True if a signal that ends the program waits beside others: sigwait gives the lowest number first, which is
  * SIGHUP. */
 static bool is_ended(void) {
@@ -69,6 +59,7 @@ static void serve_until_signal(service *s, const sigset_t *signals) {
     int signal_number = 0;
     for (;;) {
         if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP || is_ended()) return;
+        access_log_reopen(s->access_log);
         size_t served = catalog_reload(s->catalog);
         printf("reloaded: %zu scene%s\n", served, served == 1 ? "" : "s");
         fflush(stdout);
@@ -98,7 +89,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     for (size_t i = 0; i < route_label_count(); i++) labels[i] = route_label(i);
     atomic_init(&s.state, SERVICE_LOADING);
     if (c->token_file != NULL) TRY(token_read(c->token_file, &s.token, error));
-    TRY(open_access_log(c->access_log, &s.access_log, error));
+    if (c->access_log != NULL) TRY(access_log_open(c->access_log, &s.access_log, error));
     TRY(metrics_create(route_label_count(), labels, &s.metrics, error));
     TRY(catalog_create(c, stdout, stderr, &s.catalog, error));
     TRY(variants_start(c, s.catalog, &s.variants, error));
@@ -124,7 +115,7 @@ done:
     variants_destroy(s.variants);
     catalog_destroy(s.catalog);
     metrics_destroy(s.metrics);
-    if (s.access_log != NULL && s.access_log != stdout) fclose(s.access_log);
+    access_log_close(s.access_log);
     connections_unlink(&own);
     free(labels);
     return status;

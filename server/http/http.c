@@ -302,10 +302,9 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
     return handle(r);
 }
 
-/* Writes one line of JSON to the access log and flushes it. status 0: the client left before it was answered.
+/* Adds one line of JSON to the access log. status 0: the client left before it was answered.
  */
 static void log_request(const request *r, unsigned status, double ms) {
-    FILE *log = r->service->access_log;
     buffer b = {0};
     struct timespec now;
     struct tm utc;
@@ -322,10 +321,7 @@ static void log_request(const request *r, unsigned status, double ms) {
                       ",\"status\":%u,\"received\":%zu,\"sent\":%zu,\"coding\":\"%s\",\"vectors\":%zu,"
                       "\"ms\":%.3f}\n",
                       status, (size_t)r->received, r->sent, coding_name(r->coding), r->call.n_rhs, ms);
-    if (written) {
-        fwrite(b.bytes, 1, b.length, log);
-        fflush(log);
-    }
+    if (written) access_log_add(r->service->access_log, b.bytes, b.length);
     buffer_free(&b);
 }
 

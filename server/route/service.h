@@ -3,6 +3,7 @@
 #define LAMBERT_SERVER_ROUTE_SERVICE_H
 
 #include "server/config.h"
+#include "server/net/access_log.h"
 #include "server/net/connections.h"
 #include "server/net/token.h"
 #include "server/queue/batch.h"
@@ -19,7 +20,7 @@ typedef struct service {
     metrics *metrics;
     batch_queue *queue;
     token token;              /* empty: none is needed */
-    FILE *access_log;         /* NULL: none */
+    access_log *access_log;   /* NULL: none */
     atomic_int state;         /* a service_state */
     connections *connections; /* from http_start to http_stop */
     atomic_size_t body_bytes; /* bytes of request bodies in memory */

@@ -1,8 +1,12 @@
 """lambertd and its clients: many at once, slow ones, silent ones, those that go, and those without a token."""
 
 import json
+import os
+import re
+import signal
 import socket
 import threading
+import time
 import unittest
 
 import numpy as np
@@ -193,6 +197,42 @@ class Clients(Case):
                 self.assertEqual(daemon.get(route).status, 200)
         token.write_text("\n")
         self.assertEqual(self.run_once(path, "--token-file", token).returncode, 1)
+
+    def test_an_access_log_that_nobody_reads(self):
+        path, _ = self.store()
+        fifo = self.folder / "log.fifo"
+        os.mkfifo(fifo)
+        reader = os.open(fifo, os.O_RDONLY | os.O_NONBLOCK)
+        with Daemon(path, "--access-log", fifo) as daemon:
+            connection = daemon.connect()
+            for _ in range(4000):  # 64 KiB of the pipe and 256 of the daemon are some 2,000 lines
+                self.assertEqual(daemon.get("/healthz", connection=connection).status, 200)
+            lost = re.search(r"lambertd_access_log_lost_total (\d+)", daemon.get("/metrics").body.decode())
+            self.assertGreater(int(lost[1]), 0)
+            connection.close()
+            daemon.signal(signal.SIGTERM)
+            self.assertEqual(daemon.wait(), 0)
+        os.close(reader)
+
+    def test_an_access_log_is_opened_again(self):
+        path, _ = self.store()
+        log, moved = self.folder / "access.log", self.folder / "old.log"
+        with Daemon(path, "--access-log", log) as daemon:
+            daemon.get("/healthz")
+            self.wait_for_lines(log, 1)
+            log.rename(moved)
+            daemon.signal(signal.SIGHUP)
+            daemon.wait_for("reloaded")
+            daemon.get("/readyz")
+            self.wait_for_lines(log, 1)
+            self.assertIn("/readyz", log.read_text())
+            self.assertEqual(len(moved.read_text().splitlines()), 1)
+
+    def wait_for_lines(self, file, count):
+        end = time.time() + PATIENCE
+        while not file.exists() or len(file.read_text().splitlines()) < count:
+            self.assertLess(time.time(), end)
+            time.sleep(.01)
 
     def test_access_log(self):
         path, _ = self.store()
