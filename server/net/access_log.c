@@ -142,10 +142,10 @@ void access_log_reopen(access_log *log) {
 }
 
 bool access_log_metrics(access_log *log, buffer *b) {
-    if (log == NULL) return true;
-    pthread_mutex_lock(&log->mutex);
-    const uint64_t lost = log->lost;
-    pthread_mutex_unlock(&log->mutex);
+    uint64_t lost = 0;
+    if (log != NULL) pthread_mutex_lock(&log->mutex);
+    if (log != NULL) lost = log->lost;
+    if (log != NULL) pthread_mutex_unlock(&log->mutex);
     return buffer_printf(
         b,
         "# HELP lambertd_access_log_lost_total Lines of the access log that were dropped, as "

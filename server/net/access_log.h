@@ -18,7 +18,7 @@ void access_log_add(access_log *log, const char *line, size_t length);
 /* Opens the file again by its path, once what waits is written; a file that cannot be opened is kept. */
 void access_log_reopen(access_log *log);
 
-/* Appends how many lines were dropped, as a metric. False when memory is short. */
+/* Appends how many lines were dropped, 0 without a log, as a metric. False when memory is short. */
 bool access_log_metrics(access_log *log, buffer *b);
 
 /* Writes what waits, for a second at most, and closes. NULL is allowed. */

@@ -181,7 +181,7 @@ class Headers(unittest.TestCase):
                  "lambertd_body_bytes": "gauge", "lambertd_scenes": "gauge", "lambertd_operator_bytes": "gauge",
                  "lambertd_mapped_bytes": "gauge", "lambertd_scenes_damaged": "gauge",
                  "lambertd_scenes_unverified": "gauge", "lambertd_connections": "gauge", "lambertd_connections_most": "gauge",
-                 "lambertd_connections_cut": "counter"}
+                 "lambertd_connections_cut": "counter", "lambertd_access_log_lost": "counter"}
         self.assertEqual({name: f.type for name, f in families.items()}, kinds)
         for family in families.values():
             self.assertTrue(family.documentation)
