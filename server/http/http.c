@@ -1,5 +1,6 @@
 #include "server/http/http.h"
 
+#include "server/http/framing.h"
 #include "server/http/http_request.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/verifier.h"
@@ -230,7 +231,7 @@ static enum MHD_Result handle(request *r) {
 static request *begin_request(http *h, struct MHD_Connection *connection, const char *path,
                               const char *method) {
     request *r = calloc(1, sizeof *r);
-    if (r == NULL || (r->path = strdup(path)) == NULL) {
+    if (r == NULL || (r->path = strdup(framing_path(path))) == NULL) {
         free(r);
         return NULL;
     }
@@ -258,11 +259,33 @@ static uint64_t announced_length(const request *r) {
     return *end == '\0' ? length : UINT64_MAX;
 }
 
+static enum MHD_Result frame_field(void *context, enum MHD_ValueKind kind, const char *name, size_t name_size,
+                                   const char *value, size_t value_size) {
+    (void)kind;
+    framing_add(context, name, name_size, value, value_size);
+    return MHD_YES;
+}
+
+/* False, with the answer made, if readers of this head could differ on where the request ends. */
+static bool check_framing(request *r, const char *version) {
+    framing fields = {0};
+    problem why;
+    MHD_get_connection_values_n(r->connection, MHD_HEADER_KIND, frame_field, &fields);
+    if (framing_check(&fields, version, &why)) return true;
+    answer_problem(&r->answer, &why);
+    return false;
+}
+
 static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const char *path,
-                               const char *method, void **context) {
+                               const char *method, const char *version, void **context) {
     request *r = begin_request(h, connection, path, method);
     if (r == NULL) return MHD_NO;
     *context = r;
+    if (!check_framing(r, version)) {
+        /* Nothing that follows may be read as a request, nor waited for as a body. */
+        r->answered = r->last = true;
+        return http_send_answer(r);
+    }
     uint64_t length = announced_length(r);
     r->answered = !check_head(r, method, length);
     /* An answer sent before the end of the body closes the connection. So the body of a refused request is
@@ -295,9 +318,8 @@ static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
 static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *path,
                                   const char *method, const char *version, const char *bytes, size_t *size,
                                   void **request_context) {
-    (void)version;
     request *r = *request_context;
-    if (r == NULL) return on_head(context, connection, path, method, request_context);
+    if (r == NULL) return on_head(context, connection, path, method, version, request_context);
     if (*size > 0) return on_body(r, bytes, size);
     return handle(r);
 }

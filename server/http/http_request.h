@@ -18,7 +18,7 @@ typedef struct request {
     client *client; /* NULL when memory was short */
     char id[REQUEST_ID_MAX + 1];
     char method[16];
-    char *path;   /* as sent */
+    char *path;   /* as sent, without scheme and host */
     double start; /* clock_seconds */
     route_match match;
     catalog_snapshot *snapshot;
@@ -28,6 +28,7 @@ typedef struct request {
     content_coding coding; /* of the answer */
     char etag[ETAG_MAX];   /* of the answer; "" for none */
     bool answered;         /* the answer is made; the rest of the body is dropped */
+    bool last;             /* the connection ends with this answer */
     bool queued;           /* the answer was handed to libmicrohttpd */
     buffer body;           /* counted in the service's body_bytes */
     uint64_t received;

@@ -12,6 +12,7 @@ static const struct {
     const char *type, *title;
 } kinds[PROBLEM_COUNT] = {
     [PROBLEM_NONE] = {0, "about:blank", "Error"},
+    [PROBLEM_MALFORMED_HEAD] = {400, MANUAL "malformed-head", "The head of the request is malformed"},
     [PROBLEM_NOT_JSON] = {400, MANUAL "not-json", "The body is not JSON"},
     [PROBLEM_NOT_NPY] = {400, MANUAL "not-npy", "The body is not an NPY array"},
     [PROBLEM_NO_TOKEN] = {401, MANUAL "no-token", "A bearer token is missing or wrong"},
@@ -36,6 +37,7 @@ static const struct {
     [PROBLEM_NOT_REFINED] = {422, MANUAL "not-refined", "The answer cannot be refined to this tolerance"},
     [PROBLEM_TOO_MANY_VARIANTS] = {429, MANUAL "too-many-variants", "There are too many variants"},
     [PROBLEM_INTERNAL] = {500, MANUAL "internal", "The daemon failed"},
+    [PROBLEM_TRANSFER_CODING] = {501, MANUAL "transfer-coding", "The transfer coding is not known"},
     [PROBLEM_NO_MEMORY] = {503, MANUAL "no-memory", "Memory is short; try again later"},
     [PROBLEM_UNAVAILABLE] = {503, MANUAL "unavailable", "The daemon or the scene is busy; try again later"},
 };

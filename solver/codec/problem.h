@@ -8,6 +8,7 @@
 /* The classes; problem.c has a row for each. */
 typedef enum problem_kind {
     PROBLEM_NONE,
+    PROBLEM_MALFORMED_HEAD,
     PROBLEM_NOT_JSON,
     PROBLEM_NOT_NPY,
     PROBLEM_NO_TOKEN,
@@ -31,6 +32,7 @@ typedef enum problem_kind {
     PROBLEM_NOT_REFINED,
     PROBLEM_TOO_MANY_VARIANTS,
     PROBLEM_INTERNAL,
+    PROBLEM_TRANSFER_CODING,
     PROBLEM_NO_MEMORY,
     PROBLEM_UNAVAILABLE,
     PROBLEM_COUNT
