@@ -68,8 +68,7 @@ bool framing_check(const framing *f, const char *version, problem *why) {
     if (why->status != 0) return false;
     if (f->n_hosts > 1)
         return problem_set(why, PROBLEM_MALFORMED_HEAD, "there are %u Host fields", f->n_hosts);
-    if (f->n_hosts == 0 && !old)
-        return problem_set(why, PROBLEM_MALFORMED_HEAD, "Host is missing, which %.20s needs", version);
+    if (f->n_hosts == 0 && !old) return problem_set(why, PROBLEM_MALFORMED_HEAD, "Host is missing");
     if (f->n_lengths > 1)
         return problem_set(why, PROBLEM_MALFORMED_HEAD, "there are %u Content-Length fields", f->n_lengths);
     if (f->continued)

@@ -20,8 +20,7 @@ typedef struct framing {
 void framing_add(framing *f, const char *name, size_t name_size, const char *value, size_t value_size);
 
 /* True if the fields go together in a request of this version ("HTTP/1.1"). False, with the problem: 400, or
- * 501 for a transfer coding that is not known. Whatever follows on the connection must then not be read as a
- * request. */
+ * 501 for a transfer coding that is not known. The bytes behind it must then not be read as a request. */
 bool framing_check(const framing *f, const char *version, problem *why);
 
 /* The path of a request's target: of http://HOST/PATH (absolute form, RFC 9112, 3.2.2) without scheme and
