@@ -187,6 +187,7 @@ static lam_status store_new(const char *path, store **out, lam_error *error) {
     if (s == NULL) return LAM_ERR_MEMORY;
     s->h5 = -1;
     s->file.fd = -1;
+    s->file.driver = -1;
     lam_status status = text_copy(path, &s->path, error);
     if (status == LAM_OK)
         *out = s;
@@ -271,6 +272,7 @@ void store_close(store *s) {
         if (s->file.error == 0) s->file.error = ECANCELED; /* data still in HDF5 need not be written */
     }
     if (s->h5 >= 0) H5Fclose(s->h5);
+    store_driver_release(&s->file);
     if (s->file.fd >= 0) close(s->file.fd);
     store_sums_free(&s->sums);
     store_map_release(s->map);

@@ -152,16 +152,20 @@ static const H5FD_class_t driver_class = {
 
 hid_t store_driver_properties(store_file *file) {
     const driver_info info = {.file = file};
-    hid_t properties = -1, driver = H5FDregister(&driver_class);
-    if (driver < 0) return -1;
-    properties = H5Pcreate(H5P_FILE_ACCESS);
-    if (properties >= 0 && (H5Pset_driver(properties, driver, &info) < 0 ||
+    if (file->driver < 0) file->driver = H5FDregister(&driver_class);
+    if (file->driver < 0) return -1;
+    hid_t properties = H5Pcreate(H5P_FILE_ACCESS);
+    if (properties >= 0 && (H5Pset_driver(properties, file->driver, &info) < 0 ||
                             H5Pset_fclose_degree(properties, H5F_CLOSE_STRONG) < 0)) {
         H5Pclose(properties);
         properties = -1;
     }
-    H5FDunregister(driver); /* the properties and the open file hold it */
     return properties;
+}
+
+void store_driver_release(store_file *file) {
+    if (file->driver >= 0) H5FDunregister(file->driver);
+    file->driver = -1;
 }
 
 #ifdef LAMBERT_SANITIZED

@@ -23,6 +23,7 @@ typedef struct store_file {
     bool writable;
     int error;     /* errno of the first failed access; from then on writes are dropped */
     uint64_t size; /* of the file; while writing, dropped writes included */
+    hid_t driver;  /* our reference to its driver; negative: none */
 } store_file;
 
 /* The checksums of one dataset: XXH3 of each piece of its bytes. */
@@ -71,11 +72,17 @@ lam_status store_hdf5_failure(store *s, const char *name, const char *what, lam_
 typedef lam_status store_opener(const char *path, store **out, lam_error *error);
 
 /* Opens the file and reads its headers in a child process first. Errors: LAM_ERR_DAMAGED if that crashes or
- * does not end; a refusal is no error here. */
+ * does not end; LAM_ERR_IO if no child can be started, or SIGCHLD is ignored, so that its end stays unknown.
+ * A refusal is no error here. */
 lam_status store_probe(store_opener *opener, const char *path, lam_error *error);
 
-/* File access properties that use `file`, which must outlive the HDF5 file; negative on failure. */
+/* File access properties that use `file`, which must outlive the HDF5 file; negative on failure. The driver
+ * stays registered until store_driver_release. */
 hid_t store_driver_properties(store_file *file);
+
+/* Gives the driver back, behind H5Fclose alone: HDF5 1.10 gives up the file's reference to the driver before
+ * it calls the driver's close, so that the last reference must not be the file's. */
+void store_driver_release(store_file *file);
 
 /* Reads exactly size bytes at offset; false with file->error set, EIO if the file is shorter. */
 bool store_file_read(store_file *file, uint64_t offset, void *buffer, size_t size);

@@ -1,0 +1,63 @@
+"""Stores are opened by HDF5, first in a child process, whatever allocator and signals the program is started with."""
+
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+import unittest
+
+from command import ENVIRONMENT, LAMBERT
+from daemon import LAMBERTD, PATIENCE
+from make_store import Scene
+
+
+def ignore_children():
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+
+
+class Opening(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.store = pathlib.Path(folder.name) / "box.h5"
+        Scene(60).write(cls.store)
+        # Every byte but those of the superblock is wrong, so that HDF5 finds no root group.
+        cls.damaged = cls.store.with_name("damaged.h5")
+        raw = cls.store.read_bytes()
+        cls.damaged.write_bytes(raw[:48] + bytes(byte ^ 0x55 for byte in raw[48:]))
+
+    @staticmethod
+    def run_program(*command, **more):
+        environment = dict(ENVIRONMENT, **more.pop("extra", {}))
+        return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE, env=environment,
+                              check=False, **more)
+
+    def test_freed_memory_is_not_read(self):
+        """The C library fills freed memory, in which a function table of HDF5 was looked up once."""
+        done = self.run_program(LAMBERT, "info", self.store, extra={"MALLOC_PERTURB_": "190"})
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn("low_rank", done.stdout)
+
+    @unittest.skipIf(shutil.which("valgrind") is None, "valgrind is not installed")
+    def test_valgrind_sees_no_invalid_access(self):
+        done = self.run_program("valgrind", "--undef-value-errors=no", "--error-exitcode=99", LAMBERT, "info", self.store)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("Invalid", done.stderr)
+        self.assertIn("low_rank", done.stdout)
+
+    def test_ignored_children(self):
+        """With SIGCHLD ignored, as some launchers leave it, the system keeps no exit status of a child."""
+        for program, arguments in ((LAMBERT, ("info",)), (LAMBERTD, ("--listen", "127.0.0.1:0"))):
+            usual = self.run_program(program, *arguments, self.damaged)
+            self.assertEqual(usual.returncode, 1, usual.stderr)
+            self.assertIn("damaged", usual.stderr)
+            done = self.run_program(program, *arguments, self.damaged, preexec_fn=ignore_children)
+            self.assertEqual((done.returncode, done.stderr), (1, usual.stderr))
+        done = self.run_program(LAMBERT, "info", self.store, preexec_fn=ignore_children)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+
+if __name__ == "__main__":
+    unittest.main()
