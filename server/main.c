@@ -31,7 +31,7 @@ static void share_one_heap(void) {
 }
 
 /* Blocks the signals that the main thread waits for, before any thread starts, so that no thread gets them.
- */
+ * Where SIGCHLD was ignored by the launcher, the end of a child would be unknown. */
 static sigset_t block_signals(void) {
     sigset_t set;
     sigemptyset(&set);
@@ -40,6 +40,7 @@ static sigset_t block_signals(void) {
     sigaddset(&set, SIGTERM);
     sigprocmask(SIG_BLOCK, &set, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGCHLD, SIG_DFL);
     return set;
 }
 

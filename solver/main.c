@@ -4,6 +4,8 @@
 #include "solver/linalg/core.h"
 #include "solver/verbs/verbs.h"
 
+#include <signal.h>
+
 static const option_verb verbs[] = {
     {"generate", cmd_generate, "write one of the known scenes"},
     {"precompute", cmd_precompute, "turn a scene into a store: the operator from emission to radiosity"},
@@ -25,6 +27,7 @@ static const option_command program = {
 };
 
 int main(int argc, char **argv) {
+    signal(SIGCHLD, SIG_DFL); /* if the launcher left it ignored, the end of a child would be unknown */
     core_keep_thread_limit();
     return terminal_finish(program.name, options_run_verb(&program, verbs, argc, argv));
 }

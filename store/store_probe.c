@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -49,14 +50,24 @@ static _Noreturn void probe_in_child(store_opener *opener, const char *path) {
     _exit(0);
 }
 
-/* *how: the wait status of the child; false if none could be started. */
-static bool probe_once(store_opener *opener, const char *path, int *how) {
+/* *how: the wait status of the child. An error where there can be none: without it a file that ends its
+ * readers would be taken for sound. */
+static lam_status probe_once(store_opener *opener, const char *path, int *how, lam_error *error) {
+    lam_status status = LAM_OK;
     const pid_t child = fork();
     if (child == 0) probe_in_child(opener, path);
-    if (child < 0) return false;
-    while (waitpid(child, how, 0) < 0 && errno == EINTR) {
-    }
-    return true;
+    if (child < 0)
+        FAIL(error, LAM_ERR_IO, "%s: no process can be started to read its headers first: %s", path,
+             strerror(errno));
+    while (waitpid(child, how, 0) < 0)
+        if (errno != EINTR)
+            FAIL(
+                error, LAM_ERR_IO,
+                "%s: the system does not tell how the process that reads its headers first ended: %s; do not "
+                "ignore SIGCHLD",
+                path, strerror(errno));
+done:
+    return status;
 }
 
 lam_status store_probe(store_opener *opener, const char *path, lam_error *error) {
@@ -65,7 +76,7 @@ lam_status store_probe(store_opener *opener, const char *path, lam_error *error)
     if (!may_fork()) return LAM_OK;
     /* A damaged file ends every child; other causes (it is killed, memory is short) hardly end three. */
     for (int trial = 0; trial < TRIALS; trial++) {
-        if (!probe_once(opener, path, &how)) return LAM_OK; /* without a child the file is opened unprobed */
+        TRY(probe_once(opener, path, &how, error));
         if (WIFEXITED(how) && WEXITSTATUS(how) == 0) return LAM_OK;
         if (WIFSIGNALED(how) && (WTERMSIG(how) == SIGALRM || WTERMSIG(how) == SIGXCPU)) break;
     }

@@ -397,6 +397,7 @@ static int measure(int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
+    signal(SIGCHLD, SIG_DFL); /* if the launcher left it ignored, the end of a child would be unknown */
     core_keep_thread_limit();
     if (argc == 2 && strcmp(argv[1], "service-solver") == 0) return service_solver();
     return terminal_finish(command.name, measure(argc, argv));

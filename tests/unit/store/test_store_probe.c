@@ -6,6 +6,8 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 static lam_status crash(const char *path, store **out, lam_error *error) {
     (void)path;
@@ -43,11 +45,35 @@ START_TEST(what_is_refused_is_for_the_caller) {
 }
 END_TEST
 
+/* A process that may have no children: of an ordinary user, since root may have any number. */
+START_TEST(without_a_child_nothing_is_opened) {
+    lam_error error = {.message = ""};
+    const struct rlimit none = {0, 0};
+    ck_assert_int_eq(setrlimit(RLIMIT_NPROC, &none), 0);
+    if (geteuid() == 0) ck_assert_int_eq(setuid(65534), 0);
+    ck_assert_int_eq(store_probe(refuse, "a.h5", &error), LAM_ERR_IO);
+    ck_assert_msg(strstr(error.message, "a.h5: no process can be started") != NULL, "%s", error.message);
+}
+END_TEST
+
+/* The system keeps no exit status of a child while SIGCHLD is ignored. */
+START_TEST(an_unknown_end_is_refused) {
+    lam_error error = {.message = ""};
+    signal(SIGCHLD, SIG_IGN);
+    const lam_status status = store_probe(crash, "a.h5", &error);
+    signal(SIGCHLD, SIG_DFL);
+    ck_assert_int_eq(status, LAM_ERR_IO);
+    ck_assert_msg(strstr(error.message, "do not ignore SIGCHLD") != NULL, "%s", error.message);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("store probe");
     TCase *tests = tcase_create("probe");
     tcase_add_loop_test(tests, what_crashes_is_refused, 0, 2);
     tcase_add_test(tests, what_is_refused_is_for_the_caller);
+    tcase_add_test(tests, without_a_child_nothing_is_opened);
+    tcase_add_test(tests, an_unknown_end_is_refused);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
