@@ -16,6 +16,7 @@ typedef struct map_array {
     uint64_t *pieces; /* [n_pieces] */
     size_t n_pieces;
     size_t offset, bytes;
+    store_type type;
 } map_array;
 
 struct store_map {
@@ -120,7 +121,10 @@ static map_array *find_array(const store_map *map, const char *name) {
 static lam_status add_array(store_map *map, const char *name, const store_array *array, const store_sum *sum,
                             lam_error *error) {
     lam_status status = LAM_OK;
-    map_array made = {.n_pieces = sum->n_pieces, .offset = (size_t)array->offset, .bytes = array->bytes};
+    map_array made = {.n_pieces = sum->n_pieces,
+                      .offset = (size_t)array->offset,
+                      .bytes = array->bytes,
+                      .type = array->type};
     if (find_array(map, name) != NULL) return LAM_OK;
     if (map->n_arrays == map->capacity) {
         const size_t capacity = 2 * map->capacity + 8;
@@ -185,16 +189,33 @@ static lam_status damaged(const store_map *map, const map_array *array, size_t p
                        array->name, what, piece + 1, array->n_pieces);
 }
 
+/* True if every number of an aligned piece is finite: an exponent of ones only means infinity or NaN. */
+static bool is_finite(store_type type, const void *piece, size_t bytes) {
+    bool good = true;
+    if (type == STORE_F16)
+        for (size_t i = 0; i < bytes / 2; i++) good &= (((const uint16_t *)piece)[i] & 0x7c00u) != 0x7c00u;
+    if (type == STORE_F32)
+        for (size_t i = 0; i < bytes / 4; i++)
+            good &= (((const uint32_t *)piece)[i] & 0x7f800000u) != 0x7f800000u;
+    if (type == STORE_F64)
+        for (size_t i = 0; i < bytes / 8; i++)
+            good &= (((const uint64_t *)piece)[i] & 0x7ff0000000000000u) != 0x7ff0000000000000u;
+    return good;
+}
+
 lam_status store_map_verify(const store_map *map, const atomic_int *cancel, lam_error *error) {
     for (size_t i = 0; i < map->n_arrays; i++) {
         const map_array *array = &map->arrays[i];
         for (size_t p = 0; p < array->n_pieces; p++) {
-            const size_t start = p * STORE_PIECE, rest = array->bytes - start;
+            const size_t start = p * STORE_PIECE, rest = array->bytes - start,
+                         bytes = rest < STORE_PIECE ? rest : STORE_PIECE;
+            const char *piece = map->base + array->offset + start;
             if (cancel != NULL && atomic_load(cancel) != 0)
                 return status_fail(error, LAM_ERR_CANCELLED, "%s: cancelled", map->path);
-            if (store_checksum(map->base + array->offset + start, rest < STORE_PIECE ? rest : STORE_PIECE) !=
-                array->pieces[p])
+            if (store_checksum(piece, bytes) != array->pieces[p])
                 return damaged(map, array, p, "is damaged", error);
+            if (!is_finite(array->type, piece, bytes))
+                return damaged(map, array, p, "has a number that is not finite", error);
         }
     }
     return LAM_OK;

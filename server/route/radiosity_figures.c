@@ -36,8 +36,37 @@ bool figures_add(const scene *s, const radiosity_request *request, size_t first,
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
 }
 
+/* Refuses the figure of name k that is not finite. */
+static bool refuse_figure(const reduce_request *r, size_t k, size_t statistic, problem *why) {
+    return problem_set(why, PROBLEM_NOT_IN_ENCODING,
+                       "the %s of %.200s is not finite, as it passes the range of its precision; scale the "
+                       "emission",
+                       reduce_statistic_name(r->with[statistic]), reduce_text(r, k));
+}
+
+/* NaN stands for a figure that has no value, so that it is no error here. */
+static bool check_figures(const scene *s, const radiosity_request *request, const double *figures,
+                          problem *why) {
+    const reduce_request *r = &request->reduce;
+    const size_t count = request->n_rhs * s->n_channels;
+    for (size_t k = 0; k < r->n_names; k++)
+        for (size_t statistic = 0; statistic < r->n_with; statistic++, figures += count)
+            for (size_t v = 0; v < count; v++)
+                if (isinf(figures[v])) return refuse_figure(r, k, statistic, why);
+    return true;
+}
+
+/* The means [n_rhs][C] of name k over elements that have an area. */
+static bool check_means(const scene *s, const radiosity_request *request, size_t k, const double *means,
+                        problem *why) {
+    for (size_t v = 0; v < request->n_rhs * s->n_channels; v++)
+        if (!isfinite(means[v])) return refuse_figure(&request->reduce, k, 0, why);
+    return true;
+}
+
 bool figures_write(const scene *s, const radiosity_request *request, const double *figures,
                    const answer_notes *notes, buffer *b, problem *why) {
+    if (!check_figures(s, request, figures, why)) return false;
     return (answer_head(b, s->n, s->n_channels, notes) && buffer_append_text(b, ",\"groups\":") &&
             reduce_write(&request->reduce, s->n_channels, request->n_rhs, request->batch, figures, b) &&
             answer_certificates(b, request->n_rhs, request->batch, notes) && answer_tail(b, notes)) ||
@@ -85,6 +114,7 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
     if (good && !adjoint_row_suffices(s, rows[0], request)) good = weights_of(in, request, &weights, why);
     for (size_t k = 0; good && k < r->n_names; k++) {
         adjoint_row_evaluate(s, rows[k], request, weights, means);
+        if (rows[k]->area > 0) good = check_means(s, request, k, means, why);
         scene_mean_errors_add(s, request, k, means, &errors, notes);
         reduce_means(r, k, s->n_channels, request->n_rhs, rows[k]->area, means, figures);
     }

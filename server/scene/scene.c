@@ -209,6 +209,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(describe_scene(s, made, &made->description, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
     TRY(scene_health_create(made->path, made->map, options->verify, &made->health, error));
+    /* Under the guard just made. Only here is it known which numbers are mapped, which must be finite. */
+    if (options->verify && made->map != NULL) TRY(store_map_verify(made->map, NULL, error));
 done:
     return status;
 }

@@ -20,25 +20,20 @@ bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *not
                          codec_quantity_name(notes->quantity));
 }
 
-/* A number, null where it is not finite. */
-static bool write_figure(buffer *b, double x) {
-    return isfinite(x) ? json_write_double(b, x) : buffer_append(b, "null", 4);
-}
-
 /* The light that the figures are of, and those of each name that is reduced. */
 static bool write_light(buffer *b, const answer_notes *notes) {
     bool written = true;
     if (notes->error_light == NULL) return true;
     written = buffer_printf(b, ",\"light\":\"%s\"", notes->error_light);
     if (strcmp(notes->error_light, "own") != 0) return written;
-    written = written && buffer_append_text(b, ",\"emitters\":") && write_figure(b, notes->emitters);
+    written = written && buffer_append_text(b, ",\"emitters\":") && json_write_double(b, notes->emitters);
     if (notes->n_name_errors == 0) return written;
     written = written && buffer_append_text(b, ",\"groups\":{");
     for (size_t k = 0; written && k < notes->n_name_errors; k++) {
         const name_error *one = &notes->name_errors[k];
         written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, one->name) &&
-                  buffer_append_text(b, ":{\"mean\":") && write_figure(b, one->mean) &&
-                  buffer_append_text(b, ",\"elements\":") && write_figure(b, one->elements) &&
+                  buffer_append_text(b, ":{\"mean\":") && json_write_double(b, one->mean) &&
+                  buffer_append_text(b, ",\"elements\":") && json_write_double(b, one->elements) &&
                   buffer_append(b, "}", 1);
     }
     return written && buffer_append(b, "}", 1);
@@ -50,8 +45,9 @@ static bool write_error(buffer *b, const answer_notes *notes) {
     if (!notes->has_error)
         return from == NULL || strcmp(from, "others") != 0 ||
                buffer_append_text(b, ",\"error\":{\"from\":\"others\"}");
-    return buffer_append_text(b, ",\"error\":{\"relative_mean\":") && write_figure(b, notes->relative_mean) &&
-           buffer_append_text(b, ",\"indirect_mean\":") && write_figure(b, notes->indirect_mean) &&
+    return buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
+           json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
+           json_write_double(b, notes->indirect_mean) &&
            (!(notes->mesh > 0) ||
             (buffer_append_text(b, ",\"mesh\":") && json_write_double(b, notes->mesh))) &&
            write_light(b, notes) && (of == NULL || buffer_printf(b, ",\"of\":\"%s\"", of)) &&

@@ -167,15 +167,11 @@ void reduce_means(const reduce_request *r, size_t k, size_t n_channels, size_t n
             }
 }
 
-static bool write_one(buffer *b, double value) {
-    return isnan(value) ? buffer_append(b, "null", 4) : json_write_double(b, value);
-}
-
 bool reduce_write_channels(buffer *b, const double *values, size_t n_channels) {
-    if (n_channels == 1) return write_one(b, values[0]);
+    if (n_channels == 1) return json_write_double(b, values[0]);
     bool written = buffer_append(b, "[", 1);
     for (size_t c = 0; written && c < n_channels; c++)
-        written = (c == 0 || buffer_append(b, ",", 1)) && write_one(b, values[c]);
+        written = (c == 0 || buffer_append(b, ",", 1)) && json_write_double(b, values[c]);
     return written && buffer_append(b, "]", 1);
 }
 

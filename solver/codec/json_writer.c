@@ -108,7 +108,10 @@ static inline void put_digits(char *at, const digits *d, int k) {
 }
 
 size_t json_write_float(char *to, float value) {
-    assert(isfinite(value));
+    if (!isfinite(value)) {
+        memcpy(to, "null", 4);
+        return 4;
+    }
     if (value == 0.0f) {
         *to = '0';
         return 1;
@@ -178,7 +181,7 @@ bool json_write_floats(buffer *b, const float *values, size_t count) {
 
 bool json_write_double(buffer *b, double value) {
     char text[32];
-    assert(isfinite(value));
+    if (!isfinite(value)) return buffer_append(b, "null", 4);
     /* A number of at most 15 digits survives the way through a double, so that 15 digits without trailing
      * zeros reproduce it; denormal numbers have fewer. */
     int precision = fabs(value) < 1e-290 ? 1 : 15;

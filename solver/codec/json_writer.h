@@ -11,14 +11,14 @@
 #define JSON_FLOAT_ROOM 32
 
 /* Writes the shortest decimal that reads back as the same float (in a few cases per thousand a longer one,
- * never of more than 9 digits) and returns how many characters; value must be finite. No NUL is written; to
- * has room for the longest. */
+ * never of more than 9 digits), or null for a value that is not finite, and returns how many characters. No
+ * NUL is written; to has room for the longest. */
 size_t json_write_float(char *to, float value);
 
-/* Appends [v0,v1,...] of finite values; false when memory is short. */
+/* Appends [v0,v1,...], null for a value that is not finite; false when memory is short. */
 bool json_write_floats(buffer *b, const float *values, size_t count);
 
-/* Appends the shortest decimal that reads back as the same double; value must be finite. */
+/* Appends the shortest decimal that reads back as the same double; null for a value that is not finite. */
 bool json_write_double(buffer *b, double value);
 
 /* Appends [v0,v1,...] of them; false when memory is short. */

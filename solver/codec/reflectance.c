@@ -1,5 +1,6 @@
 #include "solver/codec/reflectance.h"
 
+#include <float.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,6 +49,7 @@ static bool read_one(const json_t *value, const char *group, size_t index, float
     }
     const double given = json_number_value(value);
     *rho = (float)given;
+    if (given >= 0 && *rho < FLT_MIN) *rho = 0; /* its reciprocal passes the range of single precision */
     if (given >= 0 && *rho < 1) return true;
     problem_set(why, PROBLEM_BAD_VALUE, "the reflectance of %.200s = %.9g, must be at least 0 and below 1",
                 group, given);

@@ -26,8 +26,8 @@ typedef struct reflectance_request {
 void reflectance_request_free(reflectance_request *request);
 
 /* {"variant":NAME, "groups":{GROUP: a number or one for each channel, ...}}; group names are those of
- * emissions. False with *why filled; request must be freed either way. 400: not JSON; 422: a request that the
- * contract refuses, a reflectance outside [0, 1); 503. */
+ * emissions; a reflectance below FLT_MIN (1.2e-38) counts as 0. False with *why filled; request must be freed
+ * either way. 400: not JSON; 422: a request that the contract refuses, a reflectance outside [0, 1); 503. */
 bool codec_read_reflectance(const reflectance_scene *scene, const char *text, size_t length,
                             reflectance_request *request, problem *why);
 

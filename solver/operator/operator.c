@@ -2,6 +2,7 @@
  * Knows no kind from inside. */
 #include "solver/operator/operator.h"
 
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -42,7 +43,8 @@ lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, 
         status = LAM_ERR_MEMORY;
         goto done;
     }
-    memcpy(op->reflectance, reflectance, count * sizeof *op->reflectance);
+    /* Division by a subnormal reflectance passes the range of single precision. */
+    for (size_t i = 0; i < count; i++) op->reflectance[i] = reflectance[i] < FLT_MIN ? 0.0f : reflectance[i];
     op->kind = kind;
     op->n = n;
     op->n_channels = n_channels;

@@ -90,8 +90,9 @@ const operator_kind *operator_kind_find(const char *name);
  * operator_load refuses, counts once. */
 uint64_t operator_unpacked_bytes(const char *kind, uint64_t stored);
 
-/* Fills the shared part (copies reflectance) of a zeroed operator; kind->destroy frees what the kind added.
- * Errors: LAM_ERR_NUMERIC names a reflectance outside [0, 1), LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
+/* Fills the shared part of a zeroed operator (copies reflectance, 0 in place of values below FLT_MIN);
+ * kind->destroy frees what the kind added. Errors: LAM_ERR_NUMERIC names a reflectance outside [0, 1),
+ * LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
 lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, size_t n_channels,
                          const float *reflectance, lam_error *error);
 

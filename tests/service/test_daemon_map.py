@@ -19,7 +19,7 @@ import numpy as np
 from command import must
 from daemon import LAMBERTD, PATIENCE, Daemon
 from daemon_case import TOLERANCE, replaced_under_load
-from make_store import Scene
+from make_store import Scene, add_checksums
 
 N, RANK, TILES = 3000, 100, 100
 BYTES = 4 * N * RANK  # of Y, V, U and first_bounce: 1.14 MiB, which is worth a mapping
@@ -146,6 +146,40 @@ class Mapped(unittest.TestCase):
                 self.check(daemon, "box", self.scene)
                 self.assertEqual(self.gauge(daemon, "scenes_damaged"), 0)
                 self.assertEqual(self.gauge(daemon, "scenes_unverified"), 0)
+
+    MEAN = {"emission": {"groups": {"lamp": 1, "floor": 1, "wall": 1, "box": 1}},
+            "reduce": {"groups": ["floor"], "with": ["mean"]}}
+
+    def test_a_number_that_is_not_finite_takes_its_scene_out(self):
+        """Its checksums are right: whoever wrote it wrote infinity."""
+        path, other = self.store("box"), self.store("other")
+        with h5py.File(path, "r+") as f:
+            f["operator/V"][N - 1, 7] = np.inf
+            add_checksums(f)
+        with Daemon(path, other) as daemon:
+            self.assertIn(daemon.radiosity("box", self.MEAN).status, (422, 503))
+            daemon.wait_for("verified other: ")
+            self.check_out_of_service(daemon, "box", path, "/operator/V has a number that is not finite in MiB 2 of 2")
+            self.check(daemon, "other", self.other)
+        with Daemon(path, other, "--verify") as daemon:
+            self.assertEqual(self.names(daemon), ["other"])
+            self.assertIn("/operator/V has a number that is not finite in MiB 2 of 2", daemon.errors())
+
+    def test_a_figure_that_is_not_finite_is_refused(self):
+        """What was compared once is not compared again: a medium that rots behind the daemon's back is met by requests."""
+        path = self.store("box")
+        with Daemon(path) as daemon:
+            daemon.wait_for("verified box: ")
+            times = os.stat(path)
+            with open(path, "r+b") as f:
+                f.seek(self.place(path, "operator/V") + 4 * 17)
+                f.write(np.float32(np.inf).tobytes())
+            os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+            answer = daemon.radiosity("box", self.MEAN)
+            self.assertEqual(answer.status, 422, answer)
+            self.assertIn("the mean of floor is not finite", answer.json()["detail"])
+            answer = daemon.radiosity("box", {"emission": [1] * N})
+            self.assertEqual(answer.status, 422, answer)
 
     def test_verify_looks_before_it_serves(self):
         path, other = self.store("box"), self.store("other")

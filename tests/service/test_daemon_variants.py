@@ -134,6 +134,27 @@ class Variants(unittest.TestCase):
                 self.made(daemon, groups, variant, "grey")
                 self.check(daemon, f"grey@{variant}", scene.relit(groups), channels=1)
 
+    def test_reflectances_that_count_as_none(self):
+        """g / rho passes the range of single precision where rho lies below its normal numbers."""
+        scene = self.store("grey.h5", "grey", channels=1, scene={"rank": 1})
+        black = scene.relit({"floor": 0, "lamp": 0})
+        tiny = scene.relit({"floor": 1e-45, "lamp": 1e-44})
+        tiny.write(self.folder / "tiny.h5", "tiny", keep_factors=True)
+        ask = {"emission": {"groups": {"lamp": 1, "wall": 1}}, "quantity": "irradiance"}
+        E = np.where(np.isin(scene.group, [scene.group_names.index(g) for g in ("lamp", "wall")]), 1.0, 0.0)[None]
+        wanted = black.solve(E, "irradiance")[0]
+        floor = scene.members("floor")
+        mean = wanted[floor] @ scene.area[floor] / scene.area[floor].sum()
+        with self.daemon("grey.h5", "tiny.h5") as daemon:
+            self.made(daemon, {"floor": 1e-45, "lamp": 1e-44}, "t", "grey")
+            for name in "grey@t", "tiny":
+                answer = self.ask(daemon, "POST", f"/v1/scenes/{name}/radiosity",
+                                  {**ask, "reduce": {"groups": ["floor"], "with": ["mean", "sum"]}})
+                self.assertEqual(answer.status, 200, answer)
+                self.assertAlmostEqual(answer.json()["groups"]["floor"]["mean"] / mean, 1, delta=TOLERANCE)
+                given = np.array(self.ask(daemon, "POST", f"/v1/scenes/{name}/radiosity", ask).json()["irradiance"])
+                self.assertLessEqual(np.abs(given - wanted).max(), TOLERANCE * wanted.max())
+
     def test_a_variant_is_replaced_whole(self):
         scene = self.store()
         with self.daemon(most=1) as daemon:

@@ -162,6 +162,16 @@ START_TEST(doubles_round_trip) {
 }
 END_TEST
 
+/* JSON has no other word for them, and a program must not end over what a file holds. */
+START_TEST(numbers_that_are_not_finite_are_null) {
+    buffer b = {0};
+    ck_assert(json_write_double(&b, (double)INFINITY) && json_write_double(&b, (double)NAN));
+    ck_assert(json_write_floats(&b, (const float[]){1, -INFINITY, NAN, 2}, 4));
+    ck_assert_str_eq(b.bytes, "nullnull[1,null,null,2]");
+    buffer_free(&b);
+}
+END_TEST
+
 /* No fewer digits give the number back, tried one by one: of any bits, of few digits, near the least of
  * doubles. */
 START_TEST(doubles_are_as_short_as_can_be) {
@@ -345,6 +355,7 @@ int main(void) {
     tcase_add_test(tcase, random_floats_round_trip);
     tcase_add_test(tcase, texts_are_plain);
     tcase_add_test(tcase, doubles_round_trip);
+    tcase_add_test(tcase, numbers_that_are_not_finite_are_null);
     tcase_add_test(tcase, doubles_are_as_short_as_can_be);
     tcase_add_test(tcase, decimals_are_rounded_right);
     tcase_add_test(tcase, numbers_at_the_edge);

@@ -4,6 +4,8 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -27,17 +29,22 @@ static float value_at(size_t i) {
     return (float)(i % 1000) - 7.0f;
 }
 
-static void write_store(void) {
+/* Its large array has `value` at place `at`; none at LARGE. */
+static void write_store_with(size_t at, float value) {
     store *s = NULL;
     lam_error error = {.message = ""};
     float *values = malloc(LARGE * sizeof *values);
     const size_t dims[2] = {1, LARGE}, small = SMALL;
-    for (size_t i = 0; i < LARGE; i++) values[i] = value_at(i);
+    for (size_t i = 0; i < LARGE; i++) values[i] = i == at ? value : value_at(i);
     ck_assert_msg(store_create(path, &s, &error) == LAM_OK, "%s", error.message);
     ck_assert(store_write(s, "/a/large", STORE_F32, 2, dims, values, &error) == LAM_OK);
     ck_assert(store_write(s, "/a/small", STORE_F32, 1, &small, values, &error) == LAM_OK);
     ck_assert_msg(store_seal(s, &error) == LAM_OK, "%s", error.message);
     free(values);
+}
+
+static void write_store(void) {
+    write_store_with(LARGE, 0);
 }
 
 static store *open_mapped(void) {
@@ -170,6 +177,71 @@ START_TEST(a_flipped_bit_is_named) {
 }
 END_TEST
 
+/* With right checksums, in any piece: of the type of the array, since the bits of another may mean anything.
+ */
+START_TEST(a_number_that_is_not_finite_is_named) {
+    static const size_t places[] = {0, ((size_t)1 << 18) + 5, LARGE - 1};
+    static const float values[] = {INFINITY, -INFINITY, NAN};
+    for (size_t i = 0; i < 3; i++) {
+        lam_error error = {.message = ""};
+        char wanted[96];
+        write_store_with(places[i], values[i]);
+        store *s = open_mapped();
+        store_view view = view_of(s, "/a/large", 2);
+        ck_assert(store_map_verify(view.map, NULL, &error) == LAM_ERR_DAMAGED);
+        snprintf(wanted, sizeof wanted, "/a/large has a number that is not finite in MiB %zu of 3",
+                 (places[i] >> 18) + 1);
+        ck_assert_msg(strstr(error.message, wanted) != NULL && strstr(error.message, path) != NULL, "%s",
+                      error.message);
+        store_view_free(&view);
+        store_close(s);
+    }
+    write_store_with(5, FLT_MAX);
+    store *s = open_mapped();
+    store_view view = view_of(s, "/a/large", 2);
+    lam_error error = {.message = ""};
+    ck_assert_msg(store_map_verify(view.map, NULL, &error) == LAM_OK, "%s", error.message);
+    store_view_free(&view);
+    store_close(s);
+}
+END_TEST
+
+/* Checks one mapped array of these bytes, as the type. */
+static lam_status verify_as(store_type type, const void *values, size_t count) {
+    store *s = NULL;
+    store_view view = {.data = NULL};
+    lam_error error = {.message = ""};
+    size_t dims[STORE_MAX_RANK] = {count};
+    ck_assert_msg(store_create(path, &s, &error) == LAM_OK, "%s", error.message);
+    ck_assert(store_write(s, "/a/large", type, 1, dims, values, &error) == LAM_OK);
+    ck_assert_msg(store_seal(s, &error) == LAM_OK, "%s", error.message);
+    s = open_mapped();
+    ck_assert(store_read_view(s, "/a/large", type, 1, dims, &view, &error) == LAM_OK);
+    ck_assert_ptr_nonnull(view.map);
+    const lam_status status = store_map_verify(view.map, NULL, &error);
+    store_view_free(&view);
+    store_close(s);
+    return status;
+}
+
+START_TEST(every_type_is_looked_at_as_what_it_is) {
+    static const store_type types[] = {STORE_I8, STORE_F16, STORE_U32, STORE_F64};
+    const size_t bytes = (size_t)3 << 20;
+    unsigned char *values = malloc(bytes);
+    for (size_t t = 0; t < sizeof types / sizeof *types; t++) {
+        const size_t size = store_type_size(types[t]);
+        const bool real = types[t] == STORE_F16 || types[t] == STORE_F64;
+        memset(values, 0x3f, bytes);
+        ck_assert(verify_as(types[t], values, bytes / size) == LAM_OK);
+        /* The last number gets an exponent of ones in each of the floating types: 7fff.... */
+        memset(values + bytes - size, 0xff, size);
+        values[bytes - 1] = 0x7f;
+        ck_assert(verify_as(types[t], values, bytes / size) == (real ? LAM_ERR_DAMAGED : LAM_OK));
+    }
+    free(values);
+}
+END_TEST
+
 START_TEST(places_have_names) {
     write_store();
     const size_t begin = (size_t)place_of_large();
@@ -251,6 +323,8 @@ int main(void) {
     tcase_add_test(tests, a_store_that_is_not_mapped_is_read);
     tcase_add_test(tests, other_types_and_shapes_are_refused);
     tcase_add_test(tests, a_flipped_bit_is_named);
+    tcase_add_test(tests, a_number_that_is_not_finite_is_named);
+    tcase_add_test(tests, every_type_is_looked_at_as_what_it_is);
     tcase_add_test(tests, places_have_names);
     tcase_add_test(tests, a_comparison_can_be_stopped);
     tcase_add_test(tests, a_truncated_file_is_refused);
