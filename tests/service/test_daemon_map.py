@@ -166,7 +166,7 @@ class Mapped(unittest.TestCase):
             self.assertIn("/operator/V has a number that is not finite in MiB 2 of 2", daemon.errors())
 
     def test_a_figure_that_is_not_finite_is_refused(self):
-        """What was compared once is not compared again: a medium that rots behind the daemon's back is met by requests."""
+        """Bytes that were compared are not compared again, so that requests meet a medium that rots later."""
         path = self.store("box")
         with Daemon(path) as daemon:
             daemon.wait_for("verified box: ")
