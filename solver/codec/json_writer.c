@@ -108,9 +108,10 @@ static inline void put_digits(char *at, const digits *d, int k) {
 }
 
 size_t json_write_float(char *to, float value) {
+    static const char none[] = {'n', 'u', 'l', 'l'};
     if (!isfinite(value)) {
-        memcpy(to, "null", 4);
-        return 4;
+        memcpy(to, none, sizeof none);
+        return sizeof none;
     }
     if (value == 0.0f) {
         *to = '0';
