@@ -115,7 +115,8 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
     for (size_t k = 0; good && k < r->n_names; k++) {
         adjoint_row_evaluate(s, rows[k], request, weights, means);
         if (rows[k]->area > 0) good = check_means(s, request, k, means, why);
-        scene_mean_errors_add(s, request, k, means, &errors, notes);
+        if (!scene_mean_errors_add(s, request, k, means, &errors, notes))
+            good = problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
         reduce_means(r, k, s->n_channels, request->n_rhs, rows[k]->area, means, figures);
     }
     const double solved = clock_ms();

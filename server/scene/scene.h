@@ -102,7 +102,7 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
                                const float *values, answer_notes *notes, name_error **names);
 
 /* The same of a linear reduction, name by name; means are [n_rhs][C]. The notes refer to it until it is
- * freed. */
+ * freed. False when memory is short. */
 typedef struct mean_errors {
     name_error *names;    /* [n_names]; NULL: that of the store stays */
     emission_size *sizes; /* [n_rhs] */
@@ -110,7 +110,7 @@ typedef struct mean_errors {
 } mean_errors;
 bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, answer_notes *notes,
                              mean_errors *out);
-void scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, const double *means,
+bool scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, const double *means,
                            mean_errors *to, answer_notes *notes);
 void mean_errors_free(mean_errors *e);
 

@@ -152,25 +152,35 @@ static bool is_in_name(const reduce_name *name, size_t group) {
     return false;
 }
 
-/* The means [C] over a name of values [C][count] of the elements selected, or of all. */
-static void mean_of_values(const scene *s, const radiosity_request *request, const reduce_name *name,
-                           const float *values, double *mean) {
+/* sums [n_groups][1 + C] of values [C][count] of the elements selected, or of all: A, and A times each. */
+static void sum_by_group(const scene *s, const radiosity_request *request, const float *values,
+                         double *sums) {
     const size_t C = s->n_channels, count = request->select ? request->n_selected : s->n;
     const emitters_error *e = &s->errors.emitters;
-    double area = 0;
-    for (size_t c = 0; c < C; c++) mean[c] = 0;
+    memset(sums, 0, e->n_groups * (1 + C) * sizeof *sums);
     for (size_t k = 0; k < count; k++) {
         const size_t i = request->select ? request->selected[k] : k;
-        if (!is_in_name(name, e->group[i])) continue;
-        area += s->area[i];
-        for (size_t c = 0; c < C; c++) mean[c] += s->area[i] * (double)values[c * count + k];
+        double *const own = sums + e->group[i] * (1 + C);
+        own[0] += s->area[i];
+        for (size_t c = 0; c < C; c++) own[1 + c] += s->area[i] * (double)values[c * count + k];
     }
-    for (size_t c = 0; area > 0 && c < C; c++) mean[c] /= area;
 }
 
-static void take_name(const emitters_error *e, size_t n_channels, const float *weights, const name_error *one,
-                      size_t k, name_error *names, answer_notes *notes) {
-    const answer_error mean = {one->relative, one->mean, emitters_error_number(e, n_channels, weights)};
+/* The means [C] over a name. */
+static void mean_of_name(size_t n_channels, const reduce_name *name, const double *sums, double *mean) {
+    double area = 0;
+    for (size_t c = 0; c < n_channels; c++) mean[c] = 0;
+    for (size_t g = 0; g < name->n_groups; g++) {
+        const double *own = sums + name->groups[g] * (1 + n_channels);
+        area += own[0];
+        for (size_t c = 0; c < n_channels; c++) mean[c] += own[1 + c];
+    }
+    for (size_t c = 0; area > 0 && c < n_channels; c++) mean[c] /= area;
+}
+
+static void take_name(const emitters_mix *mix, const name_error *one, size_t k, name_error *names,
+                      answer_notes *notes) {
+    const answer_error mean = {one->relative, one->mean, mix->emitters};
     take_error(&mean, notes);
     if (is_larger(one->mean, names[k].mean)) names[k].mean = one->mean;
     if (is_larger(one->elements, names[k].elements)) names[k].elements = one->elements;
@@ -188,17 +198,22 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
         ((request->select || reduce->on) && !emitters_error_knows_groups(e)))
         return true;
     float *light = memory_allocate(2, vector * sizeof *light, "errors", NULL);
-    double *mean = memory_allocate(C, sizeof *mean, "errors", NULL);
+    double *mean = memory_allocate(C + e->n_groups * (1 + C), sizeof *mean, "errors", NULL);
     name_error *const kept = memory_allocate(reduce->n_names, sizeof *kept, "errors", NULL);
+    emitters_mix mix = {.W = NULL};
     bool good = light != NULL && mean != NULL && kept != NULL;
     if (good) begin_own(reduce, kept, &made);
     for (size_t v = 0; good && v < request->n_rhs; v++) {
         const float *weights = W + v * C * s->n_emitters, *own = values + v * C * count;
+        emitters_mix_free(&mix);
+        good = emitters_mix_create(e, C, weights, &mix);
+        if (!good) break;
+        if (reduce->on) sum_by_group(s, request, own, mean + C);
         for (size_t k = 0; reduce->on && k < reduce->n_names; k++) {
-            mean_of_values(s, request, &reduce->names[k], own, mean);
+            mean_of_name(C, &reduce->names[k], mean + C, mean);
             const name_error one =
-                emitters_error_of_name(e, C, request->quantity, &reduce->names[k], weights, mean);
-            take_name(e, C, weights, &one, k, kept, &made);
+                emitters_error_of_name(e, C, request->quantity, &reduce->names[k], &mix, mean);
+            take_name(&mix, &one, k, kept, &made);
         }
         if (reduce->on) continue;
         const error_answer of = {.quantity = request->quantity,
@@ -209,12 +224,13 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
                                  .values = own};
         good = operator_emitters_light(s->op, 1, weights, light, light + vector, NULL) == LAM_OK;
         if (!good) break;
-        const answer_error one = emitters_error_of(e, &about, &of, weights);
+        const answer_error one = emitters_error_of(e, &about, &of, &mix);
         take_error(&one, &made);
     }
     if (good) *notes = made;
     if (good) *names = kept;
     if (!good) free(kept);
+    emitters_mix_free(&mix);
     free(light);
     free(mean);
     return good;
@@ -324,20 +340,22 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
     return true;
 }
 
-void scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, const double *means,
+bool scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, const double *means,
                            mean_errors *to, answer_notes *notes) {
     const reduce_name *name = &request->reduce.names[k];
     const size_t C = s->n_channels;
-    if (to->names == NULL) return;
+    if (to->names == NULL) return true;
     if (s->n_emitters > 0) {
         const emitters_error *e = &s->errors.emitters;
         for (size_t v = 0; v < request->emitters.n; v++) {
-            const float *weights = request->emitters.values + v * C * s->n_emitters;
-            const name_error one =
-                emitters_error_of_name(e, C, request->quantity, name, weights, means + v * C);
-            take_name(e, C, weights, &one, k, to->names, notes);
+            emitters_mix mix;
+            if (!emitters_mix_create(e, C, request->emitters.values + v * C * s->n_emitters, &mix))
+                return false;
+            const name_error one = emitters_error_of_name(e, C, request->quantity, name, &mix, means + v * C);
+            take_name(&mix, &one, k, to->names, notes);
+            emitters_mix_free(&mix);
         }
-        return;
+        return true;
     }
     double *const direct = to->emission + request->n_rhs * C;
     emission_of_name(s, request, name, to->emission);
@@ -357,6 +375,7 @@ void scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
         if (is_larger(one.mean, to->names[k].mean)) to->names[k].mean = one.mean;
         if (is_larger(one.elements, to->names[k].elements)) to->names[k].elements = one.elements;
     }
+    return true;
 }
 
 void mean_errors_free(mean_errors *e) {

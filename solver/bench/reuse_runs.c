@@ -7,18 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void bounds(const mesh *m, double low[3], double high[3]) {
-    for (int d = 0; d < 3; d++) {
-        low[d] = INFINITY;
-        high[d] = -INFINITY;
-    }
-    for (size_t v = 0; v < m->n_vertices; v++)
-        for (int d = 0; d < 3; d++) {
-            low[d] = fmin(low[d], m->vertices[v][d]);
-            high[d] = fmax(high[d], m->vertices[v][d]);
-        }
-}
-
 static void pose_of(int experiment, size_t k, const double low[3], const double high[3], light_pose *p) {
     const double t = (double)k / (REUSE_POSITIONS - 1), a = M_PI * t;
     const double turned = experiment == 0 ? .5 * (a - M_PI / 2) : 0;
@@ -34,7 +22,7 @@ lam_status reuse_lamp(int experiment, double size, const mesh *m, moving_light *
     lam_status status = LAM_OK;
     double low[3], high[3];
     moving_light l = {.n_corners = 0};
-    bounds(m, low, high);
+    mesh_box(m, low, high);
     double(*corner)[3] = memory_allocate(4, sizeof *corner, "lamp", error);
     if (corner == NULL) return LAM_ERR_MEMORY;
     for (int k = 0; k < 4; k++)

@@ -90,70 +90,80 @@ bool emitters_error_knows_groups(const emitters_error *e) {
     return e->of_groups != NULL;
 }
 
-static double weight(const emitters_error *e, size_t n_channels, const float *W, size_t k) {
-    double most = 0;
-    for (size_t c = 0; c < n_channels; c++) most = fmax(most, (double)W[c * e->s + k]);
-    return most;
+/* Of each emitter the largest weight over channels, [s]. */
+static void largest_weights(const emitters_error *e, size_t n_channels, const float *W, double *w) {
+    for (size_t k = 0; k < e->s; k++) {
+        w[k] = 0;
+        for (size_t c = 0; c < n_channels; c++) w[k] = fmax(w[k], (double)W[c * e->s + k]);
+    }
 }
 
 /* w' K w */
-static double square(const emitters_error *e, size_t n_channels, const double *K, const float *W) {
+static double square(const emitters_error *e, const double *K, const double *w) {
     const size_t s = e->s;
     double sum = 0;
     for (size_t j = 0; j < s; j++) {
-        const double own = weight(e, n_channels, W, j);
         double row = 0;
-        for (size_t l = 0; own > 0 && l < s; l++) {
-            const double other = weight(e, n_channels, W, l);
-            if (other > 0) row += K[j * s + l] * other;
-        }
-        sum += own * row;
+        for (size_t l = 0; w[j] > 0 && l < s; l++) row += K[j * s + l] * w[l];
+        sum += w[j] * row;
     }
     return fmax(sum, 0);
 }
 
-double emitters_error_number(const emitters_error *e, size_t n_channels, const float *W) {
+bool emitters_mix_create(const emitters_error *e, size_t n_channels, const float *W, emitters_mix *out) {
+    const size_t s = e->s, G = e->n_groups;
+    emitters_mix m = {.W = W, .weight = memory_allocate(s + 2 * G, sizeof *m.weight, "errors", NULL)};
     double power = 0, squares = 0;
-    for (size_t k = 0; k < e->s; k++) {
-        const double own = weight(e, n_channels, W, k);
-        power += own;
-        squares += own * own;
+    if (m.weight == NULL) return false;
+    m.of_group = m.weight + s;
+    m.of_mean = m.of_group + G;
+    largest_weights(e, n_channels, W, m.weight);
+    for (size_t k = 0; k < s; k++) {
+        power += m.weight[k];
+        squares += m.weight[k] * m.weight[k];
     }
-    return squares > 0 ? power * power / squares : 0;
+    m.emitters = squares > 0 ? power * power / squares : 0;
+    for (size_t g = 0; g < G; g++) m.of_group[g] = m.of_mean[g] = -1;
+    *out = m;
+    return true;
 }
 
-/* The squared error of the elements of a group that are selected, with their areas. */
-static double selected_square(const emitters_error *e, const error_scene *scene, const error_answer *of,
-                              const float *W) {
+/* The squared errors of a group, found when they are first asked for. */
+static void find_group(const emitters_error *e, size_t g, emitters_mix *m) {
     const size_t s = e->s;
-    double sum = 0;
-    for (size_t g = 0; g < e->n_groups; g++) {
-        double area = 0;
-        for (size_t k = 0; k < of->count; k++)
-            if (e->group[of->selected[k]] == g) area += scene->area[of->selected[k]];
-        if (area > 0) sum += area / e->area[g] * square(e, scene->n_channels, e->of_groups + g * s * s, W);
-    }
-    return sum;
+    if (m->of_group[g] >= 0) return;
+    m->of_group[g] = square(e, e->of_groups + g * s * s, m->weight);
+    m->of_mean[g] = square(e, e->of_means + g * s * s, m->weight);
+}
+
+void emitters_mix_free(emitters_mix *m) {
+    free(m->weight);
+    *m = (emitters_mix){.W = NULL};
 }
 
 answer_error emitters_error_of(const emitters_error *e, const error_scene *scene, const error_answer *of,
-                               const float *W) {
-    const double off = of->selected != NULL ? selected_square(e, scene, of, W)
-                                            : square(e, scene->n_channels, e->covariance, W);
+                               emitters_mix *mix) {
+    double off = of->selected != NULL ? 0 : square(e, e->covariance, mix->weight);
+    for (size_t k = 0; of->selected != NULL && k < of->count; k++) {
+        const uint32_t i = of->selected[k], g = e->group[i];
+        find_group(e, g, mix);
+        off += scene->area[i] / e->area[g] * mix->of_group[g];
+    }
     answer_error made = answer_error_of_square(scene, of, off);
-    made.emitters = emitters_error_number(e, scene->n_channels, W);
+    made.emitters = mix->emitters;
     return made;
 }
 
 name_error emitters_error_of_name(const emitters_error *e, size_t n_channels, lam_quantity quantity,
-                                  const reduce_name *name, const float *W, const double *mean) {
+                                  const reduce_name *name, emitters_mix *mix, const double *mean) {
     const size_t s = e->s, G = e->n_groups;
     double area = 0, off = 0, elements2 = 0, reflected2 = 0, radiosity2 = 0;
     for (size_t k = 0; k < name->n_groups; k++) {
         const size_t g = name->groups[k];
         area += e->area[g];
-        off += e->area[g] * sqrt(square(e, n_channels, e->of_means + g * s * s, W));
-        elements2 += square(e, n_channels, e->of_groups + g * s * s, W);
+        find_group(e, g, mix);
+        off += e->area[g] * sqrt(mix->of_mean[g]);
+        elements2 += mix->of_group[g];
     }
     if (!(area > 0)) return (name_error){.mean = 0};
     for (size_t c = 0; c < n_channels; c++) {
@@ -162,7 +172,8 @@ name_error emitters_error_of_name(const emitters_error *e, size_t n_channels, la
             const size_t g = name->groups[k];
             rho += e->area[g] / area * e->reflectance[c * G + g];
             for (size_t l = 0; l < s; l++)
-                direct += e->area[g] / area * (double)W[c * s + l] * e->exitance[c] * e->direct[g * s + l];
+                direct +=
+                    e->area[g] / area * (double)mix->W[c * s + l] * e->exitance[c] * e->direct[g * s + l];
         }
         const double r = quantity == LAM_INDIRECT     ? mean[c]
                          : quantity == LAM_IRRADIANCE ? rho * (mean[c] - direct)

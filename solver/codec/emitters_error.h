@@ -35,18 +35,27 @@ lam_status emitters_error_read(store *s, const error_scene *scene, const emitter
 /* True if the error of an answer for some elements or of names can be told, too. */
 bool emitters_error_knows_groups(const emitters_error *e);
 
-/* The error of an answer to weights W [C][s]: of each emitter the largest over channels. The size of the
- * emission in `of` is not used; of elements that are selected, those of a group have the error that its
- * elements have on average. O(C count + g s^2). */
-answer_error emitters_error_of(const emitters_error *e, const error_scene *scene, const error_answer *of,
-                               const float *W);
+/* One mixture: its weights, of each emitter the largest over channels, and its squared errors. */
+typedef struct emitters_mix {
+    const float *W;             /* [C][s], the caller's */
+    double *weight;             /* [s], and in one block with it */
+    double *of_group, *of_mean; /* [n_groups]: of its elements, and of its mean; negative: not found yet */
+    double emitters;            /* their effective number, (sum w)^2 / sum w^2 */
+} emitters_mix;
 
-/* The effective number of emitters, (sum w)^2 / sum w^2. */
-double emitters_error_number(const emitters_error *e, size_t n_channels, const float *W);
+/* O(s). False when memory is short. Freed by emitters_mix_free. */
+bool emitters_mix_create(const emitters_error *e, size_t n_channels, const float *W, emitters_mix *out);
+void emitters_mix_free(emitters_mix *m);
+
+/* The error of an answer to a mixture. The size of the emission in `of` is not used; of elements that are
+ * selected, those of a group have the error that its elements have on average. O(C count + s^2), the second
+ * for each group that is first asked for. */
+answer_error emitters_error_of(const emitters_error *e, const error_scene *scene, const error_answer *of,
+                               emitters_mix *mix);
 
 /* The error of one name of a reduction, by the mean [C] of the quantity over it. Errors of the means of
- * several groups add up. O(s^2 groups of the name). */
+ * several groups add up. O(C s) for each group of the name, and s^2 as above. */
 name_error emitters_error_of_name(const emitters_error *e, size_t n_channels, lam_quantity quantity,
-                                  const reduce_name *name, const float *W, const double *mean);
+                                  const reduce_name *name, emitters_mix *mix, const double *mean);
 
 #endif

@@ -416,14 +416,9 @@ void state_log_mesh(const precompute_state *state) {
     const mesh *m = &state->m;
     const precompute_options *o = state->options;
     const char axes[] = {'x', 'y', 'z'};
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    double size[3] = {0, 0, 0}, height = 0, area = 0, largest = 0;
+    double low[3], high[3], size[3] = {0, 0, 0}, height = 0, area = 0, largest = 0;
     size_t n_wide = 0;
-    for (size_t v = 0; v < m->n_vertices; v++)
-        for (int k = 0; k < 3; k++) {
-            low[k] = fmin(low[k], m->vertices[v][k]);
-            high[k] = fmax(high[k], m->vertices[v][k]);
-        }
+    mesh_box(m, low, high);
     for (int k = 0; k < 3; k++)
         if (axes[k] == m->up)
             height = high[k] - low[k];

@@ -141,14 +141,18 @@ void mesh_geometry_hash(const mesh *m, char hash[33]) {
     hash[32] = '\0';
 }
 
-void mesh_bounds(const mesh *m, double centre[3], double *radius) {
-    double low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, square = 0;
-    for (size_t v = 0; v < m->n_vertices; v++)
+void mesh_box(const mesh *m, double low[3], double high[3]) {
+    for (int k = 0; k < 3; k++) low[k] = high[k] = m->n_vertices > 0 ? m->vertices[0][k] : 0;
+    for (size_t v = 1; v < m->n_vertices; v++)
         for (int k = 0; k < 3; k++) {
-            const double x = m->vertices[v][k];
-            if (v == 0 || x < low[k]) low[k] = x;
-            if (v == 0 || x > high[k]) high[k] = x;
+            low[k] = fmin(low[k], m->vertices[v][k]);
+            high[k] = fmax(high[k], m->vertices[v][k]);
         }
+}
+
+void mesh_bounds(const mesh *m, double centre[3], double *radius) {
+    double low[3], high[3], square = 0;
+    mesh_box(m, low, high);
     for (int k = 0; k < 3; k++) {
         centre[k] = low[k] + (high[k] - low[k]) / 2;
         square += (high[k] - low[k]) * (high[k] - low[k]);

@@ -71,7 +71,8 @@ lam_status mesh_z_order(const mesh *m, uint32_t *order, lam_error *error);
 /* Hash of vertices, elements and sidedness: 32 hex digits and a NUL. */
 void mesh_geometry_hash(const mesh *m, char hash[33]);
 
-/* The centre of the bounding box and half its diagonal. */
+/* The bounding box; its centre and half its diagonal. */
+void mesh_box(const mesh *m, double low[3], double high[3]);
 void mesh_bounds(const mesh *m, double centre[3], double *radius);
 
 /* The centroid of an element. */

@@ -107,6 +107,7 @@ static lam_status take_mixture(const stated_errors *stated, const error_scene *s
     const size_t n = scene->n, C = scene->n_channels, s = lam_operator_emitters(lit->op);
     const emitters_error *e = &stated->emitters;
     const emission *given = &lit->light;
+    emitters_mix mix = {.W = NULL};
     if (e->s == 0 || given->W == NULL || out->relative < 0 ||
         (out->n_reductions > 0 && !emitters_error_knows_groups(e)))
         return LAM_OK;
@@ -120,20 +121,22 @@ static lam_status take_mixture(const stated_errors *stated, const error_scene *s
         const float *weights = given->W + (given->steady ? 0 : v * C * s), *values = out->values + v * C * n;
         const error_answer of = {
             .quantity = out->quantity, .E = light, .H0 = light + C * n, .count = n, .values = values};
-        answer_error one = {.emitters = emitters_error_number(e, C, weights)};
+        if (!emitters_mix_create(e, C, weights, &mix)) TRY(LAM_ERR_MEMORY);
+        answer_error one = {.emitters = mix.emitters};
         if (out->n_reductions == 0) {
             TRY(operator_emitters_light(lit->op, 1, weights, light, light + C * n, error));
-            one = emitters_error_of(e, scene, &of, weights);
+            one = emitters_error_of(e, scene, &of, &mix);
         }
         for (size_t r = 0; r < out->n_reductions; r++) {
             const reduce_name *name = &out->reductions[r].request.names[0];
             mean_of_name(scene, name, values, mean);
-            const name_error own = emitters_error_of_name(e, C, out->quantity, name, weights, mean);
+            const name_error own = emitters_error_of_name(e, C, out->quantity, name, &mix, mean);
             made[r].mean = fmax(made[r].mean, own.mean);
             made[r].elements = fmax(made[r].elements, own.elements);
             one.indirect = fmax(one.indirect, own.mean);
             one.relative = fmax(one.relative, own.relative);
         }
+        emitters_mix_free(&mix);
         if (one.indirect >= out->indirect) out->emitters = one.emitters;
         out->indirect = fmax(out->indirect, one.indirect);
         out->relative = fmax(out->relative, one.relative);
@@ -143,6 +146,7 @@ static lam_status take_mixture(const stated_errors *stated, const error_scene *s
     *names = made;
     made = NULL;
 done:
+    emitters_mix_free(&mix);
     free(made);
     free(mean);
     free(light);

@@ -11,6 +11,7 @@ import numpy
 
 from case import Case
 from command import must
+from quads import Quads
 
 TRIAL = re.compile(r"trial (\d): the error of the mean of (\S+) by (.*) is stated as ([\d.e-]+), --group-error asks for ([\d.e-]+)"
                    r"(?:; next: (.*))?\n")
@@ -47,18 +48,9 @@ def write_rooms(path):
         for side, at in enumerate((low, high)):
             across, along = ((1.4, 1.6), (4, 4.02)) if axis == 1 else ((4, 4.02), (1.9, 2.1))
             grid("rim", axis, at, 1 - 2 * side, across, along)
-    with open(path, "w", encoding="ascii") as file:
-        file.write(f"mtllib {os.path.basename(path)[:-3]}mtl\nusemtl grey\n")
-        last = None
-        for k, (group, corners) in enumerate(faces):
-            if group != last:
-                file.write(f"o {group}\n")
-            last = group
-            for corner in corners:
-                file.write("v %.9g %.9g %.9g\n" % tuple(corner))
-            file.write("f %d %d %d %d\n" % tuple(range(4 * k + 1, 4 * k + 5)))
-    with open(path[:-3] + "mtl", "w", encoding="ascii") as file:
-        file.write("newmtl grey\nKd .7 .7 .7\n")
+    quads = Quads()
+    quads.groups, quads.faces = zip(*faces)
+    quads.write(path, .7)
 
 
 class GroupError(Case):

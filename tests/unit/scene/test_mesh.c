@@ -1,50 +1,8 @@
 #include "support/suite.h"
 
-#include "solver/base/vector3.h"
 #include "solver/scene/mesh.h"
-#include "solver/scene/mesh_cells.h"
 #include "support/scene.h"
-
-/* A mesh of quads and triangles (4th index MESH_NO_VERTEX) in one group, grey .5. */
-static mesh make_mesh(const double (*vertices)[3], size_t n_vertices, const uint32_t (*elements)[4],
-                      size_t n) {
-    lam_error error;
-    mesh m = {.n_vertices = n_vertices, .n = n, .n_groups = 1, .n_channels = 1, .unit = 1, .up = 'z'};
-    m.vertices = malloc(n_vertices * sizeof *m.vertices);
-    m.elements = malloc(n * sizeof *m.elements);
-    m.group = calloc(n, sizeof *m.group);
-    m.reflectance = calloc(n, sizeof *m.reflectance);
-    m.emission = calloc(n, sizeof *m.emission);
-    m.group_names = malloc(sizeof *m.group_names + 8);
-    memcpy(m.vertices, vertices, n_vertices * sizeof *vertices);
-    memcpy(m.elements, elements, n * sizeof *elements);
-    m.group_names[0] = strcpy((char *)(m.group_names + 1), "all");
-    for (size_t i = 0; i < n; i++) m.reflectance[i] = .5f, m.emission[i] = (float)i;
-    snprintf(m.name, sizeof m.name, "made");
-    snprintf(m.source_hash, sizeof m.source_hash, "%032d", 7);
-    ck_assert_int_eq(mesh_measure(&m, &error), LAM_OK);
-    return m;
-}
-
-#define TRIANGLE MESH_NO_VERTEX
-
-static const double cube_vertices[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
-                                           {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
-static const uint32_t cube_elements[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 4, 6, 2},
-                                             {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}};
-static const double octahedron_vertices[6][3] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
-                                                 {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
-static const uint32_t octahedron_elements[8][4] = {
-    {0, 2, 4, TRIANGLE}, {2, 1, 4, TRIANGLE}, {1, 3, 4, TRIANGLE}, {3, 0, 4, TRIANGLE},
-    {2, 0, 5, TRIANGLE}, {1, 2, 5, TRIANGLE}, {3, 1, 5, TRIANGLE}, {0, 3, 5, TRIANGLE}};
-
-static mesh make_cube(void) {
-    return make_mesh(cube_vertices, 8, cube_elements, 6);
-}
-
-static mesh make_octahedron(void) {
-    return make_mesh(octahedron_vertices, 6, octahedron_elements, 8);
-}
+#include "support/solids.h"
 
 START_TEST(areas_and_normals_are_exact) {
     mesh m = make_cube();
@@ -446,108 +404,6 @@ START_TEST(dropped_elements) {
 }
 END_TEST
 
-/* Halves have half of the area of a cell each, whichever side is halved, down to tiny cells. */
-START_TEST(halves_of_cells_are_equal) {
-    mesh m = _i == 0 ? make_cube() : make_octahedron();
-    for (size_t side = 0; side < (_i == 0 ? 2u : 3u); side++) {
-        mesh_cell cell = mesh_cell_of(&m, 1), halves[2];
-        const double whole = m.area[1];
-        ck_assert_double_eq_tol(mesh_cell_area(&cell), whole, 1e-15);
-        for (size_t step = 0; mesh_cell_halve(&cell, (side + step) % (_i == 0 ? 2u : 3u), halves); step++) {
-            const double area = mesh_cell_area(&cell);
-            for (int k = 0; k < 2; k++)
-                ck_assert_double_eq_tol(mesh_cell_area(&halves[k]), area / 2, 1e-12 * whole);
-            cell = halves[step % 2];
-        }
-        ck_assert_double_lt(mesh_cell_area(&cell), whole * 4 * MESH_CELL_LEAST);
-        ck_assert_double_ge(cell.share, MESH_CELL_LEAST);
-    }
-    mesh_free(&m);
-}
-END_TEST
-
-/* All turns at the corners of a cell have the same sense: it is convex, and has no corner twice. */
-static void check_convex(const mesh *m, const mesh_cell *c) {
-    for (size_t k = 0; k < c->n; k++) {
-        double a[3], b[3], turn[3], along = 0;
-        subtract3(c->corner[(k + 1) % c->n], c->corner[k], a);
-        subtract3(c->corner[(k + 2) % c->n], c->corner[(k + 1) % c->n], b);
-        cross3(a, b, turn);
-        for (int d = 0; d < 3; d++) along += turn[d] * (double)m->normal[c->face][d];
-        ck_assert_double_gt(along, 0);
-    }
-}
-
-/* Every cut of a quad, of a trapezoid and of a triangle leaves two convex cells of 3 or 4 corners with the
- * normal of the face, whose areas and shares add up and whose common side has the same bits; there are as
- * many cuts as counted by hand: 3 x 3 between each two sides that may be joined, 3 from a corner to each side
- * that is not its own, and two diagonals. */
-START_TEST(cuts_of_cells_add_up) {
-    mesh m = _i == 2 ? make_octahedron() : make_cube();
-    mesh_cell cell = mesh_cell_of(&m, 1), of[2], parts[2];
-    mesh_cut cuts[MESH_CUTS_MOST];
-    if (_i == 1) {
-        ck_assert(mesh_cell_cut(&cell, (mesh_cut){1, 9}, of));
-        cell = of[0];
-    }
-    const size_t n = mesh_cell_cuts(cell.n, cuts);
-    ck_assert_uint_eq(n, _i == 2 ? 3 * 9 + 3 * 3 : 2 * 9 + 4 * 2 * 3 + 2);
-    const double area = mesh_cell_area(&cell);
-    for (size_t k = 0; k < n; k++) {
-        double from[3], to[3];
-        ck_assert(mesh_cell_cut(&cell, cuts[k], parts));
-        const double first = mesh_cell_area(&parts[0]), second = mesh_cell_area(&parts[1]);
-        ck_assert_double_eq_tol(first + second, area, 1e-14 * area);
-        ck_assert_double_eq_tol(parts[0].share, cell.share * first / area, 1e-14);
-        ck_assert_double_eq_tol(parts[0].share + parts[1].share, cell.share, 1e-14);
-        mesh_cell_place(&cell, cuts[k].from, from);
-        mesh_cell_place(&cell, cuts[k].to, to);
-        for (int side = 0; side < 2; side++) {
-            ck_assert(parts[side].n == 3 || parts[side].n == 4);
-            ck_assert_uint_eq(parts[side].face, 1);
-            check_convex(&m, &parts[side]);
-            ck_assert_mem_eq(parts[side].corner[0], side == 0 ? from : to, sizeof from);
-            ck_assert_mem_eq(parts[side].corner[parts[side].n - 1], side == 0 ? to : from, sizeof from);
-        }
-    }
-    mesh_free(&m);
-}
-END_TEST
-
-/* Cells cover the faces in their order, keep their planes, fronts, groups and materials, and share corners.
- */
-START_TEST(meshes_of_cells_cover_faces) {
-    mesh m = _i == 0 ? make_cube() : make_octahedron(), fine = {0};
-    mesh_cell *cells = NULL;
-    size_t n;
-    lam_error error = {0};
-    const double area = total_area(&m), most = m.area[0] / 5;
-    ck_ok(mesh_cells_even(&m, most, 1000, &cells, &n, &error));
-    ck_assert_uint_eq(n, 8 * m.n);
-    ck_ok(mesh_of_cells(&m, n, cells, &fine, &error));
-    ck_assert_uint_eq(fine.n, n);
-    ck_assert_double_eq_tol(total_area(&fine), area, 1e-12 * area);
-    for (size_t i = 0; i < n; i++) {
-        const size_t face = cells[i].face;
-        ck_assert_uint_eq(face, i / 8);
-        ck_assert_double_le(fine.area[i], most);
-        ck_assert_uint_eq(fine.group[i], m.group[face]);
-        ck_assert(fine.emission[i] == m.emission[face]);
-        for (int d = 0; d < 3; d++) ck_assert_float_eq_tol(fine.normal[i][d], m.normal[face][d], 1e-6f);
-    }
-    ck_assert_uint_lt(fine.n_vertices, 2 * n); /* of 3 n or 4 n corners */
-    mesh_replace(&m, &fine);
-    ck_assert_uint_eq(m.n, n);
-    ck_assert_str_eq(m.group_names[0], "all");
-    ck_assert_ptr_null(fine.vertices);
-    free(cells);
-    ck_ok(mesh_cells_even(&m, 0, n + 3, &cells, &n, &error)); /* no more than may be */
-    ck_assert_uint_eq(n, m.n + 3);
-    free(cells);
-    mesh_free(&m);
-}
-END_TEST
-
 int main(void) {
     Suite *suite = suite_create("mesh");
     TCase *tests = tcase_create("mesh");
@@ -566,9 +422,6 @@ int main(void) {
     tcase_add_test(tests, fewer_elements_than_faces_changes_nothing);
     tcase_add_test(tests, store_keeps_every_bit);
     tcase_add_loop_test(tests, loading_refuses_bad_values, 0, 11);
-    tcase_add_loop_test(tests, halves_of_cells_are_equal, 0, 2);
-    tcase_add_loop_test(tests, cuts_of_cells_add_up, 0, 3);
-    tcase_add_loop_test(tests, meshes_of_cells_cover_faces, 0, 2);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
