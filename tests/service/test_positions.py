@@ -224,6 +224,16 @@ class Positions(Case):
             np.testing.assert_allclose(turn[0], np.diag([1, -1, -1]), atol=1e-9)
             np.testing.assert_allclose(turn[-1] @ [0, 0, 1], [0, -1, 0], atol=1e-9)
 
+    def test_turns_take_the_shorter_way(self):
+        file, store = self.path("turn.json"), self.path("turn.h5")
+        turns = [{"move": [.5, .5, .5 + k * .1], "turn": {"axis": [0, 0, 1], "degrees": degrees}} for k, degrees in enumerate((10, 350))]
+        self.of_file(file, light(path=turns))
+        must("precompute", self.box, "--path", file, "--frames", 5, "--paths", 32, "-o", store)
+        with h5py.File(store) as h5:
+            turn = h5["positions/pose"][:, :, :3]
+        angles = np.degrees(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+        np.testing.assert_allclose(angles, [10, 5, 0, -5, -10], atol=1e-9)
+
     def test_threads_stores_and_colours(self):
         one, two = self.path("one.h5"), self.path("two.h5")
         for store, scene, threads in (one, self.box, 1), (two, self.store, 2):

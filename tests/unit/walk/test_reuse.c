@@ -369,6 +369,49 @@ START_TEST(rays_know_what_is_hidden) {
 }
 END_TEST
 
+/* Covariances of groups add up to the whole one, and that of their means is the spread of the means over
+ * seeds: of 8 groups and 12 positions and channels, many alike, 24 seeds; the mean of the squares is sure to
+ * a fifth. */
+START_TEST(means_of_groups_scatter_as_stated) {
+    enum { SEEDS = 24 };
+    const reuse_way way = _i == 0 ? REUSE_EXACT : REUSE_ELEMENTS;
+    mesh m = cornell();
+    moving_light l = falling_light(&m);
+    const size_t s = l.n, C = m.n_channels, G = m.n_groups;
+    double *sum = test_allocate(G * s * C, sizeof *sum), *squares = test_allocate(G * s * C, sizeof *squares);
+    double *area = test_allocate(G, sizeof *area), stated = 0, found = 0;
+    for (size_t i = 0; i < m.n; i++) area[m.group[i]] += m.area[i];
+    for (size_t r = 0; r < SEEDS; r++) {
+        reuse_estimates e = reuse(&m, &l, way, 1600, 0, r + 1);
+        double whole = 0, parts = 0;
+        for (size_t g = 0; g < G; g++)
+            for (size_t k = 0; k < s; k++) {
+                stated += e.of_means[(g * s + k) * s + k] * area[g] * area[g] / SEEDS;
+                parts += e.of_groups[(g * s + k) * s + k];
+                for (size_t c = 0; c < C; c++) {
+                    double mean = 0;
+                    for (size_t i = 0; i < m.n; i++)
+                        if (m.group[i] == g)
+                            mean += m.area[i] * (double)m.reflectance[c * m.n + i] *
+                                    (double)e.H[(c * s + k) * m.n + i];
+                    sum[(g * s + k) * C + c] += mean / SEEDS;
+                    squares[(g * s + k) * C + c] += mean * mean / SEEDS;
+                }
+            }
+        for (size_t k = 0; k < s; k++) whole += e.covariance[k * s + k];
+        ck_assert_double_eq_tol(parts, whole, 1e-9 * whole);
+        reuse_estimates_free(&e);
+    }
+    for (size_t k = 0; k < G * s * C; k++) found += (squares[k] - sum[k] * sum[k]) * SEEDS / (SEEDS - 1.);
+    ck_assert_msg(found > .7 * stated && found < 1.4 * stated, "%g for %g", found, stated);
+    free(sum);
+    free(squares);
+    free(area);
+    moving_light_free(&l);
+    mesh_free(&m);
+}
+END_TEST
+
 /* |H~ - H| / |H| over all positions and elements. */
 static double distance(const reuse_estimates *e, const reuse_estimates *of, const mesh *m) {
     double off = 0, all = 0;
@@ -483,6 +526,7 @@ int main(void) {
     tcase_add_test(tests, sharing_lowers_the_error);
     tcase_add_test(tests, walks_from_elements_agree_with_closed_forms);
     tcase_add_loop_test(tests, rays_know_what_is_hidden, 0, 2);
+    tcase_add_loop_test(tests, means_of_groups_scatter_as_stated, 0, 2);
     tcase_add_loop_test(tests, maps_come_close, 0, 2);
     tcase_add_test(tests, counts_even_out_errors);
     tcase_add_loop_test(tests, bits_do_not_depend_on_threads, 0, 5);
