@@ -14,7 +14,7 @@ static const float near_part = 1e-4f;
 
 /* Samples of an element and a position: of the pilot, which are not used again, and at least; at least of
  * lights that are near, of which a pilot may miss a sliver that shines on the element; at most. */
-enum { PILOT = 16, NEAR_LEAST = 256, MOST = 4096 };
+enum { PILOT = 16, NEAR_LEAST = 256, MOST = 1 << 17 };
 
 /* The spread of samples over the mean without anything in between that is assumed at least: few may have
  * missed what varies, or the only gap that light comes through. */

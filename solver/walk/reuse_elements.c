@@ -19,7 +19,7 @@
 
 /* Segments between an element and a position of the light, a power of two: about as much time as the walks
  * take. */
-enum { SAMPLES_LEAST = 32, SAMPLES_MOST = 256 };
+enum { SAMPLES_LEAST = 32, SAMPLES_MOST = 1 << 14 };
 
 /* All that batches share. */
 typedef struct shared {
