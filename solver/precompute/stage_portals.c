@@ -64,7 +64,7 @@ lam_status state_take_portals(precompute_state *state, lam_error *error) {
     if (n_dropped == m->n)
         FAIL(error, LAM_ERR_ARGUMENT, "--portal %.200s: every face of the scene is of a portal",
              names->items[0]);
-    mesh_drop(m, dropped);
+    TRY(mesh_drop(m, dropped, error));
     terminal_log(state->t, "%zu face%s of portals, which are no elements", n_dropped,
                  n_dropped == 1 ? "" : "s");
 done:

@@ -174,23 +174,26 @@ void mesh_centroid(const mesh *m, size_t element, double centroid[3]) {
         centroid[k] = a[k] + ((c[k] - a[k]) + (1 - share) * (b[k] - a[k]) + share * (d[k] - a[k])) / 3;
 }
 
-/* Renumbers the groups that still have elements. Names lie in one block, in order. */
-static void drop_empty_groups(mesh *m) {
-    size_t kept = 0;
-    for (uint32_t g = 0; g < m->n_groups; g++) {
-        bool used = false;
-        for (size_t i = 0; i < m->n; i++) used = used || m->group[i] == g;
-        if (!used) continue;
-        for (size_t i = 0; i < m->n; i++)
-            if (m->group[i] == g) m->group[i] = (uint32_t)kept;
-        m->group_names[kept++] = m->group_names[g];
+/* Renumbers the groups that still have elements. Names lie in one block, in order. number [n_groups] is
+ * scratch. */
+static void drop_empty_groups(mesh *m, uint32_t *number) {
+    uint32_t kept = 0;
+    memset(number, 0, m->n_groups * sizeof *number);
+    for (size_t i = 0; i < m->n; i++) number[m->group[i]] = 1;
+    for (size_t g = 0; g < m->n_groups; g++) {
+        if (number[g] == 0) continue;
+        m->group_names[kept] = m->group_names[g];
+        number[g] = kept++;
     }
+    for (size_t i = 0; i < m->n; i++) m->group[i] = number[m->group[i]];
     m->n_groups = kept;
 }
 
-void mesh_drop(mesh *m, const bool *dropped) {
+lam_status mesh_drop(mesh *m, const bool *dropped, lam_error *error) {
     const size_t before = m->n;
     size_t n = 0;
+    uint32_t *number = memory_allocate(m->n_groups, sizeof *number, "groups", error);
+    if (number == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < before; i++) n += !dropped[i];
     assert(n > 0);
     for (size_t c = 0, to = 0; c < m->n_channels; c++)
@@ -207,5 +210,7 @@ void mesh_drop(mesh *m, const bool *dropped) {
         m->group[to++] = m->group[i];
     }
     m->n = n;
-    drop_empty_groups(m);
+    drop_empty_groups(m, number);
+    free(number);
+    return LAM_OK;
 }

@@ -62,8 +62,9 @@ lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
 lam_status mesh_make_two_sided(mesh *m, lam_error *error);
 
 /* Removes the elements that are marked in dropped [n], and groups that have none left; at least one element
- * stays. Vertices and the hash of the source stay as they are. */
-void mesh_drop(mesh *m, const bool *dropped);
+ * stays. Vertices and the hash of the source stay as they are. Cost: O(n + groups). Errors: LAM_ERR_MEMORY,
+ * with nothing changed. */
+lam_status mesh_drop(mesh *m, const bool *dropped, lam_error *error);
 
 /* 3-D Morton order of the element centroids (thesis 2.3): order[position] = element. order is [n]. */
 lam_status mesh_z_order(const mesh *m, uint32_t *order, lam_error *error);

@@ -385,7 +385,8 @@ START_TEST(dropped_elements) {
     for (size_t k = 0; k < 12; k++) m.reflectance[k] = .01f * (float)k, m.emission[k] = (float)k;
     for (size_t i = 0; i < 6; i++) m.area[i] = 1 + (double)i;
     for (size_t i = 0; i < 6; i++) m.normal[i][0] = (float)i;
-    mesh_drop(&m, dropped);
+    lam_error error;
+    ck_assert_int_eq(mesh_drop(&m, dropped, &error), LAM_OK);
     static const size_t kept[] = {0, 2, 3, 5};
     ck_assert_uint_eq(m.n, 4);
     ck_assert_uint_eq(m.n_groups, 2);
