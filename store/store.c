@@ -1,5 +1,4 @@
-/* Creates, seals and opens stores: a new file is written beside the target and renamed onto it; opening reads
- * all metadata of a sealed one. */
+/* Creates, seals and closes stores: a new file is written beside the target and renamed onto it. */
 #include "store/store_private.h"
 
 #include <errno.h>
@@ -91,38 +90,6 @@ lam_status store_name_check(const store *s, const char *name, lam_error *error) 
     return LAM_OK;
 }
 
-static bool is_group(const store *s, const char *name) {
-    hid_t object = H5Oopen(s->h5, name, H5P_DEFAULT);
-    /* An object that cannot be opened counts as one: reading it will fail with a message. */
-    bool group = object < 0 || H5Iget_type(object) == H5I_GROUP;
-    if (object >= 0) H5Oclose(object);
-    return group;
-}
-
-int store_exists(const store *s, const char *name) {
-    char prefix[STORE_NAME_SIZE];
-    size_t length = strlen(name);
-    if (name[0] != '/' || length >= sizeof prefix) return 0;
-    if (length == 1) return 1;
-    for (size_t i = 1; i <= length; i++) {
-        if (name[i] != '/' && name[i] != '\0') continue;
-        if (name[i - 1] == '/') return 0;
-        memcpy(prefix, name, i);
-        prefix[i] = '\0';
-        htri_t found = H5Lexists(s->h5, prefix, H5P_DEFAULT);
-        if (found <= 0) return found < 0 ? -1 : 0;
-        if (name[i] == '/' && !is_group(s, prefix)) return 0; /* an array has no objects within */
-    }
-    return 1;
-}
-
-bool store_has(store *s, const char *name) {
-    store_mute mute = store_mute_begin();
-    bool found = store_exists(s, name) > 0;
-    store_mute_end(&mute);
-    return found;
-}
-
 static lam_status text_copy(const char *text, char **copy, lam_error *error) {
     size_t size = strlen(text) + 1;
     *copy = memory_allocate(size, 1, "a path", error);
@@ -182,7 +149,7 @@ done:
     return status;
 }
 
-static lam_status store_new(const char *path, store **out, lam_error *error) {
+lam_status store_new(const char *path, store **out, lam_error *error) {
     store *s = memory_allocate(1, sizeof *s, path, error);
     if (s == NULL) return LAM_ERR_MEMORY;
     s->h5 = -1;
@@ -266,7 +233,9 @@ done:
 
 void store_close(store *s) {
     if (s == NULL) return;
-    store_mute mute = store_mute_begin();
+    const bool writes = s->file.writable; /* otherwise HDF5 is not called */
+    store_mute mute = {NULL, NULL};
+    if (writes) mute = store_mute_begin();
     if (s->partial != NULL) {
         unlink(s->partial);
         if (s->file.error == 0) s->file.error = ECANCELED; /* data still in HDF5 need not be written */
@@ -275,29 +244,13 @@ void store_close(store *s) {
     store_driver_release(&s->file);
     if (s->file.fd >= 0) close(s->file.fd);
     store_sums_free(&s->sums);
+    store_index_free(&s->index);
     store_map_release(s->map);
     free(s->partial);
     free(s->target);
     free(s->path);
     free(s);
-    store_mute_end(&mute);
-}
-
-static lam_status open_file(store *s, lam_error *error) {
-    struct stat info;
-    /* O_NONBLOCK: a pipe of that name must not make us wait for its writer. */
-    s->file.fd = open(s->path, O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
-    if (s->file.fd < 0 || fstat(s->file.fd, &info) != 0)
-        return status_fail(error, LAM_ERR_IO, "%s: cannot open: %s", s->path, strerror(errno));
-    if (!S_ISREG(info.st_mode))
-        return status_fail(error, LAM_ERR_FORMAT, "%s: not a regular file, so not a Lambert store", s->path);
-    s->file.size = (uint64_t)info.st_size;
-    s->identity = (store_identity){.device = (uint64_t)info.st_dev,
-                                   .inode = (uint64_t)info.st_ino,
-                                   .size = s->file.size,
-                                   .modified_s = (int64_t)info.st_mtim.tv_sec,
-                                   .modified_ns = (int64_t)info.st_mtim.tv_nsec};
-    return LAM_OK;
+    if (writes) store_mute_end(&mute);
 }
 
 const store_identity *store_identity_of(const store *s) {
@@ -308,135 +261,4 @@ bool store_identity_same(const store_identity *a, const store_identity *b) {
     return a->device == b->device && a->inode == b->inode && a->size == b->size &&
            a->modified_s == b->modified_s && a->modified_ns == b->modified_ns &&
            strcmp(a->digest, b->digest) == 0;
-}
-
-/* The fixed part of a superblock of version 2 or 3: signature [8], version, size of offsets, size of lengths,
- * flags, then four offsets: base, extension, end of file, root; a checksum [4]. */
-static lam_status open_hdf5(store *s, lam_error *error) {
-    static const unsigned char signature[8] = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
-    lam_status status = LAM_OK;
-    unsigned char head[48];
-    hid_t access = -1;
-    if (s->file.size < sizeof head)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %llu bytes, too short for a Lambert store", s->path,
-             (unsigned long long)s->file.size);
-    if (!store_file_read(&s->file, 0, head, sizeof head))
-        TRY(store_hdf5_failure(s, "the file", "read", error));
-    /* Version 0, of other HDF5 files, has no checksum: it is refused without asking HDF5. */
-    if (memcmp(head, signature, sizeof signature) != 0 || head[8] < 2 || head[8] > 3 || head[9] != 8 ||
-        head[10] != 8)
-        FAIL(error, LAM_ERR_FORMAT, "%s: not a Lambert store", s->path);
-    access = store_driver_properties(&s->file);
-    if (access < 0) TRY(store_hdf5_failure(s, "the file", "open", error));
-    s->h5 = H5Fopen(s->path, H5F_ACC_RDONLY, access);
-    if (s->h5 < 0) {
-        status = store_hdf5_failure(s, "the file's head", "read", error);
-        uint64_t end = 0;
-        for (int i = 7; i >= 0; i--) end = end << 8 | head[28 + i];
-        if (status == LAM_ERR_DAMAGED && end > s->file.size)
-            FAIL(error, LAM_ERR_FORMAT, "%s: truncated: %llu bytes of %llu; make or copy it again", s->path,
-                 (unsigned long long)s->file.size, (unsigned long long)end);
-    }
-done:
-    if (access >= 0) H5Pclose(access);
-    return status;
-}
-
-static lam_status check_root(store *s, lam_error *error) {
-    lam_status status = LAM_OK;
-    char *format = NULL;
-    int64_t version = 0;
-    status = store_get_text(s, "/", "format", &format, error);
-    if (status == LAM_ERR_FORMAT || (status == LAM_OK && strcmp(format, STORE_FORMAT) != 0))
-        FAIL(error, LAM_ERR_FORMAT, "%s: HDF5, but not a Lambert store", s->path);
-    TRY(status);
-    TRY(store_get_integer(s, "/", "version", &version, error));
-    if (version != STORE_VERSION)
-        FAIL(error, LAM_ERR_VERSION, "%s: of format version %lld, this program reads version %d; %s", s->path,
-             (long long)version, STORE_VERSION,
-             version > STORE_VERSION ? "use a newer lambert or precompute it again" : "precompute it again");
-    if (store_exists(s, "/checksum") == 0 || !is_group(s, "/checksum"))
-        FAIL(error, LAM_ERR_FORMAT, "%s: has no /checksum: it was never finished", s->path);
-done:
-    free(format);
-    return status;
-}
-
-typedef struct metadata_walk {
-    store *s;
-    lam_status status;
-    lam_error *error;
-} metadata_walk;
-
-static void attribute_ignore(void *context, const char *name, const char *text, double number) {
-    (void)context;
-    (void)name;
-    (void)text;
-    (void)number;
-}
-
-/* Checks one link: a hard link to a readable group, or to a readable array with checksums. */
-static herr_t metadata_visit(hid_t root, const char *relative, const H5L_info_t *info, void *context) {
-    metadata_walk *walk = context;
-    store *s = walk->s;
-    lam_error *error = walk->error;
-    lam_status status = LAM_OK;
-    char name[STORE_NAME_SIZE];
-    hid_t object = -1;
-    size_t depth = 1;
-    for (const char *c = relative; *c != '\0'; c++) depth += *c == '/';
-    if (info->type != H5L_TYPE_HARD || strlen(relative) + 2 > sizeof name || depth >= STORE_MAX_DEPTH + 1)
-        FAIL(error, LAM_ERR_FORMAT, "%s: /%.80s is a link or lies too deep, not a Lambert store", s->path,
-             relative);
-    snprintf(name, sizeof name, "/%s", relative);
-    object = H5Oopen(root, relative, H5P_DEFAULT);
-    if (object < 0) TRY(store_hdf5_failure(s, name, "read", error));
-    H5I_type_t kind = H5Iget_type(object);
-    if (kind != H5I_GROUP && kind != H5I_DATASET)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s is neither a group nor an array, not a Lambert store", s->path,
-             name);
-    if (kind == H5I_DATASET && strncmp(name, "/checksum/", 10) != 0 &&
-        store_sums_find(&s->sums, name) == NULL)
-        FAIL(error, LAM_ERR_DAMAGED, "%s: %s has no checksum; make the store again", s->path, name);
-    TRY(store_each_attribute(s, name, attribute_ignore, NULL, error));
-done:
-    if (object >= 0) H5Oclose(object);
-    walk->status = status;
-    return status == LAM_OK ? 0 : -1;
-}
-
-/* Reads every header once, so that a damaged one is reported here and not taken for a missing one. */
-static lam_status check_metadata(store *s, lam_error *error) {
-    lam_status status = LAM_OK;
-    metadata_walk walk = {s, LAM_OK, error};
-    TRY(store_each_attribute(s, "/", attribute_ignore, NULL, error));
-    if (H5Lvisit(s->h5, H5_INDEX_NAME, H5_ITER_INC, metadata_visit, &walk) < 0) {
-        TRY(walk.status);
-        TRY(store_hdf5_failure(s, "a group", "read", error));
-    }
-done:
-    return status;
-}
-
-static lam_status open_here(const char *path, store **out, lam_error *error) {
-    lam_status status = LAM_OK;
-    store *s = NULL;
-    store_mute mute = store_mute_begin();
-    TRY(store_new(path, &s, error));
-    TRY(open_file(s, error));
-    TRY(open_hdf5(s, error));
-    TRY(check_root(s, error));
-    TRY(store_sums_read(s, error));
-    TRY(check_metadata(s, error));
-    *out = s;
-    s = NULL;
-done:
-    store_close(s);
-    store_mute_end(&mute);
-    return status;
-}
-
-lam_status store_open(const char *path, store **out, lam_error *error) {
-    const lam_status status = store_probe(open_here, path, error);
-    return status == LAM_OK ? open_here(path, out, error) : status;
 }

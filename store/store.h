@@ -1,6 +1,7 @@
 /* A store file: named typed arrays and attributes in HDF5, sealed once, then read only.
  * The only user of <hdf5.h>; knows no operator kind. Names are HDF5 paths ("/mesh/area").
- * One thread at a time may call into a store. */
+ * Each function that reads asks for a store that was opened, each that writes for one that was created. One
+ * thread at a time may call into a store; several may read different ones, as HDF5 only runs in children. */
 #ifndef LAMBERT_STORE_STORE_H
 #define LAMBERT_STORE_STORE_H
 
@@ -58,8 +59,10 @@ lam_status store_seal(store *s, lam_error *error);
 /* Abandons a store being written, or closes one that was opened; NULL is allowed. */
 void store_close(store *s);
 
-/* Opens read only and checks that it is a sealed store of this version.
- * Errors: LAM_ERR_IO, LAM_ERR_FORMAT (foreign or truncated), LAM_ERR_VERSION, LAM_ERR_DAMAGED. */
+/* Opens read only and checks that it is a sealed store of this version. The file is opened once; a child
+ * process reads its headers (some ms, more for a process with much memory of its own), at most 30 s.
+ * Errors: LAM_ERR_IO (also where no child can be started, or SIGCHLD is ignored), LAM_ERR_FORMAT (foreign or
+ * truncated), LAM_ERR_VERSION, LAM_ERR_DAMAGED (also where HDF5 crashes or does not end), LAM_ERR_MEMORY. */
 lam_status store_open(const char *path, store **out, lam_error *error);
 
 /* Reads every dataset and compares it with /checksum; LAM_ERR_DAMAGED names the dataset and its MiB. */

@@ -117,56 +117,31 @@ done:
     return status;
 }
 
-typedef struct sums_walk {
-    store *s;
-    lam_status status;
-    lam_error *error;
-} sums_walk;
-
-/* Reads one dataset below /checksum into the table. */
-static herr_t sums_visit(hid_t group, const char *relative, const H5L_info_t *info, void *context) {
-    sums_walk *walk = context;
-    store *s = walk->s;
-    lam_error *error = walk->error;
+/* Reads the dataset of this name, below /checksum, into the table. */
+static lam_status sums_load(store *s, const char *name, lam_error *error) {
     lam_status status = LAM_OK;
-    char name[STORE_NAME_SIZE];
-    store_array array = {.id = -1};
+    const store_array *array = NULL;
     uint64_t *pieces = NULL;
-    H5I_type_t kind = H5I_BADID;
-    size_t depth = 1;
-    for (const char *c = relative; *c != '\0'; c++) depth += *c == '/';
-    int length = snprintf(name, sizeof name, "/checksum/%s", relative);
-    if (info->type != H5L_TYPE_HARD || length >= (int)sizeof name || depth > STORE_MAX_DEPTH)
-        FAIL(error, LAM_ERR_FORMAT, "%s: /checksum/%.80s is a link or lies too deep", s->path, relative);
-    hid_t object = H5Oopen(group, relative, H5P_DEFAULT);
-    if (object < 0) TRY(store_hdf5_failure(s, name, "read", error));
-    kind = H5Iget_type(object);
-    H5Oclose(object);
-    if (kind == H5I_GROUP) goto done;
-    TRY(store_array_open(s, name, &array, error));
-    if (array.is_text || array.type != STORE_U64 || array.rank != 1)
+    TRY(store_array_find(s, name, &array, error));
+    if (array->is_text || array->type != STORE_U64 || array->rank != 1)
         FAIL(error, LAM_ERR_FORMAT, "%s: %s is not a list of checksums", s->path, name);
-    pieces = memory_allocate(array.bytes, 1, name, error);
+    pieces = memory_allocate(array->bytes, 1, name, error);
     if (pieces == NULL) TRY(LAM_ERR_MEMORY);
-    if (!store_file_read(&s->file, array.offset, pieces, array.bytes))
-        TRY(store_hdf5_failure(s, name, "read", error));
-    TRY(sums_insert(&s->sums, name + strlen("/checksum"), array.dims[0], pieces, error));
+    TRY(store_data_read(s, name, array->offset, pieces, array->bytes, error));
+    TRY(sums_insert(&s->sums, name + strlen("/checksum"), array->dims[0], pieces, error));
     pieces = NULL;
 done:
     free(pieces);
-    store_array_close(&array);
-    walk->status = status;
-    return status == LAM_OK ? 0 : -1;
+    return status;
 }
 
 lam_status store_sums_read(store *s, lam_error *error) {
     lam_status status = LAM_OK;
     char *expected = NULL, digest[17];
-    sums_walk walk = {s, LAM_OK, error};
-    hid_t group = H5Gopen2(s->h5, "/checksum", H5P_DEFAULT);
-    if (group < 0 || H5Lvisit(group, H5_INDEX_NAME, H5_ITER_INC, sums_visit, &walk) < 0) {
-        TRY(walk.status);
-        TRY(store_hdf5_failure(s, "/checksum", "read", error));
+    for (size_t i = 0; i < s->index.n_objects; i++) {
+        const store_object *object = &s->index.objects[i];
+        if (object->kind != OBJECT_GROUP && strncmp(object->name, "/checksum/", 10) == 0)
+            TRY(sums_load(s, object->name, error));
     }
     TRY(sums_digest(&s->sums, digest, error));
     TRY(store_get_text(s, "/checksum", "xxh3", &expected, error));
@@ -174,7 +149,6 @@ lam_status store_sums_read(store *s, lam_error *error) {
         FAIL(error, LAM_ERR_DAMAGED, "%s: /checksum is damaged; make the store again", s->path);
     memcpy(s->identity.digest, digest, sizeof digest);
 done:
-    if (group >= 0) H5Gclose(group);
     free(expected);
     return status;
 }
@@ -186,6 +160,12 @@ const store_sum *store_sums_find_for(const store *s, const char *name, const sto
     (void)status_fail(error, LAM_ERR_DAMAGED, "%s: %s has no checksum of its size; make the store again",
                       s->path, name);
     return NULL;
+}
+
+lam_status store_data_read(store *s, const char *name, uint64_t offset, void *data, size_t bytes,
+                           lam_error *error) {
+    if (store_file_read(&s->file, offset, data, bytes)) return LAM_OK;
+    return status_fail(error, LAM_ERR_IO, "%s: cannot read %s: %s", s->path, name, strerror(s->file.error));
 }
 
 lam_status store_array_load(store *s, const char *name, const store_array *array, void *data,
@@ -201,8 +181,7 @@ lam_status store_array_load(store *s, const char *name, const store_array *array
     for (size_t i = 0; i < sum->n_pieces; i++) {
         size_t start = i * STORE_PIECE, size = piece_size(array->bytes, i);
         char *piece = data == NULL ? scratch : (char *)data + start;
-        if (!store_file_read(&s->file, array->offset + start, piece, size))
-            TRY(store_hdf5_failure(s, name, "read", error));
+        TRY(store_data_read(s, name, array->offset + start, piece, size, error));
         if (store_checksum(piece, size) != sum->pieces[i])
             FAIL(error, LAM_ERR_DAMAGED, "%s: %s is damaged in MiB %zu of %zu; make the store again", s->path,
                  name, i + 1, sum->n_pieces);
@@ -223,40 +202,32 @@ lam_status store_verify(store *s, lam_error *error) {
 
 lam_status store_verify_group(store *s, const char *group, lam_error *error) {
     lam_status status = LAM_OK;
-    store_mute mute = store_mute_begin();
-    store_array array = {.id = -1};
+    const store_array *array = NULL;
     const size_t length = strcmp(group, "/") == 0 ? 0 : strlen(group);
     /* Every array is in the table: store_open has checked that. */
     for (size_t i = 0; i < s->sums.count; i++) {
         const char *name = s->sums.entries[i].name;
         if (!is_below(name, group, length)) continue;
-        TRY(store_array_open(s, name, &array, error));
-        TRY(store_array_load(s, name, &array, NULL, error));
-        store_array_close(&array);
+        TRY(store_array_find(s, name, &array, error));
+        TRY(store_array_load(s, name, array, NULL, error));
     }
 done:
-    store_array_close(&array);
-    store_mute_end(&mute);
     return status;
 }
 
 lam_status store_group_bytes(store *s, const char *group, uint64_t *bytes, lam_error *error) {
     lam_status status = LAM_OK;
-    store_mute mute = store_mute_begin();
-    store_array array = {.id = -1};
+    const store_array *array = NULL;
     uint64_t total = 0;
     const size_t length = strcmp(group, "/") == 0 ? 0 : strlen(group);
-    if (store_exists(s, group) == 0) FAIL(error, LAM_ERR_FORMAT, "%s: has no %s", s->path, group);
+    if (store_find(s, group) == NULL) FAIL(error, LAM_ERR_FORMAT, "%s: has no %s", s->path, group);
     for (size_t i = 0; i < s->sums.count; i++) {
         const char *name = s->sums.entries[i].name;
         if (!is_below(name, group, length)) continue;
-        TRY(store_array_open(s, name, &array, error));
-        total += array.bytes;
-        store_array_close(&array);
+        TRY(store_array_find(s, name, &array, error));
+        total += array->bytes;
     }
     *bytes = total;
 done:
-    store_array_close(&array);
-    store_mute_end(&mute);
     return status;
 }

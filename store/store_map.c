@@ -149,25 +149,22 @@ done:
 lam_status store_read_view(store *s, const char *name, store_type type, int rank, size_t *dims,
                            store_view *view, lam_error *error) {
     lam_status status = LAM_OK;
-    store_mute mute = store_mute_begin();
-    store_array array = {.id = -1};
+    const store_array *array = NULL;
     store_view found = {.data = NULL};
-    TRY(store_array_open_as(s, name, type, rank, dims, &array, error));
-    if (s->map != NULL && array.bytes >= STORE_MAP_LEAST && array.offset % store_type_size(type) == 0) {
-        const store_sum *sum = store_sums_find_for(s, name, &array, error);
+    TRY(store_array_find_as(s, name, type, rank, dims, &array, error));
+    if (s->map != NULL && array->bytes >= STORE_MAP_LEAST && array->offset % store_type_size(type) == 0) {
+        const store_sum *sum = store_sums_find_for(s, name, array, error);
         if (sum == NULL) TRY(LAM_ERR_DAMAGED);
-        TRY(add_array(s->map, name, &array, sum, error));
+        TRY(add_array(s->map, name, array, sum, error));
         found.map = store_map_hold(s->map);
-        found.data = s->map->base + array.offset;
-        memcpy(dims, array.dims, (size_t)rank * sizeof *dims);
+        found.data = s->map->base + array->offset;
+        memcpy(dims, array->dims, (size_t)rank * sizeof *dims);
     } else {
         TRY(store_read(s, name, type, rank, dims, &found.memory, error));
         found.data = found.memory;
     }
     *view = found;
 done:
-    store_array_close(&array);
-    store_mute_end(&mute);
     return status;
 }
 

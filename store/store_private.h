@@ -1,11 +1,13 @@
-/* Declarations shared by the files of store/: the open file, its table of checksums, an array of it. No other
- * header includes <hdf5.h>. */
+/* Declarations shared by the files of store/: the open file, its table of checksums, the index of one that is
+ * read. No other header includes <hdf5.h>. A store that is read never calls HDF5 in this process. */
 #ifndef LAMBERT_STORE_STORE_PRIVATE_H
 #define LAMBERT_STORE_STORE_PRIVATE_H
 
+#include "store/confined.h"
 #include "store/status.h"
 #include "store/store.h"
 #include "store/store_map.h"
+#include "store/store_reply.h"
 
 #include <hdf5.h>
 
@@ -39,13 +41,50 @@ typedef struct store_sums {
     store_sum *entries;
 } store_sums;
 
+/* An array of the file; its offset and size were compared with the size of the file. */
+typedef struct store_array {
+    bool is_text;
+    store_type type;   /* unless is_text */
+    size_t value_size; /* bytes of a value or a text */
+    int rank;
+    size_t dims[STORE_MAX_RANK];
+    size_t bytes;
+    uint64_t offset; /* in the file; 0 when bytes is 0 */
+} store_array;
+
+typedef struct store_attribute {
+    attribute_kind kind;
+    const char *name, *text;
+    double number; /* an integer's value also stands here */
+    int64_t integer;
+} store_attribute;
+
+typedef struct store_object {
+    object_kind kind;
+    const char *name;
+    store_array array;
+    lam_status status; /* of OBJECT_FAULTY */
+    const char *fault;
+    const store_attribute *attributes; /* sorted by name */
+    size_t n_attributes;
+} store_object;
+
+/* Everything in an opened store but its data. */
+typedef struct store_index {
+    char *bytes; /* names and texts point into them */
+    size_t n_objects, n_attributes;
+    store_object *objects; /* sorted by name */
+    store_attribute *attributes;
+} store_index;
+
 struct store {
     char *path;    /* as given */
     char *target;  /* final path of partial; NULL when reading */
     char *partial; /* NULL when reading */
     bool broken;   /* a call failed while writing: cannot be sealed */
     store_file file;
-    hid_t h5; /* negative: none */
+    hid_t h5;          /* of a file that is written; negative: none */
+    store_index index; /* of an opened file */
     store_sums sums;
     store_identity identity; /* of an opened file */
     store_map *map;          /* of an opened file, held; NULL: none */
@@ -62,19 +101,33 @@ void store_mute_end(const store_mute *mute);
 /* LAM_ERR_ARGUMENT unless name is an absolute path that a store may use. */
 lam_status store_name_check(const store *s, const char *name, lam_error *error);
 
-/* 1 if the path leads to an object, 0 if not, negative if the file is damaged there. */
-int store_exists(const store *s, const char *name);
-
 /* Turns a failed HDF5 call into a status and a message; call it before any other HDF5 function.
  * what: the verb, "write", "read". */
 lam_status store_hdf5_failure(store *s, const char *name, const char *what, lam_error *error);
 
-typedef lam_status store_opener(const char *path, store **out, lam_error *error);
+/* Memory for a store of this path, with no file yet. */
+lam_status store_new(const char *path, store **out, lam_error *error);
 
-/* Opens the file and reads its headers in a child process first. Errors: LAM_ERR_DAMAGED if that crashes or
- * does not end; LAM_ERR_IO if no child can be started, or SIGCHLD is ignored, so that its end stays unknown.
- * A refusal is no error here. */
-lam_status store_probe(store_opener *opener, const char *path, lam_error *error);
+/* In a child process: reads the headers of the file at s->file.fd by HDF5 and sends them (store_reply.h). */
+void store_headers_send(store *s, int to);
+
+/* store_open by a child that runs `run` on the store, with these limits: tests send what they like. */
+lam_status store_open_by(const char *path, confined_main *run, const confined_limits *limits, store **out,
+                         lam_error *error);
+
+/* LAM_ERR_DAMAGED unless a reply may begin so: then head->bytes more of it are worth the memory. */
+lam_status store_reply_check(const reply_head *head, const char *path, lam_error *error);
+
+/* Turns the bytes behind a head into an index of a file of this size. Takes bytes over, of malloc, also where
+ * it fails. Errors: LAM_ERR_DAMAGED for nonsense, LAM_ERR_FORMAT for arrays that share bytes, LAM_ERR_MEMORY.
+ */
+lam_status store_reply_read(const reply_head *head, const char *path, uint64_t file_size, char *bytes,
+                            store_index *out, lam_error *error);
+void store_index_free(store_index *index);
+
+/* A group or an array of an opened store; NULL: none has this name. */
+const store_object *store_find(const store *s, const char *name);
+const store_attribute *store_attribute_find(const store_object *object, const char *name);
 
 /* File access properties that use `file`, which must outlive the HDF5 file; negative on failure. The driver
  * stays registered until store_driver_release. */
@@ -103,26 +156,12 @@ lam_status store_text_type(store *s, size_t width, hid_t *out, lam_error *error)
 /* The HDF5 type of values; the caller closes it. Negative when HDF5 fails. */
 hid_t store_file_type(store_type type);
 
-/* An array of the file; its offset and size were compared with the size of the file. */
-typedef struct store_array {
-    hid_t id;
-    bool is_text;
-    store_type type;   /* unless is_text */
-    size_t value_size; /* bytes of a value or a text */
-    int rank;
-    size_t dims[STORE_MAX_RANK];
-    size_t bytes;
-    uint64_t offset; /* in the file; 0 when bytes is 0 */
-} store_array;
-
-/* Opens an array; the caller closes it, also after an error. LAM_ERR_FORMAT if missing or of an unknown type.
- */
-lam_status store_array_open(store *s, const char *name, store_array *array, lam_error *error);
-void store_array_close(store_array *array);
+/* An array of an opened store. LAM_ERR_FORMAT if it is missing or of an unknown type. */
+lam_status store_array_find(const store *s, const char *name, const store_array **array, lam_error *error);
 
 /* The same for an array that must have this type and shape; a dimension of SIZE_MAX matches any. */
-lam_status store_array_open_as(store *s, const char *name, store_type type, int rank, const size_t *dims,
-                               store_array *array, lam_error *error);
+lam_status store_array_find_as(const store *s, const char *name, store_type type, int rank,
+                               const size_t *dims, const store_array **array, lam_error *error);
 
 /* Adds the checksums of a dataset that is about to be written. */
 lam_status store_sums_add(store_sums *sums, const char *name, const void *data, size_t bytes,
@@ -134,9 +173,13 @@ const store_sum *store_sums_find(const store_sums *sums, const char *name);
 const store_sum *store_sums_find_for(const store *s, const char *name, const store_array *array,
                                      lam_error *error);
 
-/* Writes /checksum; reads it and compares it with its own checksum. */
+/* Writes /checksum; reads it, of an opened store, and compares it with its own checksum. */
 lam_status store_sums_write(store *s, lam_error *error);
 lam_status store_sums_read(store *s, lam_error *error);
+
+/* Reads exactly that many bytes of the file, of the array `name`. Errors: LAM_ERR_IO. */
+lam_status store_data_read(store *s, const char *name, uint64_t offset, void *data, size_t bytes,
+                           lam_error *error);
 
 /* Reads an array into data (NULL: nowhere) and compares it with its checksums. */
 lam_status store_array_load(store *s, const char *name, const store_array *array, void *data,

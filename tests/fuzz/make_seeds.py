@@ -12,7 +12,7 @@ import tempfile
 import numpy as np
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
-for name in ("json", "adjoint", "npy", "store", "import"):
+for name in ("json", "adjoint", "npy", "store", "import", "index"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -63,3 +63,30 @@ header = struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 0, b"", b"", 0, 3, 1, 1, 2,
 body = struct.pack("<9d", 0, 0, 0, 1, 0, 0, 0, 1, 0) + struct.pack("<6I", 0, 1, 2, 0xFFFFFFFF, 0, 0) + b"a\0" + b"m\0"
 (folder / "import" / "one").write_bytes(header + body + struct.pack("<6d2Q", .5, .5, .5, 0, 0, 0, 1, 1))
 (folder / "import" / "refused").write_bytes(struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 4, b"no", b"w\nv", 3, *[0] * 7))
+
+
+# The reply of the process that reads headers: a head, then objects with their attributes.
+def attribute(kind, name, text=b"", value=0):
+    return struct.pack("<4IQ", kind, len(name), len(text), 0, value) + name + text
+
+
+def item(kind, name, attributes=(), status=0, fault=b"", shape=(0, 0, 0, 0), dims=(), offset=0):
+    """shape: type, is_text, rank, bytes of a value"""
+    kind_of_value, is_text, rank, value_size = shape
+    return struct.pack("<8I6Q", kind, status, len(name), len(fault), len(attributes), kind_of_value, is_text, rank, value_size,
+                       *(list(dims) + [0] * 4)[:4], offset) + name + fault + b"".join(attributes)
+
+
+def reply(items, n_attributes, status=0, message=b""):
+    body = b"".join(items)
+    return struct.pack("<8sQ480s3Q", b"lamhead", status, message, len(items), n_attributes, len(body)) + body
+
+
+root = item(0, b"/\0", [attribute(0, b"format\0", b"lambert\0"), attribute(1, b"number\0", value=1), attribute(3, b"other\0"),
+                        attribute(2, b"version\0", value=1)])
+items = [root, item(0, b"/checksum\0"), item(1, b"/mesh-area\0", shape=(1, 0, 1, 8), dims=[100], offset=4096),
+         item(1, b"/names\0", shape=(0, 1, 1, 5), dims=[3], offset=8192), item(2, b"/odd\0", status=4, fault=b"store.h5: odd\0"),
+         item(1, b"/checksum/mesh-area\0", shape=(3, 0, 2, 8), dims=[1, 1], offset=8)]
+(folder / "index" / "whole").write_bytes(reply(items, 4))
+(folder / "index" / "refused").write_bytes(reply([root], 4, 4, b"store.h5: refused"))
+(folder / "index" / "shared").write_bytes(reply(items + [item(1, b"/x\0", shape=(0, 0, 1, 4), dims=[9], offset=4100)], 4))

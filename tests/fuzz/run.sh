@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Fuzzes every parser of bytes from outside, by libFuzzer under AddressSanitizer and UndefinedBehaviourSanitizer.
-# usage: tests/fuzz/run.sh [SECONDS [NAME ...]]     seconds for each (60); json adjoint npy store import
+# usage: tests/fuzz/run.sh [SECONDS [NAME ...]]     seconds for each (60); json adjoint npy store import index
 # What it finds is left in build/fuzz/found/NAME: give it a name and put it into tests/fuzz/found/NAME, where the
 # tests replay it for ever.
 set -euo pipefail
@@ -25,7 +25,7 @@ for name in "${names[@]}"; do
     mkdir -p "$build/corpus/$name" "$build/found/$name" "tests/fuzz/found/$name"
     longest=65536
     memory=4096
-    # A store is opened in a child first, as HDF5 may crash; under a sanitizer only where no other thread is.
+    # The headers of a store are read in a child, which under a sanitizer starts more slowly beside other threads.
     [ "$name" = store ] && longest=1048576 memory=0
     [ "$name" = store ] && export OMP_NUM_THREADS=1
     "$build/tests/fuzz_$name" -max_total_time="$seconds" -max_len=$longest -timeout=20 -rss_limit_mb=$memory \

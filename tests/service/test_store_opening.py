@@ -1,15 +1,37 @@
-"""Stores are opened by HDF5, first in a child process, whatever allocator and signals the program is started with."""
+"""The headers of stores are read by HDF5 in a child process, whatever allocator and signals the program is started with."""
 
+import ctypes
+import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import tempfile
 import unittest
 
 from command import ENVIRONMENT, LAMBERT
-from daemon import LAMBERTD, PATIENCE
+from daemon import LAMBERTD, PATIENCE, Daemon
 from make_store import Scene
+
+
+class Opens:
+    """Counts how often a file is opened by its name, one time after the other."""
+    IN_CLOSE, IN_OPEN, EVENT = 0x18, 0x20, struct.Struct("iIII")
+
+    def __init__(self, path):
+        library = ctypes.CDLL(None, use_errno=True)
+        self.fd = library.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)
+        if self.fd < 0 or library.inotify_add_watch(self.fd, os.fsencode(path), self.IN_OPEN | self.IN_CLOSE) < 0:
+            raise OSError(ctypes.get_errno(), "inotify")
+
+    def count(self):
+        """Since the last call. Equal events in a row are told as one: the end of each opening stands between."""
+        try:
+            seen = os.read(self.fd, 65536)
+        except BlockingIOError:
+            return 0
+        return sum(mask & self.IN_OPEN != 0 for _, mask, _, _ in self.EVENT.iter_unpack(seen))
 
 
 def ignore_children():
@@ -46,6 +68,15 @@ class Opening(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertNotIn("Invalid", done.stderr)
         self.assertIn("low_rank", done.stdout)
+
+    def test_the_file_is_looked_up_once(self):
+        """Nothing can take its place between the process that reads its headers and the one that reads its data."""
+        opens = Opens(self.store)
+        done = self.run_program(LAMBERT, "info", self.store)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertEqual(opens.count(), 1)
+        with Daemon(self.store):
+            self.assertEqual(opens.count(), 1)
 
     def test_ignored_children(self):
         """With SIGCHLD ignored, as some launchers leave it, the system keeps no exit status of a child."""
