@@ -176,14 +176,14 @@ static bool runs(pid_t pid) {
     return waitid(P_PID, (id_t)pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
 }
 
-lam_status confined_end(confined *c, bool whole, const char *path, int *how, lam_error *error) {
+lam_status confined_end(confined *c, bool answered, const char *path, int *how, lam_error *error) {
     const struct timespec pause = {.tv_nsec = 1000000};
     int status = 0;
     pid_t ended;
     close(c->reply);
     c->reply = -1;
     /* The pipe of a process that crashes ends before the process. */
-    for (int k = 0; !whole && !c->late && k < 100 && runs(c->pid); k++) nanosleep(&pause, NULL);
+    for (int k = 0; !answered && !c->late && k < 100 && runs(c->pid); k++) nanosleep(&pause, NULL);
     const bool killed = runs(c->pid);
     if (killed) kill(c->pid, SIGKILL);
     do ended = waitpid(c->pid, &status, 0);

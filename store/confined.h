@@ -38,10 +38,10 @@ lam_status confined_start(confined_main *run, void *context, int input, const co
 /* Reads exactly that many bytes of the answer; false where it or the time ends before. */
 bool confined_receive(confined *c, void *out, size_t bytes);
 
-/* Waits for the end of the child; unless its answer was whole it is killed first. *how: its wait status, 0 if
- * it was killed here. Errors: LAM_ERR_IO if the system does not tell it, which is so while SIGCHLD is
- * ignored. */
-lam_status confined_end(confined *c, bool whole, const char *path, int *how, lam_error *error);
+/* Ends a child that still runs. answered: the caller has all that it wants; otherwise the child gets a moment
+ * to end by itself, unless it is late. *how: its wait status, 0 if it was killed here. Errors: LAM_ERR_IO if
+ * the system does not tell the end, as while SIGCHLD is ignored. */
+lam_status confined_end(confined *c, bool answered, const char *path, int *how, lam_error *error);
 
 /* In the child: writes all bytes to a descriptor. */
 bool confined_send(int fd, const void *data, size_t bytes);

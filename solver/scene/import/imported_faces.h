@@ -97,8 +97,8 @@ scene_reader assimp_read;
  * polygons). Every index and size is checked. */
 typedef struct child_limits {
     unsigned cpu_seconds;
-    size_t memory_bytes;
-    const char *assets; /* of imported_faces */
+    size_t memory_bytes; /* beyond that of the caller */
+    const char *assets;  /* of imported_faces */
 } child_limits;
 
 lam_status import_in_child(scene_reader *reader, const char *path, const child_limits *limits,
