@@ -55,6 +55,12 @@ static const option_row connection_rows[] = {
      .offset = AT(token_file),
      .argument = "FILE",
      .help = "Ask for the bearer token in this file under /v1"},
+    {.name = "trusted-proxy",
+     .kind = OPTION_LIST,
+     .offset = AT(trusted_proxies),
+     .argument = "ADDRESS[/BITS]|unix",
+     .help =
+         "Believe this proxy about the client's address (Forwarded, X-Forwarded-For); may be given again"},
     {.name = "access-log",
      .kind = OPTION_TEXT,
      .offset = AT(access_log),

@@ -2,6 +2,7 @@
 #ifndef LAMBERT_SERVER_CONFIG_H
 #define LAMBERT_SERVER_CONFIG_H
 
+#include "solver/base/options.h"
 #include "store/status.h"
 
 #include <stdio.h>
@@ -11,7 +12,8 @@ typedef struct config {
     const char *listen_address; /* HOST:PORT; port 0: any that is free */
     const char *unix_path;      /* instead of listen_address */
     const char *token_file;
-    const char *access_log; /* "-": standard output */
+    option_list trusted_proxies; /* texts of peer_rules_read */
+    const char *access_log;      /* "-": standard output */
     size_t threads;
     size_t max_body;     /* bytes */
     size_t max_batch;    /* vectors in a request */

@@ -89,6 +89,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     if (labels == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < route_label_count(); i++) labels[i] = route_label(i);
     atomic_init(&s.state, SERVICE_LOADING);
+    TRY(peer_rules_read(&c->trusted_proxies, &s.peers, error));
     if (c->token_file != NULL) TRY(token_read(c->token_file, &s.token, error));
     if (c->access_log != NULL) TRY(access_log_open(c->access_log, &s.access_log, error));
     TRY(metrics_create(route_label_count(), labels, &s.metrics, error));

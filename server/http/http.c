@@ -259,19 +259,31 @@ static uint64_t announced_length(const request *r) {
     return *end == '\0' ? length : UINT64_MAX;
 }
 
-static enum MHD_Result frame_field(void *context, enum MHD_ValueKind kind, const char *name, size_t name_size,
-                                   const char *value, size_t value_size) {
+/* One walk over the fields of a head fills these. */
+typedef struct head_fields {
+    framing framing;
+    peer_fields peer;
+} head_fields;
+
+static enum MHD_Result take_field(void *context, enum MHD_ValueKind kind, const char *name, size_t name_size,
+                                  const char *value, size_t value_size) {
+    head_fields *fields = context;
     (void)kind;
-    framing_add(context, name, name_size, value, value_size);
+    framing_add(&fields->framing, name, name_size, value, value_size);
+    peer_add_field(&fields->peer, name, name_size, value, value_size);
     return MHD_YES;
 }
 
-/* False, with the answer made, if readers of this head could differ on where the request ends. */
-static bool check_framing(request *r, const char *version) {
-    framing fields = {0};
+/* Finds who asks. False, with the answer made, if readers of this head could differ on where the request
+ * ends. */
+static bool check_fields(request *r, const char *version) {
+    head_fields fields = {.peer = {.n_forwarded = 0}};
     problem why;
-    MHD_get_connection_values_n(r->connection, MHD_HEADER_KIND, frame_field, &fields);
-    if (framing_check(&fields, version, &why)) return true;
+    MHD_get_connection_values_n(r->connection, MHD_HEADER_KIND, take_field, &fields);
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+    peer_find(&r->service->peers, info != NULL ? info->client_addr : NULL, &fields.peer, &r->peer);
+    if (framing_check(&fields.framing, version, &why)) return true;
     answer_problem(&r->answer, &why);
     return false;
 }
@@ -281,7 +293,7 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
     request *r = begin_request(h, connection, path, method);
     if (r == NULL) return MHD_NO;
     *context = r;
-    if (!check_framing(r, version)) {
+    if (!check_fields(r, version)) {
         /* Nothing that follows may be read as a request, nor waited for as a body. */
         r->answered = r->last = true;
         return http_send_answer(r);
@@ -336,7 +348,8 @@ static void log_request(const request *r, unsigned status, double ms) {
     strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
     bool written =
         buffer_printf(&b, "{\"time\":\"%s.%03ldZ\",\"id\":", stamp, now.tv_nsec / 1000000) &&
-        json_write_text(&b, r->id) && buffer_append_text(&b, ",\"method\":") &&
+        json_write_text(&b, r->id) && buffer_append_text(&b, ",\"client\":") &&
+        json_write_text(&b, r->peer.text) && buffer_append_text(&b, ",\"method\":") &&
         json_write_text(&b, r->method) && buffer_append_text(&b, ",\"path\":") &&
         json_write_text(&b, r->path) &&
         buffer_printf(&b,

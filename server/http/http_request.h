@@ -16,6 +16,7 @@ typedef struct request {
     service *service;
     struct MHD_Connection *connection;
     client *client; /* NULL when memory was short */
+    peer peer;      /* the client, as the head states it */
     char id[REQUEST_ID_MAX + 1];
     char method[16];
     char *path;   /* as sent, without scheme and host */

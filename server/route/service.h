@@ -5,6 +5,7 @@
 #include "server/config.h"
 #include "server/net/access_log.h"
 #include "server/net/connections.h"
+#include "server/net/peer.h"
 #include "server/net/token.h"
 #include "server/queue/batch.h"
 #include "server/queue/metrics.h"
@@ -20,6 +21,7 @@ typedef struct service {
     metrics *metrics;
     batch_queue *queue;
     token token;              /* empty: none is needed */
+    peer_rules peers;         /* whose word about a client's address is taken */
     access_log *access_log;   /* NULL: none */
     atomic_int state;         /* a service_state */
     connections *connections; /* from http_start to http_stop */
