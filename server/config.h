@@ -12,8 +12,9 @@ typedef struct config {
     const char *listen_address; /* HOST:PORT; port 0: any that is free */
     const char *unix_path;      /* instead of listen_address */
     const char *token_file;
-    option_list trusted_proxies; /* texts of peer_rules_read */
-    const char *access_log;      /* "-": standard output */
+    option_list trusted_proxies;                /* texts of peer_rules_read */
+    option_list allowed_hosts, allowed_origins; /* texts of origin_rules_read */
+    const char *access_log;                     /* "-": standard output */
     size_t threads;
     size_t max_body;     /* bytes */
     size_t max_batch;    /* vectors in a request */

@@ -78,6 +78,18 @@ static void drain(service *s, const sigset_t *signals) {
     }
 }
 
+/* A daemon that other machines reach should know who asks, and by which names. */
+static void warn_if_open(const service *s) {
+    if (s->origins.is_local) return;
+    if (s->config->token_file == NULL)
+        fprintf(stderr, "lambertd: other machines may reach %s, and no token is asked for (--token-file)\n",
+                s->origins.bound);
+    if (s->origins.any_host)
+        fprintf(stderr, "lambertd: any Host is accepted on %s; name those to answer to by --allow-host\n",
+                s->origins.bound);
+    fflush(stderr);
+}
+
 static lam_status run(const config *c, const sigset_t *signals, lam_error *error) {
     lam_status status = LAM_OK;
     service s = {.config = c};
@@ -99,6 +111,9 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     TRY(c->unix_path != NULL
             ? connections_listen_unix(c->unix_path, &listen_fd, where, sizeof where, &own, error)
             : connections_listen_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
+    TRY(origin_rules_read(&c->allowed_hosts, &c->allowed_origins,
+                          c->unix_path == NULL ? c->listen_address : NULL, where, &s.origins, error));
+    warn_if_open(&s);
     TRY(http_start(&s, listen_fd, &h, error));
     if (catalog_reload(s.catalog) == 0) FAIL(error, LAM_ERR_IO, "no store can be served");
     atomic_store(&s.state, SERVICE_READY);

@@ -87,16 +87,24 @@ bool framing_check(const framing *f, const char *version, problem *why) {
     return true;
 }
 
-const char *framing_path(const char *target) {
+/* The bytes of the scheme of an absolute target, http:// or https://; 0 for others. */
+static size_t scheme_length(const char *target) {
     static const char *const schemes[] = {"http://", "https://"};
-    for (size_t i = 0; i < sizeof schemes / sizeof schemes[0]; i++) {
-        const size_t length = strlen(schemes[i]);
-        if (strncasecmp(target, schemes[i], length) != 0) continue;
-        const char *host = target + length;
-        const char *path = host + strcspn(host, "/");
-        /* A target without host is invalid (RFC 9110, 4.2.1), and no route has its name. */
-        if (path == host) return target;
-        return *path == '\0' ? "/" : path;
-    }
-    return target;
+    for (size_t i = 0; i < sizeof schemes / sizeof schemes[0]; i++)
+        if (strncasecmp(target, schemes[i], strlen(schemes[i])) == 0) return strlen(schemes[i]);
+    return 0;
+}
+
+const char *framing_path(const char *target) {
+    const char *host = target + scheme_length(target), *path = host + strcspn(host, "/");
+    /* A target without host is invalid (RFC 9110, 4.2.1), and no route has its name. */
+    if (host == target || path == host) return target;
+    return *path == '\0' ? "/" : path;
+}
+
+void framing_host(const char *target, const char **host, size_t *length) {
+    const size_t scheme = scheme_length(target), count = strcspn(target + scheme, "/");
+    if (scheme == 0 || count == 0) return;
+    *host = target + scheme;
+    *length = count;
 }

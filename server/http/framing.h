@@ -27,4 +27,9 @@ bool framing_check(const framing *f, const char *version, problem *why);
  * host, of others as it is. Points into the target, or to "/". */
 const char *framing_path(const char *target);
 
+/* Sets *host and *length to the HOST of a target in absolute form, which lies in the target; others leave
+ * them.
+ */
+void framing_host(const char *target, const char **host, size_t *length);
+
 #endif

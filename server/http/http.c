@@ -1,7 +1,7 @@
 #include "server/http/http.h"
 
+#include "server/http/browser.h"
 #include "server/http/framing.h"
-#include "server/http/http_request.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/verifier.h"
 #include "solver/base/clock.h"
@@ -66,7 +66,11 @@ static bool check_type(request *r) {
     const char *encoding = http_header(r, MHD_HTTP_HEADER_CONTENT_ENCODING);
     r->call.body_type = media_content_type(type);
     r->call.accept = media_choose(http_header(r, MHD_HTTP_HEADER_ACCEPT));
-    if (r->call.body_type == MEDIA_OTHER)
+    /* Without a type a page of any origin could send the body, as that asks for no preflight. */
+    if (type == NULL && (strcmp(r->method, "POST") == 0 || strcmp(r->method, "PUT") == 0))
+        answer_refuse(&r->answer, PROBLEM_MEDIA_TYPE,
+                      "Content-Type is missing, must be application/json or application/x-npy");
+    else if (r->call.body_type == MEDIA_OTHER)
         answer_refuse(&r->answer, PROBLEM_MEDIA_TYPE,
                       "Content-Type is %.100s, must be application/json or application/x-npy", type);
     else if (encoding != NULL && strcasecmp(encoding, "identity") != 0)
@@ -89,10 +93,12 @@ static void refuse_to_hold(request *r, const char *what) {
                   r->service->config->max_buffered);
 }
 
-/* The checks of the head: route, method, token, scene, type, length. True if the body is to be read. */
-static bool check_head(request *r, const char *method, uint64_t length) {
+/* The checks of the head: route, method, host and page, token, scene, type, length. True if the body is to be
+ * read. */
+static bool check_head(request *r, const char *method, const char *target, uint64_t length) {
     const service *s = r->service;
     route_find(method, r->path, &r->match, &r->answer);
+    if (!browser_check(r, target)) return false;
     if (r->match.with_token && !token_matches(&s->token, http_header(r, MHD_HTTP_HEADER_AUTHORIZATION))) {
         refuse_token(r);
         return false;
@@ -299,7 +305,7 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
         return http_send_answer(r);
     }
     uint64_t length = announced_length(r);
-    r->answered = !check_head(r, method, length);
+    r->answered = !check_head(r, method, path, length);
     /* An answer sent before the end of the body closes the connection. So the body of a refused request is
      * read and dropped, unless it is long or its client waits for 100 Continue. */
     if (r->answered && (length > DROP_MAX || http_header(r, MHD_HTTP_HEADER_EXPECT) != NULL))

@@ -1,5 +1,5 @@
 /* Sends answers: content coding, entity tag, headers. */
-#include "server/http/http_request.h"
+#include "server/http/browser.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -42,7 +42,7 @@ static bool add_refined(struct MHD_Response *response, const answer *a) {
 
 static bool add_headers(const request *r, size_t length, struct MHD_Response *response) {
     const answer *a = &r->answer;
-    bool good = add(response, "X-Request-Id", r->id);
+    bool good = add(response, "X-Request-Id", r->id) && browser_add_headers(r, response);
     if (a->type != NULL) good = good && add(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
     if (a->allow[0] != '\0') good = good && add(response, MHD_HTTP_HEADER_ALLOW, a->allow);
     if (a->location != NULL) good = good && add(response, MHD_HTTP_HEADER_LOCATION, a->location);

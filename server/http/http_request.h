@@ -28,6 +28,8 @@ typedef struct request {
     coding_choice accepted;
     content_coding coding; /* of the answer */
     char etag[ETAG_MAX];   /* of the answer; "" for none */
+    const char *origin;    /* of --allow-origin, the page that asks; NULL: none of them */
+    bool preflight;        /* the answer is one to a CORS preflight */
     bool answered;         /* the answer is made; the rest of the body is dropped */
     bool last;             /* the connection ends with this answer */
     bool queued;           /* the answer was handed to libmicrohttpd */

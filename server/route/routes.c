@@ -4,8 +4,8 @@
 
 /* Routes of one pattern follow each other. */
 static const route routes[] = {
-    {.method = "GET", .pattern = "/healthz", .handle = get_healthz, .open = true},
-    {.method = "GET", .pattern = "/readyz", .handle = get_readyz, .open = true},
+    {.method = "GET", .pattern = "/healthz", .handle = get_healthz, .open = true, .any_host = true},
+    {.method = "GET", .pattern = "/readyz", .handle = get_readyz, .open = true, .any_host = true},
     {.method = "GET", .pattern = "/metrics", .handle = get_metrics, .open = true},
     {.method = "GET", .pattern = "/v1/scenes", .handle = get_scenes},
     {.method = "GET", .pattern = "/v1/scenes/{name}", .handle = get_scene, .also_built = true},
@@ -93,6 +93,7 @@ void route_find(const char *method, const char *path, route_match *match, answer
         /* Routes of one pattern share the label of the first. */
         if (match->label == N_ROUTES) match->label = i;
         match->with_token = !routes[i].open;
+        match->any_host = routes[i].any_host;
         if (strcmp(routes[i].method, wanted) == 0) {
             match->route = &routes[i];
             return;

@@ -26,6 +26,7 @@ typedef struct route {
     route_shortcut *shortcut; /* of a route with a body, or NULL */
     bool with_body;  /* the body may have --max-body bytes; the handler runs on a thread that solves */
     bool open;       /* no token is needed */
+    bool any_host;   /* asked for by those that know no name of the daemon */
     bool also_built; /* {name} may also be a variant that is not served yet */
 } route;
 
@@ -40,6 +41,7 @@ typedef struct route_match {
     const route *route; /* NULL: the answer was made */
     size_t label;
     bool with_token; /* the path needs a token, whatever the method */
+    bool any_host;   /* the path is answered to under any name */
     bool has_name;
     char name[ROUTE_NAME_MAX]; /* of {name}, escapes resolved; "" if no scene can have it */
 } route_match;

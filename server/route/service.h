@@ -5,6 +5,7 @@
 #include "server/config.h"
 #include "server/net/access_log.h"
 #include "server/net/connections.h"
+#include "server/net/origin.h"
 #include "server/net/peer.h"
 #include "server/net/token.h"
 #include "server/queue/batch.h"
@@ -21,6 +22,7 @@ typedef struct service {
     metrics *metrics;
     batch_queue *queue;
     token token;              /* empty: none is needed */
+    origin_rules origins;     /* hosts and pages that are served */
     peer_rules peers;         /* whose word about a client's address is taken */
     access_log *access_log;   /* NULL: none */
     atomic_int state;         /* a service_state */

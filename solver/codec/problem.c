@@ -17,6 +17,8 @@ static const struct {
     [PROBLEM_NOT_NPY] = {400, MANUAL "not-npy", "The body is not an NPY array"},
     [PROBLEM_NO_TOKEN] = {401, MANUAL "no-token", "A bearer token is missing or wrong"},
     [PROBLEM_NOT_ALLOWED] = {403, MANUAL "not-allowed", "The daemon was started without this ability"},
+    [PROBLEM_WRONG_HOST] = {403, MANUAL "wrong-host", "The daemon does not answer to this host"},
+    [PROBLEM_WRONG_ORIGIN] = {403, MANUAL "wrong-origin", "Pages of this origin may not ask"},
     [PROBLEM_NOT_FOUND] = {404, MANUAL "not-found", "There is no such route, scene or variant"},
     [PROBLEM_WRONG_METHOD] = {405, MANUAL "wrong-method", "The route has other methods"},
     [PROBLEM_CONFLICT] = {409, MANUAL "conflict", "The scene cannot have this variant"},

@@ -12,7 +12,7 @@ from daemon import PATIENCE
 from make_store import Scene
 
 MIB = 1 << 20
-HEAD = b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\n"
+HEAD = b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 SOLVE = json.dumps({"emission": [1] * 60}).encode()
 
 

@@ -82,9 +82,9 @@ class Clients(Case):
         # libmicrohttpd may miss that a client went right behind its last byte; the time-out then ends it.
         with Daemon(path, "--timeout", 3) as daemon:
             for junk in (b"\r\n\r\n\r\n", b"\0" * 5000, b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"HELO example\r\n\r\n",
-                         b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\n{}",
-                         b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nContent-Length: 9x\r\n\r\n{}",
-                         b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
+                         b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\n\r\n{}",
+                         b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9x\r\n\r\n{}",
+                         b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
                          b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\n\r\n",
                          b"GET / HTTP/1.1\r\n" + b"X: " + b"y" * 100_000 + b"\r\n\r\n",
                          b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 20_000 + b"\r\n",
@@ -103,7 +103,7 @@ class Clients(Case):
         path, _ = self.store(n=400, kind="exact")
         forms = [{"elements": [i], "values": [1]} for i in range(100)]
         body = json.dumps({"emissions": forms}).encode()
-        whole = (b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n"
+        whole = (b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
                  b"Content-Length: %d\r\n\r\n" % len(body) + body)
         with Daemon(path, "--timeout", 3) as daemon:
             for sent in (0, 1, 30, whole.index(b"{"), len(whole) - 1, len(whole), len(whole)):
@@ -127,7 +127,7 @@ class Clients(Case):
     def test_a_slow_client(self):
         path, scene = self.store()
         body = json.dumps({"emission": [1] * 60}).encode()
-        whole = b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n" % len(body) + body
+        whole = b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body) + body
         with Daemon(path) as daemon, daemon.raw() as s:
             s.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             for at in range(len(whole)):
@@ -143,7 +143,7 @@ class Clients(Case):
     def test_a_silent_client_is_cut(self):
         path, _ = self.store()
         with Daemon(path, "--timeout", 1) as daemon:
-            for begun in b"", b"GET /hea", b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nContent-Length: 99\r\n\r\n{":
+            for begun in b"", b"GET /hea", b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 99\r\n\r\n{":
                 with daemon.raw() as s:
                     s.sendall(begun)
                     self.assertNotIn(b" 200 ", self.read_all(s))
@@ -153,8 +153,8 @@ class Clients(Case):
         requests, wanted = b"", []
         for i in range(20):
             body = json.dumps({"emission": {"elements": [i], "values": [1]}, "select": {"elements": [i]}}).encode()
-            requests += (b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n" % len(body)) + body
-            requests += b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n"
+            requests += (b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body)) + body
+            requests += b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"
             E = np.zeros((1, 60))
             E[0, i] = 1
             wanted.append(scene.solve(E)[0, i])
@@ -256,7 +256,7 @@ class Clients(Case):
             with daemon:
                 s = socket.socket(socket.AF_UNIX)
                 s.connect(str(where))
-                s.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+                s.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
                 self.assertTrue(self.read_all(s).startswith(b"HTTP/1.1 200 "))
                 s.close()
             self.assertFalse(where.exists())

@@ -10,7 +10,7 @@ from daemon_case import Case
 # Nobody may wait for this long: a test that hangs fails by the patience of its socket.
 TIMEOUT = 600
 
-NEXT = b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n"
+NEXT = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"
 POST = b"POST /v1/scenes/box/radiosity HTTP/1.1\r\n"
 
 
@@ -43,7 +43,7 @@ class Framing(Case):
                     what = json.loads(body)
                     self.assertEqual((what["type"], what["status"]), (f"deploy/docs/api.md#{name}", status))
 
-    def post(self, *fields, host=b"Host: x"):
+    def post(self, *fields, host=b"Host: localhost"):
         own = [f for f in (host, b"Content-Type: application/json", *fields) if f is not None]
         return POST + b"\r\n".join(own) + b"\r\n\r\n"
 
@@ -60,7 +60,7 @@ class Framing(Case):
         for space in b" ", b"\t":
             self.refused(self.post(b"Content-Length: 1\r\n%s2" % space) + self.body)
             self.refused(self.post(b"Transfer-Encoding: chunked\r\n%sx" % space) + self.chunked())
-        self.refused(b"GET /healthz HTTP/1.1\r\nHost: x\r\n y\r\n\r\n")
+        self.refused(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n y\r\n\r\n")
 
     def test_white_space_in_a_name(self):
         n = len(self.body)
@@ -88,21 +88,21 @@ class Framing(Case):
     def test_hosts(self):
         self.refused(b"GET /healthz HTTP/1.1\r\n\r\n")
         self.refused(self.post(b"Content-Length: %d" % len(self.body), host=None) + self.body)
-        self.refused(b"GET /healthz HTTP/1.1\r\nHost: x\r\nHost: x\r\n\r\n")
-        self.refused(b"GET /healthz HTTP/1.1\r\nHost: x\r\nhost: y\r\n\r\n")
+        self.refused(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n")
+        self.refused(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nhost: y\r\n\r\n")
         answer = self.exchange(b"GET /healthz HTTP/1.0\r\n\r\n")
         self.assertTrue(answer.startswith(b"HTTP/1.1 200 ") or answer.startswith(b"HTTP/1.0 200 "), answer)
 
     def test_control_characters_in_a_value(self):
         for byte in b"\x01", b"\r", b"\x0b", b"\x7f":
-            self.refused(b"GET /healthz HTTP/1.1\r\nHost: x\r\nX: a%sb\r\n\r\n" % byte)
+            self.refused(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX: a%sb\r\n\r\n" % byte)
 
     def test_the_absolute_form(self):
         for target in b"http://host/healthz", b"HTTP://host:8317/healthz", b"https://[::1]:1/healthz?x=/y", b"/healthz":
             answer = self.exchange(b"GET %s HTTP/1.1\r\nHost: host\r\nConnection: close\r\n\r\n" % target)
             self.assertTrue(answer.startswith(b"HTTP/1.1 200 "), (target, answer))
-        for target in b"http:///healthz", b"http://host", b"http:/healthz", b"//host/healthz":
-            answer = self.exchange(b"GET %s HTTP/1.1\r\nHost: host\r\nConnection: close\r\n\r\n" % target)
+        for target in b"http:///healthz", b"http://localhost", b"http:/healthz", b"//host/healthz":
+            answer = self.exchange(b"GET %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n" % target)
             self.assertTrue(answer.startswith(b"HTTP/1.1 404 "), (target, answer))
 
     def test_good_heads_keep_their_connection(self):

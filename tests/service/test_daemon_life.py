@@ -182,7 +182,7 @@ class Life(Case):
                 body = json.dumps({"emission": [1] * 60}).encode()
                 idle, slow = daemon.connect(), daemon.raw()
                 self.assertEqual(daemon.get("/readyz", connection=idle).status, 200)
-                slow.sendall(b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n"
+                slow.sendall(b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n"
                              b"Content-Type: application/json\r\n\r\n" % len(body) + body[:20])
                 self.wait_in_flight(daemon, 2, idle)
                 daemon.signal(number)
@@ -278,7 +278,7 @@ class Life(Case):
         path, _ = self.store()
         with Daemon(path) as daemon:
             watch, slow = daemon.connect(), daemon.raw()
-            slow.sendall(b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n{")
+            slow.sendall(b"POST /v1/scenes/box/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{")
             self.wait_in_flight(daemon, 2, watch)
             daemon.signal(signal.SIGTERM)
             self.wait_draining(daemon, watch)

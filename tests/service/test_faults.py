@@ -235,7 +235,7 @@ class Faults(unittest.TestCase):
             while not stop.is_set():
                 try:
                     with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as s:
-                        s.sendall(f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Length: 500\r\n\r\n".encode() + b" " * 100)
+                        s.sendall(f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 500\r\n\r\n".encode() + b" " * 100)
                 except OSError:
                     pass
                 except Exception as failure:
@@ -256,7 +256,7 @@ class Faults(unittest.TestCase):
                     wanted.add(settled(answer))
                     with socket.socket(socket.AF_UNIX) as s:
                         s.connect(str(where))
-                        s.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+                        s.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
                         self.assertTrue(s.recv(100).startswith(b"HTTP/1.1 200 "))
                     daemon.kill()
                     other.kill()

@@ -34,7 +34,8 @@ class Guard(Case):
                 self.assertIn(b"--max-buffered", answer)
             # Not announced: counted as it comes. The rest is read and dropped, and the connection goes on.
             connection = daemon.connect()
-            answer = daemon.ask("POST", "/v1/scenes/box/radiosity", iter([b" " * 65536] * 20), connection=connection)
+            answer = daemon.ask("POST", "/v1/scenes/box/radiosity", iter([b" " * 65536] * 20),
+                                {"Content-Type": "application/json"}, connection)
             self.assertEqual((answer.status, answer.headers["Retry-After"]), (503, "1"), answer)
             self.assertEqual(metrics(daemon)[("lambertd_body_bytes",)], 3 * MIB)
             # A request that fits is served meanwhile, on that connection too.
@@ -102,7 +103,7 @@ class Guard(Case):
     def test_one_client_does_not_hold_up_another(self):
         """Large requests of one client, many at a time and pipelined, while another asks small ones."""
         dense = json.dumps({"emissions": [[1] * 20000] * 40}).encode()
-        large = (b"POST /v1/scenes/big/radiosity HTTP/1.1\r\nHost: x\r\nAccept: application/x-npy\r\n"
+        large = (b"POST /v1/scenes/big/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nAccept: application/x-npy\r\n"
                  b"Content-Length: %d\r\n\r\n" % len(dense) + dense)
         rounds, streams = 3, 6
         with Daemon(self.box, self.big, "--threads", 1) as daemon:
@@ -142,7 +143,7 @@ class Guard(Case):
 
     def test_clients_that_reset_while_they_wait(self):
         body = json.dumps({"emissions": [[1] * 20000] * 20}).encode()
-        whole = (b"POST /v1/scenes/big/radiosity HTTP/1.1\r\nHost: x\r\nAccept: application/x-npy\r\n"
+        whole = (b"POST /v1/scenes/big/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nAccept: application/x-npy\r\n"
                  b"Content-Length: %d\r\n\r\n" % len(body) + body)
         with Daemon(self.box, self.big, "--threads", 1) as daemon:
             for _ in range(10):
@@ -168,7 +169,7 @@ class Guard(Case):
                          b"/v1/scenes/\x00box", b"/\x00", b"/v1/scenes/\\..\\..\\etc", b"file:///etc/passwd",
                          b"http://127.0.0.1/etc/passwd", b"/?file=/etc/passwd", b"/metrics/../etc/passwd"):
                 with self.subTest(path=path[:80]), daemon.raw() as s:
-                    s.sendall(b"GET " + path + b" HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+                    s.sendall(b"GET " + path + b" HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
                     answer = read_all(s)
                     self.assertRegex(answer[:13], rb"^HTTP/1\.1 (400|404|414|431|501)", answer[:200])
                     self.assertNotIn(b"root:x", answer)

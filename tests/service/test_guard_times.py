@@ -39,7 +39,7 @@ class Times(Case):
             self.assertEqual(cuts(daemon, "head"), 1)
             # Also the second on a connection.
             with daemon.raw() as s:
-                s.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+                s.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
                 self.assertIn(b" 200 ", s.recv(65536))
                 self.assertEqual(self.drip(s, b"GET /healthz HTTP/1.1\r\nX: " + b"y" * 8000, 0.1), b"")
             self.assertEqual(cuts(daemon, "head"), 2)
@@ -48,7 +48,7 @@ class Times(Case):
         with Daemon(self.box, "--timeout", 1) as daemon:
             for head in (HEAD + b"Content-Length: 90000\r\n\r\n", HEAD + b"Transfer-Encoding: chunked\r\n\r\nffff\r\n",
                          # One that is refused, whose body is dropped.
-                         HEAD + b"Content-Type: text/plain\r\nContent-Length: 90000\r\n\r\n"):
+                         HEAD.replace(b"application/json", b"text/plain") + b"Content-Length: 90000\r\n\r\n"):
                 with daemon.raw() as s:
                     s.sendall(head)
                     self.assertEqual(self.drip(s, b" " * 9000, 0.1), b"")
@@ -87,7 +87,7 @@ class Times(Case):
     def ask_much(self, s):
         """For an answer of 24 MB, more than what the system keeps between the two."""
         body = json.dumps({"emissions": [{"elements": [i], "values": [1]} for i in range(300)]}).encode()
-        s.sendall(b"POST /v1/scenes/big/radiosity HTTP/1.1\r\nHost: x\r\nAccept: application/x-npy\r\n"
+        s.sendall(b"POST /v1/scenes/big/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nAccept: application/x-npy\r\n"
                   b"Content-Length: %d\r\n\r\n" % len(body) + body)
         return 300 * 20000 * 4
 

@@ -36,7 +36,7 @@ def array(values):
 
 
 def request(method, path, body=b"", kind=None, accept=None, more=()):
-    lines = [f"{method} {path} HTTP/1.1", "Host: soak", *more]
+    lines = [f"{method} {path} HTTP/1.1", "Host: localhost", *more]
     if kind:
         lines.append(f"Content-Type: {kind}")
     if accept:
