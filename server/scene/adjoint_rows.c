@@ -178,14 +178,22 @@ static void fill_from_emitters(const scene *s, const emitter_weights *weights, c
     }
 }
 
-/* The weights of a store of emitters, made when first needed; false when memory is short. */
+/* The weights of a store of emitters, made when first needed; NULL where they are not worth their memory or
+ * the ledger has no room for them. False when memory is short. */
 static bool get_weights(const scene *s, const emitter_weights **weights) {
     *weights = NULL;
     if (s->n_emitters == 0 || !emitter_weights_worth(s)) return true;
     *weights = row_cache_weights(s->rows);
     if (*weights != NULL) return true;
+    const size_t bytes = sizeof(emitter_weights) +
+                         (s->groups.n_groups + tiles_of(s)) * s->n_channels * s->n_emitters * sizeof(float);
+    if (!memory_ledger_take(s->ledger, bytes)) return true;
     emitter_weights *made = emitter_weights_make(s);
-    if (made == NULL) return false;
+    if (made == NULL) {
+        memory_ledger_give_back(s->ledger, bytes);
+        return false;
+    }
+    made->bytes = bytes;
     *weights = row_cache_set_weights(s->rows, made);
     return true;
 }

@@ -19,6 +19,7 @@ struct catalog {
     pthread_mutex_t lock;   /* of present */
     pthread_mutex_t stores; /* held while a store is open */
     catalog_snapshot *present;
+    uint64_t n_variants; /* made so far */
 };
 
 /* A store to read: path[path_length] may be the ':' before its name. */
@@ -213,7 +214,7 @@ static lam_status check_work(const catalog *all, const catalog_snapshot *next, c
     size_t work_bytes;
     const uint64_t used = memory_used(next, &work_bytes) + memory_grown(next);
     if (s->work_bytes > work_bytes) work_bytes = s->work_bytes;
-    const uint64_t wanted = used + s->memory + scene_work_memory(threads, work_bytes);
+    const uint64_t wanted = used + s->memory + scene_grown(s) + scene_work_memory(threads, work_bytes);
     if (all->config->max_memory == 0 || wanted <= all->config->max_memory) return LAM_OK;
     return status_fail(
         error, LAM_ERR_MEMORY,
@@ -221,6 +222,15 @@ static lam_status check_work(const catalog *all, const catalog_snapshot *next, c
         "stores have %llu",
         s->path, (unsigned long long)s->memory, threads, work_bytes, all->config->max_memory,
         (unsigned long long)used);
+}
+
+/* The same for a scene that is served already: rows of reductions go before the scene does. */
+static lam_status check_kept(const catalog *all, const catalog_snapshot *next, const scene *s,
+                             lam_error *error) {
+    lam_error unused;
+    if (check_work(all, next, s, &unused) == LAM_OK) return LAM_OK;
+    row_cache_clear(s->rows);
+    return check_work(all, next, s, error);
 }
 
 /* Opens the store of a source and checks its memory. */
@@ -242,7 +252,7 @@ static lam_status open_source(catalog *all, const catalog_snapshot *next, const 
     status = scene_open(&options, &opened, error);
     pthread_mutex_unlock(&all->stores);
     TRY(status);
-    TRY(check_work(all, next, opened, error));
+    TRY(check_kept(all, next, opened, error));
     *out = opened;
     opened = NULL;
 done:
@@ -256,7 +266,7 @@ static void load_source(catalog *all, catalog_snapshot *next, const catalog_snap
     scene *loaded = NULL, *old = find_before(before, from);
     FILE *problems = all->problems;
     if (open_source(all, next, from, old, &loaded, &error) != LAM_OK) {
-        if (old == NULL || check_work(all, next, old, NULL) != LAM_OK) {
+        if (old == NULL || check_kept(all, next, old, NULL) != LAM_OK) {
             /* Most messages begin with the path, some (out of memory) do not. */
             bool named = strncmp(error.message, from->path, strlen(from->path)) == 0;
             fprintf(problems, "refused %s%s%s\n", named ? "" : from->path, named ? "" : ": ", error.message);
@@ -284,19 +294,33 @@ static bool has_base_of(const catalog_snapshot *snapshot, const scene *variant) 
     return catalog_find(snapshot, variant->base->name) == variant->base;
 }
 
-/* Adds the variants in `from` whose base is in next, which has room for them. */
-static void keep_variants(catalog_snapshot *next, const catalog_snapshot *from) {
+/* The oldest variant of a snapshot that was made after number `after`, or NULL. */
+static scene *next_variant(const catalog_snapshot *from, uint64_t after) {
+    scene *oldest = NULL;
     for (size_t i = 0; i < from->n_scenes; i++) {
         scene *s = from->scenes[i];
-        if (s->base != NULL && has_base_of(next, s) && insert(next, s) == NULL) scene_acquire(s);
+        if (s->base != NULL && s->number > after && (oldest == NULL || s->number < oldest->number))
+            oldest = s;
     }
+    return oldest;
+}
+
+/* Adds the variants in `from` whose base is in next, which has places for them. Stores come first: where
+ * --max-memory has no room for all, the newest are left out. */
+static void keep_variants(catalog *all, catalog_snapshot *next, const catalog_snapshot *from) {
+    for (scene *s = NULL; (s = next_variant(from, s == NULL ? 0 : s->number)) != NULL;)
+        if (has_base_of(next, s) && check_kept(all, next, s, NULL) == LAM_OK && insert(next, s) == NULL)
+            scene_acquire(s);
 }
 
 static void report_dropped(const catalog_snapshot *next, const catalog_snapshot *before, FILE *problems) {
     for (size_t i = 0; i < before->n_scenes; i++) {
         const scene *s = before->scenes[i];
-        if (s->base != NULL && catalog_find(next, s->name) != s)
-            fprintf(problems, "dropped %s: its store has changed, or another has its name\n", s->name);
+        if (s->base == NULL || catalog_find(next, s->name) == s) continue;
+        const bool squeezed = has_base_of(next, s) && catalog_find(next, s->name) == NULL;
+        fprintf(problems, "dropped %s: %s\n", s->name,
+                squeezed ? "the stores leave it no room in --max-memory"
+                         : "its store has changed, or another has its name");
     }
 }
 
@@ -329,6 +353,7 @@ lam_status catalog_put_variant(catalog *all, scene *variant, lam_error *error) {
         FAIL(error, LAM_ERR_ARGUMENT, "the name %s is taken by a store", variant->name);
     TRY(copy_without(all->present, variant->name, &next, error));
     TRY(check_work(all, next, variant, error));
+    variant->number = ++all->n_variants;
     (void)insert(next, variant);
     variant = NULL;
     catalog_snapshot *old = all->present;
@@ -377,7 +402,8 @@ size_t catalog_reload(catalog *all) {
     for (size_t i = 0; i < sources.count; i++) load_source(all, next, before, &sources.items[i]);
     pthread_mutex_lock(&all->lock);
     catalog_snapshot *old = all->present;
-    keep_variants(next, old); /* of the present snapshot, as variants may have been added after `before` */
+    keep_variants(all, next,
+                  old); /* of the present snapshot, as variants may have been added after `before` */
     atomic_fetch_add(&next->references, 1); /* our own reference, for the report */
     all->present = next;
     pthread_mutex_unlock(&all->lock);

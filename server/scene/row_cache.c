@@ -40,6 +40,12 @@ void adjoint_row_free(adjoint_row *row) {
     free(row);
 }
 
+static void drop_weights(memory_ledger *ledger, emitter_weights *weights) {
+    if (weights == NULL) return;
+    memory_ledger_give_back(ledger, weights->bytes);
+    emitter_weights_free(weights);
+}
+
 void row_cache_destroy(row_cache *rows) {
     if (rows == NULL) return;
     for (adjoint_row *row = rows->first, *next; row != NULL; row = next) {
@@ -47,14 +53,14 @@ void row_cache_destroy(row_cache *rows) {
         adjoint_row_free(row);
     }
     memory_ledger_give_back(rows->ledger, rows->bytes);
-    emitter_weights_free(rows->weights);
+    drop_weights(rows->ledger, rows->weights);
     pthread_mutex_destroy(&rows->lock);
     free(rows);
 }
 
 size_t row_cache_held(row_cache *rows) {
     pthread_mutex_lock(&rows->lock);
-    const size_t held = rows->bytes;
+    const size_t held = rows->bytes + (rows->weights != NULL ? rows->weights->bytes : 0);
     pthread_mutex_unlock(&rows->lock);
     return held;
 }
@@ -85,6 +91,12 @@ static void evict_locked(row_cache *rows) {
     rows->bytes -= gone->bytes;
     memory_ledger_give_back(rows->ledger, gone->bytes);
     release_locked(gone);
+}
+
+void row_cache_clear(row_cache *rows) {
+    pthread_mutex_lock(&rows->lock);
+    while (rows->first != NULL) evict_locked(rows);
+    pthread_mutex_unlock(&rows->lock);
 }
 
 /* With the lock: makes room for a row by dropping others; false if the ledger has none. A single row may
@@ -154,6 +166,6 @@ const emitter_weights *row_cache_set_weights(row_cache *rows, emitter_weights *m
     }
     const emitter_weights *weights = rows->weights;
     pthread_mutex_unlock(&rows->lock);
-    emitter_weights_free(made);
+    drop_weights(rows->ledger, made);
     return weights;
 }

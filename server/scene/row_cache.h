@@ -36,6 +36,7 @@ void adjoint_row_free(adjoint_row *row);
 typedef struct emitter_weights {
     float *of_group; /* [groups][C][s] */
     float *of_tile;  /* [m][C][s] */
+    size_t bytes;    /* taken of the ledger of the cache that it is set in */
 } emitter_weights;
 
 void emitter_weights_free(emitter_weights *weights);
@@ -47,7 +48,10 @@ lam_status row_cache_create(size_t max_bytes, memory_ledger *ledger, row_cache *
 /* No row may be in use. NULL is allowed. */
 void row_cache_destroy(row_cache *rows);
 
-/* Bytes taken of the ledger. */
+/* Drops all rows; those in use are freed by their last user. */
+void row_cache_clear(row_cache *rows);
+
+/* Bytes taken of the ledger, for rows and weights. */
 size_t row_cache_held(row_cache *rows);
 
 /* max_bytes. */

@@ -27,6 +27,7 @@ struct scene {
     store_identity identity;
     scene *base; /* of a variant, held: path, groups, areas, sky, health and factors belong to it. NULL: this
                     is a store */
+    uint64_t number; /* of a variant, from 1: in the order in which they were made; set by the catalog */
     size_t n;
     size_t n_channels;
     lam_operator *op;
