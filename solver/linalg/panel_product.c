@@ -1,9 +1,9 @@
 /* The two products of a panel, cut into blocks of rows in a fixed order, so that the bits depend on neither
  * the batch nor the threads. */
+#include "solver/base/parallel.h"
 #include "solver/base/work_area.h"
 #include "solver/linalg/panel_kernels.h"
 
-#include <omp.h>
 #include <string.h>
 
 /* Rows whose products are added in single precision before they join a sum in double. */
@@ -15,8 +15,9 @@
  * threads; each slab has its own sums in double, which are then added in the order of the slabs. */
 #define MOST_SLABS 64
 #define SLAB_ROWS 512
-/* Rows of expand that a thread takes at a time. */
+/* Rows of a block of expand, and blocks that a thread takes at a time. */
 #define EXPAND_BLOCK 64
+#define BLOCKS_AT_ONCE 8
 /* Bytes of a panel below which threads cost more than they bring. */
 #define THREADS_WORTH ((size_t)1 << 20)
 
@@ -120,6 +121,30 @@ static bool project_slab(const panel *a, size_t slab, size_t m, const float *X, 
     return any;
 }
 
+/* The slabs of a projection. */
+typedef struct projection {
+    const panel *a;
+    size_t m, x_stride, part_size;
+    const float *X;
+    char *parts;  /* [n_threads] of part_size bytes, 0 */
+    double *sums; /* [n_slabs][stride m], or NULL: they join total in their order */
+    double *total, *sum;
+    bool *any; /* [n_slabs] */
+} projection;
+
+static void project_slabs(const void *job, size_t thread, size_t first, size_t last) {
+    const projection *p = job;
+    const panel *a = p->a;
+    const size_t count = a->stride * p->m;
+    float *part = (float *)(void *)(p->parts + thread * p->part_size);
+    for (size_t s = first; s < last; s++) {
+        double *sum = p->sums != NULL ? p->sums + s * count : p->sum;
+        memset(sum, 0, count * sizeof *sum);
+        p->any[s] = project_slab(a, s * slab_rows(a), p->m, p->X, p->x_stride, part, sum);
+        for (size_t j = 0; j < count && p->any[s] && p->sums == NULL; j++) p->total[j] += sum[j];
+    }
+}
+
 static void project_pass(const panel *a, size_t m, const float *X, size_t x_stride, float *T, size_t t_stride,
                          void *work) {
     const size_t count = a->stride * m, n_slabs = count_slabs(a), n_threads = count_threads(a, n_slabs);
@@ -130,18 +155,18 @@ static void project_pass(const panel *a, size_t m, const float *X, size_t x_stri
     double *sums = work; /* of every slab, or of one at a time */
     bool any[MOST_SLABS] = {false};
     memset(total, 0, count * sizeof *total);
-#pragma omp parallel num_threads((int)n_threads) if (n_threads > 1)
-    {
-        float *part = (float *)(void *)(parts + (size_t)omp_get_thread_num() * part_size);
-        memset(part, 0, count * sizeof *part);
-#pragma omp for schedule(dynamic, 1)
-        for (size_t s = 0; s < n_slabs; s++) {
-            double *sum = n_threads > 1 ? sums + s * count : sums;
-            memset(sum, 0, count * sizeof *sum);
-            any[s] = project_slab(a, s * slab_rows(a), m, X, x_stride, part, sum);
-            for (size_t j = 0; j < count && any[s] && n_threads == 1; j++) total[j] += sum[j];
-        }
-    }
+    memset(parts, 0, n_threads * part_size);
+    const projection p = {.a = a,
+                          .m = m,
+                          .x_stride = x_stride,
+                          .part_size = part_size,
+                          .X = X,
+                          .parts = parts,
+                          .sums = n_threads > 1 ? sums : NULL,
+                          .total = total,
+                          .sum = sums,
+                          .any = any};
+    parallel_share(n_threads, n_slabs, 1, project_slabs, &p);
     for (size_t s = 0; s < n_slabs && n_threads > 1; s++)
         for (size_t j = 0; j < count && any[s]; j++) total[j] += sums[s * count + j];
     for (size_t v = 0; v < m; v++)
@@ -169,6 +194,37 @@ static size_t chosen_row(const row_choice *choice, size_t r) {
     return choice->map != NULL ? choice->map[choice->rows[r]] : choice->rows[r];
 }
 
+/* The rows of a product, a block of them a piece. */
+typedef struct expansion {
+    const panel *a;
+    size_t m, y_stride;
+    const float *t;
+    const row_choice *choice;
+    float *Y;
+} expansion;
+
+static void expand_blocks(const void *job, size_t thread, size_t first_block, size_t last_block) {
+    const expansion *x = job;
+    const panel *a = x->a;
+    const size_t n_rows = x->choice->n_rows;
+    (void)thread;
+    for (size_t b = first_block; b < last_block; b++) {
+        const size_t first = b * EXPAND_BLOCK;
+        const size_t last = n_rows - first < EXPAND_BLOCK ? n_rows : first + EXPAND_BLOCK;
+        if (x->choice->rows == NULL) {
+            const panel_values from = tile_of(a, first);
+            a->kernels->expand[a->layout][a->precision](&from, last - first, x->m, x->t, x->Y + first,
+                                                        x->y_stride);
+        }
+        for (size_t r = first; r < last && x->choice->rows != NULL; r++) {
+            const size_t i = chosen_row(x->choice, r);
+            const panel_values from = tile_of(a, i);
+            a->kernels->expand_row[a->layout][a->precision](&from, i % PANEL_TILE, x->m, x->t, x->Y + r,
+                                                            x->y_stride);
+        }
+    }
+}
+
 static void expand_pass(const panel *a, size_t m, const float *T, size_t t_stride, const row_choice *choice,
                         float *Y, size_t y_stride, void *work) {
     const size_t n_rows = choice->n_rows;
@@ -181,20 +237,8 @@ static void expand_pass(const panel *a, size_t m, const float *T, size_t t_strid
             *t_vj = j < a->k ? T[v * t_stride + j] : 0.0f;
             if (a->scale != NULL && j < a->k) *t_vj *= a->scale[j];
         }
-#pragma omp parallel for schedule(static) num_threads((int)n_threads) if (n_threads > 1)
-    for (size_t b = 0; b < n_blocks; b++) {
-        const size_t first = b * EXPAND_BLOCK;
-        const size_t last = n_rows - first < EXPAND_BLOCK ? n_rows : first + EXPAND_BLOCK;
-        if (choice->rows == NULL) {
-            const panel_values from = tile_of(a, first);
-            a->kernels->expand[a->layout][a->precision](&from, last - first, m, t, Y + first, y_stride);
-        }
-        for (size_t r = first; r < last && choice->rows != NULL; r++) {
-            const size_t i = chosen_row(choice, r);
-            const panel_values from = tile_of(a, i);
-            a->kernels->expand_row[a->layout][a->precision](&from, i % PANEL_TILE, m, t, Y + r, y_stride);
-        }
-    }
+    const expansion x = {.a = a, .m = m, .y_stride = y_stride, .t = t, .choice = choice, .Y = Y};
+    parallel_share(n_threads, n_blocks, BLOCKS_AT_ONCE, expand_blocks, &x);
 }
 
 static void expand(const panel *a, size_t m, const float *T, size_t t_stride, const row_choice *choice,

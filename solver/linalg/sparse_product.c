@@ -1,5 +1,6 @@
 #include "solver/linalg/sparse_product.h"
 
+#include "solver/base/parallel.h"
 #include "solver/base/work_area.h"
 #include "solver/linalg/csr_rows.h"
 #include "solver/linalg/panel.h"
@@ -9,8 +10,8 @@
 
 enum { BATCH = 16 };
 
-/* Below this number of multiplications one thread does all. */
-enum { THREADS_WORTH = 200000 };
+/* Below this number of multiplications one thread does all; rows that a thread takes at a time. */
+enum { THREADS_WORTH = 200000, ROWS_AT_ONCE = 256 };
 
 /* By columns, each product is added in memory, which is slower than a sum in a register: columns are taken
  * when they hold less than 1/SPARSE_SHARE of all entries. */
@@ -74,6 +75,30 @@ static void by_columns(const csr *columns, const float *x, float *y) {
     }
 }
 
+/* The rows of a product. */
+typedef struct row_products {
+    const csr *a;
+    csr_float_row *multiply;
+    size_t m, y_stride;
+    const size_t *which;
+    const uint32_t *chosen, *map;
+    const float *x;
+    float *Y;
+} row_products;
+
+static void multiply_rows(const void *job, size_t thread, size_t first, size_t last) {
+    const row_products *p = job;
+    const csr *a = p->a;
+    (void)thread;
+    for (size_t r = first; r < last; r++) {
+        const size_t i = row_of(p->chosen, p->map, r);
+        const uint64_t begin = a->indptr[i];
+        float sums[CSR_FLOATS_WIDTH];
+        p->multiply(a->indices + begin, a->data + begin, a->indptr[i + 1] - begin, p->x, sums);
+        for (size_t v = 0; v < p->m; v++) p->Y[p->which[v] * p->y_stride + r] = sums[v];
+    }
+}
+
 /* Vectors which[0] ... which[m - 1] by rows; several of them are first copied side by side. */
 static void by_rows(const sparse_pair *A, size_t m, const size_t *which, const float *X, size_t x_stride,
                     size_t n_rows, const uint32_t *chosen, const uint32_t *map, float *Y, size_t y_stride,
@@ -81,21 +106,22 @@ static void by_rows(const sparse_pair *A, size_t m, const size_t *which, const f
     const csr *a = A->rows;
     const size_t n = a->n, width = csr_floats_width(m);
     const float *x = X + which[0] * x_stride;
-    csr_float_row *row_product = csr_floats_row(width);
     if (width > 1) {
         for (size_t p = 0; p < n; p++)
             for (size_t v = 0; v < width; v++) side[p * width + v] = v < m ? X[which[v] * x_stride + p] : 0;
         x = side;
     }
-    const bool many = A->n_threads > 1 && a->indptr[n] / n * n_rows * m > THREADS_WORTH;
-#pragma omp parallel for schedule(dynamic, 256) num_threads((int)A->n_threads) if (many)
-    for (size_t r = 0; r < n_rows; r++) {
-        const size_t i = row_of(chosen, map, r);
-        const uint64_t first = a->indptr[i];
-        float sums[CSR_FLOATS_WIDTH];
-        row_product(a->indices + first, a->data + first, a->indptr[i + 1] - first, x, sums);
-        for (size_t v = 0; v < m; v++) Y[which[v] * y_stride + r] = sums[v];
-    }
+    const bool many = a->indptr[n] / n * n_rows * m > THREADS_WORTH;
+    const row_products p = {.a = a,
+                            .multiply = csr_floats_row(width),
+                            .m = m,
+                            .y_stride = y_stride,
+                            .which = which,
+                            .chosen = chosen,
+                            .map = map,
+                            .x = x,
+                            .Y = Y};
+    parallel_share(many ? A->n_threads : 1, n_rows, ROWS_AT_ONCE, multiply_rows, &p);
 }
 
 /* True when the rows hold fewer than n entries, so that copying vectors side by side would cost more than the

@@ -1,10 +1,9 @@
 #include "solver/linalg/tiled.h"
 
 #include "solver/base/cpu.h"
-#include "solver/base/work_shares.h"
+#include "solver/base/parallel.h"
 #include "store/status.h"
 
-#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,9 +11,9 @@
 #include <immintrin.h>
 #endif
 
-/* Groups that a thread takes at a time; multiplications below which one thread works; vectors side by side;
- * fours whose digits are converted at once. */
-enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 100000, WIDTH = 16, CHUNK = 32 };
+/* Groups and columns that a thread takes at a time; multiplications below which one thread works; vectors
+ * side by side; fours whose digits are converted at once. */
+enum { GROUPS_AT_ONCE = 64, COLUMNS_AT_ONCE = 4096, THREADS_WORTH = 100000, WIDTH = 16, CHUNK = 32 };
 
 /* By columns, products are added in memory, which is slower than in a register: columns are taken when they
  * hold less than 1/COLUMNS_SHARE of all tiles. */
@@ -339,28 +338,41 @@ size_t tiled_work(size_t n, size_t m) {
     return (n + COLUMNS_PAST) * (m > 1 ? WIDTH : 1);
 }
 
-void tiled_multiply(const tiled_rows *t, size_t m, const float *X, float *Y, float *work, size_t n_threads) {
-    const kernels run = kernels_of[cpu_best()];
-    const size_t n = t->n, width = m > 1 ? WIDTH : 1;
-    const bool many =
-        n_threads > 1 && t->begin[t->n_groups * t->n_planes] * TILE * TILE_LANES * m > THREADS_WORTH;
-    work_shares groups;
-    work_shares_begin(&groups, t->n_groups, GROUPS_AT_ONCE, many ? n_threads : 1);
-#pragma omp parallel num_threads((int)n_threads) if (many)
-    {
-#pragma omp for schedule(static)
-        for (size_t p = 0; p < n + COLUMNS_PAST; p++)
-            for (size_t v = 0; v < width; v++)
-                work[p * width + v] = v < m && p < n ? t->step[p] * X[v * n + p] : 0;
-        size_t tried = 0, first = 0, last = 0;
-        while (work_shares_take(&groups, (size_t)omp_get_thread_num(), &tried, &first, &last))
-            for (size_t g = first; g < last; g++) {
-                if (m > 1)
-                    run.wide(t, g, m, work, Y);
-                else
-                    run.one(t, g, work, Y);
-            }
+/* A product: columns times their steps, side by side, then groups of rows. */
+typedef struct product {
+    const tiled_rows *t;
+    kernels run;
+    size_t m;
+    const float *X;
+    float *side, *Y;
+} product;
+
+static void place_columns(const void *job, size_t thread, size_t first, size_t last) {
+    const product *p = job;
+    const size_t n = p->t->n, m = p->m, width = m > 1 ? WIDTH : 1;
+    (void)thread;
+    for (size_t q = first; q < last; q++)
+        for (size_t v = 0; v < width; v++)
+            p->side[q * width + v] = v < m && q < n ? p->t->step[q] * p->X[v * n + q] : 0;
+}
+
+static void multiply_groups(const void *job, size_t thread, size_t first, size_t last) {
+    const product *p = job;
+    (void)thread;
+    for (size_t g = first; g < last; g++) {
+        if (p->m > 1)
+            p->run.wide(p->t, g, p->m, p->side, p->Y);
+        else
+            p->run.one(p->t, g, p->side, p->Y);
     }
+}
+
+void tiled_multiply(const tiled_rows *t, size_t m, const float *X, float *Y, float *work, size_t n_threads) {
+    const product p = {.t = t, .run = kernels_of[cpu_best()], .m = m, .X = X, .side = work, .Y = Y};
+    const bool many = t->begin[t->n_groups * t->n_planes] * TILE * TILE_LANES * m > THREADS_WORTH;
+    const bool long_side = many && t->n * m > THREADS_WORTH;
+    parallel_share(long_side ? n_threads : 1, t->n + COLUMNS_PAST, COLUMNS_AT_ONCE, place_columns, &p);
+    parallel_share(many ? n_threads : 1, t->n_groups, GROUPS_AT_ONCE, multiply_groups, &p);
 }
 
 /* work [n + COLUMNS_PAST] = the columns' steps times x. */

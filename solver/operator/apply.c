@@ -1,5 +1,6 @@
 /* The public functions around a kind's product: they check arguments, cut a batch into passes, and lead from
  * emission in mesh order to the quantity asked for and back. */
+#include "solver/base/parallel.h"
 #include "solver/base/work_area.h"
 #include "solver/operator/operator.h"
 
@@ -66,28 +67,42 @@ done:
 /* Rows shorter than this are finished by one thread. */
 #define THREADS_WORTH 65536
 
-/* Elements that a thread finishes at a time. */
-enum { BLOCK = 256 };
+/* Elements that a thread takes at a time. */
+enum { AT_ONCE = 4096 };
 
 /* One row of out from the same row of E and of H0 (NULL: 0), all in mesh order, and of P (position order).
- * out may be P when there is no order. Elements are taken in mesh order, as scattered reads cost less than
- * scattered writes. */
+ * out may be P when there is no order. */
+typedef struct mesh_row {
+    const lam_operator *op;
+    lam_quantity quantity;
+    const float *rho, *E, *H0, *P;
+    float *out;
+} mesh_row;
+
+static size_t row_threads(const lam_operator *op) {
+    return op->n >= THREADS_WORTH ? op->n_threads : 1;
+}
+
+/* Elements are taken in mesh order, as scattered reads cost less than scattered writes. */
+static void finish_elements(const void *job, size_t thread, size_t first, size_t last) {
+    const mesh_row *r = job;
+    const lam_operator *op = r->op;
+    const float *rho = r->rho, *E = r->E, *H0 = r->H0, *P = r->P;
+    float *out = r->out;
+    (void)thread;
+    if (r->quantity == LAM_RADIOSITY && H0 == NULL) /* most answers */
+        for (size_t i = first; i < last; i++)
+            out[i] = rho[i] > 0.0f ? E[i] + P[operator_position(op, i)] : E[i];
+    else
+        for (size_t i = first; i < last; i++)
+            out[i] = operator_finish(r->quantity, rho[i], operator_light(rho, E, H0, i),
+                                     P[operator_position(op, i)], H0 != NULL ? H0[i] : 0.0f);
+}
+
 static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *E,
                        const float *H0, const float *P, float *out) {
-    const float *rho = op->reflectance + c * op->n;
-    const size_t blocks = (op->n + BLOCK - 1) / BLOCK;
-#pragma omp parallel for schedule(static)                                                                    \
-    num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
-    for (size_t b = 0; b < blocks; b++) {
-        const size_t first = b * BLOCK, last = first + BLOCK < op->n ? first + BLOCK : op->n;
-        if (quantity == LAM_RADIOSITY && H0 == NULL) /* most answers */
-            for (size_t i = first; i < last; i++)
-                out[i] = rho[i] > 0.0f ? E[i] + P[operator_position(op, i)] : E[i];
-        else
-            for (size_t i = first; i < last; i++)
-                out[i] = operator_finish(quantity, rho[i], operator_light(rho, E, H0, i),
-                                         P[operator_position(op, i)], H0 != NULL ? H0[i] : 0.0f);
-    }
+    const mesh_row r = {op, quantity, op->reflectance + c * op->n, E, H0, P, out};
+    parallel_share(row_threads(op), op->n, AT_ONCE, finish_elements, &r);
 }
 
 /* The same for some elements: P holds theirs, or (by_position) all. out may be P when it holds theirs. */
@@ -101,15 +116,18 @@ static void finish_selected(const lam_operator *op, size_t c, lam_quantity quant
     }
 }
 
+static void light_positions(const void *job, size_t thread, size_t first, size_t last) {
+    const mesh_row *r = job;
+    const uint32_t *order = r->op->order;
+    (void)thread;
+    for (size_t p = first; p < last; p++)
+        r->out[p] = operator_light(r->rho, r->E, r->H0, order != NULL ? order[p] : p);
+}
+
 /* One row of E' = E + rho H0, from mesh order into position order. */
 static void light_row(const lam_operator *op, size_t c, const float *E, const float *H0, float *lit) {
-    const float *rho = op->reflectance + c * op->n;
-#pragma omp parallel for schedule(static)                                                                    \
-    num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
-    for (size_t p = 0; p < op->n; p++) {
-        const size_t i = op->order != NULL ? op->order[p] : p;
-        lit[p] = operator_light(rho, E, H0, i);
-    }
+    const mesh_row r = {.op = op, .rho = op->reflectance + c * op->n, .E = E, .H0 = H0, .out = lit};
+    parallel_share(row_threads(op), op->n, AT_ONCE, light_positions, &r);
 }
 
 /* The input of one pass, for all of out or (selected not NULL) some elements. */

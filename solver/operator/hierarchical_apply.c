@@ -2,6 +2,7 @@
  * mean error are taken along piece by piece of the tree, right before the forward transform of a piece and
  * right after its inverse, while it is in the cache of the thread that transforms it; those of an answer in
  * mesh order are taken along where it is written. */
+#include "solver/base/parallel.h"
 #include "solver/base/work_area.h"
 #include "solver/operator/hierarchical.h"
 
@@ -105,12 +106,19 @@ static inline float answer_of(const channel *h, const float *E, const float *H0,
 }
 
 /* Elements that a thread finishes at a time, and those below which one thread does. */
-enum { BLOCK = 256, THREADS_WORTH = 65536 };
+enum { AT_ONCE = 4096, THREADS_WORTH = 65536 };
 
-/* An answer from X, in mesh order, as scattered reads cost less than scattered writes. */
-static void finish(const channel *h, size_t v) {
+/* An answer from X. */
+typedef struct ending {
+    const channel *h;
+    size_t v;
+} ending;
+
+/* In mesh order, as scattered reads cost less than scattered writes. */
+static void finish_elements(const void *job, size_t thread, size_t first, size_t last) {
+    const channel *h = ((const ending *)job)->h;
     const hierarchical *self = h->self;
-    const size_t n = self->base.n, c = h->c, blocks = (n + BLOCK - 1) / BLOCK, threads = self->base.n_threads;
+    const size_t v = ((const ending *)job)->v, n = self->base.n, c = h->c;
     const float *left = self->left_of_element + c * n, *rho = self->base.reflectance + c * n,
                 *X = h->X + v * n;
     const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
@@ -118,17 +126,20 @@ static void finish(const channel *h, size_t v) {
     const uint32_t *position = self->base.position;
     const float factor = mean_factor(h, v);
     float *out = h->out + v * h->stride;
-#pragma omp parallel for schedule(static) num_threads((int)threads) if (threads > 1 && n >= THREADS_WORTH)
-    for (size_t b = 0; b < blocks; b++) {
-        const size_t first = b * BLOCK, last = first + BLOCK < n ? first + BLOCK : n;
-        if (h->quantity == LAM_RADIOSITY && H0 == NULL && position != NULL) /* most answers */
-            for (size_t i = first; i < last; i++)
-                out[i] = rho[i] > 0.0f ? E[i] + bounced(left[i], lift, factor, X, position[i]) : E[i];
-        else
-            for (size_t i = first; i < last; i++)
-                out[i] = answer_of(h, E, H0, i,
-                                   bounced(left[i], lift, factor, X, operator_position(&self->base, i)));
-    }
+    (void)thread;
+    if (h->quantity == LAM_RADIOSITY && H0 == NULL && position != NULL) /* most answers */
+        for (size_t i = first; i < last; i++)
+            out[i] = rho[i] > 0.0f ? E[i] + bounced(left[i], lift, factor, X, position[i]) : E[i];
+    else
+        for (size_t i = first; i < last; i++)
+            out[i] =
+                answer_of(h, E, H0, i, bounced(left[i], lift, factor, X, operator_position(&self->base, i)));
+}
+
+static void finish(const channel *h, size_t v) {
+    const size_t n = h->self->base.n;
+    const ending e = {h, v};
+    parallel_share(n >= THREADS_WORTH ? h->self->base.n_threads : 1, n, AT_ONCE, finish_elements, &e);
 }
 
 /* out from X. */

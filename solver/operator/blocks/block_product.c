@@ -1,11 +1,11 @@
 /* Products with form factors by blocks, panels of vectors at a time: the two passes of an H^2-matrix product
  * (Hackbusch and Boerm 2002) around one over the blocks. */
 #include "solver/base/cpu.h"
+#include "solver/base/parallel.h"
 #include "solver/operator/blocks/block_factors.h"
 
 #include "store/status.h"
 
-#include <omp.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,6 +19,7 @@ typedef double wide __attribute__((vector_size(8 * WIDE), may_alias));
  * [n_clusters][BLOCK_FUNCTIONS]. */
 typedef struct panel {
     const block_factors *f;
+    const struct product_kernels *kernels;
     const block_vectors *vectors;
     const uint32_t *order; /* NULL: vectors are by position */
     void *x, *y, *up, *down;
@@ -74,14 +75,21 @@ static bool is_leaf(const block_factors *f, size_t t) {
 }
 
 /* Moments from the elements to the root. The topmost node of a piece waits for the pass above. */
-static void pass_up(const panel *p, const product_kernels *kernels, int n_threads) {
+static void up_pieces(const void *job, size_t thread, size_t first, size_t last) {
+    const panel *p = job;
     const block_factors *f = p->f;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(n_threads) if (n_threads > 1)
-    for (size_t k = 0; k < f->n_pieces; k++)
+    (void)thread;
+    for (size_t k = first; k < last; k++)
         for (size_t t = f->pieces[k].first; t < f->pieces[k].last; t++) {
-            if (is_leaf(f, t)) kernels->load_leaf(p, t);
-            if (t + 1 < f->pieces[k].last) kernels->raise(p, t);
+            if (is_leaf(f, t)) p->kernels->load_leaf(p, t);
+            if (t + 1 < f->pieces[k].last) p->kernels->raise(p, t);
         }
+}
+
+static void pass_up(const panel *p, size_t n_threads) {
+    const block_factors *f = p->f;
+    const product_kernels *kernels = p->kernels;
+    parallel_share(n_threads, f->n_pieces, 1, up_pieces, p);
     for (size_t k = 0; k < f->n_pieces; k++)
         if (f->nodes[f->pieces[k].last - 1].parent != BLOCK_NO_NODE) kernels->raise(p, f->pieces[k].last - 1);
     for (size_t k = 0; k < f->n_above; k++) {
@@ -155,14 +163,18 @@ static void add_range(double *to, const double *from, size_t first, size_t last)
 
 /* One vector: blocks are read once, in their order, where gathering reads them twice, once at random. Parts
  * are added up in their order. */
-static void pass_parts(const panel *p, int n_threads) {
+static void some_parts(const void *job, size_t thread, size_t first, size_t last) {
+    (void)thread;
+    for (size_t k = first; k < last; k++) pass_part(job, k);
+}
+
+static void add_parts(const void *job, size_t thread, size_t begin_node, size_t end_node) {
+    const panel *p = job;
     const block_factors *f = p->f;
-    const size_t n_clusters = f->n_clusters, n_nodes = n_clusters + f->n;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(n_threads) if (n_threads > 1)
-    for (size_t k = 0; k < BLOCK_PARTS; k++) pass_part(p, k);
-#pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-    for (size_t first = 0; first < n_nodes; first += MANY_NODES) {
-        const size_t last = first + MANY_NODES < n_nodes ? first + MANY_NODES : n_nodes;
+    const size_t n_clusters = f->n_clusters;
+    (void)thread;
+    for (size_t first = begin_node; first < end_node; first += MANY_NODES) {
+        const size_t last = first + MANY_NODES < end_node ? first + MANY_NODES : end_node;
         for (size_t k = 0; k < BLOCK_PARTS; k++) {
             const block_part *part = &f->parts[k];
             const double *const down = arriving(p, k), *const y = down + BLOCK_FUNCTIONS * n_clusters;
@@ -175,25 +187,37 @@ static void pass_parts(const panel *p, int n_threads) {
     }
 }
 
-static void pass_blocks(const panel *p, const product_kernels *kernels, int n_threads) {
-    const size_t n_nodes = p->f->n_clusters + p->f->n;
-#pragma omp parallel for schedule(dynamic, NODES_AT_ONCE) num_threads(n_threads) if (n_threads > 1)
-    for (size_t t = 0; t < n_nodes; t++) kernels->gather_blocks(p, t);
+static void pass_parts(const panel *p, size_t n_threads) {
+    parallel_share(n_threads, BLOCK_PARTS, 1, some_parts, p);
+    parallel_share(n_threads, p->f->n_clusters + p->f->n, MANY_NODES, add_parts, p);
 }
 
-static void pass_down(const panel *p, const product_kernels *kernels, int n_threads) {
+static void gather_nodes(const void *job, size_t thread, size_t first, size_t last) {
+    const panel *p = job;
+    (void)thread;
+    for (size_t t = first; t < last; t++) p->kernels->gather_blocks(p, t);
+}
+
+static void down_pieces(const void *job, size_t thread, size_t first, size_t last) {
+    const panel *p = job;
     const block_factors *f = p->f;
+    (void)thread;
+    for (size_t k = first; k < last; k++)
+        for (size_t t = f->pieces[k].last; t-- > f->pieces[k].first;) {
+            if (f->nodes[t].parent != BLOCK_NO_NODE) p->kernels->lower(p, t);
+            if (is_leaf(f, t)) p->kernels->store_leaf(p, t);
+        }
+}
+
+static void pass_down(const panel *p, size_t n_threads) {
+    const block_factors *f = p->f;
+    const product_kernels *kernels = p->kernels;
     for (size_t k = f->n_above; k-- > 0;) {
         const size_t t = f->above[k];
         if (f->nodes[t].parent != BLOCK_NO_NODE) kernels->lower(p, t);
         if (is_leaf(f, t)) kernels->store_leaf(p, t);
     }
-#pragma omp parallel for schedule(dynamic, 1) num_threads(n_threads) if (n_threads > 1)
-    for (size_t k = 0; k < f->n_pieces; k++)
-        for (size_t t = f->pieces[k].last; t-- > f->pieces[k].first;) {
-            if (f->nodes[t].parent != BLOCK_NO_NODE) kernels->lower(p, t);
-            if (is_leaf(f, t)) kernels->store_leaf(p, t);
-        }
+    parallel_share(n_threads, f->n_pieces, 1, down_pieces, p);
 }
 
 /* Bytes of a panel's numbers, in whole cache lines. */
@@ -216,6 +240,7 @@ void block_factors_apply(const block_factors *f, const block_vectors *vectors, v
     const product_kernels *kernels = vectors->count > 1 ? &wide_kernels[cpu_best()] : &one_kernels;
     char *const first = (char *)work + (LINE - (uintptr_t)work % LINE) % LINE;
     const panel p = {.f = f,
+                     .kernels = kernels,
                      .vectors = vectors,
                      .order = vectors->by_element ? f->order : NULL,
                      .x = first,
@@ -224,12 +249,12 @@ void block_factors_apply(const block_factors *f, const block_vectors *vectors, v
                      .down = first + 2 * element + cluster,
                      .parts = (double *)(first + 2 * element + 2 * cluster)};
     memset(p.up, 0, cluster);
-    pass_up(&p, kernels, (int)n_threads);
+    pass_up(&p, n_threads);
     if (kernels->gather_blocks != NULL)
-        pass_blocks(&p, kernels, (int)n_threads);
+        parallel_share(n_threads, f->n_clusters + f->n, NODES_AT_ONCE, gather_nodes, &p);
     else
-        pass_parts(&p, (int)n_threads);
-    pass_down(&p, kernels, (int)n_threads);
+        pass_parts(&p, n_threads);
+    pass_down(&p, n_threads);
 }
 
 /* Vectors [n][n_vectors], some at a time. */
@@ -246,7 +271,7 @@ static lam_status multiply(const block_factors *f, bool by_element, size_t n_vec
             to[v] = y + first + v;
         }
         const block_vectors vectors = {count, n_vectors, by_element, from, to};
-        block_factors_apply(f, &vectors, work, (size_t)omp_get_max_threads());
+        block_factors_apply(f, &vectors, work, parallel_threads());
     }
     free(work);
     return LAM_OK;

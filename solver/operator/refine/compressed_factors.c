@@ -1,5 +1,6 @@
 #include "solver/operator/refine/compressed_factors.h"
 
+#include "solver/base/parallel.h"
 #include "solver/linalg/csr_rows.h"
 #include "solver/operator/hierarchical.h"
 
@@ -133,18 +134,31 @@ static void take_apart(const compressed_factors *c, const double *x, double *mea
     wavelets_forward(&c->basis, scratch, coefficients, work);
 }
 
+/* Rows of S times coefficients. */
+typedef struct row_products {
+    const csr *S;
+    csr_double_row *multiply;
+    const double *from;
+    double *to;
+} row_products;
+
+static void multiply_rows(const void *job, size_t thread, size_t first, size_t last) {
+    const row_products *p = job;
+    (void)thread;
+    for (size_t k = first; k < last; k++) {
+        const uint64_t begin = p->S->indptr[k];
+        p->multiply(p->S->indices + begin, p->S->data + begin, p->S->indptr[k + 1] - begin, p->from,
+                    p->to + k);
+    }
+}
+
 void compressed_multiply(const compressed_factors *c, const double *x, double *y, double *work,
                          size_t n_threads) {
     const size_t n = c->n;
     double *from = work, *to = from + n, *mean = to + n, *slots = mean + c->n_lit;
-    csr_double_row *const row = csr_doubles_row(1);
+    const row_products rows = {&c->S, csr_doubles_row(1), from, to};
     take_apart(c, x, mean, from, to, slots);
-#pragma omp parallel for schedule(dynamic, 1) num_threads((int)n_threads) if (n_threads > 1)
-    for (size_t first = 0; first < n; first += ROWS_AT_ONCE)
-        for (size_t k = first; k < n && k < first + ROWS_AT_ONCE; k++) {
-            const uint64_t begin = c->S.indptr[k];
-            row(c->S.indices + begin, c->S.data + begin, c->S.indptr[k + 1] - begin, from, to + k);
-        }
+    parallel_share(n_threads, n, ROWS_AT_ONCE, multiply_rows, &rows);
     wavelets_inverse(&c->basis, to, from, slots);
     for (size_t p = 0; p < n; p++) y[c->order[p]] = from[p] / c->root[p];
     for (size_t g = 0; g < c->n_lit; g++)

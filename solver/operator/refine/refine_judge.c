@@ -1,4 +1,5 @@
 /* The certificate of refinement.h: a bound on the error of a column, and the decision whether it is done. */
+#include "solver/base/parallel.h"
 #include "solver/linalg/csr_rows.h"
 #include "solver/operator/refine/refinement.h"
 
@@ -18,6 +19,9 @@ static const double compressed_rest = 1.1;
 /* A certificate multiplies at most 1/SHARE_OF_ROWS of the entries of F; for more, a whole product would
  * improve the answer instead. */
 enum { SHARE_OF_ROWS = 8 };
+
+/* Most threads that judge rows, and rows that one takes at a time. */
+enum { SHARES_MOST = 64, ROWS_AT_ONCE = 16 };
 
 double refinement_sum_rounding(const refinement *s, size_t column) {
     /* fl(P + r) is within u of itself, fl(E + fl(rho H0)) within 2u of E', which is at most 1, and fl(E' + P)
@@ -55,23 +59,39 @@ static size_t rows_in_question(const lam_refiner *refiner, const refine_channel 
     return count;
 }
 
-/* max_i rho_i |(F r)_i| / v_i over the first rows, plus rounding. */
-static double largest_of_rows(const lam_refiner *refiner, const refine_channel *channel, size_t count,
-                              const double *r, double r_most) {
-    const csr *F = &refiner->F->F;
-    csr_double_row *const multiply = csr_doubles_row(1);
-    const double rounded = refiner->roundings * refiner->row_most * r_most;
-    double largest = 0;
-#pragma omp parallel for schedule(dynamic, 16) num_threads((int)refiner->op->n_threads)                      \
-    reduction(max                                                                                            \
-              : largest) if (refiner->op->n_threads > 1)
-    for (size_t k = 0; k < count; k++) {
+/* Rows that are judged, and the largest of each share of them. */
+typedef struct judged_rows {
+    const lam_refiner *refiner;
+    const refine_channel *channel;
+    csr_double_row *multiply;
+    const double *r;
+    double rounded;
+    double *largest; /* [SHARES_MOST] */
+} judged_rows;
+
+static void judge_rows(const void *job, size_t thread, size_t first, size_t last) {
+    const judged_rows *j = job;
+    const refine_channel *channel = j->channel;
+    const csr *F = &j->refiner->F->F;
+    for (size_t k = first; k < last; k++) {
         const size_t i = channel->rows[k].element;
         const uint64_t begin = F->indptr[i];
         double h;
-        multiply(F->indices + begin, F->data + begin, F->indptr[i + 1] - begin, r, &h);
-        largest = fmax(largest, (double)channel->rho[i] * (fabs(h) + rounded) / channel->v[i]);
+        j->multiply(F->indices + begin, F->data + begin, F->indptr[i + 1] - begin, j->r, &h);
+        j->largest[thread] =
+            fmax(j->largest[thread], (double)channel->rho[i] * (fabs(h) + j->rounded) / channel->v[i]);
     }
+}
+
+/* max_i rho_i |(F r)_i| / v_i over the first rows, plus rounding. */
+static double largest_of_rows(const lam_refiner *refiner, const refine_channel *channel, size_t count,
+                              const double *r, double r_most) {
+    const size_t n_threads = refiner->op->n_threads;
+    double of_thread[SHARES_MOST] = {0}, largest = 0;
+    const judged_rows j = {
+        refiner, channel, csr_doubles_row(1), r, refiner->roundings * refiner->row_most * r_most, of_thread};
+    parallel_share(n_threads < SHARES_MOST ? n_threads : SHARES_MOST, count, ROWS_AT_ONCE, judge_rows, &j);
+    for (size_t t = 0; t < SHARES_MOST; t++) largest = fmax(largest, of_thread[t]);
     return largest;
 }
 

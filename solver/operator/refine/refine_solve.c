@@ -2,6 +2,7 @@
  * = A z in double, each q made orthogonal to the last REFINE_WINDOW ones, steps that minimize |r|. r is
  * updated with P, so that an iteration takes one product with F; a bound on the difference from the true
  * residual is updated too. */
+#include "solver/base/parallel.h"
 #include "solver/linalg/csr_rows.h"
 #include "solver/operator/refine/refinement.h"
 
@@ -118,12 +119,30 @@ static void add(size_t n, double a, const double *y, double *x) {
     for (size_t i = 0; i < n; i++) x[i] += a * y[i];
 }
 
+/* Rows of F times columns that stand side by side. */
+typedef struct row_products {
+    const csr *F;
+    csr_double_row *multiply;
+    size_t width;
+    const double *X;
+    double *Y;
+} row_products;
+
+static void multiply_rows(const void *job, size_t thread, size_t first, size_t last) {
+    const row_products *p = job;
+    (void)thread;
+    for (size_t i = first; i < last; i++) {
+        const uint64_t begin = p->F->indptr[i];
+        p->multiply(p->F->indices + begin, p->F->data + begin, p->F->indptr[i + 1] - begin, p->X,
+                    p->Y + i * p->width);
+    }
+}
+
 /* Multiplies m columns, side by side when m > 1. */
 static void multiply_some(refinement *s, size_t m, const size_t *columns, const double *from, double *to) {
     const lam_operator *op = s->refiner->op;
     const csr *F = &s->refiner->F->F;
     const size_t n = op->n, width = csr_doubles_width(m);
-    csr_double_row *const row = csr_doubles_row(width);
     const double *X = s->X;
     double *Y = s->Y;
     if (width == 1) {
@@ -133,12 +152,8 @@ static void multiply_some(refinement *s, size_t m, const size_t *columns, const 
         for (size_t i = 0; i < n; i++)
             for (size_t k = 0; k < width; k++) s->X[i * width + k] = k < m ? from[columns[k] * n + i] : 0;
     }
-#pragma omp parallel for schedule(dynamic, 1) num_threads((int)op->n_threads) if (op->n_threads > 1)
-    for (size_t first = 0; first < n; first += ROWS_AT_ONCE)
-        for (size_t i = first; i < n && i < first + ROWS_AT_ONCE; i++) {
-            const uint64_t begin = F->indptr[i];
-            row(F->indices + begin, F->data + begin, F->indptr[i + 1] - begin, X, Y + i * width);
-        }
+    const row_products p = {F, csr_doubles_row(width), width, X, Y};
+    parallel_share(op->n_threads, n, ROWS_AT_ONCE, multiply_rows, &p);
     for (size_t i = 0; width > 1 && i < n; i++)
         for (size_t k = 0; k < m; k++) to[columns[k] * n + i] = Y[i * width + k];
 }
@@ -347,9 +362,19 @@ static void find_directions(refinement *s, const bool *active) {
     }
 }
 
+/* A step of columns that are active, each judged afterwards. */
+static void step_columns(const void *job, size_t thread, size_t first, size_t last) {
+    refinement *s = *(refinement *const *)job;
+    (void)thread;
+    for (size_t c = first; c < last; c++) {
+        if (!s->active[c]) continue;
+        step(s, c);
+        if (!s->columns[c].stuck) s->again[c] = refinement_judge(s, c);
+    }
+}
+
 void refinement_solve(refinement *s) {
     const size_t m = s->n_columns;
-    const int n_threads = (int)s->refiner->op->n_threads;
     bool *active = s->active, *again = s->again;
     for (size_t c = 0; c < m; c++) {
         refine_column *col = &s->columns[c];
@@ -366,12 +391,7 @@ void refinement_solve(refinement *s) {
         if (!any_of(active, m)) return;
         find_directions(s, active);
         refinement_multiply(s, active, s->z, s->q);
-#pragma omp parallel for schedule(dynamic, 1) num_threads(n_threads) if (n_threads > 1 && m > 1)
-        for (size_t c = 0; c < m; c++) {
-            if (!active[c]) continue;
-            step(s, c);
-            if (!s->columns[c].stuck) again[c] = refinement_judge(s, c);
-        }
+        parallel_share(s->refiner->op->n_threads, m, 1, step_columns, &s);
         if (any_of(again, m)) find_residuals(s, again);
     }
 }

@@ -2,10 +2,9 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/base/cpu.h"
-#include "solver/base/work_shares.h"
+#include "solver/base/parallel.h"
 #include "store/status.h"
 
-#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -291,25 +290,57 @@ static size_t piece_end(const wavelet_plan *plan, const wavelet_piece *piece) {
     return piece_begin(plan, piece) + plan->steps[piece->last - 1].count;
 }
 
+/* One of the two transforms of m vectors: [m][n] elements X, [m][n_used] coefficients C. */
+typedef struct transform_job {
+    const wavelet_plan *plan;
+    transform *run;
+    wavelet_visit *visit; /* before a piece forward, after it inverse; or NULL */
+    void *context;
+    const float *from;
+    float *to, *work;
+} transform_job;
+
+static void forward_pieces(const void *job, size_t thread, size_t first, size_t last) {
+    const transform_job *t = job;
+    const wavelet_plan *plan = t->plan;
+    const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
+    (void)thread;
+    for (size_t k = first; k < last; k++) {
+        const size_t v = k / n_pieces;
+        const wavelet_piece *piece = &plan->pieces[k % n_pieces];
+        const float *X = t->from + v * plan->n;
+        float *C = t->to + v * plan->n_used, *work = t->work + v * room;
+        if (t->visit != NULL)
+            t->visit(t->context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
+        if (is_dark(plan, piece, X))
+            leave_dark(plan, piece, C, work);
+        else
+            t->run(plan, piece->first, piece->last, NULL, X, C, work);
+    }
+}
+
+static void inverse_pieces(const void *job, size_t thread, size_t first, size_t last) {
+    const transform_job *t = job;
+    const wavelet_plan *plan = t->plan;
+    const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
+    (void)thread;
+    for (size_t k = first; k < last; k++) {
+        const size_t v = k / n_pieces;
+        const wavelet_piece *piece = &plan->pieces[k % n_pieces];
+        t->run(plan, piece->first, piece->last, NULL, t->from + v * plan->n_used, t->to + v * plan->n,
+               t->work + v * room);
+        if (t->visit != NULL)
+            t->visit(t->context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
+    }
+}
+
 void wavelet_plan_forward(const wavelet_plan *plan, size_t m, wavelet_visit *fill, void *context,
                           const float *X, float *C, float *work, size_t n_threads) {
     transform *const run = forward[cpu_best()];
-    const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
+    const size_t room = wavelet_plan_work(plan);
     const plan_step *root = &plan->steps[plan->n_steps - 1];
-    work_shares pieces;
-    work_shares_begin(&pieces, m * n_pieces, 1, n_threads);
-#pragma omp parallel num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
-    for (size_t tried = 0, k, end;
-         work_shares_take(&pieces, (size_t)omp_get_thread_num(), &tried, &k, &end);) {
-        const size_t v = k / n_pieces;
-        const wavelet_piece *piece = &plan->pieces[k % n_pieces];
-        if (fill != NULL) fill(context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
-        if (is_dark(plan, piece, X + v * plan->n))
-            leave_dark(plan, piece, C + v * plan->n_used, work + v * room);
-        else
-            run(plan, piece->first, piece->last, NULL, X + v * plan->n, C + v * plan->n_used,
-                work + v * room);
-    }
+    const transform_job job = {plan, run, fill, context, X, C, work};
+    parallel_share(n_threads, m * plan->n_pieces, 1, forward_pieces, &job);
     for (size_t v = 0; v < m; v++) {
         float *c = C + v * plan->n_used;
         const float *s = work + v * room + (plan->n_steps - 1) * WAVELET_SCALING;
@@ -321,7 +352,7 @@ void wavelet_plan_forward(const wavelet_plan *plan, size_t m, wavelet_visit *fil
 void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, wavelet_visit *use,
                           void *context, float *work, size_t n_threads) {
     transform *const run = inverse[cpu_best()];
-    const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
+    const size_t room = wavelet_plan_work(plan);
     const plan_step *root = &plan->steps[plan->n_steps - 1];
     for (size_t v = 0; v < m; v++) {
         const float *c = C + v * plan->n_used;
@@ -329,16 +360,8 @@ void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, fl
         for (size_t k = 0; k < root->scaling; k++) s[k] = c[plan->n_used - root->scaling + k];
         run(plan, 0, plan->n_above, plan->above, c, X + v * plan->n, work + v * room);
     }
-    work_shares pieces;
-    work_shares_begin(&pieces, m * n_pieces, 1, n_threads);
-#pragma omp parallel num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
-    for (size_t tried = 0, k, end;
-         work_shares_take(&pieces, (size_t)omp_get_thread_num(), &tried, &k, &end);) {
-        const size_t v = k / n_pieces;
-        const wavelet_piece *piece = &plan->pieces[k % n_pieces];
-        run(plan, piece->first, piece->last, NULL, C + v * plan->n_used, X + v * plan->n, work + v * room);
-        if (use != NULL) use(context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
-    }
+    const transform_job job = {plan, run, use, context, C, X, work};
+    parallel_share(n_threads, m * plan->n_pieces, 1, inverse_pieces, &job);
 }
 
 /* The leaf that takes a position. */
