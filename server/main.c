@@ -5,9 +5,11 @@
 #include "solver/base/clock.h"
 #include "solver/base/options.h"
 #include "solver/codec/reflectance.h"
+#include "solver/linalg/core.h"
 
 #include <errno.h>
 #include <malloc.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,12 +17,30 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Between its loops OpenMP's threads spin, unless the environment forbids it before the program starts. On a
- * machine that also serves clients they should sleep, so the program starts once more. ps and pgrep would
- * then call it "exe", after the path of the second start. */
-static void let_threads_sleep(char **argv) {
+/* OpenMP binds the first thread, and so all others, to one processor where the environment asks it to bind
+ * its own; they are none here. True if it did. */
+static bool undo_binding(void) {
+    static const char *const names[] = {"OMP_PROC_BIND", "OMP_PLACES", "GOMP_CPU_AFFINITY"};
+    cpu_set_t all;
+    bool bound = false;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        bound = bound || getenv(names[i]) != NULL;
+        (void)unsetenv(names[i]);
+    }
+    memset(&all, 0xff, sizeof all);
+    if (bound) (void)sched_setaffinity(0, sizeof all, &all);
+    return bound;
+}
+
+/* Loops are shared by the threads of the queue alone. OpenMP would give each of them a team of its own, and
+ * end the program where the system allows no more threads. The environment forbids that only before the
+ * program starts, so it starts once more. ps and pgrep would then call it "exe", after the path of the second
+ * start. */
+static void forbid_teams(char **argv) {
+    const char *limit = getenv("OMP_THREAD_LIMIT");
+    const bool right = limit != NULL && strcmp(limit, "1") == 0;
     (void)prctl(PR_SET_NAME, program_invocation_short_name);
-    if (getenv("OMP_WAIT_POLICY") != NULL || setenv("OMP_WAIT_POLICY", "passive", 1) != 0) return;
+    if ((!undo_binding() && right) || setenv("OMP_THREAD_LIMIT", "1", 1) != 0) return;
     execv("/proc/self/exe", argv);
 }
 
@@ -108,6 +128,10 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     TRY(catalog_create(c, stdout, stderr, &s.catalog, error));
     TRY(variants_start(c, s.catalog, &s.variants, error));
     TRY(batch_start(c->threads, c->max_inflight, &s.queue, error));
+    if (batch_threads(s.queue) < c->threads)
+        fprintf(stderr, "lambertd: %zu of %zu --threads: the system allows no more\n", batch_threads(s.queue),
+                c->threads);
+    batch_lend(s.queue);
     TRY(c->unix_path != NULL
             ? connections_listen_unix(c->unix_path, &listen_fd, where, sizeof where, &own, error)
             : connections_listen_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
@@ -139,13 +163,14 @@ done:
 }
 
 int main(int argc, char **argv) {
-    let_threads_sleep(argv);
+    forbid_teams(argv);
     share_one_heap();
     config c;
     lam_error error = {0};
     sigset_t signals = block_signals();
     map_guard_install();
     reflectance_watch_memory();
+    core_use_one_thread();
     const int code = config_read(&c, argc, argv);
     if (code != OPTIONS_GO) return fflush(stdout) == 0 ? code : EXIT_FAILURE;
     if (run(&c, &signals, &error) == LAM_OK) return EXIT_SUCCESS;

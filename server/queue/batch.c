@@ -1,5 +1,7 @@
 #include "server/queue/batch.h"
 
+#include "server/queue/thread_budget.h"
+
 #include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -24,7 +26,8 @@ struct batch_queue {
     bool closed;
     const void **passing; /* [n_threads] keys of the passes that run */
     size_t n_passing;
-    size_t n_threads;
+    thread_budget budget;
+    size_t n_threads, n_numbered;
     pthread_t threads[];
 };
 
@@ -48,6 +51,7 @@ static batch_job *list_take(job_list *list) {
 /* With the lock: wakes an idle thread, unless one is already woken. A busy thread reads the lists before it
  * waits. */
 static void wake_one(batch_queue *queue) {
+    if (queue->n_idle == 0) thread_budget_call(&queue->budget);
     if (queue->n_woken > 0 || queue->n_idle == 0) return;
     queue->n_woken++;
     pthread_cond_signal(&queue->changed);
@@ -141,8 +145,10 @@ static void make_pass(batch_queue *queue, batch_job *like, batch_workspace *work
     queue->passing[mine] = queue->passing[--queue->n_passing];
     sort_waiting(queue, parts, n_parts);
     /* This thread ends one of the jobs itself: a single one needs no other thread. */
-    if (!brief && (queue->computed.first != queue->computed.last || queue->waiting.first != NULL))
+    if (!brief && (queue->computed.first != queue->computed.last || queue->waiting.first != NULL)) {
+        thread_budget_call(&queue->budget);
         pthread_cond_broadcast(&queue->changed);
+    }
 }
 
 /* With the lock, which is released meanwhile. */
@@ -192,6 +198,8 @@ static void *serve(void *argument) {
     batch_queue *queue = argument;
     batch_workspace workspace = {0};
     pthread_mutex_lock(&queue->lock);
+    const size_t member = queue->n_numbered++;
+    thread_budget_join(&queue->budget, member);
     for (batch_job *job;;) {
         batch_job *ready = find_ready(queue);
         if ((job = list_take(&queue->computed)) != NULL)
@@ -204,7 +212,7 @@ static void *serve(void *argument) {
             make_pass(queue, ready, &workspace);
         else if (queue->closed && queue->n_jobs == 0)
             break;
-        else {
+        else if (!thread_budget_help(&queue->budget, member)) {
             queue->n_idle++;
             pthread_cond_wait(&queue->changed, &queue->lock);
             queue->n_idle--;
@@ -214,6 +222,32 @@ static void *serve(void *argument) {
     pthread_mutex_unlock(&queue->lock);
     free(workspace.bytes);
     return NULL;
+}
+
+/* Threads and processes that the rest of the program starts later. */
+enum { BESIDE = 4 };
+
+/* A thread that holds a place for another one until the lock is free. */
+static void *hold_place(void *argument) {
+    batch_queue *queue = argument;
+    pthread_mutex_lock(&queue->lock);
+    pthread_mutex_unlock(&queue->lock);
+    return NULL;
+}
+
+/* As many of n_threads as the system allows beside those of the rest of the program. They wait for the lock
+ * until their number is known. */
+static void start_threads(batch_queue *queue, size_t n_threads) {
+    pthread_t beside[BESIDE];
+    size_t n_beside = 0;
+    pthread_mutex_lock(&queue->lock);
+    for (; n_beside < BESIDE; n_beside++)
+        if (pthread_create(&beside[n_beside], NULL, hold_place, queue) != 0) break;
+    for (; queue->n_threads < n_threads; queue->n_threads++)
+        if (pthread_create(&queue->threads[queue->n_threads], NULL, serve, queue) != 0) break;
+    thread_budget_init(&queue->budget, queue->n_threads, &queue->lock, &queue->changed);
+    pthread_mutex_unlock(&queue->lock);
+    for (size_t i = 0; i < n_beside; i++) pthread_join(beside[i], NULL);
 }
 
 lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam_error *error) {
@@ -228,12 +262,9 @@ lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam
     queue->max_jobs = max_jobs;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    for (; queue->n_threads < n_threads; queue->n_threads++)
-        if (pthread_create(&queue->threads[queue->n_threads], NULL, serve, queue) != 0) break;
+    start_threads(queue, n_threads);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (queue->n_threads < n_threads)
-        FAIL(error, LAM_ERR_MEMORY, "cannot start thread %zu of %zu; use fewer --threads",
-             queue->n_threads + 1, n_threads);
+    if (queue->n_threads == 0) FAIL(error, LAM_ERR_MEMORY, "cannot start a thread that solves");
     *out = queue;
     queue = NULL;
 done:
@@ -263,6 +294,14 @@ size_t batch_jobs(batch_queue *queue) {
     return n_jobs;
 }
 
+size_t batch_threads(const batch_queue *queue) {
+    return queue->n_threads;
+}
+
+void batch_lend(batch_queue *queue) {
+    thread_budget_join(&queue->budget, 0);
+}
+
 void batch_close(batch_queue *queue) {
     pthread_mutex_lock(&queue->lock);
     queue->closed = true;
@@ -273,6 +312,7 @@ void batch_close(batch_queue *queue) {
 
 void batch_destroy(batch_queue *queue) {
     if (queue == NULL) return;
+    parallel_join(NULL, 0); /* if batch_lend was called */
     pthread_cond_destroy(&queue->changed);
     pthread_mutex_destroy(&queue->lock);
     free(queue->passing);

@@ -44,7 +44,8 @@ struct batch_job {
     batch_job *next;    /* private to the queue */
 };
 
-/* Starts n_threads threads with all signals blocked. At most max_jobs wait or run. */
+/* Starts n_threads threads with all signals blocked, or as many as there can be, at least one. At most
+ * max_jobs wait or run. An idle thread helps the others with their loops (solver/base/parallel.h). */
 lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam_error *error);
 
 /* Queues a job; false if there are max_jobs already or the queue is closed. */
@@ -52,6 +53,12 @@ bool batch_submit(batch_queue *queue, batch_job *job);
 
 /* The number of jobs that wait or run. */
 size_t batch_jobs(batch_queue *queue);
+
+/* The threads that were started. */
+size_t batch_threads(const batch_queue *queue);
+
+/* From now on idle threads help the calling one, which is none of the queue, with its loops. */
+void batch_lend(batch_queue *queue);
 
 /* Refuses further jobs, finishes those that wait and ends the threads. Once. */
 void batch_close(batch_queue *queue);

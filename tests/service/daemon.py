@@ -37,11 +37,7 @@ class Daemon:
         self.err = tempfile.TemporaryFile("w+")
         self.port = None
         where = ["--listen", listen] if listen is not None else []
-        environment = dict(os.environ)
-        if "LAMBERTD_OMP_THREAD_LIMIT" in environment:
-            environment["OMP_THREAD_LIMIT"] = environment["LAMBERTD_OMP_THREAD_LIMIT"]
-        self.process = subprocess.Popen([*launcher, LAMBERTD, *where, *map(str, arguments)], stdout=self.out, stderr=self.err,
-                                        env=environment)
+        self.process = subprocess.Popen([*launcher, LAMBERTD, *where, *map(str, arguments)], stdout=self.out, stderr=self.err)
         try:
             if ready:
                 self.wait_for("listening on")
