@@ -1,9 +1,9 @@
 #include "server/config.h"
 
+#include "solver/base/machine.h"
 #include "solver/base/options.h"
 
 #include <stdio.h>
-#include <unistd.h>
 
 _Static_assert(sizeof(size_t) == sizeof(uint64_t), "counts and sizes of the tables are uint64_t");
 
@@ -84,10 +84,10 @@ static const option_row limit_rows[] = {
      .kind = OPTION_COUNT,
      .offset = AT(threads),
      .argument = "T",
-     .otherwise = "one per core",
+     .otherwise = "one per core, fewer where affinity or a control group allows fewer",
      .least = 1,
      .most = 4096,
-     .help = "Threads that solve"},
+     .help = "Threads that compute, all requests together"},
     {.name = "max-body",
      .kind = OPTION_SIZE,
      .offset = AT(max_body),
@@ -162,6 +162,16 @@ static const option_command daemon_command = {
     .most_arguments = SIZE_MAX,
 };
 
+/* Threads and processes beside those that compute: main, input and output, connections, verification,
+ * variants, a child that opens a store. */
+enum { BESIDE = 6 };
+
+static void choose_threads(config *c) {
+    machine limits;
+    machine_read("", &limits);
+    c->threads = machine_threads(&limits, BESIDE, c->threads_why, sizeof c->threads_why);
+}
+
 int config_read(config *c, int argc, char **argv) {
     const option_table tables[] = {{"stores", store_rows, c},
                                    {"connections", connection_rows, c},
@@ -169,8 +179,7 @@ int config_read(config *c, int argc, char **argv) {
                                    {"other", other_rows, c},
                                    {0}};
     option_result given;
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    *c = (config){.threads = cores > 0 ? (size_t)cores : 1};
+    *c = (config){.threads = 0};
     const int code = options_parse(&daemon_command, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     if (c->version) {
@@ -182,6 +191,7 @@ int config_read(config *c, int argc, char **argv) {
     if (c->n_stores == 0 && c->stores_dir == NULL)
         return options_usage(daemon_command.name, "no store is given; usage: lambertd %s",
                              daemon_command.arguments);
+    if (c->threads == 0) choose_threads(c);
     if (c->max_buffered == 0) c->max_buffered = 4 * c->max_body;
     if (c->max_buffered < c->max_body)
         return options_usage(daemon_command.name, "--max-buffered %zu: must be at least --max-body (%zu)",

@@ -16,10 +16,11 @@ typedef struct config {
     option_list allowed_hosts, allowed_origins; /* texts of origin_rules_read */
     const char *access_log;                     /* "-": standard output */
     size_t threads;
-    size_t max_body;     /* bytes */
-    size_t max_batch;    /* vectors in a request */
-    size_t max_inflight; /* solves that wait or run */
-    size_t max_buffered; /* bytes of request bodies, of all clients together */
+    char threads_why[96]; /* the limit by which they are fewer than the processors; "": none */
+    size_t max_body;      /* bytes */
+    size_t max_batch;     /* vectors in a request */
+    size_t max_inflight;  /* solves that wait or run */
+    size_t max_buffered;  /* bytes of request bodies, of all clients together */
     size_t max_connections;
     size_t max_memory; /* bytes that stores and work areas may take; 0: any */
     size_t timeout_s;

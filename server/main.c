@@ -131,6 +131,8 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     if (batch_threads(s.queue) < c->threads)
         fprintf(stderr, "lambertd: %zu of %zu --threads: the system allows no more\n", batch_threads(s.queue),
                 c->threads);
+    if (c->threads_why[0] != '\0')
+        printf("%zu thread%s: %s\n", batch_threads(s.queue), c->threads == 1 ? "" : "s", c->threads_why);
     batch_lend(s.queue);
     TRY(c->unix_path != NULL
             ? connections_listen_unix(c->unix_path, &listen_fd, where, sizeof where, &own, error)

@@ -1,4 +1,5 @@
 /* Bytes of memory that a precompute takes, and options that would make it fit. */
+#include "solver/base/machine.h"
 #include "solver/method/judge.h"
 #include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
@@ -262,13 +263,10 @@ static bool read_number(const char *path, const char *format, unsigned long long
 }
 
 uint64_t memory_available(void) {
-    unsigned long long kilobytes = 0, allowed = 0, used = 0;
+    unsigned long long kilobytes = 0;
+    machine limits;
     if (!read_number("/proc/meminfo", "MemAvailable: %llu kB", &kilobytes)) return 0;
-    uint64_t bytes = (uint64_t)kilobytes * 1024;
-    if (read_number("/sys/fs/cgroup/memory.max", "%llu", &allowed) &&
-        read_number("/sys/fs/cgroup/memory.current", "%llu", &used)) {
-        const uint64_t left = allowed > used ? allowed - used : 0;
-        if (left < bytes) bytes = left;
-    }
-    return bytes;
+    const uint64_t bytes = (uint64_t)kilobytes * 1024;
+    machine_read("", &limits);
+    return limits.memory_left < bytes ? limits.memory_left : bytes;
 }

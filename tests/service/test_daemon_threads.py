@@ -98,6 +98,20 @@ class Threads(Case):
             for task in pathlib.Path(f"/proc/{daemon.process.pid}/task").iterdir():
                 self.assertEqual(os.sched_getaffinity(int(task.name)), os.sched_getaffinity(0))
 
+    def test_as_many_as_the_process_may_use(self):
+        """Without --threads, and a line that says why they are fewer than the processors."""
+        most = len(os.sched_getaffinity(0))
+        first = min(os.sched_getaffinity(0))
+        with Daemon(self.path, launcher=["taskset", "-c", str(first)]) as daemon:
+            self.assertEqual(threads_of(daemon), 1 + BESIDE)
+            if os.cpu_count() > 1:
+                self.assertRegex(daemon.output(), rf"^1 thread: the process may run on 1 of {os.cpu_count()} processors\n")
+        with Daemon(self.path) as daemon:
+            self.assertLessEqual(threads_of(daemon), most + BESIDE)
+        with Daemon(self.path, "--threads", 3, launcher=["taskset", "-c", str(first)]) as daemon:
+            self.assertEqual(threads_of(daemon), 3 + BESIDE)
+            self.assertRegex(daemon.output(), "^serving box")
+
     def test_fewer_threads_than_asked_for(self):
         """The program tells how many there are and serves with those."""
         question = next(self.questions())
