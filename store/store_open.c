@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -58,19 +59,20 @@ static bool has_threads(void) {
 }
 
 static void send_headers_afresh(void *context) {
-    char name[] = FRESH;
-    char *arguments[] = {name, ((store *)context)->path, NULL};
+    const store *s = context;
+    char name[] = FRESH, size[32];
+    char *arguments[] = {name, s->path, size, NULL};
+    snprintf(size, sizeof size, "%llu", (unsigned long long)s->file.size);
     execv("/proc/self/exe", arguments);
 }
 
 /* Before main, whose arguments these are. */
 __attribute__((constructor)) static void be_fresh(int argc, char **argv) {
-    struct stat info;
     store *s = NULL;
     lam_error error;
-    if (argc != 2 || strcmp(argv[0], FRESH) != 0) return;
-    if (store_new(argv[1], &s, &error) == LAM_OK && fstat(CONFINED_INPUT, &info) == 0) {
-        s->file.size = (uint64_t)info.st_size;
+    if (argc != 3 || strcmp(argv[0], FRESH) != 0) return;
+    if (store_new(argv[1], &s, &error) == LAM_OK) {
+        s->file.size = strtoull(argv[2], NULL, 10);
         send_headers(s);
     }
     _exit(0);
