@@ -47,7 +47,7 @@ typedef struct lam_operator lam_operator;
 
 /* Opens the store at path and loads its operator; the caller closes it with lam_operator_close.
  * Errors: LAM_ERR_IO, LAM_ERR_FORMAT, LAM_ERR_VERSION, LAM_ERR_DAMAGED, LAM_ERR_MEMORY, LAM_ERR_UNSUPPORTED.
- * One thread at a time may open stores. */
+ * Any thread; a child process reads the headers of the file, so SIGCHLD must not be ignored. */
 lam_status lam_operator_open(const char *path, lam_operator **op, lam_error *error);
 
 /* Frees an operator; NULL is allowed. */

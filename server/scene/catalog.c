@@ -16,8 +16,7 @@ struct catalog {
     FILE *out, *problems;
     memory_ledger ledger;
     verifier *verifier;
-    pthread_mutex_t lock;   /* of present */
-    pthread_mutex_t stores; /* held while a store is open */
+    pthread_mutex_t lock; /* of present */
     catalog_snapshot *present;
     uint64_t n_variants; /* made so far */
 };
@@ -105,7 +104,6 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
     all->present = empty;
     empty = NULL;
     pthread_mutex_init(&all->lock, NULL);
-    pthread_mutex_init(&all->stores, NULL);
     *made = all;
     all = NULL;
 done:
@@ -119,7 +117,6 @@ void catalog_destroy(catalog *all) {
     verifier_stop(all->verifier);
     catalog_release(all->present);
     pthread_mutex_destroy(&all->lock);
-    pthread_mutex_destroy(&all->stores);
     free(all);
 }
 
@@ -246,12 +243,8 @@ static lam_status open_source(catalog *all, const catalog_snapshot *next, const 
                                    .memory = memory_left(all, next, memory_grown(next)),
                                    .ledger = &all->ledger,
                                    .before = old,
-                                   .threads = all->config->threads,
-                                   .stores = &all->stores};
-    pthread_mutex_lock(&all->stores);
-    status = scene_open(&options, &opened, error);
-    pthread_mutex_unlock(&all->stores);
-    TRY(status);
+                                   .threads = all->config->threads};
+    TRY(scene_open(&options, &opened, error));
     TRY(check_kept(all, next, opened, error));
     *out = opened;
     opened = NULL;

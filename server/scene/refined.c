@@ -8,8 +8,7 @@
 
 struct refined {
     const lam_operator *op;
-    refined *base; /* of a variant: the one with the form factors; NULL: this one */
-    pthread_mutex_t *stores;
+    refined *base;        /* of a variant: the one with the form factors; NULL: this one */
     pthread_mutex_t lock; /* of F and refiner */
     char *path;           /* NULL: no form factors are kept */
     char *checksum;       /* of the file that op was read from */
@@ -30,13 +29,12 @@ static lam_status read_checksum(store *s, char **checksum, lam_error *error) {
     return store_get_text(s, "/checksum", "xxh3", checksum, error);
 }
 
-lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *stores, memory_ledger *ledger,
-                          refined **out, lam_error *error) {
+lam_status refined_create(store *s, const lam_operator *op, memory_ledger *ledger, refined **out,
+                          lam_error *error) {
     lam_status status = LAM_OK;
     refined *made = memory_allocate(1, sizeof *made, store_path(s), error);
     if (made == NULL) return LAM_ERR_MEMORY;
     made->op = op;
-    made->stores = stores;
     made->ledger = ledger;
     made->helper_bytes = helper_bytes_of(op);
     pthread_mutex_init(&made->lock, NULL);
@@ -81,7 +79,6 @@ static lam_status read_form_factors(refined *r, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     char *checksum = NULL;
-    pthread_mutex_lock(r->stores);
     TRY(store_open(r->path, &s, error));
     TRY(read_checksum(s, &checksum, error));
     if (strcmp(checksum, r->checksum) != 0)
@@ -91,7 +88,6 @@ static lam_status read_form_factors(refined *r, lam_error *error) {
     if (r->F == NULL) FAIL(error, LAM_ERR_DAMAGED, "%s: its form factors are gone", r->path);
 done:
     store_close(s);
-    pthread_mutex_unlock(r->stores);
     free(checksum);
     return status;
 }

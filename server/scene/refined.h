@@ -11,10 +11,10 @@
  * Any thread. */
 typedef struct refined refined;
 
-/* Records if the open store s of op keeps form factors, and their size. op, stores and ledger (or NULL)
- * outlive it; `stores` is held while a store is open. Errors: LAM_ERR_MEMORY, those of form_factors_size. */
-lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *stores, memory_ledger *ledger,
-                          refined **out, lam_error *error);
+/* Records if the open store s of op keeps form factors, and their size. op and ledger (or NULL) outlive it.
+ * Errors: LAM_ERR_MEMORY, those of form_factors_size. */
+lam_status refined_create(store *s, const lam_operator *op, memory_ledger *ledger, refined **out,
+                          lam_error *error);
 
 /* For a variant: op is another operator for the elements of base. Both outlive it. Errors: LAM_ERR_MEMORY. */
 lam_status refined_create_variant(refined *base, const lam_operator *op, refined **out, lam_error *error);

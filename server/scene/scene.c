@@ -204,7 +204,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(read_area(s, made, error));
     made->ledger = options->ledger;
     TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
-    TRY(refined_create(s, made->op, options->stores, made->ledger, &made->refined, error));
+    TRY(refined_create(s, made->op, made->ledger, &made->refined, error));
     TRY(read_errors(s, made, error));
     TRY(describe_scene(s, made, &made->description, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));

@@ -59,14 +59,13 @@ typedef struct scene_options {
     memory_ledger *ledger;   /* or NULL; outlives the scene */
     scene *before;           /* the present scene of this path and name, or NULL */
     size_t threads;          /* for one answer, at most */
-    pthread_mutex_t *stores; /* outlives the scene; held by everyone who opens a store, also by the caller */
 } scene_options;
 
 /* Opens a store. The file is closed before this returns, except for its mapped arrays. Headers, checksums of
  * checksums, /mesh and all arrays that are not mapped are verified here; mapped arrays are left to
  * scene_verify, unless options->verify. If the file is still that of options->before, of which no damage is
  * known, that scene is returned. Errors: as store_open and operator_load; LAM_ERR_MEMORY names the sizes if
- * it does not fit. Each names the path. One thread at a time. */
+ * it does not fit. Each names the path. */
 lam_status scene_open(const scene_options *options, scene **out, lam_error *error);
 
 /* Bytes that the scene has taken of its ledger since it was opened. Any thread. */

@@ -52,14 +52,13 @@ static void refine(const scene *s, const char *path) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     char path[] = "/dev/shm/lambert-fuzz-XXXXXX";
-    pthread_mutex_t stores = PTHREAD_MUTEX_INITIALIZER;
     const int fd = mkstemp(path);
     FUZZ_CHECK(fd >= 0 && write(fd, data, size) == (ssize_t)size);
     close(fd);
     for (int verify = 0; verify < 2; verify++) {
         scene *s = NULL;
         const scene_options options = {
-            .path = path, .verify = verify == 1, .memory = UINT64_MAX, .threads = 1, .stores = &stores};
+            .path = path, .verify = verify == 1, .memory = UINT64_MAX, .threads = 1};
         lam_error error = {.message = ""};
         if (scene_open(&options, &s, &error) == LAM_OK) {
             apply(s);

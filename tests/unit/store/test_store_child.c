@@ -298,6 +298,32 @@ START_TEST(a_reader_never_calls_hdf5) {
 }
 END_TEST
 
+enum { THREADS = 8, ROUNDS = 10 };
+
+static void *read_often(void *out) {
+    uint64_t *reading = out;
+    lam_error why;
+    for (int k = 0; k < ROUNDS; k++) {
+        uint64_t seen = 0;
+        if (sample_read(path, &seen, &why) != LAM_OK || (k > 0 && seen != *reading)) seen = UINT64_MAX;
+        *reading = seen;
+    }
+    return NULL;
+}
+
+START_TEST(threads_open_stores_at_once) {
+    pthread_t threads[THREADS];
+    uint64_t expected = 0, seen[THREADS] = {0};
+    ck_ok(sample_read(path, &expected, &error));
+    for (int k = 0; k < THREADS; k++)
+        ck_assert_int_eq(pthread_create(&threads[k], NULL, read_often, &seen[k]), 0);
+    for (int k = 0; k < THREADS; k++) {
+        pthread_join(threads[k], NULL);
+        ck_assert_uint_eq(seen[k], expected);
+    }
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("store child");
     TCase *tests = tcase_create("child");
@@ -311,6 +337,7 @@ int main(void) {
     tcase_add_test(tests, closed_streams_do_no_harm);
     tcase_add_test(tests, the_file_that_was_read_is_the_one_opened);
     tcase_add_test(tests, a_reader_never_calls_hdf5);
+    tcase_add_test(tests, threads_open_stores_at_once);
     suite_add_tcase(suite, tests);
     return suite_run_apart(suite);
 }
