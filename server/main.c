@@ -82,6 +82,7 @@ static void serve_until_signal(service *s, const sigset_t *signals) {
         if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP || is_ended()) return;
         access_log_reopen(s->access_log);
         size_t served = catalog_reload(s->catalog);
+        connections_reserve(s->connections, catalog_stores(s->catalog));
         printf("reloaded: %zu scene%s\n", served, served == 1 ? "" : "s");
         fflush(stdout);
     }
@@ -142,6 +143,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     warn_if_open(&s);
     TRY(http_start(&s, listen_fd, &h, error));
     if (catalog_reload(s.catalog) == 0) FAIL(error, LAM_ERR_IO, "no store can be served");
+    connections_reserve(s.connections, catalog_stores(s.catalog));
     atomic_store(&s.state, SERVICE_READY);
     printf("listening on %s\n", where);
     fflush(stdout);

@@ -423,8 +423,10 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
     h->listen_fd = listen_fd;
     h->seed = request_id_seed();
     h->next_id = 1;
-    connection_limits limits = {.timeout_s = s->config->timeout_s, .least_rate = s->config->min_rate};
-    TRY(connections_affordable(s->config->max_connections, &limits.most, error));
+    connection_limits limits = {.wanted = s->config->max_connections,
+                                .timeout_s = s->config->timeout_s,
+                                .least_rate = s->config->min_rate};
+    TRY(connections_affordable(limits.wanted, catalog_stores(s->catalog), &limits.most, error));
     TRY(connections_start(&limits, &s->connections, error));
     /* No time-out of libmicrohttpd: it would close a client whose answer waits in a slow socket. At its limit
      * of connections, or out of descriptors, the daemon accepts none until one closes. */

@@ -3,6 +3,7 @@
 #include "solver/base/clock.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <netdb.h>
@@ -119,6 +120,11 @@ void connections_unlink(unix_socket *own) {
  * the log, libraries. */
 #define OTHER_DESCRIPTORS 64
 
+/* Connections that are always allowed; files that are more than all tables of the program can hold, to which
+ * the limit is raised at most. */
+#define LEAST_CONNECTIONS 8
+#define MOST_DESCRIPTORS ((rlim_t)1 << 17)
+
 /* When all connections are in use, an idle one is kept for this time. */
 #define IDLE_GRACE_S 1.0
 
@@ -151,22 +157,33 @@ struct connections {
     bool ended;
 };
 
-lam_status connections_affordable(size_t wanted, size_t *most, lam_error *error) {
+lam_status connections_affordable(size_t wanted, size_t n_stores, size_t *most, lam_error *error) {
     lam_status status = LAM_OK;
     struct rlimit limit;
     if (getrlimit(RLIMIT_NOFILE, &limit) != 0) FAIL(error, LAM_ERR_IO, "the limit on open files is unknown");
-    const rlim_t needed = (rlim_t)wanted + OTHER_DESCRIPTORS;
-    if (limit.rlim_cur < needed) {
+    const rlim_t highest = limit.rlim_max < MOST_DESCRIPTORS ? limit.rlim_max : MOST_DESCRIPTORS;
+    if (limit.rlim_cur < highest) {
         struct rlimit raised = limit;
-        raised.rlim_cur = limit.rlim_max < needed ? limit.rlim_max : needed;
+        raised.rlim_cur = highest;
         if (setrlimit(RLIMIT_NOFILE, &raised) == 0) limit = raised;
     }
     if (limit.rlim_cur <= OTHER_DESCRIPTORS)
         FAIL(error, LAM_ERR_IO, "only %llu files may be open (ulimit -n), must be more than %d",
              (unsigned long long)limit.rlim_cur, OTHER_DESCRIPTORS);
-    *most = limit.rlim_cur < needed ? (size_t)(limit.rlim_cur - OTHER_DESCRIPTORS) : wanted;
+    const size_t others = OTHER_DESCRIPTORS + n_stores,
+                 left = limit.rlim_cur > others ? (size_t)(limit.rlim_cur - others) : 0;
+    const size_t allowed = left < LEAST_CONNECTIONS ? LEAST_CONNECTIONS : left;
+    *most = wanted < allowed ? wanted : allowed;
 done:
     return status;
+}
+
+/* True if the process may open no file any more; nobody is accepted then, however few are connected. */
+static bool is_out_of_descriptors(void) {
+    const int fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return errno == EMFILE || errno == ENFILE;
+    close(fd);
+    return false;
 }
 
 /* *bytes: bytes that the client's machine has acknowledged; false if the socket does not count them. */
@@ -253,14 +270,14 @@ static client *find_idle(const connections *all, double now) {
     return oldest;
 }
 
-/* With the lock. Closes what is past its deadline and, if all connections are in use, at most a quarter of
- * them that are idle. O(open) for each one closed. */
+/* With the lock. Closes what is past its deadline and, if all connections or descriptors are in use, at most
+ * a quarter of them that are idle. O(open) for each one closed. */
 static void sweep(connections *all) {
     const double now = clock_seconds();
     cut_reason why = CUT_HEAD;
     for (client *c = all->first; c != NULL; c = c->after)
         if (!c->cut && is_over_time(&all->limits, c, now, &why)) cut(all, c, why);
-    if (all->n_open < all->limits.most) return;
+    if (all->n_open < all->limits.most && !is_out_of_descriptors()) return;
     for (size_t place = 0; place <= all->limits.most / 4 && place < PLACES; place++) {
         client *idle = find_idle(all, now);
         if (idle == NULL) return;
@@ -308,6 +325,14 @@ done:
         free(all);
     }
     return status;
+}
+
+void connections_reserve(connections *all, size_t n_stores) {
+    size_t most = 0;
+    if (connections_affordable(all->limits.wanted, n_stores, &most, NULL) != LAM_OK) return;
+    pthread_mutex_lock(&all->lock);
+    all->limits.most = most;
+    pthread_mutex_unlock(&all->lock);
 }
 
 void connections_stop(connections *all) {
@@ -382,7 +407,7 @@ bool client_is_lost(const client *c) {
 bool connections_write(connections *all, buffer *b) {
     uint64_t n_cut[N_CUT_REASONS];
     pthread_mutex_lock(&all->lock);
-    const size_t n_open = all->n_open;
+    const size_t n_open = all->n_open, most = all->limits.most;
     for (size_t r = 0; r < N_CUT_REASONS; r++) n_cut[r] = all->n_cut[r];
     pthread_mutex_unlock(&all->lock);
     bool written = buffer_printf(b,
@@ -395,7 +420,7 @@ bool connections_write(connections *all, buffer *b) {
                                  "# HELP lambertd_connections_cut_total Connections closed at a time limit, "
                                  "or to make room.\n"
                                  "# TYPE lambertd_connections_cut_total counter\n",
-                                 n_open, all->limits.most);
+                                 n_open, most);
     for (size_t r = 0; r < N_CUT_REASONS; r++)
         written = written && buffer_printf(b, "lambertd_connections_cut_total{why=\"%s\"} %llu\n", reasons[r],
                                            (unsigned long long)n_cut[r]);

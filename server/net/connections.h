@@ -19,15 +19,17 @@ typedef struct client client;
 typedef enum connection_stage { STAGE_HEAD, STAGE_BODY, STAGE_SOLVE, STAGE_ANSWER } connection_stage;
 
 typedef struct connection_limits {
-    size_t most; /* connections; when all are open, those idle for longest are closed for others */
+    size_t wanted; /* most connections */
+    size_t most;   /* of these, as many as there are descriptors for; when all are open, or no descriptor is
+                      left, those idle for longest are closed for others */
     size_t timeout_s;
     size_t least_rate; /* bytes a second */
 } connection_limits;
 
-/* *most: the number of connections that the process has descriptors for, at most `wanted`, after those for
- * stores and other files. Raises the soft limit as needed and allowed. Errors: LAM_ERR_IO if there are none.
- */
-lam_status connections_affordable(size_t wanted, size_t *most, lam_error *error);
+/* *most: the number of connections that the process has descriptors for, at most `wanted`, beside those of
+ * n_stores mapped stores and of other files; some, even if these take all. Raises the soft limit to the hard
+ * one. Errors: LAM_ERR_IO if there are none. */
+lam_status connections_affordable(size_t wanted, size_t n_stores, size_t *most, lam_error *error);
 
 /* Listens on address, HOST:PORT ([...]:PORT for IPv6). where: the URL for clients, with the port that was
  * taken. The caller closes *fd. Errors: LAM_ERR_ARGUMENT, LAM_ERR_IO. */
@@ -51,6 +53,9 @@ void connections_unlink(unix_socket *own);
 
 /* Starts a thread that checks all connections once a second. */
 lam_status connections_start(const connection_limits *limits, connections **out, lam_error *error);
+
+/* The stores hold so many descriptors from now on: idle connections beyond the rest are closed. */
+void connections_reserve(connections *all, size_t n_stores);
 
 /* Ends the thread and frees everything; no connection may be open. */
 void connections_stop(connections *all);

@@ -377,15 +377,35 @@ done:
     return status;
 }
 
+/* Every store that the configuration names now. */
+static lam_status find_sources(const catalog *all, source_list *sources, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t i = 0; i < all->config->n_stores; i++)
+        TRY(add_source(sources, NULL, all->config->stores[i], true, error));
+    if (all->config->stores_dir != NULL) TRY(add_folder(sources, all->config->stores_dir, error));
+done:
+    return status;
+}
+
+size_t catalog_stores(catalog *all) {
+    source_list sources = {0};
+    lam_error unused;
+    catalog_snapshot *present = catalog_acquire(all);
+    size_t count = 0;
+    for (size_t i = 0; i < present->n_scenes; i++) count += present->scenes[i]->base == NULL;
+    catalog_release(present);
+    if (count == 0 && find_sources(all, &sources, &unused) == LAM_OK) count = sources.count;
+    free_sources(&sources);
+    return count;
+}
+
 size_t catalog_reload(catalog *all) {
     source_list sources = {0};
     lam_error error = {0};
     lam_status status = LAM_OK;
     catalog_snapshot *before = catalog_acquire(all), *next = NULL;
     if (all->config->max_memory > 0) atomic_store(&all->ledger.room, 0); /* no scene grows meanwhile */
-    for (size_t i = 0; i < all->config->n_stores; i++)
-        TRY(add_source(&sources, NULL, all->config->stores[i], true, &error));
-    if (all->config->stores_dir != NULL) TRY(add_folder(&sources, all->config->stores_dir, &error));
+    TRY(find_sources(all, &sources, &error));
     next = memory_allocate(1, sizeof *next, "catalog", &error);
     if (next == NULL) TRY(LAM_ERR_MEMORY);
     atomic_init(&next->references, 1);

@@ -25,6 +25,10 @@ void catalog_destroy(catalog *all);
  * thread at a time. */
 size_t catalog_reload(catalog *all);
 
+/* The number of stores that are served, each of which holds a descriptor where it is mapped; before any is,
+ * of those that will be read. */
+size_t catalog_stores(catalog *all);
+
 /* The present snapshot, valid until it is released. Any thread. */
 catalog_snapshot *catalog_acquire(catalog *all);
 void catalog_release(catalog_snapshot *snapshot);

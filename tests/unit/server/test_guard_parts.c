@@ -42,7 +42,7 @@ static void close_pair(connections *all, pair *p) {
 static connections *start(size_t most, size_t timeout_s, size_t least_rate) {
     connections *all = NULL;
     lam_error error;
-    const connection_limits limits = {most, timeout_s, least_rate};
+    const connection_limits limits = {most, most, timeout_s, least_rate};
     ck_assert_int_eq(connections_start(&limits, &all, &error), LAM_OK);
     return all;
 }
@@ -145,16 +145,21 @@ START_TEST(as_many_as_files_may_be_open) {
     ck_assert_int_eq(getrlimit(RLIMIT_NOFILE, &before), 0);
     struct rlimit low = {100, before.rlim_max < 300 ? before.rlim_max : 300};
     ck_assert_int_eq(setrlimit(RLIMIT_NOFILE, &low), 0);
-    ck_assert_int_eq(connections_affordable(10, &most, &error), LAM_OK);
+    ck_assert_int_eq(connections_affordable(10, 5, &most, &error), LAM_OK);
     ck_assert_uint_eq(most, 10);
+    /* The soft limit is raised to the hard one. */
     ck_assert_int_eq(getrlimit(RLIMIT_NOFILE, &before), 0);
-    ck_assert_uint_eq(before.rlim_cur, 100);
-    /* The soft limit is raised, up to the hard one. */
-    ck_assert_int_eq(connections_affordable(1000, &most, &error), LAM_OK);
+    ck_assert_uint_eq(before.rlim_cur, low.rlim_max);
+    ck_assert_int_eq(connections_affordable(1000, 0, &most, &error), LAM_OK);
     ck_assert_uint_eq(most, (size_t)low.rlim_max - 64);
+    ck_assert_int_eq(connections_affordable(1000, 80, &most, &error), LAM_OK);
+    ck_assert_uint_eq(most, (size_t)low.rlim_max - 64 - 80);
+    /* Some clients, even where stores take all. */
+    ck_assert_int_eq(connections_affordable(1000, 5000, &most, &error), LAM_OK);
+    ck_assert_uint_eq(most, 8);
     low = (struct rlimit){64, 64};
     ck_assert_int_eq(setrlimit(RLIMIT_NOFILE, &low), 0);
-    ck_assert_int_eq(connections_affordable(10, &most, &error), LAM_ERR_IO);
+    ck_assert_int_eq(connections_affordable(10, 0, &most, &error), LAM_ERR_IO);
     ck_assert_ptr_nonnull(strstr(error.message, "ulimit -n"));
 }
 END_TEST
