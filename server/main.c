@@ -81,6 +81,11 @@ static void serve_until_signal(service *s, const sigset_t *signals) {
     for (;;) {
         if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP || is_ended()) return;
         access_log_reopen(s->access_log);
+        lam_error error;
+        if (tokens_reload(s->tokens, stderr, &error) != LAM_OK) {
+            fprintf(stderr, "lambertd: the tokens stay as they were: %s\n", error.message);
+            fflush(stderr);
+        }
         size_t served = catalog_reload(s->catalog);
         connections_reserve(s->connections, catalog_stores(s->catalog));
         printf("reloaded: %zu scene%s\n", served, served == 1 ? "" : "s");
@@ -123,8 +128,10 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     for (size_t i = 0; i < route_label_count(); i++) labels[i] = route_label(i);
     atomic_init(&s.state, SERVICE_LOADING);
     TRY(peer_rules_read(&c->trusted_proxies, &s.peers, error));
-    if (c->token_file != NULL) TRY(token_read(c->token_file, &s.token, error));
+    if (c->token_file != NULL) TRY(tokens_open(c->token_file, stderr, &s.tokens, error));
     if (c->access_log != NULL) TRY(access_log_open(c->access_log, &s.access_log, error));
+    s.audit_log = s.access_log;
+    if (s.audit_log == NULL && c->max_variants > 0) TRY(access_log_open(NULL, &s.audit_log, error));
     TRY(metrics_create(route_label_count(), labels, &s.metrics, error));
     TRY(catalog_create(c, stdout, stderr, &s.catalog, error));
     TRY(variants_start(c, s.catalog, &s.variants, error));
@@ -160,7 +167,9 @@ done:
     variants_destroy(s.variants);
     catalog_destroy(s.catalog);
     metrics_destroy(s.metrics);
+    if (s.audit_log != s.access_log) access_log_close(s.audit_log);
     access_log_close(s.access_log);
+    tokens_close(s.tokens);
     connections_unlink(&own);
     free(labels);
     return status;

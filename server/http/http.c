@@ -2,10 +2,10 @@
 
 #include "server/http/browser.h"
 #include "server/http/framing.h"
+#include "server/http/request_log.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/verifier.h"
 #include "solver/base/clock.h"
-#include "solver/codec/json_writer.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,8 +27,23 @@ struct http {
  */
 #define DROP_MAX ((uint64_t)1 << 20)
 
-static void refuse_token(request *r) {
-    answer_refuse(&r->answer, PROBLEM_NO_TOKEN, "a bearer token is needed: Authorization: Bearer TOKEN");
+/* True if the client may have the route, by its token where one is needed. */
+static bool check_token(request *r) {
+    tokens *all = r->service->tokens;
+    const route *to = r->match.route;
+    const token_right right = to != NULL && to->right != 0 ? to->right : TOKEN_READ;
+    if (all == NULL || !(r->match.with_token || (right == TOKEN_METRICS && tokens_guard_metrics(all))))
+        return true;
+    if (!tokens_find(all, http_header(r, MHD_HTTP_HEADER_AUTHORIZATION), &r->holder)) {
+        answer_refuse(&r->answer, PROBLEM_NO_TOKEN, "a bearer token is needed: Authorization: Bearer TOKEN");
+        return false;
+    }
+    if (to == NULL || (r->holder.rights & right) != 0) return true;
+    answer_refuse(&r->answer, PROBLEM_NO_RIGHT, "the token has no right to %s",
+                  right == TOKEN_READ   ? "read"
+                  : right == TOKEN_VARY ? "make or delete variants"
+                                        : "read metrics");
+    return false;
 }
 
 /* False, with 503 in place of any answer, if the scene is out of service. */
@@ -99,11 +114,7 @@ static bool check_head(request *r, const char *method, const char *target, uint6
     const service *s = r->service;
     route_find(method, r->path, &r->match, &r->answer);
     if (!browser_check(r, target)) return false;
-    if (r->match.with_token && !token_matches(&s->token, http_header(r, MHD_HTTP_HEADER_AUTHORIZATION))) {
-        refuse_token(r);
-        return false;
-    }
-    if (r->match.route == NULL) return false;
+    if (!check_token(r) || r->match.route == NULL) return false;
     /* The state of the variant before the snapshot: a variant built in between is then in the snapshot. */
     const variant_state variant =
         r->match.has_name ? variants_state(s->variants, r->match.name, &r->variant_why) : VARIANT_SETTLED;
@@ -342,30 +353,6 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
     return handle(r);
 }
 
-/* Adds one line of JSON to the access log. status 0: the client left before it was answered.
- */
-static void log_request(const request *r, unsigned status, double ms) {
-    buffer b = {0};
-    struct timespec now;
-    struct tm utc;
-    char stamp[32];
-    clock_gettime(CLOCK_REALTIME, &now);
-    gmtime_r(&now.tv_sec, &utc);
-    strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
-    bool written =
-        buffer_printf(&b, "{\"time\":\"%s.%03ldZ\",\"id\":", stamp, now.tv_nsec / 1000000) &&
-        json_write_text(&b, r->id) && buffer_append_text(&b, ",\"client\":") &&
-        json_write_text(&b, r->peer.text) && buffer_append_text(&b, ",\"method\":") &&
-        json_write_text(&b, r->method) && buffer_append_text(&b, ",\"path\":") &&
-        json_write_text(&b, r->path) &&
-        buffer_printf(&b,
-                      ",\"status\":%u,\"received\":%zu,\"sent\":%zu,\"coding\":\"%s\",\"vectors\":%zu,"
-                      "\"ms\":%.3f}\n",
-                      status, (size_t)r->received, r->sent, coding_name(r->coding), r->call.n_rhs, ms);
-    if (written) access_log_add(r->service->access_log, b.bytes, b.length);
-    buffer_free(&b);
-}
-
 static void on_completed(void *context, struct MHD_Connection *connection, void **request_context,
                          enum MHD_RequestTerminationCode code) {
     (void)connection;
@@ -376,11 +363,12 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     const double seconds = clock_seconds() - r->start;
     client_enter(h->service->connections, r->client, STAGE_HEAD, 0);
     unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
-    if (h->service->access_log != NULL) log_request(r, status, seconds * 1e3);
+    request_log(r, status, seconds * 1e3);
     catalog_release(r->snapshot);
     drop_body(r);
     buffer_free(&r->answer.body);
     free(r->answer.location);
+    free(r->call.changed);
     size_t label = r->match.label;
     free(r->path);
     free(r);

@@ -15,8 +15,9 @@ typedef struct request {
     call call;
     service *service;
     struct MHD_Connection *connection;
-    client *client; /* NULL when memory was short */
-    peer peer;      /* the client, as the head states it */
+    client *client;      /* NULL when memory was short */
+    peer peer;           /* the client, as the head states it */
+    token_holder holder; /* its token; "" without one */
     char id[REQUEST_ID_MAX + 1];
     char method[16];
     char *path;   /* as sent, without scheme and host */

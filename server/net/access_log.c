@@ -15,7 +15,7 @@
 enum { RING = 1 << 18, LOOK_MS = 50, LOOKS_MOST = 20 };
 
 struct access_log {
-    const char *path; /* "-": standard output */
+    const char *path; /* "-": standard output; NULL: standard error */
     int fd;
     pthread_t thread;
     pthread_mutex_t mutex;
@@ -28,8 +28,13 @@ struct access_log {
 
 /* -1 with errno. A named pipe without a reader is refused, not waited for. */
 static int open_file(const char *path) {
+    if (path == NULL) return STDERR_FILENO;
     if (strcmp(path, "-") == 0) return STDOUT_FILENO;
     return open(path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
+}
+
+static void close_file(int fd) {
+    if (fd > STDERR_FILENO) close(fd);
 }
 
 /* Takes what waits and lies in one piece, as many bytes as a pipe takes at once; 0 at the end. */
@@ -47,7 +52,7 @@ static size_t take(access_log *log, char piece[PIPE_BUF]) {
     if (!again) return count;
     const int fd = open_file(log->path);
     if (fd >= 0 && fd != log->fd) {
-        if (log->fd != STDOUT_FILENO) close(log->fd);
+        close_file(log->fd);
         log->fd = fd;
     }
     return take(log, piece);
@@ -111,7 +116,7 @@ lam_status access_log_open(const char *path, access_log **out, lam_error *error)
     log = NULL;
 done:
     if (log != NULL) {
-        if (log->fd >= 0 && log->fd != STDOUT_FILENO) close(log->fd);
+        close_file(log->fd);
         free(log->ring);
         free(log);
     }
@@ -134,7 +139,7 @@ void access_log_add(access_log *log, const char *line, size_t length) {
 }
 
 void access_log_reopen(access_log *log) {
-    if (log == NULL || strcmp(log->path, "-") == 0) return;
+    if (log == NULL || log->path == NULL || strcmp(log->path, "-") == 0) return;
     pthread_mutex_lock(&log->mutex);
     log->reopen = true;
     pthread_cond_signal(&log->more);
@@ -163,7 +168,7 @@ void access_log_close(access_log *log) {
     pthread_join(log->thread, NULL);
     pthread_mutex_destroy(&log->mutex);
     pthread_cond_destroy(&log->more);
-    if (log->fd != STDOUT_FILENO) close(log->fd);
+    close_file(log->fd);
     free(log->ring);
     free(log);
 }

@@ -8,8 +8,8 @@
 
 typedef struct access_log access_log;
 
-/* Opens path for appending, or standard output for "-". Errors: LAM_ERR_IO (also a named pipe without a
- * reader), LAM_ERR_MEMORY. */
+/* Opens path for appending, or standard output for "-", standard error for NULL. Errors: LAM_ERR_IO (also a
+ * named pipe without a reader), LAM_ERR_MEMORY. */
 lam_status access_log_open(const char *path, access_log **out, lam_error *error);
 
 /* Adds a whole line, or drops and counts it where so many wait already. Never blocks. NULL: no log. */

@@ -19,7 +19,7 @@ static bool check_scene(const call *in, problem *why) {
     if (in->service->config->max_variants == 0)
         return problem_set(why, PROBLEM_NOT_ALLOWED,
                            "this daemon makes no variants; start it with --max-variants N");
-    if (in->service->token.length == 0)
+    if (in->service->tokens == NULL)
         return problem_set(why, PROBLEM_NOT_ALLOWED,
                            "variants need a token; start the daemon with --token-file FILE");
     if (s->base != NULL)
@@ -64,7 +64,7 @@ static scene *scene_of(const call *in) {
 }
 
 /* Queues the variant; takes over the reflectances of request. */
-static bool put(const call *in, reflectance_request *request, char **location, problem *why) {
+static bool put(call *in, reflectance_request *request, char **location, problem *why) {
     char name[ROUTE_NAME_MAX];
     float *reflectance = request->reflectance;
     if (snprintf(name, sizeof name, "%s@%s", in->scene->name, request->variant) >= ROUTE_NAME_MAX)
@@ -73,6 +73,7 @@ static bool put(const call *in, reflectance_request *request, char **location, p
                            request->variant, ROUTE_NAME_MAX - 1);
     *location = path_of(name);
     if (*location == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for a variant");
+    in->changed = strdup(name);
     request->reflectance = NULL;
     return variants_put(in->service->variants, scene_of(in), name, reflectance, request->groups, why);
 }
@@ -107,6 +108,7 @@ void put_reflectance(call *in, answer *out) {
 
 static void remove_variant(call *in, const char *name, answer *out) {
     problem why = {0};
+    in->changed = strdup(name);
     if (variants_remove(in->service->variants, name, &why))
         *out = (answer){.status = 204};
     else

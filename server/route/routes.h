@@ -24,10 +24,11 @@ typedef struct route {
     route_handler *handle;    /* or */
     const solve_steps *steps; /* of a solve that shares passes */
     route_shortcut *shortcut; /* of a route with a body, or NULL */
-    bool with_body;  /* the body may have --max-body bytes; the handler runs on a thread that solves */
-    bool open;       /* no token is needed */
-    bool any_host;   /* asked for by those that know no name of the daemon */
-    bool also_built; /* {name} may also be a variant that is not served yet */
+    bool with_body;    /* the body may have --max-body bytes; the handler runs on a thread that solves */
+    bool open;         /* no token is needed, unless one has the right */
+    token_right right; /* that a token must have; 0: TOKEN_READ */
+    bool any_host;     /* asked for by those that know no name of the daemon */
+    bool also_built;   /* {name} may also be a variant that is not served yet */
 } route;
 
 #define ROUTE_NAME_MAX 256

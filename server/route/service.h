@@ -21,11 +21,13 @@ typedef struct service {
     variants *variants;
     metrics *metrics;
     batch_queue *queue;
-    token token;              /* empty: none is needed */
-    origin_rules origins;     /* hosts and pages that are served */
-    peer_rules peers;         /* whose word about a client's address is taken */
-    access_log *access_log;   /* NULL: none */
-    atomic_int state;         /* a service_state */
+    tokens *tokens;         /* NULL: none is needed */
+    origin_rules origins;   /* hosts and pages that are served */
+    peer_rules peers;       /* whose word about a client's address is taken */
+    access_log *access_log; /* NULL: none */
+    access_log
+        *audit_log;   /* PUT and DELETE; the access log, or standard error; NULL: nothing can be changed */
+    atomic_int state; /* a service_state */
     connections *connections; /* from http_start to http_stop */
     atomic_size_t body_bytes; /* bytes of request bodies in memory */
 } service;

@@ -16,6 +16,7 @@ static const struct {
     [PROBLEM_NOT_JSON] = {400, MANUAL "not-json", "The body is not JSON"},
     [PROBLEM_NOT_NPY] = {400, MANUAL "not-npy", "The body is not an NPY array"},
     [PROBLEM_NO_TOKEN] = {401, MANUAL "no-token", "A bearer token is missing or wrong"},
+    [PROBLEM_NO_RIGHT] = {403, MANUAL "no-right", "The token has not this right"},
     [PROBLEM_NOT_ALLOWED] = {403, MANUAL "not-allowed", "The daemon was started without this ability"},
     [PROBLEM_WRONG_HOST] = {403, MANUAL "wrong-host", "The daemon does not answer to this host"},
     [PROBLEM_WRONG_ORIGIN] = {403, MANUAL "wrong-origin", "Pages of this origin may not ask"},

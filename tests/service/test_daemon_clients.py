@@ -176,7 +176,7 @@ class Clients(Case):
     def test_token(self):
         path, _ = self.store()
         token = self.folder / "token"
-        token.write_text("  s3cret-token \nrest\n")
+        token.write_text("  s3cret-token \n# rest\n")
         body = json.dumps({"emission": [1] * 60})
         with Daemon(path, "--token-file", token) as daemon:
             for given in (None, "", "Bearer", "Bearer ", "Bearer s3cret", "Bearer s3cret-tokenx", "Bearer S3cret-token",

@@ -1,0 +1,46 @@
+#include "server/http/request_log.h"
+
+#include "solver/codec/json_writer.h"
+
+#include <string.h>
+#include <time.h>
+
+static bool is_change(const request *r) {
+    return strcmp(r->method, "PUT") == 0 || strcmp(r->method, "DELETE") == 0;
+}
+
+/* Appends by whose word something was to be changed, and which scene. */
+static bool write_holder(const request *r, buffer *b) {
+    bool written = true;
+    if (r->holder.name[0] != '\0')
+        written = buffer_append_text(b, ",\"token\":") && json_write_text(b, r->holder.name);
+    if (is_change(r) && r->match.has_name)
+        written = written && buffer_append_text(b, ",\"scene\":") && json_write_text(b, r->match.name);
+    if (r->call.changed != NULL)
+        written = written && buffer_append_text(b, ",\"variant\":") && json_write_text(b, r->call.changed);
+    return written;
+}
+
+void request_log(const request *r, unsigned status, double ms) {
+    access_log *log = is_change(r) ? r->service->audit_log : r->service->access_log;
+    if (log == NULL) return;
+    buffer b = {0};
+    struct timespec now;
+    struct tm utc;
+    char stamp[32];
+    clock_gettime(CLOCK_REALTIME, &now);
+    gmtime_r(&now.tv_sec, &utc);
+    strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
+    bool written =
+        buffer_printf(&b, "{\"time\":\"%s.%03ldZ\",\"id\":", stamp, now.tv_nsec / 1000000) &&
+        json_write_text(&b, r->id) && buffer_append_text(&b, ",\"client\":") &&
+        json_write_text(&b, r->peer.text) && buffer_append_text(&b, ",\"method\":") &&
+        json_write_text(&b, r->method) && buffer_append_text(&b, ",\"path\":") &&
+        json_write_text(&b, r->path) && write_holder(r, &b) &&
+        buffer_printf(&b,
+                      ",\"status\":%u,\"received\":%zu,\"sent\":%zu,\"coding\":\"%s\",\"vectors\":%zu,"
+                      "\"ms\":%.3f}\n",
+                      status, (size_t)r->received, r->sent, coding_name(r->coding), r->call.n_rhs, ms);
+    if (written) access_log_add(log, b.bytes, b.length);
+    buffer_free(&b);
+}
