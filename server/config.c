@@ -163,9 +163,9 @@ static const option_command daemon_command = {
     .most_arguments = SIZE_MAX,
 };
 
-/* Threads and processes beside those that compute: main, input and output, connections, verification,
- * variants, a child that opens a store. */
-enum { BESIDE = 6 };
+/* Threads and processes beside those that compute: the one for short solves, main, input and output,
+ * connections, verification, variants, a child that opens a store. */
+enum { BESIDE = 7 };
 
 static void choose_threads(config *c) {
     machine limits;

@@ -7,6 +7,7 @@
 #include "server/scene/verifier.h"
 #include "solver/base/clock.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -166,6 +167,31 @@ static void finish_answer(request *r) {
     drop_body(r);
 }
 
+/* Seconds, roughly: to read a byte of JSON or of NPY, to read a byte of an operator, to write a number. */
+#define PER_JSON_BYTE 20e-9
+#define PER_NPY_BYTE .5e-9
+#define PER_OPERATOR_BYTE .1e-9
+#define PER_NUMBER 60e-9
+/* A pass of refinement takes many products; its cost is not known before. */
+#define REFINEMENT 1.0
+
+/* The cost of begin: of routes without steps it has all of the work. */
+static double cost_to_begin(const call *c, const route *to) {
+    const double read = (double)c->length * (c->body_type == MEDIA_NPY ? PER_NPY_BYTE : PER_JSON_BYTE);
+    if (to->steps != NULL || c->scene == NULL) return read;
+    return read + PER_OPERATOR_BYTE * (double)lam_operator_bytes(c->scene->op) +
+           PER_NUMBER * (double)(c->scene->n * c->scene->n_channels);
+}
+
+/* The cost of a pass, or of the end if that takes longer. */
+static double cost_to_solve(const call *c) {
+    const double n_vectors = (double)c->job.n_vectors, together = fmin(n_vectors, BATCH_PASS);
+    if (c->refines) return REFINEMENT;
+    const double pass = PER_OPERATOR_BYTE * (double)lam_operator_bytes(c->scene->op) * (1 + together / 8);
+    const double numbers = n_vectors * (double)(c->scene->n * c->scene->n_channels);
+    return fmax(pass, c->accept.type == MEDIA_NPY ? 0 : numbers * PER_NUMBER);
+}
+
 static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     request *r = request_of(job);
     const route *to = r->match.route;
@@ -174,7 +200,10 @@ static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     if (client_is_lost(r->client)) {
         answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "the client left before the solve began");
     } else if (to->steps != NULL) {
-        if (to->steps->begin(&r->call, &r->answer)) return true;
+        if (to->steps->begin(&r->call, &r->answer)) {
+            job->cost = cost_to_solve(&r->call);
+            return true;
+        }
     } else {
         to->handle(&r->call, &r->answer);
     }
@@ -226,6 +255,8 @@ static enum MHD_Result handle(request *r) {
                                       .pass = steps != NULL ? pass_solve : NULL,
                                       .end = end_solve,
                                       .finish = finish_solve,
+                                      .kind = (unsigned)r->match.label,
+                                      .cost = cost_to_begin(&r->call, r->match.route),
                                       .brief = is_brief(&r->call)};
             client_enter(r->service->connections, r->client, STAGE_SOLVE, 0);
             MHD_suspend_connection(r->connection);

@@ -1,11 +1,26 @@
 /* The queue of solves and the threads that serve it. Jobs of several clients on one operator share a pass,
  *     (B_1 | B_2 | ...) = M (E_1 | E_2 | ...),
  * which reads M once for up to BATCH_PASS vectors. Knows neither HTTP nor scenes; a job brings its functions.
- */
+ *
+ * Order. Jobs of one client, one kind and about one cost (within a factor of 4) stand in one line, in the
+ * order in which they came. Every line that has work gets an equal share of the threads' time: a line is
+ * charged for the time of its jobs, and the least charged one goes on; a line that was empty begins at the
+ * charge of the one that is served (start-time fair queuing: Goyal, Vin and Cheng 1996). Hence these bounds:
+ *   - Of two lines that both have work neither is charged more than the other by more than the cost of one
+ *     job of each. So with k lines a job waits for at most k times what those before it in its line take,
+ *     and for the functions that the threads are in.
+ *   - A job that is ready for a pass lets others be begun first, so that they share it, but at most
+ *     BATCH_PASS, of its own kind, each not longer than the pass or BATCH_GATHER.
+ *   - When all threads are in functions of long jobs, one more thread serves the short ones (cost up to
+ *     BATCH_SHORT), so that these wait for none of those functions; the processor is then shared.
+ * The table of lines has 256 places by hash; lines that meet there are one (stochastic fairness queueing:
+ * McKenney 1990). */
 #ifndef LAMBERT_SERVER_QUEUE_BATCH_H
 #define LAMBERT_SERVER_QUEUE_BATCH_H
 
 #include "store/status.h"
+
+#include <stdint.h>
 
 typedef struct batch_queue batch_queue;
 typedef struct batch_job batch_job;
@@ -19,6 +34,10 @@ typedef struct batch_workspace {
 /* Most vectors in a pass: enough to use each number read many times, few enough to stay in the cache. */
 #define BATCH_PASS 16
 
+/* Seconds: the cost of a short job, and of a begin that any pass waits for. */
+#define BATCH_SHORT 4e-3
+#define BATCH_GATHER 1e-3
+
 /* Vectors first ... first + count of a job, in a pass. */
 typedef struct batch_part {
     batch_job *job;
@@ -27,9 +46,10 @@ typedef struct batch_part {
 
 /* Embedded in a request. Any thread calls, one after the other:
  *   begin   reads the request. True: it has set key and n_vectors (at least 1), which wait for passes
- *           shared by all jobs of this key and pass function. False: only finish is left.
+ *           shared by all jobs of this key and pass function, and cost. False: only finish is left.
  *   pass    computes some vectors of one or several jobs, at most BATCH_PASS in all. It is called until
- *           every vector is computed, by one thread at a time for a job.
+ *           every vector is computed, by one thread at a time for a job. It may lower n_vectors to what has
+ *           been computed.
  *   end     makes the answer.
  *   finish  after the job has left the count of batch_jobs. The job may not exist when it returns. */
 struct batch_job {
@@ -39,13 +59,20 @@ struct batch_job {
     void (*finish)(batch_job *job);
     const void *key;
     size_t n_vectors;
+    double cost;     /* estimated seconds of begin; once begun, of the longest function that is left */
+    uint64_t client; /* whose it is */
+    unsigned kind;   /* of work; jobs of one kind take similar steps */
     bool brief; /* set at submission: each of the four functions takes about as long as waking a thread */
-    size_t next_vector; /* private to the queue */
-    batch_job *next;    /* private to the queue */
+    size_t next_vector; /* here and below: private to the queue */
+    uint64_t ticket;    /* number of its submission */
+    uint64_t begun;     /* jobs that had begun when it was ready for its next pass */
+    size_t line;
+    batch_job *next;
 };
 
-/* Starts n_threads threads with all signals blocked, or as many as there can be, at least one. At most
- * max_jobs wait or run. An idle thread helps the others with their loops (solver/base/parallel.h). */
+/* Starts n_threads threads and the one for short jobs, with all signals blocked, or as many as there can be,
+ * at least one. At most max_jobs wait or run. An idle thread helps the others with their loops
+ * (solver/base/parallel.h). */
 lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam_error *error);
 
 /* Queues a job; false if there are max_jobs already or the queue is closed. */
@@ -54,7 +81,7 @@ bool batch_submit(batch_queue *queue, batch_job *job);
 /* The number of jobs that wait or run. */
 size_t batch_jobs(batch_queue *queue);
 
-/* The threads that were started. */
+/* The threads that were started, without the one for short jobs. */
 size_t batch_threads(const batch_queue *queue);
 
 /* From now on idle threads help the calling one, which is none of the queue, with its loops. */

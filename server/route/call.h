@@ -26,6 +26,7 @@ typedef struct call {
     size_t length;
     batch_workspace *workspace; /* of a route with a body */
     void *state;                /* of a route with solve_steps: its own, from begin to end */
+    bool refines;               /* set by begin: to a tolerance */
     size_t n_rhs;               /* set by the handler, for the log */
     char *changed; /* the variant that the handler made or removed, owned, for the log; or NULL */
 } call;

@@ -134,6 +134,7 @@ static bool begin(call *in, answer *out) {
     /* Answers for all elements share passes. Answers for selected elements, and of emitters, have passes of
      * their own. Refined answers take many times as long: one common key lets one such pass run at a time,
      * and leaves the other threads to other requests. */
+    in->refines = refine;
     in->job.key = refine                                  ? (const void *)in->service->queue
                   : request->select || of->n_emitters > 0 ? (const void *)in
                                                           : of->op;

@@ -1,0 +1,214 @@
+/* The order of the queue: lines of kinds and costs, their shares, what a job that is ready for its pass waits
+ * for, and the thread for short jobs. Costs are what a line is charged, as the functions take no time
+ * themselves. */
+#include "server/queue/batch.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <semaphore.h>
+
+enum { MOST = 400 };
+
+typedef struct record {
+    pthread_mutex_t lock;
+    sem_t finished, held, gate;
+    size_t n;
+    size_t ids[MOST]; /* of begins, or of passes plus MOST, in their order */
+    batch_queue *queue;
+} record;
+
+typedef struct job {
+    batch_job job;
+    record *record;
+    size_t id, wanted;
+    double then; /* cost once begun */
+} job;
+
+static job *job_of(batch_job *b) {
+    return (job *)(void *)b;
+}
+
+static void note(record *r, size_t id) {
+    pthread_mutex_lock(&r->lock);
+    r->ids[r->n++] = id;
+    pthread_mutex_unlock(&r->lock);
+}
+
+static bool begin(batch_job *b, batch_workspace *workspace) {
+    (void)workspace;
+    job *self = job_of(b);
+    note(self->record, self->id);
+    b->key = self->record;
+    b->n_vectors = self->wanted;
+    b->cost = self->then;
+    return self->wanted > 0;
+}
+
+static bool begin_held(batch_job *b, batch_workspace *workspace) {
+    (void)workspace;
+    record *r = job_of(b)->record;
+    sem_post(&r->held);
+    sem_wait(&r->gate);
+    return false;
+}
+
+static void pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    (void)workspace;
+    for (size_t p = 0; p < n_parts; p++) note(job_of(parts[p].job)->record, MOST + job_of(parts[p].job)->id);
+}
+
+static void end(batch_job *b, batch_workspace *workspace) {
+    (void)b;
+    (void)workspace;
+}
+
+static void finish(batch_job *b) {
+    sem_post(&job_of(b)->record->finished);
+}
+
+static void submit(record *r, job *j, size_t id, unsigned kind, double cost, size_t wanted, double then) {
+    *j = (job){.record = r, .id = id, .wanted = wanted, .then = then};
+    j->job =
+        (batch_job){.begin = begin, .pass = pass, .end = end, .finish = finish, .kind = kind, .cost = cost};
+    ck_assert(batch_submit(r->queue, &j->job));
+}
+
+/* Keeps a thread in a function of this cost until the gate opens. */
+static void hold(record *r, job *j, double cost) {
+    *j = (job){.record = r};
+    j->job = (batch_job){.begin = begin_held, .finish = finish, .kind = 60, .cost = cost};
+    ck_assert(batch_submit(r->queue, &j->job));
+    sem_wait(&r->held);
+}
+
+static void record_open(record *r, size_t n_threads) {
+    lam_error error = {.message = ""};
+    *r = (record){.n = 0};
+    pthread_mutex_init(&r->lock, NULL);
+    sem_init(&r->finished, 0, 0);
+    sem_init(&r->held, 0, 0);
+    sem_init(&r->gate, 0, 0);
+    ck_assert_msg(batch_start(n_threads, MOST, &r->queue, &error) == LAM_OK, "%s", error.message);
+}
+
+static void record_close(record *r, size_t n_jobs) {
+    sem_post(&r->gate);
+    for (size_t k = 0; k < n_jobs; k++) sem_wait(&r->finished);
+    batch_close(r->queue);
+    batch_destroy(r->queue);
+    sem_destroy(&r->finished);
+    sem_destroy(&r->held);
+    sem_destroy(&r->gate);
+    pthread_mutex_destroy(&r->lock);
+}
+
+/* Two kinds, whose jobs cost 10 and 40 ms: while both have work, what they are charged differs by no more
+ * than one job of each, and each kind keeps its order. */
+START_TEST(kinds_have_equal_shares) {
+    enum { N = 100 };
+    static job jobs[2 * N], first;
+    static const double costs[2] = {10e-3, 40e-3};
+    record r;
+    record_open(&r, 1);
+    hold(&r, &first, 1);
+    for (size_t k = 0; k < N; k++) submit(&r, &jobs[k], k, 1, costs[0], 0, 0);
+    for (size_t k = 0; k < N; k++) submit(&r, &jobs[N + k], N + k, 2, costs[1], 0, 0);
+    record_close(&r, 2 * N + 1);
+    size_t next[2] = {0};
+    double charge[2] = {0};
+    ck_assert_uint_eq(r.n, 2 * N);
+    for (size_t k = 0; k < r.n; k++) {
+        const size_t kind = r.ids[k] / N;
+        ck_assert_uint_eq(r.ids[k] % N, next[kind]++);
+        charge[kind] += costs[kind];
+        if (next[0] < N && next[1] < N) ck_assert_double_le(fabs(charge[0] - charge[1]), 50e-3 + 1e-9);
+    }
+}
+END_TEST
+
+/* A job of a kind that had none goes next, behind any number of others. */
+START_TEST(a_new_kind_goes_next) {
+    enum { N = 200 };
+    static job jobs[N], first, last;
+    record r;
+    record_open(&r, 1);
+    hold(&r, &first, 1);
+    for (size_t k = 0; k < N; k++) submit(&r, &jobs[k], k, 1, 48e-3, 0, 0);
+    submit(&r, &last, N, 2, 5e-3, 0, 0);
+    record_close(&r, N + 2);
+    size_t at = 0;
+    while (r.ids[at] != N) at++;
+    ck_assert_uint_le(at, 1);
+}
+END_TEST
+
+/* A job that is ready for its pass is overtaken by at most BATCH_PASS begins of its kind. Those that are
+ * longer than its pass get no more than their share: its line is charged for 17 begins of 5 ms, theirs for at
+ * most 55 ms more, which is 2 of 50 ms. Costs are above BATCH_SHORT, so that the one ordinary thread serves
+ * all. */
+START_TEST(a_pass_waits_for_few_begins) {
+    enum { N = 100 };
+    static job jobs[2 * N], first, waits;
+    record r;
+    record_open(&r, 1);
+    hold(&r, &first, 1);
+    submit(&r, &waits, 0, 1, 5e-3, 1, 6e-3);
+    for (size_t k = 1; k <= N; k++) submit(&r, &jobs[k], k, 1, 5e-3, 0, 0);
+    for (size_t k = N + 1; k < 2 * N; k++) submit(&r, &jobs[k], k, 1, 50e-3, 0, 0);
+    record_close(&r, 2 * N + 1);
+    size_t at = 0, begins = 0, longs = 0;
+    for (; r.ids[at] != MOST; at++) {
+        if (at > 0 && r.ids[at] <= N) begins++;
+        if (r.ids[at] > N) longs++;
+    }
+    ck_assert_uint_ge(begins, 1);
+    ck_assert_uint_le(begins, BATCH_PASS + 1);
+    ck_assert_uint_le(longs, 2);
+}
+END_TEST
+
+/* All threads are in long functions: short jobs are served all the same, with their passes, and long ones
+ * wait. */
+START_TEST(short_jobs_wait_for_no_long_function) {
+    job held[2], briefs[20], lengthy;
+    record r;
+    record_open(&r, 2);
+    hold(&r, &held[0], 1);
+    hold(&r, &held[1], .1);
+    submit(&r, &lengthy, 99, 1, .1, 0, 0);
+    for (size_t k = 0; k < 20; k++) submit(&r, &briefs[k], k, 1, 1e-4, k % 2, 1e-4);
+    for (size_t k = 0; k < 20; k++) sem_wait(&r.finished);
+    pthread_mutex_lock(&r.lock);
+    ck_assert_uint_eq(r.n, 30);
+    for (size_t k = 0; k < r.n; k++) ck_assert_uint_ne(r.ids[k], 99);
+    pthread_mutex_unlock(&r.lock);
+    sem_post(&r.gate);
+    record_close(&r, 3);
+}
+END_TEST
+
+/* The same where the functions were estimated to be short. */
+START_TEST(a_wrong_estimate_holds_up_no_short_job) {
+    job held, brief;
+    record r;
+    record_open(&r, 1);
+    hold(&r, &held, 1e-4);
+    submit(&r, &brief, 0, 1, 1e-4, 1, 1e-4);
+    sem_wait(&r.finished);
+    record_close(&r, 1);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("batch_order");
+    TCase *tests = tcase_create("order");
+    tcase_set_timeout(tests, 60);
+    tcase_add_test(tests, kinds_have_equal_shares);
+    tcase_add_test(tests, a_new_kind_goes_next);
+    tcase_add_test(tests, a_pass_waits_for_few_begins);
+    tcase_add_test(tests, short_jobs_wait_for_no_long_function);
+    tcase_add_test(tests, a_wrong_estimate_holds_up_no_short_job);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}
