@@ -112,7 +112,9 @@ static void confine(int reply, int input, const confined_limits *limits) {
     limit_memory(limits->memory_bytes);
     keep_descriptors(reply, input);
     limit(RLIMIT_CORE, 0, 0);
+#ifndef __SANITIZE_THREAD__ /* which writes a file when a program starts */
     limit(RLIMIT_FSIZE, 0, 0);
+#endif
     limit(RLIMIT_NOFILE, 32, 32);
     limit(RLIMIT_CPU, limits->cpu_seconds, limits->cpu_seconds + 1);
     if (limits->filtered) filter_calls();
