@@ -109,22 +109,40 @@ static size_t pack(const tiled_rows *t, const tile_matrix *m, size_t plane, cons
     return fours;
 }
 
+/* The fours of groups of rows: their numbers where fours is NULL, else themselves. */
+typedef struct packing {
+    tiled_rows *t;
+    const tile_matrix *m;
+    const plane_rows *rows;
+    tile_four *fours;
+} packing;
+
+static void pack_groups(const void *job, size_t thread, size_t first, size_t last) {
+    const packing *p = job;
+    tiled_rows *t = p->t;
+    (void)thread;
+    for (size_t g = first; g < last; g++)
+        for (size_t d = 0; d < t->n_planes; d++) {
+            const size_t part = part_of(t, g, d);
+            if (p->fours != NULL)
+                pack(t, p->m, d, &p->rows[d], g, p->fours + t->begin[part]);
+            else
+                t->begin[part + 1] = pack(t, p->m, d, &p->rows[d], g, NULL);
+        }
+}
+
 static lam_status make_fours(tiled_rows *t, const tile_matrix *m, lam_error *error) {
     lam_status status = LAM_OK;
     plane_rows rows[TILE_PLANES] = {{NULL, NULL}};
     for (size_t d = 0; d < t->n_planes; d++) TRY(sort_plane(m, d, t->n_groups, &rows[d], error));
-#pragma omp parallel for schedule(static)
-    for (size_t g = 0; g < t->n_groups; g++)
-        for (size_t d = 0; d < t->n_planes; d++)
-            t->begin[part_of(t, g, d) + 1] = pack(t, m, d, &rows[d], g, NULL);
+    packing p = {.t = t, .m = m, .rows = rows};
+    parallel_share(parallel_threads(), t->n_groups, GROUPS_AT_ONCE, pack_groups, &p);
     for (size_t k = 0; k < t->n_groups * t->n_planes; k++) t->begin[k + 1] += t->begin[k];
     t->fours = memory_allocate((size_t)t->begin[t->n_groups * t->n_planes] + FOURS_PAST, sizeof *t->fours,
                                "operator", error);
     if (t->fours == NULL) TRY(LAM_ERR_MEMORY);
-#pragma omp parallel for schedule(static)
-    for (size_t g = 0; g < t->n_groups; g++)
-        for (size_t d = 0; d < t->n_planes; d++)
-            pack(t, m, d, &rows[d], g, t->fours + t->begin[part_of(t, g, d)]);
+    p.fours = t->fours;
+    parallel_share(parallel_threads(), t->n_groups, GROUPS_AT_ONCE, pack_groups, &p);
 done:
     for (size_t d = 0; d < TILE_PLANES; d++) {
         free(rows[d].begin);

@@ -1,6 +1,7 @@
 #include "solver/operator/blocks/block_factors.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/base/parallel.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -260,10 +261,11 @@ static void order_by_b(const block_factors *f, size_t *next) {
     }
 }
 
-static void find_parts(block_factors *f) {
+static void find_some_parts(const void *job, size_t thread, size_t first_part, size_t last_part) {
+    block_factors *f = *(block_factors *const *)job;
     const uint32_t n_clusters = (uint32_t)f->n_clusters, n_nodes = n_clusters + (uint32_t)f->n;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t k = 0; k < BLOCK_PARTS; k++) {
+    (void)thread;
+    for (size_t k = first_part; k < last_part; k++) {
         block_part part = {.first = part_begin(f->from, n_nodes, k, BLOCK_PARTS),
                            .last = part_begin(f->from, n_nodes, k + 1, BLOCK_PARTS),
                            .least_cluster = n_clusters,
@@ -316,7 +318,7 @@ lam_status block_factors_end_lists(block_factors *f, size_t n_lists, block_list 
     count_both(f);
     if (!sorted) TRY(sort_blocks(f, error));
     order_by_b(f, next);
-    find_parts(f);
+    parallel_share(parallel_threads(), BLOCK_PARTS, 1, find_some_parts, &f);
 done:
     free(next);
     return status;
