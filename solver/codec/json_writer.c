@@ -1,5 +1,6 @@
 #include "solver/codec/json_writer.h"
 
+#include "solver/base/parallel.h"
 #include "solver/base/utf8.h"
 
 #include <assert.h>
@@ -159,20 +160,72 @@ size_t json_write_float(char *to, float value) {
     return (size_t)(at - to);
 }
 
+/* Pieces that are written at once; numbers of a long array, and of a piece, with the room that this takes at
+ * most. */
+enum {
+    TOGETHER = 64,
+    LONG = 32768,
+    PIECE = 4096,
+    PIECE_ROOM = PIECE * (JSON_FLOAT_MAX + 1) + JSON_FLOAT_ROOM
+};
+
 static bool reserve_floats(buffer *b, size_t count) {
     size_t bytes;
-    return !__builtin_mul_overflow(count, (size_t)JSON_FLOAT_MAX + 1, &bytes) &&
-           buffer_reserve(b, bytes + 2 + JSON_FLOAT_ROOM);
+    return !__builtin_mul_overflow(count / PIECE + 1, (size_t)PIECE_ROOM, &bytes) &&
+           bytes < SIZE_MAX - 2 - JSON_FLOAT_ROOM &&
+           buffer_reserve(b, count < PIECE ? count * (JSON_FLOAT_MAX + 1) + 2 + JSON_FLOAT_ROOM : bytes + 2);
+}
+
+/* Numbers, each with a comma behind it; returns the end. */
+static char *write_numbers(char *at, const float *values, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        at += json_write_float(at, values[i]);
+        *at++ = ',';
+    }
+    return at;
+}
+
+/* Pieces of an array, written apart. */
+typedef struct pieces {
+    const float *values;
+    size_t count;
+    char *to;       /* piece p at p PIECE_ROOM */
+    size_t *length; /* of each piece */
+} pieces;
+
+static void write_pieces(const void *job, size_t thread, size_t first, size_t last) {
+    const pieces *p = job;
+    (void)thread;
+    for (size_t k = first; k < last; k++) {
+        char *const to = p->to + k * PIECE_ROOM;
+        const size_t left = p->count - k * PIECE;
+        p->length[k] = (size_t)(write_numbers(to, p->values + k * PIECE, left < PIECE ? left : PIECE) - to);
+    }
+}
+
+/* The numbers of a long array by the threads that are free, then pushed together. */
+static char *write_together(char *at, const float *values, size_t count) {
+    size_t length[TOGETHER];
+    for (size_t first = 0; first < count; first += (size_t)TOGETHER * PIECE) {
+        const size_t left = count - first,
+                     some = left < (size_t)TOGETHER * PIECE ? left : (size_t)TOGETHER * PIECE;
+        const pieces p = {values + first, some, at, length};
+        const size_t n_pieces = (some + PIECE - 1) / PIECE;
+        parallel_share(parallel_threads(), n_pieces, 1, write_pieces, &p);
+        for (size_t k = 0; k < n_pieces; k++) {
+            if (k > 0) memmove(at, p.to + k * PIECE_ROOM, length[k]);
+            at += length[k];
+        }
+    }
+    return at;
 }
 
 bool json_write_floats(buffer *b, const float *values, size_t count) {
     if (!reserve_floats(b, count)) return false;
     char *at = b->bytes + b->length;
     *at++ = '[';
-    for (size_t i = 0; i < count; i++) {
-        at += json_write_float(at, values[i]);
-        *at++ = ',';
-    }
+    at = count < LONG || parallel_threads() < 2 ? write_numbers(at, values, count)
+                                                : write_together(at, values, count);
     if (count > 0) at--;
     *at++ = ']';
     *at = '\0';

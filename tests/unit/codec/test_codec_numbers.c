@@ -347,6 +347,37 @@ START_TEST(numbers_at_the_edge) {
 }
 END_TEST
 
+/* Written by several threads, in pieces and in groups of pieces, an array has the text of its numbers. */
+START_TEST(long_arrays) {
+    static const size_t counts[] = {4095, 32767, 32768, 40000, 262144, 262145, 600001};
+    const size_t most = counts[sizeof counts / sizeof *counts - 1];
+    float *const values = malloc(most * sizeof *values);
+    char *const wanted = malloc(most * (JSON_FLOAT_MAX + 1) + JSON_FLOAT_ROOM + 2);
+    uint32_t state = 1;
+    ck_assert(values != NULL && wanted != NULL);
+    for (size_t i = 0; i < most; i++) {
+        state = state * 1664525u + 1013904223u;
+        memcpy(&values[i], &state, sizeof state); /* of any length and sign, NaN among them */
+    }
+    for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
+        buffer b = {0};
+        char *at = wanted;
+        *at++ = '[';
+        for (size_t i = 0; i < counts[k]; i++) {
+            at += json_write_float(at, values[i]);
+            *at++ = i + 1 < counts[k] ? ',' : ']';
+        }
+        ck_assert(buffer_append(&b, "x", 1) && json_write_floats(&b, values, counts[k]));
+        ck_assert_uint_eq(b.length, 1 + (size_t)(at - wanted));
+        ck_assert_int_eq(memcmp(b.bytes + 1, wanted, b.length - 1), 0);
+        ck_assert_int_eq(b.bytes[b.length], 0);
+        buffer_free(&b);
+    }
+    free(values);
+    free(wanted);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("codec_numbers");
     TCase *tcase = tcase_create("codec_numbers");
@@ -361,6 +392,7 @@ int main(void) {
     tcase_add_test(tcase, numbers_at_the_edge);
     tcase_add_test(tcase, plain_numbers_are_the_same_numbers);
     tcase_add_test(tcase, what_is_not_plain_is_left);
+    tcase_add_test(tcase, long_arrays);
     suite_add_tcase(suite, tcase);
     return suite_run(suite);
 }
