@@ -31,17 +31,25 @@ size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
     return total;
 }
 
-/* out_v = K_c in_v: light of few elements by its columns, other vectors together. */
+/* Vectors side by side take as long as WIDE_WORTH of them one by one, however few they are. From so many
+ * elements on, several vectors do not fit into a core's caches together, and each is taken alone through all
+ * of a product. */
+enum { WIDE_WORTH = 9, ALONE_FROM = 131072 };
+
+/* out_v = K_c in_v: light of few elements by its columns, other vectors together where they are many. */
 static void multiply_core(const hierarchical *self, size_t c, size_t m, const float *in, float *out,
                           float *work) {
     const tiled_rows *K = &self->K[self->of_channel[c]];
     for (size_t v = 0, last; v < m; v = last) {
         last = v;
         while (last < m && !tiled_few_columns(K, in + last * K->n)) last++;
-        if (last > v)
+        if (last == v)
+            tiled_multiply_columns(K, in + v * K->n, out + last++ * K->n, work);
+        else if (last - v >= WIDE_WORTH)
             tiled_multiply(K, last - v, in + v * K->n, out + v * K->n, work, self->base.n_threads);
         else
-            tiled_multiply_columns(K, in + v * K->n, out + last++ * K->n, work);
+            for (size_t u = v; u < last; u++)
+                tiled_multiply(K, 1, in + u * K->n, out + u * K->n, work, self->base.n_threads);
     }
 }
 
@@ -205,8 +213,8 @@ static void leave_dark(const channel *h, size_t m) {
     }
 }
 
-/* All m vectors of a channel. */
-static void apply_channel(areas *a, size_t m, void *work) {
+/* m vectors of a channel, together. */
+static void apply_together(areas *a, size_t m, void *work) {
     const hierarchical *self = a->h.self;
     if (is_dark(&a->h, m)) {
         leave_dark(&a->h, m);
@@ -217,6 +225,20 @@ static void apply_channel(areas *a, size_t m, void *work) {
     wavelet_plan_inverse(&self->plan, m, a->to, a->h.X, a->h.in != NULL ? use : NULL, &a->h, a->slots,
                          self->base.n_threads);
     for (size_t v = 0; a->h.in == NULL && v < m; v++) finish(&a->h, v);
+}
+
+/* All m vectors of a channel. */
+static void apply_channel(const areas *a, size_t m, void *work) {
+    const bool alone = a->h.self->base.n >= ALONE_FROM;
+    for (size_t v = 0; v < m; v += alone ? 1 : m) {
+        areas some = *a;
+        const size_t before = v * a->h.stride;
+        if (a->h.in != NULL) some.h.in += before;
+        if (a->h.E != NULL) some.h.E += before;
+        if (a->h.H0 != NULL) some.h.H0 += before;
+        some.h.out += before;
+        apply_together(&some, alone ? 1 : m, work);
+    }
 }
 
 void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
