@@ -139,6 +139,16 @@ static const option_row limit_rows[] = {
      .most = 86400,
      .help =
          "Close a connection that is idle, or whose next request lacks a part of its head, for this long"},
+    {.name = "request-timeout",
+     .kind = OPTION_COUNT,
+     .offset = AT(request_timeout_s),
+     .argument = "SECONDS",
+     .preset = "300",
+     .unit = "s",
+     .least = 1,
+     .most = 86400,
+     .help = "Most time from the head of a request to the last byte of its answer; a client may ask for less "
+             "by Lambert-Timeout: SECONDS"},
     {.name = "min-rate",
      .kind = OPTION_SIZE,
      .offset = AT(min_rate),

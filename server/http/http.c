@@ -3,11 +3,8 @@
 #include "server/http/browser.h"
 #include "server/http/framing.h"
 #include "server/http/request_log.h"
-#include "server/scene/map_guard.h"
-#include "server/scene/verifier.h"
 #include "solver/base/clock.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,23 +44,12 @@ static bool check_token(request *r) {
     return false;
 }
 
-/* False, with 503 in place of any answer, if the scene is out of service. */
-static bool check_health(request *r) {
-    lam_error why;
-    bool news;
-    if (r->call.scene == NULL || !scene_damaged(r->call.scene, &why, &news)) return true;
-    if (news) verifier_report_damage(stderr, r->call.scene, &why);
-    answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "%.200s is out of service: %s", r->call.scene->name,
-                  why.message);
-    return false;
-}
-
 static bool check_scene(request *r) {
     const variant_state variant = r->call.variant;
     if (!r->match.has_name) return true;
     r->call.scene = catalog_find(r->snapshot, r->match.name);
     r->call.name = r->match.name;
-    if (r->call.scene != NULL) return check_health(r);
+    if (r->call.scene != NULL) return http_check_health(r);
     if (variant != VARIANT_SETTLED && r->match.route->also_built) return true;
     if (variant == VARIANT_BUILDING)
         answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "%.200s is being built", r->match.name);
@@ -152,94 +138,6 @@ static bool hold_body(request *r, const char *bytes, size_t count) {
     return false;
 }
 
-static void drop_body(request *r) {
-    atomic_fetch_sub(&r->service->body_bytes, r->body.length);
-    buffer_free(&r->body);
-}
-
-/* The request that a job is part of. */
-static request *request_of(batch_job *job) {
-    return (request *)(void *)((char *)call_of(job) - offsetof(request, call));
-}
-
-static void finish_answer(request *r) {
-    http_finish_answer(r, false);
-    drop_body(r);
-}
-
-/* Seconds, roughly: to read a byte of JSON or of NPY, to read a byte of an operator, to write a number. */
-#define PER_JSON_BYTE 20e-9
-#define PER_NPY_BYTE .5e-9
-#define PER_OPERATOR_BYTE .1e-9
-#define PER_NUMBER 60e-9
-/* A pass of refinement takes many products; its cost is not known before. */
-#define REFINEMENT 1.0
-
-/* The cost of begin: of routes without steps it has all of the work. */
-static double cost_to_begin(const call *c, const route *to) {
-    const double read = (double)c->length * (c->body_type == MEDIA_NPY ? PER_NPY_BYTE : PER_JSON_BYTE);
-    if (to->steps != NULL || c->scene == NULL) return read;
-    return read + PER_OPERATOR_BYTE * (double)lam_operator_bytes(c->scene->op) +
-           PER_NUMBER * (double)(c->scene->n * c->scene->n_channels);
-}
-
-/* The cost of a pass, or of the end if that takes longer. */
-static double cost_to_solve(const call *c) {
-    const double n_vectors = (double)c->job.n_vectors, together = fmin(n_vectors, BATCH_PASS);
-    if (c->refines) return REFINEMENT;
-    const double pass = PER_OPERATOR_BYTE * (double)lam_operator_bytes(c->scene->op) * (1 + together / 8);
-    const double numbers = n_vectors * (double)(c->scene->n * c->scene->n_channels);
-    return fmax(pass, c->accept.type == MEDIA_NPY ? 0 : numbers * PER_NUMBER);
-}
-
-static bool begin_solve(batch_job *job, batch_workspace *workspace) {
-    request *r = request_of(job);
-    const route *to = r->match.route;
-    r->call.workspace = workspace;
-    map_guard_allow();
-    if (client_is_lost(r->client)) {
-        answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "the client left before the solve began");
-    } else if (to->steps != NULL) {
-        if (to->steps->begin(&r->call, &r->answer)) {
-            job->cost = cost_to_solve(&r->call);
-            return true;
-        }
-    } else {
-        to->handle(&r->call, &r->answer);
-    }
-    (void)check_health(r); /* an answer from lost pages is wrong */
-    finish_answer(r);
-    return false;
-}
-
-static void pass_solve(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
-    map_guard_allow();
-    request_of(parts[0].job)->match.route->steps->pass(parts, n_parts, workspace);
-}
-
-static void end_solve(batch_job *job, batch_workspace *workspace) {
-    request *r = request_of(job);
-    r->call.workspace = workspace;
-    r->match.route->steps->end(&r->call, &r->answer);
-    (void)check_health(r);
-    finish_answer(r);
-}
-
-/* A pass over this operator takes about a millisecond; reading a body of this length as NPY takes less. */
-#define BRIEF_OPERATOR ((size_t)32 << 20)
-#define BRIEF_BODY ((size_t)256 << 10)
-
-static bool is_brief(const call *c) {
-    return c->body_type == MEDIA_NPY && c->accept.type == MEDIA_NPY && c->length <= BRIEF_BODY &&
-           c->scene != NULL && lam_operator_bytes(c->scene->op) <= BRIEF_OPERATOR;
-}
-
-static void finish_solve(batch_job *job) {
-    request *r = request_of(job);
-    r->answered = true;
-    MHD_resume_connection(r->connection);
-}
-
 /* The whole request has arrived. */
 static enum MHD_Result handle(request *r) {
     if (!r->answered) {
@@ -247,25 +145,9 @@ static enum MHD_Result handle(request *r) {
         r->call.length = r->body.length;
         route_shortcut *shortcut = r->match.route->shortcut;
         if (shortcut != NULL && shortcut(&r->call, &r->answer)) {
-            drop_body(r);
+            http_drop_body(r);
         } else if (r->match.route->with_body) {
-            /* Suspended before batch_submit, as the solve may finish before that returns. */
-            const solve_steps *steps = r->match.route->steps;
-            r->call.job = (batch_job){.begin = begin_solve,
-                                      .pass = steps != NULL ? pass_solve : NULL,
-                                      .end = end_solve,
-                                      .finish = finish_solve,
-                                      .kind = (unsigned)r->match.label,
-                                      .cost = cost_to_begin(&r->call, r->match.route),
-                                      .brief = is_brief(&r->call)};
-            client_enter(r->service->connections, r->client, STAGE_SOLVE, 0);
-            MHD_suspend_connection(r->connection);
-            if (batch_submit(r->service->queue, &r->call.job)) return MHD_YES;
-            answer_refuse(&r->answer, PROBLEM_UNAVAILABLE,
-                          "%zu solves wait or run (--max-inflight); try again",
-                          r->service->config->max_inflight);
-            r->answered = true;
-            MHD_resume_connection(r->connection);
+            http_solve(r);
             return MHD_YES;
         } else {
             r->match.route->handle(&r->call, &r->answer);
@@ -293,6 +175,8 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
     client_enter(h->service->connections, r->client, STAGE_BODY, 0);
     snprintf(r->method, sizeof r->method, "%s", method);
     r->start = clock_seconds();
+    r->deadline = r->start + (double)h->service->config->request_timeout_s;
+    client_end_by(h->service->connections, r->client, r->deadline);
     r->match.label = route_label_count() - 1;
     metrics_begin(h->service->metrics);
     return r;
@@ -347,7 +231,7 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
         return http_send_answer(r);
     }
     uint64_t length = announced_length(r);
-    r->answered = !check_head(r, method, path, length);
+    r->answered = !http_read_timeout(r) || !check_head(r, method, path, length);
     /* An answer sent before the end of the body closes the connection. So the body of a refused request is
      * read and dropped, unless it is long or its client waits for 100 Continue. */
     if (r->answered && (length > DROP_MAX || http_header(r, MHD_HTTP_HEADER_EXPECT) != NULL))
@@ -363,10 +247,10 @@ static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
         if (r->received > c->max_body) {
             refuse_length(r);
             r->answered = true;
-            drop_body(r);
+            http_drop_body(r);
         } else if (!hold_body(r, bytes, *size)) {
             r->answered = true;
-            drop_body(r);
+            http_drop_body(r);
         }
     }
     /* libmicrohttpd sends no answer in the middle of a body: the connection of one without end is closed. */
@@ -396,7 +280,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
     request_log(r, status, seconds * 1e3);
     catalog_release(r->snapshot);
-    drop_body(r);
+    http_drop_body(r);
     buffer_free(&r->answer.body);
     free(r->answer.location);
     free(r->call.changed);

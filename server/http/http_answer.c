@@ -61,7 +61,7 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
         good = good && add(response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT_ENCODING);
     if (r->coding != CODING_IDENTITY && a->status != MHD_HTTP_NOT_MODIFIED)
         good = good && add(response, MHD_HTTP_HEADER_CONTENT_ENCODING, coding_name(r->coding));
-    if (r->last || atomic_load(&r->service->state) == SERVICE_DRAINING)
+    if (r->last || atomic_load(&r->service->state) >= SERVICE_DRAINING)
         good = good && add(response, MHD_HTTP_HEADER_CONNECTION, "close");
     return good;
 }

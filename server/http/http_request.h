@@ -1,5 +1,5 @@
-/* A request while it is served, shared by http.c, which receives, and http_answer.c, which sends. Private to
- * them. */
+/* A request while it is served, shared by http.c, which receives, http_solve.c, which solves, and
+ * http_answer.c, which sends. Private to them. */
 #ifndef LAMBERT_SERVER_HTTP_HTTP_REQUEST_H
 #define LAMBERT_SERVER_HTTP_HTTP_REQUEST_H
 
@@ -20,8 +20,11 @@ typedef struct request {
     token_holder holder; /* its token; "" without one */
     char id[REQUEST_ID_MAX + 1];
     char method[16];
-    char *path;   /* as sent, without scheme and host */
-    double start; /* clock_seconds */
+    char *path;              /* as sent, without scheme and host */
+    double start;            /* clock_seconds */
+    double submitted;        /* the same, to the queue */
+    double deadline;         /* of the last byte of the answer */
+    metrics_refusal refusal; /* of a solve that is not wanted any more */
     route_match match;
     catalog_snapshot *snapshot;
     problem variant_why;
@@ -41,6 +44,17 @@ typedef struct request {
 
 /* A header of the request, or NULL. */
 const char *http_header(const request *r, const char *name);
+
+/* Lowers the deadline to what the header Lambert-Timeout asks for; false, with 400, if that is no time. */
+bool http_read_timeout(request *r);
+
+/* Suspends the connection and queues the solve of a request with its whole body, or refuses it. */
+void http_solve(request *r);
+
+/* False, with 503 in place of any answer, if the scene is out of service. */
+bool http_check_health(request *r);
+
+void http_drop_body(request *r);
 
 /* Compresses the answer if the client accepts that and it pays, and sets its ETag. The I/O thread sends long
  * bodies as they are. */

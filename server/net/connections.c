@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <linux/sockios.h>
 #include <linux/tcp.h>
+#include <math.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -128,11 +129,14 @@ void connections_unlink(unix_socket *own) {
 /* When all connections are in use, an idle one is kept for this time. */
 #define IDLE_GRACE_S 1.0
 
+/* Seconds after its end when a connection is closed. */
+#define END_SLACK 1e-3
+
 /* Idle connections closed in a second, at most. */
 #define PLACES 64
 
-typedef enum cut_reason { CUT_HEAD, CUT_BODY, CUT_ANSWER, CUT_PLACE, N_CUT_REASONS } cut_reason;
-static const char *const reasons[N_CUT_REASONS] = {"head", "body", "answer", "place"};
+typedef enum cut_reason { CUT_HEAD, CUT_BODY, CUT_ANSWER, CUT_PLACE, CUT_DEADLINE, N_CUT_REASONS } cut_reason;
+static const char *const reasons[N_CUT_REASONS] = {"head", "body", "answer", "place", "deadline"};
 
 struct client {
     client *before, *after;
@@ -142,6 +146,7 @@ struct client {
     bool checked;    /* seen was set in this stage */
     double since;    /* seconds, begin of the stage */
     double deadline; /* extended by bytes that move */
+    double end;      /* of body and answer; INFINITY: none */
     uint64_t bytes;  /* received of a body, or to be sent of an answer */
     uint64_t seen;   /* the counter of bytes when it was last checked */
 };
@@ -152,6 +157,8 @@ struct connections {
     pthread_t thread;
     connection_limits limits;
     client *first;
+    double next_end; /* the earliest of all, or earlier */
+    bool hurried;    /* an end comes before the next check */
     size_t n_open;
     uint64_t n_cut[N_CUT_REASONS];
     bool ended;
@@ -244,6 +251,10 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
         moved = measure_read(limits, c, now);
         break;
     }
+    if (now > c->end && c->stage != STAGE_HEAD) {
+        *why = CUT_DEADLINE;
+        return true;
+    }
     c->deadline += moved / (double)limits->least_rate;
     if (c->deadline > now + timeout) c->deadline = now + timeout;
     return now > c->deadline;
@@ -275,8 +286,14 @@ static client *find_idle(const connections *all, double now) {
 static void sweep(connections *all) {
     const double now = clock_seconds();
     cut_reason why = CUT_HEAD;
-    for (client *c = all->first; c != NULL; c = c->after)
-        if (!c->cut && is_over_time(&all->limits, c, now, &why)) cut(all, c, why);
+    all->next_end = INFINITY;
+    for (client *c = all->first; c != NULL; c = c->after) {
+        if (c->cut) continue;
+        if (is_over_time(&all->limits, c, now, &why))
+            cut(all, c, why);
+        else if (c->stage != STAGE_SOLVE)
+            all->next_end = fmin(all->next_end, c->end);
+    }
     if (all->n_open < all->limits.most && !is_out_of_descriptors()) return;
     for (size_t place = 0; place <= all->limits.most / 4 && place < PLACES; place++) {
         client *idle = find_idle(all, now);
@@ -285,15 +302,20 @@ static void sweep(connections *all) {
     }
 }
 
+/* Checks every second, and at the ends that come before. */
 static void *watch(void *argument) {
     connections *all = argument;
-    struct timespec next = clock_now();
+    double check_at = clock_seconds() + 1;
     pthread_mutex_lock(&all->lock);
     while (!all->ended) {
-        next.tv_sec++;
-        while (!all->ended && pthread_cond_timedwait(&all->ending, &all->lock, &next) == 0) {
+        const double next = fmin(check_at, all->next_end + END_SLACK);
+        const struct timespec when = {.tv_sec = (time_t)next, .tv_nsec = (long)(1e9 * (next - floor(next)))};
+        all->hurried = false;
+        while (!all->ended && !all->hurried && pthread_cond_timedwait(&all->ending, &all->lock, &when) == 0) {
         }
-        if (!all->ended) sweep(all);
+        if (all->ended || clock_seconds() < next) continue;
+        sweep(all);
+        check_at = clock_seconds() + 1;
     }
     pthread_mutex_unlock(&all->lock);
     return NULL;
@@ -306,6 +328,7 @@ lam_status connections_start(const connection_limits *limits, connections **out,
     connections *all = memory_allocate(1, sizeof *all, "connections", error);
     if (all == NULL) return LAM_ERR_MEMORY;
     all->limits = *limits;
+    all->next_end = INFINITY;
     pthread_mutex_init(&all->lock, NULL);
     pthread_condattr_init(&monotonic);
     pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
@@ -354,6 +377,15 @@ static void begin_stage(const connections *all, client *c, connection_stage stag
     c->bytes = bytes;
     c->seen = 0;
     c->checked = false;
+    if (stage == STAGE_HEAD) c->end = INFINITY;
+}
+
+/* Wakes the thread that checks, if the end of c comes before all others. */
+static void hurry(connections *all, const client *c) {
+    if (c->stage == STAGE_SOLVE || !(c->end < all->next_end)) return;
+    all->next_end = c->end;
+    all->hurried = true;
+    pthread_cond_signal(&all->ending);
 }
 
 client *connections_add(connections *all, int fd) {
@@ -388,6 +420,7 @@ void client_enter(connections *all, client *c, connection_stage stage, size_t by
     const double now = clock_seconds();
     pthread_mutex_lock(&all->lock);
     begin_stage(all, c, stage, bytes, now);
+    hurry(all, c);
     pthread_mutex_unlock(&all->lock);
 }
 
@@ -398,10 +431,18 @@ void client_received(connections *all, client *c, size_t bytes) {
     pthread_mutex_unlock(&all->lock);
 }
 
+void client_end_by(connections *all, client *c, double end) {
+    if (c == NULL) return;
+    pthread_mutex_lock(&all->lock);
+    c->end = end;
+    hurry(all, c);
+    pthread_mutex_unlock(&all->lock);
+}
+
 bool client_is_lost(const client *c) {
     if (c == NULL) return false;
-    struct pollfd one = {.fd = c->fd};
-    return poll(&one, 1, 0) > 0 && (one.revents & (POLLERR | POLLHUP)) != 0;
+    struct pollfd one = {.fd = c->fd, .events = POLLRDHUP};
+    return poll(&one, 1, 0) > 0 && (one.revents & (POLLRDHUP | POLLERR | POLLHUP)) != 0;
 }
 
 bool connections_write(connections *all, buffer *b) {

@@ -73,7 +73,13 @@ void client_enter(connections *all, client *c, connection_stage stage, size_t by
 /* Bytes of the body have arrived. c may be NULL. */
 void client_received(connections *all, client *c, size_t bytes);
 
-/* True if the connection is lost; a client that only ended its sending may still read. c is open, or NULL. */
+/* The next body and answer must have moved by then (clock_seconds), whatever their rate; until the next head.
+ * c may be NULL. */
+void client_end_by(connections *all, client *c, double end);
+
+/* True if the connection is lost, or the client has ended its sending, as one does that closes. c is open, or
+ * NULL.
+ */
 bool client_is_lost(const client *c);
 
 /* Appends the counts as Prometheus text. */

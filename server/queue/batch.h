@@ -38,6 +38,9 @@ typedef struct batch_workspace {
 #define BATCH_SHORT 4e-3
 #define BATCH_GATHER 1e-3
 
+/* Seconds between two looks at a job that waits. */
+#define BATCH_LOOK 50e-3
+
 /* Vectors first ... first + count of a job, in a pass. */
 typedef struct batch_part {
     batch_job *job;
@@ -51,12 +54,19 @@ typedef struct batch_part {
  *           every vector is computed, by one thread at a time for a job. It may lower n_vectors to what has
  *           been computed.
  *   end     makes the answer.
- *   finish  after the job has left the count of batch_jobs. The job may not exist when it returns. */
+ *   finish  after the job has left the count of batch_jobs. The job may not exist when it returns.
+ * Every BATCH_LOOK seconds jobs that wait are looked at, and a job that no look has seen for as long is
+ * before its next function: is_wanted  False: nobody needs the answer any more. Called with the lock of the
+ * queue: it neither waits nor calls the queue. NULL: it always is. drop       makes an answer in place of the
+ * functions that are left, but finish, which follows. Also of the jobs that batch_abandon ends. Needed with
+ * is_wanted. */
 struct batch_job {
     bool (*begin)(batch_job *job, batch_workspace *workspace);
     void (*pass)(const batch_part *parts, size_t n_parts, batch_workspace *workspace);
     void (*end)(batch_job *job, batch_workspace *workspace);
     void (*finish)(batch_job *job);
+    bool (*is_wanted)(batch_job *job);
+    void (*drop)(batch_job *job);
     const void *key;
     size_t n_vectors;
     double cost;     /* estimated seconds of begin; once begun, of the longest function that is left */
@@ -66,6 +76,8 @@ struct batch_job {
     size_t next_vector; /* here and below: private to the queue */
     uint64_t ticket;    /* number of its submission */
     uint64_t begun;     /* jobs that had begun when it was ready for its next pass */
+    bool passing;       /* a thread computes some of its vectors */
+    double looked;      /* when it was last looked at, or came */
     size_t line;
     batch_job *next;
 };
@@ -81,11 +93,19 @@ bool batch_submit(batch_queue *queue, batch_job *job);
 /* The number of jobs that wait or run. */
 size_t batch_jobs(batch_queue *queue);
 
+/* Seconds, about, until a job that is submitted now would be done: the jobs that wait or run, at the pace of
+ * the last ones. 0 until some are done. */
+double batch_delay(batch_queue *queue);
+
 /* The threads that were started, without the one for short jobs. */
 size_t batch_threads(const batch_queue *queue);
 
 /* From now on idle threads help the calling one, which is none of the queue, with its loops. */
 void batch_lend(batch_queue *queue);
+
+/* Refuses further jobs and drops those that wait, also those that return from a function; of jobs without
+ * `drop` none. Returns at once. */
+void batch_abandon(batch_queue *queue);
 
 /* Refuses further jobs, finishes those that wait and ends the threads. Once. */
 void batch_close(batch_queue *queue);

@@ -19,6 +19,12 @@ static const double latencies[] = {.0005, .001, .0025, .005, .01, .025, .05, .1,
 static const size_t batches[] = {1, 2, 4, 8, 16, 32, 64};
 #define N_BATCHES (sizeof batches / sizeof batches[0])
 
+static const char *const refusals[N_REFUSALS] = {
+    [REFUSED_FULL] = "full",         [REFUSED_DEADLINE] = "deadline",
+    [REFUSED_GONE] = "gone",         [REFUSED_REFINEMENTS] = "refinements",
+    [REFUSED_SHUTDOWN] = "shutdown",
+};
+
 typedef struct route_counts {
     uint64_t by_status[MOST_STATUSES + 1]; /* at n_statuses: any other */
     uint64_t by_latency[N_LATENCIES + 1];
@@ -34,6 +40,9 @@ struct metrics {
     size_t in_flight;
     uint64_t by_batch[N_BATCHES + 1];
     uint64_t vectors;
+    uint64_t by_wait[N_LATENCIES + 1];
+    double waited; /* seconds */
+    uint64_t by_refusal[N_REFUSALS];
     route_counts routes[];
 };
 
@@ -76,15 +85,33 @@ void metrics_begin(metrics *m) {
     pthread_mutex_unlock(&m->lock);
 }
 
-void metrics_end(metrics *m, size_t label, unsigned status, double seconds) {
-    const size_t s = find_status(m, status);
+static size_t find_latency(double seconds) {
     size_t l = 0;
     while (l < N_LATENCIES && seconds > latencies[l]) l++;
+    return l;
+}
+
+void metrics_end(metrics *m, size_t label, unsigned status, double seconds) {
+    const size_t s = find_status(m, status), l = find_latency(seconds);
     pthread_mutex_lock(&m->lock);
     m->in_flight--;
     m->routes[label].by_status[s]++;
     m->routes[label].by_latency[l]++;
     m->routes[label].seconds += seconds;
+    pthread_mutex_unlock(&m->lock);
+}
+
+void metrics_refuse(metrics *m, metrics_refusal why) {
+    pthread_mutex_lock(&m->lock);
+    m->by_refusal[why]++;
+    pthread_mutex_unlock(&m->lock);
+}
+
+void metrics_wait(metrics *m, double seconds) {
+    const size_t l = find_latency(seconds);
+    pthread_mutex_lock(&m->lock);
+    m->by_wait[l]++;
+    m->waited += seconds;
     pthread_mutex_unlock(&m->lock);
 }
 
@@ -123,26 +150,52 @@ static bool write_requests(const metrics *m, buffer *b) {
     return written;
 }
 
+/* One histogram of times; label: "" or route="..." */
+static bool write_times(buffer *b, const char *name, const char *label, const uint64_t *counts,
+                        double seconds) {
+    const char *comma = label[0] != '\0' ? "," : "", *open = label[0] != '\0' ? "{" : "",
+               *close = label[0] != '\0' ? "}" : "";
+    bool written = true;
+    uint64_t sum = 0;
+    for (size_t l = 0; l <= N_LATENCIES; l++) {
+        char bound[16] = "+Inf";
+        sum += counts[l];
+        if (l < N_LATENCIES) snprintf(bound, sizeof bound, "%g", latencies[l]);
+        written = written && buffer_printf(b, "%s_bucket{%s%sle=\"%s\"} %llu\n", name, label, comma, bound,
+                                           (unsigned long long)sum);
+    }
+    return written && buffer_printf(b, "%s_sum%s%s%s %.9g\n%s_count%s%s%s %llu\n", name, open, label, close,
+                                    seconds, name, open, label, close, (unsigned long long)sum);
+}
+
 static bool write_latencies(const metrics *m, buffer *b) {
     static const char name[] = "lambertd_request_duration_seconds";
     bool written = write_head(b, name, "histogram", "From a request's head to the last byte of its answer.");
     for (size_t r = 0; r < m->n_labels; r++) {
         const route_counts *counts = &m->routes[r];
+        char label[128];
         uint64_t sum = 0;
         for (size_t l = 0; l <= N_LATENCIES; l++) sum += counts->by_latency[l];
         if (sum == 0) continue;
-        sum = 0;
-        for (size_t l = 0; l <= N_LATENCIES; l++) {
-            char bound[16] = "+Inf";
-            sum += counts->by_latency[l];
-            if (l < N_LATENCIES) snprintf(bound, sizeof bound, "%g", latencies[l]);
-            written = written && buffer_printf(b, "%s_bucket{route=\"%s\",le=\"%s\"} %llu\n", name,
-                                               m->labels[r], bound, (unsigned long long)sum);
-        }
-        written = written &&
-                  buffer_printf(b, "%s_sum{route=\"%s\"} %.9g\n%s_count{route=\"%s\"} %llu\n", name,
-                                m->labels[r], counts->seconds, name, m->labels[r], (unsigned long long)sum);
+        snprintf(label, sizeof label, "route=\"%s\"", m->labels[r]);
+        written = written && write_times(b, name, label, counts->by_latency, counts->seconds);
     }
+    return written;
+}
+
+static bool write_waits(const metrics *m, buffer *b) {
+    static const char name[] = "lambertd_queue_wait_seconds";
+    return write_head(b, name, "histogram",
+                      "From the last byte of a solve's request until a thread begins it.") &&
+           write_times(b, name, "", m->by_wait, m->waited);
+}
+
+static bool write_refusals(const metrics *m, buffer *b) {
+    static const char name[] = "lambertd_solves_refused_total";
+    bool written = write_head(b, name, "counter", "Solves that were not done, or not to their end.");
+    for (int why = REFUSED_NOT + 1; why < N_REFUSALS; why++)
+        written = written && buffer_printf(b, "%s{why=\"%s\"} %llu\n", name, refusals[why],
+                                           (unsigned long long)m->by_refusal[why]);
     return written;
 }
 
@@ -168,9 +221,11 @@ static bool write_gauge(buffer *b, const char *name, const char *help, unsigned 
 bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b) {
     pthread_mutex_lock(&m->lock);
     bool written =
-        write_requests(m, b) && write_latencies(m, b) && write_batches(m, b) &&
+        write_requests(m, b) && write_latencies(m, b) && write_waits(m, b) && write_refusals(m, b) &&
+        write_batches(m, b) &&
         write_gauge(b, "lambertd_in_flight", "Requests that are not answered yet.", m->in_flight) &&
         write_gauge(b, "lambertd_queued", "Solves that wait or run.", gauges->queued) &&
+        write_gauge(b, "lambertd_refining", "Refinements that wait or run.", gauges->refining) &&
         write_gauge(b, "lambertd_body_bytes", "Bytes of request bodies held.", gauges->body_bytes) &&
         write_gauge(b, "lambertd_scenes", "Scenes that are served.", gauges->n_scenes) &&
         write_gauge(b, "lambertd_operator_bytes", "Bytes of operator held.", gauges->operator_bytes);

@@ -17,6 +17,22 @@ void metrics_destroy(metrics *m);
 void metrics_begin(metrics *m);
 void metrics_end(metrics *m, size_t label, unsigned status, double seconds);
 
+/* A solve that is not done: it found no place; its deadline passed; its client went; there were too many
+ * refinements; the daemon ends. */
+typedef enum metrics_refusal {
+    REFUSED_NOT,
+    REFUSED_FULL,
+    REFUSED_DEADLINE,
+    REFUSED_GONE,
+    REFUSED_REFINEMENTS,
+    REFUSED_SHUTDOWN,
+    N_REFUSALS
+} metrics_refusal;
+void metrics_refuse(metrics *m, metrics_refusal why);
+
+/* Counts a solve that waited so long before a thread began it. */
+void metrics_wait(metrics *m, double seconds);
+
 /* Counts a pass over an operator by its number of vectors. */
 void metrics_pass(metrics *m, size_t n_rhs);
 
@@ -28,6 +44,7 @@ typedef struct metrics_gauges {
     size_t n_scenes;
     uint64_t operator_bytes;
     size_t queued;     /* solves that wait or run */
+    size_t refining;   /* refinements among them */
     size_t body_bytes; /* of requests, held in memory */
 } metrics_gauges;
 

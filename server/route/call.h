@@ -24,10 +24,12 @@ typedef struct call {
     media_accept accept;
     const char *body; /* body[length] is NUL */
     size_t length;
-    batch_workspace *workspace; /* of a route with a body */
-    void *state;                /* of a route with solve_steps: its own, from begin to end */
-    bool refines;               /* set by begin: to a tolerance */
-    size_t n_rhs;               /* set by the handler, for the log */
+    batch_workspace *workspace;         /* of a route with a body */
+    void *state;                        /* of a route with solve_steps: its own, from begin to end */
+    bool refines;                       /* set by begin: to a tolerance */
+    bool (*is_wanted)(struct call *in); /* of a route with a body, from the thread that serves it: false when
+                                         * nobody needs the answer any more; what is done may then be left */
+    size_t n_rhs;                       /* set by the handler, for the log */
     char *changed; /* the variant that the handler made or removed, owned, for the log; or NULL */
 } call;
 

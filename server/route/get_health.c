@@ -21,6 +21,7 @@ void get_readyz(call *in, answer *out) {
         answer_refuse(out, PROBLEM_UNAVAILABLE, "loading stores");
         break;
     case SERVICE_DRAINING:
+    case SERVICE_ENDING:
         answer_refuse(out, PROBLEM_UNAVAILABLE, "shutting down");
         break;
     }

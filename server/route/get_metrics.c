@@ -4,7 +4,9 @@
 void get_metrics(call *in, answer *out) {
     const service *s = in->service;
     const catalog_snapshot *snapshot = in->snapshot;
-    metrics_gauges gauges = {.queued = batch_jobs(s->queue), .body_bytes = atomic_load(&s->body_bytes)};
+    metrics_gauges gauges = {.queued = batch_jobs(s->queue),
+                             .refining = atomic_load(&s->n_refining),
+                             .body_bytes = atomic_load(&s->body_bytes)};
     metrics_stores stores = {.mapped_bytes = 0};
     buffer b = {0};
     for (size_t i = 0; i < snapshot->n_scenes; i++) {

@@ -170,8 +170,11 @@ static void pass_refined(const batch_part *parts, size_t n_parts) {
     for (size_t p = 0; p < n_parts; p++) {
         call *in = call_of(parts[p].job);
         radiosity_solve *s = in->state;
-        s->failed = s->failed || !refined_pass(in, &s->request, parts[p].first, parts[p].count, s->refined,
-                                               &s->notes, &s->answer, &s->why);
+        s->failed = s->failed || !in->is_wanted(in) ||
+                    !refined_pass(in, &s->request, parts[p].first, parts[p].count, s->refined, &s->notes,
+                                  &s->answer, &s->why);
+        /* The rest of one that failed is not computed. */
+        if (s->failed) in->job.n_vectors = parts[p].first + parts[p].count;
     }
 }
 
@@ -252,4 +255,9 @@ static void end(call *in, answer *out) {
     solve_free(s);
 }
 
-const solve_steps post_radiosity = {begin, pass, end};
+static void drop(call *in) {
+    solve_free(in->state);
+    in->state = NULL;
+}
+
+const solve_steps post_radiosity = {begin, pass, end, drop};

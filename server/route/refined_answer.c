@@ -4,6 +4,7 @@
 #include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
 #include "solver/operator/emitters.h"
+#include "solver/operator/refine/refine_watch.h"
 #include "solver/operator/sky_light.h"
 
 #include <math.h>
@@ -109,17 +110,25 @@ static void light_any(const scene *s, const radiosity_request *request, size_t f
     sky_irradiance_double(s->sky, count * C, p->L, p->H0);
 }
 
+static bool go_on(void *context) {
+    call *in = context;
+    return in->is_wanted(in);
+}
+
 /* Refines vectors first ... first + count; returns them, or their selected elements, or NULL with *why. */
-static const double *refine(const scene *s, const lam_refiner *refiner, const radiosity_request *request,
+static const double *refine(call *in, const lam_refiner *refiner, const radiosity_request *request,
                             size_t first, size_t count, pass_memory *p, double *certificates,
                             size_t *iterations, problem *why) {
+    const scene *s = in->scene;
+    const refine_watch watch = {go_on, in};
     lam_error error;
     if (s->n_emitters == 0)
         light_any(s, request, first, count, p);
     else if (!light_emitters(s, request, first, count, p, why))
         return NULL;
-    const lam_status status = lam_refine(refiner, count, request->quantity, p->E, p->H0, p->start,
-                                         request->tolerance, p->out, certificates, iterations, &error);
+    const lam_status status =
+        refine_watched(refiner, count, request->quantity, p->E, p->H0, p->start, request->tolerance, p->out,
+                       certificates, iterations, &watch, &error);
     if (status != LAM_OK) {
         refuse(status, &error, why);
         return NULL;
@@ -179,7 +188,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
         good = pass_memory_allocate(s, request, &r->p, why) &&
                (r->figures != NULL || answer_begin(b, &r->shape, &r->as, notes, why));
     }
-    const double *x = good ? refine(s, refiner, request, first, count, &r->p, r->certificates + first,
+    const double *x = good ? refine(in, refiner, request, first, count, &r->p, r->certificates + first,
                                     r->iterations + first, why)
                            : NULL;
     const double solved = clock_ms();

@@ -16,7 +16,7 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
 /* Refines vectors first ... first + count, at most BATCH_PASS, and appends them to b; passes come in order,
  * and none after one that failed. Errors: 422 if the store keeps no form factors, the tolerance cannot be
  * certified or the store's emitters cannot give the emission; 503 if memory is short or the store's file has
- * changed; 500 if it is damaged. */
+ * changed; 500 if it is damaged; any, once nobody needs the answer (call.is_wanted). */
 bool refined_pass(call *in, const radiosity_request *request, size_t first, size_t count, refined_solve *r,
                   answer_notes *notes, buffer *b, problem *why);
 

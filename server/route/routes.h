@@ -11,11 +11,13 @@ typedef void route_handler(call *in, answer *out);
 typedef bool route_shortcut(call *in, answer *out);
 
 /* A solve that shares passes over an operator with those of other clients (server/queue/batch.h). begin sets
- * the key and n_vectors of the job; or it makes the answer, usually a problem, and returns false. */
+ * the key and n_vectors of the job, and `state` and `refines` of the call; or it makes the answer, usually a
+ * problem, and returns false. */
 typedef struct solve_steps {
     bool (*begin)(call *in, answer *out);
     void (*pass)(const batch_part *parts, size_t n_parts, batch_workspace *workspace);
     void (*end)(call *in, answer *out);
+    void (*drop)(call *in); /* frees the state in place of end */
 } solve_steps;
 
 typedef struct route {

@@ -13,7 +13,8 @@
 #include "server/scene/catalog.h"
 #include "server/scene/variants.h"
 
-typedef enum service_state { SERVICE_LOADING, SERVICE_READY, SERVICE_DRAINING } service_state;
+/* ENDING: solves that wait or run are given up. */
+typedef enum service_state { SERVICE_LOADING, SERVICE_READY, SERVICE_DRAINING, SERVICE_ENDING } service_state;
 
 typedef struct service {
     const config *config;
@@ -30,6 +31,7 @@ typedef struct service {
     atomic_int state; /* a service_state */
     connections *connections; /* from http_start to http_stop */
     atomic_size_t body_bytes; /* bytes of request bodies in memory */
+    atomic_size_t n_refining; /* refinements that wait or run */
 } service;
 
 #endif

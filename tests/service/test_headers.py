@@ -181,7 +181,8 @@ class Headers(unittest.TestCase):
                  "lambertd_body_bytes": "gauge", "lambertd_scenes": "gauge", "lambertd_operator_bytes": "gauge",
                  "lambertd_mapped_bytes": "gauge", "lambertd_scenes_damaged": "gauge",
                  "lambertd_scenes_unverified": "gauge", "lambertd_connections": "gauge", "lambertd_connections_most": "gauge",
-                 "lambertd_connections_cut": "counter", "lambertd_access_log_lost": "counter"}
+                 "lambertd_connections_cut": "counter", "lambertd_access_log_lost": "counter",
+                 "lambertd_queue_wait_seconds": "histogram", "lambertd_refining": "gauge", "lambertd_solves_refused": "counter"}
         self.assertEqual({name: f.type for name, f in families.items()}, kinds)
         for family in families.values():
             self.assertTrue(family.documentation)
@@ -194,7 +195,7 @@ class Headers(unittest.TestCase):
         counts = {(s.labels["route"], s.labels["status"]): s.value for s in families["lambertd_requests"].samples}
         self.assertEqual(counts, {("/v1/scenes/{name}/radiosity", "200"): 3, ("/v1/scenes/{name}/radiosity", "400"): 1,
                                   ("other", "404"): 1, ("/v1/scenes", "304"): 1})
-        for name in "lambertd_request_duration_seconds", "lambertd_batch_size":
+        for name in "lambertd_request_duration_seconds", "lambertd_batch_size", "lambertd_queue_wait_seconds":
             series = {}
             for s in families[name].samples:
                 series.setdefault(s.labels.get("route"), {}).setdefault(re.sub(f"^{name}_", "", s.name), []).append(s)

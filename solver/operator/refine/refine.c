@@ -345,6 +345,7 @@ static lam_status refine_pass(refinement *s, size_t first, const request *asked,
         }
     }
     refinement_solve(s);
+    if (s->left) FAIL(error, LAM_ERR_NUMERIC, "the refinement was left before its end");
     for (size_t c = 0; c < s->n_columns; c++) {
         const refine_column *col = &s->columns[c];
         if (col->done) continue;
@@ -387,9 +388,10 @@ static lam_status reserve_answers(size_t n_rhs, size_t size, request *made, lam_
                                                                                        : LAM_ERR_MEMORY;
 }
 
-lam_status lam_refine(const lam_refiner *refiner, size_t n_rhs, lam_quantity quantity, const double *E,
-                      const double *H0, const float *start, double tolerance, double *out,
-                      double *certificates, size_t *iterations, lam_error *error) {
+lam_status refine_watched(const lam_refiner *refiner, size_t n_rhs, lam_quantity quantity, const double *E,
+                          const double *H0, const float *start, double tolerance, double *out,
+                          double *certificates, size_t *iterations, const refine_watch *watch,
+                          lam_error *error) {
     lam_status status = LAM_OK;
     refinement s = {.n_columns = 0};
     int *exponents = NULL;
@@ -407,6 +409,7 @@ lam_status lam_refine(const lam_refiner *refiner, size_t n_rhs, lam_quantity qua
                 memory_allocate(count * refiner->op->n_channels, sizeof *exponents, "refining", error);
             if (exponents == NULL) TRY(LAM_ERR_MEMORY);
             TRY(refinement_create(refiner, count, &s, error));
+            s.watch = watch;
         }
         TRY(refine_pass(&s, first, &made, exponents, error));
     }
@@ -420,4 +423,11 @@ done:
     free(made.certificates);
     free(made.iterations);
     return status;
+}
+
+lam_status lam_refine(const lam_refiner *refiner, size_t n_rhs, lam_quantity quantity, const double *E,
+                      const double *H0, const float *start, double tolerance, double *out,
+                      double *certificates, size_t *iterations, lam_error *error) {
+    return refine_watched(refiner, n_rhs, quantity, E, H0, start, tolerance, out, certificates, iterations,
+                          NULL, error);
 }

@@ -389,6 +389,8 @@ void refinement_solve(refinement *s) {
             again[c] = false;
         }
         if (!any_of(active, m)) return;
+        s->left = s->watch != NULL && !s->watch->go_on(s->watch->context);
+        if (s->left) return;
         find_directions(s, active);
         refinement_multiply(s, active, s->z, s->q);
         parallel_share(s->refiner->op->n_threads, m, 1, step_columns, &s);

@@ -26,6 +26,7 @@
 
 #include "solver/operator/operator.h"
 #include "solver/operator/refine/form_factor_rows.h"
+#include "solver/operator/refine/refine_watch.h"
 
 /* The unit roundoff of double. */
 #define REFINE_U 0x1p-53
@@ -90,8 +91,10 @@ typedef struct refinement {
     bool help;    /* the operator gives directions */
     bool weights; /* stop when r is small enough for w = E' + P, instead of at a tolerance */
     double tolerance;
-    bool count_sum; /* the rounding of E' + P counts against the tolerance */
-    double *lit;    /* E' */
+    const refine_watch *watch; /* or NULL */
+    bool left;                 /* the watch did not go on */
+    bool count_sum;            /* the rounding of E' + P counts against the tolerance */
+    double *lit;               /* E' */
     double *P, *r, *z, *q;
     double *kept_Z, *kept_Q; /* [REFINE_WINDOW][columns][n] */
     double *X, *Y;           /* the vectors of a product with rows, [n][CSR_DOUBLES_WIDTH] */
@@ -116,7 +119,7 @@ size_t refinement_bytes(const lam_refiner *refiner);
 void refinement_start(refinement *s);
 
 /* Iterates from lit (largest value of a column from 1/2 to 1, or all 0) and P until every column is done or
- * stuck. */
+ * stuck, or the watch does not go on. */
 void refinement_solve(refinement *s);
 
 /* Sets r, P, bound, done and stuck of a column. True when r should be computed anew from P. */

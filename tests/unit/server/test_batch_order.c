@@ -7,6 +7,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <semaphore.h>
+#include <time.h>
 
 enum { MOST = 400 };
 
@@ -143,10 +144,9 @@ START_TEST(a_new_kind_goes_next) {
 }
 END_TEST
 
-/* A job that is ready for its pass is overtaken by at most BATCH_PASS begins of its kind. Those that are
- * longer than its pass get no more than their share: its line is charged for 17 begins of 5 ms, theirs for at
- * most 55 ms more, which is 2 of 50 ms. Costs are above BATCH_SHORT, so that the one ordinary thread serves
- * all. */
+/* A job that is ready for its pass is overtaken by at most BATCH_PASS begins of its kind. Longer ones get no
+ * more than their share: its line is charged for 17 begins of 5 ms, theirs for at most 55 ms more, which is 2
+ * of 50 ms. Costs are above BATCH_SHORT, so that the one ordinary thread serves all. */
 START_TEST(a_pass_waits_for_few_begins) {
     enum { N = 100 };
     static job jobs[2 * N], first, waits;
@@ -200,6 +200,87 @@ START_TEST(a_wrong_estimate_holds_up_no_short_job) {
 }
 END_TEST
 
+/* The id of a job that is not wanted, in its record. */
+enum { DROPPED = 3 * MOST };
+
+static bool is_never_wanted(batch_job *b) {
+    (void)b;
+    return false;
+}
+
+static bool is_always_wanted(batch_job *b) {
+    (void)b;
+    return true;
+}
+
+static void drop(batch_job *b) {
+    note(job_of(b)->record, DROPPED + job_of(b)->id);
+}
+
+static void submit_with(record *r, job *j, size_t id, bool (*is_wanted)(batch_job *)) {
+    *j = (job){.record = r, .id = id, .wanted = 1, .then = 1};
+    j->job = (batch_job){.begin = begin,
+                         .pass = pass,
+                         .end = end,
+                         .finish = finish,
+                         .is_wanted = is_wanted,
+                         .drop = drop,
+                         .kind = 1,
+                         .cost = 1};
+    ck_assert(batch_submit(r->queue, &j->job));
+}
+
+/* Jobs that nobody wants are dropped while all threads are in functions; the others are served. */
+START_TEST(unwanted_jobs_are_dropped) {
+    static job jobs[40], held;
+    record r;
+    record_open(&r, 1);
+    hold(&r, &held, 1);
+    for (size_t k = 0; k < 40; k++) submit_with(&r, &jobs[k], k, k % 2 ? is_always_wanted : is_never_wanted);
+    for (size_t k = 0; k < 20; k++) sem_wait(&r.finished);
+    pthread_mutex_lock(&r.lock);
+    ck_assert_uint_eq(r.n, 20);
+    for (size_t k = 0; k < 20; k++) ck_assert_uint_eq(r.ids[k], DROPPED + 2 * k);
+    pthread_mutex_unlock(&r.lock);
+    ck_assert_uint_eq(batch_jobs(r.queue), 21);
+    record_close(&r, 21);
+    for (size_t k = 20; k < r.n; k++) ck_assert_uint_lt(r.ids[k], DROPPED);
+    ck_assert_uint_eq(r.n, 60);
+}
+END_TEST
+
+/* An abandoned queue drops what waits, and after their function those that have a drop. */
+START_TEST(an_abandoned_queue_drops_all) {
+    static job jobs[20], held, late;
+    record r;
+    record_open(&r, 1);
+    hold(&r, &held, 1);
+    for (size_t k = 0; k < 20; k++) submit_with(&r, &jobs[k], k, is_always_wanted);
+    batch_abandon(r.queue);
+    for (size_t k = 0; k < 20; k++) sem_wait(&r.finished);
+    ck_assert_uint_eq(batch_jobs(r.queue), 1);
+    late = jobs[0];
+    ck_assert(!batch_submit(r.queue, &late.job));
+    record_close(&r, 1);
+    for (size_t k = 0; k < r.n; k++) ck_assert_uint_ge(r.ids[k], DROPPED);
+}
+END_TEST
+
+/* The delay is the jobs at their pace: one waits behind a function of .6 s. */
+START_TEST(the_delay_follows_the_pace) {
+    static job held, waits;
+    record r;
+    record_open(&r, 1);
+    ck_assert_double_eq(batch_delay(r.queue), 0);
+    hold(&r, &held, 1);
+    submit(&r, &waits, 0, 1, 1, 0, 0);
+    const struct timespec while_held = {.tv_nsec = 600000000};
+    nanosleep(&while_held, NULL);
+    ck_assert_double_ge(batch_delay(r.queue), .5);
+    record_close(&r, 2);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("batch_order");
     TCase *tests = tcase_create("order");
@@ -209,6 +290,9 @@ int main(void) {
     tcase_add_test(tests, a_pass_waits_for_few_begins);
     tcase_add_test(tests, short_jobs_wait_for_no_long_function);
     tcase_add_test(tests, a_wrong_estimate_holds_up_no_short_job);
+    tcase_add_test(tests, unwanted_jobs_are_dropped);
+    tcase_add_test(tests, an_abandoned_queue_drops_all);
+    tcase_add_test(tests, the_delay_follows_the_pace);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }

@@ -2,6 +2,7 @@
  * entity tags, request ids. */
 #include "server/http/http_fields.h"
 #include "server/net/connections.h"
+#include "solver/base/clock.h"
 #include "support/suite.h"
 
 #include <string.h>
@@ -123,12 +124,43 @@ START_TEST(idle_clients_make_place_and_no_others) {
 }
 END_TEST
 
+/* Ends pass over those who solve, come before the next check of rates, and are gone with the next head. */
+START_TEST(an_end_cuts_bodies_and_answers) {
+    connections *all = start(10, 3600, 1);
+    pair solve = open_pair(all), body = open_pair(all), next = open_pair(all), answer = open_pair(all);
+    const double end = clock_seconds() + .05;
+    client_enter(all, solve.c, STAGE_SOLVE, 0);
+    client_end_by(all, solve.c, end);
+    client_enter(all, next.c, STAGE_BODY, 0);
+    client_end_by(all, next.c, end);
+    client_enter(all, next.c, STAGE_HEAD, 0);
+    client_enter(all, next.c, STAGE_BODY, 0);
+    client_enter(all, body.c, STAGE_BODY, 0);
+    client_end_by(all, body.c, end);
+    client_enter(all, answer.c, STAGE_SOLVE, 0);
+    client_end_by(all, answer.c, end);
+    client_enter(all, answer.c, STAGE_ANSWER, 10);
+    wait_cut(&body);
+    wait_cut(&answer);
+    ck_assert_double_ge(clock_seconds(), end);
+    ck_assert(!is_cut(&solve) && !is_cut(&next));
+    expect_count(all, "_cut_total{why=\"deadline\"} 2\n");
+    client_enter(all, solve.c, STAGE_ANSWER, 10);
+    wait_cut(&solve);
+    close_pair(all, &solve);
+    close_pair(all, &body);
+    close_pair(all, &next);
+    close_pair(all, &answer);
+    connections_stop(all);
+}
+END_TEST
+
 START_TEST(who_is_lost) {
     connections *all = start(10, 1, 1);
     pair half = open_pair(all), gone = open_pair(all);
     ck_assert(!client_is_lost(half.c) && !client_is_lost(gone.c) && !client_is_lost(NULL));
-    shutdown(half.theirs, SHUT_WR);
-    ck_assert(!client_is_lost(half.c));
+    shutdown(half.theirs, SHUT_WR); /* as one that closes; the two cannot be told apart */
+    ck_assert(client_is_lost(half.c));
     close(gone.theirs);
     ck_assert(client_is_lost(gone.c));
     gone.theirs = -1;
@@ -210,6 +242,7 @@ int main(void) {
     tcase_add_test(all, each_stage_has_its_time);
     tcase_add_test(all, a_body_that_moves_is_cut_for_its_rate_alone);
     tcase_add_test(all, idle_clients_make_place_and_no_others);
+    tcase_add_test(all, an_end_cuts_bodies_and_answers);
     tcase_add_test(all, who_is_lost);
     tcase_add_test(all, tags);
     tcase_add_test(all, ids);

@@ -1,0 +1,219 @@
+/* Solves: their way through the queue, their deadlines, and what becomes of those that nobody waits for. */
+#include "server/http/http_request.h"
+#include "server/scene/map_guard.h"
+#include "server/scene/verifier.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* The longest time that Retry-After asks for. */
+#define RETRY_MOST 600
+
+/* Seconds in which an answer is sent that is made at the deadline. */
+#define REFUSAL_S 1.0
+
+bool http_check_health(request *r) {
+    lam_error why;
+    bool news;
+    if (r->call.scene == NULL || !scene_damaged(r->call.scene, &why, &news)) return true;
+    if (news) verifier_report_damage(stderr, r->call.scene, &why);
+    answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "%.200s is out of service: %s", r->call.scene->name,
+                  why.message);
+    return false;
+}
+
+void http_drop_body(request *r) {
+    atomic_fetch_sub(&r->service->body_bytes, r->body.length);
+    buffer_free(&r->body);
+}
+
+/* The request that a job is part of. */
+static request *request_of(batch_job *job) {
+    return (request *)(void *)((char *)call_of(job) - offsetof(request, call));
+}
+
+static void finish_answer(request *r) {
+    http_finish_answer(r, false);
+    http_drop_body(r);
+}
+
+bool http_read_timeout(request *r) {
+    const char *text = http_header(r, "Lambert-Timeout");
+    char *end;
+    if (text == NULL) return true;
+    const double seconds = strtod(text, &end);
+    if (end == text || *end != '\0' || !(seconds > 0 && seconds <= 1e9)) {
+        answer_refuse(&r->answer, PROBLEM_MALFORMED_HEAD,
+                      "Lambert-Timeout is %.40s, must be a number of seconds above 0", text);
+        return false;
+    }
+    r->deadline = fmin(r->deadline, r->start + seconds);
+    client_end_by(r->service->connections, r->client, r->deadline);
+    return true;
+}
+
+/* Makes the answer of a solve that is not done. */
+static void refuse_solve(request *r) {
+    static const char *const reasons[N_REFUSALS] = {
+        [REFUSED_FULL] = "too many solves wait or run (--max-inflight); try again",
+        [REFUSED_DEADLINE] = "the answer was not ready in time (--request-timeout, Lambert-Timeout)",
+        [REFUSED_GONE] = "the client ended its sending before the answer was ready",
+        [REFUSED_REFINEMENTS] = "too many refinements wait or run (a quarter of --max-inflight); try again",
+        [REFUSED_SHUTDOWN] = "shutting down",
+    };
+    const double delay = fmin(fmax(ceil(batch_delay(r->service->queue)), 1), RETRY_MOST);
+    answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "%s", reasons[r->refusal]);
+    r->answer.retry_after = (unsigned)delay;
+    metrics_refuse(r->service->metrics, r->refusal);
+}
+
+static bool is_wanted(request *r) {
+    const double now = clock_seconds();
+    if (atomic_load(&r->service->state) == SERVICE_ENDING)
+        r->refusal = REFUSED_SHUTDOWN;
+    else if (now > r->deadline)
+        r->refusal = REFUSED_DEADLINE;
+    else if (client_is_lost(r->client))
+        r->refusal = REFUSED_GONE;
+    else
+        return true;
+    return false;
+}
+
+static bool is_solve_wanted(batch_job *job) {
+    return is_wanted(request_of(job));
+}
+
+/* The same for steps that look in the middle of their work. */
+static bool is_call_wanted(call *in) {
+    return is_wanted(request_of(&in->job));
+}
+
+static void leave_refinements(request *r) {
+    if (r->call.refines) atomic_fetch_sub(&r->service->n_refining, 1);
+    r->call.refines = false;
+}
+
+static void drop_solve(batch_job *job) {
+    request *r = request_of(job);
+    if (r->call.state != NULL) r->match.route->steps->drop(&r->call);
+    leave_refinements(r);
+    refuse_solve(r);
+    finish_answer(r);
+}
+
+/* Seconds, roughly: to read a byte of JSON or of NPY, to read a byte of an operator, to write a number. */
+#define PER_JSON_BYTE 20e-9
+#define PER_NPY_BYTE .5e-9
+#define PER_OPERATOR_BYTE .1e-9
+#define PER_NUMBER 60e-9
+/* A pass of refinement takes many products; its cost is not known before. */
+#define REFINEMENT 1.0
+
+/* The cost of begin: of routes without steps it has all of the work. */
+static double cost_to_begin(const call *c, const route *to) {
+    const double read = (double)c->length * (c->body_type == MEDIA_NPY ? PER_NPY_BYTE : PER_JSON_BYTE);
+    if (to->steps != NULL || c->scene == NULL) return read;
+    return read + PER_OPERATOR_BYTE * (double)lam_operator_bytes(c->scene->op) +
+           PER_NUMBER * (double)(c->scene->n * c->scene->n_channels);
+}
+
+/* The cost of a pass, or of the end if that takes longer. */
+static double cost_to_solve(const call *c) {
+    const double n_vectors = (double)c->job.n_vectors, together = fmin(n_vectors, BATCH_PASS);
+    if (c->refines) return REFINEMENT;
+    const double pass = PER_OPERATOR_BYTE * (double)lam_operator_bytes(c->scene->op) * (1 + together / 8);
+    const double numbers = n_vectors * (double)(c->scene->n * c->scene->n_channels);
+    return fmax(pass, c->accept.type == MEDIA_NPY ? 0 : numbers * PER_NUMBER);
+}
+
+/* Refinements may have a quarter of the places: they take many times as long as other solves. */
+static bool enter_refinements(request *r) {
+    const size_t most = r->service->config->max_inflight / 4;
+    if (!r->call.refines || atomic_fetch_add(&r->service->n_refining, 1) < (most > 0 ? most : 1)) return true;
+    r->refusal = REFUSED_REFINEMENTS;
+    return false;
+}
+
+static bool begin_solve(batch_job *job, batch_workspace *workspace) {
+    request *r = request_of(job);
+    const route *to = r->match.route;
+    r->call.workspace = workspace;
+    metrics_wait(r->service->metrics, clock_seconds() - r->submitted);
+    map_guard_allow();
+    if (to->steps == NULL) {
+        to->handle(&r->call, &r->answer);
+    } else if (to->steps->begin(&r->call, &r->answer)) {
+        if (enter_refinements(r)) {
+            job->cost = cost_to_solve(&r->call);
+            return true;
+        }
+        drop_solve(job);
+        return false;
+    }
+    (void)http_check_health(r); /* an answer from lost pages is wrong */
+    finish_answer(r);
+    return false;
+}
+
+static void pass_solve(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    map_guard_allow();
+    request_of(parts[0].job)->match.route->steps->pass(parts, n_parts, workspace);
+}
+
+static void end_solve(batch_job *job, batch_workspace *workspace) {
+    request *r = request_of(job);
+    r->call.workspace = workspace;
+    leave_refinements(r);
+    /* A look in the middle of the work may have ended it. */
+    if (r->refusal != REFUSED_NOT) {
+        drop_solve(job);
+        return;
+    }
+    r->match.route->steps->end(&r->call, &r->answer);
+    (void)http_check_health(r);
+    finish_answer(r);
+}
+
+/* A pass over this operator takes about a millisecond; reading a body of this length as NPY takes less. */
+#define BRIEF_OPERATOR ((size_t)32 << 20)
+#define BRIEF_BODY ((size_t)256 << 10)
+
+static bool is_brief(const call *c) {
+    return c->body_type == MEDIA_NPY && c->accept.type == MEDIA_NPY && c->length <= BRIEF_BODY &&
+           c->scene != NULL && lam_operator_bytes(c->scene->op) <= BRIEF_OPERATOR;
+}
+
+static void finish_solve(batch_job *job) {
+    request *r = request_of(job);
+    r->answered = true;
+    if (r->refusal == REFUSED_DEADLINE)
+        client_end_by(r->service->connections, r->client, clock_seconds() + REFUSAL_S);
+    MHD_resume_connection(r->connection);
+}
+
+void http_solve(request *r) {
+    const solve_steps *steps = r->match.route->steps;
+    service *s = r->service;
+    r->submitted = clock_seconds();
+    r->call.is_wanted = is_call_wanted;
+    r->call.job = (batch_job){.begin = begin_solve,
+                              .pass = steps != NULL ? pass_solve : NULL,
+                              .end = end_solve,
+                              .finish = finish_solve,
+                              .is_wanted = is_solve_wanted,
+                              .drop = drop_solve,
+                              .client = r->peer.key,
+                              .kind = (unsigned)r->match.label,
+                              .cost = cost_to_begin(&r->call, r->match.route),
+                              .brief = is_brief(&r->call)};
+    client_enter(s->connections, r->client, STAGE_SOLVE, 0);
+    /* Suspended before batch_submit, as the solve may finish before that returns. */
+    MHD_suspend_connection(r->connection);
+    if (batch_submit(s->queue, &r->call.job)) return;
+    r->refusal = atomic_load(&s->state) == SERVICE_ENDING ? REFUSED_SHUTDOWN : REFUSED_FULL;
+    refuse_solve(r);
+    r->answered = true;
+    MHD_resume_connection(r->connection);
+}

@@ -1,0 +1,264 @@
+#include "server/queue/job_order.h"
+
+#include "solver/base/clock.h"
+
+#include <math.h>
+
+/* Classes of cost. */
+enum { CLASSES = 12 };
+
+/* Seconds that a line which had no thread for its work may be ahead of the others when it has one. */
+static const double most_credit = 1.0;
+
+/* The least time over which the pace of jobs is measured. */
+static const double pace_period = .25;
+
+void order_add(job_list *list, batch_job *job) {
+    job->next = NULL;
+    if (list->last == NULL)
+        list->first = job;
+    else
+        list->last->next = job;
+    list->last = job;
+}
+
+batch_job *order_take(job_list *list) {
+    batch_job *job = list->first;
+    if (job == NULL) return NULL;
+    list->first = job->next;
+    if (list->first == NULL) list->last = NULL;
+    return job;
+}
+
+bool order_is_short(const batch_job *job) {
+    return job->cost <= BATCH_SHORT;
+}
+
+/* 0 below a millisecond, then one more for every factor of 4. */
+static unsigned class_of(double cost) {
+    int exponent = 0;
+    (void)frexp(cost / 1e-3, &exponent);
+    const int class = (exponent + 1) / 2;
+    return class < 0 ? 0 : class < CLASSES ? (unsigned)class : CLASSES - 1;
+}
+
+static size_t find_line(const batch_job *job) {
+    const uint64_t place = job->client * CLASSES * 64 + job->kind * CLASSES + class_of(job->cost);
+    return (size_t)(place * UINT64_C(0x9E3779B97F4A7C15) >> 56);
+}
+
+void order_enter(job_order *order, batch_job *job) {
+    job->line = find_line(job);
+    job_line *l = &order->lines[job->line];
+    if (l->n_jobs++ > 0) return;
+    order->active[order->n_active++] = job->line;
+    l->charge = fmax(l->charge, order->now_served);
+}
+
+void order_leave(job_order *order, const batch_job *job) {
+    size_t a = 0;
+    if (--order->lines[job->line].n_jobs > 0) return;
+    while (order->active[a] != job->line) a++;
+    order->active[a] = order->active[--order->n_active];
+}
+
+static size_t left_of(const batch_job *job) {
+    return job->n_vectors - job->next_vector;
+}
+
+static bool is_passing(const job_order *order, const void *key) {
+    for (size_t k = 0; k < order->n_passing; k++)
+        if (order->passing[k] == key) return true;
+    return false;
+}
+
+bool order_is_any_ready(const job_order *order) {
+    for (const batch_job *job = order->waiting.first; job != NULL; job = job->next)
+        if (!is_passing(order, job->key)) return true;
+    return false;
+}
+
+/* The jobs that wait for a pass with `like`, at most BATCH_PASS. */
+static size_t count_alike(const job_order *order, const batch_job *like) {
+    size_t count = 0;
+    for (const batch_job *job = order->waiting.first; job != NULL && count < BATCH_PASS; job = job->next)
+        count += job->key == like->key && job->pass == like->pass;
+    return count;
+}
+
+/* The most jobs in the next pass. The round trip of a brief job to its client takes about as long as a pass.
+ * If the waiting ones do not fill a pass, it takes half of BATCH_PASS: the others travel meanwhile, and
+ * passes stay evenly filled. Without this limit passes of most jobs would alternate with passes of the few
+ * that came too late. */
+static size_t most_together(const job_order *order, const batch_job *like) {
+    return like->brief && count_alike(order, like) < BATCH_PASS ? BATCH_PASS / 2 : BATCH_PASS;
+}
+
+/* The vectors of the next pass, from all jobs with the key and pass of `like`: first one of each job, so that
+ * a long request delays no short one, then the rest in their order. Returns the number of parts. */
+size_t order_choose_parts(const job_order *order, batch_job *like, batch_part parts[BATCH_PASS]) {
+    const size_t most = most_together(order, like);
+    size_t n_parts = 0, room = BATCH_PASS;
+    for (batch_job *job = like; job != NULL && n_parts < most; job = job->next) {
+        if (job->key != like->key || job->pass != like->pass) continue;
+        parts[n_parts++] = (batch_part){job, job->next_vector, 1};
+        job->passing = true;
+        room--;
+    }
+    for (size_t p = 0; p < n_parts && room > 0; p++) {
+        const size_t more = left_of(parts[p].job) - 1 < room ? left_of(parts[p].job) - 1 : room;
+        parts[p].count += more;
+        room -= more;
+    }
+    return n_parts;
+}
+
+bool order_is_unwanted(const job_order *order, batch_job *job, double now) {
+    if (job->is_wanted == NULL) return false;
+    if (order->abandoned) return true;
+    if (now - job->looked < BATCH_LOOK) return false;
+    job->looked = now;
+    return !job->is_wanted(job);
+}
+
+/* Moves the unwanted jobs of a list; returns their number. Jobs in a pass belong to its thread. */
+static size_t sift(job_order *order, job_list *list, bool in_line, double now) {
+    job_list before = *list;
+    size_t count = 0;
+    *list = (job_list){0};
+    for (batch_job *job; (job = order_take(&before)) != NULL;) {
+        const bool unwanted = !job->passing && order_is_unwanted(order, job, now);
+        order_add(unwanted ? &order->unwanted : list, job);
+        if (unwanted && in_line) order_leave(order, job);
+        count += unwanted;
+    }
+    return count;
+}
+
+/* The pace of the jobs that were done since it was last measured, and of those before. */
+static void measure_pace(job_order *order, double now) {
+    const double passed = now - order->pace_since;
+    if (order->pace_since == 0) order->pace_since = now;
+    if (order->pace_since == now || passed < pace_period) return;
+    if (order->n_done == 0) {
+        order->pace = fmax(order->pace, passed);
+        return;
+    }
+    const double pace = passed / (double)order->n_done;
+    order->pace = order->pace == 0 ? pace : (order->pace + pace) / 2;
+    order->n_done = 0;
+    order->pace_since = now;
+}
+
+void order_look(job_order *order) {
+    const double now = clock_seconds();
+    if (now < order->next_look) return;
+    order->next_look = now + BATCH_LOOK;
+    measure_pace(order, now);
+    (void)sift(order, &order->waiting, true, now);
+    (void)sift(order, &order->computed, false, now);
+    /* Backwards, as a line without jobs leaves its place to the last. */
+    for (size_t a = order->n_active; a-- > 0;)
+        order->n_arrived -= sift(order, &order->lines[order->active[a]].arrived, true, now);
+}
+
+/* Each job of a pass is charged for its vectors. */
+static void charge_parts(job_order *order, const batch_part *parts, size_t n_parts, double took) {
+    size_t count = 0;
+    for (size_t p = 0; p < n_parts; p++) count += parts[p].count;
+    for (size_t p = 0; p < n_parts; p++)
+        order->lines[parts[p].job->line].charge += took * (double)parts[p].count / (double)count;
+}
+
+/* Jobs of which all vectors are computed move to `computed`, the others to the end of `waiting`. */
+void order_sort(job_order *order, const batch_part *parts, size_t n_parts, double took) {
+    job_list before = order->waiting, again = {0};
+    order->waiting = (job_list){0};
+    charge_parts(order, parts, n_parts, took);
+    for (size_t p = 0; p < n_parts; p++) {
+        parts[p].job->next_vector += parts[p].count;
+        parts[p].job->passing = false;
+    }
+    for (batch_job *job; (job = order_take(&before)) != NULL;) {
+        bool served = false;
+        for (size_t p = 0; p < n_parts; p++) served = served || parts[p].job == job;
+        const bool computed = served && left_of(job) == 0;
+        order_add(computed ? &order->computed : served ? &again : &order->waiting, job);
+        if (computed) order_leave(order, job);
+    }
+    const double now = again.first != NULL ? clock_seconds() : 0;
+    for (batch_job *job; (job = order_take(&again)) != NULL;) {
+        const bool unwanted = order_is_unwanted(order, job, now);
+        job->begun = order->n_begun;
+        order_add(unwanted ? &order->unwanted : &order->waiting, job);
+        if (unwanted) order_leave(order, job);
+    }
+}
+
+batch_job *order_take_computed(job_order *order, bool spare) {
+    batch_job *before = NULL, *job = order->computed.first;
+    for (; spare && job != NULL && !order_is_short(job); job = job->next) before = job;
+    if (job == NULL || before == NULL) return job == NULL ? NULL : order_take(&order->computed);
+    before->next = job->next;
+    if (job->next == NULL) order->computed.last = before;
+    return job;
+}
+
+/* Sets `ready` of every line with jobs. */
+static void find_ready(job_order *order, bool spare) {
+    for (size_t a = 0; a < order->n_active; a++) order->lines[order->active[a]].ready = NULL;
+    for (batch_job *job = order->waiting.first; job != NULL; job = job->next) {
+        job_line *l = &order->lines[job->line];
+        if (l->ready == NULL && !is_passing(order, job->key) && (!spare || order_is_short(job)))
+            l->ready = job;
+    }
+}
+
+/* The job of a line that goes on: the one that came first. */
+static batch_job *next_of(const job_line *l, bool spare) {
+    batch_job *arrived = l->arrived.first;
+    if (arrived != NULL && spare && !order_is_short(arrived)) arrived = NULL;
+    if (arrived == NULL || l->ready == NULL) return arrived == NULL ? l->ready : arrived;
+    return arrived->ticket < l->ready->ticket ? arrived : l->ready;
+}
+
+batch_job *order_find_next(job_order *order, bool spare) {
+    batch_job *best = NULL;
+    find_ready(order, spare);
+    for (size_t a = 0; a < order->n_active; a++) {
+        const job_line *l = &order->lines[order->active[a]];
+        batch_job *job = next_of(l, spare);
+        if (job == NULL) continue;
+        const double charge = best == NULL ? INFINITY : order->lines[best->line].charge;
+        if (l->charge < charge || (l->charge == charge && job->ticket < best->ticket)) best = job;
+    }
+    if (best == NULL) return NULL;
+    job_line *l = &order->lines[best->line];
+    l->charge = fmax(l->charge, order->now_served - most_credit);
+    order->now_served = fmax(order->now_served, l->charge);
+    return best;
+}
+
+bool order_is_ready(const job_order *order, const batch_job *job) {
+    return order->lines[job->line].ready == job;
+}
+
+batch_job *order_find_company(const job_order *order, const batch_job *ready) {
+    batch_job *best = NULL;
+    if (order->n_arrived == 0 || order->n_begun - ready->begun >= BATCH_PASS ||
+        count_alike(order, ready) >= BATCH_PASS)
+        return NULL;
+    for (size_t a = 0; a < order->n_active; a++) {
+        batch_job *job = order->lines[order->active[a]].arrived.first;
+        if (job == NULL || job->kind != ready->kind || job->cost > fmax(ready->cost, BATCH_GATHER)) continue;
+        if (best == NULL || job->ticket < best->ticket) best = job;
+    }
+    return best;
+}
+
+void order_count_done(job_order *order) {
+    order->n_done++;
+    if (--order->n_jobs > 0) return;
+    order->n_done = 0;
+    order->pace_since = 0;
+}

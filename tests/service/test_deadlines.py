@@ -1,0 +1,153 @@
+"""Solves that nobody waits for any more: their clients went, or their time is over. Their places are free for others."""
+
+import contextlib
+import json
+import pathlib
+import re
+import socket
+import tempfile
+import time
+import unittest
+
+from command import must
+from daemon import PATIENCE, Daemon
+from guard_case import cuts, metrics, read_all, until
+
+N = 600
+
+
+def refinement(n_vectors, tolerance=1e-9):
+    """One that takes some milliseconds for each vector."""
+    return json.dumps({"emissions": [{"elements": [i % N], "values": [1]} for i in range(n_vectors)], "tolerance": tolerance,
+                       "select": {"elements": [0]}}).encode()
+
+
+LONG = refinement(1 << 14)  # minutes
+SHORT = json.dumps({"emission": {"groups": {}}, "select": {"elements": [0]}})
+
+
+def head(body, *fields):
+    return b"\r\n".join([b"POST /v1/scenes/box/radiosity HTTP/1.1", b"Host: localhost", b"Content-Type: application/json",
+                         b"Content-Length: %d" % len(body), *fields, b"", b""])
+
+
+def refused(daemon, why):
+    return metrics(daemon)[("lambertd_solves_refused_total", ("why", why))]
+
+
+class Deadlines(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        folder = pathlib.Path(folder.name)
+        cls.store = folder / "box.h5"
+        must("generate", "box", "--divisions", 10, "-o", folder / "box.obj")
+        must("precompute", folder / "box.obj", "-o", cls.store, "--method", "low-rank", "--keep-form-factors", "--probes", 8,
+             "--quiet")
+
+    def daemon(self, *arguments):
+        return Daemon(self.store, "--threads", 2, "--max-batch", 1 << 14, *arguments)
+
+    def ask(self, daemon, body, *fields):
+        s = daemon.raw()
+        s.sendall(head(body, *fields) + body)
+        return s
+
+    def check_problem(self, answer, words, most_seconds=600):
+        self.assertTrue(answer.startswith(b"HTTP/1.1 503 "), answer[:300])
+        self.assertIn(b"application/problem+json", answer)
+        self.assertIn(words, answer)
+        seconds = int(re.search(rb"\r\nRetry-After: (\d+)\r\n", answer).group(1))
+        self.assertGreaterEqual(seconds, 1)
+        self.assertLessEqual(seconds, most_seconds)
+
+    def serves(self, daemon):
+        self.assertEqual(daemon.radiosity("box", SHORT).status, 200)
+
+    def test_clients_that_go_leave_no_work(self):
+        """By FIN and by RST, before and in the middle of their iterations."""
+        with self.daemon("--max-inflight", 16) as daemon:
+            for abrupt in False, True:
+                clients = [self.ask(daemon, LONG) for _ in range(4)]
+                until(lambda: metrics(daemon)[("lambertd_queued",)] == 4)
+                before = refused(daemon, "gone")
+                time.sleep(.3)
+                for s in clients:
+                    if abrupt:
+                        s.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+                    s.close()
+                until(lambda: metrics(daemon)[("lambertd_queued",)] == 0)
+                self.assertEqual(refused(daemon, "gone"), before + 4)
+                self.serves(daemon)
+
+    def test_a_client_that_only_ends_its_sending(self):
+        """It is answered if that is quick, and else told why it is not."""
+        with self.daemon() as daemon:
+            for body, wanted in ((SHORT.encode(), b"HTTP/1.1 200 "), (LONG, b"HTTP/1.1 503 ")):
+                with self.ask(daemon, body, b"Connection: close") as s:
+                    s.shutdown(socket.SHUT_WR)
+                    answer = read_all(s)
+                    self.assertTrue(answer.startswith(wanted), answer[:300])
+            self.check_problem(answer, b"ended its sending")
+
+    def test_the_time_of_a_request(self):
+        for arguments, fields in (((), [b"Lambert-Timeout: .4"]), (("--request-timeout", 1), []),
+                                  (("--request-timeout", 1), [b"Lambert-Timeout: 1000"])):
+            with self.daemon(*arguments) as daemon:
+                start = time.monotonic()
+                with self.ask(daemon, LONG, b"Connection: close", *fields) as s:
+                    self.check_problem(read_all(s), b"not ready in time")
+                took = time.monotonic() - start
+                least = 1 if arguments else .4
+                self.assertGreaterEqual(took, least)
+                print(f"answered {took - least:.3f} s after its time")
+                self.assertEqual(refused(daemon, "deadline"), 1)
+                until(lambda: metrics(daemon)[("lambertd_queued",)] == 0)
+                self.serves(daemon)
+
+    def test_a_solve_that_waits_is_answered_in_time(self):
+        """Behind refinements, which go on: one pass of these runs at a time."""
+        with self.daemon() as daemon, contextlib.closing(self.ask(daemon, LONG)), contextlib.closing(self.ask(daemon, LONG)):
+            until(lambda: metrics(daemon)[("lambertd_queued",)] == 2)
+            with self.ask(daemon, LONG, b"Connection: close", b"Lambert-Timeout: 0.5") as s:
+                self.check_problem(read_all(s), b"not ready in time")
+            self.assertEqual(metrics(daemon)[("lambertd_queued",)], 2)
+
+    def test_times_that_are_none(self):
+        with self.daemon() as daemon:
+            for text in "", "soon", "-1", "0", "nan", "inf", "1 s", "1e99":
+                answer = daemon.radiosity("box", SHORT, headers={"Lambert-Timeout": text})
+                self.assertEqual(answer.status, 400, text)
+                self.assertIn("Lambert-Timeout", answer.json()["detail"])
+            self.assertEqual(daemon.radiosity("box", SHORT, headers={"Lambert-Timeout": "30"}).status, 200)
+
+    def test_bodies_and_answers_end_in_time(self):
+        body = json.dumps({"emissions": [{"elements": [i % N], "values": [1]} for i in range(8000)]}).encode()
+        with self.daemon() as daemon:
+            with daemon.raw() as s:
+                s.sendall(head(body, b"Lambert-Timeout: .5") + body[:100])
+                self.assertEqual(read_all(s), b"")
+            self.assertEqual(cuts(daemon, "deadline"), 1)
+            with self.ask(daemon, body, b"Lambert-Timeout: 3") as s:
+                until(lambda: cuts(daemon, "deadline") == 2)  # an answer of 50 MB is not read
+            self.serves(daemon)
+
+    def test_refinements_have_a_quarter_of_the_places(self):
+        with self.daemon("--max-inflight", 8) as daemon, contextlib.ExitStack() as stack:
+            for _ in range(2):
+                stack.enter_context(self.ask(daemon, LONG))
+            until(lambda: metrics(daemon)[("lambertd_refining",)] == 2)
+            answer = daemon.radiosity("box", refinement(1))
+            self.assertEqual(answer.status, 503)
+            self.assertIn("refinements", answer.json()["detail"])
+            self.assertGreaterEqual(int(answer.headers["Retry-After"]), 1)
+            self.serves(daemon)
+            self.assertEqual(refused(daemon, "refinements"), 1)
+            stack.close()
+            until(lambda: metrics(daemon)[("lambertd_refining",)] == 0)
+            self.assertEqual(daemon.radiosity("box", refinement(1, 1e-3)).status, 200)
+
+
+if __name__ == "__main__":
+    unittest.main()
