@@ -93,15 +93,57 @@ static void serve_until_signal(service *s, const sigset_t *signals) {
     }
 }
 
-/* Waits until no request is open, at most as long as a silent connection is kept; a further signal (but
- * SIGHUP) ends the wait. */
-static void drain(service *s, const sigset_t *signals) {
-    const struct timespec pause = {.tv_nsec = 5000000};
-    const double end = clock_seconds() + (double)s->config->timeout_s + 1;
-    while (metrics_in_flight(s->metrics) > 0 && clock_seconds() < end) {
-        int signal_number = sigtimedwait(signals, NULL, &pause);
-        if (signal_number == SIGINT || signal_number == SIGTERM) break;
+/* Seconds in which the answers of solves that are given up are sent. */
+#define LAST_ANSWERS_S .6
+
+static bool is_busy(service *s) {
+    return metrics_in_flight(s->metrics) > 0 || variants_busy(s->variants);
+}
+
+/* Waits for a signal (but SIGHUP) that hurries; false if none came in so many seconds. */
+static bool hurried_within(double seconds, const sigset_t *signals) {
+    const double end = clock_seconds() + seconds;
+    for (double left; (left = end - clock_seconds()) > 0;) {
+        const struct timespec pause = {.tv_sec = (time_t)left,
+                                       .tv_nsec = (long)(1e9 * (left - (double)(time_t)left))};
+        const int signal_number = sigtimedwait(signals, NULL, &pause);
+        if (signal_number == SIGINT || signal_number == SIGTERM) return true;
     }
+    return false;
+}
+
+/* Waits until no request is open and no variant is built; false if a signal hurries or the seconds are over.
+ */
+static bool idle_within(service *s, double seconds, const sigset_t *signals) {
+    const double end = clock_seconds() + seconds;
+    while (is_busy(s)) {
+        if (clock_seconds() >= end || hurried_within(5e-3, signals)) return false;
+    }
+    return true;
+}
+
+/* Leaves as --drain-delay and --shutdown-timeout say; a second signal hurries. True if no thread is in a
+ * function that could take long. */
+static bool leave(service *s, http *h, unix_socket *own, const sigset_t *signals) {
+    atomic_store(&s->state, SERVICE_DRAINING);
+    const bool hurried = hurried_within((double)s->config->drain_delay_s, signals);
+    http_quiesce(h);
+    connections_unlink(own);
+    variants_close(s->variants);
+    if (!hurried && idle_within(s, (double)s->config->shutdown_timeout_s, signals)) return true;
+    atomic_store(&s->state, SERVICE_ENDING);
+    batch_abandon(s->queue);
+    (void)idle_within(s, LAST_ANSWERS_S, signals);
+    return batch_jobs(s->queue) == 0 && !variants_busy(s->variants);
+}
+
+/* Ends the process while threads are in functions that take long. Nothing is lost: a daemon writes no file
+ * but its log. */
+static void end_at_once(service *s) {
+    fprintf(stderr, "lambertd: what still runs is given up\n");
+    access_log_close(s->access_log);
+    fflush(NULL);
+    _exit(EXIT_SUCCESS);
 }
 
 /* A daemon that other machines reach should know who asks, and by which names. */
@@ -155,11 +197,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     printf("listening on %s\n", where);
     fflush(stdout);
     serve_until_signal(&s, signals);
-    http_quiesce(h);
-    connections_unlink(&own);
-    atomic_store(&s.state, SERVICE_DRAINING);
-    variants_close(s.variants);
-    drain(&s, signals);
+    if (!leave(&s, h, &own, signals)) end_at_once(&s);
 done:
     if (s.queue != NULL) batch_close(s.queue);
     http_stop(h);

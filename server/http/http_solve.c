@@ -97,6 +97,8 @@ static void leave_refinements(request *r) {
 
 static void drop_solve(batch_job *job) {
     request *r = request_of(job);
+    /* An abandoned queue asks no more. */
+    if (r->refusal == REFUSED_NOT) r->refusal = REFUSED_SHUTDOWN;
     if (r->call.state != NULL) r->match.route->steps->drop(&r->call);
     leave_refinements(r);
     refuse_solve(r);

@@ -176,6 +176,13 @@ void variants_close(variants *v) {
     pthread_mutex_unlock(&v->lock);
 }
 
+bool variants_busy(variants *v) {
+    pthread_mutex_lock(&v->lock);
+    const bool busy = v->running != NULL;
+    pthread_mutex_unlock(&v->lock);
+    return busy;
+}
+
 void variants_destroy(variants *v) {
     if (v == NULL) return;
     variants_close(v);

@@ -18,6 +18,9 @@ lam_status variants_start(const config *c, catalog *all, variants **out, lam_err
 /* Refuses further requests and cancels the running build (an inversion goes on to its end). */
 void variants_close(variants *v);
 
+/* True while a variant is built. Any thread. */
+bool variants_busy(variants *v);
+
 /* Closes, waits for the thread, frees; NULL is allowed. */
 void variants_destroy(variants *v);
 

@@ -1,0 +1,95 @@
+"""A lambertd leaves: balancers are told before it stops to accept, what runs has its time, what is left is told so."""
+
+import signal
+import time
+import unittest
+
+from daemon import Daemon
+from deadlines_case import LONG, Case, metrics, read_all, until
+
+
+class Leaving(Case):
+    def many(self, daemon, count):
+        """Clients whose solves take minutes, all in the queue."""
+        clients = [self.ask(daemon, LONG) for _ in range(count)]
+        for s in clients:
+            self.addCleanup(s.close)
+        until(lambda: metrics(daemon)[("lambertd_queued",)] == count)
+        return clients
+
+    def check_end(self, daemon, clients, start, least):
+        """All are told, and the daemon ends with 0."""
+        for s in clients:
+            self.check_problem(read_all(s), b"shutting down")
+        self.assertEqual(daemon.wait(), 0)
+        took = time.monotonic() - start
+        self.assertGreaterEqual(took, least)
+        print(f"ended {took - least:.3f} s after its time")
+        self.assertEqual(daemon.errors(), "")
+
+    def test_it_accepts_for_a_while(self):
+        with self.daemon("--drain-delay", 2) as daemon:
+            self.assertEqual(daemon.get("/readyz").status, 200)
+            daemon.signal(signal.SIGTERM)
+            until(lambda: daemon.get("/readyz").status == 503)
+            self.assertEqual(daemon.get("/healthz").status, 200)
+            answer = daemon.radiosity("box", {"emission": {"groups": {}}})
+            self.assertEqual((answer.status, answer.headers["Connection"]), (200, "close"))
+            self.assertEqual(daemon.wait(), 0)
+
+    def test_a_second_signal_ends_the_delay(self):
+        with self.daemon("--drain-delay", 80000) as daemon:
+            daemon.signal(signal.SIGTERM)
+            until(lambda: daemon.get("/readyz").status == 503)
+            daemon.signal(signal.SIGHUP)
+            self.assertEqual(daemon.get("/readyz").status, 503)
+            daemon.signal(signal.SIGINT)
+            self.assertEqual(daemon.wait(), 0)
+
+    def test_the_time_to_finish(self):
+        with self.daemon("--shutdown-timeout", 1, "--max-inflight", 64) as daemon:
+            clients = self.many(daemon, 12)
+            start = time.monotonic()
+            daemon.signal(signal.SIGTERM)
+            self.check_end(daemon, clients, start, 1)
+
+    def test_a_second_signal_ends_at_once(self):
+        with self.daemon("--max-inflight", 64) as daemon:
+            clients = self.many(daemon, 12)
+            daemon.signal(signal.SIGTERM)
+            time.sleep(.3)
+            start = time.monotonic()
+            daemon.signal(signal.SIGTERM)
+            self.check_end(daemon, clients, start, 0)
+
+    def test_a_solve_that_ends_in_time_is_answered(self):
+        with self.daemon() as daemon:
+            s = self.ask(daemon, self.refinement(300))
+            until(lambda: metrics(daemon)[("lambertd_queued",)] == 1)
+            daemon.signal(signal.SIGTERM)
+            self.assertTrue(read_all(s).startswith(b"HTTP/1.1 200 "))
+            self.assertEqual(daemon.wait(), 0)
+            s.close()
+
+    def test_ready_with_scenes_alone(self):
+        folder = self.folder / "stores"
+        folder.mkdir()
+        path = folder / "box.h5"
+        path.write_bytes(self.store.read_bytes())
+        with Daemon("--stores", folder) as daemon:
+            self.assertEqual(daemon.get("/readyz").status, 200)
+            path.unlink()
+            daemon.signal(signal.SIGHUP)
+            daemon.wait_for("reloaded: 0 scenes")
+            answer = daemon.get("/readyz")
+            self.assertEqual(answer.status, 503)
+            self.assertIn("no scene", answer.json()["detail"])
+            self.assertEqual(daemon.get("/healthz").status, 200)
+            path.write_bytes(self.store.read_bytes())
+            daemon.signal(signal.SIGHUP)
+            daemon.wait_for("reloaded: 1 scene\n")
+            self.assertEqual(daemon.get("/readyz").status, 200)
+
+
+if __name__ == "__main__":
+    unittest.main()
