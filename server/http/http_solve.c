@@ -60,6 +60,7 @@ static void refuse_solve(request *r) {
         [REFUSED_DEADLINE] = "the answer was not ready in time (--request-timeout, Lambert-Timeout)",
         [REFUSED_GONE] = "the client ended its sending before the answer was ready",
         [REFUSED_REFINEMENTS] = "too many refinements wait or run (a quarter of --max-inflight); try again",
+        [REFUSED_SHARE] = "all places are taken, and this client has most of them; try again",
         [REFUSED_SHUTDOWN] = "shutting down",
     };
     const double delay = fmin(fmax(ceil(batch_delay(r->service->queue)), 1), RETRY_MOST);
@@ -97,8 +98,9 @@ static void leave_refinements(request *r) {
 
 static void drop_solve(batch_job *job) {
     request *r = request_of(job);
-    /* An abandoned queue asks no more. */
-    if (r->refusal == REFUSED_NOT) r->refusal = REFUSED_SHUTDOWN;
+    /* A queue that needs the place, or is abandoned, does not ask. */
+    if (r->refusal == REFUSED_NOT)
+        r->refusal = atomic_load(&r->service->state) == SERVICE_ENDING ? REFUSED_SHUTDOWN : REFUSED_SHARE;
     if (r->call.state != NULL) r->match.route->steps->drop(&r->call);
     leave_refinements(r);
     refuse_solve(r);
@@ -130,10 +132,14 @@ static double cost_to_solve(const call *c) {
     return fmax(pass, c->accept.type == MEDIA_NPY ? 0 : numbers * PER_NUMBER);
 }
 
-/* Refinements may have a quarter of the places: they take many times as long as other solves. */
+/* Refinements may have a quarter of the places: they take many times as long as other solves. No client has
+ * all of these while others come. */
 static bool enter_refinements(request *r) {
-    const size_t most = r->service->config->max_inflight / 4;
-    if (!r->call.refines || atomic_fetch_add(&r->service->n_refining, 1) < (most > 0 ? most : 1)) return true;
+    service *s = r->service;
+    const size_t most = s->config->max_inflight / 4;
+    if (!r->call.refines || atomic_fetch_add(&s->n_refining, 1) < (most > 0 ? most : 1) ||
+        batch_make_place(s->queue, r->peer.key, r->call.job.key))
+        return true;
     r->refusal = REFUSED_REFINEMENTS;
     return false;
 }

@@ -337,9 +337,24 @@ done:
     return status;
 }
 
+/* Wakes a thread that drops the job. */
+static bool evict(batch_queue *queue, uint64_t client, const void *key) {
+    if (!order_evict(&queue->order, client, key)) return false;
+    pthread_cond_signal(&queue->spare_changed);
+    return true;
+}
+
+bool batch_make_place(batch_queue *queue, uint64_t client, const void *key) {
+    pthread_mutex_lock(&queue->lock);
+    const bool made = evict(queue, client, key);
+    pthread_mutex_unlock(&queue->lock);
+    return made;
+}
+
 bool batch_submit(batch_queue *queue, batch_job *job) {
     pthread_mutex_lock(&queue->lock);
-    const bool taken = !queue->closed && queue->order.n_jobs < queue->max_jobs;
+    const bool full = queue->order.n_jobs >= queue->max_jobs;
+    const bool taken = !queue->closed && (!full || evict(queue, job->client, NULL));
     if (taken) {
         job->ticket = queue->order.n_submitted++;
         job->looked = clock_seconds();

@@ -55,11 +55,11 @@ typedef struct batch_part {
  *           been computed.
  *   end     makes the answer.
  *   finish  after the job has left the count of batch_jobs. The job may not exist when it returns.
- * Every BATCH_LOOK seconds jobs that wait are looked at, and a job that no look has seen for as long is
- * before its next function: is_wanted  False: nobody needs the answer any more. Called with the lock of the
+ * Jobs that wait are looked at every BATCH_LOOK seconds, others before their next function if no look has
+ * seen them for as long: is_wanted  False: nobody needs the answer any more. Called with the lock of the
  * queue: it neither waits nor calls the queue. NULL: it always is. drop       makes an answer in place of the
- * functions that are left, but finish, which follows. Also of the jobs that batch_abandon ends. Needed with
- * is_wanted. */
+ * functions that are left but finish, which follows. Also of jobs that batch_abandon ends, and of those that
+ * give their place away. Needed with is_wanted. */
 struct batch_job {
     bool (*begin)(batch_job *job, batch_workspace *workspace);
     void (*pass)(const batch_part *parts, size_t n_parts, batch_workspace *workspace);
@@ -77,6 +77,7 @@ struct batch_job {
     uint64_t ticket;    /* number of its submission */
     uint64_t begun;     /* jobs that had begun when it was ready for its next pass */
     bool passing;       /* a thread computes some of its vectors */
+    bool evicted;       /* it is unwanted once it has left its pass */
     double looked;      /* when it was last looked at, or came */
     size_t line;
     batch_job *next;
@@ -87,8 +88,14 @@ struct batch_job {
  * (solver/base/parallel.h). */
 lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam_error *error);
 
-/* Queues a job; false if there are max_jobs already or the queue is closed. */
+/* Queues a job; false if there are max_jobs already or the queue is closed. When it is full, a job of the
+ * client with most jobs that wait is dropped for one of a client that has fewer (longest queue drop: Suter et
+ * al. 1998), so that nobody has all places while others come, and one alone may. */
 bool batch_submit(batch_queue *queue, batch_job *job);
+
+/* The same among the jobs that have begun with this key: drops one of the client that has most for one of
+ * `client`; false if it has not two fewer. */
+bool batch_make_place(batch_queue *queue, uint64_t client, const void *key);
 
 /* The number of jobs that wait or run. */
 size_t batch_jobs(batch_queue *queue);

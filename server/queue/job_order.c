@@ -114,9 +114,9 @@ size_t order_choose_parts(const job_order *order, batch_job *like, batch_part pa
 }
 
 bool order_is_unwanted(const job_order *order, batch_job *job, double now) {
-    if (job->is_wanted == NULL) return false;
-    if (order->abandoned) return true;
-    if (now - job->looked < BATCH_LOOK) return false;
+    if (job->drop == NULL) return false;
+    if (order->abandoned || job->evicted) return true;
+    if (job->is_wanted == NULL || now - job->looked < BATCH_LOOK) return false;
     job->looked = now;
     return !job->is_wanted(job);
 }
@@ -184,7 +184,9 @@ void order_sort(job_order *order, const batch_part *parts, size_t n_parts, doubl
         for (size_t p = 0; p < n_parts; p++) served = served || parts[p].job == job;
         const bool computed = served && left_of(job) == 0;
         order_add(computed ? &order->computed : served ? &again : &order->waiting, job);
-        if (computed) order_leave(order, job);
+        if (!computed) continue;
+        order_leave(order, job);
+        job->evicted = false; /* little is left to do */
     }
     const double now = again.first != NULL ? clock_seconds() : 0;
     for (batch_job *job; (job = order_take(&again)) != NULL;) {
@@ -254,6 +256,70 @@ batch_job *order_find_company(const job_order *order, const batch_job *ready) {
         if (best == NULL || job->ticket < best->ticket) best = job;
     }
     return best;
+}
+
+/* Clients that meet in a place of this table count as one. */
+enum { CLIENTS = 256 };
+
+static size_t place_of(uint64_t client) {
+    return (size_t)(client * UINT64_C(0x9E3779B97F4A7C15) >> 56);
+}
+
+/* A job that waits and may be dropped for another client's. */
+static bool is_evictable(const batch_job *job, const void *key) {
+    return job->drop != NULL && !job->evicted && (key == NULL || job->key == key);
+}
+
+/* Counts of jobs by client, and the job to be dropped. */
+typedef struct crowd {
+    const void *key;
+    size_t counts[CLIENTS];
+    size_t most;     /* the place with most jobs */
+    batch_job *last; /* of these, the one that came last */
+    job_list *of;    /* its list */
+} crowd;
+
+static void count_clients(crowd *c, const job_list *list) {
+    for (const batch_job *job = list->first; job != NULL; job = job->next)
+        c->counts[place_of(job->client)] += is_evictable(job, c->key);
+}
+
+static void find_last(crowd *c, job_list *list) {
+    for (batch_job *job = list->first; job != NULL; job = job->next)
+        if (place_of(job->client) == c->most && is_evictable(job, c->key) &&
+            (c->last == NULL || job->ticket > c->last->ticket)) {
+            c->last = job;
+            c->of = list;
+        }
+}
+
+static void remove_job(job_list *list, const batch_job *gone) {
+    job_list before = *list;
+    *list = (job_list){0};
+    for (batch_job *job; (job = order_take(&before)) != NULL;)
+        if (job != gone) order_add(list, job);
+}
+
+bool order_evict(job_order *order, uint64_t client, const void *key) {
+    crowd c = {.key = key};
+    count_clients(&c, &order->waiting);
+    for (size_t a = 0; key == NULL && a < order->n_active; a++)
+        count_clients(&c, &order->lines[order->active[a]].arrived);
+    for (size_t p = 1; p < CLIENTS; p++)
+        if (c.counts[p] > c.counts[c.most]) c.most = p;
+    if (c.counts[c.most] <= c.counts[place_of(client)] + 1) return false;
+    for (size_t a = 0; key == NULL && a < order->n_active; a++)
+        find_last(&c, &order->lines[order->active[a]].arrived);
+    const bool has_arrived = c.last != NULL; /* less is lost than of one that has begun */
+    if (!has_arrived) find_last(&c, &order->waiting);
+    if (c.last == NULL) return false;
+    c.last->evicted = true;
+    if (c.last->passing) return true; /* it belongs to the thread of its pass */
+    remove_job(c.of, c.last);
+    if (has_arrived) order->n_arrived--;
+    order_leave(order, c.last);
+    order_add(&order->unwanted, c.last);
+    return true;
 }
 
 void order_count_done(job_order *order) {

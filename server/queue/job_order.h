@@ -76,6 +76,12 @@ void order_count_done(job_order *order);
  * pace. */
 void order_look(job_order *order);
 
+/* Moves to `unwanted` the job that came last of the client with most jobs that wait, if these are more than
+ * the jobs of `client` and one. Of the jobs of one key that have begun, or (NULL) of all. False if there is
+ * none. O(jobs).
+ */
+bool order_evict(job_order *order, uint64_t client, const void *key);
+
 /* Looks at one job that was not looked at for BATCH_LOOK seconds. */
 bool order_is_unwanted(const job_order *order, batch_job *job, double now);
 

@@ -18,13 +18,14 @@ void metrics_begin(metrics *m);
 void metrics_end(metrics *m, size_t label, unsigned status, double seconds);
 
 /* A solve that is not done: it found no place; its deadline passed; its client went; there were too many
- * refinements; the daemon ends. */
+ * refinements; its place went to a client with fewer; the daemon ends. */
 typedef enum metrics_refusal {
     REFUSED_NOT,
     REFUSED_FULL,
     REFUSED_DEADLINE,
     REFUSED_GONE,
     REFUSED_REFINEMENTS,
+    REFUSED_SHARE,
     REFUSED_SHUTDOWN,
     N_REFUSALS
 } metrics_refusal;

@@ -93,6 +93,20 @@ class Deadlines(Case):
             until(lambda: metrics(daemon)[("lambertd_refining",)] == 0)
             self.assertEqual(daemon.radiosity("box", refinement(1, 1e-3)).status, 200)
 
+    def test_no_client_has_all_places(self):
+        """While another comes; a trusted proxy tells them apart. One alone may have all."""
+        with self.daemon("--max-inflight", 16, "--trusted-proxy", "127.0.0.1") as daemon, contextlib.ExitStack() as stack:
+            def ask(name, body):
+                return stack.enter_context(self.ask(daemon, body, b"Connection: close", b"X-Forwarded-For: 192.0.2." + name))
+
+            greedy = [ask(b"1", LONG) for _ in range(4)]
+            until(lambda: metrics(daemon)[("lambertd_refining",)] == 4)
+            self.check_problem(read_all(ask(b"1", LONG)), b"too many refinements")
+            modest = ask(b"2", refinement(1, 1e-3))
+            self.assertTrue(read_all(modest).startswith(b"HTTP/1.1 200 "))
+            self.assertEqual(refused(daemon, "share"), 1)
+            self.check_problem(read_all(greedy[-1]), b"has most of them")
+
 
 if __name__ == "__main__":
     unittest.main()

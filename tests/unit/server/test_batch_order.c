@@ -266,6 +266,38 @@ START_TEST(an_abandoned_queue_drops_all) {
 }
 END_TEST
 
+/* A full queue drops jobs of the client with most of them for others, the last ones first, until these have
+ * as many but one; none for a client alone. */
+START_TEST(places_are_shared) {
+    static job jobs[MOST], others[MOST], held;
+    record r;
+    record_open(&r, 1);
+    hold(&r, &held, 1);
+    held.job.client = 1;
+    for (size_t k = 0; k < MOST - 1; k++) submit_with(&r, &jobs[k], k, is_always_wanted);
+    job one_more = jobs[0];
+    ck_assert(!batch_submit(r.queue, &one_more.job));
+    size_t n_others = 0;
+    for (; n_others < MOST; n_others++) {
+        job *j = &others[n_others];
+        *j = jobs[0];
+        j->id = MOST + n_others;
+        j->job.client = 77;
+        if (!batch_submit(r.queue, &j->job)) break;
+        sem_wait(&r.finished); /* the dropped one */
+    }
+    ck_assert_uint_eq(n_others, MOST / 2 - 1);
+    pthread_mutex_lock(&r.lock);
+    ck_assert_uint_eq(r.n, n_others);
+    for (size_t k = 0; k < r.n; k++) ck_assert_uint_eq(r.ids[k], DROPPED + MOST - 2 - k);
+    r.n = 0;
+    pthread_mutex_unlock(&r.lock);
+    ck_assert_uint_eq(batch_jobs(r.queue), MOST);
+    batch_abandon(r.queue);
+    record_close(&r, MOST);
+}
+END_TEST
+
 /* The delay is the jobs at their pace: one waits behind a function of .6 s. */
 START_TEST(the_delay_follows_the_pace) {
     static job held, waits;
@@ -292,6 +324,7 @@ int main(void) {
     tcase_add_test(tests, a_wrong_estimate_holds_up_no_short_job);
     tcase_add_test(tests, unwanted_jobs_are_dropped);
     tcase_add_test(tests, an_abandoned_queue_drops_all);
+    tcase_add_test(tests, places_are_shared);
     tcase_add_test(tests, the_delay_follows_the_pace);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
