@@ -55,11 +55,13 @@ typedef struct batch_part {
  *           been computed.
  *   end     makes the answer.
  *   finish  after the job has left the count of batch_jobs. The job may not exist when it returns.
- * Jobs that wait are looked at every BATCH_LOOK seconds, others before their next function if no look has
- * seen them for as long: is_wanted  False: nobody needs the answer any more. Called with the lock of the
- * queue: it neither waits nor calls the queue. NULL: it always is. drop       makes an answer in place of the
- * functions that are left but finish, which follows. Also of jobs that batch_abandon ends, and of those that
- * give their place away. Needed with is_wanted. */
+ * Jobs that wait are looked at every BATCH_LOOK seconds, others before their next function if no
+ * look has seen them for as long:
+ *   is_wanted  False: nobody needs the answer any more. Called with the lock of the queue: it
+ *              neither waits nor calls the queue. NULL: it always is.
+ *   drop       makes an answer in place of the functions that are left but finish, which follows.
+ *              Also of jobs that batch_abandon ends, and of those that give their place away.
+ *              Needed with is_wanted. */
 struct batch_job {
     bool (*begin)(batch_job *job, batch_workspace *workspace);
     void (*pass)(const batch_part *parts, size_t n_parts, batch_workspace *workspace);
