@@ -167,17 +167,3 @@ void store_driver_release(store_file *file) {
     if (file->driver >= 0) H5FDunregister(file->driver);
     file->driver = -1;
 }
-
-#ifdef LAMBERT_SANITIZED
-#include <sanitizer/lsan_interface.h>
-
-/* HDF5 1.10 leaks 424 bytes for every damaged object header. Weak: a program may have its own list. */
-__attribute__((weak)) const char *__lsan_default_suppressions(void) {
-    return "leak:libhdf5\n";
-}
-
-/* Suppresses the report on standard error, where a program writes one line of its own. */
-__attribute__((weak)) const char *__lsan_default_options(void) {
-    return "print_suppressions=0";
-}
-#endif
