@@ -115,6 +115,7 @@ class Faults(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
         Scene(N).write(self.folder / "grey.h5", "grey", keep_factors=True)
         (self.folder / "token").write_text(TOKEN)
+        (self.folder / "token").chmod(0o600)
 
     def daemon(self, *more, **how):
         return Daemon(self.folder / "grey.h5", "--threads", 2, "--token-file", self.folder / "token", *more, **how)
