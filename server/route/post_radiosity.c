@@ -6,6 +6,7 @@
 #include "solver/base/clock.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
+#include "solver/operator/operator.h"
 
 #include <stdlib.h>
 
@@ -91,6 +92,13 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve %zu vectors", s->shape.n_rhs);
 }
 
+/* True if requests should have passes of their own: these take no longer than one of all, and one could not
+ * use all threads. */
+static bool passes_apart(const call *in) {
+    const lam_operator *op = in->scene->op;
+    return operator_vectors_apart(op) && op->n_threads < batch_threads(in->service->queue);
+}
+
 static bool begin(call *in, answer *out) {
     const scene *of = in->scene;
     const codec_scene about = call_codec_scene(in);
@@ -135,9 +143,9 @@ static bool begin(call *in, answer *out) {
      * their own. Refined answers take many times as long: one common key lets one such pass run at a time,
      * and leaves the other threads to other requests. */
     in->refines = refine;
-    in->job.key = refine                                  ? (const void *)in->service->queue
-                  : request->select || of->n_emitters > 0 ? (const void *)in
-                                                          : of->op;
+    in->job.key = refine ? (const void *)in->service->queue
+                  : request->select || of->n_emitters > 0 || passes_apart(in) ? (const void *)in
+                                                                              : of->op;
     return true;
 }
 

@@ -298,6 +298,7 @@ const operator_kind operator_hierarchical = {
     .apply_selected = hierarchical_apply_selected,
     .apply_adjoint = hierarchical_apply_adjoint,
     .answer = hierarchical_answer,
+    .apart = hierarchical_apart,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,
     /* Both triangles in tiles, of 12 bytes each; the store has of one triangle two bytes for a tile and one

@@ -39,6 +39,7 @@ void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, fl
 void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
 void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
                                  const uint32_t *selected, float *P, void *work);
+bool hierarchical_apart(const lam_operator *op);
 void hierarchical_answer(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
                          const float *H0, float *out, void *work);
 

@@ -227,9 +227,13 @@ static void apply_together(areas *a, size_t m, void *work) {
     for (size_t v = 0; a->h.in == NULL && v < m; v++) finish(&a->h, v);
 }
 
+bool hierarchical_apart(const lam_operator *op) {
+    return op->n >= ALONE_FROM;
+}
+
 /* All m vectors of a channel. */
 static void apply_channel(const areas *a, size_t m, void *work) {
-    const bool alone = a->h.self->base.n >= ALONE_FROM;
+    const bool alone = hierarchical_apart(&a->h.self->base);
     for (size_t v = 0; v < m; v += alone ? 1 : m) {
         areas some = *a;
         const size_t before = v * a->h.stride;

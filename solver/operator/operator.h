@@ -34,7 +34,7 @@ typedef struct operator_description {
  * narrow, which makes the operator again with its large arrays in another precision, all of its own; relight,
  * which makes it again under other reflectances, its large arrays those of op; check, which compares the
  * operator with the areas of its mesh and, where they disagree, writes the reason to detail and returns
- * false. */
+ * false; apart, which is true where several vectors together take no less time than one by one. */
 #define OPERATOR_PASS 16 /* a larger batch is cut into passes */
 
 typedef struct operator_kind {
@@ -54,6 +54,7 @@ typedef struct operator_kind {
                          lam_error *error);
     lam_status (*relight)(const lam_operator *op, const float *reflectance, atomic_bool *cancelled,
                           lam_operator **out, lam_error *error);
+    bool (*apart)(const lam_operator *op);
     void (*destroy)(lam_operator *op);
     void (*describe)(const lam_operator *op, operator_description *description);
     bool (*check)(const lam_operator *op, const double *area, char *detail, size_t size);
@@ -89,6 +90,9 @@ const operator_kind *operator_kind_find(const char *name);
 /* Bytes of memory that an operator of this kind takes of so many bytes of /operator; an unknown kind, which
  * operator_load refuses, counts once. */
 uint64_t operator_unpacked_bytes(const char *kind, uint64_t stored);
+
+/* True where several vectors together take no less time than one by one. */
+bool operator_vectors_apart(const lam_operator *op);
 
 /* Fills the shared part of a zeroed operator (copies reflectance, 0 in place of values below FLT_MIN);
  * kind->destroy frees what the kind added. Errors: LAM_ERR_NUMERIC names a reflectance outside [0, 1),
