@@ -94,7 +94,7 @@ static void serve_until_signal(service *s, const sigset_t *signals) {
 }
 
 /* Seconds in which the answers of solves that are given up are sent. */
-#define LAST_ANSWERS_S .6
+#define LAST_ANSWERS_S .8
 
 static bool is_busy(service *s) {
     return metrics_in_flight(s->metrics) > 0 || variants_busy(s->variants);
