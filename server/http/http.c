@@ -5,6 +5,7 @@
 #include "server/http/request_log.h"
 #include "solver/base/clock.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -279,6 +280,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     client_enter(h->service->connections, r->client, STAGE_HEAD, 0);
     unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
     request_log(r, status, seconds * 1e3);
+    if (r->answer.problem != PROBLEM_NONE) problem_counts_add(&h->service->problems, r->answer.problem);
     catalog_release(r->snapshot);
     http_drop_body(r);
     buffer_free(&r->answer.body);
@@ -308,6 +310,15 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
     }
 }
 
+/* libmicrohttpd 0.9.75 answers by itself what it cannot read, and calls no function but that of its log.
+ * Other words of the log are dropped. */
+static void on_library_words(void *context, const char *format, va_list arguments) {
+    static const char refusal[] = "Error processing request (HTTP response code is %u";
+    http *h = context;
+    if (strncmp(format, refusal, sizeof refusal - 1) == 0)
+        problem_counts_add_unread(&h->service->problems, va_arg(arguments, unsigned));
+}
+
 /* Escapes stay in the path, so that %2F does not become a slash; route_find resolves them. */
 static size_t keep_escapes(void *context, struct MHD_Connection *connection, char *text) {
     (void)context;
@@ -333,12 +344,13 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
     TRY(connections_start(&limits, &s->connections, error));
     /* No time-out of libmicrohttpd: it would close a client whose answer waits in a slow socket. At its limit
      * of connections, or out of descriptors, the daemon accepts none until one closes. */
-    h->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, h,
-        MHD_OPTION_LISTEN_SOCKET, listen_fd, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
-        MHD_OPTION_CONNECTION_LIMIT, (unsigned)limits.most, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h,
-        MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_UNESCAPE_CALLBACK, keep_escapes, NULL,
-        MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    h->daemon = MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG,
+                                 0, NULL, NULL, on_request, h, MHD_OPTION_EXTERNAL_LOGGER, on_library_words,
+                                 h, MHD_OPTION_LISTEN_SOCKET, listen_fd, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+                                 (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT,
+                                 (unsigned)limits.most, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h,
+                                 MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_UNESCAPE_CALLBACK,
+                                 keep_escapes, NULL, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
     if (h->daemon == NULL) FAIL(error, LAM_ERR_IO, "the HTTP server cannot start");
     h->listen_fd = -1;
     *out = h;

@@ -12,6 +12,7 @@
 void answer_problem(answer *out, const problem *what) {
     buffer_free(&out->body);
     out->status = what->status;
+    out->problem = what->kind;
     out->type = "application/problem+json";
     out->retry_after = what->status == 503 ? 1 : 0;
     if (problem_write(what, &out->body)) return;

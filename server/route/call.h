@@ -36,7 +36,8 @@ typedef struct call {
 /* Zero at the start. The sender takes the body over. */
 typedef struct answer {
     unsigned status;
-    const char *type; /* static */
+    problem_kind problem; /* PROBLEM_NONE: it is none */
+    const char *type;     /* static */
     buffer body;
     char allow[32];       /* of a 405 */
     unsigned retry_after; /* of a 503: seconds; 0: no header */

@@ -19,7 +19,8 @@ void get_metrics(call *in, answer *out) {
     }
     gauges.n_scenes = snapshot->n_scenes - stores.n_damaged;
     const bool written = metrics_write(s->metrics, &gauges, &b) && metrics_write_stores(&stores, &b) &&
-                         connections_write(s->connections, &b) && access_log_metrics(s->access_log, &b);
+                         problem_counts_write(&s->problems, &b) && connections_write(s->connections, &b) &&
+                         access_log_metrics(s->access_log, &b);
     answer_json(out, &b, written);
     if (written) out->type = "text/plain; version=0.0.4; charset=utf-8";
 }

@@ -10,6 +10,7 @@
 #include "server/net/token.h"
 #include "server/queue/batch.h"
 #include "server/queue/metrics.h"
+#include "server/queue/problem_counts.h"
 #include "server/scene/catalog.h"
 #include "server/scene/variants.h"
 
@@ -27,8 +28,9 @@ typedef struct service {
     peer_rules peers;       /* whose word about a client's address is taken */
     access_log *access_log; /* NULL: none */
     access_log
-        *audit_log;   /* PUT and DELETE; the access log, or standard error; NULL: nothing can be changed */
-    atomic_int state; /* a service_state */
+        *audit_log; /* PUT and DELETE; the access log, or standard error; NULL: nothing can be changed */
+    problem_counts problems;
+    atomic_int state;         /* a service_state */
     connections *connections; /* from http_start to http_stop */
     atomic_size_t body_bytes; /* bytes of request bodies in memory */
     atomic_size_t n_refining; /* refinements that wait or run */
