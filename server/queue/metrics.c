@@ -239,5 +239,8 @@ bool metrics_write_stores(const metrics_stores *stores, buffer *b) {
            write_gauge(b, "lambertd_scenes_unverified", "Scenes whose mapped blocks are still compared.",
                        stores->n_unverified) &&
            write_gauge(b, "lambertd_mapped_bytes", "Bytes of stores that are mapped, not copied.",
-                       stores->mapped_bytes);
+                       stores->mapped_bytes) &&
+           write_gauge(b, "lambertd_verified_timestamp_seconds",
+                       "Unix time when the mapped store that waits for longest was found sound; 0: not yet.",
+                       (unsigned long long)stores->verified_at);
 }

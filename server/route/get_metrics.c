@@ -8,6 +8,7 @@ void get_metrics(call *in, answer *out) {
                              .refining = atomic_load(&s->n_refining),
                              .body_bytes = atomic_load(&s->body_bytes)};
     metrics_stores stores = {.mapped_bytes = 0};
+    size_t n_mapped = 0;
     buffer b = {0};
     for (size_t i = 0; i < snapshot->n_scenes; i++) {
         const scene *one = snapshot->scenes[i];
@@ -15,6 +16,10 @@ void get_metrics(call *in, answer *out) {
         gauges.operator_bytes += one->base != NULL ? one->bytes : lam_operator_bytes(one->op);
         stores.n_damaged += scene_damaged(one, NULL, NULL);
         stores.n_unverified += !scene_verified(one);
+        if (one->map != NULL && one->base == NULL) {
+            const long long at = scene_verified_at(one);
+            if (n_mapped++ == 0 || at < stores.verified_at) stores.verified_at = at;
+        }
         stores.mapped_bytes += one->map != NULL && one->base == NULL ? store_map_bytes(one->map) : 0;
     }
     gauges.n_scenes = snapshot->n_scenes - stores.n_damaged;

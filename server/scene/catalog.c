@@ -89,6 +89,13 @@ done:
     return status;
 }
 
+/* The scenes in service are to be compared again. */
+static void list_again(void *context, verifier *v) {
+    catalog_snapshot *now = catalog_acquire(context);
+    for (size_t i = 0; i < now->n_scenes; i++) verifier_add_again(v, now->scenes[i]);
+    catalog_release(now);
+}
+
 lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **made, lam_error *error) {
     lam_status status = LAM_OK;
     catalog *all = memory_allocate(1, sizeof *all, "catalog", error);
@@ -100,10 +107,11 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
     atomic_init(&all->ledger.room, 0); /* until the memory of the stores is known */
     all->out = out;
     all->problems = problems;
-    TRY(verifier_start(out, problems, &all->verifier, error));
-    all->present = empty;
-    empty = NULL;
+    const verifier_scrub scrub = {.hours = c->scrub_hours, .list = list_again, .context = all};
     pthread_mutex_init(&all->lock, NULL);
+    all->present = empty;
+    TRY(verifier_start(out, problems, &scrub, &all->verifier, error));
+    empty = NULL;
     *made = all;
     all = NULL;
 done:

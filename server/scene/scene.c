@@ -11,6 +11,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 /* Limit of the adjoint rows of a scene. */
 #define ADJOINT_ROWS_BYTES ((size_t)256 << 20)
@@ -20,8 +21,9 @@ enum { HEALTH_UNKNOWN, HEALTH_SOUND, HEALTH_DAMAGED };
 struct scene_health {
     atomic_int state;
     atomic_bool reported;
-    map_range *guard; /* NULL: nothing is mapped */
-    lam_error damage; /* of HEALTH_DAMAGED, written before the state is */
+    atomic_llong verified_at; /* Unix time, s; 0: never */
+    map_range *guard;         /* NULL: nothing is mapped */
+    lam_error damage;         /* of HEALTH_DAMAGED, written before the state is */
 };
 
 static void scene_health_free(scene_health *health) {
@@ -39,6 +41,7 @@ static lam_status scene_health_create(const char *path, const store_map *map, bo
     if (made == NULL) return LAM_ERR_MEMORY;
     atomic_init(&made->state, sound || map == NULL ? HEALTH_SOUND : HEALTH_UNKNOWN);
     atomic_init(&made->reported, false);
+    atomic_init(&made->verified_at, sound ? (long long)time(NULL) : 0);
     if (map != NULL) {
         const void *begin;
         size_t bytes;
@@ -328,9 +331,11 @@ void scene_release(scene *s) {
 lam_status scene_verify(scene *s, const atomic_int *cancel, lam_error *error) {
     scene_health *health = s->health;
     lam_error damage;
-    if (scene_verified(s)) return LAM_OK;
     const lam_status status = store_map_verify(s->map, cancel, &damage);
-    if (status == LAM_OK) atomic_store(&health->state, HEALTH_SOUND);
+    if (status == LAM_OK) {
+        atomic_store(&health->verified_at, (long long)time(NULL));
+        atomic_store(&health->state, HEALTH_SOUND);
+    }
     if (status == LAM_ERR_DAMAGED) {
         health->damage = damage;
         atomic_store(&health->state, HEALTH_DAMAGED);
@@ -341,6 +346,10 @@ lam_status scene_verify(scene *s, const atomic_int *cancel, lam_error *error) {
 
 bool scene_verified(const scene *s) {
     return atomic_load(&s->health->state) != HEALTH_UNKNOWN;
+}
+
+long long scene_verified_at(const scene *s) {
+    return atomic_load(&s->health->verified_at);
 }
 
 bool scene_damaged(const scene *s, lam_error *why, bool *news) {

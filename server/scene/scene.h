@@ -49,7 +49,8 @@ struct scene {
     refined *refined;      /* the refiner of its answers, made when first needed */
     store_map *map;        /* held; NULL: nothing is mapped */
     scene_health *health;
-    scene *next_to_verify; /* private to verifier.c */
+    scene *next_to_verify; /* private to verifier.c, as the next one */
+    bool to_verify;
 };
 
 typedef struct scene_options {
@@ -118,12 +119,16 @@ void mean_errors_free(mean_errors *e);
 scene *scene_acquire(scene *s);
 void scene_release(scene *s);
 
-/* Compares mapped arrays with their checksums. After LAM_ERR_DAMAGED the scene is out of service. One thread
- * at a time, while others solve. Errors: as store_map_verify. */
+/* Compares mapped arrays with their checksums, again where they were compared before; something is mapped.
+ * After LAM_ERR_DAMAGED the scene is out of service. One thread at a time, while others solve. Errors: as
+ * store_map_verify. */
 lam_status scene_verify(scene *s, const atomic_int *cancel, lam_error *error);
 
 /* True if mapped arrays were compared, with whatever result, or nothing is mapped. Any thread. */
 bool scene_verified(const scene *s);
+
+/* When mapped arrays were found sound last, in seconds of Unix time; 0: never. Any thread. */
+long long scene_verified_at(const scene *s);
 
 /* True if the scene is out of service: a block differs from its checksum or cannot be read any more, or the
  * file was written to. An answer is valid only if this is still false after it was computed. why names file,

@@ -183,7 +183,8 @@ class Headers(unittest.TestCase):
                  "lambertd_scenes_unverified": "gauge", "lambertd_connections": "gauge", "lambertd_connections_most": "gauge",
                  "lambertd_connections_cut": "counter", "lambertd_access_log_lost": "counter",
                  "lambertd_queue_wait_seconds": "histogram", "lambertd_refining": "gauge", "lambertd_solves_refused": "counter"}
-        kinds |= {"lambertd_problems": "counter", "lambertd_malformed_requests": "counter"}
+        kinds |= {"lambertd_problems": "counter", "lambertd_malformed_requests": "counter",
+                  "lambertd_verified_timestamp_seconds": "gauge"}
         self.assertEqual({name: f.type for name, f in families.items()}, kinds)
         for family in families.values():
             self.assertTrue(family.documentation)
