@@ -2,6 +2,7 @@
 
 #include "server/http/browser.h"
 #include "server/http/framing.h"
+#include "server/http/head_fields.h"
 #include "server/http/request_log.h"
 #include "solver/base/clock.h"
 
@@ -159,6 +160,19 @@ static enum MHD_Result handle(request *r) {
     return http_send_answer(r);
 }
 
+static client *client_of(struct MHD_Connection *connection) {
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    return info != NULL ? info->socket_context : NULL;
+}
+
+/* The line of a request was read: its connection is idle no more. The result becomes that of the request. */
+static void *on_request_line(void *context, const char *target, struct MHD_Connection *connection) {
+    (void)target;
+    client_enter(((http *)context)->service->connections, client_of(connection), STAGE_HEAD, 0);
+    return NULL;
+}
+
 static request *begin_request(http *h, struct MHD_Connection *connection, const char *path,
                               const char *method) {
     request *r = calloc(1, sizeof *r);
@@ -168,9 +182,7 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
     }
     r->service = h->service;
     r->connection = connection;
-    const union MHD_ConnectionInfo *info =
-        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
-    r->client = info != NULL ? info->socket_context : NULL;
+    r->client = client_of(connection);
     request_id_choose(http_header(r, "X-Request-Id"), h->seed, h->next_id++, r->id);
     r->accepted = coding_choose(http_header(r, MHD_HTTP_HEADER_ACCEPT_ENCODING));
     client_enter(h->service->connections, r->client, STAGE_BODY, 0);
@@ -192,41 +204,12 @@ static uint64_t announced_length(const request *r) {
     return *end == '\0' ? length : UINT64_MAX;
 }
 
-/* One walk over the fields of a head fills these. */
-typedef struct head_fields {
-    framing framing;
-    peer_fields peer;
-} head_fields;
-
-static enum MHD_Result take_field(void *context, enum MHD_ValueKind kind, const char *name, size_t name_size,
-                                  const char *value, size_t value_size) {
-    head_fields *fields = context;
-    (void)kind;
-    framing_add(&fields->framing, name, name_size, value, value_size);
-    peer_add_field(&fields->peer, name, name_size, value, value_size);
-    return MHD_YES;
-}
-
-/* Finds who asks. False, with the answer made, if readers of this head could differ on where the request
- * ends. */
-static bool check_fields(request *r, const char *version) {
-    head_fields fields = {.peer = {.n_forwarded = 0}};
-    problem why;
-    MHD_get_connection_values_n(r->connection, MHD_HEADER_KIND, take_field, &fields);
-    const union MHD_ConnectionInfo *info =
-        MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
-    peer_find(&r->service->peers, info != NULL ? info->client_addr : NULL, &fields.peer, &r->peer);
-    if (framing_check(&fields.framing, version, &why)) return true;
-    answer_problem(&r->answer, &why);
-    return false;
-}
-
 static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const char *path,
                                const char *method, const char *version, void **context) {
     request *r = begin_request(h, connection, path, method);
     if (r == NULL) return MHD_NO;
     *context = r;
-    if (!check_fields(r, version)) {
+    if (!head_check_fields(r, version)) {
         /* Nothing that follows may be read as a request, nor waited for as a body. */
         r->answered = r->last = true;
         return http_send_answer(r);
@@ -277,7 +260,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     if (r == NULL) return;
     *request_context = NULL;
     const double seconds = clock_seconds() - r->start;
-    client_enter(h->service->connections, r->client, STAGE_HEAD, 0);
+    client_enter(h->service->connections, r->client, STAGE_IDLE, 0);
     unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
     request_log(r, status, seconds * 1e3);
     if (r->answer.problem != PROBLEM_NONE) problem_counts_add(&h->service->problems, r->answer.problem);
@@ -339,18 +322,19 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
     h->next_id = 1;
     connection_limits limits = {.wanted = s->config->max_connections,
                                 .timeout_s = s->config->timeout_s,
+                                .keep_alive_s = s->config->keep_alive_s,
                                 .least_rate = s->config->min_rate};
     TRY(connections_affordable(limits.wanted, catalog_stores(s->catalog), &limits.most, error));
     TRY(connections_start(&limits, &s->connections, error));
     /* No time-out of libmicrohttpd: it would close a client whose answer waits in a slow socket. At its limit
      * of connections, or out of descriptors, the daemon accepts none until one closes. */
-    h->daemon = MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG,
-                                 0, NULL, NULL, on_request, h, MHD_OPTION_EXTERNAL_LOGGER, on_library_words,
-                                 h, MHD_OPTION_LISTEN_SOCKET, listen_fd, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-                                 (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT,
-                                 (unsigned)limits.most, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h,
-                                 MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_UNESCAPE_CALLBACK,
-                                 keep_escapes, NULL, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    h->daemon = MHD_start_daemon(
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL,
+        on_request, h, MHD_OPTION_EXTERNAL_LOGGER, on_library_words, h, MHD_OPTION_LISTEN_SOCKET, listen_fd,
+        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT,
+        (unsigned)limits.most, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h, MHD_OPTION_NOTIFY_COMPLETED,
+        on_completed, h, MHD_OPTION_URI_LOG_CALLBACK, on_request_line, h, MHD_OPTION_UNESCAPE_CALLBACK,
+        keep_escapes, NULL, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
     if (h->daemon == NULL) FAIL(error, LAM_ERR_IO, "the HTTP server cannot start");
     h->listen_fd = -1;
     *out = h;

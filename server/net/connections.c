@@ -135,8 +135,16 @@ void connections_unlink(unix_socket *own) {
 /* Idle connections closed in a second, at most. */
 #define PLACES 64
 
-typedef enum cut_reason { CUT_HEAD, CUT_BODY, CUT_ANSWER, CUT_PLACE, CUT_DEADLINE, N_CUT_REASONS } cut_reason;
-static const char *const reasons[N_CUT_REASONS] = {"head", "body", "answer", "place", "deadline"};
+typedef enum cut_reason {
+    CUT_IDLE,
+    CUT_HEAD,
+    CUT_BODY,
+    CUT_ANSWER,
+    CUT_PLACE,
+    CUT_DEADLINE,
+    N_CUT_REASONS
+} cut_reason;
+static const char *const reasons[N_CUT_REASONS] = {"idle", "head", "body", "answer", "place", "deadline"};
 
 struct client {
     client *before, *after;
@@ -238,6 +246,9 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
     switch (c->stage) {
     case STAGE_SOLVE:
         return false;
+    case STAGE_IDLE:
+        *why = CUT_IDLE;
+        return now > c->deadline || (now - c->since > 1.0 && has_hung_up(c));
     case STAGE_HEAD:
     case STAGE_BODY:
         *why = c->stage == STAGE_HEAD ? CUT_HEAD : CUT_BODY;
@@ -275,7 +286,7 @@ static void cut(connections *all, client *c, cut_reason why) {
 static client *find_idle(const connections *all, double now) {
     client *oldest = NULL;
     for (client *c = all->first; c != NULL; c = c->after)
-        if (!c->cut && c->stage == STAGE_HEAD && now - c->since > IDLE_GRACE_S &&
+        if (!c->cut && (c->stage == STAGE_IDLE || c->stage == STAGE_HEAD) && now - c->since > IDLE_GRACE_S &&
             (oldest == NULL || c->since < oldest->since))
             oldest = c;
     return oldest;
@@ -373,7 +384,7 @@ void connections_stop(connections *all) {
 static void begin_stage(const connections *all, client *c, connection_stage stage, size_t bytes, double now) {
     c->stage = stage;
     c->since = now;
-    c->deadline = now + (double)all->limits.timeout_s;
+    c->deadline = now + (double)(stage == STAGE_IDLE ? all->limits.keep_alive_s : all->limits.timeout_s);
     c->bytes = bytes;
     c->seen = 0;
     c->checked = false;

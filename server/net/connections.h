@@ -12,17 +12,24 @@ typedef struct connections connections;
 typedef struct client client;
 
 /* The time limit of each stage:
- *   HEAD    the head of the next request must be complete timeout_s after the connection or the last answer
+ *   IDLE    the next request must begin keep_alive_s after the last answer
+ *   HEAD    its head must be complete timeout_s after it began, that of the first one after the connection
  *   BODY    timeout_s, extended by 1/least_rate seconds with every byte, to at most timeout_s from now
  *   SOLVE   none
  *   ANSWER  as BODY, for bytes that the client reads */
-typedef enum connection_stage { STAGE_HEAD, STAGE_BODY, STAGE_SOLVE, STAGE_ANSWER } connection_stage;
+typedef enum connection_stage {
+    STAGE_IDLE,
+    STAGE_HEAD,
+    STAGE_BODY,
+    STAGE_SOLVE,
+    STAGE_ANSWER
+} connection_stage;
 
 typedef struct connection_limits {
     size_t wanted; /* most connections */
     size_t most;   /* of these, as many as there are descriptors for; when all are open, or no descriptor is
                       left, those idle for longest are closed for others */
-    size_t timeout_s;
+    size_t timeout_s, keep_alive_s;
     size_t least_rate; /* bytes a second */
 } connection_limits;
 

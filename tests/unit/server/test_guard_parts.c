@@ -40,12 +40,16 @@ static void close_pair(connections *all, pair *p) {
     close(p->theirs);
 }
 
-static connections *start(size_t most, size_t timeout_s, size_t least_rate) {
+static connections *start_with(size_t most, size_t timeout_s, size_t keep_alive_s, size_t least_rate) {
     connections *all = NULL;
     lam_error error;
-    const connection_limits limits = {most, most, timeout_s, least_rate};
+    const connection_limits limits = {most, most, timeout_s, keep_alive_s, least_rate};
     ck_assert_int_eq(connections_start(&limits, &all, &error), LAM_OK);
     return all;
+}
+
+static connections *start(size_t most, size_t timeout_s, size_t least_rate) {
+    return start_with(most, timeout_s, 3600, least_rate);
 }
 
 static void expect_count(connections *all, const char *line) {
@@ -85,6 +89,32 @@ START_TEST(each_stage_has_its_time) {
     for (size_t i = 0; i < sizeof every / sizeof every[0]; i++) close_pair(all, every[i]);
     expect_count(all, "\nlambertd_connections 0\n");
     connections_stop(all);
+}
+END_TEST
+
+/* Between two requests the time is another one than within them. */
+START_TEST(idle_connections_have_a_time_of_their_own) {
+    connections *patient = start_with(10, 1, 3600, 1), *brief = start_with(10, 3600, 1, 1);
+    pair idle = open_pair(patient), begun = open_pair(patient), done = open_pair(brief),
+         next = open_pair(brief);
+    client_enter(patient, idle.c, STAGE_IDLE, 0);
+    client_enter(patient, begun.c, STAGE_IDLE, 0);
+    client_enter(patient, begun.c, STAGE_HEAD, 0);
+    client_enter(brief, done.c, STAGE_IDLE, 0);
+    client_enter(brief, next.c, STAGE_IDLE, 0);
+    client_enter(brief, next.c, STAGE_HEAD, 0);
+    wait_cut(&begun);
+    wait_cut(&done);
+    ck_assert(!is_cut(&idle) && !is_cut(&next));
+    expect_count(patient, "_cut_total{why=\"head\"} 1\n");
+    expect_count(patient, "_cut_total{why=\"idle\"} 0\n");
+    expect_count(brief, "_cut_total{why=\"idle\"} 1\n");
+    close_pair(patient, &idle);
+    close_pair(patient, &begun);
+    close_pair(brief, &done);
+    close_pair(brief, &next);
+    connections_stop(patient);
+    connections_stop(brief);
 }
 END_TEST
 
@@ -240,6 +270,7 @@ int main(void) {
     TCase *all = tcase_create("all");
     tcase_set_timeout(all, 120);
     tcase_add_test(all, each_stage_has_its_time);
+    tcase_add_test(all, idle_connections_have_a_time_of_their_own);
     tcase_add_test(all, a_body_that_moves_is_cut_for_its_rate_alone);
     tcase_add_test(all, idle_clients_make_place_and_no_others);
     tcase_add_test(all, an_end_cuts_bodies_and_answers);
