@@ -4,6 +4,7 @@
 #include "solver/base/options.h"
 
 #include <stdio.h>
+#include <unistd.h>
 
 _Static_assert(sizeof(size_t) == sizeof(uint64_t), "counts and sizes of the tables are uint64_t");
 
@@ -38,6 +39,16 @@ static const option_row store_rows[] = {
      .least = 1,
      .most = SIZE_MOST,
      .help = "Refuse stores that, with the work areas of the threads, take more memory than this"},
+    {.name = "max-request-memory",
+     .kind = OPTION_SIZE,
+     .offset = AT(max_request_memory),
+     .argument = "SIZE",
+     .otherwise = "half of the memory of the machine or control group",
+     .least = 1 << 20,
+     .most = SIZE_MOST,
+     .help =
+         "Most memory that requests take: bodies, emissions, answers until they are sent; further ones are "
+         "answered 503, and 422 where they alone would take more"},
     {.name = "max-variants",
      .kind = OPTION_COUNT,
      .offset = AT(max_variants),
@@ -215,10 +226,18 @@ static const option_command daemon_command = {
  * connections, verification, variants, a child that opens a store. */
 enum { BESIDE = 7 };
 
-static void choose_threads(config *c) {
+/* A machine that does not tell is taken to have this much. */
+#define UNKNOWN_MEMORY ((uint64_t)2 << 30)
+
+/* What was not given: threads, and half of the memory for requests. */
+static void choose_by_machine(config *c) {
+    const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+    const uint64_t all = pages > 0 && page > 0 ? (uint64_t)pages * (uint64_t)page : UNKNOWN_MEMORY;
     machine limits;
     machine_read("", &limits);
-    c->threads = machine_threads(&limits, BESIDE, c->threads_why, sizeof c->threads_why);
+    if (c->threads == 0) c->threads = machine_threads(&limits, BESIDE, c->threads_why, sizeof c->threads_why);
+    if (c->max_request_memory == 0)
+        c->max_request_memory = (limits.memory_most < all ? limits.memory_most : all) / 2;
 }
 
 int config_read(config *c, int argc, char **argv) {
@@ -240,7 +259,7 @@ int config_read(config *c, int argc, char **argv) {
     if (c->n_stores == 0 && c->stores_dir == NULL)
         return options_usage(daemon_command.name, "no store is given; usage: lambertd %s",
                              daemon_command.arguments);
-    if (c->threads == 0) choose_threads(c);
+    if (c->threads == 0 || c->max_request_memory == 0) choose_by_machine(c);
     if (c->max_buffered == 0) c->max_buffered = 4 * c->max_body;
     if (c->max_buffered < c->max_body)
         return options_usage(daemon_command.name, "--max-buffered %zu: must be at least --max-body (%zu)",

@@ -22,7 +22,8 @@ typedef struct config {
     size_t max_inflight;  /* solves that wait or run */
     size_t max_buffered;  /* bytes of request bodies, of all clients together */
     size_t max_connections;
-    size_t max_memory; /* bytes that stores and work areas may take; 0: any */
+    size_t max_memory;         /* bytes that stores and work areas may take; 0: any */
+    size_t max_request_memory; /* bytes that requests and their answers may take */
     size_t timeout_s, keep_alive_s;
     size_t request_timeout_s;
     size_t drain_delay_s, shutdown_timeout_s;

@@ -154,3 +154,72 @@ content_coding coding_apply(buffer *b, coding_choice choice) {
     buffer_trim(b);
     return choice.coding;
 }
+
+bool coding_pays(content_coding coding, const char *bytes, size_t length) {
+    char out[SAMPLE];
+    if (length > SAMPLE) length = SAMPLE;
+    const size_t coded = code(coding, bytes, length, out, sizeof out);
+    return coded > 0 && coded <= worth(length);
+}
+
+struct coder {
+    content_coding coding;
+    z_stream z;
+    ZSTD_CStream *zstd;
+};
+
+coder *coder_create(content_coding coding) {
+    coder *c = calloc(1, sizeof *c);
+    if (c == NULL) return NULL;
+    c->coding = coding;
+    bool good;
+    if (coding == CODING_GZIP) {
+        good = deflateInit2(&c->z, LEVEL, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) == Z_OK;
+    } else {
+        c->zstd = ZSTD_createCStream();
+        good = c->zstd != NULL && !ZSTD_isError(ZSTD_initCStream(c->zstd, LEVEL));
+    }
+    if (good) return c;
+    ZSTD_freeCStream(c->zstd);
+    free(c);
+    return NULL;
+}
+
+void coder_free(coder *c) {
+    if (c == NULL) return;
+    if (c->coding == CODING_GZIP) deflateEnd(&c->z);
+    ZSTD_freeCStream(c->zstd);
+    free(c);
+}
+
+static bool run_gzip(coder *c, const char **bytes, size_t *count, bool last, char *to, size_t room,
+                     size_t *written, bool *ended) {
+    /* zlib counts in 32 bits; callers bring far less. */
+    c->z.next_in = (const Bytef *)*bytes;
+    c->z.avail_in = (uInt)*count;
+    c->z.next_out = (Bytef *)to;
+    c->z.avail_out = (uInt)room;
+    const int code = deflate(&c->z, last ? Z_FINISH : Z_NO_FLUSH);
+    *bytes = (const char *)c->z.next_in;
+    *count = c->z.avail_in;
+    *written = room - c->z.avail_out;
+    *ended = code == Z_STREAM_END;
+    return code == Z_OK || code == Z_STREAM_END || code == Z_BUF_ERROR;
+}
+
+static bool run_zstd(coder *c, const char **bytes, size_t *count, bool last, char *to, size_t room,
+                     size_t *written, bool *ended) {
+    ZSTD_inBuffer in = {.src = *bytes, .size = *count};
+    ZSTD_outBuffer out = {.dst = to, .size = room};
+    const size_t left = ZSTD_compressStream2(c->zstd, &out, &in, last ? ZSTD_e_end : ZSTD_e_continue);
+    *bytes += in.pos;
+    *count -= in.pos;
+    *written = out.pos;
+    *ended = last && left == 0;
+    return !ZSTD_isError(left);
+}
+
+bool coder_run(coder *c, const char **bytes, size_t *count, bool last, char *to, size_t room, size_t *written,
+               bool *ended) {
+    return (c->coding == CODING_GZIP ? run_gzip : run_zstd)(c, bytes, count, last, to, room, written, ended);
+}

@@ -25,4 +25,23 @@ const char *coding_name(content_coding coding);
  * those that do not shrink (raw numbers) cost little. O(length) at about 100 (gzip) or 300 (zstd) MB/s. */
 content_coding coding_apply(buffer *b, coding_choice choice);
 
+/* True if bytes, a sample of a longer body, shrink as much as the whole has to. O(length). */
+bool coding_pays(content_coding coding, const char *bytes, size_t length);
+
+/* A coding of bytes that come in parts. */
+typedef struct coder coder;
+
+/* Memory that a coder takes, at most. */
+#define CODER_BYTES ((size_t)2 << 20)
+
+/* NULL if memory is short. */
+coder *coder_create(content_coding coding);
+void coder_free(coder *c);
+
+/* Codes bytes (*count of them, those that were taken are subtracted and *bytes moved on); behind the last of
+ * them, `last`, it ends the coded bytes. *written: bytes written to `to`, at most room. *ended: nothing more
+ * comes. False if the coder failed. */
+bool coder_run(coder *c, const char **bytes, size_t *count, bool last, char *to, size_t room, size_t *written,
+               bool *ended);
+
 #endif

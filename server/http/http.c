@@ -86,9 +86,11 @@ static bool check_type(request *r) {
 }
 
 static void refuse_length(request *r) {
-    answer_refuse(&r->answer, PROBLEM_TOO_LONG,
-                  "the body is longer than %zu bytes (--max-body); send several requests",
-                  r->service->config->max_body);
+    const size_t most = r->service->config->max_body, room = atomic_load(&r->service->memory.all.room);
+    answer_refuse(
+        &r->answer, PROBLEM_TOO_LONG,
+        "the body is longer than %zu bytes (--max-body, --max-request-memory); send several requests",
+        most < room ? most : room);
 }
 
 static void refuse_to_hold(request *r, const char *what) {
@@ -108,12 +110,15 @@ static bool check_head(request *r, const char *method, const char *target, uint6
     const variant_state variant =
         r->match.has_name ? variants_state(s->variants, r->match.name, &r->variant_why) : VARIANT_SETTLED;
     r->snapshot = catalog_acquire(s->catalog);
-    r->call =
-        (call){.service = s, .snapshot = r->snapshot, .variant = variant, .variant_why = &r->variant_why};
+    r->call = (call){.service = s,
+                     .snapshot = r->snapshot,
+                     .variant = variant,
+                     .variant_why = &r->variant_why,
+                     .memory = &r->memory};
     if (!check_scene(r)) return false;
     if (!r->match.route->with_body) return true;
     if (!check_type(r)) return false;
-    if (length > s->config->max_body) {
+    if (length > s->config->max_body || length > atomic_load(&s->memory.all.room)) {
         refuse_length(r);
         return false;
     }
@@ -131,9 +136,15 @@ static bool hold_body(request *r, const char *bytes, size_t count) {
     service *s = r->service;
     const size_t before = atomic_fetch_add(&s->body_bytes, count);
     const bool room = before <= s->config->max_buffered && count <= s->config->max_buffered - before;
-    if (room && buffer_append(&r->body, bytes, count)) return true;
+    problem why = {0};
+    if (room && request_memory_take(&r->memory, count, &why)) {
+        if (buffer_append(&r->body, bytes, count)) return true;
+        request_memory_give_back(&r->memory, count);
+    }
     atomic_fetch_sub(&s->body_bytes, count);
-    if (room)
+    if (why.status != 0)
+        answer_problem(&r->answer, &why);
+    else if (room)
         answer_refuse(&r->answer, PROBLEM_NO_MEMORY, "not enough memory for the body");
     else
         refuse_to_hold(r, "the rest of the body");
@@ -181,6 +192,7 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
         return NULL;
     }
     r->service = h->service;
+    r->memory.ledger = &h->service->memory;
     r->connection = connection;
     r->client = client_of(connection);
     request_id_choose(http_header(r, "X-Request-Id"), h->seed, h->next_id++, r->id);
@@ -267,6 +279,8 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     catalog_release(r->snapshot);
     http_drop_body(r);
     buffer_free(&r->answer.body);
+    answer_stream_free(r->answer.stream);
+    request_memory_give_back(&r->memory, r->memory.held);
     free(r->answer.location);
     free(r->call.changed);
     size_t label = r->match.label;

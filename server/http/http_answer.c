@@ -1,8 +1,12 @@
 /* Sends answers: content coding, entity tag, headers. */
 #include "server/http/browser.h"
+#include "server/http/http_stream.h"
 
 #include <stdio.h>
 #include <string.h>
+
+/* Bodies of this capacity give back what they do not use. */
+#define TRIM_LEAST ((size_t)256 << 10)
 
 /* The longest body that the I/O thread compresses, in a millisecond or two; no other client is served
  * meanwhile. */
@@ -12,11 +16,43 @@ const char *http_header(const request *r, const char *name) {
     return MHD_lookup_connection_value(r->connection, MHD_HEADER_KIND, name);
 }
 
+/* Answers of this length are sent whatever the ledger has: problems, and most figures of the daemon. */
+#define FREE_OF_LEDGER ((size_t)4 << 10)
+
+/* Keeps of the memory of the request what its answer and its body take. */
+static void count_answer(request *r) {
+    const answer *a = &r->answer;
+    const size_t length = a->stream != NULL ? answer_stream_held(a->stream) + STREAM_BYTES : a->body.capacity;
+    const bool free_of =
+        a->stream == NULL && (length <= FREE_OF_LEDGER || r->match.route == NULL || r->match.route->open);
+    if (request_memory_keep(&r->memory, bytes_plus(r->body.length, free_of ? 0 : length))) return;
+    answer_refuse(&r->answer, PROBLEM_NO_MEMORY,
+                  "the answer takes %zu bytes of memory, which other requests hold now "
+                  "(--max-request-memory); try again",
+                  length);
+    (void)request_memory_keep(&r->memory, r->body.length);
+}
+
+/* Compresses a whole body within the memory that requests may take. */
+static void code_body(request *r) {
+    buffer *b = &r->answer.body;
+    problem unused;
+    if (r->accepted.coding == CODING_IDENTITY || !request_memory_take(&r->memory, b->length, &unused)) return;
+    r->coding = coding_apply(b, r->accepted);
+    count_answer(r);
+}
+
 void http_finish_answer(request *r, bool on_io_thread) {
     answer *a = &r->answer;
+    if (a->stream == NULL && a->body.capacity >= TRIM_LEAST) buffer_trim(&a->body);
+    count_answer(r);
+    if (a->stream != NULL) {
+        http_stream_choose(r);
+        return;
+    }
     /* The tag is that of the bytes before compression. */
     const uint64_t hash = a->cacheable ? etag_hash(a->body.bytes, a->body.length) : 0;
-    if (!on_io_thread || a->body.length <= IO_THREAD_MAX) r->coding = coding_apply(&a->body, r->accepted);
+    if (!on_io_thread || a->body.length <= IO_THREAD_MAX) code_body(r);
     if (a->cacheable) etag_make(hash, coding_name(r->coding), r->etag);
 }
 
@@ -74,9 +110,12 @@ enum MHD_Result http_send_answer(request *r) {
         a->type = NULL;
     }
     const bool with_body = a->status != MHD_HTTP_NOT_MODIFIED && strcmp(r->method, "HEAD") != 0;
-    const size_t length = a->body.length;
+    uint64_t length = a->body.length;
     r->sent = with_body ? length : 0;
-    if (a->body.bytes == NULL) {
+    if (a->stream != NULL) {
+        r->sent = 0;
+        response = http_stream_response(r, &length);
+    } else if (a->body.bytes == NULL) {
         static char nothing[1];
         response = MHD_create_response_from_buffer(0, nothing, MHD_RESPMEM_PERSISTENT);
     } else {
@@ -85,7 +124,7 @@ enum MHD_Result http_send_answer(request *r) {
     if (response == NULL) return MHD_NO;
     a->body = (buffer){0};
     const bool good = add_headers(r, length, response);
-    client_enter(r->service->connections, r->client, STAGE_ANSWER, r->sent);
+    client_enter(r->service->connections, r->client, STAGE_ANSWER, with_body ? length : 0);
     enum MHD_Result result = good ? MHD_queue_response(r->connection, a->status, response) : MHD_NO;
     MHD_destroy_response(response);
     r->queued = result == MHD_YES;

@@ -37,7 +37,8 @@ typedef struct request {
     bool answered;         /* the answer is made; the rest of the body is dropped */
     bool last;             /* the connection ends with this answer */
     bool queued;           /* the answer was handed to libmicrohttpd */
-    buffer body;           /* counted in the service's body_bytes */
+    buffer body;           /* counted in the service's body_bytes and in memory */
+    request_memory memory; /* of the body, of what is computed, of the answer */
     uint64_t received;
     size_t sent;
 } request;
@@ -56,8 +57,8 @@ bool http_check_health(request *r);
 
 void http_drop_body(request *r);
 
-/* Compresses the answer if the client accepts that and it pays, and sets its ETag. The I/O thread sends long
- * bodies as they are. */
+/* Counts the memory of the answer, in place of all that the request took to make it. Compresses it if the
+ * client accepts that and it pays, and sets its ETag. The I/O thread sends long bodies as they are. */
 void http_finish_answer(request *r, bool on_io_thread);
 
 /* Hands a finished answer to libmicrohttpd. */

@@ -25,6 +25,7 @@ bool http_check_health(request *r) {
 
 void http_drop_body(request *r) {
     atomic_fetch_sub(&r->service->body_bytes, r->body.length);
+    request_memory_give_back(&r->memory, r->body.length);
     buffer_free(&r->body);
 }
 
@@ -155,6 +156,7 @@ static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     } else if (to->steps->begin(&r->call, &r->answer)) {
         if (enter_refinements(r)) {
             job->cost = cost_to_solve(&r->call);
+            http_drop_body(r); /* its vectors were read */
             return true;
         }
         drop_solve(job);

@@ -57,6 +57,7 @@ typedef struct metrics_stores {
     size_t n_damaged, n_unverified; /* scenes out of service; scenes still being compared */
     uint64_t mapped_bytes;
     long long verified_at; /* Unix time of the oldest comparison of a mapped store; 0: none */
+    uint64_t memory;       /* counted against --max-memory */
 } metrics_stores;
 bool metrics_write_stores(const metrics_stores *stores, buffer *b);
 

@@ -3,14 +3,14 @@
 #include "server/scene/adjoint_rows.h"
 
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
-
-/* Least limit of the bytes of a request's emission vectors: a short sparse text may ask for many long ones.
- */
-#define LEAST_EMISSION_LIMIT ((size_t)1 << 30)
+#include <stdlib.h>
 
 void answer_problem(answer *out, const problem *what) {
     buffer_free(&out->body);
+    answer_stream_free(out->stream);
+    out->stream = NULL;
     out->status = what->status;
     out->problem = what->kind;
     out->type = "application/problem+json";
@@ -43,17 +43,33 @@ void answer_json(answer *out, buffer *b, bool written) {
 
 codec_scene call_codec_scene(const call *in) {
     const scene *s = in->scene;
-    const config *c = in->service->config;
     return (codec_scene){.n = s->n,
                          .n_channels = s->n_channels,
                          .groups = &s->groups,
                          .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
                          .n_emitters = s->n_emitters,
                          .emitters = &s->emitters,
-                         .max_batch = c->max_batch,
-                         .max_bytes =
-                             4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT,
+                         .max_batch = in->service->config->max_batch,
+                         .max_bytes = SIZE_MAX, /* the memory of the request is the limit */
+                         .take = request_memory_take_of,
+                         .owner = in->memory,
                          .max_rows = adjoint_rows_capacity(s)};
+}
+
+size_t call_parse_bytes(const call *in) {
+    const scene *s = in->scene;
+    if (in->body_type != MEDIA_JSON) return 0;
+    /* Indices and values of one sparse vector, the set of those seen, and a list of selected elements; each
+     * takes a letter of the text at least, and there are n of them at most. */
+    const size_t numbers = in->length < s->n ? in->length : s->n;
+    return bytes_times(numbers, 32 + 6 * s->n_channels);
+}
+
+void *call_allocate(const call *in, size_t bytes, const char *what, problem *why) {
+    if (!request_memory_take(in->memory, bytes, why)) return NULL;
+    void *made = malloc(bytes > 0 ? bytes : 1);
+    if (made == NULL) problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %s", what);
+    return made;
 }
 
 answer_notes call_notes(const call *in) {

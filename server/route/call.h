@@ -2,9 +2,10 @@
 #ifndef LAMBERT_SERVER_ROUTE_CALL_H
 #define LAMBERT_SERVER_ROUTE_CALL_H
 
+#include "server/route/request_memory.h"
 #include "server/route/service.h"
 #include "solver/base/clock.h"
-#include "solver/codec/answer.h"
+#include "solver/codec/answer_stream.h"
 #include "solver/codec/media.h"
 #include "solver/codec/problem.h"
 #include "solver/codec/request.h"
@@ -24,9 +25,10 @@ typedef struct call {
     media_accept accept;
     const char *body; /* body[length] is NUL */
     size_t length;
-    batch_workspace *workspace;         /* of a route with a body */
-    void *state;                        /* of a route with solve_steps: its own, from begin to end */
-    bool refines;                       /* set by begin: to a tolerance */
+    request_memory *memory;     /* of this request; all that it still holds is given back after its answer */
+    batch_workspace *workspace; /* of a route with a body */
+    void *state;                /* of a route with solve_steps: its own, from begin to end */
+    bool refines;               /* set by begin: to a tolerance */
     bool (*is_wanted)(struct call *in); /* of a route with a body, from the thread that serves it: false when
                                          * nobody needs the answer any more; what is done may then be left */
     size_t n_rhs;                       /* set by the handler, for the log */
@@ -39,9 +41,10 @@ typedef struct answer {
     problem_kind problem; /* PROBLEM_NONE: it is none */
     const char *type;     /* static */
     buffer body;
-    char allow[32];       /* of a 405 */
-    unsigned retry_after; /* of a 503: seconds; 0: no header */
-    bool refined;         /* certificate and iterations are set: the largest of its vectors */
+    answer_stream *stream; /* in place of body: of an answer of many numbers; or NULL */
+    char allow[32];        /* of a 405 */
+    unsigned retry_after;  /* of a 503: seconds; 0: no header */
+    bool refined;          /* certificate and iterations are set: the largest of its vectors */
     double certificate;
     size_t iterations;
     char *location; /* of a 202, owned; or NULL */
@@ -64,6 +67,13 @@ void answer_json(answer *out, buffer *b, bool written);
 /* The scene as a body is read against, and the notes of an answer beside its numbers and its
  * error (scene_note_error), for a route with {name}. */
 codec_scene call_codec_scene(const call *in);
+
+/* Bytes that reading the body takes while it is read, beside emission vectors. */
+size_t call_parse_bytes(const call *in);
+
+/* malloc of bytes taken of the memory of the request; NULL with *why if there is no room (422, 503) or no
+ * memory (503, `what` names it). */
+void *call_allocate(const call *in, size_t bytes, const char *what, problem *why);
 answer_notes call_notes(const call *in);
 
 #endif

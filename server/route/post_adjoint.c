@@ -6,12 +6,12 @@
 #include "solver/codec/adjoint.h"
 #include "solver/codec/answer.h"
 
-#include <string.h>
+#include <stdlib.h>
 
-/* Arrays [C][n] in the workspace of the thread. */
+/* Arrays [C][n], and the work area of the operator in the workspace of the thread. */
 typedef struct adjoint_memory {
-    float *w, *H, *H0, *v;
-    float *narrow; /* [C][m] of tiles, or [C][s] of emitters */
+    float *w, *H, *H0, *v; /* w begins what is freed */
+    float *narrow;         /* [C][m] of tiles, or [C][s] of emitters */
     void *work;
     size_t work_bytes;
 } adjoint_memory;
@@ -20,32 +20,39 @@ static size_t narrow_width(const scene *s) {
     return s->n_emitters > 0 ? s->n_emitters : s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
 }
 
-/* *at: the offset of count floats behind *total bytes, aligned to 64 bytes; false on overflow. */
-static bool take(size_t count, size_t *at, size_t *total) {
-    size_t bytes;
-    *at = *total;
-    return size_multiply(count, sizeof(float), &bytes) && bytes < SIZE_MAX - 64 &&
-           !__builtin_add_overflow(*total, (bytes + 63) / 64 * 64, total);
+/* Bytes of the answer, at most. */
+static size_t answer_most(const call *in, const adjoint_request *request) {
+    const scene *s = in->scene;
+    size_t bytes = 0;
+    for (int kind = 0; kind < GRADIENT_COUNT; kind++) {
+        const bool wide = kind == GRADIENT_EMISSION || kind == GRADIENT_REFLECTANCE;
+        const answer_shape shape = {
+            .n_channels = s->n_channels, .n_rhs = 1, .n_values = wide ? s->n : narrow_width(s)};
+        if (adjoint_wants(request, (gradient_kind)kind))
+            bytes = bytes_plus(bytes, answer_bytes_most(&shape, &in->accept));
+    }
+    return bytes;
 }
 
-static bool get_memory(call *in, const adjoint_request *request, adjoint_memory *memory, problem *why) {
+static bool get_memory(call *in, const adjoint_request *request, adjoint_memory *memory, buffer *b,
+                       problem *why) {
     const scene *s = in->scene;
     const bool by_reflectance = adjoint_wants(request, GRADIENT_REFLECTANCE);
     const size_t vector = s->n_channels * s->n,
                  rows[] = {vector, by_reflectance ? vector : 0, by_reflectance && s->sky != NULL ? vector : 0,
                            vector, s->n_channels * narrow_width(s)};
-    size_t at[5], total = 0, all;
-    bool fits = true;
-    for (size_t k = 0; k < 5; k++) fits = fits && take(rows[k], &at[k], &total);
+    const size_t most = answer_most(in, request);
+    size_t total = 0;
+    for (size_t k = 0; k < 5; k++) total += rows[k];
     memory->work_bytes = lam_operator_work_bytes(s->op, 1);
-    char *bytes = NULL;
-    if (fits && memory->work_bytes > 0 && !__builtin_add_overflow(total, memory->work_bytes, &all))
-        bytes = batch_workspace_get(in->workspace, all);
-    if (bytes == NULL)
+    memory->work = memory->work_bytes > 0 ? batch_workspace_get(in->workspace, memory->work_bytes) : NULL;
+    float *at = call_allocate(in, bytes_times(total, sizeof *at), "a gradient", why);
+    memory->w = at;
+    if (at == NULL || !request_memory_take(in->memory, most, why)) return false;
+    if (memory->work == NULL || !buffer_reserve(b, most))
         return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for a gradient");
     float **const places[] = {&memory->w, &memory->H, &memory->H0, &memory->v, &memory->narrow};
-    for (size_t k = 0; k < 5; k++) *places[k] = (float *)(void *)(bytes + at[k]);
-    memory->work = bytes + total;
+    for (size_t k = 0; k < 5; at += rows[k++]) *places[k] = at;
     return true;
 }
 
@@ -127,6 +134,8 @@ static bool write_json(const call *in, const adjoint_request *request, const adj
 
 static bool read_body(const call *in, adjoint_request *request, problem *why) {
     const codec_scene about = call_codec_scene(in);
+    const size_t lists = call_parse_bytes(in);
+    if (!request_memory_take(in->memory, lists, why)) return false;
     if (in->body_type == MEDIA_JSON ? !codec_read_adjoint_json(&about, in->body, in->length, request, why)
                                     : !codec_read_adjoint_npy(&about, in->body, in->length, request, why))
         return false;
@@ -145,7 +154,7 @@ void post_adjoint(call *in, answer *out) {
     problem why = {0};
     buffer b = {0};
     const double start = clock_ms();
-    bool good = read_body(in, &request, &why) && get_memory(in, &request, &memory, &why);
+    bool good = read_body(in, &request, &why) && get_memory(in, &request, &memory, &b, &why);
     const double parsed = clock_ms();
     notes.parse_ms = parsed - start;
     notes.quantity = request.quantity;
@@ -161,5 +170,6 @@ void post_adjoint(call *in, answer *out) {
         answer_problem(out, &why);
     }
     buffer_free(&b);
+    free(memory.w);
     adjoint_request_free(&request);
 }

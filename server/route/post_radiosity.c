@@ -18,6 +18,8 @@ typedef struct radiosity_solve {
     buffer answer;
     float *out;             /* [n_rhs][C][n_values]: inside `answer` if its encoding allows, else own */
     float *own;             /* or NULL */
+    answer_stream *stream;  /* of these, until the answer has it */
+    bool streams;           /* the values are encoded while the answer is sent */
     float *H0;              /* [n_rhs][C][n], direct irradiance of the sky; NULL if no vector has a sky */
     double *figures;        /* of reduce, in place of values; else NULL */
     float *W;               /* [n_rhs][C][s], weights of a store of emitters; else NULL */
@@ -30,6 +32,7 @@ typedef struct radiosity_solve {
 static void solve_free(radiosity_solve *s) {
     radiosity_request_free(&s->request);
     buffer_free(&s->answer);
+    answer_stream_free(s->stream);
     refined_free(s->refined, &s->notes);
     free(s->own);
     free(s->figures);
@@ -39,32 +42,29 @@ static void solve_free(radiosity_solve *s) {
     free(s);
 }
 
-/* [n_rhs][C][width] floats, not cleared; NULL if memory is short. */
-static float *allocate_rows(const radiosity_solve *s, size_t width) {
-    size_t count;
-    if (!size_multiply(s->shape.n_rhs, s->shape.n_channels, &count) || !size_multiply(count, width, &count) ||
-        !size_multiply(count, sizeof(float), &count))
-        return NULL;
-    return malloc(count > 0 ? count : 1);
+/* [n_rhs][C][width] floats, not cleared; NULL with *why. */
+static float *allocate_rows(const call *in, const radiosity_solve *s, size_t width, const char *what,
+                            problem *why) {
+    return call_allocate(
+        in, bytes_times(bytes_times(s->shape.n_rhs, s->shape.n_channels), bytes_times(width, sizeof(float))),
+        what, why);
 }
 
 /* Computes the direct irradiance of skies, or, for a store of emitters, the weights of these. */
-static bool find_light(const scene *s, radiosity_solve *solve, problem *why) {
+static bool find_light(const call *in, radiosity_solve *solve, problem *why) {
+    const scene *s = in->scene;
     const radiosity_request *request = &solve->request;
     const size_t C = s->n_channels, n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
     lam_error error;
     if (s->n_emitters == 0) {
         if (request->sky.values == NULL) return true;
-        solve->H0 = allocate_rows(solve, s->n);
-        if (solve->H0 == NULL)
-            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu skies", request->n_rhs);
+        solve->H0 = allocate_rows(in, solve, s->n, "skies", why);
+        if (solve->H0 == NULL) return false;
         lam_sky_irradiance(s->sky, request->n_rhs * C, request->sky.values, solve->H0);
         return true;
     }
-    solve->W = allocate_rows(solve, s->n_emitters);
-    if (solve->W == NULL)
-        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the weights of %zu vectors",
-                           request->n_rhs);
+    solve->W = allocate_rows(in, solve, s->n_emitters, "the weights of emitters", why);
+    if (solve->W == NULL) return false;
     const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, n_tiles,
                                                    request->sky.values, solve->W, &error);
     if (status != LAM_OK)
@@ -79,17 +79,39 @@ static bool find_light(const scene *s, radiosity_solve *solve, problem *why) {
  * scratch for the figures. */
 static bool find_room(call *in, radiosity_solve *s, problem *why) {
     const reduce_request *reduce = &s->request.reduce;
+    const size_t most = answer_bytes_most(&s->shape, &in->accept);
     if (reduce->on) {
+        if (!request_memory_take(in->memory, figures_bytes(&s->request, s->shape.n_channels), why))
+            return false;
         s->figures = reduce_figures(reduce, s->shape.n_rhs, s->shape.n_channels);
-        s->out = s->own = allocate_rows(s, s->shape.n_values);
-        return (s->figures != NULL && s->own != NULL) ||
-               problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", s->shape.n_rhs);
+        s->out = s->own = allocate_rows(in, s, s->shape.n_values, "values to reduce", why);
+        return s->own != NULL &&
+               (s->figures != NULL || problem_set(why, PROBLEM_NO_MEMORY,
+                                                  "not enough memory to reduce %zu vectors", s->shape.n_rhs));
     }
+    const bool placed = in->accept.type == MEDIA_NPY && in->accept.npy == NPY_F4;
+    s->streams = !placed && most > ANSWER_WHOLE;
+    if (!s->streams && (!request_memory_take(in->memory, most, why) ||
+                        !(buffer_reserve(&s->answer, most) ||
+                          problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer"))))
+        return false;
     if (!answer_begin(&s->answer, &s->shape, &in->accept, &s->notes, why)) return false;
-    s->out = answer_place(&s->answer, &s->shape, &in->accept);
-    if (s->out == NULL) s->out = s->own = allocate_rows(s, s->shape.n_values);
-    return s->out != NULL ||
-           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve %zu vectors", s->shape.n_rhs);
+    s->out = placed ? answer_place(&s->answer, &s->shape, &in->accept) : NULL;
+    if (s->out == NULL) s->out = s->own = allocate_rows(in, s, s->shape.n_values, "values", why);
+    return s->out != NULL;
+}
+
+/* Takes room for the lists of a text, which are freed before it returns, and reads it. */
+static bool read_body(const call *in, radiosity_request *request, problem *why) {
+    const codec_scene about = call_codec_scene(in);
+    const size_t lists = call_parse_bytes(in);
+    if (!request_memory_take(in->memory, lists, why)) return false;
+    const bool good = in->body_type == MEDIA_NPY
+                          ? codec_read_npy(&about, in->body, in->length, request, why)
+                          : codec_read_json(&about, in->body, in->length, request, why);
+    request_memory_give_back(in->memory, lists);
+    return good && (!request->select ||
+                    request_memory_take(in->memory, request->n_selected * sizeof *request->selected, why));
 }
 
 /* True if requests should have passes of their own: these take no longer than one of all, and one could not
@@ -101,7 +123,6 @@ static bool passes_apart(const call *in) {
 
 static bool begin(call *in, answer *out) {
     const scene *of = in->scene;
-    const codec_scene about = call_codec_scene(in);
     problem why = {0};
     radiosity_solve *s = calloc(1, sizeof *s);
     if (s == NULL) {
@@ -109,8 +130,7 @@ static bool begin(call *in, answer *out) {
         return false;
     }
     const double start = clock_ms();
-    bool good = in->body_type == MEDIA_NPY ? codec_read_npy(&about, in->body, in->length, &s->request, &why)
-                                           : codec_read_json(&about, in->body, in->length, &s->request, &why);
+    bool good = read_body(in, &s->request, &why);
     const radiosity_request *request = &s->request;
     s->notes = call_notes(in);
     s->notes.quantity = request->quantity;
@@ -128,7 +148,7 @@ static bool begin(call *in, answer *out) {
     const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;
     good = linear   ? figures_linear(in, &s->request, &s->notes, &s->answer, &why)
            : refine ? refined_begin(in, request, &s->notes, &s->refined, &why)
-                    : good && find_light(of, s, &why) && find_room(in, s, &why);
+                    : good && find_light(in, s, &why) && find_room(in, s, &why);
     if (!good || linear) {
         if (good)
             answer_json(out, &s->answer, true);
@@ -229,6 +249,23 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     }
 }
 
+/* Hands the values over to a stream, all of which can be sent; false with s->why. Of `encode` the answer
+ * states what was spent before its end was written. */
+static bool make_stream(const call *in, radiosity_solve *s) {
+    buffer tail = {0};
+    const double start = clock_ms();
+    const bool good = answer_check_encoding(&s->shape, &in->accept, s->own, &s->why);
+    s->notes.encode_ms = clock_ms() - start;
+    if (good && answer_end(&tail, &s->shape, &in->accept, &s->notes, &s->why))
+        s->stream = answer_stream_create(&s->shape, &in->accept, &s->answer, s->own, &tail);
+    buffer_free(&tail);
+    if (s->stream != NULL)
+        s->own = NULL;
+    else if (s->why.status == 0)
+        problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
+    return s->stream != NULL;
+}
+
 /* Writes figures or values into the answer; false with s->why. */
 static bool write_answer(call *in, radiosity_solve *s) {
     const double start = clock_ms();
@@ -243,6 +280,7 @@ static bool write_answer(call *in, radiosity_solve *s) {
     if (s->figures != NULL)
         return good && figures_add(in->scene, &s->request, 0, s->shape.n_rhs, s->own, s->figures, &s->why) &&
                figures_write(in->scene, &s->request, s->figures, &s->notes, &s->answer, &s->why);
+    if (s->streams) return good && make_stream(in, s);
     good = good && (s->own == NULL
                         ? answer_placed(&s->answer, &s->shape, &s->why)
                         : answer_add(&s->answer, &s->shape, &in->accept, 0, s->shape.n_rhs, s->own, &s->why));
@@ -254,6 +292,8 @@ static void end(call *in, answer *out) {
     radiosity_solve *s = in->state;
     if (write_answer(in, s)) {
         answer_json(out, &s->answer, true);
+        out->stream = s->stream;
+        s->stream = NULL;
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
         if (s->refined != NULL) refined_set_headers(&s->notes, s->request.n_rhs, out);
     } else {

@@ -24,6 +24,19 @@ bool figures_acceptable(const call *in, const radiosity_request *request, proble
                        "reduce is answered in JSON; leave application/x-npy out of Accept");
 }
 
+/* The longest text of a double with the brackets and commas around it. */
+#define DOUBLE_TEXT ((size_t)32)
+
+size_t figures_bytes(const radiosity_request *request, size_t n_channels) {
+    const reduce_request *r = &request->reduce;
+    const size_t of_name = bytes_times(bytes_times(request->n_rhs, n_channels), r->n_with);
+    /* A name stands twice in the text, with two figures of its error, in escapes of up to six letters; the
+     * last summand is for the means of a name and its errors. */
+    return bytes_plus(bytes_plus(bytes_times(bytes_times(r->n_names, of_name), sizeof(double) + DOUBLE_TEXT),
+                                 bytes_times(12, r->texts.length) + (r->n_names + 4) * 8 * DOUBLE_TEXT),
+                      bytes_times(bytes_times(request->n_rhs, n_channels), 8 * sizeof(double)));
+}
+
 bool figures_add(const scene *s, const radiosity_request *request, size_t first, size_t count, const float *x,
                  double *figures, problem *why) {
     const size_t n_values = count * s->n_channels * request->n_selected;
@@ -80,16 +93,13 @@ static bool weights_of(const call *in, radiosity_request *request, float **weigh
     const scene *s = in->scene;
     const size_t row = s->n_channels * s->n_emitters;
     const codec_scene about = call_codec_scene(in);
-    size_t count;
     lam_error error;
     *weights = NULL;
     if (s->n_emitters == 0 || (request->n_spots == 0 && request->n_dense == 0 && request->sky.values == NULL))
         return true;
     if (!radiosity_request_expand(request, &about, why)) return false;
-    if (size_multiply(request->n_rhs, row, &count))
-        *weights = memory_allocate(count, sizeof **weights, "weights", NULL);
-    if (*weights == NULL)
-        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu vectors", request->n_rhs);
+    *weights = call_allocate(in, bytes_times(request->n_rhs, row * sizeof **weights), "weights", why);
+    if (*weights == NULL) return false;
     const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, about.n_tiles,
                                                    request->sky.values, *weights, &error);
     if (status != LAM_OK)
@@ -133,7 +143,13 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
 bool figures_linear(call *in, radiosity_request *request, answer_notes *notes, buffer *b, problem *why) {
     adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
     notes->solve_ms = -clock_ms();
-    if (!adjoint_rows_get(in->scene, request, in->workspace, rows, why)) return false;
+    if (!request_memory_take(in->memory, figures_bytes(request, in->scene->n_channels), why)) return false;
+    if (!adjoint_rows_find(in->scene, request, rows)) {
+        /* Rows that the scene has no room to keep are this request's alone. */
+        if (!request_memory_take(in->memory, adjoint_rows_bytes(in->scene, request), why) ||
+            !adjoint_rows_get(in->scene, request, in->workspace, rows, why))
+            return false;
+    }
     const bool good = evaluate(in, request, rows, notes, b, why);
     adjoint_rows_release(in->scene, request->reduce.n_names, rows);
     return good;
@@ -154,13 +170,16 @@ bool quick_radiosity(call *in, answer *out) {
     codec_scene about = call_codec_scene(in);
     about.only_linear = true;
     about.max_bytes = QUICK_BYTES;
+    about.take = NULL; /* it is taken at once */
     answer_notes notes = call_notes(in);
     radiosity_request request = {0};
     problem why = {0};
     buffer b = {0};
     adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
+    const size_t held = in->memory->held;
     const double start = clock_ms();
-    bool good = codec_read_json(&about, in->body, in->length, &request, &why) &&
+    bool good = request_memory_take(in->memory, QUICK_BYTES, &why) &&
+                codec_read_json(&about, in->body, in->length, &request, &why) &&
                 adjoint_row_work(s, &request) <= QUICK_WORK / request.reduce.n_names &&
                 is_short(s, &request) && adjoint_rows_find(s, &request, rows);
     if (good && !adjoint_row_suffices(s, rows[0], &request)) {
@@ -178,6 +197,7 @@ bool quick_radiosity(call *in, answer *out) {
         adjoint_rows_release(s, request.reduce.n_names, rows);
         if (good) answer_json(out, &b, true);
     }
+    if (in->memory->held > held) request_memory_give_back(in->memory, in->memory->held - held);
     buffer_free(&b);
     radiosity_request_free(&request);
     return good;

@@ -8,6 +8,9 @@
 /* False with *why if the client does not accept JSON, the only format of figures. */
 bool figures_acceptable(const call *in, const radiosity_request *request, problem *why);
 
+/* Bytes that figures take until they are written, and their text, at most. */
+size_t figures_bytes(const radiosity_request *request, size_t n_channels);
+
 /* Adds vectors first ... first + count, x [count][C][n_selected], to figures of reduce_figures. 422 for a
  * value beyond single precision. */
 bool figures_add(const scene *s, const radiosity_request *request, size_t first, size_t count, const float *x,

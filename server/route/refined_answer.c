@@ -11,6 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* The longest text of a double, with a comma. */
+#define DOUBLE_TEXT ((size_t)25)
+
+/* Vectors of a row that lam_refine takes, at most. */
+#define REFINING_VECTORS 8
+
 /* Arrays of a pass; NULL if not needed. */
 typedef struct pass_memory {
     double *E, *H0, *out; /* [BATCH_PASS][C][n] */
@@ -43,12 +49,24 @@ static void pass_memory_free(pass_memory *p) {
     free(p->work);
 }
 
-static bool pass_memory_allocate(const scene *s, const radiosity_request *request, pass_memory *p,
+/* Bytes of the arrays of a pass, and of those that refining takes beside them. */
+static size_t pass_memory_bytes(const scene *s, const radiosity_request *request, size_t rows) {
+    const bool few = s->n_emitters > 0, sky = request->sky.values != NULL;
+    const size_t doubles = (size_t)(REFINING_VECTORS + 2 + (few || sky)) * s->n +
+                           (sky ? lam_sky_tiles(s->sky) : 0) + (request->select ? request->n_selected : 0);
+    const size_t floats = few ? s->n + s->n_emitters : 0;
+    return bytes_plus(bytes_times(rows, doubles * sizeof(double) + floats * sizeof(float)),
+                      few ? lam_operator_work_bytes(s->op, rows / s->n_channels) : 0);
+}
+
+static bool pass_memory_allocate(const call *in, const radiosity_request *request, pass_memory *p,
                                  problem *why) {
+    const scene *s = in->scene;
     const size_t vectors = request->n_rhs < BATCH_PASS ? request->n_rhs : BATCH_PASS,
                  rows = vectors * s->n_channels;
     const size_t row = s->n * sizeof(double);
     const bool few = s->n_emitters > 0;
+    if (!request_memory_take(in->memory, pass_memory_bytes(s, request, rows), why)) return false;
     p->E = memory_allocate(rows, row, "E", NULL);
     p->out = memory_allocate(rows, row, "B", NULL);
     bool good = p->E != NULL && p->out != NULL;
@@ -140,6 +158,17 @@ static const double *refine(call *in, const lam_refiner *refiner, const radiosit
     return p->some;
 }
 
+/* Bytes of certificates, and of the answer, at most. */
+static size_t bytes_needed(const call *in, const radiosity_request *request, const answer_shape *shape,
+                           const media_accept *as) {
+    const size_t certificates =
+        bytes_times(request->n_rhs, sizeof(double) + sizeof(size_t) + 2 * DOUBLE_TEXT);
+    if (request->reduce.on) return bytes_plus(certificates, figures_bytes(request, in->scene->n_channels));
+    /* The text of a double is longer than that of the float that answer_bytes_most counts. */
+    return bytes_plus(certificates,
+                      bytes_times(as->type == MEDIA_JSON ? 2 : 1, answer_bytes_most(shape, as)));
+}
+
 bool refined_begin(call *in, const radiosity_request *request, answer_notes *notes, refined_solve **out,
                    problem *why) {
     const scene *s = in->scene;
@@ -152,11 +181,12 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
                               .n_rhs = request->n_rhs,
                               .batch = request->batch,
                               .n_values = request->select ? request->n_selected : s->n};
+    *out = r;
+    if (!request_memory_take(in->memory, bytes_needed(in, request, &r->shape, &r->as), why)) return false;
     r->certificates = memory_allocate(request->n_rhs, sizeof *r->certificates, "certificates", NULL);
     r->iterations = memory_allocate(request->n_rhs, sizeof *r->iterations, "certificates", NULL);
     notes->certificates = r->certificates;
     notes->iterations = r->iterations;
-    *out = r;
     if (request->reduce.on) r->figures = reduce_figures(&request->reduce, request->n_rhs, s->n_channels);
     return (r->certificates != NULL && r->iterations != NULL &&
             (r->figures != NULL || !request->reduce.on)) ||
@@ -185,7 +215,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     bool good = find_refiner(s, &refiner, why);
     if (good && !r->made) {
         r->made = true;
-        good = pass_memory_allocate(s, request, &r->p, why) &&
+        good = pass_memory_allocate(in, request, &r->p, why) &&
                (r->figures != NULL || answer_begin(b, &r->shape, &r->as, notes, why));
     }
     const double *x = good ? refine(in, refiner, request, first, count, &r->p, r->certificates + first,

@@ -11,6 +11,7 @@
 #include "server/queue/batch.h"
 #include "server/queue/metrics.h"
 #include "server/queue/problem_counts.h"
+#include "server/route/request_memory.h"
 #include "server/scene/catalog.h"
 #include "server/scene/variants.h"
 
@@ -34,6 +35,7 @@ typedef struct service {
     connections *connections; /* from http_start to http_stop */
     atomic_size_t body_bytes; /* bytes of request bodies in memory */
     atomic_size_t n_refining; /* refinements that wait or run */
+    request_ledger memory;    /* --max-request-memory */
 } service;
 
 #endif

@@ -95,6 +95,16 @@ static size_t row_bytes(const scene *s) {
                             (tiles_of(s) + (s->n_emitters > 0 ? s->n_emitters : s->n)) * sizeof(float));
 }
 
+/* Bytes of g and w of a pass for `count` rows. */
+static size_t pass_bytes(const scene *s, size_t count) {
+    return count * s->n_channels * (s->n + (s->n_emitters > 0 ? s->n_emitters : s->n)) * sizeof(float);
+}
+
+size_t adjoint_rows_bytes(const scene *s, const radiosity_request *request) {
+    const size_t n_names = request->reduce.n_names;
+    return n_names * row_bytes(s) + pass_bytes(s, n_names < BATCH_PASS ? n_names : BATCH_PASS);
+}
+
 size_t adjoint_rows_capacity(const scene *s) {
     const size_t count = row_cache_limit(s->rows) / row_bytes(s);
     return count < ADJOINT_ROWS_OF_REQUEST ? count : ADJOINT_ROWS_OF_REQUEST;
@@ -203,33 +213,22 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
                       batch_workspace *workspace, adjoint_row **rows, problem *why) {
     const size_t n = s->n, C = s->n_channels, width = s->n_emitters > 0 ? s->n_emitters : n;
     const size_t work_bytes = lam_operator_work_bytes(s->op, count);
-    size_t g_bytes, w_bytes, total;
     lam_error error;
-    char *bytes = NULL;
     const emitter_weights *weights;
     adjoint_row *made[BATCH_PASS] = {NULL};
     double area[BATCH_PASS];
     bool allocated, good = false;
-    if (work_bytes > 0 && size_multiply(count * C * sizeof(float), n, &g_bytes) &&
-        size_multiply(count * C * sizeof(float), width, &w_bytes) && g_bytes < SIZE_MAX - 64 &&
-        w_bytes < SIZE_MAX - 64) {
-        g_bytes = (g_bytes + 63) / 64 * 64;
-        w_bytes = (w_bytes + 63) / 64 * 64;
-        if (!__builtin_add_overflow(g_bytes, w_bytes, &total) &&
-            !__builtin_add_overflow(total, work_bytes, &total))
-            bytes = batch_workspace_get(workspace, total);
-    }
-    allocated = bytes != NULL && get_weights(s, &weights);
+    float *g = memory_allocate(1, pass_bytes(s, count), "rows", NULL), *w = g + count * C * n;
+    void *work = work_bytes > 0 ? batch_workspace_get(workspace, work_bytes) : NULL;
+    allocated = g != NULL && work != NULL && get_weights(s, &weights);
     for (size_t k = 0; allocated && k < count; k++)
         allocated = (made[k] = row_allocate(s, &request->reduce.names[which[k]], request->quantity)) != NULL;
     if (!allocated) {
         problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the adjoint rows of %zu groups", count);
         goto done;
     }
-    float *g = (float *)(void *)bytes, *w = (float *)(void *)(bytes + g_bytes);
     for (size_t k = 0; k < count; k++)
         area[k] = write_cotangent(s, &request->reduce.names[which[k]], g + k * C * n);
-    void *work = bytes + g_bytes + w_bytes;
     const lam_status status =
         s->n_emitters > 0
             ? lam_operator_adjoint_emitters(s->op, count, request->quantity, g, w, work, work_bytes, &error)
@@ -250,6 +249,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     good = true;
 done:
     for (size_t k = 0; k < count; k++) adjoint_row_free(made[k]);
+    free(g);
     return good;
 }
 

@@ -92,6 +92,10 @@ static bool check_range(const float *x, size_t count, float limit, problem *why)
     return !bad || refuse_range((double)limit, why);
 }
 
+bool answer_check_as(const float *x, size_t count, const media_accept *as, problem *why) {
+    return check_range(x, count, as->type == MEDIA_NPY && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why);
+}
+
 bool answer_check(const float *x, size_t count, problem *why) {
     return check_range(x, count, FLT_MAX, why);
 }
@@ -104,7 +108,7 @@ static bool add_row(buffer *b, const media_accept *as, const float *row, size_t 
 bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,
                  problem *why) {
     const bool json = as->type == MEDIA_JSON, deep = json && n_channels > 1;
-    if (!check_range(x, n_channels * n, !json && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why)) return false;
+    if (!answer_check_as(x, n_channels * n, as, why)) return false;
     bool written = !deep || buffer_append(b, "[", 1);
     for (size_t c = 0; written && c < n_channels; c++)
         written = (!json || c == 0 || buffer_append(b, ",", 1)) && add_row(b, as, x + c * n, n);

@@ -51,6 +51,8 @@ bool answer_tail(buffer *b, const answer_notes *notes);
 
 /* Checks that an answer is within single precision; 422. */
 bool answer_check(const float *x, size_t count, problem *why);
+/* The same within the range of an encoding. */
+bool answer_check_as(const float *x, size_t count, const media_accept *as, problem *why);
 
 /* Appends x [C][n], or [n] for one channel. False with *why as the next. */
 bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,

@@ -10,8 +10,8 @@ bool buffer_reserve(buffer *b, size_t more) {
     if (more >= SIZE_MAX / 4 || b->length >= SIZE_MAX / 4) return false;
     size_t needed = b->length + more + 1;
     if (needed > b->capacity) {
-        size_t capacity = b->capacity < 256 ? 256 : b->capacity;
-        while (capacity < needed) capacity += capacity / 2;
+        size_t capacity = b->capacity < 256 ? 256 : b->capacity + b->capacity / 2;
+        if (capacity < needed) capacity = needed;
         char *bytes = realloc(b->bytes, capacity);
         if (bytes == NULL) return false;
         b->bytes = bytes;

@@ -29,12 +29,22 @@ bool radiosity_request_add(radiosity_request *request, const codec_scene *scene,
     return true;
 }
 
+static bool take_memory(const codec_scene *scene, size_t bytes, problem *why) {
+    return scene->take == NULL || scene->take(scene->owner, bytes, why);
+}
+
 /* Makes room for `wanted` rows of `bytes` each within max_bytes, and zeroes those beyond *n. */
-static bool grow_rows(float **values, size_t *n, size_t *capacity, size_t wanted, size_t bytes,
-                      size_t max_bytes, const char *what, problem *why) {
+static bool grow_rows(const codec_scene *scene, float **values, size_t *n, size_t *capacity, size_t wanted,
+                      size_t bytes, const char *what, problem *why) {
     if (wanted > *capacity) {
-        const size_t most = max_bytes / bytes, more = 2 * *capacity > wanted ? 2 * *capacity : wanted;
-        const size_t rows = more < most ? more : most;
+        const size_t most = scene->max_bytes / bytes, more = 2 * *capacity > wanted ? 2 * *capacity : wanted;
+        size_t rows = more < most ? more : most;
+        problem unused;
+        /* Room for vectors to come is taken if there is any. */
+        if (!take_memory(scene, (rows - *capacity) * bytes, &unused)) {
+            rows = wanted;
+            if (!take_memory(scene, (rows - *capacity) * bytes, why)) return false;
+        }
         if (array_resize(values, rows, bytes, what, NULL) != LAM_OK)
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu vectors of %s", rows, what);
         *capacity = rows;
@@ -56,8 +66,8 @@ static bool grow_dense(radiosity_request *request, const codec_scene *scene, pro
             "hold; send several requests",
             request->n_rhs, scene->n_channels, scene->n, scene->max_bytes);
     if (request->n_dense == request->n_rhs) return true;
-    return grow_rows(&request->E, &request->n_dense, &request->dense_capacity, request->n_rhs, bytes,
-                     scene->max_bytes, "emission", why);
+    return grow_rows(scene, &request->E, &request->n_dense, &request->dense_capacity, request->n_rhs, bytes,
+                     "emission", why);
 }
 
 bool radiosity_request_dense(radiosity_request *request, const codec_scene *scene, float **E, problem *why) {
@@ -78,6 +88,7 @@ bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene
                                "the sparse vectors pass the %zu bytes that a request may hold; send several "
                                "requests",
                                scene->max_bytes);
+        if (!take_memory(scene, (more - request->spots_capacity) * each, why)) return false;
         if (array_resize(&request->spots, more, sizeof *request->spots, "spots", NULL) != LAM_OK ||
             array_resize(&request->colours, more, C * sizeof *colour, "spots", NULL) != LAM_OK)
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
@@ -121,8 +132,7 @@ static bool add_side(const radiosity_request *request, const codec_scene *scene,
             "%zu times %zu channels of %zu %s pass the %zu bytes that a request may hold; send "
             "several requests",
             request->n_rhs, scene->n_channels, width, what, scene->max_bytes);
-    if (!grow_rows(&side->values, &side->n, &side->capacity, request->n_rhs, bytes, scene->max_bytes, what,
-                   why))
+    if (!grow_rows(scene, &side->values, &side->n, &side->capacity, request->n_rhs, bytes, what, why))
         return false;
     *row = side->values + (request->n_rhs - 1) * values;
     return true;

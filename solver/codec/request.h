@@ -18,6 +18,10 @@ typedef struct codec_scene {
     const group_index *emitters; /* these by name; NULL: they have none */
     size_t max_batch;            /* vectors in a request, at most CODEC_BATCH_MOST */
     size_t max_bytes;            /* of emission vectors in a request */
+    /* Asked before memory for emission vectors is allocated, of bytes more than before; false with *why.
+     * NULL: max_bytes is the only limit. */
+    bool (*take)(void *owner, size_t bytes, problem *why);
+    void *owner;        /* of take */
     bool only_linear;   /* anything but a linear reduction of sparse vectors is refused (503) before it costs
                            more than its text */
     size_t max_rows;    /* adjoint rows that the scene keeps: at most so many groups are reduced by them */

@@ -23,7 +23,7 @@ class Life(Case):
     def test_help_and_version(self):
         asked = self.run_once("--help")
         self.assertEqual(asked.returncode, 0)
-        for option in ("stores listen unix threads max-body max-batch max-inflight max-buffered max-connections max-memory "
+        for option in ("stores listen unix threads max-body max-batch max-inflight max-buffered max-connections max-memory max-request-memory "
                        "max-variants timeout request-timeout drain-delay shutdown-timeout min-rate token-file access-log verify").split():
             self.assertIn(f"--{option}", asked.stdout)
         self.assertRegex(self.run_once("--version").stdout, r"^lambertd \d+\.\d+\.\d+\n$")

@@ -185,6 +185,8 @@ class Headers(unittest.TestCase):
                  "lambertd_queue_wait_seconds": "histogram", "lambertd_refining": "gauge", "lambertd_solves_refused": "counter"}
         kinds |= {"lambertd_problems": "counter", "lambertd_malformed_requests": "counter",
                   "lambertd_verified_timestamp_seconds": "gauge"}
+        kinds |= {"lambertd_request_memory_bytes": "gauge", "lambertd_request_memory_limit_bytes": "gauge",
+                  "lambertd_request_memory_refused": "counter", "lambertd_kept_memory_bytes": "gauge"}
         self.assertEqual({name: f.type for name, f in families.items()}, kinds)
         for family in families.values():
             self.assertTrue(family.documentation)

@@ -4,12 +4,16 @@ import json
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import tempfile
 import time
 import unittest
 
+import numpy as np
+
 from daemon import LAMBERTD, PATIENCE, Daemon
+from guard_case import HEAD, MIB, metrics, read_all, until
 from make_store import Scene
 
 TOKEN = "s3cret"
@@ -62,6 +66,104 @@ class Kept(Case):
             self.assertEqual([s["name"] for s in scenes], ["base", "base@older", "later"])
             self.assertLessEqual(sum(s["bytes"] for s in scenes) + work, limit)
             self.assertIn("dropped base@newer: the stores leave it no room in --max-memory", daemon.errors())
+
+
+# Beside the limits: the program, its heap between allocations, the memory of connections (32 KiB each).
+CONSTANT = 64 * MIB
+
+
+class Requests(Case):
+    """--max-request-memory: bodies, emissions, outputs, answers that nobody reads."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.store = pathlib.Path(folder.name) / "big.h5"
+        cls.n = 60000
+        cls.scene = Scene(cls.n, rank=4)
+        cls.scene.write(cls.store, "big", kind="low_rank")
+
+    @staticmethod
+    def resident(daemon, what="VmRSS"):
+        status = pathlib.Path(f"/proc/{daemon.process.pid}/status").read_text()
+        return int(re.search(rf"^{what}:\s+(\d+) kB", status, re.M).group(1)) * 1024
+
+    @staticmethod
+    def send(daemon, body, accept="application/json"):
+        """A connection whose answer is not read: its first byte is there."""
+        s = socket.socket()
+        s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        s.connect(("127.0.0.1", daemon.port))
+        s.sendall(b"POST /v1/scenes/big/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+                  b"Accept: %s\r\nContent-Length: %d\r\n\r\n" % (accept.encode(), len(body)) + body)
+        return s
+
+    def groups(self, count, **more):
+        return json.dumps({"emissions": [{"groups": {"lamp": k}} for k in range(1, count + 1)], **more}).encode()
+
+    def test_answers_that_nobody_reads(self):
+        """Twelve of 128 vectors, 2.8 KB each, whose text is 70 MB: those that fit are held as floats, others are refused."""
+        limit = 200 * MIB
+        with Daemon(self.store, "--threads", 2, "--max-request-memory", limit) as daemon:
+            clients, statuses = [], []
+            for _ in range(12):
+                clients.append(self.send(daemon, self.groups(128)))
+                statuses.append(clients[-1].recv(12)[9:])
+            self.assertLess(self.resident(daemon, "VmHWM"), limit + CONSTANT)
+            self.assertEqual(set(statuses), {b"200", b"503"})
+            # 31 MB each as they are computed; twice as much while they are.
+            self.assertGreaterEqual(statuses.count(b"200"), 4)
+            held = metrics(daemon)[("lambertd_request_memory_bytes",)]
+            self.assertGreaterEqual(held, statuses.count(b"200") * 128 * self.n * 4)
+            self.assertLessEqual(held, limit)
+            self.assertEqual(metrics(daemon)[("lambertd_request_memory_refused_total", ("why", "full"))], statuses.count(b"503"))
+            # A request that was refused is served once others have gone, and all is given back.
+            for s in clients:
+                s.close()
+            until(lambda: metrics(daemon)[("lambertd_request_memory_bytes",)] == 0)
+            answer = daemon.radiosity("big", self.groups(128))
+            self.assertEqual(answer.status, 200)
+            until(lambda: metrics(daemon)[("lambertd_request_memory_bytes",)] == 0)
+            self.assertLess(self.resident(daemon), CONSTANT)
+            B = np.array(answer.json()["radiosity"])
+            E = np.zeros((128, 1, self.n))
+            E[:, :, self.scene.members("lamp")] = np.arange(1, 129)[:, None, None]
+            wanted = np.array([self.scene.solve(e)[0] for e in E])
+            self.assertLess(np.abs(B - wanted).max(), 1e-5 * wanted.max())
+
+    def test_requests_under_way(self):
+        """Short bodies that ask for 1,024 vectors of 60,000 elements, 246 MB of emission alone."""
+        limit = 300 * MIB
+        with Daemon(self.store, "--threads", 2, "--max-request-memory", limit) as daemon:
+            clients = [self.send(daemon, self.groups(1024), "application/x-npy") for _ in range(6)]
+            statuses = [s.recv(12)[9:] for s in clients]
+            # Each fits alone, and its answer with another that is computed.
+            clients += [self.send(daemon, self.groups(300), "application/x-npy") for _ in range(6)]
+            statuses += [s.recv(12)[9:] for s in clients[6:]]
+            self.assertLess(self.resident(daemon, "VmHWM"), limit + CONSTANT)
+            self.assertEqual(set(statuses[:6]) - {b"503"}, {b"422"})
+            self.assertIn(b"200", statuses[6:])
+            for s in clients:
+                s.close()
+            until(lambda: metrics(daemon)[("lambertd_request_memory_bytes",)] == 0)
+            answer = daemon.radiosity("big", self.groups(1024))
+            self.assertEqual(answer.status, 422)
+            self.assertIn("--max-request-memory", answer.json()["detail"])
+            # With the values of one group in place of the whole vectors there is room.
+            for more in {"reduce": {"groups": ["lamp"], "with": ["max"]}}, {"select": {"groups": ["lamp"]}}:
+                self.assertEqual(daemon.radiosity("big", self.groups(1024, **more)).status, 200)
+                self.assertLess(self.resident(daemon, "VmHWM"), limit + CONSTANT)
+
+    def test_a_body_that_can_never_fit(self):
+        with Daemon(self.store, "--max-request-memory", "2M") as daemon:
+            with daemon.raw() as s:
+                s.sendall(HEAD.replace(b"box", b"big") + b"Content-Length: %d\r\n\r\n" % (3 * MIB))
+                answer = read_all(s)
+            self.assertTrue(answer.startswith(b"HTTP/1.1 413 "), answer)
+            self.assertIn(b"--max-request-memory", answer)
+            self.assertEqual(metrics(daemon)[("lambertd_request_memory_bytes",)], 0)
+            self.assertEqual(daemon.radiosity("big", self.groups(1)).status, 200)
 
 
 if __name__ == "__main__":

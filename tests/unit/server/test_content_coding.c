@@ -128,6 +128,50 @@ START_TEST(bodies_are_coded_where_it_pays) {
 }
 END_TEST
 
+/* Codes b by a coder that gets and gives pieces of any length. */
+static buffer code_in_pieces(const buffer *b, content_coding coding, size_t piece, size_t room) {
+    buffer coded = {0};
+    coder *c = coder_create(coding);
+    char *to = malloc(room);
+    size_t at = 0, left = 0, written;
+    const char *bytes = b->bytes;
+    bool ended = false;
+    ck_assert_ptr_nonnull(c);
+    while (!ended) {
+        if (left == 0 && at < b->length) {
+            bytes = b->bytes + at;
+            left = b->length - at < piece ? b->length - at : piece;
+            at += left;
+        }
+        ck_assert(coder_run(c, &bytes, &left, at == b->length && left == 0, to, room, &written, &ended));
+        ck_assert(buffer_append(&coded, to, written));
+    }
+    free(to);
+    coder_free(c);
+    return coded;
+}
+
+START_TEST(pieces_are_coded_as_one) {
+    static const size_t pieces[] = {1, 1000, 16384, 1 << 20}, rooms[] = {64, 5000, 65536};
+    for (int coding = CODING_GZIP; coding <= CODING_ZSTD; coding++)
+        for (int what = TEXT; what <= MIXED; what++)
+            for (size_t p = 0; p < 4; p++)
+                for (size_t r = 0; r < 3; r++) {
+                    buffer b = make((content)what, pieces[p] == 1 ? 3000 : 300001);
+                    buffer coded = code_in_pieces(&b, (content_coding)coding, pieces[p], rooms[r]);
+                    char *back = malloc(b.length + 1);
+                    ck_assert_uint_eq(decode((content_coding)coding, &coded, back, b.length + 1), b.length);
+                    ck_assert(memcmp(back, b.bytes, b.length) == 0);
+                    if (what != MIXED)
+                        ck_assert_int_eq(coding_pays((content_coding)coding, b.bytes, b.length),
+                                         what == TEXT);
+                    free(back);
+                    buffer_free(&coded);
+                    buffer_free(&b);
+                }
+}
+END_TEST
+
 START_TEST(identity_touches_nothing) {
     buffer b = make(TEXT, 5000);
     const char *before = b.bytes;
@@ -142,6 +186,7 @@ int main(void) {
     TCase *all = tcase_create("all");
     tcase_add_test(all, headers_choose);
     tcase_add_test(all, bodies_are_coded_where_it_pays);
+    tcase_add_test(all, pieces_are_coded_as_one);
     tcase_add_test(all, identity_touches_nothing);
     suite_add_tcase(suite, all);
     return suite_run(suite);
