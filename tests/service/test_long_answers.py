@@ -1,5 +1,9 @@
 """Answers of many numbers: nobody waits for one to be written or read."""
 
+import ctypes
+import ctypes.util
+import gzip
+import io
 import json
 import pathlib
 import tempfile
@@ -7,8 +11,10 @@ import threading
 import time
 import unittest
 
+import numpy as np
+
 from daemon import Daemon
-from guard_case import metrics
+from guard_case import HEAD, metrics, read_all, until
 from make_store import Scene
 
 GROUPS = [f"g{k}" for k in range(20)]
@@ -60,6 +66,92 @@ class LongAnswers(unittest.TestCase):
             self.assertEqual(failures, [])
             self.assertIn(503, seen)
             self.assertEqual(metrics(daemon)[("lambertd_queued",)], 0)
+
+
+    def stream(self, daemon, accept="application/json", coding=None, version="1.1", n=40):
+        """Status line, headers and body of an answer of n vectors, whose text is above 4 MiB."""
+        body = json.dumps({"emissions": [{"groups": {"g1": v}} for v in range(1, n + 1)]}).encode()
+        more = f"Accept-Encoding: {coding}\r\n" if coding else ""
+        with daemon.raw() as s:
+            s.sendall((f"POST /v1/scenes/big/radiosity HTTP/{version}\r\nHost: localhost\r\nAccept: {accept}\r\n{more}"
+                       f"Content-Type: application/json\r\nConnection: close\r\nContent-Length: {len(body)}\r\n\r\n").encode() + body)
+            head, _, rest = read_all(s).partition(b"\r\n\r\n")
+        lines = head.decode().split("\r\n")
+        headers = {k.lower(): v for k, v in (line.split(": ", 1) for line in lines[1:])}
+        if headers.get("transfer-encoding") == "chunked":
+            rest = unchunk(rest)
+        return lines[0], headers, rest
+
+    def test_answers_that_are_encoded_while_they_are_sent(self):
+        """They are the same numbers in every encoding, coding and version of HTTP, and give back what they held."""
+        with Daemon(self.folder / "big.h5", "--threads", 2) as daemon:
+            line, headers, body = self.stream(daemon, "application/x-npy")
+            self.assertEqual((line, headers["content-length"]), ("HTTP/1.1 200 OK", str(len(body))))
+            wanted = np.load(io.BytesIO(body))
+            self.assertEqual(wanted.shape, (40, 20000))
+            for accept, exact in ("application/json", np.float32), ("application/x-npy; dtype=f8", np.float64), \
+                    ("application/x-npy; dtype=f2", np.float16):
+                plain = None
+                for coding, version in (None, "1.1"), ("gzip", "1.1"), ("zstd", "1.1"), (None, "1.0"), ("gzip", "1.0"):
+                    # Enough that half precision passes 4 MiB too.
+                    n = 120 if exact == np.float16 else 40
+                    line, headers, body = self.stream(daemon, accept, coding, version, n)
+                    self.assertTrue(line.endswith(" 200 OK"), line)
+                    used = headers.get("content-encoding")
+                    self.assertIn(used, (None, coding))
+                    if exact == np.float32 and coding:
+                        self.assertEqual(used, coding)
+                    if used == "gzip":
+                        body = gzip.decompress(body)
+                    elif used == "zstd":
+                        body = unzstd(body, 64 << 20)
+                    elif exact != np.float32:
+                        self.assertEqual(headers["content-length"], str(len(body)))
+                    if exact == np.float32:
+                        answer = json.loads(body)
+                        self.assertEqual((answer["scene"], answer["elements"]), ("big", 20000))
+                        self.assertIn("time_ms", answer)
+                        given = np.array(answer["radiosity"], np.float32)
+                    else:
+                        given = np.load(io.BytesIO(body))
+                        self.assertEqual(given.dtype, exact)
+                    np.testing.assert_array_equal(given[:40], wanted.astype(exact))
+                    plain = given if plain is None else plain
+                    np.testing.assert_array_equal(given, plain)
+            until(lambda: metrics(daemon)[("lambertd_request_memory_bytes",)] == 0)
+
+    def test_clients_that_go_in_the_middle(self):
+        body = json.dumps({"emissions": [{"groups": {"g1": 1}}] * 40}).encode()
+        with Daemon(self.folder / "big.h5", "--threads", 2) as daemon:
+            for coding in b"identity", b"gzip", b"zstd":
+                with daemon.raw() as s:
+                    s.sendall(HEAD.replace(b"box", b"big") + b"Accept-Encoding: " + coding +
+                              b"\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
+                    self.assertTrue(s.recv(100).startswith(b"HTTP/1.1 200 OK"))
+                    self.assertGreater(metrics(daemon)[("lambertd_request_memory_bytes",)], 40 * 20000 * 4)
+                until(lambda: metrics(daemon)[("lambertd_request_memory_bytes",)] == 0)
+
+
+def unzstd(raw, most):
+    """A frame without its length, which a stream does not know before."""
+    library = ctypes.CDLL(ctypes.util.find_library("zstd"))
+    library.ZSTD_decompress.restype = ctypes.c_size_t
+    library.ZSTD_decompress.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t]
+    out = ctypes.create_string_buffer(most)
+    length = library.ZSTD_decompress(out, most, raw, len(raw))
+    assert length <= most, "not zstd"
+    return out.raw[:length]
+
+
+def unchunk(body):
+    parts, at = [], 0
+    while True:
+        end = body.index(b"\r\n", at)
+        size = int(body[at:end], 16)
+        if size == 0:
+            return b"".join(parts)
+        parts.append(body[end + 2:end + 2 + size])
+        at = end + 4 + size
 
 
 if __name__ == "__main__":
