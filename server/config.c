@@ -229,7 +229,7 @@ enum { BESIDE = 7 };
 /* A machine that does not tell is taken to have this much. */
 #define UNKNOWN_MEMORY ((uint64_t)2 << 30)
 
-/* What was not given: threads, and half of the memory for requests. */
+/* Fills in threads and the memory of requests, half of all, where they were not given. */
 static void choose_by_machine(config *c) {
     const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
     const uint64_t all = pages > 0 && page > 0 ? (uint64_t)pages * (uint64_t)page : UNKNOWN_MEMORY;
