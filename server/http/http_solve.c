@@ -19,7 +19,7 @@ bool http_check_health(request *r) {
     if (r->call.scene == NULL || !scene_damaged(r->call.scene, &why, &news)) return true;
     if (news) verifier_report_damage(stderr, r->call.scene, &why);
     answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "%.200s is out of service: %s", r->call.scene->name,
-                  why.message);
+                  scene_message(r->call.scene, why.message));
     return false;
 }
 

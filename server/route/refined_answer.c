@@ -92,11 +92,13 @@ static bool pass_memory_allocate(const call *in, const radiosity_request *reques
     return good || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to refine %zu vectors", vectors);
 }
 
-static bool refuse(lam_status status, const lam_error *error, problem *why) {
+/* A store that cannot be read any more is no fault of the daemon's, and its next version may be right. */
+static bool refuse(const scene *s, lam_status status, const lam_error *error, problem *why) {
     const problem_kind as = status == LAM_ERR_MEMORY || status == LAM_ERR_IO          ? PROBLEM_NO_MEMORY
                             : status == LAM_ERR_NUMERIC || status == LAM_ERR_ARGUMENT ? PROBLEM_NOT_REFINED
-                                                                                      : PROBLEM_INTERNAL;
-    return problem_set(why, as, "%s", error->message);
+                            : status == LAM_ERR_INTERNAL                              ? PROBLEM_INTERNAL
+                                                                                      : PROBLEM_UNAVAILABLE;
+    return problem_set(why, as, "%.100s: %s", s->name, scene_message(s, error->message));
 }
 
 /* E and H0 of the weights of emitters, and the store's own answer to these as the start of the iteration. */
@@ -115,7 +117,7 @@ static bool light_emitters(const scene *s, const radiosity_request *request, siz
     TRY(lam_operator_apply_emitters(s->op, count, LAM_INDIRECT, p->W, s->n, NULL, p->start, p->work,
                                     p->work_bytes, &error));
 done:
-    return status == LAM_OK || refuse(status, &error, why);
+    return status == LAM_OK || refuse(s, status, &error, why);
 }
 
 static void light_any(const scene *s, const radiosity_request *request, size_t first, size_t count,
@@ -148,7 +150,7 @@ static const double *refine(call *in, const lam_refiner *refiner, const radiosit
         refine_watched(refiner, count, request->quantity, p->E, p->H0, p->start, request->tolerance, p->out,
                        certificates, iterations, &watch, &error);
     if (status != LAM_OK) {
-        refuse(status, &error, why);
+        refuse(s, status, &error, why);
         return NULL;
     }
     if (!request->select) return p->out;
@@ -197,7 +199,7 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
 static bool find_refiner(const scene *s, const lam_refiner **refiner, problem *why) {
     lam_error error;
     const lam_status status = refined_get(s->refined, refiner, &error);
-    if (status != LAM_OK) return refuse(status, &error, why);
+    if (status != LAM_OK) return refuse(s, status, &error, why);
     if (*refiner != NULL) return true;
     problem_set(why, PROBLEM_NOT_IN_STORE,
                 "scene %.80s keeps no form factors, which a tolerance needs; precompute it with "

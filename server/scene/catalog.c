@@ -1,5 +1,6 @@
 #include "server/scene/catalog.h"
 
+#include "server/scene/log_line.h"
 #include "server/scene/verifier.h"
 #include "solver/base/array_grow.h"
 
@@ -270,23 +271,23 @@ static void load_source(catalog *all, catalog_snapshot *next, const catalog_snap
         if (old == NULL || check_kept(all, next, old, NULL) != LAM_OK) {
             /* Most messages begin with the path, some (out of memory) do not. */
             bool named = strncmp(error.message, from->path, strlen(from->path)) == 0;
-            fprintf(problems, "refused %s%s%s\n", named ? "" : from->path, named ? "" : ": ", error.message);
+            log_line(problems, "refused %s%s%s", named ? "" : from->path, named ? "" : ": ", error.message);
             return;
         }
-        fprintf(problems, "kept the %s read before; %s cannot be read now: %s\n", old->name, from->path,
-                error.message);
+        log_line(problems, "kept the %s read before; %s cannot be read now: %s", old->name, from->path,
+                 error.message);
         loaded = scene_acquire(old);
     }
     const scene *taken = insert(next, loaded);
     if (taken != NULL) {
-        fprintf(problems, "refused %s: the name %s is taken by %s; give it another: %s:NAME\n", from->path,
-                loaded->name, taken->path, from->path);
+        log_line(problems, "refused %s: the name %s is taken by %s; give it another: %s:NAME", from->path,
+                 loaded->name, taken->path, from->path);
         scene_release(loaded);
         return;
     }
-    fprintf(all->out, "serving %s: %zu elements, %zu channel%s, %s, from %s\n", loaded->name, loaded->n,
-            loaded->n_channels, loaded->n_channels == 1 ? "" : "s", lam_operator_kind(loaded->op),
-            loaded->path);
+    log_line(all->out, "serving %s: %zu elements, %zu channel%s, %s, from %s", loaded->name, loaded->n,
+             loaded->n_channels, loaded->n_channels == 1 ? "" : "s", lam_operator_kind(loaded->op),
+             loaded->path);
     if (loaded != old) verifier_add(all->verifier, loaded);
 }
 
@@ -319,9 +320,9 @@ static void report_dropped(const catalog_snapshot *next, const catalog_snapshot 
         const scene *s = before->scenes[i];
         if (s->base == NULL || catalog_find(next, s->name) == s) continue;
         const bool squeezed = has_base_of(next, s) && catalog_find(next, s->name) == NULL;
-        fprintf(problems, "dropped %s: %s\n", s->name,
-                squeezed ? "the stores leave it no room in --max-memory"
-                         : "its store has changed, or another has its name");
+        log_line(problems, "dropped %s: %s", s->name,
+                 squeezed ? "the stores leave it no room in --max-memory"
+                          : "its store has changed, or another has its name");
     }
 }
 
@@ -431,15 +432,13 @@ size_t catalog_reload(catalog *all) {
     report_dropped(next, old, all->problems);
     catalog_release(old);
 done:
-    if (status != LAM_OK) fprintf(all->problems, "%s\n", error.message);
+    if (status != LAM_OK) log_line(all->problems, "%s", error.message);
     catalog_release(next);
     catalog_release(before);
     free_sources(&sources);
     /* Returns the memory of the old stores to the system, so that a daemon does not keep its peak for months.
      */
     (void)malloc_trim(0);
-    fflush(all->out);
-    fflush(all->problems);
     pthread_mutex_lock(&all->lock);
     share_memory(all, all->present);
     size_t served = all->present->n_scenes;

@@ -348,6 +348,12 @@ bool scene_verified(const scene *s) {
     return atomic_load(&s->health->state) != HEALTH_UNKNOWN;
 }
 
+const char *scene_message(const scene *s, const char *message) {
+    const size_t length = strlen(s->path);
+    const bool named = strncmp(message, s->path, length) == 0 && strncmp(message + length, ": ", 2) == 0;
+    return named ? message + length + 2 : message;
+}
+
 long long scene_verified_at(const scene *s) {
     return atomic_load(&s->health->verified_at);
 }

@@ -115,6 +115,10 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
                            mean_errors *to, answer_notes *notes);
 void mean_errors_free(mean_errors *e);
 
+/* The message of an error of this scene for clients: without the path of its store, which is none of theirs.
+ * Points into the message. */
+const char *scene_message(const scene *s, const char *message);
+
 /* Adds a reference, to be dropped by scene_release. Any thread. */
 scene *scene_acquire(scene *s);
 void scene_release(scene *s);

@@ -106,7 +106,7 @@ static void keep_failed(variants *v, build *b, lam_status status, const lam_erro
                 : status == LAM_ERR_ARGUMENT ? PROBLEM_CONFLICT
                 : status == LAM_ERR_NUMERIC  ? PROBLEM_BAD_VALUE
                                              : PROBLEM_INTERNAL,
-                "%.200s could not be built: %.240s", b->name, error->message);
+                "%.200s could not be built: %.240s", b->name, scene_message(b->base, error->message));
     free(b->reflectance);
     b->reflectance = NULL;
     b->base = NULL;

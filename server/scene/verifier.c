@@ -1,5 +1,6 @@
 #include "server/scene/verifier.h"
 
+#include "server/scene/log_line.h"
 #include "server/scene/map_guard.h"
 #include "solver/base/clock.h"
 
@@ -24,8 +25,7 @@ struct verifier {
 };
 
 void verifier_report_damage(FILE *problems, const scene *s, const lam_error *why) {
-    fprintf(problems, "took %s out of service: %s\n", s->name, why->message);
-    fflush(problems);
+    log_line(problems, "took %s out of service: %s", s->name, why->message);
 }
 
 static void verify(verifier *v, scene *s) {
@@ -37,8 +37,7 @@ static void verify(verifier *v, scene *s) {
     if (scene_damaged(s, &error, &news)) {
         if (news) verifier_report_damage(v->problems, s, &error);
     } else if (status == LAM_OK) {
-        fprintf(v->out, "verified %s: %zu bytes\n", s->name, store_map_bytes(s->map));
-        fflush(v->out);
+        log_line(v->out, "verified %s: %zu bytes", s->name, store_map_bytes(s->map));
     }
 }
 

@@ -78,7 +78,7 @@ class Mapped(unittest.TestCase):
             self.assertEqual(answer.headers["Content-Type"], "application/problem+json")
             self.assertIsNotNone(answer.headers["Retry-After"])
             detail = answer.json()["detail"]
-            self.assertIn(f"{name} is out of service: {path}: {words}", detail)
+            self.assertIn(f"{name} is out of service: {words}", detail)
         self.assertNotIn(name, self.names(daemon))
         self.assertEqual(self.gauge(daemon, "scenes_damaged"), 1)
         lines = [line for line in daemon.errors().splitlines() if line.startswith(f"took {name} out of service")]
