@@ -182,6 +182,56 @@ class OpenApi(unittest.TestCase):
         self.assertGreater(len(table), 10)
         self.assertEqual(sorted(table), sorted((method, path) for path, method, _ in self.operations()))
 
+    def statuses_of(self, *files):
+        """The statuses of the classes of problems that these files name."""
+        classes = dict(re.findall(r"\[(PROBLEM_\w+)\] = \{(\d+),", (SOURCE / "solver" / "codec" / "problem.c").read_text()))
+        self.assertGreater(len(classes), 20)
+        found = set()
+        for file in files:
+            named = re.findall(r"\bPROBLEM_\w+", (SOURCE / file).read_text())
+            found |= {classes[name] for name in named if name not in ("PROBLEM_NONE", "PROBLEM_COUNT")}
+        return found
+
+    def test_every_status_that_the_code_can_give(self):
+        """A problem that the sources of a route name is described there, and no other one is."""
+        body = [f"solver/codec/{name}.c" for name in "answer group_figures json json_adjoint json_emission json_parser npy request".split()]
+        own = {"get_healthz": ["get_health.c"], "get_readyz": ["get_health.c"], "get_metrics": ["get_metrics.c"],
+               "get_scenes": ["get_scenes.c"], "get_scene": ["get_scenes.c"], "get_openapi": ["get_openapi.c"],
+               "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c"], "post_adjoint": ["post_adjoint.c"],
+               "put_reflectance": ["reflectance_variants.c"], "delete_reflectance": ["reflectance_variants.c"],
+               "delete_scene": ["reflectance_variants.c"]}
+        table = re.findall(r"\{\.method = .*?\}(?=,\s)", ROUTES.read_text(), re.S)
+        self.assertGreater(len(table), 10)
+        framing, pages = self.statuses_of("server/http/framing.c"), self.statuses_of("server/http/browser.c")
+        self.assertEqual((framing, pages), ({"400", "501"}, {"403"}))
+        for row in table:
+            method, path = re.search(r'\.method = "(\w+)",\s+\.pattern = "([^"]+)"', row).groups()
+            handler = re.search(r"\.(?:handle|steps) = &?(\w+)", row)[1]
+            wanted = framing | self.statuses_of("server/route/call.c")  # 503: memory is short for any answer
+            if ".any_host" not in row:
+                wanted |= pages
+            if ".open" not in row or "TOKEN_METRICS" in row:
+                wanted |= {"401"}
+            if "{name}" in path:  # no such scene; a variant that could not be built answers by its problem
+                wanted |= {"404"}
+                if method != "DELETE":
+                    wanted |= self.statuses_of("server/scene/variants.c") - ({"429"} if method != "PUT" else set())
+            if "with_body" in row:
+                wanted |= {"413", "415"}
+            for file in own[handler]:
+                wanted |= self.statuses_of(f"server/route/{file}")
+            if handler.startswith("post_"):
+                wanted |= self.statuses_of(*body)
+            if method in ("PUT", "DELETE") and "with_body" in row:
+                wanted |= self.statuses_of("solver/codec/reflectance.c", "solver/codec/json.c")
+            # One file holds the handlers of variants: not all of its problems are of each.
+            wanted -= {"put_reflectance": {"405"}, "delete_reflectance": {"405", "409", "429"},
+                       "delete_scene": {"409", "413", "415", "422", "429"}}.get(handler, set())
+            said = set(self.document["paths"][path][method.lower()]["responses"])
+            with self.subTest(method=method, path=path):
+                self.assertEqual(sorted(wanted - said), [])
+                self.assertEqual(sorted(s for s in said - wanted if s >= "400"), [])
+
     def test_every_method_of_every_path(self):
         connection = self.daemon.connect()
         for path, item in self.document["paths"].items():
