@@ -12,7 +12,7 @@ import tempfile
 import numpy as np
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
-for name in ("json", "adjoint", "npy", "store", "import", "index"):
+for name in ("json", "adjoint", "npy", "store", "import", "index", "head"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -90,3 +90,8 @@ items = [root, item(0, b"/checksum\0"), item(1, b"/mesh-area\0", shape=(1, 0, 1,
 (folder / "index" / "whole").write_bytes(reply(items, 4))
 (folder / "index" / "refused").write_bytes(reply([root], 4, 4, b"store.h5: refused"))
 (folder / "index" / "shared").write_bytes(reply(items + [item(1, b"/x\0", shape=(0, 0, 1, 4), dims=[9], offset=4100)], 4))
+
+for k, lines in enumerate((('for=192.0.2.1;proto=http, For="[2001:db8::17]:80"', "", "localhost:8317", "https://a.example"),
+                           ("", "203.0.113.9, 198.51.100.1:80, 10.0.0.2", "[::1]:80", "http://[::1]:80"),
+                           ('for=_hidden;by="a\\"b"', "_hidden, unknown", "a.example", "null"), ("for", ",,", "[", "://"))):
+    (folder / "head" / f"{k}").write_text("\n".join(lines))
