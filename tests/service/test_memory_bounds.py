@@ -92,10 +92,10 @@ class Requests(Case):
         status = (process / "status").read_text()
         return int(re.search(rf"^{what}:\s+(\d+) kB", status, re.M).group(1)) * 1024
 
-    @staticmethod
-    def send(daemon, body, accept="application/json"):
-        """A connection whose answer is not read: its first byte is there."""
+    def send(self, daemon, body, accept="application/json"):
+        """A connection whose answer is not read."""
         s = socket.socket()
+        self.addCleanup(s.close)
         s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         s.connect(("127.0.0.1", daemon.port))
         s.sendall(b"POST /v1/scenes/big/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
@@ -108,7 +108,7 @@ class Requests(Case):
     def test_answers_that_nobody_reads(self):
         """Twelve of 128 vectors, 2.8 KB each, whose text is 70 MB: those that fit are held as floats, others are refused."""
         limit = 200 * MIB
-        with Daemon(self.store, "--threads", 2, "--max-request-memory", limit) as daemon:
+        with Daemon(self.store, "--threads", 2, "--max-request-memory", limit, "--timeout", 3600) as daemon:
             clients, statuses = [], []
             for _ in range(12):
                 clients.append(self.send(daemon, self.groups(128)))
@@ -138,7 +138,7 @@ class Requests(Case):
     def test_requests_under_way(self):
         """Short bodies that ask for 1,024 vectors of 60,000 elements, 246 MB of emission alone."""
         limit = 300 * MIB
-        with Daemon(self.store, "--threads", 2, "--max-request-memory", limit) as daemon:
+        with Daemon(self.store, "--threads", 2, "--max-request-memory", limit, "--timeout", 3600) as daemon:
             clients = [self.send(daemon, self.groups(1024), "application/x-npy") for _ in range(6)]
             statuses = [s.recv(12)[9:] for s in clients]
             # Each fits alone, and its answer with another that is computed.
