@@ -78,6 +78,10 @@ static bool put(call *in, reflectance_request *request, char **location, problem
     return variants_put(in->service->variants, scene_of(in), name, reflectance, request->groups, why);
 }
 
+/* Memory of a tree of JSON for each letter of its text, at most: [] and a comma are an array with room for
+ * eight. */
+#define TREE_OF_LETTER 48
+
 void put_reflectance(call *in, answer *out) {
     const scene *s = in->scene;
     problem why = {0};
@@ -88,7 +92,12 @@ void put_reflectance(call *in, answer *out) {
     if (good) {
         const reflectance_scene about = {
             .n = s->n, .n_channels = s->n_channels, .groups = &s->groups, .reflectance = s->op->reflectance};
-        good = codec_read_reflectance(&about, in->body, in->length, &request, &why);
+        /* All is given back with the answer; what the builder holds meanwhile is the variant's. */
+        good = request_memory_take(in->memory,
+                                   bytes_plus(bytes_times(in->length, TREE_OF_LETTER),
+                                              bytes_times(s->n, s->n_channels * sizeof(float))),
+                                   &why) &&
+               codec_read_reflectance(&about, in->body, in->length, &request, &why);
     }
     if (good && !buffer_append_text(&b, "{\"status\":\"building\"}\n"))
         good = problem_set(&why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
