@@ -14,7 +14,7 @@ typedef struct answer_stream answer_stream;
 
 /* Bytes of an answer, at most, and the longest that is worth to be encoded as a whole. */
 size_t answer_bytes_most(const answer_shape *shape, const media_accept *as);
-#define ANSWER_WHOLE ((size_t)4 << 20)
+#define ANSWER_WHOLE ((size_t)12 << 20)
 
 /* Takes over head, the bytes of answer_begin; x [n_rhs][C][n_values], which answer_check_encoding has passed;
  * and tail, those of answer_end. Errors: NULL when memory is short, everything is then the caller's. */

@@ -69,7 +69,7 @@ class LongAnswers(unittest.TestCase):
 
 
     def stream(self, daemon, accept="application/json", coding=None, version="1.1", n=40):
-        """Status line, headers and body of an answer of n vectors, whose text is above 4 MiB."""
+        """Status line, headers and body of an answer of n vectors, whose text is above 12 MiB."""
         body = json.dumps({"emissions": [{"groups": {"g1": v}} for v in range(1, n + 1)]}).encode()
         more = f"Accept-Encoding: {coding}\r\n" if coding else ""
         with daemon.raw() as s:
@@ -93,8 +93,8 @@ class LongAnswers(unittest.TestCase):
                     ("application/x-npy; dtype=f2", np.float16):
                 plain = None
                 for coding, version in (None, "1.1"), ("gzip", "1.1"), ("zstd", "1.1"), (None, "1.0"), ("gzip", "1.0"):
-                    # Enough that half precision passes 4 MiB too.
-                    n = 120 if exact == np.float16 else 40
+                    # Enough that every encoding passes 12 MiB.
+                    n = {np.float32: 40, np.float64: 80, np.float16: 320}[exact]
                     line, headers, body = self.stream(daemon, accept, coding, version, n)
                     self.assertTrue(line.endswith(" 200 OK"), line)
                     used = headers.get("content-encoding")
