@@ -99,7 +99,7 @@ static void serve_until_signal(service *s, const sigset_t *signals) {
     }
 }
 
-/* Seconds in which the answers of solves that are given up are sent. */
+/* Seconds in which the answers of solves that are given up are sent, the last of --shutdown-timeout. */
 #define LAST_ANSWERS_S .8
 
 static bool is_busy(service *s) {
@@ -136,7 +136,8 @@ static bool leave(service *s, http *h, unix_socket *own, const sigset_t *signals
     http_quiesce(h);
     connections_unlink(own);
     variants_close(s->variants);
-    if (!hurried && idle_within(s, (double)s->config->shutdown_timeout_s, signals)) return true;
+    if (!hurried && idle_within(s, (double)s->config->shutdown_timeout_s - LAST_ANSWERS_S, signals))
+        return true;
     atomic_store(&s->state, SERVICE_ENDING);
     batch_abandon(s->queue);
     (void)idle_within(s, LAST_ANSWERS_S, signals);

@@ -22,7 +22,7 @@ class Soak(unittest.TestCase):
         self.assertIn("'400'", said)
 
     def test_mixed(self):
-        self.assertIn("no fault", self.run_soak("mixed.py", 8))
+        self.assertIn("no fault", self.run_soak("mixed.py", 8, "untimed"))
 
 
 if __name__ == "__main__":
