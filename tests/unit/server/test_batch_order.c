@@ -2,6 +2,7 @@
  * for, and the thread for short jobs. Costs are what a line is charged, as the functions take no time
  * themselves. */
 #include "server/queue/batch.h"
+#include "server/queue/job_order.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -125,6 +126,26 @@ START_TEST(kinds_have_equal_shares) {
         charge[kind] += costs[kind];
         if (next[0] < N && next[1] < N) ck_assert_double_le(fabs(charge[0] - charge[1]), 50e-3 + 1e-9);
     }
+}
+END_TEST
+
+/* A pass of .4 s over three vectors of one kind and one of another is charged to them by these. */
+START_TEST(a_pass_is_charged_by_vectors) {
+    static job_order order;
+    batch_job jobs[2] = {{.kind = 1, .n_vectors = 3}, {.kind = 2, .n_vectors = 1}};
+    batch_part parts[2];
+    double before[2];
+    for (size_t k = 0; k < 2; k++) {
+        order_enter(&order, &jobs[k]);
+        order_add(&order.waiting, &jobs[k]);
+        parts[k] = (batch_part){&jobs[k], 0, jobs[k].n_vectors};
+    }
+    ck_assert_uint_ne(jobs[0].line, jobs[1].line);
+    for (size_t k = 0; k < 2; k++) before[k] = order.lines[jobs[k].line].charge;
+    const size_t lines[2] = {jobs[0].line, jobs[1].line};
+    order_sort(&order, parts, 2, .4);
+    ck_assert_double_eq_tol(order.lines[lines[0]].charge - before[0], .3, 1e-12);
+    ck_assert_double_eq_tol(order.lines[lines[1]].charge - before[1], .1, 1e-12);
 }
 END_TEST
 
@@ -318,6 +339,7 @@ int main(void) {
     TCase *tests = tcase_create("order");
     tcase_set_timeout(tests, 60);
     tcase_add_test(tests, kinds_have_equal_shares);
+    tcase_add_test(tests, a_pass_is_charged_by_vectors);
     tcase_add_test(tests, a_new_kind_goes_next);
     tcase_add_test(tests, a_pass_waits_for_few_begins);
     tcase_add_test(tests, short_jobs_wait_for_no_long_function);
