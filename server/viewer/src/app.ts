@@ -1,0 +1,283 @@
+// Ties the state, the daemon and the picture together. Panels listen to it and change the state; they hold none.
+import { Box3, BufferAttribute } from "three";
+import { luminance, type Rgb } from "./base/colour.ts";
+import { Api, Lost, Problem, type Description, type SceneLine } from "./daemon/api.ts";
+import { Newest } from "./daemon/newest.ts";
+import { Cameras } from "./picture/cameras.ts";
+import { Field, spreadOf, type Spread } from "./picture/field.ts";
+import { readMesh, type SceneMesh } from "./picture/glb.ts";
+import { Picker } from "./picture/pick.ts";
+import { Stage } from "./picture/stage.ts";
+import { wantedFor, type Abilities, type Wanted } from "./state/request.ts";
+import { firstState, type GroupLight, type Lighting, type State } from "./state/state.ts";
+import { Store } from "./state/store.ts";
+
+export interface OpenScene {
+    description: Description;
+    mesh: SceneMesh;
+    picker: Picker;
+    /** Lighting that the scene comes with. */
+    ownLighting: Lighting;
+}
+
+export interface Timing {
+    /** From the request to the picture's textures, and in the daemon, ms. */
+    roundTrip: number;
+    solve: number | null;
+}
+
+type Event = "scene" | "field" | "pick" | "hover" | "timing" | "lost" | "found" | "problem" | "token";
+type Side = 0 | 1;
+
+/** Of the unit shown: lx where the store's numbers are photometric already, so no factor. */
+const MIDDLE_GREY = 0.2;
+
+export class App {
+    readonly api = new Api();
+    readonly store = new Store(firstState);
+    readonly stage: Stage;
+    readonly cameras: Cameras;
+    scenes: SceneLine[] = [];
+    scene: OpenScene | null = null;
+    fields: [Field | null, Field | null] = [null, null];
+    spread: Spread = { low: 0, high: 1, most: 1, logMean: 0 };
+    timing: Timing = { roundTrip: 0, solve: null };
+    hovered: number | null = null;
+    problem: string | null = null;
+    isLost = false;
+    /** Answers shown so far. */
+    answers = 0;
+    /** Radiances of the sky's tiles for a lighting; set by the panel of skies. */
+    skyOf: (lighting: Lighting, scene: OpenScene) => readonly (number | number[])[] | null = () => null;
+    private readonly listeners = new Map<Event, Set<() => void>>();
+    private readonly askers: [Newest<Wanted, [Field, number | null]>, Newest<Wanted, [Field, number | null]>];
+    private asked = ["", ""];
+    private opening = 0;
+
+    constructor(canvas: HTMLCanvasElement) {
+        this.cameras = new Cameras(canvas, () => this.stage.invalidate(), () => this.keepCamera());
+        this.stage = new Stage(canvas, this.cameras.camera, (seconds) => this.cameras.advance(seconds));
+        const asker = (side: Side): Newest<Wanted, [Field, number | null]> => new Newest(
+            (wanted) => this.solve(wanted), (answer, wanted) => this.take(side, answer, wanted), (reason) => this.fail(reason));
+        this.askers = [asker(0), asker(1)];
+        this.store.listen((now, before) => this.changed(now, before));
+    }
+
+    on(event: Event, listener: () => void): void {
+        if (!this.listeners.has(event)) this.listeners.set(event, new Set());
+        this.listeners.get(event)?.add(listener);
+    }
+
+    tell(event: Event): void {
+        for (const listener of this.listeners.get(event) ?? []) listener();
+    }
+
+    /** Opens a scene; the rest of the state is given (a link), or that of the scene as it comes. */
+    async open(name: string, given: State | null): Promise<void> {
+        const turn = ++this.opening;
+        const [description, file] = await Promise.all([this.api.describe(name), this.api.mesh(name)]);
+        if (turn !== this.opening) return;
+        const mesh = readMesh(file);
+        this.stage.show(mesh, description.channels);
+        const picker = new Picker(this.stage.geometry as never, mesh);
+        const ownLighting = lightingOf(mesh, description);
+        this.scene = { description, mesh, picker, ownLighting };
+        this.cameras.setBounds(new Box3().setFromBufferAttribute(new BufferAttribute(mesh.positions, 3)));
+        this.fields = [null, null];
+        this.askers.forEach((asker) => asker.forget());
+        this.asked = ["", ""];
+        const base = given ?? { ...firstState, view: { ...this.store.now.view, camera: null, exposure: null, range: null } };
+        const lighting = { ...base.lighting, groups: { ...ownLighting.groups, ...base.lighting.groups } };
+        if (base.lighting === firstState.lighting) Object.assign(lighting, ownLighting);
+        this.store.restart({ ...base, scene: name, lighting, pins: base.pins.filter((pin) => pin < mesh.elements) });
+        document.title = `${name} · Lambert`;
+        this.stage.resize();
+        this.cameras.setWalk(base.view.walk);
+        if (base.view.camera === null) this.cameras.fit(false);
+        else this.cameras.place(base.view.camera, false);
+        this.tell("scene");
+        this.ask();
+    }
+
+    /** What is shown now, as a request. */
+    wanted(side: Side = 0): Wanted | null {
+        const { scene, store: { now } } = this;
+        if (scene === null || (side === 1 && now.compare === null)) return null;
+        const quantity = now.view.picture === "light" ? "radiosity" : now.view.quantity;
+        const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
+        const name = (side === 1 ? now.compare?.scene : null) ?? now.scene;
+        return wantedFor(name, quantity, lighting, this.abilities(scene, lighting));
+    }
+
+    abilities(scene: OpenScene, lighting: Lighting): Abilities {
+        return {
+            channels: scene.description.channels, groups: scene.mesh.groups.map((group) => group.name),
+            emitters: scene.description.emitters?.length ?? 0, sky: this.skyOf(lighting, scene),
+        };
+    }
+
+    /** Asks for what is to be shown, if that has changed. */
+    ask(again = false): void {
+        for (const side of [0, 1] as const) {
+            const wanted = this.wanted(side);
+            const key = wanted === null ? "" : JSON.stringify(wanted);
+            if (wanted === null || (key === this.asked[side] && !again)) continue;
+            this.asked[side] = key;
+            this.askers[side].want(wanted);
+        }
+    }
+
+    get isIdle(): boolean {
+        return this.askers.every((asker) => asker.isIdle);
+    }
+
+    hover(element: number | null): void {
+        if (element === this.hovered) return;
+        this.hovered = element;
+        this.stage.mark(element ?? -1, this.store.now.pins);
+        this.tell("hover");
+    }
+
+    fail(reason: unknown): void {
+        if (reason instanceof DOMException && reason.name === "AbortError") return;
+        if (reason instanceof Lost) {
+            this.lose();
+            return;
+        }
+        if (reason instanceof Problem && reason.status === 401) {
+            this.tell("token");
+            return;
+        }
+        if (reason instanceof Problem && reason.status === 503) {
+            this.lose();
+            return;
+        }
+        this.problem = reason instanceof Error ? reason.message : String(reason);
+        this.tell("problem");
+    }
+
+    private async solve(wanted: Wanted): Promise<[Field, number | null]> {
+        const { scene } = this;
+        if (scene === null) throw new Error("no scene is open");
+        if (wanted.emission === null) {
+            const { channels } = scene.description;
+            return [new Field(new Uint16Array(channels * scene.mesh.elements), [channels, scene.mesh.elements], 1), null];
+        }
+        const start = performance.now();
+        const { values, solveMs } = await this.api.radiosity(wanted.scene,
+            { emission: wanted.emission, quantity: wanted.quantity });
+        this.timing = { roundTrip: performance.now() - start, solve: solveMs };
+        const field = Field.of(values, wanted.scale);
+        if (field.elements !== scene.mesh.elements)
+            throw new Error(`${wanted.scene} has ${field.elements} elements, the mesh shown has ${scene.mesh.elements}`);
+        return [field, solveMs];
+    }
+
+    private take(side: Side, [field]: [Field, number | null], wanted: Wanted): void {
+        if (this.isLost) this.find();
+        this.problem = null;
+        this.fields[side] = field;
+        this.answers += 1;
+        this.stage.setField(side, field);
+        if (side === 0) this.measure(wanted);
+        this.setLook();
+        this.tell("field");
+        this.tell("timing");
+    }
+
+    /** Finds the ends of the palette and the exposure, where the person left them to the page. */
+    private measure(wanted: Wanted): void {
+        const { scene, fields: [field], store: { now } } = this;
+        if (scene === null || field === null) return;
+        const mustMeasure = now.view.picture === "false" ? now.view.range === null : now.view.exposure === null || now.view.follow;
+        if (!mustMeasure || wanted.emission === null) return;
+        const lit = now.lighting.groups;
+        const isDark = scene.mesh.groups.map((group) => !(lit[group.name]?.on && lit[group.name].power > 0));
+        const dark = isDark.some((d) => d) ? (i: number): boolean => isDark[scene.mesh.groupOf[i]] : (): boolean => true;
+        this.spread = spreadOf(field.values, scene.mesh.area, dark);
+        if (now.view.picture === "light" && this.spread.most > 0) {
+            const exposure = Number((Math.log2(MIDDLE_GREY) - this.spread.logMean).toFixed(2));
+            this.store.settle({ ...now, view: { ...now.view, exposure } });
+        }
+    }
+
+    /** Hands all that shapes the picture, but the values, to the stage. */
+    setLook(): void {
+        const { view, compare } = this.store.now;
+        const range: [number, number] = view.range ?? [view.log ? Math.max(this.spread.low, this.spread.high / 1e4) : 0, this.spread.high];
+        this.stage.setLook({
+            picture: view.picture, smooth: view.smooth, tone: view.tone, exposure: 2 ** (view.exposure ?? 0), palette: view.palette,
+            range, log: view.log, isoLines: view.isoLines, threshold: view.threshold,
+            compare: compare === null || this.fields[1] === null ? "none" : compare.how, split: compare?.split ?? 0.5,
+        });
+    }
+
+    private changed(now: State, before: State): void {
+        if (now.view.walk !== before.view.walk) this.cameras.setWalk(now.view.walk);
+        if (now.pins !== before.pins) this.stage.mark(this.hovered ?? -1, now.pins);
+        if (now.view.judged !== before.view.judged || now.scene !== before.scene) this.judge(now);
+        if (now.compare === null && before.compare !== null) {
+            this.fields[1] = null;
+            this.asked[1] = "";
+        }
+        if (now.view !== before.view || now.compare !== before.compare) this.setLook();
+        this.ask();
+    }
+
+    private judge(now: State): void {
+        const { scene } = this;
+        if (scene === null) return;
+        const group = scene.mesh.groups.findIndex((g) => g.name === now.view.judged);
+        this.stage.judge((element) => group < 0 || scene.mesh.groupOf[element] === group);
+    }
+
+    private keepCamera(): void {
+        const { store: { now } } = this;
+        if (this.scene === null) return;
+        const camera = this.cameras.now;
+        if (JSON.stringify(camera) !== JSON.stringify(now.view.camera))
+            this.store.settle({ ...now, view: { ...now.view, camera } });
+    }
+
+    private lose(): void {
+        if (this.isLost) return;
+        this.isLost = true;
+        this.tell("lost");
+        const again = async (): Promise<void> => {
+            if (!this.isLost) return;
+            if (await this.api.isReady()) this.find();
+            else setTimeout(() => void again(), 1000);
+        };
+        setTimeout(() => void again(), 500);
+    }
+
+    private find(): void {
+        this.isLost = false;
+        this.tell("found");
+        if (this.scene === null) return;
+        // The store may be another one now.
+        void this.api.describe(this.store.now.scene).then((description) => {
+            if (JSON.stringify(description) !== JSON.stringify(this.scene?.description)) return this.open(this.store.now.scene, this.store.now);
+            this.ask(true);
+            return undefined;
+        }).catch((reason: unknown) => this.fail(reason));
+    }
+}
+
+/** Lights as the scene has them: each group that emits, with its power and colour. */
+function lightingOf(mesh: SceneMesh, description: Description): Lighting {
+    const groups: { [name: string]: GroupLight } = {};
+    for (const group of mesh.groups) if (group.emission !== null) groups[group.name] = lightOf(group.emission);
+    const emitters: { [index: string]: number } = {};
+    description.emitters?.forEach((_, index) => { emitters[index] = 1; });
+    const sky = description.sky === null ? firstState.lighting.sky : { ...firstState.lighting.sky, model: "overcast" as const };
+    return { ...firstState.lighting, groups, emitters, sky };
+}
+
+export function lightOf(emission: Rgb): GroupLight {
+    const power = luminance(emission);
+    return {
+        on: true, power: Number(power.toPrecision(6)), kelvin: null,
+        colour: power > 0 ? emission.map((v) => Number((v / power).toPrecision(6))) as Rgb : [1, 1, 1],
+    };
+}

@@ -1,0 +1,139 @@
+// Asks the daemon. Knows its routes and their JSON, and nothing of pictures.
+import { readNpy, type Npy } from "../base/npy.ts";
+
+export interface SceneLine {
+    name: string;
+    elements: number;
+    channels: number;
+    kind: string;
+    bytes: number;
+}
+
+export type ErrorFigures = { [name: string]: number };
+
+export interface Description {
+    name: string;
+    elements: number;
+    channels: number;
+    kind: string;
+    method: string;
+    reason: string;
+    bytes: number;
+    groups: { name: string; elements: number }[];
+    emitters: string[] | null;
+    sky: { tiling: string; tiles: number; ground_albedo: number } | null;
+    error: { single?: ErrorFigures; lights?: ErrorFigures; random?: ErrorFigures; sky?: ErrorFigures } | null;
+    provenance?: { [name: string]: unknown };
+}
+
+/** A body for POST …/radiosity; EMISSION of the contract. */
+export type Emission = { [member: string]: unknown };
+
+export type Quantity = "radiosity" | "irradiance" | "indirect";
+
+/** An answer that is no success: what the problem document says. */
+export class Problem extends Error {
+    constructor(readonly status: number, detail: string, readonly retryAfter: number) {
+        super(detail);
+    }
+}
+
+/** The daemon did not answer. */
+export class Lost extends Error {}
+
+const TOKEN_KEY = "lambert-token";
+
+export class Api {
+    /** Requests so far, for the tests and the curious. */
+    asked = 0;
+
+    get token(): string | null {
+        return sessionStorage.getItem(TOKEN_KEY);
+    }
+
+    set token(value: string | null) {
+        if (value === null) sessionStorage.removeItem(TOKEN_KEY);
+        else sessionStorage.setItem(TOKEN_KEY, value);
+    }
+
+    async ask(path: string, init: RequestInit = {}, accept = "application/json"): Promise<Response> {
+        const headers = new Headers(init.headers);
+        headers.set("Accept", accept);
+        if (this.token !== null) headers.set("Authorization", `Bearer ${this.token}`);
+        this.asked += 1;
+        let response: Response;
+        try {
+            response = await fetch(path, { ...init, headers, credentials: "omit" });
+        } catch (reason) {
+            if (reason instanceof DOMException && reason.name === "AbortError") throw reason;
+            throw new Lost("the daemon does not answer");
+        }
+        if (response.ok) return response;
+        const text = await response.text();
+        let detail = `${response.status} ${response.statusText}`;
+        try {
+            detail = (JSON.parse(text) as { detail?: string }).detail ?? detail;
+        } catch {
+            // A proxy may have answered in words of its own.
+        }
+        throw new Problem(response.status, detail, Number(response.headers.get("Retry-After") ?? 0));
+    }
+
+    private post(path: string, body: unknown, accept: string, signal?: AbortSignal): Promise<Response> {
+        return this.ask(path, {
+            method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" },
+            ...(signal === undefined ? {} : { signal }),
+        }, accept);
+    }
+
+    static path(scene: string, what = ""): string {
+        return `/v1/scenes/${encodeURIComponent(scene)}${what}`;
+    }
+
+    async isReady(): Promise<boolean> {
+        try {
+            return (await fetch("/readyz", { cache: "no-store" })).ok;
+        } catch {
+            return false;
+        }
+    }
+
+    async scenes(): Promise<SceneLine[]> {
+        return ((await (await this.ask("/v1/scenes")).json()) as { scenes: SceneLine[] }).scenes;
+    }
+
+    async describe(scene: string): Promise<Description> {
+        return (await (await this.ask(Api.path(scene))).json()) as Description;
+    }
+
+    async mesh(scene: string): Promise<ArrayBuffer> {
+        return (await this.ask(Api.path(scene, "/mesh"), {}, "model/gltf-binary")).arrayBuffer();
+    }
+
+    /** [C][n] values, or [n] of one channel, in half precision; `request` has the emission and the quantity. */
+    async radiosity(scene: string, request: object, signal?: AbortSignal): Promise<{ values: Npy; solveMs: number | null }> {
+        const response = await this.post(Api.path(scene, "/radiosity"), request, "application/x-npy; dtype=f2", signal);
+        const solve = /solve;dur=([\d.]+)/.exec(response.headers.get("Server-Timing") ?? "");
+        return { values: readNpy(await response.arrayBuffer()), solveMs: solve === null ? null : Number(solve[1]) };
+    }
+
+    /** The same as JSON, with its error, for selected elements, reductions and refinements. */
+    async answer(scene: string, request: object, signal?: AbortSignal): Promise<{ [member: string]: unknown }> {
+        return (await (await this.post(Api.path(scene, "/radiosity"), request, "application/json", signal)).json()) as
+            { [member: string]: unknown };
+    }
+
+    async adjoint(scene: string, request: object, signal?: AbortSignal): Promise<{ [member: string]: unknown }> {
+        return (await (await this.post(Api.path(scene, "/adjoint"), request, "application/json", signal)).json()) as
+            { [member: string]: unknown };
+    }
+
+    /** Makes a variant of reflectances, or removes it (groups null); its name is NAME@variant. */
+    async vary(scene: string, variant: string, groups: { [name: string]: readonly number[] } | null): Promise<void> {
+        await this.ask(Api.path(scene, "/reflectance"), {
+            method: groups === null ? "DELETE" : "PUT",
+            headers: { "Content-Type": "application/json" },
+            body: JSON.stringify(groups === null ? { variant } : { variant, groups }),
+        });
+    }
+}

@@ -1,0 +1,62 @@
+// Starts the page.
+import { App } from "./app.ts";
+import { make } from "./base/dom.ts";
+import { makeBanner, makeBar, makeDrawer, makeStatus, makeTokenDialog, setBackground } from "./panels/frame.ts";
+import { lightsPanel } from "./panels/lights.ts";
+import { lookPanel } from "./panels/look.ts";
+import type { PanelMaker } from "./panels/panel.ts";
+import { fromFragment, toFragment } from "./state/link.ts";
+import "./style.css";
+
+/** The panels, in the order of their tabs. */
+const panelMakers: readonly PanelMaker[] = [lightsPanel, lookPanel];
+
+/** The fragment is written this long after the last change. */
+const LINK_MS = 300;
+
+function start(): void {
+    const canvas = make("canvas", { tabindex: 0, "aria-label": "The scene. Arrow keys turn it, plus and minus move, F shows all of it." });
+    const frame = make("main", {}, canvas);
+    // The canvas needs a place before its size is asked for.
+    document.body.append(frame);
+    const app = new App(canvas);
+    frame.append(makeBanner(app));
+    document.body.prepend(makeBar(app));
+    document.body.append(makeDrawer(app, panelMakers.map((makePanel) => makePanel(app))), makeStatus(app), makeTokenDialog(app, () => void begin(app)));
+    setBackground(app);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setBackground(app));
+    keepLink(app);
+    // For tests, and for those who look into the page.
+    Object.assign(window, { lambert: app });
+    void begin(app);
+}
+
+async function begin(app: App): Promise<void> {
+    try {
+        app.scenes = await app.api.scenes();
+        const given = fromFragment(location.hash);
+        const name = app.scenes.find((scene) => scene.name === given?.scene)?.name ?? app.scenes[0]?.name;
+        if (name === undefined) throw new Error("The daemon serves no scene.");
+        await app.open(name, given !== null && given.scene === name ? given : null);
+    } catch (reason) {
+        app.fail(reason);
+        if (app.isLost) app.on("found", () => { if (app.scene === null) void begin(app); });
+    }
+}
+
+function keepLink(app: App): void {
+    let timer = 0, written = "";
+    app.store.listen(() => {
+        clearTimeout(timer);
+        timer = window.setTimeout(() => {
+            if (app.scene === null) return;
+            written = toFragment(app.store.now);
+            history.replaceState(null, "", written);
+        }, LINK_MS);
+    });
+    window.addEventListener("hashchange", () => {
+        if (location.hash !== written) void begin(app);
+    });
+}
+
+start();

@@ -1,0 +1,141 @@
+// The frame of the page: the bar above, the panels beside or below the picture, the line of figures, the banner.
+import { button, choice, fill, make } from "../base/dom.ts";
+import { count, percent, tell } from "../base/numbers.ts";
+import type { App } from "../app.ts";
+import type { Panel } from "./panel.ts";
+
+export function makeBar(app: App): HTMLElement {
+    const scenes = make("div", { class: "scenes" });
+    const undo = button("↶", "Undo (Ctrl+Z)", () => app.store.undo());
+    const redo = button("↷", "Redo (Ctrl+Y)", () => app.store.redo());
+    const share = button("Link", "Copy a link to this state", () => {
+        void navigator.clipboard?.writeText(location.href).then(() => {
+            share.textContent = "Copied";
+            setTimeout(() => { share.textContent = "Link"; }, 1500);
+        }, () => undefined);
+    });
+    const theme = button("◐", "Dark or light page", () => {
+        const root = document.documentElement;
+        const isDark = root.dataset.theme === undefined ? matchMedia("(prefers-color-scheme: dark)").matches : root.dataset.theme === "dark";
+        root.dataset.theme = isDark ? "light" : "dark";
+        setBackground(app);
+    });
+    const update = (): void => {
+        undo.disabled = !app.store.canUndo;
+        redo.disabled = !app.store.canRedo;
+    };
+    app.store.listen(update);
+    app.on("scene", () => {
+        update();
+        fill(scenes, choice("Scene", app.scenes.map((scene) => [scene.name, scene.name] as const), app.store.now.scene, (name) => {
+            void app.open(name, null).catch((reason: unknown) => app.fail(reason));
+        }));
+    });
+    document.addEventListener("keydown", (event) => {
+        if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+        const key = event.key.toLowerCase();
+        if (key === "z" && !event.shiftKey) app.store.undo();
+        else if (key === "y" || (key === "z" && event.shiftKey)) app.store.redo();
+        else return;
+        event.preventDefault();
+    });
+    return make("header", {}, make("h1", {}, "Lambert"), scenes, make("div", { class: "row", role: "group", "aria-label": "State" }, undo, redo, share, theme));
+}
+
+export function setBackground(app: App): void {
+    app.stage.background = getComputedStyle(document.documentElement).getPropertyValue("--stage").trim();
+}
+
+/** Tabs after the pattern of WAI-ARIA: arrows move between them. */
+export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
+    let current = panels[0].id;
+    const tabs = new Map(panels.map((panel) => [panel.id, make("button", {
+        type: "button", role: "tab", id: `tab-${panel.id}`, "aria-controls": `panel-${panel.id}`,
+        onclick: () => show(panel.id), onkeydown: (event: KeyboardEvent) => move(event, panel.id),
+    }, panel.title)]));
+    const bodies = new Map(panels.map((panel) => [panel.id, make("div", {
+        role: "tabpanel", id: `panel-${panel.id}`, "aria-labelledby": `tab-${panel.id}`, tabindex: 0,
+    }, panel.element)]));
+    const useful = (): Panel[] => panels.filter((panel) => panel.isUseful?.(app) ?? true);
+    const show = (id: string): void => {
+        current = id;
+        for (const panel of panels) {
+            const tab = tabs.get(panel.id) as HTMLElement, isOn = panel.id === id;
+            tab.setAttribute("aria-selected", String(isOn));
+            tab.tabIndex = isOn ? 0 : -1;
+            (bodies.get(panel.id) as HTMLElement).hidden = !isOn;
+        }
+    };
+    const move = (event: KeyboardEvent, id: string): void => {
+        const way = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+        if (way === 0) return;
+        event.preventDefault();
+        const all = useful(), at = all.findIndex((panel) => panel.id === id);
+        const next = all[(at + way + all.length) % all.length];
+        show(next.id);
+        tabs.get(next.id)?.focus();
+    };
+    const update = (): void => {
+        const all = useful();
+        for (const panel of panels) (tabs.get(panel.id) as HTMLElement).hidden = !all.includes(panel);
+        if (!all.some((panel) => panel.id === current)) show(all[0].id);
+    };
+    app.on("scene", update);
+    show(current);
+    const drawer = make("aside", { "aria-label": "Panels" }, make("div", { role: "tablist", "aria-label": "Panels" }, ...tabs.values()),
+        make("div", { class: "bodies" }, ...bodies.values()));
+    const fold = button("▾", "Fold the panels", () => {
+        const folded = document.body.classList.toggle("folded");
+        fold.setAttribute("aria-expanded", String(!folded));
+        fold.textContent = folded ? "▴" : "▾";
+    }, { class: "fold", "aria-expanded": "true" });
+    drawer.prepend(fold);
+    return drawer;
+}
+
+/** Size, error and time: always in sight. */
+export function makeStatus(app: App): HTMLElement {
+    const size = make("span", {}), error = make("span", {}), time = make("span", { "data-figure": "time" });
+    app.on("scene", () => {
+        const { description } = app.scene as NonNullable<App["scene"]>;
+        size.textContent = `${count(description.elements)} elements · ${description.kind}`;
+        const figures = description.error?.lights ?? description.error?.single ?? description.error?.sky;
+        error.textContent = figures === undefined || figures.total_indirect_mean === undefined ? "error not measured"
+            : `error ${percent(figures.total_indirect_mean)} of the indirect light, ${percent(figures.total_relative_mean)} of all`;
+        error.title = description.reason;
+    });
+    app.on("timing", () => {
+        const { roundTrip, solve } = app.timing;
+        time.textContent = solve === null ? `answer ${tell(roundTrip, 2)} ms` : `solve ${tell(solve, 2)} ms, answer ${tell(roundTrip, 2)} ms`;
+    });
+    return make("footer", { "aria-label": "Figures" }, size, error, time);
+}
+
+/** Tells that the daemon is gone, or of a request that failed. */
+export function makeBanner(app: App): HTMLElement {
+    const banner = make("div", { class: "banner", role: "status", "aria-live": "polite", hidden: true });
+    const show = (text: string | null): void => {
+        banner.hidden = text === null;
+        banner.textContent = text ?? "";
+    };
+    app.on("lost", () => show("The daemon does not answer. This page asks again each second and goes on by itself."));
+    app.on("found", () => show(null));
+    app.on("problem", () => show(app.problem));
+    app.on("field", () => { if (!app.isLost) show(null); });
+    return banner;
+}
+
+/** Asks for a token, which is kept as long as this tab. */
+export function makeTokenDialog(app: App, again: () => void): HTMLDialogElement {
+    const field = make("input", { type: "password", autocomplete: "off", required: true, "aria-label": "Token" });
+    const dialog = make("dialog", { "aria-label": "A token is needed" },
+        make("form", {
+            method: "dialog", onsubmit: () => {
+                app.api.token = field.value.trim();
+                field.value = "";
+                again();
+            },
+        }, make("p", {}, "This daemon asks for a token. It is kept until this tab is closed."), field, make("button", { type: "submit" }, "Go on")));
+    app.on("token", () => { if (!dialog.open) dialog.showModal(); });
+    return dialog;
+}

@@ -1,0 +1,119 @@
+// The lights: every group that emits, and any other that a person lets shine.
+import { fromHex, luminance, ofTemperature, toHex, type Rgb } from "../base/colour.ts";
+import { button, choice, fill, make, tick, unique } from "../base/dom.ts";
+import type { App } from "../app.ts";
+import type { GroupLight, Lighting } from "../state/state.ts";
+import type { Panel } from "./panel.ts";
+import { slider, type Slider } from "./slider.ts";
+
+interface Row {
+    element: HTMLElement;
+    update(light: GroupLight, solo: string | null): void;
+}
+
+export function lightsPanel(app: App): Panel {
+    const rows = new Map<string, Row>();
+    const list = make("div", { class: "lights" });
+    const presets = make("div", { class: "presets" });
+    const change = (to: Partial<Lighting>, tag: string | null): void => {
+        const { now } = app.store;
+        app.store.change({ ...now, lighting: { ...now.lighting, ...to } }, tag);
+    };
+    const changeGroup = (name: string, to: Partial<GroupLight>, tag: string | null): void => {
+        const { groups } = app.store.now.lighting;
+        change({ groups: { ...groups, [name]: { ...groups[name], ...to } } }, tag);
+    };
+    const dim = slider({ label: "All", unit: "×", least: 0, most: 2, step: 0.01, change: (value) => change({ dim: value }, "dim") }, 1);
+    const more = make("div", {});
+    const draw = (): void => {
+        const { lighting } = app.store.now;
+        const names = Object.keys(lighting.groups).filter((name) => app.scene?.mesh.groups.some((g) => g.name === name));
+        rows.clear();
+        fill(list, ...names.map((name) => {
+            const row = lightRow(app, name, lighting.groups[name], changeGroup, (solo) => change({ solo }, null));
+            rows.set(name, row);
+            return row.element;
+        }));
+        if (names.length === 0) list.append(make("p", { class: "hint" }, "No group of this scene emits light."));
+        drawMore();
+    };
+    const drawMore = (): void => {
+        const { groups } = app.store.now.lighting;
+        const others = app.scene?.mesh.groups.filter((g) => !(g.name in groups)).map((g) => g.name) ?? [];
+        fill(more, others.length > 0 && choice("Let another group shine", [["", "…"], ...others.map((n) => [n, n] as const)], "", (name) => {
+            if (name !== "") changeGroup(name, { on: true, power: 1, colour: [1, 1, 1], kelvin: null }, null);
+        }));
+    };
+    const update = (): void => {
+        const { lighting } = app.store.now;
+        dim.set(lighting.dim);
+        const known = Object.keys(lighting.groups).filter((name) => app.scene?.mesh.groups.some((g) => g.name === name));
+        if (known.length !== rows.size || known.some((name) => !rows.has(name))) draw();
+        for (const [name, row] of rows) row.update(lighting.groups[name], lighting.solo);
+    };
+    app.on("scene", () => { draw(); drawPresets(app, presets); });
+    app.store.listen((now, before) => {
+        if (now.lighting !== before.lighting) update();
+        if (now.presets !== before.presets) drawPresets(app, presets);
+    });
+    const reset = button("As the scene comes", null, () => {
+        if (app.scene !== null) app.store.change({ ...app.store.now, lighting: app.scene.ownLighting });
+    });
+    return { id: "lights", title: "Lights", element: make("div", {}, dim.element, list, more, reset, presets) };
+}
+
+function lightRow(app: App, name: string, light: GroupLight,
+    change: (name: string, to: Partial<GroupLight>, tag: string | null) => void, solo: (name: string | null) => void): Row {
+    const id = unique("light");
+    const coloured = app.scene?.description.channels === 3;
+    const on = tick(name, light.on, (is) => change(name, { on: is }, null));
+    on.querySelector("span")?.setAttribute("id", id);
+    const most = Math.max(1e-6, 4 * (light.power || 1));
+    const power: Slider = slider({
+        label: "Power", unit: app.store.now.view.unit === "lx" ? "lm/m²" : "W/m²", least: 0, most, log: true,
+        change: (value) => change(name, { power: value }, `power ${name}`),
+    }, light.power);
+    const swatch = make("input", {
+        type: "color", "aria-label": `Colour of ${name}`,
+        oninput: () => {
+            const rgb = fromHex(swatch.value), L = luminance(rgb);
+            change(name, { colour: L > 0 ? rgb.map((v) => v / L) as Rgb : [1, 1, 1], kelvin: null }, `colour ${name}`);
+        },
+    });
+    const kelvin = slider({
+        label: "Temperature", unit: "K", least: 1800, most: 12000, step: 50,
+        change: (value) => change(name, { kelvin: value, colour: ofTemperature(value) }, `kelvin ${name}`),
+    }, light.kelvin ?? 4000);
+    const alone = button("Solo", `Only ${name}`, () => solo(app.store.now.lighting.solo === name ? null : name), { "aria-pressed": "false" });
+    const element = make("section", { class: "light", "aria-labelledby": id },
+        make("div", { class: "row" }, on, coloured && swatch, alone), power.element, coloured && kelvin.element);
+    const update = (now: GroupLight, soloed: string | null): void => {
+        (on.querySelector("input") as HTMLInputElement).checked = now.on;
+        power.set(now.power);
+        const largest = Math.max(...now.colour, 1e-9);
+        if (document.activeElement !== swatch) swatch.value = toHex(now.colour.map((v) => v / largest));
+        if (now.kelvin !== null) kelvin.set(now.kelvin);
+        alone.setAttribute("aria-pressed", String(soloed === name));
+        element.classList.toggle("dark", !now.on || (soloed !== null && soloed !== name));
+    };
+    update(light, app.store.now.lighting.solo);
+    return { element, update };
+}
+
+/** Lightings with names, which stand in the link. */
+function drawPresets(app: App, place: HTMLElement): void {
+    const name = make("input", { type: "text", placeholder: "Name of this lighting", "aria-label": "Name of this lighting", maxlength: 60 });
+    const keep = (): void => {
+        const { now } = app.store, text = name.value.trim();
+        if (text === "") return;
+        const others = now.presets.filter((preset) => preset.name !== text);
+        app.store.change({ ...now, presets: [...others, { name: text, lighting: now.lighting }] });
+    };
+    fill(place, make("h3", {}, "Presets"),
+        ...app.store.now.presets.map((preset) => make("div", { class: "row" },
+            button(preset.name, null, () => app.store.change({ ...app.store.now, lighting: preset.lighting }), { class: "grow" }),
+            button("×", `Forget ${preset.name}`, () => app.store.change(
+                { ...app.store.now, presets: app.store.now.presets.filter((other) => other !== preset) })))),
+        make("form", { class: "row", onsubmit: (event: Event) => { event.preventDefault(); keep(); } }, name,
+            make("button", { type: "submit" }, "Keep")));
+}

@@ -1,0 +1,64 @@
+// How the picture is drawn: tone, exposure, false colour, cameras. Nothing here costs a request but the quantity.
+import { button, choice, make, tick } from "../base/dom.ts";
+import type { App } from "../app.ts";
+import type { View } from "../state/state.ts";
+import type { Panel } from "./panel.ts";
+import { slider } from "./slider.ts";
+
+export function lookPanel(app: App): Panel {
+    const change = (to: Partial<View>, tag: string | null = null): void => {
+        const { now } = app.store;
+        app.store.change({ ...now, view: { ...now.view, ...to } }, tag);
+    };
+    const { view } = app.store.now;
+    const exposure = slider({ label: "Exposure", unit: "EV", least: -16, most: 16, step: 0.1, change: (value) => change({ exposure: value, follow: false }, "exposure") }, 0);
+    const iso = slider({ label: "Iso-lines", least: 0, most: 20, step: 1, change: (value) => change({ isoLines: Math.round(value) }, "iso") }, 0);
+    const follow = tick("Exposure follows the light", view.follow, (on) => change({ follow: on, exposure: on ? null : app.store.now.view.exposure }));
+    const smooth = tick("Smooth", view.smooth, (on) => change({ smooth: on }));
+    const log = tick("Logarithmic", view.log, (on) => change({ log: on }));
+    const fields = {
+        picture: choice("Picture", [["light", "As the eye sees it"], ["false", "False colour"]], view.picture, (picture) => change({ picture, range: null })),
+        quantity: choice("Quantity", [["radiosity", "Radiosity B"], ["irradiance", "Irradiance H"], ["indirect", "Indirect"]], view.quantity, (quantity) => change({ quantity, range: null })),
+        tone: choice("Tone curve", [["agx", "AgX"], ["aces", "ACES"], ["linear", "Linear"]], view.tone, (tone) => change({ tone })),
+        palette: choice("Palette", [["viridis", "Viridis"], ["inferno", "Inferno"], ["turbo", "Turbo"]], view.palette, (palette) => change({ palette })),
+        unit: choice("Unit of the store", [["W/m²", "W/m²"], ["lx", "lm/m² (lx)"]], view.unit, (unit) => change({ unit })),
+        walk: choice("Camera", [["orbit", "Around the scene"], ["walk", "On foot (W A S D)"]], view.walk ? "walk" : "orbit", (way) => change({ walk: way === "walk" })),
+    };
+    const least = make("input", { type: "number", step: "any", "aria-label": "Least value of the palette" });
+    const most = make("input", { type: "number", step: "any", "aria-label": "Largest value of the palette" });
+    const setRange = (): void => {
+        const [low, high] = [Number(least.value), Number(most.value)];
+        change({ range: least.value !== "" && most.value !== "" && high > low ? [low, high] : null });
+    };
+    least.addEventListener("change", setRange);
+    most.addEventListener("change", setRange);
+    const light = make("div", {}, exposure.element, follow, button("Expose for this light", null, () => change({ exposure: null })), fields.tone);
+    const colour = make("div", {}, fields.quantity, fields.palette, log, iso.element, make("div", { class: "row" }, make("span", {}, "Range"), least, most,
+        button("Auto", "Range from the values", () => change({ range: null }))));
+    const update = (): void => {
+        const now = app.store.now.view;
+        exposure.set(now.exposure ?? 0);
+        iso.set(now.isoLines);
+        for (const [name, field] of Object.entries(fields))
+            (field.querySelector("select") as HTMLSelectElement).value = name === "walk" ? (now.walk ? "walk" : "orbit") : String(now[name as keyof View]);
+        for (const [box, on] of [[follow, now.follow], [smooth, now.smooth], [log, now.log]] as const)
+            (box.querySelector("input") as HTMLInputElement).checked = on;
+        if (document.activeElement !== least) least.value = now.range === null ? "" : String(now.range[0]);
+        if (document.activeElement !== most) most.value = now.range === null ? "" : String(now.range[1]);
+        light.hidden = now.picture !== "light";
+        colour.hidden = now.picture !== "false";
+    };
+    app.store.listen((now, before) => { if (now.view !== before.view) update(); });
+    app.on("scene", update);
+    app.store.listen((now, before) => {
+        // An exposure that was left to the page is found from the next answer.
+        if (now.view.exposure === null && before.view.exposure !== null) app.ask(true);
+        else if (now.view.range === null && before.view.range !== null) app.ask(true);
+    });
+    update();
+    return {
+        id: "look", title: "View",
+        element: make("div", {}, fields.picture, light, colour, smooth, fields.unit, fields.walk,
+            button("Fit (F)", "Show the whole scene", () => app.cameras.fit(true))),
+    };
+}

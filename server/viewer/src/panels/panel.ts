@@ -1,0 +1,12 @@
+// What a panel is: a part of the page beside the picture.
+import type { App } from "../app.ts";
+
+export interface Panel {
+    id: string;
+    title: string;
+    element: HTMLElement;
+    /** True while it has something to offer for the scene that is open; absent: always. */
+    isUseful?: (app: App) => boolean;
+}
+
+export type PanelMaker = (app: App) => Panel;

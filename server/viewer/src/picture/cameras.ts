@@ -1,0 +1,125 @@
+// Moves the camera: around the scene, or on foot through it.
+import {
+    Box3, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Sphere, Spherical, Vector2, Vector3, Vector4,
+} from "three";
+import CameraControls from "camera-controls";
+
+CameraControls.install({
+    THREE: { Vector2, Vector3, Vector4, Quaternion, Matrix4, Spherical, Box3, Sphere, Raycaster } as never,
+});
+
+export type Place = [number, number, number, number, number, number];
+
+/** Metres a second on foot. */
+const PACE = 1.4;
+
+export class Cameras {
+    readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
+    private readonly controls: CameraControls;
+    private readonly held = new Set<string>();
+    private box = new Box3();
+    private isWalk = false;
+
+    constructor(canvas: HTMLCanvasElement, private readonly moved: () => void, rested: () => void) {
+        this.controls = new CameraControls(this.camera, canvas);
+        this.controls.smoothTime = matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : 0.12;
+        this.controls.draggingSmoothTime = 0.03;
+        this.controls.dollyToCursor = true;
+        for (const event of ["control", "controlstart", "wake"] as const) this.controls.addEventListener(event, moved);
+        for (const event of ["rest", "controlend"] as const) this.controls.addEventListener(event, rested);
+        canvas.addEventListener("blur", () => this.held.clear());
+        canvas.addEventListener("keyup", (event) => this.held.delete(event.key.toLowerCase()));
+        canvas.addEventListener("keydown", (event) => this.press(event));
+    }
+
+    /** Sets what is seen whole by fit(), and how near and far things are. */
+    setBounds(box: Box3): void {
+        this.box = box;
+        const size = Math.max(1e-3, box.getSize(new Vector3()).length());
+        this.camera.near = size / 5000;
+        this.camera.far = size * 20;
+        this.camera.updateProjectionMatrix();
+        this.controls.maxDistance = size * 8;
+    }
+
+    /** Looks at the whole scene from the front and a little above. */
+    fit(animated: boolean): void {
+        const centre = this.box.getCenter(new Vector3()), size = this.box.getSize(new Vector3());
+        const half = (this.camera.fov * Math.PI) / 360;
+        const fits = Math.max(size.y / 2, size.x / 2 / Math.max(0.2, this.camera.aspect)) / Math.tan(half);
+        // Flat scenes are seen from above, rooms from in front.
+        const lift = size.y < 0.4 * Math.max(size.x, size.z) ? 0.6 : 0.08;
+        const distance = (fits + size.z / 2) * 1.05;
+        const eye = centre.clone().add(new Vector3(0, Math.sin(lift), Math.cos(lift)).multiplyScalar(distance));
+        this.place([eye.x, eye.y, eye.z, centre.x, centre.y, centre.z], animated);
+    }
+
+    place(place: Place, animated: boolean): void {
+        void this.controls.setLookAt(...place, animated);
+        this.moved();
+    }
+
+    get now(): Place {
+        const eye = this.controls.getPosition(new Vector3()), target = this.controls.getTarget(new Vector3());
+        return [eye.x, eye.y, eye.z, target.x, target.y, target.z].map((v) => Number(v.toFixed(4))) as Place;
+    }
+
+    /** On foot the target is at arm's length: turning looks around, and keys walk. */
+    setWalk(on: boolean): void {
+        if (on === this.isWalk) return;
+        this.isWalk = on;
+        const eye = this.controls.getPosition(new Vector3()), target = this.controls.getTarget(new Vector3());
+        const size = this.box.getSize(new Vector3()).length();
+        const ahead = target.sub(eye).normalize().multiplyScalar(on ? size / 2000 : size / 4);
+        const inside = on && !this.box.containsPoint(eye);
+        if (inside) {
+            this.box.getCenter(eye);
+            eye.y = Math.min(this.box.min.y + 1.6, (this.box.min.y + this.box.max.y) / 2);
+        }
+        this.controls.minDistance = on ? ahead.length() : 0;
+        this.controls.maxDistance = on ? ahead.length() : size * 8;
+        this.controls.azimuthRotateSpeed = this.controls.polarRotateSpeed = on ? -0.4 : 1;
+        void this.controls.setLookAt(eye.x, eye.y, eye.z, eye.x + ahead.x, eye.y + ahead.y, eye.z + ahead.z, false);
+        this.moved();
+    }
+
+    /** True if the camera goes on moving. */
+    advance(seconds: number): boolean {
+        if (this.held.size > 0) this.step(seconds);
+        return this.controls.update(seconds) || this.held.size > 0;
+    }
+
+    private step(seconds: number): void {
+        const has = (...keys: string[]): boolean => keys.some((key) => this.held.has(key));
+        if (this.isWalk) {
+            const way = PACE * seconds * (this.held.has("shift") ? 3 : 1);
+            if (has("w", "arrowup")) void this.controls.forward(way, false);
+            if (has("s", "arrowdown")) void this.controls.forward(-way, false);
+            if (has("a")) void this.controls.truck(-way, 0, false);
+            if (has("d")) void this.controls.truck(way, 0, false);
+            if (has("q")) void this.controls.elevate(-way, false);
+            if (has("e")) void this.controls.elevate(way, false);
+            if (has("arrowleft")) void this.controls.rotate(seconds, 0, false);
+            if (has("arrowright")) void this.controls.rotate(-seconds, 0, false);
+        } else {
+            if (has("arrowleft", "a")) void this.controls.rotate(-seconds, 0, false);
+            if (has("arrowright", "d")) void this.controls.rotate(seconds, 0, false);
+            if (has("arrowup", "w")) void this.controls.rotate(0, -seconds, false);
+            if (has("arrowdown", "s")) void this.controls.rotate(0, seconds, false);
+            if (has("+", "=", "e")) void this.controls.dolly(this.controls.distance * seconds, false);
+            if (has("-", "q")) void this.controls.dolly(-this.controls.distance * seconds, false);
+        }
+    }
+
+    private press(event: KeyboardEvent): void {
+        if (event.ctrlKey || event.metaKey || event.altKey) return;
+        const key = event.key.toLowerCase();
+        if (key === "f") {
+            this.fit(true);
+        } else if (/^(arrow(up|down|left|right)|[wasdqe+=-]|shift)$/.test(key)) {
+            this.held.add(key);
+            if (key.startsWith("arrow")) event.preventDefault();
+            this.moved();
+        }
+    }
+}

@@ -1,0 +1,123 @@
+// Reads the mesh of a scene: the binary glTF of GET /v1/scenes/NAME/mesh, in the layout that the daemon writes
+// (one node per group, POSITION, NORMAL, _ELEMENT, indices; an element's corners are its own).
+import type { Rgb } from "../base/colour.ts";
+
+export interface MeshGroup {
+    name: string;
+    /** Its elements, ascending. */
+    elements: Uint32Array;
+    /** Mean reflectance. */
+    reflectance: Rgb;
+    /** Emission of its own, in the store's unit; null: it is dark. */
+    emission: Rgb | null;
+    area: number;
+}
+
+export interface SceneMesh {
+    elements: number;
+    positions: Float32Array;
+    normals: Float32Array;
+    /** Of each vertex, its element. */
+    elementOf: Uint32Array;
+    index: Uint32Array;
+    /** Of each element, its group and its area in m². */
+    groupOf: Uint32Array;
+    area: Float64Array;
+    groups: MeshGroup[];
+}
+
+interface Accessor { bufferView: number; byteOffset?: number; componentType: number; count: number; type: string }
+interface Gltf {
+    nodes: { name?: string; mesh?: number; children?: number[] }[];
+    meshes: { primitives: { attributes: { [name: string]: number }; indices: number; material?: number }[] }[];
+    accessors: Accessor[];
+    bufferViews: { byteOffset?: number; byteLength: number }[];
+    materials?: {
+        pbrMetallicRoughness?: { baseColorFactor?: number[] };
+        emissiveFactor?: number[];
+        extensions?: { KHR_materials_emissive_strength?: { emissiveStrength?: number } };
+    }[];
+    scenes?: { extras?: { lambert?: { elements?: number } } }[];
+}
+
+const WIDTHS: { [type: string]: number } = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
+
+function chunks(file: ArrayBuffer): { gltf: Gltf; start: number } {
+    const view = new DataView(file);
+    if (file.byteLength < 20 || view.getUint32(0, true) !== 0x46546c67) throw new Error("the mesh is no binary glTF");
+    const length = view.getUint32(12, true);
+    const text = new TextDecoder().decode(new Uint8Array(file, 20, length));
+    return { gltf: JSON.parse(text) as Gltf, start: 20 + length + 8 };
+}
+
+function rgb(values: readonly number[] | undefined, otherwise: number): Rgb {
+    return [0, 1, 2].map((i) => values?.[i] ?? otherwise) as Rgb;
+}
+
+function materialOf(gltf: Gltf, index: number | undefined): { reflectance: Rgb; emission: Rgb | null } {
+    const material = index === undefined ? undefined : gltf.materials?.[index];
+    const strength = material?.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
+    const emission = rgb(material?.emissiveFactor, 0).map((v) => v * strength) as Rgb;
+    return {
+        reflectance: rgb(material?.pbrMetallicRoughness?.baseColorFactor, 1),
+        emission: emission.some((v) => v > 0) ? emission : null,
+    };
+}
+
+export function readMesh(file: ArrayBuffer): SceneMesh {
+    const { gltf, start } = chunks(file);
+    const floats = (accessor: Accessor): Float32Array =>
+        new Float32Array(file, start + (gltf.bufferViews[accessor.bufferView].byteOffset ?? 0) + (accessor.byteOffset ?? 0),
+            accessor.count * WIDTHS[accessor.type]);
+    const parts = gltf.nodes.filter((node) => node.mesh !== undefined).flatMap((node) =>
+        gltf.meshes[node.mesh as number].primitives.map((primitive) => ({ name: node.name ?? "", primitive })));
+    let vertices = 0, indices = 0;
+    for (const { primitive } of parts) {
+        vertices += gltf.accessors[primitive.attributes.POSITION].count;
+        indices += gltf.accessors[primitive.indices].count;
+    }
+    const positions = new Float32Array(3 * vertices), normals = new Float32Array(3 * vertices);
+    const elementOf = new Uint32Array(vertices), index = new Uint32Array(indices);
+    const ranges: { name: string; vertices: [number, number]; material: number | undefined }[] = [];
+    let atVertex = 0, atIndex = 0, elements = 0;
+    for (const { name, primitive } of parts) {
+        positions.set(floats(gltf.accessors[primitive.attributes.POSITION]), 3 * atVertex);
+        normals.set(floats(gltf.accessors[primitive.attributes.NORMAL]), 3 * atVertex);
+        const ids = floats(gltf.accessors[primitive.attributes._ELEMENT]);
+        for (let v = 0; v < ids.length; v++) {
+            elementOf[atVertex + v] = ids[v];
+            if (ids[v] >= elements) elements = ids[v] + 1;
+        }
+        const accessor = gltf.accessors[primitive.indices];
+        const from = start + (gltf.bufferViews[accessor.bufferView].byteOffset ?? 0) + (accessor.byteOffset ?? 0);
+        const own = accessor.componentType === 5125 ? new Uint32Array(file, from, accessor.count)
+            : new Uint16Array(file, from, accessor.count);
+        for (let i = 0; i < own.length; i++) index[atIndex + i] = own[i] + atVertex;
+        ranges.push({ name, vertices: [atVertex, atVertex + ids.length], material: primitive.material });
+        atVertex += ids.length;
+        atIndex += own.length;
+    }
+    const area = new Float64Array(elements), groupOf = new Uint32Array(elements);
+    addAreas(positions, elementOf, index, area);
+    const groups = ranges.map(({ name, vertices: [first, end], material }, g) => {
+        const own = new Set<number>();
+        for (let v = first; v < end; v++) own.add(elementOf[v]);
+        const ascending = Uint32Array.from(own).sort();
+        let total = 0;
+        for (const element of ascending) {
+            groupOf[element] = g;
+            total += area[element];
+        }
+        return { name, elements: ascending, area: total, ...materialOf(gltf, material) };
+    });
+    return { elements, positions, normals, elementOf, index, groupOf, area, groups };
+}
+
+function addAreas(p: Float32Array, elementOf: Uint32Array, index: Uint32Array, area: Float64Array): void {
+    for (let t = 0; t < index.length; t += 3) {
+        const [a, b, c] = [3 * index[t], 3 * index[t + 1], 3 * index[t + 2]];
+        const [ux, uy, uz] = [p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]];
+        const [vx, vy, vz] = [p[c] - p[a], p[c + 1] - p[a + 1], p[c + 2] - p[a + 2]];
+        area[elementOf[index[t]]] += 0.5 * Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
+    }
+}

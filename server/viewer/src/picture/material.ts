@@ -1,0 +1,185 @@
+// The shaders. One texel per element and channel, half precision as the daemon sent it; a vertex looks up the texel of
+// its element (flat) or of its node (smooth, whose means a pass over the nodes makes). Tone curve, exposure, palette,
+// iso-lines, threshold and the comparison are in the fragment shader: none of them costs a request.
+import { GLSL3, RawShaderMaterial, ShaderChunk, Vector2, Vector3, Vector4, type IUniform, type Texture } from "three";
+
+const fetchElement = `
+uniform highp sampler2D values_a, values_b;
+uniform int elements, channels;
+uniform vec3 weights;
+
+float texel(highp sampler2D values, int i) {
+    int width = textureSize(values, 0).x;
+    return texelFetch(values, ivec2(i % width, i / width), 0).r;
+}
+
+// The colour of an element; other numbers of channels than three are shown as their mean.
+vec3 element_colour(highp sampler2D values, int i) {
+    if (channels == 3) return vec3(texel(values, i), texel(values, elements + i), texel(values, 2 * elements + i));
+    float sum = 0.0;
+    for (int c = 0; c < channels; c++) sum += texel(values, c * elements + i);
+    return vec3(sum / float(channels));
+}
+`;
+
+/** Fills the texture of nodes: each is the mean of the elements at it. */
+const nodesFragment = `
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+${fetchElement}
+uniform usampler2D node_first, node_elements;
+uniform int node_count;
+layout(location = 0) out vec4 mean_a;
+layout(location = 1) out vec4 mean_b;
+
+uint entry(usampler2D list, int i) {
+    int width = textureSize(list, 0).x;
+    return texelFetch(list, ivec2(i % width, i / width), 0).r;
+}
+
+void main() {
+    int width = textureSize(node_first, 0).x;
+    int node = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
+    if (node >= node_count) discard;
+    int first = int(entry(node_first, node)), end = int(entry(node_first, node + 1));
+    vec3 a = vec3(0.0), b = vec3(0.0);
+    for (int k = first; k < end; k++) {
+        int element = int(entry(node_elements, k));
+        a += element_colour(values_a, element);
+        b += element_colour(values_b, element);
+    }
+    mean_a = vec4(a / float(end - first), 1.0);
+    mean_b = vec4(b / float(end - first), 1.0);
+}
+`;
+
+const nodesVertex = `
+precision highp float;
+in vec3 position;
+void main() { gl_Position = vec4(position.xy, 0.0, 1.0); }
+`;
+
+const sceneVertex = `
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+${fetchElement}
+uniform mat4 modelViewMatrix, projectionMatrix;
+uniform sampler2D nodes_a, nodes_b;
+uniform bool is_smooth;
+in vec3 position;
+in uvec2 ids; // element, node
+out vec3 colour_a, colour_b;
+flat out int element;
+
+vec3 node_colour(sampler2D nodes, int i) {
+    int width = textureSize(nodes, 0).x;
+    return texelFetch(nodes, ivec2(i % width, i / width), 0).rgb;
+}
+
+void main() {
+    element = int(ids.x);
+    if (is_smooth) {
+        colour_a = node_colour(nodes_a, int(ids.y));
+        colour_b = node_colour(nodes_b, int(ids.y));
+    } else {
+        colour_a = element_colour(values_a, element);
+        colour_b = element_colour(values_b, element);
+    }
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}
+`;
+
+const sceneFragment = `
+precision highp float;
+precision highp int;
+#define saturate(a) clamp(a, 0.0, 1.0)
+${ShaderChunk.tonemapping_pars_fragment}
+uniform vec3 weights;
+uniform int picture;          // 0: as the eye sees it, 1: false colour
+uniform int tone;             // 0: linear, 1: AgX, 2: ACES
+uniform vec2 scale;           // of the values of a and b to the unit shown
+uniform float exposure;
+uniform sampler2D palette;
+uniform vec2 range;
+uniform bool is_log;
+uniform float iso_lines;
+uniform float threshold;      // below 0: none
+uniform int compare;          // 0: a alone, 1: a left and b right of the split, 2: b − a
+uniform float split;          // in pixels
+uniform int hovered;
+uniform ivec4 pins;
+uniform sampler2D judged;     // 1 where the threshold judges an element
+in vec3 colour_a, colour_b;
+flat in int element;
+layout(location = 0) out vec4 pixel;
+
+float place(float value) {
+    return is_log ? log2(max(value, 1e-30) / range.x) / log2(range.y / range.x) : (value - range.x) / (range.y - range.x);
+}
+
+vec3 to_srgb(vec3 c) {
+    return mix(12.92 * c, 1.055 * pow(max(c, 0.0), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
+}
+
+bool is_judged(int i) {
+    int width = textureSize(judged, 0).x;
+    return texelFetch(judged, ivec2(i % width, i / width), 0).r > 0.5;
+}
+
+void main() {
+    bool right = compare == 1 && gl_FragCoord.x > split;
+    vec3 colour = right ? colour_b * scale.y : colour_a * scale.x;
+    float value = dot(colour, weights);
+    vec3 shown;
+    if (compare == 2) {
+        // Blue where b is darker, red where it is brighter, by range.y at most.
+        float change = clamp((dot(colour_b, weights) * scale.y - value) / range.y, -1.0, 1.0);
+        shown = to_srgb(change < 0.0 ? mix(vec3(0.8), vec3(0.02, 0.13, 0.65), -change) : mix(vec3(0.8), vec3(0.62, 0.02, 0.05), change));
+    } else if (picture == 1) {
+        float t = clamp(place(value), 0.0, 1.0);
+        shown = texture(palette, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
+        if (iso_lines > 0.0) {
+            float level = place(value) * iso_lines, width = fwidth(level);
+            if (width > 1e-9 && abs(level - round(level)) < 0.75 * width && round(level) > 0.5) shown *= 0.25;
+        }
+    } else {
+        vec3 exposed = colour * exposure;
+        vec3 toned = tone == 1 ? AgXToneMapping(exposed) : tone == 2 ? ACESFilmicToneMapping(exposed) : saturate(exposed * toneMappingExposure);
+        shown = to_srgb(saturate(toned));
+    }
+    if (threshold >= 0.0 && is_judged(element))
+        shown = mix(shown, value >= threshold ? vec3(0.1, 0.75, 0.3) : vec3(0.9, 0.15, 0.15), 0.55);
+    if (element == hovered || any(equal(pins, ivec4(element)))) shown = mix(shown, vec3(1.0, 0.85, 0.2), 0.5);
+    if (right && gl_FragCoord.x < split + 1.5 || compare == 1 && abs(gl_FragCoord.x - split) < 1.0) shown = vec3(1.0);
+    pixel = vec4(shown, 1.0);
+}
+`;
+
+export type Uniforms = { [name: string]: IUniform };
+
+export function makeUniforms(nothing: Texture): Uniforms {
+    const of = (value: unknown): IUniform => ({ value });
+    return {
+        values_a: of(nothing), values_b: of(nothing), nodes_a: of(nothing), nodes_b: of(nothing), judged: of(nothing),
+        node_first: of(null), node_elements: of(null), node_count: of(0),
+        elements: of(1), channels: of(1), weights: of(new Vector3(1, 0, 0)), is_smooth: of(false),
+        picture: of(0), tone: of(1), scale: of(new Vector2(1, 1)), exposure: of(1), toneMappingExposure: of(1),
+        palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1),
+        compare: of(0), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
+    };
+}
+
+export function sceneMaterial(uniforms: Uniforms): RawShaderMaterial {
+    return new RawShaderMaterial({
+        glslVersion: GLSL3, uniforms, vertexShader: sceneVertex, fragmentShader: sceneFragment,
+    });
+}
+
+export function nodesMaterial(uniforms: Uniforms): RawShaderMaterial {
+    return new RawShaderMaterial({
+        glslVersion: GLSL3, uniforms, vertexShader: nodesVertex, fragmentShader: nodesFragment,
+        depthTest: false, depthWrite: false,
+    });
+}

@@ -1,0 +1,26 @@
+// Finds the element under a point of the canvas, by a tree of boxes that is made when it is first needed.
+import { FrontSide, Raycaster, Vector2, type BufferGeometry, type Camera } from "three";
+import { MeshBVH } from "three-mesh-bvh";
+import type { SceneMesh } from "./glb.ts";
+
+export class Picker {
+    private tree: MeshBVH | null = null;
+    private readonly caster = new Raycaster();
+
+    constructor(private readonly geometry: BufferGeometry, private readonly mesh: SceneMesh) {}
+
+    /** Makes the tree: about a second for 300,000 elements. */
+    prepare(): void {
+        // The order of triangles stays, since the picture has uploaded it.
+        this.tree ??= new MeshBVH(this.geometry, { indirect: true });
+    }
+
+    /** The element at (x, y), each from −1 to 1, or null. Only fronts are met, as only they are drawn. */
+    at(x: number, y: number, camera: Camera): number | null {
+        this.prepare();
+        this.caster.setFromCamera(new Vector2(x, y), camera);
+        const hit = (this.tree as MeshBVH).raycastFirst(this.caster.ray, FrontSide);
+        if (hit === null || hit.faceIndex === undefined || hit.faceIndex === null) return null;
+        return this.mesh.elementOf[this.mesh.index[3 * hit.faceIndex]];
+    }
+}

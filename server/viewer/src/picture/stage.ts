@@ -1,0 +1,217 @@
+// Draws the scene: buffers, textures of values, the pass over the nodes, the loop that draws when something changed.
+// Knows no daemon and no panel; what it shows is set by its methods.
+import {
+    BufferAttribute, BufferGeometry, Color, HalfFloatType, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry, RGBAFormat,
+    Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type PerspectiveCamera,
+} from "three";
+import type { Palette, Tone } from "../state/state.ts";
+import type { Field } from "./field.ts";
+import { channelWeights } from "./field.ts";
+import type { SceneMesh } from "./glb.ts";
+import { findNodes } from "./nodes.ts";
+import { makeUniforms, nodesMaterial, sceneMaterial, type Uniforms } from "./material.ts";
+import { emptyTexture, HalfTexture, integerTexture, maskTexture, paletteTexture, rowsFor } from "./textures.ts";
+
+export interface Look {
+    picture: "light" | "false";
+    smooth: boolean;
+    tone: Tone;
+    /** Factor before the tone curve. */
+    exposure: number;
+    palette: Palette;
+    range: [number, number];
+    log: boolean;
+    isoLines: number;
+    /** In the unit of the values; null: no marks. */
+    threshold: number | null;
+    compare: "none" | "split" | "difference";
+    /** Share of the width that is left of the split. */
+    split: number;
+}
+
+const TONES: { [name in Tone]: number } = { linear: 0, agx: 1, aces: 2 };
+
+export class Stage {
+    readonly renderer: WebGLRenderer;
+    readonly uniforms: Uniforms;
+    mesh: SceneMesh | null = null;
+    geometry: BufferGeometry | null = null;
+    /** Pictures drawn so far. */
+    frames = 0;
+    private readonly scene = new Scene();
+    private readonly nodesScene = new Scene();
+    private readonly nodesCamera = new OrthographicCamera();
+    private values: [HalfTexture, HalfTexture] | null = null;
+    private nodes: WebGLRenderTarget | null = null;
+    private nodesAreOld = false;
+    private paletteName: Palette | null = null;
+    private wanted = false;
+    private look: Look | null = null;
+
+    constructor(readonly canvas: HTMLCanvasElement, readonly camera: PerspectiveCamera,
+        /** Moves the camera; true if it goes on moving. */
+        private readonly advance: (seconds: number) => boolean) {
+        this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: false });
+        this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+        this.uniforms = makeUniforms(emptyTexture());
+        const plane = new Mesh(new PlaneGeometry(2, 2), nodesMaterial(this.uniforms));
+        plane.frustumCulled = false;
+        this.nodesScene.add(plane);
+        canvas.addEventListener("webglcontextrestored", () => { this.nodesAreOld = true; this.invalidate(); });
+        new ResizeObserver(() => this.resize()).observe(canvas.parentElement as HTMLElement);
+    }
+
+    set background(colour: string) {
+        this.scene.background = new Color(colour);
+        this.invalidate();
+    }
+
+    /** Smooth shading needs textures that can be drawn into. */
+    get canSmooth(): boolean {
+        return this.renderer.extensions.has("EXT_color_buffer_float") || this.renderer.extensions.has("EXT_color_buffer_half_float");
+    }
+
+    show(mesh: SceneMesh, channels: number): void {
+        this.clear();
+        const nodes = findNodes(mesh);
+        const ids = new Uint32Array(2 * mesh.elementOf.length);
+        for (let v = 0; v < mesh.elementOf.length; v++) {
+            ids[2 * v] = mesh.elementOf[v];
+            ids[2 * v + 1] = nodes.nodeOf[v];
+        }
+        const geometry = new BufferGeometry();
+        geometry.setAttribute("position", new BufferAttribute(mesh.positions, 3));
+        geometry.setAttribute("ids", new BufferAttribute(ids, 2));
+        geometry.setIndex(new BufferAttribute(mesh.index, 1));
+        this.geometry = geometry;
+        this.mesh = mesh;
+        const body = new Mesh(geometry, sceneMaterial(this.uniforms));
+        body.name = "scene";
+        this.scene.add(body);
+        this.values = [new HalfTexture(channels * mesh.elements), new HalfTexture(channels * mesh.elements)];
+        const { width, height } = rowsFor(nodes.count);
+        this.nodes = new WebGLRenderTarget(width, height, {
+            count: 2, format: RGBAFormat, type: HalfFloatType, minFilter: NearestFilter, magFilter: NearestFilter,
+            depthBuffer: false, generateMipmaps: false,
+        });
+        const u = this.uniforms;
+        u.values_a.value = this.values[0].texture;
+        u.values_b.value = this.values[1].texture;
+        u.node_first.value = integerTexture(nodes.first);
+        u.node_elements.value = integerTexture(nodes.elements);
+        u.node_count.value = nodes.count;
+        u.nodes_a.value = this.nodes.textures[0];
+        u.nodes_b.value = this.nodes.textures[1];
+        u.elements.value = mesh.elements;
+        u.channels.value = channels;
+        const weights = channels === 3 ? channelWeights(3) : [1, 0, 0];
+        (u.weights.value as Vector3).set(weights[0], weights[1], weights[2]);
+        this.judge(() => true);
+    }
+
+    /** Values of side a (0), or of b (1), which a comparison shows beside it. */
+    setField(side: 0 | 1, field: Field): void {
+        if (this.values === null) return;
+        this.values[side].write(field.bits);
+        const scale = this.uniforms.scale.value as Vector2;
+        if (side === 0) scale.x = field.scale;
+        else scale.y = field.scale;
+        this.nodesAreOld = true;
+        this.invalidate();
+    }
+
+    setLook(look: Look): void {
+        const u = this.uniforms;
+        this.look = look;
+        u.picture.value = look.picture === "false" ? 1 : 0;
+        u.is_smooth.value = look.smooth && this.canSmooth;
+        u.tone.value = TONES[look.tone];
+        u.exposure.value = look.exposure;
+        (u.range.value as Vector2).set(look.range[0], Math.max(look.range[1], look.range[0] + 1e-12));
+        u.is_log.value = look.log && look.range[0] > 0;
+        u.iso_lines.value = look.isoLines;
+        u.threshold.value = look.threshold ?? -1;
+        u.compare.value = look.compare === "split" ? 1 : look.compare === "difference" ? 2 : 0;
+        if (this.paletteName !== look.palette) {
+            this.paletteName = look.palette;
+            u.palette.value = paletteTexture(look.palette);
+        }
+        this.placeSplit();
+        this.invalidate();
+    }
+
+    /** The elements that the threshold judges. */
+    judge(isJudged: (element: number) => boolean): void {
+        if (this.mesh === null) return;
+        this.uniforms.judged.value = maskTexture(this.mesh.elements, isJudged);
+        this.invalidate();
+    }
+
+    mark(hovered: number, pins: readonly number[]): void {
+        this.uniforms.hovered.value = hovered;
+        const [a, b, c, d] = [0, 1, 2, 3].map((i) => pins[i] ?? -1);
+        (this.uniforms.pins.value as Vector4).set(a, b, c, d);
+        this.invalidate();
+    }
+
+    invalidate(): void {
+        if (this.wanted) return;
+        this.wanted = true;
+        requestAnimationFrame((time) => this.frame(time));
+    }
+
+    /** Draws at once, at another size if one is given; for a picture that is saved. */
+    draw(width?: number, height?: number): void {
+        if (width !== undefined && height !== undefined) {
+            this.renderer.setPixelRatio(1);
+            this.renderer.setSize(width, height, false);
+            this.camera.aspect = width / height;
+            this.camera.updateProjectionMatrix();
+            this.placeSplit();
+        }
+        if (this.nodesAreOld && this.nodes !== null && this.uniforms.is_smooth.value === true) {
+            this.nodesAreOld = false;
+            this.renderer.setRenderTarget(this.nodes);
+            this.renderer.render(this.nodesScene, this.nodesCamera);
+            this.renderer.setRenderTarget(null);
+        }
+        this.renderer.render(this.scene, this.camera);
+        this.frames += 1;
+    }
+
+    resize(): void {
+        const frame = this.canvas.parentElement as HTMLElement;
+        const [width, height] = [Math.max(1, frame.clientWidth), Math.max(1, frame.clientHeight)];
+        this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+        this.renderer.setSize(width, height, false);
+        this.camera.aspect = width / height;
+        this.camera.updateProjectionMatrix();
+        this.placeSplit();
+        this.invalidate();
+    }
+
+    private placeSplit(): void {
+        this.uniforms.split.value = (this.look?.split ?? 0) * this.renderer.domElement.width;
+    }
+
+    private lastTime = 0;
+
+    private frame(time: number): void {
+        this.wanted = false;
+        const seconds = Math.min(0.1, (time - this.lastTime) / 1000);
+        this.lastTime = time;
+        const goesOn = this.advance(seconds);
+        this.draw();
+        if (goesOn) this.invalidate();
+    }
+
+    private clear(): void {
+        this.scene.clear();
+        this.geometry?.dispose();
+        this.values?.forEach((texture) => texture.dispose());
+        this.nodes?.dispose();
+        for (const name of ["node_first", "node_elements", "judged"])
+            (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
+        this.geometry = this.mesh = this.values = this.nodes = null;
+    }
+}

@@ -1,0 +1,100 @@
+// The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
+import { firstLighting, firstState, firstView, skyOff, type Lighting, type State } from "./state.ts";
+
+type Plain = { [name: string]: unknown };
+
+function isPlain(value: unknown): value is Plain {
+    return typeof value === "object" && value !== null && !Array.isArray(value);
+}
+
+/** The members of `now` that are not those of `first`. */
+function difference(now: Plain, first: Plain): Plain {
+    const out: Plain = {};
+    for (const [name, value] of Object.entries(now))
+        if (JSON.stringify(value) !== JSON.stringify(first[name])) out[name] = value;
+    return out;
+}
+
+/** Members of the right type replace those of the first state; others come from links of strangers and are dropped. */
+function restore<T extends object>(first: T, given: unknown, loose: readonly string[]): T {
+    if (!isPlain(given)) return first;
+    const out: Plain = { ...(first as Plain) };
+    for (const [name, value] of Object.entries(given)) {
+        if (!(name in out)) continue;
+        const kind = typeof out[name];
+        if (loose.includes(name) || (typeof value === kind && Array.isArray(value) === Array.isArray(out[name])))
+            out[name] = value;
+    }
+    return out as T;
+}
+
+const number = (value: unknown, otherwise: number): number =>
+    typeof value === "number" && Number.isFinite(value) ? value : otherwise;
+
+function restoreLighting(given: unknown): Lighting {
+    const out = restore(firstLighting, given, ["solo"]);
+    const groups: Lighting["groups"] = {};
+    for (const [name, light] of Object.entries(out.groups)) {
+        if (!isPlain(light)) continue;
+        const colour = Array.isArray(light.colour) && light.colour.length === 3 ? light.colour : [1, 1, 1];
+        groups[name] = {
+            on: light.on !== false,
+            power: Math.max(0, number(light.power, 0)),
+            colour: [0, 1, 2].map((i) => Math.max(0, number(colour[i], 1))) as [number, number, number],
+            kelvin: typeof light.kelvin === "number" ? light.kelvin : null,
+        };
+    }
+    const emitters: Lighting["emitters"] = {};
+    for (const [index, weight] of Object.entries(out.emitters)) emitters[index] = Math.max(0, number(weight, 0));
+    return {
+        groups, emitters, dim: Math.max(0, number(out.dim, 1)), sky: restore(skyOff, out.sky, []),
+        solo: typeof out.solo === "string" ? out.solo : null,
+    };
+}
+
+function toBase64Url(text: string): string {
+    const bytes = new TextEncoder().encode(text);
+    let raw = "";
+    for (const byte of bytes) raw += String.fromCharCode(byte);
+    return btoa(raw).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
+}
+
+function fromBase64Url(text: string): string {
+    const raw = atob(text.replaceAll("-", "+").replaceAll("_", "/"));
+    return new TextDecoder().decode(Uint8Array.from(raw, (c) => c.charCodeAt(0)));
+}
+
+export function toFragment(state: State): string {
+    const plain = difference(state as unknown as Plain, firstState as unknown as Plain);
+    plain.view = difference(state.view as unknown as Plain, firstView as unknown as Plain);
+    return "#1." + toBase64Url(JSON.stringify(plain));
+}
+
+/** The state of a fragment; null where there is none or it is no state. */
+export function fromFragment(fragment: string): State | null {
+    if (!fragment.startsWith("#1.")) return null;
+    let given: unknown;
+    try {
+        given = JSON.parse(fromBase64Url(fragment.slice(3)));
+    } catch {
+        return null;
+    }
+    if (!isPlain(given)) return null;
+    const state = restore(firstState, given, ["compare", "tolerance"]);
+    const compare = isPlain(state.compare) ? state.compare as unknown as Plain : null;
+    return {
+        ...state,
+        lighting: restoreLighting(given.lighting),
+        view: restore(firstView, given.view, ["exposure", "range", "threshold", "judged", "camera"]),
+        presets: (state.presets as unknown[]).filter(isPlain)
+            .map((p) => ({ name: String(p.name), lighting: restoreLighting(p.lighting) })),
+        pins: state.pins.filter((pin) => Number.isInteger(pin) && pin >= 0),
+        tolerance: typeof state.tolerance === "number" ? state.tolerance : null,
+        compare: compare === null ? null : {
+            how: compare.how === "split" ? "split" : "difference",
+            scene: typeof compare.scene === "string" ? compare.scene : null,
+            lighting: compare.lighting === null ? null : restoreLighting(compare.lighting),
+            split: number(compare.split, 0.5),
+        },
+    };
+}

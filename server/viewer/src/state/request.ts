@@ -1,0 +1,47 @@
+// The body of the request for a lighting. Emission is sent scaled to at most 1, so that answers in half precision keep
+// their digits whatever the unit; the field gets the scale back.
+import type { Quantity } from "../daemon/api.ts";
+import { emissionOf, type Lighting } from "./state.ts";
+
+export interface Wanted {
+    scene: string;
+    quantity: Quantity;
+    /** EMISSION of the contract, scaled; null: nothing shines. */
+    emission: { [member: string]: unknown } | null;
+    scale: number;
+}
+
+/** What of the lighting the store can take. */
+export interface Abilities {
+    channels: number;
+    groups: readonly string[];
+    emitters: number;
+    /** One radiance per tile of the sky in the store's unit; null: no sky, or dark. */
+    sky: readonly (number | number[])[] | null;
+}
+
+export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting, can: Abilities): Wanted {
+    const groups = Object.entries(emissionOf(lighting, can.channels)).filter(([name]) => can.groups.includes(name));
+    const sky = can.sky !== null && can.sky.some((v) => [v].flat().some((x) => x > 0)) ? can.sky : null;
+    const weights = Object.entries(lighting.emitters).filter(([index, weight]) => weight > 0 && Number(index) < can.emitters);
+    const largest = (values: Iterable<number>): number => {
+        let most = 0;
+        for (const value of values) if (value > most) most = value;
+        return most;
+    };
+    const most = Math.max(largest(groups.flatMap(([, v]) => [v].flat())), largest((sky ?? []).flatMap((v) => [v].flat())),
+        lighting.dim * largest(weights.map(([, weight]) => weight)));
+    if (most <= 0 || !Number.isFinite(most)) return { scene, quantity, emission: null, scale: 1 };
+    const scaled = <T extends number | number[]>(value: T): T =>
+        (typeof value === "number" ? value / most : value.map((v) => v / most)) as T;
+    const emission: { [member: string]: unknown } = {};
+    if (can.emitters > 0) {
+        const all = new Array<number>(can.emitters).fill(0);
+        for (const [index, weight] of weights) all[Number(index)] = (weight * lighting.dim) / most;
+        emission.emitters = all;
+    } else if (groups.length > 0) {
+        emission.groups = Object.fromEntries(groups.map(([name, value]) => [name, scaled(value)]));
+    }
+    if (sky !== null) emission.sky = sky.map(scaled);
+    return { scene, quantity, emission, scale: most };
+}

@@ -1,0 +1,116 @@
+// The state of the page: all that a link restores. Plain data; changes make new objects.
+import type { Rgb } from "../base/colour.ts";
+import type { Quantity } from "../daemon/api.ts";
+
+/** Emission of a group: `power` is its luminance-weighted exitance in the store's unit, the colour has luminance 1. */
+export interface GroupLight {
+    on: boolean;
+    power: number;
+    colour: Rgb;
+    /** The colour temperature that the colour was chosen by, or null. */
+    kelvin: number | null;
+}
+
+export interface SkyLight {
+    model: "off" | "overcast" | "clear" | "even" | "perez";
+    /** Horizontal irradiance of an even or overcast sky, in the store's unit. */
+    strength: number;
+    latitude: number;
+    longitude: number;
+    /** Hours from UTC of the clock that `hour` is read from. */
+    zone: number;
+    /** Day of the year, 1 to 365, and local time in hours. */
+    day: number;
+    hour: number;
+}
+
+export interface Lighting {
+    groups: { [name: string]: GroupLight };
+    dim: number;
+    solo: string | null;
+    sky: SkyLight;
+    /** Weights of precomputed emitters; those that are absent are 0. */
+    emitters: { [index: string]: number };
+}
+
+export type Tone = "agx" | "aces" | "linear";
+export type Palette = "viridis" | "inferno" | "turbo";
+export type Unit = "W/m²" | "lx";
+
+export interface View {
+    picture: "light" | "false";
+    quantity: Quantity;
+    smooth: boolean;
+    tone: Tone;
+    /** log2 of the factor before the tone curve; null: chosen from the first answer and then held. */
+    exposure: number | null;
+    /** The exposure follows each answer. */
+    follow: boolean;
+    palette: Palette;
+    /** Ends of the palette; null: from the values. */
+    range: [number, number] | null;
+    log: boolean;
+    isoLines: number;
+    unit: Unit;
+    /** Elements below this value are marked; null: no marks. */
+    threshold: number | null;
+    /** Group whose elements are judged by the threshold; null: all. */
+    judged: string | null;
+    /** Targets of mean and uniformity for the judged group, as EN 12464-1 states them for a task. */
+    uniformity: number;
+    walk: boolean;
+    /** Eye and target in metres, y up; null: the whole scene. */
+    camera: [number, number, number, number, number, number] | null;
+}
+
+export interface Preset {
+    name: string;
+    lighting: Lighting;
+}
+
+export interface Compare {
+    how: "split" | "difference";
+    /** Another scene of as many elements, or null: this one. */
+    scene: string | null;
+    /** The other lighting, or null: this one. */
+    lighting: Lighting | null;
+    split: number;
+}
+
+export interface State {
+    scene: string;
+    lighting: Lighting;
+    view: View;
+    presets: Preset[];
+    pins: number[];
+    compare: Compare | null;
+    /** Certified bound that is asked for, or null. */
+    tolerance: number | null;
+}
+
+export const skyOff: SkyLight = {
+    model: "off", strength: 100, latitude: 48, longitude: 11, zone: 1, day: 172, hour: 12,
+};
+
+export const firstView: View = {
+    picture: "light", quantity: "radiosity", smooth: true, tone: "agx", exposure: null, follow: false,
+    palette: "viridis", range: null, log: false, isoLines: 0, unit: "W/m²", threshold: null, judged: null,
+    uniformity: 0.6, walk: false, camera: null,
+};
+
+export const firstLighting: Lighting = { groups: {}, dim: 1, solo: null, sky: skyOff, emitters: {} };
+
+export const firstState: State = {
+    scene: "", lighting: firstLighting, view: firstView, presets: [], pins: [], compare: null, tolerance: null,
+};
+
+/** Emission of each group under a lighting, per channel, in the store's unit; groups that are dark are absent. */
+export function emissionOf(lighting: Lighting, channels: number): { [name: string]: number | number[] } {
+    const out: { [name: string]: number | number[] } = {};
+    for (const [name, light] of Object.entries(lighting.groups)) {
+        const power = light.power * lighting.dim;
+        if (!light.on || power <= 0 || (lighting.solo !== null && lighting.solo !== name)) continue;
+        out[name] = channels === 3 ? light.colour.map((c) => c * power) : power;
+    }
+    return out;
+}
