@@ -94,6 +94,10 @@ static const option_row connection_rows[] = {
      .argument = "ADDRESS[/BITS]|unix",
      .help =
          "Believe this proxy about the client's address (Forwarded, X-Forwarded-For); may be given again"},
+    {.name = "no-viewer",
+     .kind = OPTION_FLAG,
+     .offset = AT(no_viewer),
+     .help = "Serve no page at /, only the routes"},
     {.name = "access-log",
      .kind = OPTION_TEXT,
      .offset = AT(access_log),

@@ -30,6 +30,7 @@ typedef struct config {
     size_t min_rate; /* bytes a second that a client has to send and to read */
     size_t max_variants;
     bool verify;
+    bool no_viewer;
     double scrub_hours; /* 0: never */
     bool version;
     char **stores; /* the other arguments: STORE.h5 or STORE.h5:NAME */

@@ -9,7 +9,7 @@ jobs=$(nproc)
 logs=build/logs
 mkdir -p "$logs"
 
-./deploy/install-packages
+./deploy/install-packages deploy/packages tests/packages
 
 step() { printf '\n== %s (%d s)\n' "$*" "$SECONDS"; }
 

@@ -48,9 +48,11 @@ static int read_weight(const char *word, size_t length) {
     return weight > 1000 ? 1000 : weight;
 }
 
-coding_choice coding_choose(const char *header) {
-    int weights[N_CODINGS] = {-1, -1, -1}, others = -1; /* -1: not named */
+/* The weights of the codings in thousandths; -1: not named. */
+static void read_weights(const char *header, int weights[N_CODINGS], int *others) {
     const char *at = header == NULL ? "" : header;
+    *others = -1;
+    for (size_t c = 0; c < N_CODINGS; c++) weights[c] = -1;
     while (*at != '\0') {
         const char *word, *value;
         size_t length, value_length;
@@ -65,11 +67,16 @@ coding_choice coding_choose(const char *header) {
             if (is_word(key, key_length, "q")) weight = read_weight(value, value_length);
         }
         if (*at == ',') at++;
-        if (is_word(word, length, "*")) others = weight;
+        if (is_word(word, length, "*")) *others = weight;
         if (is_word(word, length, "x-gzip")) weights[CODING_GZIP] = weight;
         for (size_t c = 0; c < N_CODINGS; c++)
             if (is_word(word, length, names[c])) weights[c] = weight;
     }
+}
+
+coding_choice coding_choose(const char *header) {
+    int weights[N_CODINGS], others;
+    read_weights(header, weights, &others);
     /* Identity is acceptable unless its name or the star has weight 0, and preferred to a coding only by its
      * name. */
     coding_choice choice = {CODING_IDENTITY, false};
@@ -85,6 +92,13 @@ coding_choice coding_choose(const char *header) {
     }
     choice.forced = refused && choice.coding != CODING_IDENTITY;
     return choice;
+}
+
+bool coding_accepts(const char *header, content_coding coding) {
+    int weights[N_CODINGS], others;
+    read_weights(header, weights, &others);
+    const int weight = weights[coding] < 0 ? others : weights[coding];
+    return weight > 0 && weight >= weights[CODING_IDENTITY];
 }
 
 const char *coding_name(content_coding coding) {

@@ -17,6 +17,9 @@ typedef struct coding_choice {
 /* The coding that an Accept-Encoding header (or NULL) asks for; identity if it asks for others than these. */
 coding_choice coding_choose(const char *header);
 
+/* True if the header accepts a coding, and does not prefer identity to it. */
+bool coding_accepts(const char *header, content_coding coding);
+
 /* The name of a coding in Content-Encoding. */
 const char *coding_name(content_coding coding);
 

@@ -50,6 +50,13 @@ void http_finish_answer(request *r, bool on_io_thread) {
         http_stream_choose(r);
         return;
     }
+    if (a->fixed != NULL) {
+        if (coding_accepts(http_header(r, MHD_HTTP_HEADER_ACCEPT_ENCODING), CODING_GZIP))
+            r->coding = CODING_GZIP;
+        etag_make(etag_hash((const char *)a->fixed->plain, a->fixed->length), coding_name(r->coding),
+                  r->etag);
+        return;
+    }
     /* The tag is that of the bytes before compression. */
     const uint64_t hash = a->cacheable ? etag_hash(a->body.bytes, a->body.length) : 0;
     if (!on_io_thread || a->body.length <= IO_THREAD_MAX) code_body(r);
@@ -82,6 +89,7 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
     if (a->type != NULL) good = good && add(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
     if (a->allow[0] != '\0') good = good && add(response, MHD_HTTP_HEADER_ALLOW, a->allow);
     if (a->location != NULL) good = good && add(response, MHD_HTTP_HEADER_LOCATION, a->location);
+    if (a->policy != NULL) good = good && add(response, "Content-Security-Policy", a->policy);
     if (a->refined) good = good && add_refined(response, a);
     if (a->retry_after > 0) {
         char seconds[16];
@@ -111,10 +119,18 @@ enum MHD_Result http_send_answer(request *r) {
     }
     const bool with_body = a->status != MHD_HTTP_NOT_MODIFIED && strcmp(r->method, "HEAD") != 0;
     uint64_t length = a->body.length;
+    if (a->fixed != NULL) length = r->coding == CODING_GZIP ? a->fixed->gzip_length : a->fixed->length;
     r->sent = with_body ? length : 0;
     if (a->stream != NULL) {
         r->sent = 0;
         response = http_stream_response(r, &length);
+    } else if (a->fixed != NULL) {
+        /* The library takes bytes that are not const, and does not write to them. */
+        union {
+            const unsigned char *held;
+            void *taken;
+        } bytes = {r->coding == CODING_GZIP ? a->fixed->gzip : a->fixed->plain};
+        response = MHD_create_response_from_buffer(length, bytes.taken, MHD_RESPMEM_PERSISTENT);
     } else if (a->body.bytes == NULL) {
         static char nothing[1];
         response = MHD_create_response_from_buffer(0, nothing, MHD_RESPMEM_PERSISTENT);

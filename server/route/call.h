@@ -35,16 +35,26 @@ typedef struct call {
     char *changed; /* the variant that the handler made or removed, owned, for the log; or NULL */
 } call;
 
+/* Bytes that the program holds as long as it runs. */
+typedef struct fixed_bytes {
+    const unsigned char *plain;
+    size_t length;
+    const unsigned char *gzip; /* the same, compressed */
+    size_t gzip_length;
+} fixed_bytes;
+
 /* Zero at the start. The sender takes the body over. */
 typedef struct answer {
     unsigned status;
     problem_kind problem; /* PROBLEM_NONE: it is none */
     const char *type;     /* static */
     buffer body;
-    answer_stream *stream; /* in place of body: of an answer of many numbers; or NULL */
-    char allow[32];        /* of a 405 */
-    unsigned retry_after;  /* of a 503: seconds; 0: no header */
-    bool refined;          /* certificate and iterations are set: the largest of its vectors */
+    answer_stream *stream;    /* in place of body: of an answer of many numbers; or NULL */
+    const fixed_bytes *fixed; /* in place of body; or NULL */
+    const char *policy;       /* Content-Security-Policy, static; or NULL */
+    char allow[32];           /* of a 405 */
+    unsigned retry_after;     /* of a 503: seconds; 0: no header */
+    bool refined;             /* certificate and iterations are set: the largest of its vectors */
     double certificate;
     size_t iterations;
     char *location; /* of a 202, owned; or NULL */

@@ -32,6 +32,11 @@ static const route routes[] = {
      .also_built = true,
      .right = TOKEN_VARY},
     {.method = "GET", .pattern = "/v1/openapi.json", .handle = get_openapi},
+    {.method = "GET", .pattern = "/", .handle = get_viewer_page, .open = true},
+    {.method = "GET", .pattern = "/viewer.js", .handle = get_viewer_script, .open = true},
+    {.method = "GET", .pattern = "/viewer.css", .handle = get_viewer_style, .open = true},
+    {.method = "GET", .pattern = "/viewer.svg", .handle = get_viewer_icon, .open = true},
+    {.method = "GET", .pattern = "/viewer.txt", .handle = get_viewer_licences, .open = true},
 };
 #define N_ROUTES (sizeof routes / sizeof routes[0])
 

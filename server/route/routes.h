@@ -53,7 +53,8 @@ typedef struct route_match {
 void route_find(const char *method, const char *path, route_match *match, answer *out);
 
 route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_adjoint, put_reflectance,
-    delete_reflectance, delete_scene, get_openapi;
+    delete_reflectance, delete_scene, get_openapi, get_viewer_page, get_viewer_script, get_viewer_style,
+    get_viewer_icon, get_viewer_licences;
 route_shortcut quick_radiosity;
 extern const solve_steps post_radiosity;
 

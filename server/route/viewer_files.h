@@ -1,20 +1,22 @@
-/* The files of the page at GET /, which the build of server/viewer puts into the daemon; none where it was built
- * without the viewer. */
+/* The files of the page at GET /, which the build of server/viewer puts into the daemon. */
 #ifndef LAMBERT_SERVER_ROUTE_VIEWER_FILES_H
 #define LAMBERT_SERVER_ROUTE_VIEWER_FILES_H
 
-#include <stddef.h>
+#include "server/route/call.h"
 
-typedef struct viewer_file {
-    const char *path; /* of its route */
-    const char *type;
-    const unsigned char *bytes;
-    size_t length;
-    const unsigned char *gzip; /* the same, compressed */
-    size_t gzip_length;
-} viewer_file;
+typedef enum viewer_part {
+    VIEWER_PAGE,
+    VIEWER_SCRIPT,
+    VIEWER_STYLE,
+    VIEWER_ICON,
+    VIEWER_LICENCES,
+    VIEWER_PARTS
+} viewer_part;
 
-extern const viewer_file viewer_files[];
-extern const size_t viewer_file_count;
+/* True if the daemon was built with the viewer. */
+extern const bool viewer_is_built;
+
+/* Empty where it was not. */
+extern const fixed_bytes viewer_files[VIEWER_PARTS];
 
 #endif

@@ -43,27 +43,19 @@ const licence = (name) => {
 writeFileSync(join(out, "licences.txt"), [...packages].sort().map(licence).join(`\n${"-".repeat(80)}\n\n`));
 for (const file of ["page.html", "icon.svg"]) writeFileSync(join(out, file), readFileSync(join(sources, file)));
 
-// Paths of the daemon, files, types. The names of the C side stand in server/route/viewer_files.h.
-const files = [
-    ["/", "page.html", "text/html; charset=utf-8"],
-    ["/viewer.js", "viewer.js", "text/javascript; charset=utf-8"],
-    ["/viewer.css", "viewer.css", "text/css; charset=utf-8"],
-    ["/viewer.svg", "icon.svg", "image/svg+xml"],
-    ["/viewer.txt", "licences.txt", "text/plain; charset=utf-8"],
-];
-const quoted = (path) => JSON.stringify(path);
-const pieces = ['#include "server/route/viewer_files.h"\n'];
-const rows = [];
-files.forEach(([path, file, type], i) => {
-    const bytes = readFileSync(join(out, file));
-    const packed = gzipSync(bytes, { level: 9 });
+// In the order of viewer_part in server/route/viewer_files.h.
+const files = ["page.html", "viewer.js", "viewer.css", "icon.svg", "licences.txt"];
+const text = (path) => JSON.stringify(path).slice(1, -1).replaceAll("\\", "\\\\");
+const include = (symbol, path) => `__asm__(".section .rodata\\n.hidden ${symbol}\\n.global ${symbol}\\n${symbol}:\\n"
+        ".incbin \\"${text(path)}\\"\\n.byte 0\\n.previous\\n");
+extern const unsigned char ${symbol}[];
+`;
+let code = '#include "server/route/viewer_files.h"\n\n', rows = "";
+files.forEach((file, i) => {
+    const bytes = readFileSync(join(out, file)), packed = gzipSync(bytes, { level: 9 });
     writeFileSync(join(out, `${file}.gz`), packed);
-    for (const [symbol, name] of [[`viewer_plain_${i}`, file], [`viewer_gzip_${i}`, `${file}.gz`]]) {
-        pieces.push(`__asm__(".section .rodata\\n.hidden ${symbol}\\n.global ${symbol}\\n${symbol}:\\n"
-        ".incbin ${quoted(join(out, name)).replaceAll('"', '\\"')}\\n.byte 0\\n.previous");
-extern const unsigned char ${symbol}[];`);
-    }
-    rows.push(`    {${quoted(path)}, ${quoted(type)}, viewer_plain_${i}, ${bytes.length}, viewer_gzip_${i}, ${packed.length}},`);
+    code += include(`viewer_plain_${i}`, join(out, file)) + include(`viewer_gzip_${i}`, join(out, `${file}.gz`));
+    rows += `    {viewer_plain_${i}, ${bytes.length}, viewer_gzip_${i}, ${packed.length}},\n`;
 });
-pieces.push(`\nconst viewer_file viewer_files[] = {\n${rows.join("\n")}\n};\nconst size_t viewer_file_count = ${files.length};\n`);
-writeFileSync(join(out, "viewer_files.c"), pieces.join("\n"));
+code += `\nconst bool viewer_is_built = true;\nconst fixed_bytes viewer_files[VIEWER_PARTS] = {\n${rows}};\n`;
+writeFileSync(join(out, "viewer_files.c"), code);

@@ -37,7 +37,7 @@ class Life(Case):
             ended = self.run_once(*arguments)
             self.assertEqual(ended.returncode, 2, arguments)
             self.assertEqual(len(ended.stderr.splitlines()), 1, ended.stderr)
-        for option in ("--lock", "--no-viewer"):
+        for option in ("--lock", "--no-lights"):
             self.assertEqual(self.run_once("x.h5", option).stderr,
                              f"lambertd: {option}: no such option; see lambertd --help\n")
 
