@@ -1,0 +1,140 @@
+// Stores, daemons and pages for the tests in a browser. LAMBERT and LAMBERTD name the programs, CHROMIUM the browser.
+import { execFileSync, spawn } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after } from "node:test";
+import { chromium } from "playwright-core";
+
+export const LAMBERT = process.env.LAMBERT ?? "lambert";
+export const LAMBERTD = process.env.LAMBERTD ?? "lambertd";
+/** Long enough for a browser that draws by software beside other tests. */
+export const PATIENCE = 60_000;
+
+const folder = mkdtempSync(join(tmpdir(), "lambert-browser-"));
+const ends = [];
+after(async () => {
+    for (const end of ends.reverse()) await end();
+    rmSync(folder, { recursive: true, force: true });
+});
+
+export function inFolder(name) {
+    return join(folder, name);
+}
+
+export function lambert(...args) {
+    return execFileSync(LAMBERT, args.map(String), { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
+}
+
+/** A store of a generated scene, named NAME. */
+export function makeStore(name, kind, { generate = [], precompute = ["--probes", 2] } = {}) {
+    const scene = inFolder(`${name}.obj`), store = inFolder(`${name}.h5`);
+    lambert("generate", kind, ...generate, "-o", scene);
+    lambert("precompute", scene, "-o", store, "--quiet", ...precompute);
+    return store;
+}
+
+export class Daemon {
+    /** Starts lambertd on loopback; port 0 is a free one. */
+    static async start(stores, { port = 0, options = [] } = {}) {
+        const daemon = new Daemon();
+        daemon.process = spawn(LAMBERTD, [...stores, "--listen", `127.0.0.1:${port}`, ...options].map(String));
+        ends.push(() => daemon.stop("SIGTERM"));
+        daemon.gone = new Promise((resolve) => daemon.process.once("exit", resolve));
+        daemon.address = await new Promise((resolve, reject) => {
+            let said = "";
+            const read = (bytes) => {
+                said += bytes;
+                const found = /listening on (http:\S+)/.exec(said);
+                if (found) resolve(found[1].replace(/\/$/, ""));
+            };
+            daemon.process.stdout.on("data", read);
+            daemon.process.stderr.on("data", read);
+            daemon.process.once("exit", () => reject(new Error(`lambertd ended: ${said}`)));
+        });
+        return daemon;
+    }
+
+    get port() {
+        return Number(new URL(this.address).port);
+    }
+
+    async stop(signal = "SIGTERM") {
+        if (this.process.exitCode === null && this.process.signalCode === null) this.process.kill(signal);
+        await this.gone;
+    }
+
+    async json(path, body) {
+        const response = await fetch(this.address + path, body === undefined ? {} : {
+            method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body),
+        });
+        return response.json();
+    }
+}
+
+let browser = null;
+
+/** A page of the viewer, which has shown its first answer. Its `faults` are errors and requests to other origins. */
+export async function openPage(address, { width = 1280, height = 800, hash = "", touch = false, wait = true, storage } = {}) {
+    if (browser === null) {
+        browser = await chromium.launch({
+            executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+            args: ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+                "--disable-component-update", "--disable-sync", "--use-angle=swiftshader",
+                "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
+        });
+        ends.push(() => browser.close());
+    }
+    const context = await browser.newContext({
+        viewport: { width, height }, hasTouch: touch, isMobile: touch, permissions: ["clipboard-read", "clipboard-write"], ...storage,
+    });
+    const page = await context.newPage();
+    page.setDefaultTimeout(PATIENCE);
+    page.faults = [];
+    page.on("pageerror", (error) => page.faults.push(String(error)));
+    page.on("request", (request) => {
+        const url = request.url();
+        if (!url.startsWith(address) && !url.startsWith("data:") && !url.startsWith("blob:")) page.faults.push(`asked ${url}`);
+    });
+    page.on("console", (message) => {
+        // A daemon that is gone, or a token that is missing, is told by the browser itself.
+        if (message.type() === "error" && !/Failed to load resource/.test(message.text())) page.faults.push(message.text());
+    });
+    await page.goto(`${address}/${hash}`);
+    if (wait) await settled(page);
+    return page;
+}
+
+/** Waits until all that was asked for is shown and drawn. */
+export async function settled(page) {
+    await page.waitForFunction(() => window.lambert?.answers > 0 && window.lambert.isIdle);
+    await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+}
+
+/** The colour of the picture at a point given in shares of its width and height, [r, g, b] of 255; drawn anew for it. */
+export function pixel(page, x, y) {
+    return page.evaluate(([u, v]) => {
+        const { stage } = window.lambert, gl = stage.renderer.getContext(), bytes = new Uint8Array(4);
+        stage.draw();
+        gl.readPixels(Math.floor(u * gl.drawingBufferWidth), Math.floor((1 - v) * gl.drawingBufferHeight), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+        return [...bytes.subarray(0, 3)];
+    }, [x, y]);
+}
+
+/** The element under a point, found by the page's own picking. */
+export function elementAt(page, x, y) {
+    return page.evaluate(([u, v]) => {
+        const { scene, cameras } = window.lambert;
+        cameras.camera.updateMatrixWorld();
+        return scene.picker.at(2 * u - 1, 1 - 2 * v, cameras.camera);
+    }, [x, y]);
+}
+
+/** axe-core's violations that are serious or critical, as texts. */
+export async function violations(page) {
+    const source = readFileSync(new URL(import.meta.resolve("axe-core/axe.min.js")), "utf8");
+    await page.evaluate(source);
+    return page.evaluate(async () => (await window.axe.run()).violations
+        .filter((v) => v.impact === "serious" || v.impact === "critical")
+        .map((v) => `${v.id}: ${v.nodes.map((n) => n.html.slice(0, 120)).join(" | ")}`));
+}
