@@ -27,6 +27,7 @@ declare -A allowed=(
     [solver/operator/blocks]="$below_operator"
     [solver/operator/refine]="$operator"
     [solver/codec]="$below_linalg solver/operator/operator.h solver/operator/blocks/importance.h"
+    [solver/codec/gltf]="lambert/ store/ solver/base/ solver/codec/"
     [solver/daylight]="$below_linalg"
     [solver/scene]="$below_linalg"
     [solver/scene/facet]="$scene"

@@ -1,0 +1,343 @@
+#include "solver/codec/gltf/gltf.h"
+
+#include "solver/codec/gltf/corner_normals.h"
+#include "solver/codec/json_writer.h"
+#include "store/status.h"
+
+#include <assert.h>
+#include <endian.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The heads of a file and of its two chunks. */
+#define FILE_HEAD 12u
+#define CHUNK_HEAD 8u
+static const uint32_t magic = 0x46546C67, version = 2, chunk_json = 0x4E4F534A, chunk_binary = 0x004E4942;
+
+/* Of the specification: component types, and targets of views. */
+enum { TYPE_FLOAT = 5126, TYPE_U32 = 5125, TARGET_VERTICES = 34962, TARGET_INDICES = 34963 };
+
+/* The views of the binary chunk, in this order; each group has one accessor in each. */
+enum { VIEW_POSITION, VIEW_NORMAL, VIEW_ELEMENT, VIEW_INDEX, N_VIEWS };
+
+/* A group's part of the file. */
+typedef struct part {
+    size_t group, n_elements;
+    size_t vertex, n_vertices; /* first of the file, and how many */
+    size_t index, n_indices;
+    float low[3], high[3];
+    double reflectance[3], emission[3];
+} part;
+
+typedef struct writer {
+    const gltf_mesh *m;
+    corner_normals s;
+    float (*normals)[3]; /* [4 elements of the largest group] */
+    part *parts;         /* [n_parts]: the groups that have elements */
+    size_t n_parts, n_vertices, n_indices;
+    size_t view[N_VIEWS + 1]; /* offsets in the binary chunk, and its length */
+    buffer json;
+} writer;
+
+static void writer_free(writer *w) {
+    corner_normals_free(&w->s);
+    free(w->normals);
+    free(w->parts);
+    buffer_free(&w->json);
+}
+
+static size_t corners_of(const gltf_mesh *m, size_t element) {
+    return m->elements[element][3] == GLTF_NO_VERTEX ? 3 : 4;
+}
+
+static const uint32_t *elements_of(const gltf_mesh *m, size_t g) {
+    return m->groups->elements + m->groups->start[g];
+}
+
+/* The mean by area of values [C][n] over a group, as red, green and blue. Of an area of 0 it is the plain
+ * mean.
+ */
+static void mean_colour(const gltf_mesh *m, size_t g, const float *values, double colour[3]) {
+    const uint32_t *elements = elements_of(m, g);
+    const size_t count = m->groups->start[g + 1] - m->groups->start[g], C = m->n_channels;
+    double area = 0, grey = 0;
+    for (size_t j = 0; j < count; j++) area += m->area[elements[j]];
+    for (size_t c = 0; c < C; c++) {
+        double sum = 0;
+        for (size_t j = 0; j < count; j++)
+            sum += (area > 0 ? m->area[elements[j]] / area : 1 / (double)count) *
+                   (double)values[c * m->n + elements[j]];
+        grey += sum / (double)C;
+        if (C == 3) colour[c] = fmax(sum, 0);
+    }
+    if (C != 3) colour[0] = colour[1] = colour[2] = fmax(grey, 0);
+}
+
+static void measure_part(writer *w, part *p) {
+    const gltf_mesh *m = w->m;
+    const uint32_t *elements = elements_of(m, p->group);
+    for (int d = 0; d < 3; d++) {
+        p->low[d] = INFINITY;
+        p->high[d] = -INFINITY;
+    }
+    for (size_t j = 0; j < p->n_elements; j++) {
+        const size_t corners = corners_of(m, elements[j]);
+        p->n_vertices += corners;
+        p->n_indices += 3 * (corners - 2);
+        for (size_t k = 0; k < corners; k++)
+            for (int d = 0; d < 3; d++) {
+                const float x = w->s.position[m->elements[elements[j]][k]][d];
+                p->low[d] = fminf(p->low[d], x);
+                p->high[d] = fmaxf(p->high[d], x);
+            }
+    }
+    mean_colour(m, p->group, m->reflectance, p->reflectance);
+    mean_colour(m, p->group, m->emission, p->emission);
+}
+
+static lam_status plan(writer *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const gltf_mesh *m = w->m;
+    const size_t bytes[N_VIEWS] = {3 * sizeof(float), 3 * sizeof(float), sizeof(float), sizeof(uint32_t)};
+    if (m->n > GLTF_ELEMENTS_MOST)
+        FAIL(error, LAM_ERR_ARGUMENT, "%zu elements, at most %zu have a number in glTF", m->n,
+             GLTF_ELEMENTS_MOST);
+    TRY(corner_normals_create(m, &w->s, error));
+    w->normals = memory_allocate(gltf_largest_group(m->groups), 4 * sizeof *w->normals, "normals", error);
+    w->parts = memory_allocate(m->groups->n_groups, sizeof *w->parts, "glTF", error);
+    if (w->normals == NULL || w->parts == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0; g < m->groups->n_groups; g++) {
+        const size_t count = m->groups->start[g + 1] - m->groups->start[g];
+        if (count == 0) continue;
+        part *p = &w->parts[w->n_parts++];
+        *p = (part){.group = g, .n_elements = count, .vertex = w->n_vertices, .index = w->n_indices};
+        measure_part(w, p);
+        w->n_vertices += p->n_vertices;
+        w->n_indices += p->n_indices;
+    }
+    for (size_t v = 0; v < N_VIEWS; v++)
+        w->view[v + 1] = w->view[v] + bytes[v] * (v == VIEW_INDEX ? w->n_indices : w->n_vertices);
+done:
+    return status;
+}
+
+static bool say_numbers(buffer *b, const char *name, size_t count, const double *values) {
+    return buffer_printf(b, "%s", name) && json_write_doubles(b, values, count);
+}
+
+static bool say_floats(buffer *b, const char *name, const float values[3]) {
+    return say_numbers(b, name, 3,
+                       (const double[3]){(double)values[0], (double)values[1], (double)values[2]});
+}
+
+static bool say_extras(const writer *w, buffer *b) {
+    bool good = buffer_append_text(b, "\"extras\":{\"lambert\":{\"name\":") &&
+                json_write_text(b, w->m->name) &&
+                buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu", w->m->n, w->m->n_channels);
+    if (w->m->kind != NULL)
+        good = good && buffer_append_text(b, ",\"kind\":") && json_write_text(b, w->m->kind);
+    return good && buffer_append_text(b, "}}");
+}
+
+/* Node 0 is the root, node and mesh and material 1 + k, k and k are those of part k. */
+static bool say_nodes(const writer *w, buffer *b) {
+    bool good = buffer_append_text(b, ",\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"name\":") &&
+                json_write_text(b, w->m->name) && buffer_append_text(b, ",\"children\":[");
+    for (size_t k = 0; k < w->n_parts; k++) good = good && buffer_printf(b, k > 0 ? ",%zu" : "%zu", k + 1);
+    good = good && buffer_append_text(b, "],") && say_extras(w, b) && buffer_append_text(b, "}");
+    for (size_t k = 0; k < w->n_parts; k++)
+        good = good && buffer_append_text(b, ",{\"name\":") &&
+               json_write_text(b, w->m->groups->names[w->parts[k].group]) &&
+               buffer_printf(b, ",\"mesh\":%zu,\"extras\":{\"group\":%zu,\"elements\":%zu}}", k,
+                             w->parts[k].group, w->parts[k].n_elements);
+    return good && buffer_append_text(b, "]");
+}
+
+static bool say_meshes(const writer *w, buffer *b) {
+    bool good = buffer_append_text(b, ",\"meshes\":[");
+    for (size_t k = 0; k < w->n_parts; k++)
+        good = good && buffer_append_text(b, k > 0 ? ",{\"name\":" : "{\"name\":") &&
+               json_write_text(b, w->m->groups->names[w->parts[k].group]) &&
+               buffer_printf(b,
+                             ",\"primitives\":[{\"attributes\":{\"POSITION\":%zu,\"NORMAL\":%zu,\"_ELEMENT\":"
+                             "%zu},\"indices\":%zu,\"material\":%zu,\"mode\":4}]}",
+                             N_VIEWS * k, N_VIEWS * k + 1, N_VIEWS * k + 2, N_VIEWS * k + 3, k);
+    return good && buffer_append_text(b, "]");
+}
+
+/* emission = emissiveFactor, whose largest component is 1, times emissiveStrength. */
+static bool say_emission(const double emission[3], buffer *b) {
+    const double most = fmax(emission[0], fmax(emission[1], emission[2]));
+    if (!(most > 0)) return true;
+    const double factor[3] = {emission[0] / most, emission[1] / most, emission[2] / most};
+    return say_numbers(b, ",\"emissiveFactor\":", 3, factor) &&
+           buffer_append_text(
+               b, ",\"extensions\":{\"KHR_materials_emissive_strength\":{\"emissiveStrength\":") &&
+           json_write_double(b, most) && buffer_append_text(b, "}}");
+}
+
+static bool say_materials(const writer *w, buffer *b) {
+    bool good = buffer_append_text(b, ",\"materials\":["), emits = false;
+    for (size_t k = 0; k < w->n_parts; k++) {
+        const part *p = &w->parts[k];
+        const double colour[4] = {fmin(p->reflectance[0], 1), fmin(p->reflectance[1], 1),
+                                  fmin(p->reflectance[2], 1), 1};
+        good = good && buffer_append_text(b, k > 0 ? ",{\"name\":" : "{\"name\":") &&
+               json_write_text(b, w->m->groups->names[p->group]) &&
+               say_numbers(b, ",\"pbrMetallicRoughness\":{\"baseColorFactor\":", 4, colour) &&
+               buffer_append_text(b, ",\"metallicFactor\":0,\"roughnessFactor\":1},\"doubleSided\":false") &&
+               say_emission(p->emission, b) && buffer_append_text(b, "}");
+        emits = emits || fmax(p->emission[0], fmax(p->emission[1], p->emission[2])) > 0;
+    }
+    good = good && buffer_append_text(b, "]");
+    return good &&
+           (!emits || buffer_append_text(b, ",\"extensionsUsed\":[\"KHR_materials_emissive_strength\"]"));
+}
+
+static bool say_accessors(const writer *w, buffer *b) {
+    bool good = buffer_append_text(b, ",\"accessors\":[");
+    for (size_t k = 0; k < w->n_parts; k++) {
+        const part *p = &w->parts[k];
+        static const char text[] = "{\"bufferView\":%d,\"byteOffset\":%zu,\"componentType\":%d,\"count\":%zu,"
+                                   "\"type\":\"%s\"";
+        if (k > 0) good = good && buffer_append_text(b, ",");
+        good = good &&
+               buffer_printf(b, text, VIEW_POSITION, 12 * p->vertex, TYPE_FLOAT, p->n_vertices, "VEC3") &&
+               say_floats(b, ",\"min\":", p->low) && say_floats(b, ",\"max\":", p->high) &&
+               buffer_append_text(b, "},") &&
+               buffer_printf(b, text, VIEW_NORMAL, 12 * p->vertex, TYPE_FLOAT, p->n_vertices, "VEC3") &&
+               buffer_append_text(b, "},") &&
+               buffer_printf(b, text, VIEW_ELEMENT, 4 * p->vertex, TYPE_FLOAT, p->n_vertices, "SCALAR") &&
+               buffer_append_text(b, "},") &&
+               buffer_printf(b, text, VIEW_INDEX, 4 * p->index, TYPE_U32, p->n_indices, "SCALAR") &&
+               buffer_append_text(b, "}");
+    }
+    return good && buffer_append_text(b, "]");
+}
+
+static bool say_views(const writer *w, buffer *b) {
+    static const int strides[N_VIEWS] = {12, 12, 4, 0};
+    bool good = buffer_append_text(b, ",\"bufferViews\":[");
+    for (size_t v = 0; v < N_VIEWS; v++) {
+        good = good && buffer_printf(b, "%s{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu,\"target\":%d",
+                                     v > 0 ? "," : "", w->view[v], w->view[v + 1] - w->view[v],
+                                     v == VIEW_INDEX ? TARGET_INDICES : TARGET_VERTICES);
+        if (strides[v] > 0) good = good && buffer_printf(b, ",\"byteStride\":%d", strides[v]);
+        good = good && buffer_append_text(b, "}");
+    }
+    return good && buffer_printf(b, "],\"buffers\":[{\"byteLength\":%zu}]", w->view[N_VIEWS]);
+}
+
+static bool say_json(writer *w) {
+    static const char spaces[] = "   ";
+    buffer *b = &w->json;
+    return buffer_append_text(b, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"lambert " LAMBERT_VERSION
+                                 "\"},") &&
+           say_extras(w, b) && say_nodes(w, b) && say_meshes(w, b) && say_materials(w, b) &&
+           say_accessors(w, b) && say_views(w, b) && buffer_append_text(b, "}") &&
+           buffer_append(b, spaces, (4 - b->length % 4) % 4);
+}
+
+static char *put(char *at, uint32_t value) {
+    value = htole32(value);
+    memcpy(at, &value, sizeof value);
+    return at + sizeof value;
+}
+
+static char *put_float(char *at, float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return put(at, bits);
+}
+
+static char *put_vector(char *at, const float v[3]) {
+    return put_float(put_float(put_float(at, v[0]), v[1]), v[2]);
+}
+
+/* Writes the part's vertices and triangles; to is the binary chunk. */
+static lam_status put_part(writer *w, const part *p, char *to, lam_error *error) {
+    lam_status status = LAM_OK;
+    const gltf_mesh *m = w->m;
+    const uint32_t *elements = elements_of(m, p->group);
+    char *position = to + w->view[VIEW_POSITION] + 12 * p->vertex,
+         *normal = to + w->view[VIEW_NORMAL] + 12 * p->vertex,
+         *element = to + w->view[VIEW_ELEMENT] + 4 * p->vertex,
+         *index = to + w->view[VIEW_INDEX] + 4 * p->index;
+    uint32_t vertex = 0;
+    TRY(corner_normals_of_group(&w->s, p->group, w->normals, error));
+    for (size_t j = 0; j < p->n_elements; j++) {
+        const uint32_t corners = (uint32_t)corners_of(m, elements[j]);
+        for (uint32_t k = 0; k < corners; k++) {
+            position = put_vector(position, w->s.position[m->elements[elements[j]][k]]);
+            normal = put_vector(normal, w->normals[4 * j + k]);
+            element = put_float(element, (float)elements[j]);
+        }
+        for (uint32_t k = 2; k < corners; k++)
+            index = put(put(put(index, vertex), vertex + k - 1), vertex + k);
+        vertex += corners;
+    }
+    assert(vertex == p->n_vertices);
+done:
+    return status;
+}
+
+static size_t sum_of_products(size_t n, const size_t (*terms)[2]) {
+    size_t sum = 0, product;
+    for (size_t k = 0; k < n; k++)
+        if (!size_multiply(terms[k][0], terms[k][1], &product) || __builtin_add_overflow(sum, product, &sum))
+            return SIZE_MAX;
+    return sum;
+}
+
+/* Bytes of JSON: a name stands three times, six characters for one at most; the rest of a group has less than
+ * this many characters, and that of the file. */
+#define JSON_OF_NAME 18
+#define JSON_OF_GROUP 2048
+#define JSON_OF_FILE 4096
+
+size_t gltf_bytes_most(const gltf_sizes *sizes) {
+    const size_t element = 4 * 7 * sizeof(float) + 6 * sizeof(uint32_t);
+    return sum_of_products(4, (const size_t[][2]){{sizes->n, element},
+                                                  {sizes->n_texts, JSON_OF_NAME},
+                                                  {sizes->n_groups, JSON_OF_GROUP},
+                                                  {JSON_OF_FILE, 1}});
+}
+
+size_t gltf_work_bytes(const gltf_sizes *sizes) {
+    /* Of a vertex: its position, three numbers, and up to four places of a hash table. */
+    const size_t vertex = 3 * sizeof(float) + 7 * sizeof(uint32_t),
+                 element = 4 * (3 * sizeof(float) + sizeof(uint32_t));
+    return sum_of_products(5, (const size_t[][2]){{sizes->n, element},
+                                                  {sizes->n_vertices, vertex},
+                                                  {sizes->n_texts, JSON_OF_NAME},
+                                                  {sizes->n_groups, JSON_OF_GROUP + sizeof(part)},
+                                                  {JSON_OF_FILE, 1}});
+}
+
+lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    writer w = {.m = m};
+    buffer made = {0};
+    TRY(plan(&w, error));
+    if (!say_json(&w)) FAIL(error, LAM_ERR_MEMORY, "not enough memory for glTF");
+    const size_t head = FILE_HEAD + CHUNK_HEAD + w.json.length + CHUNK_HEAD;
+    if (w.json.length > UINT32_MAX || w.view[N_VIEWS] > UINT32_MAX - head)
+        FAIL(error, LAM_ERR_ARGUMENT, "%zu bytes, glTF has at most 2^32", head + w.view[N_VIEWS]);
+    const size_t length = head + w.view[N_VIEWS];
+    if (!buffer_reserve(&made, length))
+        FAIL(error, LAM_ERR_MEMORY, "not enough memory for %zu bytes of glTF", length);
+    made.length = length;
+    made.bytes[length] = '\0';
+    char *at = put(put(put(made.bytes, magic), version), (uint32_t)length);
+    at = put(put(at, (uint32_t)w.json.length), chunk_json);
+    memcpy(at, w.json.bytes, w.json.length);
+    at = put(put(at + w.json.length, (uint32_t)w.view[N_VIEWS]), chunk_binary);
+    for (size_t k = 0; k < w.n_parts; k++) TRY(put_part(&w, &w.parts[k], at, error));
+    *out = made;
+    made = (buffer){0};
+done:
+    buffer_free(&made);
+    writer_free(&w);
+    return status;
+}

@@ -1,0 +1,56 @@
+/* The elements of a scene as binary glTF 2.0 (Khronos, ISO/IEC 12113:2022). Knows neither stores nor files.
+ */
+#ifndef LAMBERT_CODEC_GLTF_GLTF_H
+#define LAMBERT_CODEC_GLTF_GLTF_H
+
+#include "solver/codec/buffer.h"
+#include "solver/codec/groups.h"
+
+/* More elements have numbers that a float does not hold. */
+#define GLTF_ELEMENTS_MOST ((size_t)1 << 24)
+
+/* The 4th vertex of an element that is a triangle. */
+#define GLTF_NO_VERTEX 0xFFFFFFFFu
+
+/* A scene as it is stored (store/FORMAT.md, /mesh). Every index is below its bound, every number finite. */
+typedef struct gltf_mesh {
+    const char *name, *kind; /* of the scene and of its operator; kind NULL: it is left out */
+    size_t n_vertices, n, n_channels;
+    const double (*vertices)[3];   /* [n_vertices][3], m */
+    const uint32_t (*elements)[4]; /* [n] */
+    const float (*normal)[3];      /* [n][3] */
+    const double *area;            /* [n], m^2 */
+    const float *reflectance;      /* [C][n] */
+    const float *emission;         /* [C][n], W/m^2 */
+    const group_index *groups;
+    char up; /* 'x', 'y' or 'z' */
+} gltf_mesh;
+
+/* Appends the mesh to out, which is empty: metres, y up, north -z (as of a scene that has y up), every
+ * element with 3 or 4 vertices of its own.
+ *   - A scene of one root node, which has a child for each group that has elements, of the group's name. Its
+ *     mesh is one primitive of triangles with POSITION, NORMAL, _ELEMENT (the number of the element, a float)
+ *     and indices of 32 bits; elements ascend, and the triangles of one follow each other.
+ *   - Corners of a group at one position share a normal, bit for bit, if they belong to one surface: elements
+ *     that meet there at less than 30 degrees, directly or by others between them. It is the mean of their
+ *     elements' normals by area. All other corners have those of their elements.
+ *   - A material for each group: the mean by area of its reflectance as base colour, and of its emission as
+ *     emissive factor and KHR_materials_emissive_strength. Of 1 channel these are grey, of 3 red, green and
+ *     blue, of others the grey of their mean.
+ *   - extras of the file and of the root node: {"lambert":{"name","elements","channels","kind"}}; of the node
+ *     of a group: {"group","elements"}.
+ * O(n). Errors: LAM_ERR_ARGUMENT (more than GLTF_ELEMENTS_MOST elements, more bytes than a file of glTF has,
+ * a position beyond float), LAM_ERR_MEMORY; out is then empty. */
+lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error);
+
+/* The sizes of a mesh that is not read yet; n_texts: bytes of all names. */
+typedef struct gltf_sizes {
+    size_t n, n_vertices, n_groups, n_texts;
+} gltf_sizes;
+
+/* Bytes that gltf_write leaves in out, and bytes that it takes meanwhile beside them, at most; SIZE_MAX where
+ * a size_t does not hold them. */
+size_t gltf_bytes_most(const gltf_sizes *sizes);
+size_t gltf_work_bytes(const gltf_sizes *sizes);
+
+#endif
