@@ -71,8 +71,8 @@ declare -A home=(
     ["png.h"]="solver/render/image.c"
     ["jansson.h"]="solver/codec/ solver/light/light_path.c solver/scene/import/file_header.c solver/verbs/ solver/bench/ tests/bench/"
     ["microhttpd.h"]="server/http/ tests/bench/ready_server.c"
-    ["zlib.h"]="server/http/content_coding.c"
-    ["zstd.h"]="server/http/content_coding.c"
+    ["zlib.h"]="server/route/content_coding.c"
+    ["zstd.h"]="server/route/content_coding.c"
 )
 
 for file in $(git ls-files 'include/*.h' 'store/*.[ch]' 'solver/*.[ch]' 'solver/*.inc' 'server/*.[ch]' 'tests/bench/*.[ch]'); do

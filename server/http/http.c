@@ -114,6 +114,7 @@ static bool check_head(request *r, const char *method, const char *target, uint6
                      .snapshot = r->snapshot,
                      .variant = variant,
                      .variant_why = &r->variant_why,
+                     .accepted = r->accepted,
                      .memory = &r->memory};
     if (!check_scene(r)) return false;
     if (!r->match.route->with_body) return true;
@@ -159,7 +160,7 @@ static enum MHD_Result handle(request *r) {
         route_shortcut *shortcut = r->match.route->shortcut;
         if (shortcut != NULL && shortcut(&r->call, &r->answer)) {
             http_drop_body(r);
-        } else if (r->match.route->with_body) {
+        } else if (r->match.route->with_body || r->match.route->steps != NULL) {
             http_solve(r);
             return MHD_YES;
         } else {
@@ -280,6 +281,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     http_drop_body(r);
     buffer_free(&r->answer.body);
     answer_stream_free(r->answer.stream);
+    kept_bytes_release(r->answer.kept);
     request_memory_give_back(&r->memory, r->memory.held);
     free(r->answer.location);
     free(r->call.changed);

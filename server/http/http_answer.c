@@ -22,6 +22,7 @@ const char *http_header(const request *r, const char *name) {
 /* Keeps of the memory of the request what its answer and its body take. */
 static void count_answer(request *r) {
     const answer *a = &r->answer;
+    /* Kept bytes count themselves. */
     const size_t length = a->stream != NULL ? answer_stream_held(a->stream) + STREAM_BYTES : a->body.capacity;
     const bool free_of =
         a->stream == NULL && (length <= FREE_OF_LEDGER || r->match.route == NULL || r->match.route->open);
@@ -55,6 +56,11 @@ void http_finish_answer(request *r, bool on_io_thread) {
             r->coding = CODING_GZIP;
         etag_make(etag_hash((const char *)a->fixed->plain, a->fixed->length), coding_name(r->coding),
                   r->etag);
+        return;
+    }
+    if (a->kept != NULL) {
+        r->coding = a->kept_coding;
+        etag_make(a->tag, coding_name(r->coding), r->etag);
         return;
     }
     /* The tag is that of the bytes before compression. */
@@ -110,6 +116,10 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
     return good;
 }
 
+static void release_kept(void *context) {
+    kept_bytes_release(context);
+}
+
 enum MHD_Result http_send_answer(request *r) {
     answer *a = &r->answer;
     struct MHD_Response *response;
@@ -120,6 +130,7 @@ enum MHD_Result http_send_answer(request *r) {
     const bool with_body = a->status != MHD_HTTP_NOT_MODIFIED && strcmp(r->method, "HEAD") != 0;
     uint64_t length = a->body.length;
     if (a->fixed != NULL) length = r->coding == CODING_GZIP ? a->fixed->gzip_length : a->fixed->length;
+    if (a->kept != NULL) length = a->kept->content.length;
     r->sent = with_body ? length : 0;
     if (a->stream != NULL) {
         r->sent = 0;
@@ -131,6 +142,10 @@ enum MHD_Result http_send_answer(request *r) {
             void *taken;
         } bytes = {r->coding == CODING_GZIP ? a->fixed->gzip : a->fixed->plain};
         response = MHD_create_response_from_buffer(length, bytes.taken, MHD_RESPMEM_PERSISTENT);
+    } else if (a->kept != NULL) {
+        response = MHD_create_response_from_buffer_with_free_callback_cls(length, a->kept->content.bytes,
+                                                                          release_kept, a->kept);
+        if (response != NULL) a->kept = NULL;
     } else if (a->body.bytes == NULL) {
         static char nothing[1];
         response = MHD_create_response_from_buffer(0, nothing, MHD_RESPMEM_PERSISTENT);

@@ -3,8 +3,8 @@
 #ifndef LAMBERT_SERVER_HTTP_HTTP_REQUEST_H
 #define LAMBERT_SERVER_HTTP_HTTP_REQUEST_H
 
-#include "server/http/content_coding.h"
 #include "server/http/http_fields.h"
+#include "server/route/content_coding.h"
 #include "server/route/routes.h"
 
 #include <microhttpd.h>
@@ -29,16 +29,16 @@ typedef struct request {
     catalog_snapshot *snapshot;
     problem variant_why;
     answer answer;
-    coding_choice accepted;
-    content_coding coding; /* of the answer */
-    char etag[ETAG_MAX];   /* of the answer; "" for none */
-    const char *origin;    /* of --allow-origin, the page that asks; NULL: none of them */
-    bool preflight;        /* the answer is one to a CORS preflight */
-    bool answered;         /* the answer is made; the rest of the body is dropped */
-    bool last;             /* the connection ends with this answer */
-    bool queued;           /* the answer was handed to libmicrohttpd */
-    buffer body;           /* counted in the service's body_bytes and in memory */
-    request_memory memory; /* of the body, of what is computed, of the answer */
+    coding_choice accepted; /* as that of the call, which some requests never have */
+    content_coding coding;  /* of the answer */
+    char etag[ETAG_MAX];    /* of the answer; "" for none */
+    const char *origin;     /* of --allow-origin, the page that asks; NULL: none of them */
+    bool preflight;         /* the answer is one to a CORS preflight */
+    bool answered;          /* the answer is made; the rest of the body is dropped */
+    bool last;              /* the connection ends with this answer */
+    bool queued;            /* the answer was handed to libmicrohttpd */
+    buffer body;            /* counted in the service's body_bytes and in memory */
+    request_memory memory;  /* of the body, of what is computed, of the answer */
     uint64_t received;
     size_t sent;
 } request;

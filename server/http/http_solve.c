@@ -125,7 +125,8 @@ static double cost_to_begin(const call *c, const route *to) {
 }
 
 /* The cost of a pass, or of the end if that takes longer. */
-static double cost_to_solve(const call *c) {
+static double cost_to_solve(const call *c, const route *to) {
+    if (to->steps->cost != NULL) return to->steps->cost(c);
     const double n_vectors = (double)c->job.n_vectors, together = fmin(n_vectors, BATCH_PASS);
     if (c->refines) return REFINEMENT;
     const double pass = PER_OPERATOR_BYTE * (double)lam_operator_bytes(c->scene->op) * (1 + together / 8);
@@ -155,7 +156,7 @@ static bool begin_solve(batch_job *job, batch_workspace *workspace) {
         to->handle(&r->call, &r->answer);
     } else if (to->steps->begin(&r->call, &r->answer)) {
         if (enter_refinements(r)) {
-            job->cost = cost_to_solve(&r->call);
+            job->cost = cost_to_solve(&r->call, to);
             http_drop_body(r); /* its vectors were read */
             return true;
         }

@@ -11,6 +11,8 @@ void answer_problem(answer *out, const problem *what) {
     buffer_free(&out->body);
     answer_stream_free(out->stream);
     out->stream = NULL;
+    kept_bytes_release(out->kept);
+    out->kept = NULL;
     out->status = what->status;
     out->problem = what->kind;
     out->type = "application/problem+json";

@@ -2,6 +2,7 @@
 #ifndef LAMBERT_SERVER_ROUTE_CALL_H
 #define LAMBERT_SERVER_ROUTE_CALL_H
 
+#include "server/route/content_coding.h"
 #include "server/route/request_memory.h"
 #include "server/route/service.h"
 #include "solver/base/clock.h"
@@ -23,7 +24,8 @@ typedef struct call {
     const problem *variant_why; /* of a variant that failed */
     media_type body_type;
     media_accept accept;
-    const char *body; /* body[length] is NUL */
+    coding_choice accepted; /* of the answer */
+    const char *body;       /* body[length] is NUL */
     size_t length;
     request_memory *memory;     /* of this request; all that it still holds is given back after its answer */
     batch_workspace *workspace; /* of a route with a body */
@@ -49,7 +51,11 @@ typedef struct answer {
     problem_kind problem; /* PROBLEM_NONE: it is none */
     const char *type;     /* static */
     buffer body;
-    answer_stream *stream;    /* in place of body: of an answer of many numbers; or NULL */
+    answer_stream *stream; /* in place of body: of an answer of many numbers; or NULL */
+    kept_bytes *kept; /* in place of body: a reference to bytes in kept_coding, the coding accepted, whose
+                         memory is counted by themselves; or NULL */
+    content_coding kept_coding;
+    uint64_t tag;             /* of kept: what its ETag is made of */
     const fixed_bytes *fixed; /* in place of body; or NULL */
     const char *policy;       /* Content-Security-Policy, static; or NULL */
     char allow[32];           /* of a 405 */

@@ -308,4 +308,4 @@ static void drop(call *in) {
     in->state = NULL;
 }
 
-const solve_steps post_radiosity = {begin, pass, end, drop};
+const solve_steps post_radiosity = {.begin = begin, .pass = pass, .end = end, .drop = drop};

@@ -34,6 +34,11 @@ bool request_memory_take_of(void *owner, size_t bytes, problem *why);
 
 void request_memory_give_back(request_memory *m, size_t bytes);
 
+/* The bytes are not the request's any more, but stay taken: another gives them back to the ledger. */
+static inline void request_memory_hand_over(request_memory *m, size_t bytes) {
+    m->held -= bytes;
+}
+
 /* Gives back all but `bytes` of it, or takes what it is short of; false if there is no room for that. */
 bool request_memory_keep(request_memory *m, size_t bytes);
 

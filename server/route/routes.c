@@ -14,6 +14,7 @@ static const route routes[] = {
      .handle = delete_scene,
      .also_built = true,
      .right = TOKEN_VARY},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", .steps = &get_mesh, .shortcut = quick_mesh},
     {.method = "POST",
      .pattern = "/v1/scenes/{name}/radiosity",
      .steps = &post_radiosity,

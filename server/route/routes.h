@@ -17,7 +17,8 @@ typedef struct solve_steps {
     bool (*begin)(call *in, answer *out);
     void (*pass)(const batch_part *parts, size_t n_parts, batch_workspace *workspace);
     void (*end)(call *in, answer *out);
-    void (*drop)(call *in); /* frees the state in place of end */
+    void (*drop)(call *in);         /* frees the state in place of end */
+    double (*cost)(const call *in); /* seconds of a pass, about; NULL: as passes over the operator have */
 } solve_steps;
 
 typedef struct route {
@@ -25,9 +26,10 @@ typedef struct route {
     const char *pattern;
     route_handler *handle;    /* or */
     const solve_steps *steps; /* of a solve that shares passes */
-    route_shortcut *shortcut; /* of a route with a body, or NULL */
-    bool with_body;    /* the body may have --max-body bytes; the handler runs on a thread that solves */
-    bool open;         /* no token is needed, unless one has the right */
+    route_shortcut *shortcut; /* or NULL */
+    bool with_body; /* the body may have --max-body bytes; the handler runs on a thread that solves, as steps
+                       do */
+    bool open;      /* no token is needed, unless one has the right */
     token_right right; /* that a token must have; 0: TOKEN_READ */
     bool any_host;     /* asked for by those that know no name of the daemon */
     bool also_built;   /* {name} may also be a variant that is not served yet */
@@ -55,7 +57,7 @@ void route_find(const char *method, const char *path, route_match *match, answer
 route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_adjoint, put_reflectance,
     delete_reflectance, delete_scene, get_openapi, get_viewer_page, get_viewer_script, get_viewer_style,
     get_viewer_icon, get_viewer_licences;
-route_shortcut quick_radiosity;
-extern const solve_steps post_radiosity;
+route_shortcut quick_radiosity, quick_mesh;
+extern const solve_steps post_radiosity, get_mesh;
 
 #endif

@@ -230,12 +230,25 @@ static lam_status check_work(const catalog *all, const catalog_snapshot *next, c
         (unsigned long long)used);
 }
 
-/* The same for a scene that is served already: rows of reductions go before the scene does. */
+/* Drops what a scene computed and can compute again. */
+static void drop_computed(const scene *s) {
+    row_cache_clear(s->rows);
+    scene_mesh_clear(s->mesh);
+}
+
+static void drop_all_computed(const catalog_snapshot *next) {
+    for (size_t i = 0; i < next->n_scenes; i++) drop_computed(next->scenes[i]);
+}
+
+/* The same, where rows of reductions and meshes go before the scene does: its own, which it may have where it
+ * is served already, then those of others. */
 static lam_status check_kept(const catalog *all, const catalog_snapshot *next, const scene *s,
                              lam_error *error) {
     lam_error unused;
     if (check_work(all, next, s, &unused) == LAM_OK) return LAM_OK;
-    row_cache_clear(s->rows);
+    drop_computed(s);
+    if (check_work(all, next, s, &unused) == LAM_OK) return LAM_OK;
+    drop_all_computed(next);
     return check_work(all, next, s, error);
 }
 
@@ -246,14 +259,20 @@ static lam_status open_source(catalog *all, const catalog_snapshot *next, const 
     scene *opened = NULL;
     /* A store that was damaged is verified as a whole first. */
     const bool verify = all->config->verify || (old != NULL && scene_damaged(old, NULL, NULL));
-    const scene_options options = {.path = from->path,
-                                   .name = from->name,
-                                   .verify = verify,
-                                   .memory = memory_left(all, next, memory_grown(next)),
-                                   .ledger = &all->ledger,
-                                   .before = old,
-                                   .threads = all->config->threads};
-    TRY(scene_open(&options, &opened, error));
+    scene_options options = {.path = from->path,
+                             .name = from->name,
+                             .verify = verify,
+                             .memory = memory_left(all, next, memory_grown(next)),
+                             .ledger = &all->ledger,
+                             .before = old,
+                             .threads = all->config->threads};
+    status = scene_open(&options, &opened, error);
+    if (status == LAM_ERR_MEMORY && memory_grown(next) > 0) {
+        drop_all_computed(next);
+        options.memory = memory_left(all, next, memory_grown(next));
+        status = scene_open(&options, &opened, error);
+    }
+    TRY(status);
     TRY(check_kept(all, next, opened, error));
     *out = opened;
     opened = NULL;
@@ -354,7 +373,7 @@ lam_status catalog_put_variant(catalog *all, scene *variant, lam_error *error) {
     if (taken != NULL && taken->base == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "the name %s is taken by a store", variant->name);
     TRY(copy_without(all->present, variant->name, &next, error));
-    TRY(check_work(all, next, variant, error));
+    TRY(check_kept(all, next, variant, error));
     variant->number = ++all->n_variants;
     (void)insert(next, variant);
     variant = NULL;

@@ -210,6 +210,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(refined_create(s, made->op, made->ledger, &made->refined, error));
     TRY(read_errors(s, made, error));
     TRY(describe_scene(s, made, &made->description, error));
+    TRY(scene_mesh_create(s, made, &made->mesh, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
     TRY(scene_health_create(made->path, made->map, options->verify, &made->health, error));
     /* Under the guard just made. Only here is it known which numbers are mapped, which must be finite. */
@@ -288,6 +289,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
     TRY(refined_create_variant(base->refined, op, &made->refined, error));
     TRY(describe_variant(made, groups, &made->description, error));
+    TRY(scene_mesh_create(NULL, made, &made->mesh, error));
     *out = made;
     made = NULL;
 done:
@@ -296,7 +298,7 @@ done:
 }
 
 uint64_t scene_grown(const scene *s) {
-    return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows);
+    return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) + scene_mesh_held(s->mesh);
 }
 
 scene *scene_acquire(scene *s) {
@@ -309,6 +311,7 @@ void scene_release(scene *s) {
     refined_destroy(s->refined);
     lam_operator_close(s->op);
     row_cache_destroy(s->rows);
+    scene_mesh_destroy(s->mesh);
     if (s->base == NULL) {
         lam_sky_close(s->sky);
         group_index_free(&s->groups);

@@ -1,11 +1,12 @@
-/* A store that is served, or a variant of one. Immutable except for its health and its cache of adjoint rows;
- * reference-counted. Large arrays are mapped, all others are read. */
+/* A store that is served, or a variant of one. Immutable except for its health and for what it keeps of
+ * answers (adjoint rows, its mesh); reference-counted. Large arrays are mapped, all others are read. */
 #ifndef LAMBERT_SERVER_SCENE_SCENE_H
 #define LAMBERT_SERVER_SCENE_SCENE_H
 
 #include "lambert/lambert.h"
 #include "server/scene/refined.h"
 #include "server/scene/row_cache.h"
+#include "server/scene/scene_mesh.h"
 #include "solver/codec/groups.h"
 #include "solver/codec/request.h"
 #include "solver/codec/stated_errors.h"
@@ -47,6 +48,7 @@ struct scene {
     memory_ledger *ledger; /* of memory taken later; or NULL */
     row_cache *rows;       /* adjoint rows for linear reductions; any thread */
     refined *refined;      /* the refiner of its answers, made when first needed */
+    scene_mesh *mesh;      /* its elements as glTF, made when first asked for */
     store_map *map;        /* held; NULL: nothing is mapped */
     scene_health *health;
     scene *next_to_verify; /* private to verifier.c, as the next one */

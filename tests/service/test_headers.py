@@ -1,7 +1,5 @@
 """Headers of answers: codings, entity tags, request ids; and /metrics as Prometheus reads it."""
 
-import ctypes
-import ctypes.util
 import gzip
 import io
 import json
@@ -15,26 +13,11 @@ import unittest
 import numpy as np
 from prometheus_client.parser import text_string_to_metric_families
 
+from codings import DECODERS, unzstd
 from daemon import PATIENCE, Daemon
 from make_store import Scene
 
 N = 3000
-
-_zstd = ctypes.CDLL(ctypes.util.find_library("zstd"))
-for call in _zstd.ZSTD_decompress, _zstd.ZSTD_getFrameContentSize:
-    call.restype = ctypes.c_size_t
-_zstd.ZSTD_getFrameContentSize.argtypes = [ctypes.c_char_p, ctypes.c_size_t]
-_zstd.ZSTD_decompress.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t]
-
-
-def unzstd(raw):
-    size = _zstd.ZSTD_getFrameContentSize(raw, len(raw))
-    out = ctypes.create_string_buffer(size)
-    assert _zstd.ZSTD_decompress(out, size, raw, len(raw)) == size
-    return out.raw
-
-
-DECODERS = {None: bytes, "gzip": gzip.decompress, "zstd": unzstd}
 
 
 class Headers(unittest.TestCase):

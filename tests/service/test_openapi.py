@@ -196,7 +196,7 @@ class OpenApi(unittest.TestCase):
         """A problem that the sources of a route name is described there, and no other one is."""
         body = [f"solver/codec/{name}.c" for name in "answer group_figures json json_adjoint json_emission json_parser npy request".split()]
         own = {"get_healthz": ["get_health.c"], "get_readyz": ["get_health.c"], "get_metrics": ["get_metrics.c"],
-               "get_scenes": ["get_scenes.c"], "get_scene": ["get_scenes.c"], "get_openapi": ["get_openapi.c"],
+               "get_scenes": ["get_scenes.c"], "get_scene": ["get_scenes.c"], "get_mesh": ["get_mesh.c"], "get_openapi": ["get_openapi.c"],
                "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c"], "post_adjoint": ["post_adjoint.c"],
                "put_reflectance": ["reflectance_variants.c"], "delete_reflectance": ["reflectance_variants.c"],
                "delete_scene": ["reflectance_variants.c"],

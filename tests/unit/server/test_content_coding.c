@@ -1,6 +1,6 @@
 /* Accept-Encoding, and when a body is coded: what is coded comes back as it was, what does not shrink stays.
  */
-#include "server/http/content_coding.h"
+#include "server/route/content_coding.h"
 #include "support/suite.h"
 
 #include <string.h>
@@ -172,6 +172,25 @@ START_TEST(pieces_are_coded_as_one) {
 }
 END_TEST
 
+START_TEST(whole_bodies_are_coded_whatever_they_hold) {
+    static const size_t lengths[] = {0, 1, 1000, 300001, 3 << 20};
+    for (int coding = CODING_GZIP; coding <= CODING_ZSTD; coding++)
+        for (int what = TEXT; what <= MIXED; what++)
+            for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
+                buffer b = make((content)what, lengths[i]), coded = {0};
+                char *back = malloc(b.length + 1);
+                ck_assert(
+                    coding_whole((content_coding)coding, b.bytes != NULL ? b.bytes : "", b.length, &coded));
+                ck_assert_uint_le(coded.capacity, coding_bytes_most(b.length));
+                ck_assert_uint_eq(decode((content_coding)coding, &coded, back, b.length + 1), b.length);
+                ck_assert(b.length == 0 || memcmp(back, b.bytes, b.length) == 0);
+                free(back);
+                buffer_free(&coded);
+                buffer_free(&b);
+            }
+}
+END_TEST
+
 START_TEST(identity_touches_nothing) {
     buffer b = make(TEXT, 5000);
     const char *before = b.bytes;
@@ -187,6 +206,7 @@ int main(void) {
     tcase_add_test(all, headers_choose);
     tcase_add_test(all, bodies_are_coded_where_it_pays);
     tcase_add_test(all, pieces_are_coded_as_one);
+    tcase_add_test(all, whole_bodies_are_coded_whatever_they_hold);
     tcase_add_test(all, identity_touches_nothing);
     suite_add_tcase(suite, all);
     return suite_run(suite);

@@ -1,6 +1,6 @@
 /* Content codings of answers (Accept-Encoding; RFC 9110): the only user of <zlib.h> and <zstd.h>. No I/O. */
-#ifndef LAMBERT_SERVER_HTTP_CONTENT_CODING_H
-#define LAMBERT_SERVER_HTTP_CONTENT_CODING_H
+#ifndef LAMBERT_SERVER_ROUTE_CONTENT_CODING_H
+#define LAMBERT_SERVER_ROUTE_CONTENT_CODING_H
 
 #include "solver/codec/buffer.h"
 
@@ -27,6 +27,12 @@ const char *coding_name(content_coding coding);
  * also if memory is short or b is longer than 64 MiB. Samples of long bodies are compressed first, so that
  * those that do not shrink (raw numbers) cost little. O(length) at about 100 (gzip) or 300 (zstd) MB/s. */
 content_coding coding_apply(buffer *b, coding_choice choice);
+
+/* Codes bytes of any length, not by identity, into to, which is empty; false if memory is short. */
+bool coding_whole(content_coding coding, const char *bytes, size_t length, buffer *to);
+
+/* Bytes of to, at most. */
+size_t coding_bytes_most(size_t length);
 
 /* True if bytes, a sample of a longer body, shrink as much as the whole has to. O(length). */
 bool coding_pays(content_coding coding, const char *bytes, size_t length);

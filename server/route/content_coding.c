@@ -1,5 +1,6 @@
-#include "server/http/content_coding.h"
+#include "server/route/content_coding.h"
 
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -167,6 +168,37 @@ content_coding coding_apply(buffer *b, coding_choice choice) {
     *b = made;
     buffer_trim(b);
     return choice.coding;
+}
+
+/* Much that repeats itself shrinks to less than this share. */
+#define FIRST_ROOM 4
+
+size_t coding_bytes_most(size_t length) {
+    /* Bytes that do not shrink grow by less than a thousandth and some heads; room grows by half. */
+    return length / 2 * 3 + length / 512 + 4 * SAMPLE;
+}
+
+bool coding_whole(content_coding coding, const char *bytes, size_t length, buffer *to) {
+    coder *c = coder_create(coding);
+    bool ended = false, good = c != NULL;
+    while (good && !ended) {
+        /* zlib counts in 32 bits. */
+        size_t written = 0, part = length < UINT32_MAX / 2 ? length : UINT32_MAX / 2;
+        const bool last = part == length;
+        length -= part;
+        good = buffer_reserve(to, to->length > 0 ? SAMPLE : part / FIRST_ROOM + SAMPLE);
+        const size_t room = good ? to->capacity - to->length - 1 : 0;
+        good = good && coder_run(c, &bytes, &part, last, to->bytes + to->length,
+                                 room < UINT32_MAX / 2 ? room : UINT32_MAX / 2, &written, &ended);
+        length += part;
+        to->length += written;
+    }
+    coder_free(c);
+    if (good)
+        buffer_trim(to);
+    else
+        buffer_free(to);
+    return good;
 }
 
 bool coding_pays(content_coding coding, const char *bytes, size_t length) {

@@ -1,0 +1,221 @@
+#include "server/scene/scene_mesh.h"
+
+#include "server/scene/scene.h"
+#include "solver/codec/gltf/gltf.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+
+struct scene_mesh {
+    const scene *of;
+    char up;
+    size_t n_vertices;
+    uint64_t tag;
+    pthread_mutex_t lock; /* of kept */
+    kept_bytes *kept[SCENE_MESH_FORMS];
+};
+
+/* The store of a scene or of a variant's base. */
+static const scene *root_of(const scene *s) {
+    return s->base != NULL ? s->base : s;
+}
+
+static lam_status read_up(store *s, char *up, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *text = NULL;
+    TRY(store_get_text(s, "/mesh", "up", &text, error));
+    if (strlen(text) != 1 || strchr("xyz", text[0]) == NULL)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute up is '%s', must be x, y or z", store_path(s), text);
+    *up = text[0];
+done:
+    free(text);
+    return status;
+}
+
+static lam_status read_vertices(store *s, size_t *count, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_type type;
+    size_t dims[STORE_MAX_RANK];
+    int rank;
+    TRY(store_array_info(s, "/mesh/vertices", &type, &rank, dims, error));
+    if (type != STORE_F64 || rank != 2 || dims[1] != 3)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/vertices must be [v][3] of f64", store_path(s));
+    *count = dims[0];
+done:
+    return status;
+}
+
+/* The checksum of the store stands for its arrays; the description for names, and for the reflectances of a
+ * variant. */
+static lam_status make_tag(scene_mesh *mesh, lam_error *error) {
+    char *text = NULL;
+    const int length = asprintf(&text, "%s %s %c %s", LAMBERT_VERSION, root_of(mesh->of)->identity.digest,
+                                mesh->up, mesh->of->description);
+    if (length < 0) return status_fail(error, LAM_ERR_MEMORY, "not enough memory for the tag of a mesh");
+    mesh->tag = store_checksum(text, (size_t)length);
+    free(text);
+    return LAM_OK;
+}
+
+lam_status scene_mesh_create(store *s, const scene *of, scene_mesh **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    scene_mesh *made = memory_allocate(1, sizeof *made, "the mesh of a scene", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    pthread_mutex_init(&made->lock, NULL);
+    made->of = of;
+    if (of->base != NULL) {
+        made->up = of->base->mesh->up;
+        made->n_vertices = of->base->mesh->n_vertices;
+    } else {
+        TRY(read_up(s, &made->up, error));
+        TRY(read_vertices(s, &made->n_vertices, error));
+    }
+    TRY(make_tag(made, error));
+    *out = made;
+    made = NULL;
+done:
+    scene_mesh_destroy(made);
+    return status;
+}
+
+void scene_mesh_destroy(scene_mesh *mesh) {
+    if (mesh == NULL) return;
+    scene_mesh_clear(mesh);
+    pthread_mutex_destroy(&mesh->lock);
+    free(mesh);
+}
+
+uint64_t scene_mesh_tag(const scene_mesh *mesh) {
+    return mesh->tag;
+}
+
+kept_bytes *scene_mesh_find(scene_mesh *mesh, size_t form) {
+    pthread_mutex_lock(&mesh->lock);
+    kept_bytes *found = kept_bytes_hold(mesh->kept[form]);
+    pthread_mutex_unlock(&mesh->lock);
+    return found;
+}
+
+kept_bytes *scene_mesh_keep(scene_mesh *mesh, size_t form, buffer *made) {
+    memory_ledger *ledger = mesh->of->ledger;
+    const size_t bytes = made->capacity;
+    if (!memory_ledger_take(ledger, bytes)) return NULL;
+    kept_bytes *kept = kept_bytes_create(made, ledger, bytes), *dropped = NULL;
+    if (kept == NULL) {
+        memory_ledger_give_back(ledger, bytes);
+        return NULL;
+    }
+    pthread_mutex_lock(&mesh->lock);
+    if (mesh->kept[form] == NULL) {
+        mesh->kept[form] = kept;
+    } else {
+        dropped = kept;
+        kept = mesh->kept[form];
+    }
+    (void)kept_bytes_hold(kept);
+    pthread_mutex_unlock(&mesh->lock);
+    kept_bytes_release(dropped);
+    return kept;
+}
+
+void scene_mesh_clear(scene_mesh *mesh) {
+    kept_bytes *gone[SCENE_MESH_FORMS];
+    pthread_mutex_lock(&mesh->lock);
+    memcpy(gone, mesh->kept, sizeof gone);
+    memset(mesh->kept, 0, sizeof mesh->kept);
+    pthread_mutex_unlock(&mesh->lock);
+    for (size_t form = 0; form < SCENE_MESH_FORMS; form++) kept_bytes_release(gone[form]);
+}
+
+size_t scene_mesh_held(scene_mesh *mesh) {
+    size_t held = 0;
+    pthread_mutex_lock(&mesh->lock);
+    for (size_t form = 0; form < SCENE_MESH_FORMS; form++)
+        held += mesh->kept[form] != NULL ? mesh->kept[form]->taken : 0;
+    pthread_mutex_unlock(&mesh->lock);
+    return held;
+}
+
+static size_t sum(size_t a, size_t b) {
+    size_t both;
+    return __builtin_add_overflow(a, b, &both) ? SIZE_MAX : both;
+}
+
+static size_t times(size_t a, size_t b) {
+    size_t product;
+    return __builtin_mul_overflow(a, b, &product) ? SIZE_MAX : product;
+}
+
+size_t scene_mesh_build_bytes(const scene_mesh *mesh) {
+    const scene *s = mesh->of;
+    gltf_sizes sizes = {.n = s->n, .n_vertices = mesh->n_vertices, .n_groups = s->groups.n_groups};
+    sizes.n_texts = strlen(s->name);
+    for (size_t g = 0; g < s->groups.n_groups; g++) sizes.n_texts += strlen(s->groups.names[g]);
+    const size_t element = 4 * sizeof(uint32_t) + (3 + s->n_channels) * sizeof(float);
+    return sum(sum(times(mesh->n_vertices, 3 * sizeof(double)), times(s->n, element)),
+               sum(gltf_bytes_most(&sizes), gltf_work_bytes(&sizes)));
+}
+
+/* Arrays of /mesh that a scene does not hold. */
+typedef struct arrays {
+    void *vertices, *elements, *normal, *emission;
+} arrays;
+
+static lam_status read_arrays(store *s, const scene_mesh *mesh, arrays *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = mesh->of->n, C = mesh->of->n_channels;
+    TRY(store_read(s, "/mesh/vertices", STORE_F64, 2, (size_t[]){mesh->n_vertices, 3}, &a->vertices, error));
+    TRY(store_read(s, "/mesh/elements", STORE_U32, 2, (size_t[]){n, 4}, &a->elements, error));
+    TRY(store_read(s, "/mesh/normal", STORE_F32, 2, (size_t[]){n, 3}, &a->normal, error));
+    TRY(store_read(s, "/mesh/emission", STORE_F32, 2, (size_t[]){C, n}, &a->emission, error));
+    const uint32_t(*elements)[4] = a->elements;
+    for (size_t i = 0; i < n; i++)
+        for (int k = 0; k < 4; k++)
+            if (elements[i][k] >= mesh->n_vertices && !(k == 3 && elements[i][k] == GLTF_NO_VERTEX))
+                FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/elements[%zu][%d] = %u, there are %zu vertices",
+                     store_path(s), i, k, elements[i][k], mesh->n_vertices);
+    const float *emission = a->emission;
+    for (size_t i = 0; i < C * n; i++)
+        if (!isfinite(emission[i]))
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/emission[%zu][%zu] = %g, must be finite", store_path(s),
+                 i / n, i % n, (double)emission[i]);
+done:
+    return status;
+}
+
+lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const scene *of = mesh->of, *root = root_of(of);
+    store *s = NULL;
+    arrays a = {NULL, NULL, NULL, NULL};
+    lam_error cause;
+    TRY(store_open(root->path, &s, error));
+    if (strcmp(store_identity_of(s)->digest, root->identity.digest) != 0)
+        FAIL(error, LAM_ERR_IO, "%s: the store is another one than was read; read it again (SIGHUP)",
+             root->path);
+    TRY(read_arrays(s, mesh, &a, error));
+    const gltf_mesh m = {.name = of->name,
+                         .kind = lam_operator_kind(of->op),
+                         .n_vertices = mesh->n_vertices,
+                         .n = of->n,
+                         .n_channels = of->n_channels,
+                         .vertices = a.vertices,
+                         .elements = a.elements,
+                         .normal = a.normal,
+                         .area = root->area,
+                         .reflectance = of->reflectance,
+                         .emission = a.emission,
+                         .groups = &root->groups,
+                         .up = mesh->up};
+    status = gltf_write(&m, out, &cause);
+    if (status != LAM_OK) FAIL(error, status, "%s: %s", root->path, cause.message);
+done:
+    store_close(s);
+    free(a.vertices);
+    free(a.elements);
+    free(a.normal);
+    free(a.emission);
+    return status;
+}
