@@ -38,9 +38,10 @@ export function unique(stem: string): string {
     return `${stem}-${counter}`;
 }
 
-/** A button with a text or a sign; the sign needs a label for those who cannot see it. */
+/** A button with a text or a sign. A sign is called by its label; a text keeps its name, and the label is a hint. */
 export function button(text: string, label: string | null, press: () => void, properties: Properties = {}): HTMLButtonElement {
-    return make("button", { type: "button", "aria-label": label, title: label, onclick: press, ...properties }, text);
+    const isSign = !/[a-z]/i.test(text);
+    return make("button", { type: "button", "aria-label": isSign ? label : null, title: label, onclick: press, ...properties }, text);
 }
 
 /** A choice of one of several values. */

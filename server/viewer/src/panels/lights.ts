@@ -84,7 +84,7 @@ function lightRow(app: App, name: string, light: GroupLight,
         label: "Temperature", unit: "K", least: 1800, most: 12000, step: 50,
         change: (value) => change(name, { kelvin: value, colour: ofTemperature(value) }, `kelvin ${name}`),
     }, light.kelvin ?? 4000);
-    const alone = button("Solo", `Only ${name}`, () => solo(app.store.now.lighting.solo === name ? null : name), { "aria-pressed": "false" });
+    const alone = button("Solo", `Only ${name}`, () => solo(app.store.now.lighting.solo === name ? null : name), { "aria-pressed": "false", "aria-label": `Solo ${name}` });
     const element = make("section", { class: "light", "aria-labelledby": id },
         make("div", { class: "row" }, on, coloured && swatch, alone), power.element, coloured && kelvin.element);
     const update = (now: GroupLight, soloed: string | null): void => {

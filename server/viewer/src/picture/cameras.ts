@@ -20,7 +20,7 @@ export class Cameras {
     private box = new Box3();
     private isWalk = false;
 
-    constructor(canvas: HTMLCanvasElement, private readonly moved: () => void, rested: () => void) {
+    constructor(canvas: HTMLCanvasElement, private readonly moved: () => void, private readonly rested: () => void) {
         this.controls = new CameraControls(this.camera, canvas);
         this.controls.smoothTime = matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : 0.12;
         this.controls.draggingSmoothTime = 0.03;
@@ -57,6 +57,7 @@ export class Cameras {
     place(place: Place, animated: boolean): void {
         void this.controls.setLookAt(...place, animated);
         this.moved();
+        if (!animated) this.rested();
     }
 
     get now(): Place {
