@@ -29,7 +29,10 @@ export interface Timing {
 type Event = "scene" | "field" | "pick" | "hover" | "timing" | "lost" | "found" | "problem" | "token";
 type Side = 0 | 1;
 
-/** Of the unit shown: lx where the store's numbers are photometric already, so no factor. */
+/** The store was replaced by one of another mesh. */
+class Replaced extends Error {}
+
+/** The mean of the logarithm of what is seen becomes this before the tone curve. */
 const MIDDLE_GREY = 0.2;
 
 export class App {
@@ -45,6 +48,7 @@ export class App {
     hovered: number | null = null;
     problem: string | null = null;
     isLost = false;
+    lostWhy = "";
     /** Answers shown so far. */
     answers = 0;
     /** Radiances of the sky's tiles for a lighting; set by the panel of skies. */
@@ -141,7 +145,11 @@ export class App {
     fail(reason: unknown): void {
         if (reason instanceof DOMException && reason.name === "AbortError") return;
         if (reason instanceof Lost) {
-            this.lose();
+            this.lose("The daemon does not answer. This page asks again each second and goes on by itself.");
+            return;
+        }
+        if (reason instanceof Replaced) {
+            void this.open(this.store.now.scene, this.store.now).catch((why: unknown) => this.fail(why));
             return;
         }
         if (reason instanceof Problem && reason.status === 401) {
@@ -149,7 +157,7 @@ export class App {
             return;
         }
         if (reason instanceof Problem && reason.status === 503) {
-            this.lose();
+            this.lose(`The daemon is busy: ${reason.message}. This page goes on by itself.`);
             return;
         }
         this.problem = reason instanceof Error ? reason.message : String(reason);
@@ -169,7 +177,7 @@ export class App {
         this.timing = { roundTrip: performance.now() - start, solve: solveMs };
         const field = Field.of(values, wanted.scale);
         if (field.elements !== scene.mesh.elements)
-            throw new Error(`${wanted.scene} has ${field.elements} elements, the mesh shown has ${scene.mesh.elements}`);
+            throw new Replaced(`${wanted.scene} has ${field.elements} elements, the mesh shown has ${scene.mesh.elements}`);
         return [field, solveMs];
     }
 
@@ -239,9 +247,10 @@ export class App {
             this.store.settle({ ...now, view: { ...now.view, camera } });
     }
 
-    private lose(): void {
+    private lose(why: string): void {
         if (this.isLost) return;
         this.isLost = true;
+        this.lostWhy = why;
         this.tell("lost");
         const again = async (): Promise<void> => {
             if (!this.isLost) return;
@@ -268,10 +277,24 @@ export class App {
 function lightingOf(mesh: SceneMesh, description: Description): Lighting {
     const groups: { [name: string]: GroupLight } = {};
     for (const group of mesh.groups) if (group.emission !== null) groups[group.name] = lightOf(group.emission);
+    const isDark = Object.keys(groups).length === 0 && description.sky === null && (description.emitters ?? []).length === 0;
+    if (isDark) groups[ceilingOf(mesh)] = lightOf([1, 1, 1]);
     const emitters: { [index: string]: number } = {};
     description.emitters?.forEach((_, index) => { emitters[index] = 1; });
     const sky = description.sky === null ? firstState.lighting.sky : { ...firstState.lighting.sky, model: "overcast" as const };
     return { ...firstState.lighting, groups, emitters, sky };
+}
+
+/** The group that looks down most, from above: what shines first in a scene without lamps, which would be black. */
+function ceilingOf(mesh: SceneMesh): string {
+    const low = new Array<number>(mesh.groups.length).fill(0);
+    let floor = Infinity;
+    for (let v = 1; v < mesh.positions.length; v += 3) floor = Math.min(floor, mesh.positions[v]);
+    for (let i = 0; i < mesh.index.length; i += 3) {
+        const v = mesh.index[i], element = mesh.elementOf[v];
+        low[mesh.groupOf[element]] += Math.max(0, -mesh.normals[3 * v + 1]) * (mesh.positions[3 * v + 1] - floor) * mesh.area[element];
+    }
+    return mesh.groups[low.indexOf(Math.max(...low))].name;
 }
 
 export function lightOf(emission: Rgb): GroupLight {

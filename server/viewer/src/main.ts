@@ -19,7 +19,14 @@ function start(): void {
     const frame = make("main", {}, canvas);
     // The canvas needs a place before its size is asked for.
     document.body.append(frame);
-    const app = new App(canvas);
+    let app: App;
+    try {
+        app = new App(canvas);
+    } catch (reason) {
+        frame.replaceChildren(make("p", { class: "banner", role: "alert" },
+            `This browser cannot draw the scene, which needs WebGL 2 (${reason instanceof Error ? reason.message : String(reason)}).`));
+        return;
+    }
     frame.append(makeBanner(app));
     document.body.prepend(makeBar(app));
     document.body.append(makeDrawer(app, panelMakers.map((makePanel) => makePanel(app))), makeStatus(app), makeTokenDialog(app, () => void begin(app)));

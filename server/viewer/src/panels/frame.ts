@@ -118,7 +118,7 @@ export function makeBanner(app: App): HTMLElement {
         banner.hidden = text === null;
         banner.textContent = text ?? "";
     };
-    app.on("lost", () => show("The daemon does not answer. This page asks again each second and goes on by itself."));
+    app.on("lost", () => show(app.lostWhy));
     app.on("found", () => show(null));
     app.on("problem", () => show(app.problem));
     app.on("field", () => { if (!app.isLost) show(null); });

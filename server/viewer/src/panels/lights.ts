@@ -34,7 +34,8 @@ export function lightsPanel(app: App): Panel {
             rows.set(name, row);
             return row.element;
         }));
-        if (names.length === 0) list.append(make("p", { class: "hint" }, "No group of this scene emits light."));
+        if (app.scene?.mesh.groups.every((group) => group.emission === null) && app.scene.description.sky === null && names.length > 0)
+            list.append(make("p", { class: "hint" }, "No group of this scene emits light: these do it in its place."));
         drawMore();
     };
     const drawMore = (): void => {

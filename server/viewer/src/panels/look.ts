@@ -1,5 +1,5 @@
 // How the picture is drawn: tone, exposure, false colour, cameras. Nothing here costs a request but the quantity.
-import { button, choice, make, tick } from "../base/dom.ts";
+import { button, choice, fill, make, tick } from "../base/dom.ts";
 import type { App } from "../app.ts";
 import type { View } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
@@ -59,6 +59,28 @@ export function lookPanel(app: App): Panel {
     return {
         id: "look", title: "View",
         element: make("div", {}, fields.picture, light, colour, smooth, fields.unit, fields.walk,
-            button("Fit (F)", "Show the whole scene", () => app.cameras.fit(true))),
+            button("Fit (F)", "Show the whole scene", () => app.cameras.fit(true)), keptViews(app)),
     };
+}
+
+/** Places of the camera with names: those of the scene file, and those that were kept on the page. */
+function keptViews(app: App): HTMLElement {
+    const place = make("div", {});
+    const name = make("input", { type: "text", placeholder: "Name of this place", "aria-label": "Name of this place", maxlength: 60 });
+    const keep = (): void => {
+        const { now } = app.store, text = name.value.trim();
+        if (text === "") return;
+        name.value = "";
+        app.store.change({ ...now, views: [...now.views.filter((view) => view.name !== text), { name: text, camera: app.cameras.now }] });
+    };
+    const form = make("form", { class: "row", onsubmit: (event: Event) => { event.preventDefault(); keep(); } }, name,
+        make("button", { type: "submit" }, "Keep"));
+    const draw = (): void => fill(place, make("h3", {}, "Places"),
+        ...app.store.now.views.map((view) => make("div", { class: "row" },
+            button(view.name, null, () => app.cameras.place(view.camera, true), { class: "grow" }),
+            button("×", `Forget ${view.name}`, () => app.store.change(
+                { ...app.store.now, views: app.store.now.views.filter((other) => other !== view) })))), form);
+    app.store.listen((now, before) => { if (now.views !== before.views) draw(); });
+    draw();
+    return place;
 }

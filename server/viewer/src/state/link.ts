@@ -1,5 +1,5 @@
 // The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
-import { firstLighting, firstState, firstView, skyOff, type Lighting, type State } from "./state.ts";
+import { firstLighting, firstState, firstView, skyOff, type KeptView, type Lighting, type State, type View } from "./state.ts";
 
 type Plain = { [name: string]: unknown };
 
@@ -52,6 +52,20 @@ function restoreLighting(given: unknown): Lighting {
     };
 }
 
+function isPlace(value: unknown): value is KeptView["camera"] {
+    return Array.isArray(value) && value.length === 6 && value.every((v) => Number.isFinite(v));
+}
+
+function restoreView(given: unknown): View {
+    const view = restore(firstView, given, ["exposure", "range", "threshold", "judged", "camera"]);
+    const orNull = (value: unknown): number | null => (typeof value === "number" && Number.isFinite(value) ? value : null);
+    const range = Array.isArray(view.range) && view.range.length === 2 && view.range.every((v) => Number.isFinite(v)) ? view.range : null;
+    return {
+        ...view, range, exposure: orNull(view.exposure), threshold: orNull(view.threshold),
+        judged: typeof view.judged === "string" ? view.judged : null, camera: isPlace(view.camera) ? view.camera : null,
+    };
+}
+
 function toBase64Url(text: string): string {
     const bytes = new TextEncoder().encode(text);
     let raw = "";
@@ -85,9 +99,10 @@ export function fromFragment(fragment: string): State | null {
     return {
         ...state,
         lighting: restoreLighting(given.lighting),
-        view: restore(firstView, given.view, ["exposure", "range", "threshold", "judged", "camera"]),
+        view: restoreView(given.view),
         presets: (state.presets as unknown[]).filter(isPlain)
             .map((p) => ({ name: String(p.name), lighting: restoreLighting(p.lighting) })),
+        views: (state.views as unknown[]).filter(isPlain).flatMap((v) => (isPlace(v.camera) ? [{ name: String(v.name), camera: v.camera }] : [])),
         pins: state.pins.filter((pin) => Number.isInteger(pin) && pin >= 0),
         tolerance: typeof state.tolerance === "number" ? state.tolerance : null,
         compare: compare === null ? null : {

@@ -68,6 +68,12 @@ export interface Preset {
     lighting: Lighting;
 }
 
+/** A place of the camera that was kept. */
+export interface KeptView {
+    name: string;
+    camera: [number, number, number, number, number, number];
+}
+
 export interface Compare {
     how: "split" | "difference";
     /** Another scene of as many elements, or null: this one. */
@@ -82,6 +88,7 @@ export interface State {
     lighting: Lighting;
     view: View;
     presets: Preset[];
+    views: KeptView[];
     pins: number[];
     compare: Compare | null;
     /** Certified bound that is asked for, or null. */
@@ -101,7 +108,7 @@ export const firstView: View = {
 export const firstLighting: Lighting = { groups: {}, dim: 1, solo: null, sky: skyOff, emitters: {} };
 
 export const firstState: State = {
-    scene: "", lighting: firstLighting, view: firstView, presets: [], pins: [], compare: null, tolerance: null,
+    scene: "", lighting: firstLighting, view: firstView, presets: [], views: [], pins: [], compare: null, tolerance: null,
 };
 
 /** Emission of each group under a lighting, per channel, in the store's unit; groups that are dark are absent. */
