@@ -242,6 +242,17 @@ class Mesh(Case):
             self.assertEqual(self.mesh(daemon, "box", "zstd").status, 200)
             self.assertEqual(self.held(daemon)[1], 0)
 
+    def test_a_deadline_that_has_passed(self):
+        """Nothing is made for nobody, and the next request finds no trace of it."""
+        path, _ = self.store(n=3000)
+        with Daemon(path, "--threads", 1) as daemon:
+            before = self.held(daemon)
+            late = self.mesh(daemon, "box", headers={"Lambert-Timeout": "1e-9"})
+            self.assertEqual(late.status, 503, late)
+            self.assertIn("was not ready in time", late.json()["detail"])
+            self.assertEqual(self.held(daemon), before)
+            self.assertEqual(self.mesh(daemon, "box").status, 200)
+
     def test_many_at_once(self):
         """The first demand of 24 clients: one answer for all, and what is kept is one of each coding."""
         path, _ = self.store(n=20000)
