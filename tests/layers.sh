@@ -68,6 +68,7 @@ declare -A home=(
     ["embree3/"]="solver/formfactor/visibility/"
     ["lapacke.h"]="solver/method/ solver/linalg/core.c"
     ["cblas.h"]="solver/method/ solver/linalg/ tests/bench/bench_online.c"
+    ["OpenEXR/"]="solver/render/exr.c"
     ["png.h"]="solver/render/image.c"
     ["jansson.h"]="solver/codec/ solver/light/light_path.c solver/scene/import/file_header.c solver/verbs/ solver/bench/ tests/bench/"
     ["microhttpd.h"]="server/http/ tests/bench/ready_server.c"

@@ -8,7 +8,7 @@
 /* A ray that slips between two elements is cast again this far away, in pixels. */
 #define SIDESTEP 0.02
 
-enum { ROW_RAYS = RASTER_TILE * RASTER_SAMPLES };
+enum { ROW_RAYS = RASTER_TILE * RASTER_SAMPLES_MOST };
 
 /* The rays through one row of a tile, pixel by pixel. */
 typedef struct ray_row {
@@ -146,7 +146,7 @@ lam_status raster_tile_create(const raster_view *view, raster_tile *tile, lam_er
     for (size_t y = tile->top; y < tile->bottom; y++) {
         cast_row(view, tile->left, tile->right, y, row);
         for (size_t x = 0; x < wide; x++) {
-            double middle[RASTER_SAMPLES][3];
+            double middle[RASTER_SAMPLES_MOST][3];
             const size_t found = gather_parts(view, row, x * view->samples, parts + n, middle);
             for (size_t k = 0; k < found && view->smooth; k++)
                 if (parts[n + k].element != VISIBILITY_NOTHING)

@@ -6,9 +6,10 @@
 #include "solver/base/progress.h"
 #include "solver/render/camera.h"
 
-/* Rays of a pixel of a picture. They are placed as a (0, 4, 2)-net in base 2, with one point in each
- * elementary cell. */
+/* Rays of a pixel of a picture unless others are asked for, and the most. 2^m of them are placed as a (0, m,
+ * 2)-net in base 2, with one point in each elementary cell. */
 #define RASTER_SAMPLES 16
+#define RASTER_SAMPLES_MOST 64
 
 /* The picture that is looked at. The mesh, its visibility and the camera are borrowed. */
 typedef struct raster_view {
@@ -16,7 +17,7 @@ typedef struct raster_view {
     const visibility *visibility;
     const camera *camera;
     size_t width, height; /* pixels */
-    size_t samples;       /* rays of a pixel: 1, or RASTER_SAMPLES */
+    size_t samples;       /* rays of a pixel: a power of two */
     bool smooth;          /* light varies inside elements: find the weights of their corners */
 } raster_view;
 

@@ -6,7 +6,7 @@
 
 typedef struct shade shade;
 
-#define SHADE_MAX_CHANNELS 3
+#define SHADE_MAX_CHANNELS 64
 
 /* values[c * n + i] is the value of element i in channel c; only the first SHADE_MAX_CHANNELS are kept.
  * nodes: light inside elements as smooth_corners says, with E its part that does not vary there, or NULL.

@@ -74,15 +74,3 @@ unsigned char tone_encode(float linear) {
 float tone_decode(float encoded) {
     return encoded <= 0.04045f ? encoded / 12.92f : powf((encoded + 0.055f) / 1.055f, 2.4f);
 }
-
-void tone_false_color(float t, float rgb[3]) {
-    /* Hue turns from violet to yellow while lightness (CIE L*) rises evenly from about 13 to 90. */
-    static const float stops[][3] = {{.230f, .010f, .330f}, {.270f, .180f, .480f}, {.215f, .330f, .545f},
-                                     {.150f, .460f, .550f}, {.120f, .585f, .540f}, {.220f, .710f, .465f},
-                                     {.480f, .815f, .310f}, {.750f, .875f, .150f}, {.985f, .905f, .145f}};
-    const int last = (int)(sizeof stops / sizeof stops[0]) - 1;
-    const float place = (t > 0 ? fminf(t, 1) : 0) * (float)last;
-    const int below = place >= (float)last ? last - 1 : (int)place;
-    const float share = place - (float)below;
-    for (int c = 0; c < 3; c++) rgb[c] = (1 - share) * stops[below][c] + share * stops[below + 1][c];
-}

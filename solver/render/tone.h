@@ -1,9 +1,11 @@
-/* The mapping of linear values to display colours: exposure, tone curve, sRGB, false colour. Knows no scene.
- */
+/* The mapping of linear values to display colours: exposure, tone curve, sRGB. Knows no scene. */
 #ifndef LAMBERT_RENDER_TONE_H
 #define LAMBERT_RENDER_TONE_H
 
 #include "store/status.h"
+
+/* Colours have red, green and blue. */
+#define TONE_CHANNELS 3
 
 /* The luminance of a sample: its only channel, the Rec. 709 luminance of 3, or the mean of more. */
 float tone_luminance(const float *values, size_t n_channels);
@@ -32,9 +34,6 @@ void tone_color(float rgb[3]);
 
 /* The sRGB code (0 to 255) of a display-linear value. */
 unsigned char tone_encode(float linear);
-
-/* Dark blue over green to yellow, lightness rising evenly: the sRGB colour (0 to 1) of t in [0, 1]. */
-void tone_false_color(float t, float rgb[3]);
 
 /* The display-linear value of an sRGB one. */
 float tone_decode(float encoded);

@@ -51,7 +51,11 @@ frame_names frame_names_of(const char *path, size_t n) {
 }
 
 lam_status frame_name(const frame_names *names, size_t k, char **name, lam_error *error) {
-    if (asprintf(name, "%.*s-%0*zu.png", names->stem, names->path, names->digits, k) >= 0) return LAM_OK;
+    char extension[16];
+    atomic_file_extension(names->path, extension);
+    if (asprintf(name, "%.*s-%0*zu.%s", names->stem, names->path, names->digits, k,
+                 strcmp(extension, "exr") == 0 ? extension : "png") >= 0)
+        return LAM_OK;
     *name = NULL;
     return status_fail(error, LAM_ERR_MEMORY, "%s: not enough memory for the name of frame %zu", names->path,
                        k);

@@ -4,8 +4,8 @@
 
 #include "solver/base/progress.h"
 
-/* The pictures IMAGE-0001.png ... of an animation with the name IMAGE.png, IMAGE.mp4 or the like. They sort
- * by name: all have as many digits, at least 4. */
+/* The pictures IMAGE-0001.png ... of an animation with the name IMAGE.png, IMAGE.mp4 or the like,
+ * IMAGE-0001.exr ... of IMAGE.exr. They sort by name: all have as many digits, at least 4. */
 typedef struct frame_names {
     const char *path; /* borrowed */
     int stem;         /* characters of path before the extension */

@@ -21,7 +21,7 @@ typedef struct animation {
     lam_quantity quantity;
     emission_pass pass;
     float *values; /* [pass.most][C][n], the answers of a batch */
-    size_t written;
+    size_t written, clamped;
     frame_names names;
     picture_options style;
     picture_light *sum; /* of the frames that were measured */
@@ -112,17 +112,22 @@ static lam_status measure_frame(animation *a, size_t k, const frame *at, lam_err
 
 static lam_status write_frame(animation *a, size_t k, const frame *at, lam_error *error) {
     lam_status status = LAM_OK;
-    image picture = {0};
+    render_sheet sheet = {.picture = {0}};
+    size_t clamped;
     char *name = NULL;
     TRY(frame_name(&a->names, k + 1, &name, error));
-    TRY(render_image(a->f, &a->style, shade_channels(at->shown), &picture, error));
-    picture_fill(&a->pixels, at->shown, &a->style, &picture);
-    if (a->style.range > 0) picture_legend(a->style.range, &picture);
-    TRY(image_write_png(&picture, name, error));
+    TRY(render_sheet_create(a->f, &a->style, shade_channels(at->shown), &sheet, error));
+    if (a->view.exr)
+        picture_values_fill(&a->pixels, at->shown, &sheet.values);
+    else
+        TRY(picture_fill(&a->pixels, at->shown, &a->style, &sheet.picture, error));
+    TRY(render_sheet_write(a->f, &a->style, &sheet, name, &clamped, error));
 #pragma omp atomic
     a->written++;
+#pragma omp atomic
+    a->clamped += clamped;
 done:
-    image_free(&picture);
+    render_sheet_free(&sheet);
     free(name);
     return status;
 }
@@ -273,7 +278,7 @@ lam_status animate(const char *path, const render_options *f, terminal *t, char 
     const raster_view measured = picture_coarse(&a.view.pixels);
     TRY(raster_create(&measured, NULL, &a.coarse, error));
     TRY(each_frame(&a, "measuring", measure_frame, &a.measuring, t, error));
-    a.style = render_style(f, a.sum);
+    a.style = render_style(f, a.sum, &a.view.nodes);
     began = clock_seconds();
     TRY(raster_create(&a.view.pixels, &waiting, &a.pixels, error));
     const double looking = clock_seconds() - began;
@@ -285,7 +290,8 @@ lam_status animate(const char *path, const render_options *f, terminal *t, char 
                  1e3 * a.measuring / (double)a.names.n, 1e3 * a.drawing / (double)a.names.n);
     warn_of_older(&a.names, t);
     render_log_camera(&a.view.camera, t);
-    render_log_style(&a.style, t);
+    render_log_style(f, &a.style, t);
+    render_log_clamped(a.clamped, t);
     if (video_is_named(f->output)) TRY(video_write(&a.names, f->fps, &waiting, error));
 done:
     if (a.written > 0) {

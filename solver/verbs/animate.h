@@ -4,9 +4,6 @@
 
 #include "solver/verbs/render_view.h"
 
-/* The word of --animate for every sky of --sky as a frame. */
-#define ANIMATE_SKY "sky"
-
 /* Draws the frames of f->light beside f->output, IMAGE-0001.png and so on, and makes the video that
  * f->output names, where it is one. The camera and the exposure are those of the whole sequence. Elements
  * behind pixels are found once; answers are found a few frames at a time, twice: for the exposure and for the

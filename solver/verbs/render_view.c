@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static float luminance_of(const mesh *m, const float *values, size_t i) {
     float channels[3] = {0, 0, 0};
@@ -48,6 +49,10 @@ lam_status render_view_open(const char *path, const render_options *f, render_vi
     TRY(atomic_file_check(f->output, error));
     TRY(store_open(path, &v->s, error));
     TRY(mesh_load(v->s, &v->m, NULL, error));
+    v->exr = render_is_exr(f);
+    if (v->exr && v->m.n_channels > SHADE_MAX_CHANNELS)
+        FAIL(error, LAM_ERR_UNSUPPORTED, "%s: has %zu channels, an EXR at most %d; draw a .png", path,
+             v->m.n_channels, SHADE_MAX_CHANNELS);
 done:
     return status;
 }
@@ -68,7 +73,7 @@ lam_status render_view_aim(const render_options *f, bool smooth, const bool *lit
                               .camera = &v->camera,
                               .width = view_width(f),
                               .height = f->size.height,
-                              .samples = RASTER_SAMPLES,
+                              .samples = (size_t)strtoul(f->samples, NULL, 10),
                               .smooth = smooth};
 done:
     return status;
@@ -76,23 +81,69 @@ done:
 
 lam_status render_view_shade(const render_view *v, size_t n_channels, const float *values, const float *E,
                              shade **out, lam_error *error) {
-    return shade_create(&v->m, n_channels, values, E, v->pixels.smooth ? &v->nodes : NULL, out, error);
+    const size_t drawn = v->exr || n_channels < TONE_CHANNELS ? n_channels : TONE_CHANNELS;
+    return shade_create(&v->m, drawn, values, E, v->pixels.smooth ? &v->nodes : NULL, out, error);
 }
 
-picture_options render_style(const render_options *f, const picture_light *light) {
+/* The ends of a scale for values from low, an estimate that may be 0, to high. */
+static color_scale scale_between(const render_options *f, double low, double high) {
+    color_scale scale = {.palette = palette_find(f->palette), .logarithmic = f->logarithmic};
+    if (f->range.high > 0) {
+        scale.low = f->range.low;
+        scale.high = f->range.high;
+        return scale;
+    }
+    scale.high = render_round_up(high);
+    if (f->logarithmic) scale.low = pow(10, floor(log10(fmax(low, scale.high * 1e-3)) + 1e-9));
+    if (f->logarithmic && !(scale.low < .5 * scale.high)) scale.low = .1 * scale.high;
+    return scale;
+}
+
+color_scale render_scale(const render_options *f, double high) {
+    return scale_between(f, 0, high);
+}
+
+picture_options render_style(const render_options *f, const picture_light *light, const smooth_nodes *nodes) {
     const tone_histogram *shown = picture_light_shown(light);
+    const double factor = exp2(f->exposure);
     picture_options style = {0};
-    if (f->false_color)
-        style.range = render_round_up(tone_histogram_quantile(shown, .99) / exp2(f->exposure));
-    else
-        style.exposure = tone_exposure(shown) * exp2(f->exposure);
+    if (f->false_color) {
+        style.scale = scale_between(f, tone_histogram_quantile(shown, .01) / factor,
+                                    tone_histogram_quantile(shown, .99) / factor);
+        style.iso_lines = f->iso_lines;
+        style.nodes = nodes;
+    } else {
+        style.exposure = tone_exposure(shown) * factor;
+    }
     return style;
 }
 
-lam_status render_image(const render_options *f, const picture_options *style, size_t n_channels, image *out,
-                        lam_error *error) {
-    const size_t channels = style->range > 0 || n_channels >= SHADE_MAX_CHANNELS ? 3 : 1;
-    return image_create(f->size.width, f->size.height, channels, out, error);
+lam_status render_sheet_create(const render_options *f, const picture_options *style, size_t n_channels,
+                               render_sheet *out, lam_error *error) {
+    const size_t colors = style->scale.palette != NULL || n_channels >= TONE_CHANNELS ? 3 : 1;
+    if (render_is_exr(f))
+        return picture_values_create(f->size.width, f->size.height, n_channels, &out->values, error);
+    return image_create(f->size.width, f->size.height, colors, &out->picture, error);
+}
+
+void render_sheet_free(render_sheet *sheet) {
+    image_free(&sheet->picture);
+    picture_values_free(&sheet->values);
+}
+
+lam_status render_sheet_write(const render_options *f, const picture_options *style, render_sheet *sheet,
+                              const char *path, size_t *clamped, lam_error *error) {
+    const char *unit = render_needs_no_light(f) ? "" : f->unit;
+    const exr_notes notes = {.quantity = f->quantity, .unit = unit};
+    *clamped = 0;
+    if (render_is_exr(f)) return exr_write(&sheet->values, f->single, &notes, path, clamped, error);
+    if (style->scale.palette != NULL) picture_legend(&style->scale, unit, &sheet->picture);
+    return image_write_png(&sheet->picture, path, error);
+}
+
+void render_log_clamped(size_t clamped, terminal *t) {
+    if (clamped > 0)
+        terminal_warn(t, "%zu values above 65504 were written as that; --float holds them", clamped);
 }
 
 void render_log_camera(const camera *c, terminal *t) {
@@ -101,9 +152,10 @@ void render_log_camera(const camera *c, terminal *t) {
                  2 * atan(c->tan_y) * 180 / M_PI);
 }
 
-void render_log_style(const picture_options *style, terminal *t) {
-    if (style->range > 0)
-        terminal_log(t, "colours from 0 to %g W/m2", style->range);
+void render_log_style(const render_options *f, const picture_options *style, terminal *t) {
+    if (render_is_exr(f)) return;
+    if (style->scale.palette != NULL)
+        terminal_log(t, "colours from %g to %g %s", style->scale.low, style->scale.high, f->unit);
     else
-        terminal_log(t, "white is about %.3g W/m2", 1 / style->exposure);
+        terminal_log(t, "white is about %.3g %s", 1 / style->exposure, f->unit);
 }

@@ -213,7 +213,7 @@ class Animate(unittest.TestCase):
                 (2, "not both", [self.box, "--animate", good, "--emit", "lamp=1", "-o", image]),
                 (2, "not both", [self.box, "--animate", good, "--emission", good, "-o", image]),
                 (2, "none to animate", [self.box, "--animate", good, "--quantity", "patch", "-o", image]),
-                (2, "must end in .png, .mp4", [self.box, "--animate", good, "-o", self.at / "a.avi"]),
+                (2, "must end in .png or .exr, or .mp4", [self.box, "--animate", good, "-o", self.at / "a.avi"]),
                 (2, "must end in .png", [self.box, "-o", video]),
                 (2, "--fps is for", [self.box, "--animate", good, "--fps", 20, "-o", image]),
                 (2, "--fps", [self.box, "--animate", good, "--fps", 0, "-o", video]),

@@ -12,6 +12,7 @@ import h5py
 import numpy
 
 from command import LAMBERT, lambert, must
+from exr_file import decode_exr
 from png_file import decode_png
 
 BACKGROUND = 38
@@ -125,8 +126,76 @@ class Render(unittest.TestCase):
         pixels = self.draw(self.furnace, *GLOW, "--false-color", "--size", "320x240")
         self.assertEqual(pixels.shape, (240, 320, 3))
         # The legend's top is yellow, its bottom violet.
-        self.assertTrue((pixels[:60, -40:] == (251, 231, 37)).all(2).any())
-        self.assertTrue((pixels[-60:, -40:] == (59, 3, 84)).all(2).any())
+        self.assertTrue((pixels[:60, -40:] == (253, 231, 37)).all(2).any())
+        self.assertTrue((pixels[-60:, -40:] == (68, 1, 84)).all(2).any())
+
+    def test_palettes_and_ranges(self):
+        # A furnace of exitance 1 and reflectance rho has the same radiosity 1/(1 - rho) everywhere.
+        with h5py.File(self.furnace) as file:
+            value = 1 / (1 - file["mesh/reflectance"][0, 0])
+        for place, options in ((.25, ("--range", f"0,{4 * value}")),
+                               (.5, ("--range", f"{.5 * value},{1.5 * value}")),
+                               (2 / 3, ("--range", f"{.01 * value},{10 * value}", "--log"))):
+            for palette, colours in (("viridis", {.25: (59, 82, 139), .5: (33, 144, 140), 2 / 3: (53, 183, 121)}),
+                                     ("inferno", {.25: (87, 16, 110), .5: (188, 55, 84), 2 / 3: (237, 105, 37)}),
+                                     ("turbo", {.25: (38, 188, 225), .5: (149, 251, 81), 2 / 3: (251, 185, 37)})):
+                pixels = self.draw(self.furnace, *GLOW, *options, "--palette", palette, "--size", "90x90")
+                # The samples of a palette are within 4 of it, the radiosity is right to 1e-3 of its colour.
+                self.assertLessEqual(numpy.abs(pixels[45, 45] - colours[place]).max(), 6, (palette, options))
+        lines = self.draw(self.cornell, "--iso-lines", 5, "--size", "200x150")
+        plain = self.draw(self.cornell, "--false-color", "--smooth", "--size", "200x150")
+        changed = (lines != plain).any(2)
+        self.assertTrue(.01 < changed.mean() < .2, changed.mean())
+        self.assertFalse(changed[:, -40:].any())  # the legend
+
+    def test_exr(self):
+        image = self.path("a.exr")
+        for options, kind, tolerance in ((), "f2", 2**-11), (("--float",), "f4", 1e-6):
+            said = lambert("render", self.cornell, "--size", "61x47", "--exposure", 3, *options, "-o", image)
+            self.assertEqual(said.returncode, 0, said.stderr)
+            self.assertNotIn("white is", said.stderr)
+            planes, notes = decode_exr(image)
+            self.assertEqual(sorted(planes), ["B", "G", "R"])
+            self.assertEqual((notes["quantity"], notes["unit"], notes["exposure"]), ("radiosity", "W/m2", 0))
+            version = lambert("--version").stdout.split()[1]
+            self.assertEqual(notes["software"], f"lambert {version}")
+            # The same ray through the middle of each pixel: a pixel has the value of one element.
+            must("render", self.cornell, "--size", "61x47", "--samples", 1, "-o", image, *options)
+            solved = self.path("solved.npy")
+            must("solve", self.cornell, "-o", solved)
+            planes, _ = decode_exr(image)
+            for channel, name in enumerate("RGB"):
+                own = numpy.load(solved)[channel].astype(float)
+                seen = planes[name][planes[name] > 0].astype(float)
+                self.assertGreater(seen.size, 1000)
+                nearest = numpy.abs(seen[:, None] - own[None, :]).min(1)
+                self.assertLess((nearest / seen).max(), tolerance, kind)
+        # One channel; a value that halves do not hold; another quantity and unit.
+        said = must("render", self.furnace, *(word.replace("=1", "=1e5") for word in GLOW), "--size", "20x20", "-o",
+                    image, "--quantity", "irradiance", "--value-unit", "lx").stderr
+        planes, notes = decode_exr(image)
+        self.assertEqual(list(planes), ["Y"])
+        self.assertEqual((notes["quantity"], notes["unit"]), ("irradiance", "lx"))
+        self.assertIn("above 65504", said)
+        self.assertEqual(planes["Y"].max(), 65504)
+        # Beside the old file, on a full disk too.
+        with open(image, "rb") as file:
+            older = file.read()
+        done = lambert("render", self.cornell, "-o", image, "--size", "400x400", "--smooth",
+                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)))
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+        self.assertIn("a.exr: cannot write the picture: ", done.stderr)
+        with open(image, "rb") as file:
+            self.assertEqual(file.read(), older)
+        self.assertFalse([name for name in os.listdir(self.folder.name) if name.startswith(".")])
+
+    def test_samples(self):
+        # An edge of two colours has no more shades than rays of a pixel, between them.
+        for samples in 1, 4, 16, 64:
+            pixels = self.draw(self.furnace, *GLOW, "--camera", "30,20,9,0,0,0,30", "--size", "80x80", "--samples",
+                               samples)
+            shades = len(numpy.unique(pixels))
+            self.assertTrue(shades <= samples + 1 and (samples == 1 or shades > 2), (samples, shades))
 
     def test_camera(self):
         # From close by, only the back wall, which is white: no channel far from the others.
@@ -157,6 +226,15 @@ class Render(unittest.TestCase):
                 (2, "two different", [self.cornell, "-o", image, "--camera", "1,1,1,1,1,1,40"]),
                 (2, "--exposure", [self.cornell, "-o", image, "--exposure", "bright"]),
                 (2, "--quantity", [self.cornell, "-o", image, "--quantity", "beauty"]),
+                (2, "--samples", [self.cornell, "-o", image, "--samples", "5"]),
+                (2, "--palette", [self.cornell, "-o", image, "--palette", "jet"]),
+                (2, "0 <= LO < HI", [self.cornell, "-o", image, "--range", "5,5"]),
+                (2, "0 <= LO < HI", [self.cornell, "-o", image, "--range", "-1,5"]),
+                (2, "--range", [self.cornell, "-o", image, "--range", "1"]),
+                (2, "above 0 with --log", [self.cornell, "-o", image, "--range", "0,1", "--log"]),
+                (2, "--iso-lines", [self.cornell, "-o", image, "--iso-lines", "0"]),
+                (2, "--float is for", [self.cornell, "-o", image, "--float"]),
+                (2, "the values themselves", [self.cornell, "-o", self.path("never.exr"), "--palette", "turbo"]),
                 (1, "has no patches; precompute it with --method 2msc",
                  [self.cornell, "-o", image, "--quantity", "coherence"]),
                 (1, "has no patches", [self.cornell, "-o", image, "--quantity", "patch"]),

@@ -52,14 +52,20 @@ START_TEST(test_found_once) {
     raster r;
     image one = {0}, other = {0};
     lam_error error = {0};
-    const picture_options styles[] = {{.exposure = 1.5}, {.range = 2}, {.plain = true}};
+    const color_scale scale = {.palette = palette_find("viridis"), .high = 2};
     open_scene(_i != 0, 70, 45, &s);
+    const picture_options styles[] = {
+        {.exposure = 1.5},
+        {.scale = scale},
+        {.plain = true},
+        {.scale = scale, .iso_lines = _i != 0 ? 5 : 0, .nodes = &s.nodes},
+    };
     ck_assert_msg(raster_create(&s.view, NULL, &r, &error) == LAM_OK, "%s", error.message);
     for (size_t k = 0; k < sizeof styles / sizeof *styles; k++) {
         ck_assert_int_eq(image_create(78, 45, 3, &one, &error), LAM_OK);
         ck_assert_int_eq(image_create(78, 45, 3, &other, &error), LAM_OK);
         ck_assert_int_eq(picture_draw(&s.view, s.light, &styles[k], NULL, &one, &error), LAM_OK);
-        picture_fill(&r, s.light, &styles[k], &other);
+        ck_assert_int_eq(picture_fill(&r, s.light, &styles[k], &other, &error), LAM_OK);
         ck_assert_mem_eq(one.pixels, other.pixels, 78 * 45 * 3);
         ck_assert_uint_eq(one.pixels[3 * 75], 0);
         ck_assert_uint_ne(one.pixels[3 * 35], one.pixels[3 * (78 * 40 + 35)]);
@@ -67,6 +73,94 @@ START_TEST(test_found_once) {
         image_free(&other);
     }
     raster_free(&r);
+    close_scene(&s);
+}
+END_TEST
+
+/* A square floor of 10 x 10 tiles, seen from above by a camera whose picture it fills, of two groups: light
+ * is x in one and 1 - x in the other, beyond y = .5. */
+static void open_floor(scene *s, float *values) {
+    static const double eye[3] = {.5, .5, 1}, target[3] = {.5, .5, 0};
+    lam_error error = {0};
+    *s = (scene){.m = {0}};
+    for (int i = 0; i < 100; i++) {
+        const double x = i % 10 / 10., y = i / 10 / 10.;
+        const double corners[4][3] = {{x, y, 0}, {x + .1, y, 0}, {x + .1, y + .1, 0}, {x, y + .1, 0}};
+        mesh_add_quad(&s->m, corners);
+    }
+    mesh_finish(&s->m, .5f);
+    for (int i = 0; i < 100; i++) {
+        s->m.group[i] = i >= 50;
+        values[i] = (float)(i >= 50 ? .95 - i % 10 / 10. : .05 + i % 10 / 10.);
+    }
+    ck_assert_msg(visibility_create(&s->m, &s->v, &error) == LAM_OK, "%s", error.message);
+    ck_assert_int_eq(smooth_nodes_create(&s->m, &s->nodes, &error), LAM_OK);
+    ck_assert_int_eq(camera_look(eye, target, 2 * atan(.5) * 180 / M_PI, 1, 'z', &s->c, &error), LAM_OK);
+    ck_assert_int_eq(shade_create(&s->m, 1, values, NULL, &s->nodes, &s->light, &error), LAM_OK);
+    s->view = (raster_view){.mesh = &s->m,
+                            .visibility = s->v,
+                            .camera = &s->c,
+                            .width = 200,
+                            .height = 200,
+                            .samples = RASTER_SAMPLES,
+                            .smooth = true};
+}
+
+START_TEST(test_iso_lines) {
+    /* Three lines at a quarter, half and three quarters of the width, at both groups; none along their
+     * border, though light jumps there. A pixel of 200 is darker or brighter by ink alone: beside it the
+     * colour is that of the picture without lines. */
+    scene s;
+    float values[100];
+    image plain, lines;
+    open_floor(&s, values);
+    picture_options how = {.scale = {.palette = palette_find("turbo"), .high = 1}};
+    ck_assert_int_eq(image_create(200, 200, 3, &plain, NULL), LAM_OK);
+    ck_assert_int_eq(image_create(200, 200, 3, &lines, NULL), LAM_OK);
+    ck_assert_int_eq(picture_draw(&s.view, s.light, &how, NULL, &plain, NULL), LAM_OK);
+    how.iso_lines = 3;
+    how.nodes = &s.nodes;
+    ck_assert_int_eq(picture_draw(&s.view, s.light, &how, NULL, &lines, NULL), LAM_OK);
+    for (size_t y = 0; y < 200; y++)
+        for (size_t x = 0; x < 200; x++) {
+            const size_t from_line = (x + 25) % 50; /* a line is between the columns 49 and 0 */
+            const bool differs =
+                memcmp(plain.pixels + 3 * (200 * y + x), lines.pixels + 3 * (200 * y + x), 3);
+            const bool inside = x >= 25 && x < 175;
+            if (inside && (from_line == 24 || from_line == 25))
+                ck_assert_msg(differs, "no line at %zu, %zu", x, y);
+            if (!inside || from_line < 22 || from_line > 27)
+                ck_assert_msg(!differs, "a line at %zu, %zu", x, y);
+        }
+    image_free(&plain);
+    image_free(&lines);
+    close_scene(&s);
+}
+END_TEST
+
+START_TEST(test_values) {
+    /* The values of a pixel are the mean of its rays, which for light that is linear over the floor is its
+     * value at the middle: x of half a pixel, .0025 exact in 16 rays at equal distances, to single precision.
+     */
+    scene s;
+    float values[100];
+    raster r;
+    picture_values one, other;
+    open_floor(&s, values);
+    ck_assert_int_eq(picture_values_create(200, 200, 1, &one, NULL), LAM_OK);
+    ck_assert_int_eq(picture_values_create(200, 200, 1, &other, NULL), LAM_OK);
+    ck_assert_int_eq(picture_values_draw(&s.view, s.light, NULL, &one, NULL), LAM_OK);
+    ck_assert_int_eq(raster_create(&s.view, NULL, &r, NULL), LAM_OK);
+    picture_values_fill(&r, s.light, &other);
+    ck_assert_mem_eq(one.values, other.values, 200 * 200 * sizeof(float));
+    for (size_t y = 0; y < 200; y++)
+        for (size_t x = 0; x < 200; x++) {
+            const double place = ((double)x + .5) / 200, expected = y < 100 ? 1 - place : place;
+            ck_assert_double_eq_tol((double)one.values[200 * y + x], expected, 2e-5);
+        }
+    raster_free(&r);
+    picture_values_free(&one);
+    picture_values_free(&other);
     close_scene(&s);
 }
 END_TEST
@@ -177,6 +271,8 @@ int main(void) {
     TCase *tests = tcase_create("frames");
     tcase_set_timeout(tests, 60);
     tcase_add_loop_test(tests, test_found_once, 0, 2);
+    tcase_add_test(tests, test_iso_lines);
+    tcase_add_test(tests, test_values);
     tcase_add_test(tests, test_parts);
     tcase_add_test(tests, test_exposure_of_a_sequence);
     tcase_add_test(tests, test_names);

@@ -168,12 +168,66 @@ START_TEST(test_false_color_rises) {
     float before = -1;
     for (int i = 0; i <= 200; i++) {
         float rgb[3], linear[3];
-        tone_false_color((float)i / 200, rgb);
+        palette_color(palette_find(_i == 0 ? "viridis" : "inferno"), (float)i / 200, rgb);
         for (int c = 0; c < 3; c++) linear[c] = tone_decode(rgb[c]);
         const float now = tone_luminance(linear, 3);
         ck_assert_msg(now > before, "at %d of 200: %g after %g", i, now, before);
         before = now;
     }
+}
+END_TEST
+
+START_TEST(test_palettes) {
+    /* Ends as the tables of viridis, inferno and turbo have them, and colours beyond are those of the ends.
+     */
+    static const struct {
+        const char *name;
+        int first[3], last[3];
+    } known[] = {{"viridis", {68, 1, 84}, {253, 231, 37}},
+                 {"inferno", {0, 0, 4}, {252, 255, 164}},
+                 {"turbo", {35, 23, 27}, {144, 12, 0}}};
+    for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
+        const palette *p = palette_find(known[k].name);
+        float low[3], high[3];
+        ck_assert_ptr_nonnull(p);
+        palette_color(p, -3, low);
+        palette_color(p, 7, high);
+        for (int c = 0; c < 3; c++) {
+            ck_assert_int_eq((int)lrintf(255 * low[c]), known[k].first[c]);
+            ck_assert_int_eq((int)lrintf(255 * high[c]), known[k].last[c]);
+        }
+    }
+    ck_assert_ptr_null(palette_find("jet"));
+}
+END_TEST
+
+START_TEST(test_scales) {
+    /* Ticks by hand: steps of 1, 2 or 5 times a power of ten, 4 to 8 of them; decades and their parts. */
+    static const struct {
+        color_scale scale;
+        size_t n;
+        double ticks[COLOR_SCALE_TICKS];
+    } known[] = {
+        {{.high = 1}, 6, {0, .2, .4, .6, .8, 1}},
+        {{.high = 2.4}, 5, {0, .5, 1, 1.5, 2}},
+        {{.high = 750}, 4, {0, 200, 400, 600}},
+        {{.high = 700}, 8, {0, 100, 200, 300, 400, 500, 600, 700}},
+        {{.low = 95, .high = 105}, 5, {96, 98, 100, 102, 104}},
+        {{.low = 1000, .high = 1000.1}, 6, {1000, 1000.02, 1000.04, 1000.06, 1000.08, 1000.1}},
+        {{.low = .1, .high = 100, .logarithmic = true}, 10, {.1, .2, .5, 1, 2, 5, 10, 20, 50, 100}},
+        {{.low = 1e-3, .high = 300, .logarithmic = true}, 6, {.001, .01, .1, 1, 10, 100}},
+        {{.low = 2, .high = 4, .logarithmic = true}, 5, {2, 2.5, 3, 3.5, 4}},
+    };
+    for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
+        double ticks[COLOR_SCALE_TICKS];
+        const size_t n = color_scale_ticks(&known[k].scale, ticks);
+        ck_assert_msg(n == known[k].n, "scale %zu: %zu ticks", k, n);
+        for (size_t i = 0; i < n; i++)
+            ck_assert_double_eq_tol(ticks[i], known[k].ticks[i], 1e-9 * known[k].scale.high);
+    }
+    ck_assert_double_eq(color_scale_place(&known[1].scale, .6), .25);
+    ck_assert_double_eq_tol(color_scale_place(&known[6].scale, 10), 2. / 3, 1e-15);
+    ck_assert_double_lt(color_scale_place(&known[6].scale, 0), -1e300);
 }
 END_TEST
 
@@ -197,16 +251,17 @@ START_TEST(test_exposure) {
 END_TEST
 
 START_TEST(test_legend) {
+    const color_scale scale = {.palette = palette_find("turbo"), .high = 250};
     image picture;
     ck_assert_int_eq(image_create(640, 480, 3, &picture, NULL), LAM_OK);
-    picture_legend(250, &picture);
+    picture_legend(&scale, "W/m2", &picture);
     size_t touched = 0;
     for (size_t i = 0; i < 640 * 480 * 3; i++) touched += picture.pixels[i] != 0;
     ck_assert_uint_gt(touched, 1000);
     image_free(&picture);
     /* Too small a picture stays as it is. */
     ck_assert_int_eq(image_create(64, 64, 3, &picture, NULL), LAM_OK);
-    picture_legend(250, &picture);
+    picture_legend(&scale, "W/m2", &picture);
     for (size_t i = 0; i < 64 * 64 * 3; i++) ck_assert_uint_eq(picture.pixels[i], 0);
     image_free(&picture);
 }
@@ -223,7 +278,9 @@ int main(void) {
     tcase_add_test(tests, test_srgb);
     tcase_add_test(tests, test_curve);
     tcase_add_test(tests, test_color_keeps_its_hue);
-    tcase_add_test(tests, test_false_color_rises);
+    tcase_add_loop_test(tests, test_false_color_rises, 0, 2);
+    tcase_add_test(tests, test_palettes);
+    tcase_add_test(tests, test_scales);
     tcase_add_test(tests, test_exposure);
     tcase_add_test(tests, test_legend);
     suite_add_tcase(suite, tests);
