@@ -15,6 +15,7 @@ static const option_verb verbs[] = {
     {"solve", cmd_solve, "light a store and write the radiosity"},
     {"verify", cmd_verify, "check a store: checksums, invariants, error"},
     {"render", cmd_render, "draw a picture of a store under any light"},
+    {"view", cmd_view, "serve stores to this machine and open the viewer in the browser"},
     {"bench", cmd_bench, "measure errors against exact values, times and throughput"},
     {0},
 };

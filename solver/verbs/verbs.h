@@ -11,6 +11,7 @@ int cmd_sky(int argc, char **argv);
 int cmd_solve(int argc, char **argv);
 int cmd_verify(int argc, char **argv);
 int cmd_render(int argc, char **argv);
+int cmd_view(int argc, char **argv);
 int cmd_bench(int argc, char **argv);
 
 #endif

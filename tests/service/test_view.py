@@ -1,0 +1,154 @@
+"""Black box: `lambert view` starts a daemon, opens a browser and leaves nothing running."""
+
+import http.client
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+import urllib.parse
+
+from command import ENVIRONMENT, LAMBERT, lambert, must
+
+# Nothing here is a measure of speed: so long only a program that hangs takes.
+PATIENCE = 120
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(.05)
+
+
+def status_of(address, path):
+    where = urllib.parse.urlsplit(address)
+    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=PATIENCE)
+    connection.request("GET", path)
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+def is_gone(pid):
+    """True once a process has ended, also where nobody has asked for its status."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[0] == "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return True
+
+
+class View(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(prefix="lambert-view-")
+        must("generate", "cornell", "--elements", 200, "-o", cls.path("box.obj"))
+        must("precompute", cls.path("box.obj"), "-o", cls.path("box.h5"), "--rays", 64, "--probes", 0, "--quiet")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    def script(self, name, text):
+        path = self.path(name)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("#!/bin/sh\n" + text)
+        os.chmod(path, 0o755)
+        return path
+
+    def start(self, *options, **environment):
+        process = subprocess.Popen([LAMBERT, "view", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   env=dict(ENVIRONMENT, **environment))
+
+        def stop():
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+        self.addCleanup(stop)
+        address = process.stdout.readline().strip()
+        self.assertRegex(address, r"^http://127\.0\.0\.1:\d+/$")
+        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text(encoding="utf-8").split()
+        daemons = [int(pid) for pid in children
+                   if pathlib.Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip() == "lambertd"]
+        self.assertEqual(len(daemons), 1, children)
+        return process, address, daemons[0]
+
+    def test_browser_and_interrupt(self):
+        opened = self.path("opened")
+        browser = self.script("browser", f'echo "$#" "$@" >"{opened}.new" && mv "{opened}.new" "{opened}"\n')
+        process, address, daemon = self.start(self.path("box.h5") + ":room", BROWSER=browser)
+        wait_until(lambda: os.path.exists(opened))
+        with open(opened, encoding="utf-8") as file:
+            self.assertEqual(file.read(), f"1 {address}\n")
+        # The stores are there before anybody is told the address.
+        self.assertEqual(status_of(address, "/readyz"), 200)
+        self.assertEqual(status_of(address, "/v1/scenes/room"), 200)
+        self.assertEqual(os.getpgid(daemon), daemon)  # Ctrl-C comes to `lambert view` alone
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=PATIENCE)
+        self.assertEqual((process.returncode, output), (0, ""), errors)
+        self.assertIn("serving room", errors)
+        self.assertTrue(is_gone(daemon))
+
+    def test_no_browser(self):
+        opened = self.path("never")
+        browser = self.script("browser-2", f'touch "{opened}"\n')
+        process, address, daemon = self.start(self.path("box.h5"), "--no-browser", BROWSER=browser)
+        self.assertEqual(status_of(address, "/healthz"), 200)
+        # The end of `lambert view` by any signal ends the daemon.
+        process.kill()
+        process.wait()
+        wait_until(lambda: is_gone(daemon))
+        self.assertFalse(os.path.exists(opened))
+
+    def test_terminated(self):
+        process, _, daemon = self.start(self.path("box.h5"), "--no-browser")
+        process.terminate()
+        process.communicate(timeout=PATIENCE)
+        self.assertEqual(process.returncode, 0)
+        self.assertTrue(is_gone(daemon))
+
+    def test_browser_that_fails(self):
+        for browser, words in ((self.path("missing"), f"{self.path('missing')} cannot be run"),
+                               (self.script("browser-3", "exit 3\n"), "the browser did not open the address")):
+            process, address, _ = self.start(self.path("box.h5"), BROWSER=browser)
+            self.assertIn("serving box", process.stderr.readline())
+            self.assertIn(words, process.stderr.readline())
+            self.assertEqual(status_of(address, "/healthz"), 200)
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE)
+            self.assertEqual(process.returncode, 0)
+
+    def test_daemon_that_is_ended(self):
+        process, _, daemon = self.start(self.path("box.h5"), "--no-browser")
+        os.kill(daemon, signal.SIGKILL)
+        _, errors = process.communicate(timeout=PATIENCE)
+        self.assertEqual(process.returncode, 1)
+        self.assertIn("lambertd was ended by signal 9", errors)
+
+    def test_nothing_to_view(self):
+        done = lambert("view", self.path("box.obj"))
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertIn("box.obj", done.stderr)
+        self.assertIn("no store can be served", done.stderr)
+        done = lambert("view")
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1))
+        # A copy without a daemon beside it or in PATH.
+        alone = self.path("alone")
+        os.mkdir(alone)
+        shutil.copy(LAMBERT, alone)
+        done = subprocess.run([os.path.join(alone, "lambert"), "view", self.path("box.h5")], capture_output=True, text=True,
+                              env=dict(ENVIRONMENT, PATH=alone), timeout=PATIENCE, check=False)
+        self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), done.stderr)
+        self.assertIn("lambertd cannot be run", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
