@@ -23,7 +23,7 @@ extern char **environ;
 /* The status of a child whose program cannot be run, as shells have it. */
 enum { NOT_FOUND = 127 };
 
-/* How often signals and the browser are looked at. */
+/* The pause between two looks at signals and the browser. */
 enum { PAUSE_MS = 200 };
 
 static const char announced[] = "listening on ";
