@@ -67,8 +67,8 @@ static float slope_along(const iso_field *f, const smooth_nodes *nodes, size_t a
 /* The share of a pixel that the nearest line covers. */
 static float cover(const iso_field *f, const smooth_nodes *nodes, size_t n, size_t x, size_t y) {
     const size_t at = y * f->width + x;
-    const float steps = (float)(n + 1), place = f->place[at];
-    const float nearest = fminf(fmaxf(rintf(place * steps), 1), (float)n) / steps;
+    const float steps = (float)n, place = f->place[at];
+    const float nearest = fminf(fmaxf(rintf(place * steps), 1), steps) / steps;
     const float across = slope_along(f, nodes, at, x, f->width, 1);
     const float down = slope_along(f, nodes, at, y, f->height, f->width);
     const float gradient = hypotf(across, down);

@@ -22,10 +22,10 @@ void iso_field_free(iso_field *f);
 /* Fills the pixels of a tile. */
 void iso_field_tile(const raster_tile *tile, const shade *light, const color_scale *scale, iso_field *f);
 
-/* Draws n lines, at the places k / (n + 1) for k = 1 ... n, about 1.2 pixels wide, over a picture of 3
- * channels whose view stands at the left. A line is |place - k / (n + 1)| < .6 |gradient|, with the gradient
- * a pixel by differences between pixels side by side whose elements have a node in common: so lines end at
- * creases, at the borders of groups and at silhouettes, where light jumps. Cost: O(pixels). */
+/* Draws n lines, at the places k / n for k = 1 ... n as the viewer of the daemon does, about 1.2 pixels wide,
+ * over a picture of 3 channels whose view stands at the left. A line is |place - k / n| < .6 |gradient|, with
+ * the gradient a pixel by differences between pixels side by side whose elements have a node in common: so
+ * lines end at creases, at the borders of groups and at silhouettes, where light jumps. Cost: O(pixels). */
 void iso_lines_draw(const iso_field *f, const smooth_nodes *nodes, size_t n, image *picture);
 
 #endif

@@ -11,7 +11,7 @@
 
 /* The mapping of values to colours: exposure and tone curve; with a scale, its false colours; with plain, the
  * values themselves, display-linear from 0 to 1. Of a smooth view with a scale, iso_lines lines are drawn at
- * equal steps within the scale; nodes are those of the view then, else NULL. */
+ * equal steps from low, the last at high; nodes are those of the view then, else NULL. */
 typedef struct picture_options {
     double exposure;
     color_scale scale;

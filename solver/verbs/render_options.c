@@ -104,9 +104,9 @@ const option_row render_color_rows[] = {
      .argument = "N",
      .least = 1,
      .most = 1000,
-     .help =
-         "Draw N lines of equal value, at equal steps within the range (of the logarithm with --log); light "
-         "is smoothed for them, as by --smooth"},
+     .help = "Draw N lines of equal value, at equal steps from LO, the last at HI (of the logarithm with "
+             "--log); light "
+             "is smoothed for them, as by --smooth"},
     {0},
 };
 const option_row render_frame_rows[] = {
