@@ -2,6 +2,7 @@
 #include "solver/scene/mesh.h"
 
 #include "solver/scene/plane.h"
+#include "solver/scene/texture.h"
 
 #include <assert.h>
 #include <math.h>
@@ -18,6 +19,7 @@ void mesh_free(mesh *m) {
     free(m->group_names);
     free(m->reflectance);
     free(m->emission);
+    mesh_textures_release(m);
     *m = (mesh){0};
 }
 
@@ -93,6 +95,10 @@ lam_status mesh_make_two_sided(mesh *m, lam_error *error) {
     wide.group = doubled(m->group, 1, m->n, sizeof *m->group, error);
     wide.reflectance = doubled(m->reflectance, m->n_channels, m->n, sizeof *m->reflectance, error);
     wide.emission = doubled(m->emission, m->n_channels, m->n, sizeof *m->emission, error);
+    if (m->textured_face != NULL) {
+        wide.textured_face = doubled(m->textured_face, 1, m->n, sizeof *m->textured_face, error);
+        if (wide.textured_face == NULL) TRY(LAM_ERR_MEMORY);
+    }
     if (wide.elements == NULL || wide.area == NULL || wide.normal == NULL || wide.group == NULL ||
         wide.reflectance == NULL || wide.emission == NULL)
         TRY(LAM_ERR_MEMORY);
@@ -113,6 +119,7 @@ lam_status mesh_make_two_sided(mesh *m, lam_error *error) {
     MESH_EXCHANGE(group);
     MESH_EXCHANGE(reflectance);
     MESH_EXCHANGE(emission);
+    MESH_EXCHANGE(textured_face);
 #undef MESH_EXCHANGE
     m->n *= 2;
     m->two_sided = true;
@@ -207,6 +214,7 @@ lam_status mesh_drop(mesh *m, const bool *dropped, lam_error *error) {
         memmove(m->elements[to], m->elements[i], sizeof *m->elements);
         memmove(m->normal[to], m->normal[i], sizeof *m->normal);
         m->area[to] = m->area[i];
+        if (m->textured_face != NULL) m->textured_face[to] = m->textured_face[i];
         m->group[to++] = m->group[i];
     }
     m->n = n;

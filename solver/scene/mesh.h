@@ -21,10 +21,12 @@ typedef struct mesh {
     float (*normal)[3]; /* [n][3], unit, towards the front */
     uint32_t *group;    /* [n] */
     size_t n_groups;
-    char **group_names; /* [n_groups], one block freed by one free() */
-    size_t n_channels;  /* 1 when every reflectance and emission is grey, else 3 */
-    float *reflectance; /* [C][n], in [0, 1) */
-    float *emission;    /* [C][n], W/m^2 */
+    char **group_names;             /* [n_groups], one block freed by one free() */
+    size_t n_channels;              /* 1 when every reflectance and emission is grey, else 3 */
+    float *reflectance;             /* [C][n], in [0, 1) */
+    float *emission;                /* [C][n], W/m^2 */
+    struct mesh_textures *textures; /* NULL: none (texture.h) */
+    uint32_t *textured_face; /* [n], of textures, or TEXTURE_NONE; NULL: no element has a textured face */
     bool two_sided;
     double unit;          /* metres per unit of the scene file, for the record */
     char up;              /* 'x', 'y' or 'z' */
@@ -55,7 +57,8 @@ typedef struct mesh_refinement {
     size_t elements;           /* the number of elements, as closely as near-equal areas allow */
 } mesh_refinement;
 
-/* Refines in place; children of an element are consecutive and inherit its group and materials. */
+/* Refines in place; children of an element are consecutive and inherit its group and materials, of textures
+ * the means over their own areas. */
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
 
 /* Doubles every element: all fronts in mesh order, then all backs (`--two-sided`). */

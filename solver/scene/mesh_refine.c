@@ -2,6 +2,7 @@
 #include "solver/scene/face_grid.h"
 #include "solver/scene/mesh_cells.h"
 #include "solver/scene/mesh_refined.h"
+#include "solver/scene/texture.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -178,12 +179,19 @@ lam_status refined_mesh_end(refined_mesh *r, const mesh *m, mesh *out, lam_error
             fine.emission[c * n + i] = m->emission[c * m->n + r->face[i]];
         }
     }
+    if (m->textures != NULL) {
+        fine.textured_face = memory_allocate(n, sizeof *fine.textured_face, "refined mesh", error);
+        if (fine.textured_face == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t i = 0; i < n; i++) fine.textured_face[i] = m->textured_face[r->face[i]];
+        mesh_textures_hold(&fine, m->textures);
+    }
     fine.elements = r->elements;
     fine.vertices = r->points.points;
     fine.n_vertices = r->points.n;
     r->elements = NULL;
     r->points.points = NULL;
     TRY(mesh_measure(&fine, error));
+    TRY(mesh_textures_apply(&fine, error));
     memcpy(fine.name, m->name, sizeof fine.name);
     memcpy(fine.source_hash, m->source_hash, sizeof fine.source_hash);
     *out = fine;
