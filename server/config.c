@@ -47,8 +47,8 @@ static const option_row store_rows[] = {
      .least = 1 << 20,
      .most = SIZE_MOST,
      .help =
-         "Most memory that requests take: bodies, emissions, answers until they are sent; further ones are "
-         "answered 503, and 422 where they alone would take more"},
+         "Most memory that requests take: bodies, emissions, answers until they are sent; further ones wait "
+         "within their time, and are answered 422 where they alone would take more"},
     {.name = "max-variants",
      .kind = OPTION_COUNT,
      .offset = AT(max_variants),

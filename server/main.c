@@ -215,6 +215,7 @@ done:
     metrics_destroy(s.metrics);
     if (s.audit_log != s.access_log) access_log_close(s.audit_log);
     access_log_close(s.access_log);
+    request_ledger_destroy(&s.memory);
     tokens_close(s.tokens);
     connections_unlink(&own);
     free(labels);

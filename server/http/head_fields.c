@@ -24,6 +24,7 @@ bool head_check_fields(request *r, const char *version) {
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
     peer_find(&r->service->peers, info != NULL ? info->client_addr : NULL, &fields.peer, &r->peer);
+    r->memory.client = r->peer.key;
     if (framing_check(&fields.framing, version, &why)) return true;
     answer_problem(&r->answer, &why);
     return false;

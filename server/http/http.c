@@ -86,7 +86,7 @@ static bool check_type(request *r) {
 }
 
 static void refuse_length(request *r) {
-    const size_t most = r->service->config->max_body, room = atomic_load(&r->service->memory.all.room);
+    const size_t most = r->service->config->max_body, room = request_ledger_most(&r->service->memory);
     answer_refuse(
         &r->answer, PROBLEM_TOO_LONG,
         "the body is longer than %zu bytes (--max-body, --max-request-memory); send several requests",
@@ -119,7 +119,7 @@ static bool check_head(request *r, const char *method, const char *target, uint6
     if (!check_scene(r)) return false;
     if (!r->match.route->with_body) return true;
     if (!check_type(r)) return false;
-    if (length > s->config->max_body || length > atomic_load(&s->memory.all.room)) {
+    if (length > s->config->max_body || length > request_ledger_most(&s->memory)) {
         refuse_length(r);
         return false;
     }
@@ -138,6 +138,7 @@ static bool hold_body(request *r, const char *bytes, size_t count) {
     const size_t before = atomic_fetch_add(&s->body_bytes, count);
     const bool room = before <= s->config->max_buffered && count <= s->config->max_buffered - before;
     problem why = {0};
+    r->memory.wanted = 0;
     if (room && request_memory_take(&r->memory, count, &why)) {
         if (buffer_append(&r->body, bytes, count)) return true;
         request_memory_give_back(&r->memory, count);
@@ -155,6 +156,7 @@ static bool hold_body(request *r, const char *bytes, size_t count) {
 /* The whole request has arrived. */
 static enum MHD_Result handle(request *r) {
     if (!r->answered) {
+        r->memory.wanted = 0;
         r->call.body = r->body.bytes == NULL ? "" : r->body.bytes;
         r->call.length = r->body.length;
         route_shortcut *shortcut = r->match.route->shortcut;
@@ -167,6 +169,7 @@ static enum MHD_Result handle(request *r) {
             r->match.route->handle(&r->call, &r->answer);
         }
         http_finish_answer(r, true);
+        if (http_wait_for_memory(r, 0)) return MHD_YES;
         r->answered = true;
     }
     return http_send_answer(r);
@@ -193,7 +196,7 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
         return NULL;
     }
     r->service = h->service;
-    r->memory.ledger = &h->service->memory;
+    r->memory.ledger = &h->service->memory; /* its client is set with the peer */
     r->connection = connection;
     r->client = client_of(connection);
     request_id_choose(http_header(r, "X-Request-Id"), h->seed, h->next_id++, r->id);
@@ -227,7 +230,8 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
         r->answered = r->last = true;
         return http_send_answer(r);
     }
-    uint64_t length = announced_length(r);
+    const uint64_t length = announced_length(r);
+    r->announced = length;
     r->answered = !http_read_timeout(r) || !check_head(r, method, path, length);
     /* An answer sent before the end of the body closes the connection. So the body of a refused request is
      * read and dropped, unless it is long or its client waits for 100 Continue. */
@@ -238,18 +242,23 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
 
 static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
     const config *c = r->service->config;
-    r->received += *size;
-    client_received(r->service->connections, r->client, *size);
+    if (r->paused) {
+        r->paused = false;
+        client_enter(r->service->connections, r->client, STAGE_BODY, r->received);
+    }
     if (!r->answered && r->match.route->with_body) {
-        if (r->received > c->max_body) {
+        if (r->received + *size > c->max_body) {
             refuse_length(r);
             r->answered = true;
             http_drop_body(r);
         } else if (!hold_body(r, bytes, *size)) {
+            if (http_wait_for_memory(r, r->announced)) return MHD_YES;
             r->answered = true;
             http_drop_body(r);
         }
     }
+    r->received += *size;
+    client_received(r->service->connections, r->client, *size);
     /* libmicrohttpd sends no answer in the middle of a body: the connection of one without end is closed. */
     if (r->received > c->max_body + DROP_MAX) return MHD_NO;
     *size = 0;
@@ -279,11 +288,8 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     if (r->answer.problem != PROBLEM_NONE) problem_counts_add(&h->service->problems, r->answer.problem);
     catalog_release(r->snapshot);
     http_drop_body(r);
-    buffer_free(&r->answer.body);
-    answer_stream_free(r->answer.stream);
-    kept_bytes_release(r->answer.kept);
-    request_memory_give_back(&r->memory, r->memory.held);
-    free(r->answer.location);
+    answer_free(&r->answer);
+    (void)request_memory_keep(&r->memory, 0);
     free(r->call.changed);
     size_t label = r->match.label;
     free(r->path);

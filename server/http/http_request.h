@@ -34,12 +34,15 @@ typedef struct request {
     char etag[ETAG_MAX];    /* of the answer; "" for none */
     const char *origin;     /* of --allow-origin, the page that asks; NULL: none of them */
     bool preflight;         /* the answer is one to a CORS preflight */
+    bool paused;            /* the rest of the body waits in the socket for memory */
+    bool waits_for_memory;  /* of the thread that solves, and of the queue's looks */
     bool answered;          /* the answer is made; the rest of the body is dropped */
     bool last;              /* the connection ends with this answer */
     bool queued;            /* the answer was handed to libmicrohttpd */
     buffer body;            /* counted in the service's body_bytes and in memory */
     request_memory memory;  /* of the body, of what is computed, of the answer */
     uint64_t received;
+    uint64_t announced; /* length of the body; 0: unknown */
     size_t sent;
 } request;
 
@@ -51,6 +54,11 @@ bool http_read_timeout(request *r);
 
 /* Suspends the connection and queues the solve of a request with its whole body, or refuses it. */
 void http_solve(request *r);
+
+/* After a take that found no room, on the I/O thread: suspends the connection until there is room for
+ * `wanted` bytes in all, or until it is refused (answered). libmicrohttpd then calls with the same bytes
+ * again. False if memory is short for another reason. */
+bool http_wait_for_memory(request *r, size_t wanted);
 
 /* False, with 503 in place of any answer, if the scene is out of service. */
 bool http_check_health(request *r);

@@ -59,15 +59,20 @@ static void refuse_solve(request *r) {
     static const char *const reasons[N_REFUSALS] = {
         [REFUSED_FULL] = "too many solves wait or run (--max-inflight); try again",
         [REFUSED_DEADLINE] = "the answer was not ready in time (--request-timeout, Lambert-Timeout)",
+        [REFUSED_MEMORY] =
+            "other requests held the memory that it needs (--max-request-memory), until its time was "
+            "over or the requests that waited held too much themselves; try again",
         [REFUSED_GONE] = "the client ended its sending before the answer was ready",
         [REFUSED_REFINEMENTS] = "too many refinements wait or run (a quarter of --max-inflight); try again",
         [REFUSED_SHARE] = "all places are taken, and this client has most of them; try again",
         [REFUSED_SHUTDOWN] = "shutting down",
     };
     const double delay = fmin(fmax(ceil(batch_delay(r->service->queue)), 1), RETRY_MOST);
-    answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "%s", reasons[r->refusal]);
+    const bool memory = r->refusal == REFUSED_MEMORY;
+    answer_refuse(&r->answer, memory ? PROBLEM_NO_MEMORY : PROBLEM_UNAVAILABLE, "%s", reasons[r->refusal]);
     r->answer.retry_after = (unsigned)delay;
     metrics_refuse(r->service->metrics, r->refusal);
+    if (memory) request_ledger_count_full(&r->service->memory);
 }
 
 static bool is_wanted(request *r) {
@@ -75,7 +80,7 @@ static bool is_wanted(request *r) {
     if (atomic_load(&r->service->state) == SERVICE_ENDING)
         r->refusal = REFUSED_SHUTDOWN;
     else if (now > r->deadline)
-        r->refusal = REFUSED_DEADLINE;
+        r->refusal = r->waits_for_memory ? REFUSED_MEMORY : REFUSED_DEADLINE;
     else if (client_is_lost(r->client))
         r->refusal = REFUSED_GONE;
     else
@@ -97,11 +102,16 @@ static void leave_refinements(request *r) {
     r->call.refines = false;
 }
 
+/* A queue that needs the place, or is abandoned, does not ask. */
+static metrics_refusal why_dropped(const request *r) {
+    if (r->refusal != REFUSED_NOT) return r->refusal;
+    return atomic_load(&r->service->state) == SERVICE_ENDING ? REFUSED_SHUTDOWN : REFUSED_SHARE;
+}
+
 static void drop_solve(batch_job *job) {
     request *r = request_of(job);
-    /* A queue that needs the place, or is abandoned, does not ask. */
-    if (r->refusal == REFUSED_NOT)
-        r->refusal = atomic_load(&r->service->state) == SERVICE_ENDING ? REFUSED_SHUTDOWN : REFUSED_SHARE;
+    request_memory_leave(&r->memory);
+    r->refusal = why_dropped(r);
     if (r->call.state != NULL) r->match.route->steps->drop(&r->call);
     leave_refinements(r);
     refuse_solve(r);
@@ -146,21 +156,65 @@ static bool enter_refinements(request *r) {
     return false;
 }
 
+/* Called with the lock of the ledger. */
+static void wake_solve(request_memory *memory) {
+    request *r = (request *)(void *)((char *)memory - offsetof(request, memory));
+    batch_unblock(r->service->queue, &r->call.job);
+}
+
+/* Has begin called again once there is the memory that the request was short of. */
+static void wait_for_memory(request *r) {
+    r->waits_for_memory = r->call.job.blocked = true;
+    request_memory_wait(&r->memory, wake_solve);
+}
+
+/* True if the request found no room, which is no answer while it has time: all but its body is given back,
+ * and it waits. */
+static bool is_short_of_memory(request *r) {
+    if (r->memory.wanted == 0 || r->answer.problem != PROBLEM_NO_MEMORY) return false;
+    const size_t wanted = r->memory.wanted;
+    answer_free(&r->answer);
+    r->answer = (answer){.status = 0};
+    (void)request_memory_keep(&r->memory, r->body.length);
+    r->memory.wanted = wanted;
+    return true;
+}
+
+/* After a wait: false, with the answer made, if the request was refused to let others go on. */
+static bool has_memory(request *r) {
+    r->memory.wanted = 0;
+    if (!r->waits_for_memory) {
+        metrics_wait(r->service->metrics, clock_seconds() - r->submitted);
+        return true;
+    }
+    r->waits_for_memory = false;
+    if (!r->memory.refused) return true;
+    r->refusal = REFUSED_MEMORY;
+    refuse_solve(r);
+    finish_answer(r);
+    return false;
+}
+
 static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     request *r = request_of(job);
     const route *to = r->match.route;
     r->call.workspace = workspace;
-    metrics_wait(r->service->metrics, clock_seconds() - r->submitted);
     map_guard_allow();
+    if (!has_memory(r)) return false;
     if (to->steps == NULL) {
         to->handle(&r->call, &r->answer);
     } else if (to->steps->begin(&r->call, &r->answer)) {
         if (enter_refinements(r)) {
             job->cost = cost_to_solve(&r->call, to);
             http_drop_body(r); /* its vectors were read */
+            (void)request_memory_keep(&r->memory, r->memory.held);
             return true;
         }
         drop_solve(job);
+        return false;
+    }
+    if (is_short_of_memory(r)) {
+        wait_for_memory(r);
         return false;
     }
     (void)http_check_health(r); /* an answer from lost pages is wrong */
@@ -199,9 +253,67 @@ static bool is_brief(const call *c) {
 static void finish_solve(batch_job *job) {
     request *r = request_of(job);
     r->answered = true;
-    if (r->refusal == REFUSED_DEADLINE)
+    if (r->refusal == REFUSED_DEADLINE || r->refusal == REFUSED_MEMORY)
         client_end_by(r->service->connections, r->client, clock_seconds() + REFUSAL_S);
     MHD_resume_connection(r->connection);
+}
+
+static void refuse_wait(request *r, metrics_refusal why) {
+    r->refusal = why;
+    refuse_solve(r);
+    http_drop_body(r);
+    (void)request_memory_keep(&r->memory, 0);
+}
+
+/* The first time it waits, the second time it goes on. */
+static bool begin_wait(batch_job *job, batch_workspace *workspace) {
+    request *r = request_of(job);
+    (void)workspace;
+    if (!r->waits_for_memory) {
+        wait_for_memory(r);
+        return false;
+    }
+    r->waits_for_memory = false;
+    if (r->memory.refused) refuse_wait(r, REFUSED_MEMORY);
+    return false;
+}
+
+static void drop_wait(batch_job *job) {
+    request *r = request_of(job);
+    request_memory_leave(&r->memory);
+    r->waits_for_memory = false;
+    refuse_wait(r, why_dropped(r));
+}
+
+/* The I/O thread goes on with the body, or with the answer if it was refused. */
+static void finish_wait(batch_job *job) {
+    request *r = request_of(job);
+    if (r->refusal != REFUSED_NOT) {
+        r->answered = true;
+        client_end_by(r->service->connections, r->client, clock_seconds() + REFUSAL_S);
+    }
+    MHD_resume_connection(r->connection);
+}
+
+bool http_wait_for_memory(request *r, size_t wanted) {
+    service *s = r->service;
+    if (!is_short_of_memory(r)) return false;
+    const size_t most = request_ledger_most(&s->memory);
+    if (wanted > r->memory.wanted) r->memory.wanted = wanted < most ? wanted : most;
+    r->call.job = (batch_job){.begin = begin_wait,
+                              .finish = finish_wait,
+                              .is_wanted = is_solve_wanted,
+                              .drop = drop_wait,
+                              .client = r->peer.key,
+                              .kind = (unsigned)route_label_count()};
+    r->paused = true;
+    client_enter(s->connections, r->client, STAGE_SOLVE, 0);
+    MHD_suspend_connection(r->connection);
+    if (batch_submit(s->queue, &r->call.job)) return true;
+    refuse_wait(r, atomic_load(&s->state) == SERVICE_ENDING ? REFUSED_SHUTDOWN : REFUSED_FULL);
+    r->answered = true;
+    MHD_resume_connection(r->connection);
+    return true;
 }
 
 void http_solve(request *r) {

@@ -152,6 +152,16 @@ static void drop(worker *w, batch_job *job) {
     finish(w, job);
 }
 
+/* The job waits until it is unblocked, which may have been done while begin still ran. */
+static void block(batch_queue *queue, batch_job *job) {
+    job->blocked = false;
+    if (job->unblocked)
+        order_return(&queue->order, job);
+    else
+        order_add(&queue->order.blocked, job);
+    job->unblocked = false;
+}
+
 /* The line is charged for the estimate at once, so that other threads do not all take it meanwhile, and for
  * what the function took beyond that later. */
 static void begin(worker *w, batch_job *job) {
@@ -167,6 +177,10 @@ static void begin(worker *w, batch_job *job) {
     pthread_mutex_lock(&queue->lock);
     l->charge += fmax(leave_function(w, brief) - cost, 0);
     order_leave(&queue->order, job);
+    if (!waits && job->blocked) {
+        block(queue, job);
+        return;
+    }
     if (!waits) {
         finish(w, job);
         return;
@@ -349,6 +363,13 @@ bool batch_make_place(batch_queue *queue, uint64_t client, const void *key) {
     const bool made = evict(queue, client, key);
     pthread_mutex_unlock(&queue->lock);
     return made;
+}
+
+void batch_unblock(batch_queue *queue, batch_job *job) {
+    pthread_mutex_lock(&queue->lock);
+    order_unblock(&queue->order, job);
+    if (queue->n_brief == 0) wake_one(queue);
+    pthread_mutex_unlock(&queue->lock);
 }
 
 bool batch_submit(batch_queue *queue, batch_job *job) {

@@ -53,6 +53,8 @@ typedef struct batch_part {
  *   pass    computes some vectors of one or several jobs, at most BATCH_PASS in all. It is called until
  *           every vector is computed, by one thread at a time for a job. It may lower n_vectors to what has
  *           been computed.
+ *           Or it sets `blocked` and returns false: it is called again, in the turn that the job had, once
+ *           batch_unblock was called, which may be before it returns.
  *   end     makes the answer.
  *   finish  after the job has left the count of batch_jobs. The job may not exist when it returns.
  * Jobs that wait are looked at every BATCH_LOOK seconds, others before their next function if no
@@ -74,11 +76,13 @@ struct batch_job {
     double cost;     /* estimated seconds of begin; once begun, of the longest function that is left */
     uint64_t client; /* whose it is */
     unsigned kind;   /* of work; jobs of one kind take similar steps */
+    bool blocked;    /* set by begin: it cannot go on before batch_unblock */
     bool brief; /* set at submission: each of the four functions takes about as long as waking a thread */
     size_t next_vector; /* here and below: private to the queue */
     uint64_t ticket;    /* number of its submission */
     uint64_t begun;     /* jobs that had begun when it was ready for its next pass */
     bool passing;       /* a thread computes some of its vectors */
+    bool unblocked;     /* while begin still ran */
     bool evicted;       /* it is unwanted once it has left its pass */
     double looked;      /* when it was last looked at, or came */
     size_t line;
@@ -98,6 +102,10 @@ bool batch_submit(batch_queue *queue, batch_job *job);
 /* The same among the jobs that have begun with this key: drops one of the client that has most for one of
  * `client`; false if it has not two fewer. */
 bool batch_make_place(batch_queue *queue, uint64_t client, const void *key);
+
+/* Lets a job go on whose begin blocked it. The job must not have come to its drop yet, or its drop must wait
+ * for this call. */
+void batch_unblock(batch_queue *queue, batch_job *job);
 
 /* The number of jobs that wait or run. */
 size_t batch_jobs(batch_queue *queue);

@@ -62,6 +62,38 @@ void order_leave(job_order *order, const batch_job *job) {
     order->active[a] = order->active[--order->n_active];
 }
 
+static void remove_job(job_list *list, const batch_job *gone) {
+    job_list before = *list;
+    *list = (job_list){0};
+    for (batch_job *job; (job = order_take(&before)) != NULL;)
+        if (job != gone) order_add(list, job);
+}
+
+static bool is_listed(const job_list *list, const batch_job *wanted) {
+    const batch_job *job = list->first;
+    while (job != NULL && job != wanted) job = job->next;
+    return job != NULL;
+}
+
+void order_return(job_order *order, batch_job *job) {
+    order_enter(order, job);
+    job_list *line = &order->lines[job->line].arrived, before = *line;
+    *line = (job_list){0};
+    while (before.first != NULL && before.first->ticket < job->ticket) order_add(line, order_take(&before));
+    order_add(line, job);
+    for (batch_job *later; (later = order_take(&before)) != NULL;) order_add(line, later);
+    order->n_arrived++;
+}
+
+void order_unblock(job_order *order, batch_job *job) {
+    if (!is_listed(&order->blocked, job)) {
+        job->unblocked = true; /* its begin has not returned yet, or nobody wants it any more */
+        return;
+    }
+    remove_job(&order->blocked, job);
+    order_return(order, job);
+}
+
 static size_t left_of(const batch_job *job) {
     return job->n_vectors - job->next_vector;
 }
@@ -157,6 +189,7 @@ void order_look(job_order *order) {
     measure_pace(order, now);
     (void)sift(order, &order->waiting, true, now);
     (void)sift(order, &order->computed, false, now);
+    (void)sift(order, &order->blocked, false, now);
     /* Backwards, as a line without jobs leaves its place to the last. */
     for (size_t a = order->n_active; a-- > 0;)
         order->n_arrived -= sift(order, &order->lines[order->active[a]].arrived, true, now);
@@ -293,16 +326,10 @@ static void find_last(crowd *c, job_list *list) {
         }
 }
 
-static void remove_job(job_list *list, const batch_job *gone) {
-    job_list before = *list;
-    *list = (job_list){0};
-    for (batch_job *job; (job = order_take(&before)) != NULL;)
-        if (job != gone) order_add(list, job);
-}
-
 bool order_evict(job_order *order, uint64_t client, const void *key) {
     crowd c = {.key = key};
     count_clients(&c, &order->waiting);
+    if (key == NULL) count_clients(&c, &order->blocked);
     for (size_t a = 0; key == NULL && a < order->n_active; a++)
         count_clients(&c, &order->lines[order->active[a]].arrived);
     for (size_t p = 1; p < CLIENTS; p++)
@@ -311,13 +338,15 @@ bool order_evict(job_order *order, uint64_t client, const void *key) {
     for (size_t a = 0; key == NULL && a < order->n_active; a++)
         find_last(&c, &order->lines[order->active[a]].arrived);
     const bool has_arrived = c.last != NULL; /* less is lost than of one that has begun */
-    if (!has_arrived) find_last(&c, &order->waiting);
+    if (!has_arrived && key == NULL) find_last(&c, &order->blocked);
+    const bool is_blocked = !has_arrived && c.last != NULL;
+    if (c.last == NULL) find_last(&c, &order->waiting);
     if (c.last == NULL) return false;
     c.last->evicted = true;
     if (c.last->passing) return true; /* it belongs to the thread of its pass */
     remove_job(c.of, c.last);
     if (has_arrived) order->n_arrived--;
-    order_leave(order, c.last);
+    if (!is_blocked) order_leave(order, c.last);
     order_add(&order->unwanted, c.last);
     return true;
 }

@@ -24,6 +24,7 @@ typedef struct job_line {
  */
 typedef struct job_order {
     job_list waiting, computed; /* before or between passes; before end */
+    job_list blocked;           /* until batch_unblock; in no line */
     job_list unwanted;          /* before drop */
     size_t n_arrived, n_jobs;   /* jobs before begin; from submit to finish */
     uint64_t n_submitted, n_begun;
@@ -47,6 +48,12 @@ bool order_is_short(const batch_job *job);
 /* A job stands in the line of its client, kind and cost from its submission until it is computed. */
 void order_enter(job_order *order, batch_job *job);
 void order_leave(job_order *order, const batch_job *job);
+
+/* A job whose begin is to be called again stands in its line, before those that came after it. */
+void order_return(job_order *order, batch_job *job);
+
+/* The same for one in `blocked`; of others it is noted. */
+void order_unblock(job_order *order, batch_job *job);
 
 /* True if a pass may begin. */
 bool order_is_any_ready(const job_order *order);

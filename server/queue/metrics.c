@@ -20,9 +20,9 @@ static const size_t batches[] = {1, 2, 4, 8, 16, 32, 64};
 #define N_BATCHES (sizeof batches / sizeof batches[0])
 
 static const char *const refusals[N_REFUSALS] = {
-    [REFUSED_FULL] = "full",   [REFUSED_DEADLINE] = "deadline",
-    [REFUSED_GONE] = "gone",   [REFUSED_REFINEMENTS] = "refinements",
-    [REFUSED_SHARE] = "share", [REFUSED_SHUTDOWN] = "shutdown",
+    [REFUSED_FULL] = "full",         [REFUSED_DEADLINE] = "deadline", [REFUSED_MEMORY] = "memory",
+    [REFUSED_GONE] = "gone",         [REFUSED_SHARE] = "share",       [REFUSED_REFINEMENTS] = "refinements",
+    [REFUSED_SHUTDOWN] = "shutdown",
 };
 
 typedef struct route_counts {

@@ -17,12 +17,13 @@ void metrics_destroy(metrics *m);
 void metrics_begin(metrics *m);
 void metrics_end(metrics *m, size_t label, unsigned status, double seconds);
 
-/* A solve that is not done: it found no place; its deadline passed; its client went; there were too many
- * refinements; its place went to a client with fewer; the daemon ends. */
+/* A solve that is not done: it found no place; its deadline passed, or did while it waited for memory; its
+ * client went; there were too many refinements; its place went to a client with fewer; the daemon ends. */
 typedef enum metrics_refusal {
     REFUSED_NOT,
     REFUSED_FULL,
     REFUSED_DEADLINE,
+    REFUSED_MEMORY,
     REFUSED_GONE,
     REFUSED_REFINEMENTS,
     REFUSED_SHARE,

@@ -7,6 +7,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+void answer_free(answer *out) {
+    buffer_free(&out->body);
+    answer_stream_free(out->stream);
+    out->stream = NULL;
+    kept_bytes_release(out->kept);
+    out->kept = NULL;
+    free(out->location);
+    out->location = NULL;
+}
+
 void answer_problem(answer *out, const problem *what) {
     buffer_free(&out->body);
     answer_stream_free(out->stream);

@@ -72,6 +72,9 @@ static inline call *call_of(batch_job *job) {
     return (call *)(void *)((char *)job - offsetof(call, job));
 }
 
+/* Frees what the answer owns. */
+void answer_free(answer *out);
+
 /* Makes the answer a problem document. */
 void answer_problem(answer *out, const problem *what);
 void answer_refuse(answer *out, problem_kind kind, const char *format, ...)

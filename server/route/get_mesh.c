@@ -67,7 +67,7 @@ static kept_bytes *keep(call *in, content_coding form, buffer *made, size_t take
     const size_t bytes = made->capacity;
     kept_bytes *kept = scene_mesh_keep(in->scene->mesh, form, made);
     if (kept == NULL && bytes <= taken) {
-        kept = kept_bytes_create(made, &in->memory->ledger->all, bytes);
+        kept = kept_bytes_create(made, request_ledger_give_back, in->memory->ledger, bytes);
         if (kept == NULL) problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for a mesh");
         if (kept != NULL) {
             request_memory_hand_over(in->memory, bytes);

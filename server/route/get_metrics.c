@@ -28,7 +28,8 @@ void get_metrics(call *in, answer *out) {
     stores.memory += scene_work_memory(s->config->threads, work_bytes);
     gauges.n_scenes = snapshot->n_scenes - stores.n_damaged;
     const bool written = metrics_write(s->metrics, &gauges, &b) && metrics_write_stores(&stores, &b) &&
-                         problem_counts_write(&s->problems, &b) && request_ledger_write(&s->memory, &b) &&
+                         problem_counts_write(&s->problems, &b) &&
+                         request_ledger_write(in->memory->ledger, &b) &&
                          connections_write(s->connections, &b) && access_log_metrics(s->access_log, &b);
     answer_json(out, &b, written);
     if (written) out->type = "text/plain; version=0.0.4; charset=utf-8";

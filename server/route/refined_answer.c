@@ -49,6 +49,10 @@ static void pass_memory_free(pass_memory *p) {
     free(p->work);
 }
 
+static size_t vectors_of_pass(const radiosity_request *request) {
+    return request->n_rhs < BATCH_PASS ? request->n_rhs : BATCH_PASS;
+}
+
 /* Bytes of the arrays of a pass, and of those that refining takes beside them. */
 static size_t pass_memory_bytes(const scene *s, const radiosity_request *request, size_t rows) {
     const bool few = s->n_emitters > 0, sky = request->sky.values != NULL;
@@ -59,14 +63,11 @@ static size_t pass_memory_bytes(const scene *s, const radiosity_request *request
                       few ? lam_operator_work_bytes(s->op, rows / s->n_channels) : 0);
 }
 
-static bool pass_memory_allocate(const call *in, const radiosity_request *request, pass_memory *p,
+static bool pass_memory_allocate(const scene *s, const radiosity_request *request, pass_memory *p,
                                  problem *why) {
-    const scene *s = in->scene;
-    const size_t vectors = request->n_rhs < BATCH_PASS ? request->n_rhs : BATCH_PASS,
-                 rows = vectors * s->n_channels;
+    const size_t vectors = vectors_of_pass(request), rows = vectors * s->n_channels;
     const size_t row = s->n * sizeof(double);
     const bool few = s->n_emitters > 0;
-    if (!request_memory_take(in->memory, pass_memory_bytes(s, request, rows), why)) return false;
     p->E = memory_allocate(rows, row, "E", NULL);
     p->out = memory_allocate(rows, row, "B", NULL);
     bool good = p->E != NULL && p->out != NULL;
@@ -184,7 +185,11 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
                               .batch = request->batch,
                               .n_values = request->select ? request->n_selected : s->n};
     *out = r;
-    if (!request_memory_take(in->memory, bytes_needed(in, request, &r->shape, &r->as), why)) return false;
+    /* With the memory of the pass: what waits for memory must not have begun. */
+    const size_t of_pass = pass_memory_bytes(s, request, vectors_of_pass(request) * s->n_channels);
+    if (!request_memory_take(in->memory, bytes_plus(of_pass, bytes_needed(in, request, &r->shape, &r->as)),
+                             why))
+        return false;
     r->certificates = memory_allocate(request->n_rhs, sizeof *r->certificates, "certificates", NULL);
     r->iterations = memory_allocate(request->n_rhs, sizeof *r->iterations, "certificates", NULL);
     notes->certificates = r->certificates;
@@ -217,7 +222,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     bool good = find_refiner(s, &refiner, why);
     if (good && !r->made) {
         r->made = true;
-        good = pass_memory_allocate(in, request, &r->p, why) &&
+        good = pass_memory_allocate(s, request, &r->p, why) &&
                (r->figures != NULL || answer_begin(b, &r->shape, &r->as, notes, why));
     }
     const double *x = good ? refine(in, refiner, request, first, count, &r->p, r->certificates + first,

@@ -1,32 +1,67 @@
 /* The memory that requests may take, --max-request-memory: bodies, emissions, what is computed from them, and
  * answers until their last byte is sent. It is taken before it is allocated, by what follows from shapes, and
  * given back when it is freed. The memory that the process keeps is another ledger's
- * (server/scene/memory_ledger.h). */
+ * (server/scene/memory_ledger.h).
+ *
+ * Waiting. A request that finds no room gives back all but its body and waits. Freed memory goes to the
+ * waiting request whose client holds least, of those to the one that came first, if there is room for all
+ * that it was short of; otherwise to the next that has room. The bytes are then its own, so that nobody takes
+ * them before it goes on. Once the first of this order has waited for REQUEST_MEMORY_PATIENCE seconds, it is
+ * overtaken no more by requests of at least a sixteenth of its size, of its own client or of those that hold
+ * more. Where requests that wait hold so much by their bodies that none of them could go on, the last one of
+ * the client that holds most of it is refused. */
 #ifndef LAMBERT_SERVER_ROUTE_REQUEST_MEMORY_H
 #define LAMBERT_SERVER_ROUTE_REQUEST_MEMORY_H
 
-#include "server/scene/memory_ledger.h"
+#include "solver/codec/buffer.h"
 #include "solver/codec/problem.h"
 
+#include <pthread.h>
 #include <stdint.h>
 
-/* Of all requests. Any thread. */
+/* Clients that meet in a place of the ledger's table count as one; the keys are hashes that nobody can
+ * choose (server/net/peer.h). */
+enum { REQUEST_MEMORY_CLIENTS = 256 };
+
+#define REQUEST_MEMORY_PATIENCE 1.0
+
+typedef struct request_memory request_memory;
+
+/* Of all requests. Any thread, by the functions below. */
 typedef struct request_ledger {
-    memory_ledger all;
-    atomic_size_t n_full;  /* refusals where others held the room */
-    atomic_size_t n_never; /* refusals of what passes the whole of it */
+    pthread_mutex_t lock;
+    size_t room, taken;
+    size_t by_client[REQUEST_MEMORY_CLIENTS]; /* of taken */
+    request_memory *first;                    /* requests that wait */
+    size_t n_waiting;
+    uint64_t n_waited;        /* requests that have begun to wait */
+    uint64_t n_full, n_never; /* refusals where others held the room, and of what passes the whole of it */
 } request_ledger;
 
 void request_ledger_init(request_ledger *ledger, size_t room);
+void request_ledger_destroy(request_ledger *ledger);
 
-/* Of one request; belongs to the thread that has the request. */
-typedef struct request_memory {
+/* The most bytes that one request may have. */
+size_t request_ledger_most(const request_ledger *ledger);
+
+/* Of one request; belongs to the thread that has the request. Zero at the start but for ledger. */
+struct request_memory {
     request_ledger *ledger;
-    size_t held;
-} request_memory;
+    uint64_t client; /* whose it is */
+    size_t held;     /* taken */
+    size_t granted;  /* kept for it beside these */
+    size_t assured;  /* after a wait, until request_memory_keep: what it gives back stays granted up to this
+                        sum of both, as it may need it again to come as far as before */
+    size_t wanted;   /* the least it needs in all to go on, after a take that found no room; else 0 */
+    /* While it waits, with the lock of the ledger: */
+    bool waits, refused;
+    double since;
+    void (*wake)(request_memory *m);
+    request_memory *before, *after;
+};
 
 /* Takes bytes; false with *why: 422 with the sizes if the request could never have as much, 503 if others
- * hold it. */
+ * hold it (`wanted` is then set). */
 bool request_memory_take(request_memory *m, size_t bytes, problem *why);
 
 /* The same for a codec_scene, whose owner is a request_memory. */
@@ -34,16 +69,28 @@ bool request_memory_take_of(void *owner, size_t bytes, problem *why);
 
 void request_memory_give_back(request_memory *m, size_t bytes);
 
-/* The bytes are not the request's any more, but stay taken: another gives them back to the ledger. */
-static inline void request_memory_hand_over(request_memory *m, size_t bytes) {
-    m->held -= bytes;
-}
+/* The bytes are not the request's any more, but stay taken, as nobody's: who has them gives them back to the
+ * ledger (a request_ledger). */
+void request_memory_hand_over(request_memory *m, size_t bytes);
+void request_ledger_give_back(void *ledger, size_t bytes);
 
-/* Gives back all but `bytes` of it, or takes what it is short of; false if there is no room for that. */
+/* Gives back all but `bytes` of it, and what is granted, or takes what it is short of; false if there is no
+ * room for that. */
 bool request_memory_keep(request_memory *m, size_t bytes);
 
+/* Waits for `wanted` bytes in all (of which `held` are taken). wake is called once, by any thread and maybe
+ * before this returns, with the lock of the ledger held: when they are granted, or with `refused`. It must
+ * not call the functions of this file. */
+void request_memory_wait(request_memory *m, void (*wake)(request_memory *m));
+
+/* Waits no more. wake neither runs nor will run when this returns. */
+void request_memory_leave(request_memory *m);
+
+/* Counts a request that is refused because others hold the room. */
+void request_ledger_count_full(request_ledger *ledger);
+
 /* Appends the figures of the ledger as Prometheus text. */
-bool request_ledger_write(const request_ledger *ledger, buffer *b);
+bool request_ledger_write(request_ledger *ledger, buffer *b);
 
 /* Sizes that stay SIZE_MAX once they pass it, which no ledger has. */
 static inline size_t bytes_times(size_t a, size_t b) {

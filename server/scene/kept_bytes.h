@@ -3,25 +3,28 @@
 #ifndef LAMBERT_SERVER_SCENE_KEPT_BYTES_H
 #define LAMBERT_SERVER_SCENE_KEPT_BYTES_H
 
-#include "server/scene/memory_ledger.h"
 #include "solver/codec/buffer.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 
 typedef struct kept_bytes {
     atomic_size_t references;
     buffer content;
-    memory_ledger *ledger; /* gets the bytes of its content back when it is freed; or NULL; outlives it */
+    void (*give_back)(void *ledger, size_t bytes); /* of its content, when it is freed */
+    void *ledger;                                  /* outlives it */
     size_t taken;
 } kept_bytes;
 
 /* Takes content over, of whose memory `taken` bytes were taken of the ledger. One reference, the caller's;
  * NULL, with nothing taken over, if memory is short. */
-static inline kept_bytes *kept_bytes_create(buffer *content, memory_ledger *ledger, size_t taken) {
+static inline kept_bytes *kept_bytes_create(buffer *content, void (*give_back)(void *ledger, size_t bytes),
+                                            void *ledger, size_t taken) {
     kept_bytes *made = calloc(1, sizeof *made);
     if (made == NULL) return NULL;
     atomic_init(&made->references, 1);
     made->content = *content;
+    made->give_back = give_back;
     made->ledger = ledger;
     made->taken = taken;
     *content = (buffer){0};
@@ -36,7 +39,7 @@ static inline kept_bytes *kept_bytes_hold(kept_bytes *b) {
 
 static inline void kept_bytes_release(kept_bytes *b) {
     if (b == NULL || atomic_fetch_sub(&b->references, 1) != 1) return;
-    memory_ledger_give_back(b->ledger, b->taken);
+    b->give_back(b->ledger, b->taken);
     buffer_free(&b->content);
     free(b);
 }

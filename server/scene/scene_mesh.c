@@ -98,11 +98,15 @@ kept_bytes *scene_mesh_find(scene_mesh *mesh, size_t form) {
     return found;
 }
 
+static void give_back(void *ledger, size_t bytes) {
+    memory_ledger_give_back(ledger, bytes);
+}
+
 kept_bytes *scene_mesh_keep(scene_mesh *mesh, size_t form, buffer *made) {
     memory_ledger *ledger = mesh->of->ledger;
     const size_t bytes = made->capacity;
     if (!memory_ledger_take(ledger, bytes)) return NULL;
-    kept_bytes *kept = kept_bytes_create(made, ledger, bytes), *dropped = NULL;
+    kept_bytes *kept = kept_bytes_create(made, give_back, ledger, bytes), *dropped = NULL;
     if (kept == NULL) {
         memory_ledger_give_back(ledger, bytes);
         return NULL;
