@@ -1,5 +1,5 @@
-/* POST /v1/scenes/NAME/adjoint: gradients of J = g . q by emission, reflectance, sky and emitters. gradient.h
- * has the formulas. */
+/* POST /v1/scenes/NAME/adjoint: gradients of J = g . q by emission, reflectance, sky, emitters and groups.
+ * gradient.h has the formulas. */
 #include "server/route/routes.h"
 #include "server/scene/gradient.h"
 #include "solver/base/clock.h"
@@ -12,6 +12,7 @@
 typedef struct adjoint_memory {
     float *w, *H, *H0, *v; /* w begins what is freed */
     float *narrow;         /* [C][m] of tiles, or [C][s] of emitters */
+    float *of_groups;      /* [C][g] */
     void *work;
     size_t work_bytes;
 } adjoint_memory;
@@ -20,14 +21,20 @@ static size_t narrow_width(const scene *s) {
     return s->n_emitters > 0 ? s->n_emitters : s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
 }
 
+/* The numbers of a gradient for one channel. */
+static size_t gradient_width(const scene *s, gradient_kind kind) {
+    return kind == GRADIENT_EMISSION || kind == GRADIENT_REFLECTANCE ? s->n
+           : kind == GRADIENT_GROUPS                                 ? s->groups.n_groups
+                                                                     : narrow_width(s);
+}
+
 /* Bytes of the answer, at most. */
 static size_t answer_most(const call *in, const adjoint_request *request) {
     const scene *s = in->scene;
     size_t bytes = 0;
     for (int kind = 0; kind < GRADIENT_COUNT; kind++) {
-        const bool wide = kind == GRADIENT_EMISSION || kind == GRADIENT_REFLECTANCE;
         const answer_shape shape = {
-            .n_channels = s->n_channels, .n_rhs = 1, .n_values = wide ? s->n : narrow_width(s)};
+            .n_channels = s->n_channels, .n_rhs = 1, .n_values = gradient_width(s, (gradient_kind)kind)};
         if (adjoint_wants(request, (gradient_kind)kind))
             bytes = bytes_plus(bytes, answer_bytes_most(&shape, &in->accept));
     }
@@ -39,11 +46,15 @@ static bool get_memory(call *in, const adjoint_request *request, adjoint_memory 
     const scene *s = in->scene;
     const bool by_reflectance = adjoint_wants(request, GRADIENT_REFLECTANCE);
     const size_t vector = s->n_channels * s->n,
-                 rows[] = {vector, by_reflectance ? vector : 0, by_reflectance && s->sky != NULL ? vector : 0,
-                           vector, s->n_channels * narrow_width(s)};
+                 rows[] = {vector,
+                           by_reflectance ? vector : 0,
+                           by_reflectance && s->sky != NULL ? vector : 0,
+                           vector,
+                           s->n_channels * narrow_width(s),
+                           adjoint_wants(request, GRADIENT_GROUPS) ? s->n_channels * s->groups.n_groups : 0};
     const size_t most = answer_most(in, request);
     size_t total = 0;
-    for (size_t k = 0; k < 5; k++) total += rows[k];
+    for (size_t k = 0; k < 6; k++) total += rows[k];
     memory->work_bytes = lam_operator_work_bytes(s->op, 1);
     memory->work = memory->work_bytes > 0 ? batch_workspace_get(in->workspace, memory->work_bytes) : NULL;
     float *at = call_allocate(in, bytes_times(total, sizeof *at), "a gradient", why);
@@ -51,8 +62,9 @@ static bool get_memory(call *in, const adjoint_request *request, adjoint_memory 
     if (at == NULL || !request_memory_take(in->memory, most, why)) return false;
     if (memory->work == NULL || !buffer_reserve(b, most))
         return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for a gradient");
-    float **const places[] = {&memory->w, &memory->H, &memory->H0, &memory->v, &memory->narrow};
-    for (size_t k = 0; k < 5; at += rows[k++]) *places[k] = at;
+    float **const places[] = {&memory->w, &memory->H,      &memory->H0,
+                              &memory->v, &memory->narrow, &memory->of_groups};
+    for (size_t k = 0; k < 6; at += rows[k++]) *places[k] = at;
     return true;
 }
 
@@ -70,7 +82,8 @@ static bool solve_irradiance(const scene *s, const radiosity_request *light, adj
            problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
 }
 
-/* Computes the gradients asked for: by emission in w, by reflectance in H, by tile or emitter in narrow. */
+/* Computes the gradients asked for: by emission in w, by reflectance in H, by tile or emitter in narrow,
+ * by group in of_groups. */
 static bool solve(const scene *s, const adjoint_request *request, adjoint_memory *memory, metrics *m,
                   problem *why) {
     const float *g = request->cotangent.E, *H0;
@@ -84,6 +97,8 @@ static bool solve(const scene *s, const adjoint_request *request, adjoint_memory
     if (lam_operator_apply_adjoint(s->op, 1, request->quantity, g, memory->w, memory->work,
                                    memory->work_bytes, &error) != LAM_OK)
         return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+    if (adjoint_wants(request, GRADIENT_GROUPS))
+        gradient_of_groups(s->n_channels, s->n, &s->groups, memory->w, memory->of_groups);
     if (adjoint_wants(request, GRADIENT_SKY)) {
         gradient_of_sky_irradiance(request->quantity, vector, s->reflectance, g, memory->w, memory->v);
         lam_sky_adjoint(s->sky, s->n_channels, memory->v, memory->narrow);
@@ -98,8 +113,17 @@ static bool solve(const scene *s, const adjoint_request *request, adjoint_memory
 
 static const float *gradient_values(const scene *s, const adjoint_memory *memory, gradient_kind kind,
                                     size_t *width) {
-    *width = kind == GRADIENT_EMISSION || kind == GRADIENT_REFLECTANCE ? s->n : narrow_width(s);
-    return kind == GRADIENT_EMISSION ? memory->w : kind == GRADIENT_REFLECTANCE ? memory->H : memory->narrow;
+    *width = gradient_width(s, kind);
+    switch (kind) {
+    case GRADIENT_EMISSION:
+        return memory->w;
+    case GRADIENT_REFLECTANCE:
+        return memory->H;
+    case GRADIENT_GROUPS:
+        return memory->of_groups;
+    default:
+        return memory->narrow;
+    }
 }
 
 /* An array holds one gradient, the one that was named. */

@@ -18,3 +18,13 @@ void gradient_of_sky_irradiance(lam_quantity quantity, size_t count, const float
         out[i] = (float)sum;
     }
 }
+
+void gradient_of_groups(size_t n_channels, size_t n, const group_index *groups, const float *w, float *out) {
+    for (size_t c = 0; c < n_channels; c++)
+        for (size_t g = 0; g < groups->n_groups; g++) {
+            double sum = 0;
+            for (uint32_t k = groups->start[g]; k < groups->start[g + 1]; k++)
+                sum += (double)w[c * n + groups->elements[k]];
+            out[c * groups->n_groups + g] = (float)sum;
+        }
+}

@@ -18,6 +18,7 @@
 #define LAMBERT_SERVER_SCENE_GRADIENT_H
 
 #include "lambert/lambert.h"
+#include "solver/codec/groups.h"
 
 /* dJ/drho [C][n]: H is the irradiance, H0 that of the sky alone (NULL: 0). out may be any of the inputs. */
 void gradient_of_reflectance(lam_quantity quantity, size_t count, const float *g, const float *w,
@@ -26,5 +27,9 @@ void gradient_of_reflectance(lam_quantity quantity, size_t count, const float *g
 /* dJ/dH0, which the sky's adjoint turns into dJ/dL. out may be any of the inputs. */
 void gradient_of_sky_irradiance(lam_quantity quantity, size_t count, const float *reflectance, const float *g,
                                 const float *w, float *out);
+
+/* dJ/dv [C][g] by the emission v that all elements of a group have: sum of w [C][n] over the group. O(C n).
+ */
+void gradient_of_groups(size_t n_channels, size_t n, const group_index *groups, const float *w, float *out);
 
 #endif

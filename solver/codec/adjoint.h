@@ -9,6 +9,7 @@ typedef enum gradient_kind {
     GRADIENT_REFLECTANCE,
     GRADIENT_SKY,
     GRADIENT_EMITTERS,
+    GRADIENT_GROUPS, /* by one emission that all elements of a group have */
     GRADIENT_COUNT
 } gradient_kind;
 

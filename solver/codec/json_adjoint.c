@@ -11,7 +11,7 @@ void adjoint_request_free(adjoint_request *request) {
 }
 
 const char *gradient_name(gradient_kind kind) {
-    static const char *const names[GRADIENT_COUNT] = {"emission", "reflectance", "sky", "emitters"};
+    static const char *const names[GRADIENT_COUNT] = {"emission", "reflectance", "sky", "emitters", "groups"};
     return names[kind];
 }
 
@@ -25,6 +25,10 @@ static bool check_gradient(parser *p, gradient_kind kind) {
         return scene->n_emitters == 0 ||
                parser_refuse(p, PROBLEM_NOT_IN_STORE,
                              "%s: a store of few emitters has no gradient by reflectance", parser_here(p));
+    case GRADIENT_GROUPS:
+        return scene->n_emitters == 0 ||
+               parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: a store of few emitters has no gradient by groups",
+                             parser_here(p));
     case GRADIENT_SKY:
         if (scene->n_emitters > 0)
             return parser_refuse(p, PROBLEM_NOT_IN_STORE,
@@ -55,14 +59,15 @@ static bool read_gradient_name(parser *p, adjoint_request *request) {
         return check_gradient(p, (gradient_kind)kind);
     }
     return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
-                         "%s = \"%.*s\", must be emission, reflectance, sky or emitters", parser_here(p),
-                         text.length > 80 ? 80 : (int)text.length, text.bytes);
+                         "%s = \"%.*s\", must be emission, reflectance, sky, emitters or groups",
+                         parser_here(p), text.length > 80 ? 80 : (int)text.length, text.bytes);
 }
 
 /* ["emission", ...] */
 static bool read_gradient(parser *p, adjoint_request *request) {
     const size_t mark = p->pointer_length;
-    if (!parser_expect(p, JSON_ARRAY, "an array of emission, reflectance, sky or emitters")) return false;
+    if (!parser_expect(p, JSON_ARRAY, "an array of emission, reflectance, sky, emitters or groups"))
+        return false;
     if (!json_enter_array(&p->r)) return parser_fault(p);
     for (size_t index = 0; json_next_element(&p->r); index++) {
         parser_point_index(p, index);

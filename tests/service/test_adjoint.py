@@ -77,7 +77,10 @@ class SmallScene(Scene):
 class Yard(Truth):
     @property
     def lamp_members(self):
-        return np.flatnonzero(self.group == self.groups.index("lamp"))
+        return self.members("lamp")
+
+    def members(self, name):
+        return np.flatnonzero(self.group == self.groups.index(name))
 
     def value(self, rho, E, L, quantity):
         kept, self.rho = self.rho, rho
@@ -147,6 +150,33 @@ class Gradients(Both):
                 q = np.array(answer.json()[quantity], float).reshape(e.shape)
                 w = self.gradient(name, {"cotangent": g.tolist(), "quantity": quantity})["emission"].reshape(e.shape)
                 self.close((w * e).sum(), (g * q).sum(), np.abs(g * q).sum() + np.abs(w * e).sum(), (name, quantity))
+
+    def test_groups(self):
+        """One number a group: the sum of the gradient by the emission of its elements, and what an emission of the group
+        alone gives."""
+        for name, scene in self.scenes.items():
+            about = self.daemon.get(f"/v1/scenes/{name}").json()
+            names = [group["name"] for group in about["groups"]]
+            rng = np.random.default_rng(8)
+            for quantity in QUANTITIES:
+                g = rng.standard_normal((scene.C, scene.n)).round(5)
+                found = self.gradient(name, {"cotangent": g.tolist(), "quantity": quantity, "gradient": ["groups", "emission"]})
+                self.assertEqual(found["groups"].shape, (len(names),) if scene.C == 1 else (scene.C, len(names)))
+                w, by_group = found["emission"].reshape(scene.C, scene.n), found["groups"].reshape(scene.C, len(names))
+                answer = self.daemon.radiosity(name, {"emissions": [{"groups": {one: 1}} for one in names], "quantity": quantity})
+                q = np.array(answer.json()[quantity], float).reshape(len(names), scene.C, scene.n)
+                for k, one in enumerate(names):
+                    self.close(by_group[:, k], w[:, scene.members(one)].sum(axis=1), np.abs(w).sum(), (name, quantity, one))
+                    self.close(by_group[:, k], (q[k] * g).sum(axis=1), np.abs(q[k] * g).sum() + np.abs(w).sum(), (name, quantity, one))
+            # The light of one point, by the lamps that make it.
+            point = {"elements": [3], "values": [1]}
+            emission = {one: k + 1 for k, one in enumerate(names)}
+            answer = self.daemon.radiosity(name, {"emission": {"groups": emission}, "select": {"elements": [3]}}).json()
+            B = np.array(answer["radiosity"], float).sum()
+            parts = self.gradient(name, {"cotangent": point, "gradient": ["groups"]})["groups"].reshape(scene.C, len(names))
+            self.close((parts * list(emission.values())).sum(), B, B, name)
+            array = np.load(io.BytesIO(self.ask(name, {"cotangent": point, "gradient": ["groups"]}, accept=NPY).body))
+            np.testing.assert_array_equal(array.reshape(parts.shape), parts.astype("f4"))
 
     def test_sky(self):
         """One number a tile: the derivative by its radiance, of what is linear in it."""
@@ -353,7 +383,7 @@ class Emitters(Both):
 
     def test_refusals(self):
         g = [1] * self.truth["lights"].n
-        for gradient in "reflectance", "sky":
+        for gradient in "reflectance", "sky", "groups":
             answer = self.daemon.post("/v1/scenes/lights/adjoint", {"cotangent": g, "gradient": [gradient],
                                                                     "emission": {"groups": {"lamp": 1}}})
             self.assertEqual(answer.status, 422, answer)

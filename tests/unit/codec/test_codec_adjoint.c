@@ -178,17 +178,19 @@ static const char *const good_requests[] = {
     ("{\"cotangent\":{\"groups\":{\"box\":-2}},\"gradient\":[\"emission\",\"reflectance\"],"
      "\"emission\":{\"elements\":[1],\"values\":[2]}}"),
     "{\"cotangent\":[[1,2,3,4,5]],\"gradient\":[\"sky\"],\"quantity\":\"irradiance\"}",
+    "{\"cotangent\":[0,0,1,0,0],\"gradient\":[\"groups\"]}",
 };
 #define N_GOOD (sizeof good_requests / sizeof good_requests[0])
 
 START_TEST(good_requests_are_read) {
     static const float g[N_GOOD][N] = {
-        {1, -2.5f, 3, 0, 5}, {0, 0, 0, -1, 0}, {0, -2, 0, -2, -2}, {1, 2, 3, 4, 5}};
+        {1, -2.5f, 3, 0, 5}, {0, 0, 0, -1, 0}, {0, -2, 0, -2, -2}, {1, 2, 3, 4, 5}, {0, 0, 1, 0, 0}};
     static const unsigned wanted[N_GOOD] = {
         1u << GRADIENT_EMISSION | 1u << GRADIENT_SKY, 1u << GRADIENT_REFLECTANCE,
-        1u << GRADIENT_EMISSION | 1u << GRADIENT_SKY | 1u << GRADIENT_REFLECTANCE, 1u << GRADIENT_SKY};
+        1u << GRADIENT_EMISSION | 1u << GRADIENT_SKY | 1u << GRADIENT_REFLECTANCE, 1u << GRADIENT_SKY,
+        1u << GRADIENT_GROUPS};
     static const lam_quantity quantities[N_GOOD] = {LAM_RADIOSITY, LAM_INDIRECT, LAM_RADIOSITY,
-                                                    LAM_IRRADIANCE};
+                                                    LAM_IRRADIANCE, LAM_RADIOSITY};
     fixture f = make_scene(1);
     for (size_t i = 0; i < N_GOOD; i++) {
         adjoint_request request = {0};
