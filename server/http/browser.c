@@ -6,7 +6,8 @@
 
 /* Fields of requests that a page may set, and those of answers that it may read, beside the usual ones. */
 #define ASKED "Accept, Authorization, Content-Type, If-None-Match, Lambert-Timeout, X-Request-Id"
-#define SHOWN "ETag, Lambert-Certificate, Lambert-Iterations, Location, Retry-After, X-Request-Id"
+#define SHOWN                                                                                                \
+    "ETag, Lambert-Certificate, Lambert-Iterations, Location, Retry-After, Server-Timing, X-Request-Id"
 
 /* Seconds that a browser may keep the answer to a preflight. */
 #define PREFLIGHT_AGE "600"
@@ -64,7 +65,9 @@ bool browser_add_headers(const request *r, struct MHD_Response *response) {
     if (r->service->origins.origins->count > 0) good = good && add(response, MHD_HTTP_HEADER_VARY, "Origin");
     if (r->origin == NULL) return good;
     good = good && add(response, MHD_HTTP_HEADER_ACCESS_CONTROL_ALLOW_ORIGIN, r->origin);
-    if (!r->preflight) return good && add(response, "Access-Control-Expose-Headers", SHOWN);
+    if (!r->preflight)
+        return good && add(response, "Access-Control-Expose-Headers", SHOWN) &&
+               add(response, "Timing-Allow-Origin", r->origin);
     return good && add(response, "Access-Control-Allow-Methods", r->answer.allow) &&
            add(response, "Access-Control-Allow-Headers", ASKED) &&
            add(response, "Access-Control-Max-Age", PREFLIGHT_AGE);

@@ -89,6 +89,14 @@ static bool add_refined(struct MHD_Response *response, const answer *a) {
            add(response, "Lambert-Iterations", iterations);
 }
 
+/* The times of parsing, solving and encoding, which pages read as performance entries. */
+static bool add_times(struct MHD_Response *response, const answer *a) {
+    char times[120];
+    snprintf(times, sizeof times, "parse;dur=%.3f, solve;dur=%.3f, encode;dur=%.3f", a->parse_ms, a->solve_ms,
+             a->encode_ms);
+    return add(response, "Server-Timing", times);
+}
+
 static bool add_headers(const request *r, size_t length, struct MHD_Response *response) {
     const answer *a = &r->answer;
     bool good = add(response, "X-Request-Id", r->id) && browser_add_headers(r, response);
@@ -96,6 +104,7 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
     if (a->allow[0] != '\0') good = good && add(response, MHD_HTTP_HEADER_ALLOW, a->allow);
     if (a->location != NULL) good = good && add(response, MHD_HTTP_HEADER_LOCATION, a->location);
     if (a->policy != NULL) good = good && add(response, "Content-Security-Policy", a->policy);
+    if (a->timed) good = good && add_times(response, a);
     if (a->refined) good = good && add_refined(response, a);
     if (a->retry_after > 0) {
         char seconds[16];

@@ -84,6 +84,13 @@ void *call_allocate(const call *in, size_t bytes, const char *what, problem *why
     return made;
 }
 
+void answer_set_times(answer *out, const answer_notes *notes) {
+    out->timed = true;
+    out->parse_ms = notes->parse_ms;
+    out->solve_ms = notes->solve_ms;
+    out->encode_ms = notes->encode_ms;
+}
+
 answer_notes call_notes(const call *in) {
     const scene *s = in->scene;
     return (answer_notes){.scene = s->name, .has_time = true};

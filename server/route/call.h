@@ -63,6 +63,8 @@ typedef struct answer {
     bool refined;             /* certificate and iterations are set: the largest of its vectors */
     double certificate;
     size_t iterations;
+    bool timed; /* the times below are set, in ms */
+    double parse_ms, solve_ms, encode_ms;
     char *location; /* of a 202, owned; or NULL */
     bool cacheable; /* gets an ETag */
 } answer;
@@ -82,6 +84,9 @@ void answer_refuse(answer *out, problem_kind kind, const char *format, ...)
 
 /* Makes the answer the JSON in b (taken over), or 503 if it could not be written. */
 void answer_json(answer *out, buffer *b, bool written);
+
+/* States the times of the notes with the answer, whatever its type. */
+void answer_set_times(answer *out, const answer_notes *notes);
 
 /* The scene as a body is read against, and the notes of an answer beside its numbers and its
  * error (scene_note_error), for a route with {name}. */

@@ -127,15 +127,18 @@ static const float *gradient_values(const scene *s, const adjoint_memory *memory
 }
 
 /* An array holds one gradient, the one that was named. */
-static bool write_npy(const call *in, const adjoint_request *request, const adjoint_memory *memory, buffer *b,
-                      problem *why) {
+static bool write_npy(const call *in, const adjoint_request *request, const adjoint_memory *memory,
+                      answer_notes *notes, buffer *b, problem *why) {
     const size_t C = in->scene->n_channels;
     size_t width;
     const float *values = gradient_values(in->scene, memory, request->named[0], &width);
     const size_t dims[2] = {C, width};
-    if (!npy_write_header(b, in->accept.npy, C > 1 ? 2 : 1, C > 1 ? dims : &dims[1]))
-        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
-    return answer_rows(b, &in->accept, C, width, values, why);
+    const double start = clock_ms();
+    const bool good = npy_write_header(b, in->accept.npy, C > 1 ? 2 : 1, C > 1 ? dims : &dims[1])
+                          ? answer_rows(b, &in->accept, C, width, values, why)
+                          : problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
+    notes->encode_ms = clock_ms() - start;
+    return good;
 }
 
 static bool write_json(const call *in, const adjoint_request *request, const adjoint_memory *memory,
@@ -186,9 +189,10 @@ void post_adjoint(call *in, answer *out) {
     in->n_rhs = 1;
     good = good && solve(in->scene, &request, &memory, in->service->metrics, &why);
     notes.solve_ms = clock_ms() - parsed;
-    if (good && (in->accept.type == MEDIA_NPY ? write_npy(in, &request, &memory, &b, &why)
+    if (good && (in->accept.type == MEDIA_NPY ? write_npy(in, &request, &memory, &notes, &b, &why)
                                               : write_json(in, &request, &memory, &notes, &b, &why))) {
         answer_json(out, &b, true);
+        answer_set_times(out, &notes);
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
     } else {
         answer_problem(out, &why);

@@ -150,10 +150,12 @@ static bool begin(call *in, answer *out) {
            : refine ? refined_begin(in, request, &s->notes, &s->refined, &why)
                     : good && find_light(in, s, &why) && find_room(in, s, &why);
     if (!good || linear) {
-        if (good)
+        if (good) {
             answer_json(out, &s->answer, true);
-        else
+            answer_set_times(out, &s->notes);
+        } else {
             answer_problem(out, &why);
+        }
         solve_free(s);
         return false;
     }
@@ -292,6 +294,7 @@ static void end(call *in, answer *out) {
     radiosity_solve *s = in->state;
     if (write_answer(in, s)) {
         answer_json(out, &s->answer, true);
+        answer_set_times(out, &s->notes);
         out->stream = s->stream;
         s->stream = NULL;
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";

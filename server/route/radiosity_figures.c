@@ -195,7 +195,10 @@ bool quick_radiosity(call *in, answer *out) {
         in->n_rhs = request.n_rhs;
         good = evaluate(in, &request, rows, &notes, &b, &why);
         adjoint_rows_release(s, request.reduce.n_names, rows);
-        if (good) answer_json(out, &b, true);
+        if (good) {
+            answer_json(out, &b, true);
+            answer_set_times(out, &notes);
+        }
     }
     if (in->memory->held > held) request_memory_give_back(in->memory, in->memory->held - held);
     buffer_free(&b);

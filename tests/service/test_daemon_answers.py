@@ -169,6 +169,22 @@ class Answers(unittest.TestCase):
             self.assertGreaterEqual(value, 0)
         self.assertNotIn("error", self.solve("exact", {"emission": [1] * 40}).json())
 
+    def test_times_stand_in_a_header_of_every_type(self):
+        ask = {"emission": [1] * 60}
+        for body in ask, {**ask, "reduce": {"groups": ["lamp"], "with": ["mean"]}}, {**ask, "reduce": {"groups": ["lamp"], "with": ["max"]}}:
+            answer = self.solve("grey", body)
+            said = ", ".join(f"{part};dur={answer.json()['time_ms'][part]:.3f}" for part in ("parse", "solve", "encode"))
+            self.assertEqual(answer.headers["Server-Timing"], said)
+        for route, body in ("radiosity", ask), ("adjoint", {"cotangent": [1] * 60, "gradient": ["emission"]}):
+            for accept in "application/json", "application/x-npy", "application/x-npy; dtype=f2":
+                answer = self.daemon.ask("POST", f"/v1/scenes/grey/{route}", json.dumps(body),
+                                         {"Content-Type": "application/json", "Accept": accept})
+                self.assertEqual(answer.status, 200)
+                self.assertRegex(answer.headers["Server-Timing"],
+                                 r"^parse;dur=\d+\.\d{3}, solve;dur=\d+\.\d{3}, encode;dur=\d+\.\d{3}$")
+        self.assertIsNone(self.daemon.radiosity("grey", {"emission": [1]}).headers["Server-Timing"])
+        self.assertIsNone(self.daemon.get("/v1/scenes").headers["Server-Timing"])
+
     RECEIVERS = {"relative_mean": 0.03125, "indirect_mean": 0.0625, "light": "lights", "of": "receivers"}
     ALL = {"relative_mean": 0.125, "indirect_mean": 0.25, "light": "lights", "of": "all"}
 

@@ -111,6 +111,8 @@ class Origin(Case):
             self.assertEqual(answer.status, status)
             self.assertEqual(answer.headers["Access-Control-Allow-Origin"], "http://localhost:3000")
             self.assertIn("X-Request-Id", answer.headers["Access-Control-Expose-Headers"])
+            self.assertIn("Server-Timing", answer.headers["Access-Control-Expose-Headers"])
+            self.assertEqual(answer.headers["Timing-Allow-Origin"], "http://localhost:3000")
             self.assertIn("Origin", answer.headers.get_all("Vary"))
         answer = daemon.get("/v1/scenes", headers={**bearer, "Origin": "https://app.example", "Sec-Fetch-Site": "cross-site"})
         self.assertEqual((answer.status, answer.headers["Access-Control-Allow-Origin"]), (200, "https://app.example"))
