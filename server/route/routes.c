@@ -15,6 +15,8 @@ static const route routes[] = {
      .also_built = true,
      .right = TOKEN_VARY},
     {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", .steps = &get_mesh, .shortcut = quick_mesh},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/sky", .handle = get_sky},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/weather", .handle = get_weather},
     {.method = "POST",
      .pattern = "/v1/scenes/{name}/radiosity",
      .steps = &post_radiosity,

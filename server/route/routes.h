@@ -56,7 +56,7 @@ void route_find(const char *method, const char *path, route_match *match, answer
 
 route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_adjoint, put_reflectance,
     delete_reflectance, delete_scene, get_openapi, get_viewer_page, get_viewer_script, get_viewer_style,
-    get_viewer_icon, get_viewer_licences;
+    get_viewer_icon, get_viewer_licences, get_sky, get_weather;
 route_shortcut quick_radiosity, quick_mesh;
 extern const solve_steps post_radiosity, get_mesh;
 

@@ -192,6 +192,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     if (made->memory > options->memory)
         FAIL(error, LAM_ERR_MEMORY, "%s: takes %llu bytes, %llu are left of --max-memory; raise it",
              options->path, (unsigned long long)made->memory, (unsigned long long)options->memory);
+    TRY(weather_file_read(options->path, options->memory - made->memory, &made->weather, error));
+    made->memory += made->weather.length;
     TRY(store_verify_group(s, options->verify ? "/" : "/mesh", error));
     TRY(store_map_file(s, error));
     TRY(operator_load(s, &made->op, error));
@@ -200,6 +202,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     made->reflectance = made->op->reflectance;
     lam_operator_set_threads(made->op, threads_of(made->op, options->threads));
     TRY(sky_load(s, made->n, &made->sky, error));
+    if (made->sky != NULL) TRY(tile_places_read(s, lam_sky_tiles(made->sky), &made->tiles, error));
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
     made->work_bytes = pass_work_bytes(made);
@@ -219,9 +222,11 @@ done:
     return status;
 }
 
-/* True if the file is the one that the present scene was read from, and that scene is not damaged. */
+/* True if the file, and the weather beside it, are those that the present scene was read from, and that scene
+ * is not damaged. */
 static bool is_unchanged(const scene_options *options, const store *s) {
     return options->before != NULL && store_identity_same(&options->before->identity, store_identity_of(s)) &&
+           weather_file_same(&options->before->weather, options->path) &&
            !scene_damaged(options->before, NULL, NULL);
 }
 
@@ -314,6 +319,8 @@ void scene_release(scene *s) {
     scene_mesh_destroy(s->mesh);
     if (s->base == NULL) {
         lam_sky_close(s->sky);
+        tile_places_free(&s->tiles);
+        weather_file_free(&s->weather);
         group_index_free(&s->groups);
         group_index_free(&s->emitters);
         free(s->area);

@@ -199,7 +199,7 @@ class OpenApi(unittest.TestCase):
                "get_scenes": ["get_scenes.c"], "get_scene": ["get_scenes.c"], "get_mesh": ["get_mesh.c"], "get_openapi": ["get_openapi.c"],
                "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c"], "post_adjoint": ["post_adjoint.c"],
                "put_reflectance": ["reflectance_variants.c"], "delete_reflectance": ["reflectance_variants.c"],
-               "delete_scene": ["reflectance_variants.c"],
+               "delete_scene": ["reflectance_variants.c"], "get_sky": ["get_sky.c"], "get_weather": ["get_sky.c"],
                **{f"get_viewer_{part}": ["get_viewer.c"] for part in ("page", "script", "style", "icon", "licences")}}
         table = re.findall(r"\{\.method = .*?\}(?=,\s)", ROUTES.read_text(), re.S)
         self.assertGreater(len(table), 10)
