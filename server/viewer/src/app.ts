@@ -280,7 +280,9 @@ function lightingOf(mesh: SceneMesh, description: Description): Lighting {
     const isDark = Object.keys(groups).length === 0 && description.sky === null && (description.emitters ?? []).length === 0;
     if (isDark) groups[ceilingOf(mesh)] = lightOf([1, 1, 1]);
     const emitters: { [index: string]: number } = {};
-    description.emitters?.forEach((_, index) => { emitters[index] = 1; });
+    // A lamp begins at its first position; tiles of a sky shine as the panel of skies says.
+    const shine = description.sky !== null ? 0 : description.report?.paths !== undefined ? 1 : Infinity;
+    description.emitters?.forEach((_, index) => { if (index < shine) emitters[index] = 1; });
     const sky = description.sky === null ? firstState.lighting.sky : { ...firstState.lighting.sky, model: "overcast" as const };
     return { ...firstState.lighting, groups, emitters, sky };
 }

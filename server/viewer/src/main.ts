@@ -3,13 +3,15 @@ import { App } from "./app.ts";
 import { make } from "./base/dom.ts";
 import { makeBanner, makeBar, makeDrawer, makeStatus, makeTokenDialog, setBackground } from "./panels/frame.ts";
 import { lightsPanel } from "./panels/lights.ts";
+import { emittersPanel } from "./panels/emitters.ts";
 import { lookPanel } from "./panels/look.ts";
 import type { PanelMaker } from "./panels/panel.ts";
+import { skyPanel } from "./panels/sky.ts";
 import { fromFragment, toFragment } from "./state/link.ts";
 import "./style.css";
 
 /** The panels, in the order of their tabs. */
-const panelMakers: readonly PanelMaker[] = [lightsPanel, lookPanel];
+const panelMakers: readonly PanelMaker[] = [lightsPanel, skyPanel, emittersPanel, lookPanel];
 
 /** The fragment is written this long after the last change. */
 const LINK_MS = 300;

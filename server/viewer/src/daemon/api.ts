@@ -1,4 +1,5 @@
 // Asks the daemon. Knows its routes and their JSON, and nothing of pictures.
+import type { SkyAnswer } from "../daylight/tiles.ts";
 import { readNpy, type Npy } from "../base/npy.ts";
 
 export interface SceneLine {
@@ -23,6 +24,8 @@ export interface Description {
     emitters: string[] | null;
     sky: { tiling: string; tiles: number; ground_albedo: number } | null;
     error: { single?: ErrorFigures; lights?: ErrorFigures; random?: ErrorFigures; sky?: ErrorFigures } | null;
+    /** What the method reported; paths and reuse are of a lamp in many positions. */
+    report?: { [name: string]: unknown };
     provenance?: { [name: string]: unknown };
 }
 
@@ -104,6 +107,15 @@ export class Api {
 
     async describe(scene: string): Promise<Description> {
         return (await (await this.ask(Api.path(scene))).json()) as Description;
+    }
+
+    async sky(scene: string): Promise<SkyAnswer> {
+        return (await (await this.ask(Api.path(scene, "/sky"))).json()) as SkyAnswer;
+    }
+
+    /** The weather file beside the store. */
+    async weather(scene: string): Promise<string> {
+        return (await this.ask(Api.path(scene, "/weather"), {}, "text/plain")).text();
     }
 
     async mesh(scene: string): Promise<ArrayBuffer> {

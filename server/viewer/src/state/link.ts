@@ -1,5 +1,5 @@
 // The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
-import { firstLighting, firstState, firstView, skyOff, type KeptView, type Lighting, type State, type View } from "./state.ts";
+import { firstLighting, firstState, firstView, skyOff, type KeptView, type Lighting, type SkyLight, type State, type View } from "./state.ts";
 
 type Plain = { [name: string]: unknown };
 
@@ -31,6 +31,22 @@ function restore<T extends object>(first: T, given: unknown, loose: readonly str
 const number = (value: unknown, otherwise: number): number =>
     typeof value === "number" && Number.isFinite(value) ? value : otherwise;
 
+/** A number of a link within its range. */
+const held = (value: number, otherwise: number, low: number, high: number): number =>
+    Math.min(high, Math.max(low, number(value, otherwise)));
+
+function restoreSky(given: unknown): SkyLight {
+    const out = restore(skyOff, given, []);
+    return {
+        model: (["overcast", "clear", "even", "perez"] as const).find((model) => model === out.model) ?? "off",
+        strength: held(out.strength, skyOff.strength, 0, 1e6), factor: held(out.factor, 1, 0, 1e3),
+        sun: (["tile", "off"] as const).find((sun) => sun === out.sun) ?? "spread", tinted: out.tinted,
+        latitude: held(out.latitude, skyOff.latitude, -90, 90), longitude: held(out.longitude, skyOff.longitude, -180, 180),
+        zone: held(out.zone, skyOff.zone, -14, 14), day: Math.round(held(out.day, skyOff.day, 1, 365)),
+        hour: held(out.hour, skyOff.hour, 0, 24),
+    };
+}
+
 function restoreLighting(given: unknown): Lighting {
     const out = restore(firstLighting, given, ["solo"]);
     const groups: Lighting["groups"] = {};
@@ -47,7 +63,7 @@ function restoreLighting(given: unknown): Lighting {
     const emitters: Lighting["emitters"] = {};
     for (const [index, weight] of Object.entries(out.emitters)) emitters[index] = Math.max(0, number(weight, 0));
     return {
-        groups, emitters, dim: Math.max(0, number(out.dim, 1)), sky: restore(skyOff, out.sky, []),
+        groups, emitters, dim: Math.max(0, number(out.dim, 1)), sky: restoreSky(out.sky),
         solo: typeof out.solo === "string" ? out.solo : null,
     };
 }

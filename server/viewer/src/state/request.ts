@@ -35,11 +35,12 @@ export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting,
     const scaled = <T extends number | number[]>(value: T): T =>
         (typeof value === "number" ? value / most : value.map((v) => v / most)) as T;
     const emission: { [member: string]: unknown } = {};
-    if (can.emitters > 0) {
+    // A store of the tiles of a sky takes them as weights or as a sky, whichever shines.
+    if (can.emitters > 0 && (weights.length > 0 || sky === null)) {
         const all = new Array<number>(can.emitters).fill(0);
         for (const [index, weight] of weights) all[Number(index)] = (weight * lighting.dim) / most;
         emission.emitters = all;
-    } else if (groups.length > 0) {
+    } else if (can.emitters === 0 && groups.length > 0) {
         emission.groups = Object.fromEntries(groups.map(([name, value]) => [name, scaled(value)]));
     }
     if (sky !== null) emission.sky = sky.map(scaled);

@@ -12,9 +12,16 @@ export interface GroupLight {
 }
 
 export interface SkyLight {
+    /** "perez" is that of a weather file. */
     model: "off" | "overcast" | "clear" | "even" | "perez";
     /** Horizontal irradiance of an even or overcast sky, in the store's unit. */
     strength: number;
+    /** Of the light of a clear sky, or of the weather file. */
+    factor: number;
+    /** The sun is in one tile, spread over those near it, or left out. */
+    sun: "tile" | "spread" | "off";
+    /** Where the store has channels, the sky is bluish and the sun warm. */
+    tinted: boolean;
     latitude: number;
     longitude: number;
     /** Hours from UTC of the clock that `hour` is read from. */
@@ -96,7 +103,7 @@ export interface State {
 }
 
 export const skyOff: SkyLight = {
-    model: "off", strength: 100, latitude: 48, longitude: 11, zone: 1, day: 172, hour: 12,
+    model: "off", strength: 100, factor: 1, sun: "spread", tinted: false, latitude: 48, longitude: 11, zone: 1, day: 172, hour: 12,
 };
 
 export const firstView: View = {

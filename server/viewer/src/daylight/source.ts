@@ -1,0 +1,74 @@
+// The tiles of the open store and the weather that skies are made of; answers with radiances for a lighting.
+import { ofTemperature } from "../base/colour.ts";
+import type { SkyLight } from "../state/state.ts";
+import { skyFor, type Sky } from "./skies.ts";
+import { tilesOf, type SkyAnswer, type Tiles } from "./tiles.ts";
+import { readWeather, type Weather } from "./weather.ts";
+
+/** Skies that are kept, for two lightings beside each other that take turns. */
+const KEPT = 4;
+
+/** Colour temperatures of a tinted sky, K: without a sun, beside a sun, and of the sun. */
+const OVERCAST_K = 6500, BLUE_K = 12000, SUN_K = 5200;
+
+export class SkySource {
+    tiles: Tiles | null = null;
+    weather: Weather | null = null;
+    /** True where the weather is that beside the store, so that a link restores it. */
+    isBeside = false;
+    private kept = new Map<string, { sky: Sky | null; values: readonly (number | number[])[] | null }>();
+
+    take(answer: SkyAnswer | null): void {
+        this.tiles = answer === null ? null : tilesOf(answer);
+        this.kept.clear();
+    }
+
+    /** Reads a weather file; null forgets the one there is. Throws what is wrong with it. */
+    read(text: string | null, isBeside: boolean): void {
+        const weather = text === null ? null : readWeather(text);
+        this.weather = weather;
+        this.isBeside = weather !== null && isBeside;
+        this.kept.clear();
+    }
+
+    sky(light: SkyLight, photometric: boolean): Sky | null {
+        return this.find(light, photometric, 1).sky;
+    }
+
+    /** One radiance a tile, or three; null without light. */
+    radiances(light: SkyLight, photometric: boolean, channels: number): readonly (number | number[])[] | null {
+        return this.find(light, photometric, channels).values;
+    }
+
+    private find(light: SkyLight, photometric: boolean, channels: number): { sky: Sky | null; values: readonly (number | number[])[] | null } {
+        const isColoured = light.tinted && channels === 3;
+        const key = JSON.stringify([light, photometric, isColoured]);
+        let found = this.kept.get(key);
+        if (found === undefined) {
+            const sky = this.tiles === null ? null : skyFor(this.tiles, light, photometric, this.weather);
+            found = { sky, values: sky === null ? null : isColoured ? coloured(sky) : Array.from(sky.diffuse, (value, t) => value + sky.direct[t]) };
+            this.kept.set(key, found);
+            if (this.kept.size > KEPT) this.kept.delete(this.kept.keys().next().value as string);
+        }
+        return found;
+    }
+}
+
+/** With the luminance of the sky as it is. */
+function coloured(sky: Sky): number[][] {
+    const blue = ofTemperature(sky.directHorizontal > 0 ? BLUE_K : OVERCAST_K), warm = ofTemperature(SUN_K);
+    return Array.from(sky.diffuse, (value, t) => [0, 1, 2].map((c) => value * blue[c] + sky.direct[t] * warm[c]));
+}
+
+const WINDS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
+
+/** Degrees from north by east, 0 to 360, and the wind's name. */
+export function windOf(azimuth: number): string {
+    const degrees = (((azimuth * 180) / Math.PI) % 360 + 360) % 360;
+    return `${degrees.toFixed(0)}° (${WINDS[Math.round(degrees / 45) % 8]})`;
+}
+
+export function clockOf(hour: number): string {
+    const minutes = Math.round(hour * 60);
+    return `${String(Math.floor(minutes / 60)).padStart(2, "0")}:${String(minutes % 60).padStart(2, "0")}`;
+}

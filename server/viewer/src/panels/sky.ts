@@ -1,0 +1,217 @@
+// The sky of a store that has one: its model, place and time, a day that goes by, and the weather file.
+import type { App } from "../app.ts";
+import { button, choice, fill, make, tick } from "../base/dom.ts";
+import { count, tell } from "../base/numbers.ts";
+import { clockOf, SkySource, windOf } from "../daylight/source.ts";
+import type { Sky } from "../daylight/skies.ts";
+import { dateOf, dayOf, sunAt } from "../daylight/sun.ts";
+import { skyOff, type SkyLight } from "../state/state.ts";
+import { makeDome } from "./dome.ts";
+import type { Panel } from "./panel.ts";
+import { player } from "./player.ts";
+import { slider } from "./slider.ts";
+
+/** A year has 1.6 MB. */
+const FILE_MOST = 16e6;
+
+const MONTHS = ["January", "February", "March", "April", "May", "June", "July", "August", "September", "October", "November", "December"];
+
+export function dateText(day: number): string {
+    const date = dateOf(day);
+    return `${date.day} ${MONTHS[date.month - 1]}`;
+}
+
+type Change = (to: Partial<SkyLight>, tag?: string | null) => void;
+
+/** The hour that is so many hours later, and by day where the sun rises at all. */
+export function goOn(light: SkyLight, hours: number): number {
+    const wrap = (hour: number): number => ((hour % 24) + 24) % 24;
+    const isNight = (hour: number): boolean =>
+        sunAt(light.latitude, light.longitude, light.zone, { year: 2001, ...dateOf(light.day) }, hour).altitude < -0.1;
+    const next = wrap(light.hour + hours);
+    for (let skipped = 0; skipped < 24; skipped += 0.25) {
+        const hour = wrap(next + Math.sign(hours) * skipped);
+        if (!isNight(hour)) return hour;
+    }
+    return next;
+}
+
+export function skyPanel(app: App): Panel {
+    const source = new SkySource();
+    const change: Change = (to, tag = null) => {
+        const { now } = app.store;
+        app.store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, ...to } } }, tag);
+    };
+    const isPhotometric = (): boolean => app.store.now.view.unit === "lx";
+    app.skyOf = (lighting, scene) => (scene.description.sky === null || lighting.solo !== null ? null
+        : source.radiances(lighting.sky, isPhotometric(), scene.description.channels));
+    const controls = makeControls(app, change);
+    const weather = makeWeather(app, source, change, () => update());
+    const dome = makeDome(), figures = make("table", { class: "figures" }), moment = make("p", { class: "moment", "aria-live": "off" });
+    const day = player({
+        what: "the day", speeds: [["0.5", "½ hour a second"], ["1", "1 hour a second"], ["2", "2 hours a second"], ["4", "4 hours a second"]],
+        speed: "1", step: 0.5, stepLabel: "Half an hour", advance: (hours) => change({ hour: Number(goOn(app.store.now.lighting.sky, hours).toFixed(3)) }, "hour of the sky"),
+    });
+    const note = make("p", { class: "hint", role: "status" });
+    const update = (): void => {
+        const light = app.store.now.lighting.sky, sky = source.sky(light, isPhotometric());
+        controls.update(light);
+        weather.update(light);
+        moment.textContent = `${dateText(light.day)}, ${clockOf(light.hour)}`;
+        dome.draw(source.tiles, sky);
+        drawFigures(figures, dome.element, light, sky, isPhotometric() ? "lx" : "W/m²");
+        note.textContent = noteOf(light, source, app);
+        note.hidden = note.textContent === "";
+    };
+    let opening = 0;
+    app.on("scene", () => {
+        const turn = ++opening;
+        day.stop();
+        source.take(null);
+        source.read(null, false);
+        update();
+        void load(app, source, () => turn === opening).then(() => {
+            if (turn !== opening) return;
+            update();
+            app.ask();
+        }).catch((reason: unknown) => app.fail(reason));
+    });
+    app.store.listen((now, before) => {
+        if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit) update();
+    });
+    return {
+        id: "sky", title: "Sky", isUseful: () => app.scene?.description.sky !== null && app.scene !== null,
+        element: make("div", {}, controls.model, note, controls.strength, weather.element, moment, controls.time, day.element, dome.element, figures,
+            controls.place),
+    };
+}
+
+/** The tiles and the weather beside the store; a scene that was opened without a link begins with that weather. */
+async function load(app: App, source: SkySource, isWanted: () => boolean): Promise<void> {
+    const { scene } = app;
+    if (scene === null || scene.description.sky === null) return;
+    const name = scene.description.name;
+    const answer = await app.api.sky(name);
+    if (!isWanted()) return;
+    source.take(answer);
+    if (answer.weather === null) return;
+    const text = await app.api.weather(name);
+    if (!isWanted()) return;
+    source.read(text, true);
+    const { now } = app.store, { weather } = source;
+    if (weather === null || JSON.stringify(now.lighting.sky) !== JSON.stringify(scene.ownLighting.sky)) return;
+    const sky: SkyLight = {
+        ...now.lighting.sky, model: "perez", latitude: weather.latitude, longitude: weather.longitude, zone: weather.zone,
+    };
+    scene.ownLighting = { ...scene.ownLighting, sky };
+    app.store.settle({ ...now, lighting: { ...now.lighting, sky } });
+}
+
+function noteOf(light: SkyLight, source: SkySource, app: App): string {
+    if (source.tiles === null) return "The tiles of this sky are not known yet.";
+    if (app.store.now.lighting.solo !== null) return `Only ${app.store.now.lighting.solo} shines now (Lights, Solo), not the sky.`;
+    if (light.model === "perez" && source.weather === null) return "Pick a weather file below; until then this sky is dark.";
+    if (light.model === "perez" && source.sky(light, false) === null) return "The weather file has nothing at this time.";
+    return "";
+}
+
+interface Controls {
+    model: HTMLElement;
+    strength: HTMLElement;
+    time: HTMLElement;
+    place: HTMLElement;
+    update(light: SkyLight): void;
+}
+
+function makeControls(app: App, change: Change): Controls {
+    const first = skyOff;
+    const model = choice("Sky", [["off", "None"], ["overcast", "Overcast (CIE)"], ["clear", "Clear (CIE)"], ["even", "Even"], ["perez", "Of a weather file (Perez)"]],
+        first.model, (to) => change({ model: to }));
+    const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]], first.sun, (to) => change({ sun: to }));
+    const tinted = tick("Blue sky, warm sun", first.tinted, (on) => change({ tinted: on }));
+    const unit = (): string => (app.store.now.view.unit === "lx" ? "lx" : "W/m²");
+    const strength = slider({ label: "On the ground", unit: unit(), least: 0, most: 1000, log: true, change: (value) => change({ strength: value }, "strength of the sky") }, first.strength);
+    const factor = slider({ label: "Times", unit: "×", least: 0, most: 3, step: 0.01, change: (value) => change({ factor: value }, "factor of the sky") }, first.factor);
+    const day = slider({ label: "Day", unit: "of 365", least: 1, most: 365, step: 1, change: (value) => change({ day: Math.min(365, Math.round(value)) }, "day of the sky") }, first.day);
+    const hour = slider({ label: "Hour", unit: "h", least: 0, most: 24, step: 0.05, change: (value) => change({ hour: Math.min(24, value) }, "hour of the sky") }, first.hour);
+    const latitude = slider({ label: "Latitude", unit: "° N", least: -90, most: 90, step: 0.1, change: (value) => change({ latitude: Math.min(90, value) }, "latitude") }, first.latitude);
+    const longitude = slider({ label: "Longitude", unit: "° E", least: -180, most: 180, step: 0.1, change: (value) => change({ longitude: Math.min(180, value) }, "longitude") }, first.longitude);
+    const zone = slider({ label: "Clock", unit: "h UTC", least: -12, most: 14, step: 0.25, change: (value) => change({ zone: Math.min(14, value) }, "zone") }, first.zone);
+    const jumps = make("div", { class: "row" }, ...([[3, 21], [6, 21], [9, 23], [12, 21]] as const).map(([month, d]) =>
+        button(`${d} ${MONTHS[month - 1].slice(0, 3)}`, `${d} ${MONTHS[month - 1]}`, () => change({ day: dayOf(month, d) }))));
+    const update = (light: SkyLight): void => {
+        (model.querySelector("select") as HTMLSelectElement).value = light.model;
+        (sun.querySelector("select") as HTMLSelectElement).value = light.sun;
+        (tinted.querySelector("input") as HTMLInputElement).checked = light.tinted;
+        const isPlain = light.model === "even" || light.model === "overcast";
+        strength.element.hidden = !isPlain;
+        factor.element.hidden = isPlain || light.model === "off";
+        sun.hidden = factor.element.hidden;
+        tinted.hidden = app.scene?.description.channels !== 3 || light.model === "off";
+        strength.setMost(Math.max(app.store.now.view.unit === "lx" ? 1e5 : 1000, light.strength));
+        (strength.element.querySelector(".unit") as HTMLElement).textContent = unit();
+        for (const [one, value] of [[strength, light.strength], [factor, light.factor], [day, light.day], [hour, light.hour], [latitude, light.latitude],
+            [longitude, light.longitude], [zone, light.zone]] as const) one.set(value);
+    };
+    return {
+        model, strength: make("div", {}, strength.element, factor.element, sun, tinted), time: make("div", {}, day.element, jumps, hour.element),
+        place: make("div", {}, make("h3", {}, "Place"), latitude.element, longitude.element, zone.element), update,
+    };
+}
+
+/** The weather file: picked or dropped, read by the page itself. */
+function makeWeather(app: App, source: SkySource, change: Change, done: () => void): { element: HTMLElement; update(light: SkyLight): void } {
+    const about = make("p", { class: "hint" });
+    const place = (): void => {
+        const { weather } = source;
+        if (weather === null) return;
+        change({ model: "perez", latitude: weather.latitude, longitude: weather.longitude, zone: weather.zone });
+    };
+    const take = async (file: File): Promise<void> => {
+        try {
+            if (file.size > FILE_MOST) throw new Error(`${file.name} has ${count(file.size)} bytes, a weather file at most ${count(FILE_MOST)}.`);
+            source.read(await file.text(), false);
+            place();
+            done();
+            app.ask();
+        } catch (reason) {
+            app.fail(reason);
+        }
+    };
+    const picker = make("input", {
+        type: "file", accept: ".epw,.wea,.EPW,.WEA", "aria-label": "Weather file (EPW or WEA)",
+        onchange: () => {
+            const file = picker.files?.[0];
+            if (file !== undefined) void take(file);
+            picker.value = "";
+        },
+    });
+    const element = make("div", { class: "drop" }, make("h3", {}, "Weather file"), about, picker, button("Its place", "Latitude, longitude and clock of the weather file", place));
+    // Anywhere on the page, as a file that is dropped beside would replace the page.
+    document.addEventListener("dragover", (event) => { if (event.dataTransfer?.types.includes("Files")) event.preventDefault(); });
+    document.addEventListener("drop", (event) => {
+        const file = event.dataTransfer?.files[0];
+        if (file === undefined) return;
+        event.preventDefault();
+        if (app.scene?.description.sky !== null && /\.(epw|wea)$/i.test(file.name)) void take(file);
+    });
+    const update = (light: SkyLight): void => {
+        const { weather } = source;
+        element.hidden = light.model === "off";
+        (element.querySelector("button") as HTMLButtonElement).hidden = weather === null;
+        about.textContent = weather === null ? "EPW or WEA. Pick it, or drop it on the page. It stays on this machine; nothing is sent."
+            : `${weather.place}: ${count(weather.hours.length)} hours${source.isBeside ? ", from beside the store." : ". A link to this state does not hold it."}`;
+    };
+    return { element, update };
+}
+
+function drawFigures(table: HTMLTableElement, dome: HTMLElement, light: SkyLight, sky: Sky | null, unit: string): void {
+    const sun = sky?.sun ?? sunAt(light.latitude, light.longitude, light.zone, { year: 2001, ...dateOf(light.day) }, light.hour);
+    const altitude = `${((sun.altitude * 180) / Math.PI).toFixed(1)}°`;
+    const rows: [string, string, string][] = [
+        ["Sun's altitude", sun.altitude > 0 ? altitude : `${altitude}, below the horizon`, "altitude"], ["Sun's azimuth", windOf(sun.azimuth), "azimuth"],
+        ["Sky on the ground", sky === null ? "–" : `${tell(sky.diffuseHorizontal)} ${unit}`, "diffuse"],
+        ["Sun on the ground", sky === null ? "–" : `${tell(sky.directHorizontal)} ${unit}`, "direct"]];
+    fill(table, make("tbody", {}, ...rows.map(([name, text, figure]) => make("tr", {}, make("th", { scope: "row" }, name), make("td", { "data-sky": figure }, text)))));
+    dome.setAttribute("aria-label", `Map of the sky, north above: sun at altitude ${altitude}, azimuth ${windOf(sun.azimuth)}.`);
+}
