@@ -81,8 +81,8 @@ export function skyPanel(app: App): Panel {
     });
     return {
         id: "sky", title: "Sky", isUseful: () => app.scene?.description.sky !== null && app.scene !== null,
-        element: make("div", {}, controls.model, note, controls.strength, weather.element, moment, controls.time, day.element, dome.element, figures,
-            controls.place),
+        element: make("div", {}, controls.model, note, controls.strength, moment, controls.time, day.element, dome.element, figures,
+            weather.element, controls.place),
     };
 }
 
