@@ -108,7 +108,7 @@ class Errors(unittest.TestCase):
         self.refuse('{"quantity":"heat","emission":[1]} x', 400, "not JSON")
 
     def test_no_such_route(self):
-        for path in ("/", "/nothing", "/v1", "/v1/", "/v1/scenes/", "/v1/scenes/grey/", "/v1/scenes/grey/mesh", "//",
+        for path in ("/nothing", "/viewer", "/v1", "/v1/", "/v1/scenes/", "/v1/scenes/grey/", "/v1/scenes/grey/mesh/", "//",
                      "/v1/scenes/grey/light", "/v1/scenes//radiosity", "/v1/scenes/grey/radiosity/x", "/../etc/passwd",
                      "/healthz/", "/%00", "/v1/%73cenes"):
             for method in "GET", "POST":

@@ -16,7 +16,7 @@ import numpy as np
 
 from daemon import LAMBERTD, PATIENCE, Daemon
 from daemon_case import Case, replaced_under_load
-from make_store import Scene
+from make_store import Scene, add_checksums
 
 
 class Life(Case):
@@ -111,8 +111,10 @@ class Life(Case):
     def test_verify_reads_what_a_solve_does_not_need(self):
         path = self.folder / "box.h5"
         Scene(60).write(path, sky=4)
-        with h5py.File(path, "r") as f:
-            at = f["sky/tiles"].id.get_offset()
+        with h5py.File(path, "a") as f:
+            f.create_dataset("/later", data=np.arange(100.0))
+            add_checksums(f)
+            at = f["later"].id.get_offset()
         raw = bytearray(path.read_bytes())
         raw[at] ^= 1
         path.write_bytes(raw)
@@ -121,7 +123,7 @@ class Life(Case):
             self.assertEqual(self.names(daemon), ["box", "other"])
         with Daemon(path, other, "--verify") as daemon:
             self.assertEqual(self.names(daemon), ["other"])
-            self.check_refusals(daemon.errors(), {path: "/sky/tiles"})
+            self.check_refusals(daemon.errors(), {path: "/later"})
 
     def test_nothing_to_serve(self):
         _, wanted = self.spoil()

@@ -177,7 +177,8 @@ class Headers(unittest.TestCase):
         kinds |= {"lambertd_problems": "counter", "lambertd_malformed_requests": "counter",
                   "lambertd_verified_timestamp_seconds": "gauge"}
         kinds |= {"lambertd_request_memory_bytes": "gauge", "lambertd_request_memory_limit_bytes": "gauge",
-                  "lambertd_request_memory_refused": "counter", "lambertd_kept_memory_bytes": "gauge"}
+                  "lambertd_request_memory_refused": "counter", "lambertd_request_memory_waiting": "gauge",
+                  "lambertd_request_memory_waited": "counter", "lambertd_kept_memory_bytes": "gauge"}
         self.assertEqual({name: f.type for name, f in families.items()}, kinds)
         for family in families.values():
             self.assertTrue(family.documentation)

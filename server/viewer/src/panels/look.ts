@@ -27,8 +27,9 @@ export function lookPanel(app: App): Panel {
     const least = make("input", { type: "number", step: "any", "aria-label": "Least value of the palette" });
     const most = make("input", { type: "number", step: "any", "aria-label": "Largest value of the palette" });
     const setRange = (): void => {
-        const [low, high] = [Number(least.value), Number(most.value)];
-        change({ range: least.value !== "" && most.value !== "" && high > low ? [low, high] : null });
+        // An end that is left open is that of the values.
+        const low = least.value === "" ? 0 : Number(least.value), high = most.value === "" ? app.spread.high : Number(most.value);
+        change({ range: (least.value !== "" || most.value !== "") && high > low ? [low, high] : null });
     };
     least.addEventListener("change", setRange);
     most.addEventListener("change", setRange);
