@@ -1,5 +1,6 @@
 // How the picture is drawn: tone, exposure, false colour, cameras. Nothing here costs a request but the quantity.
 import { button, choice, fill, make, tick } from "../base/dom.ts";
+import { tell } from "../base/numbers.ts";
 import type { App } from "../app.ts";
 import type { View } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
@@ -51,6 +52,10 @@ export function lookPanel(app: App): Panel {
     };
     app.store.listen((now, before) => { if (now.view !== before.view) update(); });
     app.on("scene", update);
+    app.on("field", () => {
+        least.placeholder = "0";
+        most.placeholder = tell(app.spread.high).replaceAll(",", "");
+    });
     app.store.listen((now, before) => {
         // An exposure that was left to the page is found from the next answer.
         if (now.view.exposure === null && before.view.exposure !== null) app.ask(true);

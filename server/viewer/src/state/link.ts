@@ -48,6 +48,8 @@ function restoreSky(given: unknown): SkyLight {
 }
 
 function restoreLighting(given: unknown): Lighting {
+    // A link without lights asks for those that the scene comes with.
+    if (given === undefined) return firstLighting;
     const out = restore(firstLighting, given, ["solo"]);
     const groups: Lighting["groups"] = {};
     for (const [name, light] of Object.entries(out.groups)) {
@@ -96,6 +98,7 @@ function fromBase64Url(text: string): string {
 
 export function toFragment(state: State): string {
     const plain = difference(state as unknown as Plain, firstState as unknown as Plain);
+    plain.lighting = state.lighting;
     plain.view = difference(state.view as unknown as Plain, firstView as unknown as Plain);
     return "#1." + toBase64Url(JSON.stringify(plain));
 }
