@@ -128,7 +128,7 @@ static const struct {
 } formats[] = {
     {"npy", output_npy, {true, false, true}}, {"json", output_json, {true, true, false}},
     {"csv", output_csv, {true, true, false}}, {"ply", output_ply, {true, false, true}},
-    {"vtu", output_vtu, {true, false, true}},
+    {"vtu", output_vtu, {true, false, true}}, {"glb", output_glb, {true, false, true}},
 };
 #define N_FORMATS (sizeof formats / sizeof *formats)
 

@@ -1,5 +1,5 @@
-/* Solutions as files: NPY, JSON, CSV, PLY, VTU; and the figures of groups that --reduce asks for. The room
- * codec writes numbers, NPY and JSON. */
+/* Solutions as files: NPY, JSON, CSV, PLY, VTU, glTF; and the figures of groups that --reduce asks for. The
+ * room codec writes numbers, NPY, JSON and glTF. */
 #ifndef LAMBERT_OUTPUT_OUTPUT_H
 #define LAMBERT_OUTPUT_OUTPUT_H
 
@@ -106,5 +106,6 @@ lam_status output_json(const solution *s, FILE *stream, lam_error *error);
 lam_status output_csv(const solution *s, FILE *stream, lam_error *error);
 lam_status output_ply(const solution *s, FILE *stream, lam_error *error);
 lam_status output_vtu(const solution *s, FILE *stream, lam_error *error);
+lam_status output_glb(const solution *s, FILE *stream, lam_error *error);
 
 #endif

@@ -72,7 +72,7 @@ static const option_row answer_options[] = {
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),
      .help = "Write the light at the corners of elements, which neighbours give it, beside the mean (.ply, "
-             ".vtu) or in its place (.npy: one more dimension, 4, NaN where a triangle has no corner)"},
+             ".vtu) or in its place (.glb; .npy: one more dimension, 4, NaN where a triangle has no corner)"},
     {.name = "json",
      .kind = OPTION_FLAG,
      .offset = FIELD(json),

@@ -1,18 +1,24 @@
 // Khronos' validator on the meshes that the daemon makes: no error, no warning. Nothing is drawn.
 import assert from "node:assert/strict";
-import { writeFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { test } from "node:test";
 import validator from "gltf-validator";
 import { Daemon, inFolder, lambert, makeStore } from "./page.mjs";
 
-/** The validator's report of a mesh: its elements and groups are counted, its faults and warnings are none. */
-async function validated(daemon, name) {
-    const response = await fetch(`${daemon.address}/v1/scenes/${encodeURIComponent(name)}/mesh`);
-    assert.equal(response.status, 200, name);
-    const report = await validator.validateBytes(new Uint8Array(await response.arrayBuffer()), { maxIssues: 20 });
+/** The validator's report of bytes, which has no fault and no warning. */
+async function reportOn(bytes, name) {
+    const report = await validator.validateBytes(bytes, { maxIssues: 20 });
     const said = report.issues.messages.map((m) => `${m.code} ${m.pointer}: ${m.message}`).join("\n");
     assert.deepEqual([report.issues.numErrors, report.issues.numWarnings], [0, 0], `${name}\n${said}`);
     assert.equal(report.mimeType, "model/gltf-binary");
+    return report;
+}
+
+/** That of a mesh, whose elements and groups are counted. */
+async function validated(daemon, name) {
+    const response = await fetch(`${daemon.address}/v1/scenes/${encodeURIComponent(name)}/mesh`);
+    assert.equal(response.status, 200, name);
+    const report = await reportOn(new Uint8Array(await response.arrayBuffer()), name);
     const about = await daemon.json(`/v1/scenes/${encodeURIComponent(name)}`);
     assert.equal(report.info.materialCount, about.groups.filter((g) => g.elements > 0).length);
     assert.ok(report.info.totalTriangleCount >= about.elements);
@@ -33,6 +39,15 @@ test("meshes of generated scenes are valid glTF", async () => {
     const emissive = await validated(daemon, "cornell");
     assert.deepEqual(emissive.info.extensionsUsed, ["KHR_materials_emissive_strength"]);
     await daemon.stop();
+});
+
+test("so is light on a mesh", async () => {
+    const store = makeStore("lit", "cornell", { generate: ["--elements", 300], precompute: ["--probes", 0, "--quality", "draft"] });
+    for (const options of [[], ["--smooth"], ["--quantity", "irradiance", "--smooth"]]) {
+        lambert("solve", store, "--emit", "lamp=1700,1200,400", ...options, "-o", inFolder("lit.glb"));
+        const report = await reportOn(new Uint8Array(readFileSync(inFolder("lit.glb"))), options.join(" "));
+        assert.deepEqual(report.info.extensionsUsed, ["KHR_materials_unlit"]);
+    }
 });
 
 /** A glTF with few words for much that is unusual: names, scales that mirror, slivers, one triangle twice. */

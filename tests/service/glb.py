@@ -43,8 +43,8 @@ class Group:
         assert primitive["mode"] == 4
         self.index = node["extras"]["group"]
         self.count = node["extras"]["elements"]
-        self.position, self.normal, self.element = (file.array(primitive["attributes"][k])
-                                                    for k in ("POSITION", "NORMAL", "_ELEMENT"))
+        self.attributes = primitive["attributes"]
+        self.position, self.normal, self.element = (file.array(self.attributes[k]) for k in ("POSITION", "NORMAL", "_ELEMENT"))
         self.triangles = file.array(primitive["indices"]).reshape(-1, 3)
         self.material = file.json["materials"][primitive["material"]]
 

@@ -114,11 +114,11 @@ class Annual(unittest.TestCase):
         answer = json.loads(out.read_text())
         self.assertEqual((answer["quantity"], list(answer["annual"])), ("irradiance", list(figures)))
         np.testing.assert_array_equal(np.array([answer["annual"][f] for f in figures], np.float32), got)
-        for name in "year.ply", "year.vtu":
+        for name in "year.ply", "year.vtu", "year.glb":
             must("solve", self.stores["exact"], *light, *options, "-o", self.folder / name)
             text = (self.folder / name).read_bytes()
             for column in columns:
-                self.assertIn(column.encode(), text)
+                self.assertIn((f'"_{column.upper()}"' if name == "year.glb" else column).encode(), text)
         # Means of groups where no file is asked for.
         said = must("solve", self.stores["exact"], *light, *options).stdout.splitlines()
         self.assertEqual(said[0].split()[-9:], columns)

@@ -110,7 +110,7 @@ class Usage(Case):
     def test_what_is_not_there_is_unknown(self):
         self.refused(2, "no such option", "precompute", "a.obj", "-o", "b.h5", "--texture", "x.png")
         self.refused(2, "no such suite", "bench", "nothing")
-        self.refused(2, "must end in", "solve", "a.h5", "-o", "b.glb")
+        self.refused(2, "must end in", "solve", "a.h5", "-o", "b.fbx")
 
     def test_a_full_disk_behind_standard_output(self):
         with open("/dev/full", "wb") as full:
@@ -209,7 +209,7 @@ class Files(Case):
 
         def tiny():
             resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
-        for name in ("c.npy", "c.json", "c.csv", "c.ply", "c.vtu"):
+        for name in ("c.npy", "c.json", "c.csv", "c.ply", "c.vtu", "c.glb"):
             done = self.failed(name, "solve", self.store, "--emit", "floor=1", "-o", self.path(name), preexec_fn=tiny)
             self.assertIn("File too large", done.stderr)
         self.assertEqual(os.listdir(self.folder), ["a.h5"])

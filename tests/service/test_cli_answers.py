@@ -11,6 +11,7 @@ import numpy
 
 from case import Case
 from command import lambert, must
+from glb import Glb, turned
 
 
 class Answers(Case):
@@ -60,6 +61,25 @@ class Answers(Case):
             [("corners", "u1"), ("vertices", "<u4", 4), ("group", "<u4"), ("value", "<f4")]))
         self.assertEqual((len(faces), set(faces["corners"])), (96, {4}))
         numpy.testing.assert_array_equal(faces["value"], B)
+        self.glb("a.glb", numpy.repeat(B[:, None], 4, axis=1), B, *light)
+
+    def glb(self, name, corners, B, *options):
+        """A file of glTF has the values of corners [n][4], and their colours."""
+        with open(self.solve(name, *options), "rb") as file:
+            made = Glb(file.read())
+        with h5py.File(self.store) as file:
+            area, vertices, elements = (file["mesh"][k][:] for k in ("area", "vertices", "elements"))
+        white = made.about["white"]
+        self.assertAlmostEqual(white, 4 * (B * area).sum() / area.sum(), delta=1e-5 * white)
+        self.assertEqual(sum(group.count for group in made.groups.values()), 96)
+        for group in made.groups.values():
+            element = group.element.astype(int)
+            corner = numpy.tile(numpy.arange(4), group.count)
+            value, colour = (made.array(group.attributes[k]) for k in ("_RADIOSITY", "COLOR_0"))
+            numpy.testing.assert_array_equal(value, corners[element, corner])
+            numpy.testing.assert_allclose(colour, numpy.repeat(numpy.clip(value / white, 0, 1)[:, None], 3, axis=1), rtol=1e-6)
+            numpy.testing.assert_array_equal(group.position, turned(vertices[elements[element, corner]], "z").astype("f4"))
+            self.assertEqual(group.material["extensions"], {"KHR_materials_unlit": {}})
 
     def test_corners(self):
         # The light of a floor falls off towards its rim, so that corners at the rim have less than the mean there.
@@ -100,6 +120,7 @@ class Answers(Case):
         numpy.testing.assert_array_equal(vertex["value"][faces["vertices"]], smooth)
         numpy.testing.assert_array_equal(vertex["at"][faces["vertices"]], places)
         numpy.testing.assert_array_equal(faces["value"], B)
+        self.glb("s.glb", smooth, B, "--smooth", *light)
         # A batch has a vector more in front, each as if alone.
         E = numpy.zeros((2, 96))
         E[0, 7], E[1] = 5, 1
@@ -109,7 +130,7 @@ class Answers(Case):
         numpy.save(self.path("e1.npy"), E[1])
         numpy.testing.assert_array_equal(
             both[1], numpy.load(self.solve("b1.npy", "--smooth", "--emission", self.path("e1.npy"))))
-        for arguments, words in ((("-o", "x.csv"), ".npy, .ply or .vtu only"), (("-o", "x.npy", "--reduce", "floor=mean"),
+        for arguments, words in ((("-o", "x.csv"), ".npy, .ply, .vtu or .glb only"), (("-o", "x.npy", "--reduce", "floor=mean"),
                                  "without --reduce"), ((), "is for -o"), (("-o", "x.npy", "--tolerance", "1e-3"),
                                                                           "--tolerance")):
             done = lambert("solve", self.store, "--smooth", *light, *arguments)

@@ -18,8 +18,9 @@ static const uint32_t magic = 0x46546C67, version = 2, chunk_json = 0x4E4F534A, 
 /* Of the specification: component types, and targets of views. */
 enum { TYPE_FLOAT = 5126, TYPE_U32 = 5125, TARGET_VERTICES = 34962, TARGET_INDICES = 34963 };
 
-/* The views of the binary chunk, in this order; each group has one accessor in each. */
-enum { VIEW_POSITION, VIEW_NORMAL, VIEW_ELEMENT, VIEW_INDEX, N_VIEWS };
+/* The views of the binary chunk, in this order; each group has one accessor in each. With light there is a
+ * colour, and a view for each column. */
+enum { VIEW_POSITION, VIEW_NORMAL, VIEW_ELEMENT, VIEW_INDEX, VIEW_COLOUR, VIEW_COLUMN };
 
 /* A group's part of the file. */
 typedef struct part {
@@ -36,7 +37,8 @@ typedef struct writer {
     float (*normals)[3]; /* [4 elements of the largest group] */
     part *parts;         /* [n_parts]: the groups that have elements */
     size_t n_parts, n_vertices, n_indices;
-    size_t view[N_VIEWS + 1]; /* offsets in the binary chunk, and its length */
+    size_t n_views;
+    size_t *view; /* [n_views + 1]: offsets in the binary chunk, and its length */
     buffer json;
 } writer;
 
@@ -44,6 +46,7 @@ static void writer_free(writer *w) {
     corner_normals_free(&w->s);
     free(w->normals);
     free(w->parts);
+    free(w->view);
     buffer_free(&w->json);
 }
 
@@ -96,17 +99,24 @@ static void measure_part(writer *w, part *p) {
     mean_colour(m, p->group, m->emission, p->emission);
 }
 
+/* Bytes of an item of a view. */
+static size_t width_of(size_t view) {
+    const bool vector = view == VIEW_POSITION || view == VIEW_NORMAL || view == VIEW_COLOUR;
+    return vector ? 3 * sizeof(float) : sizeof(float);
+}
+
 static lam_status plan(writer *w, lam_error *error) {
     lam_status status = LAM_OK;
     const gltf_mesh *m = w->m;
-    const size_t bytes[N_VIEWS] = {3 * sizeof(float), 3 * sizeof(float), sizeof(float), sizeof(uint32_t)};
     if (m->n > GLTF_ELEMENTS_MOST)
         FAIL(error, LAM_ERR_ARGUMENT, "%zu elements, at most %zu have a number in glTF", m->n,
              GLTF_ELEMENTS_MOST);
     TRY(corner_normals_create(m, &w->s, error));
     w->normals = memory_allocate(gltf_largest_group(m->groups), 4 * sizeof *w->normals, "normals", error);
     w->parts = memory_allocate(m->groups->n_groups, sizeof *w->parts, "glTF", error);
-    if (w->normals == NULL || w->parts == NULL) TRY(LAM_ERR_MEMORY);
+    w->n_views = m->light != NULL ? VIEW_COLUMN + m->light->n_columns : VIEW_COLOUR;
+    w->view = memory_allocate(w->n_views + 1, sizeof *w->view, "glTF", error);
+    if (w->normals == NULL || w->parts == NULL || w->view == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t g = 0; g < m->groups->n_groups; g++) {
         const size_t count = m->groups->start[g + 1] - m->groups->start[g];
         if (count == 0) continue;
@@ -116,8 +126,8 @@ static lam_status plan(writer *w, lam_error *error) {
         w->n_vertices += p->n_vertices;
         w->n_indices += p->n_indices;
     }
-    for (size_t v = 0; v < N_VIEWS; v++)
-        w->view[v + 1] = w->view[v] + bytes[v] * (v == VIEW_INDEX ? w->n_indices : w->n_vertices);
+    for (size_t v = 0; v < w->n_views; v++)
+        w->view[v + 1] = w->view[v] + width_of(v) * (v == VIEW_INDEX ? w->n_indices : w->n_vertices);
 done:
     return status;
 }
@@ -135,6 +145,8 @@ static bool say_extras(const writer *w, buffer *b) {
     bool good = buffer_append_text(b, "\"extras\":{\"lambert\":{\"name\":") &&
                 json_write_text(b, w->m->name) &&
                 buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu", w->m->n, w->m->n_channels);
+    if (w->m->light != NULL)
+        good = good && buffer_append_text(b, ",\"white\":") && json_write_double(b, w->m->light->white);
     if (w->m->kind != NULL)
         good = good && buffer_append_text(b, ",\"kind\":") && json_write_text(b, w->m->kind);
     return good && buffer_append_text(b, "}}");
@@ -154,15 +166,27 @@ static bool say_nodes(const writer *w, buffer *b) {
     return good && buffer_append_text(b, "]");
 }
 
+static bool say_attributes(const writer *w, size_t first, buffer *b) {
+    const gltf_light *light = w->m->light;
+    bool good = buffer_printf(b, "\"POSITION\":%zu,\"NORMAL\":%zu,\"_ELEMENT\":%zu", first + VIEW_POSITION,
+                              first + VIEW_NORMAL, first + VIEW_ELEMENT);
+    if (light == NULL) return good;
+    good = good && buffer_printf(b, ",\"COLOR_0\":%zu", first + VIEW_COLOUR);
+    for (size_t k = 0; k < light->n_columns; k++)
+        good = good && buffer_append_text(b, ",") && json_write_text(b, light->columns[k]) &&
+               buffer_printf(b, ":%zu", first + VIEW_COLUMN + k);
+    return good;
+}
+
 static bool say_meshes(const writer *w, buffer *b) {
     bool good = buffer_append_text(b, ",\"meshes\":[");
     for (size_t k = 0; k < w->n_parts; k++)
         good = good && buffer_append_text(b, k > 0 ? ",{\"name\":" : "{\"name\":") &&
                json_write_text(b, w->m->groups->names[w->parts[k].group]) &&
-               buffer_printf(b,
-                             ",\"primitives\":[{\"attributes\":{\"POSITION\":%zu,\"NORMAL\":%zu,\"_ELEMENT\":"
-                             "%zu},\"indices\":%zu,\"material\":%zu,\"mode\":4}]}",
-                             N_VIEWS * k, N_VIEWS * k + 1, N_VIEWS * k + 2, N_VIEWS * k + 3, k);
+               buffer_append_text(b, ",\"primitives\":[{\"attributes\":{") &&
+               say_attributes(w, w->n_views * k, b) &&
+               buffer_printf(b, "},\"indices\":%zu,\"material\":%zu,\"mode\":4}]}",
+                             w->n_views * k + VIEW_INDEX, k);
     return good && buffer_append_text(b, "]");
 }
 
@@ -177,56 +201,64 @@ static bool say_emission(const double emission[3], buffer *b) {
            json_write_double(b, most) && buffer_append_text(b, "}}");
 }
 
+static bool say_surface(const part *p, buffer *b) {
+    const double colour[4] = {fmin(p->reflectance[0], 1), fmin(p->reflectance[1], 1),
+                              fmin(p->reflectance[2], 1), 1};
+    return say_numbers(b, ",\"pbrMetallicRoughness\":{\"baseColorFactor\":", 4, colour) &&
+           buffer_append_text(b, ",\"metallicFactor\":0,\"roughnessFactor\":1},\"doubleSided\":false") &&
+           say_emission(p->emission, b);
+}
+
 static bool say_materials(const writer *w, buffer *b) {
+    const bool lit = w->m->light != NULL;
     bool good = buffer_append_text(b, ",\"materials\":["), emits = false;
     for (size_t k = 0; k < w->n_parts; k++) {
         const part *p = &w->parts[k];
-        const double colour[4] = {fmin(p->reflectance[0], 1), fmin(p->reflectance[1], 1),
-                                  fmin(p->reflectance[2], 1), 1};
         good = good && buffer_append_text(b, k > 0 ? ",{\"name\":" : "{\"name\":") &&
                json_write_text(b, w->m->groups->names[p->group]) &&
-               say_numbers(b, ",\"pbrMetallicRoughness\":{\"baseColorFactor\":", 4, colour) &&
-               buffer_append_text(b, ",\"metallicFactor\":0,\"roughnessFactor\":1},\"doubleSided\":false") &&
-               say_emission(p->emission, b) && buffer_append_text(b, "}");
+               (lit ? buffer_append_text(b, ",\"extensions\":{\"KHR_materials_unlit\":{}}")
+                    : say_surface(p, b)) &&
+               buffer_append_text(b, "}");
         emits = emits || fmax(p->emission[0], fmax(p->emission[1], p->emission[2])) > 0;
     }
     good = good && buffer_append_text(b, "]");
-    return good &&
-           (!emits || buffer_append_text(b, ",\"extensionsUsed\":[\"KHR_materials_emissive_strength\"]"));
+    if (lit) good = good && buffer_append_text(b, ",\"extensionsUsed\":[\"KHR_materials_unlit\"]");
+    if (!lit && emits)
+        good = good && buffer_append_text(b, ",\"extensionsUsed\":[\"KHR_materials_emissive_strength\"]");
+    return good;
 }
 
 static bool say_accessors(const writer *w, buffer *b) {
     bool good = buffer_append_text(b, ",\"accessors\":[");
-    for (size_t k = 0; k < w->n_parts; k++) {
-        const part *p = &w->parts[k];
-        static const char text[] = "{\"bufferView\":%d,\"byteOffset\":%zu,\"componentType\":%d,\"count\":%zu,"
-                                   "\"type\":\"%s\"";
-        if (k > 0) good = good && buffer_append_text(b, ",");
-        good = good &&
-               buffer_printf(b, text, VIEW_POSITION, 12 * p->vertex, TYPE_FLOAT, p->n_vertices, "VEC3") &&
-               say_floats(b, ",\"min\":", p->low) && say_floats(b, ",\"max\":", p->high) &&
-               buffer_append_text(b, "},") &&
-               buffer_printf(b, text, VIEW_NORMAL, 12 * p->vertex, TYPE_FLOAT, p->n_vertices, "VEC3") &&
-               buffer_append_text(b, "},") &&
-               buffer_printf(b, text, VIEW_ELEMENT, 4 * p->vertex, TYPE_FLOAT, p->n_vertices, "SCALAR") &&
-               buffer_append_text(b, "},") &&
-               buffer_printf(b, text, VIEW_INDEX, 4 * p->index, TYPE_U32, p->n_indices, "SCALAR") &&
-               buffer_append_text(b, "}");
-    }
+    for (size_t k = 0; k < w->n_parts; k++)
+        for (size_t v = 0; v < w->n_views; v++) {
+            const part *p = &w->parts[k];
+            const size_t first = v == VIEW_INDEX ? p->index : p->vertex;
+            good = good && buffer_printf(
+                               b,
+                               "%s{\"bufferView\":%zu,\"byteOffset\":%zu,\"componentType\":%d,\"count\":%zu,"
+                               "\"type\":\"%s\"",
+                               k + v > 0 ? "," : "", v, width_of(v) * first,
+                               v == VIEW_INDEX ? (int)TYPE_U32 : (int)TYPE_FLOAT,
+                               v == VIEW_INDEX ? p->n_indices : p->n_vertices,
+                               width_of(v) > sizeof(float) ? "VEC3" : "SCALAR");
+            if (v == VIEW_POSITION)
+                good = good && say_floats(b, ",\"min\":", p->low) && say_floats(b, ",\"max\":", p->high);
+            good = good && buffer_append_text(b, "}");
+        }
     return good && buffer_append_text(b, "]");
 }
 
 static bool say_views(const writer *w, buffer *b) {
-    static const int strides[N_VIEWS] = {12, 12, 4, 0};
     bool good = buffer_append_text(b, ",\"bufferViews\":[");
-    for (size_t v = 0; v < N_VIEWS; v++) {
+    for (size_t v = 0; v < w->n_views; v++) {
         good = good && buffer_printf(b, "%s{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu,\"target\":%d",
                                      v > 0 ? "," : "", w->view[v], w->view[v + 1] - w->view[v],
-                                     v == VIEW_INDEX ? TARGET_INDICES : TARGET_VERTICES);
-        if (strides[v] > 0) good = good && buffer_printf(b, ",\"byteStride\":%d", strides[v]);
+                                     v == VIEW_INDEX ? (int)TARGET_INDICES : (int)TARGET_VERTICES);
+        if (v != VIEW_INDEX) good = good && buffer_printf(b, ",\"byteStride\":%zu", width_of(v));
         good = good && buffer_append_text(b, "}");
     }
-    return good && buffer_printf(b, "],\"buffers\":[{\"byteLength\":%zu}]", w->view[N_VIEWS]);
+    return good && buffer_printf(b, "],\"buffers\":[{\"byteLength\":%zu}]", w->view[w->n_views]);
 }
 
 static bool say_json(writer *w) {
@@ -255,6 +287,33 @@ static char *put_vector(char *at, const float v[3]) {
     return put_float(put_float(put_float(at, v[0]), v[1]), v[2]);
 }
 
+/* Writes the light of the part's vertices; to is the binary chunk. */
+static void put_light(const writer *w, const part *p, char *to) {
+    const gltf_light *light = w->m->light;
+    const uint32_t *elements = elements_of(w->m, p->group);
+    const size_t C = w->m->n_channels;
+    char *colour = to + w->view[VIEW_COLOUR] + 12 * p->vertex;
+    for (size_t k = 0; k < light->n_columns; k++) {
+        char *at = to + w->view[VIEW_COLUMN + k] + 4 * p->vertex;
+        for (size_t j = 0; j < p->n_elements; j++)
+            for (size_t corner = 0; corner < corners_of(w->m, elements[j]); corner++)
+                at = put_float(at, light->value(light->context, k, elements[j], corner));
+    }
+    for (size_t j = 0; j < p->n_elements; j++)
+        for (size_t corner = 0; corner < corners_of(w->m, elements[j]); corner++) {
+            double of[3] = {0, 0, 0}, grey = 0;
+            float shown[3];
+            for (size_t c = 0; c < C; c++) {
+                const double x = (double)light->value(light->context, c, elements[j], corner);
+                grey += x / (double)C;
+                if (C == 3) of[c] = x;
+            }
+            if (C != 3) of[0] = of[1] = of[2] = grey;
+            for (int d = 0; d < 3; d++) shown[d] = (float)fmin(fmax(of[d] / light->white, 0), 1);
+            colour = put_vector(colour, shown);
+        }
+}
+
 /* Writes the part's vertices and triangles; to is the binary chunk. */
 static lam_status put_part(writer *w, const part *p, char *to, lam_error *error) {
     lam_status status = LAM_OK;
@@ -278,6 +337,7 @@ static lam_status put_part(writer *w, const part *p, char *to, lam_error *error)
         vertex += corners;
     }
     assert(vertex == p->n_vertices);
+    if (m->light != NULL) put_light(w, p, to);
 done:
     return status;
 }
@@ -322,9 +382,9 @@ lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error) {
     TRY(plan(&w, error));
     if (!say_json(&w)) FAIL(error, LAM_ERR_MEMORY, "not enough memory for glTF");
     const size_t head = FILE_HEAD + CHUNK_HEAD + w.json.length + CHUNK_HEAD;
-    if (w.json.length > UINT32_MAX || w.view[N_VIEWS] > UINT32_MAX - head)
-        FAIL(error, LAM_ERR_ARGUMENT, "%zu bytes, glTF has at most 2^32", head + w.view[N_VIEWS]);
-    const size_t length = head + w.view[N_VIEWS];
+    if (w.json.length > UINT32_MAX || w.view[w.n_views] > UINT32_MAX - head)
+        FAIL(error, LAM_ERR_ARGUMENT, "%zu bytes, glTF has at most 2^32", head + w.view[w.n_views]);
+    const size_t length = head + w.view[w.n_views];
     if (!buffer_reserve(&made, length))
         FAIL(error, LAM_ERR_MEMORY, "not enough memory for %zu bytes of glTF", length);
     made.length = length;
@@ -332,7 +392,7 @@ lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error) {
     char *at = put(put(put(made.bytes, magic), version), (uint32_t)length);
     at = put(put(at, (uint32_t)w.json.length), chunk_json);
     memcpy(at, w.json.bytes, w.json.length);
-    at = put(put(at + w.json.length, (uint32_t)w.view[N_VIEWS]), chunk_binary);
+    at = put(put(at + w.json.length, (uint32_t)w.view[w.n_views]), chunk_binary);
     for (size_t k = 0; k < w.n_parts; k++) TRY(put_part(&w, &w.parts[k], at, error));
     *out = made;
     made = (buffer){0};

@@ -12,6 +12,17 @@
 /* The 4th vertex of an element that is a triangle. */
 #define GLTF_NO_VERTEX 0xFFFFFFFFu
 
+/* Light of a scene: attributes of the vertices, by columns, and their colour. */
+typedef struct gltf_light {
+    size_t n_columns;
+    const char *const *columns; /* [n_columns]: names of attributes, which begin with _ */
+    /* The finite value of a column at a corner of an element. */
+    float (*value)(const void *context, size_t column, size_t element, size_t corner);
+    const void *context;
+    double white; /* the value that COLOR_0 shows as 1, of the first 3 columns of 3 channels, or else of the
+                     mean of the first C */
+} gltf_light;
+
 /* A scene as it is stored (store/FORMAT.md, /mesh). Every index is below its bound, every number finite. */
 typedef struct gltf_mesh {
     const char *name, *kind; /* of the scene and of its operator; kind NULL: it is left out */
@@ -23,7 +34,8 @@ typedef struct gltf_mesh {
     const float *reflectance;      /* [C][n] */
     const float *emission;         /* [C][n], W/m^2 */
     const group_index *groups;
-    char up; /* 'x', 'y' or 'z' */
+    const gltf_light *light; /* or NULL */
+    char up;                 /* 'x', 'y' or 'z' */
 } gltf_mesh;
 
 /* Appends the mesh to out, which is empty: metres, y up, north -z (as of a scene that has y up), every
@@ -37,6 +49,8 @@ typedef struct gltf_mesh {
  *   - A material for each group: the mean by area of its reflectance as base colour, and of its emission as
  *     emissive factor and KHR_materials_emissive_strength. Of 1 channel these are grey, of 3 red, green and
  *     blue, of others the grey of their mean.
+ *   - With light each column is one more attribute (a float), and COLOR_0 its colour, cut to [0, 1].
+ * Materials are then white and unlit (KHR_materials_unlit), and extras say "white".
  *   - extras of the file and of the root node: {"lambert":{"name","elements","channels","kind"}}; of the node
  *     of a group: {"group","elements"}.
  * O(n). Errors: LAM_ERR_ARGUMENT (more than GLTF_ELEMENTS_MOST elements, more bytes than a file of glTF has,
@@ -48,8 +62,8 @@ typedef struct gltf_sizes {
     size_t n, n_vertices, n_groups, n_texts;
 } gltf_sizes;
 
-/* Bytes that gltf_write leaves in out, and bytes that it takes meanwhile beside them, at most; SIZE_MAX where
- * a size_t does not hold them. */
+/* Bytes that gltf_write leaves in out of a mesh without light, and bytes that it takes meanwhile beside them,
+ * at most; SIZE_MAX where a size_t does not hold them. */
 size_t gltf_bytes_most(const gltf_sizes *sizes);
 size_t gltf_work_bytes(const gltf_sizes *sizes);
 
