@@ -152,13 +152,23 @@ static size_t times(size_t a, size_t b) {
     return __builtin_mul_overflow(a, b, &product) ? SIZE_MAX : product;
 }
 
-size_t scene_mesh_build_bytes(const scene_mesh *mesh) {
+static gltf_sizes sizes_of(const scene_mesh *mesh) {
     const scene *s = mesh->of;
     gltf_sizes sizes = {.n = s->n, .n_vertices = mesh->n_vertices, .n_groups = s->groups.n_groups};
     sizes.n_texts = strlen(s->name);
     for (size_t g = 0; g < s->groups.n_groups; g++) sizes.n_texts += strlen(s->groups.names[g]);
-    const size_t element = 4 * sizeof(uint32_t) + (3 + s->n_channels) * sizeof(float);
-    return sum(sum(times(mesh->n_vertices, 3 * sizeof(double)), times(s->n, element)),
+    return sizes;
+}
+
+size_t scene_mesh_bytes_most(const scene_mesh *mesh) {
+    const gltf_sizes sizes = sizes_of(mesh);
+    return gltf_bytes_most(&sizes);
+}
+
+size_t scene_mesh_build_bytes(const scene_mesh *mesh) {
+    const gltf_sizes sizes = sizes_of(mesh);
+    const size_t element = 4 * sizeof(uint32_t) + (3 + mesh->of->n_channels) * sizeof(float);
+    return sum(sum(times(mesh->n_vertices, 3 * sizeof(double)), times(sizes.n, element)),
                sum(gltf_bytes_most(&sizes), gltf_work_bytes(&sizes)));
 }
 

@@ -36,7 +36,8 @@ void scene_mesh_clear(scene_mesh *mesh);
 /* Bytes of the forms that are kept. */
 size_t scene_mesh_held(scene_mesh *mesh);
 
-/* Bytes that scene_mesh_build takes, at most, with those of the file. */
+/* Bytes of the file, and bytes that scene_mesh_build takes with those, at most. */
+size_t scene_mesh_bytes_most(const scene_mesh *mesh);
 size_t scene_mesh_build_bytes(const scene_mesh *mesh);
 
 /* Makes the file. It opens the store again, and checks that it still is the one of the scene. O(n). Errors:

@@ -242,6 +242,28 @@ class Mesh(Case):
             self.assertEqual(self.mesh(daemon, "box", "zstd").status, 200)
             self.assertEqual(self.held(daemon)[1], 0)
 
+    def test_requests_wait_for_memory(self):
+        """Room for one that makes the mesh, and none to keep it: the others wait, and make it anew."""
+        path, _ = self.store(n=20000)
+        with Daemon(path, "--threads", 2) as daemon:
+            before = self.held(daemon)[0]
+        limit = ("--threads", 2, "--max-memory", int(before) + 1000, "--max-request-memory")
+        with Daemon(path, *limit, "1M") as daemon:
+            refused = self.mesh(daemon, "box", "gzip").json()["detail"]
+            needed = int(re.search(r"takes (\d+) bytes", refused).group(1))
+        answers = [None] * 9
+        with Daemon(path, *limit, needed) as daemon:
+            def ask(k):
+                answers[k] = self.mesh(daemon, "box", ("gzip", "zstd", None)[k % 3])
+            clients = [threading.Thread(target=ask, args=(k,)) for k in range(len(answers))]
+            for c in clients:
+                c.start()
+            for c in clients:
+                c.join()
+            self.assertEqual({a.status for a in answers}, {200}, [a for a in answers if a.status != 200])
+            self.assertEqual(len({a.body for a in answers}), 3)
+            self.assertEqual(self.held(daemon), (before, 0))
+
     def test_a_deadline_that_has_passed(self):
         """Nothing is made for nobody, and the next request finds no trace of it."""
         path, _ = self.store(n=3000)
