@@ -1,5 +1,6 @@
 #include "solver/codec/describe.h"
 
+#include "solver/base/scene_cameras.h"
 #include "solver/operator/operator.h"
 #include "store/status.h"
 
@@ -235,6 +236,30 @@ done:
     return status;
 }
 
+/* The cameras that came with the scene, in its axes and metres; the array may be empty. */
+static lam_status add_cameras(store *s, json_t *out, lam_error *error) {
+    static const char *const members[] = {"eye", "direction", "up"};
+    lam_status status = LAM_OK;
+    scene_camera *cameras = NULL;
+    size_t n = 0;
+    TRY(scene_cameras_load(s, &n, &cameras, error));
+    json_t *list = json_array();
+    for (size_t k = 0; k < n; k++) {
+        const double *const vectors[] = {cameras[k].eye, cameras[k].direction, cameras[k].up};
+        json_t *one = json_object();
+        json_object_set_new(one, "name", json_string(cameras[k].name));
+        for (size_t v = 0; v < 3; v++)
+            json_object_set_new(one, members[v],
+                                json_pack("[f, f, f]", vectors[v][0], vectors[v][1], vectors[v][2]));
+        json_object_set_new(one, "fov", json_real(cameras[k].fov));
+        json_array_append_new(list, one);
+    }
+    json_object_set_new(out, "cameras", list);
+done:
+    free(cameras);
+    return status;
+}
+
 /* null where there is none. */
 static lam_status add_sky(store *s, json_t *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -321,6 +346,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     add_report(made, operator_attributes);
     TRY(add_groups(s, dims[1], made, error));
     TRY(add_emitters(s, made, error));
+    TRY(add_cameras(s, made, error));
     TRY(add_sky(s, made, error));
     TRY(add_elements(s, "/importance", "importance", made, error));
     TRY(add_elements(s, "/sources", "sources", made, error));

@@ -64,6 +64,21 @@ done:
     return status;
 }
 
+lam_status camera_place(const double eye[3], const double direction[3], const double up[3], double fov,
+                        double aspect, camera *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (!(fov >= 1 && fov <= 170))
+        FAIL(error, LAM_ERR_ARGUMENT, "the camera's field of view = %g degrees, must be from 1 to 170", fov);
+    memcpy(c->eye, eye, sizeof c->eye);
+    memcpy(c->forward, direction, sizeof c->forward);
+    memcpy(c->up, up, sizeof c->up);
+    cross3(direction, up, c->right);
+    c->tan_y = tan(fov / 2 * M_PI / 180);
+    c->tan_x = c->tan_y * aspect;
+done:
+    return status;
+}
+
 void camera_direction(const camera *c, double x, double y, double direction[3]) {
     double right = (2 * x - 1) * c->tan_x, up = (1 - 2 * y) * c->tan_y;
     for (int d = 0; d < 3; d++) direction[d] = c->forward[d] + right * c->right[d] + up * c->up[d];

@@ -17,6 +17,11 @@ typedef struct camera {
 lam_status camera_look(const double eye[3], const double target[3], double fov, double aspect, char up,
                        camera *c, lam_error *error);
 
+/* A camera with a direction and an up vector of its own, unit vectors at right angles, such as one of a
+ * scene. LAM_ERR_ARGUMENT: fov not within 1 to 170. */
+lam_status camera_place(const double eye[3], const double direction[3], const double up[3], double fov,
+                        double aspect, camera *c, lam_error *error);
+
 /* The direction (forward component 1) through a point of the picture; x and y run from 0 to 1, right and
  * down. */
 void camera_direction(const camera *c, double x, double y, double direction[3]);

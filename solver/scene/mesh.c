@@ -20,6 +20,7 @@ void mesh_free(mesh *m) {
     free(m->reflectance);
     free(m->emission);
     mesh_textures_release(m);
+    free(m->cameras);
     *m = (mesh){0};
 }
 

@@ -1,4 +1,4 @@
-/* /mesh of a store: written as it is, read back with every index and value checked. */
+/* /mesh and /cameras of a store: written as it is, read back with every index and value checked. */
 #include "solver/scene/mesh.h"
 
 #include <math.h>
@@ -27,6 +27,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_set_text(s, "/mesh", "up", up, error));
     TRY(store_set_number(s, "/mesh", "unit", m->unit, error));
     TRY(store_set_integer(s, "/mesh", "two_sided", m->two_sided, error));
+    TRY(scene_cameras_save(m->n_cameras, m->cameras, s, error));
 done:
     return status;
 }
@@ -168,6 +169,7 @@ lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
                  i, loaded.group[i], loaded.n_groups);
     if (store_has(s, "/mesh/row_sums") || store_has(s, "/form_factors") || store_has(s, "/sky"))
         TRY(load_f64(s, "/mesh/row_sums", loaded.n, 0, false, &sums, error));
+    TRY(scene_cameras_load(s, &loaded.n_cameras, &loaded.cameras, error));
     *m = loaded;
     loaded = (mesh){0};
     if (row_sums != NULL) {

@@ -190,6 +190,18 @@ static void print_emitters(const json_t *emitters) {
     puts(count > MOST ? ", ... (--json names them all)" : "");
 }
 
+/* The first names of the scene's cameras, and how many there are. */
+static void print_cameras(const json_t *cameras) {
+    enum { MOST = 6 };
+    const size_t count = json_array_size(cameras);
+    if (count == 0) return;
+    printf("%-18s%zu:", "cameras", count);
+    for (size_t k = 0; k < count && k < MOST; k++)
+        printf("%s %s", k > 0 ? "," : "",
+               json_string_value(json_object_get(json_array_get(cameras, k), "name")));
+    puts(count > MOST ? ", ... (--json has them all)" : "");
+}
+
 /* Prints as many groups as fit on a screen: a city has hundreds of them. */
 static void print_groups(const json_t *groups) {
     enum { MOST = 20 };
@@ -231,6 +243,7 @@ static void print_text(const json_t *about) {
     print_report(json_object_get(about, "report"));
     print_groups(json_object_get(about, "groups"));
     print_emitters(json_object_get(about, "emitters"));
+    print_cameras(json_object_get(about, "cameras"));
     print_sky(json_object_get(about, "sky"));
     print_elements("read", json_object_get(about, "importance"), "the light of others is only roughly right");
     print_elements("emit", json_object_get(about, "sources"),

@@ -14,9 +14,14 @@ static lam_status parse_camera(const char *text, void *field, lam_error *error) 
     render_camera *option = field;
     double numbers[7];
     camera ignored;
+    /* Names of cameras rarely look like numbers with commas between them. */
+    if (strchr(text, ',') == NULL || strspn(text, "+-.0123456789") == 0) {
+        *option = (render_camera){.given = true, .name = text};
+        return LAM_OK;
+    }
     TRY(option_numbers("--camera", text, 7, true, numbers, NULL, error));
     TRY(camera_look(numbers, numbers + 3, numbers[6], 1, 'z', &ignored, error));
-    option->given = true;
+    *option = (render_camera){.given = true};
     memcpy(option->eye, numbers, sizeof option->eye);
     memcpy(option->target, numbers + 3, sizeof option->target);
     option->fov = numbers[6];
@@ -143,10 +148,12 @@ const option_row render_view_rows[] = {
     {.name = "camera",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(camera),
-     .argument = "EYE,TARGET,FOV",
+     .argument = "EYE,TARGET,FOV|NAME",
      .otherwise = "a camera that shows the whole scene",
      .parse = parse_camera,
-     .help = "x,y,z,x,y,z,degrees: position of the eye, point that it looks at, vertical field of view"},
+     .help = "x,y,z,x,y,z,degrees: position of the eye, point that it looks at, vertical field of view; or "
+             "the name of "
+             "a camera that came with the scene, a glTF, which `lambert info` lists"},
     {.name = "size",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(size),

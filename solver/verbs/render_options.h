@@ -10,6 +10,7 @@
 
 typedef struct render_camera {
     bool given;
+    const char *name; /* of one of the scene, or NULL: eye, target and fov */
     double eye[3], target[3], fov;
 } render_camera;
 

@@ -57,6 +57,28 @@ done:
     return status;
 }
 
+/* Places the camera of the scene that has this name. */
+static lam_status place_named(render_view *v, const char *name, double aspect, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &v->m;
+    const scene_camera *found = scene_camera_find(m->n_cameras, m->cameras, name);
+    enum { TOLD = 6 };
+    char names[TOLD * 42 + 1] = "";
+    size_t length = 0, told = 0;
+    if (found != NULL)
+        return camera_place(found->eye, found->direction, found->up, found->fov, aspect, &v->camera, error);
+    if (m->n_cameras == 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--camera %s: the scene came without cameras; give EYE,TARGET,FOV as x,y,z,x,y,z,degrees", name);
+    for (; told < m->n_cameras && told < TOLD; told++)
+        length += (size_t)snprintf(names + length, sizeof names - length, "%s%.40s", told > 0 ? ", " : "",
+                                   m->cameras[told].name);
+    FAIL(error, LAM_ERR_ARGUMENT, "--camera %s: no camera of this name; there %s %s%s", name,
+         m->n_cameras == 1 ? "is" : "are", names, told < m->n_cameras ? " and others" : "");
+done:
+    return status;
+}
+
 lam_status render_view_aim(const render_options *f, bool smooth, const bool *lit, render_view *v,
                            lam_error *error) {
     lam_status status = LAM_OK;
@@ -64,7 +86,9 @@ lam_status render_view_aim(const render_options *f, bool smooth, const bool *lit
     const render_camera *given = &f->camera;
     TRY(visibility_create(&v->m, &v->seen, error));
     if (smooth) TRY(smooth_nodes_create(&v->m, &v->nodes, error));
-    if (given->given)
+    if (given->name != NULL)
+        TRY(place_named(v, given->name, aspect, error));
+    else if (given->given)
         TRY(camera_look(given->eye, given->target, given->fov, aspect, v->m.up, &v->camera, error));
     else
         TRY(camera_choose(&v->m, v->seen, lit, aspect, &v->camera, error));

@@ -1,5 +1,7 @@
 """Black box: pictures of known scenes show what they should, and wrong usage is one line."""
 
+import base64
+import json
 import os
 import resource
 import signal
@@ -11,7 +13,7 @@ import unittest
 import h5py
 import numpy
 
-from command import LAMBERT, lambert, must
+from command import LAMBERT, example, lambert, must
 from exr_file import decode_exr
 from png_file import decode_png
 
@@ -205,6 +207,46 @@ class Render(unittest.TestCase):
         # Away from the scene there is nothing but background.
         pixels = self.draw(self.cornell, "--camera", "-9,-9,9,-10,-10,9,40", "--size", "10x10")
         self.assertTrue((pixels == BACKGROUND).all())
+
+    def test_cameras_of_the_scene(self):
+        # Two cameras look along -z at two triangles, the second from further away: it sees less of them.
+        triangle = base64.b64encode(numpy.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "<f4").tobytes()).decode()
+        nodes = [{"name": "tri", "mesh": 0}, {"name": "near", "camera": 0, "translation": [0, 0, 2]},
+                 {"name": "far off", "camera": 0, "translation": [0, 0, 4]}]
+        scene = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}], "nodes": nodes,
+                 "cameras": [{"type": "perspective", "perspective": {"yfov": 1.2, "aspectRatio": 1.5, "znear": .1}}],
+                 "materials": [{"name": "glow", "emissiveFactor": [1, 1, 1]}],
+                 "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+                 "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0],
+                                "max": [1, 1, 0]}],
+                 "bufferViews": [{"buffer": 0, "byteLength": 36}],
+                 "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64," + triangle}]}
+        file, store = self.path("eyes.gltf"), self.path("eyes.h5")
+        with open(file, "w", encoding="utf-8") as out:
+            json.dump(scene, out)
+        must("precompute", file, "-o", store, "--unit", 10, "--elements", 50, "--probes", 0, "--quiet")
+        self.assertIn("cameras           2: near, far off\n", must("info", store).stdout)
+        about = json.loads(must("info", store, "--json").stdout)["cameras"]
+        self.assertEqual([camera["name"] for camera in about], ["near", "far off"])
+        self.assertEqual(about[1]["eye"], [0, 0, 40])
+        self.assertEqual((about[0]["direction"], about[0]["up"]), ([0, 0, -1], [0, 1, 0]))
+        self.assertAlmostEqual(about[0]["fov"], numpy.degrees(1.2), 4)
+        found = example("read_cameras.py", store)
+        self.assertEqual(found["names"], ["near", "far off"])
+        by_name, by_numbers = (self.draw(store, "--camera", camera, "--size", "40x30")
+                               for camera in ("far off", found["numbers"]))
+        self.assertLessEqual(numpy.abs(by_name - by_numbers).max(), 1)
+        for name, distance in ("near", 20), ("far off", 40):
+            pixels = self.draw(store, "--camera", name, "--size", "90x60")
+            # The triangle has 200 m2 of the plane that the picture shows, 2 d tan(fov/2) high and 1.5 times as wide.
+            height = 2 * distance * numpy.tan(.6)
+            self.assertAlmostEqual((pixels[..., 0] != BACKGROUND).mean(), 200 / (1.5 * height**2), delta=.02)
+        done = lambert("render", store, "--camera", "side", "-o", self.path("never.png"))
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1))
+        self.assertIn("--camera side: no camera of this name; there are near, far off", done.stderr)
+        done = lambert("render", self.cornell, "--camera", "side", "-o", self.path("never.png"))
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1))
+        self.assertIn("came without cameras", done.stderr)
 
     def test_wrong_usage_is_one_line(self):
         image = self.path("never.png")

@@ -298,6 +298,7 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     for (unsigned i = 0; i < a.scene->mNumMaterials; i++) TRY(read_material(&a, i, error));
     const affine unit = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
     if (a.scene->mRootNode != NULL) TRY(read_node(&a, a.scene->mRootNode, &unit, error));
+    if (a.gltf) TRY(gltf_read_cameras(path, bytes, length, s, error));
 done:
     if (a.scene != NULL) aiReleaseImport(a.scene);
     free(a.materials);

@@ -30,14 +30,17 @@ static void put_little_endian(char *bytes, uint32_t x) {
     for (int k = 0; k < 4; k++) bytes[k] = (char)(x >> 8 * k & 255);
 }
 
+void gltf_find_json(const char **bytes, size_t *length) {
+    if (*length < 20 || memcmp(*bytes, "glTF", 4) != 0) return;
+    const size_t size = little_endian(*bytes + 12);
+    if (memcmp(*bytes + 16, "JSON", 4) != 0 || size > *length - 20) return;
+    *bytes += 20;
+    *length = size;
+}
+
 lam_status gltf_check_head(const char *path, const char *bytes, size_t length, lam_error *error) {
     lam_status status = LAM_OK;
-    if (length >= 20 && memcmp(bytes, "glTF", 4) == 0) { /* a GLB, whose first chunk is the JSON */
-        const size_t size = little_endian(bytes + 12);
-        if (memcmp(bytes + 16, "JSON", 4) != 0 || size > length - 20) return LAM_OK;
-        bytes += 20;
-        length = size;
-    }
+    gltf_find_json(&bytes, &length);
     json_t *root = json_loadb(bytes, length, 0, NULL), *name;
     size_t i;
     json_array_foreach(json_object_get(root, "extensionsRequired"), i, name) {

@@ -196,6 +196,17 @@ done:
     return status;
 }
 
+/* Cameras in metres. One that --unit moves too far is left out, as a vertex there would be refused. */
+static void take_cameras(imported_faces *s, double unit, mesh *m) {
+    m->cameras = s->cameras;
+    s->cameras = NULL;
+    for (size_t k = 0; k < s->n_cameras; k++) {
+        scene_camera c = m->cameras[k];
+        for (int d = 0; d < 3; d++) c.eye[d] *= unit;
+        if (scene_camera_settle(&c)) m->cameras[m->n_cameras++] = c;
+    }
+}
+
 /* Formats in single precision lose the shape of a small scene far from the origin; the text of an OBJ does
  * not. */
 static void warn_of_lost_precision(imported_faces *s, const char *path, const mesh *m) {
@@ -244,6 +255,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     made.unit = options->unit;
     made.up = options->up != 0 ? options->up : is_gltf ? 'y' : 'z';
     TRY(copy_geometry(&s, path, options->unit, &made, error));
+    take_cameras(&s, options->unit, &made);
     TRY(name_groups(&s, &made, error));
     TRY(apply_materials(&s, path, options, &made, &found, error));
     if (!is_obj) warn_of_lost_precision(&s, path, &made);

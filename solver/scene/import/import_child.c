@@ -1,5 +1,6 @@
 /* Reads scene files in a child process with limits, which sends plain arrays through a pipe. The parent
  * checks all that it receives. */
+#include "solver/base/utf8.h"
 #include "solver/scene/import/imported_faces.h"
 #include "store/confined.h"
 
@@ -9,13 +10,15 @@
 #include <string.h>
 #include <sys/wait.h>
 
-/* The first bytes that the child sends; points, elements, both name texts and the material values follow. */
+/* The first bytes that the child sends; points, elements, both name texts, the material values and
+ * the cameras follow. */
 typedef struct reply_header {
     char magic[8];
     uint64_t status;
     char message[sizeof((lam_error *)0)->message];
     import_warnings warnings;
-    uint64_t n_points, n_elements, n_objects, object_bytes, n_materials, material_bytes, dropped, latin1;
+    uint64_t n_points, n_elements, n_objects, object_bytes, n_materials, material_bytes, n_cameras, dropped,
+        latin1;
 } reply_header;
 
 static const char reply_magic[8] = "lamsoup";
@@ -37,6 +40,7 @@ static void send_reply(lam_status result, const lam_error *error, const imported
     header.object_bytes = s->objects.text_bytes;
     header.n_materials = s->materials.n;
     header.material_bytes = s->materials.text_bytes;
+    header.n_cameras = s->n_cameras;
     header.dropped = s->dropped;
     header.latin1 = s->latin1;
     const struct {
@@ -47,7 +51,8 @@ static void send_reply(lam_status result, const lam_error *error, const imported
                  {s->elements, s->n_elements * sizeof *s->elements},
                  {s->objects.text, s->objects.text_bytes},
                  {s->materials.text, s->materials.text_bytes},
-                 {s->values, s->materials.n * sizeof *s->values}};
+                 {s->values, s->materials.n * sizeof *s->values},
+                 {s->cameras, s->n_cameras * sizeof *s->cameras}};
     for (size_t k = 0; k < sizeof parts / sizeof *parts; k++)
         if (!confined_send(CONFINED_REPLY, parts[k].data, parts[k].bytes)) return;
 }
@@ -108,6 +113,16 @@ static bool elements_are_sound(const imported_faces *s) {
     return true;
 }
 
+static bool cameras_are_sound(imported_faces *s) {
+    for (size_t k = 0; k < s->n_cameras; k++) {
+        scene_camera *c = &s->cameras[k];
+        const size_t length = strnlen(c->name, sizeof c->name);
+        if (length == 0 || length == sizeof c->name || !utf8_is_valid(c->name, length)) return false;
+        if (!scene_camera_settle(c) || scene_camera_find(k, s->cameras, c->name) != NULL) return false;
+    }
+    return true;
+}
+
 /* Receives a reply into s; *whole is false where the pipe ended before. */
 static lam_status receive_reply(confined *child, const char *path, size_t most_bytes, imported_faces *s,
                                 bool *whole, lam_error *error) {
@@ -125,7 +140,8 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
     const uint64_t most = most_bytes / 8; /* except for names, no entry is smaller in the pipe */
     sound = sound && header.status == LAM_OK && header.n_points < most && header.n_elements < most &&
             header.n_points < TABLE_NONE && header.n_elements < TABLE_NONE && header.n_elements > 0 &&
-            header.object_bytes < most && header.material_bytes < most && header.n_materials < most;
+            header.object_bytes < most && header.material_bytes < most && header.n_materials < most &&
+            header.n_cameras <= SCENE_CAMERAS_MOST;
     if (!sound) FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
     s->points.points = receive_array(child, header.n_points, sizeof *s->points.points, whole, error);
     if (s->points.points == NULL) TRY(LAM_ERR_MEMORY);
@@ -139,12 +155,15 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
     if (materials == NULL) TRY(LAM_ERR_MEMORY);
     s->values = receive_array(child, header.n_materials, sizeof *s->values, whole, error);
     if (s->values == NULL) TRY(LAM_ERR_MEMORY);
+    s->cameras = receive_array(child, header.n_cameras, sizeof *s->cameras, whole, error);
+    if (s->cameras == NULL) TRY(LAM_ERR_MEMORY);
+    s->n_cameras = s->camera_capacity = header.n_cameras;
     if (!*whole) goto done;
     bool objects_sound = false, materials_sound = false;
     TRY(names_of_block(objects, header.object_bytes, header.n_objects, &s->objects, &objects_sound, error));
     TRY(names_of_block(materials, header.material_bytes, header.n_materials, &s->materials, &materials_sound,
                        error));
-    if (!objects_sound || !materials_sound || !elements_are_sound(s))
+    if (!objects_sound || !materials_sound || !elements_are_sound(s) || !cameras_are_sound(s))
         FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
     s->warnings = header.warnings;
     s->dropped = header.dropped;

@@ -38,6 +38,7 @@ void imported_faces_free(imported_faces *s) {
     free(s->polygons);
     free(s->elements);
     free(s->values);
+    free(s->cameras);
     point_table_free(&s->points);
     name_table_free(&s->objects);
     name_table_free(&s->materials);
@@ -98,6 +99,34 @@ lam_status imported_faces_add_material(imported_faces *s, const char *name, size
         return LAM_ERR_MEMORY;
     s->values[*index] = (imported_material){0};
     return LAM_OK;
+}
+
+/* The longest beginning of a name of at most most bytes that is whole in UTF-8. */
+static size_t whole_length(const char *name, size_t most) {
+    size_t length = strlen(name);
+    if (length <= most) return length;
+    for (length = most; length > 0 && ((unsigned char)name[length] & 0xC0u) == 0x80u;) length--;
+    return length;
+}
+
+lam_status imported_faces_add_camera(imported_faces *s, const char *path, const scene_camera *camera,
+                                     lam_error *error) {
+    lam_status status = LAM_OK;
+    scene_camera made = *camera;
+    if (!scene_camera_settle(&made) || s->n_cameras == SCENE_CAMERAS_MOST) {
+        import_warn(&s->warnings, "%s: the camera '%s' is left out: %s", path, camera->name,
+                    s->n_cameras == SCENE_CAMERAS_MOST ? "there are too many"
+                                                       : "its place or field of view is not usable");
+        goto done;
+    }
+    for (unsigned k = 2; scene_camera_find(s->n_cameras, s->cameras, made.name) != NULL; k++) {
+        const size_t length = whole_length(camera->name, sizeof made.name - 12);
+        snprintf(made.name, sizeof made.name, "%.*s-%u", (int)length, camera->name, k);
+    }
+    TRY(array_grow(&s->cameras, &s->camera_capacity, s->n_cameras + 1, sizeof *s->cameras, "cameras", error));
+    s->cameras[s->n_cameras++] = made;
+done:
+    return status;
 }
 
 static lam_status add_element(imported_faces *s, const uint32_t piece[4],

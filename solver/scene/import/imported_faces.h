@@ -3,6 +3,7 @@
 #ifndef LAMBERT_SCENE_IMPORT_IMPORTED_FACES_H
 #define LAMBERT_SCENE_IMPORT_IMPORTED_FACES_H
 
+#include "solver/base/scene_cameras.h"
 #include "solver/scene/polygon_split.h"
 #include "solver/scene/tables.h"
 
@@ -46,6 +47,8 @@ typedef struct imported_faces {
     name_table objects, materials;
     imported_material *values; /* [materials.n] */
     size_t value_capacity;
+    scene_camera *cameras; /* in units of the file, settled; names differ */
+    size_t n_cameras, camera_capacity;
     size_t latin1;      /* names that were not UTF-8 and were read as Latin-1 */
     const char *assets; /* folder that files of the scene may lie in beside the scene's own; NULL: none */
     import_warnings warnings;
@@ -63,6 +66,11 @@ lam_status imported_faces_add_object(imported_faces *s, const char *name, size_t
                                      lam_error *error);
 lam_status imported_faces_add_material(imported_faces *s, const char *name, size_t length, uint32_t *index,
                                        lam_error *error);
+
+/* Adds a camera, whose name is made different from those before: NAME-2 and so on. One that cannot be
+ * settled, or beyond SCENE_CAMERAS_MOST, is left out with a warning. */
+lam_status imported_faces_add_camera(imported_faces *s, const char *path, const scene_camera *camera,
+                                     lam_error *error);
 
 /* Turns polygons into elements: planar convex quads stay, others become triangles, faces without an area are
  * counted in dropped. Equal vertices are shared, unused ones dropped. Errors: LAM_ERR_FORMAT for an empty
@@ -83,6 +91,16 @@ asset_place asset_find(const char *scene, const char *assets, const char *file, 
  * to tell. */
 lam_status gltf_check_head(const char *path, const char *bytes, size_t length, lam_error *error);
 lam_status ply_check_head(const char *path, const char *bytes, size_t length, lam_error *error);
+
+/* Moves a view of a glTF or GLB to its JSON, which is the first chunk of a GLB; a damaged GLB stays as it is.
+ */
+void gltf_find_json(const char **bytes, size_t *length);
+
+/* Adds the perspective cameras of the nodes of a glTF's or GLB's scene, in the order of its tree, in scene
+ * coordinates and by the names of their nodes. Broken JSON has none: the library says so. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status gltf_read_cameras(const char *path, const char *bytes, size_t length, imported_faces *s,
+                             lam_error *error);
 
 /* Some writers of GLB do not pad chunks to 4 bytes, which the library refuses. *out is a padded copy, freed
  * by the caller, or NULL where the file is not a GLB or is padded. Errors: LAM_ERR_MEMORY. */
