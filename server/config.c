@@ -48,7 +48,7 @@ static const option_row store_rows[] = {
      .most = SIZE_MOST,
      .help =
          "Most memory that requests take: bodies, emissions, answers until they are sent; further ones wait "
-         "within their time, and are answered 422 where they alone would take more"},
+         "within their time, and are answered 422 where they alone would take more than three quarters"},
     {.name = "max-variants",
      .kind = OPTION_COUNT,
      .offset = AT(max_variants),

@@ -176,7 +176,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     if (labels == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < route_label_count(); i++) labels[i] = route_label(i);
     atomic_init(&s.state, SERVICE_LOADING);
-    request_ledger_init(&s.memory, c->max_request_memory);
+    request_ledger_init(&s.memory, c->max_request_memory, c->max_buffered);
     TRY(peer_rules_read(&c->trusted_proxies, &s.peers, error));
     if (c->token_file != NULL) TRY(tokens_open(c->token_file, stderr, &s.tokens, error));
     if (c->access_log != NULL) TRY(access_log_open(c->access_log, &s.access_log, error));

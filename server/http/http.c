@@ -95,8 +95,9 @@ static void refuse_length(request *r) {
 
 static void refuse_to_hold(request *r, const char *what) {
     answer_refuse(&r->answer, PROBLEM_UNAVAILABLE,
-                  "there is no room for %s: %zu bytes of bodies are held at once (--max-buffered)", what,
-                  r->service->config->max_buffered);
+                  "there is no room for %s: %zu bytes of bodies are held at once, and not all of them of one "
+                  "client (--max-buffered)",
+                  what, r->service->config->max_buffered);
 }
 
 /* The checks of the head: route, method, host and page, token, scene, type, length. True if the body is to be
@@ -124,32 +125,24 @@ static bool check_head(request *r, const char *method, const char *target, uint6
         return false;
     }
     /* Announced bytes are not reserved: otherwise a few slow clients would exclude all others. */
-    const size_t held = atomic_load(&s->body_bytes);
-    if (length > 0 && (held > s->config->max_buffered || length > s->config->max_buffered - held)) {
-        refuse_to_hold(r, "the body");
-        return false;
-    }
-    return true;
+    if (length == 0 || request_memory_allows_body(&r->memory, length)) return true;
+    refuse_to_hold(r, "the body");
+    return false;
 }
 
 /* Appends to the body and counts its bytes; false, with the answer made, if there is no room. */
 static bool hold_body(request *r, const char *bytes, size_t count) {
-    service *s = r->service;
-    const size_t before = atomic_fetch_add(&s->body_bytes, count);
-    const bool room = before <= s->config->max_buffered && count <= s->config->max_buffered - before;
     problem why = {0};
     r->memory.wanted = 0;
-    if (room && request_memory_take(&r->memory, count, &why)) {
+    if (request_memory_take_body(&r->memory, count, &why)) {
         if (buffer_append(&r->body, bytes, count)) return true;
-        request_memory_give_back(&r->memory, count);
-    }
-    atomic_fetch_sub(&s->body_bytes, count);
-    if (why.status != 0)
-        answer_problem(&r->answer, &why);
-    else if (room)
+        request_memory_give_back_body(&r->memory, count);
         answer_refuse(&r->answer, PROBLEM_NO_MEMORY, "not enough memory for the body");
-    else
+    } else if (why.status != 0) {
+        answer_problem(&r->answer, &why);
+    } else {
         refuse_to_hold(r, "the rest of the body");
+    }
     return false;
 }
 

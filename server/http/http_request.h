@@ -39,7 +39,7 @@ typedef struct request {
     bool answered;          /* the answer is made; the rest of the body is dropped */
     bool last;              /* the connection ends with this answer */
     bool queued;            /* the answer was handed to libmicrohttpd */
-    buffer body;            /* counted in the service's body_bytes and in memory */
+    buffer body;            /* counted in memory */
     request_memory memory;  /* of the body, of what is computed, of the answer */
     uint64_t received;
     uint64_t announced; /* length of the body; 0: unknown */

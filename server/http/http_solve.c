@@ -24,8 +24,7 @@ bool http_check_health(request *r) {
 }
 
 void http_drop_body(request *r) {
-    atomic_fetch_sub(&r->service->body_bytes, r->body.length);
-    request_memory_give_back(&r->memory, r->body.length);
+    request_memory_give_back_body(&r->memory, r->body.length);
     buffer_free(&r->body);
 }
 

@@ -6,7 +6,7 @@ void get_metrics(call *in, answer *out) {
     const catalog_snapshot *snapshot = in->snapshot;
     metrics_gauges gauges = {.queued = batch_jobs(s->queue),
                              .refining = atomic_load(&s->n_refining),
-                             .body_bytes = atomic_load(&s->body_bytes)};
+                             .body_bytes = request_ledger_bodies(in->memory->ledger)};
     metrics_stores stores = {.mapped_bytes = 0};
     size_t n_mapped = 0;
     buffer b = {0};

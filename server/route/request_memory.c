@@ -5,8 +5,8 @@
 /* A request of less than this part of the first one that waits may overtake it. */
 #define SMALL_PART 16
 
-void request_ledger_init(request_ledger *ledger, size_t room) {
-    *ledger = (request_ledger){.room = room};
+void request_ledger_init(request_ledger *ledger, size_t room, size_t room_of_bodies) {
+    *ledger = (request_ledger){.all.room = room, .bodies.room = room_of_bodies};
     pthread_mutex_init(&ledger->lock, NULL);
 }
 
@@ -15,31 +15,18 @@ void request_ledger_destroy(request_ledger *ledger) {
 }
 
 size_t request_ledger_most(const request_ledger *ledger) {
-    return ledger->room;
-}
-
-static size_t *held_by(request_ledger *ledger, uint64_t client) {
-    return &ledger->by_client[client * UINT64_C(0x9E3779B97F4A7C15) >> 56];
-}
-
-static void add_taken(const request_memory *m, size_t bytes) {
-    m->ledger->taken += bytes;
-    *held_by(m->ledger, m->client) += bytes;
-}
-
-static void subtract_taken(const request_memory *m, size_t bytes) {
-    m->ledger->taken -= bytes;
-    *held_by(m->ledger, m->client) -= bytes;
+    return shares_most(&ledger->all);
 }
 
 /* True if the request comes before the other: its client holds less, or as much and it came first. */
-static bool is_before(request_ledger *ledger, const request_memory *m, const request_memory *first) {
+static bool is_before(const request_ledger *ledger, const request_memory *m, const request_memory *first) {
     if (first == NULL) return true;
-    const size_t held = *held_by(ledger, m->client), held_first = *held_by(ledger, first->client);
+    const size_t held = shares_of(&ledger->all, m->client),
+                 held_first = shares_of(&ledger->all, first->client);
     return held < held_first || (held == held_first && m->since < first->since);
 }
 
-static request_memory *find_first(request_ledger *ledger) {
+static request_memory *find_first(const request_ledger *ledger) {
     request_memory *first = NULL;
     for (request_memory *m = ledger->first; m != NULL; m = m->after)
         if (is_before(ledger, m, first)) first = m;
@@ -47,16 +34,13 @@ static request_memory *find_first(request_ledger *ledger) {
 }
 
 /* True if the request, which needs so much in all, may not overtake the first one that waits. */
-static bool is_held_up(request_ledger *ledger, const request_memory *m, size_t wanted) {
+static bool is_held_up(const request_ledger *ledger, const request_memory *m, size_t wanted) {
     if (ledger->first == NULL) return false;
     const request_memory *first = find_first(ledger);
     return first != m && wanted >= first->wanted / SMALL_PART &&
-           (first->client == m->client || *held_by(ledger, m->client) > *held_by(ledger, first->client)) &&
+           (first->client == m->client ||
+            shares_of(&ledger->all, m->client) > shares_of(&ledger->all, first->client)) &&
            clock_seconds() - first->since > REQUEST_MEMORY_PATIENCE;
-}
-
-static bool has_room(const request_ledger *ledger, size_t bytes) {
-    return bytes <= ledger->room - ledger->taken;
 }
 
 static void unlist(request_memory *m) {
@@ -82,30 +66,32 @@ static void grant(request_ledger *ledger) {
     for (;;) {
         request_memory *best = NULL;
         for (request_memory *m = ledger->first; m != NULL; m = m->after)
-            if (has_room(ledger, m->wanted - m->held) && is_before(ledger, m, best) &&
+            if (shares_allow(&ledger->all, m->client, m->wanted - m->held) && is_before(ledger, m, best) &&
                 !is_held_up(ledger, m, m->wanted))
                 best = m;
         if (best == NULL) return;
         best->assured = best->wanted;
         best->granted = best->wanted - best->held;
-        add_taken(best, best->granted);
+        shares_add(&ledger->all, best->client, best->granted);
         wake(best, false);
     }
 }
 
-/* The bytes that those who wait hold, of one client or (NULL) of all. */
-static size_t held_waiting(const request_ledger *ledger, const uint64_t *client) {
+/* The bytes that a client holds by waiting. */
+static size_t held_waiting(const request_ledger *ledger, uint64_t client) {
     size_t sum = 0;
     for (const request_memory *m = ledger->first; m != NULL; m = m->after)
-        if (client == NULL || m->client == *client) sum += m->held;
+        if (m->client == client) sum += m->held;
     return sum;
 }
 
 /* True if one of those who wait could go on once all others are done. */
 static bool can_any_go_on(const request_ledger *ledger) {
-    const size_t held = held_waiting(ledger, NULL);
+    shares then = {.room = ledger->all.room};
     for (const request_memory *m = ledger->first; m != NULL; m = m->after)
-        if (held <= ledger->room && m->wanted - m->held <= ledger->room - held) return true;
+        shares_add(&then, m->client, m->held);
+    for (const request_memory *m = ledger->first; m != NULL; m = m->after)
+        if (shares_allow(&then, m->client, m->wanted - m->held)) return true;
     return ledger->first == NULL;
 }
 
@@ -114,7 +100,7 @@ static void refuse_one(request_ledger *ledger) {
     request_memory *worst = NULL;
     size_t most = 0;
     for (request_memory *m = ledger->first; m != NULL; m = m->after) {
-        const size_t held = held_waiting(ledger, &m->client);
+        const size_t held = held_waiting(ledger, m->client);
         if (held < most) continue;
         most = held;
         worst = m;
@@ -135,9 +121,10 @@ static void settle(request_ledger *ledger) {
 static bool take(request_memory *m, size_t bytes) {
     request_ledger *ledger = m->ledger;
     const size_t more = bytes > m->granted ? bytes - m->granted : 0;
-    if (more > 0 && (!has_room(ledger, more) || is_held_up(ledger, m, bytes_plus(m->held, bytes))))
+    if (more > 0 &&
+        (!shares_allow(&ledger->all, m->client, more) || is_held_up(ledger, m, bytes_plus(m->held, bytes))))
         return false;
-    add_taken(m, more);
+    shares_add(&ledger->all, m->client, more);
     m->granted -= bytes - more;
     m->held += bytes;
     return true;
@@ -154,18 +141,18 @@ static bool refuse(request_memory *m, size_t bytes, problem *why) {
                 why, PROBLEM_TOO_MUCH,
                 "the request takes more memory than there is (--max-request-memory %zu); send several "
                 "requests",
-                ledger->room);
-        return problem_set(
-            why, PROBLEM_TOO_MUCH,
-            "the request takes %zu bytes of memory, at most %zu (--max-request-memory); send several "
-            "requests, or select elements",
-            wanted, most);
+                ledger->all.room);
+        return problem_set(why, PROBLEM_TOO_MUCH,
+                           "the request takes %zu bytes of memory, at most %zu (three quarters of "
+                           "--max-request-memory); send "
+                           "several requests, or select elements",
+                           wanted, most);
     }
     m->wanted = wanted;
     return problem_set(why, PROBLEM_NO_MEMORY,
                        "the request takes %zu bytes of memory, of which others hold too much now "
                        "(--max-request-memory %zu); try again",
-                       wanted, ledger->room);
+                       wanted, ledger->all.room);
 }
 
 bool request_memory_take(request_memory *m, size_t bytes, problem *why) {
@@ -173,6 +160,46 @@ bool request_memory_take(request_memory *m, size_t bytes, problem *why) {
     const bool taken = take(m, bytes) || refuse(m, bytes, why);
     pthread_mutex_unlock(&m->ledger->lock);
     return taken;
+}
+
+/* With the lock. */
+static bool allows_body(const request_memory *m, size_t bytes) {
+    const shares *bodies = &m->ledger->bodies;
+    if (shares_of(bodies, m->client) > m->body) return shares_allow(bodies, m->client, bytes);
+    return bodies->taken <= bodies->room && bytes <= bodies->room - bodies->taken;
+}
+
+bool request_memory_allows_body(const request_memory *m, size_t bytes) {
+    pthread_mutex_lock(&m->ledger->lock);
+    const bool allowed = allows_body(m, bytes);
+    pthread_mutex_unlock(&m->ledger->lock);
+    return allowed;
+}
+
+bool request_memory_take_body(request_memory *m, size_t bytes, problem *why) {
+    pthread_mutex_lock(&m->ledger->lock);
+    const bool taken = allows_body(m, bytes) && (take(m, bytes) || refuse(m, bytes, why));
+    if (taken) {
+        shares_add(&m->ledger->bodies, m->client, bytes);
+        m->body += bytes;
+    }
+    pthread_mutex_unlock(&m->ledger->lock);
+    return taken;
+}
+
+void request_memory_give_back_body(request_memory *m, size_t bytes) {
+    pthread_mutex_lock(&m->ledger->lock);
+    shares_subtract(&m->ledger->bodies, m->client, bytes);
+    m->body -= bytes;
+    pthread_mutex_unlock(&m->ledger->lock);
+    request_memory_give_back(m, bytes);
+}
+
+size_t request_ledger_bodies(request_ledger *ledger) {
+    pthread_mutex_lock(&ledger->lock);
+    const size_t bytes = ledger->bodies.taken;
+    pthread_mutex_unlock(&ledger->lock);
+    return bytes;
 }
 
 bool request_memory_take_of(void *owner, size_t bytes, problem *why) {
@@ -186,7 +213,7 @@ void request_memory_give_back(request_memory *m, size_t bytes) {
     const size_t has = m->held + m->granted, short_of = m->assured > has ? m->assured - has : 0,
                  kept = bytes < short_of ? bytes : short_of;
     m->granted += kept;
-    subtract_taken(m, bytes - kept);
+    shares_subtract(&m->ledger->all, m->client, bytes - kept);
     settle(m->ledger);
     pthread_mutex_unlock(&m->ledger->lock);
 }
@@ -194,14 +221,14 @@ void request_memory_give_back(request_memory *m, size_t bytes) {
 void request_memory_hand_over(request_memory *m, size_t bytes) {
     pthread_mutex_lock(&m->ledger->lock);
     m->held -= bytes;
-    *held_by(m->ledger, m->client) -= bytes;
+    m->ledger->all.of[shares_place(m->client)] -= bytes;
     pthread_mutex_unlock(&m->ledger->lock);
 }
 
 void request_ledger_give_back(void *of, size_t bytes) {
     request_ledger *ledger = of;
     pthread_mutex_lock(&ledger->lock);
-    ledger->taken -= bytes;
+    ledger->all.taken -= bytes;
     settle(ledger);
     pthread_mutex_unlock(&ledger->lock);
 }
@@ -256,8 +283,8 @@ void request_ledger_count_full(request_ledger *ledger) {
 
 bool request_ledger_write(request_ledger *ledger, buffer *b) {
     pthread_mutex_lock(&ledger->lock);
-    const request_ledger now = {.room = ledger->room,
-                                .taken = ledger->taken,
+    const request_ledger now = {.all.room = ledger->all.room,
+                                .all.taken = ledger->all.taken,
                                 .n_waiting = ledger->n_waiting,
                                 .n_waited = ledger->n_waited,
                                 .n_full = ledger->n_full,
@@ -282,6 +309,6 @@ bool request_ledger_write(request_ledger *ledger, buffer *b) {
         "# TYPE lambertd_request_memory_refused_total counter\n"
         "lambertd_request_memory_refused_total{why=\"full\"} %llu\n"
         "lambertd_request_memory_refused_total{why=\"never\"} %llu\n",
-        now.taken, now.room, now.n_waiting, (unsigned long long)now.n_waited, (unsigned long long)now.n_full,
-        (unsigned long long)now.n_never);
+        now.all.taken, now.all.room, now.n_waiting, (unsigned long long)now.n_waited,
+        (unsigned long long)now.n_full, (unsigned long long)now.n_never);
 }

@@ -1,27 +1,24 @@
 /* The memory that requests may take, --max-request-memory: bodies, emissions, what is computed from them, and
  * answers until their last byte is sent. It is taken before it is allocated, by what follows from shapes, and
  * given back when it is freed. The memory that the process keeps is another ledger's
- * (server/scene/memory_ledger.h).
+ * (server/scene/memory_ledger.h). No client has more than its share (server/net/shares.h).
  *
- * Waiting. A request that finds no room gives back all but its body and waits. Freed memory goes to the
- * waiting request whose client holds least, of those to the one that came first, if there is room for all
- * that it was short of; otherwise to the next that has room. The bytes are then its own, so that nobody takes
- * them before it goes on. Once the first of this order has waited for REQUEST_MEMORY_PATIENCE seconds, it is
- * overtaken no more by requests of at least a sixteenth of its size, of its own client or of those that hold
- * more. Where requests that wait hold so much by their bodies that none of them could go on, the last one of
- * the client that holds most of it is refused. */
+ * Waiting. A request that finds no room, or none in its client's share, gives back all but its body and
+ * waits. Freed memory goes to the waiting request whose client holds least, of those to the one that came
+ * first, if there is room for all that it was short of; otherwise to the next that has room. The bytes are
+ * then its own, so that nobody takes them before it goes on. Once the first of this order has waited for
+ * REQUEST_MEMORY_PATIENCE seconds, it is overtaken no more by requests of at least a sixteenth of its size,
+ * of its own client or of those that hold more. Where requests that wait hold so much by their bodies that
+ * none of them could go on, the last one of the client that holds most of it is refused. */
 #ifndef LAMBERT_SERVER_ROUTE_REQUEST_MEMORY_H
 #define LAMBERT_SERVER_ROUTE_REQUEST_MEMORY_H
 
+#include "server/net/shares.h"
 #include "solver/codec/buffer.h"
 #include "solver/codec/problem.h"
 
 #include <pthread.h>
 #include <stdint.h>
-
-/* Clients that meet in a place of the ledger's table count as one; the keys are hashes that nobody can
- * choose (server/net/peer.h). */
-enum { REQUEST_MEMORY_CLIENTS = 256 };
 
 #define REQUEST_MEMORY_PATIENCE 1.0
 
@@ -30,18 +27,17 @@ typedef struct request_memory request_memory;
 /* Of all requests. Any thread, by the functions below. */
 typedef struct request_ledger {
     pthread_mutex_t lock;
-    size_t room, taken;
-    size_t by_client[REQUEST_MEMORY_CLIENTS]; /* of taken */
-    request_memory *first;                    /* requests that wait */
+    shares all, bodies;    /* bytes; bodies are part of all, with a limit of their own (--max-buffered) */
+    request_memory *first; /* requests that wait */
     size_t n_waiting;
     uint64_t n_waited;        /* requests that have begun to wait */
     uint64_t n_full, n_never; /* refusals where others held the room, and of what passes the whole of it */
 } request_ledger;
 
-void request_ledger_init(request_ledger *ledger, size_t room);
+void request_ledger_init(request_ledger *ledger, size_t room, size_t room_of_bodies);
 void request_ledger_destroy(request_ledger *ledger);
 
-/* The most bytes that one request may have. */
+/* The most bytes that one request, or one client, may have (server/net/shares.h). */
 size_t request_ledger_most(const request_ledger *ledger);
 
 /* Of one request; belongs to the thread that has the request. Zero at the start but for ledger. */
@@ -49,6 +45,7 @@ struct request_memory {
     request_ledger *ledger;
     uint64_t client; /* whose it is */
     size_t held;     /* taken */
+    size_t body;     /* bytes of its body among them */
     size_t granted;  /* kept for it beside these */
     size_t assured;  /* after a wait, until request_memory_keep: what it gives back stays granted up to this
                         sum of both, as it may need it again to come as far as before */
@@ -63,6 +60,17 @@ struct request_memory {
 /* Takes bytes; false with *why: 422 with the sizes if the request could never have as much, 503 if others
  * hold it (`wanted` is then set). */
 bool request_memory_take(request_memory *m, size_t bytes, problem *why);
+
+/* True if so much more of the body may be held: one body of a client may take all of --max-buffered, several
+ * have a share of it. */
+bool request_memory_allows_body(const request_memory *m, size_t bytes);
+
+/* Takes bytes of the body; false with *why, as above, or with none set where --max-buffered is full. */
+bool request_memory_take_body(request_memory *m, size_t bytes, problem *why);
+void request_memory_give_back_body(request_memory *m, size_t bytes);
+
+/* Bytes of bodies that are held. */
+size_t request_ledger_bodies(request_ledger *ledger);
 
 /* The same for a codec_scene, whose owner is a request_memory. */
 bool request_memory_take_of(void *owner, size_t bytes, problem *why);

@@ -33,9 +33,8 @@ typedef struct service {
     problem_counts problems;
     atomic_int state;         /* a service_state */
     connections *connections; /* from http_start to http_stop */
-    atomic_size_t body_bytes; /* bytes of request bodies in memory */
     atomic_size_t n_refining; /* refinements that wait or run */
-    request_ledger memory;    /* --max-request-memory */
+    request_ledger memory;    /* --max-request-memory, --max-buffered */
 } service;
 
 #endif

@@ -150,7 +150,7 @@ class Requests(Case):
 
     def test_requests_under_way(self):
         """Short bodies that ask for 1,024 vectors of 60,000 elements, 246 MB of emission alone."""
-        limit = 300 * MIB
+        limit = 400 * MIB
         with Daemon(self.store, "--threads", 2, "--max-request-memory", limit, "--timeout", 3600) as daemon:
             clients = [self.send(daemon, self.groups(1024), "application/x-npy") for _ in range(6)]
             self.assertEqual({s.recv(12)[9:] for s in clients}, {b"422"})
