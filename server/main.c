@@ -1,5 +1,6 @@
 /* lambertd: reads stores and answers requests over HTTP until a signal ends it. */
 #include "server/http/http.h"
+#include "server/net/listener.h"
 #include "server/route/routes.h"
 #include "server/scene/map_guard.h"
 #include "solver/base/clock.h"
@@ -134,7 +135,7 @@ static bool leave(service *s, http *h, unix_socket *own, const sigset_t *signals
     atomic_store(&s->state, SERVICE_DRAINING);
     const bool hurried = hurried_within((double)s->config->drain_delay_s, signals);
     http_quiesce(h);
-    connections_unlink(own);
+    listener_unlink(own);
     variants_close(s->variants);
     if (!hurried && idle_within(s, (double)s->config->shutdown_timeout_s - LAST_ANSWERS_S, signals))
         return true;
@@ -192,9 +193,8 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     if (c->threads_why[0] != '\0')
         printf("%zu thread%s: %s\n", batch_threads(s.queue), c->threads == 1 ? "" : "s", c->threads_why);
     batch_lend(s.queue);
-    TRY(c->unix_path != NULL
-            ? connections_listen_unix(c->unix_path, &listen_fd, where, sizeof where, &own, error)
-            : connections_listen_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
+    TRY(c->unix_path != NULL ? listener_open_unix(c->unix_path, &listen_fd, where, sizeof where, &own, error)
+                             : listener_open_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
     TRY(origin_rules_read(&c->allowed_hosts, &c->allowed_origins,
                           c->unix_path == NULL ? c->listen_address : NULL, where, &s.origins, error));
     warn_if_open(&s);
@@ -217,7 +217,7 @@ done:
     access_log_close(s.access_log);
     request_ledger_destroy(&s.memory);
     tokens_close(s.tokens);
-    connections_unlink(&own);
+    listener_unlink(&own);
     free(labels);
     return status;
 }

@@ -290,13 +290,35 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     metrics_end(h->service->metrics, label, status, seconds);
 }
 
+/* The key of the socket's address, whoever its requests come from. */
+static uint64_t key_of(const service *s, const struct sockaddr *from) {
+    const peer_fields none = {.n_forwarded = 0};
+    peer who;
+    peer_find(&s->peers, from, &none, &who);
+    return who.key;
+}
+
+static client *add_connection(const http *h, struct MHD_Connection *connection, int fd) {
+    const service *s = h->service;
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+    const struct sockaddr *from = info != NULL ? info->client_addr : NULL;
+    return connections_add(s->connections, fd, key_of(s, from), !peer_is_proxy(&s->peers, from));
+}
+
+static enum MHD_Result on_accept(void *context, const struct sockaddr *from, socklen_t size) {
+    const service *s = ((http *)context)->service;
+    (void)size;
+    return connections_admit(s->connections, key_of(s, from)) ? MHD_YES : MHD_NO;
+}
+
 static void on_connection(void *context, struct MHD_Connection *connection, void **socket_context,
                           enum MHD_ConnectionNotificationCode code) {
     connections *all = ((http *)context)->service->connections;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         const union MHD_ConnectionInfo *info =
             MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-        *socket_context = info != NULL ? connections_add(all, info->connect_fd) : NULL;
+        if (info != NULL) *socket_context = add_connection(context, connection, info->connect_fd);
         /* Without a client of `connections`, libmicrohttpd has to apply the time limit. */
         if (*socket_context == NULL)
             MHD_set_connection_option(connection, MHD_CONNECTION_OPTION_TIMEOUT,
@@ -339,17 +361,18 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
                                 .timeout_s = s->config->timeout_s,
                                 .keep_alive_s = s->config->keep_alive_s,
                                 .least_rate = s->config->min_rate};
-    TRY(connections_affordable(limits.wanted, catalog_stores(s->catalog), &limits.most, error));
+    TRY(connections_affordable(&limits, catalog_stores(s->catalog), error));
     TRY(connections_start(&limits, &s->connections, error));
     /* No time-out of libmicrohttpd: it would close a client whose answer waits in a slow socket. At its limit
      * of connections, or out of descriptors, the daemon accepts none until one closes. */
     h->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL,
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, on_accept, h,
         on_request, h, MHD_OPTION_EXTERNAL_LOGGER, on_library_words, h, MHD_OPTION_LISTEN_SOCKET, listen_fd,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT,
-        (unsigned)limits.most, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h, MHD_OPTION_NOTIFY_COMPLETED,
-        on_completed, h, MHD_OPTION_URI_LOG_CALLBACK, on_request_line, h, MHD_OPTION_UNESCAPE_CALLBACK,
-        keep_escapes, NULL, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+        (unsigned)(limits.most + limits.beyond), MHD_OPTION_NOTIFY_CONNECTION, on_connection, h,
+        MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_URI_LOG_CALLBACK, on_request_line, h,
+        MHD_OPTION_UNESCAPE_CALLBACK, keep_escapes, NULL, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1,
+        MHD_OPTION_END);
     if (h->daemon == NULL) FAIL(error, LAM_ERR_IO, "the HTTP server cannot start");
     h->listen_fd = -1;
     *out = h;

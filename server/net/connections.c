@@ -1,5 +1,6 @@
 #include "server/net/connections.h"
 
+#include "server/net/shares.h"
 #include "solver/base/clock.h"
 
 #include <errno.h>
@@ -7,115 +8,16 @@
 #include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <math.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/ioctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
-
-#define SOCKET_FLAGS (SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC)
-#define BACKLOG 1024
-
-static lam_status split_address(const char *address, char *host, size_t host_size, const char **port,
-                                lam_error *error) {
-    lam_status status = LAM_OK;
-    const char *colon = strrchr(address, ':');
-    if (colon == NULL || colon[1] == '\0')
-        FAIL(error, LAM_ERR_ARGUMENT, "--listen %s: must be HOST:PORT, such as 127.0.0.1:8317", address);
-    size_t length = (size_t)(colon - address);
-    if (length >= 2 && address[0] == '[' && address[length - 1] == ']') {
-        address++;
-        length -= 2;
-    }
-    if (length >= host_size) FAIL(error, LAM_ERR_ARGUMENT, "--listen: the host's name is too long");
-    memcpy(host, address, length);
-    host[length] = '\0';
-    *port = colon + 1;
-    /* getaddrinfo truncates a port to 16 bits. */
-    if (strspn(*port, "0123456789") != strlen(*port) || strlen(*port) > 5 || atoi(*port) > 65535)
-        FAIL(error, LAM_ERR_ARGUMENT, "--listen %s: the port must be from 0 to 65535", address);
-done:
-    return status;
-}
-
-lam_status connections_listen_tcp(const char *address, int *fd, char *where, size_t where_size,
-                                  lam_error *error) {
-    lam_status status = LAM_OK;
-    char host[256], shown_host[64], shown_port[16];
-    const char *port = NULL;
-    struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV};
-    struct addrinfo *found = NULL;
-    struct sockaddr_storage bound = {0};
-    socklen_t bound_size = sizeof bound;
-    int s = -1, one = 1;
-    TRY(split_address(address, host, sizeof host, &port, error));
-    int failed = getaddrinfo(host[0] == '\0' ? NULL : host, port, &hints, &found);
-    if (failed != 0) FAIL(error, LAM_ERR_ARGUMENT, "--listen %s: %s", address, gai_strerror(failed));
-    s = socket(found->ai_family, SOCKET_FLAGS, 0);
-    if (s < 0 || setsockopt(s, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one) != 0 ||
-        bind(s, found->ai_addr, found->ai_addrlen) != 0 || listen(s, BACKLOG) != 0 ||
-        getsockname(s, (struct sockaddr *)&bound, &bound_size) != 0)
-        FAIL(error, LAM_ERR_IO, "cannot listen on %s: %s; choose another with --listen", address,
-             strerror(errno));
-    if (getnameinfo((struct sockaddr *)&bound, bound_size, shown_host, sizeof shown_host, shown_port,
-                    sizeof shown_port, NI_NUMERICHOST | NI_NUMERICSERV) != 0)
-        FAIL(error, LAM_ERR_IO, "cannot tell what %s is bound to", address);
-    bool bracket = strchr(shown_host, ':') != NULL;
-    snprintf(where, where_size, "http://%s%s%s:%s", bracket ? "[" : "", shown_host, bracket ? "]" : "",
-             shown_port);
-    *fd = s;
-    s = -1;
-done:
-    if (found != NULL) freeaddrinfo(found);
-    if (s >= 0) close(s);
-    return status;
-}
-
-lam_status connections_listen_unix(const char *path, int *fd, char *where, size_t where_size,
-                                   unix_socket *own, lam_error *error) {
-    lam_status status = LAM_OK;
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    struct stat there;
-    int s = -1;
-    if (path[0] == '\0' || strlen(path) >= sizeof address.sun_path)
-        FAIL(error, LAM_ERR_ARGUMENT, "--unix %s: must have 1 to %zu characters", path,
-             sizeof address.sun_path - 1);
-    strcpy(address.sun_path, path);
-    s = socket(AF_UNIX, SOCKET_FLAGS, 0);
-    if (s < 0) FAIL(error, LAM_ERR_IO, "%s: %s", path, strerror(errno));
-    if (lstat(path, &there) == 0 && S_ISSOCK(there.st_mode) &&
-        connect(s, (struct sockaddr *)&address, sizeof address) != 0 && errno == ECONNREFUSED)
-        unlink(path);
-    close(s);
-    s = socket(AF_UNIX, SOCKET_FLAGS, 0);
-    if (s < 0 || bind(s, (struct sockaddr *)&address, sizeof address) != 0 || listen(s, BACKLOG) != 0)
-        FAIL(error, LAM_ERR_IO, "cannot listen on %s: %s", path, strerror(errno));
-    snprintf(where, where_size, "unix:%s", path);
-    if (lstat(path, &there) == 0)
-        *own = (unix_socket){.path = path, .device = there.st_dev, .inode = there.st_ino};
-    *fd = s;
-    s = -1;
-done:
-    if (s >= 0) close(s);
-    return status;
-}
-
-void connections_unlink(unix_socket *own) {
-    struct stat there;
-    if (own->path != NULL && lstat(own->path, &there) == 0 && there.st_dev == own->device &&
-        there.st_ino == own->inode)
-        unlink(own->path);
-    own->path = NULL;
-}
 
 /* Descriptors for other than connections: standard streams, the listening socket, epoll, stores being read,
  * the log, libraries. */
@@ -132,6 +34,10 @@ void connections_unlink(unix_socket *own) {
 /* Seconds after its end when a connection is closed. */
 #define END_SLACK 1e-3
 
+/* Connections that are accepted beyond the limit, of which the client that has most may take half. */
+#define BEYOND_MOST ((size_t)32)
+#define BEYOND_LEAST ((size_t)8)
+
 /* Idle connections closed in a second, at most. */
 #define PLACES 64
 
@@ -142,15 +48,19 @@ typedef enum cut_reason {
     CUT_ANSWER,
     CUT_PLACE,
     CUT_DEADLINE,
+    CUT_SHARE,
     N_CUT_REASONS
 } cut_reason;
-static const char *const reasons[N_CUT_REASONS] = {"idle", "head", "body", "answer", "place", "deadline"};
+static const char *const reasons[N_CUT_REASONS] = {"idle",  "head",     "body", "answer",
+                                                   "place", "deadline", "share"};
 
 struct client {
     client *before, *after;
     int fd;
     connection_stage stage;
     bool cut;
+    bool counts;     /* counts for its client */
+    uint64_t key;    /* of its client */
     bool checked;    /* seen was set in this stage */
     double since;    /* seconds, begin of the stage */
     double deadline; /* extended by bytes that move */
@@ -168,11 +78,13 @@ struct connections {
     double next_end; /* the earliest of all, or earlier */
     bool hurried;    /* an end comes before the next check */
     size_t n_open;
+    shares kept;        /* connections but those that are being closed */
+    uint64_t n_refused; /* not accepted, as their client has most of all */
     uint64_t n_cut[N_CUT_REASONS];
     bool ended;
 };
 
-lam_status connections_affordable(size_t wanted, size_t n_stores, size_t *most, lam_error *error) {
+lam_status connections_affordable(connection_limits *limits, size_t n_stores, lam_error *error) {
     lam_status status = LAM_OK;
     struct rlimit limit;
     if (getrlimit(RLIMIT_NOFILE, &limit) != 0) FAIL(error, LAM_ERR_IO, "the limit on open files is unknown");
@@ -188,7 +100,9 @@ lam_status connections_affordable(size_t wanted, size_t n_stores, size_t *most, 
     const size_t others = OTHER_DESCRIPTORS + n_stores,
                  left = limit.rlim_cur > others ? (size_t)(limit.rlim_cur - others) : 0;
     const size_t allowed = left < LEAST_CONNECTIONS ? LEAST_CONNECTIONS : left;
-    *most = wanted < allowed ? wanted : allowed;
+    limits->most = limits->wanted < allowed ? limits->wanted : allowed;
+    const size_t spare = allowed - limits->most;
+    limits->beyond = spare < BEYOND_LEAST ? BEYOND_LEAST : spare < BEYOND_MOST ? spare : BEYOND_MOST;
 done:
     return status;
 }
@@ -271,9 +185,16 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
     return now > c->deadline;
 }
 
+/* The connection counts no more. */
+static void uncount(connections *all, const client *c) {
+    all->kept.taken--;
+    if (c->counts) all->kept.of[shares_place(c->key)]--;
+}
+
 /* With the lock, so that the descriptor still belongs to this client. The thread that serves it finds the
  * socket shut down and closes it. */
 static void cut(connections *all, client *c, cut_reason why) {
+    uncount(all, c);
     /* Discards unread bytes of the answer, which would otherwise stay in the socket. */
     const struct linger none = {.l_onoff = 1, .l_linger = 0};
     if (c->stage == STAGE_ANSWER) setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
@@ -362,10 +283,10 @@ done:
 }
 
 void connections_reserve(connections *all, size_t n_stores) {
-    size_t most = 0;
-    if (connections_affordable(all->limits.wanted, n_stores, &most, NULL) != LAM_OK) return;
+    connection_limits limits = {.wanted = all->limits.wanted};
+    if (connections_affordable(&limits, n_stores, NULL) != LAM_OK) return;
     pthread_mutex_lock(&all->lock);
-    all->limits.most = most;
+    all->limits.most = limits.most;
     pthread_mutex_unlock(&all->lock);
 }
 
@@ -399,16 +320,67 @@ static void hurry(connections *all, const client *c) {
     pthread_cond_signal(&all->ending);
 }
 
-client *connections_add(connections *all, int fd) {
+/* How much is lost with a connection, least first. */
+static unsigned loss_of(const client *c) {
+    static const unsigned losses[] = {
+        [STAGE_IDLE] = 0, [STAGE_HEAD] = 1, [STAGE_BODY] = 2, [STAGE_ANSWER] = 3, [STAGE_SOLVE] = 4};
+    return losses[c->stage];
+}
+
+/* The connection that the clients of a place of the table give away. */
+static client *find_gift(const connections *all, size_t place) {
+    client *found = NULL;
+    for (client *c = all->first; c != NULL; c = c->after) {
+        if (c->cut || !c->counts || shares_place(c->key) != place) continue;
+        if (found == NULL || loss_of(c) < loss_of(found) ||
+            (loss_of(c) == loss_of(found) && c->since < found->since))
+            found = c;
+    }
+    return found;
+}
+
+/* Closes one of the client's connections that has sent no head; false if there is none. */
+static bool replace_idle(connections *all, uint64_t key) {
+    client *gift = find_gift(all, shares_place(key));
+    if (gift == NULL || (gift->stage != STAGE_IDLE && gift->stage != STAGE_HEAD)) return false;
+    cut(all, gift, CUT_SHARE);
+    return true;
+}
+
+bool connections_admit(connections *all, uint64_t key) {
+    pthread_mutex_lock(&all->lock);
+    const size_t kept = all->kept.taken;
+    bool admitted = kept < all->limits.most;
+    if (!admitted) {
+        size_t most = 0;
+        for (size_t p = 1; p < SHARES_CLIENTS; p++)
+            if (all->kept.of[p] > all->kept.of[most]) most = p;
+        if (all->kept.of[most] > shares_of(&all->kept, key) + 1) {
+            cut(all, find_gift(all, most), CUT_SHARE);
+            admitted = true;
+        } else {
+            admitted = kept < all->limits.most + all->limits.beyond / 2 || replace_idle(all, key);
+        }
+    }
+    all->n_refused += !admitted;
+    pthread_mutex_unlock(&all->lock);
+    return admitted;
+}
+
+client *connections_add(connections *all, int fd, uint64_t key, bool counts) {
     client *c = calloc(1, sizeof *c);
     if (c == NULL) return NULL;
     c->fd = fd;
+    c->key = key;
+    c->counts = counts;
     begin_stage(all, c, STAGE_HEAD, 0, clock_seconds());
     pthread_mutex_lock(&all->lock);
     c->after = all->first;
     if (all->first != NULL) all->first->before = c;
     all->first = c;
     all->n_open++;
+    all->kept.taken++;
+    if (counts) all->kept.of[shares_place(key)]++;
     pthread_mutex_unlock(&all->lock);
     return c;
 }
@@ -421,6 +393,7 @@ void connections_remove(connections *all, client *c) {
     else
         all->first = c->after;
     if (c->after != NULL) c->after->before = c->before;
+    if (!c->cut) uncount(all, c);
     all->n_open--;
     pthread_mutex_unlock(&all->lock);
     free(c);
@@ -460,6 +433,7 @@ bool connections_write(connections *all, buffer *b) {
     uint64_t n_cut[N_CUT_REASONS];
     pthread_mutex_lock(&all->lock);
     const size_t n_open = all->n_open, most = all->limits.most;
+    const uint64_t n_refused = all->n_refused;
     for (size_t r = 0; r < N_CUT_REASONS; r++) n_cut[r] = all->n_cut[r];
     pthread_mutex_unlock(&all->lock);
     bool written = buffer_printf(b,
@@ -469,10 +443,14 @@ bool connections_write(connections *all, buffer *b) {
                                  "# HELP lambertd_connections_most Limit of open connections.\n"
                                  "# TYPE lambertd_connections_most gauge\n"
                                  "lambertd_connections_most %zu\n"
+                                 "# HELP lambertd_connections_refused_total Connections that were not "
+                                 "accepted, of clients that have most of all.\n"
+                                 "# TYPE lambertd_connections_refused_total counter\n"
+                                 "lambertd_connections_refused_total %llu\n"
                                  "# HELP lambertd_connections_cut_total Connections closed at a time limit, "
                                  "or to make room.\n"
                                  "# TYPE lambertd_connections_cut_total counter\n",
-                                 n_open, most);
+                                 n_open, most, (unsigned long long)n_refused);
     for (size_t r = 0; r < N_CUT_REASONS; r++)
         written = written && buffer_printf(b, "lambertd_connections_cut_total{why=\"%s\"} %llu\n", reasons[r],
                                            (unsigned long long)n_cut[r]);

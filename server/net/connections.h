@@ -1,5 +1,5 @@
-/* The listening socket and the open connections with their time limits: connections of slow readers and
- * writers are closed. Knows sockets, not HTTP. Any thread. */
+/* The open connections with their time limits and the shares of clients in them: connections of slow readers
+ * and writers are closed. Knows sockets, not HTTP. Any thread. */
 #ifndef LAMBERT_SERVER_NET_CONNECTIONS_H
 #define LAMBERT_SERVER_NET_CONNECTIONS_H
 
@@ -27,36 +27,17 @@ typedef enum connection_stage {
 
 typedef struct connection_limits {
     size_t wanted; /* most connections */
+    size_t beyond; /* accepted beyond most, for a moment: while another is closed for it, or idle ones are */
     size_t most;   /* of these, as many as there are descriptors for; when all are open, or no descriptor is
                       left, those idle for longest are closed for others */
     size_t timeout_s, keep_alive_s;
     size_t least_rate; /* bytes a second */
 } connection_limits;
 
-/* *most: the number of connections that the process has descriptors for, at most `wanted`, beside those of
- * n_stores mapped stores and of other files; some, even if these take all. Raises the soft limit to the hard
- * one. Errors: LAM_ERR_IO if there are none. */
-lam_status connections_affordable(size_t wanted, size_t n_stores, size_t *most, lam_error *error);
-
-/* Listens on address, HOST:PORT ([...]:PORT for IPv6). where: the URL for clients, with the port that was
- * taken. The caller closes *fd. Errors: LAM_ERR_ARGUMENT, LAM_ERR_IO. */
-lam_status connections_listen_tcp(const char *address, int *fd, char *where, size_t where_size,
-                                  lam_error *error);
-
-/* A socket in the file system: its path, and the file that was bound there. */
-typedef struct unix_socket {
-    const char *path; /* NULL: none */
-    uint64_t device, inode;
-} unix_socket;
-
-/* Listens on a socket at path; one without a listener is replaced. own is for connections_unlink; its path is
- * the caller's. */
-lam_status connections_listen_unix(const char *path, int *fd, char *where, size_t where_size,
-                                   unix_socket *own, lam_error *error);
-
-/* Removes the socket, once, unless the path is that of another one by now: a successor may have taken it over
- * as soon as this program stopped to listen. */
-void connections_unlink(unix_socket *own);
+/* limits->most: the number of connections that the process has descriptors for, at most `wanted`, beside
+ * those of n_stores mapped stores and of other files; some, even if these take all. Raises the soft limit to
+ * the hard one. Errors: LAM_ERR_IO if there are none. */
+lam_status connections_affordable(connection_limits *limits, size_t n_stores, lam_error *error);
 
 /* Starts a thread that checks all connections once a second. */
 lam_status connections_start(const connection_limits *limits, connections **out, lam_error *error);
@@ -67,8 +48,16 @@ void connections_reserve(connections *all, size_t n_stores);
 /* Ends the thread and frees everything; no connection may be open. */
 void connections_stop(connections *all);
 
-/* Adds a connection at STAGE_HEAD; NULL if memory is short. */
-client *connections_add(connections *all, int fd);
+/* True if a new connection of a client (a key of server/net/peer.h) is to be accepted. When all are in use,
+ * one of the client that has most of them is closed for one of a client that has fewer: the one that has been
+ * idle for longest, or in its stage. One of the client that has most is accepted beyond the limit, if few
+ * are, or for one of its own without a request, or is refused. O(open connections) when all are in use, else
+ * O(1). */
+bool connections_admit(connections *all, uint64_t key);
+
+/* Adds a connection at STAGE_HEAD; NULL if memory is short. counts: it counts for its client, as that of a
+ * proxy does not. */
+client *connections_add(connections *all, int fd, uint64_t key, bool counts);
 
 /* Call it before the descriptor is closed, so that no other connection with this descriptor is closed
  * instead. c may be NULL. */

@@ -337,3 +337,9 @@ void peer_find(const peer_rules *rules, const struct sockaddr *from, const peer_
     }
     name_peer(rules, &who, out);
 }
+
+bool peer_is_proxy(const peer_rules *rules, const struct sockaddr *from) {
+    peer_address address;
+    read_socket(from, &address);
+    return is_trusted(rules, &address);
+}

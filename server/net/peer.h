@@ -53,6 +53,9 @@ void peer_add_field(peer_fields *fields, const char *name, size_t name_size, con
  * the fields), and without a trusted proxy O(1). */
 void peer_find(const peer_rules *rules, const struct sockaddr *from, const peer_fields *fields, peer *out);
 
+/* True if the socket with this address is that of a trusted proxy. */
+bool peer_is_proxy(const peer_rules *rules, const struct sockaddr *from);
+
 /* SipHash-2-4 of bytes under a key of 128 bits (Aumasson and Bernstein 2012). O(length). */
 uint64_t peer_hash(const uint64_t seed[2], const unsigned char *bytes, size_t length);
 

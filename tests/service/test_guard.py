@@ -1,15 +1,18 @@
 """lambertd's defence against bad clients: limits of memory, connections and descriptors; and that others do not feel it."""
 
+import contextlib
+import http.client
 import json
 import os
 import pathlib
+import re
 import resource
 import socket
 import struct
 import threading
 import unittest
 
-from daemon import Daemon
+from daemon import PATIENCE, Daemon
 from guard_case import HEAD, MIB, SOLVE, Case, cuts, metrics, read_all, until
 
 
@@ -33,12 +36,12 @@ class Guard(Case):
                 self.assertIn(b"\r\nRetry-After: 1\r\n", answer)
                 self.assertIn(b"--max-buffered", answer)
             # Not announced: counted as it comes. The rest is read and dropped, and the connection goes on.
-            connection = daemon.connect()
+            connection = http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=PATIENCE, source_address=("127.0.0.2", 0))
             answer = daemon.ask("POST", "/v1/scenes/box/radiosity", iter([b" " * 65536] * 20),
                                 {"Content-Type": "application/json"}, connection)
             self.assertEqual((answer.status, answer.headers["Retry-After"]), (503, "1"), answer)
             self.assertEqual(metrics(daemon)[("lambertd_body_bytes",)], 3 * MIB)
-            # A request that fits is served meanwhile, on that connection too.
+            # A request of this client that fits is served meanwhile, on that connection too.
             self.assertEqual(daemon.radiosity("box", SOLVE, connection=connection).status, 200)
             connection.close()
             first.sendall(whole[3 * MIB :])
@@ -67,6 +70,34 @@ class Guard(Case):
             for s in working, *idle:
                 s.close()
             self.serves(daemon)
+
+    def connect_from(self, daemon, source):
+        s = socket.create_connection(("127.0.0.1", daemon.port), timeout=PATIENCE, source_address=(source, 0))
+        self.addCleanup(s.close)
+        return s
+
+    def test_one_client_has_not_all_connections(self):
+        """One address opens connections that are all in the middle of a request, again and again: others are served at once, and
+        two that are greedy do not shut out a third."""
+        part = HEAD + b"Content-Length: %d\r\n\r\n" % len(SOLVE) + SOLVE[:5]
+        whole = HEAD + b"Content-Length: %d\r\n\r\n" % len(SOLVE) + SOLVE
+        with Daemon(self.box, "--max-connections", 8, "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+            kept = daemon.connect()
+            text = daemon.get("/healthz", connection=kept)
+            self.assertEqual(text.status, 200)
+            greedy = [self.connect_from(daemon, "127.0.0.2") for _ in range(60)]
+            for s in greedy:
+                with contextlib.suppress(OSError):
+                    s.sendall(part)
+            for source in "127.0.0.3", "127.0.0.4":
+                others = [self.connect_from(daemon, source) for _ in range(2)]
+                for s in others:
+                    s.sendall(whole)
+                    self.assertTrue(s.recv(65536).startswith(b"HTTP/1.1 200 "))
+            figures = daemon.get("/metrics", connection=kept).body.decode()
+            self.assertGreaterEqual(int(re.search(r'cut_total{why="share"} (\d+)', figures).group(1)), 4)
+            self.assertLessEqual(int(re.search(r"lambertd_connections (\d+)", figures).group(1)), 8 + 32)
+            kept.close()
 
     def test_connections_are_as_many_as_descriptors_allow(self):
         # 64 are kept for what else is opened, one is of the store.
@@ -166,12 +197,19 @@ class Guard(Case):
                          b"/v1/scenes/secret.txt", b"/v1/scenes/box.h5", b"/v1/scenes/%2e%2e%2f" + self.folder.name.encode(),
                          b"/%2e%2e/%2e%2e/etc/passwd", b"/etc/passwd", b"/v1/scenes/box%00", b"/v1/scenes/box%00/../box",
                          b"/v1/scenes/" + b"..%c0%af" * 20, b"/v1/scenes/" + b"a" * 30000, b"/v1/scenes/" + b"%61" * 300,
-                         b"/v1/scenes/\x00box", b"/\x00", b"/v1/scenes/\\..\\..\\etc", b"file:///etc/passwd",
-                         b"http://127.0.0.1/etc/passwd", b"/?file=/etc/passwd", b"/metrics/../etc/passwd"):
+                         b"/v1/scenes/\x00box", b"/v1/scenes/\\..\\..\\etc", b"file:///etc/passwd",
+                         b"http://127.0.0.1/etc/passwd", b"/metrics/../etc/passwd"):
                 with self.subTest(path=path[:80]), daemon.raw() as s:
                     s.sendall(b"GET " + path + b" HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
                     answer = read_all(s)
                     self.assertRegex(answer[:13], rb"^HTTP/1\.1 (400|404|414|431|501)", answer[:200])
+                    self.assertNotIn(b"root:x", answer)
+            # These are the page of the viewer, whatever they say beside.
+            for path in b"/\x00", b"/?file=/etc/passwd":
+                with daemon.raw() as s:
+                    s.sendall(b"GET " + path + b" HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+                    answer = read_all(s)
+                    self.assertRegex(answer, rb"^HTTP/1\.1 (200|400|404) ")
                     self.assertNotIn(b"root:x", answer)
             self.serves(daemon)
 

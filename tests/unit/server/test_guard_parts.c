@@ -15,10 +15,10 @@ typedef struct pair {
     client *c;
 } pair;
 
-static pair open_pair(connections *all) {
+static pair open_pair(connections *all, uint64_t key) {
     int fds[2];
     ck_assert_int_eq(socketpair(AF_UNIX, SOCK_STREAM, 0, fds), 0);
-    pair p = {fds[0], fds[1], connections_add(all, fds[0])};
+    pair p = {fds[0], fds[1], connections_add(all, fds[0], key, true)};
     ck_assert_ptr_nonnull(p.c);
     return p;
 }
@@ -43,7 +43,12 @@ static void close_pair(connections *all, pair *p) {
 static connections *start_with(size_t most, size_t timeout_s, size_t keep_alive_s, size_t least_rate) {
     connections *all = NULL;
     lam_error error;
-    const connection_limits limits = {most, most, timeout_s, keep_alive_s, least_rate};
+    const connection_limits limits = {.wanted = most,
+                                      .most = most,
+                                      .beyond = 8,
+                                      .timeout_s = timeout_s,
+                                      .keep_alive_s = keep_alive_s,
+                                      .least_rate = least_rate};
     ck_assert_int_eq(connections_start(&limits, &all, &error), LAM_OK);
     return all;
 }
@@ -62,8 +67,8 @@ static void expect_count(connections *all, const char *line) {
 /* In the order in which the last is cut; those that are never cut are looked at when all others are. */
 START_TEST(each_stage_has_its_time) {
     connections *all = start(100, 1, 1 << 10);
-    pair head = open_pair(all), body = open_pair(all), solve = open_pair(all), quick = open_pair(all),
-         large = open_pair(all), next = open_pair(all);
+    pair head = open_pair(all, 0), body = open_pair(all, 0), solve = open_pair(all, 0),
+         quick = open_pair(all, 0), large = open_pair(all, 0), next = open_pair(all, 0);
     client_enter(all, body.c, STAGE_BODY, 0);
     client_enter(all, solve.c, STAGE_SOLVE, 0);
     /* A MiB has come, at the least rate the bytes of 1024 seconds: they are worth a time-out all the same. */
@@ -95,8 +100,8 @@ END_TEST
 /* Between two requests the time is another one than within them. */
 START_TEST(idle_connections_have_a_time_of_their_own) {
     connections *patient = start_with(10, 1, 3600, 1), *brief = start_with(10, 3600, 1, 1);
-    pair idle = open_pair(patient), begun = open_pair(patient), done = open_pair(brief),
-         next = open_pair(brief);
+    pair idle = open_pair(patient, 0), begun = open_pair(patient, 0), done = open_pair(brief, 0),
+         next = open_pair(brief, 0);
     client_enter(patient, idle.c, STAGE_IDLE, 0);
     client_enter(patient, begun.c, STAGE_IDLE, 0);
     client_enter(patient, begun.c, STAGE_HEAD, 0);
@@ -120,7 +125,7 @@ END_TEST
 
 START_TEST(a_body_that_moves_is_cut_for_its_rate_alone) {
     connections *all = start(100, 3, 1 << 20);
-    pair slow = open_pair(all), fast = open_pair(all);
+    pair slow = open_pair(all, 0), fast = open_pair(all, 0);
     client_enter(all, slow.c, STAGE_BODY, 0);
     client_enter(all, fast.c, STAGE_BODY, 0);
     while (!is_cut(&slow)) {
@@ -137,12 +142,12 @@ END_TEST
 
 START_TEST(idle_clients_make_place_and_no_others) {
     connections *all = start(4, 3600, 1);
-    pair solve = open_pair(all), old = open_pair(all), body = open_pair(all);
+    pair solve = open_pair(all, 0), old = open_pair(all, 0), body = open_pair(all, 0);
     client_enter(all, solve.c, STAGE_SOLVE, 0);
     client_enter(all, body.c, STAGE_BODY, 0);
     usleep(2500000);
     ck_assert(!is_cut(&old));
-    pair late = open_pair(all);
+    pair late = open_pair(all, 0);
     wait_cut(&old);
     ck_assert(!is_cut(&solve) && !is_cut(&body));
     expect_count(all, "_cut_total{why=\"place\"} 1\n");
@@ -157,7 +162,8 @@ END_TEST
 /* Ends pass over those who solve, come before the next check of rates, and are gone with the next head. */
 START_TEST(an_end_cuts_bodies_and_answers) {
     connections *all = start(10, 3600, 1);
-    pair solve = open_pair(all), body = open_pair(all), next = open_pair(all), answer = open_pair(all);
+    pair solve = open_pair(all, 0), body = open_pair(all, 0), next = open_pair(all, 0),
+         answer = open_pair(all, 0);
     const double end = clock_seconds() + .05;
     client_enter(all, solve.c, STAGE_SOLVE, 0);
     client_end_by(all, solve.c, end);
@@ -187,7 +193,7 @@ END_TEST
 
 START_TEST(who_is_lost) {
     connections *all = start(10, 1, 1);
-    pair half = open_pair(all), gone = open_pair(all);
+    pair half = open_pair(all, 0), gone = open_pair(all, 0);
     ck_assert(!client_is_lost(half.c) && !client_is_lost(gone.c) && !client_is_lost(NULL));
     shutdown(half.theirs, SHUT_WR); /* as one that closes; the two cannot be told apart */
     ck_assert(client_is_lost(half.c));
@@ -200,6 +206,52 @@ START_TEST(who_is_lost) {
 }
 END_TEST
 
+/* A client that comes gets the places of one that has two more than it would: the idle one first, then that
+ * of a body; one that has as many as others waits beyond the limit, if few do. */
+START_TEST(connections_are_shared) {
+    connections *all = start_with(4, 1000, 1000, 1);
+    pair theirs[4], mine[6];
+    for (size_t k = 0; k < 4; k++) theirs[k] = open_pair(all, 0);
+    client_enter(all, theirs[0].c, STAGE_SOLVE, 0);
+    client_enter(all, theirs[1].c, STAGE_BODY, 0);
+    client_enter(all, theirs[2].c, STAGE_IDLE, 0);
+    client_enter(all, theirs[3].c, STAGE_ANSWER, 1);
+    for (size_t k = 0; k < 6; k++) {
+        ck_assert(connections_admit(all, 1));
+        mine[k] = open_pair(all, 1);
+        ck_assert(is_cut(&theirs[2]));
+        ck_assert_int_eq(is_cut(&theirs[1]), k > 0);
+        client_enter(all, mine[k].c, STAGE_BODY, 0);
+    }
+    ck_assert(!connections_admit(all, 1));
+    ck_assert(!is_cut(&theirs[0]));
+    ck_assert(!is_cut(&theirs[3]));
+    for (size_t k = 0; k < 6; k++) ck_assert(!is_cut(&mine[k]));
+    /* Now this one has most: others get a place of it, and it itself for one without a request. */
+    ck_assert(connections_admit(all, 2));
+    ck_assert(is_cut(&mine[0]));
+    pair third = open_pair(all, 2);
+    client_enter(all, mine[3].c, STAGE_IDLE, 0);
+    ck_assert(connections_admit(all, 1));
+    ck_assert(is_cut(&mine[3]));
+    pair last = open_pair(all, 1);
+    client_enter(all, last.c, STAGE_BODY, 0);
+    ck_assert(!connections_admit(all, 1));
+    close_pair(all, &third);
+    close_pair(all, &last);
+    for (size_t k = 0; k < 4; k++) close_pair(all, &theirs[k]);
+    for (size_t k = 0; k < 6; k++) close_pair(all, &mine[k]);
+    connections_stop(all);
+}
+END_TEST
+
+static lam_status afford(size_t wanted, size_t n_stores, size_t *most, lam_error *error) {
+    connection_limits limits = {.wanted = wanted};
+    const lam_status status = connections_affordable(&limits, n_stores, error);
+    *most = limits.most;
+    return status;
+}
+
 START_TEST(as_many_as_files_may_be_open) {
     struct rlimit before;
     lam_error error;
@@ -207,21 +259,21 @@ START_TEST(as_many_as_files_may_be_open) {
     ck_assert_int_eq(getrlimit(RLIMIT_NOFILE, &before), 0);
     struct rlimit low = {100, before.rlim_max < 300 ? before.rlim_max : 300};
     ck_assert_int_eq(setrlimit(RLIMIT_NOFILE, &low), 0);
-    ck_assert_int_eq(connections_affordable(10, 5, &most, &error), LAM_OK);
+    ck_assert_int_eq(afford(10, 5, &most, &error), LAM_OK);
     ck_assert_uint_eq(most, 10);
     /* The soft limit is raised to the hard one. */
     ck_assert_int_eq(getrlimit(RLIMIT_NOFILE, &before), 0);
     ck_assert_uint_eq(before.rlim_cur, low.rlim_max);
-    ck_assert_int_eq(connections_affordable(1000, 0, &most, &error), LAM_OK);
+    ck_assert_int_eq(afford(1000, 0, &most, &error), LAM_OK);
     ck_assert_uint_eq(most, (size_t)low.rlim_max - 64);
-    ck_assert_int_eq(connections_affordable(1000, 80, &most, &error), LAM_OK);
+    ck_assert_int_eq(afford(1000, 80, &most, &error), LAM_OK);
     ck_assert_uint_eq(most, (size_t)low.rlim_max - 64 - 80);
     /* Some clients, even where stores take all. */
-    ck_assert_int_eq(connections_affordable(1000, 5000, &most, &error), LAM_OK);
+    ck_assert_int_eq(afford(1000, 5000, &most, &error), LAM_OK);
     ck_assert_uint_eq(most, 8);
     low = (struct rlimit){64, 64};
     ck_assert_int_eq(setrlimit(RLIMIT_NOFILE, &low), 0);
-    ck_assert_int_eq(connections_affordable(10, 0, &most, &error), LAM_ERR_IO);
+    ck_assert_int_eq(afford(10, 0, &most, &error), LAM_ERR_IO);
     ck_assert_ptr_nonnull(strstr(error.message, "ulimit -n"));
 }
 END_TEST
@@ -278,6 +330,7 @@ int main(void) {
     tcase_add_test(all, tags);
     tcase_add_test(all, ids);
     /* Last: in a process that is not forked the limit stays. */
+    tcase_add_test(all, connections_are_shared);
     tcase_add_test(all, as_many_as_files_may_be_open);
     suite_add_tcase(suite, all);
     return suite_run(suite);
