@@ -53,6 +53,8 @@ export class App {
     answers = 0;
     /** Radiances of the sky's tiles for a lighting; set by the panel of skies. */
     skyOf: (lighting: Lighting, scene: OpenScene) => readonly (number | number[])[] | null = () => null;
+    /** Fetches what the first picture of a scene needs beside its mesh; the function that it returns takes that in. */
+    prepare: (description: Description) => Promise<(scene: OpenScene) => void> = () => Promise.resolve(() => undefined);
     private readonly listeners = new Map<Event, Set<() => void>>();
     private readonly askers: [Newest<Wanted, [Field, number | null]>, Newest<Wanted, [Field, number | null]>];
     private asked = ["", ""];
@@ -79,13 +81,16 @@ export class App {
     /** Opens a scene; the rest of the state is given (a link), or that of the scene as it comes. */
     async open(name: string, given: State | null): Promise<void> {
         const turn = ++this.opening;
-        const [description, file] = await Promise.all([this.api.describe(name), this.api.mesh(name)]);
+        const described = this.api.describe(name);
+        const [description, file, takeIn] = await Promise.all([described, this.api.mesh(name), described.then((d) => this.prepare(d))]);
         if (turn !== this.opening) return;
         const mesh = readMesh(file);
         this.stage.show(mesh, description.channels);
         const picker = new Picker(this.stage.geometry as never, mesh);
-        const ownLighting = lightingOf(mesh, description);
-        this.scene = { description, mesh, picker, ownLighting };
+        const scene = { description, mesh, picker, ownLighting: lightingOf(mesh, description) };
+        takeIn(scene);
+        this.scene = scene;
+        const { ownLighting } = scene;
         this.cameras.setBounds(new Box3().setFromBufferAttribute(new BufferAttribute(mesh.positions, 3)));
         this.fields = [null, null];
         this.askers.forEach((asker) => asker.forget());

@@ -1,10 +1,12 @@
 // The sky of a store that has one: its model, place and time, a day that goes by, and the weather file.
-import type { App } from "../app.ts";
+import type { App, OpenScene } from "../app.ts";
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { count, tell } from "../base/numbers.ts";
+import type { Description } from "../daemon/api.ts";
 import { clockOf, SkySource, windOf } from "../daylight/source.ts";
 import type { Sky } from "../daylight/skies.ts";
 import { dateOf, dayOf, sunAt } from "../daylight/sun.ts";
+import type { SkyAnswer } from "../daylight/tiles.ts";
 import { skyOff, type SkyLight } from "../state/state.ts";
 import { makeDome } from "./dome.ts";
 import type { Panel } from "./panel.ts";
@@ -43,7 +45,9 @@ export function skyPanel(app: App): Panel {
         app.store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, ...to } } }, tag);
     };
     const isPhotometric = (): boolean => app.store.now.view.unit === "lx";
-    app.skyOf = (lighting, scene) => (scene.description.sky === null || lighting.solo !== null ? null
+    // Tiles are of the scene that they were read for: another one may be shown before its own have come.
+    let tiledScene: OpenScene | null = null;
+    app.skyOf = (lighting, scene) => (scene !== tiledScene || scene.description.sky === null || lighting.solo !== null ? null
         : source.radiances(lighting.sky, isPhotometric(), scene.description.channels));
     const controls = makeControls(app, change);
     const weather = makeWeather(app, source, change, () => update());
@@ -63,18 +67,16 @@ export function skyPanel(app: App): Panel {
         note.textContent = noteOf(light, source, app);
         note.hidden = note.textContent === "";
     };
-    let opening = 0;
+    app.prepare = async (description) => {
+        const fetched = await fetchSky(app, description);
+        return (scene) => {
+            tiledScene = scene;
+            takeSky(app, source, fetched, scene);
+        };
+    };
     app.on("scene", () => {
-        const turn = ++opening;
         day.stop();
-        source.take(null);
-        source.read(null, false);
         update();
-        void load(app, source, () => turn === opening).then(() => {
-            if (turn !== opening) return;
-            update();
-            app.ask();
-        }).catch((reason: unknown) => app.fail(reason));
     });
     app.store.listen((now, before) => {
         if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit) update();
@@ -86,25 +88,39 @@ export function skyPanel(app: App): Panel {
     };
 }
 
-/** The tiles and the weather beside the store; a scene that was opened without a link begins with that weather. */
-async function load(app: App, source: SkySource, isWanted: () => boolean): Promise<void> {
-    const { scene } = app;
-    if (scene === null || scene.description.sky === null) return;
-    const name = scene.description.name;
-    const answer = await app.api.sky(name);
-    if (!isWanted()) return;
-    source.take(answer);
-    if (answer.weather === null) return;
-    const text = await app.api.weather(name);
-    if (!isWanted()) return;
-    source.read(text, true);
-    const { now } = app.store, { weather } = source;
-    if (weather === null || JSON.stringify(now.lighting.sky) !== JSON.stringify(scene.ownLighting.sky)) return;
+interface Fetched {
+    answer: SkyAnswer | null;
+    weather: string | null;
+    reason: unknown;
+}
+
+/** The tiles and the weather beside the store. Without them a scene can still be shown. */
+async function fetchSky(app: App, { name, sky }: Description): Promise<Fetched> {
+    if (sky === null) return { answer: null, weather: null, reason: null };
+    try {
+        const answer = await app.api.sky(name);
+        return { answer, weather: answer.weather === null ? null : await app.api.weather(name), reason: null };
+    } catch (reason) {
+        return { answer: null, weather: null, reason };
+    }
+}
+
+/** A scene that is opened without a link begins with the weather beside it. */
+function takeSky(app: App, source: SkySource, fetched: Fetched, scene: OpenScene): void {
+    source.take(fetched.answer);
+    if (fetched.reason !== null) app.fail(fetched.reason);
+    try {
+        source.read(fetched.weather, true);
+    } catch (reason) {
+        source.read(null, false);
+        app.fail(reason);
+    }
+    const { weather } = source;
+    if (weather === null) return;
     const sky: SkyLight = {
-        ...now.lighting.sky, model: "perez", latitude: weather.latitude, longitude: weather.longitude, zone: weather.zone,
+        ...scene.ownLighting.sky, model: "perez", latitude: weather.latitude, longitude: weather.longitude, zone: weather.zone,
     };
     scene.ownLighting = { ...scene.ownLighting, sky };
-    app.store.settle({ ...now, lighting: { ...now.lighting, sky } });
 }
 
 function noteOf(light: SkyLight, source: SkySource, app: App): string {

@@ -1,0 +1,251 @@
+// Skies and emitters: skies are those of `lambert sky`, and the page shows what they give.
+import assert from "node:assert/strict";
+import { readFileSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { join } from "node:path";
+import { before, test } from "node:test";
+import { pathToFileURL } from "node:url";
+import { Daemon, elementAt, inFolder, lambert, makeStore, openPage, pixel, settled, violations } from "./page.mjs";
+
+/** Hours of clear, broken and overcast weather: every bin of clearness, a low sun, night, and a sun below the horizon. */
+const HOURS = [];
+for (const [month, day, cloud] of [[3, 21, 0], [6, 21, 0.15], [6, 22, 0.5], [12, 21, 0.3], [12, 22, 1]])
+    for (let hour = 0; hour < 24; hour++) {
+        const up = Math.max(0, Math.sin((Math.PI * (hour + 0.5 - 6)) / 12)) * (month === 12 ? 0.5 : 1);
+        HOURS.push([month, day, hour + 0.5, Math.round(950 * Math.sqrt(up) * Math.max(0, 1 - 1.6 * cloud)), Math.round(up * (60 + 350 * cloud))]);
+    }
+const [LATITUDE, LONGITUDE, ZONE] = [37.5, -122.25, -8];
+
+const wea = (units = 1) => `place Somewhere_XX\nlatitude ${LATITUDE}\nlongitude ${-LONGITUDE}\ntime_zone ${-15 * ZONE}\nsite_elevation 2.0\n`
+    + `weather_data_file_units ${units}\n${HOURS.map((h) => h.join(" ")).join("\n")}\n`;
+const epw = () => `LOCATION,Somewhere,XX,USA,TMY3,0,${LATITUDE},${LONGITUDE},${ZONE},2.0\nDESIGN CONDITIONS,0\nTYPICAL/EXTREME PERIODS,0\n`
+    + "GROUND TEMPERATURES,0\nHOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,\nCOMMENTS 2,\nDATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31\n"
+    + HOURS.map(([m, d, h, direct, diffuse]) => `1997,${m},${d},${h + 0.5},0,?,15.0,${m},60,101300,0,0,300,0,${direct},${diffuse},0,0,0,0\n`).join("");
+
+let daemon, daylight, state, paths;
+before(async () => {
+    const { buildSync } = createRequire(join(process.env.MODULES, "of-the-test.js"))("esbuild");
+    const take = (file) => {
+        const out = inFolder(`${file.replaceAll("/", "-")}.mjs`);
+        buildSync({ entryPoints: [join(process.env.VIEWER, "src", `${file}.ts`)], bundle: true, format: "esm", outfile: out });
+        return import(pathToFileURL(out));
+    };
+    daylight = { ...await take("daylight/source"), ...await take("daylight/skies"), ...await take("daylight/tiles"), ...await take("daylight/sun") };
+    state = await take("state/state");
+    paths = await take("state/path");
+    const patio = makeStore("patio", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "reinhart:2"] });
+    writeFileSync(inFolder("patio.epw"), epw());
+    const yard = makeStore("yard", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "tregenza"] });
+    const pose = (x, y) => ({ move: [x, y, 0.5], turn: { axis: [1, 0, 0], degrees: 180 } });
+    writeFileSync(inFolder("lamp.json"), JSON.stringify({
+        light: { polygon: [[-0.05, -0.05, 0], [0.05, -0.05, 0], [0.05, 0.05, 0], [-0.05, 0.05, 0]], emission: [10, 9, 7] },
+        path: [pose(0.1, 0.1), pose(0.3, 0.45), pose(0.45, 0.1)],
+    }));
+    const way = makeStore("way", "cornell", {
+        generate: ["--elements", 300], precompute: ["--path", inFolder("lamp.json"), "--frames", 5, "--paths", 500],
+    });
+    daemon = await Daemon.start([patio, yard, way]);
+});
+
+/** Single-precision rows of an NPY file. */
+function rowsOf(file, length) {
+    const bytes = readFileSync(file), start = 10 + bytes.readUInt16LE(8);
+    const values = new Float32Array(bytes.buffer.slice(bytes.byteOffset + start, bytes.byteOffset + bytes.length));
+    return Array.from({ length: values.length / length }, (_, k) => values.subarray(k * length, (k + 1) * length));
+}
+
+const lightOf = (to) => ({ ...state.skyOff, latitude: LATITUDE, longitude: LONGITUDE, zone: ZONE, ...to });
+
+test("skies of weather are those of `lambert sky`", async () => {
+    for (const [name, tiling] of [["patio", "reinhart:2"], ["yard", "tregenza"]]) {
+        const source = new daylight.SkySource();
+        source.take(await daemon.json(`/v1/scenes/${name}/sky`));
+        for (const [file, text] of [["a.wea", wea()], ["flat.wea", wea(2)], ["a.epw", epw()]])
+            for (const photometric of [false, true]) {
+                writeFileSync(inFolder(file), text);
+                lambert("sky", inFolder(file), "--tiles", tiling, "-o", inFolder("sky.npy"), ...(photometric ? ["--photometric"] : []));
+                source.read(text, false);
+                const rows = rowsOf(inFolder("sky.npy"), source.tiles.count);
+                assert.equal(rows.length, HOURS.length);
+                let lit = 0;
+                rows.forEach((row, k) => {
+                    const [month, day, hour] = HOURS[k];
+                    const got = source.radiances(lightOf({ model: "perez", sun: "tile", day: daylight.dayOf(month, day), hour }), photometric, 1);
+                    lit += row.some((v) => v > 0) ? 1 : 0;
+                    const off = row.findIndex((v, t) => !(Math.abs(got[t] - v) <= 1e-4 * v));
+                    assert.equal(off, -1, `${file} ${HOURS[k]} tile ${off}: ${got[off]}, lambert sky has ${row[off]}`);
+                });
+                assert.ok(lit > 40, `${lit} hours are lit`);
+            }
+    }
+});
+
+test("skies without weather have the light that they are given", async () => {
+    const tiles = daylight.tilesOf(await daemon.json("/v1/scenes/patio/sky")), last = tiles.count - 1;
+    for (const model of ["even", "overcast"]) {
+        const { diffuse } = daylight.skyFor(tiles, lightOf({ model, strength: 250 }), false, null);
+        assert.ok(Math.abs(daylight.horizontalOf(tiles, diffuse) - 250) < 1e-9);
+        // (1 + 2 sin a) / 3 of Moon and Spencer, with the mean of sin a over the lowest band, cosine over solid angle.
+        const wanted = model === "even" ? 1 : (1 + 2 * tiles.cosine[0] / tiles.solidAngle[0]) / (1 + 2 * tiles.cosine[last] / tiles.solidAngle[last]);
+        assert.ok(Math.abs(diffuse[0] / diffuse[last] - wanted) < 1e-3 * wanted, `${model}: ${diffuse[0] / diffuse[last]}, not ${wanted}`);
+    }
+    for (const hour of [6, 8.3, 12, 15, 17.7]) {
+        const [spread, tile] = ["spread", "tile"].map((sun) => daylight.skyFor(tiles, lightOf({ model: "clear", sun, hour }), false, null));
+        assert.ok(Math.abs(spread.directHorizontal - tile.directHorizontal) < 1e-9 * tile.directHorizontal);
+        // CIE S 011, type 12: the same ratios whatever the scale. The sun is in no tile of this one.
+        const sun = tile.sun.direction, angle = (t) => Math.acos([0, 1, 2].reduce((sum, d) => sum + tiles.centre[3 * t + d] * sun[d], 0));
+        const relative = (t) => (1 - Math.exp(-0.32 / tiles.centre[3 * t + 2])) * (1 + 10 * Math.exp(-3 * angle(t)) + 0.45 * Math.cos(angle(t)) ** 2);
+        const far = Array.from({ length: last }, (_, t) => t).filter((t) => angle(t) > 1 && tiles.centre[3 * t + 2] > 0.3 && tiles.centre[3 * t + 2] < 0.95);
+        assert.ok(far.length > 50);
+        // Means over tiles of 6 degrees differ from middles by their curvature, some (6 degrees / 2)² of it.
+        for (const t of far) assert.ok(Math.abs(tile.diffuse[t] / tile.diffuse[far[0]] / (relative(t) / relative(far[0])) - 1) < 0.01);
+    }
+    const night = daylight.skyFor(tiles, lightOf({ model: "clear", hour: 0 }), true, null);
+    assert.ok(night.sun.altitude < 0 && night.diffuse.every((v) => v === 0) && night.direct.every((v) => v === 0));
+});
+
+const skyTo = (page, to) => page.evaluate((sky) => {
+    const { store } = window.lambert;
+    store.change({ ...store.now, lighting: { ...store.now.lighting, sky: { ...store.now.lighting.sky, ...sky } } });
+}, to);
+const skyNow = (page) => page.evaluate(() => window.lambert.store.now.lighting.sky);
+
+/** A page that shows a scene as the scene comes. */
+async function openScene(name, options) {
+    const page = await openPage(daemon.address, options);
+    await page.evaluate((to) => window.lambert.open(to, null), name);
+    await settled(page);
+    return page;
+}
+
+const near = (a, b, tolerance) => assert.ok(a.every((v, i) => Math.abs(v - b[i]) <= tolerance), `${a} is not near ${b}`);
+const shown = (linear) => linear.map((v) => {
+    const c = Math.min(1, Math.max(0, v));
+    return Math.round(255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055));
+});
+
+test("the weather beside the store is taken, and pixels are what its sky gives", async () => {
+    const page = await openScene("patio");
+    const sky = await skyNow(page);
+    assert.deepEqual([sky.model, sky.latitude, sky.longitude, sky.zone], ["perez", LATITUDE, LONGITUDE, ZONE]);
+    await page.getByRole("tab", { name: "Sky" }).click();
+    lambert("sky", inFolder("patio.epw"), "--tiles", "reinhart:2", "-o", inFolder("patio.npy"));
+    const rows = rowsOf(inFolder("patio.npy"), 577);
+    await page.evaluate(() => {
+        const { store } = window.lambert, { now } = store;
+        const groups = Object.fromEntries(Object.entries(now.lighting.groups).map(([name, light]) => [name, { ...light, on: false }]));
+        store.change({ ...now, lighting: { ...now.lighting, groups }, view: { ...now.view, smooth: false, tone: "linear", exposure: -9 } });
+    });
+    for (const [day, hour] of [[172, 12.5], [172, 17.5], [355, 10.5]]) {
+        await skyTo(page, { sun: "tile", day, hour });
+        await settled(page);
+        const k = HOURS.findIndex(([m, d, h]) => daylight.dayOf(m, d) === day && h === hour);
+        let seen = 0;
+        for (const [x, y] of [[0.3, 0.55], [0.7, 0.55], [0.5, 0.8], [0.5, 0.5], [0.4, 0.75]]) {
+            const element = await elementAt(page, x, y);
+            if (element === null || element < 0) continue;
+            const answer = await daemon.json("/v1/scenes/patio/radiosity", { emission: { sky: [...rows[k]] }, select: { elements: [element] } });
+            near(await pixel(page, x, y), shown(answer.radiosity.map((channel) => channel[0] * 2 ** -9)), 2);
+            seen += 1;
+        }
+        assert.ok(seen >= 3, `${seen} points show the scene`);
+        const horizontal = (await page.locator("[data-sky=diffuse]").innerText()).replace(/ W\/m²$/, "");
+        assert.ok(Math.abs(Number(horizontal) - HOURS[k][4]) <= 0.005 * HOURS[k][4], `${horizontal} is shown, the file has ${HOURS[k][4]}`);
+    }
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("a link restores a sky, and a store of its own tiles takes one", async () => {
+    const page = await openScene("yard");
+    assert.equal((await skyNow(page)).model, "overcast");
+    await skyTo(page, { model: "clear", hour: 9.25, day: 80, latitude: -33, sun: "tile" });
+    await settled(page);
+    await page.waitForFunction(() => location.hash.length > 3);
+    await page.waitForTimeout(500);
+    const [hash, wanted, sky] = await page.evaluate(() => [location.hash, window.lambert.wanted(), window.lambert.store.now.lighting.sky]);
+    const other = await openPage(daemon.address, { hash });
+    assert.deepEqual(await skyNow(other), sky);
+    assert.deepEqual(await other.evaluate(() => window.lambert.wanted()), wanted);
+    assert.equal(wanted.emission.sky.length, 145);
+    // What strangers put into a link is held within its range.
+    const spoilt = (to) => `#1.${Buffer.from(JSON.stringify({ scene: "yard", lighting: { sky: to } })).toString("base64url")}`;
+    const third = await openPage(daemon.address, { hash: spoilt({ model: "none", latitude: 1e9, day: "x", hour: -3 }) });
+    assert.deepEqual(await skyNow(third), { ...state.skyOff, latitude: 90, hour: 0 });
+    for (const one of [page, other, third]) {
+        assert.deepEqual(one.faults, []);
+        await one.context().close();
+    }
+});
+
+test("a day goes by, by keys too, and stands still for those who ask for it", async () => {
+    const page = await openScene("yard");
+    await skyTo(page, { model: "clear" });
+    await page.getByRole("tab", { name: "Sky" }).click();
+    const slider = page.locator("#panel-sky").getByLabel("Hour", { exact: true });
+    await slider.focus();
+    await page.keyboard.press("ArrowRight");
+    assert.ok(Math.abs((await skyNow(page)).hour - 12.05) < 1e-9);
+    const play = page.getByRole("button", { name: "Play the day" });
+    await play.focus();
+    await page.keyboard.press("Enter");
+    await page.waitForFunction(() => window.lambert.store.now.lighting.sky.hour > 12.5);
+    await page.getByRole("button", { name: "Pause the day" }).click();
+    await settled(page);
+    const { hour } = await skyNow(page);
+    await page.waitForTimeout(300);
+    assert.equal((await skyNow(page)).hour, hour);
+    assert.deepEqual(await violations(page), []);
+    await page.emulateMedia({ reducedMotion: "reduce" });
+    await play.waitFor({ state: "hidden" });
+    await page.getByRole("button", { name: "Half an hour on" }).click();
+    assert.ok(Math.abs((await skyNow(page)).hour - hour - 0.5) < 1e-3);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("a weather file that is picked stays on the page", async () => {
+    const page = await openScene("yard", { width: 360, height: 740 });
+    await page.getByRole("tab", { name: "Sky" }).click();
+    const sent = [];
+    page.on("request", (request) => sent.push([request.method(), new URL(request.url()).pathname, request.postData() ?? ""]));
+    writeFileSync(inFolder("bad.wea"), wea().replace("latitude 37.5", "latitude 375"));
+    await page.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("bad.wea"));
+    await page.getByText("line 2: latitude is \"375\", must be a number from -90 to 90").waitFor();
+    writeFileSync(inFolder("good.wea"), wea());
+    await page.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("good.wea"));
+    await page.getByText("Somewhere_XX: 120 hours. A link to this state does not hold it.").waitFor();
+    await settled(page);
+    const sky = await skyNow(page);
+    assert.deepEqual([sky.model, sky.latitude, sky.longitude, sky.zone], ["perez", LATITUDE, LONGITUDE, ZONE]);
+    assert.ok(sent.length > 0);
+    for (const [method, path, body] of sent) assert.ok(method === "POST" && path.endsWith("/radiosity") && !body.includes("Somewhere"), `${method} ${path}`);
+    assert.deepEqual(await violations(page), []);
+    await page.context().close();
+});
+
+test("a lamp on its way is the mixture of its neighbouring positions", async () => {
+    assert.deepEqual([paths.positionOf({ 2: 3 }), paths.positionOf({ 1: 1, 2: 3 }), paths.positionOf({ 1: 1, 3: 1 }), paths.positionOf({})], [2, 1.75, null, null]);
+    const page = await openScene("way");
+    assert.deepEqual(await page.evaluate(() => window.lambert.store.now.lighting.emitters), { 0: 1 });
+    await page.getByRole("tab", { name: "Emitters" }).click();
+    await page.getByRole("spinbutton", { name: "Position", exact: true }).fill("1.25");
+    await page.keyboard.press("Enter");
+    await settled(page);
+    assert.deepEqual(await page.evaluate(() => window.lambert.store.now.lighting.emitters), { 1: 0.75, 2: 0.25 });
+    const values = await page.evaluate(() => {
+        const [field] = window.lambert.fields;
+        return [0, 1, 2].flatMap((c) => Array.from({ length: field.elements }, (_, i) => field.at(i)[c]));
+    });
+    const answers = await daemon.json("/v1/scenes/way/radiosity", { emissions: [{ emitters: [0, 1, 0, 0, 0] }, { emitters: [0, 0, 1, 0, 0] }] });
+    const [one, other] = answers.radiosity.map((channels) => channels.flat());
+    const scale = Math.max(...one, ...other);
+    assert.equal(values.length, one.length);
+    // Half precision keeps 11 digits of each value.
+    values.forEach((v, i) => assert.ok(Math.abs(v - 0.75 * one[i] - 0.25 * other[i]) <= 2 ** -11 * Math.abs(v) + 1e-6 * scale));
+    await page.getByRole("button", { name: "One position on" }).click();
+    assert.deepEqual(await page.evaluate(() => window.lambert.store.now.lighting.emitters), { 2: 0.75, 3: 0.25 });
+    assert.deepEqual(await violations(page), []);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
