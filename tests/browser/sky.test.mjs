@@ -156,7 +156,7 @@ test("the weather beside the store is taken, and pixels are what its sky gives",
     await page.context().close();
 });
 
-test("a link restores a sky, and a store of its own tiles takes one", async () => {
+test("a link restores a sky, and one that is spoilt is held within its range", async () => {
     const page = await openScene("yard");
     assert.equal((await skyNow(page)).model, "overcast");
     await skyTo(page, { model: "clear", hour: 9.25, day: 80, latitude: -33, sun: "tile" });
