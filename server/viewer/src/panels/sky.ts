@@ -171,7 +171,7 @@ function makeControls(app: App, change: Change): Controls {
     };
     return {
         model, strength: make("div", {}, strength.element, factor.element, sun, tinted), time: make("div", {}, day.element, jumps, hour.element),
-        place: make("div", {}, make("h3", {}, "Place"), latitude.element, longitude.element, zone.element), update,
+        place: make("div", {}, make("h2", {}, "Place"), latitude.element, longitude.element, zone.element), update,
     };
 }
 
@@ -202,7 +202,7 @@ function makeWeather(app: App, source: SkySource, change: Change, done: () => vo
             picker.value = "";
         },
     });
-    const element = make("div", { class: "drop" }, make("h3", {}, "Weather file"), about, picker, button("Its place", "Latitude, longitude and clock of the weather file", place));
+    const element = make("div", { class: "drop" }, make("h2", {}, "Weather file"), about, picker, button("Its place", "Latitude, longitude and clock of the weather file", place));
     // Anywhere on the page, as a file that is dropped beside would replace the page.
     document.addEventListener("dragover", (event) => { if (event.dataTransfer?.types.includes("Files")) event.preventDefault(); });
     document.addEventListener("drop", (event) => {
