@@ -10,13 +10,13 @@ static const scene *store_of(const call *in) {
 void get_sky(call *in, answer *out) {
     const scene *s = store_of(in);
     buffer b = {0};
-    if (s->tiles.tiles == NULL) {
+    if (s->tiles.length == 0) {
         answer_refuse(out, PROBLEM_NOT_FOUND, "%.120s: the store has no sky%s", in->scene->name,
                       s->sky != NULL ? " whose tiles it states; precompute it again" : "");
         return;
     }
     answer_json(out, &b,
-                buffer_append_text(&b, "{") && tile_places_write(&s->tiles, &b) &&
+                buffer_append_text(&b, "{") && buffer_append(&b, s->tiles.bytes, s->tiles.length) &&
                     (s->weather.format != NULL
                          ? buffer_printf(&b, ",\"weather\":\"%s\"}\n", s->weather.format)
                          : buffer_append_text(&b, ",\"weather\":null}\n")));

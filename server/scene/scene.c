@@ -2,6 +2,7 @@
 
 #include "server/queue/batch.h"
 #include "server/scene/map_guard.h"
+#include "server/scene/tile_places.h"
 #include "solver/codec/describe.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
@@ -203,6 +204,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     lam_operator_set_threads(made->op, threads_of(made->op, options->threads));
     TRY(sky_load(s, made->n, &made->sky, error));
     if (made->sky != NULL) TRY(tile_places_read(s, lam_sky_tiles(made->sky), &made->tiles, error));
+    made->memory += made->tiles.capacity;
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
     made->work_bytes = pass_work_bytes(made);
@@ -319,7 +321,7 @@ void scene_release(scene *s) {
     scene_mesh_destroy(s->mesh);
     if (s->base == NULL) {
         lam_sky_close(s->sky);
-        tile_places_free(&s->tiles);
+        buffer_free(&s->tiles);
         weather_file_free(&s->weather);
         group_index_free(&s->groups);
         group_index_free(&s->emitters);

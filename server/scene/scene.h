@@ -7,8 +7,8 @@
 #include "server/scene/refined.h"
 #include "server/scene/row_cache.h"
 #include "server/scene/scene_mesh.h"
-#include "server/scene/tile_places.h"
 #include "server/scene/weather_file.h"
+#include "solver/codec/buffer.h"
 #include "solver/codec/groups.h"
 #include "solver/codec/request.h"
 #include "solver/codec/stated_errors.h"
@@ -39,7 +39,7 @@ struct scene {
     group_index emitters;  /* by name */
     double *area;          /* [n], m^2 */
     lam_sky *sky;          /* NULL: none */
-    tile_places tiles;     /* of the sky; a variant has none of its own */
+    buffer tiles;          /* of the sky, as JSON (tile_places_read); a variant has none of its own */
     weather_file weather;  /* likewise, beside the file */
     size_t n_emitters;     /* 0: the store answers any emission */
     uint64_t bytes;        /* of /operator as stored; of a variant, of the cores alone */

@@ -9,7 +9,16 @@
 #define DEGREE (M_PI / 180)
 
 /* Columns of /sky/tiles; the first three are the direction of the middle. */
+enum { TILE_COLUMNS = 9 };
 enum { ALTITUDE_FROM = 3, ALTITUDE_TO, AZIMUTH_FROM, AZIMUTH_TO, SOLID_ANGLE, COSINE };
+
+typedef struct tile_places {
+    size_t n_tiles;
+    double *tiles; /* [n_tiles][TILE_COLUMNS] */
+    char *tiling;  /* its name */
+    char *up;      /* "x", "y" or "z" */
+    double ground_albedo;
+} tile_places;
 
 /* The axes of the scene, with their signs, that are east, north and up. */
 static const struct {
@@ -22,12 +31,6 @@ static size_t way_of(char up) {
     size_t way = 0;
     while (way < N_WAYS && ways[way].up != up) way++;
     return way;
-}
-
-void tile_places_free(tile_places *p) {
-    free(p->tiles);
-    free(p->tiling);
-    *p = (tile_places){0};
 }
 
 static lam_status check_tiles(const store *s, const tile_places *p, lam_error *error) {
@@ -43,30 +46,6 @@ static lam_status check_tiles(const store *s, const tile_places *p, lam_error *e
                  store_path(s), t, SOLID_ANGLE, row[SOLID_ANGLE]);
     }
 done:
-    return status;
-}
-
-lam_status tile_places_read(store *s, size_t n_tiles, tile_places *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    tile_places made = {.n_tiles = n_tiles};
-    void *tiles = NULL;
-    char *up = NULL;
-    if (!store_has(s, "/sky/tiles")) return LAM_OK;
-    TRY(store_read(s, "/sky/tiles", STORE_F64, 2, (size_t[]){n_tiles, TILE_COLUMNS}, &tiles, error));
-    made.tiles = tiles;
-    TRY(check_tiles(s, &made, error));
-    TRY(store_get_text(s, "/sky", "tiling", &made.tiling, error));
-    TRY(store_get_text(s, "/sky", "up", &up, error));
-    TRY(store_get_number(s, "/sky", "ground_albedo", &made.ground_albedo, error));
-    if (way_of(up[0]) == N_WAYS || up[1] != '\0')
-        FAIL(error, LAM_ERR_FORMAT, "%s: attribute \"up\" of /sky is \"%.20s\", must be x, y or z",
-             store_path(s), up);
-    made.up = up[0];
-    *out = made;
-    made = (tile_places){0};
-done:
-    free(up);
-    tile_places_free(&made);
     return status;
 }
 
@@ -103,10 +82,10 @@ static bool write_column(buffer *b, const tile_places *p, const char *name, int 
     return written && buffer_append_text(b, "]");
 }
 
-bool tile_places_write(const tile_places *p, buffer *b) {
-    const size_t way = way_of(p->up);
+static bool write_places(const tile_places *p, buffer *b) {
+    const size_t way = way_of(p->up[0]);
     bool written = buffer_append_text(b, "\"tiling\":") && json_write_text(b, p->tiling) &&
-                   buffer_printf(b, ",\"tiles\":%zu,\"up\":\"%c\"", p->n_tiles, p->up) &&
+                   buffer_printf(b, ",\"tiles\":%zu,\"up\":\"%s\"", p->n_tiles, p->up) &&
                    write_axis(b, "east", way, 0) && write_axis(b, "north", way, 1) &&
                    buffer_append_text(b, ",\"ground_albedo\":") && json_write_double(b, p->ground_albedo) &&
                    buffer_append_text(b, ",\"centre\":[");
@@ -118,4 +97,32 @@ bool tile_places_write(const tile_places *p, buffer *b) {
     return written && buffer_append_text(b, "]") && write_pairs(b, p, "azimuth", AZIMUTH_FROM) &&
            write_pairs(b, p, "altitude", ALTITUDE_FROM) && write_column(b, p, "solid_angle", SOLID_ANGLE) &&
            write_column(b, p, "cosine", COSINE);
+}
+
+lam_status tile_places_read(store *s, size_t n_tiles, buffer *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    tile_places p = {.n_tiles = n_tiles};
+    buffer written = {0};
+    void *tiles = NULL;
+    if (!store_has(s, "/sky/tiles")) return LAM_OK;
+    TRY(store_read(s, "/sky/tiles", STORE_F64, 2, (size_t[]){n_tiles, TILE_COLUMNS}, &tiles, error));
+    p.tiles = tiles;
+    TRY(check_tiles(s, &p, error));
+    TRY(store_get_text(s, "/sky", "tiling", &p.tiling, error));
+    TRY(store_get_text(s, "/sky", "up", &p.up, error));
+    TRY(store_get_number(s, "/sky", "ground_albedo", &p.ground_albedo, error));
+    if (way_of(p.up[0]) == N_WAYS || p.up[1] != '\0')
+        FAIL(error, LAM_ERR_FORMAT, "%s: attribute \"up\" of /sky is \"%.20s\", must be x, y or z",
+             store_path(s), p.up);
+    if (!write_places(&p, &written))
+        FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for the tiles of its sky", store_path(s));
+    buffer_trim(&written);
+    *out = written;
+    written = (buffer){0};
+done:
+    buffer_free(&written);
+    free(p.tiles);
+    free(p.tiling);
+    free(p.up);
+    return status;
 }
