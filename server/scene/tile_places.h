@@ -6,9 +6,9 @@
 #include "solver/codec/buffer.h"
 #include "store/store.h"
 
-/* Reads the places of n_tiles tiles and appends them as members of the JSON of GET /v1/scenes/NAME/sky,
- * without braces: angles in degrees, azimuths from north by east. They are written once, as numbers of a fine
- * sky take a tenth of a second. Appends nothing for a store without them. O(n_tiles). Errors: as store_read;
+/* Sets *out (empty before) to the places of n_tiles tiles as members of the JSON of GET /v1/scenes/NAME/sky,
+ * without braces: angles in degrees, azimuths from north by east. They are written once, as those of a fine
+ * sky take a tenth of a second. A store without them leaves *out empty. O(n_tiles). Errors: as store_read;
  * LAM_ERR_FORMAT names the tile. */
 lam_status tile_places_read(store *s, size_t n_tiles, buffer *out, lam_error *error);
 
