@@ -7,6 +7,7 @@ import { Cameras } from "./picture/cameras.ts";
 import { Field, spreadOf, type Spread } from "./picture/field.ts";
 import { readMesh, type SceneMesh } from "./picture/glb.ts";
 import { Picker } from "./picture/pick.ts";
+import type { Axis } from "./picture/scale.ts";
 import { Stage } from "./picture/stage.ts";
 import { wantedFor, type Abilities, type Wanted } from "./state/request.ts";
 import { firstState, type GroupLight, type Lighting, type State } from "./state/state.ts";
@@ -99,6 +100,7 @@ export class App {
         const lighting = { ...base.lighting, groups: { ...ownLighting.groups, ...base.lighting.groups } };
         if (base.lighting === firstState.lighting) Object.assign(lighting, ownLighting);
         this.store.restart({ ...base, scene: name, lighting, pins: base.pins.filter((pin) => pin < mesh.elements) });
+        this.judge(this.store.now);
         document.title = `${name} · Lambert`;
         this.stage.resize();
         this.cameras.setWalk(base.view.walk);
@@ -214,13 +216,20 @@ export class App {
         }
     }
 
+    /** The ends of the palette, as the person or the values set them. */
+    get axis(): Axis {
+        const { view } = this.store.now, { low, high } = this.spread;
+        const [from, to] = view.range ?? [view.log ? Math.max(low, high / 1e4) : 0, high];
+        return { low: from, high: Math.max(to, from + 1e-12), log: view.log && from > 0 };
+    }
+
     /** Hands all that shapes the picture, but the values, to the stage. */
     setLook(): void {
         const { view, compare } = this.store.now;
-        const range: [number, number] = view.range ?? [view.log ? Math.max(this.spread.low, this.spread.high / 1e4) : 0, this.spread.high];
+        const { low, high } = this.axis;
         this.stage.setLook({
             picture: view.picture, smooth: view.smooth, tone: view.tone, exposure: 2 ** (view.exposure ?? 0), palette: view.palette,
-            range, log: view.log, isoLines: view.isoLines, threshold: view.threshold,
+            range: [low, high], log: view.log, isoLines: view.isoLines, threshold: view.threshold, marked: view.judged !== null,
             compare: compare === null || this.fields[1] === null ? "none" : compare.how, split: compare?.split ?? 0.5,
         });
     }

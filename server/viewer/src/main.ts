@@ -6,18 +6,19 @@ import { lightsPanel } from "./panels/lights.ts";
 import { emittersPanel } from "./panels/emitters.ts";
 import { lookPanel } from "./panels/look.ts";
 import type { PanelMaker } from "./panels/panel.ts";
+import { readingPanel } from "./panels/reading/reading.ts";
 import { skyPanel } from "./panels/sky.ts";
 import { fromFragment, toFragment } from "./state/link.ts";
 import "./style.css";
 
 /** The panels, in the order of their tabs. */
-const panelMakers: readonly PanelMaker[] = [lightsPanel, skyPanel, emittersPanel, lookPanel];
+const panelMakers: readonly PanelMaker[] = [lightsPanel, skyPanel, emittersPanel, lookPanel, readingPanel];
 
 /** The fragment is written this long after the last change. */
 const LINK_MS = 300;
 
 function start(): void {
-    const canvas = make("canvas", { tabindex: 0, "aria-label": "The scene. Arrow keys turn it, plus and minus move, F shows all of it." });
+    const canvas = make("canvas", { tabindex: 0, "aria-label": "The scene. Arrow keys turn it, plus and minus move, F shows all of it, R reads values at a cross." });
     const frame = make("main", {}, canvas);
     // The canvas needs a place before its size is asked for.
     document.body.append(frame);

@@ -106,6 +106,7 @@ uniform vec2 range;
 uniform bool is_log;
 uniform float iso_lines;
 uniform float threshold;      // below 0: none
+uniform bool is_marked;       // stripes on the judged elements where there is no threshold
 uniform int compare;          // 0: a alone, 1: a left and b right of the split, 2: b − a
 uniform float split;          // in pixels
 uniform int hovered;
@@ -142,7 +143,7 @@ void main() {
         shown = texture(palette, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
         if (iso_lines > 0.0) {
             float level = place(value) * iso_lines, width = fwidth(level);
-            if (width > 1e-9 && abs(level - round(level)) < 0.75 * width && round(level) > 0.5) shown *= 0.25;
+            if (width > 1e-9 && abs(level - round(level)) < 0.75 * width && round(level) > 0.5 && round(level) < iso_lines + 0.5) shown *= 0.25;
         }
     } else {
         vec3 exposed = colour * exposure;
@@ -151,6 +152,8 @@ void main() {
     }
     if (threshold >= 0.0 && is_judged(element))
         shown = mix(shown, value >= threshold ? vec3(0.1, 0.75, 0.3) : vec3(0.9, 0.15, 0.15), 0.55);
+    else if (is_marked && is_judged(element) && mod(gl_FragCoord.x + gl_FragCoord.y, 14.0) < 2.0)
+        shown = mix(shown, vec3(1.0, 0.85, 0.2), 0.7);
     if (element == hovered || any(equal(pins, ivec4(element)))) shown = mix(shown, vec3(1.0, 0.85, 0.2), 0.5);
     if (right && gl_FragCoord.x < split + 1.5 || compare == 1 && abs(gl_FragCoord.x - split) < 1.0) shown = vec3(1.0);
     pixel = vec4(shown, 1.0);
@@ -166,7 +169,7 @@ export function makeUniforms(nothing: Texture): Uniforms {
         node_first: of(null), node_elements: of(null), node_count: of(0),
         elements: of(1), channels: of(1), weights: of(new Vector3(1, 0, 0)), is_smooth: of(false),
         picture: of(0), tone: of(1), scale: of(new Vector2(1, 1)), exposure: of(1), toneMappingExposure: of(1),
-        palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1),
+        palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),
         compare: of(0), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
     };
 }

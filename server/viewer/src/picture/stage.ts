@@ -24,6 +24,8 @@ export interface Look {
     isoLines: number;
     /** In the unit of the values; null: no marks. */
     threshold: number | null;
+    /** The judged elements are shown as such without a threshold, too. */
+    marked: boolean;
     compare: "none" | "split" | "difference";
     /** Share of the width that is left of the split. */
     split: number;
@@ -131,6 +133,7 @@ export class Stage {
         u.is_log.value = look.log && look.range[0] > 0;
         u.iso_lines.value = look.isoLines;
         u.threshold.value = look.threshold ?? -1;
+        u.is_marked.value = look.marked;
         u.compare.value = look.compare === "split" ? 1 : look.compare === "difference" ? 2 : 0;
         if (this.paletteName !== look.palette) {
             this.paletteName = look.palette;
@@ -143,6 +146,7 @@ export class Stage {
     /** The elements that the threshold judges. */
     judge(isJudged: (element: number) => boolean): void {
         if (this.mesh === null) return;
+        (this.uniforms.judged.value as { dispose?: () => void } | null)?.dispose?.();
         this.uniforms.judged.value = maskTexture(this.mesh.elements, isJudged);
         this.invalidate();
     }

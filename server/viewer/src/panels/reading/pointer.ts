@@ -1,0 +1,147 @@
+// Points at elements: the mouse hovers and clicks, a finger taps, and keys move a cross over the picture.
+import { button, make } from "../../base/dom.ts";
+import { clamp, tell } from "../../base/numbers.ts";
+import type { App } from "../../app.ts";
+import { pinsAfter } from "../../state/shares.ts";
+
+/** A pointer that moved less than this, in pixels, between down and up has clicked. */
+const CLICK_PX = 5;
+const STEP_PX = 6;
+
+export class Pointer {
+    readonly keys: HTMLButtonElement;
+    /** The cross is there: arrow keys move it in place of the camera. */
+    isByKeys = false;
+    private readonly tip = make("div", { class: "tip", hidden: true });
+    private readonly cross = make("div", { class: "cross", hidden: true, "aria-hidden": "true" });
+    /** Tells readers of the screen what stands under the cross. */
+    private readonly told = make("div", { class: "unseen", role: "status", "aria-live": "polite" });
+    private readonly canvas: HTMLCanvasElement;
+    private readonly frame: HTMLElement;
+    /** In pixels of the picture; null: the pointer is elsewhere. */
+    private place: [number, number] | null = null;
+    private down: [number, number, number] | null = null;
+    private isWaiting = false;
+    private element: number | null = null;
+
+    constructor(private readonly app: App, /** True while the panel is seen: then elements are marked and pinned. */
+        private readonly isReading: () => boolean) {
+        this.canvas = app.stage.canvas;
+        this.frame = this.canvas.parentElement as HTMLElement;
+        this.frame.append(this.tip, this.cross, this.told);
+        this.keys = button("Read by keys (R)", "A cross on the picture that arrow keys move; Enter pins, Escape ends", () => this.setKeys(!this.isByKeys), { "aria-pressed": "false" });
+        this.canvas.addEventListener("pointermove", (event) => {
+            if (event.pointerType === "touch" || this.isByKeys) return;
+            if (event.buttons !== 0) this.leave();
+            else this.moveTo(event.offsetX, event.offsetY);
+        });
+        this.canvas.addEventListener("pointerleave", () => { if (!this.isByKeys) this.leave(); });
+        this.canvas.addEventListener("pointerdown", (event) => {
+            this.down = event.isPrimary && event.button === 0 ? [event.clientX, event.clientY, event.pointerId] : null;
+        });
+        window.addEventListener("pointerup", (event) => this.release(event));
+        // Before the camera, which listens to the canvas itself.
+        this.frame.addEventListener("keydown", (event) => this.press(event), true);
+        app.on("field", () => this.tell());
+        app.on("scene", () => {
+            this.leave();
+            const prepare = (): void => app.scene?.picker.prepare();
+            if ("requestIdleCallback" in window) requestIdleCallback(prepare, { timeout: 4000 });
+            else setTimeout(prepare, 2000);
+        });
+    }
+
+    setKeys(on: boolean): void {
+        this.isByKeys = on;
+        this.keys.setAttribute("aria-pressed", String(on));
+        this.cross.hidden = !on;
+        if (!on) {
+            this.leave();
+            return;
+        }
+        this.canvas.focus();
+        this.moveTo(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
+    }
+
+    private press(event: KeyboardEvent): void {
+        if (event.target !== this.canvas || event.ctrlKey || event.metaKey || event.altKey) return;
+        const key = event.key.toLowerCase();
+        if (key === "r") this.setKeys(!this.isByKeys);
+        else if (!this.isByKeys) return;
+        else if (key === "escape") this.setKeys(false);
+        else if (key === "enter" || key === " ") this.pin(event.shiftKey);
+        else if (key.startsWith("arrow") && this.place !== null) {
+            const step = STEP_PX * (event.shiftKey ? 5 : 1);
+            const [x, y] = this.place;
+            this.moveTo(clamp(x + (key === "arrowright" ? step : key === "arrowleft" ? -step : 0), 0, this.canvas.clientWidth - 1),
+                clamp(y + (key === "arrowdown" ? step : key === "arrowup" ? -step : 0), 0, this.canvas.clientHeight - 1));
+        } else return;
+        event.preventDefault();
+        event.stopPropagation();
+    }
+
+    private release(event: PointerEvent): void {
+        const { down } = this;
+        this.down = null;
+        if (down === null || event.pointerId !== down[2] || event.target !== this.canvas || !this.isReading()) return;
+        if (Math.hypot(event.clientX - down[0], event.clientY - down[1]) > CLICK_PX) return;
+        const box = this.canvas.getBoundingClientRect();
+        this.place = [event.clientX - box.left, event.clientY - box.top];
+        this.look();
+        this.pin(event.shiftKey);
+    }
+
+    private pin(isMore: boolean): void {
+        const { store } = this.app;
+        if (this.element !== null) store.change({ ...store.now, pins: pinsAfter(store.now.pins, this.element, isMore) });
+        else if (!isMore && store.now.pins.length > 0) store.change({ ...store.now, pins: [] });
+    }
+
+    private leave(): void {
+        this.place = null;
+        this.element = null;
+        this.tip.hidden = true;
+        this.app.hover(null);
+    }
+
+    private moveTo(x: number, y: number): void {
+        this.place = [x, y];
+        if (this.isWaiting) return;
+        this.isWaiting = true;
+        // One look for each picture at most.
+        requestAnimationFrame(() => {
+            this.isWaiting = false;
+            if (this.place !== null) this.look();
+        });
+    }
+
+    private look(): void {
+        const { app: { scene, cameras }, place } = this;
+        if (scene === null || place === null) return;
+        cameras.camera.updateMatrixWorld();
+        this.element = scene.picker.at((2 * place[0]) / this.canvas.clientWidth - 1, 1 - (2 * place[1]) / this.canvas.clientHeight, cameras.camera);
+        this.app.hover(this.isReading() || this.isByKeys ? this.element : null);
+        this.tell();
+    }
+
+    /** The number beside the pointer: what the picture shows there. */
+    private tell(): void {
+        const { app: { scene, fields: [field], store: { now: { view } } }, place, element } = this;
+        if (place === null) return;
+        this.cross.style.left = `${place[0]}px`;
+        this.cross.style.top = `${place[1]}px`;
+        this.tip.hidden = element === null || field === null || scene === null;
+        if (element === null || field === null || scene === null) {
+            if (this.isByKeys) this.told.textContent = "nothing";
+            return;
+        }
+        const text = `${tell(field.values[element])} ${view.unit} · ${scene.mesh.groups[scene.mesh.groupOf[element]]?.name ?? ""}`;
+        this.tip.textContent = text;
+        if (this.isByKeys) this.told.textContent = `${text}, element ${element}`;
+        // It stays within the picture, and beside the pointer.
+        const right = place[0] > this.frame.clientWidth - this.tip.offsetWidth - 24;
+        const below = place[1] < this.tip.offsetHeight + 24;
+        this.tip.style.left = `${Math.max(4, right ? place[0] - this.tip.offsetWidth - 14 : place[0] + 14)}px`;
+        this.tip.style.top = `${below ? place[1] + 18 : place[1] - this.tip.offsetHeight - 12}px`;
+    }
+}

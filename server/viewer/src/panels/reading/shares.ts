@@ -1,0 +1,83 @@
+// Which lamp lights this point: one adjoint request for an element, then every lighting is read off it without another.
+import { fill, make } from "../../base/dom.ts";
+import { count, percent, tell } from "../../base/numbers.ts";
+import type { App } from "../../app.ts";
+import { Newest } from "../../daemon/newest.ts";
+import { channelWeights } from "../../picture/field.ts";
+import { partsOf, type Gradient } from "../../state/shares.ts";
+
+interface Asked {
+    scene: string;
+    element: number;
+    quantity: string;
+}
+
+const LINES_MOST = 12;
+
+export class Shares {
+    readonly element = make("section", { class: "shares" });
+    private readonly head = make("h3", {}, "Which lamp lights this point");
+    private readonly body = make("div", {});
+    private gradient: { key: string; of: Gradient } | null = null;
+    private readonly asker: Newest<Asked, Gradient>;
+
+    constructor(private readonly app: App, private readonly isSeen: () => boolean) {
+        this.element.append(this.head, this.body);
+        this.asker = new Newest((asked) => this.ask(asked), (of, asked) => {
+            this.gradient = { key: JSON.stringify(asked), of };
+            this.draw();
+        }, (reason) => app.fail(reason), 1);
+        app.on("scene", () => {
+            this.asker.forget();
+            this.gradient = null;
+            this.draw();
+        });
+        app.on("field", () => this.draw());
+        app.store.listen((now, before) => { if (now.pins !== before.pins || now.view !== before.view || now.lighting !== before.lighting) this.draw(); });
+    }
+
+    /** The last pin, of the quantity shown. */
+    private get asked(): Asked | null {
+        const { pins, scene, view } = this.app.store.now, element = pins[pins.length - 1];
+        return element === undefined ? null : { scene, element, quantity: view.picture === "light" ? "radiosity" : view.quantity };
+    }
+
+    private async ask({ scene, element, quantity }: Asked): Promise<Gradient> {
+        const { description } = this.app.scene as NonNullable<App["scene"]>, { channels } = description;
+        const gradient = (description.emitters?.length ?? 0) > 0 ? ["emitters"] : description.sky === null ? ["groups"] : ["groups", "sky"];
+        const weights = channelWeights(channels);
+        const answer = await this.app.api.adjoint(scene, {
+            cotangent: { elements: [element], values: [channels === 1 ? 1 : weights] }, quantity, gradient,
+        });
+        return answer.gradient as Gradient;
+    }
+
+    draw(): void {
+        const { app, asked } = this, { scene, store: { now } } = app;
+        this.element.hidden = asked === null || scene === null;
+        if (!this.isSeen() || asked === null || scene === null) return;
+        const key = JSON.stringify(asked);
+        if (this.gradient?.key !== key) {
+            this.gradient = null;
+            this.body.replaceChildren();
+            this.asker.want(asked);
+            return;
+        }
+        const { description, mesh } = scene;
+        const parts = partsOf(this.gradient.of, now.lighting, description.channels, description.groups.map((group) => group.name),
+            description.emitters ?? [], description.sky === null ? null : app.skyOf(now.lighting, scene));
+        const total = parts.reduce((sum, part) => sum + part.value, 0);
+        const group = mesh.groups[mesh.groupOf[asked.element]]?.name ?? "";
+        const listed = parts.slice(0, LINES_MOST), rest = parts.slice(LINES_MOST).reduce((sum, part) => sum + part.value, 0);
+        if (parts.length > LINES_MOST) listed.push({ name: `${parts.length - LINES_MOST} others`, value: rest });
+        fill(this.body, make("p", {}, `${group}, element ${count(asked.element)}: ${asked.quantity} ${tell(total)} ${now.view.unit}`),
+            parts.length === 0 && make("p", { class: "hint" }, "Nothing shines."),
+            make("ol", {}, ...listed.map(({ name, value }) => {
+                const share = total > 0 ? value / total : 0;
+                const bar = make("span", { class: "bar", "aria-hidden": "true" });
+                bar.style.inlineSize = `${100 * Math.min(1, Math.max(0, share))}%`;
+                return make("li", { "data-part": name }, make("span", { class: "row" }, make("span", { class: "grow" }, name),
+                    make("span", { class: "figures" }, `${percent(share)} · ${tell(value)} ${now.view.unit}`)), make("span", { class: "track", "aria-hidden": "true" }, bar));
+            })));
+    }
+}
