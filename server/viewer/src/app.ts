@@ -27,7 +27,7 @@ export interface Timing {
     solve: number | null;
 }
 
-type Event = "scene" | "field" | "pick" | "hover" | "timing" | "lost" | "found" | "problem" | "token";
+type Event = "scene" | "scenes" | "field" | "pick" | "hover" | "timing" | "lost" | "found" | "problem" | "token";
 type Side = 0 | 1;
 
 /** The store was replaced by one of another mesh. */
@@ -46,6 +46,8 @@ export class App {
     fields: [Field | null, Field | null] = [null, null];
     spread: Spread = { low: 0, high: 1, most: 1, logMean: 0 };
     timing: Timing = { roundTrip: 0, solve: null };
+    /** The bound on the error of every number shown, where the daemon has certified one. */
+    certificate: { bound: number; iterations: number; solve: number | null } | null = null;
     hovered: number | null = null;
     problem: string | null = null;
     isLost = false;
@@ -138,6 +140,20 @@ export class App {
         }
     }
 
+    /** Shows refined values in place of those of the same request. */
+    certify(field: Field, certificate: NonNullable<App["certificate"]>): void {
+        this.certificate = certificate;
+        this.fields[0] = field;
+        this.stage.setField(0, field);
+        this.tell("field");
+    }
+
+    /** Asks which scenes there are, after variants came or went. */
+    async listScenes(): Promise<void> {
+        this.scenes = await this.api.scenes();
+        this.tell("scenes");
+    }
+
     get isIdle(): boolean {
         return this.askers.every((asker) => asker.isIdle);
     }
@@ -191,6 +207,7 @@ export class App {
     private take(side: Side, [field]: [Field, number | null], wanted: Wanted): void {
         if (this.isLost) this.find();
         this.problem = null;
+        if (side === 0) this.certificate = null;
         this.fields[side] = field;
         this.answers += 1;
         this.stage.setField(side, field);
@@ -241,6 +258,7 @@ export class App {
         if (now.compare === null && before.compare !== null) {
             this.fields[1] = null;
             this.asked[1] = "";
+            this.askers[1].forget();
         }
         if (now.view !== before.view || now.compare !== before.compare) this.setLook();
         this.ask();

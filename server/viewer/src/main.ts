@@ -2,9 +2,11 @@
 import { App } from "./app.ts";
 import { make } from "./base/dom.ts";
 import { makeBanner, makeBar, makeDrawer, makeStatus, makeTokenDialog, setBackground } from "./panels/frame.ts";
+import { comparePanel } from "./panels/compare.ts";
 import { lightsPanel } from "./panels/lights.ts";
 import { emittersPanel } from "./panels/emitters.ts";
 import { lookPanel } from "./panels/look.ts";
+import { trustPanel } from "./panels/trust.ts";
 import type { PanelMaker } from "./panels/panel.ts";
 import { readingPanel } from "./panels/reading/reading.ts";
 import { skyPanel } from "./panels/sky.ts";
@@ -12,7 +14,9 @@ import { fromFragment, toFragment } from "./state/link.ts";
 import "./style.css";
 
 /** The panels, in the order of their tabs. */
-const panelMakers: readonly PanelMaker[] = [lightsPanel, skyPanel, emittersPanel, lookPanel, readingPanel];
+const panelMakers: readonly PanelMaker[] = [
+    lightsPanel, skyPanel, emittersPanel, lookPanel, readingPanel, trustPanel, comparePanel,
+];
 
 /** The fragment is written this long after the last change. */
 const LINK_MS = 300;

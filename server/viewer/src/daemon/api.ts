@@ -12,6 +12,17 @@ export interface SceneLine {
 
 export type ErrorFigures = { [name: string]: number };
 
+/** Errors of what a group receives, as shares of what it reflects: of light of all groups, of near and of far ones. */
+export type GroupErrors = { name: string; uniform?: number; near?: number; far?: number };
+
+/** An answer in single precision as it came, with what its headers say. */
+export interface Floats {
+    file: ArrayBuffer;
+    certificate: number | null;
+    iterations: number | null;
+    solveMs: number | null;
+}
+
 export interface Description {
     name: string;
     elements: number;
@@ -23,10 +34,10 @@ export interface Description {
     groups: { name: string; elements: number }[];
     emitters: string[] | null;
     sky: { tiling: string; tiles: number; ground_albedo: number } | null;
-    error: { single?: ErrorFigures; lights?: ErrorFigures; random?: ErrorFigures; sky?: ErrorFigures } | null;
+    error: { [light: string]: ErrorFigures | GroupErrors[] } & { single?: ErrorFigures; lights?: ErrorFigures; sky?: ErrorFigures } | null;
+    provenance?: { [name: string]: unknown };
     /** What the method reported; paths and reuse are of a lamp in many positions. */
     report?: { [name: string]: unknown };
-    provenance?: { [name: string]: unknown };
 }
 
 /** A body for POST …/radiosity; EMISSION of the contract. */
@@ -106,7 +117,9 @@ export class Api {
     }
 
     async describe(scene: string): Promise<Description> {
-        return (await (await this.ask(Api.path(scene))).json()) as Description;
+        const answer = await this.ask(Api.path(scene));
+        if (answer.status === 202) throw new Problem(202, `${scene} is being built; open it again in a while.`, 1);
+        return (await answer.json()) as Description;
     }
 
     async sky(scene: string): Promise<SkyAnswer> {
@@ -125,8 +138,22 @@ export class Api {
     /** [C][n] values, or [n] of one channel, in half precision; `request` has the emission and the quantity. */
     async radiosity(scene: string, request: object, signal?: AbortSignal): Promise<{ values: Npy; solveMs: number | null }> {
         const response = await this.post(Api.path(scene, "/radiosity"), request, "application/x-npy; dtype=f2", signal);
+        return { values: readNpy(await response.arrayBuffer()), solveMs: Api.solveMs(response) };
+    }
+
+    /** The same in single precision, as an NPY file. A request with a tolerance has a certificate. */
+    async floats(scene: string, request: object, signal?: AbortSignal): Promise<Floats> {
+        const response = await this.post(Api.path(scene, "/radiosity"), request, "application/x-npy; dtype=f4", signal);
+        const number = (name: string): number | null => (response.headers.has(name) ? Number(response.headers.get(name)) : null);
+        return {
+            file: await response.arrayBuffer(), certificate: number("Lambert-Certificate"), iterations: number("Lambert-Iterations"),
+            solveMs: Api.solveMs(response),
+        };
+    }
+
+    private static solveMs(response: Response): number | null {
         const solve = /solve;dur=([\d.]+)/.exec(response.headers.get("Server-Timing") ?? "");
-        return { values: readNpy(await response.arrayBuffer()), solveMs: solve === null ? null : Number(solve[1]) };
+        return solve === null ? null : Number(solve[1]);
     }
 
     /** The same as JSON, with its error, for selected elements, reductions and refinements. */
@@ -140,12 +167,14 @@ export class Api {
             { [member: string]: unknown };
     }
 
-    /** Makes a variant of reflectances, or removes it (groups null); its name is NAME@variant. */
-    async vary(scene: string, variant: string, groups: { [name: string]: readonly number[] } | null): Promise<void> {
-        await this.ask(Api.path(scene, "/reflectance"), {
+    /** Makes a variant of reflectances, or removes it (groups null); its name is NAME@variant. The path of one that is
+     * made answers 202 until it is served. */
+    async vary(scene: string, variant: string, groups: { [name: string]: number | readonly number[] } | null): Promise<string | null> {
+        const response = await this.ask(Api.path(scene, "/reflectance"), {
             method: groups === null ? "DELETE" : "PUT",
             headers: { "Content-Type": "application/json" },
             body: JSON.stringify(groups === null ? { variant } : { variant, groups }),
         });
+        return response.headers.get("Location");
     }
 }

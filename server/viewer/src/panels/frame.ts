@@ -25,12 +25,14 @@ export function makeBar(app: App): HTMLElement {
         redo.disabled = !app.store.canRedo;
     };
     app.store.listen(update);
-    app.on("scene", () => {
+    const list = (): void => {
         update();
         fill(scenes, choice("Scene", app.scenes.map((scene) => [scene.name, scene.name] as const), app.store.now.scene, (name) => {
             void app.open(name, null).catch((reason: unknown) => app.fail(reason));
         }));
-    });
+    };
+    app.on("scene", list);
+    app.on("scenes", list);
     document.addEventListener("keydown", (event) => {
         if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
         const key = event.key.toLowerCase();
@@ -96,13 +98,22 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
 /** Size, error and time: always in sight. */
 export function makeStatus(app: App): HTMLElement {
     const size = make("span", {}), error = make("span", {}), time = make("span", { "data-figure": "time" });
-    app.on("scene", () => {
+    const drawError = (): void => {
         const { description } = app.scene as NonNullable<App["scene"]>;
-        size.textContent = `${count(description.elements)} elements · ${description.kind}`;
+        if (app.certificate !== null) {
+            error.textContent = `certified: no number is off by more than ${tell(app.certificate.bound, 2)} ${app.store.now.view.unit}`;
+            return;
+        }
         const figures = description.error?.lights ?? description.error?.single ?? description.error?.sky;
         error.textContent = figures === undefined || figures.total_indirect_mean === undefined ? "error not measured"
             : `error ${percent(figures.total_indirect_mean)} of the indirect light, ${percent(figures.total_relative_mean)} of all`;
         error.title = description.reason;
+    };
+    app.on("field", drawError);
+    app.on("scene", () => {
+        const { description } = app.scene as NonNullable<App["scene"]>;
+        drawError();
+        size.textContent = `${count(description.elements)} elements · ${description.kind}`;
     });
     app.on("timing", () => {
         const { roundTrip, solve } = app.timing;

@@ -108,6 +108,7 @@ uniform float iso_lines;
 uniform float threshold;      // below 0: none
 uniform bool is_marked;       // stripes on the judged elements where there is no threshold
 uniform int compare;          // 0: a alone, 1: a left and b right of the split, 2: b − a
+uniform float change;         // of b − a: at this it is all blue or all red
 uniform float split;          // in pixels
 uniform int hovered;
 uniform ivec4 pins;
@@ -135,9 +136,9 @@ void main() {
     float value = dot(colour, weights);
     vec3 shown;
     if (compare == 2) {
-        // Blue where b is darker, red where it is brighter, by range.y at most.
-        float change = clamp((dot(colour_b, weights) * scale.y - value) / range.y, -1.0, 1.0);
-        shown = to_srgb(change < 0.0 ? mix(vec3(0.8), vec3(0.02, 0.13, 0.65), -change) : mix(vec3(0.8), vec3(0.62, 0.02, 0.05), change));
+        // Blue where b is darker, red where it is brighter; the colours stand in changes.ts, too.
+        float t = clamp((dot(colour_b, weights) * scale.y - value) / change, -1.0, 1.0);
+        shown = to_srgb(t < 0.0 ? mix(vec3(0.8), vec3(0.02, 0.13, 0.65), -t) : mix(vec3(0.8), vec3(0.62, 0.02, 0.05), t));
     } else if (picture == 1) {
         float t = clamp(place(value), 0.0, 1.0);
         shown = texture(palette, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
@@ -170,7 +171,7 @@ export function makeUniforms(nothing: Texture): Uniforms {
         elements: of(1), channels: of(1), weights: of(new Vector3(1, 0, 0)), is_smooth: of(false),
         picture: of(0), tone: of(1), scale: of(new Vector2(1, 1)), exposure: of(1), toneMappingExposure: of(1),
         palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),
-        compare: of(0), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
+        compare: of(0), change: of(1), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
     };
 }
 

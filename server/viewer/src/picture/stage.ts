@@ -143,6 +143,12 @@ export class Stage {
         this.invalidate();
     }
 
+    /** The difference that is all blue or all red, in the unit of the values. */
+    setChange(most: number): void {
+        this.uniforms.change.value = Math.max(most, 1e-30);
+        this.invalidate();
+    }
+
     /** The elements that the threshold judges. */
     judge(isJudged: (element: number) => boolean): void {
         if (this.mesh === null) return;

@@ -1,0 +1,138 @@
+// Two scenes or two lightings of one scene, side by side or as their difference, with the numbers of that.
+import { button, choice, fill, make } from "../base/dom.ts";
+import { halvesToFloats } from "../base/half.ts";
+import { readNpy } from "../base/npy.ts";
+import { count, percent, tell } from "../base/numbers.ts";
+import type { App } from "../app.ts";
+import { changesOf, roundUp, type Changes } from "../picture/changes.ts";
+import type { Field } from "../picture/field.ts";
+import type { Wanted } from "../state/request.ts";
+import type { Compare } from "../state/state.ts";
+import { changeLegend, splitLine } from "./split.ts";
+import type { Panel } from "./panel.ts";
+
+/** The numbers are asked for in single precision this long after the last answer. */
+const REST_MS = 400;
+
+export function comparePanel(app: App): Panel {
+    const line = splitLine(app), legend = changeLegend(app);
+    app.stage.canvas.parentElement?.append(line.element, legend.element);
+    const choices = make("div", {}), numbers = make("div", { "data-figure": "compared", "aria-live": "polite" }), said = make("p", { role: "status" });
+    const how = choice("Shown as", [["split", "A left, B right of a line"], ["difference", "Difference B − A"]], "split",
+        (way) => set({ how: way }));
+    const set = (to: Partial<Compare> | null): void => {
+        const { now } = app.store;
+        const first: Compare = { how: (how.querySelector("select") as HTMLSelectElement).value as Compare["how"], scene: null, lighting: null, split: 0.5 };
+        said.textContent = "";
+        app.store.change({ ...now, compare: to === null ? null : { ...first, ...now.compare, ...to } });
+    };
+    const pick = async (value: string): Promise<void> => {
+        const { now } = app.store, name = value.slice(2);
+        if (value === "") set(null);
+        else if (value.startsWith("p:")) set({ scene: null, lighting: now.presets.find((preset) => preset.name === name)?.lighting ?? null });
+        else if (value.startsWith("s:")) {
+            const why = await unlike(app, name);
+            if (why === null) set({ scene: name, lighting: null });
+            else {
+                draw();
+                said.textContent = why;
+            }
+        }
+    };
+    const draw = (): void => {
+        const { scenes, store: { now } } = app;
+        const here = scenes.find((scene) => scene.name === now.scene);
+        const others = scenes.filter((scene) => scene.name !== now.scene && scene.elements === here?.elements && scene.channels === here.channels);
+        const chosen = chosenOf(app);
+        fill(choices, choice("B is", [["", "nothing: no comparison"], ...(chosen === "kept" ? [["kept", "the lighting that was kept"] as const] : []),
+            ...others.map((scene) => [`s:${scene.name}`, `scene ${scene.name}`] as const),
+            ...now.presets.map((preset) => [`p:${preset.name}`, `lighting ${preset.name}`] as const)],
+        chosen, (value) => { pick(value).catch((reason: unknown) => app.fail(reason)); }));
+        how.hidden = now.compare === null;
+        (how.querySelector("select") as HTMLSelectElement).value = now.compare?.how ?? "split";
+        line.name(now.scene, nameOf(now.compare, chosen));
+        if (now.compare === null) fill(numbers);
+    };
+    app.on("scene", draw);
+    app.on("scenes", draw);
+    app.store.listen((now, before) => { if (now.compare !== before.compare || now.presets !== before.presets) draw(); });
+    measure(app, numbers, (changes) => {
+        const most = roundUp(changes.high);
+        app.stage.setChange(most);
+        legend.set(most);
+    });
+    const keep = button("Keep this lighting as B", "Keep the lighting that is shown now as B, then change A", () => set({ scene: null, lighting: app.store.now.lighting }));
+    return {
+        id: "compare", title: "Compare",
+        element: make("div", {}, make("p", { class: "hint" }, "A is what the other panels show. B is another scene with as many elements, or another lighting."),
+            choices, make("div", { class: "row" }, keep), how, said, numbers),
+    };
+}
+
+/** What the choice shows: a scene, a preset of this very lighting, or what was kept. */
+function chosenOf(app: App): string {
+    const { now } = app.store, { compare } = now;
+    if (compare === null) return "";
+    if (compare.scene !== null) return `s:${compare.scene}`;
+    const preset = now.presets.find(({ lighting }) => JSON.stringify(lighting) === JSON.stringify(compare.lighting));
+    return preset === undefined ? "kept" : `p:${preset.name}`;
+}
+
+function nameOf(compare: Compare | null, chosen: string): string {
+    if (compare === null) return "";
+    return chosen === "kept" ? "kept lighting" : chosen.slice(2);
+}
+
+/** Why another scene cannot take the lighting of this one; null: it can. */
+async function unlike(app: App, name: string): Promise<string | null> {
+    const here = app.scene?.description, there = await app.api.describe(name);
+    if (here === undefined) return null;
+    const names = (list: { name: string }[]): string => JSON.stringify(list.map((group) => group.name).sort());
+    if (names(here.groups) !== names(there.groups)) return `${name} has other groups, so it cannot be lit alike.`;
+    if (here.emitters?.length !== there.emitters?.length) return `${name} has other emitters, so it cannot be lit alike.`;
+    if (here.sky?.tiles !== there.sky?.tiles) return `${name} has another sky, so it cannot be lit alike.`;
+    return null;
+}
+
+const planar = (field: Field): Float32Array => halvesToFloats(field.bits, 0, field.bits.length, field.scale);
+
+/** Finds the figures of what is shown at each answer, and again in single precision when it rests. */
+function measure(app: App, place: HTMLElement, found: (changes: Changes) => void): void {
+    let timer = 0, turn = 0;
+    const show = (changes: Changes, isRough: boolean): void => {
+        const { scene, store: { now } } = app;
+        if (scene === null) return;
+        const { unit } = now.view, group = scene.mesh.groups[scene.mesh.groupOf[changes.mostAt]].name, about = isRough ? "≈ " : "";
+        found(changes);
+        fill(place, make("dl", { "data-rough": isRough ? "yes" : "no" },
+            make("dt", {}, "Root mean square of B − A"), make("dd", { "data-number": changes.rms }, `${about}${tell(changes.rms)} ${unit}`),
+            make("dt", {}, "Largest"), make("dd", { "data-number": changes.most },
+                `${about}${changes.most > 0 ? "+" : "−"}${tell(Math.abs(changes.most))} ${unit} at element ${count(changes.mostAt)} of ${group}`),
+            make("dt", {}, "|B − A| / |A|"), make("dd", { "data-number": changes.relative }, `${about}${percent(changes.relative)}`)),
+        make("p", { class: "hint" }, "Weighted by area. The first two are of luminance, the last of all channels."));
+    };
+    const exact = async (wanted: Wanted): Promise<Float32Array> => {
+        const { scene } = app, tolerance = app.store.now.tolerance;
+        if (scene === null || wanted.emission === null) return new Float32Array((scene?.description.channels ?? 0) * (scene?.mesh.elements ?? 0));
+        // A certified A is compared as such.
+        const certified = tolerance !== null && app.certificate !== null && wanted === a;
+        const { file } = await app.api.floats(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity, ...(certified ? { tolerance } : {}) });
+        return (readNpy(file).data as Float32Array).map((v) => v * wanted.scale);
+    };
+    let a: Wanted | null = null;
+    const rested = async (): Promise<void> => {
+        const { scene } = app, b = app.wanted(1), mine = ++turn;
+        a = app.wanted(0);
+        if (scene === null || a === null || b === null || !app.isIdle) return;
+        const [first, second] = await Promise.all([exact(a), exact(b)]);
+        if (mine === turn && app.store.now.compare !== null) show(changesOf(first, second, scene.description.channels, scene.mesh.area), false);
+    };
+    app.on("field", () => {
+        const { scene, fields: [first, second], store: { now } } = app;
+        turn += 1;
+        clearTimeout(timer);
+        if (scene === null || now.compare === null || first === null || second === null) return;
+        show(changesOf(planar(first), planar(second), scene.description.channels, scene.mesh.area), true);
+        timer = window.setTimeout(() => { rested().catch((reason: unknown) => app.fail(reason)); }, REST_MS);
+    });
+}
