@@ -37,8 +37,9 @@ export function partsOf(gradient: Gradient, lighting: Lighting, channels: number
             const k = Number(index);
             if (weight > 0 && k < emitters.length) parts.push({ name: emitters[k], value: product(gradient.emitters, k, weight * lighting.dim) });
         }
-    if (gradient.sky !== undefined && sky !== null) {
-        const rows = gradient.sky;
+    // A store of the tiles of a sky has these as its emitters.
+    const rows = gradient.sky ?? (parts.length === 0 && sky !== null && sky.length === emitters.length ? gradient.emitters : undefined);
+    if (rows !== undefined && sky !== null) {
         const value = sky.reduce((sum: number, radiance, tile) => sum + product(rows, tile, radiance), 0);
         if (value !== 0) parts.push({ name: "sky", value });
     }

@@ -88,7 +88,7 @@ export class Pins {
         // Buttons stay where they are while numbers change, so that a click meets them.
         const cards = [...this.element.querySelectorAll<HTMLElement>(".pin")];
         const wanted = [...pins.map(String), ...(hovered === null ? [] : ["hover"])];
-        if (cards.map((card) => card.dataset.pin).join() !== wanted.join()) {
+        if (this.element.childElementCount === 0 || cards.map((card) => card.dataset.pin).join() !== wanted.join()) {
             fill(this.element, pins.length === 0 && hovered === null
                 && make("p", { class: "hint" }, "Click or tap the picture to pin an element; Shift adds another, a second click removes it."),
             ...wanted.map((pin) => make("section", { class: "pin", "data-pin": pin },

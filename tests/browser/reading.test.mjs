@@ -1,0 +1,300 @@
+// The panel of readings: what it tells agrees with what the daemon answers.
+import assert from "node:assert/strict";
+import { writeFileSync } from "node:fs";
+import { before, test } from "node:test";
+import { pathToFileURL } from "node:url";
+import { Daemon, elementAt, inFolder, lambert, openPage, settled, violations } from "./page.mjs";
+
+// A coloured yard under a sky, with two lamps on its walls. The floor is 4 m by 4 m.
+const OBJ = `mtllib yard.mtl
+v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 0 0 2\nv 4 0 2\nv 4 4 2\nv 0 4 2
+v 1 .01 .8\nv 2 .01 .8\nv 2 .01 1.4\nv 1 .01 1.4\nv 3.99 2 1\nv 3.99 3 1\nv 3.99 3 1.5\nv 3.99 2 1.5
+o floor\nusemtl floor\nf 1 2 3 4\no south\nusemtl wall\nf 1 5 6 2\no north\nusemtl black\nf 4 3 7 8\no west\nusemtl red\nf 1 4 8 5\no east\nusemtl wall\nf 2 6 7 3
+o lamp\nusemtl lamp\nf 9 12 11 10\no spot\nusemtl spot\nf 13 16 15 14
+`;
+const MTL = `newmtl floor\nKd .5 .5 .5\nnewmtl wall\nKd .7 .7 .6\nnewmtl red\nKd .7 .1 .1\nnewmtl black\nKd 0 0 0
+newmtl lamp\nKd .5 .5 .5\nKe 900 700 400\nnewmtl spot\nKd .3 .3 .3\nKe 100 200 900
+`;
+const WEIGHTS = [0.2126, 0.7152, 0.0722];
+const luminance = (c) => c.reduce((sum, v, i) => sum + v * WEIGHTS[i], 0);
+/** Numbers are told with three digits. */
+const told = (text, value) => assert.ok(Math.abs(Number(text.replaceAll(",", "").match(/-?[\d.]+(e[+-]?\d+)?/)?.[0]) - value) <= 0.0055 * Math.abs(value) + 1e-6,
+    `"${text}" is told, it is ${value}`);
+
+let daemon;
+before(async () => {
+    writeFileSync(inFolder("yard.obj"), OBJ);
+    writeFileSync(inFolder("yard.mtl"), MTL);
+    lambert("precompute", inFolder("yard.obj"), "-o", inFolder("yard.h5"), "--elements", 500, "--rays", 512, "--probes", 2, "--quiet",
+        "--method", "low-rank", "--epsilon", 0.02, "--sky", "grid:4x3");
+    daemon = await Daemon.start([inFolder("yard.h5")]);
+});
+
+/** A page that shows the panel, seen from above, under an even sky. */
+async function openReading(options = {}) {
+    const page = await openPage(daemon.address, options);
+    await page.evaluate(() => {
+        const { store } = window.lambert, { now } = store;
+        window.lambert.cameras.place([2, 7, -1, 2, 0, -2.2], false);
+        store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, model: "even", strength: 40 } } });
+    });
+    await settled(page);
+    await page.getByRole("tab", { name: "Reading" }).click();
+    await page.locator(".pins > *").first().waitFor();
+    return page;
+}
+
+const ask = async (emission, more) => daemon.json("/v1/scenes/yard/radiosity", { emission, ...more });
+
+/** What shines, as the page says: by group, and of the sky's tiles. */
+const lightsOf = (page) => page.evaluate(() => {
+    const { store: { now: { lighting } }, scene, skyOf } = window.lambert;
+    const groups = Object.fromEntries(Object.entries(lighting.groups).map(([name, light]) => [name, light.colour.map((c) => c * light.power * lighting.dim)]));
+    return { groups, sky: skyOf(lighting, scene) };
+});
+
+/** [C] of one element. */
+async function at(element, emission, quantity) {
+    return (await ask(emission, { quantity, select: { elements: [element] } }))[quantity].map((row) => row[0]);
+}
+
+async function click(page, x, y) {
+    const box = await page.locator("main canvas").first().boundingBox();
+    await page.mouse.move(box.x + x * box.width, box.y + y * box.height);
+    await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+    return elementAt(page, x, y);
+}
+
+const change = (page, to) => page.evaluate((what) => {
+    const { store: s } = window.lambert;
+    s.change({ ...s.now, view: { ...s.now.view, ...what } });
+}, to);
+
+test("a pinned element has the numbers of the daemon", async () => {
+    const page = await openReading();
+    const first = await click(page, 0.53, 0.63);
+    await page.keyboard.down("Shift");
+    const second = await click(page, 0.35, 0.75);
+    await page.keyboard.up("Shift");
+    assert.deepEqual(await page.evaluate(() => window.lambert.store.now.pins), [first, second]);
+    const lights = await lightsOf(page);
+    for (const element of [first, second]) {
+        for (const [row, quantity] of [["B", "radiosity"], ["H", "irradiance"]]) {
+            const wanted = await at(element, lights, quantity);
+            const cells = page.locator(`.pin[data-pin="${element}"] tr[data-row="${row}"] td`);
+            await page.waitForFunction(([pin, r]) => !document.querySelector(`.pin[data-pin="${pin}"] tr[data-row="${r}"] td`).textContent.includes("–"), [element, row]);
+            const texts = await cells.allTextContents();
+            [...wanted, luminance(wanted)].forEach((value, i) => told(texts[i], value));
+        }
+        assert.deepEqual((await page.locator(`.pin[data-pin="${element}"] tr[data-row="E"] td`).allTextContents()), ["0", "0", "0", "0"]);
+    }
+    // The numbers follow a slider.
+    const before = await page.locator(`.pin[data-pin="${first}"] tr[data-row="B"] td`).first().textContent();
+    await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, lighting: { ...s.now.lighting, dim: 0.5 } }); });
+    await settled(page);
+    const dimmed = await at(first, await lightsOf(page), "radiosity");
+    await page.waitForFunction(([pin, old]) => document.querySelector(`.pin[data-pin="${pin}"] tr[data-row="B"] td`).textContent !== old, [first, before]);
+    told(await page.locator(`.pin[data-pin="${first}"] tr[data-row="B"] td`).first().textContent(), dimmed[0]);
+    // A second click takes the pin away; the number beside the pointer is that of the picture.
+    await click(page, 0.53, 0.63);
+    assert.deepEqual(await page.evaluate(() => window.lambert.store.now.pins), [second]);
+    told(await page.locator(".tip").textContent(), luminance(dimmed));
+    assert.match(await page.locator(".tip").textContent(), /W\/m² · floor/);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("shares are those of each lamp and of the sky alone", async () => {
+    const page = await openReading();
+    for (const [quantity, shows] of [["radiosity", "light"], ["irradiance", "irradiance"]]) {
+        await page.locator(".reading").getByLabel("Shows").selectOption(shows);
+        await settled(page);
+        await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, pins: [] }); });
+        const element = await click(page, 0.53, 0.63);
+        const { groups, sky } = await lightsOf(page);
+        const alone = {};
+        for (const name of ["lamp", "spot"]) alone[name] = luminance(await at(element, { groups: { [name]: groups[name] } }, quantity));
+        alone.sky = luminance(await at(element, { sky }, quantity));
+        const all = Object.values(alone).reduce((sum, v) => sum + v, 0);
+        // Light is linear: what they give one by one is what they give together, but for single precision.
+        const together = luminance(await at(element, { groups, sky }, quantity));
+        assert.ok(Math.abs(all - together) < 1e-4 * together, `${all} is not ${together}`);
+        await page.locator('.shares li[data-part="sky"]').waitFor();
+        let sum = 0;
+        for (const [name, value] of Object.entries(alone)) {
+            const text = await page.locator(`.shares li[data-part="${name}"] .figures`).textContent();
+            const [share, figure] = text.split("·");
+            told(figure, value);
+            // Shares are told with two digits.
+            assert.ok(Math.abs(parseFloat(share) / 100 - value / all) <= 0.06 * (value / all), `${name}: ${text}, it is ${value / all}`);
+            sum += parseFloat(share);
+        }
+        assert.ok(Math.abs(sum - 100) < 2, `the shares sum to ${sum} %`);
+        told(await page.locator(".shares p").first().textContent().then((text) => text.split(`${quantity} `)[1]), together);
+    }
+    // A lamp that is dimmed costs no adjoint request.
+    let adjoints = 0;
+    page.on("request", (request) => { if (request.url().endsWith("/adjoint")) adjoints += 1; });
+    await page.evaluate(() => {
+        const { store: s } = window.lambert, { lighting } = s.now;
+        s.change({ ...s.now, lighting: { ...lighting, groups: { ...lighting.groups, lamp: { ...lighting.groups.lamp, on: false } } } });
+    });
+    await settled(page);
+    assert.equal(await page.locator('.shares li[data-part="lamp"]').count(), 0);
+    assert.equal(adjoints, 0);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("groups, threshold and legend say what the answer says", async () => {
+    const page = await openReading();
+    await page.locator(".reading").getByLabel("Shows").selectOption("irradiance");
+    await settled(page);
+    const answer = (await ask(await lightsOf(page), { quantity: "irradiance" })).irradiance;
+    const { groups, areas } = await page.evaluate(() => ({
+        areas: [...window.lambert.scene.mesh.area], groups: window.lambert.scene.mesh.groups.map((g) => ({ name: g.name, elements: [...g.elements] })),
+    }));
+    const H = answer[0].map((_, i) => luminance(answer.map((row) => row[i])));
+    const figures = ({ elements }) => {
+        const area = elements.reduce((sum, i) => sum + areas[i], 0), mean = elements.reduce((sum, i) => sum + areas[i] * H[i], 0) / area;
+        const values = elements.map((i) => H[i]);
+        return { area, mean, min: Math.min(...values), max: Math.max(...values) };
+    };
+    await page.locator(".groups tbody tr").first().waitFor();
+    for (const group of groups) {
+        const cells = await page.locator(`.groups tr[data-group="${group.name}"] td`).allTextContents();
+        const { mean, min, max } = figures(group);
+        [mean, min, max].forEach((value, i) => told(cells[i], value));
+        assert.ok(Math.abs(Number(cells[3]) - min / mean) < 0.006, `${group.name}: ${cells[3]}, it is ${min / mean}`);
+    }
+    const order = await page.locator(".groups tbody tr").evaluateAll((rows) => rows.map((row) => row.dataset.group));
+    assert.deepEqual(order, [...groups].sort((a, b) => figures(b).mean - figures(a).mean).map((g) => g.name));
+    await page.locator(".groups thead button", { hasText: "Group" }).click();
+    assert.deepEqual(await page.locator(".groups tbody tr").evaluateAll((rows) => rows.map((row) => row.dataset.group)), groups.map((g) => g.name).sort());
+
+    // The floor is judged, with a threshold between its values.
+    await page.locator(".groups").getByRole("button", { name: "floor" }).click();
+    assert.equal(await page.evaluate(() => window.lambert.store.now.view.judged), "floor");
+    const floor = groups.find((g) => g.name === "floor"), { area, mean, min } = figures(floor);
+    const sorted = floor.elements.map((i) => H[i]).sort((a, b) => a - b), middle = sorted[Math.floor(0.4 * sorted.length)] * 1.001;
+    const level = Number(middle.toPrecision(4));
+    await page.getByLabel("Judge by a threshold").check();
+    await page.getByLabel("Threshold, target of the mean").fill(String(level));
+    await page.keyboard.press("Enter");
+    const reached = floor.elements.reduce((sum, i) => sum + (H[i] >= level ? areas[i] : 0), 0) / area;
+    const verdict = await page.locator(".judge [role=status]").textContent();
+    assert.ok(Math.abs(parseFloat(verdict) / 100 - reached) < 0.02, `${verdict}; it is ${reached}`);
+    const rows = await page.locator(".judge tbody tr").allTextContents();
+    told(rows[0].replace("Mean Em", ""), mean);
+    assert.match(rows[0], mean >= level ? /✓ met/ : /✗ not met/);
+    assert.match(rows[1], min / mean >= 0.6 ? /✓ met/ : /✗ not met/);
+    await page.getByLabel("Task").selectOption({ label: "Corridor: 100 lx, U0 0.40" });
+    assert.deepEqual(await page.evaluate(() => { const { view } = window.lambert.store.now; return [view.threshold, view.uniformity, view.judged]; }), [100, 0.4, "floor"]);
+    await change(page, { threshold: null, judged: null });
+
+    // The colour of the legend beside a number is the palette's at that number.
+    await change(page, { range: [0, 200], isoLines: 0 });
+    const { interpolateViridis } = await import(pathToFileURL(`${process.env.MODULES}/d3-scale-chromatic/dist/d3-scale-chromatic.mjs`));
+    const ticks = await page.locator(".legend .ticks span").evaluateAll((spans) => {
+        const ramp = document.querySelector(".legend canvas"), box = ramp.getBoundingClientRect();
+        return spans.map((span) => {
+            const { top, height } = span.getBoundingClientRect(), place = (top + height / 2 - box.top) / box.height;
+            const row = Math.min(255, Math.max(0, Math.floor(place * 256)));
+            return { text: span.textContent, colour: [...ramp.getContext("2d").getImageData(0, row, 1, 1).data].slice(0, 3) };
+        });
+    });
+    assert.ok(ticks.length >= 3, JSON.stringify(ticks));
+    for (const { text, colour } of ticks) {
+        const wanted = interpolateViridis(Number(text) / 200).match(/[0-9a-f]{2}/g).map((hex) => parseInt(hex, 16));
+        assert.ok(colour.every((c, i) => Math.abs(c - wanted[i]) <= 6), `${text}: ${colour} is not ${wanted}`);
+    }
+    await change(page, { isoLines: 4 });
+    assert.deepEqual(await page.locator(".legend .ticks span").allTextContents(), ["50", "100", "150", "200"]);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("a histogram's part that is dragged over becomes the range", async () => {
+    const page = await openReading();
+    await page.locator(".reading").getByLabel("Shows").selectOption("irradiance");
+    await settled(page);
+    const over = page.locator(".histogram .u-over");
+    await over.scrollIntoViewIfNeeded();
+    const box = await over.boundingBox();
+    await page.mouse.move(box.x + box.width * 0.2, box.y + 40);
+    await page.mouse.down();
+    await page.mouse.move(box.x + box.width * 0.4, box.y + 40, { steps: 4 });
+    await page.mouse.move(box.x + box.width * 0.6, box.y + 40, { steps: 4 });
+    await page.mouse.up();
+    const { range, high } = await page.evaluate(() => ({ range: window.lambert.store.now.view.range, high: window.lambert.spread.high * 1.15 }));
+    assert.ok(range !== null && Math.abs(range[0] - 0.2 * high) < 0.02 * high && Math.abs(range[1] - 0.6 * high) < 0.02 * high, `${range} of ${high}`);
+    await page.getByLabel("High end of the palette").fill("77");
+    await page.keyboard.press("Enter");
+    assert.equal(await page.evaluate(() => window.lambert.store.now.view.range[1]), 77);
+    await page.getByRole("button", { name: "Auto" }).last().click();
+    assert.equal(await page.evaluate(() => window.lambert.store.now.view.range), null);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("keys and fingers read too, and a link keeps the pins", async () => {
+    const page = await openReading();
+    await page.locator("main canvas").first().focus();
+    await page.keyboard.press("r");
+    const eye = await page.evaluate(() => window.lambert.cameras.now);
+    for (let i = 0; i < 4; i++) await page.keyboard.press("ArrowDown");
+    await page.keyboard.press("Shift+ArrowLeft");
+    await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+    assert.match(await page.locator("main [role=status].unseen").textContent(), /W\/m² · .*, element \d+/);
+    await page.keyboard.press("Enter");
+    const pins = await page.evaluate(() => window.lambert.store.now.pins);
+    assert.equal(pins.length, 1);
+    assert.equal(pins[0], await page.evaluate(() => window.lambert.hovered));
+    assert.deepEqual(await page.evaluate(() => window.lambert.cameras.now), eye);
+    await page.keyboard.press("Escape");
+    assert.ok(await page.locator(".cross").isHidden());
+    await page.waitForTimeout(800);
+    const hash = await page.evaluate(() => location.hash);
+    const other = await openPage(daemon.address, { hash, width: 360, height: 740, touch: true });
+    assert.deepEqual(await other.evaluate(() => window.lambert.store.now.pins), pins);
+    await other.getByRole("tab", { name: "Reading" }).tap();
+    await other.locator(".pins > *").first().waitFor();
+    const canvas = await other.locator("main canvas").first().boundingBox();
+    const tapped = await elementAt(other, 0.53, 0.63);
+    await other.touchscreen.tap(canvas.x + 0.53 * canvas.width, canvas.y + 0.63 * canvas.height);
+    await other.waitForFunction((element) => window.lambert.store.now.pins.includes(element) && window.lambert.store.now.pins.length === 1, tapped);
+    assert.ok(await other.evaluate(() => document.documentElement.scrollWidth <= 360));
+    await change(other, { picture: "false", threshold: 100, isoLines: 6 });
+    await settled(other);
+    for (const theme of ["dark", "light"]) {
+        await other.evaluate((t) => { document.documentElement.dataset.theme = t; }, theme);
+        assert.deepEqual(await violations(other), [], theme);
+    }
+    assert.deepEqual([...page.faults, ...other.faults], []);
+    await other.context().close();
+    await page.context().close();
+});
+
+test("ticks are round and within the axis", async () => {
+    const { build } = await import(pathToFileURL(`${process.env.MODULES}/esbuild/lib/main.js`));
+    const out = inFolder("scale.mjs");
+    await build({ entryPoints: [`${process.env.VIEWER}/src/picture/scale.ts`], outfile: out, format: "esm", logLevel: "error" });
+    const { ticksOf, placeOf, valueAt, areaByValue, figuresOf } = await import(pathToFileURL(out));
+    assert.deepEqual(ticksOf({ low: 0, high: 1000, log: false }, 5), [0, 200, 400, 600, 800, 1000]);
+    assert.deepEqual(ticksOf({ low: 0.13, high: 0.31, log: false }, 4), [0.15, 0.2, 0.25, 0.3]);
+    assert.deepEqual(ticksOf({ low: 1, high: 1000, log: true }, 4), [1, 10, 100, 1000]);
+    assert.deepEqual(ticksOf({ low: 3, high: 60, log: true }, 6), [5, 10, 20, 50]);
+    for (const axis of [{ low: -3, high: 17.3, log: false }, { low: 2e-7, high: 3e5, log: true }, { low: 41, high: 47, log: true }])
+        for (const wanted of [3, 6]) {
+            const ticks = ticksOf(axis, wanted);
+            assert.ok(ticks.length >= 2 && ticks.length <= 2 * wanted + 1, `${JSON.stringify(axis)}: ${ticks}`);
+            for (const tick of ticks) {
+                assert.ok(placeOf(tick, axis) > -1e-9 && placeOf(tick, axis) < 1 + 1e-9);
+                assert.ok(Math.abs(valueAt(placeOf(tick, axis), axis) - tick) <= 1e-9 * Math.max(1, Math.abs(tick)));
+            }
+        }
+    const values = Float32Array.of(1, 2, 3, 4), area = Float64Array.of(1, 1, 2, 4);
+    assert.deepEqual([...areaByValue(values, area, (i) => i > 0, { low: 0, high: 4, log: false }, 4)], [0, 0, 1, 6]);
+    assert.deepEqual(figuresOf(values, area, [1, 2, 3], 3), { area: 7, mean: 24 / 7, min: 2, max: 4, uniformity: 7 / 12, reached: 6 / 7 });
+    assert.ok(Number.isNaN(figuresOf(values, area, []).mean));
+});
