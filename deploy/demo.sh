@@ -71,7 +71,7 @@ for listen in 127.0.0.1:8317 127.0.0.1:0; do
     done
 done
 [ -n "$address" ] || { echo "demo: the daemon did not start:" >&2; cat "$out/daemon.log" >&2; exit 1; }
-echo "$address (process $daemon)"
+echo "$address/ (process $daemon)"
 
 echo "== two lightings"
 name=$(curl -sS --fail "$address/v1/scenes" | /usr/bin/python3 -c 'import json, sys; print(json.load(sys.stdin)["scenes"][0]["name"])')
@@ -101,7 +101,7 @@ if [ $once = yes ]; then
 else
     trap - EXIT
     disown "$daemon"
-    echo "the daemon goes on at $address; ask it again with"
+    echo "the daemon goes on: open $address/ in a browser, or ask it again with"
     echo "  $example"
     echo "and stop it with: kill $daemon"
 fi
