@@ -35,6 +35,8 @@ export function makeBar(app: App): HTMLElement {
     app.on("scenes", list);
     document.addEventListener("keydown", (event) => {
         if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+        // Fields of text take their own changes back.
+        if (event.target instanceof HTMLInputElement && /^(text|number|password|search)$/.test(event.target.type)) return;
         const key = event.key.toLowerCase();
         if (key === "z" && !event.shiftKey) app.store.undo();
         else if (key === "y" || (key === "z" && event.shiftKey)) app.store.redo();
@@ -104,7 +106,7 @@ export function makeStatus(app: App): HTMLElement {
             error.textContent = `certified: no number is off by more than ${tell(app.certificate.bound, 2)} ${app.store.now.view.unit}`;
             return;
         }
-        const figures = description.error?.lights ?? description.error?.single ?? description.error?.sky;
+        const figures = description.error?.lights ?? description.error?.random ?? description.error?.single;
         error.textContent = figures === undefined || figures.total_indirect_mean === undefined ? "error not measured"
             : `error ${percent(figures.total_indirect_mean)} of the indirect light, ${percent(figures.total_relative_mean)} of all`;
         error.title = description.reason;
