@@ -34,7 +34,7 @@ export interface Description {
     groups: { name: string; elements: number }[];
     emitters: string[] | null;
     sky: { tiling: string; tiles: number; ground_albedo: number } | null;
-    error: { [light: string]: ErrorFigures | GroupErrors[] } & { single?: ErrorFigures; lights?: ErrorFigures; sky?: ErrorFigures } | null;
+    error: { [light: string]: ErrorFigures | GroupErrors[] } & { [light in "single" | "lights" | "random" | "sky"]?: ErrorFigures } | null;
     provenance?: { [name: string]: unknown };
     /** What the method reported; paths and reuse are of a lamp in many positions. */
     report?: { [name: string]: unknown };
