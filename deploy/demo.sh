@@ -85,6 +85,9 @@ for lighting in 1 2; do
     picture=$out/$(basename "${store%.h5}")-$lighting.png
     "$lambert" render "$store" --emission "$out/emission-$lighting.json" --smooth -o "$picture"
     echo "picture: $picture"
+    levels=${picture%.png}-levels.png
+    "$lambert" render "$store" --emission "$out/emission-$lighting.json" --palette turbo --iso-lines 10 -o "$levels"
+    echo "the same in false colours: $levels"
     echo
 done
 
