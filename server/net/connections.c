@@ -320,7 +320,7 @@ static void hurry(connections *all, const client *c) {
     pthread_cond_signal(&all->ending);
 }
 
-/* How much is lost with a connection, least first. */
+/* The loss of what a connection is in, least first. */
 static unsigned loss_of(const client *c) {
     static const unsigned losses[] = {
         [STAGE_IDLE] = 0, [STAGE_HEAD] = 1, [STAGE_BODY] = 2, [STAGE_ANSWER] = 3, [STAGE_SOLVE] = 4};

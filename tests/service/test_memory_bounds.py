@@ -171,9 +171,9 @@ class Requests(Case):
                 self.assertLess(self.resident(daemon, "VmHWM"), limit + CONSTANT)
 
     def test_a_body_that_can_never_fit(self):
-        with Daemon(self.store, "--max-request-memory", "2M") as daemon:
+        with Daemon(self.store, "--max-request-memory", "3M") as daemon:
             with daemon.raw() as s:
-                s.sendall(HEAD.replace(b"box", b"big") + b"Content-Length: %d\r\n\r\n" % (3 * MIB))
+                s.sendall(HEAD.replace(b"box", b"big") + b"Content-Length: %d\r\n\r\n" % (4 * MIB))
                 answer = read_all(s)
             self.assertTrue(answer.startswith(b"HTTP/1.1 413 "), answer)
             self.assertIn(b"--max-request-memory", answer)
