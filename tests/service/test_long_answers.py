@@ -120,6 +120,26 @@ class LongAnswers(unittest.TestCase):
                     np.testing.assert_array_equal(given, plain)
             until(lambda: metrics(daemon)[("lambertd_request_memory_bytes",)] == 0)
 
+    def test_threads_that_solve_encode_and_compress(self):
+        """The one that receives and sends only copies: of the processor time of long answers it takes the smaller part."""
+        def seconds(daemon):
+            """Of the thread that receives and sends, and of all."""
+            io = every = 0
+            for task in pathlib.Path(f"/proc/{daemon.process.pid}/task").iterdir():
+                took = int((task / "schedstat").read_text().split()[0])
+                every += took
+                io += took if (task / "comm").read_text().startswith("MHD") else 0
+            return io, every
+
+        with Daemon(self.folder / "big.h5", "--threads", 2) as daemon:
+            before = seconds(daemon)
+            for coding in "gzip", "gzip", None:
+                self.stream(daemon, coding=coding)
+            io, every = (after - b for after, b in zip(seconds(daemon), before))
+            print(f"{1e-6 * io:.0f} of {1e-6 * every:.0f} ms by the thread that receives and sends")
+            self.assertGreater(io, 0)
+            self.assertLess(io, every / 2)
+
     def test_clients_that_go_in_the_middle(self):
         body = json.dumps({"emissions": [{"groups": {"g1": 1}}] * 40}).encode()
         with Daemon(self.folder / "big.h5", "--threads", 2) as daemon:
