@@ -23,32 +23,74 @@
 #endif
 
 #if defined(FILTER_MACHINE) && !defined(LAMBERT_SANITIZED)
-/* Any other call fails with EPERM, also those of another machine's numbers: no file can be opened, no socket
- * made, no process started or sent a signal. A kernel without filters leaves the other limits. */
-static void filter_calls(void) {
+/* A program of the kernel's filter. */
+typedef struct call_filter {
+    struct sock_filter code[160];
+    unsigned short length;
+} call_filter;
+
+static void add(call_filter *f, struct sock_filter one) {
+    f->code[f->length++] = one;
+}
+
+/* A call with this number ends the program with `then`. */
+static void answer_call(call_filter *f, int number, unsigned then) {
+    add(f, (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, (unsigned)number, 0, 1));
+    add(f, (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, then));
+}
+
+/* A call with this number is allowed if the low half of an argument has none of the bits of mask (same false)
+ * or is the value (same true). */
+static void check_call(call_filter *f, int number, unsigned argument, bool same, unsigned value) {
+    const unsigned short test = same ? BPF_JEQ : BPF_JSET;
+    add(f, (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, (unsigned)number, 0, 4));
+    add(f, (struct sock_filter)BPF_STMT(BPF_LD | BPF_W | BPF_ABS,
+                                        (unsigned)(offsetof(struct seccomp_data, args) + 8 * argument)));
+    add(f, (struct sock_filter)BPF_JUMP(BPF_JMP | test | BPF_K, value, same ? 1 : 0, same ? 0 : 1));
+    add(f, (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM));
+    add(f, (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
+}
+
+/* Files are opened to be read, and looked at; a signal is sent to the process itself. */
+static void allow_files(call_filter *f) {
+    static const int allowed[] = {
+        SYS_newfstatat, SYS_statx, SYS_readlinkat, SYS_faccessat, SYS_faccessat2, SYS_getcwd, SYS_sched_yield,
+#ifdef SYS_readlink /* older calls, which newer machines do not have */
+        SYS_readlink,   SYS_stat,  SYS_lstat,      SYS_access
+#endif
+    };
+    const unsigned harmless = O_CLOEXEC | O_NOCTTY | O_NONBLOCK | O_DIRECTORY | O_NOFOLLOW | O_LARGEFILE;
+    for (size_t k = 0; k < sizeof allowed / sizeof *allowed; k++)
+        answer_call(f, allowed[k], SECCOMP_RET_ALLOW);
+    check_call(f, SYS_openat, 2, false, ~harmless);
+    check_call(f, SYS_tgkill, 0, true, (unsigned)getpid());
+}
+
+/* Any other call fails with EPERM, also those of another machine's numbers: no socket is made, no process
+ * started or sent a signal, and no file opened, or but to be read. A kernel without filters leaves the other
+ * limits. */
+static void filter_calls(bool reads_files) {
     static const int allowed[] = {
         SYS_pread64,        SYS_read,       SYS_write,     SYS_lseek, SYS_close,    SYS_mmap,
         SYS_munmap,         SYS_mremap,     SYS_brk,       SYS_futex, SYS_mprotect, SYS_madvise,
         SYS_rt_sigaction,   SYS_getpid,     SYS_gettid,    SYS_uname, SYS_exit,     SYS_rt_sigreturn,
         SYS_rt_sigprocmask, SYS_exit_group, SYS_getrandom, SYS_fcntl, SYS_fstat,    SYS_clock_gettime};
-    enum { CALLS = sizeof allowed / sizeof *allowed, LEAD = 4 };
-    struct sock_filter code[LEAD + CALLS + 2] = {
-        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, arch)),
-        BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, FILTER_MACHINE, 1, 0),
-        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS),
-        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, nr)),
-    };
-    for (unsigned k = 0; k < CALLS; k++)
-        code[LEAD + k] = (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, (unsigned)allowed[k],
-                                                      (unsigned char)(CALLS - k), 0);
-    code[LEAD + CALLS] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM);
-    code[LEAD + CALLS + 1] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
-    const struct sock_fprog program = {.len = LEAD + CALLS + 2, .filter = code};
+    call_filter f = {.length = 0};
+    add(&f, (struct sock_filter)BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, arch)));
+    add(&f, (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, FILTER_MACHINE, 1, 0));
+    add(&f, (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS));
+    add(&f, (struct sock_filter)BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, nr)));
+    for (size_t k = 0; k < sizeof allowed / sizeof *allowed; k++)
+        answer_call(&f, allowed[k], SECCOMP_RET_ALLOW);
+    if (reads_files) allow_files(&f);
+    add(&f, (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM));
+    const struct sock_fprog program = {.len = f.length, .filter = f.code};
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0)
         (void)prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program);
 }
 #else
-static void filter_calls(void) { /* a sanitizer reads its maps and writes reports */
+static void filter_calls(bool reads_files) { /* a sanitizer reads its maps and writes reports */
+    (void)reads_files;
 }
 #endif
 
@@ -117,7 +159,7 @@ static void confine(int reply, int input, const confined_limits *limits) {
 #endif
     limit(RLIMIT_NOFILE, 32, 32);
     limit(RLIMIT_CPU, limits->cpu_seconds, limits->cpu_seconds + 1);
-    if (limits->filtered) filter_calls();
+    if (limits->filtered) filter_calls(limits->reads_files);
 }
 
 lam_status confined_start(confined_main *run, void *context, int input, const confined_limits *limits,

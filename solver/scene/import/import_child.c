@@ -204,7 +204,9 @@ lam_status import_in_child(scene_reader *reader, const char *path, const child_l
     /* The kernel limits the processor time; the clock only ends a child that sleeps. */
     const confined_limits confined_to = {.cpu_seconds = limits->cpu_seconds,
                                          .all_seconds = 4 * limits->cpu_seconds + 2,
-                                         .memory_bytes = limits->memory_bytes};
+                                         .memory_bytes = limits->memory_bytes,
+                                         .filtered = true,
+                                         .reads_files = true};
     confined child;
     lam_error ending;
     int wait_status = 0;
