@@ -64,7 +64,7 @@ test("skies of weather are those of `lambert sky`", async () => {
             for (const photometric of [false, true]) {
                 writeFileSync(inFolder(file), text);
                 lambert("sky", inFolder(file), "--tiles", tiling, "-o", inFolder("sky.npy"), ...(photometric ? ["--photometric"] : []));
-                source.read(text, false);
+                assert.ok(source.read(text, false), source.problem);
                 const rows = rowsOf(inFolder("sky.npy"), source.tiles.count);
                 assert.equal(rows.length, HOURS.length);
                 let lit = 0;

@@ -16,6 +16,8 @@ export class SkySource {
     weather: Weather | null = null;
     /** True where the weather is that beside the store, so that a link restores it. */
     isBeside = false;
+    /** What is wrong with the last file that was to be read. */
+    problem: string | null = null;
     private kept = new Map<string, { sky: Sky | null; values: readonly (number | number[])[] | null }>();
 
     take(answer: SkyAnswer | null): void {
@@ -23,11 +25,22 @@ export class SkySource {
         this.kept.clear();
     }
 
-    /** Reads a weather file; null forgets the one there is. Throws what is wrong with it. */
-    read(text: string | null, isBeside: boolean): void {
-        const weather = text === null ? null : readWeather(text);
-        this.weather = weather;
-        this.isBeside = weather !== null && isBeside;
+    /** Reads a weather file; one that is wrong is not taken, and `problem` says why. True if it is taken. */
+    read(text: string, isBeside: boolean): boolean {
+        this.problem = null;
+        try {
+            this.weather = readWeather(text);
+            this.isBeside = isBeside;
+        } catch (reason) {
+            this.problem = (reason as Error).message;
+        }
+        this.kept.clear();
+        return this.problem === null;
+    }
+
+    forget(): void {
+        this.weather = null;
+        this.problem = null;
         this.kept.clear();
     }
 

@@ -109,12 +109,8 @@ async function fetchSky(app: App, { name, sky }: Description): Promise<Fetched> 
 function takeSky(app: App, source: SkySource, fetched: Fetched, scene: OpenScene): void {
     source.take(fetched.answer);
     if (fetched.reason !== null) app.fail(fetched.reason);
-    try {
-        source.read(fetched.weather, true);
-    } catch (reason) {
-        source.read(null, false);
-        app.fail(reason);
-    }
+    source.forget();
+    if (fetched.weather !== null) source.read(fetched.weather, true);
     const { weather } = source;
     if (weather === null) return;
     const sky: SkyLight = {
@@ -177,44 +173,41 @@ function makeControls(app: App, change: Change): Controls {
 
 /** The weather file: picked or dropped, read by the page itself. */
 function makeWeather(app: App, source: SkySource, change: Change, done: () => void): { element: HTMLElement; update(light: SkyLight): void } {
-    const about = make("p", { class: "hint" });
+    const about = make("p", { class: "hint" }), problem = make("p", { class: "bad", role: "alert" });
     const place = (): void => {
         const { weather } = source;
         if (weather === null) return;
         change({ model: "perez", latitude: weather.latitude, longitude: weather.longitude, zone: weather.zone });
     };
     const take = async (file: File): Promise<void> => {
-        try {
-            if (file.size > FILE_MOST) throw new Error(`${file.name} has ${count(file.size)} bytes, a weather file at most ${count(FILE_MOST)}.`);
-            source.read(await file.text(), false);
-            place();
-            done();
-            app.ask();
-        } catch (reason) {
-            app.fail(reason);
-        }
+        if (file.size > FILE_MOST) source.problem = `${file.name} has ${count(file.size)} bytes, a weather file at most ${count(FILE_MOST)}.`;
+        else if (source.read(await file.text(), false)) place();
+        done();
+        app.ask();
     };
     const picker = make("input", {
         type: "file", accept: ".epw,.wea,.EPW,.WEA", "aria-label": "Weather file (EPW or WEA)",
         onchange: () => {
             const file = picker.files?.[0];
-            if (file !== undefined) void take(file);
+            if (file !== undefined) take(file).catch((reason: unknown) => app.fail(reason));
             picker.value = "";
         },
     });
-    const element = make("div", { class: "drop" }, make("h2", {}, "Weather file"), about, picker, button("Its place", "Latitude, longitude and clock of the weather file", place));
+    const element = make("div", { class: "drop" }, make("h2", {}, "Weather file"), about, problem, picker, button("Its place", "Latitude, longitude and clock of the weather file", place));
     // Anywhere on the page, as a file that is dropped beside would replace the page.
     document.addEventListener("dragover", (event) => { if (event.dataTransfer?.types.includes("Files")) event.preventDefault(); });
     document.addEventListener("drop", (event) => {
         const file = event.dataTransfer?.files[0];
         if (file === undefined) return;
         event.preventDefault();
-        if (app.scene?.description.sky !== null && /\.(epw|wea)$/i.test(file.name)) void take(file);
+        if (app.scene?.description.sky !== null && /\.(epw|wea)$/i.test(file.name)) take(file).catch((reason: unknown) => app.fail(reason));
     });
     const update = (light: SkyLight): void => {
         const { weather } = source;
         element.hidden = light.model === "off";
         (element.querySelector("button") as HTMLButtonElement).hidden = weather === null;
+        problem.textContent = source.problem ?? "";
+        problem.hidden = source.problem === null;
         about.textContent = weather === null ? "EPW or WEA. Pick it, or drop it on the page. It stays on this machine; nothing is sent."
             : `${weather.place}: ${count(weather.hours.length)} hours${source.isBeside ? ", from beside the store." : ". A link to this state does not hold it."}`;
     };
