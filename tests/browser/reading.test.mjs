@@ -27,11 +27,15 @@ before(async () => {
     writeFileSync(inFolder("yard.mtl"), MTL);
     lambert("precompute", inFolder("yard.obj"), "-o", inFolder("yard.h5"), "--elements", 500, "--rays", 512, "--probes", 2, "--quiet",
         "--method", "low-rank", "--epsilon", 0.02, "--sky", "grid:4x3");
-    daemon = await Daemon.start([inFolder("yard.h5")]);
+    // The same under the tiles of its sky, each solved once: the sky is all the light there is.
+    lambert("precompute", inFolder("yard.obj"), "-o", inFolder("tiles.h5"), "--elements", 200, "--rays", 256, "--probes", 2, "--quiet",
+        "--sky", "grid:4x3", "--emitters", "sky");
+    daemon = await Daemon.start([inFolder("yard.h5"), `${inFolder("tiles.h5")}:tiles`]);
 });
 
 /** A page that shows the panel, seen from above, under an even sky. */
-async function openReading(options = {}) {
+async function openReading({ scene = "yard", ...options } = {}) {
+    options.hash = "#1." + Buffer.from(JSON.stringify({ scene })).toString("base64url");
     const page = await openPage(daemon.address, options);
     await page.evaluate(() => {
         const { store } = window.lambert, { now } = store;
@@ -44,7 +48,7 @@ async function openReading(options = {}) {
     return page;
 }
 
-const ask = async (emission, more) => daemon.json("/v1/scenes/yard/radiosity", { emission, ...more });
+const ask = async (emission, more, scene = "yard") => daemon.json(`/v1/scenes/${scene}/radiosity`, { emission, ...more });
 
 /** What shines, as the page says: by group, and of the sky's tiles. */
 const lightsOf = (page) => page.evaluate(() => {
@@ -142,6 +146,23 @@ test("shares are those of each lamp and of the sky alone", async () => {
     await settled(page);
     assert.equal(await page.locator('.shares li[data-part="lamp"]').count(), 0);
     assert.equal(adjoints, 0);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("a store of a sky's tiles tells the sky's share", async () => {
+    const page = await openReading({ scene: "tiles" });
+    const element = await click(page, 0.53, 0.63);
+    const { sky } = await lightsOf(page);
+    const answer = await ask({ sky }, { select: { elements: [element] } }, "tiles");
+    const figures = page.locator(".shares li .figures");
+    await figures.first().waitFor();
+    assert.equal(await figures.count(), 1);
+    const [share, value] = (await figures.textContent()).split("·");
+    assert.equal(share.trim(), "100 %");
+    told(value, luminance(answer.radiosity.map((row) => row[0])));
+    // Emission by group is none of such a store's.
+    assert.deepEqual([...new Set(await page.locator('.pin tr[data-row="E"] td').allTextContents())], ["–"]);
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });

@@ -31,10 +31,12 @@ export class Pointer {
         this.frame.append(this.tip, this.cross, this.told);
         this.keys = button("Read by keys (R)", "A cross on the picture that arrow keys move; Enter pins, Escape ends", () => this.setKeys(!this.isByKeys), { "aria-pressed": "false" });
         this.canvas.addEventListener("pointermove", (event) => {
-            if (event.pointerType === "touch" || this.isByKeys) return;
-            if (event.buttons !== 0) this.leave();
+            if (this.isByKeys) return;
+            // What was read belongs to the picture before it was turned.
+            if (event.buttons !== 0 || event.pointerType === "touch") this.leave();
             else this.moveTo(event.offsetX, event.offsetY);
         });
+        this.canvas.addEventListener("wheel", () => { if (!this.isByKeys) this.leave(); }, { passive: true });
         this.canvas.addEventListener("pointerleave", () => { if (!this.isByKeys) this.leave(); });
         this.canvas.addEventListener("pointerdown", (event) => {
             this.down = event.isPrimary && event.button === 0 ? [event.clientX, event.clientY, event.pointerId] : null;
@@ -69,8 +71,10 @@ export class Pointer {
         if (key === "r") this.setKeys(!this.isByKeys);
         else if (!this.isByKeys) return;
         else if (key === "escape") this.setKeys(false);
-        else if (key === "enter" || key === " ") this.pin(event.shiftKey);
-        else if (key.startsWith("arrow") && this.place !== null) {
+        else if (key === "enter" || key === " ") {
+            this.look();
+            this.pin(event.shiftKey);
+        } else if (key.startsWith("arrow") && this.place !== null) {
             const step = STEP_PX * (event.shiftKey ? 5 : 1);
             const [x, y] = this.place;
             this.moveTo(clamp(x + (key === "arrowright" ? step : key === "arrowleft" ? -step : 0), 0, this.canvas.clientWidth - 1),
