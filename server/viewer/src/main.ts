@@ -3,9 +3,11 @@ import { App } from "./app.ts";
 import { make } from "./base/dom.ts";
 import { makeBanner, makeBar, makeDrawer, makeStatus, makeTokenDialog, setBackground } from "./panels/frame.ts";
 import { comparePanel } from "./panels/compare.ts";
+import { exportPanel } from "./panels/export.ts";
 import { lightsPanel } from "./panels/lights.ts";
 import { emittersPanel } from "./panels/emitters.ts";
 import { lookPanel } from "./panels/look.ts";
+import { materialsPanel } from "./panels/materials.ts";
 import { trustPanel } from "./panels/trust.ts";
 import type { PanelMaker } from "./panels/panel.ts";
 import { readingPanel } from "./panels/reading/reading.ts";
@@ -16,6 +18,7 @@ import "./style.css";
 /** The panels, in the order of their tabs. */
 const panelMakers: readonly PanelMaker[] = [
     lightsPanel, skyPanel, emittersPanel, lookPanel, readingPanel, trustPanel, comparePanel,
+    materialsPanel, exportPanel,
 ];
 
 /** The fragment is written this long after the last change. */

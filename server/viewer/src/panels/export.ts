@@ -1,0 +1,156 @@
+// Takes what is shown out of the page: a picture, the numbers, the request as a command or a program.
+import { button, make, tick } from "../base/dom.ts";
+import { csvOf } from "../base/csv.ts";
+import { readNpy } from "../base/npy.ts";
+import type { App } from "../app.ts";
+import { drawLegend, SIDE_MOST, snapshot, type Legend } from "../picture/snapshot.ts";
+import { curlCommand, plainRequest, pythonProgram, type PlainRequest } from "../state/snippets.ts";
+import type { Panel } from "./panel.ts";
+
+const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indirect: "Indirect light" };
+
+export function exportPanel(app: App): Panel {
+    const said = make("p", { role: "status", "aria-live": "polite" });
+    const tries = (what: () => Promise<string>): void => {
+        said.textContent = "…";
+        what().then((text) => { said.textContent = text; }, (reason: unknown) => {
+            said.textContent = "";
+            app.fail(reason);
+        });
+    };
+    const numbers = make("div", {}, make("h2", {}, "Numbers"),
+        make("p", { class: "hint" }, "Of every element, asked for again in single precision."),
+        make("div", { class: "row" }, button("Save CSV", null, () => tries(() => saveCsv(app))), button("Save NPY", null, () => tries(() => saveNpy(app)))));
+    return {
+        id: "export", title: "Export",
+        element: make("div", {}, picturePart(app, tries), numbers, said, requestPart(app)),
+    };
+}
+
+function picturePart(app: App, tries: (what: () => Promise<string>) => void): HTMLElement {
+    const size = (label: string, value: number): HTMLInputElement =>
+        make("input", { type: "number", min: 16, max: SIDE_MOST, step: 1, value: String(value), "aria-label": label });
+    const width = size("Width in pixels", 1920), height = size("Height in pixels", 1080);
+    const legend = tick("With a legend of colours", true, () => undefined);
+    const save = async (): Promise<string> => {
+        const [w, h] = [width, height].map((field) => Math.round(Number(field.value)));
+        for (const side of [w, h])
+            if (!(side >= 16 && side <= SIDE_MOST)) return `A side of the picture has 16 to ${SIDE_MOST} pixels.`;
+        const { compare } = app.store.now, canvas = snapshot(app.stage, w, h, compare?.split ?? 0.5);
+        const colours = legendOf(app);
+        if (colours !== null && (legend.querySelector("input") as HTMLInputElement).checked) drawLegend(canvas, colours);
+        const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, "image/png"));
+        if (blob === null) throw new Error(`the browser makes no picture of ${w} × ${h} pixels`);
+        download(blob, `${fileName(app)}.png`);
+        return `Saved ${w} × ${h} pixels.`;
+    };
+    const update = (): void => { legend.hidden = legendOf(app) === null; };
+    app.store.listen(update);
+    update();
+    return make("section", { "aria-label": "PNG" }, make("h2", {}, "Picture"),
+        make("div", { class: "row" }, width, make("span", { "aria-hidden": "true" }, "×"), height, make("span", { class: "hint" }, "pixels"),
+            button("Window", "The size of the picture on this screen", () => {
+                width.value = String(app.stage.canvas.width);
+                height.value = String(app.stage.canvas.height);
+            })), legend, make("div", { class: "row" }, button("Save PNG", null, () => tries(save))));
+}
+
+/** Null where the picture is that of the eye. */
+function legendOf(app: App): Legend | null {
+    const { view, compare } = app.store.now, title = `${QUANTITIES[view.quantity]}, ${view.unit}`;
+    if (compare !== null && compare.how === "difference" && app.fields[1] !== null) {
+        const most = app.stage.uniforms.change.value as number;
+        return { title: `B − A, ${view.unit}`, low: -most, high: most, log: false, palette: "change" };
+    }
+    if (view.picture !== "false") return null;
+    const range = app.stage.uniforms.range.value as { x: number; y: number };
+    return { title, low: range.x, high: range.y, log: app.stage.uniforms.is_log.value === true, palette: view.palette };
+}
+
+/** The request for what is shown; its numbers are the daemon's own, in the store's unit. */
+function request(app: App): PlainRequest | null {
+    const wanted = app.wanted();
+    return wanted === null ? null : plainRequest(wanted, app.store.now.tolerance);
+}
+
+/** A name that every system of files takes. */
+function fileName(app: App): string {
+    const { scene, view } = app.store.now;
+    return `${scene.replace(/[^\p{L}\p{N}._@-]+/gu, "-").slice(0, 80) || "scene"}-${view.picture === "light" ? "radiosity" : view.quantity}`;
+}
+
+async function ask(app: App): Promise<ArrayBuffer> {
+    const what = request(app);
+    if (what === null) throw new Error("Nothing shines, so there are no numbers to save.");
+    return (await app.api.floats(what.scene, what.body)).file;
+}
+
+async function saveNpy(app: App): Promise<string> {
+    const file = await ask(app), { shape } = readNpy(file);
+    download(new Blob([file]), `${fileName(app)}.npy`);
+    return `Saved an array of ${shape.join(" × ")} numbers.`;
+}
+
+async function saveCsv(app: App): Promise<string> {
+    const { scene } = app, unit = app.store.now.view.unit, what = request(app);
+    const { data } = readNpy(await ask(app));
+    if (scene === null || what === null) return "";
+    const { channels } = scene.description, { quantity } = what.body;
+    const channelNames = channels === 3 ? ["red", "green", "blue"] : channels === 1 ? [""] : Array.from({ length: channels }, (_, c) => String(c));
+    const names = channelNames.map((name) => `${quantity}${name === "" ? "" : `_${name}`} (${unit})`);
+    const { mesh } = scene;
+    download(new Blob([csvOf(data as Float32Array, names, mesh.groupOf, mesh.groups.map((group) => group.name), mesh.area)], { type: "text/csv;charset=utf-8" }),
+        `${fileName(app)}.csv`);
+    return `Saved ${mesh.elements} lines.`;
+}
+
+function download(blob: Blob, name: string): void {
+    const address = URL.createObjectURL(blob), link = make("a", { href: address, download: name });
+    document.body.append(link);
+    link.click();
+    link.remove();
+    setTimeout(() => URL.revokeObjectURL(address), 60_000);
+}
+
+/** The texts are made when the panel is in sight: a dense sky makes long ones. */
+function requestPart(app: App): HTMLElement {
+    const curl = snippet("Command of curl"), python = snippet("Program in Python");
+    const hint = make("p", { class: "hint" });
+    const part = make("section", { "aria-label": "Request" }, make("h2", {}, "Request"), hint, curl.element, python.element);
+    let isSeen = false;
+    const update = (): void => {
+        if (!isSeen || app.scene === null) return;
+        const what = request(app), withToken = app.api.token !== null;
+        hint.textContent = what === null ? "Nothing shines, so there is nothing to ask for."
+            : withToken ? "Asks the daemon for what is shown. The token is read from LAMBERT_TOKEN." : "Asks the daemon for what is shown.";
+        curl.set(what === null ? "" : curlCommand(location.origin, what, withToken));
+        python.set(what === null ? "" : pythonProgram(location.origin, what, withToken));
+    };
+    new IntersectionObserver((entries) => {
+        isSeen = entries.some((entry) => entry.isIntersecting);
+        update();
+    }).observe(part);
+    app.store.listen((now, before) => { if (now.lighting !== before.lighting || now.tolerance !== before.tolerance || now.view !== before.view) update(); });
+    app.on("scene", update);
+    return part;
+}
+
+function snippet(label: string): { element: HTMLElement; set(text: string): void } {
+    const text = make("textarea", { readonly: true, rows: 6, spellcheck: "false", wrap: "off", "aria-label": label });
+    const copy = button("Copy", `Copy: ${label}`, () => {
+        const done = (): void => {
+            copy.textContent = "Copied";
+            setTimeout(() => { copy.textContent = "Copy"; }, 1500);
+        };
+        // Pages without TLS have no clipboard; the text is then marked, to be copied by hand.
+        if (navigator.clipboard === undefined) text.select();
+        else navigator.clipboard.writeText(text.value).then(done, () => text.select());
+    });
+    return {
+        element: make("div", {}, make("div", { class: "row" }, make("span", { class: "grow" }, label), copy), text),
+        set: (to) => {
+            text.value = to;
+            copy.disabled = to === "";
+        },
+    };
+}

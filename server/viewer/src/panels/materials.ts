@@ -1,0 +1,133 @@
+// Reflectances of groups, which make a variant of the scene where the daemon allows it; and the variants that there are.
+import { fromHex, toHex } from "../base/colour.ts";
+import { button, fill, make } from "../base/dom.ts";
+import { Problem } from "../daemon/api.ts";
+import type { App } from "../app.ts";
+import type { MeshGroup } from "../picture/glb.ts";
+import { baseOf, checkReflectances, type Reflectances } from "../state/variants.ts";
+import type { Panel } from "./panel.ts";
+
+/** A variant that is not ready after this time is left to itself. */
+const PATIENCE_MS = 120_000;
+
+const pause = (ms: number): Promise<void> => new Promise((resolve) => { setTimeout(resolve, ms); });
+
+export function materialsPanel(app: App): Panel {
+    const rows = make("div", {}), variants = make("div", {}), said = make("p", { role: "status", "aria-live": "polite" });
+    const name = make("input", { type: "text", value: "variant-1", maxlength: 60, "aria-label": "Name of the variant" });
+    let draft: Reflectances = {}, isBusy = false;
+    const base = (): string => baseOf(app.store.now.scene, app.scenes.map((scene) => scene.name));
+    const draw = (): void => {
+        const { scene } = app;
+        if (scene === null) return;
+        draft = {};
+        const { channels } = scene.description;
+        fill(rows, ...scene.mesh.groups.map((group) => groupRow(group, channels, (to) => { draft[group.name] = to; })));
+    };
+    const tries = async (what: () => Promise<void>): Promise<void> => {
+        if (isBusy) return;
+        isBusy = true;
+        try {
+            await what();
+        } catch (reason) {
+            said.textContent = reason instanceof Problem ? inWords(reason) : "";
+            if (!(reason instanceof Problem) || reason.status === 401) app.fail(reason);
+        } finally {
+            isBusy = false;
+        }
+    };
+    const build = async (): Promise<void> => {
+        const { scene, store: { now } } = app, variant = name.value.trim();
+        if (scene === null) return;
+        // A variant begins from its store, so one of a variant has all of its own reflectances.
+        const own: Reflectances = now.scene === base() ? {} : Object.fromEntries(scene.mesh.groups.map((group) =>
+            [group.name, scene.description.channels === 3 ? [...group.reflectance] : [group.reflectance[0]]]));
+        const groups = { ...own, ...draft }, wrong = checkReflectances(variant, groups);
+        if (wrong !== null) {
+            said.textContent = wrong;
+            return;
+        }
+        said.textContent = `${variant} is being built …`;
+        const from = base(), path = await app.api.vary(from, variant, Object.fromEntries(Object.entries(groups).map(
+            ([group, values]) => [group, values.length === 1 ? values[0] : values])));
+        const start = performance.now();
+        for (let wait = 100; path !== null; wait = Math.min(2000, 1.5 * wait)) {
+            if ((await app.api.ask(path)).status === 200) break;
+            if (performance.now() - start > PATIENCE_MS) {
+                said.textContent = `${variant} is not ready after two minutes. It is listed here once it is, when the page is opened again.`;
+                return;
+            }
+            await pause(wait);
+        }
+        await app.listScenes();
+        said.textContent = `${from}@${variant} is ready.`;
+    };
+    const open = (to: string): Promise<void> => tries(() => app.open(to, { ...app.store.now, scene: to, compare: null }));
+    const compare = (to: string): void => {
+        const { now } = app.store;
+        app.store.change({ ...now, compare: { how: "split", split: 0.5, lighting: null, ...now.compare, scene: to } });
+    };
+    const remove = (variant: string): Promise<void> => tries(async () => {
+        const from = base(), { now } = app.store;
+        await app.api.vary(from, variant.slice(from.length + 1), null);
+        if (now.compare?.scene === variant) app.store.change({ ...now, compare: null });
+        await app.listScenes();
+        if (app.store.now.scene === variant) await app.open(from, { ...app.store.now, scene: from });
+        said.textContent = `${variant} is gone.`;
+    });
+    const drawVariants = (): void => {
+        const from = base(), now = app.store.now.scene, known = app.scenes.filter((scene) => scene.name.startsWith(`${from}@`));
+        fill(variants, known.length > 0 && make("h2", {}, `Variants of ${from}`),
+            now !== from && make("div", { class: "row" }, button(`Back to ${from}`, null, () => void open(from))),
+            ...known.map((scene) => make("div", { class: "row", role: "group", "aria-label": scene.name },
+                make("span", { class: "grow" }, scene.name.slice(from.length + 1)),
+                button("Open", null, () => void open(scene.name), { disabled: scene.name === now }),
+                button("Compare", null, () => compare(scene.name), { disabled: scene.name === now }),
+                button("Delete", null, () => void remove(scene.name)))));
+    };
+    app.on("scene", () => { draw(); drawVariants(); });
+    app.on("scenes", drawVariants);
+    const form = make("form", { onsubmit: (event: Event) => { event.preventDefault(); void tries(build); } },
+        make("div", { class: "row" }, name, make("button", { type: "submit" }, "Make variant"), button("Reset", "The reflectances of the open scene", draw)));
+    return {
+        id: "materials", title: "Materials",
+        element: make("div", {}, make("p", { class: "hint" }, "Mean reflectance of each group. Changes make a variant beside the scene; groups that stay as they are keep their own."),
+            rows, form, said, variants),
+    };
+}
+
+/** A refusal in plain words; the daemon's own say which option it lacks. */
+function inWords(problem: Problem): string {
+    const lead: { [status: number]: string } = {
+        403: "This daemon does not allow that", 404: "It is not there any more", 409: "This store cannot have variants",
+        422: "That is no variant", 429: "There are as many variants as the daemon keeps", 501: "This daemon cannot do that yet",
+    };
+    const start = lead[problem.status];
+    return start === undefined ? problem.message : `${start}: ${problem.message}.`;
+}
+
+/** One number for stores of one channel, red, green and blue with a swatch for three. */
+function groupRow(group: MeshGroup, channels: number, change: (to: number[]) => void): HTMLElement {
+    const count = channels === 3 ? 3 : 1, letters = count === 3 ? ["red", "green", "blue"] : ["reflectance"];
+    const now = group.reflectance.slice(0, count).map((v) => Number(v.toPrecision(4)));
+    const fields = letters.map((letter, c) => make("input", {
+        type: "number", min: 0, max: 0.999, step: "any", value: String(now[c]), "aria-label": `${group.name}: ${letter}`, class: "narrow",
+        onchange: () => {
+            now[c] = fields[c].value === "" ? NaN : Number(fields[c].value);
+            paint();
+            change([...now]);
+        },
+    }));
+    const swatch = make("input", {
+        type: "color", "aria-label": `${group.name}: colour`,
+        oninput: () => {
+            // The brightest colour of a screen is 1, which no material reaches.
+            fromHex(swatch.value).forEach((v, c) => { now[c] = Math.min(0.98, Number(v.toPrecision(4))); });
+            fields.forEach((field, c) => { field.value = String(now[c]); });
+            change([...now]);
+        },
+    });
+    const paint = (): void => { if (now.every(Number.isFinite)) swatch.value = toHex(now); };
+    paint();
+    return make("fieldset", { class: "material" }, make("legend", {}, group.name), make("div", { class: "row" }, count === 3 && swatch, ...fields));
+}

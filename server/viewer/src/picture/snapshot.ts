@@ -1,0 +1,99 @@
+// The picture at any size: drawn in parts that every graphics card can hold, put together on a canvas, with a legend.
+import { changeColour } from "./changes.ts";
+import { toHex } from "../base/colour.ts";
+import { tell } from "../base/numbers.ts";
+import { paletteBytes } from "./palettes.ts";
+import type { Stage } from "./stage.ts";
+import type { Palette } from "../state/state.ts";
+
+export const SIDE_MOST = 8192;
+
+/** The width and height of one part, in pixels. */
+const PART = 2048;
+
+export interface Legend {
+    title: string;
+    /** Of the ramp's ends; a difference has its middle at 0. */
+    low: number;
+    high: number;
+    log: boolean;
+    palette: Palette | "change";
+}
+
+/** Draws what the stage shows at this size; the stage has its own size again afterwards. `split` is the share of the width
+ * that is left of the line of a comparison. */
+export function snapshot(stage: Stage, width: number, height: number, split: number): HTMLCanvasElement {
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [width, height];
+    const context = canvas.getContext("2d");
+    if (context === null) throw new Error(`the browser makes no picture of ${width} × ${height} pixels`);
+    const { renderer, camera, uniforms } = stage, hovered: unknown = uniforms.hovered.value;
+    uniforms.hovered.value = -1;
+    renderer.setPixelRatio(1);
+    try {
+        for (let y = 0; y < height; y += PART)
+            for (let x = 0; x < width; x += PART) {
+                const [w, h] = [Math.min(PART, width - x), Math.min(PART, height - y)];
+                renderer.setSize(w, h, false);
+                // This sets the camera's aspect, too.
+                camera.setViewOffset(width, height, x, y, w, h);
+                uniforms.split.value = split * width - x;
+                stage.draw();
+                context.drawImage(renderer.domElement, x, y);
+            }
+    } finally {
+        camera.clearViewOffset();
+        uniforms.hovered.value = hovered;
+        stage.resize();
+    }
+    return canvas;
+}
+
+/** Round numbers of the legend: 1, 2 and 5 times powers of ten. */
+export function legendTicks(low: number, high: number, log: boolean): number[] {
+    if (!(high > low)) return [];
+    const out: number[] = [];
+    if (log && low > 0 && high / low >= 10) {
+        for (let e = Math.floor(Math.log10(low)); 10 ** e <= high; e++)
+            for (const m of high / low > 1e3 ? [1] : [1, 2, 5]) {
+                const value = Number(`${m}e${e}`);
+                if (value >= low * 0.999 && value <= high * 1.001) out.push(value);
+            }
+        return out;
+    }
+    const rough = (high - low) / 5, ten = 10 ** Math.floor(Math.log10(rough));
+    const step = ([1, 2, 5, 10].find((m) => m * ten >= rough * 0.999) as number) * ten;
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high * (1 + 1e-9); k++) out.push(Number((k * step).toPrecision(12)));
+    return out;
+}
+
+/** Draws a ramp with its ticks into the lower left corner. */
+export function drawLegend(canvas: HTMLCanvasElement, legend: Legend): void {
+    const context = canvas.getContext("2d") as CanvasRenderingContext2D;
+    const unit = Math.max(8, Math.min(canvas.width / 40, canvas.height / 28)), [width, height] = [unit * 18, unit * 4.2];
+    const left = unit, top = canvas.height - height - unit, ramp = width - 2 * unit;
+    context.fillStyle = "rgb(0 0 0 / .75)";
+    context.fillRect(left, top, width, height);
+    const bytes = legend.palette === "change" ? null : paletteBytes(legend.palette);
+    for (let k = 0; k < 256; k++) {
+        context.fillStyle = bytes === null ? toHex(changeColour((2 * k) / 255 - 1)) : `rgb(${bytes[4 * k]} ${bytes[4 * k + 1]} ${bytes[4 * k + 2]})`;
+        const from = Math.floor(left + unit + (ramp * k) / 256);
+        context.fillRect(from, top + unit * 1.4, Math.ceil(left + unit + (ramp * (k + 1)) / 256) - from, unit);
+    }
+    context.fillStyle = "#fff";
+    context.font = `${Math.round(unit * 0.9)}px sans-serif`;
+    context.textBaseline = "middle";
+    context.fillText(legend.title, left + unit, top + unit * 0.8, ramp);
+    context.textAlign = "center";
+    let free = -Infinity;
+    for (const value of legendTicks(legend.low, legend.high, legend.log)) {
+        const share = legend.log ? Math.log(value / legend.low) / Math.log(legend.high / legend.low) : (value - legend.low) / (legend.high - legend.low);
+        const x = left + unit + ramp * share, text = tell(value), half = context.measureText(text).width / 2;
+        context.fillRect(x - Math.max(1, unit / 16), top + unit * 2.4, Math.max(2, unit / 8), unit * 0.3);
+        // A number that would touch the one before it is left out.
+        if (x - half < free) continue;
+        context.fillText(text, x, top + unit * 3.4);
+        free = x + half + unit * 0.4;
+    }
+    context.textAlign = "start";
+}
