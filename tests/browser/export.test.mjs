@@ -3,6 +3,9 @@ import assert from "node:assert/strict";
 import { execFile } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
+import { createRequire } from "node:module";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
 import { promisify } from "node:util";
 import { Daemon, inFolder, lambert, makeStore, openPage, settled, violations } from "./page.mjs";
 
@@ -93,9 +96,10 @@ test("CSV and NPY are the daemon's numbers in single precision", async () => {
     const whole = await page.evaluate(() => window.lambert.scene.mesh.groups.reduce((sum, group) => sum + group.area, 0));
     assert.ok(Math.abs(area - whole) < 1e-5 * whole);
     const npy = await saved(page, "Save NPY");
-    writeFileSync(inFolder("saved.npy"), npy.bytes);
-    const read = await run("/usr/bin/python3", ["-c", "import json, sys, numpy; a = numpy.load(sys.argv[1]); print(json.dumps([str(a.dtype), a.astype(float).tolist()]))", inFolder("saved.npy")]);
-    assert.deepEqual(JSON.parse(read.stdout), ["float32", own.map((channel) => channel.map(Math.fround))]);
+    const head = 10 + npy.bytes.readUInt16LE(8), text = npy.bytes.toString("latin1", 10, head);
+    assert.match(text, new RegExp(`'descr': *'<f4'.*'shape': *\\(3, *${own[0].length}\\)`));
+    const read = Array.from({ length: (npy.bytes.length - head) / 4 }, (_, k) => npy.bytes.readFloatLE(head + 4 * k));
+    assert.deepEqual(read, own.flat().map(Math.fround));
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });
@@ -214,4 +218,49 @@ test("refusals of variants are told in words", async () => {
     await other.getByText(/cannot have variants: .*--keep-factors/).waitFor();
     await other.context().close();
     await own.stop();
+});
+
+test("parts without a page", async () => {
+    const { buildSync } = createRequire(join(process.env.MODULES, "of-the-test.js"))("esbuild");
+    const take = (file) => {
+        const out = inFolder(`${file.replaceAll("/", "-")}.mjs`);
+        buildSync({ entryPoints: [join(process.env.VIEWER, "src", `${file}.ts`)], bundle: true, format: "esm", outfile: out, nodePaths: [process.env.MODULES] });
+        return import(pathToFileURL(out));
+    };
+    const [half, csv, snippets, changes, snapshot, variants] = await Promise.all(
+        ["base/half", "base/csv", "state/snippets", "picture/changes", "picture/snapshot", "state/variants"].map(take));
+    // Every half is its own nearest; between two neighbours the nearer one is taken, the even one in the middle.
+    for (let bits = 0; bits < 0x7c00; bits++) {
+        const value = half.halfToNumber(bits), next = half.halfToNumber(bits + 1);
+        for (const sign of [1, -1]) assert.equal(half.numberToHalf(sign * value) & 0x7fff, bits);
+        if (bits === 0x7bff) continue;
+        const middle = (value + next) / 2;
+        assert.equal(half.numberToHalf(middle), bits + (bits & 1));
+        assert.equal(half.numberToHalf(value + 0.4375 * (next - value)), bits);
+        assert.equal(half.numberToHalf(value + 0.5625 * (next - value)), bits + 1);
+    }
+    assert.deepEqual([65519, 65520, 1e9, -1e9, Infinity].map(half.numberToHalf), [0x7bff, 0x7c00, 0x7c00, 0xfc00, 0x7c00]);
+    assert.ok(Number.isNaN(half.halfToNumber(half.numberToHalf(NaN))));
+    for (const value of [0, 1, 0.1, 1 / 3, 16777217, 1e-38, 3.4e38, 17, 1e-45].map(Math.fround))
+        assert.equal(Math.fround(Number(csv.floatText(value))), value);
+    assert.equal(csv.floatText(Math.fround(0.1)), "0.1");
+    const odd = ["plain", "it's", '"$(id)`id`', "a\\b\nc", "ä “é” \u2028 😀", "-n", "!x"];
+    for (const text of odd) {
+        assert.equal((await run("sh", ["-c", `printf %s ${snippets.shellWord(text)}`])).stdout, text);
+        assert.equal((await run("python3", ["-c", `import sys; sys.stdout.buffer.write(${snippets.pythonString(text)}.encode())`])).stdout, text);
+    }
+    // A body beyond what a command may hold goes by standard input.
+    const sky = Array.from({ length: 20000 }, (_, i) => 0.001 * i);
+    const long = snippets.curlCommand("http://127.0.0.1:1", { scene: "it's", body: { emission: { sky }, quantity: "radiosity" } }, false);
+    assert.match(long, /--data-binary @- <<'BODY'\n/);
+    const echoed = await run("sh", ["-c", long.replace(/^curl .*\\\n.*\\\n.*--data-binary @-/, "cat")], { maxBuffer: 1e7 });
+    assert.deepEqual(JSON.parse(echoed.stdout).emission.sky, sky);
+    assert.deepEqual([0.0017, 1, 1.01, 4.9, 700].map(changes.roundUp), [0.002, 1, 2, 5, 1000]);
+    assert.deepEqual(snapshot.legendTicks(0, 10, false), [0, 2, 4, 6, 8, 10]);
+    assert.deepEqual(snapshot.legendTicks(-0.02, 0.02, false), [-0.02, -0.01, 0, 0.01, 0.02]);
+    assert.deepEqual(snapshot.legendTicks(0.1, 1000, true), [0.1, 1, 10, 100, 1000]);
+    assert.deepEqual(["a", "a@b", "a@b@c"].map((name) => variants.baseOf(name, ["a", "a@b", "a@b@c"])), ["a", "a", "a@b"]);
+    assert.equal(variants.checkReflectances("v", { wall: [0, 0.999] }), null);
+    for (const [name, groups] of [["", { wall: [0] }], ["v", {}], ["v", { wall: [1] }], ["v", { wall: [NaN] }], ["a b", { wall: [0] }], ["v", { wall: [-0.1] }]])
+        assert.equal(typeof variants.checkReflectances(name, groups), "string", JSON.stringify([name, groups]));
 });

@@ -115,6 +115,8 @@ for (const ratio of [1, 2])
         // The difference is blue where B is darker and red where it is brighter.
         await page.getByLabel("Shown as").selectOption("difference");
         await settled(page);
+        const [title, ramp, ends] = await page.locator(".changes > *").evaluateAll((all) => all.map((e) => e.getBoundingClientRect().top));
+        assert.ok(title < ramp && ramp < ends, `the legend stands at ${[title, ramp, ends]}`);
         const end = Number((await page.locator(".changes .ends span").last().textContent()).replace(/[^\d.e-]/g, ""));
         for (const [x, y] of [[0.5, 0.9], [0.3, 0.4], [0.75, 0.5]]) {
             const element = await elementAt(page, x, y), t = Math.max(-1, Math.min(1, WEIGHTS.reduce((sum, w, c) => sum + w * (b[c][element] - a[c][element]), 0) / end));

@@ -12,7 +12,7 @@ const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indir
 export function exportPanel(app: App): Panel {
     const said = make("p", { role: "status", "aria-live": "polite" });
     const tries = (what: () => Promise<string>): void => {
-        said.textContent = "…";
+        said.textContent = "Working …";
         what().then((text) => { said.textContent = text; }, (reason: unknown) => {
             said.textContent = "";
             app.fail(reason);
@@ -36,6 +36,8 @@ function picturePart(app: App, tries: (what: () => Promise<string>) => void): HT
         const [w, h] = [width, height].map((field) => Math.round(Number(field.value)));
         for (const side of [w, h])
             if (!(side >= 16 && side <= SIDE_MOST)) return `A side of the picture has 16 to ${SIDE_MOST} pixels.`;
+        // A large picture takes seconds without a graphics card; the word on it is to be seen before.
+        await new Promise((resolve) => { setTimeout(resolve, 50); });
         const { compare } = app.store.now, canvas = snapshot(app.stage, w, h, compare?.split ?? 0.5);
         const colours = legendOf(app);
         if (colours !== null && (legend.querySelector("input") as HTMLInputElement).checked) drawLegend(canvas, colours);

@@ -32,7 +32,10 @@ export function shellWord(text: string): string {
 
 /** A string of Python, whatever it holds: that of JSON in ASCII. */
 export function pythonString(text: string): string {
-    return JSON.stringify(text).replace(/[\u007f-\uffff]/g, (c) => `\\u${c.charCodeAt(0).toString(16).padStart(4, "0")}`);
+    return JSON.stringify(text).replace(/[^ -~]/gu, (c) => {
+        const code = c.codePointAt(0) as number;
+        return code > 0xffff ? `\\U${code.toString(16).padStart(8, "0")}` : `\\u${code.toString(16).padStart(4, "0")}`;
+    });
 }
 
 function pythonValue(value: unknown): string {
