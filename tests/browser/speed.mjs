@@ -1,0 +1,58 @@
+// How fast the page is on this machine; measured, never judged. In the folder `browser` of a build:
+//   LAMBERTD=../lambertd node --preserve-symlinks --preserve-symlinks-main speed.mjs STORE...
+// prints the time to the first picture, answers a second while the slider of all lamps is dragged, with the time of drawing
+// counted apart (software draws here; a graphics card takes it off the processor), and what the daemon's memory grew by.
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { Daemon, openPage, settled } from "./page.mjs";
+
+const DRAG_MS = 5000;
+const middle = (values) => values.sort((a, b) => a - b)[values.length >> 1];
+
+/** Changes the dimmer at each turn of the page's loop; resolves to figures by second. */
+function drag(page, isDrawn) {
+    return page.evaluate(async ([milliseconds, draws]) => {
+        const app = window.lambert, { draw } = app.stage, start = performance.now(), first = app.answers;
+        let drawing = 0, frames = 0;
+        app.stage.draw = (...size) => {
+            if (!draws) return;
+            const from = performance.now();
+            draw.apply(app.stage, size);
+            app.stage.renderer.getContext().finish();
+            drawing += performance.now() - from;
+            frames += 1;
+        };
+        for (let i = 0; performance.now() - start < milliseconds; i++) {
+            const { now } = app.store;
+            app.store.change({ ...now, lighting: { ...now.lighting, dim: 0.3 + 0.001 * (i % 700) } }, "drag");
+            await new Promise((resolve) => { setTimeout(resolve, 4); });
+        }
+        app.stage.draw = draw;
+        const seconds = (performance.now() - start) / 1000;
+        return { answers: (app.answers - first) / seconds, apart: (app.answers - first) / (seconds - drawing / 1000), frames: frames / seconds };
+    }, [DRAG_MS, isDrawn]);
+}
+
+test("speed", async () => {
+    for (const store of process.argv.slice(2)) {
+        const daemon = await Daemon.start([store]);
+        const memory = () => Number(/RssAnon:\s+(\d+)/.exec(readFileSync(`/proc/${daemon.process.pid}/status`, "utf8"))[1]) / 1024;
+        const before = memory(), page = await openPage(daemon.address), firsts = [];
+        const { elements, channels } = await page.evaluate(() => window.lambert.scene.description);
+        for (let i = 0; i < 5; i++) {
+            const start = performance.now();
+            await page.goto(`${daemon.address}/?${i}`);
+            await settled(page);
+            firsts.push(performance.now() - start);
+        }
+        const undrawn = await drag(page, false);
+        await settled(page);
+        const drawn = await drag(page, true);
+        console.log(`${store}: ${elements} elements x ${channels}; first picture ${Math.round(middle(firsts))} ms (median of 5); `
+            + `${undrawn.answers.toFixed(0)} answers/s applied without drawing, ${drawn.answers.toFixed(0)} beside `
+            + `${drawn.frames.toFixed(1)} pictures/s by software (${drawn.apart.toFixed(0)} with the time of drawing counted apart); `
+            + `daemon +${(memory() - before).toFixed(1)} MiB`);
+        await page.context().close();
+        await daemon.stop();
+    }
+});
