@@ -1,136 +1,20 @@
 /* Binary glTF of small meshes, read back by the rules of the specification: heads, accessors, normals,
  * materials. */
 #include "solver/codec/gltf/gltf.h"
+#include "support/gltf_file.h"
 #include "support/request_text.h"
 #include "support/suite.h"
 
-#include <jansson.h>
 #include <math.h>
 #include <string.h>
 
 #define NO GLTF_NO_VERTEX
 
-/* A file of glTF in parts. */
-typedef struct loaded {
-    buffer file;
-    json_t *root;
-    const char *binary;
-    size_t n_binary;
-} loaded;
-
-static uint32_t u32_at(const char *at) {
-    uint32_t value;
-    memcpy(&value, at, sizeof value);
-    return le32toh(value);
-}
-
-static float float_at(const char *at) {
-    const uint32_t bits = u32_at(at);
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
-static loaded load(const gltf_mesh *m) {
-    loaded l = {.root = NULL};
-    lam_error error;
-    json_error_t why;
-    gltf_sizes sizes = {.n = m->n, .n_vertices = m->n_vertices, .n_groups = m->groups->n_groups};
-    for (size_t g = 0; g < m->groups->n_groups; g++) sizes.n_texts += strlen(m->groups->names[g]);
-    ck_ok(gltf_write(m, &l.file, &error));
-    ck_assert_uint_le(l.file.length, gltf_bytes_most(&sizes));
-    const char *bytes = l.file.bytes;
-    const size_t text = u32_at(bytes + 12);
-    ck_assert_uint_eq(u32_at(bytes), 0x46546C67);
-    ck_assert_uint_eq(u32_at(bytes + 4), 2);
-    ck_assert_uint_eq(u32_at(bytes + 8), l.file.length);
-    ck_assert_uint_eq(u32_at(bytes + 16), 0x4E4F534A);
-    ck_assert_uint_eq(text % 4, 0);
-    l.root = json_loadb(bytes + 20, text, 0, &why);
-    ck_assert_msg(l.root != NULL, "%s", why.text);
-    l.n_binary = u32_at(bytes + 20 + text);
-    ck_assert_uint_eq(u32_at(bytes + 24 + text), 0x004E4942);
-    l.binary = bytes + 28 + text;
-    ck_assert_uint_eq(28 + text + l.n_binary, l.file.length);
-    const json_t *first = json_array_get(json_object_get(l.root, "buffers"), 0);
-    ck_assert_int_eq(json_integer_value(json_object_get(first, "byteLength")), (json_int_t)l.n_binary);
-    return l;
-}
-
-static void unload(loaded *l) {
-    json_decref(l->root);
-    buffer_free(&l->file);
-}
-
-static json_t *item(const json_t *object, const char *list, size_t k) {
-    json_t *found = json_array_get(json_object_get(object, list), k);
-    ck_assert_msg(found != NULL, "%s[%zu]", list, k);
-    return found;
-}
-
-static size_t number(const json_t *object, const char *name) {
-    const json_t *found = json_object_get(object, name);
-    ck_assert_msg(json_is_integer(found), "%s", name);
-    return (size_t)json_integer_value(found);
-}
-
-/* The bytes of an accessor, which must lie in their view and be aligned. */
-static const char *accessor(const loaded *l, size_t k, const char *type, size_t component, size_t bytes,
-                            size_t *count) {
-    const json_t *a = item(l->root, "accessors", k),
-                 *view = item(l->root, "bufferViews", number(a, "bufferView"));
-    *count = number(a, "count");
-    ck_assert_str_eq(json_string_value(json_object_get(a, "type")), type);
-    ck_assert_uint_eq(number(a, "componentType"), component);
-    const size_t offset = number(a, "byteOffset"), start = number(view, "byteOffset") + offset;
-    ck_assert_uint_eq(start % 4, 0);
-    ck_assert_uint_le(offset + *count * bytes, number(view, "byteLength"));
-    ck_assert_uint_le(start + *count * bytes, l->n_binary);
-    if (component == 5126) ck_assert_uint_eq(number(view, "byteStride"), bytes);
-    return l->binary + start;
-}
-
-/* The primitive of a node. */
-typedef struct primitive {
-    const char *name;
-    const char *position, *normal, *element, *index;
-    size_t n_vertices, n_indices;
-    const json_t *material, *extras;
-} primitive;
-
-static primitive primitive_of(const loaded *l, size_t node) {
-    const json_t *n = item(l->root, "nodes", node), *mesh = item(l->root, "meshes", number(n, "mesh"));
-    const json_t *p = item(mesh, "primitives", 0), *of = json_object_get(p, "attributes");
-    primitive out = {.name = json_string_value(json_object_get(n, "name")),
-                     .extras = json_object_get(n, "extras")};
-    size_t count;
-    ck_assert_uint_eq(json_array_size(json_object_get(mesh, "primitives")), 1);
-    ck_assert_uint_eq(number(p, "mode"), 4);
-    out.position = accessor(l, number(of, "POSITION"), "VEC3", 5126, 12, &out.n_vertices);
-    out.normal = accessor(l, number(of, "NORMAL"), "VEC3", 5126, 12, &count);
-    ck_assert_uint_eq(count, out.n_vertices);
-    out.element = accessor(l, number(of, "_ELEMENT"), "SCALAR", 5126, 4, &count);
-    ck_assert_uint_eq(count, out.n_vertices);
-    out.index = accessor(l, number(p, "indices"), "SCALAR", 5125, 4, &out.n_indices);
-    out.material = item(l->root, "materials", number(p, "material"));
-    const json_t *a = item(l->root, "accessors", number(of, "POSITION"));
-    for (size_t d = 0; d < 3; d++) {
-        float low = INFINITY, high = -INFINITY;
-        for (size_t v = 0; v < out.n_vertices; v++) {
-            low = fminf(low, float_at(out.position + 12 * v + 4 * d));
-            high = fmaxf(high, float_at(out.position + 12 * v + 4 * d));
-        }
-        ck_assert((float)json_number_value(json_array_get(json_object_get(a, "min"), d)) == low);
-        ck_assert((float)json_number_value(json_array_get(json_object_get(a, "max"), d)) == high);
-    }
-    return out;
-}
-
 static void is_vector(const char *at, double x, double y, double z) {
     const double wanted[3] = {x, y, z};
     for (size_t d = 0; d < 3; d++)
-        ck_assert_msg((double)float_at(at + 4 * d) == (double)(float)wanted[d],
-                      "component %zu is %.9g, not %.9g", d, (double)float_at(at + 4 * d), wanted[d]);
+        ck_assert_msg((double)gltf_float(at + 4 * d) == (double)(float)wanted[d],
+                      "component %zu is %.9g, not %.9g", d, (double)gltf_float(at + 4 * d), wanted[d]);
 }
 
 /* Numbers of a JSON array, to single precision. */
@@ -210,13 +94,13 @@ START_TEST(a_file_has_what_the_mesh_has) {
     static const char *const names[] = {"floor", "lamp"};
     small s = {.m = {.name = "r\"a\xC3\xBCm", .kind = "low_rank"}};
     fill_mixed(&s);
-    loaded l = load(finish(&s, 2, names));
+    gltf_file l = gltf_load(finish(&s, 2, names));
     const json_t *asset = json_object_get(l.root, "asset");
     ck_assert_str_eq(json_string_value(json_object_get(asset, "version")), "2.0");
     ck_assert_str_eq(json_string_value(json_object_get(asset, "generator")), "lambert " LAMBERT_VERSION);
     ck_assert_uint_eq(json_array_size(json_object_get(l.root, "nodes")), 3);
     ck_assert_ptr_null(json_object_get(l.root, "extensionsUsed"));
-    const json_t *root = item(l.root, "nodes", 0), *children = json_object_get(root, "children");
+    const json_t *root = gltf_item(l.root, "nodes", 0), *children = json_object_get(root, "children");
     ck_assert_uint_eq(json_array_size(children), 2);
     ck_assert_int_eq(json_integer_value(json_array_get(children, 1)), 2);
     const json_t *holders[2] = {l.root, root};
@@ -224,33 +108,33 @@ START_TEST(a_file_has_what_the_mesh_has) {
         const json_t *about = json_object_get(json_object_get(holders[k], "extras"), "lambert");
         ck_assert_str_eq(json_string_value(json_object_get(about, "name")), s.m.name);
         ck_assert_str_eq(json_string_value(json_object_get(about, "kind")), "low_rank");
-        ck_assert_uint_eq(number(about, "elements"), 3);
-        ck_assert_uint_eq(number(about, "channels"), 1);
+        ck_assert_uint_eq(gltf_number(about, "elements"), 3);
+        ck_assert_uint_eq(gltf_number(about, "channels"), 1);
     }
-    const primitive floor = primitive_of(&l, 1), lamp = primitive_of(&l, 2);
+    const gltf_primitive floor = gltf_primitive_of(&l, 1), lamp = gltf_primitive_of(&l, 2);
     ck_assert_str_eq(floor.name, "floor");
     ck_assert_str_eq(lamp.name, "lamp");
-    ck_assert_uint_eq(number(lamp.extras, "group"), 1);
-    ck_assert_uint_eq(number(lamp.extras, "elements"), 2);
+    ck_assert_uint_eq(gltf_number(lamp.extras, "group"), 1);
+    ck_assert_uint_eq(gltf_number(lamp.extras, "elements"), 2);
     ck_assert_uint_eq(floor.n_vertices, 4);
     ck_assert_uint_eq(floor.n_indices, 6);
     ck_assert_uint_eq(lamp.n_vertices, 6);
     ck_assert_uint_eq(lamp.n_indices, 6);
     const uint32_t quad[6] = {0, 1, 2, 0, 2, 3}, corner[4] = {2, 3, 5, 4}, lamps[6] = {0, 1, 3, 0, 3, 2};
     for (size_t k = 0; k < 6; k++) {
-        ck_assert_uint_eq(u32_at(floor.index + 4 * k), quad[k]);
-        ck_assert_uint_eq(u32_at(lamp.index + 4 * k), k);
-        ck_assert(float_at(lamp.element + 4 * k) == (k < 3 ? 0.f : 2.f));
+        ck_assert_uint_eq(gltf_u32(floor.index + 4 * k), quad[k]);
+        ck_assert_uint_eq(gltf_u32(lamp.index + 4 * k), k);
+        ck_assert(gltf_float(lamp.element + 4 * k) == (k < 3 ? 0.f : 2.f));
         const double *v = s.vertices[lamps[k]];
         is_vector(lamp.position + 12 * k, v[0], v[1], v[2]);
         is_vector(lamp.normal + 12 * k, 0, 1, 0);
     }
     for (size_t k = 0; k < 4; k++) {
         const double *v = s.vertices[corner[k]];
-        ck_assert(float_at(floor.element + 4 * k) == 1.f);
+        ck_assert(gltf_float(floor.element + 4 * k) == 1.f);
         is_vector(floor.position + 12 * k, v[0], v[1], v[2]);
     }
-    unload(&l);
+    gltf_unload(&l);
     group_index_free(&s.groups);
 }
 END_TEST
@@ -260,11 +144,11 @@ START_TEST(groups_without_elements_are_left_out) {
     small s = {.m = {.n = 0}};
     fill_mixed(&s);
     for (int i = 0; i < 3; i++) s.group[i] = s.group[i] == 0 ? 1 : 3;
-    loaded l = load(finish(&s, 5, names));
+    gltf_file l = gltf_load(finish(&s, 5, names));
     ck_assert_uint_eq(json_array_size(json_object_get(l.root, "nodes")), 3);
-    ck_assert_str_eq(primitive_of(&l, 1).name, "floor");
-    ck_assert_uint_eq(number(primitive_of(&l, 2).extras, "group"), 3);
-    unload(&l);
+    ck_assert_str_eq(gltf_primitive_of(&l, 1).name, "floor");
+    ck_assert_uint_eq(gltf_number(gltf_primitive_of(&l, 2).extras, "group"), 3);
+    gltf_unload(&l);
     group_index_free(&s.groups);
 }
 END_TEST
@@ -298,8 +182,8 @@ START_TEST(normals_keep_creases) {
             small s = {.m = {.n = 0}};
             fill_strip(&s, 4, steps, lengths, shared != 0);
             if (apart) s.group[1] = 1; /* a surface ends with its group */
-            loaded l = load(finish(&s, 2, names));
-            const primitive p = primitive_of(&l, 1);
+            gltf_file l = gltf_load(finish(&s, 2, names));
+            const gltf_primitive p = gltf_primitive_of(&l, 1);
             const size_t third = apart ? 1 : 2; /* elements 0, 2 and 3 are left where 1 is apart */
             const char *of[4] = {p.normal, p.normal + 48, p.normal + 48 * third, p.normal + 48 * (third + 1)};
             /* Corners 1 and 2 of an element are its end, 0 and 3 its beginning. */
@@ -310,7 +194,7 @@ START_TEST(normals_keep_creases) {
                     length += mean[d] * mean[d];
                 }
                 for (int d = 0; d < 3; d++)
-                    ck_assert_double_eq_tol((double)float_at(of[0] + 12 + 4 * d), mean[d] / sqrt(length),
+                    ck_assert_double_eq_tol((double)gltf_float(of[0] + 12 + 4 * d), mean[d] / sqrt(length),
                                             1e-6);
                 ck_assert_mem_eq(of[0] + 12, of[1], 12);
                 ck_assert_mem_eq(of[0] + 24, of[1] + 36, 12);
@@ -320,10 +204,10 @@ START_TEST(normals_keep_creases) {
             }
             ck_assert_mem_ne(of[2] + 12, of[3], 12); /* 31 degrees */
             for (size_t d = 0; d < 3; d++) {
-                ck_assert_float_eq_tol(float_at(of[3] + 4 * d), s.normal[3][d], 1e-6f);
-                ck_assert_float_eq_tol(float_at(of[2] + 12 + 4 * d), s.normal[2][d], 1e-6f);
+                ck_assert_float_eq_tol(gltf_float(of[3] + 4 * d), s.normal[3][d], 1e-6f);
+                ck_assert_float_eq_tol(gltf_float(of[2] + 12 + 4 * d), s.normal[2][d], 1e-6f);
             }
-            unload(&l);
+            gltf_unload(&l);
             group_index_free(&s.groups);
         }
 }
@@ -341,13 +225,13 @@ START_TEST(a_surface_goes_around_its_corner) {
     float apart = 0;
     for (int d = 0; d < 3; d++) apart += s.normal[0][d] * s.normal[4][d];
     ck_assert_float_lt(apart, .8f);
-    loaded l = load(finish(&s, 1, names));
-    const primitive p = primitive_of(&l, 1);
+    gltf_file l = gltf_load(finish(&s, 1, names));
+    const gltf_primitive p = gltf_primitive_of(&l, 1);
     for (size_t k = 0; k < 8; k++) {
         ck_assert_mem_eq(p.normal + 36 * k, p.normal, 12);
-        ck_assert_float_eq_tol(float_at(p.normal + 36 * k + 8), 1, 1e-6f);
+        ck_assert_float_eq_tol(gltf_float(p.normal + 36 * k + 8), 1, 1e-6f);
     }
-    unload(&l);
+    gltf_unload(&l);
     group_index_free(&s.groups);
 }
 END_TEST
@@ -366,13 +250,13 @@ START_TEST(y_is_up) {
             add_vertex(&s, at[0], at[1], at[2]);
         }
         add_element(&s, 0, 0, 1, 2, NO);
-        loaded l = load(finish(&s, 1, names));
-        const primitive p = primitive_of(&l, 1);
+        gltf_file l = gltf_load(finish(&s, 1, names));
+        const gltf_primitive p = gltf_primitive_of(&l, 1);
         is_vector(p.position, 0, 5, 0);
         double corner[3][3], normal[3];
         for (size_t k = 0; k < 3; k++) {
             is_vector(p.normal + 12 * k, 0, 1, 0);
-            for (size_t d = 0; d < 3; d++) corner[k][d] = (double)float_at(p.position + 12 * k + 4 * d);
+            for (size_t d = 0; d < 3; d++) corner[k][d] = (double)gltf_float(p.position + 12 * k + 4 * d);
         }
         /* No mirror: counter-clockwise stays so, and as large. */
         ck_assert_double_eq(facing(corner[0], corner[1], corner[2], normal), 3);
@@ -380,10 +264,10 @@ START_TEST(y_is_up) {
         if (ups[u] == 'z') is_vector(p.position + 12, 2, 5, 0), is_vector(p.position + 24, 0, 5, -3);
         /* No component is -0. */
         for (size_t k = 0; k < 9; k++)
-            ck_assert(float_at(p.position + 4 * k) != 0 || u32_at(p.position + 4 * k) == 0);
+            ck_assert(gltf_float(p.position + 4 * k) != 0 || gltf_u32(p.position + 4 * k) == 0);
         for (size_t k = 0; k < 9; k++)
-            ck_assert(float_at(p.normal + 4 * k) != 0 || u32_at(p.normal + 4 * k) == 0);
-        unload(&l);
+            ck_assert(gltf_float(p.normal + 4 * k) != 0 || gltf_u32(p.normal + 4 * k) == 0);
+        gltf_unload(&l);
         group_index_free(&s.groups);
     }
 }
@@ -398,18 +282,68 @@ START_TEST(both_sides_have_their_normals) {
         const uint32_t *e = s.elements[i];
         add_element(&s, 0, e[3], e[2], e[1], e[0]);
     }
-    loaded l = load(finish(&s, 1, names));
-    const primitive p = primitive_of(&l, 1);
+    gltf_file l = gltf_load(finish(&s, 1, names));
+    const gltf_primitive p = gltf_primitive_of(&l, 1);
     ck_assert_uint_eq(p.n_vertices, 16);
     for (size_t i = 0; i < 2; i++)
         for (size_t k = 0; k < 4; k++)
             for (size_t d = 0; d < 3; d++)
-                ck_assert(float_at(p.normal + 48 * i + 12 * k + 4 * d) ==
-                          -float_at(p.normal + 48 * (i + 2) + 12 * (3 - k) + 4 * d));
+                ck_assert(gltf_float(p.normal + 48 * i + 12 * k + 4 * d) ==
+                          -gltf_float(p.normal + 48 * (i + 2) + 12 * (3 - k) + 4 * d));
     ck_assert_mem_eq(p.normal + 12, p.normal + 48, 12);
     ck_assert(json_is_false(json_object_get(p.material, "doubleSided")));
-    unload(&l);
+    gltf_unload(&l);
     group_index_free(&s.groups);
+}
+END_TEST
+
+/* 100 column + 10 element + corner, in quarters. */
+static float some_light(const void *context, size_t column, size_t element, size_t corner) {
+    (void)context;
+    return (float)(100 * column + 10 * element + corner) / 4;
+}
+
+START_TEST(light_is_at_corners) {
+    static const char *const names[] = {"strip"}, *const columns[] = {"_A", "_B", "_C", "_D",
+                                                                      "_E", "_F", "_G", "_H"};
+    const double steps[2] = {0, 90}, lengths[2] = {1, 3};
+    static const size_t channels[] = {1, 3, 4};
+    for (size_t c = 0; c < 3; c++) {
+        const size_t C = channels[c];
+        const gltf_light light = {.n_columns = 2 * C, .columns = columns, .value = some_light, .white = 40};
+        small s = {.m = {.n_channels = C, .light = &light}};
+        fill_strip(&s, 2, steps, lengths, true);
+        s.emission[0] = 1; /* an unlit material has none */
+        gltf_file l = gltf_load(finish(&s, 1, names));
+        const gltf_primitive p = gltf_primitive_of(&l, 1);
+        size_t count;
+        const char *colour =
+            gltf_accessor(&l, gltf_number(p.attributes, "COLOR_0"), "VEC3", 5126, 12, &count);
+        ck_assert_uint_eq(count, 8);
+        for (size_t v = 0; v < 8; v++) {
+            const size_t element = v / 4, corner = v % 4;
+            for (size_t k = 0; k < 2 * C; k++) {
+                const char *of =
+                    gltf_accessor(&l, gltf_number(p.attributes, columns[k]), "SCALAR", 5126, 4, &count);
+                ck_assert(gltf_float(of + 4 * v) == some_light(NULL, k, element, corner));
+            }
+            /* Four channels are the grey of their mean, 1.5 columns above the first. */
+            double shown[3];
+            for (size_t d = 0; d < 3; d++)
+                shown[d] = fmin(
+                    ((double)some_light(NULL, C == 3 ? d : 0, element, corner) + (C == 4 ? 37.5 : 0)) / 40,
+                    1);
+            is_vector(colour + 12 * v, shown[0], shown[1], shown[2]);
+        }
+        ck_assert_ptr_nonnull(
+            json_object_get(json_object_get(p.material, "extensions"), "KHR_materials_unlit"));
+        ck_assert_ptr_null(json_object_get(p.material, "emissiveFactor"));
+        ck_assert_uint_eq(json_array_size(json_object_get(l.root, "extensionsUsed")), 1);
+        const json_t *about = json_object_get(json_object_get(l.root, "extras"), "lambert");
+        ck_assert_double_eq(json_number_value(json_object_get(about, "white")), 40);
+        gltf_unload(&l);
+        group_index_free(&s.groups);
+    }
 }
 END_TEST
 
@@ -436,26 +370,26 @@ START_TEST(materials_are_means_by_area) {
         fill_strip(&s, 2, steps, lengths, true);
         memcpy(s.reflectance, cases[k].reflectance, sizeof cases[k].reflectance);
         memcpy(s.emission, cases[k].emission, sizeof cases[k].emission);
-        loaded l = load(finish(&s, 1, names));
-        const json_t *material = primitive_of(&l, 1).material,
+        gltf_file l = gltf_load(finish(&s, 1, names));
+        const json_t *material = gltf_primitive_of(&l, 1).material,
                      *pbr = json_object_get(material, "pbrMetallicRoughness");
         ck_assert_str_eq(json_string_value(json_object_get(material, "name")), "strip");
         is_list(json_object_get(pbr, "baseColorFactor"), 4, cases[k].colour);
-        ck_assert_uint_eq(number(pbr, "metallicFactor"), 0);
-        ck_assert_uint_eq(number(pbr, "roughnessFactor"), 1);
+        ck_assert_uint_eq(gltf_number(pbr, "metallicFactor"), 0);
+        ck_assert_uint_eq(gltf_number(pbr, "roughnessFactor"), 1);
         const json_t *extensions = json_object_get(material, "extensions");
         if (cases[k].strength > 0) {
             is_list(json_object_get(material, "emissiveFactor"), 3, cases[k].factor);
             const json_t *strength = json_object_get(extensions, "KHR_materials_emissive_strength");
             ck_assert_double_eq_tol(json_number_value(json_object_get(strength, "emissiveStrength")),
                                     cases[k].strength, 1e-6);
-            ck_assert_str_eq(json_string_value(item(l.root, "extensionsUsed", 0)),
+            ck_assert_str_eq(json_string_value(gltf_item(l.root, "extensionsUsed", 0)),
                              "KHR_materials_emissive_strength");
         } else {
             ck_assert_ptr_null(extensions);
             ck_assert_ptr_null(json_object_get(l.root, "extensionsUsed"));
         }
-        unload(&l);
+        gltf_unload(&l);
         group_index_free(&s.groups);
     }
 }
@@ -473,16 +407,16 @@ START_TEST(degenerate_elements_have_a_unit_normal) {
     add_element(&s, 0, 2, 2, 2, 2);
     for (int i = 0; i < 3; i++) memset(s.normal[i], 0, sizeof s.normal[i]);
     s.area[1] = s.area[2] = 0;
-    loaded l = load(finish(&s, 1, names));
-    const primitive p = primitive_of(&l, 1);
+    gltf_file l = gltf_load(finish(&s, 1, names));
+    const gltf_primitive p = gltf_primitive_of(&l, 1);
     ck_assert_uint_eq(p.n_vertices, 10);
     for (size_t v = 0; v < p.n_vertices; v++) {
         double square = 0;
-        for (size_t d = 0; d < 3; d++) square += pow((double)float_at(p.normal + 12 * v + 4 * d), 2);
+        for (size_t d = 0; d < 3; d++) square += pow((double)gltf_float(p.normal + 12 * v + 4 * d), 2);
         ck_assert_double_eq_tol(square, 1, 1e-6);
     }
     for (size_t v = 0; v < 3; v++) is_vector(p.normal + 12 * v, 1, 0, 0);
-    unload(&l);
+    gltf_unload(&l);
     group_index_free(&s.groups);
 }
 END_TEST
@@ -541,12 +475,12 @@ START_TEST(a_fan_of_many_elements) {
                          .groups = &groups,
                          .up = 'y'};
     ck_ok(gltf_write(&m, &out, &error));
-    loaded l = load(&m);
+    gltf_file l = gltf_load(&m);
     ck_assert_mem_eq(l.file.bytes, out.bytes, out.length);
-    const primitive p = primitive_of(&l, 1);
+    const gltf_primitive p = gltf_primitive_of(&l, 1);
     ck_assert_uint_eq(p.n_vertices, 3 * FAN);
     for (size_t v = 0; v < p.n_vertices; v++) is_vector(p.normal + 12 * v, 0, 1, 0);
-    unload(&l);
+    gltf_unload(&l);
     buffer_free(&out);
     group_index_free(&groups);
     free(vertices);
@@ -567,6 +501,7 @@ int main(void) {
     tcase_add_test(tests, a_surface_goes_around_its_corner);
     tcase_add_test(tests, y_is_up);
     tcase_add_test(tests, both_sides_have_their_normals);
+    tcase_add_test(tests, light_is_at_corners);
     tcase_add_test(tests, materials_are_means_by_area);
     tcase_add_test(tests, degenerate_elements_have_a_unit_normal);
     tcase_add_test(tests, limits_are_named);
