@@ -36,6 +36,9 @@ before(async () => {
     const patio = makeStore("patio", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "reinhart:2"] });
     writeFileSync(inFolder("patio.epw"), epw());
     const yard = makeStore("yard", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "tregenza"] });
+    const dome = makeStore("dome", "patio", {
+        generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "grid:12x5", "--emitters", "sky"],
+    });
     const pose = (x, y) => ({ move: [x, y, 0.5], turn: { axis: [1, 0, 0], degrees: 180 } });
     writeFileSync(inFolder("lamp.json"), JSON.stringify({
         light: { polygon: [[-0.05, -0.05, 0], [0.05, -0.05, 0], [0.05, 0.05, 0], [-0.05, 0.05, 0]], emission: [10, 9, 7] },
@@ -44,7 +47,7 @@ before(async () => {
     const way = makeStore("way", "cornell", {
         generate: ["--elements", 300], precompute: ["--path", inFolder("lamp.json"), "--frames", 5, "--paths", 500],
     });
-    daemon = await Daemon.start([patio, yard, way]);
+    daemon = await Daemon.start([patio, yard, dome, way]);
 });
 
 /** Single-precision rows of an NPY file. */
@@ -57,7 +60,7 @@ function rowsOf(file, length) {
 const lightOf = (to) => ({ ...state.skyOff, latitude: LATITUDE, longitude: LONGITUDE, zone: ZONE, ...to });
 
 test("skies of weather are those of `lambert sky`", async () => {
-    for (const [name, tiling] of [["patio", "reinhart:2"], ["yard", "tregenza"]]) {
+    for (const [name, tiling] of [["patio", "reinhart:2"], ["yard", "tregenza"], ["dome", "grid:12x5"]]) {
         const source = new daylight.SkySource();
         source.take(await daemon.json(`/v1/scenes/${name}/sky`));
         for (const [file, text] of [["a.wea", wea()], ["flat.wea", wea(2)], ["a.epw", epw()]])
@@ -176,6 +179,35 @@ test("a link restores a sky, and one that is spoilt is held within its range", a
         assert.deepEqual(one.faults, []);
         await one.context().close();
     }
+});
+
+test("a store of the tiles of a sky takes a sky, or their weights", async () => {
+    const page = await openScene("dome");
+    await page.getByRole("tab", { name: "Sky" }).click();
+    await skyTo(page, { model: "clear", tinted: true, hour: 10 });
+    await settled(page);
+    const { emission, scale } = await page.evaluate(() => window.lambert.wanted());
+    assert.deepEqual(Object.keys(emission), ["sky"]);
+    assert.ok(emission.sky.length === 60 && emission.sky.every((v) => v.length === 3));
+    const shownNow = () => page.evaluate(() => {
+        const [field] = window.lambert.fields;
+        return [0, 1, 2].flatMap((c) => Array.from({ length: field.elements }, (_, i) => field.at(i)[c]));
+    });
+    // Answers come in half precision of the emission scaled to at most 1: 11 digits, and steps of 2^-24 below 2^-14.
+    const isNear = (got, wanted, unit) => got.forEach((v, i) => assert.ok(Math.abs(v - wanted[i]) <= 2 ** -11 * wanted[i] + 2 ** -24 * unit, `${v}, wanted ${wanted[i]} of ${i}`));
+    const answer = await daemon.json("/v1/scenes/dome/radiosity", { emission: { emitters: emission.sky } });
+    isNear(await shownNow(), answer.radiosity.flat().map((v) => v * scale), scale);
+    await skyTo(page, { model: "off" });
+    await page.getByRole("tab", { name: "Emitters" }).click();
+    const part = page.getByLabel("Show emitters whose names have");
+    await part.fill("tile 59");
+    await page.getByTitle("Only tile 59").click();
+    await settled(page);
+    assert.deepEqual(await page.evaluate(() => window.lambert.store.now.lighting.emitters), { 59: 1 });
+    const alone = await daemon.json("/v1/scenes/dome/radiosity", { emission: { emitters: { "tile 59": 1 } } });
+    isNear(await shownNow(), alone.radiosity.flat(), 1);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
 });
 
 test("a day goes by, by keys too, and stands still for those who ask for it", async () => {

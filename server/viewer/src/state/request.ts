@@ -21,7 +21,8 @@ export interface Abilities {
 }
 
 export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting, can: Abilities): Wanted {
-    const groups = Object.entries(emissionOf(lighting, can.channels)).filter(([name]) => can.groups.includes(name));
+    // Lamps of the scene are not in the answers of a store of few emitters, nor in what these are scaled by.
+    const groups = can.emitters > 0 ? [] : Object.entries(emissionOf(lighting, can.channels)).filter(([name]) => can.groups.includes(name));
     const sky = can.sky !== null && can.sky.some((v) => [v].flat().some((x) => x > 0)) ? can.sky : null;
     const weights = Object.entries(lighting.emitters).filter(([index, weight]) => weight > 0 && Number(index) < can.emitters);
     const largest = (values: Iterable<number>): number => {
@@ -40,7 +41,7 @@ export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting,
         const all = new Array<number>(can.emitters).fill(0);
         for (const [index, weight] of weights) all[Number(index)] = (weight * lighting.dim) / most;
         emission.emitters = all;
-    } else if (can.emitters === 0 && groups.length > 0) {
+    } else if (groups.length > 0) {
         emission.groups = Object.fromEntries(groups.map(([name, value]) => [name, scaled(value)]));
     }
     if (sky !== null) emission.sky = sky.map(scaled);
