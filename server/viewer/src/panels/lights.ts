@@ -25,9 +25,12 @@ export function lightsPanel(app: App): Panel {
     };
     const dim = slider({ label: "All", unit: "×", least: 0, most: 2, step: 0.01, change: (value) => change({ dim: value }, "dim") }, 1);
     const more = make("div", {});
+    const hasEmitters = (): boolean => (app.scene?.description.emitters?.length ?? 0) > 0;
+    // Stores of few emitters answer these alone.
+    const shining = (): string[] => (hasEmitters() ? []
+        : Object.keys(app.store.now.lighting.groups).filter((name) => app.scene?.mesh.groups.some((g) => g.name === name)));
     const draw = (): void => {
-        const { lighting } = app.store.now;
-        const names = Object.keys(lighting.groups).filter((name) => app.scene?.mesh.groups.some((g) => g.name === name));
+        const { lighting } = app.store.now, names = shining();
         rows.clear();
         fill(list, ...names.map((name) => {
             const row = lightRow(app, name, lighting.groups[name], changeGroup, (solo) => change({ solo }, null));
@@ -36,19 +39,20 @@ export function lightsPanel(app: App): Panel {
         }));
         if (app.scene?.mesh.groups.every((group) => group.emission === null) && app.scene.description.sky === null && names.length > 0)
             list.append(make("p", { class: "hint" }, "No group of this scene emits light: these do it in its place."));
+        if (hasEmitters()) list.append(make("p", { class: "hint" }, "This store answers its own emitters alone: see the panel Emitters."));
         drawMore();
     };
     const drawMore = (): void => {
         const { groups } = app.store.now.lighting;
         const others = app.scene?.mesh.groups.filter((g) => !(g.name in groups)).map((g) => g.name) ?? [];
-        fill(more, others.length > 0 && choice("Let another group shine", [["", "…"], ...others.map((n) => [n, n] as const)], "", (name) => {
+        fill(more, others.length > 0 && !hasEmitters() && choice("Let another group shine", [["", "…"], ...others.map((n) => [n, n] as const)], "", (name) => {
             if (name !== "") changeGroup(name, { on: true, power: 1, colour: [1, 1, 1], kelvin: null }, null);
         }));
     };
     const update = (): void => {
         const { lighting } = app.store.now;
         dim.set(lighting.dim);
-        const known = Object.keys(lighting.groups).filter((name) => app.scene?.mesh.groups.some((g) => g.name === name));
+        const known = shining();
         if (known.length !== rows.size || known.some((name) => !rows.has(name))) draw();
         for (const [name, row] of rows) row.update(lighting.groups[name], lighting.solo);
     };
