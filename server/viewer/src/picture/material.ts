@@ -151,9 +151,12 @@ void main() {
         vec3 toned = tone == 1 ? AgXToneMapping(exposed) : tone == 2 ? ACESFilmicToneMapping(exposed) : saturate(exposed * toneMappingExposure);
         shown = to_srgb(saturate(toned));
     }
-    if (threshold >= 0.0 && is_judged(element))
-        shown = mix(shown, value >= threshold ? vec3(0.1, 0.75, 0.3) : vec3(0.9, 0.15, 0.15), 0.55);
-    else if (is_marked && is_judged(element) && mod(gl_FragCoord.x + gl_FragCoord.y, 14.0) < 2.0)
+    if (threshold >= 0.0 && is_judged(element)) {
+        // Red has stripes, for those who see red and green alike.
+        bool is_dark = value < threshold;
+        shown = mix(shown, is_dark ? vec3(0.9, 0.15, 0.15) : vec3(0.1, 0.75, 0.3), 0.55);
+        if (is_dark && mod(gl_FragCoord.x - gl_FragCoord.y, 12.0) < 3.0) shown *= 0.55;
+    } else if (is_marked && is_judged(element) && mod(gl_FragCoord.x + gl_FragCoord.y, 14.0) < 2.0)
         shown = mix(shown, vec3(1.0, 0.85, 0.2), 0.7);
     if (element == hovered || any(equal(pins, ivec4(element)))) shown = mix(shown, vec3(1.0, 0.85, 0.2), 0.5);
     if (right && gl_FragCoord.x < split + 1.5 || compare == 1 && abs(gl_FragCoord.x - split) < 1.0) shown = vec3(1.0);
