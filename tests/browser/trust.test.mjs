@@ -50,7 +50,12 @@ test("the error of a lighting and a certificate", async () => {
     // Another lighting is certified when it rests; the link has the tolerance.
     await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, lighting: { ...s.now.lighting, dim: 0.5 } }); });
     await page.waitForFunction((bound) => window.lambert.certificate !== null && window.lambert.certificate.bound < 0.9 * bound, shown.bound);
-    await page.getByRole("button", { name: "Show the answer of the store again" }).or(page.getByRole("button", { name: "As stored" })).click();
+    await page.waitForTimeout(500);
+    const other = await openPage(daemon.address, { hash: await page.evaluate(() => location.hash) });
+    await other.waitForFunction(() => window.lambert.certificate !== null);
+    assert.equal(await other.evaluate(() => window.lambert.store.now.tolerance), 1e-5);
+    await other.context().close();
+    await page.getByRole("button", { name: "As stored" }).click();
     await page.waitForFunction(() => window.lambert.certificate === null && window.lambert.isIdle);
     assert.deepEqual(page.faults, []);
     assert.deepEqual(await violations(page), []);

@@ -44,13 +44,14 @@ export function trustPanel(app: App): Panel {
         },
         (error) => fill(own, ...ownError(error)),
         (reason) => fill(own, make("p", { class: "hint" }, reason instanceof Error ? reason.message : String(reason))), 1);
-    let timer = 0, asked = "";
+    // Nobody is asked for figures that nobody sees.
+    let timer = 0, asked = "", isSeen = false;
     const rest = (): void => {
         clearTimeout(timer);
         timer = window.setTimeout(() => {
             const wanted = app.wanted();
             if (wanted === null || !app.isIdle) return;
-            if (asked !== JSON.stringify(wanted)) {
+            if (isSeen && asked !== JSON.stringify(wanted)) {
                 asked = JSON.stringify(wanted);
                 asker.want(wanted);
             }
@@ -58,6 +59,11 @@ export function trustPanel(app: App): Panel {
         }, REST_MS);
     };
     app.on("field", rest);
+    const figures = make("section", { "aria-label": "Error of this lighting" }, make("h2", {}, "Error of this lighting"), own);
+    new IntersectionObserver((entries) => {
+        isSeen = entries.some((entry) => entry.isIntersecting);
+        if (isSeen) rest();
+    }).observe(figures);
     app.on("scene", () => {
         asked = "";
         asker.forget();
@@ -66,7 +72,7 @@ export function trustPanel(app: App): Panel {
     });
     return {
         id: "trust", title: "Trust",
-        element: make("div", {}, make("h2", {}, "Error of this lighting"), own, certificate.element, store),
+        element: make("div", {}, figures, certificate.element, store),
     };
 }
 
