@@ -3,6 +3,7 @@ import { changeColour } from "./changes.ts";
 import { toHex } from "../base/colour.ts";
 import { tell } from "../base/numbers.ts";
 import { paletteBytes } from "./palettes.ts";
+import { placeOf, ticksOf, type Axis } from "./scale.ts";
 import type { Stage } from "./stage.ts";
 import type { Palette } from "../state/state.ts";
 
@@ -11,12 +12,9 @@ export const SIDE_MOST = 8192;
 /** The width and height of one part, in pixels. */
 const PART = 2048;
 
-export interface Legend {
+/** The axis of a difference has its middle at 0. */
+export interface Legend extends Axis {
     title: string;
-    /** Of the ramp's ends; a difference has its middle at 0. */
-    low: number;
-    high: number;
-    log: boolean;
     palette: Palette | "change";
 }
 
@@ -49,24 +47,6 @@ export function snapshot(stage: Stage, width: number, height: number, split: num
     return canvas;
 }
 
-/** Round numbers of the legend: 1, 2 and 5 times powers of ten. */
-export function legendTicks(low: number, high: number, log: boolean): number[] {
-    if (!(high > low)) return [];
-    const out: number[] = [];
-    if (log && low > 0 && high / low >= 10) {
-        for (let e = Math.floor(Math.log10(low)); 10 ** e <= high; e++)
-            for (const m of high / low > 1e3 ? [1] : [1, 2, 5]) {
-                const value = Number(`${m}e${e}`);
-                if (value >= low * 0.999 && value <= high * 1.001) out.push(value);
-            }
-        return out;
-    }
-    const rough = (high - low) / 5, ten = 10 ** Math.floor(Math.log10(rough));
-    const step = ([1, 2, 5, 10].find((m) => m * ten >= rough * 0.999) as number) * ten;
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= high * (1 + 1e-9); k++) out.push(Number((k * step).toPrecision(12)));
-    return out;
-}
-
 /** Draws a ramp with its ticks into the lower left corner. */
 export function drawLegend(canvas: HTMLCanvasElement, legend: Legend): void {
     const context = canvas.getContext("2d") as CanvasRenderingContext2D;
@@ -86,9 +66,8 @@ export function drawLegend(canvas: HTMLCanvasElement, legend: Legend): void {
     context.fillText(legend.title, left + unit, top + unit * 0.8, ramp);
     context.textAlign = "center";
     let free = -Infinity;
-    for (const value of legendTicks(legend.low, legend.high, legend.log)) {
-        const share = legend.log ? Math.log(value / legend.low) / Math.log(legend.high / legend.low) : (value - legend.low) / (legend.high - legend.low);
-        const x = left + unit + ramp * share, text = tell(value), half = context.measureText(text).width / 2;
+    for (const value of ticksOf(legend, 5)) {
+        const x = left + unit + ramp * placeOf(value, legend), text = tell(value), half = context.measureText(text).width / 2;
         context.fillRect(x - Math.max(1, unit / 16), top + unit * 2.4, Math.max(2, unit / 8), unit * 0.3);
         // A number that would touch the one before it is left out.
         if (x - half < free) continue;
