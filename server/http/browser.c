@@ -55,20 +55,17 @@ bool browser_check(request *r, const char *target) {
     return false;
 }
 
-static bool add(struct MHD_Response *response, const char *name, const char *value) {
-    return MHD_add_response_header(response, name, value) == MHD_YES;
-}
-
 bool browser_add_headers(const request *r, struct MHD_Response *response) {
-    bool good = add(response, "X-Content-Type-Options", "nosniff") &&
-                add(response, "Cross-Origin-Resource-Policy", "same-origin");
-    if (r->service->origins.origins->count > 0) good = good && add(response, MHD_HTTP_HEADER_VARY, "Origin");
+    bool good = http_add_header(response, "X-Content-Type-Options", "nosniff") &&
+                http_add_header(response, "Cross-Origin-Resource-Policy", "same-origin");
+    if (r->service->origins.origins->count > 0)
+        good = good && http_add_header(response, MHD_HTTP_HEADER_VARY, "Origin");
     if (r->origin == NULL) return good;
-    good = good && add(response, MHD_HTTP_HEADER_ACCESS_CONTROL_ALLOW_ORIGIN, r->origin);
+    good = good && http_add_header(response, MHD_HTTP_HEADER_ACCESS_CONTROL_ALLOW_ORIGIN, r->origin);
     if (!r->preflight)
-        return good && add(response, "Access-Control-Expose-Headers", SHOWN) &&
-               add(response, "Timing-Allow-Origin", r->origin);
-    return good && add(response, "Access-Control-Allow-Methods", r->answer.allow) &&
-           add(response, "Access-Control-Allow-Headers", ASKED) &&
-           add(response, "Access-Control-Max-Age", PREFLIGHT_AGE);
+        return good && http_add_header(response, "Access-Control-Expose-Headers", SHOWN) &&
+               http_add_header(response, "Timing-Allow-Origin", r->origin);
+    return good && http_add_header(response, "Access-Control-Allow-Methods", r->answer.allow) &&
+           http_add_header(response, "Access-Control-Allow-Headers", ASKED) &&
+           http_add_header(response, "Access-Control-Max-Age", PREFLIGHT_AGE);
 }

@@ -17,6 +17,8 @@ struct http {
     service *service;
     struct MHD_Daemon *daemon;
     uint64_t seed, next_id;
+    unsigned unread_status; /* of a head that libmicrohttpd refused, until its connection is closed; or 0 */
+    char unread_reason[64];
     int listen_fd; /* after http_quiesce; before, the daemon's */
 };
 
@@ -298,11 +300,16 @@ static uint64_t key_of(const service *s, const struct sockaddr *from) {
     return who.key;
 }
 
-static client *add_connection(const http *h, struct MHD_Connection *connection, int fd) {
-    const service *s = h->service;
+/* NULL for a Unix socket. */
+static const struct sockaddr *address_of(struct MHD_Connection *connection) {
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
-    const struct sockaddr *from = info != NULL ? info->client_addr : NULL;
+    return info != NULL ? info->client_addr : NULL;
+}
+
+static client *add_connection(const http *h, struct MHD_Connection *connection, int fd) {
+    const service *s = h->service;
+    const struct sockaddr *from = address_of(connection);
     return connections_add(s->connections, fd, key_of(s, from), !peer_is_proxy(&s->peers, from));
 }
 
@@ -310,6 +317,22 @@ static enum MHD_Result on_accept(void *context, const struct sockaddr *from, soc
     const service *s = ((http *)context)->service;
     (void)size;
     return connections_admit(s->connections, key_of(s, from)) ? MHD_YES : MHD_NO;
+}
+
+/* Writes the line of a head that libmicrohttpd refused. It names no connection to its log, but sends its
+ * answer and closes the connection before it turns to another one: the next that is closed without a request.
+ */
+static void log_unread(http *h, struct MHD_Connection *connection) {
+    if (h->unread_status == 0) return;
+    peer who = {.text = ""};
+    size_t received = 0;
+    if (connection != NULL) {
+        const peer_fields none = {.n_forwarded = 0};
+        peer_find(&h->service->peers, address_of(connection), &none, &who);
+        received = client_bytes_received(client_of(connection));
+    }
+    request_log_unread(h->service->access_log, who.text, h->unread_status, h->unread_reason, received);
+    h->unread_status = 0;
 }
 
 static void on_connection(void *context, struct MHD_Connection *connection, void **socket_context,
@@ -325,6 +348,7 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
                                       (unsigned)((http *)context)->service->config->timeout_s);
     } else {
         /* The descriptor is still open. */
+        if (!client_has_request(*socket_context)) log_unread(context, connection);
         connections_remove(all, *socket_context);
         *socket_context = NULL;
     }
@@ -335,8 +359,16 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
 static void on_library_words(void *context, const char *format, va_list arguments) {
     static const char refusal[] = "Error processing request (HTTP response code is %u";
     http *h = context;
-    if (strncmp(format, refusal, sizeof refusal - 1) == 0)
-        problem_counts_add_unread(&h->service->problems, va_arg(arguments, unsigned));
+    if (strncmp(format, refusal, sizeof refusal - 1) != 0) return;
+    const unsigned status = va_arg(arguments, unsigned);
+    problem_counts_add_unread(&h->service->problems, status);
+    /* One whose connection was not closed since is told without a client. */
+    log_unread(h, NULL);
+    h->unread_status = status;
+    const char *page = va_arg(arguments, const char *),
+               *title = page != NULL ? strstr(page, "<title>") : NULL;
+    const char *reason = title != NULL ? title + 7 : MHD_get_reason_phrase_for(status);
+    snprintf(h->unread_reason, sizeof h->unread_reason, "%.*s", (int)strcspn(reason, "<"), reason);
 }
 
 /* Escapes stay in the path, so that %2F does not become a slash; route_find resolves them. */

@@ -76,17 +76,13 @@ static bool is_known(const request *r) {
            etag_is_listed(http_header(r, MHD_HTTP_HEADER_IF_NONE_MATCH), r->etag);
 }
 
-static bool add(struct MHD_Response *response, const char *name, const char *value) {
-    return MHD_add_response_header(response, name, value) == MHD_YES;
-}
-
 /* Headers of a refined answer: NPY has no place for these figures. */
 static bool add_refined(struct MHD_Response *response, const answer *a) {
     char certificate[32], iterations[24];
     snprintf(certificate, sizeof certificate, "%.17g", a->certificate);
     snprintf(iterations, sizeof iterations, "%zu", a->iterations);
-    return add(response, "Lambert-Certificate", certificate) &&
-           add(response, "Lambert-Iterations", iterations);
+    return http_add_header(response, "Lambert-Certificate", certificate) &&
+           http_add_header(response, "Lambert-Iterations", iterations);
 }
 
 /* The times of parsing, solving and encoding, which pages read as performance entries. */
@@ -94,34 +90,35 @@ static bool add_times(struct MHD_Response *response, const answer *a) {
     char times[120];
     snprintf(times, sizeof times, "parse;dur=%.3f, solve;dur=%.3f, encode;dur=%.3f", a->parse_ms, a->solve_ms,
              a->encode_ms);
-    return add(response, "Server-Timing", times);
+    return http_add_header(response, "Server-Timing", times);
 }
 
 static bool add_headers(const request *r, size_t length, struct MHD_Response *response) {
     const answer *a = &r->answer;
-    bool good = add(response, "X-Request-Id", r->id) && browser_add_headers(r, response);
-    if (a->type != NULL) good = good && add(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
-    if (a->allow[0] != '\0') good = good && add(response, MHD_HTTP_HEADER_ALLOW, a->allow);
-    if (a->location != NULL) good = good && add(response, MHD_HTTP_HEADER_LOCATION, a->location);
-    if (a->policy != NULL) good = good && add(response, "Content-Security-Policy", a->policy);
+    bool good = http_add_header(response, "X-Request-Id", r->id) && browser_add_headers(r, response);
+    if (a->type != NULL) good = good && http_add_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
+    if (a->allow[0] != '\0') good = good && http_add_header(response, MHD_HTTP_HEADER_ALLOW, a->allow);
+    if (a->location != NULL) good = good && http_add_header(response, MHD_HTTP_HEADER_LOCATION, a->location);
+    if (a->policy != NULL) good = good && http_add_header(response, "Content-Security-Policy", a->policy);
     if (a->timed) good = good && add_times(response, a);
     if (a->refined) good = good && add_refined(response, a);
     if (a->retry_after > 0) {
         char seconds[16];
         snprintf(seconds, sizeof seconds, "%u", a->retry_after);
-        good = good && add(response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
+        good = good && http_add_header(response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
     }
-    if (a->status == 401) good = good && add(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer");
+    if (a->status == 401)
+        good = good && http_add_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer");
     if (r->etag[0] != '\0')
-        good = good && add(response, MHD_HTTP_HEADER_ETAG, r->etag) &&
-               add(response, MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache");
+        good = good && http_add_header(response, MHD_HTTP_HEADER_ETAG, r->etag) &&
+               http_add_header(response, MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache");
     /* Also for a body that was not compressed, as another client may get it compressed. */
     if (r->coding != CODING_IDENTITY || r->etag[0] != '\0' || length >= COMPRESS_LEAST)
-        good = good && add(response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT_ENCODING);
+        good = good && http_add_header(response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT_ENCODING);
     if (r->coding != CODING_IDENTITY && a->status != MHD_HTTP_NOT_MODIFIED)
-        good = good && add(response, MHD_HTTP_HEADER_CONTENT_ENCODING, coding_name(r->coding));
+        good = good && http_add_header(response, MHD_HTTP_HEADER_CONTENT_ENCODING, coding_name(r->coding));
     if (r->last || atomic_load(&r->service->state) >= SERVICE_DRAINING)
-        good = good && add(response, MHD_HTTP_HEADER_CONNECTION, "close");
+        good = good && http_add_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
     return good;
 }
 

@@ -49,6 +49,11 @@ typedef struct request {
 /* A header of the request, or NULL. */
 const char *http_header(const request *r, const char *name);
 
+/* False when memory is short. */
+static inline bool http_add_header(struct MHD_Response *response, const char *name, const char *value) {
+    return MHD_add_response_header(response, name, value) == MHD_YES;
+}
+
 /* Lowers the deadline to what the header Lambert-Timeout asks for; false, with 400, if that is no time. */
 bool http_read_timeout(request *r);
 

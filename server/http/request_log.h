@@ -8,4 +8,9 @@
  * audit log, where there is one. status 0: the client left before it was answered. Never blocks. */
 void request_log(const request *r, unsigned status, double ms);
 
+/* Adds the line of a head that the HTTP library refused, which never became a request. received: bytes of its
+ * connection, 0 if unknown; who: an address, "" if unknown. log may be NULL. */
+void request_log_unread(access_log *log, const char *who, unsigned status, const char *reason,
+                        size_t received);
+
 #endif

@@ -423,6 +423,19 @@ void client_end_by(connections *all, client *c, double end) {
     pthread_mutex_unlock(&all->lock);
 }
 
+bool client_has_request(const client *c) {
+    return c != NULL && c->stage != STAGE_IDLE && c->stage != STAGE_HEAD;
+}
+
+size_t client_bytes_received(const client *c) {
+    struct tcp_info info;
+    socklen_t size = sizeof info;
+    if (c == NULL || getsockopt(c->fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 ||
+        size < offsetof(struct tcp_info, tcpi_bytes_received) + sizeof info.tcpi_bytes_received)
+        return 0;
+    return info.tcpi_bytes_received;
+}
+
 bool client_is_lost(const client *c) {
     if (c == NULL) return false;
     struct pollfd one = {.fd = c->fd, .events = POLLRDHUP};

@@ -73,6 +73,13 @@ void client_received(connections *all, client *c, size_t bytes);
  * c may be NULL. */
 void client_end_by(connections *all, client *c, double end);
 
+/* True from the head of a request to the last byte of its answer. c may be NULL. */
+bool client_has_request(const client *c);
+
+/* Bytes that came over the connection, as TCP counts them (its end is one); 0 where the socket does not. c is
+ * open, or NULL. */
+size_t client_bytes_received(const client *c);
+
 /* True if the connection is lost, or the client has ended its sending, as one does that closes. c is open, or
  * NULL.
  */

@@ -2,6 +2,7 @@
 
 import json
 import re
+import socket
 import unittest
 
 from daemon import Daemon
@@ -117,7 +118,11 @@ class Seen(Case):
     def test_requests_that_are_none(self):
         """The bytes that libmicrohttpd refuses by itself leave a trace."""
         path, _ = self.store()
-        with Daemon(path) as daemon:
+        log = self.folder / "access.log"
+        with Daemon(path, "--access-log", log) as daemon:
+            def lines():
+                return [line for line in map(json.loads, log.read_text().splitlines()) if "reason" in line]
+
             def total():
                 return sum(v for k, v in metrics(daemon).items() if k[0] == "lambertd_malformed_requests_total")
 
@@ -130,12 +135,19 @@ class Seen(Case):
                    b"GET /" + b"y" * 70000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n")
             seen = 0
             for sent in bad:
-                with daemon.raw() as s:
+                source = f"127.0.0.{seen + 2}"
+                with socket.create_connection(("127.0.0.1", daemon.port), source_address=(source, 0)) as s:
                     s.sendall(sent)
                     answer = self.read_all(s)
                 if answer.startswith(b"HTTP/1."):
                     seen += 1
-                    until(lambda: total() >= seen)
+                    until(lambda: total() >= seen and len(lines()) >= seen)
+                    self.assertEqual(len(lines()), seen)
+                    line = lines()[-1]
+                    self.assertEqual((line["client"], line["status"]), (source, int(answer[9:12])), line)
+                    self.assertGreater(len(line["reason"]), 3)
+                    self.assertGreater(line["received"], 0)
+                    self.assertLessEqual(line["received"], len(sent) + 1)  # TCP counts the end of the stream as one
                 self.assertEqual(total(), seen, (sent[:60], answer[:100]))
             self.assertGreaterEqual(seen, 4)
             self.assertEqual(metrics(daemon)[("lambertd_malformed_requests_total", ("status", "other"))], 0)
