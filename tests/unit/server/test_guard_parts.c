@@ -210,7 +210,7 @@ END_TEST
  * of a body; one that has as many as others waits beyond the limit, if few do. */
 START_TEST(connections_are_shared) {
     connections *all = start_with(4, 1000, 1000, 1);
-    pair theirs[4], mine[6];
+    pair theirs[4], mine[6], beside[8];
     for (size_t k = 0; k < 4; k++) theirs[k] = open_pair(all, 0);
     client_enter(all, theirs[0].c, STAGE_SOLVE, 0);
     client_enter(all, theirs[1].c, STAGE_BODY, 0);
@@ -241,6 +241,31 @@ START_TEST(connections_are_shared) {
     close_pair(all, &last);
     for (size_t k = 0; k < 4; k++) close_pair(all, &theirs[k]);
     for (size_t k = 0; k < 6; k++) close_pair(all, &mine[k]);
+    /* Connections that were closed for others count no more, and only once. */
+    for (size_t k = 0; k < 8; k++) {
+        ck_assert(connections_admit(all, 3));
+        beside[k] = open_pair(all, 3);
+        client_enter(all, beside[k].c, STAGE_BODY, 0);
+    }
+    ck_assert(!connections_admit(all, 3));
+    for (size_t k = 0; k < 8; k++) close_pair(all, &beside[k]);
+    connections_stop(all);
+}
+END_TEST
+
+/* One more than another has is no reason to close one. */
+START_TEST(nobody_gives_way_to_an_equal) {
+    connections *all = start_with(3, 1000, 1000, 1);
+    pair theirs[3], mine;
+    for (size_t k = 0; k < 3; k++) theirs[k] = open_pair(all, 0);
+    ck_assert(connections_admit(all, 1));
+    mine = open_pair(all, 1);
+    ck_assert(is_cut(&theirs[0]));
+    ck_assert(connections_admit(all, 1));
+    ck_assert(!is_cut(&theirs[1]));
+    ck_assert(!is_cut(&theirs[2]));
+    for (size_t k = 0; k < 3; k++) close_pair(all, &theirs[k]);
+    close_pair(all, &mine);
     connections_stop(all);
 }
 END_TEST
@@ -331,6 +356,7 @@ int main(void) {
     tcase_add_test(all, ids);
     /* Last: in a process that is not forked the limit stays. */
     tcase_add_test(all, connections_are_shared);
+    tcase_add_test(all, nobody_gives_way_to_an_equal);
     tcase_add_test(all, as_many_as_files_may_be_open);
     suite_add_tcase(suite, all);
     return suite_run(suite);

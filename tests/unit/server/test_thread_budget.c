@@ -3,6 +3,7 @@
 #include "solver/base/parallel.h"
 #include "support/suite.h"
 
+#include <pthread.h>
 #include <sched.h>
 #include <semaphore.h>
 #include <stdatomic.h>
@@ -228,6 +229,62 @@ START_TEST(jobs_go_before_help) {
 }
 END_TEST
 
+/* Two pieces of a loop, in two threads at once, of which the helper's ends last. */
+typedef struct slow_help {
+    batch_job job;
+    sem_t came[2];
+    pthread_t caller;
+    atomic_bool done[2];
+    bool is_whole; /* both pieces were done when the loop returned */
+    sem_t *finished;
+} slow_help;
+
+static void help_slowly(const void *context, size_t thread, size_t first, size_t last) {
+    slow_help *s = *(slow_help *const *)context;
+    (void)thread;
+    for (size_t k = first; k < last; k++) {
+        sem_post(&s->came[k]);
+        sem_wait(&s->came[1 - k]);
+        if (!pthread_equal(pthread_self(), s->caller))
+            nanosleep(&(struct timespec){.tv_nsec = 50000000}, NULL);
+        atomic_store(&s->done[k], true);
+    }
+}
+
+static void wait_in_pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    slow_help *s = (slow_help *)(void *)parts[0].job;
+    (void)n_parts;
+    (void)workspace;
+    s->caller = pthread_self();
+    parallel_share(2, 2, 1, help_slowly, &s);
+    s->is_whole = atomic_load(&s->done[0]) && atomic_load(&s->done[1]);
+}
+
+static void finish_slowly(batch_job *job) {
+    sem_post(((slow_help *)(void *)job)->finished);
+}
+
+/* The loop, and all that it uses, lies on the stack of its thread. */
+START_TEST(helpers_are_waited_for) {
+    lam_error error = {.message = ""};
+    batch_queue *queue;
+    sem_t finished;
+    static slow_help s;
+    s.job = (batch_job){.begin = begin, .pass = wait_in_pass, .end = end, .finish = finish_slowly, .cost = 1};
+    s.finished = &finished;
+    sem_init(&finished, 0, 0);
+    for (size_t k = 0; k < 2; k++) sem_init(&s.came[k], 0, 0);
+    ck_ok(batch_start(2, JOBS, &queue, &error));
+    ck_assert(batch_submit(queue, &s.job));
+    sem_wait(&finished);
+    ck_assert(s.is_whole);
+    batch_close(queue);
+    batch_destroy(queue);
+    for (size_t k = 0; k < 2; k++) sem_destroy(&s.came[k]);
+    sem_destroy(&finished);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("thread budget");
     TCase *tests = tcase_create("thread budget");
@@ -235,6 +292,7 @@ int main(void) {
     tcase_add_loop_test(tests, each_piece_once_and_no_thread_more, 1, 6);
     tcase_add_test(tests, idle_threads_help);
     tcase_add_test(tests, jobs_go_before_help);
+    tcase_add_test(tests, helpers_are_waited_for);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
