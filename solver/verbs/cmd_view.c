@@ -2,8 +2,10 @@
  * daemon its name, its options and the line that says where it listens. */
 #include "solver/base/options.h"
 #include "solver/base/terminal.h"
+#include "solver/light/emission.h"
 #include "solver/verbs/sibling.h"
 #include "solver/verbs/verbs.h"
+#include "solver/verbs/view_link.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -30,9 +32,18 @@ static const char announced[] = "listening on ";
 
 typedef struct view_options {
     bool no_browser;
+    option_list emit;
 } view_options;
 
 static const option_row rows[] = {
+    {.name = "emit",
+     .kind = OPTION_LIST,
+     .offset = offsetof(view_options, emit),
+     .argument = "GROUP=V[,V,V]",
+     .otherwise = "the emission in the scene",
+     .unit = "W/m2",
+     .help = "The page begins with the first store lit by these groups alone, as the address says; may be "
+             "repeated"},
     {.name = "no-browser",
      .kind = OPTION_FLAG,
      .offset = offsetof(view_options, no_browser),
@@ -63,6 +74,7 @@ typedef struct viewing {
     size_t length;
     bool told; /* the daemon was asked to end */
     const view_options *options;
+    const char *fragment; /* of the address: the lights of --emit, or "" */
 } viewing;
 
 /* Becomes the daemon, in a process group of its own: Ctrl-C on a terminal comes to `lambert view` alone,
@@ -139,13 +151,13 @@ static void take_line(viewing *v, terminal *t) {
         terminal_log(t, "%s", v->line);
         return;
     }
-    char *address = v->line + sizeof announced - 1;
-    printf("%s/\n", address);
+    const char *address = v->line + sizeof announced - 1;
+    char *whole = NULL;
+    if (asprintf(&whole, "%s/%s", address, v->fragment) < 0) return;
+    puts(whole);
     fflush(stdout);
-    if (!v->options->no_browser) {
-        strcat(address, "/");
-        open_browser(v, address, t);
-    }
+    if (!v->options->no_browser) open_browser(v, whole, t);
+    free(whole);
 }
 
 /* Takes what the daemon has written; closes its output at the end of it. */
@@ -195,11 +207,21 @@ int cmd_view(int argc, char **argv) {
     lam_error error = {0};
     terminal t;
     viewing v = {.output = -1, .options = &options};
+    char *fragment = NULL;
+    int code;
     const option_table tables[] = {{NULL, rows, &options}, {0}};
     const int go = options_parse(&verb, tables, argc, argv, &result);
     if (go != OPTIONS_GO) return go;
+    if (emission_check_items(&options.emit, &error) != LAM_OK)
+        return options_usage(verb.name, "%s", error.message);
     terminal_open(&t, verb.name, false, false);
-    if (start_daemon(&v, result.arguments, result.n_arguments, &error) != LAM_OK)
-        return terminal_fail(&t, &error);
-    return stay(&v, &t);
+    if (view_link(result.arguments[0], &options.emit, &fragment, &error) == LAM_OK &&
+        start_daemon(&v, result.arguments, result.n_arguments, &error) == LAM_OK) {
+        v.fragment = fragment;
+        code = stay(&v, &t);
+    } else {
+        code = terminal_fail(&t, &error);
+    }
+    free(fragment);
+    return code;
 }

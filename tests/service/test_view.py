@@ -1,6 +1,8 @@
 """Black box: `lambert view` starts a daemon, opens a browser and leaves nothing running."""
 
+import base64
 import http.client
+import json
 import os
 import pathlib
 import shutil
@@ -73,7 +75,7 @@ class View(unittest.TestCase):
             process.communicate()
         self.addCleanup(stop)
         address = process.stdout.readline().strip()
-        self.assertRegex(address, r"^http://127\.0\.0\.1:\d+/$")
+        self.assertRegex(address, r"^http://127\.0\.0\.1:\d+/(#1\.[-_A-Za-z0-9]+)?$")
         children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text(encoding="utf-8").split()
         daemons = [int(pid) for pid in children
                    if pathlib.Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip() == "lambertd"]
@@ -107,6 +109,29 @@ class View(unittest.TestCase):
         process.wait()
         wait_until(lambda: is_gone(daemon))
         self.assertFalse(os.path.exists(opened))
+
+    def test_lights(self):
+        for argument, scene in (":room", "room"), ("", "box"):
+            process, address, _ = self.start(self.path("box.h5") + argument, self.path("box.h5") + ":other", "--no-browser",
+                                             "--emit", "lamp=10,20,30", "--emit", "floor=.5")
+            code = address.split("#1.")[1]
+            state = json.loads(base64.urlsafe_b64decode(code + "=" * (-len(code) % 4)))
+            self.assertEqual((sorted(state), state["scene"]), (["lighting", "scene"], scene))
+            groups = state["lighting"]["groups"]
+            self.assertEqual(sorted(groups), ["floor", "lamp"])
+            lamp = groups["lamp"]
+            luminance = .2126 * 10 + .7152 * 20 + .0722 * 30
+            self.assertAlmostEqual(lamp["power"], luminance, 9)
+            for part, value in zip(lamp["colour"], (10, 20, 30)):
+                self.assertAlmostEqual(part * luminance, value, 9)
+            self.assertEqual(groups["floor"], {"on": True, "power": .5, "colour": [1, 1, 1], "kelvin": None})
+            process.terminate()
+            process.communicate(timeout=PATIENCE)
+        for status, words, item in ((1, "no group 'sun'", "sun=1"), (2, "--emit", "lamp"), (2, "--emit", "lamp=bright"),
+                                    (2, "--emit", "lamp=-1"), (1, "2 values", "lamp=1,2")):
+            done = lambert("view", self.path("box.h5"), "--no-browser", "--emit", item)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (status, "", 1), done.stderr)
+            self.assertIn(words, done.stderr)
 
     def test_terminated(self):
         process, _, daemon = self.start(self.path("box.h5"), "--no-browser")
