@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 
 from command import ENVIRONMENT, LAMBERT, lambert, must
+from exr_file import decode_exr
 from png_file import decode_png
 from yard import MATERIALS, YARD
 
@@ -184,6 +185,19 @@ class Animate(unittest.TestCase):
         self.assertIn("2 frames from", said)
         self.assertEqual(sorted(os.listdir(self.at)), [f"a.b-000{k}.png" for k in (1, 2, 3)] + ["frames.npy"])
         self.assertEqual((self.at / "a.b-0003.png").read_text(), "older")
+
+    def test_values_of_frames(self):
+        # Light is linear, and values know no exposure: the frame of a lamp twice as bright has twice the values.
+        lamp = self.emission("lamp", 1)
+        frames = self.save(np.array([lamp, 2 * lamp, 0 * lamp]))
+        must("render", self.box, "--animate", frames, "--smooth", "--float", "--size", "50x40", "-o", self.at / "f.exr")
+        self.assertEqual(sorted(path.name for path in self.at.iterdir()),
+                         ["f-0001.exr", "f-0002.exr", "f-0003.exr", "frames.npy"])
+        one, two, dark = (decode_exr(self.at / f"f-000{k}.exr")[0] for k in (1, 2, 3))
+        for name in "RGB":
+            self.assertGreater(one[name].max(), 0)
+            self.assertTrue(np.allclose(two[name], 2 * one[name], rtol=1e-5, atol=1e-6 * one[name].max()))
+            self.assertEqual(np.abs(dark[name]).max(), 0)
 
     def test_wrong_usage_is_one_line(self):
         E = self.emission("lamp", 1)
