@@ -4,6 +4,7 @@
 #include "solver/operator/refine/form_factor_rows.h"
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/import/import.h"
+#include "solver/scene/texture.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -453,6 +454,7 @@ lam_status state_refine_mesh(precompute_state *state, lam_error *error) {
         TRY(mesh_refine(&state->m, &refinement, error));
     if (o->mesh_error > 0) TRY(state_refine_by_error(state, error));
     if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
+    mesh_textures_release(&state->m); /* every element has its means */
 done:
     return status;
 }

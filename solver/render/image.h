@@ -1,4 +1,4 @@
-/* An 8-bit picture in memory, and its PNG file: the only file that knows libpng. */
+/* An 8-bit picture in memory, and its PNG file: the only file that writes with libpng. */
 #ifndef LAMBERT_RENDER_IMAGE_H
 #define LAMBERT_RENDER_IMAGE_H
 

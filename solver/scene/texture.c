@@ -13,23 +13,26 @@ struct texture_table {
     uint32_t (*sums)[3]; /* [height][width + 1]: sums over the pixels of a row that come before */
 };
 
-/* IEC 61966-2-1. */
-static double linear_of(unsigned level) {
-    const double x = level / 255.;
-    return x <= .04045 ? x / 12.92 : pow((x + .055) / 1.055, 2.4);
+void texture_linear_levels(double linear[256]) {
+    for (int k = 0; k < 256; k++) {
+        const double x = k / 255.;
+        linear[k] = x <= .04045 ? x / 12.92 : pow((x + .055) / 1.055, 2.4);
+    }
 }
 
 lam_status texture_table_create(const texture_image *image, texture_table **out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t width = image->width, height = image->height;
     const double scale = floor(UINT32_MAX / (double)width); /* a whole white row fits in 32 bits */
+    double linear[256];
     uint32_t level[256];
     texture_table *t = memory_allocate(1, sizeof *t, "texture", error);
     if (t == NULL) return LAM_ERR_MEMORY;
     *t = (texture_table){.width = width, .height = height, .unit = 1 / scale};
     t->sums = memory_allocate(height, (width + 1) * sizeof *t->sums, "texture", error);
     if (t->sums == NULL) TRY(LAM_ERR_MEMORY);
-    for (unsigned k = 0; k < 256; k++) level[k] = (uint32_t)(scale * linear_of(k));
+    texture_linear_levels(linear);
+    for (int k = 0; k < 256; k++) level[k] = (uint32_t)(scale * linear[k]);
     for (size_t y = 0; y < height; y++) {
         uint32_t(*sum)[3] = t->sums + y * (width + 1);
         const uint8_t(*pixel)[3] = (const uint8_t(*)[3])image->pixels + y * width;
@@ -196,26 +199,30 @@ static void gradient(const double e1[3], const double e2[3], double d1, double d
     for (int k = 0; k < 3; k++) out[k] = s * e1[k] + r * e2[k];
 }
 
-void texture_affine(size_t corners, const double (*p)[3], const double *value, size_t stride, double out[4]) {
-    double e[3][3];
+void texture_affine(size_t corners, const double (*p)[3], const double *value, size_t stride, float out[4]) {
+    double e[3][3], slope[3];
     for (int k = 0; k < 3; k++)
         for (size_t i = 1; i < corners; i++) e[i - 1][k] = p[i][k] - p[0][k];
     /* Of a quad, the triangle of the first, second and last corner. */
-    gradient(e[0], e[corners - 2], value[stride] - value[0], value[(corners - 1) * stride] - value[0], out);
-    out[3] = value[0];
+    gradient(e[0], e[corners - 2], value[stride] - value[0], value[(corners - 1) * stride] - value[0], slope);
+    for (int k = 0; k < 4; k++) {
+        out[k] = (float)(k < 3 ? slope[k] : value[0]);
+        if (!isfinite(out[k])) out[k] = 0; /* the file's own, or of a sliver */
+    }
+}
+
+static double value_at(const float f[4], const double origin[3], const double p[3]) {
+    double value = (double)f[3];
+    for (int k = 0; k < 3; k++) value += (double)f[k] * (p[k] - origin[k]);
+    return value;
 }
 
 bool texture_is_affine(const double (*p)[3], const double *value, size_t stride) {
-    double f[4], predicted, low = value[0], high = value[0];
+    float f[4];
+    double low = value[0], high = value[0];
     texture_affine(4, p, value, stride, f);
-    predicted = f[3];
-    for (int k = 0; k < 3; k++) predicted += f[k] * (p[2][k] - p[0][k]);
     for (size_t i = 1; i < 4; i++) low = fmin(low, value[i * stride]), high = fmax(high, value[i * stride]);
-    return fabs(predicted - value[2 * stride]) <= 1e-3 * (high - low);
-}
-
-static double value_at(const double f[4], const double origin[3], const double p[3]) {
-    return f[3] + f[0] * (p[0] - origin[0]) + f[1] * (p[1] - origin[1]) + f[2] * (p[2] - origin[2]);
+    return fabs(value_at(f, p[0], p[2]) - value[2 * stride]) <= 1e-3 * (high - low);
 }
 
 static float *quantity_of(mesh *m, int quantity) {
@@ -258,7 +265,7 @@ lam_status mesh_textures_apply(mesh *m, lam_error *error) {
         double centre[3];
         mesh_centroid(m, i, centre); /* where an affine value is its mean */
         for (size_t c = 0; c < m->n_channels; c++) {
-            const double colour = fmax(value_at(face->colour[c], face->origin, centre), 0);
+            const double colour = fmin(fmax(value_at(face->colour[c], face->origin, centre), 0), 1);
             m->reflectance[c * m->n + i] = (float)(surface->factor[TEXTURE_REFLECTANCE][c] * colour);
             m->emission[c * m->n + i] = (float)surface->factor[TEXTURE_EMISSION][c];
         }
@@ -285,7 +292,7 @@ void mesh_textures_release(mesh *m) {
     m->textured_face = NULL;
     m->textures = NULL;
     if (t == NULL || --t->holders > 0) return;
-    for (size_t k = 0; k < t->n_images && t->images != NULL; k++) free(t->images[k].pixels);
+    for (size_t k = 0; t->images != NULL && k < t->n_images; k++) free(t->images[k].pixels);
     free(t->images);
     free(t->surfaces);
     free(t->faces);

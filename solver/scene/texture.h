@@ -31,11 +31,14 @@ typedef struct texture_surface {
 /* A face as it was imported. Each value is affine in the place p: [3] + sum over d of [d] (p[d] - origin[d]).
  */
 typedef struct texture_face {
-    double origin[3];                    /* m */
-    double uv[TEXTURE_QUANTITIES][2][4]; /* v runs downwards from the first row */
-    double colour[3][4];                 /* linear, multiplies the reflectance */
+    double origin[3];                   /* m */
+    float uv[TEXTURE_QUANTITIES][2][4]; /* v runs downwards from the first row */
+    float colour[3][4];                 /* linear, kept in [0, 1]; multiplies the reflectance */
     uint32_t surface;
 } texture_face;
+
+/* The linear light of each level of sRGB, white is 1 (IEC 61966-2-1). */
+void texture_linear_levels(double linear[256]);
 
 /* Shared by a mesh and those that are refined from it; each holds it once. Immutable but for clamped. */
 typedef struct mesh_textures {
@@ -47,8 +50,8 @@ typedef struct mesh_textures {
 } mesh_textures;
 
 /* Fills the affine values of a face from those at its corners, 3 or 4; with 4 they must be affine already.
- * value [corners] are numbers, stride apart; out is [4]. */
-void texture_affine(size_t corners, const double (*p)[3], const double *value, size_t stride, double out[4]);
+ * value [corners] are numbers, stride apart; out is [4], 0 where a value would not be finite. */
+void texture_affine(size_t corners, const double (*p)[3], const double *value, size_t stride, float out[4]);
 
 /* True where the value at the 4th corner of a planar quad is that of the affine map through the others,
  * within a thousandth of their range. */

@@ -35,6 +35,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         FUZZ_CHECK(s.n_elements > 0);
         for (size_t i = 0; i < s.n_elements; i++)
             for (int k = 0; k < 3; k++) FUZZ_CHECK(s.elements[i].corners[k] < s.points.n);
+        for (size_t f = 0; f < s.n_faces; f++) {
+            FUZZ_CHECK(s.face_elements[f] < s.n_elements && s.faces[f].surface < s.materials.n);
+            for (int q = 0; q < TEXTURE_QUANTITIES; q++)
+                FUZZ_CHECK(s.values[s.faces[f].surface].textures[q].image <= s.n_images);
+        }
     } else {
         FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);
     }

@@ -58,11 +58,21 @@ with tempfile.TemporaryDirectory() as scratch:
     run("precompute", "box.obj", "--probes", 0, "--quiet", "-o", folder / "store" / "blocks.h5", "--form-factors", "blocks",
         "--epsilon", .99, "--keep-form-factors")
 
-# The reply of the importing process: a header, then points, elements, names, materials.
-header = struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0)
+# The reply of the importing process: a header, then points, elements, names, materials, textured faces, images.
+def import_header(status, message, warnings, omitted, *counts):
+    return struct.pack("<8sQ480s2048sQ11Q", b"lamsoup", status, message, warnings, omitted, *counts)
+
+
 body = struct.pack("<9d", 0, 0, 0, 1, 0, 0, 0, 1, 0) + struct.pack("<6I", 0, 1, 2, 0xFFFFFFFF, 0, 0) + b"a\0" + b"m\0"
-(folder / "import" / "one").write_bytes(header + body + struct.pack("<6d2Q", .5, .5, .5, 0, 0, 0, 1, 1))
-(folder / "import" / "refused").write_bytes(struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 4, b"no", b"w\nv", 3, *[0] * 7))
+colours = struct.pack("<6d2Q", .5, .5, .5, 0, 0, 0, 1, 1)
+plain = struct.pack("<6I6d", *[0] * 6, *[0] * 6)
+tiled = struct.pack("<6I6d", 1, 1, 1, 2, 0, 0, 1, 0, 0, 0, 1, 0)
+face = struct.pack("<3d16f12f2I", 0, 0, 0, *[1] * 28, 0, 0) + struct.pack("<I", 0)
+image = struct.pack("<2Q", 2, 1) + bytes(range(6))
+(folder / "import" / "one").write_bytes(import_header(0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0, 0, 0, 0, 0) + body + colours + plain * 2)
+(folder / "import" / "textured").write_bytes(import_header(0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0, 0, 0, 1, 1)
+                                             + body + colours + tiled + plain + face + image)
+(folder / "import" / "refused").write_bytes(import_header(4, b"no", b"w\nv", 3, *[0] * 11))
 
 
 # The reply of the process that reads headers: a head, then objects with their attributes.

@@ -20,9 +20,13 @@ typedef struct assimp_state {
     imported_faces *s;
     const char *path;
     bool gltf;
-    uint32_t *materials; /* library's index -> ours, or TABLE_NONE */
+    uint32_t *materials;           /* library's index -> ours, or TABLE_NONE */
+    gltf_material *gltf_materials; /* of a glTF, in the library's order */
+    size_t n_gltf_materials;
     uint32_t *corners;
-    size_t corner_capacity;
+    imported_corner *skin;
+    size_t corner_capacity, skin_capacity;
+    size_t colourless; /* faces without a material, whose corners have colours */
 } assimp_state;
 
 typedef struct affine {
@@ -68,6 +72,22 @@ static bool is_made_up(const assimp_state *a, unsigned index, const char *name) 
     return name[0] == '\0' && (!a->gltf || index + 1 == a->scene->mNumMaterials);
 }
 
+/* Images are read of glTF and OBJ alone. */
+static void tell_images(assimp_state *a, const struct aiMaterial *m, const char *name,
+                        imported_material *fresh) {
+    static const enum aiTextureType types[] = {aiTextureType_DIFFUSE, aiTextureType_BASE_COLOR,
+                                               aiTextureType_EMISSIVE};
+    unsigned found = 0;
+    for (size_t k = 0; k < sizeof types / sizeof *types; k++)
+        found += aiGetMaterialTextureCount(m, types[k]) > 0;
+    if (found == 0) return;
+    fresh->textures[TEXTURE_REFLECTANCE].named = 1;
+    import_warn(&a->s->warnings,
+                "%s: the images of material '%s' are not read in this format; plain colours take "
+                "their place",
+                a->path, name);
+}
+
 static lam_status read_material(assimp_state *a, unsigned index, lam_error *error) {
     lam_status status = LAM_OK;
     const struct aiMaterial *m = a->scene->mMaterials[index];
@@ -84,11 +104,14 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     imported_material fresh = {.defined = 1};
     fresh.has_diffuse =
         colour_of(m, colour_base, fresh.diffuse) || colour_of(m, colour_diffuse, fresh.diffuse);
-    fresh.textured = aiGetMaterialTextureCount(m, aiTextureType_DIFFUSE) > 0 ||
-                     aiGetMaterialTextureCount(m, aiTextureType_BASE_COLOR) > 0;
     colour_of(m, colour_emissive, fresh.emission);
-    if (aiGetMaterialFloatArray(m, emissive_intensity, 0, 0, &strength, NULL) == aiReturn_SUCCESS)
-        for (int c = 0; c < 3; c++) fresh.emission[c] *= strength;
+    if (index < a->n_gltf_materials) {
+        strength = (ai_real)a->gltf_materials[index].strength;
+        memcpy(fresh.textures, a->gltf_materials[index].textures, sizeof fresh.textures);
+    } else if (aiGetMaterialFloatArray(m, emissive_intensity, 0, 0, &strength, NULL) != aiReturn_SUCCESS)
+        strength = 1;
+    for (int c = 0; c < 3; c++) fresh.emission[c] *= strength;
+    if (!a->gltf) tell_images(a, m, name, &fresh);
     if (v->defined && memcmp(v, &fresh, sizeof fresh) != 0) { /* two materials of one name */
         const size_t length = strlen(name);
         snprintf(name + length, sizeof name - length, "-%u", index);
@@ -96,10 +119,6 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
         v = &a->s->values[a->materials[index]];
     }
     *v = fresh;
-    if (aiGetMaterialTextureCount(m, aiTextureType_EMISSIVE) > 0)
-        import_warn(&a->s->warnings,
-                    "%s: the texture of material '%s' is ignored; its emission is the plain factor", a->path,
-                    name);
 done:
     return status;
 }
@@ -117,6 +136,51 @@ static lam_status name_of_node(assimp_state *a, const struct aiNode *node, uint3
     return imported_faces_add_object(a->s, name, strlen(name), object, error);
 }
 
+/* True where a mesh has colours that are not all white. */
+static bool has_colours(const struct aiMesh *m) {
+    const struct aiColor4D *c = m->mColors[0];
+    for (unsigned v = 0; c != NULL && v < m->mNumVertices; v++)
+        if (c[v].r != 1 || c[v].g != 1 || c[v].b != 1) return true;
+    return false;
+}
+
+/* True where the faces of a glTF's mesh get a skin: for images with coordinates, and for colours. */
+static bool has_skin(assimp_state *a, const struct aiMesh *m, uint32_t material, bool colours) {
+    if (!a->gltf) return false;
+    if (material == TABLE_NONE) {
+        if (colours) a->colourless += m->mNumFaces;
+        return false;
+    }
+    bool wanted = colours;
+    for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
+        const imported_texture *t = &a->s->values[material].textures[q];
+        if (t->image == 0) continue;
+        if (t->coordinates[0] >= AI_MAX_NUMBER_OF_TEXTURECOORDS ||
+            m->mTextureCoords[t->coordinates[0]] == NULL)
+            return false;
+        wanted = true;
+    }
+    return wanted;
+}
+
+/* The corner of a skin at a vertex; the library counts v from below. */
+static imported_corner skin_corner(const assimp_state *a, const struct aiMesh *m, uint32_t material,
+                                   bool colours, unsigned vertex) {
+    imported_corner out = {.colour = {1, 1, 1}};
+    for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
+        const imported_texture *t = &a->s->values[material].textures[q];
+        if (t->image == 0) continue;
+        const struct aiVector3D *uv = &m->mTextureCoords[t->coordinates[0]][vertex];
+        out.uv[q][0] = uv->x;
+        out.uv[q][1] = 1 - (double)uv->y;
+    }
+    if (colours) {
+        const struct aiColor4D *c = &m->mColors[0][vertex];
+        out.colour[0] = c->r, out.colour[1] = c->g, out.colour[2] = c->b;
+    }
+    return out;
+}
+
 static lam_status read_mesh(assimp_state *a, const struct aiMesh *m, const affine *t, uint32_t object,
                             lam_error *error) {
     lam_status status = LAM_OK;
@@ -131,20 +195,24 @@ static lam_status read_mesh(assimp_state *a, const struct aiMesh *m, const affin
             world[k] = t->a[k][0] * p[0] + t->a[k][1] * p[1] + t->a[k][2] * p[2] + t->a[k][3];
         TRY(imported_faces_add_vertex(a->s, world, error));
     }
+    const uint32_t material =
+        m->mMaterialIndex < a->scene->mNumMaterials ? a->materials[m->mMaterialIndex] : TABLE_NONE;
+    const bool colours = a->gltf && has_colours(m), skinned = has_skin(a, m, material, colours);
     for (unsigned f = 0; f < m->mNumFaces; f++) {
         const unsigned n = m->mFaces[f].mNumIndices;
         if (n < 3) continue; /* a point or a line */
         TRY(array_grow(&a->corners, &a->corner_capacity, n, sizeof *a->corners, "face corners", error));
+        if (skinned) TRY(array_grow(&a->skin, &a->skin_capacity, n, sizeof *a->skin, "face corners", error));
         for (unsigned k = 0; k < n; k++) {
             const unsigned corner = m->mFaces[f].mIndices[mirrored ? n - 1 - k : k];
             if (corner >= m->mNumVertices)
                 FAIL(error, LAM_ERR_FORMAT, "%s: face %u of mesh '%.100s' refers to vertex %u, there are %u",
                      a->path, f, m->mName.data, corner, m->mNumVertices);
             a->corners[k] = (uint32_t)(base + corner);
+            if (skinned) a->skin[k] = skin_corner(a, m, material, colours, corner);
         }
-        const uint32_t material =
-            m->mMaterialIndex < a->scene->mNumMaterials ? a->materials[m->mMaterialIndex] : TABLE_NONE;
         TRY(imported_faces_add_polygon(a->s, a->corners, n, object, material, 0, error));
+        if (skinned) TRY(imported_faces_add_skin(a->s, a->skin, error));
     }
 done:
     return status;
@@ -267,16 +335,13 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
     const char *dot = strrchr(path, '.');
     assimp_state a = {.s = s, .path = path};
-    static const char strength[] = "KHR_materials_emissive_strength";
     char *bytes = NULL, *padded = NULL;
     size_t length = 0, padded_length = 0;
     a.gltf = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
     TRY(file_text(path, &bytes, &length, error));
     if (a.gltf) TRY(glb_padded(bytes, length, &padded, &padded_length, error));
-    if (a.gltf && memmem(bytes, length, strength, sizeof strength - 1) != NULL)
-        import_warn(&s->warnings, "%s: %s is not read; emissions are the plain emissive factors", path,
-                    strength);
-    if (a.gltf) TRY(gltf_check_head(path, bytes, length, error));
+    if (a.gltf)
+        TRY(gltf_read_materials(path, bytes, length, s, &a.gltf_materials, &a.n_gltf_materials, error));
     TRY(ply_check_head(path, bytes, length, error));
     scene_files files = {.path = path,
                          .assets = s->assets,
@@ -299,10 +364,15 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     const affine unit = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
     if (a.scene->mRootNode != NULL) TRY(read_node(&a, a.scene->mRootNode, &unit, error));
     if (a.gltf) TRY(gltf_read_cameras(path, bytes, length, s, error));
+    if (a.colourless > 0)
+        import_warn(&s->warnings, "%s: the colours of %zu faces without a material are left out", path,
+                    a.colourless);
 done:
     if (a.scene != NULL) aiReleaseImport(a.scene);
     free(a.materials);
     free(a.corners);
+    free(a.skin);
+    free(a.gltf_materials);
     free(bytes);
     free(padded);
     return status;

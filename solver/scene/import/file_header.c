@@ -1,25 +1,10 @@
-/* Heads of files, before the importing library reads them: glTF extensions that are needed, chunks of a GLB
- * that are not padded, and a PLY's numbers of vertices and faces. Runs in the child. */
+/* Heads of files, before the importing library reads them: chunks of a GLB that are not padded, and a PLY's
+ * numbers of vertices and faces. Runs in the child. */
 #include "solver/scene/import/imported_faces.h"
 
-#include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* True for extensions without which positions, faces and plain colours are read right. */
-static bool is_readable(const char *extension) {
-    static const char *const beginnings[] = {"KHR_materials_",
-                                             "KHR_texture_",
-                                             "EXT_texture_",
-                                             "MSFT_texture_",
-                                             "KHR_lights_",
-                                             "KHR_xmp",
-                                             "KHR_draco_mesh_compression"};
-    for (size_t i = 0; i < sizeof beginnings / sizeof *beginnings; i++)
-        if (strncmp(extension, beginnings[i], strlen(beginnings[i])) == 0) return true;
-    return false;
-}
 
 static uint32_t little_endian(const char *bytes) {
     const unsigned char *b = (const unsigned char *)bytes;
@@ -36,23 +21,6 @@ void gltf_find_json(const char **bytes, size_t *length) {
     if (memcmp(*bytes + 16, "JSON", 4) != 0 || size > *length - 20) return;
     *bytes += 20;
     *length = size;
-}
-
-lam_status gltf_check_head(const char *path, const char *bytes, size_t length, lam_error *error) {
-    lam_status status = LAM_OK;
-    gltf_find_json(&bytes, &length);
-    json_t *root = json_loadb(bytes, length, 0, NULL), *name;
-    size_t i;
-    json_array_foreach(json_object_get(root, "extensionsRequired"), i, name) {
-        const char *extension = json_string_value(name);
-        if (extension != NULL && !is_readable(extension))
-            FAIL(error, LAM_ERR_FORMAT,
-                 "%s: it requires the extension '%.60s', which is not read; export it without", path,
-                 extension);
-    }
-done: /* where the JSON is broken, the library says so */
-    json_decref(root);
-    return status;
 }
 
 lam_status glb_padded(const char *glb, size_t length, char **out, size_t *out_length, lam_error *error) {

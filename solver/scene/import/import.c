@@ -2,6 +2,7 @@
 #include "solver/scene/import/import.h"
 #include "solver/base/array_grow.h"
 #include "solver/base/utf8.h"
+#include "solver/scene/import/images.h"
 #include "solver/scene/import/imported_faces.h"
 
 #include <float.h>
@@ -12,8 +13,8 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-/* The reflectance of faces without a diffuse colour, or with a texture's, and the largest that a file's
- * colour gives: light between two white walls must die out. */
+/* The reflectance of faces without a diffuse colour, or with none beside an image that is not read, and the
+ * largest that a file's colour gives: light between two white walls must die out. */
 static const double default_reflectance = .5;
 static const double largest_reflectance = .9999;
 
@@ -34,6 +35,12 @@ static void stem_of(const char *path, char *out, size_t size) {
     out[utf8_of_latin1(name, length, out)] = '\0';
 }
 
+/* True for white and black, which programs write beside an image: they say nothing about the material. */
+static bool is_filler(const double v[3]) {
+    return (v[0] > largest_reflectance && v[1] > largest_reflectance && v[2] > largest_reflectance) ||
+           (v[0] == 0 && v[1] == 0 && v[2] == 0);
+}
+
 /* Checks and clamps the values of the materials that faces use, in place. */
 static lam_status settle_materials(imported_faces *s, const char *path, const bool *used,
                                    import_report *report, lam_error *error) {
@@ -43,15 +50,16 @@ static lam_status settle_materials(imported_faces *s, const char *path, const bo
         const char *name = name_table_get(&s->materials, i);
         bool clamped = false;
         if (!used[i]) continue;
-        if (v->textured) {
-            import_warn(&s->warnings,
-                        "%s: the texture of material '%s' is not read; its reflectance is set to %g", path,
-                        name, default_reflectance);
-        } else if (!v->has_diffuse) {
+        const imported_texture *image = &v->textures[TEXTURE_REFLECTANCE];
+        const bool unread = image->named != 0 && image->image == 0;
+        if (unread ? is_filler(v->diffuse) : !v->has_diffuse && image->image == 0) {
             import_warn(&s->warnings, "%s: material '%s' %s; its reflectance is set to %g", path, name,
-                        v->defined ? "has no diffuse colour" : "is not defined", default_reflectance);
+                        unread       ? "has no colour beside its image"
+                        : v->defined ? "has no diffuse colour"
+                                     : "is not defined",
+                        default_reflectance);
+            for (int c = 0; c < 3; c++) v->diffuse[c] = default_reflectance;
         }
-        for (int c = 0; c < 3 && (v->textured || !v->has_diffuse); c++) v->diffuse[c] = default_reflectance;
         for (int c = 0; c < 3; c++) {
             if (!(v->diffuse[c] >= 0) || !isfinite(v->diffuse[c]))
                 FAIL(error, LAM_ERR_FORMAT, "%s: material '%s': diffuse value %g, must be in [0, 1)", path,
@@ -60,7 +68,7 @@ static lam_status settle_materials(imported_faces *s, const char *path, const bo
                 FAIL(error, LAM_ERR_FORMAT,
                      "%s: material '%s': emission %g, must not be negative and must be finite", path, name,
                      v->emission[c]);
-            if (!(v->diffuse[c] > largest_reflectance)) continue;
+            if (!(v->diffuse[c] > largest_reflectance) || image->image > 0) continue;
             clamped = true;
             v->diffuse[c] = largest_reflectance;
         }
@@ -77,11 +85,78 @@ static bool is_grey(const double v[3]) {
     return (float)v[0] == (float)v[1] && (float)v[1] == (float)v[2];
 }
 
+/* True where an image or the colours of a face's corners make channels differ. */
+static bool has_colourful_faces(const imported_faces *s) {
+    lam_error ignored;
+    bool *coloured = memory_allocate(s->n_images, sizeof *coloured, "images", &ignored);
+    bool found = coloured == NULL; /* three channels are never wrong */
+    for (size_t k = 0; k < s->n_images && !found; k++) coloured[k] = !image_is_grey(&s->images[k]);
+    for (size_t f = 0; f < s->n_faces && !found; f++) {
+        const texture_face *face = &s->faces[f];
+        for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
+            const uint32_t image = s->values[face->surface].textures[q].image;
+            found = found || (image > 0 && coloured[image - 1]);
+        }
+        found = found || memcmp(face->colour[0], face->colour[1], sizeof face->colour[0]) != 0 ||
+                memcmp(face->colour[1], face->colour[2], sizeof face->colour[0]) != 0;
+    }
+    free(coloured);
+    return found;
+}
+
+/* Moves images and maps of faces into the mesh, whose lengths are metres, and takes the means. */
+static lam_status lay_textures(imported_faces *s, const char *path, double unit, mesh *m,
+                               import_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (s->n_faces == 0) return LAM_OK;
+    mesh_textures *t = memory_allocate(1, sizeof *t, "textures", error);
+    if (t == NULL) return LAM_ERR_MEMORY;
+    mesh_textures_hold(m, t);
+    t->largest = largest_reflectance;
+    t->n_surfaces = s->materials.n;
+    t->surfaces = memory_allocate(t->n_surfaces, sizeof *t->surfaces, "textures", error);
+    m->textured_face = memory_allocate(m->n, sizeof *m->textured_face, "textures", error);
+    if (t->surfaces == NULL || m->textured_face == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m->n; i++) m->textured_face[i] = TEXTURE_NONE;
+    for (size_t f = 0; f < s->n_faces; f++) {
+        m->textured_face[s->face_elements[f]] = (uint32_t)f;
+        texture_face *face = &s->faces[f];
+        for (int k = 0; k < 3; k++) {
+            face->origin[k] *= unit;
+            for (int d = 0; d < 3; d++) face->colour[d][k] /= (float)unit;
+            for (int q = 0; q < TEXTURE_QUANTITIES; q++)
+                for (int d = 0; d < 2; d++) face->uv[q][d][k] /= (float)unit;
+        }
+    }
+    for (size_t i = 0; i < t->n_surfaces; i++) {
+        const imported_material *v = &s->values[i];
+        memcpy(t->surfaces[i].factor[TEXTURE_REFLECTANCE], v->diffuse, sizeof v->diffuse);
+        memcpy(t->surfaces[i].factor[TEXTURE_EMISSION], v->emission, sizeof v->emission);
+        for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
+            const imported_texture *of = &v->textures[q];
+            t->surfaces[i].image[q] = of->image == 0 ? TEXTURE_NONE : of->image - 1;
+            for (int d = 0; d < 2; d++) t->surfaces[i].wrap[q][d] = (texture_wrap)of->wrap[d];
+        }
+    }
+    t->faces = s->faces, t->n_faces = s->n_faces; /* taken over */
+    t->images = s->images, t->n_images = s->n_images;
+    s->faces = NULL, s->images = NULL;
+    TRY(mesh_textures_apply(m, error));
+    for (size_t i = 0; i < t->n_surfaces; i++) {
+        if (!t->surfaces[i].clamped) continue;
+        report->clamped++;
+        import_warn(&s->warnings, "%s: material '%s': a mean reflectance above %g is clamped to it", path,
+                    name_table_get(&s->materials, i), largest_reflectance);
+    }
+done:
+    return status;
+}
+
 /* Fills reflectance, emission and the number of channels of m. */
 static lam_status apply_materials(imported_faces *s, const char *path, const import_options *options, mesh *m,
                                   import_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    size_t unnamed = 0;
+    size_t unnamed = 0, bare = 0, next = 0;
     bool *used = memory_allocate(s->materials.n, sizeof *used, "materials", error);
     if (used == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < s->n_elements; i++)
@@ -92,9 +167,12 @@ static lam_status apply_materials(imported_faces *s, const char *path, const imp
     const bool overridden = options->reflectance >= 0;
     for (size_t i = 0; overridden && i < s->materials.n; i++) {
         s->values[i].has_diffuse = 1;
-        s->values[i].textured = 0;
+        s->values[i].textures[TEXTURE_REFLECTANCE] = (imported_texture){.image = 0};
         for (int c = 0; c < 3; c++) s->values[i].diffuse[c] = options->reflectance;
     }
+    for (size_t f = 0; overridden && f < s->n_faces; f++)
+        for (int c = 0; c < 3; c++)
+            memcpy(s->faces[f].colour[c], (const float[4]){0, 0, 0, 1}, sizeof s->faces[f].colour[c]);
     if (unnamed > 0 && !overridden)
         import_warn(&s->warnings, "%s: %zu faces have no material; their reflectance is set to %g", path,
                     unnamed, default_reflectance);
@@ -102,18 +180,32 @@ static lam_status apply_materials(imported_faces *s, const char *path, const imp
     m->n_channels = 1;
     for (size_t i = 0; i < s->materials.n; i++)
         if (used[i] && (!is_grey(s->values[i].diffuse) || !is_grey(s->values[i].emission))) m->n_channels = 3;
+    if (has_colourful_faces(s)) m->n_channels = 3;
     m->reflectance = memory_allocate(m->n * m->n_channels, sizeof *m->reflectance, "reflectances", error);
     m->emission = memory_allocate(m->n * m->n_channels, sizeof *m->emission, "emissions", error);
     if (m->reflectance == NULL || m->emission == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t c = 0; c < m->n_channels; c++)
-        for (size_t i = 0; i < m->n; i++) {
-            const uint32_t material = s->elements[i].material;
-            const imported_material *v = material == TABLE_NONE ? NULL : &s->values[material];
+    for (size_t i = 0; i < m->n; i++) {
+        const uint32_t material = s->elements[i].material;
+        const imported_material *v = material == TABLE_NONE ? NULL : &s->values[material];
+        const bool has_image = v != NULL && (v->textures[0].image > 0 || v->textures[1].image > 0);
+        const bool skinned = next < s->n_faces && s->face_elements[next] == i;
+        const bool no_colour = v == NULL || (has_image && !skinned && is_filler(v->diffuse));
+        next += skinned;
+        bare += has_image && !skinned;
+        for (size_t c = 0; c < m->n_channels; c++) {
             m->emission[c * m->n + i] = v == NULL ? 0.f : (float)v->emission[c];
-            m->reflectance[c * m->n + i] = v != NULL    ? (float)v->diffuse[c]
-                                           : overridden ? (float)options->reflectance
-                                                        : (float)default_reflectance;
+            m->reflectance[c * m->n + i] =
+                (float)(v != NULL && !no_colour ? fmin(v->diffuse[c], largest_reflectance)
+                        : overridden            ? options->reflectance
+                                                : default_reflectance);
         }
+    }
+    if (bare > 0)
+        import_warn(
+            &s->warnings,
+            "%s: %zu faces of materials with images have no texture coordinates; plain colours take the "
+            "images' place",
+            path, bare);
 done:
     free(used);
     return status;
@@ -258,6 +350,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     take_cameras(&s, options->unit, &made);
     TRY(name_groups(&s, &made, error));
     TRY(apply_materials(&s, path, options, &made, &found, error));
+    TRY(lay_textures(&s, path, options->unit, &made, &found, error));
     if (!is_obj) warn_of_lost_precision(&s, path, &made);
     mesh_geometry_hash(&made, made.source_hash);
     found.dropped_faces = s.dropped;

@@ -1,6 +1,7 @@
 /* Reads scene files in a child process with limits, which sends plain arrays through a pipe. The parent
  * checks all that it receives. */
 #include "solver/base/utf8.h"
+#include "solver/scene/import/images.h"
 #include "solver/scene/import/imported_faces.h"
 #include "store/confined.h"
 
@@ -10,18 +11,30 @@
 #include <string.h>
 #include <sys/wait.h>
 
-/* The first bytes that the child sends; points, elements, both name texts, the material values and
- * the cameras follow. */
+/* The first bytes that the child sends; points, elements, both name texts, the material values, the cameras,
+ * textured faces with their elements, the sizes of images and their pixels follow. */
 typedef struct reply_header {
     char magic[8];
     uint64_t status;
     char message[sizeof((lam_error *)0)->message];
     import_warnings warnings;
     uint64_t n_points, n_elements, n_objects, object_bytes, n_materials, material_bytes, n_cameras, dropped,
-        latin1;
+        latin1, n_faces, n_images;
 } reply_header;
 
 static const char reply_magic[8] = "lamsoup";
+
+/* Sends the size of each image, then its pixels. */
+static bool send_images(const imported_faces *s) {
+    for (size_t k = 0; k < s->n_images; k++) {
+        const texture_image *image = &s->images[k];
+        const uint64_t size[2] = {image->width, image->height};
+        if (!confined_send(CONFINED_REPLY, size, sizeof size) ||
+            !confined_send(CONFINED_REPLY, image->pixels, size[0] * size[1] * sizeof *image->pixels))
+            return false;
+    }
+    return true;
+}
 
 static void send_reply(lam_status result, const lam_error *error, const imported_faces *s) {
     reply_header header;
@@ -43,6 +56,8 @@ static void send_reply(lam_status result, const lam_error *error, const imported
     header.n_cameras = s->n_cameras;
     header.dropped = s->dropped;
     header.latin1 = s->latin1;
+    header.n_faces = s->n_faces;
+    header.n_images = s->n_images;
     const struct {
         const void *data;
         size_t bytes;
@@ -52,9 +67,12 @@ static void send_reply(lam_status result, const lam_error *error, const imported
                  {s->objects.text, s->objects.text_bytes},
                  {s->materials.text, s->materials.text_bytes},
                  {s->values, s->materials.n * sizeof *s->values},
-                 {s->cameras, s->n_cameras * sizeof *s->cameras}};
+                 {s->cameras, s->n_cameras * sizeof *s->cameras},
+                 {s->faces, s->n_faces * sizeof *s->faces},
+                 {s->face_elements, s->n_faces * sizeof *s->face_elements}};
     for (size_t k = 0; k < sizeof parts / sizeof *parts; k++)
         if (!confined_send(CONFINED_REPLY, parts[k].data, parts[k].bytes)) return;
+    (void)send_images(s);
 }
 
 /* The task of the child. */
@@ -70,6 +88,7 @@ static void read_in_child(void *context) {
     lam_error error = {0};
     lam_status result = work->reader(work->path, &s, &error);
     if (result == LAM_OK) result = imported_faces_split(&s, work->path, &error);
+    imported_faces_fit_images(&s);
     if (result == LAM_ERR_MEMORY)
         status_fail(&error, LAM_ERR_MEMORY, "%s: the importer needs more than its %zu MiB of memory",
                     work->path, work->limits->memory_bytes >> 20);
@@ -123,6 +142,57 @@ static bool cameras_are_sound(imported_faces *s) {
     return true;
 }
 
+/* True where textured faces belong to elements and surfaces that exist, and have usable maps. */
+static bool faces_are_sound(const imported_faces *s, uint64_t n_images) {
+    for (size_t f = 0; f < s->n_faces; f++) {
+        const texture_face *face = &s->faces[f];
+        if (s->face_elements[f] >= s->n_elements || face->surface >= s->materials.n ||
+            (f > 0 && s->face_elements[f] <= s->face_elements[f - 1]) ||
+            s->elements[s->face_elements[f]].material != face->surface)
+            return false;
+        for (int k = 0; k < 3; k++)
+            if (!isfinite(face->origin[k])) return false;
+        for (int k = 0; k < 4; k++)
+            for (int d = 0; d < 3; d++)
+                if (!isfinite(face->colour[d][k]) || (d < 2 && !isfinite(face->uv[0][d][k])) ||
+                    (d < 2 && !isfinite(face->uv[1][d][k])))
+                    return false;
+    }
+    for (size_t i = 0; i < s->materials.n; i++)
+        for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
+            const imported_texture *t = &s->values[i].textures[q];
+            if (t->image > n_images || (t->image > 0 && s->images[t->image - 1].pixels == NULL) ||
+                t->wrap[0] > TEXTURE_CLAMP || t->wrap[1] > TEXTURE_CLAMP)
+                return false;
+        }
+    return true;
+}
+
+/* Receives images that have few enough pixels; *sound is false where one has more. */
+static lam_status receive_images(confined *child, uint64_t n, imported_faces *s, bool *sound, bool *whole,
+                                 lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t total = 0;
+    s->images = memory_allocate(n, sizeof *s->images, "images", error);
+    if (s->images == NULL) TRY(LAM_ERR_MEMORY);
+    s->image_capacity = n;
+    for (s->n_images = 0; *whole && *sound && s->n_images < n; s->n_images++) {
+        uint64_t size[2] = {0, 0};
+        *whole = confined_receive(child, size, sizeof size);
+        *sound = size[0] < UINT32_MAX && size[1] < UINT32_MAX &&
+                 size[0] * size[1] <= IMAGES_PIXELS_MOST - total && (size[0] == 0) == (size[1] == 0);
+        if (!*whole || !*sound || size[0] == 0) continue;
+        total += size[0] * size[1];
+        texture_image *image = &s->images[s->n_images];
+        image->pixels = receive_array(child, size[0] * size[1], sizeof *image->pixels, whole, error);
+        if (image->pixels == NULL) TRY(LAM_ERR_MEMORY);
+        image->width = size[0];
+        image->height = size[1];
+    }
+done:
+    return status;
+}
+
 /* Receives a reply into s; *whole is false where the pipe ended before. */
 static lam_status receive_reply(confined *child, const char *path, size_t most_bytes, imported_faces *s,
                                 bool *whole, lam_error *error) {
@@ -141,7 +211,8 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
     sound = sound && header.status == LAM_OK && header.n_points < most && header.n_elements < most &&
             header.n_points < TABLE_NONE && header.n_elements < TABLE_NONE && header.n_elements > 0 &&
             header.object_bytes < most && header.material_bytes < most && header.n_materials < most &&
-            header.n_cameras <= SCENE_CAMERAS_MOST;
+            header.n_cameras <= SCENE_CAMERAS_MOST && header.n_faces <= header.n_elements &&
+            header.n_images < most;
     if (!sound) FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
     s->points.points = receive_array(child, header.n_points, sizeof *s->points.points, whole, error);
     if (s->points.points == NULL) TRY(LAM_ERR_MEMORY);
@@ -158,12 +229,19 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
     s->cameras = receive_array(child, header.n_cameras, sizeof *s->cameras, whole, error);
     if (s->cameras == NULL) TRY(LAM_ERR_MEMORY);
     s->n_cameras = s->camera_capacity = header.n_cameras;
+    s->faces = receive_array(child, header.n_faces, sizeof *s->faces, whole, error);
+    if (s->faces == NULL) TRY(LAM_ERR_MEMORY);
+    s->face_elements = receive_array(child, header.n_faces, sizeof *s->face_elements, whole, error);
+    if (s->face_elements == NULL) TRY(LAM_ERR_MEMORY);
+    s->n_faces = header.n_faces;
+    if (*whole) TRY(receive_images(child, header.n_images, s, &sound, whole, error));
     if (!*whole) goto done;
     bool objects_sound = false, materials_sound = false;
     TRY(names_of_block(objects, header.object_bytes, header.n_objects, &s->objects, &objects_sound, error));
     TRY(names_of_block(materials, header.material_bytes, header.n_materials, &s->materials, &materials_sound,
                        error));
-    if (!objects_sound || !materials_sound || !elements_are_sound(s) || !cameras_are_sound(s))
+    if (!sound || !objects_sound || !materials_sound || !elements_are_sound(s) || !cameras_are_sound(s) ||
+        !faces_are_sound(s, header.n_images))
         FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
     s->warnings = header.warnings;
     s->dropped = header.dropped;

@@ -1,3 +1,4 @@
+/* Fills imported faces and splits polygons into elements, with the maps of images on them. */
 #include "solver/scene/import/imported_faces.h"
 
 #include "solver/base/array_grow.h"
@@ -39,6 +40,13 @@ void imported_faces_free(imported_faces *s) {
     free(s->elements);
     free(s->values);
     free(s->cameras);
+    free(s->skins);
+    free(s->skin_corners);
+    free(s->faces);
+    free(s->face_elements);
+    for (size_t k = 0; s->images != NULL && k < s->n_images; k++) free(s->images[k].pixels);
+    free(s->images);
+    name_table_free(&s->image_keys);
     point_table_free(&s->points);
     name_table_free(&s->objects);
     name_table_free(&s->materials);
@@ -129,15 +137,98 @@ done:
     return status;
 }
 
+lam_status imported_faces_add_skin(imported_faces *s, const imported_corner *corners, lam_error *error) {
+    const size_t polygon = s->n_polygons - 1, n = s->polygons[polygon].n_corners;
+    if (array_grow(&s->skins, &s->skin_capacity, s->n_skins + 1, sizeof *s->skins, "faces", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
+    if (array_grow(&s->skin_corners, &s->skin_corner_capacity, s->n_skin_corners + n, sizeof *s->skin_corners,
+                   "face corners", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
+    memcpy(s->skin_corners + s->n_skin_corners, corners, n * sizeof *corners);
+    s->skins[s->n_skins++] = (struct imported_skin){polygon, s->n_skin_corners};
+    s->n_skin_corners += n;
+    return LAM_OK;
+}
+
+/* The corner of a polygon at a vertex. A polygon that visits it twice may have another there. */
+static const imported_corner *skin_corner(const imported_faces *s, const struct imported_polygon *polygon,
+                                          const struct imported_skin *skin, uint32_t vertex) {
+    size_t c = 0;
+    while (c + 1 < polygon->n_corners && s->corners[polygon->first + c] != vertex) c++;
+    return &s->skin_corners[skin->first + c];
+}
+
+/* The place and the skin of a piece's corners, with coordinates of images. */
+typedef struct skinned_piece {
+    size_t n;
+    double p[4][3];
+    imported_corner corners[4];
+} skinned_piece;
+
+static skinned_piece skin_piece(const imported_faces *s, const struct imported_polygon *polygon,
+                                const struct imported_skin *skin, const uint32_t piece[4]) {
+    skinned_piece out = {.n = piece[3] == TABLE_NONE ? 3 : 4};
+    for (size_t k = 0; k < out.n; k++) {
+        memcpy(out.p[k], s->vertices[piece[k]], sizeof out.p[k]);
+        out.corners[k] = *skin_corner(s, polygon, skin, piece[k]);
+        for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
+            const double u = out.corners[k].uv[q][0], v = out.corners[k].uv[q][1];
+            const double(*t)[3] = (const double(*)[3])s->values[polygon->material].textures[q].transform;
+            for (int d = 0; d < 2; d++) out.corners[k].uv[q][d] = t[d][0] * u + t[d][1] * v + t[d][2];
+        }
+    }
+    return out;
+}
+
+/* The affine maps of a piece that was just added as an element. */
+static lam_status add_face(imported_faces *s, const skinned_piece *piece, uint32_t material,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    const imported_corner *c = piece->corners;
+    const double(*p)[3] = (const double(*)[3])piece->p;
+    texture_face face = {.surface = material};
+    const size_t stride = sizeof *c / sizeof(double);
+    memcpy(face.origin, p[0], sizeof face.origin);
+    for (int q = 0; q < TEXTURE_QUANTITIES; q++)
+        for (int d = 0; d < 2; d++) texture_affine(piece->n, p, &c->uv[q][d], stride, face.uv[q][d]);
+    for (int d = 0; d < 3; d++) texture_affine(piece->n, p, &c->colour[d], stride, face.colour[d]);
+    TRY(array_grow(&s->faces, &s->face_capacity, s->n_faces + 1, sizeof *s->faces, "faces", error));
+    TRY(array_grow(&s->face_elements, &s->face_element_capacity, s->n_faces + 1, sizeof *s->face_elements,
+                   "faces", error));
+    s->face_elements[s->n_faces] = (uint32_t)(s->n_elements - 1);
+    s->faces[s->n_faces++] = face;
+done:
+    return status;
+}
+
+static bool is_affine(const skinned_piece *piece) {
+    const imported_corner *c = piece->corners;
+    const size_t stride = sizeof *c / sizeof(double);
+    for (size_t k = 0; k < stride; k++)
+        if (!texture_is_affine((const double(*)[3])piece->p, (const double *)c + k, stride)) return false;
+    return true;
+}
+
+/* skin: of the polygon, or NULL. A quad on which an image is bent becomes two triangles. */
 static lam_status add_element(imported_faces *s, const uint32_t piece[4],
-                              const struct imported_polygon *polygon, lam_error *error) {
+                              const struct imported_polygon *polygon, const struct imported_skin *skin,
+                              lam_error *error) {
     lam_status status = LAM_OK;
     struct imported_element element = {{0, 0, 0, TABLE_NONE}, polygon->object, polygon->material};
+    skinned_piece skinned = {.n = 0};
+    if (skin != NULL) skinned = skin_piece(s, polygon, skin, piece);
+    if (skinned.n == 4 && !is_affine(&skinned)) {
+        const uint32_t halves[2][4] = {{piece[0], piece[1], piece[2], TABLE_NONE},
+                                       {piece[0], piece[2], piece[3], TABLE_NONE}};
+        for (int h = 0; h < 2; h++) TRY(add_element(s, halves[h], polygon, skin, error));
+        return LAM_OK;
+    }
     for (int k = 0; k < 4 && piece[k] != TABLE_NONE; k++)
         TRY(point_table_add(&s->points, s->vertices[piece[k]], &element.corners[k], error));
     TRY(array_grow(&s->elements, &s->element_capacity, s->n_elements + 1, sizeof *s->elements, "elements",
                    error));
     s->elements[s->n_elements++] = element;
+    if (skin != NULL) TRY(add_face(s, &skinned, polygon->material, error));
 done:
     return status;
 }
@@ -185,13 +276,17 @@ lam_status imported_faces_split(imported_faces *s, const char *path, lam_error *
     lam_status status = LAM_OK;
     polygon_split_scratch scratch = {0};
     double extent = 0;
+    size_t next = 0; /* skin */
     TRY(check_polygons(s, path, &extent, error));
     for (size_t i = 0; i < s->n_polygons; i++) {
         const struct imported_polygon *polygon = &s->polygons[i];
         TRY(polygon_split((const double(*)[3])s->vertices, s->corners + polygon->first, polygon->n_corners,
                           1e-14 * extent * extent, false, &scratch, error));
+        const bool has_skin = next < s->n_skins && s->skins[next].polygon == i;
+        const struct imported_skin *skin = has_skin ? &s->skins[next++] : NULL;
         if (scratch.n_pieces == 0) s->dropped++;
-        for (size_t p = 0; p < scratch.n_pieces; p++) TRY(add_element(s, scratch.pieces[p], polygon, error));
+        for (size_t p = 0; p < scratch.n_pieces; p++)
+            TRY(add_element(s, scratch.pieces[p], polygon, skin, error));
     }
     if (s->n_elements == 0)
         FAIL(error, LAM_ERR_FORMAT, "%s: the scene is empty: none of its %zu faces has an area", path,

@@ -6,6 +6,7 @@
 #include "solver/base/scene_cameras.h"
 #include "solver/scene/polygon_split.h"
 #include "solver/scene/tables.h"
+#include "solver/scene/texture.h"
 
 #include <stdbool.h>
 
@@ -17,12 +18,26 @@ typedef struct import_warnings {
 
 void import_warn(import_warnings *w, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* The image of a material's reflectance or emission. */
+typedef struct imported_texture {
+    uint32_t image;          /* 1 + its index; 0: none that is read */
+    uint32_t named;          /* 1: the file names one, which may not be read */
+    uint32_t wrap[2];        /* texture_wrap in u and in v */
+    uint32_t coordinates[2]; /* [0]: the set of the file that it takes; [1]: 0 */
+    double transform[2][3];  /* from coordinates of the file to those of the image, v downwards */
+} imported_texture;
+
 typedef struct imported_material {
     double diffuse[3], emission[3];
     uint64_t defined;     /* 0: the file only names it */
     uint64_t has_diffuse; /* 0: the file gives none */
-    uint64_t textured;    /* 1: the diffuse colour is a texture's, which is not read */
+    imported_texture textures[TEXTURE_QUANTITIES];
 } imported_material;
+
+/* A corner of a polygon that has coordinates of images, or colours, which multiply its reflectance. */
+typedef struct imported_corner {
+    double uv[TEXTURE_QUANTITIES][2], colour[3];
+} imported_corner;
 
 typedef struct imported_faces {
     /* Polygons: polygon i has the corners first[i] .. first[i+1]-1 of corners, indices into vertices. */
@@ -36,6 +51,13 @@ typedef struct imported_faces {
     } * polygons;
     size_t n_polygons, polygon_capacity;
 
+    /* Skins of some of the polygons, in their order: the same number of corners, from first on. */
+    struct imported_skin {
+        size_t polygon, first;
+    } * skins;
+    imported_corner *skin_corners;
+    size_t n_skins, skin_capacity, n_skin_corners, skin_corner_capacity;
+
     /* Elements, after imported_faces_split. */
     point_table points;
     struct imported_element {
@@ -43,6 +65,16 @@ typedef struct imported_faces {
     } * elements;
     size_t n_elements, element_capacity;
     uint64_t dropped; /* faces without an area */
+
+    /* Elements with a skin, in their order; surfaces are materials, lengths those of the file. */
+    texture_face *faces;
+    uint32_t *face_elements;
+    size_t n_faces, face_capacity, face_element_capacity;
+
+    /* Images; one that is not read has no pixels. Keys are paths, or numbers in the scene file. */
+    texture_image *images;
+    size_t n_images, image_capacity;
+    name_table image_keys;
 
     name_table objects, materials;
     imported_material *values; /* [materials.n] */
@@ -59,6 +91,9 @@ void imported_faces_free(imported_faces *s);
 lam_status imported_faces_add_vertex(imported_faces *s, const double vertex[3], lam_error *error);
 lam_status imported_faces_add_polygon(imported_faces *s, const uint32_t *corners, size_t n, uint32_t object,
                                       uint32_t material, uint32_t line, lam_error *error);
+
+/* The skin of the polygon that was added last, with a corner for each of its. */
+lam_status imported_faces_add_skin(imported_faces *s, const imported_corner *corners, lam_error *error);
 
 /* The index of the object of this name, or of the material, which is made with no values when it is new. A
  * name that is not UTF-8 is read as Latin-1, and counted. */
@@ -86,10 +121,34 @@ enum { ASSET_PATH = 4096 };
  */
 asset_place asset_find(const char *scene, const char *assets, const char *file, char out[ASSET_PATH]);
 
-/* Refuse a glTF or GLB that requires an extension which changes what is read and is not read here, and a PLY
- * that is shorter than its header says: a library may take minutes to notice. Other faults are the library's
- * to tell. */
-lam_status gltf_check_head(const char *path, const char *bytes, size_t length, lam_error *error);
+/* *image = 1 + the index of the image of a key, decoded where the key is new, or 0 where it cannot be read,
+ * which a warning says once for each key. label: its name for people. imported_faces_find_image looks for the
+ * file as asset_find does. Errors: LAM_ERR_MEMORY for the tables alone. */
+lam_status imported_faces_add_image(imported_faces *s, const char *path, const char *key, const char *label,
+                                    const char *bytes, size_t length, uint32_t *image, lam_error *error);
+lam_status imported_faces_find_image(imported_faces *s, const char *path, const char *file, uint32_t *image,
+                                     lam_error *error);
+
+/* The same for an image that is known not to be readable. */
+lam_status imported_faces_lack_image(imported_faces *s, const char *path, const char *key, const char *label,
+                                     const char *why, lam_error *error);
+
+/* Halves the largest images until all have few enough pixels together. */
+void imported_faces_fit_images(imported_faces *s);
+
+/* The parts of a glTF's material that the library does not tell. */
+typedef struct gltf_material {
+    double strength; /* KHR_materials_emissive_strength; 1 */
+    imported_texture textures[TEXTURE_QUANTITIES];
+} gltf_material;
+
+/* Reads the materials of a glTF or GLB with their images, *out [*n], freed by the caller, in the file's
+ * order; warns of what is left out. Errors: LAM_ERR_FORMAT where it requires an extension which changes what
+ * is read and is not read here; other faults are the library's to tell. */
+lam_status gltf_read_materials(const char *path, const char *bytes, size_t length, imported_faces *s,
+                               gltf_material **out, size_t *n, lam_error *error);
+
+/* Refuses a PLY that is shorter than its header says: a library may take minutes to notice. */
 lam_status ply_check_head(const char *path, const char *bytes, size_t length, lam_error *error);
 
 /* Moves a view of a glTF or GLB to its JSON, which is the first chunk of a GLB; a damaged GLB stays as it is.

@@ -89,12 +89,112 @@ done:
     return status;
 }
 
+/* A statement of a map: options, then the name of a file, which may have blanks. */
+typedef struct map_statement {
+    const char *file;
+    double scale[2], offset[2];
+    bool clamp;
+} map_statement;
+
+/* The options of the format with the number of their arguments; -o, -s and -t take one to three numbers. */
+static const struct map_option {
+    const char *name;
+    int least, most;
+} map_options[] = {{"-blendu", 1, 1}, {"-blendv", 1, 1}, {"-boost", 1, 1},      {"-bm", 1, 1},
+                   {"-cc", 1, 1},     {"-clamp", 1, 1},  {"-colorspace", 1, 1}, {"-imfchan", 1, 1},
+                   {"-mm", 2, 2},     {"-o", 1, 3},      {"-s", 1, 3},          {"-t", 1, 3},
+                   {"-texres", 1, 1}, {"-type", 1, 1}};
+
+/* The word at *text, cut off; *text is moved to the next one. */
+static char *cut_word(char **text) {
+    char *word = *text, *end = word;
+    while (*end != '\0' && !is_blank(*end)) end++;
+    *text = end;
+    while (is_blank(**text)) (*text)++;
+    *end = '\0';
+    return word;
+}
+
+static bool is_number(const char *text) {
+    char *stop;
+    strtod(text, &stop);
+    return stop != text && (*stop == '\0' || is_blank(*stop));
+}
+
+static map_statement parse_map(char *text) {
+    map_statement out = {.scale = {1, 1}};
+    for (;;) {
+        const struct map_option *option = NULL;
+        for (size_t k = 0; k < sizeof map_options / sizeof *map_options; k++)
+            if (after_keyword(text, map_options[k].name) != NULL) option = &map_options[k];
+        if (option == NULL) break;
+        cut_word(&text);
+        for (int k = 0; k < option->most && (k < option->least || is_number(text)) && *text != '\0'; k++) {
+            const char *word = cut_word(&text);
+            if (strcmp(option->name, "-clamp") == 0) out.clamp = strcmp(word, "on") == 0;
+            if (k < 2 && strcmp(option->name, "-s") == 0) out.scale[k] = strtod(word, NULL);
+            if (k < 2 && strcmp(option->name, "-o") == 0) out.offset[k] = strtod(word, NULL);
+        }
+    }
+    out.file = text;
+    return out;
+}
+
+/* Reads the image of a material's reflectance or emission, which lies beside its MTL, path. */
+static lam_status read_map(const char *path, imported_faces *s, uint32_t material, int quantity, char *text,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    const map_statement map = parse_map(text);
+    imported_texture t = {.named = 1};
+    for (int d = 0; d < 2; d++) {
+        t.wrap[d] = map.clamp ? TEXTURE_CLAMP : TEXTURE_REPEAT;
+        t.transform[d][d] = map.scale[d];
+        t.transform[d][2] = map.offset[d];
+    }
+    for (int d = 0; d < 3; d++) t.transform[1][d] = (d == 2) - t.transform[1][d]; /* from the top */
+    TRY(imported_faces_find_image(s, path, map.file, &t.image, error));
+    s->values[material].textures[quantity] = t;
+done:
+    return status;
+}
+
+/* An image is multiplied by the colour; without one it counts alone. Many programs write black beside it. */
+static void settle_colours(imported_faces *s) {
+    for (size_t i = 0; i < s->materials.n; i++) {
+        imported_material *v = &s->values[i];
+        double *colours[] = {v->diffuse, v->emission};
+        for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
+            double *c = colours[q];
+            const bool black = c[0] == 0 && c[1] == 0 && c[2] == 0;
+            if (v->textures[q].image > 0 && black) c[0] = c[1] = c[2] = 1;
+        }
+    }
+}
+
+/* Counts of statements that are not read. */
+typedef struct left_out {
+    size_t maps, transparent;
+} left_out;
+
+static void count_left_out(char *line, left_out *out) {
+    static const char *const maps[] = {"map_Ka", "map_Ks", "map_Ns", "map_Bump", "map_bump", "bump", "norm",
+                                       "disp",   "map_Pr", "map_Pm", "map_Ps",   "refl",     "decal"};
+    const char *rest;
+    double number;
+    for (size_t k = 0; k < sizeof maps / sizeof *maps; k++) out->maps += after_keyword(line, maps[k]) != NULL;
+    out->transparent += after_keyword(line, "map_d") != NULL;
+    if ((rest = after_keyword(line, "d")) != NULL)
+        out->transparent += read_numbers(rest, 1, &number) == 1 && number < 1;
+    else if ((rest = after_keyword(line, "Tr")) != NULL)
+        out->transparent += read_numbers(rest, 1, &number) == 1 && number > 0;
+}
 static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
     size_t length = 0;
     uint32_t current = TABLE_NONE;
     char *rest, *text = NULL;
     line_cursor cursor;
+    left_out out = {.maps = 0};
     TRY(file_text(path, &text, &length, error));
     TRY(begin_lines(path, text, length, &cursor, error));
     for (char *line; (line = next_line(&cursor)) != NULL;) {
@@ -113,13 +213,18 @@ static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error
             s->values[current].has_diffuse = 1;
         } else if ((rest = after_keyword(line, "Ke")) != NULL) {
             TRY(read_colour(path, cursor.number, rest, s->values[current].emission, error));
-        } else if (after_keyword(line, "map_Kd") != NULL) {
-            s->values[current].textured = 1;
-        } else if (after_keyword(line, "map_Ke") != NULL) {
-            import_warn(&s->warnings, "%s:%u: the texture of material '%s' is ignored; its emission is Ke",
-                        path, cursor.number, name_table_get(&s->materials, current));
-        }
+        } else if ((rest = after_keyword(line, "map_Kd")) != NULL) {
+            TRY(read_map(path, s, current, TEXTURE_REFLECTANCE, rest, error));
+        } else if ((rest = after_keyword(line, "map_Ke")) != NULL) {
+            TRY(read_map(path, s, current, TEXTURE_EMISSION, rest, error));
+        } else
+            count_left_out(line, &out);
     }
+    if (out.maps > 0)
+        import_warn(&s->warnings, "%s: %zu map%s of other things than Kd and Ke %s left out", path, out.maps,
+                    out.maps == 1 ? "" : "s", out.maps == 1 ? "is" : "are");
+    if (out.transparent > 0)
+        import_warn(&s->warnings, "%s: transparency (d, Tr, map_d) is left out: what has it is opaque", path);
 done:
     free(text);
     return status;
@@ -174,7 +279,24 @@ typedef struct obj_state {
     uint32_t object, group, material;
     uint32_t *corners; /* of the face being read */
     size_t corner_capacity;
+    /* Coordinates of images are kept once a material has one. skipped: some were not. */
+    bool keeps, skipped;
+    double (*uv)[2];
+    imported_corner *skin; /* of the face being read */
+    size_t n_uv, uv_capacity, skin_capacity;
 } obj_state;
+
+static lam_status read_coordinates(obj_state *o, const char *text, lam_error *error) {
+    lam_status status = LAM_OK;
+    double uv[2] = {0, 0}; /* one number is a place along a line */
+    o->skipped = o->skipped || !o->keeps;
+    if (!o->keeps) return LAM_OK;
+    TRY(array_grow(&o->uv, &o->uv_capacity, o->n_uv + 1, sizeof *o->uv, "texture coordinates", error));
+    read_numbers(text, 2, uv);
+    memcpy(o->uv[o->n_uv++], uv, sizeof uv);
+done:
+    return status;
+}
 
 static lam_status read_vertex(obj_state *o, uint32_t line, const char *text, lam_error *error) {
     lam_status status = LAM_OK;
@@ -191,9 +313,29 @@ done:
     return status;
 }
 
+/* The corner of a skin from the part behind a vertex index, "/vt" or "/vt/vn"; false where it has none that
+ * was read before. */
+static bool read_corner(const obj_state *o, const char *text, imported_corner *out) {
+    if (text[0] != '/' || text[1] == '/') return false;
+    const long long given = strtoll(text + 1, NULL, 10);
+    const long long index = given < 0 ? (long long)o->n_uv + given : given - 1;
+    if (given == 0 || index < 0 || index >= (long long)o->n_uv) return false;
+    *out = (imported_corner){.colour = {1, 1, 1}};
+    for (int q = 0; q < TEXTURE_QUANTITIES; q++) memcpy(out->uv[q], o->uv[index], sizeof out->uv[q]);
+    return true;
+}
+
+/* True where the faces that follow may have an image. */
+static bool may_have_image(const obj_state *o) {
+    if (!o->keeps || o->material == TABLE_NONE) return false;
+    const imported_material *v = &o->s->values[o->material];
+    return !v->defined || v->textures[0].image > 0 || v->textures[1].image > 0;
+}
+
 static lam_status read_face(obj_state *o, uint32_t line, const char *text, lam_error *error) {
     lam_status status = LAM_OK;
     size_t n = 0;
+    bool skinned = may_have_image(o);
     while (*text != '\0') {
         char *stop;
         errno = 0;
@@ -209,12 +351,17 @@ static lam_status read_face(obj_state *o, uint32_t line, const char *text, lam_e
                  line, (int)(stop - text), text, o->s->n_vertices);
         TRY(array_grow(&o->corners, &o->corner_capacity, n + 1, sizeof *o->corners, "face corners", error));
         o->corners[n++] = (uint32_t)index;
+        if (skinned) {
+            TRY(array_grow(&o->skin, &o->skin_capacity, n, sizeof *o->skin, "face corners", error));
+            skinned = read_corner(o, stop, &o->skin[n - 1]);
+        }
         for (text = stop; *text != '\0' && !is_blank(*text);) text++;
         while (is_blank(*text)) text++;
     }
-    if (n > 0)
-        TRY(imported_faces_add_polygon(o->s, o->corners, n, o->object != TABLE_NONE ? o->object : o->group,
-                                       o->material, line, error));
+    if (n == 0) goto done;
+    TRY(imported_faces_add_polygon(o->s, o->corners, n, o->object != TABLE_NONE ? o->object : o->group,
+                                   o->material, line, error));
+    if (skinned) TRY(imported_faces_add_skin(o->s, o->skin, error));
 done:
     return status;
 }
@@ -225,9 +372,21 @@ static lam_status read_name(imported_faces *s, const char *name, uint32_t *index
     return *name == '\0' ? LAM_OK : imported_faces_add_object(s, name, strlen(name), index, error);
 }
 
-lam_status obj_read(const char *path, imported_faces *s, lam_error *error) {
+static bool has_images(const imported_faces *s) {
+    for (size_t k = 0; k < s->n_images; k++)
+        if (s->images[k].pixels != NULL) return true;
+    return false;
+}
+
+/* *again: coordinates of images were skipped before a material had one. */
+static lam_status read_all(const char *path, imported_faces *s, bool keeps, bool *again, lam_error *error) {
     lam_status status = LAM_OK;
-    obj_state o = {.path = path, .s = s, .object = TABLE_NONE, .group = TABLE_NONE, .material = TABLE_NONE};
+    obj_state o = {.path = path,
+                   .s = s,
+                   .object = TABLE_NONE,
+                   .group = TABLE_NONE,
+                   .material = TABLE_NONE,
+                   .keeps = keeps};
     size_t length = 0;
     char *rest, *text = NULL;
     line_cursor cursor;
@@ -238,6 +397,8 @@ lam_status obj_read(const char *path, imported_faces *s, lam_error *error) {
             TRY(read_vertex(&o, cursor.number, rest, error));
         else if ((rest = after_keyword(line, "f")) != NULL)
             TRY(read_face(&o, cursor.number, rest, error));
+        else if ((rest = after_keyword(line, "vt")) != NULL)
+            TRY(read_coordinates(&o, rest, error));
         else if ((rest = after_keyword(line, "o")) != NULL)
             TRY(read_name(s, rest, &o.object, error));
         else if ((rest = after_keyword(line, "g")) != NULL)
@@ -245,11 +406,30 @@ lam_status obj_read(const char *path, imported_faces *s, lam_error *error) {
         else if ((rest = after_keyword(line, "usemtl")) != NULL) {
             o.material = TABLE_NONE;
             if (*rest != '\0') TRY(imported_faces_add_material(s, rest, strlen(rest), &o.material, error));
-        } else if ((rest = after_keyword(line, "mtllib")) != NULL)
+        } else if ((rest = after_keyword(line, "mtllib")) != NULL) {
             TRY(read_libraries(path, cursor.number, rest, s, error));
+            o.keeps = o.keeps || (!o.skipped && has_images(s));
+        }
     }
+    *again = o.skipped && has_images(s);
+    settle_colours(s);
 done:
     free(o.corners);
+    free(o.uv);
+    free(o.skin);
     free(text);
+    return status;
+}
+
+lam_status obj_read(const char *path, imported_faces *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *assets = s->assets;
+    bool again = false;
+    TRY(read_all(path, s, false, &again, error));
+    if (!again) goto done;
+    imported_faces_free(s);
+    s->assets = assets;
+    TRY(read_all(path, s, true, &again, error));
+done:
     return status;
 }

@@ -137,8 +137,11 @@ START_TEST(textures_that_are_not_read_have_a_default_and_a_warning) {
     mesh m = obj_good(folder, "mtllib scene.mtl\n" SQUARE "usemtl carpet\nf 1 2 3\nusemtl lamp\nf 1 3 4\n",
                       &report);
     ck_assert_ptr_nonnull(
-        strstr(report.warnings, "texture of material 'carpet' is not read; its reflectance is set"));
-    ck_assert_ptr_nonnull(strstr(report.warnings, "scene.mtl:6: the texture of material 'lamp' is ignored"));
+        strstr(report.warnings, "scene.mtl: the image 'carpet.png' is not read: it is missing"));
+    ck_assert_ptr_nonnull(
+        strstr(report.warnings, "scene.mtl: the image 'lamp.png' is not read: it is missing"));
+    ck_assert_ptr_nonnull(strstr(
+        report.warnings, "material 'carpet' has no colour beside its image; its reflectance is set to 0.5"));
     ck_assert_ptr_null(strstr(report.warnings, "no diffuse colour")); /* one line says enough */
     ck_assert_float_eq(m.reflectance[0], .5f);
     ck_assert_float_eq(m.reflectance[1], .2f);
