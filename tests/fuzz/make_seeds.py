@@ -2,6 +2,7 @@
 
 usage: make_seeds.py LAMBERT FOLDER   (the program, and where to put json/ adjoint/ ...)
 """
+import base64
 import json
 import pathlib
 import struct
@@ -12,7 +13,7 @@ import tempfile
 import numpy as np
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
-for name in ("json", "adjoint", "npy", "store", "import", "index", "head"):
+for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -73,6 +74,27 @@ image = struct.pack("<2Q", 2, 1) + bytes(range(6))
 (folder / "import" / "textured").write_bytes(import_header(0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0, 0, 0, 1, 1)
                                              + body + colours + tiled + plain + face + image)
 (folder / "import" / "refused").write_bytes(import_header(4, b"no", b"w\nv", 3, *[0] * 11))
+
+
+# Images, and a glTF with one in each place that it may have.
+fixtures = pathlib.Path(__file__).resolve().parents[1] / "fixtures" / "textures"
+for file in fixtures.iterdir():
+    (folder / "image" / file.name).write_bytes(file.read_bytes())
+jpeg = (fixtures / "tile.jpg").read_bytes()
+turned = {"KHR_texture_transform": {"offset": [.1, .2], "rotation": 1, "scale": [2, 3], "texCoord": 1}}
+document = {"asset": {"version": "2.0"}, "buffers": [{}], "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": len(jpeg)}],
+            "images": [{"bufferView": 0}, {"uri": "none.png"}, {"uri": "data:;base64," + base64.b64encode(jpeg).decode()}],
+            "samplers": [{"wrapS": 33071, "wrapT": 33648}], "accessors": [{"componentType": 5123}],
+            "textures": [{"source": 0, "sampler": 0}, {"source": 1}, {"source": 2}, {"extensions": {"EXT_texture_webp": {"source": 0}}}],
+            "meshes": [{"primitives": [{"attributes": {"TEXCOORD_0": 0}, "material": 1}]}], "extensionsUsed": ["KHR_materials_unlit"],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": k, "extensions": turned if k == 0 else {}}},
+                           "emissiveTexture": {"index": 3}, "alphaMode": "MASK",
+                           "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 3}}} for k in range(3)]}
+text = json.dumps(document).encode()
+text += b" " * (-len(text) % 4)
+whole = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(jpeg), b"BIN\0") + jpeg
+(folder / "gltf" / "all.glb").write_bytes(b"glTF" + struct.pack("<2I", 2, 12 + len(whole)) + whole)
+(folder / "gltf" / "all.gltf").write_bytes(text)
 
 
 # The reply of the process that reads headers: a head, then objects with their attributes.

@@ -403,6 +403,17 @@ class BadImagesTest(TexturesCase):
         np.testing.assert_allclose(store.reflectance, .5)
         self.assertIn("material 'paint' has no colour beside its image; its reflectance is set to 0.5", errors)
 
+    def test_coordinates_that_are_integers(self):
+        self.write("a.png", png_bytes(noise(8, 8)))
+        for component, kind in ((5121, np.uint8), (5123, np.uint16)):
+            scene = Gltf(base_texture([.4, .4, .4, 1]), [{"uri": "a.png"}])
+            values = np.zeros((6, 4 if kind == np.uint8 else 2), kind)
+            scene.attribute("TEXCOORD_0", values, component, "VEC2", normalized=True)
+            scene.json["bufferViews"][-1]["byteStride"] = 4
+            store, errors = self.store(self.write("a.gltf", scene.text()))
+            self.assertIn("1 images have texture coordinates that are not floating point", errors)
+            np.testing.assert_allclose(store.reflectance, .4)
+
     def test_a_broken_file_is_refused(self):
         text = Gltf(base_texture(), [{"uri": "a.png"}]).text()
         done = lambert("precompute", self.write("a.gltf", text[:len(text) // 2]), "-o", self.folder / "no.h5")

@@ -234,6 +234,37 @@ done:
     return status;
 }
 
+/* Leaves out the images of materials whose coordinates are integers somewhere: the library takes their bytes
+ * for floating point numbers. */
+static void leave_out_integers(const gltf_file *g, size_t n, gltf_material *materials) {
+    size_t i, k, found = 0;
+    json_t *m, *primitive;
+    json_array_foreach(json_object_get(g->root, "meshes"), i, m)
+        json_array_foreach(json_object_get(m, "primitives"), k, primitive) {
+        const json_t *index = json_object_get(primitive, "material");
+        if (!json_is_integer(index) || json_integer_value(index) < 0 ||
+            (size_t)json_integer_value(index) >= n)
+            continue;
+        gltf_material *of = &materials[json_integer_value(index)];
+        for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
+            char name[32];
+            snprintf(name, sizeof name, "TEXCOORD_%u", of->textures[q].coordinates[0]);
+            const json_t *at = json_object_get(json_object_get(primitive, "attributes"), name);
+            const json_t *accessor = entry_of(g, "accessors", at);
+            const double type = number_of(json_object_get(accessor, "componentType"), 5126);
+            if (of->textures[q].image == 0 || type == 5126) continue;
+            of->textures[q].image = 0;
+            found++;
+        }
+    }
+    if (found > 0)
+        import_warn(
+            &g->s->warnings,
+            "%s: %zu images have texture coordinates that are not floating point and are not read; plain "
+            "colours take their place",
+            g->path, found);
+}
+
 /* One line for each kind of thing that is left out. */
 static void tell_left_out(const gltf_file *g) {
     import_warnings *w = &g->s->warnings;
@@ -293,6 +324,7 @@ lam_status gltf_read_materials(const char *path, const char *bytes, size_t lengt
     made = memory_allocate(n_materials, sizeof *made, "materials", error);
     if (g.buffers == NULL || made == NULL) TRY(LAM_ERR_MEMORY);
     for (i = 0; i < n_materials; i++) TRY(read_material(&g, json_array_get(materials, i), &made[i], error));
+    leave_out_integers(&g, n_materials, made);
     tell_left_out(&g);
     *out = made;
     *n = n_materials;
