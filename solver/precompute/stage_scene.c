@@ -4,7 +4,7 @@
 #include "solver/operator/refine/form_factor_rows.h"
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/import/import.h"
-#include "solver/scene/texture.h"
+#include "solver/scene/import/picture_files.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -399,6 +399,7 @@ lam_status stage_load_store(precompute_state *state, lam_error *error) {
         TRY(form_factors_expand(&state->f, state->m.area, error));
     }
     if (store_has(s, "/sky")) TRY(sky_bounce_load(s, state->m.n, &state->f.sky, error));
+    if (state->options->reflectance >= 0) mesh_pictures_drop(&state->m);
     if (state->options->reflectance >= 0)
         for (size_t i = 0; i < state->m.n * state->m.n_channels; i++)
             state->m.reflectance[i] = (float)state->options->reflectance;
@@ -454,7 +455,7 @@ lam_status state_refine_mesh(precompute_state *state, lam_error *error) {
         TRY(mesh_refine(&state->m, &refinement, error));
     if (o->mesh_error > 0) TRY(state_refine_by_error(state, error));
     if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
-    mesh_textures_release(&state->m); /* every element has its means */
+    TRY(mesh_keep_pictures(&state->m, error)); /* every element has its means */
 done:
     return status;
 }

@@ -21,6 +21,7 @@ void mesh_free(mesh *m) {
     free(m->emission);
     mesh_textures_release(m);
     free(m->cameras);
+    mesh_pictures_drop(m);
     *m = (mesh){0};
 }
 

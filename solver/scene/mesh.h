@@ -27,6 +27,7 @@ typedef struct mesh {
     float *reflectance;             /* [C][n], in [0, 1) */
     float *emission;                /* [C][n], W/m^2 */
     struct mesh_textures *textures; /* NULL: none (texture.h) */
+    struct mesh_pictures *pictures; /* for those who show the elements; NULL: none (texture.h) */
     uint32_t *textured_face; /* [n], of textures, or TEXTURE_NONE; NULL: no element has a textured face */
     size_t n_cameras;
     scene_camera *cameras; /* [n_cameras], of the scene file */
@@ -85,8 +86,8 @@ void mesh_bounds(const mesh *m, double centre[3], double *radius);
 /* The centroid of an element. */
 void mesh_centroid(const mesh *m, size_t element, double centroid[3]);
 
-/* /mesh and /cameras of a store (store/FORMAT.md); loading checks every index and value. row_sums are NULL
- * where no form factors were found. */
+/* /mesh, with its pictures, and /cameras of a store (store/FORMAT.md); loading checks every index and value.
+ * row_sums are NULL where no form factors were found. */
 lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error *error);
 lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error);
 

@@ -211,7 +211,7 @@ void texture_affine(size_t corners, const double (*p)[3], const double *value, s
     }
 }
 
-static double value_at(const float f[4], const double origin[3], const double p[3]) {
+double texture_value_at(const float f[4], const double origin[3], const double p[3]) {
     double value = (double)f[3];
     for (int k = 0; k < 3; k++) value += (double)f[k] * (p[k] - origin[k]);
     return value;
@@ -222,7 +222,7 @@ bool texture_is_affine(const double (*p)[3], const double *value, size_t stride)
     double low = value[0], high = value[0];
     texture_affine(4, p, value, stride, f);
     for (size_t i = 1; i < 4; i++) low = fmin(low, value[i * stride]), high = fmax(high, value[i * stride]);
-    return fabs(value_at(f, p[0], p[2]) - value[2 * stride]) <= 1e-3 * (high - low);
+    return fabs(texture_value_at(f, p[0], p[2]) - value[2 * stride]) <= 1e-3 * (high - low);
 }
 
 static float *quantity_of(mesh *m, int quantity) {
@@ -245,7 +245,7 @@ static lam_status multiply_by_image(mesh *m, uint32_t image, lam_error *error) {
             const size_t corners = mesh_corners(m, i);
             for (size_t k = 0; k < corners; k++)
                 for (int d = 0; d < 2; d++)
-                    uv[k][d] = value_at(face->uv[q][d], face->origin, m->vertices[m->elements[i][k]]);
+                    uv[k][d] = texture_value_at(face->uv[q][d], face->origin, m->vertices[m->elements[i][k]]);
             texture_table_mean(table, surface->wrap[q], corners, (const double(*)[2])uv, mean);
             for (size_t c = 0; c < m->n_channels; c++) quantity_of(m, q)[c * m->n + i] *= (float)mean[c];
         }
@@ -265,7 +265,7 @@ lam_status mesh_textures_apply(mesh *m, lam_error *error) {
         double centre[3];
         mesh_centroid(m, i, centre); /* where an affine value is its mean */
         for (size_t c = 0; c < m->n_channels; c++) {
-            const double colour = fmin(fmax(value_at(face->colour[c], face->origin, centre), 0), 1);
+            const double colour = fmin(fmax(texture_value_at(face->colour[c], face->origin, centre), 0), 1);
             m->reflectance[c * m->n + i] = (float)(surface->factor[TEXTURE_REFLECTANCE][c] * colour);
             m->emission[c * m->n + i] = (float)surface->factor[TEXTURE_EMISSION][c];
         }

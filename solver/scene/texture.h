@@ -53,6 +53,8 @@ typedef struct mesh_textures {
  * value [corners] are numbers, stride apart; out is [4], 0 where a value would not be finite. */
 void texture_affine(size_t corners, const double (*p)[3], const double *value, size_t stride, float out[4]);
 
+double texture_value_at(const float f[4], const double origin[3], const double p[3]);
+
 /* True where the value at the 4th corner of a planar quad is that of the affine map through the others,
  * within a thousandth of their range. */
 bool texture_is_affine(const double (*p)[3], const double *value, size_t stride);
@@ -67,6 +69,29 @@ lam_status mesh_textures_apply(mesh *m, lam_error *error);
 /* Takes hold of the textures of another mesh, or none; lets them go. */
 void mesh_textures_hold(mesh *m, mesh_textures *t);
 void mesh_textures_release(mesh *m);
+
+/* Images as files, and their places on the elements of a final mesh: for those who show it. */
+typedef struct mesh_pictures {
+    size_t n_surfaces, n_files;
+    uint32_t *surface;       /* [n], or TEXTURE_NONE */
+    float (*texcoord)[4][2]; /* [n], u and v of the corners, v downwards; 0 without a surface or a corner */
+    struct picture_surface {
+        uint32_t file, wrap[2];
+        float factor[3]; /* the reflectance is that of the image times it */
+    } * surfaces;
+    uint64_t *start;      /* [n_files + 1], of each file in bytes */
+    unsigned char *bytes; /* JPEG files, one after the other */
+} mesh_pictures;
+
+/* Fills surface, texcoord and surfaces of out by the textures of m whose reflectance has an image, surfaces
+ * of one image and factor once; files are those of the images. False with LAM_OK where there is none. */
+lam_status mesh_pictures_place(const mesh *m, mesh_pictures *out, bool *any, lam_error *error);
+void mesh_pictures_drop(mesh *m);
+void mesh_pictures_free(mesh_pictures *p);
+
+/* The arrays of /mesh that hold them; loading leaves NULL where there are none, and checks every index. */
+lam_status mesh_pictures_save(const mesh *m, store *s, lam_error *error);
+lam_status mesh_pictures_load(store *s, mesh *m, lam_error *error);
 
 /* The mean of an image over a polygon of n <= 4 corners in u and v, linear. table: texture_table_create. */
 typedef struct texture_table texture_table;

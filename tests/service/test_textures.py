@@ -3,8 +3,8 @@
 import base64
 import json
 import math
-import pathlib
 import os
+import pathlib
 import struct
 import tempfile
 import unittest
@@ -127,6 +127,36 @@ class ObjTexturesTest(TexturesCase):
         must("verify", self.folder / "made.h5", scene)
         store, _ = self.store(scene, "--reflectance", .25)
         np.testing.assert_array_equal(store.reflectance, .25)
+
+    def test_store_keeps_places_and_images(self):
+        self.write("wood.png", png_bytes(noise(30, 20)))
+        self.write("tile.jpg", (FIXTURES / "textures" / "tile.jpg").read_bytes())
+        self.write("unused.png", png_bytes(noise(5, 5)))
+        self.write("a.mtl", "newmtl wood\nKd .8 .9 1\nmap_Kd -clamp on wood.png\nnewmtl tile\nmap_Kd tile.jpg\n"
+                   "newmtl unused\nmap_Kd unused.png\nnewmtl plain\nKd .3 .3 .3\n")
+        above = "v 0 0 3\nv 2 0 3\nv 2 1 3\n"
+        scene = self.write("a.obj", "mtllib a.mtl\n" + SQUARE + "usemtl wood\n" + FACE + above + "usemtl tile\nf 5/1 7/3 6/2\n"
+                           "usemtl plain\nf 5 6 7\n")
+        self.store(scene, "--subdivide", 1, "--keep-form-factors")
+        must("precompute", self.folder / "made.h5", "-o", self.folder / "again.h5", "--probes", 0)
+        for name in ("made.h5", "again.h5"):
+            with h5py.File(self.folder / name) as file:
+                mesh = {key: value[()] for key, value in file["mesh"].items()}
+            np.testing.assert_array_equal(mesh["surface"], [0] * 4 + [1] * 4 + [0xFFFFFFFF] * 4)
+            np.testing.assert_array_equal(mesh["surface_image"][:, 1:], [[2, 2], [0, 0]])
+            np.testing.assert_allclose(mesh["surface_factor"], [[.8, .9, 1], [1, 1, 1]], rtol=1e-6)
+            self.assertEqual(len(mesh["image_start"]), len(np.unique(mesh["surface_image"][:, 0])) + 1)
+            for k, i in enumerate(mesh["surface_image"][:, 0]):
+                data = mesh["images"][mesh["image_start"][i]:mesh["image_start"][i + 1]].tobytes()
+                self.assertEqual(data[:3], b"\xff\xd8\xff", k)
+            for i in range(8):
+                corners = [v for v in mesh["elements"][i] if v != 0xFFFFFFFF]
+                places = mesh["vertices"][corners][:, :2] * 1.25
+                np.testing.assert_allclose(mesh["texcoord"][i, :len(corners)], np.c_[places[:, 0], 1 - places[:, 1]], atol=1e-5)
+        self.assertEqual(lambert("verify", self.folder / "again.h5", scene).returncode, 0)
+        store, _ = self.store(scene, "--reflectance", .5)
+        with h5py.File(self.folder / "made.h5") as file:
+            self.assertNotIn("surface", file["mesh"])
 
     def test_jpeg_and_webp_are_those_of_their_own_tools(self):
         for name in ("tile.jpg", "tile.webp"):

@@ -1,4 +1,4 @@
-/* PNG, JPEG and WebP to RGB: the only file that reads images, and that knows libjpeg-turbo and libwebp. */
+/* PNG, JPEG and WebP to RGB: the only file that reads images, and that knows libwebp. */
 #include "solver/scene/import/images.h"
 
 #include <math.h>

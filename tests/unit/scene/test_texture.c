@@ -1,8 +1,10 @@
 /* Means of images over polygons, and the textures of meshes that are refined, judged by clipping every pixel.
  */
 #include "solver/base/random.h"
+#include "solver/scene/import/picture_files.h"
 #include "solver/scene/mesh_cells.h"
 #include "solver/scene/texture.h"
+#include "support/scene.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -260,6 +262,73 @@ START_TEST(parts_of_faces_add_up) {
 }
 END_TEST
 
+/* Saves the mesh under another state of its pictures; the reader must say so, or *loaded is filled. */
+static void save_and_load(const mesh *m, const char *path, const char *says, mesh *loaded) {
+    lam_error error = {0};
+    store *s = NULL;
+    ck_assert_int_eq(store_create(path, &s, &error), LAM_OK);
+    ck_assert_msg(mesh_save(m, NULL, s, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(store_seal(s, &error) == LAM_OK, "%s", error.message);
+    ck_assert_int_eq(store_open(path, &s, &error), LAM_OK);
+    const lam_status status = mesh_load(s, loaded, NULL, &error);
+    store_close(s);
+    if (says == NULL) {
+        ck_assert_msg(status == LAM_OK, "%s", error.message);
+        return;
+    }
+    ck_assert_int_eq(status, LAM_ERR_FORMAT);
+    ck_assert_msg(strstr(error.message, says) != NULL, "%s", error.message);
+}
+
+START_TEST(stores_keep_pictures) {
+    char folder[64], path[256];
+    mesh m = textured_mesh(), loaded = {0};
+    lam_error error = {0};
+    folder_make(folder);
+    snprintf(path, sizeof path, "%s/a.h5", folder);
+    strcpy(m.source_hash, "0");
+    ck_assert_int_eq(mesh_keep_pictures(&m, &error), LAM_OK);
+    ck_assert_ptr_null(m.textures);
+    mesh_pictures *p = m.pictures;
+    ck_assert_ptr_nonnull(p);
+    ck_assert_uint_eq(p->n_surfaces, 1);
+    ck_assert_uint_eq(p->n_files, 1);
+    ck_assert_float_eq_tol(p->texcoord[1][2][1], 1.4f, 1e-5f);
+    save_and_load(&m, path, NULL, &loaded);
+    ck_assert_int_eq(memcmp(loaded.pictures->texcoord, p->texcoord, m.n * sizeof *p->texcoord), 0);
+    ck_assert_int_eq(memcmp(loaded.pictures->surfaces, p->surfaces, sizeof *p->surfaces), 0);
+    ck_assert_int_eq(memcmp(loaded.pictures->bytes, p->bytes, p->start[1]), 0);
+    mesh_free(&loaded);
+    const mesh_pictures sound = *p;
+    const struct picture_surface surface = p->surfaces[0];
+    p->surface[1] = 1;
+    save_and_load(&m, path, "/mesh/surface[1] = 1, there are 1 surfaces", &loaded);
+    p->surface[1] = 0;
+    p->texcoord[1][2][0] = INFINITY;
+    save_and_load(&m, path, "/mesh/texcoord[1][2][0] = inf, must be finite", &loaded);
+    p->texcoord[1][2][0] = 0;
+    p->surfaces[0].file = 1;
+    save_and_load(&m, path, "/mesh/surface_image[0] = 1, 0, 0, there are 1 images", &loaded);
+    p->surfaces[0] = surface;
+    p->surfaces[0].wrap[1] = 3;
+    save_and_load(&m, path, "/mesh/surface_image[0] = 0, 0, 3, ", &loaded);
+    p->surfaces[0] = surface;
+    p->surfaces[0].factor[2] = NAN;
+    save_and_load(&m, path, "/mesh/surface_factor[0][2] = ", &loaded);
+    p->surfaces[0] = surface;
+    p->start[0] = 1;
+    save_and_load(&m, path, "/mesh/image_start[0] = 1, must ascend from 0", &loaded);
+    p->start[0] = 0;
+    p->n_files = 0;
+    save_and_load(&m, path, "/mesh/image_start must end with", &loaded);
+    *p = sound;
+    save_and_load(&m, path, NULL, &loaded);
+    mesh_free(&loaded);
+    mesh_free(&m);
+    folder_remove(folder);
+}
+END_TEST
+
 START_TEST(quads_that_are_not_affine_are_known) {
     static const double p[4][3] = {{0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {0, 1, 0}};
     const double straight[4] = {0, 1, 1, 0}, bent[4] = {0, 1, .9, 0}, constant[4] = {3, 3, 3, 3};
@@ -275,6 +344,7 @@ int main(void) {
     tcase_add_loop_test(tests, means_are_those_of_clipped_pixels, 0, 9);
     tcase_add_test(tests, degenerate_and_huge_maps_have_means);
     tcase_add_test(tests, parts_of_faces_add_up);
+    tcase_add_test(tests, stores_keep_pictures);
     tcase_add_test(tests, quads_that_are_not_affine_are_known);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
