@@ -58,9 +58,7 @@ static void refuse_solve(request *r) {
     static const char *const reasons[N_REFUSALS] = {
         [REFUSED_FULL] = "too many solves wait or run (--max-inflight); try again",
         [REFUSED_DEADLINE] = "the answer was not ready in time (--request-timeout, Lambert-Timeout)",
-        [REFUSED_MEMORY] =
-            "other requests held the memory that it needs (--max-request-memory), until its time was "
-            "over or the requests that waited held too much themselves; try again",
+        [REFUSED_MEMORY] = "other requests hold the memory that it needs (--max-request-memory); try again",
         [REFUSED_GONE] = "the client ended its sending before the answer was ready",
         [REFUSED_REFINEMENTS] = "too many refinements wait or run (a quarter of --max-inflight); try again",
         [REFUSED_SHARE] = "all places are taken, and this client has most of them; try again",
