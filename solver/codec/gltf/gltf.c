@@ -144,7 +144,8 @@ static bool say_floats(buffer *b, const char *name, const float values[3]) {
 static bool say_extras(const writer *w, buffer *b) {
     bool good = buffer_append_text(b, "\"extras\":{\"lambert\":{\"name\":") &&
                 json_write_text(b, w->m->name) &&
-                buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu", w->m->n, w->m->n_channels);
+                buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"up\":\"%c\"", w->m->n,
+                              w->m->n_channels, w->m->up);
     if (w->m->light != NULL)
         good = good && buffer_append_text(b, ",\"white\":") && json_write_double(b, w->m->light->white);
     if (w->m->kind != NULL)

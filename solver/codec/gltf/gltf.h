@@ -51,8 +51,8 @@ typedef struct gltf_mesh {
  *     blue, of others the grey of their mean.
  *   - With light each column is one more attribute (a float), and COLOR_0 its colour, cut to [0, 1].
  * Materials are then white and unlit (KHR_materials_unlit), and extras say "white".
- *   - extras of the file and of the root node: {"lambert":{"name","elements","channels","kind"}}; of the node
- *     of a group: {"group","elements"}.
+ *   - extras of the file and of the root node: {"lambert":{"name","elements","channels","up","kind"}}, `up`
+ *     being the axis that was turned into y; of the node of a group: {"group","elements"}.
  * O(n). Errors: LAM_ERR_ARGUMENT (more than GLTF_ELEMENTS_MOST elements, more bytes than a file of glTF has,
  * a position beyond float), LAM_ERR_MEMORY; out is then empty. */
 lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error);

@@ -23,6 +23,8 @@ export interface Floats {
     solveMs: number | null;
 }
 
+export type Vector = [number, number, number];
+
 export interface Description {
     name: string;
     elements: number;
@@ -33,6 +35,8 @@ export interface Description {
     bytes: number;
     groups: { name: string; elements: number }[];
     emitters: string[] | null;
+    /** In the axes of the store, metres; the field of view is that of the height, in degrees. */
+    cameras?: { name: string; eye: Vector; direction: Vector; up: Vector; fov: number }[];
     sky: { tiling: string; tiles: number; ground_albedo: number } | null;
     error: { [light: string]: ErrorFigures | GroupErrors[] } & { [light in "single" | "lights" | "random" | "sky"]?: ErrorFigures } | null;
     provenance?: { [name: string]: unknown };

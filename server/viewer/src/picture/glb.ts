@@ -24,6 +24,8 @@ export interface SceneMesh {
     groupOf: Uint32Array;
     area: Float64Array;
     groups: MeshGroup[];
+    /** The axis of the store that became y. */
+    up: "x" | "y" | "z";
 }
 
 interface Accessor { bufferView: number; byteOffset?: number; componentType: number; count: number; type: string }
@@ -37,7 +39,7 @@ interface Gltf {
         emissiveFactor?: number[];
         extensions?: { KHR_materials_emissive_strength?: { emissiveStrength?: number } };
     }[];
-    scenes?: { extras?: { lambert?: { elements?: number } } }[];
+    extras?: { lambert?: { up?: string } };
 }
 
 const WIDTHS: { [type: string]: number } = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
@@ -110,7 +112,13 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
         }
         return { name, elements: ascending, area: total, ...materialOf(gltf, material) };
     });
-    return { elements, positions, normals, elementOf, index, groupOf, area, groups };
+    const { up } = gltf.extras?.lambert ?? {};
+    return { elements, positions, normals, elementOf, index, groupOf, area, groups, up: up === "x" || up === "z" ? up : "y" };
+}
+
+/** A direction or place of the store's axes in those of the picture, as the daemon turns the mesh. */
+export function turned(up: SceneMesh["up"], [x, y, z]: readonly [number, number, number]): [number, number, number] {
+    return up === "x" ? [-y, x, z] : up === "z" ? [x, z, -y] : [x, y, z];
 }
 
 function addAreas(p: Float32Array, elementOf: Uint32Array, index: Uint32Array, area: Float64Array): void {
