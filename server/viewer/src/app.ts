@@ -27,7 +27,7 @@ export interface Timing {
     solve: number | null;
 }
 
-type Event = "scene" | "scenes" | "field" | "pick" | "hover" | "timing" | "lost" | "found" | "problem" | "token";
+type Event = "scene" | "scenes" | "field" | "pick" | "hover" | "timing" | "lost" | "found" | "problem" | "token" | "theme";
 type Side = 0 | 1;
 
 /** The store was replaced by one of another mesh. */

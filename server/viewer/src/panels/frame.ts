@@ -46,8 +46,10 @@ export function makeBar(app: App): HTMLElement {
     return make("header", {}, make("h1", {}, "Lambert"), scenes, make("div", { class: "row", role: "group", "aria-label": "State" }, undo, redo, share, theme));
 }
 
+/** Takes over the colours of a page that became dark or light. */
 export function setBackground(app: App): void {
     app.stage.background = getComputedStyle(document.documentElement).getPropertyValue("--stage").trim();
+    app.tell("theme");
 }
 
 /** Tabs after the pattern of WAI-ARIA: arrows move between them. */

@@ -78,6 +78,7 @@ export function skyPanel(app: App): Panel {
         day.stop();
         update();
     });
+    app.on("theme", update);
     app.store.listen((now, before) => {
         if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit) update();
     });

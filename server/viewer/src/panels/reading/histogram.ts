@@ -25,6 +25,7 @@ export class Histogram {
         this.element.append(this.head, this.place, make("div", { class: "row" }, make("span", {}, "Palette"), this.low, make("span", {}, "to"), this.high,
             make("button", { type: "button", title: "Ends of the palette from the values", onclick: () => this.setRange(NaN, NaN) }, "Auto")));
         app.on("field", () => this.draw());
+        app.on("theme", () => this.draw());
         app.store.listen((now, before) => { if (now.view !== before.view) this.draw(); });
         new MutationObserver(() => this.plot?.redraw()).observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });
         new ResizeObserver(() => { if (this.plot !== null && this.place.clientWidth > 0) this.plot.setSize({ width: this.place.clientWidth, height: HEIGHT }); }).observe(this.place);
