@@ -33,14 +33,28 @@ static request_memory *find_first(const request_ledger *ledger) {
     return first;
 }
 
-/* True if the request, which needs so much in all, may not overtake the first one that waits. */
-static bool is_held_up(const request_ledger *ledger, const request_memory *m, size_t wanted) {
-    if (ledger->first == NULL) return false;
+/* The bytes of those who wait: all that is taken once others are done. */
+static shares find_held_waiting(const request_ledger *ledger) {
+    shares then = {.room = ledger->all.room};
+    for (const request_memory *m = ledger->first; m != NULL; m = m->after)
+        shares_add(&then, m->client, m->held);
+    return then;
+}
+
+/* The first that waits, if it was patient and waits only for those that do not wait themselves; else NULL. */
+static const request_memory *find_patient(const request_ledger *ledger) {
+    if (ledger->first == NULL) return NULL;
     const request_memory *first = find_first(ledger);
-    return first != m && wanted >= first->wanted / SMALL_PART &&
-           (first->client == m->client ||
-            shares_of(&ledger->all, m->client) > shares_of(&ledger->all, first->client)) &&
-           clock_seconds() - first->since > REQUEST_MEMORY_PATIENCE;
+    if (clock_seconds() - first->since <= REQUEST_MEMORY_PATIENCE) return NULL;
+    const shares then = find_held_waiting(ledger);
+    return shares_allow(&then, first->client, first->wanted - first->held) ? first : NULL;
+}
+
+/* True if the request, which needs so much in all, may not overtake the patient one (or NULL). */
+static bool is_held_up(const request_memory *m, size_t wanted, const request_memory *patient) {
+    const shares *all = &m->ledger->all;
+    return patient != NULL && patient != m && wanted >= patient->wanted / SMALL_PART &&
+           (patient->client == m->client || shares_of(all, m->client) > shares_of(all, patient->client));
 }
 
 static void unlist(request_memory *m) {
@@ -64,10 +78,11 @@ static void wake(request_memory *m, bool refused) {
 /* Grants what is free in the order of the head of request_memory.h. O(waiting) for each that goes on. */
 static void grant(request_ledger *ledger) {
     for (;;) {
+        const request_memory *patient = find_patient(ledger);
         request_memory *best = NULL;
         for (request_memory *m = ledger->first; m != NULL; m = m->after)
             if (shares_allow(&ledger->all, m->client, m->wanted - m->held) && is_before(ledger, m, best) &&
-                !is_held_up(ledger, m, m->wanted))
+                !is_held_up(m, m->wanted, patient))
                 best = m;
         if (best == NULL) return;
         best->assured = best->wanted;
@@ -87,9 +102,7 @@ static size_t held_waiting(const request_ledger *ledger, uint64_t client) {
 
 /* True if one of those who wait could go on once all others are done. */
 static bool can_any_go_on(const request_ledger *ledger) {
-    shares then = {.room = ledger->all.room};
-    for (const request_memory *m = ledger->first; m != NULL; m = m->after)
-        shares_add(&then, m->client, m->held);
+    const shares then = find_held_waiting(ledger);
     for (const request_memory *m = ledger->first; m != NULL; m = m->after)
         if (shares_allow(&then, m->client, m->wanted - m->held)) return true;
     return ledger->first == NULL;
@@ -121,8 +134,8 @@ static void settle(request_ledger *ledger) {
 static bool take(request_memory *m, size_t bytes) {
     request_ledger *ledger = m->ledger;
     const size_t more = bytes > m->granted ? bytes - m->granted : 0;
-    if (more > 0 &&
-        (!shares_allow(&ledger->all, m->client, more) || is_held_up(ledger, m, bytes_plus(m->held, bytes))))
+    if (more > 0 && (!shares_allow(&ledger->all, m->client, more) ||
+                     is_held_up(m, bytes_plus(m->held, bytes), find_patient(ledger))))
         return false;
     shares_add(&ledger->all, m->client, more);
     m->granted -= bytes - more;

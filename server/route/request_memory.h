@@ -8,8 +8,9 @@
  * first, if there is room for all that it was short of; otherwise to the next that has room. The bytes are
  * then its own, so that nobody takes them before it goes on. Once the first of this order has waited for
  * REQUEST_MEMORY_PATIENCE seconds, it is overtaken no more by requests of at least a sixteenth of its size,
- * of its own client or of those that hold more. Where requests that wait hold so much by their bodies that
- * none of them could go on, the last one of the client that holds most of it is refused. */
+ * of its own client or of those that hold more; unless it would have no room either when all but those that
+ * wait are done. Where requests that wait hold so much by their bodies that none of them could go on, the
+ * last one of the client that holds most of it is refused. */
 #ifndef LAMBERT_SERVER_ROUTE_REQUEST_MEMORY_H
 #define LAMBERT_SERVER_ROUTE_REQUEST_MEMORY_H
 

@@ -1,5 +1,6 @@
 """Requests that lack memory (--max-request-memory) wait for it within their time, in a fair order; what can never fit does not."""
 
+import contextlib
 import json
 import pathlib
 import re
@@ -31,9 +32,18 @@ class Case(unittest.TestCase):
         cls.store = pathlib.Path(folder.name) / "big.h5"
         Scene(N, rank=4).write(cls.store, "big", kind="low_rank")
 
+    @contextlib.contextmanager
+    def daemon(self, *options):
+        """Without its clients when it is stopped, so that it has nothing to give up."""
+        self.clients = []
+        with Daemon(self.store, *options, "--timeout", 3600) as daemon:
+            yield daemon
+            for s in self.clients:
+                s.close()
+
     def connect(self, daemon, source="127.0.0.1"):
         s = socket.socket()
-        self.addCleanup(s.close)
+        self.clients.append(s)
         s.settimeout(PATIENCE)
         s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         s.bind((source, 0))
@@ -64,7 +74,7 @@ class Case(unittest.TestCase):
 
 class Waiting(Case):
     def test_a_request_waits_until_others_go(self):
-        with Daemon(self.store, "--max-request-memory", 160 * VECTOR, "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+        with self.daemon("--max-request-memory", 160 * VECTOR) as daemon:
             holders = [self.hold(daemon, 40)]
             last = self.send(daemon, body(50))
             until(lambda: self.waiting(daemon) == 1)
@@ -81,7 +91,7 @@ class Waiting(Case):
             self.assertEqual(metrics(daemon)[("lambertd_request_memory_refused_total", ("why", "full"))], 0)
 
     def test_it_waits_within_its_time(self):
-        with Daemon(self.store, "--max-request-memory", 160 * VECTOR, "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+        with self.daemon("--max-request-memory", 160 * VECTOR) as daemon:
             holder = self.hold(daemon, 40)
             start = time.monotonic()
             answer = read_all(self.send(daemon, body(50), b"Lambert-Timeout: .7", b"Connection: close"))
@@ -101,7 +111,7 @@ class Waiting(Case):
             until(lambda: self.held(daemon) == 0)
 
     def test_the_rest_of_a_body_waits(self):
-        with Daemon(self.store, "--max-request-memory", 12 * MIB, "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+        with self.daemon("--max-request-memory", 12 * MIB) as daemon:
             first = self.send(daemon, b" " * (6 * MIB), length=7 * MIB)
             until(lambda: self.held(daemon) == 6 * MIB)
             text = b" " * (6 * MIB) + body(1)
@@ -117,7 +127,7 @@ class Waiting(Case):
 
     def test_bodies_that_wait_for_each_other(self):
         """Four bodies that leave none of them the room to be read: some are refused, so that the others are served."""
-        with Daemon(self.store, "--max-request-memory", 40 * MIB, "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+        with self.daemon("--max-request-memory", 40 * MIB) as daemon:
             text = b" " * (9 * MIB) + body(10)
             clients = [self.send(daemon, b"", length=len(text), accept=b"application/x-npy") for _ in range(4)]
             senders = [threading.Thread(target=s.sendall, args=(text,)) for s in clients]
@@ -133,7 +143,7 @@ class Waiting(Case):
             until(lambda: self.held(daemon) == 0)
 
     def test_places_are_for_those_that_wait_too(self):
-        with Daemon(self.store, "--max-request-memory", 160 * VECTOR, "--timeout", 3600, "--shutdown-timeout", 1, "--max-inflight", 4) as daemon:
+        with self.daemon("--max-request-memory", 160 * VECTOR, "--max-inflight", 4) as daemon:
             holder = self.hold(daemon, 40)
             waiting = [self.send(daemon, body(50)) for _ in range(4)]
             until(lambda: self.waiting(daemon) == 4)
@@ -153,7 +163,7 @@ class Waiting(Case):
             self.assertEqual(sorted(statuses), [b"200"] * 3 + [b"503"])
 
     def test_the_daemon_ends(self):
-        with Daemon(self.store, "--max-request-memory", 160 * VECTOR, "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+        with self.daemon("--max-request-memory", 160 * VECTOR, "--shutdown-timeout", 1) as daemon:
             self.hold(daemon, 40)
             waiting = self.send(daemon, body(50))
             until(lambda: self.waiting(daemon) == 1)
@@ -165,7 +175,7 @@ class Waiting(Case):
 class Fair(Case):
     def test_one_client_has_not_all_of_it(self):
         """Answers that one client does not read leave room for the requests of another, of which two do not take all either."""
-        with Daemon(self.store, "--max-request-memory", 160 * VECTOR, "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+        with self.daemon("--max-request-memory", 160 * VECTOR) as daemon:
             for _ in range(12):
                 self.send(daemon, body(12))
             until(lambda: self.waiting(daemon) >= 2)
@@ -176,7 +186,7 @@ class Fair(Case):
 
     def test_one_client_has_not_all_bodies(self):
         """Bodies that one client sends slowly leave --max-buffered room for those of another."""
-        with Daemon(self.store, "--max-body", "2M", "--max-buffered", "8M", "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+        with self.daemon("--max-body", "2M", "--max-buffered", "8M") as daemon:
             slow = [self.send(daemon, b" " * (MIB - 1), length=MIB) for _ in range(6)]
             until(lambda: metrics(daemon)[("lambertd_body_bytes",)] == 6 * (MIB - 1))
             refused = self.send(daemon, b" " * MIB)
@@ -188,7 +198,7 @@ class Fair(Case):
 
     def test_who_holds_least_goes_first(self):
         """Of two that wait the one of the client that holds nothing is answered, though it came later."""
-        with Daemon(self.store, "--max-request-memory", 160 * VECTOR, "--timeout", 3600, "--shutdown-timeout", 1) as daemon:
+        with self.daemon("--max-request-memory", 160 * VECTOR) as daemon:
             self.hold(daemon, 20)
             holder = self.hold(daemon, 20, source="127.0.0.3")
             greedy = self.send(daemon, body(49))
@@ -203,7 +213,7 @@ class Fair(Case):
 
     def test_small_ones_do_not_overtake_for_ever(self):
         """A client that asks for a tenth of the memory again and again, several at a time, beside one that needs nearly all."""
-        with Daemon(self.store, "--max-request-memory", 160 * VECTOR, "--timeout", 3600, "--shutdown-timeout", 1, "--threads", 2) as daemon:
+        with self.daemon("--max-request-memory", 160 * VECTOR, "--threads", 2) as daemon:
             stop = threading.Event()
 
             def ask():

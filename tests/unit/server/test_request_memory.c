@@ -206,6 +206,23 @@ START_TEST(patience) {
 }
 END_TEST
 
+/* The patient one waits for bodies of others that wait: these may go on. */
+START_TEST(patience_holds_up_nobody_in_vain) {
+    stage s;
+    begin(&s);
+    ck_assert(take(&s.m[0], 310));
+    ck_assert(take(&s.m[1], 100));
+    ck_assert(take(&s.m[2], 400));
+    take_later(&s.m[1], 600);
+    take_later(&s.m[2], 50);
+    s.m[1].since -= 2 * REQUEST_MEMORY_PATIENCE;
+    request_memory_give_back(&s.m[0], 310);
+    ck_assert_uint_eq(n_woken, 1);
+    ck_assert(woken[0] == &s.m[2] && !woken[0]->refused);
+    end(&s);
+}
+END_TEST
+
 START_TEST(nobody_waits_for_those_that_wait) {
     stage s;
     begin(&s);
@@ -249,6 +266,7 @@ int main(void) {
     tcase_add_test(tests, who_waits_is_granted_all_of_it);
     tcase_add_test(tests, who_goes_first);
     tcase_add_test(tests, patience);
+    tcase_add_test(tests, patience_holds_up_nobody_in_vain);
     tcase_add_test(tests, nobody_waits_for_those_that_wait);
     tcase_add_test(tests, those_that_leave);
     suite_add_tcase(suite, tests);
