@@ -174,7 +174,7 @@ class Headers(unittest.TestCase):
                  "lambertd_scenes_unverified": "gauge", "lambertd_connections": "gauge", "lambertd_connections_most": "gauge",
                  "lambertd_connections_cut": "counter", "lambertd_access_log_lost": "counter",
                  "lambertd_queue_wait_seconds": "histogram", "lambertd_refining": "gauge", "lambertd_solves_refused": "counter"}
-        kinds |= {"lambertd_problems": "counter", "lambertd_malformed_requests": "counter",
+        kinds |= {"lambertd_problems": "counter", "lambertd_connections_refused": "counter", "lambertd_malformed_requests": "counter",
                   "lambertd_verified_timestamp_seconds": "gauge"}
         kinds |= {"lambertd_request_memory_bytes": "gauge", "lambertd_request_memory_limit_bytes": "gauge",
                   "lambertd_request_memory_refused": "counter", "lambertd_request_memory_waiting": "gauge",
