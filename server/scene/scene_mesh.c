@@ -12,6 +12,7 @@ struct scene_mesh {
     const scene *of;
     char up;
     size_t n_vertices;
+    size_t n_textured, n_textures, image_bytes; /* of gltf_sizes; 0 where no image is shown */
     uint64_t tag;
     pthread_mutex_t lock; /* of kept */
     kept_bytes *kept[SCENE_MESH_FORMS];
@@ -47,6 +48,25 @@ done:
     return status;
 }
 
+/* Images are those of three channels, and of the store's own reflectances. */
+static lam_status read_sizes_of_images(store *s, scene_mesh *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_type type;
+    size_t dims[STORE_MAX_RANK];
+    int rank;
+    if (made->of->n_channels != 3 || !store_has(s, "/mesh/surface")) return LAM_OK;
+    made->n_textured = made->of->n;
+    TRY(store_array_info(s, "/mesh/surface_image", &type, &rank, dims, error));
+    made->n_textures = dims[0];
+    TRY(store_array_info(s, "/mesh/image_start", &type, &rank, dims, error));
+    made->n_textures += dims[0];
+    TRY(store_array_info(s, "/mesh/images", &type, &rank, dims, error));
+    /* Each begins at a multiple of 4. */
+    made->image_bytes = dims[0] + 3 * made->n_textures;
+done:
+    return status;
+}
+
 /* The checksum of the store stands for its arrays; the description for names, and for the reflectances of a
  * variant. */
 static lam_status make_tag(scene_mesh *mesh, lam_error *error) {
@@ -71,6 +91,7 @@ lam_status scene_mesh_create(store *s, const scene *of, scene_mesh **out, lam_er
     } else {
         TRY(read_up(s, &made->up, error));
         TRY(read_vertices(s, &made->n_vertices, error));
+        TRY(read_sizes_of_images(s, made, error));
     }
     TRY(make_tag(made, error));
     *out = made;
@@ -154,7 +175,12 @@ static size_t times(size_t a, size_t b) {
 
 static gltf_sizes sizes_of(const scene_mesh *mesh) {
     const scene *s = mesh->of;
-    gltf_sizes sizes = {.n = s->n, .n_vertices = mesh->n_vertices, .n_groups = s->groups.n_groups};
+    gltf_sizes sizes = {.n = s->n,
+                        .n_vertices = mesh->n_vertices,
+                        .n_groups = s->groups.n_groups,
+                        .n_textured = mesh->n_textured,
+                        .n_textures = mesh->n_textures,
+                        .image_bytes = mesh->image_bytes};
     sizes.n_texts = strlen(s->name);
     for (size_t g = 0; g < s->groups.n_groups; g++) sizes.n_texts += strlen(s->groups.names[g]);
     return sizes;
@@ -168,13 +194,17 @@ size_t scene_mesh_bytes_most(const scene_mesh *mesh) {
 size_t scene_mesh_build_bytes(const scene_mesh *mesh) {
     const gltf_sizes sizes = sizes_of(mesh);
     const size_t element = 4 * sizeof(uint32_t) + (3 + mesh->of->n_channels) * sizeof(float);
-    return sum(sum(times(mesh->n_vertices, 3 * sizeof(double)), times(sizes.n, element)),
+    const size_t on_element = sizeof(uint32_t) + 8 * sizeof(float), of_texture = 4 * sizeof(uint64_t) * 3;
+    const size_t images =
+        sum(times(sizes.n_textured, on_element), sum(times(sizes.n_textures, of_texture), sizes.image_bytes));
+    return sum(sum(times(mesh->n_vertices, 3 * sizeof(double)), sum(times(sizes.n, element), images)),
                sum(gltf_bytes_most(&sizes), gltf_work_bytes(&sizes)));
 }
 
 /* Arrays of /mesh that a scene does not hold. */
 typedef struct arrays {
     void *vertices, *elements, *normal, *emission;
+    scene_pictures *pictures;
 } arrays;
 
 static lam_status read_arrays(store *s, const scene_mesh *mesh, arrays *a, lam_error *error) {
@@ -184,6 +214,7 @@ static lam_status read_arrays(store *s, const scene_mesh *mesh, arrays *a, lam_e
     TRY(store_read(s, "/mesh/elements", STORE_U32, 2, (size_t[]){n, 4}, &a->elements, error));
     TRY(store_read(s, "/mesh/normal", STORE_F32, 2, (size_t[]){n, 3}, &a->normal, error));
     TRY(store_read(s, "/mesh/emission", STORE_F32, 2, (size_t[]){C, n}, &a->emission, error));
+    if (mesh->n_textured > 0) TRY(scene_pictures_load(s, n, &a->pictures, error));
     const uint32_t(*elements)[4] = a->elements;
     for (size_t i = 0; i < n; i++)
         for (int k = 0; k < 4; k++)
@@ -203,7 +234,7 @@ lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *erro
     lam_status status = LAM_OK;
     const scene *of = mesh->of, *root = root_of(of);
     store *s = NULL;
-    arrays a = {NULL, NULL, NULL, NULL};
+    arrays a = {.vertices = NULL};
     lam_error cause;
     TRY(store_open(root->path, &s, error));
     if (strcmp(store_identity_of(s)->digest, root->identity.digest) != 0)
@@ -222,11 +253,14 @@ lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *erro
                          .reflectance = of->reflectance,
                          .emission = a.emission,
                          .groups = &root->groups,
+                         .pictures = a.pictures,
                          .up = mesh->up};
     status = gltf_write(&m, out, &cause);
     if (status != LAM_OK) FAIL(error, status, "%s: %s", root->path, cause.message);
 done:
     store_close(s);
+    if (a.pictures != NULL) scene_pictures_free(a.pictures);
+    free(a.pictures);
     free(a.vertices);
     free(a.elements);
     free(a.normal);

@@ -22,7 +22,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_write(s, "/mesh/group", STORE_U32, 1, &m->n, m->group, error));
     TRY(store_write_texts(s, "/mesh/group_names", m->n_groups, (const char *const *)m->group_names, error));
     if (row_sums != NULL) TRY(store_write(s, "/mesh/row_sums", STORE_F64, 1, &m->n, row_sums, error));
-    TRY(mesh_pictures_save(m, s, error));
+    TRY(scene_pictures_save(m->pictures, m->n, s, error));
     TRY(store_set_text(s, "/mesh", "geometry_hash", hash, error));
     TRY(store_set_text(s, "/mesh", "source_hash", m->source_hash, error));
     TRY(store_set_text(s, "/mesh", "name", m->name, error));
@@ -172,7 +172,7 @@ lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
     if (store_has(s, "/mesh/row_sums") || store_has(s, "/form_factors") || store_has(s, "/sky"))
         TRY(load_f64(s, "/mesh/row_sums", loaded.n, 0, false, &sums, error));
     TRY(scene_cameras_load(s, &loaded.n_cameras, &loaded.cameras, error));
-    TRY(mesh_pictures_load(s, &loaded, error));
+    TRY(scene_pictures_load(s, loaded.n, &loaded.pictures, error));
     *m = loaded;
     loaded = (mesh){0};
     if (row_sums != NULL) {

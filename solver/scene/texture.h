@@ -3,6 +3,7 @@
 #ifndef LAMBERT_SCENE_TEXTURE_H
 #define LAMBERT_SCENE_TEXTURE_H
 
+#include "solver/base/scene_pictures.h"
 #include "solver/scene/mesh.h"
 
 /* No image, or an element without a textured face. */
@@ -70,28 +71,10 @@ lam_status mesh_textures_apply(mesh *m, lam_error *error);
 void mesh_textures_hold(mesh *m, mesh_textures *t);
 void mesh_textures_release(mesh *m);
 
-/* Images as files, and their places on the elements of a final mesh: for those who show it. */
-typedef struct mesh_pictures {
-    size_t n_surfaces, n_files;
-    uint32_t *surface;       /* [n], or TEXTURE_NONE */
-    float (*texcoord)[4][2]; /* [n], u and v of the corners, v downwards; 0 without a surface or a corner */
-    struct picture_surface {
-        uint32_t file, wrap[2];
-        float factor[3]; /* the reflectance is that of the image times it */
-    } * surfaces;
-    uint64_t *start;      /* [n_files + 1], of each file in bytes */
-    unsigned char *bytes; /* JPEG files, one after the other */
-} mesh_pictures;
-
 /* Fills surface, texcoord and surfaces of out by the textures of m whose reflectance has an image, surfaces
  * of one image and factor once; files are those of the images. False with LAM_OK where there is none. */
-lam_status mesh_pictures_place(const mesh *m, mesh_pictures *out, bool *any, lam_error *error);
+lam_status mesh_pictures_place(const mesh *m, scene_pictures *out, bool *any, lam_error *error);
 void mesh_pictures_drop(mesh *m);
-void mesh_pictures_free(mesh_pictures *p);
-
-/* The arrays of /mesh that hold them; loading leaves NULL where there are none, and checks every index. */
-lam_status mesh_pictures_save(const mesh *m, store *s, lam_error *error);
-lam_status mesh_pictures_load(store *s, mesh *m, lam_error *error);
 
 /* The mean of an image over a polygon of n <= 4 corners in u and v, linear. table: texture_table_create. */
 typedef struct texture_table texture_table;

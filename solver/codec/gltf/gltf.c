@@ -19,26 +19,35 @@ static const uint32_t magic = 0x46546C67, version = 2, chunk_json = 0x4E4F534A, 
 enum { TYPE_FLOAT = 5126, TYPE_U32 = 5125, TARGET_VERTICES = 34962, TARGET_INDICES = 34963 };
 
 /* The views of the binary chunk, in this order; each group has one accessor in each. With light there is a
- * colour, and a view for each column. */
+ * colour, and a view for each column. With pictures there are places in the image and reflectances, which
+ * only the vertices of groups with an image have, and then a view for each image. */
 enum { VIEW_POSITION, VIEW_NORMAL, VIEW_ELEMENT, VIEW_INDEX, VIEW_COLOUR, VIEW_COLUMN };
+enum { VIEW_TEXCOORD = VIEW_COLOUR, VIEW_REFLECTANCE, VIEW_IMAGE };
 
 /* A group's part of the file. */
 typedef struct part {
     size_t group, n_elements;
+    size_t textured;           /* place among the groups with an image */
     size_t vertex, n_vertices; /* first of the file, and how many */
     size_t index, n_indices;
+    uint32_t surface;       /* of pictures, that of all its elements; or PICTURE_NONE */
+    size_t textured_vertex; /* first among those of groups with an image */
     float low[3], high[3];
     double reflectance[3], emission[3];
 } part;
+
+_Static_assert(sizeof(part) <= GLTF_PART_BYTES, "gltf_work_bytes counts less");
 
 typedef struct writer {
     const gltf_mesh *m;
     corner_normals s;
     float (*normals)[3]; /* [4 elements of the largest group] */
     part *parts;         /* [n_parts]: the groups that have elements */
-    size_t n_parts, n_vertices, n_indices;
-    size_t n_views;
-    size_t *view; /* [n_views + 1]: offsets in the binary chunk, and its length */
+    size_t n_parts, n_vertices, n_indices, n_textured_vertices;
+    size_t n_views;                 /* with accessors */
+    const scene_pictures *pictures; /* NULL where no group has an image */
+    size_t n_textured, n_images;
+    size_t *view; /* [n_views + n_images + 1]: offsets in the binary chunk, and its length */
     buffer json;
 } writer;
 
@@ -99,10 +108,36 @@ static void measure_part(writer *w, part *p) {
     mean_colour(m, p->group, m->emission, p->emission);
 }
 
-/* Bytes of an item of a view. */
-static size_t width_of(size_t view) {
-    const bool vector = view == VIEW_POSITION || view == VIEW_NORMAL || view == VIEW_COLOUR;
-    return vector ? 3 * sizeof(float) : sizeof(float);
+/* Numbers of an item of a view. */
+static size_t count_of(const writer *w, size_t view) {
+    if (view == VIEW_POSITION || view == VIEW_NORMAL) return 3;
+    if (w->pictures != NULL) return view == VIEW_TEXCOORD ? 2 : view == VIEW_REFLECTANCE ? 3 : 1;
+    return view == VIEW_COLOUR ? 3 : 1;
+}
+
+static size_t width_of(const writer *w, size_t view) {
+    return count_of(w, view) * sizeof(float);
+}
+
+/* Items of a view. */
+static size_t items_of(const writer *w, size_t view) {
+    if (view == VIEW_INDEX) return w->n_indices;
+    return w->pictures != NULL && view >= VIEW_TEXCOORD ? w->n_textured_vertices : w->n_vertices;
+}
+
+/* The surface of all elements of a group, or PICTURE_NONE. */
+static uint32_t surface_of(const gltf_mesh *m, size_t g) {
+    const uint32_t *elements = elements_of(m, g);
+    const size_t count = m->groups->start[g + 1] - m->groups->start[g];
+    if (m->pictures == NULL) return PICTURE_NONE;
+    for (size_t j = 1; j < count; j++)
+        if (m->pictures->surface[elements[j]] != m->pictures->surface[elements[0]]) return PICTURE_NONE;
+    return m->pictures->surface[elements[0]];
+}
+
+/* Views begin at multiples of 4. */
+static size_t padded(size_t bytes) {
+    return (bytes + 3) & ~(size_t)3;
 }
 
 static lam_status plan(writer *w, lam_error *error) {
@@ -114,20 +149,36 @@ static lam_status plan(writer *w, lam_error *error) {
     TRY(corner_normals_create(m, &w->s, error));
     w->normals = memory_allocate(gltf_largest_group(m->groups), 4 * sizeof *w->normals, "normals", error);
     w->parts = memory_allocate(m->groups->n_groups, sizeof *w->parts, "glTF", error);
-    w->n_views = m->light != NULL ? VIEW_COLUMN + m->light->n_columns : VIEW_COLOUR;
-    w->view = memory_allocate(w->n_views + 1, sizeof *w->view, "glTF", error);
-    if (w->normals == NULL || w->parts == NULL || w->view == NULL) TRY(LAM_ERR_MEMORY);
+    assert(m->pictures == NULL || (m->light == NULL && m->n_channels == 3));
+    if (w->normals == NULL || w->parts == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t g = 0; g < m->groups->n_groups; g++) {
         const size_t count = m->groups->start[g + 1] - m->groups->start[g];
         if (count == 0) continue;
         part *p = &w->parts[w->n_parts++];
         *p = (part){.group = g, .n_elements = count, .vertex = w->n_vertices, .index = w->n_indices};
         measure_part(w, p);
+        p->surface = surface_of(m, g);
+        p->textured = w->n_textured;
+        p->textured_vertex = w->n_textured_vertices;
+        if (p->surface != PICTURE_NONE) {
+            w->n_textured++;
+            w->n_textured_vertices += p->n_vertices;
+        }
         w->n_vertices += p->n_vertices;
         w->n_indices += p->n_indices;
     }
-    for (size_t v = 0; v < w->n_views; v++)
-        w->view[v + 1] = w->view[v] + width_of(v) * (v == VIEW_INDEX ? w->n_indices : w->n_vertices);
+    w->n_views = m->light != NULL ? VIEW_COLUMN + m->light->n_columns : VIEW_COLOUR;
+    if (w->n_textured > 0) {
+        w->pictures = m->pictures;
+        w->n_views = VIEW_IMAGE;
+        w->n_images = m->pictures->n_files;
+    }
+    w->view = memory_allocate(w->n_views + w->n_images + 1, sizeof *w->view, "glTF", error);
+    if (w->view == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < w->n_views; v++) w->view[v + 1] = w->view[v] + width_of(w, v) * items_of(w, v);
+    for (size_t k = 0; k < w->n_images; k++)
+        w->view[w->n_views + k + 1] =
+            w->view[w->n_views + k] + padded(m->pictures->start[k + 1] - m->pictures->start[k]);
 done:
     return status;
 }
@@ -167,10 +218,22 @@ static bool say_nodes(const writer *w, buffer *b) {
     return good && buffer_append_text(b, "]");
 }
 
-static bool say_attributes(const writer *w, size_t first, buffer *b) {
+/* The first accessor of part k, and that of its place in an image, which stand behind those of all parts. */
+static size_t first_accessor(const writer *w, size_t k) {
+    return (w->pictures != NULL ? (size_t)VIEW_TEXCOORD : w->n_views) * k;
+}
+
+static size_t textured_accessor(const writer *w, const part *p) {
+    return first_accessor(w, w->n_parts) + 2 * p->textured;
+}
+
+static bool say_attributes(const writer *w, const part *p, size_t first, buffer *b) {
     const gltf_light *light = w->m->light;
     bool good = buffer_printf(b, "\"POSITION\":%zu,\"NORMAL\":%zu,\"_ELEMENT\":%zu", first + VIEW_POSITION,
                               first + VIEW_NORMAL, first + VIEW_ELEMENT);
+    if (p->surface != PICTURE_NONE)
+        good = good && buffer_printf(b, ",\"TEXCOORD_0\":%zu,\"_REFLECTANCE\":%zu", textured_accessor(w, p),
+                                     textured_accessor(w, p) + 1);
     if (light == NULL) return good;
     good = good && buffer_printf(b, ",\"COLOR_0\":%zu", first + VIEW_COLOUR);
     for (size_t k = 0; k < light->n_columns; k++)
@@ -185,9 +248,9 @@ static bool say_meshes(const writer *w, buffer *b) {
         good = good && buffer_append_text(b, k > 0 ? ",{\"name\":" : "{\"name\":") &&
                json_write_text(b, w->m->groups->names[w->parts[k].group]) &&
                buffer_append_text(b, ",\"primitives\":[{\"attributes\":{") &&
-               say_attributes(w, w->n_views * k, b) &&
+               say_attributes(w, &w->parts[k], first_accessor(w, k), b) &&
                buffer_printf(b, "},\"indices\":%zu,\"material\":%zu,\"mode\":4}]}",
-                             w->n_views * k + VIEW_INDEX, k);
+                             first_accessor(w, k) + VIEW_INDEX, k);
     return good && buffer_append_text(b, "]");
 }
 
@@ -202,10 +265,14 @@ static bool say_emission(const double emission[3], buffer *b) {
            json_write_double(b, most) && buffer_append_text(b, "}}");
 }
 
-static bool say_surface(const part *p, buffer *b) {
-    const double colour[4] = {fmin(p->reflectance[0], 1), fmin(p->reflectance[1], 1),
-                              fmin(p->reflectance[2], 1), 1};
+static bool say_surface(const writer *w, const part *p, buffer *b) {
+    double colour[4] = {0, 0, 0, 1};
+    const bool has_image = p->surface != PICTURE_NONE;
+    for (int c = 0; c < 3; c++)
+        colour[c] =
+            has_image ? (double)w->pictures->surfaces[p->surface].factor[c] : fmin(p->reflectance[c], 1);
     return say_numbers(b, ",\"pbrMetallicRoughness\":{\"baseColorFactor\":", 4, colour) &&
+           (!has_image || buffer_printf(b, ",\"baseColorTexture\":{\"index\":%u}", p->surface)) &&
            buffer_append_text(b, ",\"metallicFactor\":0,\"roughnessFactor\":1},\"doubleSided\":false") &&
            say_emission(p->emission, b);
 }
@@ -218,7 +285,7 @@ static bool say_materials(const writer *w, buffer *b) {
         good = good && buffer_append_text(b, k > 0 ? ",{\"name\":" : "{\"name\":") &&
                json_write_text(b, w->m->groups->names[p->group]) &&
                (lit ? buffer_append_text(b, ",\"extensions\":{\"KHR_materials_unlit\":{}}")
-                    : say_surface(p, b)) &&
+                    : say_surface(w, p, b)) &&
                buffer_append_text(b, "}");
         emits = emits || fmax(p->emission[0], fmax(p->emission[1], p->emission[2])) > 0;
     }
@@ -229,25 +296,54 @@ static bool say_materials(const writer *w, buffer *b) {
     return good;
 }
 
+/* Textures are numbered as surfaces, each with a sampler of its own. */
+static bool say_textures(const writer *w, buffer *b) {
+    static const unsigned wraps[] = {10497, 33648, 33071}; /* repeat, mirrored, clamp to edge */
+    const scene_pictures *p = w->pictures;
+    if (p == NULL) return true;
+    bool good = buffer_append_text(b, ",\"samplers\":[");
+    for (size_t k = 0; k < p->n_surfaces; k++)
+        good = good && buffer_printf(b, "%s{\"wrapS\":%u,\"wrapT\":%u}", k > 0 ? "," : "",
+                                     wraps[p->surfaces[k].wrap[0]], wraps[p->surfaces[k].wrap[1]]);
+    good = good && buffer_append_text(b, "],\"textures\":[");
+    for (size_t k = 0; k < p->n_surfaces; k++)
+        good = good && buffer_printf(b, "%s{\"sampler\":%zu,\"source\":%u}", k > 0 ? "," : "", k,
+                                     p->surfaces[k].file);
+    good = good && buffer_append_text(b, "],\"images\":[");
+    for (size_t k = 0; k < w->n_images; k++)
+        good = good && buffer_printf(b, "%s{\"bufferView\":%zu,\"mimeType\":\"image/jpeg\"}",
+                                     k > 0 ? "," : "", w->n_views + k);
+    return good && buffer_append_text(b, "]");
+}
+
+static bool say_accessor(const writer *w, const part *p, size_t v, buffer *b) {
+    static const char *const types[] = {NULL, "SCALAR", "VEC2", "VEC3"};
+    const bool of_image = w->pictures != NULL && v >= VIEW_TEXCOORD;
+    const size_t first = v == VIEW_INDEX ? p->index : of_image ? p->textured_vertex : p->vertex;
+    bool good = buffer_printf(b,
+                              "{\"bufferView\":%zu,\"byteOffset\":%zu,\"componentType\":%d,\"count\":%zu,"
+                              "\"type\":\"%s\"",
+                              v, width_of(w, v) * first, v == VIEW_INDEX ? (int)TYPE_U32 : (int)TYPE_FLOAT,
+                              v == VIEW_INDEX ? p->n_indices : p->n_vertices, types[count_of(w, v)]);
+    if (v == VIEW_POSITION)
+        good = good && say_floats(b, ",\"min\":", p->low) && say_floats(b, ",\"max\":", p->high);
+    return good && buffer_append_text(b, "}");
+}
+
 static bool say_accessors(const writer *w, buffer *b) {
     bool good = buffer_append_text(b, ",\"accessors\":[");
+    const size_t n_common = first_accessor(w, 1);
     for (size_t k = 0; k < w->n_parts; k++)
-        for (size_t v = 0; v < w->n_views; v++) {
-            const part *p = &w->parts[k];
-            const size_t first = v == VIEW_INDEX ? p->index : p->vertex;
-            good = good && buffer_printf(
-                               b,
-                               "%s{\"bufferView\":%zu,\"byteOffset\":%zu,\"componentType\":%d,\"count\":%zu,"
-                               "\"type\":\"%s\"",
-                               k + v > 0 ? "," : "", v, width_of(v) * first,
-                               v == VIEW_INDEX ? (int)TYPE_U32 : (int)TYPE_FLOAT,
-                               v == VIEW_INDEX ? p->n_indices : p->n_vertices,
-                               width_of(v) > sizeof(float) ? "VEC3" : "SCALAR");
-            if (v == VIEW_POSITION)
-                good = good && say_floats(b, ",\"min\":", p->low) && say_floats(b, ",\"max\":", p->high);
-            good = good && buffer_append_text(b, "}");
-        }
+        for (size_t v = 0; v < n_common; v++)
+            good = good && (k + v == 0 || buffer_append_text(b, ",")) && say_accessor(w, &w->parts[k], v, b);
+    for (size_t k = 0; k < w->n_parts && w->pictures != NULL; k++)
+        for (size_t v = VIEW_TEXCOORD; v < VIEW_IMAGE && w->parts[k].surface != PICTURE_NONE; v++)
+            good = good && buffer_append_text(b, ",") && say_accessor(w, &w->parts[k], v, b);
     return good && buffer_append_text(b, "]");
+}
+
+static size_t binary_bytes(const writer *w) {
+    return w->view[w->n_views + w->n_images];
 }
 
 static bool say_views(const writer *w, buffer *b) {
@@ -256,10 +352,14 @@ static bool say_views(const writer *w, buffer *b) {
         good = good && buffer_printf(b, "%s{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu,\"target\":%d",
                                      v > 0 ? "," : "", w->view[v], w->view[v + 1] - w->view[v],
                                      v == VIEW_INDEX ? (int)TARGET_INDICES : (int)TARGET_VERTICES);
-        if (v != VIEW_INDEX) good = good && buffer_printf(b, ",\"byteStride\":%zu", width_of(v));
+        if (v != VIEW_INDEX) good = good && buffer_printf(b, ",\"byteStride\":%zu", width_of(w, v));
         good = good && buffer_append_text(b, "}");
     }
-    return good && buffer_printf(b, "],\"buffers\":[{\"byteLength\":%zu}]", w->view[w->n_views]);
+    for (size_t k = 0; k < w->n_images; k++)
+        good = good && buffer_printf(b, ",{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu}",
+                                     w->view[w->n_views + k],
+                                     (size_t)(w->pictures->start[k + 1] - w->pictures->start[k]));
+    return good && buffer_printf(b, "],\"buffers\":[{\"byteLength\":%zu}]", binary_bytes(w));
 }
 
 static bool say_json(writer *w) {
@@ -268,7 +368,7 @@ static bool say_json(writer *w) {
     return buffer_append_text(b, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"lambert " LAMBERT_VERSION
                                  "\"},") &&
            say_extras(w, b) && say_nodes(w, b) && say_meshes(w, b) && say_materials(w, b) &&
-           say_accessors(w, b) && say_views(w, b) && buffer_append_text(b, "}") &&
+           say_textures(w, b) && say_accessors(w, b) && say_views(w, b) && buffer_append_text(b, "}") &&
            buffer_append(b, spaces, (4 - b->length % 4) % 4);
 }
 
@@ -315,6 +415,33 @@ static void put_light(const writer *w, const part *p, char *to) {
         }
 }
 
+/* Writes the places in the image and the reflectances of the part's vertices; to is the binary chunk. */
+static void put_textured(const writer *w, const part *p, char *to) {
+    const gltf_mesh *m = w->m;
+    const uint32_t *elements = elements_of(m, p->group);
+    char *place = to + w->view[VIEW_TEXCOORD] + 8 * p->textured_vertex,
+         *reflectance = to + w->view[VIEW_REFLECTANCE] + 12 * p->textured_vertex;
+    for (size_t j = 0; j < p->n_elements; j++) {
+        const size_t i = elements[j];
+        for (size_t k = 0; k < corners_of(m, i); k++) {
+            place =
+                put_float(put_float(place, w->pictures->texcoord[i][k][0]), w->pictures->texcoord[i][k][1]);
+            reflectance =
+                put_vector(reflectance, (const float[3]){m->reflectance[i], m->reflectance[m->n + i],
+                                                         m->reflectance[2 * m->n + i]});
+        }
+    }
+}
+
+static void put_images(const writer *w, char *to) {
+    for (size_t k = 0; k < w->n_images; k++) {
+        const size_t bytes = w->pictures->start[k + 1] - w->pictures->start[k],
+                     room = w->view[w->n_views + k + 1] - w->view[w->n_views + k];
+        memcpy(to + w->view[w->n_views + k], w->pictures->bytes + w->pictures->start[k], bytes);
+        memset(to + w->view[w->n_views + k] + bytes, 0, room - bytes);
+    }
+}
+
 /* Writes the part's vertices and triangles; to is the binary chunk. */
 static lam_status put_part(writer *w, const part *p, char *to, lam_error *error) {
     lam_status status = LAM_OK;
@@ -339,41 +466,9 @@ static lam_status put_part(writer *w, const part *p, char *to, lam_error *error)
     }
     assert(vertex == p->n_vertices);
     if (m->light != NULL) put_light(w, p, to);
+    if (p->surface != PICTURE_NONE) put_textured(w, p, to);
 done:
     return status;
-}
-
-static size_t sum_of_products(size_t n, const size_t (*terms)[2]) {
-    size_t sum = 0, product;
-    for (size_t k = 0; k < n; k++)
-        if (!size_multiply(terms[k][0], terms[k][1], &product) || __builtin_add_overflow(sum, product, &sum))
-            return SIZE_MAX;
-    return sum;
-}
-
-/* Bytes of JSON: a name stands three times, six characters for one at most; the rest of a group has less than
- * this many characters, and that of the file. */
-#define JSON_OF_NAME 18
-#define JSON_OF_GROUP 2048
-#define JSON_OF_FILE 4096
-
-size_t gltf_bytes_most(const gltf_sizes *sizes) {
-    const size_t element = 4 * 7 * sizeof(float) + 6 * sizeof(uint32_t);
-    return sum_of_products(4, (const size_t[][2]){{sizes->n, element},
-                                                  {sizes->n_texts, JSON_OF_NAME},
-                                                  {sizes->n_groups, JSON_OF_GROUP},
-                                                  {JSON_OF_FILE, 1}});
-}
-
-size_t gltf_work_bytes(const gltf_sizes *sizes) {
-    /* Of a vertex: its position, three numbers, and up to four places of a hash table. */
-    const size_t vertex = 3 * sizeof(float) + 7 * sizeof(uint32_t),
-                 element = 4 * (3 * sizeof(float) + sizeof(uint32_t));
-    return sum_of_products(5, (const size_t[][2]){{sizes->n, element},
-                                                  {sizes->n_vertices, vertex},
-                                                  {sizes->n_texts, JSON_OF_NAME},
-                                                  {sizes->n_groups, JSON_OF_GROUP + sizeof(part)},
-                                                  {JSON_OF_FILE, 1}});
 }
 
 lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error) {
@@ -383,9 +478,9 @@ lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error) {
     TRY(plan(&w, error));
     if (!say_json(&w)) FAIL(error, LAM_ERR_MEMORY, "not enough memory for glTF");
     const size_t head = FILE_HEAD + CHUNK_HEAD + w.json.length + CHUNK_HEAD;
-    if (w.json.length > UINT32_MAX || w.view[w.n_views] > UINT32_MAX - head)
-        FAIL(error, LAM_ERR_ARGUMENT, "%zu bytes, glTF has at most 2^32", head + w.view[w.n_views]);
-    const size_t length = head + w.view[w.n_views];
+    if (w.json.length > UINT32_MAX || binary_bytes(&w) > UINT32_MAX - head)
+        FAIL(error, LAM_ERR_ARGUMENT, "%zu bytes, glTF has at most 2^32", head + binary_bytes(&w));
+    const size_t length = head + binary_bytes(&w);
     if (!buffer_reserve(&made, length))
         FAIL(error, LAM_ERR_MEMORY, "not enough memory for %zu bytes of glTF", length);
     made.length = length;
@@ -393,8 +488,9 @@ lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error) {
     char *at = put(put(put(made.bytes, magic), version), (uint32_t)length);
     at = put(put(at, (uint32_t)w.json.length), chunk_json);
     memcpy(at, w.json.bytes, w.json.length);
-    at = put(put(at + w.json.length, (uint32_t)w.view[w.n_views]), chunk_binary);
+    at = put(put(at + w.json.length, (uint32_t)binary_bytes(&w)), chunk_binary);
     for (size_t k = 0; k < w.n_parts; k++) TRY(put_part(&w, &w.parts[k], at, error));
+    put_images(&w, at);
     *out = made;
     made = (buffer){0};
 done:

@@ -3,6 +3,7 @@
 #ifndef LAMBERT_CODEC_GLTF_GLTF_H
 #define LAMBERT_CODEC_GLTF_GLTF_H
 
+#include "solver/base/scene_pictures.h"
 #include "solver/codec/buffer.h"
 #include "solver/codec/groups.h"
 
@@ -34,8 +35,9 @@ typedef struct gltf_mesh {
     const float *reflectance;      /* [C][n] */
     const float *emission;         /* [C][n], W/m^2 */
     const group_index *groups;
-    const gltf_light *light; /* or NULL */
-    char up;                 /* 'x', 'y' or 'z' */
+    const gltf_light *light;        /* or NULL */
+    const scene_pictures *pictures; /* or NULL; not beside light, and of 3 channels only */
+    char up;                        /* 'x', 'y' or 'z' */
 } gltf_mesh;
 
 /* Appends the mesh to out, which is empty: metres, y up, north -z (as of a scene that has y up), every
@@ -51,6 +53,9 @@ typedef struct gltf_mesh {
  *     blue, of others the grey of their mean.
  *   - With light each column is one more attribute (a float), and COLOR_0 its colour, cut to [0, 1].
  * Materials are then white and unlit (KHR_materials_unlit), and extras say "white".
+ *   - A group whose elements all have one image (pictures) has TEXCOORD_0, _REFLECTANCE (three floats, that
+ * of the element) and a material of the image and its factor in place of the mean. The JPEG files stand in
+ * the file.
  *   - extras of the file and of the root node: {"lambert":{"name","elements","channels","up","kind"}}, `up`
  *     being the axis that was turned into y; of the node of a group: {"group","elements"}.
  * O(n). Errors: LAM_ERR_ARGUMENT (more than GLTF_ELEMENTS_MOST elements, more bytes than a file of glTF has,
@@ -60,7 +65,12 @@ lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error);
 /* The sizes of a mesh that is not read yet; n_texts: bytes of all names. */
 typedef struct gltf_sizes {
     size_t n, n_vertices, n_groups, n_texts;
+    size_t n_textured;              /* elements that may have an image: n or 0 */
+    size_t n_textures, image_bytes; /* surfaces and images together */
 } gltf_sizes;
+
+/* Bytes of a group while the file is made, at most. */
+#define GLTF_PART_BYTES 256
 
 /* Bytes that gltf_write leaves in out of a mesh without light, and bytes that it takes meanwhile beside them,
  * at most; SIZE_MAX where a size_t does not hold them. */

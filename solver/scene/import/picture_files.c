@@ -31,7 +31,7 @@ done:
 }
 
 /* Encodes the images that surfaces name, and renumbers them; others are left out. */
-static lam_status encode_files(const mesh_textures *t, mesh_pictures *p, lam_error *error) {
+static lam_status encode_files(const mesh_textures *t, scene_pictures *p, lam_error *error) {
     lam_status status = LAM_OK;
     uint32_t *number = memory_allocate(t->n_images, sizeof *number, "images", error);
     unsigned char *made = NULL;
@@ -62,7 +62,7 @@ done:
 
 lam_status mesh_keep_pictures(mesh *m, lam_error *error) {
     lam_status status = LAM_OK;
-    mesh_pictures made = {0};
+    scene_pictures made = {0};
     bool any = false;
     TRY(mesh_pictures_place(m, &made, &any, error));
     if (any) {
@@ -71,10 +71,10 @@ lam_status mesh_keep_pictures(mesh *m, lam_error *error) {
         m->pictures = memory_allocate(1, sizeof *m->pictures, "textures", error);
         if (m->pictures == NULL) TRY(LAM_ERR_MEMORY);
         *m->pictures = made;
-        made = (mesh_pictures){0};
+        made = (scene_pictures){0};
     }
     mesh_textures_release(m);
 done:
-    mesh_pictures_free(&made);
+    scene_pictures_free(&made);
     return status;
 }

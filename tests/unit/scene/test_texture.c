@@ -289,7 +289,7 @@ START_TEST(stores_keep_pictures) {
     strcpy(m.source_hash, "0");
     ck_assert_int_eq(mesh_keep_pictures(&m, &error), LAM_OK);
     ck_assert_ptr_null(m.textures);
-    mesh_pictures *p = m.pictures;
+    scene_pictures *p = m.pictures;
     ck_assert_ptr_nonnull(p);
     ck_assert_uint_eq(p->n_surfaces, 1);
     ck_assert_uint_eq(p->n_files, 1);
@@ -299,7 +299,7 @@ START_TEST(stores_keep_pictures) {
     ck_assert_int_eq(memcmp(loaded.pictures->surfaces, p->surfaces, sizeof *p->surfaces), 0);
     ck_assert_int_eq(memcmp(loaded.pictures->bytes, p->bytes, p->start[1]), 0);
     mesh_free(&loaded);
-    const mesh_pictures sound = *p;
+    const scene_pictures sound = *p;
     const struct picture_surface surface = p->surfaces[0];
     p->surface[1] = 1;
     save_and_load(&m, path, "/mesh/surface[1] = 1, there are 1 surfaces", &loaded);
