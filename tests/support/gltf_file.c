@@ -24,6 +24,11 @@ gltf_file gltf_load(const gltf_mesh *m) {
     lam_error error;
     json_error_t why;
     gltf_sizes sizes = {.n = m->n, .n_vertices = m->n_vertices, .n_groups = m->groups->n_groups};
+    if (m->pictures != NULL) {
+        sizes.n_textured = m->n;
+        sizes.n_textures = m->pictures->n_surfaces + m->pictures->n_files;
+        sizes.image_bytes = m->pictures->start[m->pictures->n_files] + 3 * m->pictures->n_files;
+    }
     for (size_t g = 0; g < m->groups->n_groups; g++) sizes.n_texts += strlen(m->groups->names[g]);
     ck_ok(gltf_write(m, &l.file, &error));
     if (m->light == NULL) ck_assert_uint_le(l.file.length, gltf_bytes_most(&sizes));

@@ -245,7 +245,7 @@ export class App {
         const { view, compare } = this.store.now;
         const { low, high } = this.axis;
         this.stage.setLook({
-            picture: view.picture, smooth: view.smooth, tone: view.tone, exposure: 2 ** (view.exposure ?? 0), palette: view.palette,
+            picture: view.picture, smooth: view.smooth, textured: view.textured, tone: view.tone, exposure: 2 ** (view.exposure ?? 0), palette: view.palette,
             range: [low, high], log: view.log, isoLines: view.isoLines, threshold: view.threshold, marked: view.judged !== null,
             compare: compare === null || this.fields[1] === null ? "none" : compare.how, split: compare?.split ?? 0.5,
         });

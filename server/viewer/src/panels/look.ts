@@ -19,6 +19,7 @@ export function lookPanel(app: App): Panel {
     const iso = slider({ label: "Iso-lines", least: 0, most: 20, step: 1, change: (value) => change({ isoLines: Math.round(value) }, "iso") }, 0);
     const follow = tick("Exposure follows the light", view.follow, (on) => change({ follow: on, exposure: on ? null : app.store.now.view.exposure }));
     const smooth = tick("Smooth", view.smooth, (on) => change({ smooth: on }));
+    const textured = tick("Images of materials", view.textured, (on) => change({ textured: on }));
     const log = tick("Logarithmic", view.log, (on) => change({ log: on }));
     const fields = {
         picture: choice("Picture", [["light", "As the eye sees it"], ["false", "False colour"]], view.picture, (picture) => change({ picture, range: null })),
@@ -46,10 +47,11 @@ export function lookPanel(app: App): Panel {
         iso.set(now.isoLines);
         for (const [name, field] of Object.entries(fields))
             (field.querySelector("select") as HTMLSelectElement).value = name === "walk" ? (now.walk ? "walk" : "orbit") : String(now[name as keyof View]);
-        for (const [box, on] of [[follow, now.follow], [smooth, now.smooth], [log, now.log]] as const)
+        for (const [box, on] of [[follow, now.follow], [smooth, now.smooth], [textured, now.textured], [log, now.log]] as const)
             (box.querySelector("input") as HTMLInputElement).checked = on;
         if (document.activeElement !== least) least.value = now.range === null ? "" : String(now.range[0]);
         if (document.activeElement !== most) most.value = now.range === null ? "" : String(now.range[1]);
+        textured.hidden = (app.scene?.mesh.images.length ?? 0) === 0;
         light.hidden = now.picture !== "light";
         colour.hidden = now.picture !== "false";
     };
@@ -67,7 +69,7 @@ export function lookPanel(app: App): Panel {
     update();
     return {
         id: "look", title: "View",
-        element: make("div", {}, fields.picture, light, colour, smooth, fields.unit, fields.walk,
+        element: make("div", {}, fields.picture, light, colour, smooth, textured, fields.unit, fields.walk,
             button("Fit (F)", "Show the whole scene", () => app.cameras.fit(true)), keptViews(app)),
     };
 }

@@ -13,6 +13,19 @@ export interface MeshGroup {
     area: number;
 }
 
+/** An image on all elements of a group. */
+export interface MeshImage {
+    group: number;
+    /** Its part of the index. */
+    first: number;
+    count: number;
+    jpeg: Uint8Array<ArrayBuffer>;
+    /** Linear light of the image times this is the reflectance. */
+    factor: Rgb;
+    /** Continuations in u and v, as glTF numbers them. */
+    wrap: [number, number];
+}
+
 export interface SceneMesh {
     elements: number;
     positions: Float32Array;
@@ -26,6 +39,11 @@ export interface SceneMesh {
     groups: MeshGroup[];
     /** The axis of the store that became y. */
     up: "x" | "y" | "z";
+    images: MeshImage[];
+    /** Of each vertex its place in the image; null without images. */
+    uv: Float32Array | null;
+    /** [3][elements], 1 without an image; null without images. */
+    reflectance: Float32Array | null;
 }
 
 interface Accessor { bufferView: number; byteOffset?: number; componentType: number; count: number; type: string }
@@ -35,10 +53,13 @@ interface Gltf {
     accessors: Accessor[];
     bufferViews: { byteOffset?: number; byteLength: number }[];
     materials?: {
-        pbrMetallicRoughness?: { baseColorFactor?: number[] };
+        pbrMetallicRoughness?: { baseColorFactor?: number[]; baseColorTexture?: { index: number } };
         emissiveFactor?: number[];
         extensions?: { KHR_materials_emissive_strength?: { emissiveStrength?: number } };
     }[];
+    textures?: { sampler?: number; source: number }[];
+    samplers?: { wrapS?: number; wrapT?: number }[];
+    images?: { bufferView?: number }[];
     extras?: { lambert?: { up?: string } };
 }
 
@@ -113,7 +134,53 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
         return { name, elements: ascending, area: total, ...materialOf(gltf, material) };
     });
     const { up } = gltf.extras?.lambert ?? {};
-    return { elements, positions, normals, elementOf, index, groupOf, area, groups, up: up === "x" || up === "z" ? up : "y" };
+    const mesh: SceneMesh = {
+        elements, positions, normals, elementOf, index, groupOf, area, groups, up: up === "x" || up === "z" ? up : "y",
+        images: [], uv: null, reflectance: null,
+    };
+    addImages(mesh, file, start, gltf, parts.map(({ primitive }) => primitive));
+    return mesh;
+}
+
+type Primitive = Gltf["meshes"][number]["primitives"][number];
+
+/** Takes in images, the places of vertices in them, and the reflectances that their groups' elements have. */
+function addImages(mesh: SceneMesh, file: ArrayBuffer, start: number, gltf: Gltf, primitives: readonly Primitive[]): void {
+    const floats = (index: number): Float32Array => {
+        const accessor = gltf.accessors[index], view = gltf.bufferViews[accessor.bufferView];
+        return new Float32Array(file, start + (view.byteOffset ?? 0) + (accessor.byteOffset ?? 0), accessor.count * WIDTHS[accessor.type]);
+    };
+    let vertex = 0, first = 0;
+    primitives.forEach((primitive, group) => {
+        const vertices = gltf.accessors[primitive.attributes.POSITION].count, { count } = gltf.accessors[primitive.indices];
+        const material = primitive.material === undefined ? undefined : gltf.materials?.[primitive.material]?.pbrMetallicRoughness;
+        const texture = material?.baseColorTexture === undefined ? undefined : gltf.textures?.[material.baseColorTexture.index];
+        const view = texture === undefined ? undefined : gltf.bufferViews[gltf.images?.[texture.source].bufferView ?? -1];
+        if (texture !== undefined && view !== undefined) {
+            mesh.uv ??= new Float32Array(2 * mesh.elementOf.length);
+            mesh.reflectance ??= new Float32Array(3 * mesh.elements).fill(1);
+            mesh.uv.set(floats(primitive.attributes.TEXCOORD_0), 2 * vertex);
+            const own = floats(primitive.attributes._REFLECTANCE);
+            for (let v = 0; v < vertices; v++)
+                for (let c = 0; c < 3; c++) mesh.reflectance[c * mesh.elements + mesh.elementOf[vertex + v]] = own[3 * v + c];
+            const sampler = gltf.samplers?.[texture.sampler ?? -1];
+            mesh.images.push({
+                group, first, count, factor: rgb(material?.baseColorFactor, 1), wrap: [sampler?.wrapS ?? 10497, sampler?.wrapT ?? 10497],
+                jpeg: new Uint8Array(file, start + (view.byteOffset ?? 0), view.byteLength),
+            });
+            mesh.groups[group].reflectance = meanOf(mesh, mesh.groups[group]);
+        }
+        vertex += vertices;
+        first += count;
+    });
+}
+
+/** The mean by area of a group's reflectance. */
+function meanOf(mesh: SceneMesh, group: MeshGroup): Rgb {
+    const sum: Rgb = [0, 0, 0];
+    for (const element of group.elements)
+        for (let c = 0; c < 3; c++) sum[c] += (mesh.reflectance?.[c * mesh.elements + element] ?? 1) * mesh.area[element];
+    return sum.map((v) => v / Math.max(group.area, 1e-30)) as Rgb;
 }
 
 /** A direction or place of the store's axes in those of the picture, as the daemon turns the mesh. */

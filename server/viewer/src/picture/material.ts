@@ -7,6 +7,8 @@ const fetchElement = `
 uniform highp sampler2D values_a, values_b;
 uniform int elements, channels;
 uniform vec3 weights;
+uniform bool is_textured;                // light on images is shown by what falls on them
+uniform highp sampler2D reflectance;     // of elements with an image, by channel; else 1
 
 float texel(highp sampler2D values, int i) {
     int width = textureSize(values, 0).x;
@@ -15,7 +17,12 @@ float texel(highp sampler2D values, int i) {
 
 // The colour of an element; other numbers of channels than three are shown as their mean.
 vec3 element_colour(highp sampler2D values, int i) {
-    if (channels == 3) return vec3(texel(values, i), texel(values, elements + i), texel(values, 2 * elements + i));
+    if (channels == 3) {
+        vec3 value = vec3(texel(values, i), texel(values, elements + i), texel(values, 2 * elements + i));
+        if (!is_textured) return value;
+        // B / rho = H: the image at each pixel takes the place of its mean.
+        return value / max(vec3(texel(reflectance, i), texel(reflectance, elements + i), texel(reflectance, 2 * elements + i)), 0.004);
+    }
     float sum = 0.0;
     for (int c = 0; c < channels; c++) sum += texel(values, c * elements + i);
     return vec3(sum / float(channels));
@@ -69,8 +76,10 @@ uniform mat4 modelViewMatrix, projectionMatrix;
 uniform sampler2D nodes_a, nodes_b;
 uniform bool is_smooth;
 in vec3 position;
+in vec2 uv;
 in uvec2 ids; // element, node
 out vec3 colour_a, colour_b;
+out vec2 place_in_image;
 flat out int element;
 
 vec3 node_colour(sampler2D nodes, int i) {
@@ -87,6 +96,7 @@ void main() {
         colour_a = element_colour(values_a, element);
         colour_b = element_colour(values_b, element);
     }
+    place_in_image = uv;
     gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }
 `;
@@ -113,7 +123,11 @@ uniform float split;          // in pixels
 uniform int hovered;
 uniform ivec4 pins;
 uniform sampler2D judged;     // 1 where the threshold judges an element
+uniform bool is_textured;
+uniform sampler2D image;
+uniform vec3 factor;
 in vec3 colour_a, colour_b;
+in vec2 place_in_image;
 flat in int element;
 layout(location = 0) out vec4 pixel;
 
@@ -133,6 +147,7 @@ bool is_judged(int i) {
 void main() {
     bool right = compare == 1 && gl_FragCoord.x > split;
     vec3 colour = right ? colour_b * scale.y : colour_a * scale.x;
+    if (is_textured) colour *= texture(image, place_in_image).rgb * factor;
     float value = dot(colour, weights);
     vec3 shown;
     if (compare == 2) {
@@ -173,14 +188,15 @@ export function makeUniforms(nothing: Texture): Uniforms {
         node_first: of(null), node_elements: of(null), node_count: of(0),
         elements: of(1), channels: of(1), weights: of(new Vector3(1, 0, 0)), is_smooth: of(false),
         picture: of(0), tone: of(1), scale: of(new Vector2(1, 1)), exposure: of(1), toneMappingExposure: of(1),
-        palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),
+        is_textured: of(false), reflectance: of(nothing), palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),
         compare: of(0), change: of(1), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
     };
 }
 
-export function sceneMaterial(uniforms: Uniforms): RawShaderMaterial {
+/** The material of what has this image; all others of its uniforms are shared. */
+export function sceneMaterial(uniforms: Uniforms, image: Texture, factor: readonly [number, number, number]): RawShaderMaterial {
     return new RawShaderMaterial({
-        glslVersion: GLSL3, uniforms, vertexShader: sceneVertex, fragmentShader: sceneFragment,
+        glslVersion: GLSL3, uniforms: { ...uniforms, image: { value: image }, factor: { value: new Vector3(...factor) } }, vertexShader: sceneVertex, fragmentShader: sceneFragment,
     });
 }
 

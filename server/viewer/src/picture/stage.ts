@@ -2,7 +2,7 @@
 // Knows no daemon and no panel; what it shows is set by its methods.
 import {
     BufferAttribute, BufferGeometry, Color, HalfFloatType, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry, RGBAFormat,
-    Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type PerspectiveCamera,
+    Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type PerspectiveCamera, type RawShaderMaterial, type Texture,
 } from "three";
 import type { Palette, Tone } from "../state/state.ts";
 import type { Field } from "./field.ts";
@@ -10,7 +10,7 @@ import { channelWeights } from "./field.ts";
 import type { SceneMesh } from "./glb.ts";
 import { findNodes } from "./nodes.ts";
 import { makeUniforms, nodesMaterial, sceneMaterial, type Uniforms } from "./material.ts";
-import { emptyTexture, HalfTexture, integerTexture, maskTexture, paletteTexture, rowsFor } from "./textures.ts";
+import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor, whiteTexture } from "./textures.ts";
 
 export interface Look {
     picture: "light" | "false";
@@ -22,6 +22,8 @@ export interface Look {
     range: [number, number];
     log: boolean;
     isoLines: number;
+    /** Images of materials are drawn where there are any. */
+    textured: boolean;
     /** In the unit of the values; null: no marks. */
     threshold: number | null;
     /** The judged elements are shown as such without a threshold, too. */
@@ -46,6 +48,8 @@ export class Stage {
     private values: [HalfTexture, HalfTexture] | null = null;
     private nodes: WebGLRenderTarget | null = null;
     private nodesAreOld = false;
+    private hasImages = false;
+    private images: Texture[] = [];
     private paletteName: Palette | null = null;
     private wanted = false;
     private look: Look | null = null;
@@ -87,7 +91,8 @@ export class Stage {
         geometry.setIndex(new BufferAttribute(mesh.index, 1));
         this.geometry = geometry;
         this.mesh = mesh;
-        const body = new Mesh(geometry, sceneMaterial(this.uniforms));
+        const materials = this.addImages(geometry, mesh);
+        const body = new Mesh(geometry, materials);
         body.name = "scene";
         this.scene.add(body);
         this.values = [new HalfTexture(channels * mesh.elements), new HalfTexture(channels * mesh.elements)];
@@ -109,6 +114,34 @@ export class Stage {
         const weights = channels === 3 ? channelWeights(3) : [1, 0, 0];
         (u.weights.value as Vector3).set(weights[0], weights[1], weights[2]);
         this.judge(() => true);
+    }
+
+    /** The materials of the parts of the geometry: the first is that of all without an image. */
+    private addImages(geometry: BufferGeometry, mesh: SceneMesh): RawShaderMaterial[] {
+        const white = whiteTexture(), materials = [sceneMaterial(this.uniforms, white, [1, 1, 1])];
+        this.hasImages = false;
+        let first = 0;
+        for (const image of mesh.images) {
+            if (image.first > first) geometry.addGroup(first, image.first - first, 0);
+            geometry.addGroup(image.first, image.count, materials.length);
+            materials.push(sceneMaterial(this.uniforms, white, image.factor));
+            first = image.first + image.count;
+        }
+        if (first < mesh.index.length) geometry.addGroup(first, mesh.index.length - first, 0);
+        if (mesh.uv === null || mesh.reflectance === null) return materials;
+        geometry.setAttribute("uv", new BufferAttribute(mesh.uv, 2));
+        this.uniforms.reflectance.value = floatTexture(mesh.reflectance);
+        const anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
+        // Until all are decoded, groups have their means; images that no browser can decode leave it at that.
+        void Promise.all(mesh.images.map((image) => imageTexture(image, anisotropy))).then((textures) => {
+            if (this.mesh !== mesh) return;
+            textures.forEach((texture, k) => { materials[k + 1].uniforms.image.value = texture; });
+            this.images = textures;
+            this.hasImages = true;
+            this.nodesAreOld = true;
+            if (this.look !== null) this.setLook(this.look);
+        }, () => undefined);
+        return materials;
     }
 
     /** Values of side a (0), or of b (1), which a comparison shows beside it. */
@@ -134,6 +167,9 @@ export class Stage {
         u.iso_lines.value = look.isoLines;
         u.threshold.value = look.threshold ?? -1;
         u.is_marked.value = look.marked;
+        const isTextured = look.textured && look.picture === "light" && look.compare !== "difference" && this.hasImages;
+        if (isTextured !== u.is_textured.value) this.nodesAreOld = true;
+        u.is_textured.value = isTextured;
         u.compare.value = look.compare === "split" ? 1 : look.compare === "difference" ? 2 : 0;
         if (this.paletteName !== look.palette) {
             this.paletteName = look.palette;
@@ -220,7 +256,9 @@ export class Stage {
         this.geometry?.dispose();
         this.values?.forEach((texture) => texture.dispose());
         this.nodes?.dispose();
-        for (const name of ["node_first", "node_elements", "judged"])
+        this.images.forEach((texture) => texture.dispose());
+        this.images = [];
+        for (const name of ["node_first", "node_elements", "judged", "reflectance"])
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
         this.geometry = this.mesh = this.values = this.nodes = null;
     }

@@ -1,8 +1,10 @@
 // Arrays of numbers as textures of texels in rows.
 import {
-    ClampToEdgeWrapping, DataTexture, FloatType, HalfFloatType, LinearFilter, NearestFilter, RedFormat, RedIntegerFormat,
-    RGBAFormat, UnsignedByteType, UnsignedIntType,
+    ClampToEdgeWrapping, DataTexture, FloatType, HalfFloatType, LinearFilter, LinearMipmapLinearFilter, MirroredRepeatWrapping,
+    NearestFilter, RedFormat, RedIntegerFormat, RepeatWrapping, RGBAFormat, SRGBColorSpace, Texture, UnsignedByteType,
+    UnsignedIntType, type Wrapping,
 } from "three";
+import type { MeshImage } from "./glb.ts";
 import { paletteBytes } from "./palettes.ts";
 import type { Palette } from "../state/state.ts";
 
@@ -62,6 +64,38 @@ export function paletteTexture(name: Palette): DataTexture {
     const texture = new DataTexture(paletteBytes(name), 256, 1, RGBAFormat, UnsignedByteType);
     texture.minFilter = texture.magFilter = LinearFilter;
     texture.wrapS = ClampToEdgeWrapping;
+    texture.needsUpdate = true;
+    return texture;
+}
+
+/** Numbers in single precision, as rows of texels. */
+export function floatTexture(values: Float32Array): DataTexture {
+    const { width, height } = rowsFor(values.length);
+    const room = new Float32Array(width * height);
+    room.set(values);
+    const texture = new DataTexture(room, width, height, RedFormat, FloatType);
+    texture.needsUpdate = true;
+    return texture;
+}
+
+/** A texel of 1: no image. */
+export function whiteTexture(): DataTexture {
+    const texture = new DataTexture(new Uint8Array([255, 255, 255, 255]), 1, 1, RGBAFormat, UnsignedByteType);
+    texture.needsUpdate = true;
+    return texture;
+}
+
+const WRAPS: { [gltf: number]: Wrapping } = { 33648: MirroredRepeatWrapping, 33071: ClampToEdgeWrapping };
+
+/** An image of the mesh; its pixels are decoded to linear light where they are read. */
+export async function imageTexture(image: MeshImage, anisotropy: number): Promise<Texture> {
+    const bitmap = await createImageBitmap(new Blob([image.jpeg], { type: "image/jpeg" }), { colorSpaceConversion: "none" });
+    const texture = new Texture(bitmap);
+    texture.flipY = false;
+    texture.colorSpace = SRGBColorSpace;
+    [texture.wrapS, texture.wrapT] = image.wrap.map((wrap) => WRAPS[wrap] ?? RepeatWrapping);
+    texture.minFilter = LinearMipmapLinearFilter;
+    texture.anisotropy = anisotropy;
     texture.needsUpdate = true;
     return texture;
 }

@@ -48,6 +48,7 @@ export interface View {
     picture: "light" | "false";
     quantity: Quantity;
     smooth: boolean;
+    textured: boolean;
     tone: Tone;
     /** log2 of the factor before the tone curve; null: chosen from the first answer and then held. */
     exposure: number | null;
@@ -107,7 +108,7 @@ export const skyOff: SkyLight = {
 };
 
 export const firstView: View = {
-    picture: "light", quantity: "radiosity", smooth: true, tone: "agx", exposure: null, follow: false,
+    picture: "light", quantity: "radiosity", smooth: true, textured: true, tone: "agx", exposure: null, follow: false,
     palette: "viridis", range: null, log: false, isoLines: 0, unit: "W/m²", threshold: null, judged: null,
     uniformity: 0.6, walk: false, camera: null,
 };

@@ -1,0 +1,76 @@
+// Images of materials: the page draws what falls on an element times the image at each pixel, not the element's mean.
+import assert from "node:assert/strict";
+import { writeFileSync } from "node:fs";
+import { test } from "node:test";
+import { deflateSync } from "node:zlib";
+import { Daemon, inFolder, lambert, openPage, pixel, settled } from "./page.mjs";
+
+const LEFT = [200, 60, 40], RIGHT = [40, 90, 180];
+const SIZE = 64, EDGE = 22; // columns of LEFT: the colours meet inside an element
+
+/** The checksum of PNG's chunks (ISO 3309), which Node.js has only since 20.15. */
+function crc32(bytes) {
+    let c = 0xffffffff;
+    for (const byte of bytes) {
+        c ^= byte;
+        for (let k = 0; k < 8; k++) c = c & 1 ? 0xedb88320 ^ (c >>> 1) : c >>> 1;
+    }
+    return (c ^ 0xffffffff) >>> 0;
+}
+
+function png() {
+    const chunk = (kind, body) => {
+        const head = Buffer.alloc(4), tail = Buffer.alloc(4), text = Buffer.concat([Buffer.from(kind), body]);
+        head.writeUInt32BE(body.length);
+        tail.writeUInt32BE(crc32(text));
+        return Buffer.concat([head, text, tail]);
+    };
+    const size = Buffer.from([0, 0, 0, SIZE, 0, 0, 0, SIZE, 8, 2, 0, 0, 0]);
+    const row = Buffer.from([0, ...Array.from({ length: SIZE }, (_, x) => (x < EDGE ? LEFT : RIGHT)).flat()]);
+    return Buffer.concat([Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]), chunk("IHDR", size),
+        chunk("IDAT", deflateSync(Buffer.concat(Array(SIZE).fill(row)))), chunk("IEND", Buffer.alloc(0))]);
+}
+
+const decode = (v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4);
+const encode = (v) => Math.round(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055));
+
+test("an image keeps its pixels within an element", async () => {
+    writeFileSync(inFolder("two.png"), png());
+    writeFileSync(inFolder("two.mtl"), "newmtl floor\nKd 1 1 1\nmap_Kd two.png\nnewmtl lamp\nKd .5 .5 .5\nKe 8 8 8\n");
+    writeFileSync(inFolder("two.obj"), "mtllib two.mtl\nv 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 1 1 3\nv 1 3 3\nv 3 3 3\nv 3 1 3\n"
+        + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\no floor\nusemtl floor\nf 1/1 2/2 3/3 4/4\no lamp\nusemtl lamp\nf 5 6 7 8\n");
+    lambert("precompute", inFolder("two.obj"), "-o", inFolder("two.h5"), "--quiet", "--probes", 2, "--elements", 40);
+    const daemon = await Daemon.start([inFolder("two.h5")]);
+    const page = await openPage(daemon.address);
+    await page.waitForFunction(() => window.lambert.stage.uniforms.is_textured.value);
+    await page.evaluate(() => {
+        const { store: s, cameras } = window.lambert;
+        s.change({ ...s.now, view: { ...s.now.view, smooth: false, tone: "linear", exposure: -2 } });
+        cameras.place([2, 2.5, 1.5, 2, 0, -2], false);
+    });
+    await settled(page);
+    // Points of the floor on both sides of the edge, within one element; y is up in the picture, and -z the store's y.
+    const points = await page.evaluate((edge) => [-1, 1].map((side) => {
+        const { cameras: { camera }, scene } = window.lambert;
+        camera.updateMatrixWorld();
+        const p = camera.position.clone().set(4 * edge + 0.08 * side, 0, -2.3).project(camera);
+        return { x: (p.x + 1) / 2, y: (1 - p.y) / 2, element: scene.picker.at(p.x, p.y, camera) };
+    }), EDGE / SIZE);
+    assert.equal(points[0].element, points[1].element);
+    const answer = await daemon.json("/v1/scenes/two/radiosity",
+        { emission: { groups: { lamp: [8, 8, 8] } }, select: { elements: [points[0].element] }, quantity: "irradiance" });
+    const H = answer.irradiance.map((channel) => channel[0]);
+    for (const [k, colour] of [LEFT, RIGHT].entries()) {
+        const wanted = colour.map((v, c) => encode(Math.min(1, decode(v) * H[c] / 4)));
+        const shown = await pixel(page, points[k].x, points[k].y);
+        // JPEG keeps even colours within a few steps; its blocks of 8 pixels end beside the edge.
+        assert.ok(wanted.every((v, c) => Math.abs(v - shown[c]) <= 10), `${shown} is shown, must be near ${wanted}`);
+    }
+    // Without images the element has its mean.
+    await page.getByRole("tab", { name: "View" }).click();
+    await page.getByLabel("Images of materials").uncheck();
+    await settled(page);
+    assert.deepEqual(await pixel(page, points[0].x, points[0].y), await pixel(page, points[1].x, points[1].y));
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
