@@ -5,6 +5,7 @@
 #include <pthread.h>
 #include <semaphore.h>
 #include <stdatomic.h>
+#include <unistd.h>
 
 enum { MOST = 32 };
 
@@ -18,9 +19,10 @@ typedef struct record {
 typedef struct job {
     batch_job job;
     record *record;
-    size_t id, n_begun;
+    size_t id;
+    atomic_size_t n_begun;
     bool blocks, early, holds;
-    atomic_bool unwanted;
+    atomic_bool unwanted, waits; /* waits: seen by the queue among those that wait, after a begin */
 } job;
 
 static job *job_of(batch_job *b) {
@@ -37,7 +39,7 @@ static bool begin(batch_job *b, batch_workspace *workspace) {
     job *self = job_of(b);
     (void)workspace;
     note(self->record, self->id);
-    b->blocked = self->blocks && self->n_begun++ == 0;
+    b->blocked = self->blocks && atomic_fetch_add(&self->n_begun, 1) == 0;
     if (b->blocked && self->early) batch_unblock(self->record->queue, b);
     sem_post(&self->record->begun);
     if (self->holds) sem_wait(&self->record->gate);
@@ -49,7 +51,9 @@ static void finish(batch_job *b) {
 }
 
 static bool is_wanted(batch_job *b) {
-    return !atomic_load(&job_of(b)->unwanted);
+    job *self = job_of(b);
+    if (atomic_load(&self->n_begun) > 0) atomic_store(&self->waits, true);
+    return !atomic_load(&self->unwanted);
 }
 
 static void drop(batch_job *b) {
@@ -142,6 +146,8 @@ START_TEST(they_give_their_places_away) {
     start(&r, 3);
     for (size_t k = 0; k < 3; k++) submit(&r, &jobs[k], k, 7);
     wait_for(&r.begun, 3);
+    /* The last begin may not have returned yet. */
+    while (!atomic_load(&jobs[2].waits)) usleep(1000);
     submit(&r, &jobs[3], 3, 8);
     wait_for(&r.finished, 2);
     ck_assert_uint_eq(r.n, 5);
