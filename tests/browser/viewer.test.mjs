@@ -154,6 +154,10 @@ test("a link restores the state", async () => {
         assert.deepEqual(odd.faults, [], hash);
         await odd.context().close();
     }
+    // So is the scene, which may be another daemon's.
+    const absent = await openPage(daemon.address, { hash: bad('{"scene":"palace"}') });
+    await absent.getByText("The link asks for the scene palace").waitFor();
+    await absent.context().close();
     await other.context().close();
     await page.context().close();
 });

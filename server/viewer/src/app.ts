@@ -50,6 +50,8 @@ export class App {
     certificate: { bound: number; iterations: number; solve: number | null } | null = null;
     hovered: number | null = null;
     problem: string | null = null;
+    /** What a link asks for and this daemon does not have; until another scene is opened. */
+    notice: string | null = null;
     isLost = false;
     lostWhy = "";
     /** Answers shown so far. */

@@ -54,6 +54,8 @@ async function begin(app: App): Promise<void> {
         const given = fromFragment(location.hash);
         const name = app.scenes.find((scene) => scene.name === given?.scene)?.name ?? app.scenes[0]?.name;
         if (name === undefined) throw new Error("The daemon serves no scene.");
+        app.notice = given !== null && given.scene !== "" && given.scene !== name
+            ? `The link asks for the scene ${given.scene}, which this daemon does not serve; this is ${name}.` : null;
         await app.open(name, given !== null && given.scene === name ? given : null);
     } catch (reason) {
         app.fail(reason);

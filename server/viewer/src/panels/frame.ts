@@ -28,6 +28,7 @@ export function makeBar(app: App): HTMLElement {
     const list = (): void => {
         update();
         fill(scenes, choice("Scene", app.scenes.map((scene) => [scene.name, scene.name] as const), app.store.now.scene, (name) => {
+            app.notice = null;
             void app.open(name, null).catch((reason: unknown) => app.fail(reason));
         }));
     };
@@ -134,9 +135,10 @@ export function makeBanner(app: App): HTMLElement {
         banner.textContent = text ?? "";
     };
     app.on("lost", () => show(app.lostWhy));
-    app.on("found", () => show(null));
+    app.on("found", () => show(app.notice));
+    app.on("scene", () => show(app.notice));
     app.on("problem", () => show(app.problem));
-    app.on("field", () => { if (!app.isLost) show(null); });
+    app.on("field", () => { if (!app.isLost) show(app.notice); });
     return banner;
 }
 
