@@ -16,7 +16,7 @@ _Static_assert(CODING_ZSTD + 1 == SCENE_MESH_FORMS, "a form for each coding");
 /* Of one request, until its answer is made. */
 typedef struct mesh_call {
     size_t room;      /* bytes that the request has taken and not used */
-    kept_bytes *body; /* NULL: */
+    kept_bytes *body; /* or NULL, with why */
     problem why;
 } mesh_call;
 
