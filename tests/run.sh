@@ -60,14 +60,14 @@ git ls-files 'solver/*.c' 'server/*.c' 'store/*.c' | xargs -P "$jobs" -n 8 clang
     >"$logs/tidy" 2>/dev/null || { cat "$logs/tidy"; total_failed=$((total_failed + 1)); }
 
 step "the daemon under ThreadSanitizer"
-build tsan lambertd unit_batch unit_batch_order unit_thread_budget unit_adjoint_rows unit_guard_parts
+build tsan lambertd unit_batch unit_batch_blocked unit_batch_order unit_request_memory unit_thread_budget unit_adjoint_rows unit_guard_parts
 build dev lambert lambertd lambert-bench lambert_shared lambert_static ready_server faults
 export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
 # The daemon shares its passes among threads of its own; OpenMP's runtime, which the unit tests' operators use, is not
 # instrumented: its barriers would look like races.
 export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
-run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers|fair|leaving)|unit\.(batch|thread_budget|adjoint_rows|guard_parts)'
+run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers|fair|leaving|request_memory)|unit\.(batch|request_memory|thread_budget|adjoint_rows|guard_parts)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS
 
 step "programs as users have them: faults, kills, an installation, the commands of all documents, the bench"
