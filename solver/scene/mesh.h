@@ -22,12 +22,12 @@ typedef struct mesh {
     float (*normal)[3]; /* [n][3], unit, towards the front */
     uint32_t *group;    /* [n] */
     size_t n_groups;
-    char **group_names;             /* [n_groups], one block freed by one free() */
-    size_t n_channels;              /* 1 when every reflectance and emission is grey, else 3 */
-    float *reflectance;             /* [C][n], in [0, 1) */
-    float *emission;                /* [C][n], W/m^2 */
-    struct mesh_textures *textures; /* NULL: none (solver/base/scene_pictures.h) */
-    struct scene_pictures *pictures; /* for those who show the elements; NULL: none (solver/base/scene_pictures.h) */
+    char **group_names;              /* [n_groups], one block freed by one free() */
+    size_t n_channels;               /* 1 when every reflectance and emission is grey, else 3 */
+    float *reflectance;              /* [C][n], in [0, 1) */
+    float *emission;                 /* [C][n], W/m^2 */
+    struct mesh_textures *textures;  /* NULL: none (texture.h) */
+    struct scene_pictures *pictures; /* for those who show the elements; NULL: none */
     uint32_t *textured_face; /* [n], of textures, or TEXTURE_NONE; NULL: no element has a textured face */
     size_t n_cameras;
     scene_camera *cameras; /* [n_cameras], of the scene file */
