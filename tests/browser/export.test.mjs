@@ -3,11 +3,8 @@ import assert from "node:assert/strict";
 import { execFile } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
-import { createRequire } from "node:module";
-import { join } from "node:path";
-import { pathToFileURL } from "node:url";
 import { promisify } from "node:util";
-import { Daemon, inFolder, lambert, makeStore, openPage, settled, violations } from "./page.mjs";
+import { Daemon, inFolder, lambert, makeStore, openPage, settled, sourceOf, violations } from "./page.mjs";
 
 const run = promisify(execFile);
 /** Names that shells, Python and CSV have to take as they are. */
@@ -221,14 +218,8 @@ test("refusals of variants are told in words", async () => {
 });
 
 test("parts without a page", async () => {
-    const { buildSync } = createRequire(join(process.env.MODULES, "of-the-test.js"))("esbuild");
-    const take = (file) => {
-        const out = inFolder(`${file.replaceAll("/", "-")}.mjs`);
-        buildSync({ entryPoints: [join(process.env.VIEWER, "src", `${file}.ts`)], bundle: true, format: "esm", outfile: out, nodePaths: [process.env.MODULES] });
-        return import(pathToFileURL(out));
-    };
     const [half, csv, snippets, changes, variants] = await Promise.all(
-        ["base/half", "base/csv", "state/snippets", "picture/changes", "state/variants"].map(take));
+        ["base/half", "base/csv", "state/snippets", "picture/changes", "state/variants"].map(sourceOf));
     // Every half is its own nearest; between two neighbours the nearer one is taken, the even one in the middle.
     for (let bits = 0; bits < 0x7c00; bits++) {
         const value = half.halfToNumber(bits), next = half.halfToNumber(bits + 1);

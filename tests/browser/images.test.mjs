@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { test } from "node:test";
 import { deflateSync } from "node:zlib";
-import { Daemon, inFolder, lambert, openPage, pixel, settled } from "./page.mjs";
+import { Daemon, inFolder, lambert, openPage, pixel, settled, toSrgb } from "./page.mjs";
 
 const LEFT = [200, 60, 40], RIGHT = [40, 90, 180];
 const SIZE = 64, EDGE = 22; // columns of LEFT: the colours meet inside an element
@@ -32,7 +32,6 @@ function png() {
 }
 
 const decode = (v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4);
-const encode = (v) => Math.round(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055));
 
 test("an image keeps its pixels within an element", async () => {
     writeFileSync(inFolder("two.png"), png());
@@ -61,7 +60,7 @@ test("an image keeps its pixels within an element", async () => {
         { emission: { groups: { lamp: [8, 8, 8] } }, select: { elements: [points[0].element] }, quantity: "irradiance" });
     const H = answer.irradiance.map((channel) => channel[0]);
     for (const [k, colour] of [LEFT, RIGHT].entries()) {
-        const wanted = colour.map((v, c) => encode(Math.min(1, decode(v) * H[c] / 4)));
+        const wanted = toSrgb(colour.map((v, c) => decode(v) * H[c] / 4));
         const shown = await pixel(page, points[k].x, points[k].y);
         // JPEG keeps even colours within a few steps; its blocks of 8 pixels end beside the edge.
         assert.ok(wanted.every((v, c) => Math.abs(v - shown[c]) <= 10), `${shown} is shown, must be near ${wanted}`);

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { before, test } from "node:test";
 import { pathToFileURL } from "node:url";
-import { Daemon, elementAt, inFolder, lambert, openPage, settled, violations } from "./page.mjs";
+import { Daemon, elementAt, inFolder, lambert, openPage, settled, sourceOf, violations } from "./page.mjs";
 
 // A coloured yard under a sky, with two lamps on its walls. The floor is 4 m by 4 m.
 const OBJ = `mtllib yard.mtl
@@ -303,10 +303,7 @@ test("keys and fingers read too, and a link keeps the pins", async () => {
 });
 
 test("ticks are round and within the axis", async () => {
-    const { build } = await import(pathToFileURL(`${process.env.MODULES}/esbuild/lib/main.js`));
-    const out = inFolder("scale.mjs");
-    await build({ entryPoints: [`${process.env.VIEWER}/src/picture/scale.ts`], outfile: out, format: "esm", logLevel: "error" });
-    const { ticksOf, placeOf, valueAt, areaByValue, figuresOf } = await import(pathToFileURL(out));
+    const { ticksOf, placeOf, valueAt, areaByValue, figuresOf } = await sourceOf("picture/scale");
     assert.deepEqual(ticksOf({ low: 0, high: 1000, log: false }, 5), [0, 200, 400, 600, 800, 1000]);
     assert.deepEqual(ticksOf({ low: 0.13, high: 0.31, log: false }, 4), [0.15, 0.2, 0.25, 0.3]);
     assert.deepEqual(ticksOf({ low: 1, high: 1000, log: true }, 4), [1, 10, 100, 1000]);

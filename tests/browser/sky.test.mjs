@@ -1,11 +1,8 @@
 // Skies and emitters: skies are those of `lambert sky`, and the page shows what they give.
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
-import { createRequire } from "node:module";
-import { join } from "node:path";
 import { before, test } from "node:test";
-import { pathToFileURL } from "node:url";
-import { Daemon, elementAt, inFolder, lambert, makeStore, openPage, pixel, settled, violations } from "./page.mjs";
+import { Daemon, elementAt, inFolder, lambert, makeStore, near, openPage, pixel, settled, sourceOf, toSrgb, violations } from "./page.mjs";
 
 /** Hours of clear, broken and overcast weather: every bin of clearness, a low sun, night, and a sun below the horizon. */
 const HOURS = [];
@@ -24,15 +21,9 @@ const epw = () => `LOCATION,Somewhere,XX,USA,TMY3,0,${LATITUDE},${LONGITUDE},${Z
 
 let daemon, daylight, state, paths;
 before(async () => {
-    const { buildSync } = createRequire(join(process.env.MODULES, "of-the-test.js"))("esbuild");
-    const take = (file) => {
-        const out = inFolder(`${file.replaceAll("/", "-")}.mjs`);
-        buildSync({ entryPoints: [join(process.env.VIEWER, "src", `${file}.ts`)], bundle: true, format: "esm", outfile: out });
-        return import(pathToFileURL(out));
-    };
-    daylight = { ...await take("daylight/source"), ...await take("daylight/skies"), ...await take("daylight/tiles"), ...await take("daylight/sun") };
-    state = await take("state/state");
-    paths = await take("state/path");
+    daylight = { ...await sourceOf("daylight/source"), ...await sourceOf("daylight/skies"), ...await sourceOf("daylight/tiles"), ...await sourceOf("daylight/sun") };
+    state = await sourceOf("state/state");
+    paths = await sourceOf("state/path");
     const patio = makeStore("patio", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "reinhart:2"] });
     writeFileSync(inFolder("patio.epw"), epw());
     const yard = makeStore("yard", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "tregenza"] });
@@ -121,12 +112,6 @@ async function openScene(name, options) {
     return page;
 }
 
-const near = (a, b, tolerance) => assert.ok(a.every((v, i) => Math.abs(v - b[i]) <= tolerance), `${a} is not near ${b}`);
-const shown = (linear) => linear.map((v) => {
-    const c = Math.min(1, Math.max(0, v));
-    return Math.round(255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055));
-});
-
 test("the weather beside the store is taken, and pixels are what its sky gives", async () => {
     const page = await openScene("patio");
     const sky = await skyNow(page);
@@ -148,7 +133,7 @@ test("the weather beside the store is taken, and pixels are what its sky gives",
             const element = await elementAt(page, x, y);
             if (element === null || element < 0) continue;
             const answer = await daemon.json("/v1/scenes/patio/radiosity", { emission: { sky: [...rows[k]] }, select: { elements: [element] } });
-            near(await pixel(page, x, y), shown(answer.radiosity.map((channel) => channel[0] * 2 ** -9)), 2);
+            near(await pixel(page, x, y), toSrgb(answer.radiosity.map((channel) => channel[0] * 2 ** -9)), 2);
             seen += 1;
         }
         assert.ok(seen >= 3, `${seen} points show the scene`);

@@ -2,21 +2,13 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 import { pathToFileURL } from "node:url";
-import { Daemon, elementAt, makeStore, openPage, pixel, settled, violations } from "./page.mjs";
+import { Daemon, elementAt, makeStore, near, openPage, pixel, settled, sourceOf, toSrgb, violations } from "./page.mjs";
 
 let daemon, store;
 before(async () => {
     store = makeStore("cornell", "cornell", { generate: ["--elements", 700] });
     daemon = await Daemon.start([store]);
 });
-
-/** sRGB of linear values, as IEC 61966-2-1 has it, of 255. */
-const shown = (linear) => linear.map((v) => {
-    const c = Math.min(1, Math.max(0, v));
-    return Math.round(255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055));
-});
-
-const near = (a, b, tolerance) => assert.ok(a.every((v, i) => Math.abs(v - b[i]) <= tolerance), `${a} is not near ${b}`);
 
 /** Radiosity of one element by JSON, per channel. */
 async function radiosity(element, groups, quantity = "radiosity") {
@@ -42,7 +34,7 @@ test("pixels are the daemon's numbers", async () => {
         const element = await elementAt(page, x, y);
         const B = await radiosity(element, { lamp: await lampNow(page) });
         // Half precision is 2^-11, a step of 255 is 1/255: one step of rounding, one of antialiasing at an edge.
-        near(await pixel(page, x, y), shown(B.map((v) => v * 2 ** -5)), 2);
+        near(await pixel(page, x, y), toSrgb(B.map((v) => v * 2 ** -5)), 2);
     }
     assert.deepEqual(page.faults, []);
     await page.context().close();
@@ -65,7 +57,7 @@ test("dragging a slider changes the picture as the numbers say", async () => {
     assert.ok(dim > 0.1 && dim < 0.6, `dim is ${dim}`);
     const B = await radiosity(element, { lamp: await lampNow(page) });
     const last = await pixel(page, 0.5, 0.9);
-    near(last, shown(B.map((v) => v * 2 ** -5)), 2);
+    near(last, toSrgb(B.map((v) => v * 2 ** -5)), 2);
     assert.ok(last[0] < first[0]);
     assert.ok(await page.evaluate(() => window.lambert.answers) > before);
     // One drag is one step of undo.
@@ -106,8 +98,23 @@ test("smooth shading is the mean at a corner", async () => {
     const lamp = await lampNow(page);
     const all = await Promise.all(found.elements.map((element) => radiosity(element, { lamp })));
     const mean = [0, 1, 2].map((c) => all.reduce((sum, B) => sum + B[c], 0) / 4);
-    near(await pixel(page, found.x, found.y), shown(mean.map((v) => v * 2 ** -5)), 3);
+    near(await pixel(page, found.x, found.y), toSrgb(mean.map((v) => v * 2 ** -5)), 3);
     await page.context().close();
+});
+
+test("corners of other groups, normals or places are no node", async () => {
+    const { findNodes } = await sourceOf("picture/nodes");
+    // Three triangles at one corner in the plane z = 0: two of group 0, one of group 1; and one of group 0 that stands upright.
+    const corners = [[0, 0, 0, 1, 0, 0, 0, 1, 0], [0, 0, 0, 0, 1, 0, -1, 0, 0], [0, 0, 0, -1, 0, 0, 0, -1, 0], [0, 0, 0, 0, -1, 0, 0, 0, 1]];
+    const normals = [[0, 0, 1], [0, 0, 1], [0, 0, 1], [1, 0, 0]];
+    const nodes = findNodes({
+        positions: Float32Array.from(corners.flat()), normals: Float32Array.from(normals.flatMap((n) => [...n, ...n, ...n])),
+        elementOf: Uint32Array.from([0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3]), groupOf: Uint32Array.of(0, 0, 1, 0),
+    });
+    const at = (vertex) => [...nodes.elements.subarray(nodes.first[nodes.nodeOf[vertex]], nodes.first[nodes.nodeOf[vertex] + 1])].sort();
+    assert.deepEqual([at(0), at(3), at(6), at(9)], [[0, 1], [0, 1], [2], [3]]);
+    assert.deepEqual([at(2), at(4), at(1)], [[0, 1], [0, 1], [0]]);
+    assert.equal(nodes.count, 10);
 });
 
 test("false colour is the palette at the value", async () => {
