@@ -148,6 +148,8 @@ START_TEST(idle_clients_make_place_and_no_others) {
     usleep(2500000);
     ck_assert(!is_cut(&old));
     pair late = open_pair(all, 0);
+    /* An idle one would be idle for longer than the grace where the next check comes late. */
+    client_enter(all, late.c, STAGE_SOLVE, 0);
     wait_cut(&old);
     ck_assert(!is_cut(&solve) && !is_cut(&body));
     expect_count(all, "_cut_total{why=\"place\"} 1\n");
