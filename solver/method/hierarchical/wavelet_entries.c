@@ -31,7 +31,8 @@ static void fill_rows(const coefficient_list *lists, size_t n_lists, csr *out) {
         const size_t first = csr_part(out, part, n_parts), last = csr_part(out, part + 1, n_parts);
 #pragma omp barrier
         for (size_t k = 0; k < n_lists; k++)
-            for (const coefficient *c = lists[k].list, *end = c + lists[k].count; c < end; c++) {
+            for (size_t e = 0; e < lists[k].count; e++) {
+                const coefficient *const c = &lists[k].list[e];
                 if (c->i < first || c->i >= last) continue;
                 const uint64_t to = out->indptr[c->i]++;
                 out->indices[to] = c->j;
