@@ -79,6 +79,7 @@ class Documents(unittest.TestCase):
             (tools / "lambert").symlink_to(LAMBERT)
             (tools / "lambertd").write_text(f'#!/bin/sh\nexec "{LAMBERTD}" --listen 127.0.0.1:{port} "$@"\n')
             (tools / "lambertd").chmod(0o755)
+            (work / "examples").symlink_to(ROOT / "deploy" / "examples")
             (work / "oakland.epw").write_text(weather.epw(weather.a_year()))
             path = f"{tools}:{pathlib.Path(LAMBERT).parent}:/usr/bin:{os.environ['PATH']}"
             text = "\n".join(script).replace(PORT_IN_DOCUMENTS, f"127.0.0.1:{port}")
