@@ -230,11 +230,12 @@ static void add_product(row_work *w, size_t length, const row_term *z, const ter
     size_t terms = 0, count = w->count;
     for (size_t e = 0; e < length; e++) {
         const float by = z[e].value, least = skip / fabsf(by);
-        const row_term *from = B->row[z[e].column], *const first = from,
-                       *const last = from + B->length[z[e].column];
-        for (; from < last && fabsf(from->value) >= least; from++)
-            count = row_sum_add(sums, columns, count, from->column, by * from->value);
-        terms += (size_t)(from - first);
+        const row_term *const row = B->row[z[e].column];
+        const size_t most = B->length[z[e].column];
+        size_t t = 0;
+        for (; t < most && fabsf(row[t].value) >= least; t++)
+            count = row_sum_add(sums, columns, count, row[t].column, by * row[t].value);
+        terms += t;
     }
     w->count = count;
     w->terms += (double)terms;
