@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
-static const double error_most = .03;
+const double error_advice_most = .03;
 
 /* Of the squared error, the share from which on compression is the larger part. */
 static const double compression_share = .5;
@@ -70,7 +70,7 @@ static bool advise_group(const error_advice_input *input, double excess, char te
 
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]) {
     const error_report *e = input->errors;
-    const double most = input->asked > 0 ? input->asked : error_most;
+    const double most = input->asked > 0 ? input->asked : error_advice_most;
     const bool lights =
         e->lights.probes > 0 && (input->asked > 0 || !(judge_total(&e->lights) < judge_total(&e->random)));
     const error_group *g = lights ? &e->lights : &e->random;

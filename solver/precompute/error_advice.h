@@ -8,6 +8,10 @@
 
 enum { ERROR_ADVICE_BYTES = 320 };
 
+/* The indirect error of the scene's own lights and of random emission that a store has at most without a
+ * warning, unless --epsilon asks for another one: .03. */
+extern const double error_advice_most;
+
 /* The makings of a store whose errors were measured. */
 typedef struct error_advice_input {
     const error_report *errors;
@@ -27,7 +31,7 @@ typedef struct error_advice_input {
 } error_advice_input;
 
 /* text: about the scene's own lights or random emission, whichever has the larger indirect error, where that
- * is above .03; else empty. Of an error asked for: about its group alone (trial.h), where that is above it.
+ * is above error_advice_most; else empty. Of an error asked for: about its group alone (trial.h), where that is above it.
  * An error of --group-error that is missed, and by more than that of --epsilon, comes first. Single elements
  * never count: their error is that of the noise of one element's light, for which --tolerance is there. The
  * option follows from where most of the error is: compression gets a smaller --epsilon, rays, and compression

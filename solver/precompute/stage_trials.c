@@ -1,5 +1,6 @@
 /* --epsilon and --group-error kept: after a trial, that is form factors, operator and judge, either it is
  * good enough, or the next one gets finer knobs (trial.h). The best stays. */
+#include "solver/precompute/error_advice.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <stdlib.h>
@@ -64,13 +65,29 @@ void state_take_back(precompute_state *state) {
     best->blocks = (block_factors){.n = 0};
 }
 
+static bool is_judged_keeper(const precompute_state *state) {
+    return state->probes > 0 && (method_find(state->built.method)->flags & METHOD_KEEPS_EPSILON) != 0;
+}
+
 bool state_keeps_epsilon(const precompute_state *state) {
-    return state->trial.asked > 0 && state->probes > 0 &&
-           (method_find(state->built.method)->flags & METHOD_KEEPS_EPSILON) != 0;
+    return state->trial.asked > 0 && is_judged_keeper(state);
 }
 
 static bool keeps_group_error(const precompute_state *state) {
     return state->trial.group > 0 && state->probes > 0;
+}
+
+/* Without --epsilon and --group-error the error that calls for a warning is kept where a finer threshold can
+ * do it for next to nothing: an operator costs a small part of form factors pair by pair. */
+static bool keeps_preset(const precompute_state *state) {
+    return state->trial.asked == 0 && !keeps_group_error(state) && is_judged_keeper(state) &&
+           state->f.recipe.method == RECIPE_PAIRS;
+}
+
+/* The error of the lights, or of random emission, to keep; 0: none. */
+static double asked_of(const precompute_state *state) {
+    if (state_keeps_epsilon(state)) return state->trial.asked;
+    return keeps_preset(state) ? error_advice_most : 0;
 }
 
 /* The goal of which most is lacking; *group: it is that of --group-error. */
@@ -78,7 +95,7 @@ static trial_goal goal_of(const precompute_state *state, bool *group) {
     const bool by_noise = state->built.by_noise;
     const worst_group worst = judge_worst_group(&state->by_group);
     const trial_goal of_group = trial_goal_of_group(state->trial.group, &worst, by_noise);
-    const trial_goal of_epsilon = {.asked = state_keeps_epsilon(state) ? state->trial.asked : 0,
+    const trial_goal of_epsilon = {.asked = asked_of(state),
                                    .errors = trial_errors_of(trial_group(&state->errors), by_noise)};
     *group = keeps_group_error(state) &&
              (!state_keeps_epsilon(state) || trial_excess(&of_group) > trial_excess(&of_epsilon));
@@ -126,7 +143,7 @@ bool state_follows_epsilon(const precompute_state *state) {
 /* Rows of a store are as they are, and those of a scratch folder are kept for a run that goes on. */
 static trial_limits limits_of(const precompute_state *state) {
     const precompute_options *o = state->options;
-    const bool made = !o->from_store && o->scratch == NULL && !state->trial.spent;
+    const bool made = !o->from_store && o->scratch == NULL && !state->trial.spent && !keeps_preset(state);
     return (trial_limits){.rays = made && o->rays == OPTION_AUTO,
                           .accuracy = made,
                           .fixed_epsilon = !state_follows_epsilon(state),
@@ -163,7 +180,7 @@ static bool turn(precompute_state *state, const trial_knobs *from, trial_knobs *
 }
 
 static bool keeps_any(const precompute_state *state) {
-    return state_keeps_epsilon(state) || keeps_group_error(state);
+    return asked_of(state) > 0 || keeps_group_error(state);
 }
 
 bool state_may_try_again(const precompute_state *state) {
@@ -188,9 +205,12 @@ static void log_trial(const precompute_state *state, const trial_goal *goal, boo
     char what[TRIAL_WORST_TEXT];
     if (!group) {
         terminal_log(
-            state->t, "trial %zu: the indirect error of %s is stated as %.2g, --epsilon asks for %g%s%s",
-            state->trial.count, g == &state->errors.lights ? "the scene's own lights" : "random emission",
-            goal->errors.total, goal->asked, next, knobs);
+            state->t, "trial %zu: the indirect error of %s is stated as %.2g, %s %g%s%s", state->trial.count,
+            g == &state->errors.lights ? "the scene's own lights" : "random emission", goal->errors.total,
+            state_keeps_epsilon(state)         ? "--epsilon asks for"
+            : goal->errors.total > goal->asked ? "above"
+                                               : "at most",
+            goal->asked, next, knobs);
         return;
     }
     if (worst.group == state->by_group.n_groups) {
@@ -215,6 +235,10 @@ bool state_next_trial(precompute_state *state) {
     all->count++;
     const bool better = all->best.op == NULL || excess < all->best.excess;
     const bool again = excess > 1 && all->count < state->options->trials && turn(state, &from, &next);
+    if (!again && all->count == 1 && keeps_preset(state)) {
+        all->count = 0; /* nobody asked for a trial */
+        return false;
+    }
     if (again) trial_describe(&from, &next, knobs);
     log_trial(state, &goal, group, knobs);
     if (!again) {

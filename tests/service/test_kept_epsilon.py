@@ -97,6 +97,24 @@ class KeptEpsilon(Case):
                     .01)
         self.assertEqual(TRIAL.findall(done.stderr), [])
 
+    def test_defaults_keep_what_they_would_warn_of(self):
+        """The threshold of the preset leaves .033 of the lamp's light in this box, of which form factors pair by pair have
+        no part; a finer one costs next to nothing beside these."""
+        scene = self.path("lit.obj")
+        must("generate", "cornell", "--elements", 400, "-o", scene)
+        log, about, operator, errors = self.precompute(scene)
+        first, second = re.findall(r"trial \d: the indirect error of the scene's own lights is stated as (\S+), (above 0.03; next: "
+                                   r"coefficients for --epsilon [\d.]+ in place of 0.05|at most 0.03)\n", log)
+        self.assertGreater(float(first[0]), .03)
+        self.assertAlmostEqual(float(second[0]), errors["lights"]["total_indirect_mean"], delta=.001)
+        self.assertLessEqual(errors["lights"]["total_indirect_mean"], .03)
+        self.assertEqual(operator["trials"], 2)
+        self.assertNotIn("epsilon_stated", operator)
+        self.assertNotIn("advice", about)
+        log, about, *_ = self.precompute(scene, "--trials", 1)
+        self.assertNotIn("trial 1", log)
+        self.assertIn("--epsilon", about["advice"])
+
     def test_threads_do_not_change_the_trials(self):
         logs = []
         for threads in 1, 2:

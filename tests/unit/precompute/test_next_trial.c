@@ -150,6 +150,54 @@ START_TEST(memory_is_a_limit) {
 }
 END_TEST
 
+/* Nobody asked for an error: of form factors pair by pair the threshold alone is turned until the error calls
+ * for no warning. */
+START_TEST(the_preset_is_kept_by_the_threshold) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    state.trial.asked = 0;
+    state.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-4, .seed = 1};
+    const recipe pairs = state.recipe;
+    make(&state, .04, .039);
+    const double epsilon = state.trial.epsilon, *sums = state.f.row_sums;
+    ck_assert(state_may_try_again(&state));
+    ck_assert(state_next_trial(&state));
+    ck_assert_double_eq_tol(state.trial.epsilon,
+                            epsilon * pow(sqrt(.027 * .027 - (.04 * .04 - .039 * .039)) / .039, 1 / .6),
+                            1e-9);
+    ck_assert(!trial_recipes_differ(&state.recipe, &pairs));
+    ck_assert_ptr_eq(state.f.row_sums, sums);
+    make(&state, .02, .01);
+    ck_assert(!state_next_trial(&state));
+    state_report_trials(&state);
+    ck_assert_double_eq(report_get(&state.built, "trials", 0), 2);
+    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", -1), -1);
+    state_free(&state);
+}
+END_TEST
+
+/* It needs no trial, or the form factors would have to be finer, or they are of rays, whose noise the
+ * threshold follows. */
+START_TEST(the_preset_has_no_other_trials) {
+    static const double errors[][2] = {{.03, .029}, {.04, .001}, {.04, .039}};
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    state.trial.asked = 0;
+    if (_i < 2) state.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-4, .seed = 1};
+    make(&state, errors[_i][0], errors[_i][1]);
+    ck_assert_int_eq(state_may_try_again(&state), _i < 2);
+    ck_assert(!state_next_trial(&state));
+    ck_assert_uint_eq(state.trial.count, 0);
+    state_report_trials(&state);
+    ck_assert_double_eq(report_get(&state.built, "trials", 0), 0);
+    state_free(&state);
+}
+END_TEST
+
 /* Errors of the only group, by light from far away. */
 static void set_group_error(precompute_state *state, double total, double of_operator) {
     group_errors *e = &state->by_group;
@@ -266,6 +314,8 @@ int main(void) {
     tcase_add_test(cases, form_factors_are_used_again);
     tcase_add_test(cases, a_knob_without_effect_is_left);
     tcase_add_test(cases, memory_is_a_limit);
+    tcase_add_test(cases, the_preset_is_kept_by_the_threshold);
+    tcase_add_loop_test(cases, the_preset_has_no_other_trials, 0, 3);
     tcase_add_test(cases, the_worst_group_is_kept);
     tcase_add_test(cases, other_kinds_keep_groups_by_form_factors);
     tcase_add_test(cases, a_group_that_is_not_measured_ends_it);
