@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# All tests: layers and layout, then all but a few tests under AddressSanitizer and UndefinedBehaviorSanitizer, a
-# warning-free build by the other compiler with its unit and contract tests and clang-tidy, the daemon's tests under
-# ThreadSanitizer, and those few (AS_USERS in tests/CMakeLists.txt) with programs as users have them. The builds are the
+# All tests: layers and layout, then all but a few tests under AddressSanitizer and UndefinedBehaviorSanitizer, the
+# daemon's tests under ThreadSanitizer and beside them a warning-free build by the other compiler and clang-tidy, its unit
+# and contract tests, and those few (AS_USERS in tests/CMakeLists.txt) with programs as users have them. The builds are the
 # presets of CMakePresets.json, in build/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -36,6 +36,13 @@ run_ctest() {
     total_failed=$((total_failed + failed))
 }
 
+# clang_build: all of the tree by clang, where a warning is an error, and clang-tidy.
+clang_build() {
+    build clang
+    git ls-files 'solver/*.c' 'server/*.c' 'store/*.c' | xargs -P "$jobs" -n 8 clang-tidy --quiet -p build/clang \
+        >"$logs/tidy" 2>/dev/null || { cat "$logs/tidy"; return 1; }
+}
+
 step "layers, layout and comments"
 ./tests/layers.sh
 git ls-files '*.[ch]' '*.inc' | xargs -P "$jobs" -n 40 clang-format --dry-run --Werror
@@ -53,22 +60,23 @@ export UBSAN_OPTIONS=print_stacktrace=1
 # cores: those of slow clients and of time limits mostly wait.
 CK_FORK=no run_ctest asan -j $((jobs + 1))
 
-step "a warning-free build by clang, its unit and contract tests, clang-tidy"
-build clang
-run_ctest clang -L 'unit|contract' -j "$jobs"
-git ls-files 'solver/*.c' 'server/*.c' 'store/*.c' | xargs -P "$jobs" -n 8 clang-tidy --quiet -p build/clang \
-    >"$logs/tidy" 2>/dev/null || { cat "$logs/tidy"; total_failed=$((total_failed + 1)); }
-
-step "the daemon under ThreadSanitizer"
+step "the daemon under ThreadSanitizer, which mostly waits; beside it a warning-free build by clang, and clang-tidy"
 build tsan lambertd unit_batch unit_batch_blocked unit_batch_order unit_request_memory unit_thread_budget unit_adjoint_rows unit_guard_parts
 build dev lambert lambertd lambert-bench lambert_shared lambert_static ready_server faults
+cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
+# Clients of a daemon have limits of time, a build has none.
+(renice -n 19 "$BASHPID" && clang_build) >"$logs/clang" 2>&1 &
+clang=$!
 export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
 # The daemon shares its passes among threads of its own; OpenMP's runtime, which the unit tests' operators use, is not
 # instrumented: its barriers would look like races.
 export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
 run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers|fair|leaving|request_memory)|unit\.(batch|request_memory|thread_budget|adjoint_rows|guard_parts)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS
+wait "$clang" || { cat "$logs/clang"; total_failed=$((total_failed + 1)); }
+
+step "unit and contract tests by clang"
+run_ctest clang -L 'unit|contract' -j "$jobs"
 
 step "programs as users have them: faults, kills, an installation, the commands of all documents, the bench"
 run_ctest dev -j $((jobs + 1)) -L as_users
