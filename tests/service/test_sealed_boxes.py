@@ -9,7 +9,7 @@ import numpy
 from command import must
 
 # Elements along an edge.
-SIDE = 9
+SIDE = 6
 
 
 def box(file, x, first, name):
