@@ -248,17 +248,12 @@ static void split_in_middle(cells *c, const cell *one, int direction) {
     add_cells(c, 4, (const double(*)[3])half, one->bits, true);
 }
 
-/* Cuts all cells of a pair of which a window shows little: F then rises to a plateau within less than the
- * distance of two points, which the cells' sums do not tell. */
+/* Cuts all cells of a pair that windows cut. They leave what sees anything of the other element, over which F
+ * rises to a plateau: the points of a whole cell lie on the plateau rather than on its slopes and find too
+ * much light, and cells' sums do not tell. A square between four lines has 25 parts. */
 static void cut_at_lines(cells *c) {
-    enum { CUT_MOST = 16 };
-    static const double little = .1;
-    double visible = 0, full = 0;
-    for (int k = 0; k < c->n; k++) {
-        visible += c->of[k].sums.visible;
-        full += c->of[k].sums.full;
-    }
-    if (c->failed || visible > little * full) return;
+    enum { CUT_MOST = 25 };
+    if (c->failed) return;
     find_lines(c);
     for (int k = 0; k < c->n && c->n < CUT_MOST;) {
         const cell one = c->of[k];
@@ -273,9 +268,12 @@ static void cut_at_lines(cells *c) {
 }
 
 /* Splits the cell with the largest error until the whole is within the tolerance: the cells' errors are
- * independent. */
+ * independent. All light to a room may pass one small window, in pairs each of which has less than the
+ * tolerance; their errors go one way, as said above. So a pair that windows cut is also found to a share of
+ * its light. */
 static void refine(cells *c, double tolerance) {
     enum { ADDED_MOST = 4 };
+    static const double of_window = .01;
     while (!c->failed && c->n + ADDED_MOST <= CELLS_MOST) {
         double visible = 0, full = 0, square = 0, most = 0;
         int worst = 0, direction = 0;
@@ -294,7 +292,9 @@ static void refine(cells *c, double tolerance) {
             worst = k;
             direction = rough;
         }
-        if (sqrt(square) <= tolerance * (c->full > 0 ? c->full : full)) return;
+        double goal = tolerance * (c->full > 0 ? c->full : full);
+        if (c->full > 0 && visible > 0) goal = fmin(goal, of_window * visible);
+        if (sqrt(square) <= goal) return;
         if (c->n_lines < 0) find_lines(c);
         const cell one = c->of[worst];
         const break_line *line = line_across(c, &one);
