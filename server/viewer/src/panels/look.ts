@@ -2,8 +2,8 @@
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { tell } from "../base/numbers.ts";
 import type { App } from "../app.ts";
-import type { Vector } from "../daemon/api.ts";
-import type { Place } from "../picture/cameras.ts";
+import type { Description } from "../daemon/api.ts";
+import { placeOf } from "../picture/cameras.ts";
 import { turned } from "../picture/glb.ts";
 import type { View } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
@@ -86,14 +86,13 @@ function keptViews(app: App): HTMLElement {
     };
     const form = make("form", { class: "row", onsubmit: (event: Event) => { event.preventDefault(); keep(); } }, name,
         make("button", { type: "submit" }, "Keep"));
-    // The target of a camera of the scene file stands at an arm's length, which turning goes around.
-    const placeOf = ({ eye, direction }: { eye: Vector; direction: Vector }): Place => {
-        const up = app.scene?.mesh.up ?? "y", from = turned(up, eye), way = turned(up, direction);
-        return [...from, ...from.map((v, k) => v + way[k])] as Place;
+    const look = ({ eye, direction, up, fov }: NonNullable<Description["cameras"]>[number]): void => {
+        const axis = app.scene?.mesh.up ?? "y";
+        app.cameras.place(placeOf(turned(axis, eye), turned(axis, direction), turned(axis, up), fov), true);
     };
     const draw = (): void => fill(place, make("h3", {}, "Places"),
         ...(app.scene?.description.cameras ?? []).map((camera) => make("div", { class: "row" },
-            button(camera.name, "A camera of the scene", () => app.cameras.place(placeOf(camera), true), { class: "grow" }))),
+            button(camera.name, "A camera of the scene", () => look(camera), { class: "grow" }))),
         ...app.store.now.views.map((view) => make("div", { class: "row" },
             button(view.name, null, () => app.cameras.place(view.camera, true), { class: "grow" }),
             button("×", `Forget ${view.name}`, () => app.store.change(

@@ -3,18 +3,29 @@ import {
     Box3, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Sphere, Spherical, Vector2, Vector3, Vector4,
 } from "three";
 import CameraControls from "camera-controls";
+import type { Place } from "../state/state.ts";
 
 CameraControls.install({
     THREE: { Vector2, Vector3, Vector4, Quaternion, Matrix4, Spherical, Box3, Sphere, Raycaster } as never,
 });
 
-export type Place = [number, number, number, number, number, number];
+/** Angle of view of the page's own camera, of the height, in degrees. */
+const ANGLE = 50;
+
+/** That of a camera of the scene file, whose up is at right angles to its direction. One that is not tilted sideways turns about the
+ * vertical, as that of the page does. The target stands at an arm's length, which turning goes around. */
+export function placeOf(eye: readonly number[], direction: readonly number[], up: readonly number[], angle: number): Place {
+    const target = eye.map((v, k) => v + direction[k]);
+    const upright = [0, 1, 0].map((v, k) => v - direction[1] * direction[k]), length = Math.hypot(...upright);
+    const isUpright = length > 0.01 && upright.every((v, k) => Math.abs(v / length - up[k]) < 1e-3);
+    return [...eye, ...target, angle, ...(isUpright ? [0, 1, 0] : up)] as Place;
+}
 
 /** Metres a second on foot. */
 const PACE = 1.4;
 
 export class Cameras {
-    readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
+    readonly camera = new PerspectiveCamera(ANGLE, 1, 0.01, 1000);
     private readonly controls: CameraControls;
     private readonly held = new Set<string>();
     private box = new Box3();
@@ -45,7 +56,7 @@ export class Cameras {
     /** Looks at the whole scene from the front and a little above. */
     fit(animated: boolean): void {
         const centre = this.box.getCenter(new Vector3()), size = this.box.getSize(new Vector3());
-        const half = (this.camera.fov * Math.PI) / 360;
+        const half = (ANGLE * Math.PI) / 360;
         const fits = Math.max(size.y / 2, size.x / 2 / Math.max(0.2, this.camera.aspect)) / Math.tan(half);
         // Flat scenes are seen from above, rooms from in front.
         const lift = size.y < 0.4 * Math.max(size.x, size.z) ? 0.6 : 0.08;
@@ -54,15 +65,25 @@ export class Cameras {
         this.place([eye.x, eye.y, eye.z, centre.x, centre.y, centre.z], animated);
     }
 
+    /** A camera of another up is there at once: on the way it would turn over. */
     place(place: Place, animated: boolean): void {
-        void this.controls.setLookAt(...place, animated);
+        const [x, y, z, tx, ty, tz, angle = ANGLE, ...up] = place, { camera } = this, before = camera.up.clone();
+        camera.fov = angle;
+        camera.updateProjectionMatrix();
+        if (up.length === 3) camera.up.set(up[0], up[1], up[2]).normalize();
+        else camera.up.set(0, 1, 0);
+        const isTurned = before.distanceTo(camera.up) > 1e-6, goes = animated && !isTurned;
+        if (isTurned) this.controls.updateCameraUp();
+        void this.controls.setLookAt(x, y, z, tx, ty, tz, goes);
         this.moved();
-        if (!animated) this.rested();
+        if (!goes) this.rested();
     }
 
     get now(): Place {
         const eye = this.controls.getPosition(new Vector3()), target = this.controls.getTarget(new Vector3());
-        return [eye.x, eye.y, eye.z, target.x, target.y, target.z].map((v) => Number(v.toFixed(4))) as Place;
+        const { fov, up } = this.camera, isOwn = fov === ANGLE && up.y === 1;
+        return [...[eye.x, eye.y, eye.z, target.x, target.y, target.z].map((v) => Number(v.toFixed(4))),
+            ...(isOwn ? [] : [fov, up.x, up.y, up.z].map((v) => Number(v.toFixed(6))))] as Place;
     }
 
     /** On foot the target is at arm's length: turning looks around, and keys walk. */

@@ -1,5 +1,5 @@
 // The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
-import { firstLighting, firstState, firstView, skyOff, type KeptView, type Lighting, type SkyLight, type State, type View } from "./state.ts";
+import { firstLighting, firstState, firstView, skyOff, type Lighting, type Place, type SkyLight, type State, type View } from "./state.ts";
 
 type Plain = { [name: string]: unknown };
 
@@ -70,8 +70,9 @@ function restoreLighting(given: unknown): Lighting {
     };
 }
 
-function isPlace(value: unknown): value is KeptView["camera"] {
-    return Array.isArray(value) && value.length === 6 && value.every((v) => Number.isFinite(v));
+function isPlace(value: unknown): value is Place {
+    if (!Array.isArray(value) || !value.every((v) => Number.isFinite(v))) return false;
+    return value.length === 6 || (value.length === 10 && value[6] > 0 && value[6] < 180 && Math.hypot(value[7], value[8], value[9]) > 0.5);
 }
 
 function restoreView(given: unknown): View {

@@ -40,6 +40,10 @@ export interface Lighting {
     emitters: { [index: string]: number };
 }
 
+/** Eye and target in metres, y up; and, where they are not those of the page, the angle of view (of the height, in degrees) and the
+ * direction that is up in the picture. */
+export type Place = [number, number, number, number, number, number] | [number, number, number, number, number, number, number, number, number, number];
+
 export type Tone = "agx" | "aces" | "linear";
 export type Palette = "viridis" | "inferno" | "turbo";
 export type Unit = "W/m²" | "lx";
@@ -67,8 +71,8 @@ export interface View {
     /** Targets of mean and uniformity for the judged group, as EN 12464-1 states them for a task. */
     uniformity: number;
     walk: boolean;
-    /** Eye and target in metres, y up; null: the whole scene. */
-    camera: [number, number, number, number, number, number] | null;
+    /** Null: the whole scene. */
+    camera: Place | null;
 }
 
 export interface Preset {
@@ -79,7 +83,7 @@ export interface Preset {
 /** A place of the camera that was kept. */
 export interface KeptView {
     name: string;
-    camera: [number, number, number, number, number, number];
+    camera: Place;
 }
 
 export interface Compare {
