@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { test } from "node:test";
-import { Daemon, inFolder, lambert, near, openPage, settled } from "./page.mjs";
+import { Daemon, inFolder, lambert, makeStore, near, openPage, pixel, settled, sourceOf } from "./page.mjs";
 
 /** A floor and a lamp above it, seen by two cameras: one looks down, the other is tilted sideways, too. */
 function withCameras() {
@@ -82,4 +82,104 @@ test("a camera of the scene shows what it sees: its angle of view and its up", a
         await page.context().close();
         await daemon.stop();
     }
+});
+
+/** A mesh of quads in the plane z = 0, each [x, y, width, height]. */
+function quads(list) {
+    const corners = list.flatMap(([x, y, w, h]) => [x, y, 0, x + w, y, 0, x + w, y + h, 0, x, y + h, 0]);
+    return {
+        positions: Float32Array.from(corners), normals: Float32Array.from(corners, (_, k) => (k % 3 === 2 ? 1 : 0)),
+        elementOf: Uint32Array.from({ length: 4 * list.length }, (_, v) => v >> 2), groupOf: new Uint32Array(list.length),
+    };
+}
+
+/** The value at a corner, and what it is made of. */
+function nodeAt(mesh, nodes, values, x, y) {
+    const vertex = mesh.elementOf.findIndex((_, v) => mesh.positions[3 * v] === Math.fround(x) && mesh.positions[3 * v + 1] === Math.fround(y));
+    const node = nodes.nodeOf[vertex], [begin, end] = [nodes.first[node], nodes.first[node + 1]];
+    let sum = 0;
+    for (let k = begin; k < end; k++) sum += values[nodes.elements[k]] * (nodes.weights?.[k] ?? 1 / (end - begin));
+    return sum;
+}
+
+test("a corner inside an edge has the edge's value there", async () => {
+    const { findNodes } = await sourceOf("picture/nodes");
+    // A large element; at its right two of the height 1, of which the lower one has two of the height .5 at its right.
+    const mesh = quads([[0, 0, 2, 2], [2, 0, 1, 1], [2, 1, 1, 1], [3, 0, 0.5, 0.5], [3, 0.5, 0.5, 0.5], [3, 1, 1, 1]]), values = [1, 2, 4, 8, 16, 32];
+    const nodes = findNodes(mesh), at = (x, y) => nodeAt(mesh, nodes, values, x, y);
+    const close = (a, b) => assert.ok(Math.abs(a - b) < 1e-6 * b, `${a} must be ${b}`);
+    close(at(2, 0), (1 + 2) / 2);
+    close(at(2, 2), (1 + 4) / 2);
+    close(at(2, 1), (at(2, 0) + at(2, 2)) / 2);
+    close(at(3, 0), (2 + 8) / 2);
+    close(at(3, 0.5), (at(3, 0) + at(3, 1)) / 2);
+    // The lower edge of the last one has a corner of an element below it.
+    close(at(3.5, 1), (at(3, 1) + at(4, 1)) / 2);
+    // Even meshes have plain means.
+    assert.equal(findNodes(quads([[0, 0, 1, 1], [1, 0, 1, 1], [0, 1, 1, 1], [1, 1, 1, 1]])).weights, null);
+    // Another group, or a surface that stands upright, has no part in it.
+    const apart = quads([[0, 0, 2, 2], [2, 0, 1, 1], [2, 1, 1, 1]]);
+    assert.equal(findNodes({ ...apart, groupOf: Uint32Array.of(0, 1, 1) }).weights, null);
+    assert.equal(findNodes({ ...apart, normals: apart.normals.map((v, k) => (k < 12 ? [0, 1, 0][k % 3] : v)) }).weights, null);
+    // Parts of 1/3 meet parts of 1/4: every corner of one hangs in an edge of the other, and none of them on itself.
+    const thirds = [0, 1, 2].map((k) => [0, k * 4, 1, 4]), quarters = [0, 1, 2, 3].map((k) => [1, k * 3, 1, 3]);
+    const crossed = quads([...thirds, ...quarters]), found = findNodes(crossed), light = [1, 1, 1, 1, 1, 1, 1];
+    for (const y of [0, 3, 4, 6, 8, 9, 12]) close(nodeAt(crossed, found, light, 1, y), 1);
+    close(nodeAt(crossed, found, [0, 8, 0, 0, 0, 0, 0], 1, 6), nodeAt(crossed, found, [0, 4, 0, 0, 0, 0, 0], 1, 4) + nodeAt(crossed, found, [0, 4, 0, 0, 0, 0, 0], 1, 8));
+});
+
+test("smooth light has no step where elements of different sizes meet", async () => {
+    const store = makeStore("adaptive", "cornell", { generate: ["--elements", 300], precompute: ["--probes", 0, "--mesh-error", 0.05, "--elements", 1500] });
+    const daemon = await Daemon.start([store]);
+    const page = await openPage(daemon.address);
+    await page.evaluate(() => {
+        const { store: s } = window.lambert;
+        s.change({ ...s.now, view: { ...s.now.view, smooth: true, tone: "linear", exposure: null } });
+    });
+    await settled(page);
+    // Corners that stand in the middle of an edge, found the plain way, and both sides of that edge; those where means differ most.
+    const places = await page.evaluate(() => {
+        const { scene: { mesh, picker }, cameras: { camera } } = window.lambert, { positions: p, elementOf } = mesh, out = [];
+        camera.updateMatrixWorld();
+        const at = (v) => [p[3 * v], p[3 * v + 1], p[3 * v + 2]];
+        const { values } = window.lambert.fields[0], far = (a, b) => Math.max(...a.map((x, d) => Math.abs(x - b[d])));
+        const meanAt = (point, group) => {
+            const all = [];
+            for (let v = 0; v < elementOf.length; v++) if (mesh.groupOf[elementOf[v]] === group && far(at(v), point) < 1e-5) all.push(values[elementOf[v]]);
+            return all.reduce((sum, x) => sum + x, 0) / all.length;
+        };
+        const normal = (v) => [0, 1, 2].map((d) => mesh.normals[3 * v + d]), seen = (point) => camera.position.clone().set(...point).project(camera);
+        for (let begin = 0, end = 0; begin < elementOf.length; begin = end) {
+            while (end < elementOf.length && elementOf[end] === elementOf[begin]) end++;
+            if (end - begin !== 4) continue;
+            const centre = [0, 1, 2].map((d) => (p[3 * begin + d] + p[3 * begin + 3 + d] + p[3 * begin + 6 + d] + p[3 * begin + 9 + d]) / 4);
+            for (let v = begin; v < end; v++) {
+                const a = at(v), b = at(v + 1 < end ? v + 1 : begin), middle = a.map((x, d) => (x + b[d]) / 2), own = elementOf[v];
+                const u = elementOf.findIndex((other, w) => mesh.groupOf[other] === mesh.groupOf[own] && other !== own && far(at(w), middle) < 1e-5 && far(normal(w), normal(v)) < 1e-3);
+                if (u < 0) continue;
+                // A fiftieth into the large element, and as far beyond the edge.
+                const sides = [1, -1].map((side) => middle.map((x, d) => x + side * 0.02 * (centre[d] - middle[d]))).map(seen);
+                const elements = sides.map((s) => picker.at(s.x, s.y, camera));
+                if (elements[0] !== own || elements[1] === null || elements[1] === own || mesh.groupOf[elements[1]] !== mesh.groupOf[own]) continue;
+                if (!sides.every((s) => Math.abs(s.x) < 0.95 && Math.abs(s.y) < 0.95)) continue;
+                const group = mesh.groupOf[own], plain = meanAt(middle, group), along = (meanAt(a, group) + meanAt(b, group)) / 2;
+                out.push({ step: Math.abs(plain - along) / along, sides: sides.map((s) => [(s.x + 1) / 2, (1 - s.y) / 2]) });
+            }
+        }
+        return out.sort((one, other) => other.step - one.step).slice(0, 12);
+    });
+    assert.ok(places.length >= 5, `${places.length} such places are seen`);
+    let most = 0;
+    for (const { sides: [inside, beyond] } of places) {
+        const [one, other] = [await pixel(page, ...inside), await pixel(page, ...beyond)];
+        most = Math.max(most, ...one.map((v, c) => Math.abs(v - other[c])));
+    }
+    // Of plain means these pixels differed by up to 10 of 255.
+    assert.ok(places[0].step > 0.1, `means differ by ${places[0].step} at most`);
+    console.log(`largest step across such an edge: ${most} of 255 at ${places.length} places`);
+    // Light that is the same along the edge changes by a twentieth of its slope in either element.
+    assert.ok(most <= 6, `${most} of 255`);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await daemon.stop();
 });

@@ -29,14 +29,16 @@ vec3 element_colour(highp sampler2D values, int i) {
 }
 `;
 
-/** Fills the texture of nodes: each is the mean of the elements at it. */
+/** Fills the texture of nodes: each is the mean of the elements at it, or their sum by weights. */
 const nodesFragment = `
 precision highp float;
 precision highp int;
 precision highp usampler2D;
 ${fetchElement}
 uniform usampler2D node_first, node_elements;
+uniform highp sampler2D node_weights;
 uniform int node_count;
+uniform bool is_weighted;
 layout(location = 0) out vec4 mean_a;
 layout(location = 1) out vec4 mean_b;
 
@@ -53,11 +55,12 @@ void main() {
     vec3 a = vec3(0.0), b = vec3(0.0);
     for (int k = first; k < end; k++) {
         int element = int(entry(node_elements, k));
-        a += element_colour(values_a, element);
-        b += element_colour(values_b, element);
+        float weight = is_weighted ? texel(node_weights, k) : 1.0 / float(end - first);
+        a += weight * element_colour(values_a, element);
+        b += weight * element_colour(values_b, element);
     }
-    mean_a = vec4(a / float(end - first), 1.0);
-    mean_b = vec4(b / float(end - first), 1.0);
+    mean_a = vec4(a, 1.0);
+    mean_b = vec4(b, 1.0);
 }
 `;
 
@@ -185,7 +188,7 @@ export function makeUniforms(nothing: Texture): Uniforms {
     const of = (value: unknown): IUniform => ({ value });
     return {
         values_a: of(nothing), values_b: of(nothing), nodes_a: of(nothing), nodes_b: of(nothing), judged: of(nothing),
-        node_first: of(null), node_elements: of(null), node_count: of(0),
+        node_first: of(null), node_elements: of(null), node_weights: of(nothing), node_count: of(0), is_weighted: of(false),
         elements: of(1), channels: of(1), weights: of(new Vector3(1, 0, 0)), is_smooth: of(false),
         picture: of(0), tone: of(1), scale: of(new Vector2(1, 1)), exposure: of(1), toneMappingExposure: of(1),
         is_textured: of(false), reflectance: of(nothing), palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),

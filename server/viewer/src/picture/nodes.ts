@@ -1,6 +1,8 @@
-// Nodes of smooth shading: corners of equal position, normal and group share one; its value is the mean of theirs.
+// Nodes of smooth shading: corners of equal position, normal and group share one; its value is the mean of theirs;
+// one inside an edge of a larger element has the value there.
 // Creases stand in the normals, which the daemon makes; so light does not bleed around an edge or into another material.
 import type { SceneMesh } from "./glb.ts";
+import { tieHanging } from "./hanging.ts";
 
 export interface Nodes {
     count: number;
@@ -9,6 +11,8 @@ export interface Nodes {
     /** The elements at node i stand in elements[first[i]] to elements[first[i + 1] − 1]. */
     first: Uint32Array;
     elements: Uint32Array;
+    /** Of each of `elements` its weight; null: nodes are plain means. */
+    weights: Float32Array | null;
 }
 
 /** O(vertices), by a hash table of open addressing over the bits of the six numbers. */
@@ -48,7 +52,7 @@ export function findNodes(mesh: SceneMesh): Nodes {
     for (let i = 0; i < count; i++) first[i + 1] += first[i];
     const at = first.slice(0, count), elements = new Uint32Array(vertices);
     for (let v = 0; v < vertices; v++) elements[at[nodeOf[v]]++] = mesh.elementOf[v];
-    return { count, nodeOf, first, elements };
+    return tieHanging(mesh, { count, nodeOf, first, elements, weights: null });
 }
 
 function isEqual(bits: Int32Array, a: number, b: number): boolean {

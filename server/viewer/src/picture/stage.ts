@@ -42,6 +42,7 @@ export class Stage {
     geometry: BufferGeometry | null = null;
     /** Pictures drawn so far. */
     frames = 0;
+    private readonly nothing = emptyTexture();
     private readonly scene = new Scene();
     private readonly nodesScene = new Scene();
     private readonly nodesCamera = new OrthographicCamera();
@@ -59,7 +60,7 @@ export class Stage {
         private readonly advance: (seconds: number) => boolean) {
         this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: false });
         this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
-        this.uniforms = makeUniforms(emptyTexture());
+        this.uniforms = makeUniforms(this.nothing);
         const plane = new Mesh(new PlaneGeometry(2, 2), nodesMaterial(this.uniforms));
         plane.frustumCulled = false;
         this.nodesScene.add(plane);
@@ -106,6 +107,8 @@ export class Stage {
         u.values_b.value = this.values[1].texture;
         u.node_first.value = integerTexture(nodes.first);
         u.node_elements.value = integerTexture(nodes.elements);
+        u.is_weighted.value = nodes.weights !== null;
+        u.node_weights.value = nodes.weights === null ? this.nothing : floatTexture(nodes.weights);
         u.node_count.value = nodes.count;
         u.nodes_a.value = this.nodes.textures[0];
         u.nodes_b.value = this.nodes.textures[1];
@@ -258,7 +261,7 @@ export class Stage {
         this.nodes?.dispose();
         this.images.forEach((texture) => texture.dispose());
         this.images = [];
-        for (const name of ["node_first", "node_elements", "judged", "reflectance"])
+        for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance"])
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
         this.geometry = this.mesh = this.values = this.nodes = null;
     }

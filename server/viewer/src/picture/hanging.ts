@@ -1,0 +1,183 @@
+// Hanging nodes: where elements of different sizes meet, the corner of a small one stands inside an edge of a large one. Along
+// that edge the large one is drawn linear; so the node has that value, or the picture has steps and cracks there.
+import type { SceneMesh } from "./glb.ts";
+import type { Nodes } from "./nodes.ts";
+
+/** Cosine of 30 degrees, at which the daemon parts surfaces. */
+const SURFACE_COS = 0.866;
+
+/** Nodes inside edges: the value of node[i] is 1 − at[i] of that of from[i] and at[i] of that of to[i]. */
+interface Ties {
+    node: number[];
+    from: number[];
+    to: number[];
+    at: number[];
+    /** Of the edge, m. */
+    length: number[];
+}
+
+/** Gives hanging nodes the elements of their edge's ends, with weights. O(vertices), where edges meet few parts of others. */
+export function tieHanging(mesh: SceneMesh, nodes: Nodes): Nodes {
+    const edges = loneEdges(mesh, nodes);
+    const ties = findTies(mesh, nodes, edges);
+    return ties.node.length === 0 ? nodes : withWeights(nodes, ties);
+}
+
+/** The edges that belong to one element alone, as pairs of vertices. Only these have hanging nodes, and only their ends hang. */
+function loneEdges(mesh: SceneMesh, { nodeOf, first, elements }: Nodes): number[] {
+    const out: number[] = [], { elementOf } = mesh, vertices = elementOf.length;
+    for (let begin = 0, end = 0; begin < vertices; begin = end) {
+        const own = elementOf[begin];
+        while (end < vertices && elementOf[end] === own) end++;
+        for (let v = begin; v < end; v++) {
+            const w = v + 1 < end ? v + 1 : begin, a = nodeOf[v], b = nodeOf[w], endOfA = first[a + 1], endOfB = first[b + 1];
+            let isShared = false;
+            for (let i = first[a]; i < endOfA && !isShared; i++) {
+                const other = elements[i];
+                if (other === own) continue;
+                for (let k = first[b]; k < endOfB && !isShared; k++) isShared = elements[k] === other;
+            }
+            if (!isShared && a !== b) out.push(v, w);
+        }
+    }
+    return out;
+}
+
+/** The candidates by cubic cells of their group; each cell is a chain. */
+class Grid {
+    private readonly heads: Int32Array;
+    private readonly next: Int32Array;
+
+    constructor(private readonly mesh: SceneMesh, private readonly candidates: readonly number[], private readonly cell: number) {
+        let slots = 16;
+        while (slots < candidates.length) slots *= 2;
+        this.heads = new Int32Array(slots).fill(-1);
+        this.next = new Int32Array(candidates.length);
+        candidates.forEach((v, i) => {
+            const p = mesh.positions, slot = this.slot(mesh.groupOf[mesh.elementOf[v]], this.cellOf(p[3 * v]), this.cellOf(p[3 * v + 1]), this.cellOf(p[3 * v + 2]));
+            this.next[i] = this.heads[slot];
+            this.heads[slot] = i;
+        });
+    }
+
+    private cellOf(x: number): number {
+        return Math.floor(x / this.cell);
+    }
+
+    private slot(group: number, x: number, y: number, z: number): number {
+        let hash = Math.imul(group ^ x, 0x9e3779b1);
+        hash = Math.imul(hash ^ (hash >>> 15) ^ y, 0x85ebca6b);
+        hash = Math.imul(hash ^ (hash >>> 13) ^ z, 0xc2b2ae35);
+        return (hash ^ (hash >>> 16)) & (this.heads.length - 1);
+    }
+
+    /** Visits the candidates of a group in the cells that a box meets, and others that share their place in the table. */
+    visit(group: number, low: readonly number[], high: readonly number[], visitor: (vertex: number) => void): void {
+        for (let x = this.cellOf(low[0]); x <= this.cellOf(high[0]); x++)
+            for (let y = this.cellOf(low[1]); y <= this.cellOf(high[1]); y++)
+                for (let z = this.cellOf(low[2]); z <= this.cellOf(high[2]); z++)
+                    for (let i = this.heads[this.slot(group, x, y, z)]; i >= 0; i = this.next[i])
+                        if (this.mesh.groupOf[this.mesh.elementOf[this.candidates[i]]] === group) visitor(this.candidates[i]);
+    }
+}
+
+function findTies(mesh: SceneMesh, { nodeOf, count }: Nodes, edges: readonly number[]): Ties {
+    const { positions: p, normals: n } = mesh, ties: Ties = { node: [], from: [], to: [], at: [], length: [] };
+    const tieOf = new Int32Array(count).fill(-1), isCandidate = new Uint8Array(count), candidates: number[] = [];
+    let total = 0, longest = 0, most = 0;
+    for (let e = 0; e < edges.length; e += 2) {
+        const a = 3 * edges[e], b = 3 * edges[e + 1], length = Math.hypot(p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]);
+        total += length;
+        longest = Math.max(longest, length);
+        for (let d = 0; d < 3; d++) most = Math.max(most, Math.abs(p[a + d]));
+        for (const v of [edges[e], edges[e + 1]]) {
+            if (isCandidate[nodeOf[v]] === 0) candidates.push(v);
+            isCandidate[nodeOf[v]] = 1;
+        }
+    }
+    // Positions are floats, and many scene files have six digits.
+    const tolerance = Math.max(1e-6 * most, 1e-30);
+    // About one node in a cell, and no edge through more than some thousand cells.
+    const cell = Math.max((2 * total) / (edges.length + 1), longest / 4096, 4 * tolerance), grid = new Grid(mesh, candidates, cell);
+    const low = [0, 0, 0], high = [0, 0, 0], way = [0, 0, 0];
+    for (let e = 0; e < edges.length; e += 2) {
+        const v = edges[e], w = edges[e + 1], a = 3 * v, b = 3 * w;
+        for (let d = 0; d < 3; d++) way[d] = p[b + d] - p[a + d];
+        const length = Math.hypot(way[0], way[1], way[2]), pieces = Math.ceil(length / cell);
+        const tie = (u: number): void => {
+            const node = nodeOf[u], q = 3 * u, known = tieOf[node];
+            if (node === nodeOf[v] || node === nodeOf[w] || (known >= 0 && ties.length[known] >= length)) return;
+            const x = p[q] - p[a], y = p[q + 1] - p[a + 1], z = p[q + 2] - p[a + 2];
+            const t = (x * way[0] + y * way[1] + z * way[2]) / (length * length);
+            if (!(t * length > tolerance && (1 - t) * length > tolerance)) return;
+            if (Math.hypot(x - t * way[0], y - t * way[1], z - t * way[2]) > tolerance) return;
+            const mx = n[a] + n[b], my = n[a + 1] + n[b + 1], mz = n[a + 2] + n[b + 2];
+            if (mx * n[q] + my * n[q + 1] + mz * n[q + 2] < SURFACE_COS * Math.hypot(mx, my, mz)) return;
+            // The longest of several such edges wins.
+            const at = known >= 0 ? known : ties.node.length;
+            tieOf[node] = at;
+            [ties.node[at], ties.from[at], ties.to[at], ties.at[at], ties.length[at]] = [node, nodeOf[v], nodeOf[w], t, length];
+        };
+        for (let k = 0; k < pieces; k++) {
+            for (let d = 0; d < 3; d++) {
+                const one = p[a + d] + (way[d] * k) / pieces, other = p[a + d] + (way[d] * (k + 1)) / pieces;
+                low[d] = Math.min(one, other) - tolerance;
+                high[d] = Math.max(one, other) + tolerance;
+            }
+            grid.visit(mesh.groupOf[mesh.elementOf[v]], low, high, tie);
+        }
+    }
+    return ties;
+}
+
+/** Takes the ties in, long edges first; one by which a node would hang on itself is left out: parts of 1/3 and of 1/4 of one
+ * edge have such, and agree only where both have a node. */
+function withWeights(nodes: Nodes, ties: Ties): Nodes {
+    const tieOf = new Int32Array(nodes.count).fill(-1), order = ties.node.map((_, i) => i).sort((i, k) => ties.length[k] - ties.length[i]);
+    const hangsOn = (from: number, on: number): boolean => {
+        const stack = [from], seen = new Set<number>();
+        for (let node = stack.pop(); node !== undefined; node = stack.pop()) {
+            if (node === on) return true;
+            const i = tieOf[node];
+            if (i < 0 || seen.has(node)) continue;
+            seen.add(node);
+            stack.push(ties.from[i], ties.to[i]);
+        }
+        return false;
+    };
+    for (const i of order) if (!hangsOn(ties.from[i], ties.node[i]) && !hangsOn(ties.to[i], ties.node[i])) tieOf[ties.node[i]] = i;
+    const lists = new Map<number, Map<number, number>>();
+    const listOf = (node: number): Map<number, number> => {
+        const known = lists.get(node), i = tieOf[node], out = new Map<number, number>();
+        if (known !== undefined) return known;
+        const add = (list: Map<number, number>, share: number): void => {
+            for (const [element, weight] of list) out.set(element, (out.get(element) ?? 0) + share * weight);
+        };
+        if (i < 0) {
+            const { first, elements } = nodes, begin = first[node], end = first[node + 1];
+            for (let k = begin; k < end; k++) out.set(elements[k], (out.get(elements[k]) ?? 0) + 1 / (end - begin));
+            return out;
+        }
+        add(listOf(ties.from[i]), 1 - ties.at[i]);
+        add(listOf(ties.to[i]), ties.at[i]);
+        lists.set(node, out);
+        return out;
+    };
+    const first = new Uint32Array(nodes.count + 1);
+    for (let node = 0; node < nodes.count; node++)
+        first[node + 1] = first[node] + (tieOf[node] < 0 ? nodes.first[node + 1] - nodes.first[node] : listOf(node).size);
+    const elements = new Uint32Array(first[nodes.count]), weights = new Float32Array(first[nodes.count]);
+    for (let node = 0; node < nodes.count; node++) {
+        let at = first[node];
+        if (tieOf[node] < 0) {
+            for (let k = nodes.first[node]; k < nodes.first[node + 1]; k++) elements[at++] = nodes.elements[k];
+            weights.fill(1 / (at - first[node]), first[node], at);
+        } else {
+            for (const [element, weight] of listOf(node)) {
+                elements[at] = element;
+                weights[at++] = weight;
+            }
+        }
+    }
+    return { ...nodes, first, elements, weights };
+}
