@@ -60,7 +60,7 @@ async function isFine(page) {
 const lightsOf = (page) => page.evaluate(() => {
     const { store: { now: { lighting } }, scene, skyOf } = window.lambert;
     const groups = Object.fromEntries(Object.entries(lighting.groups).map(([name, light]) => [name, light.colour.map((c) => c * light.power * lighting.dim)]));
-    return { groups, sky: skyOf(lighting, scene) };
+    return { groups, sky: skyOf(lighting, scene.description) };
 });
 
 /** [C] of one element. */

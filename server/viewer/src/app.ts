@@ -9,6 +9,7 @@ import { readMesh, type SceneMesh } from "./picture/glb.ts";
 import { Picker } from "./picture/pick.ts";
 import type { Axis } from "./picture/scale.ts";
 import { Stage } from "./picture/stage.ts";
+import { whyUnlike } from "./state/alike.ts";
 import { wantedFor, type Abilities, type Wanted } from "./state/request.ts";
 import { firstState, type GroupLight, type Lighting, type State } from "./state/state.ts";
 import { Store } from "./state/store.ts";
@@ -27,7 +28,7 @@ export interface Timing {
     solve: number | null;
 }
 
-type Event = "scene" | "scenes" | "field" | "pick" | "hover" | "timing" | "lost" | "found" | "problem" | "token" | "theme";
+type Event = "scene" | "scenes" | "field" | "pick" | "hover" | "timing" | "unlike" | "lost" | "found" | "problem" | "token" | "theme";
 type Side = 0 | 1;
 
 /** The store was replaced by one of another mesh. */
@@ -57,9 +58,17 @@ export class App {
     /** Answers shown so far. */
     answers = 0;
     /** Radiances of the sky's tiles for a lighting; set by the panel of skies. */
-    skyOf: (lighting: Lighting, scene: OpenScene) => readonly (number | number[])[] | null = () => null;
+    skyOf: (lighting: Lighting, of: Description) => readonly (number | number[])[] | null = () => null;
     /** Fetches what the first picture of a scene needs beside its mesh; the function that it returns takes that in. */
     prepare: (description: Description) => Promise<(scene: OpenScene) => void> = () => Promise.resolve(() => undefined);
+    /** Fetches what the lighting of another scene needs, before it is compared. */
+    prepareOther: (description: Description) => Promise<void> = () => Promise.resolve();
+    /** Why the last scene that was to be compared is not. */
+    unlike: string | null = null;
+    /** Scenes that can be compared with the open one. */
+    private readonly alike = new Map<string, Description>();
+    /** The scenes whose comparison was taken in last. */
+    private beside: { scene: OpenScene | null; name: string | null } = { scene: null, name: null };
     private readonly listeners = new Map<Event, Set<() => void>>();
     private readonly askers: [Newest<Wanted, [Field, number | null]>, Newest<Wanted, [Field, number | null]>];
     private asked = ["", ""];
@@ -95,6 +104,7 @@ export class App {
         const scene = { description, mesh, picker, ownLighting: lightingOf(mesh, description) };
         takeIn(scene);
         this.scene = scene;
+        this.alike.clear();
         const { ownLighting } = scene;
         this.cameras.setBounds(new Box3().setFromBufferAttribute(new BufferAttribute(mesh.positions, 3)));
         this.fields = [null, null];
@@ -120,15 +130,40 @@ export class App {
         if (scene === null || (side === 1 && now.compare === null)) return null;
         const quantity = now.view.picture === "light" ? "radiosity" : now.view.quantity;
         const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
-        const name = (side === 1 ? now.compare?.scene : null) ?? now.scene;
-        return wantedFor(name, quantity, lighting, this.abilities(scene, lighting));
+        const other = side === 1 ? now.compare?.scene ?? null : null, of = other === null ? scene.description : this.alike.get(other);
+        return of === undefined ? null : wantedFor(of.name, quantity, lighting, this.abilities(of, lighting));
     }
 
-    abilities(scene: OpenScene, lighting: Lighting): Abilities {
+    private abilities(of: Description, lighting: Lighting): Abilities {
         return {
-            channels: scene.description.channels, groups: scene.mesh.groups.map((group) => group.name),
-            emitters: scene.description.emitters?.length ?? 0, sky: this.skyOf(lighting, scene),
+            channels: of.channels, groups: of.groups.map((group) => group.name), emitters: of.emitters?.length ?? 0, sky: this.skyOf(lighting, of),
         };
+    }
+
+    /** Finds out if a scene can be compared with the open one; `unlike` says why not. Nothing is asked of one that cannot. */
+    async admit(name: string): Promise<boolean> {
+        const { scene } = this;
+        if (scene === null || this.alike.has(name)) return scene !== null;
+        let why: string | null;
+        try {
+            const there = await this.api.describe(name);
+            why = whyUnlike(scene.description, there);
+            if (why === null) await this.prepareOther(there);
+            if (scene !== this.scene) return false;
+            if (why === null) this.alike.set(name, there);
+        } catch (reason) {
+            if (!(reason instanceof Problem) || reason.status === 401 || reason.status === 503) throw reason;
+            why = `${name} cannot be compared: ${reason.message}.`;
+        }
+        this.unlike = why;
+        if (why !== null) this.tell("unlike");
+        return why === null;
+    }
+
+    /** Takes in the scene of a comparison that came with a link or by undoing; ends one that cannot be. */
+    private async takeOther(name: string): Promise<void> {
+        if (await this.admit(name)) this.ask();
+        else if (this.store.now.compare?.scene === name) this.store.settle({ ...this.store.now, compare: null });
     }
 
     /** Asks for what is to be shown, if that has changed. */
@@ -185,7 +220,8 @@ export class App {
             this.lose(`The daemon is busy: ${reason.message}. This page goes on by itself.`);
             return;
         }
-        this.problem = reason instanceof Error ? reason.message : String(reason);
+        this.problem = reason instanceof Problem ? `The daemon did not do what this page asked for (${reason.status}): ${reason.message}`
+            : reason instanceof Error ? reason.message : String(reason);
         this.tell("problem");
     }
 
@@ -263,6 +299,11 @@ export class App {
             this.askers[1].forget();
         }
         if (now.view !== before.view || now.compare !== before.compare) this.setLook();
+        const other = now.compare?.scene ?? null;
+        if (other !== null && (other !== this.beside.name || this.scene !== this.beside.scene)) {
+            this.beside = { scene: this.scene, name: other };
+            this.takeOther(other).catch((reason: unknown) => this.fail(reason));
+        }
         this.ask();
     }
 

@@ -12,17 +12,30 @@ const KEPT = 4;
 const OVERCAST_K = 6500, BLUE_K = 12000, SUN_K = 5200;
 
 export class SkySource {
+    /** Of the open scene. */
     tiles: Tiles | null = null;
     weather: Weather | null = null;
     /** True where the weather is that beside the store, so that a link restores it. */
     isBeside = false;
     /** What is wrong with the last file that was to be read. */
     problem: string | null = null;
+    private readonly others = new Map<string, Tiles>();
     private kept = new Map<string, { sky: Sky | null; values: readonly (number | number[])[] | null }>();
 
+    /** Takes in the tiles of the scene that is opened. */
     take(answer: SkyAnswer | null): void {
         this.tiles = answer === null ? null : tilesOf(answer);
+        this.others.clear();
         this.kept.clear();
+    }
+
+    /** Takes in those of another scene, which the open one is compared with. */
+    takeOther(name: string, answer: SkyAnswer): void {
+        this.others.set(name, tilesOf(answer));
+    }
+
+    knows(other: string): boolean {
+        return this.others.has(other);
     }
 
     /** Reads a weather file; one that is wrong is not taken, and `problem` says why. True if it is taken. */
@@ -45,20 +58,20 @@ export class SkySource {
     }
 
     sky(light: SkyLight, photometric: boolean): Sky | null {
-        return this.find(light, photometric, 1).sky;
+        return this.find(light, photometric, 1, null).sky;
     }
 
-    /** One radiance a tile, or three; null without light. */
-    radiances(light: SkyLight, photometric: boolean, channels: number): readonly (number | number[])[] | null {
-        return this.find(light, photometric, channels).values;
+    /** One radiance a tile of the open scene (other null) or of another one, or three; null without light. */
+    radiances(light: SkyLight, photometric: boolean, channels: number, other: string | null = null): readonly (number | number[])[] | null {
+        return this.find(light, photometric, channels, other).values;
     }
 
-    private find(light: SkyLight, photometric: boolean, channels: number): { sky: Sky | null; values: readonly (number | number[])[] | null } {
+    private find(light: SkyLight, photometric: boolean, channels: number, other: string | null): { sky: Sky | null; values: readonly (number | number[])[] | null } {
         const isColoured = light.tinted && channels === 3;
-        const key = JSON.stringify([light, photometric, isColoured]);
+        const key = JSON.stringify([light, photometric, isColoured, other]);
         let found = this.kept.get(key);
         if (found === undefined) {
-            const sky = this.tiles === null ? null : skyFor(this.tiles, light, photometric, this.weather);
+            const tiles = other === null ? this.tiles : this.others.get(other) ?? null, sky = tiles === null ? null : skyFor(tiles, light, photometric, this.weather);
             found = { sky, values: sky === null ? null : isColoured ? coloured(sky) : Array.from(sky.diffuse, (value, t) => value + sky.direct[t]) };
             this.kept.set(key, found);
             if (this.kept.size > KEPT) this.kept.delete(this.kept.keys().next().value as string);

@@ -14,10 +14,14 @@ import type { Panel } from "./panel.ts";
 /** The numbers are asked for in single precision this long after the last answer. */
 const REST_MS = 400;
 
+/** Names of scenes that are not offered, at most. */
+const UNFIT_MOST = 8;
+
 export function comparePanel(app: App): Panel {
     const line = splitLine(app), legend = changeLegend(app);
     app.stage.canvas.parentElement?.append(line.element, legend.element);
     const choices = make("div", {}), numbers = make("div", { "data-figure": "compared", "aria-live": "polite" }), said = make("p", { role: "status" });
+    const unfit = make("p", { class: "hint" });
     const how = choice("Shown as", [["split", "A left, B right of a line"], ["difference", "Difference B − A"]], "split",
         (way) => set({ how: way }));
     const set = (to: Partial<Compare> | null): void => {
@@ -31,18 +35,17 @@ export function comparePanel(app: App): Panel {
         if (value === "") set(null);
         else if (value.startsWith("p:")) set({ scene: null, lighting: now.presets.find((preset) => preset.name === name)?.lighting ?? null });
         else if (value.startsWith("s:")) {
-            const why = await unlike(app, name);
-            if (why === null) set({ scene: name, lighting: null });
-            else {
-                draw();
-                said.textContent = why;
-            }
+            said.textContent = "";
+            if (await app.admit(name)) set({ scene: name, lighting: null });
         }
     };
     const draw = (): void => {
         const { scenes, store: { now } } = app;
         const here = scenes.find((scene) => scene.name === now.scene);
         const others = scenes.filter((scene) => scene.name !== now.scene && scene.elements === here?.elements && scene.channels === here.channels);
+        const left = scenes.filter((scene) => scene.name !== now.scene && !others.includes(scene)).map((scene) => scene.name);
+        unfit.hidden = left.length === 0;
+        unfit.textContent = `Not offered, as their elements or channels are other ones: ${left.slice(0, UNFIT_MOST).join(", ")}${left.length > UNFIT_MOST ? " …" : "."}`;
         const chosen = chosenOf(app);
         fill(choices, choice("B is", [["", "nothing: no comparison"], ...(chosen === "kept" ? [["kept", "the lighting that was kept"] as const] : []),
             ...others.map((scene) => [`s:${scene.name}`, `scene ${scene.name}`] as const),
@@ -55,6 +58,10 @@ export function comparePanel(app: App): Panel {
     };
     app.on("scene", draw);
     app.on("scenes", draw);
+    app.on("unlike", () => {
+        draw();
+        said.textContent = app.unlike ?? "";
+    });
     app.store.listen((now, before) => { if (now.compare !== before.compare || now.presets !== before.presets) draw(); });
     measure(app, numbers, (changes) => {
         const most = roundUp(changes.high);
@@ -65,7 +72,7 @@ export function comparePanel(app: App): Panel {
     return {
         id: "compare", title: "Compare",
         element: make("div", {}, make("p", { class: "hint" }, "A is what the other panels show. B is another scene with as many elements, or another lighting."),
-            choices, make("div", { class: "row" }, keep), how, said, numbers),
+            choices, said, unfit, make("div", { class: "row" }, keep), how, numbers),
     };
 }
 
@@ -81,17 +88,6 @@ function chosenOf(app: App): string {
 function nameOf(compare: Compare | null, chosen: string): string {
     if (compare === null) return "";
     return chosen === "kept" ? "kept lighting" : chosen.slice(2);
-}
-
-/** Why another scene cannot take the lighting of this one; null: it can. */
-async function unlike(app: App, name: string): Promise<string | null> {
-    const here = app.scene?.description, there = await app.api.describe(name);
-    if (here === undefined) return null;
-    const names = (list: { name: string }[]): string => JSON.stringify(list.map((group) => group.name).sort());
-    if (names(here.groups) !== names(there.groups)) return `${name} has other groups, so it cannot be lit alike.`;
-    if (here.emitters?.length !== there.emitters?.length) return `${name} has other emitters, so it cannot be lit alike.`;
-    if (here.sky?.tiles !== there.sky?.tiles) return `${name} has another sky, so it cannot be lit alike.`;
-    return null;
 }
 
 const planar = (field: Field): Float32Array => halvesToFloats(field.bits, 0, field.bits.length, field.scale);

@@ -47,8 +47,12 @@ export function skyPanel(app: App): Panel {
     const isPhotometric = (): boolean => app.store.now.view.unit === "lx";
     // Tiles are of the scene that they were read for: another one may be shown before its own have come.
     let tiledScene: OpenScene | null = null;
-    app.skyOf = (lighting, scene) => (scene !== tiledScene || scene.description.sky === null || lighting.solo !== null ? null
-        : source.radiances(lighting.sky, isPhotometric(), scene.description.channels));
+    app.skyOf = (lighting, description) => {
+        const isOpen = description === tiledScene?.description;
+        if (description.sky === null || lighting.solo !== null || !(isOpen || source.knows(description.name))) return null;
+        return source.radiances(lighting.sky, isPhotometric(), description.channels, isOpen ? null : description.name);
+    };
+    app.prepareOther = async ({ name, sky }) => { if (sky !== null) source.takeOther(name, await app.api.sky(name)); };
     const controls = makeControls(app, change);
     const weather = makeWeather(app, source, change, () => update());
     const dome = makeDome(), figures = make("table", { class: "figures" }), moment = make("p", { class: "moment", "aria-live": "off" });

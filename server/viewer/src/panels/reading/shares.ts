@@ -65,7 +65,7 @@ export class Shares {
         }
         const { description, mesh } = scene;
         const parts = partsOf(this.gradient.of, now.lighting, description.channels, description.groups.map((group) => group.name),
-            description.emitters ?? [], description.sky === null ? null : app.skyOf(now.lighting, scene));
+            description.emitters ?? [], description.sky === null ? null : app.skyOf(now.lighting, description));
         const total = parts.reduce((sum, part) => sum + part.value, 0);
         const group = mesh.groups[mesh.groupOf[asked.element]]?.name ?? "";
         const listed = parts.slice(0, LINES_MOST), rest = parts.slice(LINES_MOST).reduce((sum, part) => sum + part.value, 0);
