@@ -231,7 +231,7 @@ test("a weather file that is picked stays on the page", async () => {
     await page.getByText("line 2: latitude is \"375\", must be a number from -90 to 90").waitFor();
     writeFileSync(inFolder("good.wea"), wea());
     await page.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("good.wea"));
-    await page.getByText("Somewhere_XX: 120 hours. A link to this state does not hold it.").waitFor();
+    await page.getByText("Somewhere_XX: 120 hours. A link holds the weather of the time that is shown, not the file.").waitFor();
     await settled(page);
     const sky = await skyNow(page);
     assert.deepEqual([sky.model, sky.latitude, sky.longitude, sky.zone], ["perez", LATITUDE, LONGITUDE, ZONE]);
@@ -241,6 +241,23 @@ test("a weather file that is picked stays on the page", async () => {
         assert.ok(method === "GET" ? body === "" : path.startsWith("/v1/scenes/yard/"), `${method} ${path}`);
         assert.ok(!body.includes("Somewhere") && !body.includes("time_zone"));
     }
+    // A link has the weather of its hour, so that the picture is the same elsewhere; of other hours the page says that it is missing.
+    await skyTo(page, { day: 172, hour: 10.25 });
+    await settled(page);
+    await page.waitForTimeout(500);
+    const other = await openPage(daemon.address, { hash: await page.evaluate(() => location.hash), width: 360, height: 740 });
+    const [one, two] = await Promise.all([page, other].map((p) => p.evaluate(() => ({ scale: window.lambert.fields[0].scale, bits: [...window.lambert.fields[0].bits] }))));
+    assert.ok(Math.max(...one.bits) > 0);
+    assert.deepEqual(two, one);
+    assert.equal((await skyNow(other)).moment.hour, 10.25);
+    await other.getByRole("tab", { name: "Sky" }).click();
+    await skyTo(other, { hour: 11 });
+    await other.getByText("The link holds the weather of 21 June, 10:15, alone.").waitFor();
+    await other.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("good.wea"));
+    await settled(other);
+    assert.ok(Math.max(...await other.evaluate(() => [...window.lambert.fields[0].bits])) > 0);
+    assert.deepEqual(other.faults, []);
+    await other.context().close();
     assert.deepEqual(await violations(page), []);
     await page.context().close();
 });

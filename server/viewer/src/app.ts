@@ -11,7 +11,7 @@ import type { Axis } from "./picture/scale.ts";
 import { Stage } from "./picture/stage.ts";
 import { whyUnlike } from "./state/alike.ts";
 import { wantedFor, type Abilities, type Wanted } from "./state/request.ts";
-import { firstState, type GroupLight, type Lighting, type State } from "./state/state.ts";
+import { firstState, type GroupLight, type Lighting, type Moment, type SkyLight, type State } from "./state/state.ts";
 import { Store } from "./state/store.ts";
 
 export interface OpenScene {
@@ -59,6 +59,8 @@ export class App {
     answers = 0;
     /** Radiances of the sky's tiles for a lighting; set by the panel of skies. */
     skyOf: (lighting: Lighting, of: Description) => readonly (number | number[])[] | null = () => null;
+    /** The weather that a link has to hold for a light; set by the panel of skies. */
+    momentOf: (light: SkyLight) => Moment | null = () => null;
     /** Fetches what the first picture of a scene needs beside its mesh; the function that it returns takes that in. */
     prepare: (description: Description) => Promise<(scene: OpenScene) => void> = () => Promise.resolve(() => undefined);
     /** Fetches what the lighting of another scene needs, before it is compared. */

@@ -69,7 +69,7 @@ function keepLink(app: App): void {
         clearTimeout(timer);
         timer = window.setTimeout(() => {
             if (app.scene === null) return;
-            written = toFragment(app.store.now);
+            written = toFragment(app.store.now, app.momentOf);
             history.replaceState(null, "", written);
         }, LINK_MS);
     });

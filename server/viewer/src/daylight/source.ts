@@ -1,9 +1,9 @@
 // The tiles of the open store and the weather that skies are made of; answers with radiances for a lighting.
 import { ofTemperature } from "../base/colour.ts";
-import type { SkyLight } from "../state/state.ts";
+import type { Moment, SkyLight } from "../state/state.ts";
 import { skyFor, type Sky } from "./skies.ts";
 import { tilesOf, type SkyAnswer, type Tiles } from "./tiles.ts";
-import { readWeather, type Weather } from "./weather.ts";
+import { readWeather, weatherAt, weatherOf, type Weather } from "./weather.ts";
 
 /** Skies that are kept, for two lightings beside each other that take turns. */
 const KEPT = 4;
@@ -51,6 +51,23 @@ export class SkySource {
         return this.problem === null;
     }
 
+    /** That of a link holds at its own time, until a file is picked. */
+    weatherFor(light: SkyLight): Weather | null {
+        const { moment } = light, isItsTime = moment !== null && moment.day === light.day && moment.hour === light.hour;
+        return isItsTime && (this.weather === null || this.isBeside) ? weatherOf(moment) : this.weather;
+    }
+
+    /** The weather that a link has to hold: of a file that was picked, or of the link that brought it. */
+    momentOf(light: SkyLight): Moment | null {
+        if (light.model !== "perez") return null;
+        if (this.weather === null || this.isBeside) return light.moment;
+        const { day, hour } = light, at = weatherAt(this.weather, day, hour);
+        return at === null ? null : {
+            day, hour, year: at.year, direct: at.direct, isHorizontal: this.weather.directIsHorizontal, diffuse: at.diffuse,
+            dewPoint: Number.isNaN(at.dewPoint) ? null : at.dewPoint,
+        };
+    }
+
     forget(): void {
         this.weather = null;
         this.problem = null;
@@ -71,7 +88,7 @@ export class SkySource {
         const key = JSON.stringify([light, photometric, isColoured, other]);
         let found = this.kept.get(key);
         if (found === undefined) {
-            const tiles = other === null ? this.tiles : this.others.get(other) ?? null, sky = tiles === null ? null : skyFor(tiles, light, photometric, this.weather);
+            const tiles = other === null ? this.tiles : this.others.get(other) ?? null, sky = tiles === null ? null : skyFor(tiles, light, photometric, this.weatherFor(light));
             found = { sky, values: sky === null ? null : isColoured ? coloured(sky) : Array.from(sky.diffuse, (value, t) => value + sky.direct[t]) };
             this.kept.set(key, found);
             if (this.kept.size > KEPT) this.kept.delete(this.kept.keys().next().value as string);

@@ -1,6 +1,7 @@
 // Reads the hourly irradiances of a weather file: EPW of EnergyPlus, or WEA of Radiance's gendaymtx. The page keeps it to
 // itself: nothing is sent anywhere.
-import { dayOf } from "./sun.ts";
+import { dateOf, dayOf } from "./sun.ts";
+import type { Moment } from "../state/state.ts";
 
 export interface WeatherHour {
     year: number;
@@ -120,6 +121,12 @@ export function readWeather(text: string): Weather {
     // Months of a typical year are often of several years: what counts is the time of the year.
     weather.hours.sort((one, other) => timeOf(one) - timeOf(other));
     return { ...weather, times: Float64Array.from(weather.hours, timeOf) };
+}
+
+/** The weather of one hour, as a link holds it. */
+export function weatherOf({ day, hour, year, direct, isHorizontal, diffuse, dewPoint }: Moment): Weather {
+    const one: WeatherHour = { year, ...dateOf(day), hour, direct, diffuse, dewPoint: dewPoint ?? NaN };
+    return { place: "", latitude: 0, longitude: 0, zone: 0, directIsHorizontal: isHorizontal, hours: [one], times: Float64Array.of(24 * (day - 1) + hour) };
 }
 
 /** The weather at a time of the year: that of an hour at its middle, between two by their distance; `year` is that of the

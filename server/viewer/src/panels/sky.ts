@@ -52,6 +52,7 @@ export function skyPanel(app: App): Panel {
         if (description.sky === null || lighting.solo !== null || !(isOpen || source.knows(description.name))) return null;
         return source.radiances(lighting.sky, isPhotometric(), description.channels, isOpen ? null : description.name);
     };
+    app.momentOf = (light) => source.momentOf(light);
     app.prepareOther = async ({ name, sky }) => { if (sky !== null) source.takeOther(name, await app.api.sky(name)); };
     const controls = makeControls(app, change);
     const weather = makeWeather(app, source, change, () => update());
@@ -127,7 +128,9 @@ function takeSky(app: App, source: SkySource, fetched: Fetched, scene: OpenScene
 function noteOf(light: SkyLight, source: SkySource, app: App): string {
     if (source.tiles === null) return "The tiles of this sky are not known yet.";
     if (app.store.now.lighting.solo !== null) return `Only ${app.store.now.lighting.solo} shines now (Lights, Solo), not the sky.`;
-    if (light.model === "perez" && source.weather === null) return "Pick a weather file below; until then this sky is dark.";
+    if (light.model === "perez" && source.weather === null && source.weatherFor(light) === null)
+        return light.moment === null ? "Pick a weather file below; until then this sky is dark."
+            : `The link holds the weather of ${dateText(light.moment.day)}, ${clockOf(light.moment.hour)}, alone. Pick its file below; until then the sky of other times is dark.`;
     if (light.model === "perez" && source.sky(light, false) === null) return "The weather file has nothing at this time.";
     return "";
 }
@@ -214,7 +217,7 @@ function makeWeather(app: App, source: SkySource, change: Change, done: () => vo
         problem.textContent = source.problem ?? "";
         problem.hidden = source.problem === null;
         about.textContent = weather === null ? "EPW or WEA. Pick it, or drop it on the page. It stays on this machine; nothing is sent."
-            : `${weather.place}: ${count(weather.hours.length)} hours${source.isBeside ? ", from beside the store." : ". A link to this state does not hold it."}`;
+            : `${weather.place}: ${count(weather.hours.length)} hours${source.isBeside ? ", from beside the store." : ". A link holds the weather of the time that is shown, not the file."}`;
     };
     return { element, update };
 }

@@ -1,5 +1,5 @@
 // The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
-import { firstLighting, firstState, firstView, skyOff, type Lighting, type Place, type SkyLight, type State, type View } from "./state.ts";
+import { firstLighting, firstState, firstView, skyOff, type Lighting, type Moment, type Place, type SkyLight, type State, type View } from "./state.ts";
 
 type Plain = { [name: string]: unknown };
 
@@ -35,15 +35,25 @@ const number = (value: unknown, otherwise: number): number =>
 const held = (value: number, otherwise: number, low: number, high: number): number =>
     Math.min(high, Math.max(low, number(value, otherwise)));
 
+function restoreMoment(given: unknown): Moment | null {
+    if (!isPlain(given)) return null;
+    const { dewPoint } = given, of = (name: string, low: number, high: number): number => held(given[name] as number, low, low, high);
+    return {
+        day: Math.round(of("day", 1, 365)), hour: of("hour", 0, 24), year: Math.round(of("year", 1900, 2100)), direct: of("direct", 0, 3000),
+        isHorizontal: given.isHorizontal === true, diffuse: of("diffuse", 0, 3000),
+        dewPoint: typeof dewPoint === "number" ? held(dewPoint, 0, -100, 100) : null,
+    };
+}
+
 function restoreSky(given: unknown): SkyLight {
-    const out = restore(skyOff, given, []);
+    const out = restore(skyOff, given, ["moment"]);
     return {
         model: (["overcast", "clear", "even", "perez"] as const).find((model) => model === out.model) ?? "off",
         strength: held(out.strength, skyOff.strength, 0, 1e6), factor: held(out.factor, 1, 0, 1e3),
         sun: (["tile", "off"] as const).find((sun) => sun === out.sun) ?? "spread", tinted: out.tinted,
         latitude: held(out.latitude, skyOff.latitude, -90, 90), longitude: held(out.longitude, skyOff.longitude, -180, 180),
         zone: held(out.zone, skyOff.zone, -14, 14), day: Math.round(held(out.day, skyOff.day, 1, 365)),
-        hour: held(out.hour, skyOff.hour, 0, 24),
+        hour: held(out.hour, skyOff.hour, 0, 24), moment: restoreMoment(out.moment),
     };
 }
 
@@ -97,9 +107,13 @@ function fromBase64Url(text: string): string {
     return new TextDecoder().decode(Uint8Array.from(raw, (c) => c.charCodeAt(0)));
 }
 
-export function toFragment(state: State): string {
-    const plain = difference(state as unknown as Plain, firstState as unknown as Plain);
-    plain.lighting = state.lighting;
+/** `momentOf` is the weather of a light, where a link has to hold that. */
+export function toFragment(state: State, momentOf: (light: SkyLight) => Moment | null): string {
+    const whole = (lighting: Lighting): Lighting => ({ ...lighting, sky: { ...lighting.sky, moment: momentOf(lighting.sky) } });
+    const plain = difference(state as unknown as Plain, firstState as unknown as Plain), { compare } = state;
+    plain.lighting = whole(state.lighting);
+    if (state.presets.length > 0) plain.presets = state.presets.map((preset) => ({ ...preset, lighting: whole(preset.lighting) }));
+    if (compare !== null && compare.lighting !== null) plain.compare = { ...compare, lighting: whole(compare.lighting) };
     plain.view = difference(state.view as unknown as Plain, firstView as unknown as Plain);
     return "#1." + toBase64Url(JSON.stringify(plain));
 }

@@ -11,6 +11,21 @@ export interface GroupLight {
     kelvin: number | null;
 }
 
+/** The weather of one hour of a file that was picked, which a link holds in place of the file. */
+export interface Moment {
+    /** The time that it is of: those of SkyLight. */
+    day: number;
+    hour: number;
+    /** The year of the sun's position. */
+    year: number;
+    /** W/m²: direct light, facing the sun or on a horizontal plane, and diffuse light on a horizontal plane. */
+    direct: number;
+    isHorizontal: boolean;
+    diffuse: number;
+    /** Degrees Celsius; null: unknown. */
+    dewPoint: number | null;
+}
+
 export interface SkyLight {
     /** "perez" is that of a weather file. */
     model: "off" | "overcast" | "clear" | "even" | "perez";
@@ -29,6 +44,8 @@ export interface SkyLight {
     /** Day of the year, 1 to 365, and local time in hours. */
     day: number;
     hour: number;
+    /** Of a link; it holds at its own day and hour, until a file is picked. */
+    moment: Moment | null;
 }
 
 export interface Lighting {
@@ -109,6 +126,7 @@ export interface State {
 
 export const skyOff: SkyLight = {
     model: "off", strength: 100, factor: 1, sun: "spread", tinted: false, latitude: 48, longitude: 11, zone: 1, day: 172, hour: 12,
+    moment: null,
 };
 
 export const firstView: View = {
