@@ -156,11 +156,10 @@ export function elementAt(page, x, y) {
     }, [x, y]);
 }
 
-/** axe-core's violations that are serious or critical, as texts. */
+/** axe-core's violations, as texts. */
 export async function violations(page) {
     const source = readFileSync(new URL(import.meta.resolve("axe-core/axe.min.js")), "utf8");
     await page.evaluate(source);
     return page.evaluate(async () => (await window.axe.run()).violations
-        .filter((v) => v.impact === "serious" || v.impact === "critical")
         .map((v) => `${v.id}: ${v.nodes.map((n) => n.html.slice(0, 120)).join(" | ")}`));
 }

@@ -249,7 +249,7 @@ test("a phone has it all, and nothing is wider than it", async () => {
     await page.context().close();
 });
 
-test("axe-core finds nothing serious, dark or light", async () => {
+test("axe-core finds nothing, dark or light", async () => {
     for (const theme of ["dark", "light"]) {
         const page = await openPage(daemon.address);
         await page.evaluate((t) => { document.documentElement.dataset.theme = t; }, theme);

@@ -114,7 +114,7 @@ function drawPresets(app: App, place: HTMLElement): void {
         const others = now.presets.filter((preset) => preset.name !== text);
         app.store.change({ ...now, presets: [...others, { name: text, lighting: now.lighting }] });
     };
-    fill(place, make("h3", {}, "Presets"),
+    fill(place, make("h2", { class: "sub" }, "Presets"),
         ...app.store.now.presets.map((preset) => make("div", { class: "row" },
             button(preset.name, null, () => app.store.change({ ...app.store.now, lighting: preset.lighting }), { class: "grow" }),
             button("×", `Forget ${preset.name}`, () => app.store.change(

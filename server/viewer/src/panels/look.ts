@@ -90,7 +90,7 @@ function keptViews(app: App): HTMLElement {
         const axis = app.scene?.mesh.up ?? "y";
         app.cameras.place(placeOf(turned(axis, eye), turned(axis, direction), turned(axis, up), fov), true);
     };
-    const draw = (): void => fill(place, make("h3", {}, "Places"),
+    const draw = (): void => fill(place, make("h2", { class: "sub" }, "Places"),
         ...(app.scene?.description.cameras ?? []).map((camera) => make("div", { class: "row" },
             button(camera.name, "A camera of the scene", () => look(camera), { class: "grow" }))),
         ...app.store.now.views.map((view) => make("div", { class: "row" },

@@ -20,7 +20,7 @@ interface Line extends Figures {
 
 export class Groups {
     readonly element = make("section", { class: "groups" });
-    private readonly head = make("h3", {});
+    private readonly head = make("h2", { class: "sub" });
     private readonly body = make("tbody", {});
     private readonly heads: HTMLElement[];
     private column: Column = "mean";

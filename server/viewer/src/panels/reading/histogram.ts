@@ -11,7 +11,7 @@ const HEIGHT = 140;
 export class Histogram {
     readonly element = make("section", { class: "histogram" });
     private readonly place = make("div", {});
-    private readonly head = make("h3", {}, "Spread over the area");
+    private readonly head = make("h2", { class: "sub" }, "Spread over the area");
     private readonly low = make("input", { type: "number", step: "any", "aria-label": "Low end of the palette" });
     private readonly high = make("input", { type: "number", step: "any", "aria-label": "High end of the palette" });
     private plot: uPlot | null = null;

@@ -35,7 +35,7 @@ export class Judge {
         });
         this.fields.append(task, this.group, make("div", { class: "row" }, make("span", {}, "At least"), this.level, this.unit, make("span", {}, "U0"), this.evenness), this.verdict,
             make("p", { class: "hint" }, "Tasks are examples after EN 12464-1; the tables of the standard, its maintenance factor and its grid of points have to be consulted."));
-        this.element.append(make("h3", {}, "Enough light?"), this.on, this.fields);
+        this.element.append(make("h2", { class: "sub" }, "Enough light?"), this.on, this.fields);
         app.on("scene", () => this.drawGroups());
         app.on("field", () => this.draw());
         app.store.listen((now, before) => { if (now.view !== before.view) this.draw(); });

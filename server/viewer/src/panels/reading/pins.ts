@@ -92,7 +92,7 @@ export class Pins {
             fill(this.element, pins.length === 0 && hovered === null
                 && make("p", { class: "hint" }, "Click or tap the picture to pin an element; Shift adds another, a second click removes it."),
             ...wanted.map((pin) => make("section", { class: "pin", "data-pin": pin },
-                make("div", { class: "row" }, make("h3", { class: "grow" }), pin !== "hover" && button("×", `Forget element ${pin}`, () =>
+                make("div", { class: "row" }, make("h2", { class: "sub grow" }), pin !== "hover" && button("×", `Forget element ${pin}`, () =>
                     store.change({ ...store.now, pins: store.now.pins.filter((other) => other !== Number(pin)) }))),
                 make("table", {}))));
         }
@@ -106,7 +106,7 @@ export class Pins {
         if (scene === null || element >= scene.mesh.elements) return;
         const { mesh, description: { channels, emitters } } = scene;
         const group = mesh.groups[mesh.groupOf[element]]?.name ?? "";
-        (card.querySelector("h3") as HTMLElement).textContent =
+        (card.querySelector("h2") as HTMLElement).textContent =
             `${isHovered ? "Under the pointer: " : ""}${group}, element ${count(element)}, ${tell(mesh.area[element])} m²`;
         const exact = this.exact.get(element), emission = emissionOf(now.lighting, channels)[group] ?? 0;
         const E = (emitters?.length ?? 0) > 0 ? null : typeof emission === "number" ? new Array<number>(channels).fill(emission) : emission;

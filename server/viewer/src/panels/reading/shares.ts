@@ -16,7 +16,7 @@ const LINES_MOST = 12;
 
 export class Shares {
     readonly element = make("section", { class: "shares" });
-    private readonly head = make("h3", {}, "Which lamp lights this point");
+    private readonly head = make("h2", { class: "sub" }, "Which lamp lights this point");
     private readonly body = make("div", {});
     private gradient: { key: string; of: Gradient } | null = null;
     private readonly asker: Newest<Asked, Gradient>;
