@@ -152,6 +152,24 @@ test("shares are those of each lamp and of the sky alone", async () => {
     await settled(page);
     assert.equal(await page.locator('.shares li[data-part="lamp"]').count(), 0);
     assert.equal(adjoints, 0);
+    // Nor does one that is dimmed before the first answer has come.
+    let answer;
+    const held = new Promise((resolve) => { answer = resolve; });
+    await page.route("**/adjoint", async (route) => {
+        await held;
+        await route.continue();
+    });
+    const isAsked = page.waitForRequest((request) => request.url().endsWith("/adjoint"));
+    await click(page, 0.45, 0.6);
+    await isAsked;
+    for (const dim of [0.9, 0.8, 0.7]) {
+        await page.evaluate((to) => { const { store: s } = window.lambert; s.change({ ...s.now, lighting: { ...s.now.lighting, dim: to } }); }, dim);
+        await settled(page);
+    }
+    answer();
+    await page.locator(".shares li").first().waitFor();
+    await page.waitForTimeout(200);
+    assert.equal(adjoints, 1);
     await isFine(page);
     await page.context().close();
 });

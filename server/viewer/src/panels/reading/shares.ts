@@ -20,15 +20,21 @@ export class Shares {
     private readonly body = make("div", {});
     private gradient: { key: string; of: Gradient } | null = null;
     private readonly asker: Newest<Asked, Gradient>;
+    /** What was asked for last: the picture may change before it is answered. */
+    private wanted = "";
 
     constructor(private readonly app: App, private readonly isSeen: () => boolean) {
         this.element.append(this.head, this.body);
         this.asker = new Newest((asked) => this.ask(asked), (of, asked) => {
             this.gradient = { key: JSON.stringify(asked), of };
             this.draw();
-        }, (reason) => app.fail(reason), 1);
+        }, (reason) => {
+            this.wanted = "";
+            app.fail(reason);
+        }, 1);
         app.on("scene", () => {
             this.asker.forget();
+            this.wanted = "";
             this.gradient = null;
             this.draw();
         });
@@ -60,7 +66,8 @@ export class Shares {
         if (this.gradient?.key !== key) {
             this.gradient = null;
             this.body.replaceChildren();
-            this.asker.want(asked);
+            if (this.wanted !== key) this.asker.want(asked);
+            this.wanted = key;
             return;
         }
         const { description, mesh } = scene;
