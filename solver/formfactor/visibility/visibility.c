@@ -12,9 +12,9 @@ static lam_status device_error(const visibility *v, const char *what, lam_error 
     return status_fail(error, LAM_ERR_INTERNAL, "Embree: %s: error %d", what, (int)code);
 }
 
-/* Adds the triangles or the quads among the facets' pieces as one geometry with its own copy of the vertices.
- */
-static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
+/* Adds the triangles or the quads among the facets' pieces as one geometry with its own copy of the vertices;
+ * their primitives begin at `first` of all, and their number is added to it. */
+static lam_status add_geometry(visibility *v, int kind, size_t *first, lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = v->mesh;
     const facets *f = &v->facets;
@@ -22,10 +22,10 @@ static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
     RTCGeometry geometry = NULL;
     size_t count = 0;
     for (size_t p = 0; p < f->n_pieces; p++) count += corner_count(f->pieces[p]) == corners;
+    v->primitives[kind] = v->all + *first;
+    *first += count;
     if (count == 0) goto done;
 
-    v->primitives[kind] = memory_allocate(count, sizeof(primitive), "visibility", error);
-    if (v->primitives[kind] == NULL) return LAM_ERR_MEMORY;
     geometry =
         rtcNewGeometry(v->device, kind == TRIANGLES ? RTC_GEOMETRY_TYPE_TRIANGLE : RTC_GEOMETRY_TYPE_QUAD);
     if (geometry == NULL) {
@@ -48,10 +48,11 @@ static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
         for (size_t c = 0; c < corners; c++) indices[prim * corners + c] = f->pieces[p][c];
         const uint32_t facet = f->piece_facet[p];
         const bool alone = f->first[facet + 1] - f->first[facet] == 1;
-        v->primitives[kind][prim++] =
-            (primitive){.piece = (uint32_t)p,
-                        .facet = facet,
-                        .element = alone ? f->elements[f->first[facet]] : MESH_NO_VERTEX};
+        primitive *const out = &v->primitives[kind][prim++];
+        *out = (primitive){.piece = (uint32_t)p,
+                           .facet = facet,
+                           .element = alone ? f->elements[f->first[facet]] : MESH_NO_VERTEX};
+        memcpy(out->normal, f->normal[facet], sizeof out->normal);
     }
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
     rtcCommitGeometry(geometry);
@@ -68,6 +69,7 @@ static lam_status create(const mesh *m, bool join, visibility **out, lam_error *
     v->mesh = m;
     v->n_fronts = m->two_sided ? m->n / 2 : m->n;
     double radius;
+    size_t first = 0;
     mesh_bounds(m, v->centre, &radius);
     v->rounding = 4 * 0x1p-24f * (float)radius;
     if (join)
@@ -75,6 +77,8 @@ static lam_status create(const mesh *m, bool join, visibility **out, lam_error *
     else
         TRY(facets_alone(m, v->n_fronts, &v->facets, error));
     TRY(facet_grids_create(m, &v->facets, &v->grids, error));
+    v->all = memory_allocate(v->facets.n_pieces, sizeof *v->all, "visibility", error);
+    if (v->all == NULL) TRY(LAM_ERR_MEMORY);
 
     /* One thread: the hierarchy is built in a fraction of a second, and rays are cast by our own threads. */
     v->device = rtcNewDevice("threads=1,user_threads=0,set_affinity=0");
@@ -83,8 +87,8 @@ static lam_status create(const mesh *m, bool join, visibility **out, lam_error *
     if (v->scene == NULL) TRY(device_error(v, "new scene", error));
     rtcSetSceneFlags(v->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
     rtcSetSceneBuildQuality(v->scene, RTC_BUILD_QUALITY_HIGH);
-    TRY(add_geometry(v, TRIANGLES, error));
-    TRY(add_geometry(v, QUADS, error));
+    TRY(add_geometry(v, TRIANGLES, &first, error));
+    TRY(add_geometry(v, QUADS, &first, error));
     rtcCommitScene(v->scene);
     if (rtcGetDeviceError(v->device) != RTC_ERROR_NONE)
         FAIL(error, LAM_ERR_INTERNAL, "Embree: cannot build the scene of %zu elements", m->n);
@@ -107,7 +111,7 @@ void visibility_destroy(visibility *v) {
     if (v == NULL) return;
     if (v->scene != NULL) rtcReleaseScene(v->scene);
     if (v->device != NULL) rtcReleaseDevice(v->device);
-    for (int kind = 0; kind < N_GEOMETRIES; kind++) free(v->primitives[kind]);
+    free(v->all);
     facets_free(&v->facets);
     facet_grids_free(&v->grids);
     free(v);
@@ -266,6 +270,34 @@ static void cast_lifted(const visibility *v, const ray_packet *rays, const uint3
     facets_met(v, ray, n_rays, met);
 }
 
+/* The elements of the hits of a packet, whose facets and cosines are met. */
+static void report(const visibility *v, const struct RTCRayHit8 *ray, size_t n_rays, const met_packet *met,
+                   hit_packet *hits) {
+    const bool two_sided = v->mesh->two_sided;
+    uint32_t piece[VISIBILITY_PACKET], lane[VISIBILITY_PACKET], found[VISIBILITY_PACKET];
+    float u[VISIBILITY_PACKET], v_at[VISIBILITY_PACKET];
+    size_t open = 0;
+    for (size_t i = 0; i < n_rays; i++) {
+        const bool back = met->facet[i] != VISIBILITY_NOTHING && met->cosine[i] >= 0;
+        hits->distance[i] = ray->ray.tfar[i];
+        hits->back[i] = back && !two_sided;
+        hits->element[i] = VISIBILITY_NOTHING;
+        if (met->facet[i] == VISIBILITY_NOTHING) continue;
+        const primitive *p = &v->primitives[ray->hit.geomID[i]][ray->hit.primID[i]];
+        hits->element[i] = p->element;
+        if (p->element != MESH_NO_VERTEX) continue;
+        piece[open] = p->piece;
+        u[open] = ray->hit.u[i];
+        v_at[open] = ray->hit.v[i];
+        lane[open++] = (uint32_t)i;
+    }
+    if (open > 0) facet_grids_find(&v->grids, open, piece, u, v_at, found);
+    for (size_t k = 0; k < open; k++) hits->element[lane[k]] = found[k];
+    for (size_t i = 0; i < n_rays && two_sided; i++)
+        if (met->facet[i] != VISIBILITY_NOTHING && met->cosine[i] >= 0)
+            hits->element[i] += (uint32_t)v->n_fronts;
+}
+
 void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
                      unsigned how, hit_packet *hits) {
     const bool two_sided = v->mesh->two_sided;
@@ -297,28 +329,22 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
         facets_met(v, &ray, n_rays, &met);
     }
 
-    uint32_t piece[VISIBILITY_PACKET], lane[VISIBILITY_PACKET], found[VISIBILITY_PACKET];
-    float u[VISIBILITY_PACKET], v_at[VISIBILITY_PACKET];
-    size_t open = 0;
-    for (size_t i = 0; i < n_rays; i++) {
-        const bool back = met.facet[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0;
-        hits->distance[i] = ray.ray.tfar[i];
-        hits->back[i] = back && !two_sided;
-        hits->element[i] = VISIBILITY_NOTHING;
-        if (met.facet[i] == VISIBILITY_NOTHING) continue;
-        const primitive *p = &v->primitives[ray.hit.geomID[i]][ray.hit.primID[i]];
-        hits->element[i] = p->element;
-        if (p->element != MESH_NO_VERTEX) continue;
-        piece[open] = p->piece;
-        u[open] = ray.hit.u[i];
-        v_at[open] = ray.hit.v[i];
-        lane[open++] = (uint32_t)i;
-    }
-    if (open > 0) facet_grids_find(&v->grids, open, piece, u, v_at, found);
-    for (size_t k = 0; k < open; k++) hits->element[lane[k]] = found[k];
-    for (size_t i = 0; i < n_rays && two_sided; i++)
-        if (met.facet[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0)
-            hits->element[i] += (uint32_t)v->n_fronts;
+    report(v, &ray, n_rays, &met, hits);
+}
+
+/* The same of lifted rays of which some have hit backs: a front in the same place counts in their stead. */
+static void report_backs(const visibility *v, const uint32_t *facet, size_t n_rays, struct RTCRayHit8 *ray,
+                         hit_packet *hits) {
+    met_packet met = {{0}, {0}};
+    cast_context context = {.visibility = v};
+    rtcInitIntersectContext(&context.embree);
+    context.embree.filter = refuse_own_and_culled;
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++)
+        ray->ray.id[i] = i < n_rays ? facet[i] : VISIBILITY_NOTHING;
+    facets_met(v, ray, n_rays, &met);
+    prefer_fronts(v, met.cosine, &context, ray);
+    facets_met(v, ray, n_rays, &met);
+    report(v, ray, n_rays, &met, hits);
 }
 
 void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
@@ -329,32 +355,43 @@ void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t 
     uint32_t piece[VISIBILITY_PACKET], lane[VISIBILITY_PACKET], found[VISIBILITY_PACKET];
     float u[VISIBILITY_PACKET], v_at[VISIBILITY_PACKET];
     size_t open = 0;
-    bool plain = !v->mesh->two_sided;
+    bool again = false, any_back = false;
     rtcInitIntersectContext(&context);
     packet_set(&ray, rays);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) active[i] = i < n_rays ? -1 : 0;
     rtcIntersect8(active, v->scene, &context, &ray);
+    /* Without branches, which would be mispredicted at rays that leave: these take the first primitive. */
     for (size_t i = 0; i < n_rays; i++) {
+        const bool met = ray.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+        const primitive *p = &v->primitives[met ? ray.hit.geomID[i] : 0][met ? ray.hit.primID[i] : 0];
+        const float cosine = p->normal[0] * ray.ray.dir_x[i] + p->normal[1] * ray.ray.dir_y[i] +
+                             p->normal[2] * ray.ray.dir_z[i];
+        const bool back = met & (cosine >= 0);
+        again |= met & ((p->facet == facet[i]) | !(fabsf(cosine) * ray.ray.tfar[i] > v->rounding));
+        any_back |= back;
         hits->distance[i] = ray.ray.tfar[i];
-        hits->back[i] = false;
-        hits->element[i] = VISIBILITY_NOTHING;
-        if (ray.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-        const primitive *p = &v->primitives[ray.hit.geomID[i]][ray.hit.primID[i]];
-        const float cosine = along_normal(v, p->facet, ray.ray.dir_x[i], ray.ray.dir_y[i], ray.ray.dir_z[i]);
-        plain = plain && cosine < 0 && p->facet != facet[i] && -cosine * ray.ray.tfar[i] > v->rounding;
-        hits->element[i] = p->element;
+        hits->back[i] = back;
+        hits->element[i] = met ? p->element : VISIBILITY_NOTHING;
         piece[open] = p->piece;
         u[open] = ray.hit.u[i];
         v_at[open] = ray.hit.v[i];
         lane[open] = (uint32_t)i;
-        open += p->element == MESH_NO_VERTEX;
+        open += met & (p->element == MESH_NO_VERTEX);
     }
-    if (!plain) {
+    if (again) {
         visibility_cast(v, rays, n_rays, self, 0, hits);
+        return;
+    }
+    if (any_back && !v->mesh->two_sided) {
+        report_backs(v, facet, n_rays, &ray, hits);
         return;
     }
     if (open > 0) facet_grids_find(&v->grids, open, piece, u, v_at, found);
     for (size_t k = 0; k < open; k++) hits->element[lane[k]] = found[k];
+    for (size_t i = 0; i < n_rays && any_back; i++) {
+        if (hits->back[i]) hits->element[i] += (uint32_t)v->n_fronts;
+        hits->back[i] = false;
+    }
 }
 
 /* The data of the filter of segments: the facets at both ends, by lane, which is the segment's id. */

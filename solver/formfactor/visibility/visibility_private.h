@@ -14,8 +14,10 @@
  * elements. */
 enum { TRIANGLES, QUADS, N_GEOMETRIES };
 
-/* element: the only element of its facet, else MESH_NO_VERTEX: then the piece's grid finds the element. */
+/* element: the only element of its facet, else MESH_NO_VERTEX: then the piece's grid finds the element. The
+ * facet's normal stands beside them, so that a hit reads one place. */
 typedef struct primitive {
+    float normal[3];
     uint32_t piece, facet, element;
 } primitive;
 
@@ -26,6 +28,7 @@ struct visibility {
     size_t n_fronts; /* elements in the scene: n, or n/2 when two-sided */
     facets facets;   /* the primitives of the acceleration structure */
     facet_grids grids;
+    primitive *all; /* [n_pieces]: triangles, then quads */
     primitive *primitives[N_GEOMETRIES];
     double centre[3];
     float rounding; /* see visibility_rounding */

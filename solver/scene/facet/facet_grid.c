@@ -268,13 +268,25 @@ static lam_status fill_cells(const facet_grid *grid, const gathering *g, facet_g
 }
 
 /* Sets the map of a piece from its corner and the two sides from there. */
-static void place_piece(const mesh *m, const frame *f, const uint32_t piece[4], piece_place *out) {
+/* The largest number whose cell is one of n. */
+static float last_place(uint32_t n) {
+    float most = nextafterf((float)n, 0);
+    while ((uint32_t)most >= n) most = nextafterf(most, 0);
+    return most;
+}
+
+static void place_piece(const mesh *m, const frame *f, const uint32_t piece[4], const facet_grid *grid,
+                        piece_place *out) {
     double o[2], u[2], w[2];
     to_cells(f, m->vertices[piece[0]], o);
     to_cells(f, m->vertices[piece[1]], u);
     to_cells(f, m->vertices[piece[corner_count(piece) - 1]], w);
     out->x[0] = (float)o[0], out->x[1] = (float)(u[0] - o[0]), out->x[2] = (float)(w[0] - o[0]);
     out->y[0] = (float)o[1], out->y[1] = (float)(u[1] - o[1]), out->y[2] = (float)(w[1] - o[1]);
+    out->most[0] = last_place(grid->nx);
+    out->most[1] = last_place(grid->ny);
+    out->nx = grid->nx;
+    out->first = grid->first;
 }
 
 lam_status facet_grids_create(const mesh *m, const facets *f, facet_grids *out, lam_error *error) {
@@ -305,7 +317,7 @@ lam_status facet_grids_create(const mesh *m, const facets *f, facet_grids *out, 
         const uint32_t facet = f->piece_facet[p];
         if (f->first[facet + 1] - f->first[facet] == 1) continue;
         out->pieces[p].grid = grid_of[facet];
-        place_piece(m, &frames[grid_of[facet]], f->pieces[p], &out->pieces[p]);
+        place_piece(m, &frames[grid_of[facet]], f->pieces[p], &out->grids[grid_of[facet]], &out->pieces[p]);
     }
 done:
     free(grid_of);
@@ -324,9 +336,10 @@ void facet_grids_free(facet_grids *g) {
     *g = (facet_grids){.n_grids = 0};
 }
 
-static uint32_t cell_at(float x, uint32_t n) {
-    if (!(x > 0)) return 0;
-    return x < (float)n ? (uint32_t)x : n - 1;
+/* A place within the grid. */
+static float within(float x, float most) {
+    const float above = x > 0 ? x : 0;
+    return above < most ? above : most;
 }
 
 static float inside(const facet_candidate *c, float x, float y) {
@@ -336,20 +349,6 @@ static float inside(const facet_candidate *c, float x, float y) {
         least = at < least ? at : least;
     }
     return least;
-}
-
-/* The search for the element of a point. */
-typedef struct search {
-    float x, y; /* in its cell */
-    const uint32_t *cell;
-} search;
-
-static search begin(const facet_grids *g, const piece_place *p, float u, float v) {
-    const facet_grid *grid = &g->grids[p->grid];
-    const float x = p->x[0] + u * p->x[1] + v * p->x[2], y = p->y[0] + u * p->y[1] + v * p->y[2];
-    const uint32_t cell_x = cell_at(x, grid->nx), cell_y = cell_at(y, grid->ny);
-    return (search){x - (float)cell_x, y - (float)cell_y,
-                    &g->cells[grid->first + cell_y * grid->nx + cell_x]};
 }
 
 static uint32_t choose(const facet_candidate *c, float x, float y) {
@@ -366,21 +365,32 @@ static uint32_t choose(const facet_candidate *c, float x, float y) {
 
 void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,
                       uint32_t *element) {
-    search s[FACET_SEARCHES];
+    float x[FACET_SEARCHES], y[FACET_SEARCHES]; /* in their cells */
+    uint32_t cell[FACET_SEARCHES];
+    bool open = false;
     /* All searches advance step by step together, so that their cache misses overlap. */
     for (size_t i = 0; i < n; i++) {
-        s[i] = begin(g, &g->pieces[piece[i]], u[i], v[i]);
-        __builtin_prefetch(s[i].cell);
+        const piece_place *p = &g->pieces[piece[i]];
+        x[i] = p->x[0] + u[i] * p->x[1] + v[i] * p->x[2];
+        y[i] = p->y[0] + u[i] * p->y[1] + v[i] * p->y[2];
+        const uint32_t column = (uint32_t)within(x[i], p->most[0]), row = (uint32_t)within(y[i], p->most[1]);
+        x[i] -= (float)column;
+        y[i] -= (float)row;
+        cell[i] = p->first + row * p->nx + column;
+        __builtin_prefetch(&g->cells[cell[i]]);
     }
-    for (size_t i = 0; i < n; i++)
-        if ((*s[i].cell & CELL_FILLED) == 0) __builtin_prefetch(&g->candidates[*s[i].cell]);
     for (size_t i = 0; i < n; i++) {
-        const uint32_t cell = *s[i].cell;
-        if (cell == CELL_EMPTY)
+        cell[i] = g->cells[cell[i]];
+        element[i] = cell[i] & ~CELL_FILLED;
+        open |= (cell[i] == CELL_EMPTY) | ((cell[i] & CELL_FILLED) == 0);
+    }
+    if (!open) return;
+    for (size_t i = 0; i < n; i++)
+        if ((cell[i] & CELL_FILLED) == 0) __builtin_prefetch(&g->candidates[cell[i]]);
+    for (size_t i = 0; i < n; i++) {
+        if (cell[i] == CELL_EMPTY)
             element[i] = g->grids[g->pieces[piece[i]].grid].element;
-        else if ((cell & CELL_FILLED) != 0)
-            element[i] = cell & ~CELL_FILLED;
-        else
-            element[i] = choose(&g->candidates[cell], s[i].x, s[i].y);
+        else if ((cell[i] & CELL_FILLED) == 0)
+            element[i] = choose(&g->candidates[cell[i]], x[i], y[i]);
     }
 }

@@ -8,7 +8,8 @@
  * coordinates u and v of its second and last corner. */
 typedef struct piece_place {
     float x[3], y[3];
-    uint32_t grid;
+    float most[2];            /* the largest numbers below those of the grid's columns and rows */
+    uint32_t grid, nx, first; /* the last two as the grid has them, so that a search reads one place */
 } piece_place;
 
 typedef struct facet_grid facet_grid;
