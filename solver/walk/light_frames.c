@@ -43,7 +43,7 @@ void light_pieces_free(light_pieces *p) {
 
 /* A piece as a position carries it. */
 static void carry(const light_piece *piece, const light_frame *f, bool triangle, walk_shape *out) {
-    *out = (walk_shape){.facet = triangle ? WALK_TRIANGLE : 0};
+    *out = (walk_shape){.facet = triangle ? WALK_NO_FACET | WALK_TRIANGLE : WALK_NO_FACET};
     for (int d = 0; d < 3; d++) {
         out->normal[d] = f->normal[d];
         out->corner[d] = f->move[d];

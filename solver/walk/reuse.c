@@ -3,6 +3,7 @@
 #include "solver/base/clock.h"
 #include "solver/base/vector3.h"
 #include "solver/walk/light_frames.h"
+#include "solver/walk/reuse_alone.h"
 #include "solver/walk/reuse_counts.h"
 #include "solver/walk/reuse_elements.h"
 #include "solver/walk/reuse_sums.h"
@@ -61,20 +62,23 @@ static void fill_up(first_hits *h) {
 static size_t first_rays(reuse_batch *b, size_t most, ray_packet *rays, float local[][3], uint64_t *random) {
     static const double all[2] = {0, 1};
     const light_pieces *light = &b->r->pieces;
-    const walk_shape *shape = light->carried + b->position * light->n;
-    walk_places p[WALK_STREAM / VISIBILITY_PACKET];
+    const walk_shape *carried = light->carried + b->position * light->n, *shape[WALK_STREAM];
+    uint32_t place[4][WALK_STREAM], facet[WALK_STREAM];
     walker w;
     size_t n = 0, only;
     for (; n < most && walk_starts_next(&b->starts, all, 1, &w, &only); n++) {
         const size_t k = light_pieces_choose(light, &w.place[0]);
-        walk_place_set(&p[n / VISIBILITY_PACKET], n % VISIBILITY_PACKET, &shape[k], w.place);
+        shape[n] = &carried[k];
+        for (int d = 0; d < 4; d++) place[d][n] = w.place[d];
         light_pieces_point(light, k, w.place, local[n]);
         random[n] = w.random;
     }
     const size_t last = n;
-    for (; n % VISIBILITY_PACKET != 0; n++)
-        walk_place_set(&p[n / VISIBILITY_PACKET], n % VISIBILITY_PACKET, &shape[0], w.place);
-    walk_leave(p, n / VISIBILITY_PACKET, rays);
+    for (; n % VISIBILITY_PACKET != 0; n++) {
+        shape[n] = &carried[0];
+        for (int d = 0; d < 4; d++) place[d][n] = w.place[d];
+    }
+    walk_leave(n, shape, place, rays, facet);
     return last;
 }
 
@@ -102,13 +106,12 @@ static void keep_hits(reuse_batch *b, size_t n, const ray_packet *rays, const hi
     }
 }
 
-/* Shared paths of a batch take their places from one sequence, since every position has the light of all. */
+/* The paths of a batch take their places from one sequence, since every position has the light of all. */
 static void begin_position(reuse_batch *b, size_t number, size_t position) {
     const reuse *r = b->r;
-    const bool shared = r->problem->way != REUSE_NONE;
     b->position = position;
     if (position >= r->s) return;
-    if (shared && position > 0)
+    if (position > 0)
         b->starts.count += r->of_batch[position];
     else
         walk_starts_init(&b->starts, r->problem->seed, number * r->s + position, r->of_batch[position]);
@@ -142,73 +145,54 @@ static void find_hits(reuse_batch *b, size_t number) {
     fill_up(b->hits);
 }
 
-/* Adds the light that comes to an element straight from the light, the same in all channels. */
-static void deposit_first(const reuse_batch *b, size_t path, uint32_t element) {
-    const reuse *r = b->r;
-    const size_t s = r->s;
-    if (r->problem->way == REUSE_NONE) {
-        b->first[b->hits->position[path] * r->n + element] += 1 / (double)r->of_batch[0];
-        return;
-    }
-    double *const first = b->first + (size_t)element * s;
-    const float *const weight = b->weight + path * s;
+/* Adds the light that comes straight from the light, the same in all channels. */
+static void deposit_first(const reuse_batch *b) {
+    const size_t s = b->r->s;
+    for (size_t k = 0; k < b->hits->count; k++) {
+        double *const first = b->first + (size_t)b->hits->element[k] * s;
+        const float *const weight = b->weight + k * s;
 #pragma omp simd
-    for (size_t l = 0; l < s; l++) first[l] += (double)weight[l];
-}
-
-/* Paths of their own: the sums of the position that each belongs to. */
-static void arrive_alone(void *context, size_t n, const walker *w, const uint32_t *element) {
-    const reuse_batch *b = context;
-    const size_t C = b->r->C;
-    const double per_path = 1 / (double)b->r->of_batch[0];
-    for (size_t i = 0; i < n; i++) {
-        if (element[i] == VISIBILITY_NOTHING) continue;
-        double *const later = b->later + (b->hits->position[w[i].path] * b->r->n + element[i]) * C;
-        for (size_t c = 0; c < C; c++) later[c] += w[i].weight[c] * per_path;
+        for (size_t l = 0; l < s; l++) first[l] += (double)weight[l];
     }
 }
 
-/* Paths for all positions. */
-static void arrive_shared(void *context, size_t n, const walker *w, const uint32_t *element) {
+static void arrive(void *context, size_t n, const walk_stream *w, const uint32_t *element) {
     const reuse_batch *b = context;
     reuse_deposit(n, b->r->s, b->r->C, w, element, b->weight, b->later);
 }
 
-/* The next path of the chunk that goes on from its first hit. */
-static bool start(void *context, walker *w) {
+/* The next paths of the chunk that go on from their first hits. */
+static size_t start(void *context, size_t n, walker *w) {
     reuse_batch *b = context;
     const first_hits *h = b->hits;
-    while (b->next < h->count) {
+    size_t started = 0;
+    while (started < n && b->next < h->count) {
         const size_t k = b->next++;
-        w->random = h->random[k];
-        w->path = (uint32_t)k;
-        for (size_t c = 0; c < b->r->C; c++) w->weight[c] = 1;
-        deposit_first(b, k, h->element[k]);
-        if (!walk_survives(b->r->scene, w, h->element[k])) continue;
-        w->at = h->element[k];
-        walk_draw_place(w);
-        return true;
+        walker *const one = &w[started];
+        one->at = h->element[k];
+        one->path = (uint32_t)k;
+        one->random = h->random[k];
+        for (size_t c = 0; c < b->r->C; c++) one->weight[c] = 1;
+        if (!walk_survives(b->r->scene, one, one->at)) continue;
+        walk_draw_place(one);
+        started++;
     }
-    return false;
+    return started;
 }
 
 static void go(reuse_batch *b, size_t number) {
     const reuse *r = b->r;
-    const walk_batch walks = {.scene = r->scene,
-                              .run = r->run,
-                              .start = start,
-                              .arrive = r->problem->way == REUSE_NONE ? arrive_alone : arrive_shared,
-                              .context = b,
-                              .rays = &b->rays};
+    const walk_batch walks = {
+        .scene = r->scene, .run = r->run, .start = start, .arrive = arrive, .context = b, .rays = &b->rays};
     begin_position(b, number, 0);
     while (!r->run->stop) {
         const double begun = clock_thread_seconds();
         find_hits(b, number);
         if (b->hits->count == 0 && b->position == r->s) break;
         const double traced = clock_thread_seconds();
-        if (r->problem->way != REUSE_NONE)
-            reuse_weights(r->scene, r->s, r->frames, r->maps, b->hits, b->work, b->weight);
+        reuse_weights(r->scene, r->s, r->frames, r->maps, b->hits, b->work, b->weight);
         const double weighed = clock_thread_seconds();
+        deposit_first(b);
         walk_batch_go(&walks);
         b->reuse += weighed - traced;
         b->trace += traced - begun + clock_thread_seconds() - weighed;
@@ -273,7 +257,7 @@ static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *err
     bool failed = false;
     double rays = 0;
     reuse_sums sums = {.s = 0};
-    TRY(reuse_sums_create(r->scene->m, r->problem->light, r->problem->way != REUSE_NONE, &sums, error));
+    TRY(reuse_sums_create(r->scene->m, r->problem->light, true, &sums, error));
 #pragma omp parallel
     {
         reuse_batch b = {.r = r};
@@ -410,7 +394,12 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
     if (problem->even && problem->way != REUSE_NONE && problem->way != REUSE_ELEMENTS)
         TRY(count_paths(&r, of_batch, error));
     for (size_t l = 0; l < r.s; l++) e.count[l] = r.of_batch[l] * WALK_BATCHES;
-    TRY(problem->way == REUSE_ELEMENTS ? reuse_elements(s, problem, &e, error) : run_batches(&r, &e, error));
+    if (problem->way == REUSE_ELEMENTS)
+        TRY(reuse_elements(s, problem, &e, error));
+    else if (problem->way == REUSE_NONE)
+        TRY(reuse_alone(s, problem, &r.pieces, &run, &e, error));
+    else
+        TRY(run_batches(&r, &e, error));
     TRY(check_reach(&r, &e, error));
     *out = e;
     e = (reuse_estimates){.n = 0};

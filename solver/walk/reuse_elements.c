@@ -68,25 +68,29 @@ static bool choose_shares(const shared *r, double *power) {
     return walk_accumulate(r->n, r->share, r->before) > 0;
 }
 
-/* The weight of a walk that leaves element i has all of its power but the parts of positions, F[i]. */
-static bool start(void *context, walker *w) {
+/* The weight of a walk that leaves element i has all of its power but the parts of positions, F[i]. Walks end
+ * with the first one that carries nothing. */
+static size_t start(void *context, size_t n, walker *w) {
     shared_batch *b = context;
     const shared *r = b->r;
     const mesh *m = r->scene->m;
-    size_t k = 0;
-    double most = 0;
-    if (!walk_starts_next(&b->starts, r->before, r->n, w, &k)) return false;
-    const double power =
-        m->area[k] * r->before[r->n] / (r->share[k] * (double)r->of_batch * r->problem->light->area);
-    w->at = w->path = (uint32_t)k;
-    for (size_t c = 0; c < r->C; c++) {
-        w->weight[c] = power * (double)m->reflectance[c * m->n + k];
-        most = fmax(most, w->weight[c]);
+    size_t k = 0, started = 0;
+    for (; started < n && walk_starts_next(&b->starts, r->before, r->n, &w[started], &k); started++) {
+        walker *const one = &w[started];
+        double most = 0;
+        const double power =
+            m->area[k] * r->before[r->n] / (r->share[k] * (double)r->of_batch * r->problem->light->area);
+        one->at = one->path = (uint32_t)k;
+        for (size_t c = 0; c < r->C; c++) {
+            one->weight[c] = power * (double)m->reflectance[c * m->n + k];
+            most = fmax(most, one->weight[c]);
+        }
+        if (!(most > 0)) break;
     }
-    return most > 0;
+    return started;
 }
 
-static void arrive(void *context, size_t n, const walker *w, const uint32_t *element) {
+static void arrive(void *context, size_t n, const walk_stream *w, const uint32_t *element) {
     const shared_batch *b = context;
     reuse_deposit(n, b->r->s, b->r->C, w, element, b->r->F, b->later);
 }

@@ -15,9 +15,10 @@ enum { SUMS_ROWS = 8, SUMS_GROUPS_MOST = 1 << 18 };
 #define CPU_KERNELS "solver/walk/reuse_sums_kernels.inc"
 #include "solver/base/cpu_kernels.inc"
 
-void reuse_deposit(size_t n, size_t s, size_t C, const walker *w, const uint32_t *element,
+void reuse_deposit(size_t n, size_t s, size_t C, const walk_stream *w, const uint32_t *element,
                    const float *weight, double *later) {
-    typedef void deposit(size_t, size_t, size_t, const walker *, const uint32_t *, const float *, double *);
+    typedef void deposit(size_t, size_t, size_t, const walk_stream *, const uint32_t *, const float *,
+                         double *);
     static deposit *const deposits[] = CPU_TABLE(deposit_portable, deposit_avx2, deposit_avx512);
     deposits[cpu_best()](n, s, C, w, element, weight, later);
 }
@@ -94,19 +95,19 @@ static void add_means(reuse_sums *t) {
     memset(t->deviation, 0, t->groups * C * s * sizeof *t->deviation);
 }
 
-static void add_alone(reuse_sums *t, const double *first, const double *later) {
+static void add_alone(reuse_sums *t, const double *sum) {
     const size_t n = t->m->n, C = t->m->n_channels;
     const double step = 1 / (double)t->batches;
     for (size_t l = 0; l < t->s; l++) {
-        const double *const straight = first + l * n, *const reflected = later + l * n * C;
         double *const mean = t->mean + l * n * C, *const square = t->square + l * n * C;
         double *const direct = t->direct + l * n;
         for (size_t i = 0; i < n; i++) {
             const size_t g = group_of(t, i);
+            const double *const of = sum + (l * n + i) * (C + 1);
             double spread = 0;
-            direct[i] += straight[i];
+            direct[i] += of[0];
             for (size_t k = i * C; k < (i + 1) * C; k++) {
-                const double off = t->gain[k] * (straight[i] + reflected[k]) - mean[k];
+                const double off = t->gain[k] * (of[0] + of[1 + k - i * C]) - mean[k];
                 const double more = (1 - step) * off * off;
                 mean[k] += step * off;
                 square[k] += more;
@@ -165,7 +166,7 @@ void reuse_sums_add(reuse_sums *t, const double *first, const double *later) {
     if (t->shared)
         add_shared(t, first, later);
     else
-        add_alone(t, first, later);
+        add_alone(t, first);
     add_means(t);
 }
 

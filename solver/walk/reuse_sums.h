@@ -33,13 +33,13 @@ lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shar
 void reuse_sums_free(reuse_sums *t);
 
 /* Adds a batch: power over that of the light which comes to elements straight from it, first [n][s], and by
- * reflection, later [n][C][s]; or [s][n] and [s][n][C]. Cost: n C s^2 / 2 multiplications where paths are
- * shared. */
+ * reflection, later [n][C][s]; where paths are not shared, first [s][n][1 + C] has both and later is NULL.
+ * Cost: n C s^2 / 2 multiplications where paths are shared. */
 void reuse_sums_add(reuse_sums *t, const double *first, const double *later);
 
 /* Adds the power of n walks that serve all s positions to `later` [n][C][s] of the elements that they come
  * to, VISIBILITY_NOTHING where one does not: in the parts weight [paths][s]. */
-void reuse_deposit(size_t n, size_t s, size_t C, const walker *w, const uint32_t *element,
+void reuse_deposit(size_t n, size_t s, size_t C, const walk_stream *w, const uint32_t *element,
                    const float *weight, double *later);
 
 /* Numbers of the covariances of the groups of a mesh; 0 where they are not kept apart. */

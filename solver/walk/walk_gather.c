@@ -55,24 +55,27 @@ typedef struct gathering {
     uint64_t *visits; /* [n_rhs] */
 } gathering;
 
-static bool start(void *context, walker *w) {
+static size_t start(void *context, size_t n, walker *w) {
     gathering *g = context;
-    size_t k = 0;
-    if (!walk_starts_next(&g->starts, g->before, g->n_elements, w, &k)) return false;
-    w->at = g->elements[k];
-    for (size_t c = 0; c < g->m->n_channels; c++)
-        w->weight[c] =
-            g->problem->quantity == LAM_IRRADIANCE ? 1 : (double)g->m->reflectance[c * g->m->n + w->at];
-    return true;
+    size_t k = 0, started = 0;
+    for (; started < n && walk_starts_next(&g->starts, g->before, g->n_elements, &w[started], &k);
+         started++) {
+        walker *const one = &w[started];
+        one->at = g->elements[k];
+        for (size_t c = 0; c < g->m->n_channels; c++)
+            one->weight[c] =
+                g->problem->quantity == LAM_IRRADIANCE ? 1 : (double)g->m->reflectance[c * g->m->n + one->at];
+    }
+    return started;
 }
 
-static void arrive_one(gathering *g, const walker *w, uint32_t element) {
+static void arrive_one(gathering *g, const walk_stream *w, size_t i, uint32_t element) {
     const size_t n = g->m->n, channels = g->m->n_channels;
     for (size_t r = 0; r < g->problem->n_rhs; r++) {
         const float *E = g->problem->E + r * channels * n + element;
         bool raised = false;
         for (size_t c = 0; c < channels; c++) {
-            const double value = w->weight[c] * (double)E[c * n];
+            const double value = w->weight[c][i] * (double)E[c * n];
             g->sum[r * channels + c] += value;
             raised = raised || value > 0;
         }
@@ -80,9 +83,9 @@ static void arrive_one(gathering *g, const walker *w, uint32_t element) {
     }
 }
 
-static void arrive(void *context, size_t n, const walker *w, const uint32_t *element) {
+static void arrive(void *context, size_t n, const walk_stream *w, const uint32_t *element) {
     for (size_t i = 0; i < n; i++)
-        if (element[i] != VISIBILITY_NOTHING) arrive_one(context, &w[i], element[i]);
+        if (element[i] != VISIBILITY_NOTHING) arrive_one(context, w, i, element[i]);
 }
 
 /* A visit adds at most the largest emission, and its weight is at most the largest at a start, 1. */

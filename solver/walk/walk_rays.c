@@ -7,10 +7,10 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
-static float to_unit(uint32_t bits) {
-    return (float)(bits >> 8) * 0x1p-24f;
-}
+/* A vector of the rays of a packet, and four of each of two of them side by side. */
+typedef float lanes __attribute__((vector_size(4 * VISIBILITY_PACKET), aligned(4), may_alias));
 
 #define CPU_KERNELS "solver/walk/walk_kernels.inc"
 #include "solver/base/cpu_kernels.inc"
@@ -83,57 +83,63 @@ lam_status walk_shapes_create(walk_scene *s, lam_error *error) {
     return LAM_OK;
 }
 
-void walk_place_set(walk_places *p, size_t i, const walk_shape *shape, const uint32_t place[4]) {
-    for (int d = 0; d < 3; d++) {
-        p->corner[d][i] = shape->corner[d];
-        p->edge[0][d][i] = shape->edge[0][d];
-        p->edge[1][d][i] = shape->edge[1][d];
-        p->normal[d][i] = shape->normal[d];
-    }
-    p->fold[i] = (shape->facet & WALK_TRIANGLE) != 0 ? .5f : 0;
-    p->u[i] = to_unit(place[0]);
-    p->w[i] = to_unit(place[1]);
-    p->x[i] = to_unit(place[2]);
-    p->turn[i] = place[3];
+/* The triangle of a quadrilateral, and the coordinate within it, that its first coordinate chooses; without
+ * branches, which would be mispredicted half of the time. */
+static void choose_half(const walk_halves *h, const walk_shape *shape, walk_shape *half, uint32_t *place) {
+    const float share = h->share, u = (float)(*place >> 8) * 0x1p-24f;
+    const bool second = u >= share;
+    const float within = (u - (second ? share : 0)) / (second ? 1 - share : share);
+    const float *first = shape->edge[second], *last = second ? h->third : shape->edge[1];
+    *half = *shape;
+    memcpy(half->edge[0], first, sizeof half->edge[0]);
+    memcpy(half->edge[1], last, sizeof half->edge[1]);
+    *place = (uint32_t)((within < 1 - 0x1p-24f ? within : 1 - 0x1p-24f) * 0x1p24f) << 8;
 }
 
-/* The coordinate u of lane i chooses the triangle of a quadrilateral and is rescaled to [0, 1). */
-static void choose_half(walk_places *p, size_t i, const walk_shape *shape, const walk_halves *h) {
-    if (p->u[i] < h->share) {
-        p->u[i] /= h->share;
-        return;
-    }
-    p->u[i] = (p->u[i] - h->share) / (1 - h->share);
-    for (int d = 0; d < 3; d++) {
-        p->edge[0][d][i] = shape->edge[1][d];
-        p->edge[1][d][i] = h->third[d];
-    }
-}
-
-void walk_leave(const walk_places *p, size_t n, ray_packet *rays) {
-    typedef void leave(size_t, const walk_places *, ray_packet *);
+void walk_leave(size_t n, const walk_shape *const *shape, const uint32_t (*place)[WALK_STREAM],
+                ray_packet *rays, uint32_t *facet) {
+    typedef void leave(size_t, const walk_shape *const *, const uint32_t(*)[WALK_STREAM], ray_packet *,
+                       uint32_t *);
     static leave *const leaves[] = CPU_TABLE(leave_portable, leave_avx2, leave_avx512);
-    leaves[cpu_best()](n, p, rays);
+    leaves[cpu_best()](n, shape, place, rays, facet);
 }
 
-void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits) {
+void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, hit_packet *hits) {
     const size_t filled = (n + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET * VISIBILITY_PACKET;
-    walk_places p[WALK_STREAM / VISIBILITY_PACKET];
+    const walk_shape *shape[WALK_STREAM];
+    walk_shape half[WALK_STREAM];
     uint32_t self[WALK_STREAM], facet[WALK_STREAM];
-    for (size_t j = 0; j < filled; j++) {
-        const walker *of = &w[j < n ? j : n - 1];
-        const walk_shape *shape = &s->shapes[of->at];
-        walk_places *const to = &p[j / VISIBILITY_PACKET];
-        const size_t lane = j % VISIBILITY_PACKET;
-        walk_place_set(to, lane, shape, of->place);
-        if (s->halves != NULL && s->halves[of->at].share < 1)
-            choose_half(to, lane, shape, &s->halves[of->at]);
-        self[j] = of->at;
-        facet[j] = shape->facet & ~WALK_TRIANGLE;
+    for (size_t j = n; j < filled; j++) {
+        w->at[j] = w->at[n - 1];
+        for (int d = 0; d < 4; d++) w->place[d][j] = w->place[d][n - 1];
     }
-    walk_leave(p, filled / VISIBILITY_PACKET, rays);
+    for (size_t j = 0; j < filled; j++) {
+        const uint32_t at = w->at[j];
+        shape[j] = &s->shapes[at];
+        self[j] = at < s->m->n ? at : VISIBILITY_NOTHING;
+        if (s->halves == NULL || s->halves[at].share >= 1) continue;
+        choose_half(&s->halves[at], shape[j], &half[j], &w->place[0][j]);
+        shape[j] = &half[j];
+    }
+    walk_leave(filled, shape, w->place, rays, facet);
     for (size_t j = 0; j < n; j += VISIBILITY_PACKET)
         visibility_cast_lifted(s->v, &rays[j / VISIBILITY_PACKET],
                                n - j < VISIBILITY_PACKET ? n - j : VISIBILITY_PACKET, self + j, facet + j,
                                &hits[j / VISIBILITY_PACKET]);
+}
+
+void walk_stream_meet(const walk_scene *s, const walk_stream *w, size_t n, const hit_packet *hits,
+                      uint32_t *met, uint32_t *again) {
+    typedef void meet(const walk_scene *, uint32_t, const walk_stream *, size_t, const hit_packet *,
+                      uint32_t *, uint32_t *);
+    static meet *const meets[] = CPU_TABLE(meet_portable, meet_avx2, meet_avx512);
+    meets[cpu_best()](s, (uint32_t)s->m->n, w, n, hits, met, again);
+}
+
+void walk_stream_survive(walk_stream *s, size_t n, const uint32_t *met, const uint32_t *again,
+                         const float (*reflectance)[WALK_STREAM], uint32_t *alive) {
+    typedef void survive(walk_stream *, size_t, const uint32_t *, const uint32_t *,
+                         const float(*)[WALK_STREAM], uint32_t *);
+    static survive *const survives[] = CPU_TABLE(survive_portable, survive_avx2, survive_avx512);
+    survives[cpu_best()](s, n, met, again, reflectance, alive);
 }

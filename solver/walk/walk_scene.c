@@ -22,15 +22,17 @@ static void follow_lost(const walk_scene *s, const double *before, double width,
     walk_starts_init(&starts, 0, part, RAYS_OF_PART);
     for (size_t begun = 0; begun < RAYS_OF_PART && (leaving->all < FOLLOWED || backs->all < FOLLOWED);
          begun += VISIBILITY_PACKET) {
-        walker w[VISIBILITY_PACKET];
+        walk_stream w;
         hit_packet hits;
         ray_packet rays;
         size_t k = 0;
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-            walk_starts_next(&starts, before, s->m->n, &w[i], &k);
-            w[i].at = (uint32_t)k;
+            walker one = {.weight = {0}};
+            walk_starts_next(&starts, before, s->m->n, &one, &k);
+            one.at = (uint32_t)k;
+            walk_stream_set(&w, i, &one);
         }
-        walk_cast(s, w, VISIBILITY_PACKET, &rays, &hits);
+        walk_cast(s, &w, VISIBILITY_PACKET, &rays, &hits);
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
             const bool left = hits.element[i] == VISIBILITY_NOTHING;
             followed *to = left ? leaving : backs;
@@ -38,7 +40,7 @@ static void follow_lost(const walk_scene *s, const double *before, double width,
             const float origin[3] = {rays.origin[0][i], rays.origin[1][i], rays.origin[2][i]};
             const float direction[3] = {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
             to->all++;
-            to->openings += !openings_is_crack(s->v, s->m, width, origin, direction, w[i].at);
+            to->openings += !openings_is_crack(s->v, s->m, width, origin, direction, w.at[i]);
         }
     }
 }

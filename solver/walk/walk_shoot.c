@@ -17,35 +17,36 @@ typedef struct shooting {
 
 /* Every walk starts with all power, since the mean over walks is taken: each channel with its part of that of
  * the element. */
-static bool start(void *context, walker *w) {
+static size_t start(void *context, size_t n, walker *w) {
     shooting *s = context;
-    const size_t n = s->m->n;
-    size_t k = 0;
-    double emitted = 0;
-    if (!walk_starts_next(&s->starts, s->before, n, w, &k)) return false;
-    w->at = (uint32_t)k;
-    for (size_t c = 0; c < s->m->n_channels; c++) emitted += (double)s->E[c * n + k];
-    for (size_t c = 0; c < s->m->n_channels; c++)
-        w->weight[c] = s->before[n] * (double)s->E[c * n + k] / emitted;
-    return true;
+    const mesh *m = s->m;
+    size_t k = 0, started = 0;
+    for (; started < n && walk_starts_next(&s->starts, s->before, m->n, &w[started], &k); started++) {
+        double emitted = 0;
+        w[started].at = (uint32_t)k;
+        for (size_t c = 0; c < m->n_channels; c++) emitted += (double)s->E[c * m->n + k];
+        for (size_t c = 0; c < m->n_channels; c++)
+            w[started].weight[c] = s->before[m->n] * (double)s->E[c * m->n + k] / emitted;
+    }
+    return started;
 }
 
-static void arrive_one(shooting *s, const walker *w, uint32_t element) {
+static void arrive_one(shooting *s, const walk_stream *w, size_t i, uint32_t element) {
     const uint32_t t = s->problem->target[element];
     bool raised = false;
     if (t == WALK_NO_TARGET) return;
     for (size_t c = 0; c < s->m->n_channels; c++) {
         const double rho = (double)s->m->reflectance[c * s->m->n + element];
-        const double value = s->problem->quantity == LAM_IRRADIANCE ? w->weight[c] : rho * w->weight[c];
+        const double value = s->problem->quantity == LAM_IRRADIANCE ? w->weight[c][i] : rho * w->weight[c][i];
         s->sum[t * s->m->n_channels + c] += value;
         raised = raised || value > 0;
     }
     s->visits[t] += raised;
 }
 
-static void arrive(void *context, size_t n, const walker *w, const uint32_t *element) {
+static void arrive(void *context, size_t n, const walk_stream *w, const uint32_t *element) {
     for (size_t i = 0; i < n; i++)
-        if (element[i] != VISIBILITY_NOTHING) arrive_one(context, &w[i], element[i]);
+        if (element[i] != VISIBILITY_NOTHING) arrive_one(context, w, i, element[i]);
 }
 
 /* The memory of one emission at a time. */

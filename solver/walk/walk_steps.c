@@ -5,9 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-/* A walk that has lost so many rays in a row is in a corner that single precision cannot leave: it ends. */
-enum { LOST_MOST = 64 };
-
 /* Steps of all walks between two looks at the progress. */
 enum { STREAMS_AT_ONCE = 128 };
 
@@ -19,44 +16,56 @@ void walk_draw_place(walker *w) {
     }
 }
 
-/* The element that the ray of a walk has led to the front of, else VISIBILITY_NOTHING. */
-static uint32_t front_met(const walker *w, const hit_packet *hits, size_t lane) {
-    const uint32_t element = hits->element[lane];
-    return hits->back[lane] || element == w->at ? VISIBILITY_NOTHING : element;
+void walk_stream_set(walk_stream *s, size_t i, const walker *w) {
+    s->at[i] = w->at;
+    s->path[i] = w->path;
+    s->lost[i] = 0;
+    s->random[i] = w->random;
+    for (int d = 0; d < 4; d++) s->place[d][i] = w->place[d];
+    for (int c = 0; c < WALK_CHANNELS; c++) s->weight[c][i] = w->weight[c];
 }
 
-/* True for a walk that leaves its element by another ray, because this one slipped through a crack. */
-static bool leaves_again(const walk_scene *s, walker *w, const hit_packet *hits, size_t lane) {
-    const bool crack = hits->element[lane] == VISIBILITY_NOTHING ? s->closed
-                       : hits->back[lane]                        ? s->fronts
-                                                                 : true;
-    if (!crack || ++w->lost == LOST_MOST) return false;
-    walk_draw_place(w);
-    return true;
+static void move_walk(walk_stream *s, size_t from, size_t to) {
+    s->at[to] = s->at[from];
+    s->path[to] = s->path[from];
+    s->lost[to] = s->lost[from];
+    s->random[to] = s->random[from];
+    for (int d = 0; d < 4; d++) s->place[d][to] = s->place[d][from];
+    for (int c = 0; c < WALK_CHANNELS; c++) s->weight[c][to] = s->weight[c][from];
 }
 
-/* Takes n walks to where their rays led; returns how many go on, those in front. */
-static size_t advance(const walk_batch *b, size_t n, walker *w, const hit_packet *hits) {
-    uint32_t met[WALK_STREAM];
-    size_t kept = 0;
+/* Fills the free places of a stream of n with walks that start, and closes the gaps that remain; returns the
+ * new n. The places are in ascending order. */
+static size_t refill(const walk_batch *b, walk_stream *w, size_t n, size_t n_free, const uint32_t *place,
+                     size_t *begun) {
+    walker fresh[WALK_STREAM];
+    for (size_t k = 0; k < n_free; k++) fresh[k] = (walker){.weight = {0}};
+    const size_t started = b->start(b->context, n_free, fresh);
+    for (size_t k = 0; k < started; k++) walk_stream_set(w, place[k], &fresh[k]);
+    *begun += started;
+    /* The last place is a gap itself, or that of a walk. */
+    for (size_t k = n_free; k-- > started;)
+        if (place[k] != --n) move_walk(w, n, place[k]);
+    return n;
+}
+
+/* Takes n walks to what they have met. Walks that end leave free places, in ascending order; returns how
+ * many. */
+static size_t advance(const walk_scene *s, walk_stream *w, size_t n, const uint32_t *met,
+                      const uint32_t *again, uint32_t *place) {
+    float reflectance[WALK_CHANNELS][WALK_STREAM];
+    uint32_t alive[WALK_STREAM];
+    size_t n_free = 0;
     for (size_t i = 0; i < n; i++) {
-        met[i] = front_met(&w[i], &hits[i / VISIBILITY_PACKET], i % VISIBILITY_PACKET);
-        if (met[i] != VISIBILITY_NOTHING) __builtin_prefetch(&b->scene->shapes[met[i]]);
+        const walk_shape *shape = &s->shapes[met[i] == VISIBILITY_NOTHING ? 0 : met[i]];
+        for (int c = 0; c < WALK_CHANNELS; c++) reflectance[c][i] = shape->reflectance[c];
     }
-    b->arrive(b->context, n, w, met);
+    walk_stream_survive(w, n, met, again, reflectance, alive);
     for (size_t i = 0; i < n; i++) {
-        walker *const of = &w[kept];
-        *of = w[i];
-        if (met[i] == VISIBILITY_NOTHING) {
-            kept += leaves_again(b->scene, of, &hits[i / VISIBILITY_PACKET], i % VISIBILITY_PACKET);
-            continue;
-        }
-        kept += walk_survives(b->scene, of, met[i]);
-        of->at = met[i];
-        of->lost = 0;
-        walk_draw_place(of);
+        place[n_free] = (uint32_t)i;
+        n_free += 1 - alive[i];
     }
-    return kept;
+    return n_free;
 }
 
 /* Counts walks that have begun; false where the run has to stop. */
@@ -73,22 +82,24 @@ static bool go_on(walk_run *run, size_t begun) {
 }
 
 void walk_batch_go(const walk_batch *b) {
-    walker w[WALK_STREAM];
+    walk_stream w;
     ray_packet rays[WALK_STREAM / VISIBILITY_PACKET];
     hit_packet hits[WALK_STREAM / VISIBILITY_PACKET];
-    size_t n = 0, begun = 0;
+    uint32_t met[WALK_STREAM], again[WALK_STREAM], place[WALK_STREAM];
+    size_t n = WALK_STREAM, n_free = WALK_STREAM, begun = 0;
     if (!go_on(b->run, 0)) return;
+    for (uint32_t i = 0; i < WALK_STREAM; i++) place[i] = i;
     for (size_t stream = 1;; stream++) {
-        for (; n < WALK_STREAM; n++, begun++) {
-            w[n].lost = 0;
-            for (int c = 0; c < WALK_CHANNELS; c++) w[n].weight[c] = 0;
-            if (!b->start(b->context, &w[n])) break;
-        }
+        n = refill(b, &w, n, n_free, place, &begun);
         if (n == 0) break;
-        walk_cast(b->scene, w, n, rays, hits);
+        walk_cast(b->scene, &w, n, rays, hits);
         walk_log_add(b->run->log, n / VISIBILITY_PACKET, rays);
         if (b->rays != NULL) *b->rays += (double)n;
-        n = advance(b, n, w, hits);
+        walk_stream_meet(b->scene, &w, n, hits, met, again);
+        for (size_t i = 0; i < n; i++)
+            __builtin_prefetch(&b->scene->shapes[met[i] == VISIBILITY_NOTHING ? 0 : met[i]]);
+        b->arrive(b->context, n, &w, met);
+        n_free = advance(b->scene, &w, n, met, again, place);
         if (stream % STREAMS_AT_ONCE == 0) {
             if (!go_on(b->run, begun)) return;
             begun = 0;

@@ -8,24 +8,18 @@
 #include "solver/walk/walk.h"
 
 /* Walks that take their steps side by side at most, a multiple of VISIBILITY_PACKET. */
-enum { WALK_CHANNELS = 3, WALK_STREAM = 256 };
+enum { WALK_CHANNELS = 3, WALK_STREAM = 128 };
 
+/* Parts of the facet of a shape: that of a light that is no part of the scene is WALK_NO_FACET. */
 #define WALK_TRIANGLE 0x80000000u
+#define WALK_NO_FACET 0x7FFFFFFFu
 
-/* An element as walks need it, in one line of a cache. */
+/* An element as walks need it, in one line of a cache: 16 numbers of 4 bytes, which kernels read as such. */
 typedef struct walk_shape {
     float corner[3], edge[2][3], normal[3]; /* recentred, the corner lifted; a triangle, or a parallelogram */
     float reflectance[WALK_CHANNELS];
     uint32_t facet; /* of the scene, and WALK_TRIANGLE */
 } walk_shape;
-
-/* The places that a packet of rays leaves. */
-typedef struct walk_places {
-    float corner[3][VISIBILITY_PACKET], edge[2][3][VISIBILITY_PACKET], normal[3][VISIBILITY_PACKET];
-    float fold[VISIBILITY_PACKET];                                          /* 1/2 for triangles, else 0 */
-    float u[VISIBILITY_PACKET], w[VISIBILITY_PACKET], x[VISIBILITY_PACKET]; /* in [0, 1) */
-    uint32_t turn[VISIBILITY_PACKET];                                       /* in 2^-32 of a turn */
-} walk_places;
 
 /* A quadrilateral that is no parallelogram is the triangle of its shape and that of edge[1] and a third one.
  */
@@ -43,15 +37,22 @@ struct walk_scene {
     bool fronts;         /* rays hit backs through cracks only */
 };
 
-/* One walk. */
+/* One walk that starts. */
 typedef struct walker {
-    uint32_t at;                  /* the element that its next ray leaves */
+    uint32_t at;                  /* the element that its first ray leaves */
     uint32_t path;                /* its number among those of the caller */
-    unsigned lost;                /* rays through cracks since it came there */
     uint32_t place[4];            /* in 2^-32: two for the point, two for the direction */
     double weight[WALK_CHANNELS]; /* of what it has met; power when it was shot; 0 beyond the channels */
     uint64_t random;              /* its own stream */
 } walker;
+
+/* Walks on their way, one array for each number, so that vector registers take many of them. */
+typedef struct walk_stream {
+    uint32_t at[WALK_STREAM], path[WALK_STREAM], place[4][WALK_STREAM]; /* as of a walker */
+    uint32_t lost[WALK_STREAM]; /* rays through cracks since it came there */
+    double weight[WALK_CHANNELS][WALK_STREAM];
+    uint64_t random[WALK_STREAM];
+} walk_stream;
 
 /* All walks of an estimate, for progress. */
 typedef struct walk_run {
@@ -62,14 +63,14 @@ typedef struct walk_run {
     walk_log *log; /* or NULL */
 } walk_run;
 
-/* Walks that share a stream of starts. start sets element, place, weights (0 before) and random of the next
- * walk, or returns false after the last one; arrive is called when walks come to the fronts of elements, or
- * to VISIBILITY_NOTHING where one of them does not. */
+/* Walks that share a stream of starts. start sets all of the next n walkers, or fewer after the last one, and
+ * returns how many; weights are 0 before. arrive is called when walks come to the fronts of elements, or to
+ * VISIBILITY_NOTHING where one of them does not. */
 typedef struct walk_batch {
     const walk_scene *scene;
     walk_run *run;
-    bool (*start)(void *context, walker *w);
-    void (*arrive)(void *context, size_t n, const walker *w, const uint32_t *element);
+    size_t (*start)(void *context, size_t n, walker *w);
+    void (*arrive)(void *context, size_t n, const walk_stream *w, const uint32_t *element);
     void *context;
     double *rays; /* counts those that are cast; or NULL */
 } walk_batch;
@@ -82,6 +83,9 @@ void walk_batch_go(const walk_batch *b);
 
 /* A new place at random, from the walk's own stream. */
 void walk_draw_place(walker *w);
+
+/* Puts a walk that starts into a place of a stream. */
+void walk_stream_set(walk_stream *s, size_t i, const walker *w);
 
 /* Russian roulette at an element: the walk goes on with the probability
  *     q = max_c (rho_c w_c) / max_c w_c,        w_c <- rho_c w_c / q,
@@ -103,14 +107,28 @@ static inline bool walk_survives(const walk_scene *s, walker *w, uint32_t elemen
 /* Makes the shapes of a scene, freed with it. Errors: LAM_ERR_MEMORY. */
 lam_status walk_shapes_create(walk_scene *s, lam_error *error);
 
-/* Lane i: the point and the direction of the numbers that a walker has for them. */
-void walk_place_set(walk_places *p, size_t i, const walk_shape *shape, const uint32_t place[4]);
+/* The rays that leave shapes [n] from places [4][WALK_STREAM], n rounded up to packets: origins uniform over
+ * shapes, directions cosine-weighted. facet[i] is that of the shape, or VISIBILITY_NOTHING. */
+void walk_leave(size_t n, const walk_shape *const *shape, const uint32_t (*place)[WALK_STREAM],
+                ray_packet *rays, uint32_t *facet);
 
-/* The rays that leave n packets of places: origins uniform over shapes, directions cosine-weighted. */
-void walk_leave(const walk_places *p, size_t n, ray_packet *rays);
+/* Casts the next rays of the first n walks of a stream from their places: packets of rays and of hits. Walks
+ * beyond the n are overwritten. */
+void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, hit_packet *hits);
 
-/* Casts the next rays of n walks, at most WALK_STREAM, from their places: packets of rays and of hits. */
-void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits);
+/* A walk that has lost so many rays in a row is in a corner that single precision cannot leave: it ends. */
+enum { WALK_LOST_MOST = 64 };
+
+/* Sets the elements to whose fronts the rays of n walks have led, else VISIBILITY_NOTHING; again[i] is 1 for
+ * a walk that leaves its element, but no light, by another ray, because this one slipped through a crack,
+ * else 0. met and again are [WALK_STREAM]. */
+void walk_stream_meet(const walk_scene *s, const walk_stream *w, size_t n, const hit_packet *hits,
+                      uint32_t *met, uint32_t *again);
+
+/* Takes n walks to what they have met: Russian roulette (walk_survives) by the reflectances there
+ * [WALK_CHANNELS][WALK_STREAM], and new places for those that go on; alive[i] is 1 for these, else 0. */
+void walk_stream_survive(walk_stream *s, size_t n, const uint32_t *met, const uint32_t *again,
+                         const float (*reflectance)[WALK_STREAM], uint32_t *alive);
 
 /* The starts of one batch: low-discrepancy places, and strata of what elements are chosen by. */
 typedef struct walk_starts {

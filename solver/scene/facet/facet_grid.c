@@ -189,11 +189,14 @@ static void cell_range(double low, double high, uint32_t n, uint32_t *first, uin
 typedef struct overlap {
     uint32_t cell, member; /* of the facet */
     bool fills;
+    float depth; /* of the cell in the element, at its best corner */
 } overlap;
 
+/* By cells; in a cell the element that has most of it comes first, where nearly all searches end. */
 static int overlap_order(const void *a, const void *b) {
     const overlap *p = a, *q = b;
     if (p->cell != q->cell) return p->cell < q->cell ? -1 : 1;
+    if (p->depth < q->depth || q->depth < p->depth) return p->depth > q->depth ? -1 : 1;
     return (p->member > q->member) - (p->member < q->member);
 }
 
@@ -224,7 +227,7 @@ static lam_status gather(const mesh *m, const uint32_t *elements, size_t n, cons
                 if (array_grow(&g->overlaps, &g->capacity, g->n + 1, sizeof *g->overlaps, "facets", error) !=
                     LAM_OK)
                     return LAM_ERR_MEMORY;
-                g->overlaps[g->n++] = (overlap){y * grid->nx + x, (uint32_t)k, worst >= -margin};
+                g->overlaps[g->n++] = (overlap){y * grid->nx + x, (uint32_t)k, worst >= -margin, (float)best};
             }
     }
     array_sort(g->overlaps, g->n, sizeof *g->overlaps, overlap_order);
@@ -343,12 +346,10 @@ static float within(float x, float most) {
 }
 
 static float inside(const facet_candidate *c, float x, float y) {
-    float least = c->a[0] * x + c->b[0] * y + c->c[0];
-    for (int k = 1; k < 4; k++) {
-        const float at = c->a[k] * x + c->b[k] * y + c->c[k];
-        least = at < least ? at : least;
-    }
-    return least;
+    typedef float lanes __attribute__((vector_size(16), aligned(4), may_alias));
+    const lanes at = *(const lanes *)c->a * x + *(const lanes *)c->b * y + *(const lanes *)c->c;
+    const float least = at[0] < at[1] ? at[0] : at[1], other = at[2] < at[3] ? at[2] : at[3];
+    return least < other ? least : other;
 }
 
 static uint32_t choose(const facet_candidate *c, float x, float y) {
