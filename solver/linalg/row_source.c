@@ -23,9 +23,9 @@ static lam_status rows_of_csr(void *context, const uint32_t *elements, size_t m,
     }
     for (size_t k = 0; k < m; k++) {
         const uint64_t first = F->indptr[elements[k]];
-        indices[k] = F->indices + first;
-        data[k] = F->data + first;
         length[k] = (size_t)(F->indptr[elements[k] + 1] - first);
+        indices[k] = length[k] > 0 ? F->indices + first : NULL;
+        data[k] = length[k] > 0 ? F->data + first : NULL;
     }
     return LAM_OK;
 }

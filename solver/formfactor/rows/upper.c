@@ -259,7 +259,7 @@ static lam_status merge_panel(merge_run *run, transpose *below, merge_room *room
         room->start[i - first] = n_entries;
         n_entries += below->start[i - first + 1] - below->start[i - first] + run->cursors[i].left;
     }
-    TRY(room_reserve(room, 0, n_entries, error));
+    TRY(room_reserve(room, 0, n_entries > 0 ? n_entries : 1, error)); /* rows without entries point there */
 #pragma omp parallel for schedule(dynamic, 16)
     for (size_t i = first; i < last; i++) {
         uint32_t *indices = room->indices + room->start[i - first];

@@ -184,9 +184,10 @@ static lam_status make_coupled(const void *context, size_t i, row_work *w, lam_e
     for (uint64_t e = begin; e < end; e++) {
         const uint32_t k = s->R->indices[e];
         const float r = s->R->data[e], least = s->least[i] / fabsf(r);
-        const row_term *from = s->A->row[k], *const last = from + s->A->length[k];
-        for (; from < last && fabsf(from->value) >= least; from++)
-            row_work_add(w, from->column, r * from->value);
+        const row_term *const row = s->A->row[k];
+        const size_t most = s->A->length[k];
+        for (size_t t = 0; t < most && fabsf(row[t].value) >= least; t++)
+            row_work_add(w, row[t].column, r * row[t].value);
     }
     TRY(row_work_room(w, 0, w->count, &to, error));
     w->done[0].used += take_sorted(w, 1, s->least[i], to);
