@@ -218,7 +218,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     adjoint_row *made[BATCH_PASS] = {NULL};
     double area[BATCH_PASS];
     bool allocated, good = false;
-    float *g = memory_allocate(1, pass_bytes(s, count), "rows", NULL), *w = g + count * C * n;
+    float *const g = memory_allocate(1, pass_bytes(s, count), "rows", NULL);
     void *work = work_bytes > 0 ? batch_workspace_get(workspace, work_bytes) : NULL;
     allocated = g != NULL && work != NULL && get_weights(s, &weights);
     for (size_t k = 0; allocated && k < count; k++)
@@ -227,6 +227,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
         problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the adjoint rows of %zu groups", count);
         goto done;
     }
+    float *const w = g + count * C * n;
     for (size_t k = 0; k < count; k++)
         area[k] = write_cotangent(s, &request->reduce.names[which[k]], g + k * C * n);
     const lam_status status =
