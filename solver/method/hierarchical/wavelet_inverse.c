@@ -137,11 +137,12 @@ typedef struct scaled_rows {
 static size_t scale_row(const scaled_rows *s, uint64_t e, size_t i, bool sorted, row_term *to) {
     const uint32_t k = s->R->indices[e];
     const float r = s->R->data[e], least = s->least[i] / fabsf(r);
-    const row_term *from = s->A->row[k], *const last = from + s->A->length[k];
+    const row_term *const row = s->A->row[k];
+    const size_t most = s->A->length[k];
     size_t used = 0;
-    for (; from < last && !(sorted && fabsf(from->value) < least); from++) {
-        to[used] = (row_term){from->column, r * from->value};
-        used += fabsf(from->value) >= least;
+    for (size_t t = 0; t < most && !(sorted && fabsf(row[t].value) < least); t++) {
+        to[used] = (row_term){row[t].column, r * row[t].value};
+        used += fabsf(row[t].value) >= least;
     }
     return used;
 }
