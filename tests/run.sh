@@ -62,7 +62,7 @@ CK_FORK=no run_ctest asan -j $((jobs + 1))
 
 step "the daemon under ThreadSanitizer, which mostly waits; beside it a warning-free build by clang, and clang-tidy"
 build tsan lambertd unit_batch unit_batch_blocked unit_batch_order unit_request_memory unit_thread_budget unit_adjoint_rows unit_guard_parts
-build dev lambert lambertd lambert-bench lambert_shared lambert_static ready_server faults
+build dev lambert lambertd lambert-bench lambert_shared lambert_static ready_server faults stress_stability
 cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
 # Clients of a daemon have limits of time, a build has none.
 (renice -n 19 "$BASHPID" && clang_build) >"$logs/clang" 2>&1 &
