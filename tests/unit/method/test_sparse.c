@@ -270,7 +270,7 @@ END_TEST
 /* The threshold rises until all entries fit, and is reported; where the forecast is exceeded nothing is kept.
  */
 START_TEST(memory_bounds_the_entries) {
-    fixture f = subject(8);
+    fixture f = subject(6);
     build_report report;
     build_options how = options_of(1e-6, DELTA);
     lam_operator *op = build(problem_of(&f), &how, &report);
