@@ -39,7 +39,9 @@ static bool has_strange_light(const scene *s, const radiosity_request *request) 
 
 void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes) {
     const answer_scope scope = {.receivers_only = asks_receivers(s, request),
-                                .strange = has_strange_light(s, request)};
+                                .strange = has_strange_light(s, request),
+                                .sky = request->sky.values != NULL && request->E == NULL &&
+                                       request->n_spots == 0};
     stated_errors_note(&s->errors, scope, notes);
 }
 

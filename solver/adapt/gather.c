@@ -12,6 +12,7 @@ struct gather {
     const mesh *m;
     size_t n_lights;
     const float *B, *lamps;
+    const gather_sky *sky; /* NULL: none */
     visibility *v;
     size_t n_lamps;
     uint32_t *lamp; /* [n_lamps], elements that emit */
@@ -59,8 +60,8 @@ static lam_status find_lamps(gather *g, lam_error *error) {
     return LAM_OK;
 }
 
-lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps, gather **out,
-                         lam_error *error) {
+lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps,
+                         const gather_sky *sky, gather **out, lam_error *error) {
     lam_status status = LAM_OK;
     gather *g = NULL;
     if (n_lights * m->n_channels > GATHER_VALUES_MOST)
@@ -68,7 +69,7 @@ lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const f
              m->n_channels, (int)GATHER_VALUES_MOST);
     g = memory_allocate(1, sizeof *g, "light at points", error);
     if (g == NULL) TRY(LAM_ERR_MEMORY);
-    *g = (gather){.m = m, .n_lights = n_lights, .B = B, .lamps = lamps};
+    *g = (gather){.m = m, .n_lights = n_lights, .B = B, .lamps = lamps, .sky = sky};
     TRY(visibility_create(m, &g->v, error));
     TRY(find_lamps(g, error));
     *out = g;
@@ -146,6 +147,16 @@ static void add_hit(const gather *g, const float direction[3], uint32_t j, doubl
     if (lamp) add_lamp(g, j, cosine * fmax(facing, 0) / (M_PI * fmax(distance * distance, 1e-300)), H);
 }
 
+/* The light that the rays of a packet bring from where they leave the scene: pi times the radiance there. */
+static void add_sky(const gather *g, const ray_packet *rays, const hit_packet *hits, double *H) {
+    uint32_t tile[SKY_PACKET];
+    const size_t channels = g->m->n_channels, tiles = g->sky->tiling->n_tiles;
+    sky_tiling_find(g->sky->tiling, rays->direction, tile);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++)
+        for (size_t row = 0; hits->element[i] == VISIBILITY_NOTHING && row < g->n_lights * channels; row++)
+            H[row] += M_PI * g->sky->L[row / channels * (tiles + 1) + tile[i]] / GATHER_RAYS;
+}
+
 static void add_rays(const gather *g, uint32_t element, const float origin[3], float (*direction)[3],
                      double *H) {
     const float *normal = g->m->normal[element];
@@ -161,6 +172,7 @@ static void add_rays(const gather *g, uint32_t element, const float origin[3], f
             }
         }
         visibility_cast(g->v, &rays, VISIBILITY_PACKET, self, 0, &hits);
+        if (g->sky != NULL) add_sky(g, &rays, &hits, H);
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
             const float *to = direction[first + i];
             if (hits.element[i] == VISIBILITY_NOTHING || hits.back[i]) continue;

@@ -6,6 +6,7 @@
 #ifndef LAMBERT_ADAPT_GATHER_H
 #define LAMBERT_ADAPT_GATHER_H
 
+#include "solver/daylight/sky_tiles.h"
 #include "solver/scene/mesh.h"
 
 /* Samples of a half of an estimate: rays, and places on lamps. */
@@ -16,11 +17,19 @@ enum { GATHER_VALUES_MOST = 9 };
 
 typedef struct gather gather;
 
+/* Skies, one of each light: L [n_lights][n_tiles + 1] are radiances, the same in all channels, of the tiles
+ * and, last, of the ground below the horizon. */
+typedef struct gather_sky {
+    const sky_tiling *tiling;
+    const double *L;
+} gather_sky;
+
 /* The answers that are gathered from: B [n_lights][C][n]. lamps [C][n], or NULL, is the part of the first
- * light that lamps emit, which samples look for. All three must outlive what is made. Errors: LAM_ERR_MEMORY,
+ * light that lamps emit, which samples look for. Rays that leave the scene bring light of a sky, or none
+ * where it is NULL. All of these must outlive what is made. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY,
  * LAM_ERR_INTERNAL. */
-lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps, gather **out,
-                         lam_error *error);
+lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps,
+                         const gather_sky *sky, gather **out, lam_error *error);
 void gather_free(gather *g);
 
 size_t gather_values(const gather *g); /* n_lights C */

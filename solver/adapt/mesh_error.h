@@ -10,13 +10,15 @@
 enum { MESH_ERROR_LOOKS_LEAST = 64, MESH_ERROR_LOOKS_MOST = 1024 };
 
 /* error[n_lights] of the answers B [n_lights][C][n] to the emissions E, the first of which comes from lamps
- * where `lamps` says so; 0 for a light of which nothing bounces. The variance over an element of
+ * where `lamps` says so, or to skies (NULL: none), whose emission is 0; 0 for a light of which nothing
+ * bounces. The variance over an element of
  *     B(x) - E = rho H(x)
  * comes from gathering at one random point in each quarter; the product of two independent halves of each
  * estimate has no noise on average. The same for any number of threads. Cost: 768 rays and
  * segments for each element that is looked at.
  * Errors: LAM_ERR_MEMORY, LAM_ERR_INTERNAL, LAM_ERR_CANCELLED. */
 lam_status mesh_error(const mesh *m, size_t n_lights, const float *E, const float *B, bool lamps,
-                      uint64_t seed, const progress *p, double *error_of_light, lam_error *error);
+                      const gather_sky *sky, uint64_t seed, const progress *p, double *error_of_light,
+                      lam_error *error);
 
 #endif

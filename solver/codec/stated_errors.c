@@ -27,14 +27,12 @@ static stated_error read_error(store *s, const char *relative, const char *indir
     return found;
 }
 
-static double read_mesh_error(store *s) {
-    static const char *const lights[] = {"lights", "even"};
+/* A figure of /error/mesh; 0: there is none. */
+static double read_mesh_error(store *s, const char *light) {
     double found = 0;
-    for (size_t i = 0; i < 2 && store_has(s, "/error/mesh"); i++)
-        if (store_has_attribute(s, "/error/mesh", lights[i]) &&
-            store_get_number(s, "/error/mesh", lights[i], &found, NULL) == LAM_OK && isfinite(found))
-            return found;
-    return 0;
+    const bool good = store_has(s, "/error/mesh") && store_has_attribute(s, "/error/mesh", light) &&
+                      store_get_number(s, "/error/mesh", light, &found, NULL) == LAM_OK && isfinite(found);
+    return good ? found : 0;
 }
 
 /* *out [n]: true where a weight is above 0; NULL of NULL. */
@@ -54,7 +52,10 @@ lam_status stated_errors_read(store *s, const error_scene *scene, const emitters
     importance weights = {.n = 0};
     stated_errors made = {.n = n,
                           .all = read_error(s, "total_relative_mean", "total_indirect_mean"),
-                          .mesh = read_mesh_error(s)};
+                          .mesh = read_mesh_error(s, "lights"),
+                          .mesh_of_skies =
+                              fmax(read_mesh_error(s, "sky_even"), read_mesh_error(s, "sky_cloudy"))};
+    if (!(made.mesh > 0)) made.mesh = read_mesh_error(s, "even");
     TRY(importance_load(s, n, &weights, error));
     TRY(find_members(weights.read, n, &made.read, error));
     TRY(find_members(weights.emits, n, &made.emits, error));
@@ -100,7 +101,7 @@ void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes
     notes->has_error = of->known && !strange;
     notes->relative_mean = of->relative;
     notes->indirect_mean = of->indirect;
-    notes->mesh = e->mesh;
+    notes->mesh = scope.sky && e->mesh_of_skies > 0 ? e->mesh_of_skies : e->mesh;
     notes->error_light = of->light;
     notes->error_of = e->read == NULL || strange ? NULL : receivers ? "receivers" : "all";
     notes->error_from = e->emits == NULL ? NULL : strange ? "others" : "sources";

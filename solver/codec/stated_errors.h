@@ -19,6 +19,7 @@ typedef struct stated_errors {
     stated_error all; /* means over probes, of the light of all elements */
     double mesh; /* share of reflected light that constants on elements leave, of the scene's lamps, else of
                     light that all elements emit; 0: not stated */
+    double mesh_of_skies;   /* the same of skies, the larger of an even and a cloudy one; 0: not stated */
     stated_error receivers; /* of the light of receivers; known only where the store was built for them */
     bool *read;             /* [n], true of receivers; NULL: the store was built for all elements */
     bool *emits; /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */
@@ -51,6 +52,7 @@ bool stated_errors_is_strange(const stated_errors *e, size_t n_rows, const float
 typedef struct answer_scope {
     bool receivers_only; /* nothing but the light of receivers is in the answer */
     bool strange;        /* an element emits that is no source, or a sky */
+    bool sky;            /* a sky alone shines */
 } answer_scope;
 
 /* Puts the error of an answer, the elements that it is of, and those that emit, into notes. The error of

@@ -49,10 +49,10 @@ typedef struct trial_course {
 enum { PROBES_LEAST = 32 };
 
 /* The share of light that constants on elements leave, |error| / |B - E|: of the scene's lamps or of all
- * emitters together, and of 1 from every element. */
+ * emitters together, of 1 from every element, and of an even and a cloudy sky. */
 typedef struct mesh_figures {
-    bool has_lights, has_even;
-    double lights, even;
+    bool has_lights, has_even, has_skies;
+    double lights, even, sky_even, sky_cloudy;
 } mesh_figures;
 
 typedef struct precompute_state {

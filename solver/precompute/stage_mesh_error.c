@@ -2,8 +2,10 @@
  * elements leave, as the store states it. */
 #include "solver/adapt/adaptive.h"
 #include "solver/adapt/mesh_error.h"
+#include "solver/base/random.h"
 #include "solver/precompute/precompute_state.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,6 +59,78 @@ static lam_status choose_lights(precompute_state *state, float **out, lam_error 
     return LAM_OK;
 }
 
+enum { SKIES = 2 };
+
+/* Clouds are this bright at least, relative to the brightest, as those by which skies are judged. */
+static const double darkest_cloud = .2;
+
+/* Radiances [SKIES][n_tiles + 1] of an even sky and a cloudy one, and of the ground that they light. */
+static void set_skies(const sky_bounce *sky, uint64_t seed, double *L) {
+    const size_t row = sky->tiling.n_tiles + 1;
+    for (size_t s = 0; s < SKIES; s++) {
+        double light = 0;
+        for (size_t t = 0; t + 1 < row; t++) {
+            L[s * row + t] = s == 0 ? 1 : darkest_cloud + (1 - darkest_cloud) * random_unit(&seed);
+            light += L[s * row + t] * sky->tiling.tiles[t].cosine;
+        }
+        L[s * row + row - 1] = sky->ground_albedo * light / M_PI;
+    }
+}
+
+/* E = rho H0 [SKIES][C][n]; true where any of it is light. */
+static bool light_by_skies(const precompute_state *state, const double *L, float *E) {
+    const mesh *m = &state->m;
+    const sky_bounce *sky = &state->f.sky;
+    const size_t n = m->n, tiles = sky->tiling.n_tiles;
+    bool lit = false;
+    for (size_t s = 0; s < SKIES; s++)
+        for (size_t i = 0; i < n; i++) {
+            double H = 0;
+            for (size_t t = 0; t < tiles; t++)
+                H += L[s * (tiles + 1) + t] * (double)sky->first_bounce[t * n + i];
+            lit = lit || H > 0;
+            for (size_t c = 0; c < m->n_channels; c++)
+                E[(s * m->n_channels + c) * n + i] = (float)(H * (double)m->reflectance[c * n + i]);
+        }
+    return lit;
+}
+
+/* The error under skies, for any emission: 0 is the emission of a scene that a sky lights. */
+static lam_status add_skies(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const sky_bounce *sky = &state->f.sky;
+    const size_t all = SKIES * state->m.n_channels * state->m.n;
+    const uint64_t seed = precompute_seed(state->options->seed, SEED_MESH_ERROR);
+    mesh_figures *figures = &state->errors_of_mesh;
+    double found[SKIES];
+    float *E = NULL, *B = NULL;
+    void *work = NULL;
+    double *L = NULL;
+    if (sky->first_bounce == NULL || state->f.closed || state->emitters.s > 0) goto done;
+    const size_t bytes = lam_operator_work_bytes(state->op, SKIES);
+    L = memory_allocate(SKIES, (sky->tiling.n_tiles + 1) * sizeof *L, "the error of the mesh", error);
+    E = memory_allocate(all, sizeof *E, "the error of the mesh", error);
+    B = memory_allocate(all, sizeof *B, "the error of the mesh", error);
+    work = memory_allocate(bytes, 1, "the error of the mesh", error);
+    if (L == NULL || E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    set_skies(sky, seed, L);
+    if (!light_by_skies(state, L, E)) goto done;
+    TRY(lam_operator_apply(state->op, SKIES, LAM_RADIOSITY, E, B, work, bytes, error));
+    for (size_t i = 0; i < all; i++) E[i] = 0;
+    const gather_sky skies = {.tiling = &sky->tiling, .L = L};
+    TRY(mesh_error(&state->m, SKIES, E, B, false, &skies, seed, &state->progress, found, error));
+    figures->has_skies = true;
+    figures->sky_even = found[0];
+    figures->sky_cloudy = found[1];
+    terminal_log(state->t, "mesh     skies, even %.3g, cloudy %.3g", found[0], found[1]);
+done:
+    free(L);
+    free(E);
+    free(B);
+    free(work);
+    return status;
+}
+
 lam_status stage_mesh_error(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t vector = state->m.n * state->m.n_channels;
@@ -80,12 +154,13 @@ lam_status stage_mesh_error(precompute_state *state, lam_error *error) {
         goto done;
     }
     TRY(status);
-    TRY(mesh_error(&state->m, n_lights, E, B, figures->has_lights,
+    TRY(mesh_error(&state->m, n_lights, E, B, figures->has_lights, NULL,
                    precompute_seed(state->options->seed, SEED_MESH_ERROR), &state->progress, found, error));
     figures->lights = found[0];
     figures->even = found[n_lights - 1];
     if (figures->has_lights) terminal_log(state->t, "mesh     lights indirect %.3g", figures->lights);
     if (figures->has_even) terminal_log(state->t, "mesh     even indirect %.3g", figures->even);
+    TRY(add_skies(state, error));
 done:
     free(E);
     free(B);
@@ -98,6 +173,10 @@ lam_status state_save_mesh_error(const precompute_state *state, store *s, lam_er
     const mesh_figures *figures = &state->errors_of_mesh;
     if (figures->has_lights) TRY(store_set_number(s, "/error/mesh", "lights", figures->lights, error));
     if (figures->has_even) TRY(store_set_number(s, "/error/mesh", "even", figures->even, error));
+    if (figures->has_skies) {
+        TRY(store_set_number(s, "/error/mesh", "sky_even", figures->sky_even, error));
+        TRY(store_set_number(s, "/error/mesh", "sky_cloudy", figures->sky_cloudy, error));
+    }
 done:
     return status;
 }

@@ -112,11 +112,14 @@ static void print_receivers(const char *name, const json_t *group) {
 
 /* The error that no accuracy of the operator lowers. */
 static void print_mesh(const json_t *figures) {
-    const json_t *lights = json_object_get(figures, "lights"), *even = json_object_get(figures, "even");
-    if (!json_is_number(lights) && !json_is_number(even)) return;
+    static const char *const names[] = {"lights", "even", "sky_even", "sky_cloudy"};
+    static const char *const words[] = {"lights", "even", "even sky", "cloudy sky"};
+    if (json_object_size(figures) == 0) return;
     printf("  mesh   ");
-    if (json_is_number(lights)) printf("  lights %.3g", json_number_value(lights));
-    if (json_is_number(even)) printf("  even %.3g", json_number_value(even));
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
+        const json_t *figure = json_object_get(figures, names[k]);
+        if (json_is_number(figure)) printf("  %s %.3g", words[k], json_number_value(figure));
+    }
     puts("  indirect, of constants on elements, beside the errors above");
 }
 

@@ -141,7 +141,8 @@ static void take_error(const stated_errors *stated, const emission *light, size_
     const size_t rows = light->E != NULL ? (light->steady ? 1 : light->n_vectors) * out->m->n_channels : 0;
     const answer_scope scope = {.receivers_only = others == 0,
                                 .strange =
-                                    light->L != NULL || stated_errors_is_strange(stated, rows, light->E)};
+                                    light->L != NULL || stated_errors_is_strange(stated, rows, light->E),
+                                .sky = light->L != NULL && is_dark(light, rows * stated->n)};
     stated_errors_note(stated, scope, &notes);
     if (notes.has_error) out->relative = notes.relative_mean;
     if (notes.has_error) out->indirect = notes.indirect_mean;

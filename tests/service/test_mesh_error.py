@@ -1,10 +1,19 @@
 """Black box: elements where light changes (--mesh-error), and the error of the mesh that stores state."""
 
 import json
+import math
 import unittest
+
+import h5py
+import numpy
 
 from case import Case
 from command import must
+
+
+def values_of(store, name):
+    with h5py.File(store) as file:
+        return file[name][:]
 
 
 class MeshError(Case):
@@ -50,6 +59,32 @@ class MeshError(Case):
         for member in ("elements", "groups"):
             self.assertEqual(first[member], again[member])
         self.assertEqual(first["error"]["mesh"], again["error"]["mesh"])
+
+    def test_skies(self):
+        """The figures of skies beside the light that is constant on elements, and that on a mesh of 16 times as many."""
+        must("generate", "cornell", "--elements", 150, "-o", self.scene)
+        options = "--sky", "tregenza", "--method", "exact"
+        about, _, coarse = self.made("coarse.h5", *options)
+        stated = about["error"]["mesh"]
+        fine = self.path("fine.h5")
+        must("precompute", self.scene, "-o", fine, "--subdivide", 2, "--probes", 0, *options)
+        skies = numpy.stack([numpy.ones(145), .2 + .8 * numpy.random.default_rng(1).random(145)])
+        numpy.save(self.path("skies.npy"), numpy.repeat(skies[:, None], about["channels"], axis=1))
+        light = []
+        for store in coarse, fine:
+            must("solve", store, "--sky", self.path("skies.npy"), "-o", self.path("light.npy"))
+            values = numpy.load(self.path("light.npy")).astype(float)
+            light.append(values.reshape(2, -1, len(values_of(store, "mesh/area"))))
+        area = values_of(fine, "mesh/area")
+        self.assertEqual(len(area), 16 * light[0].shape[2])
+        for name, there, true in zip(("sky_even", "sky_cloudy"), light[0], light[1]):
+            off = (area * (numpy.repeat(there, 16, axis=1) - true) ** 2).sum() / (area * true ** 2).sum()
+            self.assertLess(abs(math.log(stated[name] / math.sqrt(off))), math.log(2))
+        self.assertIn(f"even sky {stated['sky_even']:.3g}", must("info", coarse).stdout)
+        numpy.save(self.path("sky.npy"), skies[0])
+        must("solve", coarse, "--sky", self.path("sky.npy"), "-o", self.path("answer.json"))
+        with open(self.path("answer.json"), encoding="utf-8") as stream:
+            self.assertEqual(json.load(stream)["error"]["mesh"], max(stated["sky_even"], stated["sky_cloudy"]))
 
     def test_no_measurement(self):
         store = self.path("none.h5")

@@ -89,7 +89,7 @@ START_TEST(light_at_points) {
     const float B[2] = {0, 1};
     gather *g = NULL;
     lam_error error = {0};
-    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, &g, &error));
+    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, NULL, &g, &error));
     ck_assert_uint_eq(gather_values(g), 1);
     for (int p = 0; p < 3; p++) {
         const double F = truth(points[p][0], points[p][1]);
@@ -128,7 +128,7 @@ START_TEST(shadow) {
     free(m.group);
     mesh_add_cell(&m, &plate, true);
     mesh_finish(&m, rho);
-    ck_ok(gather_create(&m, 1, B, lamps, &g, &error));
+    ck_ok(gather_create(&m, 1, B, lamps, NULL, &g, &error));
     for (uint64_t key = 0; key < 100; key++) {
         gather_at(g, 0, key, 2, points, H);
         ck_assert(H[0] == 0 && H[1] == 0);
@@ -136,6 +136,46 @@ START_TEST(shadow) {
     }
     ck_assert_double_eq_tol(light, truth(.1, .2), .02 * truth(.1, .2));
     gather_free(g);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Below a sky of radiance 1 the lamp of a floor is a dark plate: the rays that miss it bring pi, in both
+ * lights; no light of the ground comes from above. */
+START_TEST(light_of_skies) {
+    enum { KEYS = 400 };
+    static const double points[2][3] = {{1.2, 1.5, 0}, {.1, .2, 0}};
+    mesh m = floor_and_lamp(1);
+    const float B[4] = {0};
+    sky_tiling tiling = {.n_tiles = 0};
+    lam_error error = {0};
+    gather *g = NULL;
+    ck_ok(sky_tiling_create("tregenza", 'z', &tiling, &error));
+    double *L = malloc(2 * (tiling.n_tiles + 1) * sizeof *L);
+    for (size_t l = 0; l < 2; l++)
+        for (size_t t = 0; t <= tiling.n_tiles; t++)
+            L[l * (tiling.n_tiles + 1) + t] = t < tiling.n_tiles ? 1 + (double)l : 1e9;
+    const gather_sky sky = {.tiling = &tiling, .L = L};
+    ck_ok(gather_create(&m, 2, B, NULL, &sky, &g, &error));
+    for (int p = 0; p < 2; p++) {
+        const double seen = M_PI * (1 - truth(points[p][0], points[p][1]));
+        double sum = 0, squares = 0;
+        for (uint64_t key = 0; key < KEYS; key++) {
+            double H[2 * GATHER_HALVES];
+            gather_at(g, 0, key, 1, &points[p], H);
+            for (size_t half = 0; half < GATHER_HALVES; half++) {
+                ck_assert_double_eq_tol(H[2 * half + 1], 2 * H[2 * half], 1e-9);
+                sum += H[2 * half];
+                squares += (H[2 * half] - seen) * (H[2 * half] - seen);
+            }
+        }
+        /* four standard errors of the mean */
+        const double n = 2 * KEYS;
+        ck_assert_double_le(fabs(sum / n - seen), 4 * sqrt(squares / n / n) + 1e-6);
+    }
+    gather_free(g);
+    sky_tiling_free(&tiling);
+    free(L);
     mesh_free(&m);
 }
 END_TEST
@@ -149,7 +189,7 @@ START_TEST(furnace) {
     gather *g = NULL;
     lam_error error = {0};
     for (size_t i = 0; i < m.n; i++) B[i] = 1, B[m.n + i] = 2;
-    ck_ok(gather_create(&m, 2, B, NULL, &g, &error));
+    ck_ok(gather_create(&m, 2, B, NULL, NULL, &g, &error));
     gather_at(g, 4 * 4, 1, 2, points, H); /* the floor's first element */
     for (size_t k = 0; k < 4; k++) {
         ck_assert_double_eq_tol(H[2 * k], 1, 1e-6);
@@ -170,7 +210,7 @@ START_TEST(error_of_a_uniform_mesh) {
     double stated = 0;
     lam_error error = {0};
     const double off = true_error(&m, B);
-    ck_ok(mesh_error(&m, 1, m.emission, B, true, 3, NULL, &stated, &error));
+    ck_ok(mesh_error(&m, 1, m.emission, B, true, NULL, 3, NULL, &stated, &error));
     printf("%zu elements: stated %g, true %g\n", m.n, stated, off);
     ck_assert_double_eq_tol(stated, off, .1 * off);
     free(B);
@@ -189,7 +229,7 @@ START_TEST(no_error) {
         E[i] = 1, B[i] = 2;
         E[m.n + i] = B[m.n + i] = 0;
     }
-    ck_ok(mesh_error(&m, 2, E, B, false, 3, NULL, stated, &error));
+    ck_ok(mesh_error(&m, 2, E, B, false, NULL, 3, NULL, stated, &error));
     ck_assert_double_le(stated[0], 1e-6);
     ck_assert(stated[1] == 0);
     free(E);
@@ -277,6 +317,7 @@ int main(void) {
     tcase_set_timeout(c, 300);
     tcase_add_loop_test(c, light_at_points, 0, 2);
     tcase_add_test(c, shadow);
+    tcase_add_test(c, light_of_skies);
     tcase_add_test(c, furnace);
     tcase_add_loop_test(c, error_of_a_uniform_mesh, 0, 3);
     tcase_add_test(c, no_error);
