@@ -47,6 +47,31 @@ done:
     return status;
 }
 
+lam_status state_count_entries(precompute_state *state, lam_error *error) {
+    enum { ONE_OF = 64, LEAST = 4, MOST = 64 };
+    lam_status status = LAM_OK;
+    const size_t n = state->m.n;
+    size_t count = n / ONE_OF, seen[MOST];
+    uint32_t elements[MOST] = {0};
+    double sum = 0;
+    recipe twice = {.method = RECIPE_RAYS, .rays = 2 * state->recipe.rays, .seed = state->recipe.seed};
+    if (state->recipe.method != RECIPE_RAYS) return LAM_OK;
+    if (state->options->from_store) {
+        if (state->f.F.n > 0) state->cost.entries = (double)state->f.F.indptr[n];
+        return LAM_OK;
+    }
+    if (twice.rays > RECIPE_RAYS_MOST) twice.rays = RECIPE_RAYS_MOST;
+    if (count < LEAST) count = LEAST;
+    if (count > MOST) count = MOST;
+    if (count > n) count = n;
+    for (size_t k = 0; k < count; k++) elements[k] = (uint32_t)((2 * k + 1) * n / (2 * count));
+    TRY(form_factors_count_seen(&state->m, &twice, elements, count, NULL, NULL, seen, error));
+    for (size_t k = 0; k < count; k++) sum += (double)seen[k];
+    state->cost.entries = fmax(1, (double)n * sum / (double)count);
+done:
+    return status;
+}
+
 lam_status stage_forecast(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
@@ -56,6 +81,7 @@ lam_status stage_forecast(precompute_state *state, lam_error *error) {
     TRY(forecast_check_disk(&f, o->output, state->scratch, o->scratch, error));
     if (state->t->quiet || (o->from_store && state->probes == 0)) goto done;
     TRY(find_cost(state, error));
+    TRY(state_count_entries(state, error));
     /* Beside blocks few rays are cast, unless there is a sky: a tree of all elements for a trial takes
      * longer. */
     const bool cast = state->recipe.method != RECIPE_BLOCKS || o->sky != NULL;

@@ -113,6 +113,43 @@ START_TEST(rays_in_place_of_near_pairs_must_fit) {
 }
 END_TEST
 
+/* Entries by rays are counted: pairs of a city are hit again and again, those of a canopy rarely. One element
+ * in sixteen tells the mean of numbers that vary by their own size or less, so that five standard errors are
+ * .6 of it; truth is one-sided within that. */
+START_TEST(entries_of_rays_are_counted) {
+    lam_error error = {0};
+    const generate_options how = {.kind = _i == 0 ? "city" : "canopy",
+                                  .variant = 1,
+                                  .terrain = "flat",
+                                  .elements = 1200,
+                                  .seed = 1,
+                                  .reflectance = -1};
+    const recipe rays = {.method = RECIPE_RAYS, .rays = 1024, .seed = 3};
+    const precompute_options options = {.form_factors = "auto"}, of_store = {.from_store = true};
+    precompute_state state = {.options = &options, .m = generate_good(&how), .recipe = rays};
+    const form_factor_options make = {.recipe = rays};
+    uint32_t *order = calloc(state.m.n, sizeof *order);
+    ck_assert_ptr_nonnull(order);
+    for (size_t i = 0; i < state.m.n; i++) order[i] = (uint32_t)i;
+    ck_ok(form_factors_make(&state.m, order, &make, &state.f, &error));
+    const double truth = (double)state.f.F.indptr[state.m.n];
+    ck_ok(state_count_entries(&state, &error));
+    ck_assert_double_eq_tol(state.cost.entries, truth, .6 * truth);
+    /* A law of .3 entries a ray that hits would be far off in the city. */
+    if (_i == 0) ck_assert_double_lt(truth, .1 * .3 * (double)(rays.rays * state.m.n));
+    state.options = &of_store;
+    ck_ok(state_count_entries(&state, &error));
+    ck_assert_double_eq(state.cost.entries, truth);
+    state.recipe.method = RECIPE_PAIRS;
+    state.cost.entries = 7;
+    ck_ok(state_count_entries(&state, &error));
+    ck_assert_double_eq(state.cost.entries, 7);
+    form_factors_free(&state.f);
+    free(order);
+    mesh_free(&state.m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("weigh_pairs");
     TCase *cases = tcase_create("weigh_pairs");
@@ -123,6 +160,7 @@ int main(void) {
     tcase_add_test(cases, more_elements_cost_more);
     tcase_add_test(cases, near_pairs_are_weighed_too);
     tcase_add_test(cases, rays_in_place_of_near_pairs_must_fit);
+    tcase_add_loop_test(cases, entries_of_rays_are_counted, 0, 2);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
