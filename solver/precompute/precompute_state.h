@@ -120,8 +120,8 @@ lam_status stage_forecast(precompute_state *state, lam_error *error);
 /* Sets cost.entries of rays for the forecast: of a store those it has, else about half as many as twice the
  * rays of up to 64 elements find, because a pair is an entry if the rays of either element hit the other.
  * Elements that see few others hit these again and again: of 4,096 rays in a part of a town one in 130 finds
- * a new pair, in a canopy one in 27. Leaves other recipes as they are. Cost: a thirtieth of the rays.
- * Errors: LAM_ERR_MEMORY. */
+ * a new pair, in a canopy one in 27. Leaves other recipes as they are. Cost: a thirtieth of the rays,
+ * of fewer than 256 elements up to 262,144 of them. Errors: LAM_ERR_MEMORY. */
 lam_status state_count_entries(precompute_state *state, lam_error *error);
 void state_log_times(const precompute_state *state);
 

@@ -48,7 +48,7 @@ done:
 }
 
 lam_status state_count_entries(precompute_state *state, lam_error *error) {
-    enum { ONE_OF = 64, LEAST = 4, MOST = 64 };
+    enum { ONE_OF = 64, LEAST = 4, MOST = 64, RAYS_ENOUGH = 1 << 16 };
     lam_status status = LAM_OK;
     const size_t n = state->m.n;
     size_t count = n / ONE_OF, seen[MOST];
@@ -60,7 +60,7 @@ lam_status state_count_entries(precompute_state *state, lam_error *error) {
         if (state->f.F.n > 0) state->cost.entries = (double)state->f.F.indptr[n];
         return LAM_OK;
     }
-    if (twice.rays > RECIPE_RAYS_MOST) twice.rays = RECIPE_RAYS_MOST;
+    if (twice.rays > RAYS_ENOUGH) twice.rays = RAYS_ENOUGH; /* what they find hardly grows beyond */
     if (count < LEAST) count = LEAST;
     if (count > MOST) count = MOST;
     if (count > n) count = n;
