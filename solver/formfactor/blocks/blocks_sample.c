@@ -82,6 +82,19 @@ static double judge_seconds(const block_scene *scene, const block_report *w, dou
     return (walk_seconds(w) + w->segments * scene_seconds) * pace + finish_of(scene, w) * finer_finish;
 }
 
+/* The blocks of half the bound by those of the bound: single pairs, which cost most where elements touch at
+ * angles, are as many. The walk and the segments grow with all blocks. */
+static block_report finer_of(const block_report *w) {
+    const double blocks = count_of(w), single = blocks > 0 ? (w->pairs + w->shaded_pairs) / blocks : 0;
+    const double more = single + (1 - single) * finer_times;
+    block_report finer = *w;
+    double *const grow[] = {&finer.visits, &finer.sifted, &finer.segments, &finer.tests, &finer.cast};
+    double *const others[] = {&finer.linear, &finer.even, &finer.sampled, &finer.shaded};
+    for (size_t k = 0; k < sizeof grow / sizeof *grow; k++) *grow[k] *= more;
+    for (size_t k = 0; k < sizeof others / sizeof *others; k++) *others[k] *= finer_times;
+    return finer;
+}
+
 /* Receivers' blocks of half the bound are found by another importance: a sample of their own tells. */
 static lam_status sample_finer(block_scene *scene, const recipe *r, const importance *read, const progress *p,
                                block_report *out, lam_error *error) {
@@ -109,14 +122,14 @@ lam_status blocks_forecast(block_scene *scene, const recipe *r, const importance
     TRY(blocks_sample(scene, &options, &w, &trial, error));
     const double blocks = count_of(&w), walk = walk_seconds(&w), finish = finish_of(scene, &w);
     const double pace = sample_pace(trial.seconds, walk_seconds(&trial.work));
-    const double single = blocks > 0 ? (w.pairs + w.shaded_pairs) / blocks : 0;
-    const double more = single + (1 - single) * finer_times;
-    if (read != NULL) TRY(sample_finer(scene, r, read, p, &finer, error));
+    if (read != NULL)
+        TRY(sample_finer(scene, r, read, p, &finer, error));
+    else
+        finer = finer_of(&w);
     *out = (pairs_cost){.seconds = walk + finish,
                         .measured = walk * pace + finish,
                         .entries = 2 * blocks,
-                        .finer = read != NULL ? judge_seconds(scene, &finer, pace)
-                                              : more * judge_seconds(scene, &w, pace)};
+                        .finer = judge_seconds(scene, &finer, pace)};
 done:
     return status;
 }
