@@ -1,7 +1,9 @@
 // How fast the page is on this machine; measured, never judged. In the folder `browser` of a build:
 //   LAMBERTD=../lambertd node --preserve-symlinks --preserve-symlinks-main speed.mjs STORE...
 // prints the time to the first picture, answers a second while the slider of all lamps is dragged, with the time of drawing
-// counted apart (software draws here; a graphics card takes it off the processor), and what the daemon's memory grew by.
+// counted apart (software draws here; a graphics card takes it off the processor), and what the daemon's memory grew by. Then
+// what the page itself does, which a graphics card leaves to it: its script's time for a picture from another place and for one of
+// another answer, the calls that draw, and the bytes that are uploaded for each.
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { Daemon, openPage, settled } from "./page.mjs";
@@ -36,6 +38,55 @@ function drag(page, isDrawn) {
     }, [DRAG_MS, isDrawn]);
 }
 
+/** Medians of the script's time, ms, and counts, of pictures that are drawn one by one; the time until they are done is left out. */
+function work(page, pictures) {
+    return page.evaluate(async (count) => {
+        const app = window.lambert, { stage, cameras } = app, gl = stage.renderer.getContext(), counted = { calls: 0, bytes: 0 };
+        for (const name of ["drawElements", "drawArrays"]) {
+            const own = gl[name];
+            gl[name] = (...args) => { counted.calls += 1; own.apply(gl, args); };
+        }
+        for (const name of ["texImage2D", "texSubImage2D", "bufferData", "bufferSubData"]) {
+            const own = gl[name];
+            gl[name] = (...args) => { counted.bytes += args.find((a) => ArrayBuffer.isView(a))?.byteLength ?? 0; own.apply(gl, args); };
+        }
+        const { draw } = stage, middle = (values) => values.sort((a, b) => a - b)[values.length >> 1];
+        stage.draw = () => undefined;
+        const figures = { move: [], answer: [] }, counts = {};
+        const picture = () => {
+            const from = performance.now();
+            draw.call(stage);
+            const spent = performance.now() - from;
+            gl.finish();
+            return spent;
+        };
+        picture();
+        const { take } = app;
+        let taken = 0;
+        app.take = (...args) => {
+            const from = performance.now();
+            take.apply(app, args);
+            taken = performance.now() - from;
+        };
+        for (let i = 0; i < count; i++) {
+            Object.assign(counted, { calls: 0, bytes: 0 });
+            cameras.camera.position.x += 1e-4;
+            cameras.camera.updateMatrixWorld();
+            figures.move.push(picture());
+            counts.move = { ...counted };
+            const { now } = app.store, { answers } = app;
+            app.store.change({ ...now, lighting: { ...now.lighting, dim: 0.3 + 0.01 * (i % 50) } }, "drag");
+            while (app.answers === answers || !app.isIdle) await new Promise((resolve) => { setTimeout(resolve, 5); });
+            Object.assign(counted, { calls: 0, bytes: 0 });
+            figures.answer.push(picture() + taken);
+            counts.answer = { ...counted };
+        }
+        app.take = take;
+        stage.draw = draw;
+        return { move: middle(figures.move), answer: middle(figures.answer), counts };
+    }, pictures);
+}
+
 test("speed", async () => {
     for (const store of process.argv.slice(2)) {
         const daemon = await Daemon.start([store]);
@@ -55,6 +106,11 @@ test("speed", async () => {
             + `${undrawn.answers.toFixed(0)} answers/s applied without drawing, ${drawn.answers.toFixed(0)} beside `
             + `${drawn.frames.toFixed(1)} pictures/s by software (${drawn.apart.toFixed(0)} with the time of drawing counted apart); `
             + `daemon +${(memory() - before).toFixed(1)} MiB`);
+        await settled(page);
+        const { move, answer, counts } = await work(page, 30);
+        const told = (of) => `${of.calls} calls that draw, ${of.bytes.toLocaleString("en-US")} bytes uploaded`;
+        console.log(`${store}: script ${move.toFixed(1)} ms for a picture from another place (${told(counts.move)}), ${answer.toFixed(1)} ms for one of another `
+            + `answer (${told(counts.answer)}); medians of 30`);
         await page.context().close();
         await daemon.stop();
     }

@@ -6,6 +6,9 @@ import type { Nodes } from "./nodes.ts";
 /** Cosine of 30 degrees, at which the daemon parts surfaces. */
 const SURFACE_COS = 0.866;
 
+/** Math.hypot takes many times as long, to be right for squares beyond a float's range. */
+const size = (x: number, y: number, z: number): number => Math.sqrt(x * x + y * y + z * z);
+
 /** Nodes inside edges: the value of node[i] is 1 − at[i] of that of from[i] and at[i] of that of to[i]. */
 interface Ties {
     node: number[];
@@ -86,7 +89,7 @@ function findTies(mesh: SceneMesh, { nodeOf, count }: Nodes, edges: readonly num
     const tieOf = new Int32Array(count).fill(-1), isCandidate = new Uint8Array(count), candidates: number[] = [];
     let total = 0, longest = 0, most = 0;
     for (let e = 0; e < edges.length; e += 2) {
-        const a = 3 * edges[e], b = 3 * edges[e + 1], length = Math.hypot(p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]);
+        const a = 3 * edges[e], b = 3 * edges[e + 1], length = size(p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]);
         total += length;
         longest = Math.max(longest, length);
         for (let d = 0; d < 3; d++) most = Math.max(most, Math.abs(p[a + d]));
@@ -97,22 +100,22 @@ function findTies(mesh: SceneMesh, { nodeOf, count }: Nodes, edges: readonly num
     }
     // Positions are floats, and many scene files have six digits.
     const tolerance = Math.max(1e-6 * most, 1e-30);
-    // About one node in a cell, and no edge through more than some thousand cells.
-    const cell = Math.max((2 * total) / (edges.length + 1), longest / 4096, 4 * tolerance), grid = new Grid(mesh, candidates, cell);
+    // Some cells for an edge, as small objects have many nodes, and no edge through more than some thousand cells.
+    const cell = Math.max(total / (edges.length + 1), longest / 4096, 4 * tolerance), grid = new Grid(mesh, candidates, cell);
     const low = [0, 0, 0], high = [0, 0, 0], way = [0, 0, 0];
     for (let e = 0; e < edges.length; e += 2) {
         const v = edges[e], w = edges[e + 1], a = 3 * v, b = 3 * w;
         for (let d = 0; d < 3; d++) way[d] = p[b + d] - p[a + d];
-        const length = Math.hypot(way[0], way[1], way[2]), pieces = Math.ceil(length / cell);
+        const length = size(way[0], way[1], way[2]), pieces = Math.ceil(length / cell);
         const tie = (u: number): void => {
             const node = nodeOf[u], q = 3 * u, known = tieOf[node];
             if (node === nodeOf[v] || node === nodeOf[w] || (known >= 0 && ties.length[known] >= length)) return;
             const x = p[q] - p[a], y = p[q + 1] - p[a + 1], z = p[q + 2] - p[a + 2];
             const t = (x * way[0] + y * way[1] + z * way[2]) / (length * length);
             if (!(t * length > tolerance && (1 - t) * length > tolerance)) return;
-            if (Math.hypot(x - t * way[0], y - t * way[1], z - t * way[2]) > tolerance) return;
+            if (size(x - t * way[0], y - t * way[1], z - t * way[2]) > tolerance) return;
             const mx = n[a] + n[b], my = n[a + 1] + n[b + 1], mz = n[a + 2] + n[b + 2];
-            if (mx * n[q] + my * n[q + 1] + mz * n[q + 2] < SURFACE_COS * Math.hypot(mx, my, mz)) return;
+            if (mx * n[q] + my * n[q + 1] + mz * n[q + 2] < SURFACE_COS * size(mx, my, mz)) return;
             // The longest of several such edges wins.
             const at = known >= 0 ? known : ties.node.length;
             tieOf[node] = at;
@@ -135,6 +138,8 @@ function findTies(mesh: SceneMesh, { nodeOf, count }: Nodes, edges: readonly num
 function withWeights(nodes: Nodes, ties: Ties): Nodes {
     const tieOf = new Int32Array(nodes.count).fill(-1), order = ties.node.map((_, i) => i).sort((i, k) => ties.length[k] - ties.length[i]);
     const hangsOn = (from: number, on: number): boolean => {
+        if (from === on) return true;
+        if (tieOf[from] < 0) return false;
         const stack = [from], seen = new Set<number>();
         for (let node = stack.pop(); node !== undefined; node = stack.pop()) {
             if (node === on) return true;
@@ -147,37 +152,45 @@ function withWeights(nodes: Nodes, ties: Ties): Nodes {
     };
     for (const i of order) if (!hangsOn(ties.from[i], ties.node[i]) && !hangsOn(ties.to[i], ties.node[i])) tieOf[ties.node[i]] = i;
     const lists = new Map<number, Map<number, number>>();
+    /** Elements and weights of a node that hangs on others that hang. */
     const listOf = (node: number): Map<number, number> => {
         const known = lists.get(node), i = tieOf[node], out = new Map<number, number>();
         if (known !== undefined) return known;
-        const add = (list: Map<number, number>, share: number): void => {
-            for (const [element, weight] of list) out.set(element, (out.get(element) ?? 0) + share * weight);
-        };
+        const add = (element: number, weight: number): void => { out.set(element, (out.get(element) ?? 0) + weight); };
         if (i < 0) {
             const { first, elements } = nodes, begin = first[node], end = first[node + 1];
-            for (let k = begin; k < end; k++) out.set(elements[k], (out.get(elements[k]) ?? 0) + 1 / (end - begin));
+            for (let k = begin; k < end; k++) add(elements[k], 1 / (end - begin));
             return out;
         }
-        add(listOf(ties.from[i]), 1 - ties.at[i]);
-        add(listOf(ties.to[i]), ties.at[i]);
+        for (const [element, weight] of listOf(ties.from[i])) add(element, (1 - ties.at[i]) * weight);
+        for (const [element, weight] of listOf(ties.to[i])) add(element, ties.at[i] * weight);
         lists.set(node, out);
         return out;
     };
+    const countOf = (node: number): number => nodes.first[node + 1] - nodes.first[node], isFree = (node: number): boolean => tieOf[node] < 0;
+    const isPlain = (i: number): boolean => isFree(ties.from[i]) && isFree(ties.to[i]);
     const first = new Uint32Array(nodes.count + 1);
-    for (let node = 0; node < nodes.count; node++)
-        first[node + 1] = first[node] + (tieOf[node] < 0 ? nodes.first[node + 1] - nodes.first[node] : listOf(node).size);
-    const elements = new Uint32Array(first[nodes.count]), weights = new Float32Array(first[nodes.count]);
     for (let node = 0; node < nodes.count; node++) {
+        const i = tieOf[node];
+        first[node + 1] = first[node] + (i < 0 ? countOf(node) : isPlain(i) ? countOf(ties.from[i]) + countOf(ties.to[i]) : listOf(node).size);
+    }
+    const elements = new Uint32Array(first[nodes.count]), weights = new Float32Array(first[nodes.count]);
+    const put = (at: number, node: number, share: number): number => {
+        const begin = nodes.first[node], count = countOf(node);
+        elements.set(nodes.elements.subarray(begin, begin + count), at);
+        weights.fill(share / count, at, at + count);
+        return at + count;
+    };
+    for (let node = 0; node < nodes.count; node++) {
+        const i = tieOf[node];
         let at = first[node];
-        if (tieOf[node] < 0) {
-            for (let k = nodes.first[node]; k < nodes.first[node + 1]; k++) elements[at++] = nodes.elements[k];
-            weights.fill(1 / (at - first[node]), first[node], at);
-        } else {
+        if (i < 0) put(at, node, 1);
+        else if (isPlain(i)) put(put(at, ties.from[i], 1 - ties.at[i]), ties.to[i], ties.at[i]);
+        else
             for (const [element, weight] of listOf(node)) {
                 elements[at] = element;
                 weights[at++] = weight;
             }
-        }
     }
     return { ...nodes, first, elements, weights };
 }

@@ -49,6 +49,7 @@ export class Stage {
     private values: [HalfTexture, HalfTexture] | null = null;
     private nodes: WebGLRenderTarget | null = null;
     private nodesAreOld = false;
+    private body: Mesh | null = null;
     private hasImages = false;
     private images: Texture[] = [];
     private paletteName: Palette | null = null;
@@ -95,6 +96,9 @@ export class Stage {
         const materials = this.addImages(geometry, mesh);
         const body = new Mesh(geometry, materials);
         body.name = "scene";
+        // Until the first answer all of it is black.
+        body.visible = false;
+        this.body = body;
         this.scene.add(body);
         this.values = [new HalfTexture(channels * mesh.elements), new HalfTexture(channels * mesh.elements)];
         const { width, height } = rowsFor(nodes.count);
@@ -151,6 +155,7 @@ export class Stage {
     setField(side: 0 | 1, field: Field): void {
         if (this.values === null) return;
         this.values[side].write(field.bits);
+        if (side === 0 && this.body !== null) this.body.visible = true;
         const scale = this.uniforms.scale.value as Vector2;
         if (side === 0) scale.x = field.scale;
         else scale.y = field.scale;
