@@ -48,13 +48,14 @@ done:
     return status;
 }
 
-/* Images are those of three channels, and of the store's own reflectances. */
+/* Images are those of three channels, or the grey ones of one. */
 static lam_status read_sizes_of_images(store *s, scene_mesh *made, lam_error *error) {
     lam_status status = LAM_OK;
     store_type type;
     size_t dims[STORE_MAX_RANK];
     int rank;
-    if (made->of->n_channels != 3 || !store_has(s, "/mesh/surface")) return LAM_OK;
+    const size_t C = made->of->n_channels;
+    if ((C != 1 && C != 3) || !store_has(s, "/mesh/surface")) return LAM_OK;
     made->n_textured = made->of->n;
     TRY(store_array_info(s, "/mesh/surface_image", &type, &rank, dims, error));
     made->n_textures = dims[0];
@@ -86,8 +87,12 @@ lam_status scene_mesh_create(store *s, const scene *of, scene_mesh **out, lam_er
     pthread_mutex_init(&made->lock, NULL);
     made->of = of;
     if (of->base != NULL) {
-        made->up = of->base->mesh->up;
-        made->n_vertices = of->base->mesh->n_vertices;
+        const scene_mesh *base = of->base->mesh;
+        made->up = base->up;
+        made->n_vertices = base->n_vertices;
+        made->n_textured = base->n_textured;
+        made->n_textures = base->n_textures;
+        made->image_bytes = base->image_bytes;
     } else {
         TRY(read_up(s, &made->up, error));
         TRY(read_vertices(s, &made->n_vertices, error));
@@ -230,6 +235,14 @@ done:
     return status;
 }
 
+/* Takes the images off elements whose reflectance a variant changed: what it gave them is even. */
+static void drop_changed(const scene *of, scene_pictures *pictures) {
+    const float *before = root_of(of)->reflectance;
+    for (size_t c = 0; c < of->n_channels; c++)
+        for (size_t i = 0; i < of->n; i++)
+            if (of->reflectance[c * of->n + i] != before[c * of->n + i]) pictures->surface[i] = PICTURE_NONE;
+}
+
 lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *error) {
     lam_status status = LAM_OK;
     const scene *of = mesh->of, *root = root_of(of);
@@ -241,6 +254,7 @@ lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *erro
         FAIL(error, LAM_ERR_IO, "%s: the store is another one than was read; read it again (SIGHUP)",
              root->path);
     TRY(read_arrays(s, mesh, &a, error));
+    if (a.pictures != NULL && of != root) drop_changed(of, a.pictures);
     const gltf_mesh m = {.name = of->name,
                          .kind = lam_operator_kind(of->op),
                          .n_vertices = mesh->n_vertices,

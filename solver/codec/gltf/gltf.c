@@ -149,7 +149,7 @@ static lam_status plan(writer *w, lam_error *error) {
     TRY(corner_normals_create(m, &w->s, error));
     w->normals = memory_allocate(gltf_largest_group(m->groups), 4 * sizeof *w->normals, "normals", error);
     w->parts = memory_allocate(m->groups->n_groups, sizeof *w->parts, "glTF", error);
-    assert(m->pictures == NULL || (m->light == NULL && m->n_channels == 3));
+    assert(m->pictures == NULL || (m->light == NULL && (m->n_channels == 1 || m->n_channels == 3)));
     if (w->normals == NULL || w->parts == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t g = 0; g < m->groups->n_groups; g++) {
         const size_t count = m->groups->start[g + 1] - m->groups->start[g];
@@ -426,9 +426,8 @@ static void put_textured(const writer *w, const part *p, char *to) {
         for (size_t k = 0; k < corners_of(m, i); k++) {
             place =
                 put_float(put_float(place, w->pictures->texcoord[i][k][0]), w->pictures->texcoord[i][k][1]);
-            reflectance =
-                put_vector(reflectance, (const float[3]){m->reflectance[i], m->reflectance[m->n + i],
-                                                         m->reflectance[2 * m->n + i]});
+            for (size_t c = 0; c < 3; c++)
+                reflectance = put_float(reflectance, m->reflectance[(m->n_channels == 3 ? c * m->n : 0) + i]);
         }
     }
 }

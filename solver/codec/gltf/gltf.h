@@ -36,7 +36,7 @@ typedef struct gltf_mesh {
     const float *emission;         /* [C][n], W/m^2 */
     const group_index *groups;
     const gltf_light *light;        /* or NULL */
-    const scene_pictures *pictures; /* or NULL; not beside light, and of 3 channels only */
+    const scene_pictures *pictures; /* or NULL; not beside light, of 1 channel (grey images) or 3 */
     char up;                        /* 'x', 'y' or 'z' */
 } gltf_mesh;
 

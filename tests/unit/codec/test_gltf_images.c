@@ -121,6 +121,24 @@ START_TEST(groups_of_one_image_have_it) {
 }
 END_TEST
 
+/* A store of one channel has grey images, whose elements have one reflectance for all colours. */
+START_TEST(one_channel_has_images_too) {
+    static const uint32_t tiles[] = {0, 2};
+    size_t count;
+    strip s = {.area = {0}};
+    fill(&s);
+    s.m.n_channels = 1;
+    gltf_file l = gltf_load(&s.m);
+    const gltf_primitive p = gltf_primitive_of(&l, 1);
+    ck_assert_uint_eq(gltf_number(json_object_get(surface_of(&p), "baseColorTexture"), "index"), 1);
+    const char *rho = gltf_accessor(&l, gltf_number(p.attributes, "_REFLECTANCE"), "VEC3", 5126, 12, &count);
+    ck_assert_uint_eq(count, 6);
+    for (size_t k = 0; k < 3 * count; k++) ck_assert(gltf_float(rho + 4 * k) == s.reflectance[tiles[k / 9]]);
+    gltf_unload(&l);
+    group_index_free(&s.groups);
+}
+END_TEST
+
 /* Where no group has one image on all its elements, the file is that of a mesh without. */
 START_TEST(without_a_group_of_one_image_there_is_none) {
     strip s = {.area = {0}};
@@ -142,6 +160,7 @@ int main(void) {
     Suite *suite = suite_create("gltf_images");
     TCase *tests = tcase_create("images");
     tcase_add_test(tests, groups_of_one_image_have_it);
+    tcase_add_test(tests, one_channel_has_images_too);
     tcase_add_test(tests, without_a_group_of_one_image_there_is_none);
     suite_add_tcase(suite, tests);
     return suite_run(suite);

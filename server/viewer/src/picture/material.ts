@@ -25,6 +25,8 @@ vec3 element_colour(highp sampler2D values, int i) {
     }
     float sum = 0.0;
     for (int c = 0; c < channels; c++) sum += texel(values, c * elements + i);
+    // One channel has grey images.
+    if (is_textured) sum /= max(texel(reflectance, i), 0.004);
     return vec3(sum / float(channels));
 }
 `;
