@@ -1,7 +1,7 @@
 // Ties the state, the daemon and the picture together. Panels listen to it and change the state; they hold none.
 import { Box3, BufferAttribute } from "three";
-import { luminance, type Rgb } from "./base/colour.ts";
 import { Api, Lost, Problem, type Description, type SceneLine } from "./daemon/api.ts";
+import { Watch } from "./daemon/watch.ts";
 import { Newest } from "./daemon/newest.ts";
 import { Cameras } from "./picture/cameras.ts";
 import { Field, spreadOf, type Spread } from "./picture/field.ts";
@@ -9,9 +9,10 @@ import { readMesh, type SceneMesh } from "./picture/glb.ts";
 import { Picker } from "./picture/pick.ts";
 import type { Axis } from "./picture/scale.ts";
 import { Stage } from "./picture/stage.ts";
-import { whyUnlike } from "./state/alike.ts";
+import { Beside } from "./state/beside.ts";
+import { lightingOf } from "./state/own_lighting.ts";
 import { wantedFor, type Abilities, type Wanted } from "./state/request.ts";
-import { firstState, type GroupLight, type Lighting, type Moment, type SkyLight, type State } from "./state/state.ts";
+import { firstState, type Lighting, type Moment, type SkyLight, type State } from "./state/state.ts";
 import { Store } from "./state/store.ts";
 
 export interface OpenScene {
@@ -53,8 +54,7 @@ export class App {
     problem: string | null = null;
     /** What a link asks for and this daemon does not have; until another scene is opened. */
     notice: string | null = null;
-    isLost = false;
-    lostWhy = "";
+    readonly watch = new Watch(() => this.api.isReady(), () => this.tell("lost"), () => this.goOn());
     /** Answers shown so far. */
     answers = 0;
     /** Radiances of the sky's tiles for a lighting; set by the panel of skies. */
@@ -67,10 +67,7 @@ export class App {
     prepareOther: (description: Description) => Promise<void> = () => Promise.resolve();
     /** Why the last scene that was to be compared is not. */
     unlike: string | null = null;
-    /** Scenes that can be compared with the open one. */
-    private readonly alike = new Map<string, Description>();
-    /** The scenes whose comparison was taken in last. */
-    private beside: { scene: OpenScene | null; name: string | null } = { scene: null, name: null };
+    private readonly beside = new Beside((name) => this.api.describe(name), (description) => this.prepareOther(description));
     private readonly listeners = new Map<Event, Set<() => void>>();
     private readonly askers: [Newest<Wanted, [Field, number | null]>, Newest<Wanted, [Field, number | null]>];
     private asked = ["", ""];
@@ -106,7 +103,7 @@ export class App {
         const scene = { description, mesh, picker, ownLighting: lightingOf(mesh, description) };
         takeIn(scene);
         this.scene = scene;
-        this.alike.clear();
+        this.beside.reset(description);
         const { ownLighting } = scene;
         this.cameras.setBounds(new Box3().setFromBufferAttribute(new BufferAttribute(mesh.positions, 3)));
         this.fields = [null, null];
@@ -132,7 +129,7 @@ export class App {
         if (scene === null || (side === 1 && now.compare === null)) return null;
         const quantity = now.view.picture === "light" ? "radiosity" : now.view.quantity;
         const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
-        const other = side === 1 ? now.compare?.scene ?? null : null, of = other === null ? scene.description : this.alike.get(other);
+        const other = side === 1 ? now.compare?.scene ?? null : null, of = other === null ? scene.description : this.beside.get(other);
         return of === undefined ? null : wantedFor(of.name, quantity, lighting, this.abilities(of, lighting));
     }
 
@@ -142,24 +139,11 @@ export class App {
         };
     }
 
-    /** Finds out if a scene can be compared with the open one; `unlike` says why not. Nothing is asked of one that cannot. */
+    /** Finds out if a scene can be compared with the open one; `unlike` says why not. */
     async admit(name: string): Promise<boolean> {
-        const { scene } = this;
-        if (scene === null || this.alike.has(name)) return scene !== null;
-        let why: string | null;
-        try {
-            const there = await this.api.describe(name);
-            why = whyUnlike(scene.description, there);
-            if (why === null) await this.prepareOther(there);
-            if (scene !== this.scene) return false;
-            if (why === null) this.alike.set(name, there);
-        } catch (reason) {
-            if (!(reason instanceof Problem) || reason.status === 401 || reason.status === 503) throw reason;
-            why = `${name} cannot be compared: ${reason.message}.`;
-        }
-        this.unlike = why;
-        if (why !== null) this.tell("unlike");
-        return why === null;
+        this.unlike = await this.beside.admit(name);
+        if (this.unlike !== null) this.tell("unlike");
+        return this.unlike === null;
     }
 
     /** Takes in the scene of a comparison that came with a link or by undoing; ends one that cannot be. */
@@ -207,7 +191,7 @@ export class App {
     fail(reason: unknown): void {
         if (reason instanceof DOMException && reason.name === "AbortError") return;
         if (reason instanceof Lost) {
-            this.lose("The daemon does not answer. This page asks again each second and goes on by itself.");
+            this.watch.lose("The daemon does not answer. This page asks again each second and goes on by itself.");
             return;
         }
         if (reason instanceof Replaced) {
@@ -219,7 +203,7 @@ export class App {
             return;
         }
         if (reason instanceof Problem && reason.status === 503) {
-            this.lose(`The daemon is busy: ${reason.message}. This page goes on by itself.`);
+            this.watch.lose(`The daemon is busy: ${reason.message}. This page goes on by itself.`);
             return;
         }
         this.problem = reason instanceof Problem ? `The daemon did not do what this page asked for (${reason.status}): ${reason.message}`
@@ -245,7 +229,7 @@ export class App {
     }
 
     private take(side: Side, [field]: [Field, number | null], wanted: Wanted): void {
-        if (this.isLost) this.find();
+        this.watch.find();
         this.problem = null;
         if (side === 0) this.certificate = null;
         this.fields[side] = field;
@@ -302,10 +286,7 @@ export class App {
         }
         if (now.view !== before.view || now.compare !== before.compare) this.setLook();
         const other = now.compare?.scene ?? null;
-        if (other !== null && (other !== this.beside.name || this.scene !== this.beside.scene)) {
-            this.beside = { scene: this.scene, name: other };
-            this.takeOther(other).catch((reason: unknown) => this.fail(reason));
-        }
+        if (this.beside.isNew(other) && other !== null) this.takeOther(other).catch((reason: unknown) => this.fail(reason));
         this.ask();
     }
 
@@ -324,21 +305,8 @@ export class App {
             this.store.settle({ ...now, view: { ...now.view, camera } });
     }
 
-    private lose(why: string): void {
-        if (this.isLost) return;
-        this.isLost = true;
-        this.lostWhy = why;
-        this.tell("lost");
-        const again = async (): Promise<void> => {
-            if (!this.isLost) return;
-            if (await this.api.isReady()) this.find();
-            else setTimeout(() => void again(), 1000);
-        };
-        setTimeout(() => void again(), 500);
-    }
-
-    private find(): void {
-        this.isLost = false;
+    /** After the daemon was away. */
+    private goOn(): void {
         this.tell("found");
         if (this.scene === null) return;
         // The store may be another one now.
@@ -348,38 +316,4 @@ export class App {
             return undefined;
         }).catch((reason: unknown) => this.fail(reason));
     }
-}
-
-/** Lights as the scene has them: each group that emits, with its power and colour. */
-function lightingOf(mesh: SceneMesh, description: Description): Lighting {
-    const groups: { [name: string]: GroupLight } = {};
-    for (const group of mesh.groups) if (group.emission !== null) groups[group.name] = lightOf(group.emission);
-    const isDark = Object.keys(groups).length === 0 && description.sky === null && (description.emitters ?? []).length === 0;
-    if (isDark) groups[ceilingOf(mesh)] = lightOf([1, 1, 1]);
-    const emitters: { [index: string]: number } = {};
-    // A lamp begins at its first position; tiles of a sky shine as the panel of skies says.
-    const shine = description.sky !== null ? 0 : description.report?.paths !== undefined ? 1 : Infinity;
-    description.emitters?.forEach((_, index) => { if (index < shine) emitters[index] = 1; });
-    const sky = description.sky === null ? firstState.lighting.sky : { ...firstState.lighting.sky, model: "overcast" as const };
-    return { ...firstState.lighting, groups, emitters, sky };
-}
-
-/** The group that looks down most, from above: what shines first in a scene without lamps, which would be black. */
-function ceilingOf(mesh: SceneMesh): string {
-    const low = new Array<number>(mesh.groups.length).fill(0);
-    let floor = Infinity;
-    for (let v = 1; v < mesh.positions.length; v += 3) floor = Math.min(floor, mesh.positions[v]);
-    for (let i = 0; i < mesh.index.length; i += 3) {
-        const v = mesh.index[i], element = mesh.elementOf[v];
-        low[mesh.groupOf[element]] += Math.max(0, -mesh.normals[3 * v + 1]) * (mesh.positions[3 * v + 1] - floor) * mesh.area[element];
-    }
-    return mesh.groups[low.indexOf(Math.max(...low))].name;
-}
-
-export function lightOf(emission: Rgb): GroupLight {
-    const power = luminance(emission);
-    return {
-        on: true, power: Number(power.toPrecision(6)), kelvin: null,
-        colour: power > 0 ? emission.map((v) => Number((v / power).toPrecision(6))) as Rgb : [1, 1, 1],
-    };
 }

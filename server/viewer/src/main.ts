@@ -59,7 +59,7 @@ async function begin(app: App): Promise<void> {
         await app.open(name, given !== null && given.scene === name ? given : null);
     } catch (reason) {
         app.fail(reason);
-        if (app.isLost) app.on("found", () => { if (app.scene === null) void begin(app); });
+        if (app.watch.isLost) app.on("found", () => { if (app.scene === null) void begin(app); });
     }
 }
 

@@ -134,11 +134,11 @@ export function makeBanner(app: App): HTMLElement {
         banner.hidden = text === null;
         banner.textContent = text ?? "";
     };
-    app.on("lost", () => show(app.lostWhy));
+    app.on("lost", () => show(app.watch.why));
     app.on("found", () => show(app.notice));
     app.on("scene", () => show(app.notice));
     app.on("problem", () => show(app.problem));
-    app.on("field", () => { if (!app.isLost) show(app.notice); });
+    app.on("field", () => { if (!app.watch.isLost) show(app.notice); });
     return banner;
 }
 
