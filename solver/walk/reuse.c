@@ -64,6 +64,7 @@ static size_t first_rays(reuse_batch *b, size_t most, ray_packet *rays, float lo
     const light_pieces *light = &b->r->pieces;
     const walk_shape *carried = light->carried + b->position * light->n, *shape[WALK_STREAM];
     uint32_t place[4][WALK_STREAM], facet[WALK_STREAM];
+    float share[WALK_STREAM];
     walker w;
     size_t n = 0, only;
     for (; n < most && walk_starts_next(&b->starts, all, 1, &w, &only); n++) {
@@ -74,11 +75,12 @@ static size_t first_rays(reuse_batch *b, size_t most, ray_packet *rays, float lo
         random[n] = w.random;
     }
     const size_t last = n;
+    for (size_t i = 0; i < WALK_STREAM; i++) share[i] = 1;
     for (; n % VISIBILITY_PACKET != 0; n++) {
         shape[n] = &carried[0];
         for (int d = 0; d < 4; d++) place[d][n] = w.place[d];
     }
-    walk_leave(n, shape, place, rays, facet);
+    walk_leave(n, shape, share, place, rays, facet);
     return last;
 }
 
@@ -121,11 +123,11 @@ static void begin_position(reuse_batch *b, size_t number, size_t position) {
 static void find_hits(reuse_batch *b, size_t number) {
     const reuse *r = b->r;
     ray_packet rays[WALK_STREAM / VISIBILITY_PACKET];
-    hit_packet met;
+    hit_packet met[WALK_STREAM / VISIBILITY_PACKET];
     float local[WALK_STREAM][3];
     uint64_t random[WALK_STREAM];
-    uint32_t self[VISIBILITY_PACKET];
-    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = VISIBILITY_NOTHING;
+    uint32_t self[WALK_STREAM];
+    for (int i = 0; i < WALK_STREAM; i++) self[i] = VISIBILITY_NOTHING;
     b->hits->count = b->next = 0;
     while (b->position < r->s && b->hits->count < HITS_MOST) {
         const size_t room = HITS_MOST - b->hits->count;
@@ -136,11 +138,8 @@ static void find_hits(reuse_batch *b, size_t number) {
         }
         b->rays += (double)n;
         walk_log_add(r->run->log, n / VISIBILITY_PACKET, rays);
-        for (size_t j = 0; j < n; j += VISIBILITY_PACKET) {
-            const size_t of_packet = n - j < VISIBILITY_PACKET ? n - j : VISIBILITY_PACKET;
-            visibility_cast_lifted(r->scene->v, &rays[j / VISIBILITY_PACKET], of_packet, self, self, &met);
-            keep_hits(b, of_packet, &rays[j / VISIBILITY_PACKET], &met, local + j, random + j);
-        }
+        visibility_cast_lifted(r->scene->v, rays, n, self, self, met);
+        keep_hits(b, n, rays, met, local, random);
     }
     fill_up(b->hits);
 }

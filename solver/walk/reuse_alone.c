@@ -98,16 +98,14 @@ static void go(alone_batch *b, walk_run *run) {
 static lam_status shapes_create(const walk_scene *s, alone *r, lam_error *error) {
     const size_t of_light = r->s * r->pieces->n;
     r->scene = *s;
-    r->scene.halves = NULL;
+    r->scene.share = NULL;
     r->scene.shapes = memory_allocate(r->n + of_light, sizeof *s->shapes, "paths", error);
-    if (r->scene.shapes == NULL) return LAM_ERR_MEMORY;
+    r->scene.share = memory_allocate(r->n + of_light, sizeof *s->share, "paths", error);
+    if (r->scene.shapes == NULL || r->scene.share == NULL) return LAM_ERR_MEMORY;
     memcpy(r->scene.shapes, s->shapes, r->n * sizeof *s->shapes);
+    memcpy(r->scene.share, s->share, r->n * sizeof *s->share);
+    for (size_t k = 0; k < of_light; k++) r->scene.share[r->n + k] = 1;
     memcpy(r->scene.shapes + r->n, r->pieces->carried, of_light * sizeof *s->shapes);
-    if (s->halves == NULL) return LAM_OK;
-    r->scene.halves = memory_allocate(r->n + of_light, sizeof *s->halves, "paths", error);
-    if (r->scene.halves == NULL) return LAM_ERR_MEMORY;
-    memcpy(r->scene.halves, s->halves, r->n * sizeof *s->halves);
-    for (size_t k = r->n; k < r->n + of_light; k++) r->scene.halves[k].share = 1;
     return LAM_OK;
 }
 
@@ -157,7 +155,7 @@ lam_status reuse_alone(const walk_scene *s, const reuse_problem *problem, const 
     e->rays = rays / ((double)e->paths * (double)r.s);
 done:
     free(r.scene.shapes);
-    free(r.scene.halves);
+    free(r.scene.share);
     reuse_sums_free(&sums);
     return status;
 }

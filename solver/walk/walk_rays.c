@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A vector of the rays of a packet, and four of each of two of them side by side. */
+/* A vector of the rays of a packet. */
 typedef float lanes __attribute__((vector_size(4 * VISIBILITY_PACKET), aligned(4), may_alias));
 
 #define CPU_KERNELS "solver/walk/walk_kernels.inc"
@@ -29,16 +29,14 @@ static double twice_area(const double *a, const double *b, const double *c) {
     return sqrt(dot3(normal, normal));
 }
 
-/* True for a quadrilateral that is not a parallelogram. */
-static bool set_shape(const mesh *m, const visibility *v, size_t element, walk_shape *s,
-                      walk_halves *halves) {
+static void set_shape(const mesh *m, const visibility *v, size_t element, walk_shape *s, float *share) {
     const uint32_t *corner = m->elements[element];
     const double *a = m->vertices[corner[0]], *b = m->vertices[corner[1]], *c = m->vertices[corner[2]];
     const double *last = c;
     const float lift = 2 * (float)visibility_rounding(v);
     const size_t n_fronts = m->two_sided ? m->n / 2 : m->n;
-    bool uneven = false;
     s->facet = visibility_facets(v)->of_element[element % n_fronts] | WALK_TRIANGLE;
+    *share = 1;
     if (mesh_corners(m, element) == 4) {
         const double *e = m->vertices[corner[3]];
         double off = 0, size = 0;
@@ -46,14 +44,13 @@ static bool set_shape(const mesh *m, const visibility *v, size_t element, walk_s
             off += fabs(a[d] - b[d] + c[d] - e[d]);
             size += fabs(c[d] - a[d]) + fabs(e[d] - b[d]);
         }
-        uneven = off > 1e-9 * size;
-        if (!uneven) {
+        if (off > 1e-9 * size) {
+            const double first = twice_area(a, b, c), second = twice_area(a, c, e);
+            *share = (float)(first / (first + second));
+            set_edge(a, e, s->third);
+        } else {
             s->facet &= ~WALK_TRIANGLE;
             last = e;
-        } else if (halves != NULL) {
-            const double first = twice_area(a, b, c), second = twice_area(a, c, e);
-            halves->share = (float)(first / (first + second));
-            set_edge(a, e, halves->third);
         }
     }
     visibility_recentre(v, a, s->corner);
@@ -63,52 +60,34 @@ static bool set_shape(const mesh *m, const visibility *v, size_t element, walk_s
         s->normal[d] = m->normal[element][d];
         s->corner[d] += lift * s->normal[d];
     }
-    for (size_t k = 0; k < m->n_channels; k++) s->reflectance[k] = m->reflectance[k * m->n + element];
-    return uneven;
 }
 
 lam_status walk_shapes_create(walk_scene *s, lam_error *error) {
     const size_t n = s->m->n;
-    bool uneven = false;
     s->shapes = memory_allocate(n, sizeof *s->shapes, "walks", error);
-    if (s->shapes == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < n; i++) uneven = set_shape(s->m, s->v, i, &s->shapes[i], NULL) || uneven;
-    if (!uneven) return LAM_OK;
-    s->halves = memory_allocate(n, sizeof *s->halves, "walks", error);
-    if (s->halves == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < n; i++) {
-        s->halves[i].share = 1;
-        set_shape(s->m, s->v, i, &s->shapes[i], &s->halves[i]);
-    }
+    s->reflectance = memory_allocate(n, sizeof *s->reflectance, "walks", error);
+    s->share = memory_allocate(n, sizeof *s->share, "walks", error);
+    if (s->shapes == NULL || s->reflectance == NULL || s->share == NULL) return LAM_ERR_MEMORY;
+    for (size_t c = 0; c < s->m->n_channels; c++)
+        for (size_t i = 0; i < n; i++) s->reflectance[i].of[c] = s->m->reflectance[c * n + i];
+    for (size_t i = 0; i < n; i++) set_shape(s->m, s->v, i, &s->shapes[i], &s->share[i]);
     return LAM_OK;
 }
 
-/* The triangle of a quadrilateral, and the coordinate within it, that its first coordinate chooses; without
- * branches, which would be mispredicted half of the time. */
-static void choose_half(const walk_halves *h, const walk_shape *shape, walk_shape *half, uint32_t *place) {
-    const float share = h->share, u = (float)(*place >> 8) * 0x1p-24f;
-    const bool second = u >= share;
-    const float within = (u - (second ? share : 0)) / (second ? 1 - share : share);
-    const float *first = shape->edge[second], *last = second ? h->third : shape->edge[1];
-    *half = *shape;
-    memcpy(half->edge[0], first, sizeof half->edge[0]);
-    memcpy(half->edge[1], last, sizeof half->edge[1]);
-    *place = (uint32_t)((within < 1 - 0x1p-24f ? within : 1 - 0x1p-24f) * 0x1p24f) << 8;
-}
-
-void walk_leave(size_t n, const walk_shape *const *shape, const uint32_t (*place)[WALK_STREAM],
-                ray_packet *rays, uint32_t *facet) {
-    typedef void leave(size_t, const walk_shape *const *, const uint32_t(*)[WALK_STREAM], ray_packet *,
-                       uint32_t *);
+void walk_leave(size_t n, const walk_shape *const *shape, const float *share,
+                const uint32_t (*place)[WALK_STREAM], ray_packet *rays, uint32_t *facet) {
+    typedef void leave(size_t, const walk_shape *const *, const float *, const uint32_t(*)[WALK_STREAM],
+                       ray_packet *, uint32_t *);
     static leave *const leaves[] = CPU_TABLE(leave_portable, leave_avx2, leave_avx512);
-    leaves[cpu_best()](n, shape, place, rays, facet);
+    leaves[cpu_best()](n, shape, share, place, rays, facet);
 }
 
 void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, hit_packet *hits) {
     const size_t filled = (n + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET * VISIBILITY_PACKET;
     const walk_shape *shape[WALK_STREAM];
-    walk_shape half[WALK_STREAM];
+    float share[WALK_STREAM];
     uint32_t self[WALK_STREAM], facet[WALK_STREAM];
+    const uint32_t n_elements = (uint32_t)s->m->n;
     for (size_t j = n; j < filled; j++) {
         w->at[j] = w->at[n - 1];
         for (int d = 0; d < 4; d++) w->place[d][j] = w->place[d][n - 1];
@@ -116,16 +95,12 @@ void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, 
     for (size_t j = 0; j < filled; j++) {
         const uint32_t at = w->at[j];
         shape[j] = &s->shapes[at];
-        self[j] = at < s->m->n ? at : VISIBILITY_NOTHING;
-        if (s->halves == NULL || s->halves[at].share >= 1) continue;
-        choose_half(&s->halves[at], shape[j], &half[j], &w->place[0][j]);
-        shape[j] = &half[j];
+        share[j] = s->share[at];
+        /* VISIBILITY_NOTHING from n_elements on: a branch would be mispredicted half of the time. */
+        self[j] = at | (uint32_t) - (int)((n_elements - 1 - at) >> 31);
     }
-    walk_leave(filled, shape, w->place, rays, facet);
-    for (size_t j = 0; j < n; j += VISIBILITY_PACKET)
-        visibility_cast_lifted(s->v, &rays[j / VISIBILITY_PACKET],
-                               n - j < VISIBILITY_PACKET ? n - j : VISIBILITY_PACKET, self + j, facet + j,
-                               &hits[j / VISIBILITY_PACKET]);
+    walk_leave(filled, shape, share, w->place, rays, facet);
+    visibility_cast_lifted(s->v, rays, n, self, facet, hits);
 }
 
 void walk_stream_meet(const walk_scene *s, const walk_stream *w, size_t n, const hit_packet *hits,

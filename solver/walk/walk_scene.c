@@ -87,7 +87,8 @@ void walk_scene_free(walk_scene *s) {
     if (s == NULL) return;
     visibility_destroy(s->v);
     free(s->shapes);
-    free(s->halves);
+    free(s->share);
+    free(s->reflectance);
     free(s);
 }
 

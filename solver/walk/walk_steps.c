@@ -57,8 +57,8 @@ static size_t advance(const walk_scene *s, walk_stream *w, size_t n, const uint3
     uint32_t alive[WALK_STREAM];
     size_t n_free = 0;
     for (size_t i = 0; i < n; i++) {
-        const walk_shape *shape = &s->shapes[met[i] == VISIBILITY_NOTHING ? 0 : met[i]];
-        for (int c = 0; c < WALK_CHANNELS; c++) reflectance[c][i] = shape->reflectance[c];
+        const walk_colour *colour = &s->reflectance[met[i] == VISIBILITY_NOTHING ? 0 : met[i]];
+        for (int c = 0; c < WALK_CHANNELS; c++) reflectance[c][i] = colour->of[c];
     }
     walk_stream_survive(w, n, met, again, reflectance, alive);
     for (size_t i = 0; i < n; i++) {
@@ -96,8 +96,11 @@ void walk_batch_go(const walk_batch *b) {
         walk_log_add(b->run->log, n / VISIBILITY_PACKET, rays);
         if (b->rays != NULL) *b->rays += (double)n;
         walk_stream_meet(b->scene, &w, n, hits, met, again);
-        for (size_t i = 0; i < n; i++)
-            __builtin_prefetch(&b->scene->shapes[met[i] == VISIBILITY_NOTHING ? 0 : met[i]]);
+        for (size_t i = 0; i < n; i++) {
+            const size_t at = met[i] == VISIBILITY_NOTHING ? 0 : met[i];
+            __builtin_prefetch(&b->scene->reflectance[at]);
+            __builtin_prefetch(&b->scene->shapes[at]);
+        }
         b->arrive(b->context, n, &w, met);
         n_free = advance(b->scene, &w, n, met, again, place);
         if (stream % STREAMS_AT_ONCE == 0) {

@@ -14,27 +14,29 @@ enum { WALK_CHANNELS = 3, WALK_STREAM = 128 };
 #define WALK_TRIANGLE 0x80000000u
 #define WALK_NO_FACET 0x7FFFFFFFu
 
-/* An element as walks need it, in one line of a cache: 16 numbers of 4 bytes, which kernels read as such. */
+/* An element as walks need it, in one line of a cache: 16 numbers of 4 bytes, which kernels read as such. A
+ * triangle or a parallelogram spanned by two edges; or a quadrilateral that is none, which is the triangle of
+ * these edges and that of edge[1] and the third. */
 typedef struct walk_shape {
-    float corner[3], edge[2][3], normal[3]; /* recentred, the corner lifted; a triangle, or a parallelogram */
-    float reflectance[WALK_CHANNELS];
-    uint32_t facet; /* of the scene, and WALK_TRIANGLE */
+    float corner[3], edge[2][3], normal[3]; /* recentred, the corner lifted */
+    float third[3];                         /* 0 for others */
+    uint32_t facet;                         /* of the scene, and WALK_TRIANGLE */
 } walk_shape;
 
-/* A quadrilateral that is no parallelogram is the triangle of its shape and that of edge[1] and a third one.
- */
-typedef struct walk_halves {
-    float share; /* of the area that the first triangle has; 1 for other elements */
-    float third[3];
-} walk_halves;
+/* The numbers of an element that decide where a walk ends, which then reads no shape. */
+typedef struct walk_colour {
+    float of[WALK_CHANNELS + 1]; /* reflectance; the last one is free */
+} walk_colour;
 
 struct walk_scene {
     const mesh *m;
     visibility *v;
-    walk_shape *shapes;  /* [n] */
-    walk_halves *halves; /* [n], or NULL where no element needs them */
-    bool closed;         /* rays leave through cracks only */
-    bool fronts;         /* rays hit backs through cracks only */
+    walk_shape *shapes;       /* [n] */
+    float *share;             /* [n]: of the area that the first triangle of a shape has; 1 for all but
+                               * quadrilaterals that are no parallelograms */
+    walk_colour *reflectance; /* [n] */
+    bool closed;              /* rays leave through cracks only */
+    bool fronts;              /* rays hit backs through cracks only */
 };
 
 /* One walk that starts. */
@@ -92,7 +94,7 @@ void walk_stream_set(walk_stream *s, size_t i, const walker *w);
  * which leaves the expectation of every channel as it is and the largest weight too. The weights of a walk
  * that ends are never read: a branch for them would be mispredicted half of the time. */
 static inline bool walk_survives(const walk_scene *s, walker *w, uint32_t element) {
-    const float *reflectance = s->shapes[element].reflectance;
+    const float *reflectance = s->reflectance[element].of;
     double before = 0, after = 0, weight[WALK_CHANNELS];
     for (size_t c = 0; c < WALK_CHANNELS; c++) {
         before = w->weight[c] > before ? w->weight[c] : before;
@@ -107,10 +109,11 @@ static inline bool walk_survives(const walk_scene *s, walker *w, uint32_t elemen
 /* Makes the shapes of a scene, freed with it. Errors: LAM_ERR_MEMORY. */
 lam_status walk_shapes_create(walk_scene *s, lam_error *error);
 
-/* The rays that leave shapes [n] from places [4][WALK_STREAM], n rounded up to packets: origins uniform over
- * shapes, directions cosine-weighted. facet[i] is that of the shape, or VISIBILITY_NOTHING. */
-void walk_leave(size_t n, const walk_shape *const *shape, const uint32_t (*place)[WALK_STREAM],
-                ray_packet *rays, uint32_t *facet);
+/* The rays that leave shapes [n] with the shares [n] of their first triangles from places [4][WALK_STREAM], n
+ * rounded up to packets: origins uniform over shapes, directions cosine-weighted. facet[i] is that of the
+ * shape, or VISIBILITY_NOTHING. */
+void walk_leave(size_t n, const walk_shape *const *shape, const float *share,
+                const uint32_t (*place)[WALK_STREAM], ray_packet *rays, uint32_t *facet);
 
 /* Casts the next rays of the first n walks of a stream from their places: packets of rays and of hits. Walks
  * beyond the n are overwritten. */

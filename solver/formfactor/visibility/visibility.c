@@ -347,51 +347,80 @@ static void report_backs(const visibility *v, const uint32_t *facet, size_t n_ra
     report(v, ray, n_rays, &met, hits);
 }
 
-void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
-                            const uint32_t *facet, hit_packet *hits) {
+/* Hits on facets of many elements, which are found together. */
+typedef struct open_hits {
+    size_t n;
+    uint32_t ray[FACET_SEARCHES], piece[FACET_SEARCHES];
+    float u[FACET_SEARCHES], v[FACET_SEARCHES];
+} open_hits;
+
+static void find_elements(const visibility *v, open_hits *open, hit_packet *hits) {
+    uint32_t found[FACET_SEARCHES];
+    facet_grids_find(&v->grids, open->n, open->piece, open->u, open->v, found);
+    for (size_t k = 0; k < open->n; k++) {
+        hit_packet *const of = &hits[open->ray[k] / VISIBILITY_PACKET];
+        const size_t lane = open->ray[k] % VISIBILITY_PACKET;
+        of->element[lane] = found[k];
+        if (v->mesh->two_sided && of->back[lane]) of->element[lane] += (uint32_t)v->n_fronts;
+        of->back[lane] = of->back[lane] && !v->mesh->two_sided;
+    }
+    open->n = 0;
+}
+
+/* Packet p of lifted rays, its first n; those of its hits that are on facets of many elements are added. */
+static void cast_packet(const visibility *v, const ray_packet *rays, size_t p, size_t n, const uint32_t *self,
+                        const uint32_t *facet, hit_packet *hits, open_hits *open) {
     struct RTCRayHit8 ray __attribute__((aligned(32)));
     int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
     struct RTCIntersectContext context;
-    uint32_t piece[VISIBILITY_PACKET], lane[VISIBILITY_PACKET], found[VISIBILITY_PACKET];
-    float u[VISIBILITY_PACKET], v_at[VISIBILITY_PACKET];
-    size_t open = 0;
+    size_t n_open = open->n;
     bool again = false, any_back = false;
     rtcInitIntersectContext(&context);
     packet_set(&ray, rays);
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++) active[i] = i < n_rays ? -1 : 0;
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) active[i] = i < n ? -1 : 0;
     rtcIntersect8(active, v->scene, &context, &ray);
     /* Without branches, which would be mispredicted at rays that leave: these take the first primitive. */
-    for (size_t i = 0; i < n_rays; i++) {
+    for (size_t i = 0; i < n; i++) {
         const bool met = ray.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-        const primitive *p = &v->primitives[met ? ray.hit.geomID[i] : 0][met ? ray.hit.primID[i] : 0];
-        const float cosine = p->normal[0] * ray.ray.dir_x[i] + p->normal[1] * ray.ray.dir_y[i] +
-                             p->normal[2] * ray.ray.dir_z[i];
+        const primitive *of = &v->primitives[met ? ray.hit.geomID[i] : 0][met ? ray.hit.primID[i] : 0];
+        const float cosine = of->normal[0] * ray.ray.dir_x[i] + of->normal[1] * ray.ray.dir_y[i] +
+                             of->normal[2] * ray.ray.dir_z[i];
         const bool back = met & (cosine >= 0);
-        again |= met & ((p->facet == facet[i]) | !(fabsf(cosine) * ray.ray.tfar[i] > v->rounding));
+        again |= met & ((of->facet == facet[i]) | !(fabsf(cosine) * ray.ray.tfar[i] > v->rounding));
         any_back |= back;
         hits->distance[i] = ray.ray.tfar[i];
         hits->back[i] = back;
-        hits->element[i] = met ? p->element : VISIBILITY_NOTHING;
-        piece[open] = p->piece;
-        u[open] = ray.hit.u[i];
-        v_at[open] = ray.hit.v[i];
-        lane[open] = (uint32_t)i;
-        open += met & (p->element == MESH_NO_VERTEX);
+        hits->element[i] = met ? of->element : VISIBILITY_NOTHING;
+        open->piece[n_open] = of->piece;
+        open->u[n_open] = ray.hit.u[i];
+        open->v[n_open] = ray.hit.v[i];
+        open->ray[n_open] = (uint32_t)(p * VISIBILITY_PACKET + i);
+        n_open += met & (of->element == MESH_NO_VERTEX);
     }
-    if (again) {
-        visibility_cast(v, rays, n_rays, self, 0, hits);
-        return;
-    }
-    if (any_back && !v->mesh->two_sided) {
-        report_backs(v, facet, n_rays, &ray, hits);
-        return;
-    }
-    if (open > 0) facet_grids_find(&v->grids, open, piece, u, v_at, found);
-    for (size_t k = 0; k < open; k++) hits->element[lane[k]] = found[k];
-    for (size_t i = 0; i < n_rays && any_back; i++) {
-        if (hits->back[i]) hits->element[i] += (uint32_t)v->n_fronts;
+    if (again)
+        visibility_cast(v, rays, n, self, 0, hits);
+    else if (any_back && !v->mesh->two_sided)
+        report_backs(v, facet, n, &ray, hits);
+    else
+        open->n = n_open;
+    if (again || !any_back || !v->mesh->two_sided) return;
+    for (size_t i = 0; i < n; i++) {
+        if (!hits->back[i] || hits->element[i] == VISIBILITY_NOTHING) continue; /* or not found yet */
+        hits->element[i] += (uint32_t)v->n_fronts;
         hits->back[i] = false;
     }
+}
+
+void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
+                            const uint32_t *facet, hit_packet *hits) {
+    open_hits open = {.n = 0};
+    for (size_t j = 0; j < n_rays; j += VISIBILITY_PACKET) {
+        const size_t p = j / VISIBILITY_PACKET,
+                     n = n_rays - j < VISIBILITY_PACKET ? n_rays - j : VISIBILITY_PACKET;
+        cast_packet(v, &rays[p], p, n, self + j, facet + j, &hits[p], &open);
+        if (open.n > FACET_SEARCHES - VISIBILITY_PACKET) find_elements(v, &open, hits);
+    }
+    if (open.n > 0) find_elements(v, &open, hits);
 }
 
 /* The data of the filter of segments: the facets at both ends, by lane, which is the segment's id. */

@@ -28,7 +28,7 @@ lam_status facet_grids_create(const mesh *m, const facets *f, facet_grids *out, 
 void facet_grids_free(facet_grids *g);
 
 /* The most points of one facet_grids_find. */
-#define FACET_SEARCHES 16
+#define FACET_SEARCHES 136
 
 /* element[i], i < n: the element at (u, v) of a piece, always one of its facet, which must have more than
  * one. A point within about 1e-5 of an element's width from its border may be assigned to the neighbour.
