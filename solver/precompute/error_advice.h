@@ -31,12 +31,12 @@ typedef struct error_advice_input {
 } error_advice_input;
 
 /* text: about the scene's own lights or random emission, whichever has the larger indirect error, where that
- * is above error_advice_most; else empty. Of an error asked for: about its group alone (trial.h), where that is above it.
- * An error of --group-error that is missed, and by more than that of --epsilon, comes first. Single elements
- * never count: their error is that of the noise of one element's light, for which --tolerance is there. The
- * option follows from where most of the error is: compression gets a smaller --epsilon, rays, and compression
- * that follows their noise, more of them, N ~ 1 / error^2, and the rest --quality high. A trial that memory
- * had no room for gets more --memory. */
+ * is above error_advice_most; else empty. Of an error asked for: about its group alone (trial.h), where that
+ * is above it. An error of --group-error that is missed, and by more than that of --epsilon, comes first.
+ * Single elements never count: their error is that of the noise of one element's light, for which --tolerance
+ * is there. The option follows from where most of the error is: compression gets a smaller --epsilon, rays,
+ * and compression that follows their noise, more of them, N ~ 1 / error^2, and the rest --quality high. A
+ * trial that memory had no room for gets more --memory. */
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]);
 
 #endif

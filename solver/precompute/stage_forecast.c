@@ -60,7 +60,7 @@ lam_status state_count_entries(precompute_state *state, lam_error *error) {
         if (state->f.F.n > 0) state->cost.entries = (double)state->f.F.indptr[n];
         return LAM_OK;
     }
-    if (twice.rays > RAYS_ENOUGH) twice.rays = RAYS_ENOUGH; /* what they find hardly grows beyond */
+    if (twice.rays > RAYS_ENOUGH) twice.rays = RAYS_ENOUGH; /* more rays hardly find more */
     if (count < LEAST) count = LEAST;
     if (count > MOST) count = MOST;
     if (count > n) count = n;
