@@ -26,6 +26,8 @@ class Importance(Case):
         cls.all = os.path.join(cls.shared.name, "all.h5")
         cls.lit = os.path.join(cls.shared.name, "lit.h5")
         cls.log_of_lit = must("precompute", cls.room, "-o", cls.lit, *HOW, "--sources", "lamp", "--probes", 8).stderr
+        cls.exact = os.path.join(cls.shared.name, "exact.h5")
+        must("precompute", cls.room, "-o", cls.exact, "--form-factors", "rays", "--method", "exact", "--probes", 0, "--quiet")
         cls.log_of_all = must("precompute", cls.room, "-o", cls.all, *HOW, "--method", "hierarchical", "--probes", 0).stderr
 
     @classmethod
@@ -43,9 +45,7 @@ class Importance(Case):
         read, area = self.is_read()
         rng = numpy.random.default_rng(2)
         light = rng.random((3, len(area))).astype("f4")
-        exact = self.path("exact.h5")
-        must("precompute", self.room, "-o", exact, "--form-factors", "rays", "--method", "exact", "--probes", 0, "--quiet")
-        truth = self.solve(exact, light)[0]
+        truth = self.solve(self.exact, light)[0]
         off = {}
         for store in self.store, self.all:
             found = self.solve(store, light)[0]
@@ -65,9 +65,7 @@ class Importance(Case):
         emits, area = self.is_read()
         rng = numpy.random.default_rng(4)
         light = (rng.random((3, len(area))) * emits).astype("f4")
-        exact = self.path("exact.h5")
-        must("precompute", self.room, "-o", exact, "--form-factors", "rays", "--method", "exact", "--probes", 0, "--quiet")
-        truth, found = self.solve(exact, light)[0], self.solve(self.lit, light)[0]
+        truth, found = self.solve(self.exact, light)[0], self.solve(self.lit, light)[0]
         off = numpy.sqrt((area * (found - truth) ** 2).sum() / (area * truth ** 2).sum())
         with h5py.File(self.lit) as file:
             stated = file["error/random"].attrs
