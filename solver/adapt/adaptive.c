@@ -197,7 +197,8 @@ lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report
     adaptive_run r = {.m = m, .how = how, .coarse = &coarse};
     adaptive_report made = {.reached = false};
     TRY(coarse_light_make(m, how->two_sided, how->seed, how->progress, &coarse, error));
-    TRY(gather_create(&coarse.m, coarse.n_lights, coarse.B, coarse.lamps ? coarse.E : NULL, NULL, &g, error));
+    TRY(gather_create(&coarse.m, coarse.n_lights, coarse.B, coarse.lamps ? coarse.E : NULL,
+                      GATHER_LAMP_SAMPLES_MOST, NULL, &g, error));
     r.light = (cell_light){.m = m, .coarse = &coarse, .g = g, .two_sided = how->two_sided};
     weigh(&coarse, r.light.all);
     TRY(refine_cells(&r, &made, error));

@@ -25,7 +25,7 @@ typedef struct adaptive_report {
 } adaptive_report;
 
 /* Divides the faces of a mesh in place. The scene's lamps and 1 from every element are its lights; a coarse
- * solution is found for them first. Deterministic, for any number of threads. Cost: 36 times 128 rays and 64
+ * solution is found for them first. Deterministic, for any number of threads. Cost: 36 times 128 rays and 256
  * segments for each cell that was looked at, about twice the number of elements, and the coarse solution.
  * Errors: those of coarse_light_make and mesh_of_cells. */
 lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report *report, lam_error *error);

@@ -27,7 +27,7 @@ typedef struct cell_look {
     } of[MESH_CUTS_MOST];
 } cell_look;
 
-/* The samples of a cell. Cost: 128 rays and at most 64 segments from each of CELL_POINTS points, on each
+/* The samples of a cell. Cost: 128 rays and at most 256 segments from each of CELL_POINTS points, on each
  * side; the key chooses all of them. */
 enum { CELL_STEPS = 6, CELL_POINTS = CELL_STEPS * CELL_STEPS };
 void cell_look_at(const cell_light *light, const mesh_cell *c, uint64_t key, cell_look *out);

@@ -14,7 +14,7 @@ struct gather {
     const float *B, *lamps;
     const gather_sky *sky; /* NULL: none */
     visibility *v;
-    size_t n_lamps;
+    size_t lamp_samples, n_lamps;
     uint32_t *lamp; /* [n_lamps], elements that emit */
     double *before; /* [n_lamps + 1]: power of those before, all channels */
 };
@@ -22,8 +22,8 @@ struct gather {
 /* The same for all points of a call. */
 typedef struct gather_samples {
     float direction[GATHER_HALVES][GATHER_RAYS][3];
-    uint32_t lamp[GATHER_HALVES][GATHER_LAMP_SAMPLES];
-    double place[GATHER_HALVES][GATHER_LAMP_SAMPLES][3]; /* recentred */
+    uint32_t lamp[GATHER_HALVES][GATHER_LAMP_SAMPLES_MOST];
+    double place[GATHER_HALVES][GATHER_LAMP_SAMPLES_MOST][3]; /* recentred */
 } gather_samples;
 
 size_t gather_values(const gather *g) {
@@ -61,7 +61,7 @@ static lam_status find_lamps(gather *g, lam_error *error) {
 }
 
 lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps,
-                         const gather_sky *sky, gather **out, lam_error *error) {
+                         size_t lamp_samples, const gather_sky *sky, gather **out, lam_error *error) {
     lam_status status = LAM_OK;
     gather *g = NULL;
     if (n_lights * m->n_channels > GATHER_VALUES_MOST)
@@ -69,7 +69,8 @@ lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const f
              m->n_channels, (int)GATHER_VALUES_MOST);
     g = memory_allocate(1, sizeof *g, "light at points", error);
     if (g == NULL) TRY(LAM_ERR_MEMORY);
-    *g = (gather){.m = m, .n_lights = n_lights, .B = B, .lamps = lamps, .sky = sky};
+    *g = (gather){
+        .m = m, .n_lights = n_lights, .B = B, .lamps = lamps, .lamp_samples = lamp_samples, .sky = sky};
     TRY(visibility_create(m, &g->v, error));
     TRY(find_lamps(g, error));
     *out = g;
@@ -107,9 +108,10 @@ static void draw(const gather *g, uint32_t element, uint64_t key, gather_samples
         for (size_t r = 0; r < GATHER_RAYS; r++)
             cosine_direction(frame.tangent, frame.bitangent, frame.normal, spread(shift, r, 0),
                              spread(shift, r, 1), s->direction[h][r]);
-        for (size_t k = 0; k < GATHER_LAMP_SAMPLES && g->n_lamps > 0; k++) {
+        for (size_t k = 0; k < g->lamp_samples && g->n_lamps > 0; k++) {
             const double turn = random_to_double(random_hash(shift[1]));
-            const size_t lamp = lamp_at(g, ((double)k + turn) / GATHER_LAMP_SAMPLES * g->before[g->n_lamps]);
+            const size_t lamp =
+                lamp_at(g, ((double)k + turn) / (double)g->lamp_samples * g->before[g->n_lamps]);
             element_sampler sampler;
             float point[3];
             element_sampler_init(&sampler, g->m, g->v, g->lamp[lamp], 0);
@@ -125,7 +127,7 @@ static void draw(const gather *g, uint32_t element, uint64_t key, gather_samples
 static void add_lamp(const gather *g, uint32_t j, double K, double *H) {
     const double power = g->n_lamps > 0 ? g->before[g->n_lamps] : 0;
     const double q = power > 0 ? brightness(g, j) / power : 0;
-    const double weight = K / (GATHER_RAYS * K + GATHER_LAMP_SAMPLES * q);
+    const double weight = K / (GATHER_RAYS * K + (double)g->lamp_samples * q);
     for (size_t c = 0; c < g->m->n_channels; c++) H[c] += (double)g->lamps[c * g->m->n + j] * weight;
 }
 
@@ -230,7 +232,7 @@ void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points,
         for (size_t h = 0; h < GATHER_HALVES; h++) {
             double *of = H + (p * GATHER_HALVES + h) * values;
             add_rays(g, element, origin, s.direction[h], of);
-            for (size_t k = 0; g->n_lamps > 0 && k < GATHER_LAMP_SAMPLES; k += VISIBILITY_PACKET)
+            for (size_t k = 0; g->n_lamps > 0 && k < g->lamp_samples; k += VISIBILITY_PACKET)
                 add_lamps(g, element, origin, s.lamp[h] + k, s.place[h] + k, of);
         }
     }

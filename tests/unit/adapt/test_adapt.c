@@ -89,7 +89,7 @@ START_TEST(light_at_points) {
     const float B[2] = {0, 1};
     gather *g = NULL;
     lam_error error = {0};
-    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, NULL, &g, &error));
+    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, GATHER_LAMP_SAMPLES, NULL, &g, &error));
     ck_assert_uint_eq(gather_values(g), 1);
     for (int p = 0; p < 3; p++) {
         const double F = truth(points[p][0], points[p][1]);
@@ -128,7 +128,7 @@ START_TEST(shadow) {
     free(m.group);
     mesh_add_cell(&m, &plate, true);
     mesh_finish(&m, rho);
-    ck_ok(gather_create(&m, 1, B, lamps, NULL, &g, &error));
+    ck_ok(gather_create(&m, 1, B, lamps, GATHER_LAMP_SAMPLES_MOST, NULL, &g, &error));
     for (uint64_t key = 0; key < 100; key++) {
         gather_at(g, 0, key, 2, points, H);
         ck_assert(H[0] == 0 && H[1] == 0);
@@ -156,7 +156,7 @@ START_TEST(light_of_skies) {
         for (size_t t = 0; t <= tiling.n_tiles; t++)
             L[l * (tiling.n_tiles + 1) + t] = t < tiling.n_tiles ? 1 + (double)l : 1e9;
     const gather_sky sky = {.tiling = &tiling, .L = L};
-    ck_ok(gather_create(&m, 2, B, NULL, &sky, &g, &error));
+    ck_ok(gather_create(&m, 2, B, NULL, 0, &sky, &g, &error));
     for (int p = 0; p < 2; p++) {
         const double seen = M_PI * (1 - truth(points[p][0], points[p][1]));
         double sum = 0, squares = 0;
@@ -189,7 +189,7 @@ START_TEST(furnace) {
     gather *g = NULL;
     lam_error error = {0};
     for (size_t i = 0; i < m.n; i++) B[i] = 1, B[m.n + i] = 2;
-    ck_ok(gather_create(&m, 2, B, NULL, NULL, &g, &error));
+    ck_ok(gather_create(&m, 2, B, NULL, 0, NULL, &g, &error));
     gather_at(g, 4 * 4, 1, 2, points, H); /* the floor's first element */
     for (size_t k = 0; k < 4; k++) {
         ck_assert_double_eq_tol(H[2 * k], 1, 1e-6);
