@@ -63,6 +63,8 @@ lam_status light_pieces_create(const moving_light *l, const light_frame *frames,
     }
     const bool parallelogram = l->n_corners == 4 && off <= 1e-9 * size;
     light_pieces p = {.n = parallelogram ? 1 : l->n_corners - 2, .parallelogram = parallelogram};
+    for (size_t k = 0; k < l->n_corners; k++)
+        for (int d = 0; d < 3; d++) p.middle[d] += (float)(l->corner[k][d] / (double)l->n_corners);
     p.piece = memory_allocate(p.n, sizeof *p.piece, "light", error);
     p.carried = memory_allocate(p.n, l->n * sizeof *p.carried, "light", error);
     if (p.piece == NULL || p.carried == NULL) {
@@ -93,6 +95,20 @@ size_t light_pieces_choose(const light_pieces *p, uint32_t *place) {
     const double before = k > 0 ? p->piece[k - 1].share : 0, part = p->piece[k].share - before;
     *place = (uint32_t)fmin(fmax((u - before) / part, 0) * 0x1p32, 0x1p32 - 1);
     return k;
+}
+
+size_t light_pieces_part(const light_pieces *p, size_t split, const uint32_t place[4]) {
+    if (!p->parallelogram) return 0;
+    return (size_t)((uint64_t)place[1] * split >> 32) * split + (size_t)((uint64_t)place[0] * split >> 32);
+}
+
+void light_pieces_middle(const light_pieces *p, size_t split, size_t part, float local[3]) {
+    const float per = 1 / (float)split;
+    const float a = ((float)(part % split) + .5f) * per, b = ((float)(part / split) + .5f) * per;
+    for (int d = 0; d < 3; d++)
+        local[d] = p->parallelogram
+                       ? p->piece->corner[d] + a * p->piece->edge[0][d] + b * p->piece->edge[1][d]
+                       : p->middle[d];
 }
 
 void light_pieces_point(const light_pieces *p, size_t k, const uint32_t place[4], float local[3]) {

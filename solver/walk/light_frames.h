@@ -25,6 +25,7 @@ typedef struct light_piece {
 typedef struct light_pieces {
     size_t n;
     bool parallelogram;  /* the only piece */
+    float middle[3];     /* the mean of the corners, before any pose */
     light_piece *piece;  /* [n] */
     walk_shape *carried; /* [positions][n] */
 } light_pieces;
@@ -36,6 +37,11 @@ void light_pieces_free(light_pieces *p);
 
 /* The piece of a place by its first coordinate, which becomes one of that piece. */
 size_t light_pieces_choose(const light_pieces *p, uint32_t *place);
+
+/* A parallelogram in split x split parts: that of a place, and its middle before any pose. Other lights are
+ * one part. */
+size_t light_pieces_part(const light_pieces *p, size_t split, const uint32_t place[4]);
+void light_pieces_middle(const light_pieces *p, size_t split, size_t part, float local[3]);
 
 /* The point of a piece at a place, the same as walk_leave finds on the piece that was carried. */
 void light_pieces_point(const light_pieces *p, size_t k, const uint32_t place[4], float local[3]);

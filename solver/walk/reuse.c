@@ -54,25 +54,36 @@ typedef struct reuse_batch {
 static void fill_up(first_hits *h) {
     for (size_t k = h->count; k % HITS_LANES != 0; k++) {
         h->facet[k] = h->position[k] = VISIBILITY_NOTHING;
-        for (int d = 0; d < 3; d++) h->local[d][k] = h->y[d][k] = h->normal[d][k] = 0;
+        h->part[k] = 0;
+        for (int d = 0; d < 3; d++) h->local[d][k] = h->middle[d][k] = h->y[d][k] = h->normal[d][k] = 0;
     }
 }
 
+/* The points of the light that first rays start at. */
+typedef struct light_points {
+    float local[WALK_STREAM][3], middle[WALK_STREAM][3];
+    int part[WALK_STREAM];
+    uint64_t random[WALK_STREAM];
+} light_points;
+
 /* First rays of the position at hand, at most so many; returns how many. */
-static size_t first_rays(reuse_batch *b, size_t most, ray_packet *rays, float local[][3], uint64_t *random) {
+static size_t first_rays(reuse_batch *b, size_t most, ray_packet *rays, light_points *points) {
     static const double all[2] = {0, 1};
     const light_pieces *light = &b->r->pieces;
     const walk_shape *carried = light->carried + b->position * light->n, *shape[WALK_STREAM];
     uint32_t place[4][WALK_STREAM], facet[WALK_STREAM];
     float share[WALK_STREAM];
+    const size_t split = b->r->maps != NULL ? b->r->maps->split : 1;
     walker w;
     size_t n = 0, only;
     for (; n < most && walk_starts_next(&b->starts, all, 1, &w, &only); n++) {
         const size_t k = light_pieces_choose(light, &w.place[0]);
         shape[n] = &carried[k];
         for (int d = 0; d < 4; d++) place[d][n] = w.place[d];
-        light_pieces_point(light, k, w.place, local[n]);
-        random[n] = w.random;
+        light_pieces_point(light, k, w.place, points->local[n]);
+        points->part[n] = (int)light_pieces_part(light, split, w.place);
+        light_pieces_middle(light, split, (size_t)points->part[n], points->middle[n]);
+        points->random[n] = w.random;
     }
     const size_t last = n;
     for (size_t i = 0; i < WALK_STREAM; i++) share[i] = 1;
@@ -86,7 +97,7 @@ static size_t first_rays(reuse_batch *b, size_t most, ray_packet *rays, float lo
 
 /* Adds the hits of n rays on fronts. */
 static void keep_hits(reuse_batch *b, size_t n, const ray_packet *rays, const hit_packet *met,
-                      float local[][3], const uint64_t *random) {
+                      const light_points *points) {
     first_hits *const h = b->hits;
     for (size_t i = 0; i < n; i++) {
         const hit_packet *of = &met[i / VISIBILITY_PACKET];
@@ -98,9 +109,11 @@ static void keep_hits(reuse_batch *b, size_t n, const ray_packet *rays, const hi
         h->element[k] = element;
         h->facet[k] = shape->facet & ~WALK_TRIANGLE;
         h->position[k] = (uint32_t)b->position;
-        h->random[k] = random[i];
+        h->random[k] = points->random[i];
+        h->part[k] = points->part[i];
         for (int d = 0; d < 3; d++) {
-            h->local[d][k] = local[i][d];
+            h->local[d][k] = points->local[i][d];
+            h->middle[d][k] = points->middle[i][d];
             h->y[d][k] = ray->origin[d][lane] + of->distance[lane] * ray->direction[d][lane];
             h->normal[d][k] = shape->normal[d];
         }
@@ -124,14 +137,13 @@ static void find_hits(reuse_batch *b, size_t number) {
     const reuse *r = b->r;
     ray_packet rays[WALK_STREAM / VISIBILITY_PACKET];
     hit_packet met[WALK_STREAM / VISIBILITY_PACKET];
-    float local[WALK_STREAM][3];
-    uint64_t random[WALK_STREAM];
+    light_points points;
     uint32_t self[WALK_STREAM];
     for (int i = 0; i < WALK_STREAM; i++) self[i] = VISIBILITY_NOTHING;
     b->hits->count = b->next = 0;
     while (b->position < r->s && b->hits->count < HITS_MOST) {
         const size_t room = HITS_MOST - b->hits->count;
-        const size_t n = first_rays(b, room < WALK_STREAM ? room : WALK_STREAM, rays, local, random);
+        const size_t n = first_rays(b, room < WALK_STREAM ? room : WALK_STREAM, rays, &points);
         if (n == 0) {
             begin_position(b, number, b->position + 1);
             continue;
@@ -139,7 +151,7 @@ static void find_hits(reuse_batch *b, size_t number) {
         b->rays += (double)n;
         walk_log_add(r->run->log, n / VISIBILITY_PACKET, rays);
         visibility_cast_lifted(r->scene->v, rays, n, self, self, met);
-        keep_hits(b, n, rays, met, local, random);
+        keep_hits(b, n, rays, met, &points);
     }
     fill_up(b->hits);
 }
@@ -386,7 +398,8 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
         if (problem->resolution < 2)
             FAIL(error, LAM_ERR_ARGUMENT, "maps of %zu cells a side: must be at least 2",
                  problem->resolution);
-        TRY(light_maps_create(s, e.n_positions, r.frames, problem->way, problem->resolution, &maps, error));
+        TRY(light_maps_create(s, e.n_positions, r.frames, &r.pieces, problem->way, problem->resolution,
+                              light_maps_split(s, light, &r.pieces), &maps, error));
         e.maps_seconds = clock_processor_seconds() - begun;
         r.maps = &maps;
     }

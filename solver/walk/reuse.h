@@ -12,7 +12,8 @@
 
 /* REUSE_NONE: every position by its own paths (approach A). REUSE_EXACT: V by a ray each (B). REUSE_MAPS: V
  * by maps of the hemisphere about the light's centre that hold the nearest facet and its distance (C, fig.
- * 4). REUSE_CUBES: by hemicubes that hold facets alone (D, fig. 6), with F from the centre of the light.
+ * 4). REUSE_CUBES: by hemicubes that hold facets alone (D, fig. 6), with F from the centre of the light. A
+ * large parallelogram is divided into parts, each of which has a map and a centre of its own.
  * REUSE_ELEMENTS (E, ours): the direct light of every position by segments, and walks for all of them from
  * the elements that it lights. */
 typedef enum reuse_way { REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES, REUSE_ELEMENTS } reuse_way;
@@ -22,7 +23,8 @@ typedef struct reuse_problem {
     reuse_way way;
     size_t paths; /* of each position, rounded up to a multiple of WALK_BATCHES */
     bool even;    /* as many paths in all, but those of positions by a pilot that evens out their errors */
-    size_t resolution; /* of maps: cells along the side of a map, pixels along the top of a hemicube */
+    size_t resolution; /* of maps: cells along the side of a map, pixels along the top of a hemicube; of all
+                        * those of a position together */
     uint64_t seed;     /* the bits of estimates depend on it, not on threads */
     const progress *progress;
     const char *stage;

@@ -3,13 +3,18 @@
 #include "solver/walk/reuse_weights.h"
 
 #include "solver/base/cpu.h"
+#include "solver/base/vector3.h"
 #include "solver/walk/blend.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE_MOST = 1 << 14 };
+/* Of maps; PART_LEAST: cells along the side of the map of a part, below which fewer parts are better. */
+enum { SIDE_MOST = 1 << 14, SPLIT_MOST = 4, PART_LEAST = 32 };
+
+/* The largest diagonal of a part of a light, times the radius of the scene. */
+static const double part_most = .1;
 
 /* Far below the fourth power of any distance, added to it so that nothing is divided by 0. */
 static const float tiny = 1e-30f;
@@ -44,12 +49,29 @@ static bool direction_of(const light_maps *m, size_t cell, float out[3]) {
     return true;
 }
 
-static void look(const walk_scene *s, const light_frame *f, light_maps *m, size_t position) {
+size_t light_maps_split(const walk_scene *s, const moving_light *l, const light_pieces *p) {
+    double centre[3], radius, across = 0;
+    if (!p->parallelogram) return 1;
+    mesh_bounds(s->m, centre, &radius);
+    for (int k = 0; k < 2; k++) {
+        double diagonal[3];
+        subtract3(l->corner[k + 2], l->corner[k], diagonal);
+        across = fmax(across, sqrt(dot3(diagonal, diagonal)));
+    }
+    const double split = ceil(across / (part_most * radius));
+    return split > SPLIT_MOST ? SPLIT_MOST : split > 1 ? (size_t)split : 1;
+}
+
+/* The map of a part of the light at a position, from its middle. */
+static void look(const walk_scene *s, const light_frame *f, const float middle[3], light_maps *m,
+                 size_t first) {
     const facets *facet = visibility_facets(s->v);
+    float centre[3];
+    for (int d = 0; d < 3; d++) centre[d] = dot(f->turn[d], middle) + f->move[d];
     uint32_t self[VISIBILITY_PACKET];
     for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = VISIBILITY_NOTHING;
-    for (size_t begin = 0; begin < m->cells; begin += VISIBILITY_PACKET) {
-        const size_t n = m->cells - begin < VISIBILITY_PACKET ? m->cells - begin : VISIBILITY_PACKET;
+    for (size_t begin = 0; begin < m->one; begin += VISIBILITY_PACKET) {
+        const size_t n = m->one - begin < VISIBILITY_PACKET ? m->one - begin : VISIBILITY_PACKET;
         ray_packet rays;
         hit_packet hits;
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
@@ -57,14 +79,14 @@ static void look(const walk_scene *s, const light_frame *f, light_maps *m, size_
             (void)direction_of(m, begin + (i < n ? i : 0), v);
             const float over = 1 / sqrtf(dot(v, v));
             for (int d = 0; d < 3; d++) {
-                rays.origin[d][i] = f->centre[d];
+                rays.origin[d][i] = centre[d];
                 rays.direction[d][i] =
                     over * (v[0] * f->tangent[d] + v[1] * f->bitangent[d] + v[2] * f->normal[d]);
             }
         }
         visibility_cast(s->v, &rays, n, self, VISIBILITY_TOGETHER, &hits);
         for (size_t i = 0; i < n; i++) {
-            const size_t at = position * m->cells + begin + i;
+            const size_t at = first + begin + i;
             const bool met = hits.element[i] != VISIBILITY_NOTHING;
             const uint32_t seen = met ? facet->of_element[hits.element[i] % s->m->n] : VISIBILITY_NOTHING;
             if (m->cell != NULL)
@@ -81,21 +103,31 @@ void light_maps_free(light_maps *m) {
     *m = (light_maps){.side = 0};
 }
 
-lam_status light_maps_create(const walk_scene *s, size_t n, const light_frame *frames, reuse_way way,
-                             size_t resolution, light_maps *out, lam_error *error) {
-    light_maps m = {.way = way, .side = resolution + resolution % 2};
-    m.cells = way == REUSE_MAPS ? m.side * m.side : 3 * m.side * m.side;
+lam_status light_maps_create(const walk_scene *s, size_t n, const light_frame *frames,
+                             const light_pieces *pieces, reuse_way way, size_t resolution, size_t split,
+                             light_maps *out, lam_error *error) {
+    while (split > 1 && resolution / split < PART_LEAST) split--;
+    const size_t each = resolution / split, parts = split * split;
+    light_maps m = {.way = way, .split = split, .side = each + each % 2};
+    m.one = way == REUSE_MAPS ? m.side * m.side : 3 * m.side * m.side;
+    m.cells = parts * m.one;
     if (resolution > SIDE_MOST || m.cells > INT32_MAX / n)
-        return status_fail(error, LAM_ERR_ARGUMENT,
-                           "visibility maps of %zu cells a side for %zu positions: more than 2^31 cells",
-                           resolution, n);
+        return status_fail(
+            error, LAM_ERR_ARGUMENT,
+            "visibility maps of %zu cells a side for %zu positions of %zu parts: more than 2^31 "
+            "cells",
+            resolution, n, parts);
     if (way == REUSE_MAPS)
         m.cell = memory_allocate(n, m.cells * sizeof *m.cell, "visibility maps", error);
     else
         m.facet = memory_allocate(n, m.cells * sizeof *m.facet, "visibility maps", error);
     if (m.facet == NULL && m.cell == NULL) return LAM_ERR_MEMORY;
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t l = 0; l < n; l++) look(s, &frames[l], &m, l);
+    for (size_t k = 0; k < n * parts; k++) {
+        float middle[3];
+        light_pieces_middle(pieces, split, k % parts, middle);
+        look(s, &frames[k / parts], middle, &m, k * m.one);
+    }
     *out = m;
     return LAM_OK;
 }

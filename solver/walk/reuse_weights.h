@@ -16,9 +16,11 @@ typedef struct first_hits {
     uint32_t element[HITS_ROOM], facet[HITS_ROOM];
     uint32_t position[HITS_ROOM]; /* that the path belongs to */
     float local[3][HITS_ROOM];    /* the point of the light, before any pose */
-    float y[3][HITS_ROOM];        /* recentred */
-    float normal[3][HITS_ROOM];   /* at y */
-    uint64_t random[HITS_ROOM];   /* the stream of the walk */
+    int part[HITS_ROOM];          /* of the light that it is in, and the middle of that */
+    float middle[3][HITS_ROOM];
+    float y[3][HITS_ROOM];      /* recentred */
+    float normal[3][HITS_ROOM]; /* at y */
+    uint64_t random[HITS_ROOM]; /* the stream of the walk */
 } first_hits;
 
 /* A cell of a map. */
@@ -27,17 +29,26 @@ typedef struct map_cell {
     float distance; /* m */
 } map_cell;
 
-/* Visibility from the centres of all positions. */
+/* Visibility from the middles of split x split parts of the light at all positions. */
 typedef struct light_maps {
     reuse_way way;
-    size_t side;     /* cells of a map: maps side^2, hemicubes 3 side^2 */
-    size_t cells;    /* of a position */
-    map_cell *cell;  /* [s][cells]; hemicubes: NULL */
-    uint32_t *facet; /* [s][cells] of hemicubes, VISIBILITY_NOTHING where a ray leaves */
+    size_t split,
+        side; /* parts, and cells of a map, along a side: a map has side^2 cells, a hemicube 3 side^2 */
+    size_t one, cells; /* of a part, of a position */
+    map_cell *cell;    /* [s][split^2][one]; hemicubes: NULL */
+    uint32_t *facet;   /* the same of hemicubes, VISIBILITY_NOTHING where a ray leaves */
 } light_maps;
 
-lam_status light_maps_create(const walk_scene *s, size_t n, const light_frame *frames, reuse_way way,
-                             size_t resolution, light_maps *out, lam_error *error);
+/* The parts of a light, along a side, are so small beside a scene that each sees about what its middle sees:
+ * a tenth of the radius at most, but no more than 4. */
+size_t light_maps_split(const walk_scene *s, const moving_light *l, const light_pieces *p);
+
+/* `resolution` cells along a side of all maps of a position together, so that parts cost nothing; there are
+ * fewer than split^2 where one would have less than 32. Errors: LAM_ERR_ARGUMENT (too many cells),
+ * LAM_ERR_MEMORY. */
+lam_status light_maps_create(const walk_scene *s, size_t n, const light_frame *frames,
+                             const light_pieces *pieces, reuse_way way, size_t resolution, size_t split,
+                             light_maps *out, lam_error *error);
 void light_maps_free(light_maps *m);
 
 /* weight[k * n + l] = F(x_l, y_k) / sum_i N_i F(x_i, y_k) for the n positions l and the hits k: V is 1 from

@@ -1,6 +1,7 @@
 /* The ways to the light of all positions beside each other where something hides: the same light, the same
  * bits by any number of threads, and the same refusal. */
 #include "support/box.h"
+#include "support/dense.h"
 #include "support/moved_light.h"
 
 #include <math.h>
@@ -64,6 +65,45 @@ START_TEST(maps_come_close) {
 }
 END_TEST
 
+/* The same light with a fifth corner on one of its sides, which makes it one that has no parts. */
+static moving_light undivided(const moving_light *l) {
+    static const double corners[5][3] = {{0, 0, 0}, {0, .25, 0}, {.25, .25, 0}, {.25, .125, 0}, {.25, 0, 0}};
+    moving_light out;
+    lam_error error = {.message = ""};
+    double(*corner)[3] = test_allocate(5, sizeof *corner);
+    memcpy(corner, corners, sizeof corners);
+    ck_ok(moving_light_create(5, corner, &out, &error));
+    out.n = l->n;
+    out.pose = test_allocate(l->n, sizeof *out.pose);
+    for (size_t k = 0; k < l->n; k++) {
+        out.pose[k] = l->pose[k];
+        out.pose[k].name = strdup("a position");
+    }
+    memcpy(out.emission, l->emission, sizeof out.emission);
+    return out;
+}
+
+/* Parts of a large light have maps of their own, as many cells in all, and less bias. */
+START_TEST(parts_of_a_large_light_lower_the_bias) {
+    const reuse_way way = _i == 0 ? REUSE_MAPS : REUSE_CUBES;
+    mesh m = light_cornell();
+    moving_light l = light_curved(&m), whole = undivided(&l);
+    double off[2];
+    for (int k = 0; k < 2; k++) {
+        const moving_light *of = k == 0 ? &l : &whole;
+        reuse_estimates exact = reuse_by(&m, of, REUSE_EXACT, 8000, 0, 3),
+                        near = reuse_by(&m, of, way, 8000, 256, 3);
+        off[k] = distance(&near, &exact, &m);
+        reuse_estimates_free(&exact);
+        reuse_estimates_free(&near);
+    }
+    ck_assert_msg(off[0] < .6 * off[1], "%g in parts, %g as a whole", off[0], off[1]);
+    moving_light_free(&l);
+    moving_light_free(&whole);
+    mesh_free(&m);
+}
+END_TEST
+
 START_TEST(bits_do_not_depend_on_threads) {
     static const reuse_way ways[] = {REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES, REUSE_ELEMENTS};
     mesh m = light_cornell();
@@ -112,6 +152,7 @@ int main(void) {
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, rays_know_what_is_hidden, 0, 2);
     tcase_add_loop_test(tests, maps_come_close, 0, 2);
+    tcase_add_loop_test(tests, parts_of_a_large_light_lower_the_bias, 0, 2);
     tcase_add_loop_test(tests, bits_do_not_depend_on_threads, 0, 5);
     tcase_add_test(tests, a_position_that_sees_nothing_is_refused);
     suite_add_tcase(suite, tests);
