@@ -93,6 +93,24 @@ function quads(list) {
     };
 }
 
+test("an element is drawn with the corners inside its edges", async () => {
+    const { trianglesOf } = await sourceOf("picture/split_edges");
+    // A square of side 2 with corners in all of its edges, two of them in one.
+    const places = [[0, 0], [0.5, 0], [1.5, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1]];
+    for (const flat of [[1, 2, 4, 6, 8], [1], [2, 4], []]) {
+        const kept = places.map((_, k) => k).filter((k) => [0, 3, 5, 7].includes(k) || flat.includes(k));
+        const found = trianglesOf(kept, kept.map((k) => flat.includes(k)));
+        assert.equal(found.length, 3 * (kept.length - 2));
+        let area = 0;
+        for (let t = 0; t < found.length; t += 3) {
+            const [a, b, c] = found.slice(t, t + 3).map((k) => places[k]), own = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2;
+            assert.ok(own > 0, `a triangle of ${own}`);
+            area += own;
+        }
+        assert.equal(area, 4);
+    }
+});
+
 /** The value at a corner, and what it is made of. */
 function nodeAt(mesh, nodes, values, x, y) {
     const vertex = mesh.elementOf.findIndex((_, v) => mesh.positions[3 * v] === Math.fround(x) && mesh.positions[3 * v + 1] === Math.fround(y));
@@ -119,13 +137,28 @@ test("a corner inside an edge has the edge's value there", async () => {
     assert.equal(findNodes(quads([[0, 0, 1, 1], [1, 0, 1, 1], [0, 1, 1, 1], [1, 1, 1, 1]])).weights, null);
     // Another group, or a surface that stands upright, has no part in it.
     const apart = quads([[0, 0, 2, 2], [2, 0, 1, 1], [2, 1, 1, 1]]);
-    assert.equal(findNodes({ ...apart, groupOf: Uint32Array.of(0, 1, 1) }).weights, null);
-    assert.equal(findNodes({ ...apart, normals: apart.normals.map((v, k) => (k < 12 ? [0, 1, 0][k % 3] : v)) }).weights, null);
+    for (const other of [{ groupOf: Uint32Array.of(0, 1, 1) }, { normals: apart.normals.map((v, k) => (k < 12 ? [0, 1, 0][k % 3] : v)) }]) {
+        const changed = { ...apart, ...other }, own = findNodes(changed), within = [...own.inner.values()].flat();
+        close(nodeAt(changed, own, [1, 2, 4], 2, 1), (2 + 4) / 2);
+        // The large element is drawn with that corner, under its own light.
+        assert.deepEqual(within.map(({ along }) => along), [0.5]);
+        assert.deepEqual([...own.elements.subarray(own.first[within[0].node], own.first[within[0].node + 1])], [0, 0]);
+    }
     // Parts of 1/3 meet parts of 1/4: every corner of one hangs in an edge of the other, and none of them on itself.
     const thirds = [0, 1, 2].map((k) => [0, k * 4, 1, 4]), quarters = [0, 1, 2, 3].map((k) => [1, k * 3, 1, 3]);
     const crossed = quads([...thirds, ...quarters]), found = findNodes(crossed), light = [1, 1, 1, 1, 1, 1, 1];
     for (const y of [0, 3, 4, 6, 8, 9, 12]) close(nodeAt(crossed, found, light, 1, y), 1);
     close(nodeAt(crossed, found, [0, 8, 0, 0, 0, 0, 0], 1, 6), nodeAt(crossed, found, [0, 4, 0, 0, 0, 0, 0], 1, 4) + nodeAt(crossed, found, [0, 4, 0, 0, 0, 0, 0], 1, 8));
+});
+
+test("images keep to their elements, and their places in these", async () => {
+    const [{ findNodes }, { splitEdges }] = await Promise.all(["picture/nodes", "picture/split_edges"].map(sourceOf));
+    const mesh = quads([[0, 0, 2, 2], [2, 0, 1, 1], [2, 1, 1, 1]]), uv = Float32Array.from({ length: 24 }, (_, k) => mesh.positions[3 * (k >> 1) + k % 2]);
+    const index = Uint32Array.from([0, 1, 2].flatMap((e) => [0, 1, 2, 0, 2, 3].map((k) => 4 * e + k)));
+    const drawn = splitEdges({ ...mesh, index, uv, images: [{ first: 0, count: 6 }, { first: 6, count: 12 }] }, findNodes(mesh));
+    assert.deepEqual(drawn.images, [{ first: 0, count: 9 }, { first: 9, count: 12 }]);
+    assert.deepEqual([...drawn.index.subarray(9)], [...index.subarray(6)]);
+    assert.deepEqual([[...drawn.positions.subarray(36)], [...drawn.uv.subarray(24)], [...drawn.elementOf.subarray(12)]], [[2, 1, 0], [2, 1], [0]]);
 });
 
 test("smooth light has no step where elements of different sizes meet", async () => {
@@ -168,6 +201,23 @@ test("smooth light has no step where elements of different sizes meet", async ()
         }
         return out.sort((one, other) => other.step - one.step).slice(0, 12);
     });
+    // The box is closed where it is looked into: nothing of the background is seen through it.
+    const holes = await page.evaluate(() => {
+        const { stage } = window.lambert, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+        const bytes = new Uint8Array(4 * w * h);
+        stage.background = "#ff00ff";
+        stage.draw();
+        gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+        let found = 0;
+        for (let y = Math.round(0.15 * h); y < 0.9 * h; y++)
+            for (let x = Math.round(0.2 * w); x < 0.8 * w; x++) {
+                const k = 4 * (y * w + x);
+                if (bytes[k + 2] > bytes[k + 1] + 40 && bytes[k] > bytes[k + 1] + 10) found += 1;
+            }
+        return found;
+    });
+    console.log(`pixels that show the background: ${holes}`);
+    assert.equal(holes, 0);
     assert.ok(places.length >= 5, `${places.length} such places are seen`);
     let most = 0;
     for (const { sides: [inside, beyond] } of places) {

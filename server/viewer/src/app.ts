@@ -99,7 +99,7 @@ export class App {
         if (turn !== this.opening) return;
         const mesh = readMesh(file);
         this.stage.show(mesh, description.channels);
-        const picker = new Picker(this.stage.geometry as never, mesh);
+        const picker = new Picker(this.stage.geometry as never, this.stage.drawn ?? mesh);
         const scene = { description, mesh, picker, ownLighting: lightingOf(mesh, description) };
         takeIn(scene);
         this.scene = scene;

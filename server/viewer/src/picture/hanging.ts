@@ -17,6 +17,8 @@ interface Ties {
     at: number[];
     /** Of the edge, m. */
     length: number[];
+    /** Nodes that are added for corners of other surfaces. */
+    extra: number;
 }
 
 /** Gives hanging nodes the elements of their edge's ends, with weights. O(vertices), where edges meet few parts of others. */
@@ -46,18 +48,18 @@ function loneEdges(mesh: SceneMesh, { nodeOf, first, elements }: Nodes): number[
     return out;
 }
 
-/** The candidates by cubic cells of their group; each cell is a chain. */
+/** The candidates by cubic cells; each cell is a chain. */
 class Grid {
     private readonly heads: Int32Array;
     private readonly next: Int32Array;
 
-    constructor(private readonly mesh: SceneMesh, private readonly candidates: readonly number[], private readonly cell: number) {
+    constructor(mesh: SceneMesh, private readonly candidates: readonly number[], private readonly cell: number) {
         let slots = 16;
         while (slots < candidates.length) slots *= 2;
         this.heads = new Int32Array(slots).fill(-1);
         this.next = new Int32Array(candidates.length);
         candidates.forEach((v, i) => {
-            const p = mesh.positions, slot = this.slot(mesh.groupOf[mesh.elementOf[v]], this.cellOf(p[3 * v]), this.cellOf(p[3 * v + 1]), this.cellOf(p[3 * v + 2]));
+            const p = mesh.positions, slot = this.slot(this.cellOf(p[3 * v]), this.cellOf(p[3 * v + 1]), this.cellOf(p[3 * v + 2]));
             this.next[i] = this.heads[slot];
             this.heads[slot] = i;
         });
@@ -67,25 +69,24 @@ class Grid {
         return Math.floor(x / this.cell);
     }
 
-    private slot(group: number, x: number, y: number, z: number): number {
-        let hash = Math.imul(group ^ x, 0x9e3779b1);
+    private slot(x: number, y: number, z: number): number {
+        let hash = Math.imul(x, 0x9e3779b1);
         hash = Math.imul(hash ^ (hash >>> 15) ^ y, 0x85ebca6b);
         hash = Math.imul(hash ^ (hash >>> 13) ^ z, 0xc2b2ae35);
         return (hash ^ (hash >>> 16)) & (this.heads.length - 1);
     }
 
-    /** Visits the candidates of a group in the cells that a box meets, and others that share their place in the table. */
-    visit(group: number, low: readonly number[], high: readonly number[], visitor: (vertex: number) => void): void {
+    /** Visits the candidates in the cells that a box meets, and others that share their place in the table. */
+    visit(low: readonly number[], high: readonly number[], visitor: (vertex: number) => void): void {
         for (let x = this.cellOf(low[0]); x <= this.cellOf(high[0]); x++)
             for (let y = this.cellOf(low[1]); y <= this.cellOf(high[1]); y++)
                 for (let z = this.cellOf(low[2]); z <= this.cellOf(high[2]); z++)
-                    for (let i = this.heads[this.slot(group, x, y, z)]; i >= 0; i = this.next[i])
-                        if (this.mesh.groupOf[this.mesh.elementOf[this.candidates[i]]] === group) visitor(this.candidates[i]);
+                    for (let i = this.heads[this.slot(x, y, z)]; i >= 0; i = this.next[i]) visitor(this.candidates[i]);
     }
 }
 
-function findTies(mesh: SceneMesh, { nodeOf, count }: Nodes, edges: readonly number[]): Ties {
-    const { positions: p, normals: n } = mesh, ties: Ties = { node: [], from: [], to: [], at: [], length: [] };
+function findTies(mesh: SceneMesh, { nodeOf, count, inner }: Nodes, edges: readonly number[]): Ties {
+    const { positions: p, normals: n } = mesh, ties: Ties = { node: [], from: [], to: [], at: [], length: [], extra: 0 };
     const tieOf = new Int32Array(count).fill(-1), isCandidate = new Uint8Array(count), candidates: number[] = [];
     let total = 0, longest = 0, most = 0;
     for (let e = 0; e < edges.length; e += 2) {
@@ -102,24 +103,38 @@ function findTies(mesh: SceneMesh, { nodeOf, count }: Nodes, edges: readonly num
     const tolerance = Math.max(1e-6 * most, 1e-30);
     // Some cells for an edge, as small objects have many nodes, and no edge through more than some thousand cells.
     const cell = Math.max(total / (edges.length + 1), longest / 4096, 4 * tolerance), grid = new Grid(mesh, candidates, cell);
+    const groupOf = (vertex: number): number => mesh.groupOf[mesh.elementOf[vertex]];
     const low = [0, 0, 0], high = [0, 0, 0], way = [0, 0, 0];
     for (let e = 0; e < edges.length; e += 2) {
         const v = edges[e], w = edges[e + 1], a = 3 * v, b = 3 * w;
         for (let d = 0; d < 3; d++) way[d] = p[b + d] - p[a + d];
         const length = size(way[0], way[1], way[2]), pieces = Math.ceil(length / cell);
+        const add = (at: number, node: number, t: number, length: number): void => {
+            [ties.node[at], ties.from[at], ties.to[at], ties.at[at], ties.length[at]] = [node, nodeOf[v], nodeOf[w], t, length];
+        };
         const tie = (u: number): void => {
             const node = nodeOf[u], q = 3 * u, known = tieOf[node];
-            if (node === nodeOf[v] || node === nodeOf[w] || (known >= 0 && ties.length[known] >= length)) return;
+            if (node === nodeOf[v] || node === nodeOf[w]) return;
             const x = p[q] - p[a], y = p[q + 1] - p[a + 1], z = p[q + 2] - p[a + 2];
             const t = (x * way[0] + y * way[1] + z * way[2]) / (length * length);
             if (!(t * length > tolerance && (1 - t) * length > tolerance)) return;
             if (size(x - t * way[0], y - t * way[1], z - t * way[2]) > tolerance) return;
             const mx = n[a] + n[b], my = n[a + 1] + n[b + 1], mz = n[a + 2] + n[b + 2];
-            if (mx * n[q] + my * n[q + 1] + mz * n[q + 2] < SURFACE_COS * size(mx, my, mz)) return;
+            const isOwn = mx * n[q] + my * n[q + 1] + mz * n[q + 2] >= SURFACE_COS * size(mx, my, mz) && groupOf(u) === groupOf(v);
+            // An edge is drawn with all corners inside it; one of another surface has a node of its own there.
+            const within = inner.get(v) ?? [], same = within.find((other) => Math.abs(other.along - t) * length <= tolerance);
+            if (same === undefined) {
+                inner.set(v, [...within, { vertex: u, along: t, node: isOwn ? node : count + ties.extra }]);
+                if (!isOwn) add(ties.node.length, count + ties.extra++, t, length);
+            } else if (isOwn) {
+                same.node = node;
+            }
+            if (!isOwn) return;
             // The longest of several such edges wins.
+            if (known >= 0 && ties.length[known] >= length) return;
             const at = known >= 0 ? known : ties.node.length;
             tieOf[node] = at;
-            [ties.node[at], ties.from[at], ties.to[at], ties.at[at], ties.length[at]] = [node, nodeOf[v], nodeOf[w], t, length];
+            add(at, node, t, length);
         };
         for (let k = 0; k < pieces; k++) {
             for (let d = 0; d < 3; d++) {
@@ -127,7 +142,7 @@ function findTies(mesh: SceneMesh, { nodeOf, count }: Nodes, edges: readonly num
                 low[d] = Math.min(one, other) - tolerance;
                 high[d] = Math.max(one, other) + tolerance;
             }
-            grid.visit(mesh.groupOf[mesh.elementOf[v]], low, high, tie);
+            grid.visit(low, high, tie);
         }
     }
     return ties;
@@ -136,7 +151,7 @@ function findTies(mesh: SceneMesh, { nodeOf, count }: Nodes, edges: readonly num
 /** Takes the ties in, long edges first; one by which a node would hang on itself is left out: parts of 1/3 and of 1/4 of one
  * edge have such, and agree only where both have a node. */
 function withWeights(nodes: Nodes, ties: Ties): Nodes {
-    const tieOf = new Int32Array(nodes.count).fill(-1), order = ties.node.map((_, i) => i).sort((i, k) => ties.length[k] - ties.length[i]);
+    const count = nodes.count + ties.extra, tieOf = new Int32Array(count).fill(-1), order = ties.node.map((_, i) => i).sort((i, k) => ties.length[k] - ties.length[i]);
     const hangsOn = (from: number, on: number): boolean => {
         if (from === on) return true;
         if (tieOf[from] < 0) return false;
@@ -169,19 +184,19 @@ function withWeights(nodes: Nodes, ties: Ties): Nodes {
     };
     const countOf = (node: number): number => nodes.first[node + 1] - nodes.first[node], isFree = (node: number): boolean => tieOf[node] < 0;
     const isPlain = (i: number): boolean => isFree(ties.from[i]) && isFree(ties.to[i]);
-    const first = new Uint32Array(nodes.count + 1);
-    for (let node = 0; node < nodes.count; node++) {
+    const first = new Uint32Array(count + 1);
+    for (let node = 0; node < count; node++) {
         const i = tieOf[node];
         first[node + 1] = first[node] + (i < 0 ? countOf(node) : isPlain(i) ? countOf(ties.from[i]) + countOf(ties.to[i]) : listOf(node).size);
     }
-    const elements = new Uint32Array(first[nodes.count]), weights = new Float32Array(first[nodes.count]);
+    const elements = new Uint32Array(first[count]), weights = new Float32Array(first[count]);
     const put = (at: number, node: number, share: number): number => {
         const begin = nodes.first[node], count = countOf(node);
         elements.set(nodes.elements.subarray(begin, begin + count), at);
         weights.fill(share / count, at, at + count);
         return at + count;
     };
-    for (let node = 0; node < nodes.count; node++) {
+    for (let node = 0; node < count; node++) {
         const i = tieOf[node];
         let at = first[node];
         if (i < 0) put(at, node, 1);
@@ -192,5 +207,5 @@ function withWeights(nodes: Nodes, ties: Ties): Nodes {
                 weights[at++] = weight;
             }
     }
-    return { ...nodes, first, elements, weights };
+    return { ...nodes, count, first, elements, weights };
 }

@@ -13,6 +13,8 @@ export interface Nodes {
     elements: Uint32Array;
     /** Of each of `elements` its weight; null: nodes are plain means. */
     weights: Float32Array | null;
+    /** Of the edges that begin at these vertices, vertices of other elements inside them, where (0 to 1), and the node there. */
+    inner: Map<number, { vertex: number; along: number; node: number }[]>;
 }
 
 /** O(vertices), by a hash table of open addressing over the bits of the six numbers. */
@@ -52,7 +54,7 @@ export function findNodes(mesh: SceneMesh): Nodes {
     for (let i = 0; i < count; i++) first[i + 1] += first[i];
     const at = first.slice(0, count), elements = new Uint32Array(vertices);
     for (let v = 0; v < vertices; v++) elements[at[nodeOf[v]]++] = mesh.elementOf[v];
-    return tieHanging(mesh, { count, nodeOf, first, elements, weights: null });
+    return tieHanging(mesh, { count, nodeOf, first, elements, weights: null, inner: new Map() });
 }
 
 function isEqual(bits: Int32Array, a: number, b: number): boolean {

@@ -9,6 +9,7 @@ import type { Field } from "./field.ts";
 import { channelWeights } from "./field.ts";
 import type { SceneMesh } from "./glb.ts";
 import { findNodes } from "./nodes.ts";
+import { splitEdges, type Drawn } from "./split_edges.ts";
 import { makeUniforms, nodesMaterial, sceneMaterial, type Uniforms } from "./material.ts";
 import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor, whiteTexture } from "./textures.ts";
 
@@ -40,6 +41,7 @@ export class Stage {
     readonly uniforms: Uniforms;
     mesh: SceneMesh | null = null;
     geometry: BufferGeometry | null = null;
+    drawn: Drawn | null = null;
     /** Pictures drawn so far. */
     frames = 0;
     private readonly nothing = emptyTexture();
@@ -81,19 +83,19 @@ export class Stage {
 
     show(mesh: SceneMesh, channels: number): void {
         this.clear();
-        const nodes = findNodes(mesh);
-        const ids = new Uint32Array(2 * mesh.elementOf.length);
-        for (let v = 0; v < mesh.elementOf.length; v++) {
-            ids[2 * v] = mesh.elementOf[v];
-            ids[2 * v + 1] = nodes.nodeOf[v];
+        const nodes = findNodes(mesh), drawn = splitEdges(mesh, nodes), vertices = drawn.elementOf.length, ids = new Uint32Array(2 * vertices);
+        for (let v = 0; v < vertices; v++) {
+            ids[2 * v] = drawn.elementOf[v];
+            ids[2 * v + 1] = drawn.nodeOf[v];
         }
         const geometry = new BufferGeometry();
-        geometry.setAttribute("position", new BufferAttribute(mesh.positions, 3));
+        geometry.setAttribute("position", new BufferAttribute(drawn.positions, 3));
         geometry.setAttribute("ids", new BufferAttribute(ids, 2));
-        geometry.setIndex(new BufferAttribute(mesh.index, 1));
+        geometry.setIndex(new BufferAttribute(drawn.index, 1));
+        this.drawn = drawn;
         this.geometry = geometry;
         this.mesh = mesh;
-        const materials = this.addImages(geometry, mesh);
+        const materials = this.addImages(geometry, mesh, drawn);
         const body = new Mesh(geometry, materials);
         body.name = "scene";
         // Until the first answer all of it is black.
@@ -124,19 +126,19 @@ export class Stage {
     }
 
     /** The materials of the parts of the geometry: the first is that of all without an image. */
-    private addImages(geometry: BufferGeometry, mesh: SceneMesh): RawShaderMaterial[] {
+    private addImages(geometry: BufferGeometry, mesh: SceneMesh, drawn: Drawn): RawShaderMaterial[] {
         const white = whiteTexture(), materials = [sceneMaterial(this.uniforms, white, [1, 1, 1])];
         this.hasImages = false;
         let first = 0;
-        for (const image of mesh.images) {
+        for (const image of drawn.images) {
             if (image.first > first) geometry.addGroup(first, image.first - first, 0);
             geometry.addGroup(image.first, image.count, materials.length);
             materials.push(sceneMaterial(this.uniforms, white, image.factor));
             first = image.first + image.count;
         }
-        if (first < mesh.index.length) geometry.addGroup(first, mesh.index.length - first, 0);
-        if (mesh.uv === null || mesh.reflectance === null) return materials;
-        geometry.setAttribute("uv", new BufferAttribute(mesh.uv, 2));
+        if (first < drawn.index.length) geometry.addGroup(first, drawn.index.length - first, 0);
+        if (drawn.uv === null || mesh.reflectance === null) return materials;
+        geometry.setAttribute("uv", new BufferAttribute(drawn.uv, 2));
         this.uniforms.reflectance.value = floatTexture(mesh.reflectance);
         const anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
         // Until all are decoded, groups have their means; images that no browser can decode leave it at that.
@@ -268,6 +270,6 @@ export class Stage {
         this.images = [];
         for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance"])
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
-        this.geometry = this.mesh = this.values = this.nodes = null;
+        this.geometry = this.drawn = this.mesh = this.values = this.nodes = null;
     }
 }
