@@ -101,6 +101,10 @@ void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, 
     }
     walk_leave(filled, shape, share, w->place, rays, facet);
     visibility_cast_lifted(s->v, rays, n, self, facet, hits);
+    for (size_t j = n; j < filled; j++) {
+        hits[j / VISIBILITY_PACKET].element[j % VISIBILITY_PACKET] = VISIBILITY_NOTHING;
+        hits[j / VISIBILITY_PACKET].back[j % VISIBILITY_PACKET] = false;
+    }
 }
 
 void walk_stream_meet(const walk_scene *s, const walk_stream *w, size_t n, const hit_packet *hits,

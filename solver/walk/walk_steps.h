@@ -116,7 +116,7 @@ void walk_leave(size_t n, const walk_shape *const *shape, const float *share,
                 const uint32_t (*place)[WALK_STREAM], ray_packet *rays, uint32_t *facet);
 
 /* Casts the next rays of the first n walks of a stream from their places: packets of rays and of hits. Walks
- * beyond the n are overwritten. */
+ * beyond the n are overwritten and meet nothing. */
 void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, hit_packet *hits);
 
 /* A walk that has lost so many rays in a row is in a corner that single precision cannot leave: it ends. */
