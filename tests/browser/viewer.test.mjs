@@ -50,7 +50,10 @@ test("dragging a slider changes the picture as the numbers say", async () => {
     const box = await slider.boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     await page.mouse.down();
-    for (let step = 1; step <= 20; step++) await page.mouse.move(box.x + box.width * (0.5 - step / 60), box.y + box.height / 2);
+    for (let step = 1; step <= 20; step++) {
+        await page.mouse.move(box.x + box.width * (0.5 - step / 60), box.y + box.height / 2);
+        if (step === 10) await page.waitForTimeout(1600);  // longer than keys may pause within a step
+    }
     await page.mouse.up();
     await settled(page);
     const dim = await page.evaluate(() => window.lambert.store.now.lighting.dim);
@@ -60,7 +63,14 @@ test("dragging a slider changes the picture as the numbers say", async () => {
     near(last, toSrgb(B.map((v) => v * 2 ** -5)), 2);
     assert.ok(last[0] < first[0]);
     assert.ok(await page.evaluate(() => window.lambert.answers) > before);
-    // One drag is one step of undo.
+    // One drag is one step of undo, and another one at once another step.
+    await page.mouse.move(box.x + box.width / 4, box.y + box.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(box.x + box.width / 8, box.y + box.height / 2);
+    await page.mouse.up();
+    assert.ok(await page.evaluate(() => window.lambert.store.now.lighting.dim) < dim);
+    await page.keyboard.press("Control+z");
+    assert.equal(await page.evaluate(() => window.lambert.store.now.lighting.dim), dim);
     await page.keyboard.press("Control+z");
     assert.equal(await page.evaluate(() => window.lambert.store.now.lighting.dim), 1);
     await settled(page);

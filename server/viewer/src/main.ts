@@ -42,10 +42,18 @@ function start(): void {
     document.body.append(makeDrawer(app, panelMakers.map((makePanel) => makePanel(app))), makeStatus(app), makeTokenDialog(app, () => void begin(app)));
     setBackground(app);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setBackground(app));
+    holdSteps(app);
     keepLink(app);
     // For tests, and for those who look into the page.
     Object.assign(window, { lambert: app });
     void begin(app);
+}
+
+/** A slider may tell of its last value after its pointer is up. */
+function holdSteps(app: App): void {
+    const release = (): void => void setTimeout(() => app.store.hold(false));
+    window.addEventListener("pointerdown", () => app.store.hold(true), true);
+    for (const end of ["pointerup", "pointercancel", "blur"]) window.addEventListener(end, release, true);
 }
 
 async function begin(app: App): Promise<void> {

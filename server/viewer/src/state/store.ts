@@ -3,7 +3,7 @@ import type { State } from "./state.ts";
 
 type Listener = (now: State, before: State) => void;
 
-/** Changes with one tag that follow each other within this time are one step of undo: a slider that is dragged. */
+/** Changes with one tag that follow each other within this time are one step of undo: keys that are pressed again and again. */
 const ONE_STEP_MS = 1500;
 const STEPS_MOST = 200;
 
@@ -13,6 +13,7 @@ export class Store {
     private future: State[] = [];
     private lastTag: string | null = null;
     private lastTime = 0;
+    private held = false;
 
     constructor(private state: State) {}
 
@@ -29,13 +30,19 @@ export class Store {
     /** Makes a change that undo takes back. Changes of one tag in a row are one step. */
     change(to: State, tag: string | null = null): void {
         const time = performance.now();
-        const joins = tag !== null && tag === this.lastTag && time - this.lastTime < ONE_STEP_MS;
+        const joins = tag !== null && tag === this.lastTag && (this.held || time - this.lastTime < ONE_STEP_MS);
         if (!joins) this.past.push(this.state);
         if (this.past.length > STEPS_MOST) this.past.shift();
         this.future = [];
         this.lastTag = tag;
         this.lastTime = time;
         this.set(to);
+    }
+
+    /** A pointer is down, or up again: what it drags meanwhile is one step, however slowly, and another drag another one. */
+    hold(is: boolean): void {
+        if (this.held !== is) this.lastTag = null;
+        this.held = is;
     }
 
     /** Makes a change that is no step of undo: the camera, what the page finds out by itself. */
