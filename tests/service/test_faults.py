@@ -182,7 +182,7 @@ class Faults(unittest.TestCase):
                 self.gone(daemon)
                 held.append(controls.held())
             # Memory that is allocated once and kept is there after the first time round, and that of a thread which had nothing
-            # to do until then a time later. What a request holds back grows each time.
+            # to do until then a time later. Memory that a request holds back grows each time.
             self.assertLessEqual(min(after - before for before, after in zip(held, held[1:])), 8, held)
             self.assertGreater(refused, 10 * len(asked))
             for request, wanted in zip(asked, right):
