@@ -234,8 +234,8 @@ static const option_row resource_rows[] = {
      .preset = "3",
      .least = 1,
      .most = TRIALS_MOST,
-     .help = "Operators that are built at most until the errors that --epsilon and --group-error ask for are "
-             "kept"},
+     .help = "Operators that are built at most until the errors that --epsilon and --group-error ask for, or "
+             "without both that of which precompute warns, are kept"},
     {.name = "time",
      .kind = OPTION_NUMBER,
      .offset = FIELD(time),
