@@ -14,6 +14,7 @@ The emission is written to standard output, [n] for `lambert render --emission`;
 """
 import http.client
 import io
+import math
 import sys
 import time
 import urllib.parse
@@ -50,8 +51,20 @@ def elements_of(store, name):
     return np.flatnonzero(store["mesh/group"][()] == names.index(name))
 
 
+def number(text, least, name):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value < math.inf:
+        sys.exit(f"{name} {text}: must be a number of at least {least:g}")
+    return value
+
+
 def main(path, address, source, target, irradiance, weight="1e-4"):
-    asked, weight, scene = float(irradiance), float(weight), Scene(address)
+    asked, weight, scene = number(irradiance, 1e-30, "IRRADIANCE"), number(weight, 0, "WEIGHT"), Scene(address)
+    if source == target:
+        sys.exit(f"{source}: SOURCE and TARGET are one group, but what TARGET emits would be taken for light that comes to it")
     with h5py.File(path, "r") as store:
         sources, targets = elements_of(store, source), elements_of(store, target)
         area, reflectance = store["mesh/area"][()].astype(float), np.atleast_2d(store["mesh/reflectance"][()]).astype(float)
@@ -85,4 +98,7 @@ def main(path, address, source, target, irradiance, weight="1e-4"):
 if __name__ == "__main__":
     if len(sys.argv) not in (6, 7):
         sys.exit(__doc__)
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except (OSError, http.client.HTTPException) as error:  # of the store or of the connection
+        sys.exit(f"{sys.argv[1]}, {sys.argv[2]}: {error}")

@@ -69,7 +69,11 @@ class Inverse(unittest.TestCase):
 
     def test_words(self):
         for arguments, words in (((self.scene, "cieling", "floor", ASKED), b"no group is called cieling; there are floor, ceiling,"),
-                                 ((self.scene + "s", "ceiling", "floor", ASKED), b"no scene"), ((self.scene,), b"usage: ")):
+                                 ((self.scene + "s", "ceiling", "floor", ASKED), b"no scene"), ((self.scene,), b"usage: "),
+                                 ((self.scene, "ceiling", "floor", "nan"), b"IRRADIANCE nan: must be a number"),
+                                 ((self.scene, "ceiling", "floor", ASKED, -1), b"WEIGHT -1: must be a number of at least 0"),
+                                 ((self.scene, "ceiling", "ceiling", ASKED), b"ceiling: SOURCE and TARGET are one group"),
+                                 (("http://127.0.0.1:1/v1/scenes/box", "ceiling", "floor", ASKED), b"Connection refused")):
             done = self.run_example(*arguments)
             self.assertEqual(done.returncode, 1)
             self.assertIn(words, done.stderr)
