@@ -10,6 +10,7 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -220,6 +221,14 @@ static bool runs(pid_t pid) {
     return waitid(P_PID, (id_t)pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
 }
 
+/* The OpenMP of clang registers a process that is forked, by a file of shared memory, before any code of ours
+ * runs in it, and removes that only in handlers of exit. A later process of that number would crash by it. */
+static void forget_registration(pid_t pid) {
+    char name[64];
+    snprintf(name, sizeof name, "/__KMP_REGISTERED_LIB_%d_%d", (int)pid, (int)getuid());
+    shm_unlink(name);
+}
+
 lam_status confined_end(confined *c, bool answered, const char *path, int *how, lam_error *error) {
     const struct timespec pause = {.tv_nsec = 1000000};
     int status = 0;
@@ -232,12 +241,14 @@ lam_status confined_end(confined *c, bool answered, const char *path, int *how, 
     if (killed) kill(c->pid, SIGKILL);
     do ended = waitpid(c->pid, &status, 0);
     while (ended < 0 && errno == EINTR);
+    const int why = errno;
+    forget_registration(c->pid);
     *how = killed ? 0 : status;
     if (ended >= 0) return LAM_OK;
     return status_fail(error, LAM_ERR_IO,
                        "%s: the system does not tell how the process that reads it ended: %s; do not ignore "
                        "SIGCHLD",
-                       path, strerror(errno));
+                       path, strerror(why));
 }
 
 bool confined_send(int fd, const void *data, size_t bytes) {

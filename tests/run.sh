@@ -76,7 +76,9 @@ unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS
 wait "$clang" || { cat "$logs/clang"; total_failed=$((total_failed + 1)); }
 
 step "unit and contract tests by clang"
-run_ctest clang -L 'unit|contract' -j "$jobs"
+# In one process each: a child that ends without handlers of exit leaves a registration of clang's OpenMP in /dev/shm, and
+# a later process of its number crashes by it.
+CK_FORK=no run_ctest clang -L 'unit|contract' -j "$jobs"
 
 step "programs as users have them: faults, kills, an installation, the commands of all documents, the bench"
 run_ctest dev -j $((jobs + 1)) -L as_users

@@ -2,9 +2,12 @@
 #include "support/suite.h"
 
 #include "solver/scene/import/imported_faces.h"
+#include "store/confined.h"
 #include "support/scene.h"
 
+#include <dirent.h>
 #include <fcntl.h>
+#include <omp.h>
 #include <signal.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -160,12 +163,38 @@ START_TEST(child_is_survived) {
 }
 END_TEST
 
+static void do_nothing(void *context) {
+    (void)context;
+}
+
+/* The OpenMP of clang would leave some for each fork after its first use, by which a later process of the
+ * child's number crashes. */
+START_TEST(child_leaves_no_shared_memory) {
+    const confined_limits limits = {.cpu_seconds = 10, .all_seconds = 30, .memory_bytes = (size_t)64 << 20};
+    lam_error error;
+    confined child;
+    char number[32];
+    int how = 0;
+    ck_assert_int_ge(omp_get_max_threads(), 1);
+    ck_ok(confined_start(do_nothing, NULL, -1, &limits, folder, &child, &error));
+    ck_ok(confined_end(&child, false, folder, &how, &error));
+    ck_assert_int_eq(how, 0);
+    snprintf(number, sizeof number, "_%d_", (int)child.pid);
+    DIR *shared = opendir("/dev/shm");
+    ck_assert_ptr_nonnull(shared);
+    for (const struct dirent *e = readdir(shared); e != NULL; e = readdir(shared))
+        ck_assert_msg(strstr(e->d_name, number) == NULL, "%s", e->d_name);
+    closedir(shared);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("import_child");
     TCase *tests = tcase_create("import_child");
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, setup, teardown);
     tcase_add_test(tests, child_is_survived);
+    tcase_add_test(tests, child_leaves_no_shared_memory);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
