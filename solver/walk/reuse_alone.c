@@ -127,7 +127,8 @@ lam_status reuse_alone(const walk_scene *s, const reuse_problem *problem, const 
     TRY(reuse_sums_create(s->m, problem->light, false, &sums, error));
 #pragma omp parallel
     {
-        alone_batch b = {.r = &r, .sum = malloc(size * sizeof *b.sum)};
+        /* The numbers of an element in one line of a cache, where four of them fit. */
+        alone_batch b = {.r = &r, .sum = aligned_alloc(64, (size * sizeof *b.sum + 63) / 64 * 64)};
 #pragma omp for schedule(static, 1) ordered
         for (size_t k = 0; k < WALK_BATCHES; k++) {
             if (b.sum != NULL) {

@@ -49,6 +49,11 @@ static size_t refill(const walk_batch *b, walk_stream *w, size_t n, size_t n_fre
     return n;
 }
 
+/* Element 0 in place of VISIBILITY_NOTHING, without a branch, which would be mispredicted. */
+static inline size_t element_or_first(uint32_t element) {
+    return element & (uint32_t) - (int)(element != VISIBILITY_NOTHING);
+}
+
 /* Takes n walks to what they have met. Walks that end leave free places, in ascending order; returns how
  * many. */
 static size_t advance(const walk_scene *s, walk_stream *w, size_t n, const uint32_t *met,
@@ -57,7 +62,7 @@ static size_t advance(const walk_scene *s, walk_stream *w, size_t n, const uint3
     uint32_t alive[WALK_STREAM];
     size_t n_free = 0;
     for (size_t i = 0; i < n; i++) {
-        const walk_colour *colour = &s->reflectance[met[i] == VISIBILITY_NOTHING ? 0 : met[i]];
+        const walk_colour *colour = &s->reflectance[element_or_first(met[i])];
         for (int c = 0; c < WALK_CHANNELS; c++) reflectance[c][i] = colour->of[c];
     }
     walk_stream_survive(w, n, met, again, reflectance, alive);
@@ -97,7 +102,7 @@ void walk_batch_go(const walk_batch *b) {
         if (b->rays != NULL) *b->rays += (double)n;
         walk_stream_meet(b->scene, &w, n, hits, met, again);
         for (size_t i = 0; i < n; i++) {
-            const size_t at = met[i] == VISIBILITY_NOTHING ? 0 : met[i];
+            const size_t at = element_or_first(met[i]);
             __builtin_prefetch(&b->scene->reflectance[at]);
             __builtin_prefetch(&b->scene->shapes[at]);
         }

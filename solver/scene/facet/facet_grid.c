@@ -367,8 +367,8 @@ static uint32_t choose(const facet_candidate *c, float x, float y) {
 void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,
                       uint32_t *element) {
     float x[FACET_SEARCHES], y[FACET_SEARCHES]; /* in their cells */
-    uint32_t cell[FACET_SEARCHES];
-    bool open = false;
+    uint32_t cell[FACET_SEARCHES], open[FACET_SEARCHES];
+    size_t n_open = 0;
     /* All searches advance step by step together, so that their cache misses overlap. */
     for (size_t i = 0; i < n; i++) {
         const piece_place *p = &g->pieces[piece[i]];
@@ -380,18 +380,18 @@ void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, con
         cell[i] = p->first + row * p->nx + column;
         __builtin_prefetch(&g->cells[cell[i]]);
     }
+    /* Cells that no element fills are listed without branches, which would be mispredicted. */
     for (size_t i = 0; i < n; i++) {
         cell[i] = g->cells[cell[i]];
         element[i] = cell[i] & ~CELL_FILLED;
-        open |= (cell[i] == CELL_EMPTY) | ((cell[i] & CELL_FILLED) == 0);
+        open[n_open] = (uint32_t)i;
+        n_open += (cell[i] == CELL_EMPTY) | ((cell[i] & CELL_FILLED) == 0);
     }
-    if (!open) return;
-    for (size_t i = 0; i < n; i++)
-        if ((cell[i] & CELL_FILLED) == 0) __builtin_prefetch(&g->candidates[cell[i]]);
-    for (size_t i = 0; i < n; i++) {
-        if (cell[i] == CELL_EMPTY)
-            element[i] = g->grids[g->pieces[piece[i]].grid].element;
-        else if ((cell[i] & CELL_FILLED) == 0)
-            element[i] = choose(&g->candidates[cell[i]], x[i], y[i]);
+    for (size_t k = 0; k < n_open; k++)
+        if (cell[open[k]] != CELL_EMPTY) __builtin_prefetch(&g->candidates[cell[open[k]]]);
+    for (size_t k = 0; k < n_open; k++) {
+        const uint32_t i = open[k];
+        element[i] = cell[i] == CELL_EMPTY ? g->grids[g->pieces[piece[i]].grid].element
+                                           : choose(&g->candidates[cell[i]], x[i], y[i]);
     }
 }
