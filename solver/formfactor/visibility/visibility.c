@@ -1,7 +1,6 @@
 #include "solver/formfactor/visibility/visibility_private.h"
 
 #include <math.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -139,23 +138,6 @@ typedef struct cast_context {
     const visibility *visibility;
     bool cull_back;
 } cast_context;
-
-/* The places of the arrays in Embree's packets, in units of the width: the same for packets of any width. */
-enum {
-    RAY_DIRECTION = offsetof(struct RTCRay8, dir_x) / (8 * sizeof(float)),
-    RAY_DISTANCE = offsetof(struct RTCRay8, tfar) / (8 * sizeof(float)),
-    RAY_ID = offsetof(struct RTCRay8, id) / (8 * sizeof(unsigned)),
-    HIT_PRIMITIVE = offsetof(struct RTCHit8, primID) / (8 * sizeof(unsigned)),
-    HIT_GEOMETRY = offsetof(struct RTCHit8, geomID) / (8 * sizeof(unsigned)),
-};
-
-/* True for a hit in the ray's own plane at its origin: either the element's other side, modelled as a face of
- * its own, or the bottom of an object that stands on the element and occludes the ray by its other faces
- * anyway. */
-static bool in_own_plane(const visibility *v, uint32_t facet, uint32_t own, float travelled) {
-    const float *n = v->facets.normal[own], *m = v->facets.normal[facet];
-    return travelled <= v->rounding && fabsf(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) > 1 - 1e-6f;
-}
 
 /* Rejects hits on the facet that a ray leaves, whose index is the ray's id, on faces in its plane, and on
  * culled backs. Nine rays of ten hit their own facet at distance 0: rejecting that inside the traversal
@@ -421,87 +403,4 @@ void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t 
         if (open.n > FACET_SEARCHES - VISIBILITY_PACKET) find_elements(v, &open, hits);
     }
     if (open.n > 0) find_elements(v, &open, hits);
-}
-
-/* The data of the filter of segments: the facets at both ends, by lane, which is the segment's id. */
-typedef struct segment_context {
-    struct RTCIntersectContext embree;
-    const visibility *visibility;
-    uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET]; /* facets */
-} segment_context;
-
-/* Rejects hits on the facets at both ends of a segment and on faces in their planes at the ends. */
-static void refuse_both_ends(const struct RTCFilterFunctionNArguments *args) {
-    const segment_context *context = (const segment_context *)args->context;
-    const visibility *v = context->visibility;
-    const size_t n = args->N;
-    const float *direction = (const float *)args->ray + RAY_DIRECTION * n;
-    const float *distance = (const float *)args->ray + RAY_DISTANCE * n;
-    const unsigned *lane = (const unsigned *)args->ray + RAY_ID * n;
-    const unsigned *id = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
-    const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
-    for (size_t i = 0; i < n; i++) {
-        if (args->valid[i] == 0) continue;
-        const uint32_t facet = facet_of(v, geometry[i], id[i]);
-        const uint32_t from = context->from[lane[i]], to = context->to[lane[i]];
-        const float along =
-            fabsf(along_normal(v, facet, direction[i], direction[n + i], direction[2 * n + i]));
-        if (facet == from || facet == to || in_own_plane(v, facet, from, distance[i] * along) ||
-            in_own_plane(v, facet, to, (1 - distance[i]) * along))
-            args->valid[i] = 0;
-    }
-}
-
-/* Moves both ends above their elements' planes by more than rounding: nearly all segments then meet neither
- * of these elements, and the filter is not called for them, which would take a fifth of all time. */
-static void lift_ends(const visibility *v, uint32_t from, uint32_t to, size_t lane,
-                      struct RTCRayHit8 *packet) {
-    const float height = 2 * v->rounding;
-    const float *n = v->mesh->normal[from], *m = v->mesh->normal[to];
-    packet->ray.org_x[lane] += height * n[0];
-    packet->ray.org_y[lane] += height * n[1];
-    packet->ray.org_z[lane] += height * n[2];
-    packet->ray.dir_x[lane] += height * (m[0] - n[0]);
-    packet->ray.dir_y[lane] += height * (m[1] - n[1]);
-    packet->ray.dir_z[lane] += height * (m[2] - n[2]);
-}
-
-unsigned visibility_blocked(const visibility *v, const ray_packet *segments, size_t n_segments,
-                            const uint32_t *from, const uint32_t *to) {
-    struct RTCRayHit8 packet __attribute__((aligned(32)));
-    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
-    segment_context context = {.visibility = v};
-    rtcInitIntersectContext(&context.embree);
-    context.embree.filter = refuse_both_ends;
-    packet_set(&packet, segments);
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-        active[i] = i < n_segments ? -1 : 0;
-        packet.ray.tfar[i] = 1;
-        packet.ray.id[i] = (unsigned)i;
-        if (i >= n_segments) continue;
-        lift_ends(v, from[i], to[i], i, &packet);
-        context.from[i] = v->facets.of_element[from[i] < v->n_fronts ? from[i] : from[i] - v->n_fronts];
-        context.to[i] = v->facets.of_element[to[i] < v->n_fronts ? to[i] : to[i] - v->n_fronts];
-    }
-    rtcOccluded8(active, v->scene, &context.embree, &packet.ray);
-    unsigned blocked = 0;
-    for (size_t i = 0; i < n_segments; i++) blocked |= (unsigned)(packet.ray.tfar[i] < 0) << i;
-    return blocked;
-}
-
-unsigned visibility_between(const visibility *v, const ray_packet *segments, size_t n_segments) {
-    struct RTCRayHit8 packet __attribute__((aligned(32)));
-    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
-    struct RTCIntersectContext context;
-    unsigned blocked = 0;
-    rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    packet_set(&packet, segments);
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-        active[i] = i < n_segments ? -1 : 0;
-        packet.ray.tfar[i] = 1;
-    }
-    rtcOccluded8(active, v->scene, &context, &packet.ray);
-    for (size_t i = 0; i < n_segments; i++) blocked |= (unsigned)(packet.ray.tfar[i] < 0) << i;
-    return blocked;
 }

@@ -1,5 +1,5 @@
-/* Ray casting and visibility segments over a mesh: the only file that knows Embree. Immutable once created,
- * so that any number of threads may cast. */
+/* Ray casting and visibility segments over a mesh: this and its parts alone know Embree. Immutable once
+ * created, so that any number of threads may cast. */
 #ifndef LAMBERT_FORMFACTOR_VISIBILITY_VISIBILITY_H
 #define LAMBERT_FORMFACTOR_VISIBILITY_VISIBILITY_H
 

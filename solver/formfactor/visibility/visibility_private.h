@@ -8,6 +8,7 @@
 #include <embree3/rtcore.h>
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 /* Triangles and quads are two Embree geometries; primitives maps (geometry, primitive) to facets and
@@ -42,6 +43,23 @@ static inline float along_normal(const visibility *v, uint32_t facet, float x, f
 
 static inline uint32_t facet_of(const visibility *v, unsigned geometry, unsigned id) {
     return v->primitives[geometry][id].facet;
+}
+
+/* The places of the arrays in Embree's packets, in units of the width: the same for packets of any width. */
+enum {
+    RAY_DIRECTION = offsetof(struct RTCRay8, dir_x) / (8 * sizeof(float)),
+    RAY_DISTANCE = offsetof(struct RTCRay8, tfar) / (8 * sizeof(float)),
+    RAY_ID = offsetof(struct RTCRay8, id) / (8 * sizeof(unsigned)),
+    HIT_PRIMITIVE = offsetof(struct RTCHit8, primID) / (8 * sizeof(unsigned)),
+    HIT_GEOMETRY = offsetof(struct RTCHit8, geomID) / (8 * sizeof(unsigned)),
+};
+
+/* True for a hit in the ray's own plane at its origin: either the element's other side, modelled as a face of
+ * its own, or the bottom of an object that stands on the element and occludes the ray by its other faces
+ * anyway. */
+static inline bool in_own_plane(const visibility *v, uint32_t facet, uint32_t own, float travelled) {
+    const float *n = v->facets.normal[own], *m = v->facets.normal[facet];
+    return travelled <= v->rounding && fabsf(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) > 1 - 1e-6f;
 }
 
 static inline void packet_set(struct RTCRayHit8 *ray, const ray_packet *rays) {
