@@ -29,6 +29,8 @@ export class Cameras {
     private readonly controls: CameraControls;
     private readonly held = new Set<string>();
     private box = new Box3();
+    /** The nearest that is drawn from inside, m. */
+    private nearest = 0.01;
     private isWalk = false;
 
     constructor(canvas: HTMLCanvasElement, private readonly moved: () => void, private readonly rested: () => void) {
@@ -47,7 +49,7 @@ export class Cameras {
     setBounds(box: Box3): void {
         this.box = box;
         const size = Math.max(1e-3, box.getSize(new Vector3()).length());
-        this.camera.near = size / 5000;
+        this.nearest = size / 5000;
         this.camera.far = size * 20;
         this.camera.updateProjectionMatrix();
         this.controls.maxDistance = size * 8;
@@ -108,7 +110,18 @@ export class Cameras {
     /** True if the camera goes on moving. */
     advance(seconds: number): boolean {
         if (this.held.size > 0) this.step(seconds);
-        return this.controls.update(seconds) || this.held.size > 0;
+        const moves = this.controls.update(seconds);
+        this.setNear();
+        return moves || this.held.size > 0;
+    }
+
+    /** Depths z are parted by z² / (near · 2^24): from outside the nearest plane stands between eye and scene, far from the eye. An
+     * eighth of the way is before all that even a wide picture sees at its corners. */
+    private setNear(): void {
+        const { camera } = this, near = Math.max(this.nearest, this.box.distanceToPoint(camera.position) / 8);
+        if (Math.abs(near - camera.near) <= 0.01 * near) return;
+        camera.near = near;
+        camera.updateProjectionMatrix();
     }
 
     private step(seconds: number): void {

@@ -83,8 +83,9 @@ uniform bool is_smooth;
 in vec3 position;
 in vec2 uv;
 in uvec2 ids; // element, node
-out vec3 colour_a, colour_b;
-out vec2 place_in_image;
+// Where a pixel's middle is outside a triangle, light is taken inside: a narrow one would have it far off its corners' there.
+centroid out vec3 colour_a, colour_b;
+centroid out vec2 place_in_image;
 flat out int element;
 
 vec3 node_colour(sampler2D nodes, int i) {
@@ -131,8 +132,8 @@ uniform sampler2D judged;     // 1 where the threshold judges an element
 uniform bool is_textured;
 uniform sampler2D image;
 uniform vec3 factor;
-in vec3 colour_a, colour_b;
-in vec2 place_in_image;
+centroid in vec3 colour_a, colour_b;
+centroid in vec2 place_in_image;
 flat in int element;
 layout(location = 0) out vec4 pixel;
 
