@@ -126,7 +126,7 @@ export async function openPage(address, { width = 1280, height = 800, hash = "",
         // A daemon that is gone, or a token that is missing, is told by the browser itself.
         if (message.type() === "error" && !/Failed to load resource/.test(message.text())) page.faults.push(message.text());
     });
-    await page.goto(`${address}/${hash}`);
+    await page.goto(`${address}/?inspect${hash}`);
     if (wait) await settled(page);
     return page;
 }

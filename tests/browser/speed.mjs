@@ -95,7 +95,7 @@ test("speed", async () => {
         const { elements, channels } = await page.evaluate(() => window.lambert.scene.description);
         for (let i = 0; i < 5; i++) {
             const start = performance.now();
-            await page.goto(`${daemon.address}/?${i}`);
+            await page.goto(`${daemon.address}/?inspect&${i}`);
             await settled(page);
             firsts.push(performance.now() - start);
         }

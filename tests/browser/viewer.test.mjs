@@ -36,6 +36,11 @@ test("pixels are the daemon's numbers", async () => {
         // Half precision is 2^-11, a step of 255 is 1/255: one step of rounding, one of antialiasing at an edge.
         near(await pixel(page, x, y), toSrgb(B.map((v) => v * 2 ** -5)), 2);
     }
+    // The page's own objects are for tests alone, which ask for them in the address.
+    const plain = await page.context().newPage();
+    await plain.goto(daemon.address);
+    await plain.getByText(/solve/).first().waitFor();
+    assert.equal(await plain.evaluate(() => typeof window.lambert), "undefined");
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });

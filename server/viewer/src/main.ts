@@ -44,8 +44,8 @@ function start(): void {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setBackground(app));
     holdSteps(app);
     keepLink(app);
-    // For tests, and for those who look into the page.
-    Object.assign(window, { lambert: app });
+    // For tests, and for those who look into the page by the browser's console.
+    if (new URLSearchParams(location.search).has("inspect")) Object.assign(window, { lambert: app });
     void begin(app);
 }
 
