@@ -98,6 +98,58 @@ test("skies without weather have the light that they are given", async () => {
     assert.ok(night.sun.altitude < 0 && night.diffuse.every((v) => v === 0) && night.direct.every((v) => v === 0));
 });
 
+/** Rigollier, Bauer and Wald 2000 by hand, at one astronomical unit: altitude, turbidity; light facing the sun and diffuse light, W/m². */
+const TURBID = [[90, 3, 998.3622, 107.8924], [60, 2, 1080.5055, 65.3644], [60, 7, 600.1684, 283.9284], [30, 3, 800.9181, 89.7986], [10, 5, 232.8363, 66.1409],
+    [2, 3, 173.0286, 19.1081], [0.5, 7, 4.239, 6.9207], [-1, 3, 0, 0]];
+
+test("a clear sky has the light of its turbidity, and a given one that which it is given", async () => {
+    for (const [degrees, turbidity, direct, diffuse] of TURBID) {
+        const day = daylight.turbidDay({ altitude: (degrees * Math.PI) / 180, distance: 1 }, turbidity);
+        assert.ok(Math.abs(day.direct - direct) < 1e-4 && Math.abs(day.diffuse - diffuse) < 1e-4, `${degrees} degrees, ${turbidity}: ${JSON.stringify(day)}`);
+    }
+    const source = new daylight.SkySource();
+    source.take(await daemon.json("/v1/scenes/patio/sky"));
+    const close = (a, b) => assert.ok(Math.abs(a - b) <= 1e-9 * Math.abs(b), `${a} must be ${b}`);
+    for (const hour of [6.5, 9, 12, 17]) {
+        const { sun, ...sky } = source.sky(lightOf({ model: "turbid", turbidity: 4, hour }), false), day = daylight.turbidDay(sun, 4);
+        close(sky.diffuseHorizontal, day.diffuse);
+        close(sky.directHorizontal, day.direct * sun.direction[2]);
+        const given = source.sky(lightOf({ model: "given", ...day, hour }), false);
+        close(given.perez.clearness, sky.perez.clearness);
+        given.diffuse.forEach((v, t) => close(v, sky.diffuse[t]));
+    }
+    // Skies of the same two irradiances are one sky, whether these come from a weather file or not; the sun of its year stands elsewhere by some .1 degrees.
+    assert.ok(source.read(wea(), false));
+    for (const photometric of [false, true]) {
+        const [hour, direct, diffuse] = [12.5, ...HOURS.find(([m, d, h]) => m === 6 && d === 21 && h === 12.5).slice(3)];
+        const at = { day: 172, hour, sun: "tile" }, [one, other] = [{ model: "perez" }, { model: "given", direct, diffuse }].map((sky) => source.radiances(lightOf({ ...at, ...sky }), photometric, 1));
+        one.forEach((v, t) => assert.ok(Math.abs(other[t] - v) <= 2e-3 * v, `tile ${t}: ${other[t]}, not ${v}`));
+    }
+});
+
+test("turbidity and irradiances are set on the page, and the figures say what they give", async () => {
+    const page = await openScene("yard");
+    await page.getByRole("tab", { name: "Sky" }).click();
+    const panel = page.locator("#panel-sky"), figure = async (name) => Number((await panel.locator(`[data-sky=${name}]`).innerText()).replace(/[^0-9.].*$/, ""));
+    await panel.getByRole("combobox", { name: "Sky" }).selectOption("turbid");
+    await settled(page);
+    const clear = [await figure("direct"), await figure("diffuse"), await figure("clearness")];
+    await panel.getByRole("spinbutton", { name: "Turbidity in T" }).fill("6");
+    await page.keyboard.press("Enter");
+    await settled(page);
+    const hazy = [await figure("direct"), await figure("diffuse"), await figure("clearness")];
+    assert.ok(hazy[0] < 0.8 * clear[0] && hazy[1] > 1.5 * clear[1] && hazy[2] < clear[2], `${clear}; ${hazy}`);
+    await panel.getByRole("combobox", { name: "Sky" }).selectOption("given");
+    await panel.getByRole("spinbutton", { name: "Facing the sun in W/m²" }).fill("0");
+    await panel.getByRole("spinbutton", { name: "Sky on the ground in W/m²" }).fill("250");
+    await page.keyboard.press("Enter");
+    await settled(page);
+    assert.deepEqual([await figure("direct"), await figure("diffuse"), await figure("clearness")], [0, 250, 1]);
+    assert.deepEqual(await violations(page), []);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
 const skyTo = (page, to) => page.evaluate((sky) => {
     const { store } = window.lambert;
     store.change({ ...store.now, lighting: { ...store.now.lighting, sky: { ...store.now.lighting.sky, ...sky } } });

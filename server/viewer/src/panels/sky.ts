@@ -145,12 +145,17 @@ interface Controls {
 
 function makeControls(app: App, change: Change): Controls {
     const first = skyOff;
-    const model = choice("Sky", [["off", "None"], ["overcast", "Overcast (CIE)"], ["clear", "Clear (CIE)"], ["even", "Even"], ["perez", "Of a weather file (Perez)"]],
+    const model = choice("Sky", [["off", "None"], ["overcast", "Overcast (CIE)"], ["clear", "Clear (CIE)"],
+        ["turbid", "Clear, by turbidity (Linke)"], ["given", "By direct and diffuse light (Perez)"], ["even", "Even"], ["perez", "Of a weather file (Perez)"]],
         first.model, (to) => change({ model: to }));
     const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]], first.sun, (to) => change({ sun: to }));
     const tinted = tick("Blue sky, warm sun", first.tinted, (on) => change({ tinted: on }));
     const unit = (): string => (app.store.now.view.unit === "lx" ? "lx" : "W/m²");
     const strength = slider({ label: "On the ground", unit: unit(), least: 0, most: 1000, log: true, change: (value) => change({ strength: value }, "strength of the sky") }, first.strength);
+    const turbidity = slider({ label: "Turbidity", unit: "T", least: 1.5, most: 8, step: 0.1, change: (value) => change({ turbidity: Math.min(20, Math.max(1, value)) }, "turbidity of the sky") }, first.turbidity);
+    const haze = make("p", { class: "hint" }, "2: very clean, cold air; 3: clear; 5: hazy; 7: polluted.");
+    const direct = slider({ label: "Facing the sun", unit: "W/m²", least: 0, most: 1100, step: 5, change: (value) => change({ direct: Math.min(3000, value) }, "direct light") }, first.direct);
+    const diffuse = slider({ label: "Sky on the ground", unit: "W/m²", least: 0, most: 600, step: 5, change: (value) => change({ diffuse: Math.min(3000, value) }, "diffuse light") }, first.diffuse);
     const factor = slider({ label: "Times", unit: "×", least: 0, most: 3, step: 0.01, change: (value) => change({ factor: value }, "factor of the sky") }, first.factor);
     const day = slider({ label: "Day", unit: "of 365", least: 1, most: 365, step: 1, change: (value) => change({ day: Math.min(365, Math.round(value)) }, "day of the sky") }, first.day);
     const hour = slider({ label: "Hour", unit: "h", least: 0, most: 24, step: 0.05, change: (value) => change({ hour: Math.min(24, value) }, "hour of the sky") }, first.hour);
@@ -167,14 +172,16 @@ function makeControls(app: App, change: Change): Controls {
         strength.element.hidden = !isPlain;
         factor.element.hidden = isPlain || light.model === "off";
         sun.hidden = factor.element.hidden;
+        turbidity.element.hidden = haze.hidden = light.model !== "turbid";
+        direct.element.hidden = diffuse.element.hidden = light.model !== "given";
         tinted.hidden = app.scene?.description.channels !== 3 || light.model === "off";
         strength.setMost(Math.max(app.store.now.view.unit === "lx" ? 1e5 : 1000, light.strength));
         (strength.element.querySelector(".unit") as HTMLElement).textContent = unit();
-        for (const [one, value] of [[strength, light.strength], [factor, light.factor], [day, light.day], [hour, light.hour], [latitude, light.latitude],
+        for (const [one, value] of [[strength, light.strength], [factor, light.factor], [turbidity, light.turbidity], [direct, light.direct], [diffuse, light.diffuse], [day, light.day], [hour, light.hour], [latitude, light.latitude],
             [longitude, light.longitude], [zone, light.zone]] as const) one.set(value);
     };
     return {
-        model, strength: make("div", {}, strength.element, factor.element, sun, tinted), time: make("div", {}, day.element, jumps, hour.element),
+        model, strength: make("div", {}, strength.element, turbidity.element, haze, direct.element, diffuse.element, factor.element, sun, tinted), time: make("div", {}, day.element, jumps, hour.element),
         place: make("div", {}, make("h2", {}, "Place"), latitude.element, longitude.element, zone.element), update,
     };
 }
@@ -229,6 +236,8 @@ function drawFigures(table: HTMLTableElement, dome: HTMLElement, light: SkyLight
         ["Sun's altitude", sun.altitude > 0 ? altitude : `${altitude}, below the horizon`, "altitude"], ["Sun's azimuth", windOf(sun.azimuth), "azimuth"],
         ["Sky on the ground", sky === null ? "–" : `${tell(sky.diffuseHorizontal)} ${unit}`, "diffuse"],
         ["Sun on the ground", sky === null ? "–" : `${tell(sky.directHorizontal)} ${unit}`, "direct"]];
+    if (sky !== null && sky.perez !== null)
+        rows.push(["Clearness ε", Number.isFinite(sky.perez.clearness) ? sky.perez.clearness.toFixed(2) : "no diffuse light", "clearness"], ["Brightness Δ", sky.perez.brightness.toFixed(3), "brightness"]);
     fill(table, make("tbody", {}, ...rows.map(([name, text, figure]) => make("tr", {}, make("th", { scope: "row" }, name), make("td", { "data-sky": figure }, text)))));
     dome.setAttribute("aria-label", `Map of the sky, north above: sun at altitude ${altitude}, azimuth ${windOf(sun.azimuth)}.`);
 }

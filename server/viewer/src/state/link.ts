@@ -1,5 +1,5 @@
 // The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
-import { firstLighting, firstState, firstView, skyOff, type Lighting, type Moment, type Place, type SkyLight, type State, type View } from "./state.ts";
+import { firstLighting, firstState, firstView, SKY_MODELS, skyOff, type Lighting, type Moment, type Place, type SkyLight, type State, type View } from "./state.ts";
 
 type Plain = { [name: string]: unknown };
 
@@ -48,8 +48,9 @@ function restoreMoment(given: unknown): Moment | null {
 function restoreSky(given: unknown): SkyLight {
     const out = restore(skyOff, given, ["moment"]);
     return {
-        model: (["overcast", "clear", "even", "perez"] as const).find((model) => model === out.model) ?? "off",
+        model: SKY_MODELS.find((model) => model === out.model) ?? "off",
         strength: held(out.strength, skyOff.strength, 0, 1e6), factor: held(out.factor, 1, 0, 1e3),
+        turbidity: held(out.turbidity, skyOff.turbidity, 1, 20), direct: held(out.direct, skyOff.direct, 0, 3000), diffuse: held(out.diffuse, skyOff.diffuse, 0, 3000),
         sun: (["tile", "off"] as const).find((sun) => sun === out.sun) ?? "spread", tinted: out.tinted,
         latitude: held(out.latitude, skyOff.latitude, -90, 90), longitude: held(out.longitude, skyOff.longitude, -180, 180),
         zone: held(out.zone, skyOff.zone, -14, 14), day: Math.round(held(out.day, skyOff.day, 1, 365)),

@@ -26,13 +26,21 @@ export interface Moment {
     dewPoint: number | null;
 }
 
+export const SKY_MODELS = ["off", "overcast", "clear", "turbid", "given", "even", "perez"] as const;
+export type SkyModel = (typeof SKY_MODELS)[number];
+
 export interface SkyLight {
-    /** "perez" is that of a weather file. */
-    model: "off" | "overcast" | "clear" | "even" | "perez";
+    /** "turbid" is a clear day of a turbidity, "given" has the two irradiances below, "perez" is that of a weather file. */
+    model: SkyModel;
     /** Horizontal irradiance of an even or overcast sky, in the store's unit. */
     strength: number;
     /** Of the light of a clear sky, or of the weather file. */
     factor: number;
+    /** Of Linke: as many clean and dry atmospheres dim the sun as much. */
+    turbidity: number;
+    /** W/m² of a given sky: direct light facing the sun, and diffuse light on the ground. */
+    direct: number;
+    diffuse: number;
     /** The sun is in one tile, spread over those near it, or left out. */
     sun: "tile" | "spread" | "off";
     /** Where the store has channels, the sky is bluish and the sun warm. */
@@ -125,7 +133,7 @@ export interface State {
 }
 
 export const skyOff: SkyLight = {
-    model: "off", strength: 100, factor: 1, sun: "spread", tinted: false, latitude: 48, longitude: 11, zone: 1, day: 172, hour: 12,
+    model: "off", strength: 100, factor: 1, turbidity: 3, direct: 700, diffuse: 120, sun: "spread", tinted: false, latitude: 48, longitude: 11, zone: 1, day: 172, hour: 12,
     moment: null,
 };
 
