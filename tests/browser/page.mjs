@@ -101,7 +101,7 @@ export class Daemon {
 let browser = null;
 
 /** A page of the viewer, which has shown its first answer. Its `faults` are errors and requests to other origins. */
-export async function openPage(address, { width = 1280, height = 800, hash = "", touch = false, wait = true, storage } = {}) {
+export async function openPage(address, { width = 1280, height = 800, hash = "", touch = false, wait = true, before, storage } = {}) {
     if (browser === null) {
         browser = await chromium.launch({
             executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
@@ -126,6 +126,7 @@ export async function openPage(address, { width = 1280, height = 800, hash = "",
         // A daemon that is gone, or a token that is missing, is told by the browser itself.
         if (message.type() === "error" && !/Failed to load resource/.test(message.text())) page.faults.push(message.text());
     });
+    if (before !== undefined) await before(page);
     await page.goto(`${address}/?inspect${hash}`);
     if (wait) await settled(page);
     return page;

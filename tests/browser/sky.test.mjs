@@ -131,15 +131,21 @@ test("turbidity and irradiances are set on the page, and the figures say what th
     const page = await openScene("yard");
     await page.getByRole("tab", { name: "Sky" }).click();
     const panel = page.locator("#panel-sky"), figure = async (name) => Number((await panel.locator(`[data-sky=${name}]`).innerText()).replace(/[^0-9.].*$/, ""));
+    const exposureNow = () => page.evaluate(() => window.lambert.store.now.view.exposure), before = await exposureNow();
     await panel.getByRole("combobox", { name: "Sky" }).selectOption("turbid");
     await settled(page);
+    // A sky that is many times as bright is not all white; an exposure that a person chose stays.
+    assert.ok(await exposureNow() < before - 2, `${before} EV, then ${await exposureNow()}`);
     const clear = [await figure("direct"), await figure("diffuse"), await figure("clearness")];
     await panel.getByRole("spinbutton", { name: "Turbidity in T" }).fill("6");
     await page.keyboard.press("Enter");
     await settled(page);
     const hazy = [await figure("direct"), await figure("diffuse"), await figure("clearness")];
     assert.ok(hazy[0] < 0.8 * clear[0] && hazy[1] > 1.5 * clear[1] && hazy[2] < clear[2], `${clear}; ${hazy}`);
+    await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, view: { ...s.now.view, exposure: -3 } }); });
     await panel.getByRole("combobox", { name: "Sky" }).selectOption("given");
+    await settled(page);
+    assert.equal(await exposureNow(), -3);
     await panel.getByRole("spinbutton", { name: "Facing the sun in W/m²" }).fill("0");
     await panel.getByRole("spinbutton", { name: "Sky on the ground in W/m²" }).fill("250");
     await page.keyboard.press("Enter");

@@ -29,11 +29,17 @@ export interface Timing {
     solve: number | null;
 }
 
-type Event = "scene" | "scenes" | "field" | "pick" | "hover" | "timing" | "unlike" | "lost" | "found" | "problem" | "token" | "theme";
+type Event = "scene" | "scenes" | "field" | "pick" | "hover" | "timing" | "unlike" | "lost" | "found" | "problem" | "token" | "theme" | "loading";
 type Side = 0 | 1;
 
 /** The store was replaced by one of another mesh. */
 class Replaced extends Error {}
+
+/** Statuses of requests that fitted the store that was there before. */
+const UNFIT = [400, 404, 422];
+
+/** After the last answer, and after the last look, the page looks if the store is still the same, ms. */
+const LOOK_MS = 1000, LOOKED_MS = 5000;
 
 /** The mean of the logarithm of what is seen becomes this before the tone curve. */
 const MIDDLE_GREY = 0.2;
@@ -52,11 +58,19 @@ export class App {
     certificate: { bound: number; iterations: number; solve: number | null } | null = null;
     hovered: number | null = null;
     problem: string | null = null;
+    /** The scene that is on its way, until its first picture; "" while it has no name yet, null: none is. */
+    loading: string | null = "";
+    /** A scene that was chosen while the daemon was away. */
+    private missed: string | null = null;
+    private looked = -LOOKED_MS;
+    private lookTimer = 0;
     /** What a link asks for and this daemon does not have; until another scene is opened. */
     notice: string | null = null;
     readonly watch = new Watch(() => this.api.isReady(), () => this.tell("lost"), () => this.goOn());
     /** Answers shown so far. */
     answers = 0;
+    /** The exposure that the page chose last, log2. */
+    ownExposure = 0;
     /** Radiances of the sky's tiles for a lighting; set by the panel of skies. */
     skyOf: (lighting: Lighting, of: Description) => readonly (number | number[])[] | null = () => null;
     /** The weather that a link has to hold for a light; set by the panel of skies. */
@@ -80,6 +94,7 @@ export class App {
             (wanted) => this.solve(wanted), (answer, wanted) => this.take(side, answer, wanted), (reason) => this.fail(reason));
         this.askers = [asker(0), asker(1)];
         this.store.listen((now, before) => this.changed(now, before));
+        document.addEventListener("visibilitychange", () => { if (!document.hidden) this.look(0); });
     }
 
     on(event: Event, listener: () => void): void {
@@ -94,6 +109,7 @@ export class App {
     /** Opens a scene; the rest of the state is given (a link), or that of the scene as it comes. */
     async open(name: string, given: State | null): Promise<void> {
         const turn = ++this.opening;
+        this.load(name);
         const described = this.api.describe(name);
         const [description, file, takeIn] = await Promise.all([described, this.api.mesh(name), described.then((d) => this.prepare(d))]);
         if (turn !== this.opening) return;
@@ -121,6 +137,12 @@ export class App {
         else this.cameras.place(base.view.camera, false);
         this.tell("scene");
         this.ask();
+    }
+
+    private load(name: string | null): void {
+        if (this.loading === name) return;
+        this.loading = name;
+        this.tell("loading");
     }
 
     /** What is shown now, as a request. */
@@ -190,12 +212,11 @@ export class App {
 
     fail(reason: unknown): void {
         if (reason instanceof DOMException && reason.name === "AbortError") return;
+        const { loading } = this;
+        this.load(null);
         if (reason instanceof Lost) {
+            if (loading !== null && loading !== "" && this.scene !== null) this.missed = loading;
             this.watch.lose("The daemon does not answer. This page asks again each second and goes on by itself.");
-            return;
-        }
-        if (reason instanceof Replaced) {
-            void this.open(this.store.now.scene, this.store.now).catch((why: unknown) => this.fail(why));
             return;
         }
         if (reason instanceof Problem && reason.status === 401) {
@@ -206,9 +227,49 @@ export class App {
             this.watch.lose(`The daemon is busy: ${reason.message}. This page goes on by itself.`);
             return;
         }
+        if (reason instanceof Replaced || (reason instanceof Problem && UNFIT.includes(reason.status) && loading === null)) {
+            this.renew().then((is) => { if (!is) this.complain(reason); }, (why: unknown) => this.complain(why));
+            return;
+        }
+        this.complain(reason, loading === null);
+    }
+
+    /** `isShown`: the request was for the scene that is shown. */
+    private complain(reason: unknown, isShown = true): void {
+        if (reason instanceof Lost) return this.fail(reason);
+        const name = this.scene?.description.name ?? "";
+        if (reason instanceof Problem && reason.status === 404 && isShown && name !== "") {
+            this.problem = `The daemon serves ${name} no more; the picture is its last. Choose another scene above.`;
+            void this.listScenes().catch(() => undefined);
+            return this.tell("problem");
+        }
         this.problem = reason instanceof Problem ? `The daemon did not do what this page asked for (${reason.status}): ${reason.message}`
             : reason instanceof Error ? reason.message : String(reason);
         this.tell("problem");
+        this.tell("scenes");
+    }
+
+    /** Opens the scene anew if its store is another one by now: as it comes, or in its present state where the mesh is the same. */
+    private async renew(): Promise<boolean> {
+        const { scene } = this, name = scene?.description.name ?? "";
+        if (scene === null) return false;
+        const description = await this.api.describe(name), same = (of: Description): string => JSON.stringify([of.provenance?.geometry_hash, of.groups, of.channels]);
+        if (scene !== this.scene) return true;
+        if (JSON.stringify(description) === JSON.stringify(scene.description)) return false;
+        this.notice = `The store of ${name} was replaced; this is the new one.`;
+        const { now } = this.store, exposure = now.view.exposure === this.ownExposure ? null : now.view.exposure;
+        await this.open(name, same(description) === same(scene.description) ? { ...now, view: { ...now.view, exposure } } : null);
+        return true;
+    }
+
+    /** Looks, once nothing is asked for, if the store is still the one that is shown: its answers alone do not tell. */
+    private look(after: number): void {
+        clearTimeout(this.lookTimer);
+        this.lookTimer = window.setTimeout(() => {
+            if (this.scene === null || this.loading !== null || this.watch.isLost || !this.isIdle || document.hidden) return;
+            this.looked = performance.now();
+            this.renew().catch((reason: unknown) => { if (this.loading === null) this.complain(reason); else this.fail(reason); });
+        }, Math.max(after, this.looked + LOOKED_MS - performance.now()));
     }
 
     private async solve(wanted: Wanted): Promise<[Field, number | null]> {
@@ -237,8 +298,10 @@ export class App {
         this.stage.setField(side, field);
         if (side === 0) this.measure(wanted);
         this.setLook();
+        this.load(null);
         this.tell("field");
         this.tell("timing");
+        this.look(LOOK_MS);
     }
 
     /** Finds the ends of the palette and the exposure, where the person left them to the page. */
@@ -253,6 +316,7 @@ export class App {
         this.spread = spreadOf(field.values, scene.mesh.area, dark);
         if (now.view.picture === "light" && this.spread.most > 0) {
             const exposure = Number((Math.log2(MIDDLE_GREY) - this.spread.logMean).toFixed(2));
+            this.ownExposure = exposure;
             this.store.settle({ ...now, view: { ...now.view, exposure } });
         }
     }
@@ -269,7 +333,7 @@ export class App {
         const { view, compare } = this.store.now;
         const { low, high } = this.axis;
         this.stage.setLook({
-            picture: view.picture, smooth: view.smooth, textured: view.textured, tone: view.tone, exposure: 2 ** (view.exposure ?? 0), palette: view.palette,
+            picture: view.picture, smooth: view.smooth, textured: view.textured, tone: view.tone, exposure: 2 ** (view.exposure ?? this.ownExposure), palette: view.palette,
             range: [low, high], log: view.log, isoLines: view.isoLines, threshold: view.threshold, marked: view.judged !== null,
             compare: compare === null || this.fields[1] === null ? "none" : compare.how, split: compare?.split ?? 0.5,
         });
@@ -309,11 +373,10 @@ export class App {
     private goOn(): void {
         this.tell("found");
         if (this.scene === null) return;
-        // The store may be another one now.
-        void this.api.describe(this.store.now.scene).then((description) => {
-            if (JSON.stringify(description) !== JSON.stringify(this.scene?.description)) return this.open(this.store.now.scene, this.store.now);
-            this.ask(true);
-            return undefined;
-        }).catch((reason: unknown) => this.fail(reason));
+        const { missed } = this;
+        this.missed = null;
+        void this.listScenes().catch(() => undefined);
+        if (missed !== null) void this.open(missed, null).catch((reason: unknown) => this.fail(reason));
+        else this.renew().then((is) => { if (!is) this.ask(true); }, (reason: unknown) => this.complain(reason));
     }
 }

@@ -1,7 +1,7 @@
 // Starts the page.
 import { App } from "./app.ts";
 import { make } from "./base/dom.ts";
-import { makeBanner, makeBar, makeDrawer, makeStatus, makeTokenDialog, setBackground } from "./panels/frame.ts";
+import { makeBanner, makeBar, makeDrawer, makeLoading, makeStatus, makeTokenDialog, setBackground } from "./panels/frame.ts";
 import { comparePanel } from "./panels/compare.ts";
 import { exportPanel } from "./panels/export.ts";
 import { lightsPanel } from "./panels/lights.ts";
@@ -37,7 +37,7 @@ function start(): void {
             `This browser cannot draw the scene, which needs WebGL 2 (${reason instanceof Error ? reason.message : String(reason)}).`));
         return;
     }
-    frame.append(makeBanner(app));
+    frame.append(makeBanner(app), makeLoading(app));
     document.body.prepend(makeBar(app));
     document.body.append(makeDrawer(app, panelMakers.map((makePanel) => makePanel(app))), makeStatus(app), makeTokenDialog(app, () => void begin(app)));
     setBackground(app);
@@ -62,8 +62,9 @@ async function begin(app: App): Promise<void> {
         const given = fromFragment(location.hash);
         const name = app.scenes.find((scene) => scene.name === given?.scene)?.name ?? app.scenes[0]?.name;
         if (name === undefined) throw new Error("The daemon serves no scene.");
-        app.notice = given !== null && given.scene !== "" && given.scene !== name
-            ? `The link asks for the scene ${given.scene}, which this daemon does not serve; this is ${name}.` : null;
+        app.notice = given === null && location.hash.length > 1 ? `This link cannot be read; this is ${name} as it comes.`
+            : given !== null && given.scene !== "" && given.scene !== name
+                ? `The link asks for the scene ${given.scene}, which this daemon does not serve; this is ${name}.` : null;
         await app.open(name, given !== null && given.scene === name ? given : null);
     } catch (reason) {
         app.fail(reason);

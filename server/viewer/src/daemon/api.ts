@@ -47,7 +47,8 @@ export interface Description {
 /** A body for POST …/radiosity; EMISSION of the contract. */
 export type Emission = { [member: string]: unknown };
 
-export type Quantity = "radiosity" | "irradiance" | "indirect";
+export const QUANTITIES = ["radiosity", "irradiance", "indirect"] as const;
+export type Quantity = (typeof QUANTITIES)[number];
 
 /** An answer that is no success: what the problem document says. */
 export class Problem extends Error {

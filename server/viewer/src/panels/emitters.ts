@@ -73,7 +73,7 @@ export function emittersPanel(app: App): Panel {
     });
     app.store.listen((now, before) => { if (now.lighting.emitters !== before.lighting.emitters) update(); });
     return {
-        id: "emitters", title: "Emitters", isUseful: () => names().length > 0,
+        id: "emitters", title: "Emitters", isUseful: () => names().length > 0, isFirst: () => app.scene?.description.sky === null,
         element: make("div", {}, path, make("h2", {}, "Weights"), make("div", { class: "row" }, button("All off", null, setAll(0)), button("All 1", "All weights 1", setAll(1)), filter), list),
     };
 }

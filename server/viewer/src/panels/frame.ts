@@ -4,6 +4,9 @@ import { count, percent, tell } from "../base/numbers.ts";
 import type { App } from "../app.ts";
 import type { Panel } from "./panel.ts";
 
+/** What takes less is not told of. */
+const LOADING_MS = 300;
+
 export function makeBar(app: App): HTMLElement {
     const scenes = make("div", { class: "scenes" });
     const undo = button("↶", "Undo (Ctrl+Z)", () => app.store.undo());
@@ -27,7 +30,9 @@ export function makeBar(app: App): HTMLElement {
     app.store.listen(update);
     const list = (): void => {
         update();
-        fill(scenes, choice("Scene", app.scenes.map((scene) => [scene.name, scene.name] as const), app.store.now.scene, (name) => {
+        // The scene that is shown may be served no more.
+        const own = app.store.now.scene, names = app.scenes.map((scene) => scene.name);
+        fill(scenes, choice("Scene", (names.includes(own) || own === "" ? names : [own, ...names]).map((name) => [name, name] as const), app.store.now.scene, (name) => {
             app.notice = null;
             void app.open(name, null).catch((reason: unknown) => app.fail(reason));
         }));
@@ -55,10 +60,10 @@ export function setBackground(app: App): void {
 
 /** Tabs after the pattern of WAI-ARIA: arrows move between them. */
 export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
-    let current = panels[0].id;
+    let current = panels[0].id, isChosen = false;
     const tabs = new Map(panels.map((panel) => [panel.id, make("button", {
         type: "button", role: "tab", id: `tab-${panel.id}`, "aria-controls": `panel-${panel.id}`,
-        onclick: () => show(panel.id), onkeydown: (event: KeyboardEvent) => move(event, panel.id),
+        onclick: () => choose(panel.id), onkeydown: (event: KeyboardEvent) => move(event, panel.id),
     }, panel.title)]));
     const bodies = new Map(panels.map((panel) => [panel.id, make("div", {
         role: "tabpanel", id: `panel-${panel.id}`, "aria-labelledby": `tab-${panel.id}`, tabindex: 0,
@@ -73,19 +78,24 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
             (bodies.get(panel.id) as HTMLElement).hidden = !isOn;
         }
     };
+    const choose = (id: string): void => {
+        isChosen = true;
+        show(id);
+    };
     const move = (event: KeyboardEvent, id: string): void => {
         const way = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
         if (way === 0) return;
         event.preventDefault();
         const all = useful(), at = all.findIndex((panel) => panel.id === id);
         const next = all[(at + way + all.length) % all.length];
-        show(next.id);
+        choose(next.id);
         tabs.get(next.id)?.focus();
     };
     const update = (): void => {
         const all = useful();
         for (const panel of panels) (tabs.get(panel.id) as HTMLElement).hidden = !all.includes(panel);
-        if (!all.some((panel) => panel.id === current)) show(all[0].id);
+        const first = all.find((panel) => panel.isFirst?.(app)) ?? all[0];
+        if (!isChosen || !all.some((panel) => panel.id === current)) show(first.id);
     };
     app.on("scene", update);
     show(current);
@@ -130,9 +140,17 @@ export function makeStatus(app: App): HTMLElement {
 /** Tells that the daemon is gone, or of a request that failed. */
 export function makeBanner(app: App): HTMLElement {
     const banner = make("div", { class: "banner", role: "status", "aria-live": "polite", hidden: true });
+    const close = button("×", "Close this note", () => {
+        app.notice = null;
+        show(null);
+    });
     const show = (text: string | null): void => {
         banner.hidden = text === null;
-        banner.textContent = text ?? "";
+        // A note is no fault, and stays until it is closed.
+        const isNote = text !== null && text === app.notice;
+        banner.classList.toggle("note", isNote);
+        const now = banner.firstChild?.textContent ?? null;
+        if (now !== text || isNote !== banner.contains(close)) fill(banner, make("span", {}, text ?? ""), isNote && close);
     };
     app.on("lost", () => show(app.watch.why));
     app.on("found", () => show(app.notice));
@@ -140,6 +158,23 @@ export function makeBanner(app: App): HTMLElement {
     app.on("problem", () => show(app.problem));
     app.on("field", () => { if (!app.watch.isLost) show(app.notice); });
     return banner;
+}
+
+/** Tells that a scene is on its way, if that takes a while. */
+export function makeLoading(app: App): HTMLElement {
+    const note = make("p", { class: "loading", role: "status", hidden: true });
+    let timer = 0;
+    const update = (): void => {
+        clearTimeout(timer);
+        if (app.loading === null) note.hidden = true;
+        else timer = window.setTimeout(() => {
+            note.textContent = `Loading ${app.loading || "the scene"} …`;
+            note.hidden = false;
+        }, LOADING_MS);
+    };
+    app.on("loading", update);
+    update();
+    return note;
 }
 
 /** Asks for a token, which is kept as long as this tab. */

@@ -7,6 +7,8 @@ export interface Panel {
     element: HTMLElement;
     /** True while it has something to offer for the scene that is open; absent: always. */
     isUseful?: (app: App) => boolean;
+    /** True where it is the panel of the scene's lights, so that it is shown first. */
+    isFirst?: (app: App) => boolean;
 }
 
 export type PanelMaker = (app: App) => Panel;

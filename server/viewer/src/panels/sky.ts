@@ -89,6 +89,7 @@ export function skyPanel(app: App): Panel {
     });
     return {
         id: "sky", title: "Sky", isUseful: () => app.scene?.description.sky !== null && app.scene !== null,
+        isFirst: () => app.scene?.mesh.groups.every((group) => group.emission === null) ?? false,
         element: make("div", {}, controls.model, note, controls.strength, moment, controls.time, day.element, dome.element, figures,
             weather.element, controls.place),
     };
@@ -135,6 +136,12 @@ function noteOf(light: SkyLight, source: SkySource, app: App): string {
     return "";
 }
 
+/** Other skies are ten times as bright: an exposure that the page chose is found anew, that of a person stays. */
+function changeModel(app: App, model: SkyLight["model"]): void {
+    const { now } = app.store, exposure = now.view.exposure === app.ownExposure ? null : now.view.exposure;
+    app.store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, model } }, view: { ...now.view, exposure } });
+}
+
 interface Controls {
     model: HTMLElement;
     strength: HTMLElement;
@@ -147,7 +154,7 @@ function makeControls(app: App, change: Change): Controls {
     const first = skyOff;
     const model = choice("Sky", [["off", "None"], ["overcast", "Overcast (CIE)"], ["clear", "Clear (CIE)"],
         ["turbid", "Clear, by turbidity (Linke)"], ["given", "By direct and diffuse light (Perez)"], ["even", "Even"], ["perez", "Of a weather file (Perez)"]],
-        first.model, (to) => change({ model: to }));
+        first.model, (to) => changeModel(app, to));
     const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]], first.sun, (to) => change({ sun: to }));
     const tinted = tick("Blue sky, warm sun", first.tinted, (on) => change({ tinted: on }));
     const unit = (): string => (app.store.now.view.unit === "lx" ? "lx" : "W/m²");

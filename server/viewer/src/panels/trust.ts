@@ -43,7 +43,10 @@ export function trustPanel(app: App): Panel {
             return (answer.error ?? null) as OwnError | null;
         },
         (error) => fill(own, ...ownError(error)),
-        (reason) => fill(own, make("p", { class: "hint" }, reason instanceof Error ? reason.message : String(reason))), 1);
+        (reason) => {
+            asked = "";
+            fill(own, make("p", { class: "hint" }, reason instanceof Error ? reason.message : String(reason)));
+        }, 1);
     // Nobody is asked for figures that nobody sees.
     let timer = 0, asked = "", isSeen = false;
     const rest = (): void => {

@@ -1,5 +1,9 @@
 // The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
-import { firstLighting, firstState, firstView, SKY_MODELS, skyOff, type Lighting, type Moment, type Place, type SkyLight, type State, type View } from "./state.ts";
+import { QUANTITIES } from "../daemon/api.ts";
+import { firstLighting, firstState, firstView, PALETTES, SKY_MODELS, skyOff, TONES, UNITS, type Lighting, type Moment, type Place, type SkyLight, type State, type View } from "./state.ts";
+
+/** Of powers and weights: products of two of them are still numbers of single precision. */
+const LIGHT_MOST = 1e12;
 
 type Plain = { [name: string]: unknown };
 
@@ -28,6 +32,9 @@ function restore<T extends object>(first: T, given: unknown, loose: readonly str
     return out as T;
 }
 
+/** One of the names that there are, or the first state's. */
+const oneOf = <T extends string>(names: readonly T[], value: unknown, otherwise: T): T => names.find((name) => name === value) ?? otherwise;
+
 const number = (value: unknown, otherwise: number): number =>
     typeof value === "number" && Number.isFinite(value) ? value : otherwise;
 
@@ -48,10 +55,10 @@ function restoreMoment(given: unknown): Moment | null {
 function restoreSky(given: unknown): SkyLight {
     const out = restore(skyOff, given, ["moment"]);
     return {
-        model: SKY_MODELS.find((model) => model === out.model) ?? "off",
+        model: oneOf(SKY_MODELS, out.model, "off"),
         strength: held(out.strength, skyOff.strength, 0, 1e6), factor: held(out.factor, 1, 0, 1e3),
         turbidity: held(out.turbidity, skyOff.turbidity, 1, 20), direct: held(out.direct, skyOff.direct, 0, 3000), diffuse: held(out.diffuse, skyOff.diffuse, 0, 3000),
-        sun: (["tile", "off"] as const).find((sun) => sun === out.sun) ?? "spread", tinted: out.tinted,
+        sun: oneOf(["spread", "tile", "off"], out.sun, "spread"), tinted: out.tinted,
         latitude: held(out.latitude, skyOff.latitude, -90, 90), longitude: held(out.longitude, skyOff.longitude, -180, 180),
         zone: held(out.zone, skyOff.zone, -14, 14), day: Math.round(held(out.day, skyOff.day, 1, 365)),
         hour: held(out.hour, skyOff.hour, 0, 24), moment: restoreMoment(out.moment),
@@ -68,15 +75,15 @@ function restoreLighting(given: unknown): Lighting {
         const colour = Array.isArray(light.colour) && light.colour.length === 3 ? light.colour : [1, 1, 1];
         groups[name] = {
             on: light.on !== false,
-            power: Math.max(0, number(light.power, 0)),
+            power: held(light.power as number, 0, 0, LIGHT_MOST),
             colour: [0, 1, 2].map((i) => Math.max(0, number(colour[i], 1))) as [number, number, number],
             kelvin: typeof light.kelvin === "number" ? light.kelvin : null,
         };
     }
     const emitters: Lighting["emitters"] = {};
-    for (const [index, weight] of Object.entries(out.emitters)) emitters[index] = Math.max(0, number(weight, 0));
+    for (const [index, weight] of Object.entries(out.emitters)) emitters[index] = held(weight, 0, 0, LIGHT_MOST);
     return {
-        groups, emitters, dim: Math.max(0, number(out.dim, 1)), sky: restoreSky(out.sky),
+        groups, emitters, dim: held(out.dim, 1, 0, LIGHT_MOST), sky: restoreSky(out.sky),
         solo: typeof out.solo === "string" ? out.solo : null,
     };
 }
@@ -91,7 +98,9 @@ function restoreView(given: unknown): View {
     const orNull = (value: unknown): number | null => (typeof value === "number" && Number.isFinite(value) ? value : null);
     const range = Array.isArray(view.range) && view.range.length === 2 && view.range.every((v) => Number.isFinite(v)) ? view.range : null;
     return {
-        ...view, range, exposure: orNull(view.exposure), threshold: orNull(view.threshold),
+        ...view, picture: oneOf(["light", "false"], view.picture, "light"), quantity: oneOf(QUANTITIES, view.quantity, firstView.quantity),
+        tone: oneOf(TONES, view.tone, firstView.tone), palette: oneOf(PALETTES, view.palette, firstView.palette), unit: oneOf(UNITS, view.unit, firstView.unit),
+        isoLines: Math.round(held(view.isoLines, 0, 0, 100)), uniformity: held(view.uniformity, firstView.uniformity, 0, 1), range, exposure: view.exposure === null ? null : held(view.exposure, 0, -60, 60), threshold: orNull(view.threshold),
         judged: typeof view.judged === "string" ? view.judged : null, camera: isPlace(view.camera) ? view.camera : null,
     };
 }

@@ -69,9 +69,12 @@ export interface Lighting {
  * direction that is up in the picture. */
 export type Place = [number, number, number, number, number, number] | [number, number, number, number, number, number, number, number, number, number];
 
-export type Tone = "agx" | "aces" | "linear";
-export type Palette = "viridis" | "inferno" | "turbo";
-export type Unit = "W/m²" | "lx";
+export const TONES = ["agx", "aces", "linear"] as const;
+export const PALETTES = ["viridis", "inferno", "turbo"] as const;
+export const UNITS = ["W/m²", "lx"] as const;
+export type Tone = (typeof TONES)[number];
+export type Palette = (typeof PALETTES)[number];
+export type Unit = (typeof UNITS)[number];
 
 export interface View {
     picture: "light" | "false";

@@ -1,0 +1,156 @@
+// Odd circumstances: narrow windows, links of strangers, slow networks, a daemon that is away, stores that are replaced.
+import assert from "node:assert/strict";
+import { copyFileSync, renameSync } from "node:fs";
+import { before, test } from "node:test";
+import { Daemon, inFolder, lambert, makeStore, openPage, settled, violations } from "./page.mjs";
+
+let cornell, patio, few, daemon;
+before(async () => {
+    cornell = makeStore("cornell", "cornell", { generate: ["--elements", 300], precompute: ["--probes", 0] });
+    patio = makeStore("patio", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "tregenza"] });
+    few = makeStore("few", "cornell", { generate: ["--elements", 300], precompute: ["--probes", 0, "--emitters", "group=lamp"] });
+    daemon = await Daemon.start([cornell, patio, few]);
+});
+
+const linkOf = (state) => `#1.${Buffer.from(JSON.stringify(state)).toString("base64url")}`;
+const sceneNow = (page) => page.evaluate(() => [window.lambert.store.now.scene, window.lambert.scene.mesh.elements]);
+const dim = (page, factor) => page.evaluate((f) => {
+    const { store } = window.lambert, { now } = store;
+    store.change({ ...now, lighting: { ...now.lighting, dim: now.lighting.dim * f } });
+}, factor);
+
+test("a phone's picture grows when the panels are folded, under one row of controls", async () => {
+    const page = await openPage(daemon.address, { width: 360, height: 640, touch: true });
+    const height = async () => (await page.locator("main canvas").first().boundingBox()).height;
+    const open = await height(), bar = await page.locator("header").boundingBox();
+    await page.getByRole("button", { name: "Fold the panels" }).tap();
+    const folded = await height();
+    assert.ok(bar.height < 50 && open > 230 && folded > open + 150, `${bar.height}, ${open}, ${folded}`);
+    assert.deepEqual(await violations(page), []);
+    await page.getByRole("button", { name: "Fold the panels" }).tap();
+    assert.equal(await height(), open);
+    await page.getByRole("combobox", { name: "Scene" }).selectOption("patio");
+    await settled(page);
+    assert.equal((await sceneNow(page))[0], "patio");
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("the panel of the lights is shown first, and the tabs take two rows", async () => {
+    const page = await openPage(daemon.address), rows = [];
+    for (const [name, panel] of [["few", "Emitters"], ["patio", "Lights"], ["cornell", "Lights"]]) {
+        await page.getByRole("combobox", { name: "Scene" }).selectOption(name);
+        await page.getByRole("tab", { name: panel, selected: true }).waitFor();
+        await settled(page);
+        rows.push((await page.getByRole("tablist").boundingBox()).height);
+    }
+    assert.ok(Math.max(...rows) < 90, `${rows}`);
+    // A panel that a person chose stays.
+    await page.getByRole("tab", { name: "View" }).click();
+    await page.getByRole("combobox", { name: "Scene" }).selectOption("few");
+    await settled(page);
+    assert.equal(await page.getByRole("tab", { name: "View" }).getAttribute("aria-selected"), "true");
+    await page.context().close();
+});
+
+test("links with names and numbers that there are not are held to those that there are", async () => {
+    const odd = { picture: "false", quantity: "colour", palette: "constructor", tone: "toString", unit: "lumen", isoLines: 1e9, exposure: 1e9, uniformity: -1, range: [5, 1] };
+    const page = await openPage(daemon.address, { hash: linkOf({
+        scene: "cornell", view: odd, lighting: { dim: 1e300, groups: { lamp: { power: 1e300 }, "no such": { power: 2 } }, emitters: { 0: 1e300, 99: 1 } }, compare: { scene: "patio" },
+    }) });
+    const { view, lighting } = await page.evaluate(() => window.lambert.store.now);
+    assert.deepEqual([view.picture, view.quantity, view.palette, view.tone, view.unit, view.isoLines, view.exposure, view.uniformity],
+        ["false", "radiosity", "viridis", "agx", "W/m²", 100, 60, 0]);
+    assert.ok(Number.isFinite(lighting.dim * lighting.groups.lamp.power));
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    for (const hash of ["#1.%%%", "#top", linkOf([])]) {
+        const other = await openPage(daemon.address, { hash });
+        await other.getByText("This link cannot be read; this is").waitFor();
+        assert.deepEqual(await violations(other), []);
+        await other.getByRole("button", { name: "Close this note" }).click();
+        await other.getByText("This link cannot be read").waitFor({ state: "hidden" });
+        await dim(other, 0.5);
+        await settled(other);
+        assert.equal(await other.getByText("This link cannot be read").isVisible(), false);
+        await other.context().close();
+    }
+});
+
+test("a scene that is long on its way is told of, and one that is not there leaves the other", async () => {
+    const page = await openPage(daemon.address, { wait: false, before: (p) => p.route(/\/v1\//, async (route) => {
+        await new Promise((resolve) => setTimeout(resolve, 1200));
+        await route.continue().catch(() => undefined);
+    }) });
+    await page.getByText(/^Loading the scene …$/).waitFor();
+    await page.getByText(/^Loading cornell …$/).waitFor();
+    await settled(page);
+    await page.getByText(/^Loading/).waitFor({ state: "hidden" });
+    await page.getByRole("combobox", { name: "Scene" }).selectOption("patio");
+    await page.getByText(/^Loading patio …$/).waitFor();
+    await page.getByText(/^Loading/).waitFor({ state: "hidden" });
+    assert.equal((await sceneNow(page))[0], "patio");
+    await page.unroute(/\/v1\//);
+    await page.route(/\/v1\/scenes\/cornell/, (route) => route.fulfill({ status: 404, contentType: "application/problem+json", body: '{"detail":"there is no scene cornell"}' }));
+    await page.getByRole("combobox", { name: "Scene" }).selectOption("cornell");
+    await page.getByText("there is no scene cornell").waitFor();
+    assert.equal(await page.getByRole("combobox", { name: "Scene" }).inputValue(), "patio");
+    assert.equal((await sceneNow(page))[0], "patio");
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("a scene that is chosen while the daemon is away is opened when it is back", async () => {
+    const own = await Daemon.start([cornell, patio]), page = await openPage(own.address), { port } = own;
+    await page.getByRole("tab", { name: "Trust" }).click();
+    await own.stop("SIGKILL");
+    await page.getByRole("combobox", { name: "Scene" }).selectOption("patio");
+    await page.getByText("The daemon does not answer").waitFor();
+    const again = await Daemon.start([cornell, patio], { port });
+    await page.waitForFunction(() => window.lambert.store.now.scene === "patio");
+    await settled(page);
+    assert.equal(await page.getByRole("combobox", { name: "Scene" }).inputValue(), "patio");
+    await page.getByText("The daemon does not answer").waitFor({ state: "hidden" });
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await again.stop();
+});
+
+test("a store that is replaced is shown as it is now, and one that is gone is told of", async () => {
+    const place = (from) => {
+        copyFileSync(from, inFolder("live.new"));
+        renameSync(inFolder("live.new"), inFolder("live.h5"));
+    };
+    place(cornell);
+    const own = await Daemon.start([`${inFolder("live.h5")}:live`, few]), page = await openPage(own.address);
+    await page.evaluate(() => window.lambert.open("live", null));
+    await settled(page);
+    const replace = async (store) => {
+        place(store);
+        const { created } = (await own.json("/v1/scenes/live")).provenance;
+        own.process.kill("SIGHUP");
+        for (let i = 0; i < 100 && (await own.json("/v1/scenes/live")).provenance.created === created; i++) await new Promise((resolve) => setTimeout(resolve, 100));
+    };
+    // The same mesh, built otherwise: answers have as many numbers, and the state is kept.
+    await new Promise((resolve) => setTimeout(resolve, 1100));
+    lambert("precompute", inFolder("cornell.obj"), "-o", inFolder("coarse.h5"), "--quiet", "--probes", 0, "--epsilon", 0.2);
+    await replace(inFolder("coarse.h5"));
+    await dim(page, 0.5);
+    await page.getByText("The store of live was replaced").waitFor();
+    await settled(page);
+    assert.equal(await page.evaluate(() => window.lambert.store.now.lighting.dim), 0.5);
+    // Another scene: its own lamps, and the whole of it is seen.
+    await replace(patio);
+    await dim(page, 0.5);
+    await page.waitForFunction(() => window.lambert.scene.mesh.groups.some((group) => group.name === "pillar"));
+    await settled(page);
+    assert.deepEqual(await sceneNow(page), ["live", (await own.json("/v1/scenes/live")).elements]);
+    await page.getByRole("tab", { name: "Sky" }).waitFor();
+    assert.equal(await page.evaluate(() => window.lambert.store.now.lighting.dim), 1);
+    await page.route(/\/v1\/scenes\/live/, (route) => route.fulfill({ status: 404, contentType: "application/problem+json", body: '{"detail":"there is no scene live"}' }));
+    await dim(page, 0.5);
+    await page.getByText("The daemon serves live no more").waitFor();
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await own.stop();
+});
