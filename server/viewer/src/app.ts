@@ -9,6 +9,7 @@ import { readMesh, type SceneMesh } from "./picture/glb.ts";
 import { Picker } from "./picture/pick.ts";
 import type { Axis } from "./picture/scale.ts";
 import { Stage } from "./picture/stage.ts";
+import { SharpSun, type SunParts } from "./sharp_sun.ts";
 import { Beside } from "./state/beside.ts";
 import { lightingOf } from "./state/own_lighting.ts";
 import { wantedFor, type Abilities, type Wanted } from "./state/request.ts";
@@ -73,6 +74,10 @@ export class App {
     ownExposure = 0;
     /** Radiances of the sky's tiles for a lighting; set by the panel of skies. */
     skyOf: (lighting: Lighting, of: Description) => readonly (number | number[])[] | null = () => null;
+    /** The sky and its sun apart, of the scene that is open; set by the panel of skies. Null: no sun shines. */
+    sunOf: (lighting: Lighting, of: Description) => SunParts | null = () => null;
+    /** The sun in the picture, where it is drawn sharp. */
+    readonly sharp = new SharpSun(this, async (wanted) => (await this.solve(wanted))[0]);
     /** The weather that a link has to hold for a light; set by the panel of skies. */
     momentOf: (light: SkyLight) => Moment | null = () => null;
     /** Fetches what the first picture of a scene needs beside its mesh; the function that it returns takes that in. */
@@ -124,6 +129,7 @@ export class App {
         this.cameras.setBounds(new Box3().setFromBufferAttribute(new BufferAttribute(mesh.positions, 3)));
         this.fields = [null, null];
         this.askers.forEach((asker) => asker.forget());
+        this.sharp.forget();
         this.asked = ["", ""];
         const base = given ?? { ...firstState, view: { ...this.store.now.view, camera: null, exposure: null, range: null } };
         const lighting = { ...base.lighting, groups: { ...ownLighting.groups, ...base.lighting.groups } };
@@ -183,13 +189,14 @@ export class App {
             this.asked[side] = key;
             this.askers[side].want(wanted);
         }
+        this.sharp.ask(again);
     }
 
     /** Shows refined values in place of those of the same request. */
     certify(field: Field, certificate: NonNullable<App["certificate"]>): void {
         this.certificate = certificate;
         this.fields[0] = field;
-        this.stage.setField(0, field);
+        if (!this.sharp.isOn) this.stage.setField(0, field);
         this.tell("field");
     }
 
@@ -200,7 +207,7 @@ export class App {
     }
 
     get isIdle(): boolean {
-        return this.askers.every((asker) => asker.isIdle);
+        return this.askers.every((asker) => asker.isIdle) && this.sharp.isIdle;
     }
 
     hover(element: number | null): void {
@@ -295,7 +302,7 @@ export class App {
         if (side === 0) this.certificate = null;
         this.fields[side] = field;
         this.answers += 1;
-        this.stage.setField(side, field);
+        if (side === 1 || !this.sharp.isOn) this.stage.setField(side, field);
         if (side === 0) this.measure(wanted);
         this.setLook();
         this.load(null);

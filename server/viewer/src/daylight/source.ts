@@ -1,5 +1,6 @@
 // The tiles of the open store and the weather that skies are made of; answers with radiances for a lighting.
 import { ofTemperature } from "../base/colour.ts";
+import type { SunParts } from "../sharp_sun.ts";
 import type { Moment, SkyLight } from "../state/state.ts";
 import { skyFor, type Sky } from "./skies.ts";
 import { tilesOf, type SkyAnswer, type Tiles } from "./tiles.ts";
@@ -83,6 +84,15 @@ export class SkySource {
         return this.find(light, photometric, channels, other).values;
     }
 
+    /** The same of the open scene, with the sun apart; null without a sun. */
+    parts(light: SkyLight, photometric: boolean, channels: number): SunParts | null {
+        const { sky } = this.find(light, photometric, channels, null);
+        if (sky === null || !(sky.directHorizontal > 0)) return null;
+        const isColoured = light.tinted && channels === 3, normal = sky.directHorizontal / sky.sun.direction[2];
+        const [one, other] = isColoured ? colouredParts(sky) : [Array.from(sky.diffuse), Array.from(sky.direct)];
+        return { sky: one, sun: other, direction: sky.sun.direction, light: (isColoured ? ofTemperature(SUN_K) : [1, 1, 1]).map((v) => v * normal) as SunParts["light"] };
+    }
+
     private find(light: SkyLight, photometric: boolean, channels: number, other: string | null): { sky: Sky | null; values: readonly (number | number[])[] | null } {
         const isColoured = light.tinted && channels === 3;
         const key = JSON.stringify([light, photometric, isColoured, other]);
@@ -97,10 +107,16 @@ export class SkySource {
     }
 }
 
-/** With the luminance of the sky as it is. */
-function coloured(sky: Sky): number[][] {
+/** Sky and sun with their luminances as they are. */
+function colouredParts(sky: Sky): [number[][], number[][]] {
     const blue = ofTemperature(sky.directHorizontal > 0 ? BLUE_K : OVERCAST_K), warm = ofTemperature(SUN_K);
-    return Array.from(sky.diffuse, (value, t) => [0, 1, 2].map((c) => value * blue[c] + sky.direct[t] * warm[c]));
+    const times = (values: Float64Array, colour: readonly number[]): number[][] => Array.from(values, (value) => colour.map((c) => value * c));
+    return [times(sky.diffuse, blue), times(sky.direct, warm)];
+}
+
+function coloured(sky: Sky): number[][] {
+    const [one, other] = colouredParts(sky);
+    return one.map((values, t) => values.map((value, c) => value + other[t][c]));
 }
 
 const WINDS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];

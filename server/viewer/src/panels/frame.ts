@@ -112,7 +112,10 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
 
 /** Size, error and time: always in sight. */
 export function makeStatus(app: App): HTMLElement {
-    const size = make("span", {}), error = make("span", {}), time = make("span", { "data-figure": "time" });
+    const size = make("span", {}), error = make("span", {}), time = make("span", { "data-figure": "time" }), sun = make("span", {});
+    const drawSun = (): void => { sun.textContent = app.sharp.isOn ? "sun drawn sharp, numbers have it in tiles" : ""; };
+    app.on("field", drawSun);
+    app.store.listen(drawSun);
     const drawError = (): void => {
         const { description } = app.scene as NonNullable<App["scene"]>;
         if (app.certificate !== null) {
@@ -134,7 +137,7 @@ export function makeStatus(app: App): HTMLElement {
         const { roundTrip, solve } = app.timing;
         time.textContent = solve === null ? `answer ${tell(roundTrip, 2)} ms` : `solve ${tell(solve, 2)} ms, answer ${tell(roundTrip, 2)} ms`;
     });
-    return make("footer", { "aria-label": "Figures" }, size, error, time);
+    return make("footer", { "aria-label": "Figures" }, size, error, time, sun);
 }
 
 /** Tells that the daemon is gone, or of a request that failed. */

@@ -52,6 +52,8 @@ export function skyPanel(app: App): Panel {
         if (description.sky === null || lighting.solo !== null || !(isOpen || source.knows(description.name))) return null;
         return source.radiances(lighting.sky, isPhotometric(), description.channels, isOpen ? null : description.name);
     };
+    app.sunOf = (lighting, description) => (description !== tiledScene?.description || lighting.solo !== null ? null
+        : source.parts(lighting.sky, isPhotometric(), description.channels));
     app.momentOf = (light) => source.momentOf(light);
     app.prepareOther = async ({ name, sky }) => { if (sky !== null) source.takeOther(name, await app.api.sky(name)); };
     const controls = makeControls(app, change);
@@ -85,7 +87,7 @@ export function skyPanel(app: App): Panel {
     });
     app.on("theme", update);
     app.store.listen((now, before) => {
-        if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit) update();
+        if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit || now.view.sharpSun !== before.view.sharpSun) update();
     });
     return {
         id: "sky", title: "Sky", isUseful: () => app.scene?.description.sky !== null && app.scene !== null,
@@ -156,6 +158,11 @@ function makeControls(app: App, change: Change): Controls {
         ["turbid", "Clear, by turbidity (Linke)"], ["given", "By direct and diffuse light (Perez)"], ["even", "Even"], ["perez", "Of a weather file (Perez)"]],
         first.model, (to) => changeModel(app, to));
     const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]], first.sun, (to) => change({ sun: to }));
+    const sharp = tick("Sharp sun (drawn)", app.store.now.view.sharpSun, (on) => {
+        const { now } = app.store;
+        app.store.change({ ...now, view: { ...now.view, sharpSun: on } });
+    });
+    const drawn = make("p", { class: "hint" }, "The picture has the sun in its true place, with sharp shadows; all numbers have it in tiles of the sky.");
     const tinted = tick("Blue sky, warm sun", first.tinted, (on) => change({ tinted: on }));
     const unit = (): string => (app.store.now.view.unit === "lx" ? "lx" : "W/m²");
     const strength = slider({ label: "On the ground", unit: unit(), least: 0, most: 1000, log: true, change: (value) => change({ strength: value }, "strength of the sky") }, first.strength);
@@ -179,6 +186,9 @@ function makeControls(app: App, change: Change): Controls {
         strength.element.hidden = !isPlain;
         factor.element.hidden = isPlain || light.model === "off";
         sun.hidden = factor.element.hidden;
+        sharp.hidden = sun.hidden || light.sun === "off";
+        (sharp.querySelector("input") as HTMLInputElement).checked = app.store.now.view.sharpSun;
+        drawn.hidden = sharp.hidden || !app.store.now.view.sharpSun;
         turbidity.element.hidden = haze.hidden = light.model !== "turbid";
         direct.element.hidden = diffuse.element.hidden = light.model !== "given";
         tinted.hidden = app.scene?.description.channels !== 3 || light.model === "off";
@@ -188,7 +198,7 @@ function makeControls(app: App, change: Change): Controls {
             [longitude, light.longitude], [zone, light.zone]] as const) one.set(value);
     };
     return {
-        model, strength: make("div", {}, strength.element, turbidity.element, haze, direct.element, diffuse.element, factor.element, sun, tinted), time: make("div", {}, day.element, jumps, hour.element),
+        model, strength: make("div", {}, strength.element, turbidity.element, haze, direct.element, diffuse.element, factor.element, sun, sharp, drawn, tinted), time: make("div", {}, day.element, jumps, hour.element),
         place: make("div", {}, make("h2", {}, "Place"), latitude.element, longitude.element, zone.element), update,
     };
 }

@@ -1,7 +1,7 @@
 // The shaders. One texel per element and channel, half precision as the daemon sent it; a vertex looks up the texel of
 // its element (flat) or of its node (smooth, whose means a pass over the nodes makes). Tone curve, exposure, palette,
 // iso-lines, threshold and the comparison are in the fragment shader: none of them costs a request.
-import { GLSL3, RawShaderMaterial, ShaderChunk, Vector2, Vector3, Vector4, type IUniform, type Texture } from "three";
+import { GLSL3, Matrix4, RawShaderMaterial, ShaderChunk, Vector2, Vector3, Vector4, type IUniform, type Texture } from "three";
 
 const fetchElement = `
 uniform highp sampler2D values_a, values_b;
@@ -83,6 +83,7 @@ uniform bool is_smooth;
 in vec3 position;
 in vec2 uv;
 in uvec2 ids; // element, node
+centroid out vec3 place; // beyond a wall's edge the sun shines
 // Where a pixel's middle is outside a triangle, light is taken inside: a narrow one would have it far off its corners' there.
 centroid out vec3 colour_a, colour_b;
 centroid out vec2 place_in_image;
@@ -103,6 +104,7 @@ void main() {
         colour_b = element_colour(values_b, element);
     }
     place_in_image = uv;
+    place = position;
     gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }
 `;
@@ -135,9 +137,48 @@ uniform vec3 factor;
 centroid in vec3 colour_a, colour_b;
 centroid in vec2 place_in_image;
 flat in int element;
+centroid in vec3 place;
+uniform bool is_sunny;        // the sun is drawn
+uniform vec3 sun_direction;
+uniform vec3 sun_light;       // what faces it receives
+uniform mat4 sun_matrix;      // of places to those in the map of depths
+uniform float sun_step;       // a texel, as a part of the range of depths
+uniform highp sampler2D sun_depth;
+uniform highp sampler2D normals;          // [3][elements], as reflectances are
+uniform highp sampler2D reflectances;     // of all elements
+uniform highp sampler2D reflectance;      // of elements with an image; else 1
+uniform int elements;
 layout(location = 0) out vec4 pixel;
 
-float place(float value) {
+vec3 three(highp sampler2D values, int i) {
+    int width = textureSize(values, 0).x;
+    ivec3 at = i + ivec3(0, elements, 2 * elements);
+    return vec3(texelFetch(values, ivec2(at.x % width, at.x / width), 0).r, texelFetch(values, ivec2(at.y % width, at.y / width), 0).r,
+        texelFetch(values, ivec2(at.z % width, at.z / width), 0).r);
+}
+
+// The share of the sun that is seen: between four texels, linear. A plane's depth changes within a texel by its slope.
+float sun_seen(float cosine) {
+    vec3 at = (sun_matrix * vec4(place, 1.0)).xyz;
+    float slope = sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 0.02);
+    float depth = at.z - sun_step * (0.5 + 1.5 * slope);
+    vec2 size = vec2(textureSize(sun_depth, 0)), texels = at.xy * size - 0.5, part = fract(texels);
+    ivec2 low = ivec2(floor(texels)), most = textureSize(sun_depth, 0) - 1;
+    float seen[4];
+    for (int k = 0; k < 4; k++)
+        seen[k] = step(depth, texelFetch(sun_depth, clamp(low + ivec2(k % 2, k / 2), ivec2(0), most), 0).r);
+    return mix(mix(seen[0], seen[1], part.x), mix(seen[2], seen[3], part.x), part.y);
+}
+
+vec3 sunshine() {
+    float cosine = dot(three(normals, element), sun_direction);
+    if (cosine <= 0.0) return vec3(0.0);
+    vec3 reflected = three(reflectances, element);
+    if (is_textured) reflected /= max(three(reflectance, element), 0.004);
+    return reflected * sun_light * cosine * sun_seen(cosine);
+}
+
+float in_range(float value) {
     return is_log ? log2(max(value, 1e-30) / range.x) / log2(range.y / range.x) : (value - range.x) / (range.y - range.x);
 }
 
@@ -153,6 +194,7 @@ bool is_judged(int i) {
 void main() {
     bool right = compare == 1 && gl_FragCoord.x > split;
     vec3 colour = right ? colour_b * scale.y : colour_a * scale.x;
+    if (is_sunny && compare == 0) colour += sunshine();
     if (is_textured) colour *= texture(image, place_in_image).rgb * factor;
     float value = dot(colour, weights);
     vec3 shown;
@@ -161,10 +203,10 @@ void main() {
         float t = clamp((dot(colour_b, weights) * scale.y - value) / change, -1.0, 1.0);
         shown = to_srgb(t < 0.0 ? mix(vec3(0.8), vec3(0.02, 0.13, 0.65), -t) : mix(vec3(0.8), vec3(0.62, 0.02, 0.05), t));
     } else if (picture == 1) {
-        float t = clamp(place(value), 0.0, 1.0);
+        float t = clamp(in_range(value), 0.0, 1.0);
         shown = texture(palette, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
         if (iso_lines > 0.0) {
-            float level = place(value) * iso_lines, width = fwidth(level);
+            float level = in_range(value) * iso_lines, width = fwidth(level);
             if (width > 1e-9 && abs(level - round(level)) < 0.75 * width && round(level) > 0.5 && round(level) < iso_lines + 0.5) shown *= 0.25;
         }
     } else {
@@ -195,6 +237,8 @@ export function makeUniforms(nothing: Texture): Uniforms {
         elements: of(1), channels: of(1), weights: of(new Vector3(1, 0, 0)), is_smooth: of(false),
         picture: of(0), tone: of(1), scale: of(new Vector2(1, 1)), exposure: of(1), toneMappingExposure: of(1),
         is_textured: of(false), reflectance: of(nothing), palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),
+        is_sunny: of(false), sun_direction: of(new Vector3(0, 1, 0)), sun_light: of(new Vector3()), sun_matrix: of(new Matrix4()), sun_step: of(0),
+        sun_depth: of(nothing), normals: of(nothing), reflectances: of(nothing),
         compare: of(0), change: of(1), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
     };
 }

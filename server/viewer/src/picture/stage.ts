@@ -2,13 +2,15 @@
 // Knows no daemon and no panel; what it shows is set by its methods.
 import {
     BufferAttribute, BufferGeometry, Color, HalfFloatType, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry, RGBAFormat,
-    Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type PerspectiveCamera, type RawShaderMaterial, type Texture,
+    Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type Matrix4, type PerspectiveCamera, type RawShaderMaterial, type Texture,
 } from "three";
 import type { Palette, Tone } from "../state/state.ts";
 import type { Field } from "./field.ts";
 import { channelWeights } from "./field.ts";
 import type { SceneMesh } from "./glb.ts";
 import { findNodes } from "./nodes.ts";
+import { normalsOf, reflectancesOf } from "./elements.ts";
+import { SunShadow } from "./sun_shadow.ts";
 import { splitEdges, type Drawn } from "./split_edges.ts";
 import { makeUniforms, nodesMaterial, sceneMaterial, type Uniforms } from "./material.ts";
 import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor, whiteTexture } from "./textures.ts";
@@ -57,6 +59,9 @@ export class Stage {
     private paletteName: Palette | null = null;
     private wanted = false;
     private look: Look | null = null;
+    private shadow: SunShadow | null = null;
+    private sun: Vector3 | null = null;
+    private shadowIsOld = false;
 
     constructor(readonly canvas: HTMLCanvasElement, readonly camera: PerspectiveCamera,
         /** Moves the camera; true if it goes on moving. */
@@ -67,7 +72,7 @@ export class Stage {
         const plane = new Mesh(new PlaneGeometry(2, 2), nodesMaterial(this.uniforms));
         plane.frustumCulled = false;
         this.nodesScene.add(plane);
-        canvas.addEventListener("webglcontextrestored", () => { this.nodesAreOld = true; this.invalidate(); });
+        canvas.addEventListener("webglcontextrestored", () => { this.nodesAreOld = this.shadowIsOld = true; this.invalidate(); });
         new ResizeObserver(() => this.resize()).observe(canvas.parentElement as HTMLElement);
     }
 
@@ -165,6 +170,27 @@ export class Stage {
         this.invalidate();
     }
 
+    /** Draws the sun from this direction (a unit vector, y up), with shadows; null: values have it already. `light` is what
+     * faces the sun receive, by red, green and blue. */
+    setSun(sun: { direction: readonly [number, number, number]; light: readonly [number, number, number] } | null): void {
+        const u = this.uniforms, { mesh, geometry } = this;
+        u.is_sunny.value = sun !== null && mesh !== null;
+        this.invalidate();
+        if (sun === null || mesh === null || geometry === null) return;
+        if (this.shadow === null) {
+            this.shadow = new SunShadow(this.renderer, geometry);
+            u.sun_depth.value = this.shadow.depth;
+            u.normals.value = floatTexture(normalsOf(mesh));
+            u.reflectances.value = floatTexture(reflectancesOf(mesh));
+        }
+        (u.sun_light.value as Vector3).set(...sun.light);
+        const direction = new Vector3(...sun.direction);
+        if (this.sun !== null && this.sun.equals(direction)) return;
+        this.sun = direction;
+        this.shadowIsOld = true;
+        (u.sun_direction.value as Vector3).copy(direction);
+    }
+
     setLook(look: Look): void {
         const u = this.uniforms;
         this.look = look;
@@ -231,6 +257,12 @@ export class Stage {
             this.renderer.render(this.nodesScene, this.nodesCamera);
             this.renderer.setRenderTarget(null);
         }
+        if (this.shadowIsOld && this.shadow !== null && this.sun !== null && this.uniforms.is_sunny.value === true) {
+            this.shadowIsOld = false;
+            this.shadow.draw(this.sun);
+            (this.uniforms.sun_matrix.value as Matrix4).copy(this.shadow.matrix);
+            this.uniforms.sun_step.value = this.shadow.texel / this.shadow.range;
+        }
         this.renderer.render(this.scene, this.camera);
         this.frames += 1;
     }
@@ -268,7 +300,10 @@ export class Stage {
         this.nodes?.dispose();
         this.images.forEach((texture) => texture.dispose());
         this.images = [];
-        for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance"])
+        this.shadow?.dispose();
+        this.shadow = this.sun = null;
+        this.uniforms.is_sunny.value = false;
+        for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance", "normals", "reflectances"])
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
         this.geometry = this.drawn = this.mesh = this.values = this.nodes = null;
     }

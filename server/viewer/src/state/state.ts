@@ -81,6 +81,8 @@ export interface View {
     quantity: Quantity;
     smooth: boolean;
     textured: boolean;
+    /** The sun is drawn from its true direction, in place of the tiles of the sky that numbers have for it. */
+    sharpSun: boolean;
     tone: Tone;
     /** log2 of the factor before the tone curve; null: chosen from the first answer and then held. */
     exposure: number | null;
@@ -141,7 +143,7 @@ export const skyOff: SkyLight = {
 };
 
 export const firstView: View = {
-    picture: "light", quantity: "radiosity", smooth: true, textured: true, tone: "agx", exposure: null, follow: false,
+    picture: "light", quantity: "radiosity", smooth: true, textured: true, sharpSun: false, tone: "agx", exposure: null, follow: false,
     palette: "viridis", range: null, log: false, isoLines: 0, unit: "W/m²", threshold: null, judged: null,
     uniformity: 0.6, walk: false, camera: null,
 };
