@@ -24,16 +24,27 @@ build() {
 
 total_passed=0
 total_failed=0
-# run_ctest PRESET CTEST-ARGUMENTS...: prints what failed, adds to the totals; finding no test is a failure.
-run_ctest() {
+# tally PRESET: adds what its log of ctest says to the totals; finding no test is a failure.
+tally() {
     local preset=$1 passed failed
-    shift
-    ctest --test-dir "build/$preset" --output-on-failure --no-tests=error "$@" | tee "$logs/$preset.ctest" || true
     passed=$(grep -cE '^ *[0-9]+/[0-9]+ Test .* Passed ' "$logs/$preset.ctest" || true)
     failed=$(grep -cE '^ *[0-9]+/[0-9]+ Test .*(Failed|Timeout|Not Run|Exception|\*\*\*)' "$logs/$preset.ctest" || true)
     [ $((passed + failed)) -gt 0 ] || failed=1
     total_passed=$((total_passed + passed))
     total_failed=$((total_failed + failed))
+}
+
+# tests_of PRESET CTEST-ARGUMENTS...: runs them and prints what failed, into the log that tally reads.
+tests_of() {
+    local preset=$1
+    shift
+    ctest --test-dir "build/$preset" --output-on-failure --no-tests=error "$@" | tee "$logs/$preset.ctest" || true
+}
+
+# run_ctest PRESET CTEST-ARGUMENTS...: both, one after the other.
+run_ctest() {
+    tests_of "$@"
+    tally "$1"
 }
 
 # clang_build: all of the tree by clang, where a warning is an error, and clang-tidy.
@@ -60,12 +71,22 @@ export UBSAN_OPTIONS=print_stacktrace=1
 # cores: those of slow clients and of time limits mostly wait.
 CK_FORK=no run_ctest asan -j $((jobs + 1))
 
-step "the daemon under ThreadSanitizer, which mostly waits; beside it a warning-free build by clang, and clang-tidy"
+step "the daemon under ThreadSanitizer, which mostly waits; beside it clang: a warning-free build, clang-tidy, tests that compute"
 build tsan lambertd unit_batch unit_batch_blocked unit_batch_order unit_request_memory unit_thread_budget unit_adjoint_rows unit_guard_parts
 build dev lambert lambertd lambert-bench lambert_shared lambert_static ready_server faults stress_stability
 cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
-# Clients of a daemon have limits of time, a build has none.
-(renice -n 19 "$BASHPID" && clang_build) >"$logs/clang" 2>&1 &
+# Clients of a daemon have limits of time; a build and tests that only compute have none. Those of clang run in one process
+# each: a child that ends without handlers of exit leaves a registration of clang's OpenMP in /dev/shm, and a later process
+# of its number crashes by it.
+waiting='^(server|store|scene)$' # rooms with threads and children whose time is limited
+rm -f "$logs/clang.ctest"
+(
+    renice -n 19 "$BASHPID"
+    failed=0
+    clang_build || failed=1
+    CK_FORK=no tests_of clang -L 'unit|contract' -LE "$waiting" -j "$jobs"
+    exit "$failed"
+) >"$logs/clang" 2>&1 &
 clang=$!
 export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
 # The daemon shares its passes among threads of its own; OpenMP's runtime, which the unit tests' operators use, is not
@@ -73,12 +94,15 @@ export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:ex
 export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers|fair|leaving|request_memory)|unit\.(batch|request_memory|thread_budget|adjoint_rows|guard_parts)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS
-wait "$clang" || { cat "$logs/clang"; total_failed=$((total_failed + 1)); }
 
-step "unit and contract tests by clang"
-# In one process each: a child that ends without handlers of exit leaves a registration of clang's OpenMP in /dev/shm, and
-# a later process of its number crashes by it.
-CK_FORK=no run_ctest clang -L 'unit|contract' -j "$jobs"
+wait "$clang" || total_failed=$((total_failed + 1))
+cat "$logs/clang"
+
+step "unit tests by clang of rooms whose children and threads have limits of time"
+if [ -e "$logs/clang.ctest" ]; then # it is built
+    tally clang
+    CK_FORK=no run_ctest clang -L "$waiting" -j "$jobs"
+fi
 
 step "programs as users have them: faults, kills, an installation, the commands of all documents, the bench"
 run_ctest dev -j $((jobs + 1)) -L as_users
