@@ -1,6 +1,6 @@
 // Odd circumstances: narrow windows, links of strangers, slow networks, a daemon that is away, stores that are replaced.
 import assert from "node:assert/strict";
-import { copyFileSync, renameSync } from "node:fs";
+import { copyFileSync, renameSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
 import { Daemon, inFolder, lambert, makeStore, openPage, settled, violations } from "./page.mjs";
 
@@ -150,6 +150,66 @@ test("a store that is replaced is shown as it is now, and one that is gone is to
     await page.route(/\/v1\/scenes\/live/, (route) => route.fulfill({ status: 404, contentType: "application/problem+json", body: '{"detail":"there is no scene live"}' }));
     await dim(page, 0.5);
     await page.getByText("The daemon serves live no more").waitFor();
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await own.stop();
+});
+
+/** A floor under many lamps, some of which have odd names. */
+function manyLamps(names) {
+    const lines = ["mtllib many.mtl"];
+    let vertices = 0;
+    const square = (x, y, z, size, isDown) => {
+        const corners = [[0, 0], [1, 0], [1, 1], [0, 1]];
+        for (const [u, v] of isDown ? corners.reverse() : corners) lines.push(`v ${x + u * size} ${y + v * size} ${z}`);
+        lines.push(`f ${[1, 2, 3, 4].map((k) => vertices + k).join(" ")}`);
+        vertices += 4;
+    };
+    lines.push("g floor", "usemtl grey");
+    square(0, 0, 0, 12, false);
+    names.forEach((name, k) => {
+        lines.push(`g ${name}`, "usemtl blue");
+        square((k % 12) + 0.4, Math.floor(k / 12) + 0.4, 2.5, 0.2, true);
+    });
+    return `${lines.join("\n")}\n`;
+}
+
+test("many lamps with odd names are found, and fit", async () => {
+    const names = ["<b>bold</b>", `a-long-${"x".repeat(90)}`, "lamp&amp;", "日本の灯", ...Array.from({ length: 56 }, (_, k) => `desk-${k + 1}`)];
+    writeFileSync(inFolder("many.mtl"), "newmtl grey\nKd .5 .5 .5\nnewmtl blue\nKd .1 .1 .1\nKe 10 10 90\n");
+    writeFileSync(inFolder("many.obj"), manyLamps(names));
+    lambert("precompute", inFolder("many.obj"), "-o", inFolder("many.h5"), "--quiet", "--probes", 0);
+    const own = await Daemon.start([`${inFolder("many.h5")}:<i>many & "odd"`]), page = await openPage(own.address, { width: 360, height: 740, touch: true });
+    const rows = page.locator(".light"), on = () => page.evaluate(() => Object.entries(window.lambert.store.now.lighting.groups).filter(([, light]) => light.on).map(([name]) => name).sort());
+    assert.equal(await rows.count(), 40);
+    assert.equal(await page.locator(".light b").count(), 0);
+    await page.getByText("20 more: name a part of theirs above.").waitFor();
+    const filter = page.getByLabel("Show lamps whose names have");
+    await filter.fill("DESK-5");
+    assert.equal(await rows.count(), 8);
+    await page.getByRole("button", { name: "All off" }).tap();
+    await settled(page);
+    assert.equal((await on()).length, 52);
+    await filter.fill("");
+    await page.getByRole("button", { name: "All off" }).tap();
+    await filter.fill("desk-7");
+    await page.getByRole("button", { name: "All on" }).tap();
+    await settled(page);
+    assert.deepEqual(await on(), ["desk-7"]);
+    // A lamp whose colour was not chosen by a temperature has none.
+    const kelvin = rows.first().getByRole("spinbutton", { name: "Temperature in K" });
+    assert.deepEqual([await kelvin.inputValue(), await kelvin.getAttribute("placeholder")], ["", "own"]);
+    await kelvin.fill("3000");
+    await page.keyboard.press("Enter");
+    assert.equal(await page.evaluate(() => window.lambert.store.now.lighting.groups["desk-7"].kelvin), 3000);
+    await filter.fill("");
+    for (const tab of await page.getByRole("tab").all()) {
+        if (!(await tab.isVisible())) continue;
+        await tab.tap();
+        const wide = await page.evaluate(() => [...document.querySelectorAll("[role=tabpanel]:not([hidden]), [role=tabpanel]:not([hidden]) :is(fieldset, legend, .light)")].map((e) => e.getBoundingClientRect().right));
+        assert.ok(Math.max(...wide) <= 361, `${await tab.textContent()}: ${Math.max(...wide)}`);
+    }
+    assert.deepEqual(await violations(page), []);
     assert.deepEqual(page.faults, []);
     await page.context().close();
     await own.stop();

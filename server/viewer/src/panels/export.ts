@@ -29,7 +29,7 @@ export function exportPanel(app: App): Panel {
 
 function picturePart(app: App, tries: (what: () => Promise<string>) => void): HTMLElement {
     const size = (label: string, value: number): HTMLInputElement =>
-        make("input", { type: "number", min: 16, max: SIDE_MOST, step: 1, value: String(value), "aria-label": label });
+        make("input", { type: "number", class: "narrow", min: 16, max: SIDE_MOST, step: 1, value: String(value), "aria-label": label });
     const width = size("Width in pixels", 1920), height = size("Height in pixels", 1080);
     const legend = tick("With a legend of colours", true, () => undefined);
     const save = async (): Promise<string> => {

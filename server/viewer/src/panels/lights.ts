@@ -11,6 +11,9 @@ interface Row {
     update(light: GroupLight, solo: string | null): void;
 }
 
+/** So many rows are drawn; a filter, which is there from so many lamps on, finds the others. */
+const ROWS_MOST = 40, FILTER_FROM = 8;
+
 export function lightsPanel(app: App): Panel {
     const rows = new Map<string, Row>();
     const list = make("div", { class: "lights" });
@@ -29,14 +32,28 @@ export function lightsPanel(app: App): Panel {
     // Stores of few emitters answer these alone.
     const shining = (): string[] => (hasEmitters() ? []
         : Object.keys(app.store.now.lighting.groups).filter((name) => app.scene?.mesh.groups.some((g) => g.name === name)));
+    const filter = make("input", { type: "text", placeholder: "Part of a name", "aria-label": "Show lamps whose names have", oninput: () => draw() });
+    const found = (): string[] => {
+        const part = filter.value.trim().toLowerCase();
+        return shining().filter((name) => name.toLowerCase().includes(part));
+    };
+    /** Of the lamps that the filter finds. */
+    const turn = (on: boolean): void => {
+        const { groups } = app.store.now.lighting;
+        change({ groups: { ...groups, ...Object.fromEntries(found().map((name) => [name, { ...groups[name], on }])) } }, null);
+    };
+    const several = make("div", { class: "row" }, button("All on", "Turn on all lamps listed", () => turn(true)), button("All off", "Turn off all lamps listed", () => turn(false)), filter);
     const draw = (): void => {
-        const { lighting } = app.store.now, names = shining();
+        const { lighting } = app.store.now, all = found(), names = all.slice(0, ROWS_MOST);
+        several.hidden = shining().length < 2;
+        filter.hidden = shining().length < FILTER_FROM;
         rows.clear();
         fill(list, ...names.map((name) => {
             const row = lightRow(app, name, lighting.groups[name], changeGroup, (solo) => change({ solo }, null));
             rows.set(name, row);
             return row.element;
         }));
+        if (all.length > names.length) list.append(make("p", { class: "hint" }, `${all.length - names.length} more: name a part of theirs above.`));
         if (app.scene?.mesh.groups.every((group) => group.emission === null) && app.scene.description.sky === null && names.length > 0)
             list.append(make("p", { class: "hint" }, "No group of this scene emits light: these do it in its place."));
         if (hasEmitters()) list.append(make("p", { class: "hint" }, "This store answers its own emitters alone: see the panel Emitters."));
@@ -52,11 +69,11 @@ export function lightsPanel(app: App): Panel {
     const update = (): void => {
         const { lighting } = app.store.now;
         dim.set(lighting.dim);
-        const known = shining();
+        const known = found().slice(0, ROWS_MOST);
         if (known.length !== rows.size || known.some((name) => !rows.has(name))) draw();
         for (const [name, row] of rows) row.update(lighting.groups[name], lighting.solo);
     };
-    app.on("scene", () => { draw(); drawPresets(app, presets); });
+    app.on("scene", () => { filter.value = ""; draw(); drawPresets(app, presets); });
     app.store.listen((now, before) => {
         if (now.lighting !== before.lighting) update();
         if (now.presets !== before.presets) drawPresets(app, presets);
@@ -64,7 +81,7 @@ export function lightsPanel(app: App): Panel {
     const reset = button("As the scene comes", null, () => {
         if (app.scene !== null) app.store.change({ ...app.store.now, lighting: app.scene.ownLighting });
     });
-    return { id: "lights", title: "Lights", element: make("div", {}, dim.element, list, more, reset, presets) };
+    return { id: "lights", title: "Lights", element: make("div", {}, dim.element, several, list, more, reset, presets) };
 }
 
 function lightRow(app: App, name: string, light: GroupLight,
@@ -97,7 +114,8 @@ function lightRow(app: App, name: string, light: GroupLight,
         power.set(now.power);
         const largest = Math.max(...now.colour, 1e-9);
         if (document.activeElement !== swatch) swatch.value = toHex(now.colour.map((v) => v / largest));
-        if (now.kelvin !== null) kelvin.set(now.kelvin);
+        if (now.kelvin === null) kelvin.unset("own");
+        else kelvin.set(now.kelvin);
         alone.setAttribute("aria-pressed", String(soloed === name));
         element.classList.toggle("dark", !now.on || (soloed !== null && soloed !== name));
     };

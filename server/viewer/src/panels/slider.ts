@@ -16,6 +16,8 @@ export interface SliderOptions {
 export interface Slider {
     element: HTMLElement;
     set(value: number): void;
+    /** There is no value; the field has this word in its place. */
+    unset(word: string): void;
     setMost(most: number): void;
 }
 
@@ -43,6 +45,7 @@ export function slider(options: SliderOptions, now: number): Slider {
         type: "number", min: least, step: "any", "aria-label": `${options.label}${options.unit === undefined ? "" : ` in ${options.unit}`}`,
         onchange: () => {
             const value = Number(box.value);
+            if (box.value === "" && box.placeholder !== "") return;
             if (box.value === "" || !Number.isFinite(value) || value < least) {
                 set(current);
                 return;
@@ -55,6 +58,7 @@ export function slider(options: SliderOptions, now: number): Slider {
     let current = now;
     const set = (value: number): void => {
         current = value;
+        box.placeholder = "";
         if (document.activeElement !== box) box.value = tell(value).replaceAll(",", "");
         if (document.activeElement !== range || Math.abs(toValue(Number(range.value)) - value) > 1e-3 * Math.abs(value))
             range.value = String(toPlace(value));
@@ -64,6 +68,11 @@ export function slider(options: SliderOptions, now: number): Slider {
         options.unit !== undefined && make("span", { class: "unit" }, options.unit));
     return {
         element, set,
+        unset: (word) => {
+            if (document.activeElement === box) return;
+            box.value = "";
+            box.placeholder = word;
+        },
         setMost: (value) => {
             most = value;
             if (!log) range.max = String(value);
