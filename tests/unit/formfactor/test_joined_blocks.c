@@ -17,6 +17,12 @@ static lam_error error;
 /* Half a sphere, a shallow bowl and a deep one, which has a lid: a plane of many elements. */
 static const double depths[] = {1, .4, 2};
 enum { DEPTHS = sizeof depths / sizeof *depths, LID = 2, RINGS = 12, SECTORS = 26 };
+/* A sanitizer watches the same code in each open bowl: one of them is enough, and the one with a lid. */
+#ifdef LAMBERT_SANITIZED
+enum { FIRST_DEPTH = 1 };
+#else
+enum { FIRST_DEPTH = 0 };
+#endif
 
 /* The kernel of a block of a 2000th of all elements varies by this share of itself, as all pairs or 16 of
  * them tell. */
@@ -447,12 +453,12 @@ int main(void) {
     tcase_add_test(tests, what_hides_nothing_is_proven);
     tcase_add_test(tests, dents_count_where_they_hide_light);
     tcase_add_test(tests, spheres_hold_their_elements);
-    tcase_add_loop_test(tests, even_blocks_are_means_of_all_pairs, 0, DEPTHS);
-    tcase_add_loop_test(tests, products_are_those_of_all_pairs, 0, DEPTHS);
-    tcase_add_loop_test(tests, row_sums_are_those_of_all_pairs, 0, DEPTHS);
-    tcase_add_loop_test(tests, pairs_of_an_open_scene_are_certain, 0, DEPTHS);
+    tcase_add_loop_test(tests, even_blocks_are_means_of_all_pairs, FIRST_DEPTH, DEPTHS);
+    tcase_add_loop_test(tests, products_are_those_of_all_pairs, FIRST_DEPTH, DEPTHS);
+    tcase_add_loop_test(tests, row_sums_are_those_of_all_pairs, FIRST_DEPTH, DEPTHS);
+    tcase_add_loop_test(tests, pairs_of_an_open_scene_are_certain, FIRST_DEPTH, DEPTHS);
     tcase_add_test(tests, row_sums_of_a_closed_scene_are_1);
-    tcase_add_loop_test(tests, rows_have_the_sums_of_the_boundary, 0, DEPTHS);
+    tcase_add_loop_test(tests, rows_have_the_sums_of_the_boundary, FIRST_DEPTH, DEPTHS);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
