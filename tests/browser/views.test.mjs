@@ -233,3 +233,34 @@ test("smooth light has no step where elements of different sizes meet", async ()
     await page.context().close();
     await daemon.stop();
 });
+
+test("who walks into a scene stands on its ground and looks ahead, and a cross reads what is under it then", async () => {
+    const store = makeStore("hill", "city", { generate: ["--variant", 2, "--terrain", "hill", "--elements", 600], precompute: ["--probes", 0, "--rays", 128, "--sky", "tregenza"] });
+    const daemon = await Daemon.start([store]), page = await openPage(daemon.address);
+    await page.locator("main canvas").first().focus();
+    await page.keyboard.press("r");
+    await page.waitForFunction(() => window.lambert.hovered !== null);
+    await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, view: { ...s.now.view, walk: true } }); });
+    await page.waitForFunction(() => { const { camera } = window.lambert.store.now.view; return camera !== null && Math.abs(camera[1] - camera[4]) < 1e-3; });
+    await settled(page);
+    const found = await page.evaluate(() => {
+        const { scene: { mesh, picker }, cameras, store: { now }, hovered } = window.lambert, [x, y, z] = now.view.camera, { positions: p, index } = mesh;
+        // Heights of the triangles that face up at x and z, the plain way.
+        const heights = [], side = (a, b) => (p[3 * b] - p[3 * a]) * (z - p[3 * a + 2]) - (p[3 * b + 2] - p[3 * a + 2]) * (x - p[3 * a]);
+        for (let t = 0; t < index.length; t += 3) {
+            const [a, b, c] = index.subarray(t, t + 3), [u, v, w] = [side(b, c), side(c, a), side(a, b)];
+            if (u < 0 && v < 0 && w < 0) heights.push((u * p[3 * a + 1] + v * p[3 * b + 1] + w * p[3 * c + 1]) / (u + v + w));
+        }
+        cameras.camera.updateMatrixWorld();
+        return { y, heights, hovered, under: picker.at(0, 0, cameras.camera) };
+    });
+    assert.ok(found.heights.length > 0 && Math.abs(found.y - Math.min(...found.heights) - 1.6) < 0.01, JSON.stringify(found));
+    assert.equal(found.hovered, found.under);
+    // Another scene is entered on foot, too.
+    await page.evaluate(() => window.lambert.open("hill", null));
+    await settled(page);
+    assert.ok(Math.abs((await page.evaluate(() => window.lambert.cameras.now))[1] - found.y) < 0.01);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await daemon.stop();
+});

@@ -122,6 +122,7 @@ export class App {
         this.stage.show(mesh, description.channels);
         const picker = new Picker(this.stage.geometry as never, this.stage.drawn ?? mesh);
         const scene = { description, mesh, picker, ownLighting: lightingOf(mesh, description) };
+        this.cameras.floorAt = (x, z) => picker.floorAt(x, z);
         takeIn(scene);
         this.scene = scene;
         this.beside.reset(description);
@@ -138,9 +139,13 @@ export class App {
         this.judge(this.store.now);
         document.title = `${name} · Lambert`;
         this.stage.resize();
+        if (base.view.camera === null) {
+            // From outside, and in from there.
+            this.cameras.setWalk(false);
+            this.cameras.fit(false);
+        }
         this.cameras.setWalk(base.view.walk);
-        if (base.view.camera === null) this.cameras.fit(false);
-        else this.cameras.place(base.view.camera, false);
+        if (base.view.camera !== null) this.cameras.place(base.view.camera, false);
         this.tell("scene");
         this.ask();
     }

@@ -24,6 +24,9 @@ export function placeOf(eye: readonly number[], direction: readonly number[], up
 /** Metres a second on foot. */
 const PACE = 1.4;
 
+/** Of a walker, above the floor, m. */
+const EYE = 1.6;
+
 export class Cameras {
     readonly camera = new PerspectiveCamera(ANGLE, 1, 0.01, 1000);
     private readonly controls: CameraControls;
@@ -32,6 +35,8 @@ export class Cameras {
     /** The nearest that is drawn from inside, m. */
     private nearest = 0.01;
     private isWalk = false;
+    /** The lowest place to stand on at x and z, m; null: nothing is there. */
+    floorAt: (x: number, z: number) => number | null = () => null;
 
     constructor(canvas: HTMLCanvasElement, private readonly moved: () => void, private readonly rested: () => void) {
         this.controls = new CameraControls(this.camera, canvas);
@@ -94,17 +99,24 @@ export class Cameras {
         this.isWalk = on;
         const eye = this.controls.getPosition(new Vector3()), target = this.controls.getTarget(new Vector3());
         const size = this.box.getSize(new Vector3()).length();
-        const ahead = target.sub(eye).normalize().multiplyScalar(on ? size / 2000 : size / 4);
-        const inside = on && !this.box.containsPoint(eye);
+        const ahead = target.sub(eye).normalize(), inside = on && !this.box.containsPoint(eye);
         if (inside) {
+            // From outside one looks down, on foot ahead.
+            ahead.y = 0;
+            if (ahead.length() < 1e-3) ahead.set(0, 0, -1);
+            ahead.normalize();
             this.box.getCenter(eye);
-            eye.y = Math.min(this.box.min.y + 1.6, (this.box.min.y + this.box.max.y) / 2);
+            const floor = this.floorAt(eye.x, eye.z) ?? this.box.min.y;
+            eye.y = Math.min(floor + EYE, (floor + this.box.max.y) / 2);
         }
+        ahead.multiplyScalar(on ? size / 2000 : size / 4);
         this.controls.minDistance = on ? ahead.length() : 0;
         this.controls.maxDistance = on ? ahead.length() : size * 8;
         this.controls.azimuthRotateSpeed = this.controls.polarRotateSpeed = on ? -0.4 : 1;
         void this.controls.setLookAt(eye.x, eye.y, eye.z, eye.x + ahead.x, eye.y + ahead.y, eye.z + ahead.z, false);
         this.moved();
+        // Not within the change of the state that this is a part of.
+        queueMicrotask(() => this.rested());
     }
 
     /** True if the camera goes on moving. */

@@ -142,7 +142,7 @@ uniform bool is_sunny;        // the sun is drawn
 uniform vec3 sun_direction;
 uniform vec3 sun_light;       // what faces it receives
 uniform mat4 sun_matrix;      // of places to those in the map of depths
-uniform float sun_step;       // a texel, as a part of the range of depths
+uniform vec2 sun_step;        // a texel: m, and as a part of the range of depths
 uniform highp sampler2D sun_depth;
 uniform highp sampler2D normals;          // [3][elements], as reflectances are
 uniform highp sampler2D reflectances;     // of all elements
@@ -157,25 +157,26 @@ vec3 three(highp sampler2D values, int i) {
         texelFetch(values, ivec2(at.z % width, at.z / width), 0).r);
 }
 
-// The share of the sun that is seen: between four texels, linear. A plane's depth changes within a texel by its slope.
-float sun_seen(float cosine) {
-    vec3 at = (sun_matrix * vec4(place, 1.0)).xyz;
-    float slope = sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 0.02);
-    float depth = at.z - sun_step * (0.5 + 1.5 * slope);
-    vec2 size = vec2(textureSize(sun_depth, 0)), texels = at.xy * size - 0.5, part = fract(texels);
-    ivec2 low = ivec2(floor(texels)), most = textureSize(sun_depth, 0) - 1;
-    float seen[4];
-    for (int k = 0; k < 4; k++)
-        seen[k] = step(depth, texelFetch(sun_depth, clamp(low + ivec2(k % 2, k / 2), ivec2(0), most), 0).r);
-    return mix(mix(seen[0], seen[1], part.x), mix(seen[2], seen[3], part.x), part.y);
+// The share of the sun that is seen: a mean over three texels by three, linear between places. The place is lifted by as much as a
+// plane's own depths reach into these, which also keeps the end of a wall from letting light in at a corner.
+float sun_seen(vec3 normal) {
+    vec3 at = (sun_matrix * vec4(place + 2.5 * sun_step.x * normal, 1.0)).xyz;
+    float depth = at.z - 0.25 * sun_step.y, seen = 0.0;
+    vec2 texels = at.xy * vec2(textureSize(sun_depth, 0)) - 0.5, part = fract(texels);
+    ivec2 low = ivec2(floor(texels)) - 1, most = textureSize(sun_depth, 0) - 1;
+    vec4 across = vec4(1.0 - part.x, 1.0, 1.0, part.x), up = vec4(1.0 - part.y, 1.0, 1.0, part.y);
+    for (int j = 0; j < 4; j++)
+        for (int i = 0; i < 4; i++) seen += across[i] * up[j] * step(depth, texelFetch(sun_depth, clamp(low + ivec2(i, j), ivec2(0), most), 0).r);
+    return seen / 9.0;
 }
 
 vec3 sunshine() {
-    float cosine = dot(three(normals, element), sun_direction);
+    vec3 normal = three(normals, element);
+    float cosine = dot(normal, sun_direction);
     if (cosine <= 0.0) return vec3(0.0);
     vec3 reflected = three(reflectances, element);
     if (is_textured) reflected /= max(three(reflectance, element), 0.004);
-    return reflected * sun_light * cosine * sun_seen(cosine);
+    return reflected * sun_light * cosine * sun_seen(normal);
 }
 
 float in_range(float value) {
@@ -237,7 +238,7 @@ export function makeUniforms(nothing: Texture): Uniforms {
         elements: of(1), channels: of(1), weights: of(new Vector3(1, 0, 0)), is_smooth: of(false),
         picture: of(0), tone: of(1), scale: of(new Vector2(1, 1)), exposure: of(1), toneMappingExposure: of(1),
         is_textured: of(false), reflectance: of(nothing), palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),
-        is_sunny: of(false), sun_direction: of(new Vector3(0, 1, 0)), sun_light: of(new Vector3()), sun_matrix: of(new Matrix4()), sun_step: of(0),
+        is_sunny: of(false), sun_direction: of(new Vector3(0, 1, 0)), sun_light: of(new Vector3()), sun_matrix: of(new Matrix4()), sun_step: of(new Vector2()),
         sun_depth: of(nothing), normals: of(nothing), reflectances: of(nothing),
         compare: of(0), change: of(1), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
     };

@@ -1,5 +1,5 @@
 // Finds the element under a point of the canvas, by a tree of boxes that is made when it is first needed.
-import { FrontSide, Raycaster, Vector2, type BufferGeometry, type Camera } from "three";
+import { FrontSide, Ray, Raycaster, Vector2, Vector3, type BufferGeometry, type Camera } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import type { SceneMesh } from "./glb.ts";
 
@@ -22,5 +22,14 @@ export class Picker {
         const hit = (this.tree as MeshBVH).raycastFirst(this.caster.ray, FrontSide);
         if (hit === null || hit.faceIndex === undefined || hit.faceIndex === null) return null;
         return this.mesh.elementOf[this.mesh.index[3 * hit.faceIndex]];
+    }
+
+    /** The height of the lowest front that is met from above at x and z, or null. */
+    floorAt(x: number, z: number): number | null {
+        this.prepare();
+        this.geometry.computeBoundingBox();
+        const top = (this.geometry.boundingBox?.max.y ?? 0) + 1, down = new Ray(new Vector3(x, top, z), new Vector3(0, -1, 0));
+        const heights = (this.tree as MeshBVH).raycast(down, FrontSide).map((hit) => hit.point.y);
+        return heights.length === 0 ? null : Math.min(...heights);
     }
 }

@@ -261,7 +261,7 @@ export class Stage {
             this.shadowIsOld = false;
             this.shadow.draw(this.sun);
             (this.uniforms.sun_matrix.value as Matrix4).copy(this.shadow.matrix);
-            this.uniforms.sun_step.value = this.shadow.texel / this.shadow.range;
+            (this.uniforms.sun_step.value as Vector2).set(this.shadow.texel, this.shadow.texel / this.shadow.range);
         }
         this.renderer.render(this.scene, this.camera);
         this.frames += 1;

@@ -45,6 +45,8 @@ export class Pointer {
         // Before the camera, which listens to the canvas itself.
         this.frame.addEventListener("keydown", (event) => this.press(event), true);
         app.on("field", () => this.tell());
+        // After the camera moved by itself or by keys, another element is under the cross or the pointer.
+        app.store.listen((now, before) => { if (now.view.camera !== before.view.camera && this.place !== null) this.moveTo(...this.place); });
         app.on("scene", () => {
             this.leave();
             const prepare = (): void => app.scene?.picker.prepare();
