@@ -98,3 +98,37 @@ test("a variant keeps the images of groups that it does not change", async () =>
     }
     await daemon.stop();
 });
+
+test("an image under the sun that is drawn keeps its pixels, too", async () => {
+    const daemon = await Daemon.start([withImage("two", "--sky", "tregenza")]), page = await openPage(daemon.address);
+    await page.waitForFunction(() => window.lambert.stage.uniforms.is_textured.value);
+    await page.evaluate(() => {
+        const { store: s, cameras } = window.lambert, { lighting, view } = s.now;
+        const sky = { ...lighting.sky, model: "given", direct: 700, diffuse: 100, latitude: 0, longitude: 0, zone: 0, day: 80, hour: 12, sun: "tile" };
+        s.change({ ...s.now, lighting: { ...lighting, groups: {}, sky }, view: { ...view, smooth: false, tone: "linear", exposure: -8, sharpSun: true } });
+        cameras.place([1.4, 2.5, 1.5, 1.4, 0, -0.5], false);
+    });
+    await settled(page);
+    // In front of the lamp's shadow, on both sides of the edge in the image.
+    const { points, parts } = await page.evaluate((edge) => {
+        const app = window.lambert, { cameras: { camera }, scene } = app;
+        camera.updateMatrixWorld();
+        return {
+            points: [-1, 1].map((side) => {
+                const p = camera.position.clone().set(4 * edge + 0.08 * side, 0, -0.5).project(camera);
+                return { x: (p.x + 1) / 2, y: (1 - p.y) / 2, element: scene.picker.at(p.x, p.y, camera) };
+            }),
+            parts: app.sunOf(app.store.now.lighting, scene.description),
+        };
+    }, EDGE / SIZE);
+    const ask = async (sky, quantity, element) => (await daemon.json("/v1/scenes/two/radiosity", { emission: { sky }, select: { elements: [element] }, quantity }))[quantity].map((channel) => channel[0]);
+    for (const [k, colour] of COLOURS.two.entries()) {
+        const { x, y, element } = points[k], [B, H, further] = await Promise.all([ask(parts.sky, "radiosity", element), ask(parts.sky, "irradiance", element), ask(parts.sun, "indirect", element)]);
+        const received = H.map((h, c) => h + (further[c] * h) / B[c] + parts.light[c] * parts.direction[2]);
+        const wanted = toSrgb(colour.map((v, c) => decode(v) * received[c] * 2 ** -8)), shown = await pixel(page, x, y);
+        assert.ok(wanted.every((v, c) => Math.abs(v - shown[c]) <= 10), `${shown} is shown, must be near ${wanted}`);
+    }
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await daemon.stop();
+});
