@@ -84,6 +84,10 @@ test("a scene that is long on its way is told of, and one that is not there leav
     }) });
     await page.getByText(/^Loading the scene …$/).waitFor();
     await page.getByText(/^Loading cornell …$/).waitFor();
+    // Nothing is offered that this scene may not have.
+    for (const name of ["Undo (Ctrl+Z)", "Redo (Ctrl+Y)"]) assert.ok(await page.getByRole("button", { name }).isDisabled(), name);
+    assert.deepEqual(await page.getByRole("tab").allInnerTexts(), ["Lights", "View", "Reading", "Trust", "Compare", "Materials", "Export"]);
+    assert.equal(await page.getByRole("button", { name: "All off" }).isVisible(), false);
     await settled(page);
     await page.getByText(/^Loading/).waitFor({ state: "hidden" });
     await page.getByRole("combobox", { name: "Scene" }).selectOption("patio");

@@ -137,7 +137,7 @@ test("turbidity and irradiances are set on the page, and the figures say what th
     // A sky that is many times as bright is not all white; an exposure that a person chose stays.
     assert.ok(await exposureNow() < before - 2, `${before} EV, then ${await exposureNow()}`);
     const clear = [await figure("direct"), await figure("diffuse"), await figure("clearness")];
-    await panel.getByRole("spinbutton", { name: "Turbidity in T" }).fill("6");
+    await panel.getByRole("spinbutton", { name: "Turbidity" }).fill("6");
     await page.keyboard.press("Enter");
     await settled(page);
     const hazy = [await figure("direct"), await figure("diffuse"), await figure("clearness")];

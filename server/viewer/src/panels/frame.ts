@@ -28,6 +28,7 @@ export function makeBar(app: App): HTMLElement {
         redo.disabled = !app.store.canRedo;
     };
     app.store.listen(update);
+    update();
     const list = (): void => {
         update();
         // The scene that is shown may be served no more.
@@ -98,7 +99,7 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
         if (!isChosen || !all.some((panel) => panel.id === current)) show(first.id);
     };
     app.on("scene", update);
-    show(current);
+    update();
     const drawer = make("aside", { "aria-label": "Panels" }, make("div", { role: "tablist", "aria-label": "Panels" }, ...tabs.values()),
         make("div", { class: "bodies" }, ...bodies.values()));
     const fold = button("▾", "Fold the panels", () => {

@@ -43,6 +43,7 @@ export function lightsPanel(app: App): Panel {
         change({ groups: { ...groups, ...Object.fromEntries(found().map((name) => [name, { ...groups[name], on }])) } }, null);
     };
     const several = make("div", { class: "row" }, button("All on", "Turn on all lamps listed", () => turn(true)), button("All off", "Turn off all lamps listed", () => turn(false)), filter);
+    several.hidden = true;
     const draw = (): void => {
         const { lighting } = app.store.now, all = found(), names = all.slice(0, ROWS_MOST);
         several.hidden = shining().length < 2;

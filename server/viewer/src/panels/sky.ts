@@ -166,7 +166,7 @@ function makeControls(app: App, change: Change): Controls {
     const tinted = tick("Blue sky, warm sun", first.tinted, (on) => change({ tinted: on }));
     const unit = (): string => (app.store.now.view.unit === "lx" ? "lx" : "W/m²");
     const strength = slider({ label: "On the ground", unit: unit(), least: 0, most: 1000, log: true, change: (value) => change({ strength: value }, "strength of the sky") }, first.strength);
-    const turbidity = slider({ label: "Turbidity", unit: "T", least: 1.5, most: 8, step: 0.1, change: (value) => change({ turbidity: Math.min(20, Math.max(1, value)) }, "turbidity of the sky") }, first.turbidity);
+    const turbidity = slider({ label: "Turbidity", least: 1.5, most: 8, step: 0.1, change: (value) => change({ turbidity: Math.min(20, Math.max(1, value)) }, "turbidity of the sky") }, first.turbidity);
     const haze = make("p", { class: "hint" }, "2: very clean, cold air; 3: clear; 5: hazy; 7: polluted.");
     const direct = slider({ label: "Facing the sun", unit: "W/m²", least: 0, most: 1100, step: 5, change: (value) => change({ direct: Math.min(3000, value) }, "direct light") }, first.direct);
     const diffuse = slider({ label: "Sky on the ground", unit: "W/m²", least: 0, most: 600, step: 5, change: (value) => change({ diffuse: Math.min(3000, value) }, "diffuse light") }, first.diffuse);
