@@ -6,12 +6,17 @@ import { Daemon, inFolder, lambert, near, openPage, pixel, settled, sourceOf, to
 
 const RHO = 0.5, PARTS = 20;
 
+/** Of a point (east, north, up) the axes of a store, as solver/daylight/sky_tiles.h has them, and those of the picture. */
+const AXES = {
+    z: [([e, n, u]) => [e, n, u], ([e, n, u]) => [e, u, -n]], y: [([e, n, u]) => [e, u, -n], ([e, n, u]) => [e, u, -n]], x: [([e, n, u]) => [u, e, n], ([e, n, u]) => [-e, u, n]],
+};
+
 /** A floor of 10 m, and a plate of 2 m, 2 m above its middle, which faces up alone: light from above meets its front, from below its back. */
-function plateAboveFloor() {
+function plateAboveFloor(up) {
     const lines = ["mtllib plate.mtl"];
     let vertices = 0;
     const square = (x, y, z, size) => {
-        for (const [u, v] of [[0, 0], [1, 0], [1, 1], [0, 1]]) lines.push(`v ${x + u * size} ${y + v * size} ${z}`);
+        for (const [u, v] of [[0, 0], [1, 0], [1, 1], [0, 1]]) lines.push(`v ${AXES[up][0]([x + u * size, y + v * size, z]).join(" ")}`);
         lines.push(`f ${[1, 2, 3, 4].map((k) => vertices + k).join(" ")}`);
         vertices += 4;
     };
@@ -27,9 +32,11 @@ before(async () => {
     daylight = { ...await sourceOf("daylight/source"), ...await sourceOf("daylight/sun") };
     state = await sourceOf("state/state");
     writeFileSync(inFolder("plate.mtl"), `newmtl grey\nKd ${RHO} ${RHO} ${RHO}\n`);
-    writeFileSync(inFolder("plate.obj"), plateAboveFloor());
-    lambert("precompute", inFolder("plate.obj"), "-o", inFolder("plate.h5"), "--quiet", "--probes", 0, "--rays", 256, "--sky", "tregenza");
-    daemon = await Daemon.start([inFolder("plate.h5")]);
+    for (const up of Object.keys(AXES)) {
+        writeFileSync(inFolder(`${up}.obj`), plateAboveFloor(up));
+        lambert("precompute", inFolder(`${up}.obj`), "-o", inFolder(`${up}.h5`), "--quiet", "--probes", 0, "--rays", 256, "--sky", "tregenza", "--up", up);
+    }
+    daemon = await Daemon.start(Object.keys(AXES).map((up) => inFolder(`${up}.h5`)));
 });
 
 const LIGHT = { model: "given", direct: 700, diffuse: 100, factor: 1, latitude: 20, longitude: 0, zone: 0, day: 80 };
@@ -40,50 +47,52 @@ const set = (page, view, sky) => page.evaluate(([v, s]) => {
     store.change({ ...now, view: { ...now.view, ...v }, lighting: { ...now.lighting, sky: { ...now.lighting.sky, ...s } } });
 }, [view, sky]);
 
-/** Where points of the store (z up) are seen, in shares of the picture. */
-const seenAt = (page, points) => page.evaluate((all) => {
+/** Where points (east, north, up) are seen, in shares of the picture. */
+const seenAt = (page, up, points) => page.evaluate((all) => {
     const { camera } = window.lambert.cameras;
     camera.updateMatrixWorld();
-    return all.map(([x, y, z]) => camera.position.clone().set(x, z, -y).project(camera)).map((p) => [(p.x + 1) / 2, (1 - p.y) / 2]);
-}, points);
+    return all.map((at) => camera.position.clone().set(...at).project(camera)).map((p) => [(p.x + 1) / 2, (1 - p.y) / 2]);
+}, points.map(AXES[up][1]));
 
-async function openFromAbove() {
+async function openFromAbove(up) {
     const page = await openPage(daemon.address);
-    await page.evaluate(() => {
+    await page.evaluate((name) => window.lambert.open(name, null), up);
+    await settled(page);
+    await page.evaluate((place) => {
         const { cameras } = window.lambert;
-        cameras.place([5, 13, -4.9, 5, 0, -5], false);
+        cameras.place(place, false);
         cameras.advance(1);
-    });
+    }, [[5, 4.9, 13], [5, 5, 0]].flatMap(AXES[up][1]));
     return page;
 }
 
-test("the sun's shadow and light are where and as they must be", async () => {
-    const page = await openFromAbove(), source = new daylight.SkySource();
-    source.take(await daemon.json("/v1/scenes/plate/sky"));
+for (const [up, hours] of [["z", [9.5, 12, 15]], ["y", [15]], ["x", [15]]]) test(`the sun's shadow and light are where and as they must be, ${up} up`, async () => {
+    const page = await openFromAbove(up), source = new daylight.SkySource();
+    source.take(await daemon.json(`/v1/scenes/${up}/sky`));
     await set(page, { smooth: false, tone: "linear", exposure: EXPOSURE, sharpSun: true }, { ...LIGHT, sun: "spread" });
-    for (const hour of [9.5, 12, 15]) {
+    for (const hour of hours) {
         await set(page, {}, { hour });
         await settled(page);
-        const { sun, directHorizontal } = source.sky({ ...state.skyOff, ...LIGHT, sun: "spread", hour }, false), [east, north, up] = sun.direction;
-        assert.ok(Math.abs(directHorizontal - 700 * up) < 1e-6 * directHorizontal);
+        const { sun, directHorizontal } = source.sky({ ...state.skyOff, ...LIGHT, sun: "spread", hour }, false), [east, north, height] = sun.direction;
+        assert.ok(Math.abs(directHorizontal - 700 * height) < 1e-6 * directHorizontal);
         const { sky, sun: tiles } = source.parts({ ...state.skyOff, ...LIGHT, sun: "spread", hour }, false, 1);
-        const ask = async (radiances, quantity) => (await daemon.json("/v1/scenes/plate/radiosity", { emission: { sky: radiances }, quantity }))[quantity].flat();
+        const ask = async (radiances, quantity) => (await daemon.json(`/v1/scenes/${up}/radiosity`, { emission: { sky: radiances }, quantity }))[quantity].flat();
         const [rest, further] = await Promise.all([ask([...sky], "radiosity"), ask([...tiles], "indirect")]);
         // The shadow of the plate's corners, 4 to 6, by similar triangles; points 5 cm to either side of its edges, and the plate itself.
-        const [dx, dy] = [(-2 * east) / up, (-2 * north) / up], points = [];
+        const [dx, dy] = [(-2 * east) / height, (-2 * north) / height], points = [];
         for (const t of [4.3, 5, 5.8])
             for (const side of [-0.05, 0.05]) points.push([4 + side + dx, t + dy, 0], [6 + side + dx, t + dy, 0], [t + dx, 4 + side + dy, 0], [t + dx, 6 + side + dy, 0]);
         let lit = 0, dark = 0;
         const isHidden = ([x, y]) => { const k = 11 / 13; return [x, y].every((v) => { const c = 5 + (v - 5) * k; return c > 3.95 && c < 6.05; }); };
-        const open = points.filter((p) => !isHidden(p) && p.every((v) => v >= 0 && v < 10)), places = await seenAt(page, [...open, [5, 5, 2]]);
+        const open = points.filter((p) => !isHidden(p) && p.every((v) => v >= 0 && v < 10)), places = await seenAt(page, up, [...open, [5, 5, 2]]);
         for (const [k, [x, y]] of open.entries()) {
             const isDark = x > 4 + dx && x < 6 + dx && y > 4 + dy && y < 6 + dy, element = Math.floor((x * PARTS) / 10) * PARTS + Math.floor((y * PARTS) / 10);
-            const B = rest[element] + further[element] + (isDark ? 0 : RHO * 700 * up);
+            const B = rest[element] + further[element] + (isDark ? 0 : RHO * 700 * height);
             if (isDark) dark += 1;
             else lit += 1;
             near(await pixel(page, ...places[k]), toSrgb([B, B, B].map((v) => v * 2 ** EXPOSURE)), 2);
         }
-        const top = rest[PARTS * PARTS] + further[PARTS * PARTS] + RHO * 700 * up;
+        const top = rest[PARTS * PARTS] + further[PARTS * PARTS] + RHO * 700 * height;
         near(await pixel(page, ...places.at(-1)), toSrgb([top, top, top].map((v) => v * 2 ** EXPOSURE)), 2);
         console.log(`${hour} h: ${dark} points in the shadow, ${lit} beside it`);
         assert.ok(dark >= 3 && lit >= 3, `${dark} dark, ${lit} lit`);
@@ -93,12 +102,12 @@ test("the sun's shadow and light are where and as they must be", async () => {
 });
 
 test("numbers, false colour and comparisons have the store's sun, and the page says which is shown", async () => {
-    const page = await openFromAbove(), isDrawn = () => page.evaluate(() => window.lambert.stage.uniforms.is_sunny.value);
+    const page = await openFromAbove("z"), isDrawn = () => page.evaluate(() => window.lambert.stage.uniforms.is_sunny.value);
     const bits = () => page.evaluate(() => [...window.lambert.fields[0].bits].join());
     const note = page.getByText("sun drawn sharp, numbers have it in tiles");
     await set(page, { smooth: false, tone: "linear", exposure: EXPOSURE }, { ...LIGHT, hour: 15 });
     await settled(page);
-    const [[x, y]] = await seenAt(page, [[2, 2, 0]]), [before, plain] = [await bits(), await pixel(page, x, y)];
+    const [[x, y]] = await seenAt(page, "z", [[2, 2, 0]]), [before, plain] = [await bits(), await pixel(page, x, y)];
     await page.getByRole("tab", { name: "Sky" }).click();
     await page.getByLabel("Sharp sun (drawn)").check();
     await settled(page);
