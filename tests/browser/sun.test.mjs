@@ -120,6 +120,7 @@ test("numbers, false colour and comparisons have the store's sun, and the page s
         await settled(page);
         assert.equal(await isDrawn(), false);
         await note.waitFor({ state: "hidden" });
+        await page.getByText("Not now: no sun shines, or the picture shows numbers").waitFor();
         await set(page, { picture: "light", threshold: null, exposure: EXPOSURE }, {});
         await settled(page);
         assert.equal(await isDrawn(), true);

@@ -162,7 +162,13 @@ function makeControls(app: App, change: Change): Controls {
         const { now } = app.store;
         app.store.change({ ...now, view: { ...now.view, sharpSun: on } });
     });
-    const drawn = make("p", { class: "hint" }, "The picture has the sun in its true place, with sharp shadows; all numbers have it in tiles of the sky.");
+    const drawn = make("p", { class: "hint" });
+    const tellDrawn = (): void => {
+        drawn.textContent = app.sharp.isOn ? "The picture has the sun in its true place, with sharp shadows; all numbers have it in tiles of the sky."
+            : "Not now: no sun shines, or the picture shows numbers (false colour, a threshold, a comparison).";
+    };
+    app.store.listen(tellDrawn);
+    app.on("field", tellDrawn);
     const tinted = tick("Blue sky, warm sun", first.tinted, (on) => change({ tinted: on }));
     const unit = (): string => (app.store.now.view.unit === "lx" ? "lx" : "W/m²");
     const strength = slider({ label: "On the ground", unit: unit(), least: 0, most: 1000, log: true, change: (value) => change({ strength: value }, "strength of the sky") }, first.strength);
