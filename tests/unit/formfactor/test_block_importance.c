@@ -12,6 +12,11 @@
 static lam_error error;
 
 enum { VECTORS = 4 };
+#ifdef LAMBERT_SANITIZED /* watches the same code of fewer elements */
+enum { ELEMENTS = 1800 };
+#else
+enum { ELEMENTS = 3000 };
+#endif
 /* Of the corner of the floor that is read, of a box of 1 m. */
 static const double side = .3;
 
@@ -23,7 +28,7 @@ typedef struct subject {
 } subject;
 
 static void subject_make(subject *s) {
-    const generate_options how = {.kind = "cornell", .elements = 3000, .closed = true, .reflectance = .5};
+    const generate_options how = {.kind = "cornell", .elements = ELEMENTS, .closed = true, .reflectance = .5};
     s->m = generate_good(&how);
     s->found = (importance){.n = s->m.n, .read = calloc(s->m.n, sizeof(float))};
     size_t n_read = 0;
