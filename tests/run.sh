@@ -75,7 +75,7 @@ step "the daemon under ThreadSanitizer, which mostly waits; beside it clang: a w
 build tsan lambertd unit_batch unit_batch_blocked unit_batch_order unit_request_memory unit_thread_budget unit_adjoint_rows unit_guard_parts
 build dev lambert lambertd lambert-bench lambert_shared lambert_static ready_server faults stress_stability
 cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
-# Clients of a daemon have limits of time; a build and tests that only compute have none. Those of clang run in one process
+# Clients of a daemon have limits of time; a build and tests that only compute have none. Clang's tests run in one process
 # each: a child that ends without handlers of exit leaves a registration of clang's OpenMP in /dev/shm, and a later process
 # of its number crashes by it.
 waiting='^(server|store|scene)$' # rooms with threads and children whose time is limited
