@@ -48,9 +48,9 @@ class MeshError(Case):
         self.assertLess(adaptive["error"]["mesh"]["lights"], .9 * uniform["error"]["mesh"]["lights"])
 
     def test_limit_is_told(self):
-        about, log, _ = self.made("few.h5", "--mesh-error", .001, "--elements", 400)
-        self.assertEqual(about["elements"], 400)
-        self.assertIn("--mesh-error 0.001 is not kept with 400 elements", log)
+        about, log, _ = self.made("few.h5", "--mesh-error", .001, "--elements", 200)
+        self.assertEqual(about["elements"], 200)
+        self.assertIn("--mesh-error 0.001 is not kept with 200 elements", log)
 
     def test_two_sided_and_repeatable(self):
         first, _, _ = self.made("first.h5", "--mesh-error", .2, "--two-sided", "--threads", 1)
@@ -62,7 +62,7 @@ class MeshError(Case):
 
     def test_skies(self):
         """The figures of skies beside the light that is constant on elements, and that on a mesh of 16 times as many."""
-        must("generate", "cornell", "--elements", 150, "-o", self.scene)
+        must("generate", "cornell", "--elements", 80, "-o", self.scene)
         options = "--sky", "tregenza", "--ground-albedo", .9, "--method", "exact"
         about, _, coarse = self.made("coarse.h5", *options)
         stated = about["error"]["mesh"]

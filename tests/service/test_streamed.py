@@ -119,10 +119,15 @@ class Streamed(unittest.TestCase):
     def test_it_ends_when_asked_to(self):
         path = self.path("never.h5")
         run = subprocess.Popen([LAMBERT, "precompute", self.scene, "-o", path, "--method", "hierarchical", "--rays",
-                                "4000000", "--probes", "0"], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
-        time.sleep(3)
+                                "400000", "--probes", "0"], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+        said = ""
+        while "forecast:" not in said:  # it is the last line before the rays start
+            line = run.stderr.readline()
+            self.assertTrue(line, said)
+            said += line
+        time.sleep(.3)
         run.send_signal(signal.SIGINT)
-        said = run.communicate(timeout=120)[1]
+        said += run.communicate(timeout=120)[1]
         self.assertEqual(run.returncode, 1, said)
         self.assertIn("cancelled; nothing was written", said)
         self.assertFalse(path.exists())
