@@ -4,8 +4,8 @@
     honesty.py PROGRAMS SCALE SEED [SCENE]
 
 PROGRAMS is the folder of lambert, lambertd and lambert-bench; SCALE is quick, default or full; SCENE is a scene file, or
-a folder of some, in place of the scenes of the suite. Each scene is precomputed at defaults, and once more as the exact
-inverse of form factors pair by pair at high quality, with another seed, which is the reference. Both stores get the same random requests:
+a folder of some, in place of the scenes of the suite. Each scene is precomputed at defaults, and as exact inverses
+of form factors pair by pair at high quality, with other seeds, whose mean is the reference. All stores get the same random requests:
 groups, elements, random emission, the scene's own light and skies, of which all elements, groups or single elements are
 selected, or groups reduced. lambert-bench reads standard output: one JSON object a line, as of service.py.
 """
@@ -26,6 +26,9 @@ from service_programs import Client, Failure, Program, post, run_suite, tell
 SECONDS = 3600
 # share of the elements of each scene, requests of a scene
 SIZES = {"quick": (.25, 30), "default": (1, 200), "full": (2, 400)}
+# Small factors are no more certain at high quality than at defaults, and a few of them may be all the light of a
+# group: one reference would err as much as the store that is asked. The mean of several errs less.
+REFERENCES = {"quick": 2, "default": 4, "full": 8}
 # Below 1,025 elements the preset is an exact inverse, which has the error of the form factors alone.
 SCENES = {"cornell": (1300, ["cornell"]), "closed cornell": (640, ["cornell", "--closed"]), "rooms": (1300, ["rooms"]),
           "patio": (1300, ["patio"]), "atrium": (1300, ["atrium"]), "maze": (1300, ["maze"]),
@@ -79,6 +82,28 @@ class Store:
     def stop(self):
         self.client.close()
         self.daemon.stop()
+
+
+def mean_of(answers):
+    """The mean of JSON values of one form: of numbers, in lists and objects of these."""
+    first = answers[0]
+    if isinstance(first, dict):
+        return {key: mean_of([answer[key] for answer in answers]) for key in first}
+    if isinstance(first, list):
+        return np.mean(np.array(answers, dtype=float), axis=0)
+    return float(np.mean(answers))
+
+
+class Reference:
+    """The mean of the answers of several stores, of the members that are lighting."""
+
+    def __init__(self, stores):
+        self.stores = stores
+
+    def ask(self, request):
+        answers = [store.ask(request) for store in self.stores]
+        return {key: mean_of([answer[key] for answer in answers])
+                for key in ("radiosity", "indirect", "groups") if key in answers[0]}
 
 
 class Requests:
@@ -143,16 +168,17 @@ class Scene:
 
     def measure(self):
         folder = self.bench.folder
-        stores = [folder / "asked.h5", folder / "reference.h5"]
+        stores = [folder / "asked.h5"] + [folder / f"reference-{k}.h5" for k in range(self.bench.references)]
         served = []
         try:
             self.precompute(stores[0])
-            self.precompute(stores[1], "--seed", str(self.bench.seed + 1000), "--quality", "high", "--method", "exact",
-                            "--probes", "0")
+            for k, store in enumerate(stores[1:]):
+                self.precompute(store, "--seed", str(self.bench.seed + 1000 + k), "--quality", "high", "--method", "exact",
+                                "--probes", "0")
             self.read_elements(stores[0])
             for store in stores:
                 served.append(Store(folder, self.bench.programs, store, "lambertd"))
-            return self.compare(*served)
+            return self.compare(served[0], Reference(served[1:]))
         finally:
             for store in served:
                 store.stop()
@@ -242,6 +268,7 @@ class Bench:
     def __init__(self, programs, scale, seed, given=None):
         self.programs, self.quick, self.seed = pathlib.Path(programs), scale == "quick", int(seed)
         self.share, self.n_requests = SIZES[scale]
+        self.references = REFERENCES[scale]
         self.given = pathlib.Path(given).resolve() if given else None
 
     def scenes(self):
