@@ -117,24 +117,53 @@ static size_t add_box(scene_piece *pieces, const double low[3], const double hig
     return 6;
 }
 
+/* The room's walls, the lamp, and its furniture. The lamp hangs 2 cm below the ceiling, so that nothing
+ * touches it; the furniture stands 1 mm apart. */
+enum { LEGS = 4, BOXES = 5 + LEGS };
+static const double room_boxes[BOXES][2][3] = {
+    {{2.4, 1.6, 2.94}, {3.4, 2.6, 2.98}},   {{1.2, 1, .72}, {2.8, 1.9, .76}},
+    {{3.4, 3.3, .001}, {5.2, 3.95, 1.9}},   {{4.2, .3, .001}, {5, 1.1, .45}},
+    {{4.9, .3, .451}, {5, 1.1, .95}},       {{1.25, 1.05, .001}, {1.3, 1.1, .719}},
+    {{1.25, 1.8, .001}, {1.3, 1.85, .719}}, {{2.7, 1.05, .001}, {2.75, 1.1, .719}},
+    {{2.7, 1.8, .001}, {2.75, 1.85, .719}}};
+static const double room_origin[3] = {0, 0, 0}, room_size[3] = {6, 4, 3};
+
 lam_status scene_furnished(mesh *out, lam_error *error) {
-    enum { LEGS = 4, BOXES = 5 + LEGS };
-    /* The lamp hangs 2 cm below the ceiling, so that nothing touches it; the furniture stands 1 mm apart. */
-    static const double boxes[BOXES][2][3] = {
-        {{2.4, 1.6, 2.94}, {3.4, 2.6, 2.98}},   {{1.2, 1, .72}, {2.8, 1.9, .76}},
-        {{3.4, 3.3, .001}, {5.2, 3.95, 1.9}},   {{4.2, .3, .001}, {5, 1.1, .45}},
-        {{4.9, .3, .451}, {5, 1.1, .95}},       {{1.25, 1.05, .001}, {1.3, 1.1, .719}},
-        {{1.25, 1.8, .001}, {1.3, 1.85, .719}}, {{2.7, 1.05, .001}, {2.75, 1.1, .719}},
-        {{2.7, 1.8, .001}, {2.75, 1.85, .719}}};
-    static const double origin[3] = {0, 0, 0}, size[3] = {6, 4, 3};
     lam_status status = LAM_OK;
     scene_piece pieces[6 * (1 + BOXES)];
     mesh m = {0};
-    size_t n = add_box(pieces, origin, size, true);
-    for (size_t k = 0; k < BOXES; k++) n += add_box(pieces + n, boxes[k][0], boxes[k][1], false);
+    size_t n = add_box(pieces, room_origin, room_size, true);
+    for (size_t k = 0; k < BOXES; k++) n += add_box(pieces + n, room_boxes[k][0], room_boxes[k][1], false);
     TRY(scene_of_pieces(pieces, n, &m, error));
     for (size_t i = 0; i < n; i++) m.reflectance[i] = i < 6 ? .6f : .4f;
     m.emission[6 + 4] = 100; /* the lower side of the lamp */
+    *out = m;
+    m = (mesh){0};
+done:
+    mesh_free(&m);
+    return status;
+}
+
+lam_status scene_window(mesh *out, lam_error *error) {
+    static const double y[4] = {0, 1.25, 2.75, 4}, z[4] = {0, 1, 2.2, 3};
+    lam_status status = LAM_OK;
+    scene_piece pieces[6 * BOXES + 8];
+    mesh m = {0};
+    size_t n = add_box(pieces, room_origin, room_size, true);
+    const scene_piece last = pieces[n - 1];
+    for (size_t k = 1; k < BOXES; k++) n += add_box(pieces + n, room_boxes[k][0], room_boxes[k][1], false);
+    /* The wall x = 0 gives its place to another one, and then come eight parts of it about the window. */
+    pieces[0] = last;
+    pieces[5] = pieces[--n];
+    for (size_t i = 0; i < 3; i++)
+        for (size_t k = 0; k < 3; k++) {
+            if (i == 1 && k == 1) continue;
+            pieces[n++] = (scene_piece){.corner = {0, y[i], z[k]},
+                                        .along = {0, y[i + 1] - y[i], 0},
+                                        .across = {0, 0, z[k + 1] - z[k]}};
+        }
+    TRY(scene_of_pieces(pieces, n, &m, error));
+    for (size_t i = 0; i < n; i++) m.reflectance[i] = .6f;
     *out = m;
     m = (mesh){0};
 done:

@@ -27,6 +27,9 @@ lam_status scene_cornell(size_t elements, mesh *out, lam_error *error);
  * as they are, reflectance .6 and .4. */
 lam_status scene_furnished(mesh *out, lam_error *error);
 
+/* The same room without its lamp, with a window of 1.5 x 1.2 m in one wall, reflectance .6. */
+lam_status scene_window(mesh *out, lam_error *error);
+
 /* Any of the scenes of `lambert generate`, by way of a file in a folder of its own. */
 lam_status scene_generated(const generate_options *how, mesh *out, lam_error *error);
 

@@ -2,9 +2,9 @@
 #include "solver/adapt/adaptive.h"
 #include "solver/adapt/mesh_error.h"
 #include "solver/base/clock.h"
+#include "solver/bench/mesh_skies.h"
 #include "solver/bench/mesh_truths.h"
 #include "solver/bench/scenes.h"
-#include "solver/scene/mesh_cells.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -154,24 +154,6 @@ done:
     return status;
 }
 
-/* A copy of a mesh with each element divided into 16. */
-static lam_status divide(const mesh *m, mesh *out, lam_error *error) {
-    static const mesh_refinement twice = {.subdivide_levels = 2};
-    lam_status status = LAM_OK;
-    mesh_cell *cells = NULL;
-    mesh copy = {0};
-    size_t n;
-    TRY(mesh_cells_even(m, INFINITY, m->n, &cells, &n, error));
-    TRY(mesh_of_cells(m, n, cells, &copy, error));
-    TRY(mesh_refine(&copy, &twice, error));
-    *out = copy;
-    copy = (mesh){0};
-done:
-    free(cells);
-    mesh_free(&copy);
-    return status;
-}
-
 /* B - E of a mesh whose elements are those of another one, each divided into 16. */
 static lam_status solve_finer(const bench_run *run, mesh *finer, lowrank_scene *s, double **x,
                               lam_error *error) {
@@ -211,7 +193,7 @@ static lam_status add_mesh(const bench_run *run, const mesh_scene *scene, const 
     double *fine = NULL;
     TRY(bench_check(run, error));
     if (MESH_FINER * of->n <= FINER_MOST) {
-        TRY(divide(of, &divided, error));
+        TRY(mesh_divide(of, &divided, error));
         TRY(solve_finer(run, &divided, &finer, &fine, error));
         m.finer = &finer.m;
         m.fine = fine;
@@ -285,6 +267,7 @@ lam_status bench_mesh(const bench_run *run, lam_error *error) {
         TRY(add_scene(run, &scenes[k], &out, error));
     }
     TRY(bench_table(run, &out, error));
+    TRY(mesh_skies(run, error));
 done:
     table_free(&out);
     return status;

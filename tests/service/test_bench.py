@@ -130,7 +130,7 @@ class FormFactors(unittest.TestCase):
 
 
 class Mesh(unittest.TestCase):
-    """One quick run: a Cornell box, uniform and adaptive, against both truths."""
+    """One quick run: a Cornell box, uniform and adaptive, against both truths, and under skies."""
 
     def test_errors_of_the_mesh(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -138,6 +138,11 @@ class Mesh(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
             with open(os.path.join(folder, "mesh-mesh.csv"), encoding="utf-8", newline="") as stream:
                 rows = list(csv.DictReader(stream))
+            with open(os.path.join(folder, "mesh-skies.csv"), encoding="utf-8", newline="") as stream:
+                skies = list(csv.DictReader(stream))
+        self.assertEqual([row["sky"] for row in skies], ["even", "cloudy"])
+        for row in skies:
+            self.assertTrue(.5 < float(row["stated"]) / float(row["constant"]) < 2, row)
         self.assertEqual({(row["mesh"], row["light"]) for row in rows},
                          {(mesh, light) for mesh in ("uniform", "adaptive") for light in ("lamps", "even")})
         self.assertEqual({row["method"] for row in rows}, {"converged", "hierarchical"})
