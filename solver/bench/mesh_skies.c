@@ -4,7 +4,6 @@
 #include "solver/base/random.h"
 #include "solver/bench/mesh_truths.h"
 #include "solver/bench/scenes.h"
-#include "solver/scene/mesh_cells.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -25,23 +24,6 @@ typedef struct sky_scene {
     const char *name, *kind; /* kind: of a generated one; NULL: the furnished room with a window */
     size_t elements;
 } sky_scene;
-
-lam_status mesh_divide(const mesh *m, mesh *out, lam_error *error) {
-    static const mesh_refinement twice = {.subdivide_levels = 2};
-    lam_status status = LAM_OK;
-    mesh_cell *cells = NULL;
-    mesh copy = {0};
-    size_t n;
-    TRY(mesh_cells_even(m, INFINITY, m->n, &cells, &n, error));
-    TRY(mesh_of_cells(m, n, cells, &copy, error));
-    TRY(mesh_refine(&copy, &twice, error));
-    *out = copy;
-    copy = (mesh){0};
-done:
-    free(cells);
-    mesh_free(&copy);
-    return status;
-}
 
 /* A mesh, its answers to the skies, and their first bounce alone. */
 typedef struct sky_answers {

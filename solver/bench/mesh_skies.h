@@ -3,15 +3,11 @@
 #define LAMBERT_BENCH_MESH_SKIES_H
 
 #include "solver/bench/bench.h"
-#include "solver/scene/mesh.h"
 
 /* Hands on the table: for a Cornell box, a room with a window, a courtyard and a city the error that a store
  * states of an even sky and of a cloudy one, and the true one against a mesh 16 times finer, both solved in
  * double. Cost: that of form factors and rays of the finer meshes, up to 16 times 1,013 elements. Errors:
  * those of form factors and solutions. */
 lam_status mesh_skies(const bench_run *run, lam_error *error);
-
-/* A copy of a mesh with each element divided into 16. Freed by mesh_free. Errors: LAM_ERR_MEMORY. */
-lam_status mesh_divide(const mesh *m, mesh *out, lam_error *error);
 
 #endif

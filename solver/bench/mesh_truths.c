@@ -2,6 +2,7 @@
 
 #include "solver/base/vector3.h"
 #include "solver/method/reference.h"
+#include "solver/scene/mesh_cells.h"
 #include "solver/walk/walk.h"
 
 #include <math.h>
@@ -188,6 +189,23 @@ static void compare_points(const mesh *m, const double *x, const mesh_points *p,
     }
     out->points = sqrt(fmax(off, 0) / all);
     out->bar = sqrt(squares) / all / (2 * fmax(out->points, 1e-9));
+}
+
+lam_status mesh_divide(const mesh *m, mesh *out, lam_error *error) {
+    static const mesh_refinement twice = {.subdivide_levels = 2};
+    lam_status status = LAM_OK;
+    mesh_cell *cells = NULL;
+    mesh copy = {0};
+    size_t n;
+    TRY(mesh_cells_even(m, INFINITY, m->n, &cells, &n, error));
+    TRY(mesh_of_cells(m, n, cells, &copy, error));
+    TRY(mesh_refine(&copy, &twice, error));
+    *out = copy;
+    copy = (mesh){0};
+done:
+    free(cells);
+    mesh_free(&copy);
+    return status;
 }
 
 mesh_errors mesh_compare(const mesh *m, const double *x, const mesh *finer, const double *fine,

@@ -31,6 +31,9 @@ lam_status mesh_points_walk(const bench_run *run, mesh *pieces, size_t n, size_t
  * LAM_ERR_INTERNAL where there is none. */
 lam_status mesh_points_locate(const mesh_points *p, const mesh *m, uint32_t *element, lam_error *error);
 
+/* A copy of a mesh with each element divided into MESH_FINER. Freed by mesh_free. Errors: LAM_ERR_MEMORY. */
+lam_status mesh_divide(const mesh *m, mesh *out, lam_error *error);
+
 /* Errors of B - E [C][n], constant on elements, as shares of |B - E|. */
 typedef struct mesh_errors {
     double means;    /* of the means over elements, by the finer mesh; NaN: there is none */

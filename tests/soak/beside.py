@@ -83,6 +83,8 @@ def measure(daemon, folder, seconds, elements):
 def main():
     seconds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     elements = int(sys.argv[2]) if len(sys.argv) > 2 else 100000
+    if shutil.which("wrk") is None:
+        sys.exit("beside.py: wrk is not there; apt-get install wrk")
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         scene, store = folder / "room.obj", folder / "room.h5"
