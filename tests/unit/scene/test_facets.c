@@ -250,6 +250,31 @@ START_TEST(a_bow_is_no_line) {
 }
 END_TEST
 
+/* Points beside a piece, where a facet has holes or ends: each is one of the facet's elements all the same.
+ */
+static void check_beside(const mesh *m, const facets *f) {
+    enum { SIDE = 11 };
+    facet_grids g;
+    ck_assert_msg(facet_grids_create(m, f, &g, &error) == LAM_OK, "%s", error.message);
+    for (size_t p = 0; p < f->n_pieces; p++) {
+        const uint32_t facet = f->piece_facet[p];
+        uint32_t piece[SIDE * SIDE], found[SIDE * SIDE];
+        float u[SIDE * SIDE], v[SIDE * SIDE];
+        if (f->first[facet + 1] - f->first[facet] == 1) continue;
+        for (size_t i = 0; i < SIDE * SIDE; i++) {
+            piece[i] = (uint32_t)p;
+            u[i] = (float)(i % SIDE) - SIDE / 2;
+            v[i] = (float)(i / SIDE) - SIDE / 2;
+        }
+        facet_grids_find(&g, SIDE * SIDE, piece, u, v, found);
+        for (size_t i = 0; i < SIDE * SIDE; i++) {
+            ck_assert_uint_lt(found[i], m->n);
+            ck_assert_uint_eq(f->of_element[found[i]], facet);
+        }
+    }
+    facet_grids_free(&g);
+}
+
 /* The floor of the Cornell box has two holes, and corners of cells on the sides of others. */
 START_TEST(a_floor_with_holes) {
     mesh m = {0};
@@ -259,6 +284,7 @@ START_TEST(a_floor_with_holes) {
     ck_assert_uint_lt(f.n_pieces, 40);
     check_cover(&m, &f);
     check_points(&m, &f);
+    check_beside(&m, &f);
     facets_free(&f);
     mesh_free(&m);
 }
