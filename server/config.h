@@ -30,6 +30,7 @@ typedef struct config {
     size_t min_rate; /* bytes a second that a client has to send and to read */
     size_t max_variants;
     bool verify;
+    size_t verify_below; /* bytes of mapped arrays */
     bool no_viewer;
     double scrub_hours; /* 0: never */
     bool version;

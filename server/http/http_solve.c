@@ -234,6 +234,8 @@ static void end_solve(batch_job *job, batch_workspace *workspace) {
         return;
     }
     r->match.route->steps->end(&r->call, &r->answer);
+    /* Large numbers come of large emission, or of arrays that rot in memory or on the medium. */
+    if (r->answer.problem == PROBLEM_NOT_IN_ENCODING) catalog_doubt(r->service->catalog, r->call.scene);
     (void)http_check_health(r);
     finish_answer(r);
 }

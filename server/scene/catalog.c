@@ -262,6 +262,7 @@ static lam_status open_source(catalog *all, const catalog_snapshot *next, const 
     scene_options options = {.path = from->path,
                              .name = from->name,
                              .verify = verify,
+                             .verify_below = all->config->verify_below,
                              .memory = memory_left(all, next, memory_grown(next)),
                              .ledger = &all->ledger,
                              .before = old,
@@ -308,6 +309,15 @@ static void load_source(catalog *all, catalog_snapshot *next, const catalog_snap
              loaded->n_channels, loaded->n_channels == 1 ? "" : "s", lam_operator_kind(loaded->op),
              loaded->path);
     if (loaded != old) verifier_add(all->verifier, loaded);
+}
+
+void catalog_doubt(catalog *all, const scene *s) {
+    const scene *const of = s->base != NULL ? s->base : s;
+    if (!scene_may_doubt(of)) return;
+    catalog_snapshot *now = catalog_acquire(all);
+    for (size_t i = 0; i < now->n_scenes; i++)
+        if (now->scenes[i] == of) verifier_add_again(all->verifier, now->scenes[i]);
+    catalog_release(now);
 }
 
 /* True if the base of a variant is a scene of this snapshot. */

@@ -20,10 +20,14 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
 void catalog_destroy(catalog *all);
 
 /* Reads every store and replaces the snapshot. An unchanged file keeps its scene. A store that cannot be read
- * keeps the scene read before, or is left out if there is none or it exceeds --max-memory. Mapped arrays are
- * verified later. Variants of kept scenes stay, others are dropped. Returns the number of scenes served. One
- * thread at a time. */
+ * keeps the scene read before, or is left out if there is none or it exceeds --max-memory. Mapped arrays of
+ * --verify-below or more are verified later. Variants of kept scenes stay, others are dropped. Returns the
+ * number of scenes served. One thread at a time. */
 size_t catalog_reload(catalog *all);
+
+/* Has the mapped arrays of a scene that is served compared again, as an answer makes one doubt them; at most
+ * once in a minute. Any thread. */
+void catalog_doubt(catalog *all, const scene *s);
 
 /* The number of stores that are served, each of which holds a descriptor where it is mapped; before any is,
  * of those that will be read. */

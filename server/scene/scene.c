@@ -3,6 +3,7 @@
 #include "server/queue/batch.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/tile_places.h"
+#include "solver/base/clock.h"
 #include "solver/codec/describe.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
@@ -19,10 +20,15 @@
 
 enum { HEALTH_UNKNOWN, HEALTH_SOUND, HEALTH_DAMAGED };
 
+/* Answers may make one doubt a scene once in this many seconds. */
+#define DOUBT_S 60
+#define NEVER_DOUBTED (-DOUBT_S)
+
 struct scene_health {
     atomic_int state;
     atomic_bool reported;
     atomic_llong verified_at; /* Unix time, s; 0: never */
+    atomic_llong doubted_at;  /* of the monotonic clock, s; NEVER_DOUBTED */
     map_range *guard;         /* NULL: nothing is mapped */
     lam_error damage;         /* of HEALTH_DAMAGED, written before the state is */
 };
@@ -43,6 +49,7 @@ static lam_status scene_health_create(const char *path, const store_map *map, bo
     atomic_init(&made->state, sound || map == NULL ? HEALTH_SOUND : HEALTH_UNKNOWN);
     atomic_init(&made->reported, false);
     atomic_init(&made->verified_at, sound ? (long long)time(NULL) : 0);
+    atomic_init(&made->doubted_at, NEVER_DOUBTED);
     if (map != NULL) {
         const void *begin;
         size_t bytes;
@@ -217,9 +224,10 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(describe_scene(s, made, &made->description, error));
     TRY(scene_mesh_create(s, made, &made->mesh, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
-    TRY(scene_health_create(made->path, made->map, options->verify, &made->health, error));
+    const bool first = options->verify || store_map_bytes(store_map_of(s)) < options->verify_below;
+    TRY(scene_health_create(made->path, made->map, first, &made->health, error));
     /* Under the guard just made. Only here is it known which numbers are mapped, which must be finite. */
-    if (options->verify && made->map != NULL) TRY(store_map_verify(made->map, NULL, error));
+    if (first && made->map != NULL) TRY(store_map_verify(made->map, NULL, error));
 done:
     return status;
 }
@@ -368,6 +376,12 @@ const char *scene_message(const scene *s, const char *message) {
 
 long long scene_verified_at(const scene *s) {
     return atomic_load(&s->health->verified_at);
+}
+
+bool scene_may_doubt(const scene *s) {
+    const long long now = (long long)clock_seconds();
+    long long before = atomic_load(&s->health->doubted_at);
+    return now - before >= DOUBT_S && atomic_compare_exchange_strong(&s->health->doubted_at, &before, now);
 }
 
 bool scene_damaged(const scene *s, lam_error *why, bool *news) {

@@ -62,6 +62,7 @@ struct scene {
 typedef struct scene_options {
     const char *path, *name; /* name NULL: the store's own */
     bool verify;             /* first compare the whole file with its checksums */
+    uint64_t verify_below;   /* or, where mapped arrays take fewer bytes, first compare these */
     uint64_t memory;         /* limit of its memory in bytes; UINT64_MAX: none */
     memory_ledger *ledger;   /* or NULL; outlives the scene */
     scene *before;           /* the present scene of this path and name, or NULL */
@@ -70,9 +71,9 @@ typedef struct scene_options {
 
 /* Opens a store. The file is closed before this returns, except for its mapped arrays. Headers, checksums of
  * checksums, /mesh and all arrays that are not mapped are verified here; mapped arrays are left to
- * scene_verify, unless options->verify. If the file is still that of options->before, of which no damage is
- * known, that scene is returned. Errors: as store_open and operator_load; LAM_ERR_MEMORY names the sizes if
- * it does not fit. Each names the path. */
+ * scene_verify, unless the options have them compared here. If the file is still that of options->before, of
+ * which no damage is known, that scene is returned. Errors: as store_open and operator_load; LAM_ERR_MEMORY
+ * names the sizes if it does not fit. Each names the path. */
 lam_status scene_open(const scene_options *options, scene **out, lam_error *error);
 
 /* Bytes that the scene has taken of its ledger since it was opened. Any thread. */
@@ -139,6 +140,9 @@ bool scene_verified(const scene *s);
 
 /* When mapped arrays were found sound last, in seconds of Unix time; 0: never. Any thread. */
 long long scene_verified_at(const scene *s);
+
+/* True for the first caller in a minute. Any thread. */
+bool scene_may_doubt(const scene *s);
 
 /* True if the scene is out of service: a block differs from its checksum or cannot be read any more, or the
  * file was written to. An answer is valid only if this is still false after it was computed. why names file,

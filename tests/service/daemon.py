@@ -77,8 +77,14 @@ class Daemon:
 
     def wait_for(self, words, times=1):
         """Until standard output holds the words so often."""
+        self.wait_until(lambda: self.output().count(words) >= times, words)
+
+    def wait_for_error(self, words):
+        self.wait_until(lambda: words in self.errors(), words)
+
+    def wait_until(self, said, words):
         deadline = time.monotonic() + PATIENCE
-        while self.output().count(words) < times:
+        while not said():
             if self.process.poll() is not None:
                 raise RuntimeError(f"lambertd ended with {self.process.returncode}: {self.errors()}")
             if time.monotonic() > deadline:

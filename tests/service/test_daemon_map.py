@@ -25,6 +25,11 @@ N, RANK, TILES = 3000, 100, 100
 BYTES = 4 * N * RANK  # of Y, V, U and first_bounce: 1.14 MiB, which is worth a mapping
 
 
+def serve_first(*arguments):
+    """A daemon that compares what it maps while it serves it, as it does with large stores."""
+    return Daemon(*arguments, "--verify-below", 1)
+
+
 class Mapped(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -64,6 +69,14 @@ class Mapped(unittest.TestCase):
             f.seek(-1, os.SEEK_CUR)
             f.write(bytes([byte ^ 0x04]))
 
+    def rot(self, path):
+        """A number of V is infinite, and neither size nor time of the file tell."""
+        times = os.stat(path)
+        with open(path, "r+b") as f:
+            f.seek(self.place(path, "operator/V") + 4 * 17)
+            f.write(np.float32(np.inf).tobytes())
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+
     def check(self, daemon, name, scene, seed=5):
         E = np.random.default_rng(seed).random((scene.channels, N))
         answer = daemon.radiosity(name, {"emission": E.tolist() if scene.channels > 1 else E[0].tolist()})
@@ -86,7 +99,7 @@ class Mapped(unittest.TestCase):
         self.assertIn(f"{path}: {words}", lines[0])
 
     def test_answers(self):
-        with Daemon(self.store("box"), self.store("sky"), self.store("small")) as daemon:
+        with serve_first(self.store("box"), self.store("sky"), self.store("small")) as daemon:
             self.check(daemon, "box", self.scene)
             self.check(daemon, "sky", self.coloured)
             E, L = np.random.default_rng(6).random((3, N)), np.random.default_rng(7).random((3, TILES))
@@ -113,7 +126,7 @@ class Mapped(unittest.TestCase):
             E = np.random.default_rng(8).random((len(f["mesh/reflectance"]), len(f["mesh/area"]))).astype(np.float32)
         np.save(self.folder / "E.npy", E)
         must("solve", path, "--emission", self.folder / "E.npy", "-o", out)
-        with Daemon(path) as daemon:
+        with serve_first(path) as daemon:
             raw = io.BytesIO()
             np.save(raw, E)
             self.assertGreater(self.gauge(daemon, "mapped_bytes"), 0)
@@ -127,7 +140,7 @@ class Mapped(unittest.TestCase):
                                    ("operator/V", BYTES - 1, "/operator/V is damaged in MiB 2 of 2")):
             path, other = self.store("box"), self.store("other")
             self.flip(path, dataset, at)
-            with Daemon(path, other) as daemon:
+            with serve_first(path, other) as daemon:
                 daemon.wait_for("verified other: ")
                 self.check_out_of_service(daemon, "box", path, words)
                 self.check(daemon, "other", self.other)
@@ -156,35 +169,56 @@ class Mapped(unittest.TestCase):
         with h5py.File(path, "r+") as f:
             f["operator/V"][N - 1, 7] = np.inf
             add_checksums(f)
-        with Daemon(path, other) as daemon:
+        with serve_first(path, other) as daemon:
             self.assertIn(daemon.radiosity("box", self.MEAN).status, (422, 503))
             daemon.wait_for("verified other: ")
             self.check_out_of_service(daemon, "box", path, "/operator/V has a number that is not finite in MiB 2 of 2")
             self.check(daemon, "other", self.other)
-        with Daemon(path, other, "--verify") as daemon:
+        with serve_first(path, other, "--verify") as daemon:
             self.assertEqual(self.names(daemon), ["other"])
             self.assertIn("/operator/V has a number that is not finite in MiB 2 of 2", daemon.errors())
 
     def test_a_figure_that_is_not_finite_is_refused(self):
         """Bytes that were compared are not compared again, so that requests meet a medium that rots later."""
         path = self.store("box")
-        with Daemon(path) as daemon:
+        with serve_first(path) as daemon:
             daemon.wait_for("verified box: ")
-            times = os.stat(path)
-            with open(path, "r+b") as f:
-                f.seek(self.place(path, "operator/V") + 4 * 17)
-                f.write(np.float32(np.inf).tobytes())
-            os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+            self.rot(path)
             answer = daemon.radiosity("box", self.MEAN)
             self.assertEqual(answer.status, 422, answer)
             self.assertIn("the mean of floor is not finite", answer.json()["detail"])
             answer = daemon.radiosity("box", {"emission": [1] * N})
-            self.assertEqual(answer.status, 422, answer)
+            self.assertIn(answer.status, (422, 503), answer)
+
+    def test_an_answer_that_is_not_finite_has_its_scene_compared_again(self):
+        path = self.store("box")
+        with Daemon(path) as daemon:
+            self.assertEqual(daemon.radiosity("box", {"emission": [3e38] * N}).status, 422)
+            daemon.wait_for("verified box: ")
+            self.rot(path)
+            # Once in a minute: emission alone may have made the first answer too large.
+            self.assertEqual(daemon.radiosity("box", {"emission": [1] * N}).status, 422)
+        path = self.store("box")
+        with Daemon(path) as daemon:
+            self.rot(path)
+            self.assertIn(daemon.radiosity("box", {"emission": [1] * N}).status, (422, 503))
+            daemon.wait_for_error("took box out of service: ")
+            self.check_out_of_service(daemon, "box", path, "/operator/V is damaged in MiB 1 of 2")
+
+    def test_small_stores_are_compared_before_they_are_served(self):
+        path, other = self.store("box"), self.store("other")
+        self.flip(path, "operator/V", BYTES - 1)
+        for most, served in ("256M", ["other"]), (3 * BYTES, ["other"]), (BYTES, ["box", "other"]):
+            with Daemon(path, other, *([] if most == "256M" else ["--verify-below", most])) as daemon:
+                self.assertIn(self.names(daemon), (served, ["other"]))
+                refused = f"refused {path}: " in daemon.errors()
+                self.assertEqual(refused, "box" not in served, daemon.errors())
+                self.assertEqual(self.gauge(daemon, "scenes_damaged") + refused, 1)
 
     def test_verify_looks_before_it_serves(self):
         path, other = self.store("box"), self.store("other")
         self.flip(path, "operator/V", BYTES - 1)
-        with Daemon(path, other, "--verify") as daemon:
+        with serve_first(path, other, "--verify") as daemon:
             self.assertEqual(self.names(daemon), ["other"])
             self.assertEqual(daemon.radiosity("box", {"emission": [1] * N}).status, 404)
             self.assertIn(f"refused {path}: ", daemon.errors())
@@ -201,7 +235,7 @@ class Mapped(unittest.TestCase):
 
         for change in cut, overwrite:
             path, other = self.store("box"), self.store("other")
-            with Daemon(path, other, "--threads", 2) as daemon:
+            with serve_first(path, other, "--threads", 2) as daemon:
                 daemon.wait_for("verified box: ")
                 daemon.wait_for("verified other: ")
                 self.check(daemon, "box", self.scene)
@@ -211,7 +245,7 @@ class Mapped(unittest.TestCase):
 
     def test_a_file_cut_short_is_survived(self):
         path, other = self.store("box"), self.store("other")
-        with Daemon(path, other, "--threads", 2) as daemon:
+        with serve_first(path, other, "--threads", 2) as daemon:
             daemon.wait_for("verified box: ")
             daemon.wait_for("verified other: ")
             self.check(daemon, "box", self.scene)
@@ -238,7 +272,7 @@ class Mapped(unittest.TestCase):
                 answers.append(daemon.radiosity("box", body, connection=connection))
             connection.close()
 
-        with Daemon(path, "--threads", 2) as daemon:
+        with serve_first(path, "--threads", 2) as daemon:
             daemon.wait_for("verified box: ")
             right = daemon.radiosity("box", body).json()["radiosity"]
             clients = [threading.Thread(target=client, args=(daemon,)) for _ in range(3)]
@@ -262,7 +296,7 @@ class Mapped(unittest.TestCase):
 
     def test_what_is_unchanged_stays_mapped(self):
         path, other = self.store("box"), self.store("other")
-        with Daemon(path, other, f"{path}:again") as daemon:
+        with serve_first(path, other, f"{path}:again") as daemon:
             for name in "box", "other", "again":
                 daemon.wait_for(f"verified {name}: ")
             before = self.mappings(daemon)
@@ -311,12 +345,12 @@ class Mapped(unittest.TestCase):
 
     def test_two_daemons_share_pages(self):
         path = self.store("box")
-        with Daemon(path) as one:
+        with serve_first(path) as one:
             one.wait_for("verified box: ")
             alone = self.shares(one, path)
             self.assertGreaterEqual(alone["Rss"], 2 * BYTES)
             self.assertEqual(alone["Anonymous"], 0)
-            with Daemon(path) as two:
+            with serve_first(path) as two:
                 two.wait_for("verified box: ")
                 for daemon in one, two:
                     shared = self.shares(daemon, path)
@@ -329,12 +363,12 @@ class Mapped(unittest.TestCase):
 
     def test_max_memory_refuses_by_name(self):
         box, other, small = self.store("box"), self.store("other"), self.store("small")
-        with Daemon(box, other, small) as daemon:
+        with serve_first(box, other, small) as daemon:
             sizes = {name: daemon.get(f"/v1/scenes/{name}").json()["bytes"] for name in ("box", "other", "small")}
         # Room for one of the two and a thread's work area, which is 16 vectors of 3,000 floats a few times.
         room = sizes["box"] + sizes["small"] + 6 * 16 * 4 * N
         self.assertLess(6 * 16 * 4 * N + sizes["small"], sizes["other"])
-        with Daemon(box, other, small, "--threads", 1, "--max-memory", room) as daemon:
+        with serve_first(box, other, small, "--threads", 1, "--max-memory", room) as daemon:
             self.assertEqual(self.names(daemon), ["box", "small"])
             lines = daemon.errors().splitlines()
             self.assertEqual(len(lines), 1, lines)
@@ -346,7 +380,7 @@ class Mapped(unittest.TestCase):
             daemon.signal(signal.SIGHUP)
             daemon.wait_for("reloaded: 2 scenes")  # box stays as read before
             self.assertEqual(self.names(daemon), ["box", "small"])
-        with Daemon(other, small, "--threads", 1, "--max-memory", room) as daemon:
+        with serve_first(other, small, "--threads", 1, "--max-memory", room) as daemon:
             self.assertEqual(self.names(daemon), ["other", "small"])
         ended = subprocess.run([LAMBERTD, "--listen", "127.0.0.1:0", str(other), "--max-memory", "64K"],
                                capture_output=True, text=True, timeout=PATIENCE)

@@ -7,7 +7,7 @@ import unittest
 
 import h5py
 
-from daemon import PATIENCE, Daemon
+from daemon import Daemon
 from daemon_case import Case
 
 N, RANK = 3000, 100  # Y and V: 1.14 MiB each, which is worth a mapping
@@ -38,10 +38,7 @@ class Scrub(Case):
             self.assertGreaterEqual(self.verified_at(daemon), begun)
             self.assertLessEqual(self.verified_at(daemon), time.time())
             self.rot(path)
-            end = time.monotonic() + PATIENCE
-            while "took box out of service" not in daemon.errors():
-                self.assertLess(time.monotonic(), end)
-                time.sleep(.01)
+            daemon.wait_for_error("took box out of service")
             self.assertEqual(self.names(daemon), ["other"])
             self.assertEqual(daemon.radiosity("box", {"emission": {"groups": {"lamp": 1}}}).status, 503)
             # It stays so, is told once, and what replaces it is compared again and again.
@@ -68,7 +65,6 @@ class Scrub(Case):
     def test_never_without_the_option(self):
         path, _ = self.store(n=N, rank=RANK)
         with Daemon(path) as daemon:
-            daemon.wait_for("verified box")
             self.assertGreater(self.verified_at(daemon), 0)
         for hours in "0", "-1", "x", "1e9":
             self.assertEqual(self.run_once(path, "--scrub", hours).returncode, 2)

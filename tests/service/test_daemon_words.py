@@ -15,7 +15,6 @@ class Words(Case):
     def test_no_path_in_the_words_for_clients(self):
         path, _ = self.store(n=N, rank=RANK)
         with Daemon(path) as daemon:
-            daemon.wait_for("verified box")
             os.utime(path)
             answer = daemon.radiosity("box", {"emission": {"groups": {"lamp": 1}}})
             self.assertEqual(answer.status, 503)
