@@ -18,8 +18,7 @@ static const double rate_most = .5;
  * .001 to .002, which differ between probes by a factor of 1.6. */
 static const double rate_trusted = 5e-3;
 enum { PILOTS = 8 };
-/* Columns, of a probe and a channel, that are solved together: a whole number of probes, and of panels of
- * blocks. */
+/* Columns that are solved together: panels of blocks. */
 enum { COLUMNS = 24, PROBES_LEAST = 8 };
 /* The same of one channel without a guide. */
 enum { ALONE = 32 };
@@ -216,9 +215,9 @@ done:
 /* The operator that is judged, as a guide. */
 typedef struct operator_guide {
     const lam_operator *op;
-    float *in, *out;
+    float *in, *out; /* [at_once][C][n] */
     void *work;
-    size_t bytes;
+    size_t bytes, at_once;
 } operator_guide;
 
 static void operator_guide_free(operator_guide *g) {
@@ -227,13 +226,14 @@ static void operator_guide_free(operator_guide *g) {
     free(g->work);
 }
 
-/* For up to most answers. */
+/* For batches of `most` answers: one by one of many elements, as an operator takes them itself. */
 static lam_status operator_guide_init(operator_guide *g, const lam_operator *op, size_t most,
                                       lam_error *error) {
-    const size_t vector = lam_operator_elements(op) * lam_operator_channels(op);
-    *g = (operator_guide){.op = op, .bytes = lam_operator_work_bytes(op, most)};
-    g->in = memory_allocate(most, vector * sizeof *g->in, "reference", error);
-    g->out = memory_allocate(most, vector * sizeof *g->out, "reference", error);
+    const size_t n = lam_operator_elements(op), vector = n * lam_operator_channels(op);
+    const size_t at_once = n < REFERENCE_MANY_ELEMENTS ? most : 1;
+    *g = (operator_guide){.op = op, .bytes = lam_operator_work_bytes(op, at_once), .at_once = at_once};
+    g->in = memory_allocate(at_once, vector * sizeof *g->in, "reference", error);
+    g->out = memory_allocate(at_once, vector * sizeof *g->out, "reference", error);
     g->work = memory_allocate(1, g->bytes, "reference", error);
     return g->in == NULL || g->out == NULL || g->work == NULL ? LAM_ERR_MEMORY : LAM_OK;
 }
@@ -241,12 +241,17 @@ static lam_status operator_guide_init(operator_guide *g, const lam_operator *op,
 static lam_status answer_by_operator(void *context, size_t m, const double *r, double *X, lam_error *error) {
     lam_status status = LAM_OK;
     const operator_guide *g = context;
-    const size_t count = m * lam_operator_elements(g->op) * lam_operator_channels(g->op);
+    const size_t vector = lam_operator_elements(g->op) * lam_operator_channels(g->op);
+    for (size_t first = 0; first < m; first += g->at_once) {
+        const size_t some = m - first < g->at_once ? m - first : g->at_once, count = some * vector;
+        const double *in = r + first * vector;
+        double *out = X + first * vector;
 #pragma omp parallel for schedule(static) if (count >= 65536)
-    for (size_t i = 0; i < count; i++) g->in[i] = (float)r[i];
-    TRY(lam_operator_apply(g->op, m, LAM_RADIOSITY, g->in, g->out, g->work, g->bytes, error));
+        for (size_t i = 0; i < count; i++) g->in[i] = (float)in[i];
+        TRY(lam_operator_apply(g->op, some, LAM_RADIOSITY, g->in, g->out, g->work, g->bytes, error));
 #pragma omp parallel for schedule(static) if (count >= 65536)
-    for (size_t i = 0; i < count; i++) X[i] = (double)g->out[i];
+        for (size_t i = 0; i < count; i++) out[i] = (double)g->out[i];
+    }
 done:
     return status;
 }
@@ -311,12 +316,16 @@ static lam_status batch_init(batch *b, size_t n, size_t count, lam_error *error)
     return LAM_OK;
 }
 
+size_t guided_reference_columns(size_t n, size_t n_channels) {
+    const size_t most = n < REFERENCE_MANY_ELEMENTS ? COLUMNS / n_channels : PROBES_LEAST;
+    return n_channels * (most < PROBES_LEAST ? PROBES_LEAST : most);
+}
+
 static lam_status each_guided(const reference_system *s, const reference_answers *a, size_t m,
                               const size_t *which, visit_correction *visit, void *context, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = s->n, C = s->n_channels;
-    size_t most = COLUMNS / C < PROBES_LEAST ? PROBES_LEAST : COLUMNS / C;
-    most = most < m ? most : m;
+    const size_t together = guided_reference_columns(n, C) / C, most = together < m ? together : m;
     operator_guide of = {.op = NULL};
     const reference_guide guide = {answer_by_operator, &of};
     batch b = {.x = NULL};

@@ -49,6 +49,12 @@ typedef struct reference_answers {
 /* Gets x [n], the converged B - B~ of answer v in a channel. */
 typedef void visit_correction(void *context, size_t v, size_t channel, const double *x);
 
+/* Vectors of so many elements are most of a judge's memory, and fewer of them together cost no time. */
+#define REFERENCE_MANY_ELEMENTS ((size_t)1 << 18)
+
+/* Columns, of a probe and a channel, that guided_reference_each solves together: a whole number of probes. */
+size_t guided_reference_columns(size_t n, size_t n_channels);
+
 /* True where guided_reference_each takes an LU for m answers. */
 bool guided_reference_is_dense(const reference_system *s, const lam_operator *op, size_t m);
 

@@ -69,7 +69,7 @@ typedef struct step_rates {
 } step_rates;
 
 /* The emissions of a round, their first light H and its spread D, [m][C][n], and corrections by each
- * reference. */
+ * reference, in single precision, as the answers are that they correct. */
 typedef struct measured {
     const judge_input *input;
     step_rates *rates;
@@ -77,7 +77,8 @@ typedef struct measured {
     probes p;
     double *first, *spread;
     bool *known;
-    double *x, *y; /* y: by the other reference; NULL: of none */
+    float *x, *y;          /* y: by the other reference; NULL: of none */
+    double *one_x, *one_y; /* [C][n] those of one probe */
 } measured;
 
 static void measured_free(measured *m) {
@@ -87,6 +88,8 @@ static void measured_free(measured *m) {
     free(m->known);
     free(m->x);
     free(m->y);
+    free(m->one_x);
+    free(m->one_y);
 }
 
 static size_t vector_of(const judge_input *input) {
@@ -129,13 +132,14 @@ static reference_system system_of(const judge_input *input, const factor_product
 
 typedef struct corrections {
     const judge_input *input;
-    double *x; /* [m][C][n] */
+    float *x; /* [m][C][n] */
 } corrections;
 
 static void keep(void *context, size_t v, size_t channel, const double *x) {
     const corrections *to = context;
     const size_t n = to->input->problem->n, C = to->input->problem->n_channels;
-    memcpy(to->x + (v * C + channel) * n, x, n * sizeof *x);
+    float *out = to->x + (v * C + channel) * n;
+    for (size_t i = 0; i < n; i++) out[i] = (float)x[i];
 }
 
 /* The share of D in the first light H of the independent reference or of the other one: of twins each has an
@@ -149,7 +153,7 @@ static double share_of_spread(const judge_input *input, bool other) {
 /* x [][C][n]: corrections of the answers which[count] by F, the other reference or not; first: with the first
  * light that is known. */
 static lam_status solve(const lam_operator *op, const measured *m, const factor_product *F, bool first,
-                        bool other, size_t count, const size_t *which, double *rate, double *x,
+                        bool other, size_t count, const size_t *which, double *rate, float *x,
                         lam_error *error) {
     const reference_system system = system_of(m->input, F);
     const reference_answers answers = {.op = op,
@@ -182,9 +186,17 @@ static lam_status prepare_other(measured *m, size_t n_noisy, bool by_own, size_t
     return LAM_OK;
 }
 
+/* The numbers of probe v, of from [][C][n], as to [C][n]. */
+static const double *numbers_of(const measured *m, size_t v, const float *from, double *to) {
+    const size_t vector = vector_of(m->input);
+    for (size_t i = 0; i < vector; i++) to[i] = (double)from[v * vector + i];
+    return to;
+}
+
 /* Probe v with its corrections x and y (NULL: not known), by the references of the total error or by the
- * operator's own. The noise of the first light is a part of y - x or comes beside (share_of_spread). */
-static figure_probe probe_of(const measured *m, size_t v, const double *x, const double *y, bool total) {
+ * operator's own; until the next one. The noise of the first light is a part of y - x or comes beside
+ * (share_of_spread). */
+static figure_probe probe_of(const measured *m, size_t v, const float *x, const float *y, bool total) {
     const judge_input *input = m->input;
     const size_t first = v * vector_of(input);
     const bool apart = input->other.n == 0 || input->relation == REFERENCE_COARSER;
@@ -192,15 +204,16 @@ static figure_probe probe_of(const measured *m, size_t v, const double *x, const
     return (figure_probe){.problem = input->problem,
                           .E = m->p.E + first,
                           .B = m->p.B + first,
-                          .x = x + first,
-                          .y = y != NULL ? y + first : NULL,
+                          .x = numbers_of(m, v, x, m->one_x),
+                          .y = y != NULL ? numbers_of(m, v, y, m->one_y) : NULL,
                           .spread = spread ? m->spread + first : NULL,
                           .relation = input->relation,
                           .other_share = input->other_share};
 }
 
-/* Negative power over all power, and sum A E against sum A [(1 - rho) H + B (1 - s)], means of each group. */
-static void add_physics(const measured *m, error_group *groups[JUDGE_GROUPS]) {
+/* Negative power over all power, and sum A E against sum A [(1 - rho) H + B (1 - s)], means of each group.
+ * Drops H. */
+static void add_physics(measured *m, error_group *groups[JUDGE_GROUPS]) {
     const build_problem *problem = m->input->problem;
     const size_t n = problem->n, vector = vector_of(m->input);
     const probes *p = &m->p;
@@ -222,6 +235,8 @@ static void add_physics(const measured *m, error_group *groups[JUDGE_GROUPS]) {
             if (emitted > 0) groups[g]->energy_balance += fabs(emitted - accounted) / emitted / count;
         }
     }
+    free(m->p.H);
+    m->p.H = NULL;
 }
 
 /* Nobody knows how many rounds there will be. */
@@ -261,7 +276,10 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
     size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
     size_t *others = memory_allocate(p->m, sizeof *others, "probes", error), n_others = 0;
     m->x = memory_allocate(p->m, vector_of(input) * sizeof *m->x, "reference", error);
-    if (m->x == NULL || all == NULL || others == NULL) TRY(LAM_ERR_MEMORY);
+    m->one_x = memory_allocate(vector_of(input), sizeof *m->one_x, "reference", error);
+    m->one_y = memory_allocate(vector_of(input), sizeof *m->one_y, "reference", error);
+    if (m->x == NULL || m->one_x == NULL || m->one_y == NULL || all == NULL || others == NULL)
+        TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < p->m; v++) all[v] = v;
     if (own) {
         TRY(solve(op, m, &input->own, false, false, p->m, all, &m->rates->own, m->x, error));
@@ -306,6 +324,10 @@ double judge_of_operator(const error_group *g) {
     return g->receivers.known ? g->receivers.operator_indirect : g->operator_indirect.mean;
 }
 
+size_t judge_at_once(size_t n) {
+    return n < REFERENCE_MANY_ELEMENTS ? 16 : 8;
+}
+
 /* The probes of the next round; false where there are none. An LU takes all of them at once. */
 static bool next_counts(const judge_input *input, const probe_source *source, const group_tally *t,
                         bool at_once, size_t counts[JUDGE_GROUPS]) {
@@ -314,7 +336,7 @@ static bool next_counts(const judge_input *input, const probe_source *source, co
     size_t all = 0;
     for (int g = 0; g < JUDGE_GROUPS; g++) {
         const size_t left = source->most[g] - source->made[g];
-        const size_t step = g == JUDGE_RANDOM ? RANDOM_LEAST : JUDGE_AT_ONCE;
+        const size_t step = g == JUDGE_RANDOM ? RANDOM_LEAST : judge_at_once(input->problem->n);
         const figure_group *of = input->independent.n > 0 ? &t[g].total : &t[g].own;
         const bool enough = t[g].done >= least[g] && is_certain(&of->indirect, all_of(source, g));
         counts[g] = enough ? 0 : at_once || left < step ? left : step;
@@ -418,8 +440,8 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
         measured_free(&m);
         m = (measured){.input = input, .rates = &rates, .at_once = at_once};
         TRY(probes_next(&source, counts, rounds == 0, &m.p, error));
-        TRY(measure(op, &m, &source, rounds, t, &by_group, error));
         if (rounds == 0) add_physics(&m, groups);
+        TRY(measure(op, &m, &source, rounds, t, &by_group, error));
         for (int g = 0; g < JUDGE_GROUPS; g++) t[g].done += counts[g];
         report_round(input, rounds, 1);
     }

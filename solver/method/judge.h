@@ -5,8 +5,11 @@
 #include "solver/linalg/factor_product.h"
 #include "solver/method/method.h"
 
-/* Probes that are solved together; of random emission at most. */
-enum { JUDGE_AT_ONCE = 16, JUDGE_RANDOM_PROBES = 8, JUDGE_WHOLE_PROBES = 3 };
+/* Probes of random emission, and of whole groups, at most. */
+enum { JUDGE_RANDOM_PROBES = 8, JUDGE_WHOLE_PROBES = 3 };
+
+/* Single emissions of a round. */
+size_t judge_at_once(size_t n);
 
 /* Mean, standard deviation and largest value over the probes of a group. */
 typedef struct error_figures {

@@ -1,7 +1,7 @@
 /* Bytes of memory that a precompute takes, and options that would make it fit. */
 #include "solver/base/machine.h"
+#include "solver/method/guided_reference.h"
 #include "solver/method/judge.h"
-#include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
 
 #include <math.h>
@@ -133,15 +133,17 @@ static double compress_bytes(const forecast *f) {
     return n * (compressed_element_bytes + compressed_number_bytes * numbers);
 }
 
-/* Of each probe of a round its emission, two answers, its first light with its spread, and corrections by two
+/* Of each probe of a round its emission, an answer, its first light with its spread, and corrections by two
  * references; the vectors of the solutions that are found at once; an LU, which takes all probes in one
  * round; and the walk of first light, whose nodes are those of blocks. */
 static double judge_bytes(const forecast *f) {
     const double n = (double)f->n, n_channels = (double)f->n_channels, others = JUDGE_RANDOM_PROBES + 1;
     const bool dense = f->n <= REFERENCE_DENSE_ELEMENTS && f->judge_recipe.method != RECIPE_BLOCKS;
-    const double all = (double)f->probes + others, round = dense ? all : fmin(all, JUDGE_AT_ONCE + 5);
+    const double all = (double)f->probes + others,
+                 round = dense ? all : fmin(all, (double)judge_at_once(f->n) + 5);
+    const double columns = (double)guided_reference_columns(f->n, f->n_channels);
     const double walk = f->judge_recipe.method == RECIPE_BLOCKS ? block_element_bytes + 60 : 0;
-    return n * (44 * round * n_channels + 72 * fmin(round * n_channels, fmax(24, 8 * n_channels)) + walk) +
+    return n * (32 * round * n_channels + 72 * fmin(round * n_channels, columns) + walk) +
            (dense ? 8 * n * n : 0);
 }
 

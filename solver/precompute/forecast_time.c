@@ -101,7 +101,7 @@ static double solve_seconds(const forecast *f) {
                (probe_block_seconds * blocks_of(f, &f->judge_recipe) + probe_element_seconds * n);
     const double own = f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->recipe) / 8;
     const double entries = f->cost.entries > 0 ? own : forecast_rows_bytes(n, &f->judge_recipe) / 8;
-    return (double)f->n_channels * (reference_seconds(n, own, fmin(probes, JUDGE_AT_ONCE)) +
+    return (double)f->n_channels * (reference_seconds(n, own, fmin(probes, (double)judge_at_once(f->n))) +
                                     2 * reference_seconds(n, entries, probes) + probes * guide_seconds(f));
 }
 
