@@ -6,6 +6,7 @@
 
 #include "store/status.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -231,6 +232,85 @@ START_TEST(pilots_may_find_a_guide_too_bad) {
 }
 END_TEST
 
+enum { MEAN_PROBES = 11 };
+static const double mean_rho = .6, mean_excess = 1.03;
+
+/* Each sees all others alike: F x = mean x. */
+static lam_status multiply_by_mean(const void *context, size_t m, const double *x, double *y,
+                                   lam_error *error) {
+    const size_t n = *(const size_t *)context;
+    (void)error;
+    for (size_t k = 0; k < m; k++) {
+        double sum = 0;
+        for (size_t i = 0; i < n; i++) sum += x[i * m + k];
+        for (size_t i = 0; i < n; i++) y[i * m + k] = sum / (double)n;
+    }
+    return LAM_OK;
+}
+
+/* Corrections [MEAN_PROBES] that were visited, of which all elements have the same, and how often. */
+typedef struct visits {
+    size_t n;
+    double x[MEAN_PROBES];
+    int count[MEAN_PROBES];
+} visits;
+
+static void see(void *context, size_t v, size_t channel, const double *x) {
+    visits *all = context;
+    ck_assert_uint_eq(channel, 0);
+    ck_assert_uint_lt(v, MEAN_PROBES);
+    for (size_t i = 1; i < all->n; i += 1001) ck_assert_double_eq_tol(x[i], x[0], 1e-4 * fabs(x[0]));
+    all->x[v] = x[0];
+    all->count[v]++;
+}
+
+/* Of many elements probes come in smaller batches, and the operator answers them one by one. Its answers
+ * B = E + 1.03 rho / (1 - rho) mean E lack -.03 of the light that bounces. */
+START_TEST(many_elements_are_corrected_alike) {
+    lam_error error = {.message = ""};
+    const size_t n = REFERENCE_MANY_ELEMENTS;
+    float *E = calloc(MEAN_PROBES * n, sizeof *E), *B = calloc(MEAN_PROBES * n, sizeof *B);
+    float *rho = calloc(n, sizeof *rho), *Y = calloc(n, sizeof *Y), *V = calloc(n, sizeof *V);
+    double *area = calloc(n, sizeof *area);
+    size_t which[MEAN_PROBES];
+    visits seen = {.n = n};
+    lam_operator *op = NULL;
+    ck_assert(E != NULL && B != NULL && rho != NULL && Y != NULL && V != NULL && area != NULL);
+    const double bounced = mean_rho / (1 - mean_rho);
+    for (size_t i = 0; i < n; i++) {
+        area[i] = 1;
+        rho[i] = (float)mean_rho;
+        Y[i] = (float)(-mean_excess * bounced / (double)n);
+        V[i] = 1;
+    }
+    for (size_t v = 0; v < MEAN_PROBES; v++) {
+        which[v] = v;
+        for (size_t i = v; i < n; i += 64) E[v * n + i] = (float)(v + 1);
+    }
+    ck_ok(operator_low_rank_create_folded(n, 1, rho, Y, V, &op, &error));
+    const size_t bytes = lam_operator_work_bytes(op, MEAN_PROBES);
+    void *work = malloc(bytes);
+    ck_assert_ptr_nonnull(work);
+    ck_ok(lam_operator_apply(op, MEAN_PROBES, LAM_RADIOSITY, E, B, work, bytes, &error));
+    const factor_product F = {.n = n, .multiply = multiply_by_mean, .context = &n};
+    const reference_system system = {n, 1, &F, area, rho};
+    const reference_answers answers = {.op = op, .E = E, .B = B};
+    ck_assert_uint_lt(guided_reference_columns(n, 1), MEAN_PROBES);
+    ck_ok(guided_reference_each(&system, &answers, MEAN_PROBES, which, see, &seen, &error));
+    for (size_t v = 0; v < MEAN_PROBES; v++) {
+        const double wanted = (1 - mean_excess) * bounced * (double)(v + 1) / 64;
+        ck_assert_int_eq(seen.count[v], 1);
+        ck_assert_double_eq_tol(seen.x[v], wanted, 5e-3 * fabs(wanted));
+    }
+    lam_operator_close(op);
+    free(work);
+    free(E);
+    free(B);
+    free(rho);
+    free(area);
+}
+END_TEST
+
 static bool stop_at_once(void *context) {
     (void)context;
     return true;
@@ -265,6 +345,7 @@ int main(void) {
     tcase_add_test(cases, pilots_speak_for_the_others);
     tcase_add_test(cases, pilots_may_find_a_guide_too_bad);
     tcase_add_test(cases, nothing_lacking_needs_no_product);
+    tcase_add_test(cases, many_elements_are_corrected_alike);
     tcase_add_test(cases, errors_pass_through);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
