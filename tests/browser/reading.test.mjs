@@ -166,10 +166,30 @@ test("shares are those of each lamp and of the sky alone", async () => {
         await page.evaluate((to) => { const { store: s } = window.lambert; s.change({ ...s.now, lighting: { ...s.now.lighting, dim: to } }); }, dim);
         await settled(page);
     }
+    // Nor one that waits for the answer to another pin, nor one that was answered before.
+    const pin = async (pins) => {
+        await page.evaluate((to) => { const { store: s } = window.lambert; s.change({ ...s.now, pins: to }); }, pins);
+        await settled(page);
+    };
+    const [last] = await page.evaluate(() => window.lambert.store.now.pins);
+    await pin([last + 1]);
+    await pin([last]);
     answer();
     await page.locator(".shares li").first().waitFor();
     await page.waitForTimeout(200);
     assert.equal(adjoints, 1);
+    await pin([last, last + 1]);
+    await page.getByText(`element ${last + 1}: irradiance`).waitFor();
+    await pin([last]);
+    await page.getByText(`element ${last}: irradiance`).waitFor();
+    await page.waitForTimeout(200);
+    assert.equal(adjoints, 2);
+    // A store that is opened anew is asked once, though its state comes before its picture.
+    await page.evaluate(async () => { const { store: s } = window.lambert; await window.lambert.open(s.now.scene, { ...s.now, pins: [s.now.pins[0] + 1] }); });
+    await page.getByText(`element ${last + 1}: irradiance`).waitFor();
+    await settled(page);
+    await page.waitForTimeout(200);
+    assert.equal(adjoints, 3);
     await isFine(page);
     await page.context().close();
 });

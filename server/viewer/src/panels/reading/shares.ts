@@ -1,7 +1,7 @@
 // Which lamp lights this point: one adjoint request for an element, then every lighting is read off it without another.
 import { fill, make } from "../../base/dom.ts";
 import { count, percent, tell } from "../../base/numbers.ts";
-import type { App } from "../../app.ts";
+import type { App, OpenScene } from "../../app.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { partsOf, type Gradient } from "../../state/shares.ts";
@@ -14,30 +14,27 @@ interface Asked {
 
 const LINES_MOST = 12;
 
+/** Answers that are kept: one of a dense sky has some thousand numbers. */
+const KNOWN_MOST = 100;
+
 export class Shares {
     readonly element = make("section", { class: "shares" });
     private readonly head = make("h2", { class: "sub" }, "Which lamp lights this point");
     private readonly body = make("div", {});
-    private gradient: { key: string; of: Gradient } | null = null;
+    /** Answers by what was asked for, of this scene. */
+    private known = new Map<string, Gradient>();
+    private of: OpenScene | null = null;
     private readonly asker: Newest<Asked, Gradient>;
     /** What was asked for last: the picture may change before it is answered. */
     private wanted = "";
 
     constructor(private readonly app: App, private readonly isSeen: () => boolean) {
         this.element.append(this.head, this.body);
-        this.asker = new Newest((asked) => this.ask(asked), (of, asked) => {
-            this.gradient = { key: JSON.stringify(asked), of };
-            this.draw();
-        }, (reason) => {
+        this.asker = new Newest((asked) => this.ask(asked), () => this.draw(), (reason) => {
             this.wanted = "";
             app.fail(reason);
         }, 1);
-        app.on("scene", () => {
-            this.asker.forget();
-            this.wanted = "";
-            this.gradient = null;
-            this.draw();
-        });
+        app.on("scene", () => this.draw());
         app.on("field", () => this.draw());
         app.store.listen((now, before) => { if (now.pins !== before.pins || now.view !== before.view || now.lighting !== before.lighting) this.draw(); });
     }
@@ -48,30 +45,45 @@ export class Shares {
         return element === undefined ? null : { scene, element, quantity: view.picture === "light" ? "radiosity" : view.quantity };
     }
 
-    private async ask({ scene, element, quantity }: Asked): Promise<Gradient> {
-        const { description } = this.app.scene as NonNullable<App["scene"]>, { channels } = description;
+    private async ask(asked: Asked): Promise<Gradient> {
+        const { known } = this, key = JSON.stringify(asked), there = known.get(key);
+        // It may have been answered while this request waited.
+        if (there !== undefined) return there;
+        const { description } = this.app.scene as OpenScene, { channels } = description;
         const gradient = (description.emitters?.length ?? 0) > 0 ? ["emitters"] : description.sky === null ? ["groups"] : ["groups", "sky"];
         const weights = channelWeights(channels);
-        const answer = await this.app.api.adjoint(scene, {
-            cotangent: { elements: [element], values: [channels === 1 ? 1 : weights] }, quantity, gradient,
+        const answer = await this.app.api.adjoint(asked.scene, {
+            cotangent: { elements: [asked.element], values: [channels === 1 ? 1 : weights] }, quantity: asked.quantity, gradient,
         });
+        const [oldest] = known.keys();
+        if (known.size >= KNOWN_MOST) known.delete(oldest);
+        known.set(key, answer.gradient as Gradient);
         return answer.gradient as Gradient;
+    }
+
+    /** A scene that was opened anew may be of another store: nothing of it is known. */
+    private take(scene: OpenScene | null): void {
+        if (scene === this.of) return;
+        this.of = scene;
+        this.asker.forget();
+        this.wanted = "";
+        this.known = new Map();
     }
 
     draw(): void {
         const { app, asked } = this, { scene, store: { now } } = app;
+        this.take(scene);
         this.element.hidden = asked === null || scene === null;
         if (!this.isSeen() || asked === null || scene === null) return;
-        const key = JSON.stringify(asked);
-        if (this.gradient?.key !== key) {
-            this.gradient = null;
+        const key = JSON.stringify(asked), gradient = this.known.get(key);
+        if (gradient === undefined) {
             this.body.replaceChildren();
             if (this.wanted !== key) this.asker.want(asked);
             this.wanted = key;
             return;
         }
         const { description, mesh } = scene;
-        const parts = partsOf(this.gradient.of, now.lighting, description.channels, description.groups.map((group) => group.name),
+        const parts = partsOf(gradient, now.lighting, description.channels, description.groups.map((group) => group.name),
             description.emitters ?? [], description.sky === null ? null : app.skyOf(now.lighting, description));
         const total = parts.reduce((sum, part) => sum + part.value, 0);
         const group = mesh.groups[mesh.groupOf[asked.element]]?.name ?? "";
