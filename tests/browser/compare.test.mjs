@@ -29,7 +29,7 @@ function watched(page) {
 const figure = (page) => page.evaluate(() => {
     const mean = (field, area) => field.values.reduce((sum, v, i) => sum + v * area[i], 0);
     const { fields, scene: { mesh: { area } } } = window.lambert;
-    return { ratio: mean(fields[1], area) / mean(fields[0], area), problem: window.lambert.problem };
+    return { ratio: mean(fields[1], area) / mean(fields[0], area), problem: window.lambert.recovery.problem };
 });
 
 test("another tiling of the sky has the same sky", async () => {

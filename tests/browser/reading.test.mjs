@@ -53,7 +53,7 @@ const ask = async (emission, more, scene = "yard") => daemon.json(`/v1/scenes/${
 /** Nothing failed, and no request was refused. */
 async function isFine(page) {
     assert.deepEqual(page.faults, []);
-    assert.equal(await page.evaluate(() => window.lambert.problem), null);
+    assert.equal(await page.evaluate(() => window.lambert.recovery.problem), null);
 }
 
 /** What shines, as the page says: by group, and of the sky's tiles. */
@@ -291,7 +291,7 @@ test("a histogram's part that is dragged over becomes the range", async () => {
     await page.mouse.move(box.x + box.width * 0.4, box.y + 40, { steps: 4 });
     await page.mouse.move(box.x + box.width * 0.6, box.y + 40, { steps: 4 });
     await page.mouse.up();
-    const { range, high } = await page.evaluate(() => ({ range: window.lambert.store.now.view.range, high: window.lambert.spread.high * 1.15 }));
+    const { range, high } = await page.evaluate(() => ({ range: window.lambert.store.now.view.range, high: window.lambert.exposure.spread.high * 1.15 }));
     assert.ok(range !== null && Math.abs(range[0] - 0.2 * high) < 0.02 * high && Math.abs(range[1] - 0.6 * high) < 0.02 * high, `${range} of ${high}`);
     await page.getByLabel("High end of the palette").fill("77");
     await page.keyboard.press("Enter");

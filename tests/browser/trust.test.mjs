@@ -39,7 +39,7 @@ test("the error of a lighting and a certificate", async () => {
     await page.getByRole("button", { name: "Certify" }).click();
     await page.getByText(/^Certified: no number/).waitFor();
     const exact = await values(page, "box", { tolerance: 1e-5 });
-    const shown = await page.evaluate(() => ({ values: [...window.lambert.fields[0].values], ...window.lambert.certificate }));
+    const shown = await page.evaluate(() => ({ values: [...window.lambert.fields[0].values], ...window.lambert.asking.certificate }));
     assert.equal(shown.iterations, exact.iterations);
     // The bound is that of the answer scaled to 1, in single precision: its rounding is counted.
     const largest = Math.max(...exact.radiosity.flat());
@@ -49,14 +49,14 @@ test("the error of a lighting and a certificate", async () => {
     assert.match(await page.getByRole("contentinfo").textContent(), /certified.*solve [\d.]+ ms/);
     // Another lighting is certified when it rests; the link has the tolerance.
     await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, lighting: { ...s.now.lighting, dim: 0.5 } }); });
-    await page.waitForFunction((bound) => window.lambert.certificate !== null && window.lambert.certificate.bound < 0.9 * bound, shown.bound);
+    await page.waitForFunction((bound) => window.lambert.asking.certificate !== null && window.lambert.asking.certificate.bound < 0.9 * bound, shown.bound);
     await page.waitForTimeout(500);
     const other = await openPage(daemon.address, { hash: await page.evaluate(() => location.hash) });
-    await other.waitForFunction(() => window.lambert.certificate !== null);
+    await other.waitForFunction(() => window.lambert.asking.certificate !== null);
     assert.equal(await other.evaluate(() => window.lambert.store.now.tolerance), 1e-5);
     await other.context().close();
     await page.getByRole("button", { name: "As stored" }).click();
-    await page.waitForFunction(() => window.lambert.certificate === null && window.lambert.isIdle);
+    await page.waitForFunction(() => window.lambert.asking.certificate === null && window.lambert.isIdle);
     assert.deepEqual(page.faults, []);
     assert.deepEqual(await violations(page), []);
     await page.context().close();

@@ -1,5 +1,5 @@
 // Starts the page.
-import { App } from "./app.ts";
+import { App } from "./app/app.ts";
 import { make } from "./base/dom.ts";
 import { makeBanner, makeBar, makeDrawer, makeLoading, makeStatus, makeTokenDialog, setBackground } from "./panels/frame.ts";
 import { comparePanel } from "./panels/compare.ts";
@@ -68,7 +68,7 @@ async function begin(app: App): Promise<void> {
         await app.open(name, given !== null && given.scene === name ? given : null);
     } catch (reason) {
         app.fail(reason);
-        if (app.watch.isLost) app.on("found", () => { if (app.scene === null) void begin(app); });
+        if (app.recovery.watch.isLost) app.on("found", () => { if (app.scene === null) void begin(app); });
     }
 }
 

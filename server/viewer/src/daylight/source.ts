@@ -1,6 +1,5 @@
 // The tiles of the open store and the weather that skies are made of; answers with radiances for a lighting.
 import { ofTemperature } from "../base/colour.ts";
-import type { SunParts } from "../sharp_sun.ts";
 import type { Moment, SkyLight } from "../state/state.ts";
 import { skyFor, type Sky } from "./skies.ts";
 import { tilesOf, type SkyAnswer, type Tiles } from "./tiles.ts";
@@ -11,6 +10,17 @@ const KEPT = 4;
 
 /** Colour temperatures of a tinted sky, K: without a sun, beside a sun, and of the sun. */
 const OVERCAST_K = 6500, BLUE_K = 12000, SUN_K = 5200;
+
+/** The light of a sky and of its sun. */
+export interface SunParts {
+    /** Radiances of the tiles: of the sky without the sun, and of the sun alone. */
+    sky: readonly (number | number[])[];
+    sun: readonly (number | number[])[];
+    /** To the sun: east, north, up. */
+    direction: readonly [number, number, number];
+    /** Irradiance that faces the sun, by red, green and blue. */
+    light: [number, number, number];
+}
 
 export class SkySource {
     /** Of the open scene. */

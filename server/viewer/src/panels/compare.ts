@@ -3,7 +3,7 @@ import { button, choice, fill, make } from "../base/dom.ts";
 import { halvesToFloats } from "../base/half.ts";
 import { readNpy } from "../base/npy.ts";
 import { count, percent, tell } from "../base/numbers.ts";
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import { changesOf, roundUp, type Changes } from "../picture/changes.ts";
 import type { Field } from "../picture/field.ts";
 import type { Wanted } from "../state/request.ts";
@@ -111,7 +111,7 @@ function measure(app: App, place: HTMLElement, found: (changes: Changes) => void
         const { scene } = app, tolerance = app.store.now.tolerance;
         if (scene === null || wanted.emission === null) return new Float32Array((scene?.description.channels ?? 0) * (scene?.mesh.elements ?? 0));
         // A certified A is compared as such.
-        const certified = tolerance !== null && app.certificate !== null && wanted === a;
+        const certified = tolerance !== null && app.asking.certificate !== null && wanted === a;
         const { file } = await app.api.floats(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity, ...(certified ? { tolerance } : {}) });
         return (readNpy(file).data as Float32Array).map((v) => v * wanted.scale);
     };

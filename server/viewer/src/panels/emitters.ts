@@ -1,5 +1,5 @@
 // Stores of precomputed emitters: a weight for each, and for a lamp in many positions the way along them.
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import { button, fill, make } from "../base/dom.ts";
 import { count, tell } from "../base/numbers.ts";
 import { alongOf, positionOf, type Weights } from "../state/path.ts";

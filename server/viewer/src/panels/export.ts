@@ -2,7 +2,7 @@
 import { button, make, tick } from "../base/dom.ts";
 import { csvOf } from "../base/csv.ts";
 import { readNpy } from "../base/npy.ts";
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import { drawLegend, SIDE_MOST, snapshot, type Legend } from "../picture/snapshot.ts";
 import { curlCommand, plainRequest, pythonProgram, type PlainRequest } from "../state/snippets.ts";
 import type { Panel } from "./panel.ts";

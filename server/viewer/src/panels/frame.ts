@@ -1,7 +1,7 @@
 // The frame of the page: the bar above, the panels beside or below the picture, the line of figures, the banner.
 import { button, choice, fill, make } from "../base/dom.ts";
 import { count, percent, tell } from "../base/numbers.ts";
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import type { Panel } from "./panel.ts";
 
 /** What takes less is not told of. */
@@ -119,8 +119,8 @@ export function makeStatus(app: App): HTMLElement {
     app.store.listen(drawSun);
     const drawError = (): void => {
         const { description } = app.scene as NonNullable<App["scene"]>;
-        if (app.certificate !== null) {
-            error.textContent = `certified: no number is off by more than ${tell(app.certificate.bound, 2)} ${app.store.now.view.unit}`;
+        if (app.asking.certificate !== null) {
+            error.textContent = `certified: no number is off by more than ${tell(app.asking.certificate.bound, 2)} ${app.store.now.view.unit}`;
             return;
         }
         const figures = description.error?.lights ?? description.error?.random ?? description.error?.single;
@@ -135,7 +135,7 @@ export function makeStatus(app: App): HTMLElement {
         size.textContent = `${count(description.elements)} elements · ${description.kind}`;
     });
     app.on("timing", () => {
-        const { roundTrip, solve } = app.timing;
+        const { roundTrip, solve } = app.asking.timing;
         time.textContent = solve === null ? `answer ${tell(roundTrip, 2)} ms` : `solve ${tell(solve, 2)} ms, answer ${tell(roundTrip, 2)} ms`;
     });
     return make("footer", { "aria-label": "Figures" }, size, error, time, sun);
@@ -156,11 +156,11 @@ export function makeBanner(app: App): HTMLElement {
         const now = banner.firstChild?.textContent ?? null;
         if (now !== text || isNote !== banner.contains(close)) fill(banner, make("span", {}, text ?? ""), isNote && close);
     };
-    app.on("lost", () => show(app.watch.why));
+    app.on("lost", () => show(app.recovery.watch.why));
     app.on("found", () => show(app.notice));
     app.on("scene", () => show(app.notice));
-    app.on("problem", () => show(app.problem));
-    app.on("field", () => { if (!app.watch.isLost) show(app.notice); });
+    app.on("problem", () => show(app.recovery.problem));
+    app.on("field", () => { if (!app.recovery.watch.isLost) show(app.notice); });
     return banner;
 }
 
@@ -170,9 +170,9 @@ export function makeLoading(app: App): HTMLElement {
     let timer = 0;
     const update = (): void => {
         clearTimeout(timer);
-        if (app.loading === null) note.hidden = true;
+        if (app.opening.loading === null) note.hidden = true;
         else timer = window.setTimeout(() => {
-            note.textContent = `Loading ${app.loading || "the scene"} …`;
+            note.textContent = `Loading ${app.opening.loading || "the scene"} …`;
             note.hidden = false;
         }, LOADING_MS);
     };

@@ -1,7 +1,7 @@
 // The lights: every group that emits, and any other that a person lets shine.
 import { fromHex, luminance, ofTemperature, toHex, type Rgb } from "../base/colour.ts";
 import { button, choice, fill, make, tick, unique } from "../base/dom.ts";
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import type { GroupLight, Lighting } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
 import { slider, type Slider } from "./slider.ts";

@@ -1,7 +1,7 @@
 // How the picture is drawn: tone, exposure, false colour, cameras. Nothing here costs a request but the quantity.
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { tell } from "../base/numbers.ts";
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import type { Description } from "../daemon/api.ts";
 import { placeOf } from "../picture/cameras.ts";
 import { turned } from "../picture/glb.ts";
@@ -33,7 +33,7 @@ export function lookPanel(app: App): Panel {
     const most = make("input", { type: "number", step: "any", "aria-label": "Largest value of the palette" });
     const setRange = (): void => {
         // An end that is left open is that of the values.
-        const low = least.value === "" ? 0 : Number(least.value), high = most.value === "" ? app.spread.high : Number(most.value);
+        const low = least.value === "" ? 0 : Number(least.value), high = most.value === "" ? app.exposure.spread.high : Number(most.value);
         change({ range: (least.value !== "" || most.value !== "") && high > low ? [low, high] : null });
     };
     least.addEventListener("change", setRange);
@@ -59,7 +59,7 @@ export function lookPanel(app: App): Panel {
     app.on("scene", update);
     app.on("field", () => {
         least.placeholder = "0";
-        most.placeholder = tell(app.spread.high).replaceAll(",", "");
+        most.placeholder = tell(app.exposure.spread.high).replaceAll(",", "");
     });
     app.store.listen((now, before) => {
         // An exposure that was left to the page is found from the next answer.

@@ -2,7 +2,7 @@
 import { fromHex, toHex } from "../base/colour.ts";
 import { button, fill, make } from "../base/dom.ts";
 import { Problem } from "../daemon/api.ts";
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import type { MeshGroup } from "../picture/glb.ts";
 import { baseOf, checkReflectances, type Reflectances } from "../state/variants.ts";
 import type { Panel } from "./panel.ts";

@@ -1,5 +1,5 @@
 // What a panel is: a part of the page beside the picture.
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 
 export interface Panel {
     id: string;

@@ -1,5 +1,6 @@
 // The sky of a store that has one: its model, place and time, a day that goes by, and the weather file.
-import type { App, OpenScene } from "../app.ts";
+import type { App } from "../app/app.ts";
+import type { OpenScene } from "../app/opening.ts";
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { count, tell } from "../base/numbers.ts";
 import type { Description } from "../daemon/api.ts";
@@ -140,7 +141,7 @@ function noteOf(light: SkyLight, source: SkySource, app: App): string {
 
 /** Other skies are ten times as bright: an exposure that the page chose is found anew, that of a person stays. */
 function changeModel(app: App, model: SkyLight["model"]): void {
-    const { now } = app.store, exposure = now.view.exposure === app.ownExposure ? null : now.view.exposure;
+    const { now } = app.store, exposure = app.exposure.anew(now.view);
     app.store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, model } }, view: { ...now.view, exposure } });
 }
 

@@ -2,7 +2,7 @@
 import { make } from "../base/dom.ts";
 import { clamp, tell } from "../base/numbers.ts";
 import { toHex } from "../base/colour.ts";
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import { changeColour } from "../picture/changes.ts";
 
 /** Parts of the width that a key moves the line by. */

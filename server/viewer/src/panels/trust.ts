@@ -5,7 +5,7 @@ import { readNpy } from "../base/npy.ts";
 import { count, percent, tell } from "../base/numbers.ts";
 import { Problem, type Description, type ErrorFigures, type GroupErrors } from "../daemon/api.ts";
 import { Newest } from "../daemon/newest.ts";
-import type { App } from "../app.ts";
+import type { App } from "../app/app.ts";
 import { Field } from "../picture/field.ts";
 import type { Wanted } from "../state/request.ts";
 import type { Panel } from "./panel.ts";
@@ -166,7 +166,7 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
     let certified = "", onItsWay: AbortController | null = null;
     const rested = (wanted: Wanted): void => {
         const wished = app.store.now.tolerance, key = JSON.stringify([wanted, wished]);
-        if (wished === null || wanted.emission === null || (key === certified && app.certificate !== null)) return;
+        if (wished === null || wanted.emission === null || (key === certified && app.asking.certificate !== null)) return;
         if (key === certified && onItsWay !== null) return;
         certified = key;
         onItsWay?.abort();
@@ -200,7 +200,7 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
             said.textContent = "";
         }
     });
-    app.on("field", () => { if (app.certificate === null && onItsWay === null) said.textContent = ""; });
+    app.on("field", () => { if (app.asking.certificate === null && onItsWay === null) said.textContent = ""; });
     app.on("scene", () => {
         certified = "";
         stop.disabled = app.store.now.tolerance === null;

@@ -2,7 +2,7 @@
 // the number of elements. Least, largest and uniformity are of the luminance of each element, which the picture has.
 import { button, fill, make } from "../../base/dom.ts";
 import { tell } from "../../base/numbers.ts";
-import type { App } from "../../app.ts";
+import type { App } from "../../app/app.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { figuresOf, type Figures } from "../../picture/scale.ts";

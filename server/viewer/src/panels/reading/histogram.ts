@@ -2,7 +2,7 @@
 import uPlot from "uplot";
 import { make } from "../../base/dom.ts";
 import { percent, tell } from "../../base/numbers.ts";
-import type { App } from "../../app.ts";
+import type { App } from "../../app/app.ts";
 import { areaByValue, ticksOf, valueAt, type Axis } from "../../picture/scale.ts";
 
 const BINS = 60;
@@ -37,12 +37,12 @@ export class Histogram {
     }
 
     draw(): void {
-        const { app: { scene, fields: [field], store: { now: { view } }, spread } } = this;
+        const { app: { scene, fields: [field], store: { now: { view } }, exposure } } = this, { spread } = exposure;
         if (!this.isSeen() || scene === null || field === null || this.place.clientWidth === 0) return;
         const group = view.judged === null ? undefined : scene.mesh.groups.find((g) => g.name === view.judged);
         const counts = group === undefined ? (): boolean => true : (i: number): boolean => scene.mesh.groups[scene.mesh.groupOf[i]] === group;
         // The ends of the palette are in sight, and all but the last hundredth of the area; in log four decades at most.
-        const palette = this.app.axis;
+        const palette = exposure.axis(view);
         const high = Math.max(spread.high * 1.15, view.range?.[1] ?? 0) || 1;
         this.axis = view.log ? { low: Math.min(Math.max(spread.low / 1.5, high / 1e4), palette.low > 0 ? palette.low : Infinity), high, log: true }
             : { low: Math.min(0, view.range?.[0] ?? 0), high, log: false };
@@ -90,8 +90,8 @@ export class Histogram {
     }
 
     private drawEnds(plot: uPlot, toPlace: (value: number) => number, colour: string): void {
-        const { axis } = this.app, { ctx, bbox } = plot;
-        if (this.app.store.now.view.picture !== "false") return;
+        const { store: { now: { view } }, exposure } = this.app, axis = exposure.axis(view), { ctx, bbox } = plot;
+        if (view.picture !== "false") return;
         ctx.save();
         ctx.strokeStyle = colour;
         ctx.lineWidth = 2 * devicePixelRatio;

@@ -2,7 +2,7 @@
 // the targets of a task, in words and in colour. The shader paints the elements.
 import { choice, fill, make, tick } from "../../base/dom.ts";
 import { percent, tell } from "../../base/numbers.ts";
-import type { App } from "../../app.ts";
+import type { App } from "../../app/app.ts";
 import { figuresOf } from "../../picture/scale.ts";
 import type { View } from "../../state/state.ts";
 

@@ -1,7 +1,7 @@
 // The legend of false colour, on the picture: the palette with round numbers, or with the values of the iso-lines.
 import { fill, make } from "../../base/dom.ts";
 import { tell } from "../../base/numbers.ts";
-import type { App } from "../../app.ts";
+import type { App } from "../../app/app.ts";
 import { paletteBytes } from "../../picture/palettes.ts";
 import { placeOf, ticksOf, valueAt } from "../../picture/scale.ts";
 import type { Palette } from "../../state/state.ts";
@@ -15,7 +15,7 @@ export function addLegend(app: App): void {
     app.stage.canvas.parentElement?.append(legend);
     let palette: Palette | null = null, drawn = "";
     const draw = (): void => {
-        const { view, compare } = app.store.now, { axis } = app;
+        const { view, compare } = app.store.now, axis = app.exposure.axis(view);
         legend.hidden = view.picture !== "false" || app.scene === null || app.fields[0] === null || compare?.how === "difference";
         if (legend.hidden) return;
         if (palette !== view.palette) {

@@ -2,7 +2,7 @@
 // follows each answer at once; radiosity and irradiance come exactly, by JSON of these elements alone.
 import { button, fill, make } from "../../base/dom.ts";
 import { count, tell } from "../../base/numbers.ts";
-import type { App } from "../../app.ts";
+import type { App } from "../../app/app.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { emissionOf } from "../../state/state.ts";

@@ -1,7 +1,7 @@
 // Points at elements: the mouse hovers and clicks, a finger taps, and keys move a cross over the picture.
 import { button, make } from "../../base/dom.ts";
 import { clamp, tell } from "../../base/numbers.ts";
-import type { App } from "../../app.ts";
+import type { App } from "../../app/app.ts";
 import { pinsAfter } from "../../state/shares.ts";
 
 /** A pointer that moved less than this, in pixels, between down and up has clicked. */

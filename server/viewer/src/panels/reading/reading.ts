@@ -1,6 +1,6 @@
 // The panel of readings: what the light is at a point, in a group, over an area.
 import { choice, make } from "../../base/dom.ts";
-import type { App } from "../../app.ts";
+import type { App } from "../../app/app.ts";
 import type { Panel } from "../panel.ts";
 import { Groups } from "./groups.ts";
 import { Histogram } from "./histogram.ts";

@@ -1,7 +1,8 @@
 // Which lamp lights this point: one adjoint request for an element, then every lighting is read off it without another.
 import { fill, make } from "../../base/dom.ts";
 import { count, percent, tell } from "../../base/numbers.ts";
-import type { App, OpenScene } from "../../app.ts";
+import type { App } from "../../app/app.ts";
+import type { OpenScene } from "../../app/opening.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { partsOf, type Gradient } from "../../state/shares.ts";

@@ -1,22 +1,13 @@
 // The sun drawn sharp: from its true direction, with shadows by the mesh, in place of the tiles that the store's numbers have for it.
 // The light that the sun's own light casts further, and all other light, stay the daemon's.
+import { floatsToHalves, halfToNumber } from "../base/half.ts";
+import { Newest } from "../daemon/newest.ts";
+import type { SunParts } from "../daylight/source.ts";
+import { Field } from "../picture/field.ts";
+import { turned } from "../picture/glb.ts";
+import { wantedFor, type Wanted } from "../state/request.ts";
 import type { App } from "./app.ts";
-import { floatsToHalves, halfToNumber } from "./base/half.ts";
-import { Newest } from "./daemon/newest.ts";
-import { Field } from "./picture/field.ts";
-import { turned } from "./picture/glb.ts";
-import { wantedFor, type Wanted } from "./state/request.ts";
-
-/** The light of a sky and of its sun. */
-export interface SunParts {
-    /** Radiances of the tiles: of the sky without the sun, and of the sun alone. */
-    sky: readonly (number | number[])[];
-    sun: readonly (number | number[])[];
-    /** To the sun: east, north, up. */
-    direction: readonly [number, number, number];
-    /** Irradiance that faces the sun, by red, green and blue. */
-    light: [number, number, number];
-}
+import { abilitiesOf } from "./asking.ts";
 
 interface WantedSharp {
     /** Radiosity without the sun, and what the sun's light gives further. */
@@ -34,7 +25,7 @@ export class SharpSun {
             this.app.fail(reason);
         }, 1);
 
-    constructor(private readonly app: App, private readonly solveOne: (wanted: Wanted) => Promise<Field>) {}
+    constructor(private readonly app: Pick<App, "scene" | "store" | "stage" | "fields" | "asking" | "sunOf" | "fail">) {}
 
     /** True while the picture has the sun drawn, or will have. */
     get isOn(): boolean {
@@ -77,7 +68,7 @@ export class SharpSun {
         if (scene === null || !view.sharpSun || view.picture !== "light" || view.threshold !== null || compare !== null) return null;
         const { description } = scene, parts = (description.emitters?.length ?? 0) > 0 ? null : app.sunOf(lighting, description);
         if (parts === null) return null;
-        const can = { channels: description.channels, groups: description.groups.map((group) => group.name), emitters: 0 };
+        const can = { ...abilitiesOf(description), emitters: 0 };
         return {
             rest: wantedFor(description.name, "radiosity", lighting, { ...can, sky: parts.sky }),
             further: wantedFor(description.name, "indirect", { ...lighting, groups: {} }, { ...can, sky: parts.sun }), parts,
@@ -85,7 +76,7 @@ export class SharpSun {
     }
 
     private async solve({ rest, further }: WantedSharp): Promise<Field> {
-        const [one, other] = await Promise.all([this.solveOne(rest), this.solveOne(further)]);
+        const [one, other] = await Promise.all([this.app.asking.solve(rest), this.app.asking.solve(further)]);
         const scale = Math.max(one.scale, other.scale), sum = new Float32Array(one.bits.length);
         for (let i = 0; i < sum.length; i++) sum[i] = halfToNumber(one.bits[i]) * (one.scale / scale) + halfToNumber(other.bits[i]) * (other.scale / scale);
         return new Field(floatsToHalves(sum), [one.channels, one.elements], scale);
