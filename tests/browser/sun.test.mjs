@@ -27,6 +27,16 @@ function plateAboveFloor(up) {
     return `${lines.join("\n")}\n`;
 }
 
+/** Half the angle that the sun is wide. */
+const SUN = 0.00465;
+
+/** A plate from 3 to 7 m, 5 m above a floor of 10 m, each one element, z up. */
+const HIGH = 5;
+function highPlate() {
+    const square = (low, high, z) => [[low, low], [high, low], [high, high], [low, high]].map(([x, y]) => `v ${x} ${y} ${z}\n`).join("");
+    return `mtllib plate.mtl\n${square(0, 10, 0)}${square(3, 7, HIGH)}g floor\nusemtl grey\nf 1 2 3 4\ng plate\nusemtl grey\nf 5 6 7 8\n`;
+}
+
 let daemon, daylight, state;
 before(async () => {
     daylight = { ...await sourceOf("daylight/source"), ...await sourceOf("daylight/sun") };
@@ -36,7 +46,9 @@ before(async () => {
         writeFileSync(inFolder(`${up}.obj`), plateAboveFloor(up));
         lambert("precompute", inFolder(`${up}.obj`), "-o", inFolder(`${up}.h5`), "--quiet", "--probes", 0, "--rays", 256, "--sky", "tregenza", "--up", up);
     }
-    daemon = await Daemon.start(Object.keys(AXES).map((up) => inFolder(`${up}.h5`)));
+    writeFileSync(inFolder("high.obj"), highPlate());
+    lambert("precompute", inFolder("high.obj"), "-o", inFolder("high.h5"), "--quiet", "--probes", 0, "--rays", 256, "--sky", "tregenza", "--up", "z");
+    daemon = await Daemon.start([...Object.keys(AXES), "high"].map((name) => inFolder(`${name}.h5`)));
 });
 
 const LIGHT = { model: "given", direct: 700, diffuse: 100, factor: 1, latitude: 20, longitude: 0, zone: 0, day: 80 };
@@ -97,6 +109,108 @@ for (const [up, hours] of [["z", [9.5, 12, 15]], ["y", [15]], ["x", [15]]]) test
         console.log(`${hour} h: ${dark} points in the shadow, ${lit} beside it`);
         assert.ok(dark >= 3 && lit >= 3, `${dark} dark, ${lit} lit`);
     }
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+/** Waits, however long it takes a machine, until pictures get no better. */
+const finished = (page) => page.evaluate(async () => { while (!window.lambert.stage.isFinished) await new Promise(requestAnimationFrame); });
+
+/** Linear values of red at points given in shares of the picture, which is drawn as it is by now. */
+const lightAt = (page, places) => page.evaluate((all) => {
+    const { stage } = window.lambert, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight], bytes = new Uint8Array(4 * w * h);
+    stage.draw();
+    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    return all.map(([x, y]) => bytes[4 * (Math.floor((1 - y) * h) * w + Math.floor(x * w))] / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+}, places);
+
+/** Shadow of the high plate: its offset, and half the width of half-shadows across edges to the east (0) and to the north (1). A point of the
+ * plate above m·x = 0 has its shadow of s + δ, δ across s and |δ| ≤ SUN, at −h (s + δ)·m / (s + δ)·up; the largest change of that is
+ * (h / s·up) SUN |m − up (s·m) / (s·up)|. */
+function shadowOf([east, north, up]) {
+    return { offset: [(-HIGH * east) / up, (-HIGH * north) / up], half: [east, north].map((s) => ((HIGH * SUN) / up) * Math.hypot(1, s / up)) };
+}
+
+/** The share of a disc of radius 1 that is beyond a line at −x from its middle. */
+const shareOfDisc = (x) => (Math.abs(x) >= 1 ? Number(x > 0) : 0.5 + (x * Math.sqrt(1 - x * x) + Math.asin(x)) / Math.PI);
+
+async function openHigh(hour) {
+    const page = await openPage(daemon.address, { width: 900, height: 600 }), source = new daylight.SkySource();
+    source.take(await daemon.json("/v1/scenes/high/sky"));
+    await page.evaluate(() => window.lambert.open("high", null));
+    await set(page, { smooth: false, tone: "linear", exposure: -9, sharpSun: true }, { ...LIGHT, sun: "spread", hour });
+    await settled(page);
+    return { page, sun: source.sky({ ...state.skyOff, ...LIGHT, sun: "spread", hour }, false).sun.direction };
+}
+
+const look = (page, eye, target) => page.evaluate((place) => {
+    const { cameras, stage } = window.lambert;
+    cameras.place(place, false);
+    cameras.advance(1);
+    stage.draw();
+}, [eye, target].flatMap(AXES.z[1]));
+
+test("a half-shadow is as wide as the sun's disc makes it", async () => {
+    const { page, sun } = await openHigh(15), { offset, half } = shadowOf(sun), corner = [3 + offset[0], 3 + offset[1]];
+    // From less than 2 m above, a pixel is some 2 mm; half-shadows of edges along both axes are in the picture, apart from each other's.
+    await look(page, [corner[0] + 0.2, corner[1] + 0.19, 1.6], [corner[0] + 0.2, corner[1] + 0.2, 0]);
+    const canvas = await page.evaluate(() => [window.lambert.stage.canvas.width, window.lambert.stage.canvas.height]), lines = [];
+    for (const axis of [0, 1]) {
+        const at = (t) => [...corner.map((v, k) => v + (k === axis ? t : 0.5)), 0], [a, b] = await seenAt(page, "z", [at(-0.1), at(0.1)]);
+        const step = 0.2 / Math.hypot(...a.map((v, k) => (v - b[k]) * canvas[k])), n = Math.ceil((2 * half[axis]) / step);
+        const t = Array.from({ length: 2 * n + 1 }, (_, k) => (k - n) * step);
+        lines.push({ step, t, half: half[axis], places: await seenAt(page, "z", t.map(at)) });
+    }
+    const profiles = () => Promise.all(lines.map(async ({ places, t, step }) => {
+        const light = await lightAt(page, places), shares = light.map((v) => (v - light.at(-1)) / (light[0] - light.at(-1)));
+        const where = (level) => { const k = shares.findIndex((v) => v < level); return t[k - 1] + (step * (shares[k - 1] - level)) / (shares[k - 1] - shares[k]); };
+        return { shares, middle: where(0.5), width: where(0.1) - where(0.9) };
+    }));
+    // The first picture has the middle of the disc alone.
+    assert.equal(await page.evaluate(() => window.lambert.stage.uniforms.is_soft.value), false);
+    const sharp = await profiles();
+    await page.evaluate(() => window.lambert.stage.invalidate());
+    await finished(page);
+    const soft = await profiles();
+    lines.forEach(({ step, t, half: radius }, axis) => {
+        // From a tenth to nine tenths of the disc are 0.687 of its radius to either side.
+        const { shares, width, middle } = soft[axis], wanted = 2 * 0.687 * radius, off = Math.max(...shares.map((v, k) => Math.abs(v - shareOfDisc((middle - t[k]) / radius))));
+        console.log(`axis ${axis}: a pixel is ${(1e3 * step).toFixed(2)} mm; ${(1e3 * width).toFixed(1)} mm from .1 to .9, by the disc ${(1e3 * wanted).toFixed(1)} mm, `
+            + `sharp ${(1e3 * sharp[axis].width).toFixed(1)} mm; the middle at ${(1e3 * middle).toFixed(1)} mm, sharp ${(1e3 * sharp[axis].middle).toFixed(1)} mm; shares are off by ${off.toFixed(3)}`);
+        assert.ok(Math.abs(width - wanted) < 1.5 * step && Math.abs(middle - sharp[axis].middle) < step);
+        // Places are lifted by 2.5 texels of the map, of 4 mm at most, before they are looked for in it; the sun is 43 degrees high.
+        assert.ok(sharp[axis].width < 0.35 * wanted && Math.abs(sharp[axis].middle) < 0.011 + step);
+        // 64 points come within 0.05 of a disc along any line.
+        assert.ok(off < 0.05);
+    });
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("far from the edges of shadows the picture stays as it was", async () => {
+    const { page, sun } = await openHigh(10), { offset, half } = shadowOf(sun);
+    await look(page, [5, 4.9, 13], [5, 5, 0]);
+    const changed = await page.evaluate(() => {
+        const { stage, cameras: { camera } } = window.lambert, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+        const read = () => { const bytes = new Uint8Array(4 * w * h); gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, bytes); return bytes; };
+        stage.draw();
+        const before = read();
+        stage.drawFinished();
+        const after = read(), places = [];
+        for (let i = 0; i < w * h; i++) {
+            if (Math.max(...[0, 1, 2].map((c) => Math.abs(after[4 * i + c] - before[4 * i + c]))) <= 2) continue;
+            // On the floor, in the axes of the store.
+            const far = camera.position.clone().set((2 * ((i % w) + 0.5)) / w - 1, (2 * (Math.floor(i / w) + 0.5)) / h - 1, 0.5).unproject(camera).sub(camera.position);
+            const on = camera.position.clone().addScaledVector(far, -camera.position.y / far.y);
+            places.push([on.x, -on.z]);
+        }
+        return { places, pixel: (2 * camera.position.y * Math.tan((camera.fov * Math.PI) / 360)) / h };
+    });
+    // Texels of the map are below 4 mm; three are averaged.
+    const near = Math.max(...half) + 0.012 + 1.5 * changed.pixel;
+    const fromEdge = changed.places.map((p) => { const d = p.map((v, k) => Math.abs(v - 5 - offset[k]) - 2); return Math.max(...d) > 0 ? Math.hypot(...d.map((v) => Math.max(0, v))) : -Math.max(...d); });
+    console.log(`${fromEdge.length} pixels changed, the farthest ${(1e3 * Math.max(...fromEdge)).toFixed(0)} mm from an edge of the shadow; ${(1e3 * near).toFixed(0)} mm may`);
+    assert.ok(fromEdge.length > 500 && Math.max(...fromEdge) < near);
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });

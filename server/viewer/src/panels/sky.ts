@@ -165,7 +165,7 @@ function makeControls(app: App, change: Change): Controls {
     });
     const drawn = make("p", { class: "hint" });
     const tellDrawn = (): void => {
-        drawn.textContent = app.sharp.isOn ? "The picture has the sun in its true place, with sharp shadows; all numbers have it in tiles of the sky."
+        drawn.textContent = app.sharp.isOn ? "The picture has the sun in its true place, with the half-shadows of its disc once the view rests; all numbers have it in tiles of the sky."
             : "Not now: no sun shines, or the picture shows numbers (false colour, a threshold, a comparison).";
     };
     app.store.listen(tellDrawn);

@@ -2,6 +2,7 @@
 // its element (flat) or of its node (smooth, whose means a pass over the nodes makes). Tone curve, exposure, palette,
 // iso-lines, threshold and the comparison are in the fragment shader: none of them costs a request.
 import { GLSL3, Matrix4, RawShaderMaterial, ShaderChunk, Vector2, Vector3, Vector4, type IUniform, type Texture } from "three";
+import { sunSeen } from "./sun_shadow.ts";
 
 const fetchElement = `
 uniform highp sampler2D values_a, values_b;
@@ -141,33 +142,36 @@ centroid in vec3 place;
 uniform bool is_sunny;        // the sun is drawn
 uniform vec3 sun_direction;
 uniform vec3 sun_light;       // what faces it receives
-uniform mat4 sun_matrix;      // of places to those in the map of depths
-uniform vec2 sun_step;        // a texel: m, and as a part of the range of depths
-uniform highp sampler2D sun_depth;
-uniform highp sampler2D normals;          // [3][elements], as reflectances are
+${sunSeen}
+uniform bool is_soft;         // several points of its disc were looked from
+uniform highp sampler2D sun_places;       // of the pixels: place, and number of the element from 1
+uniform highp sampler2D sun_sum;          // of what was seen from the points
+uniform float sun_part;                   // of one point
 uniform highp sampler2D reflectances;     // of all elements
 uniform highp sampler2D reflectance;      // of elements with an image; else 1
-uniform int elements;
 layout(location = 0) out vec4 pixel;
 
-vec3 three(highp sampler2D values, int i) {
-    int width = textureSize(values, 0).x;
-    ivec3 at = i + ivec3(0, elements, 2 * elements);
-    return vec3(texelFetch(values, ivec2(at.x % width, at.x / width), 0).r, texelFetch(values, ivec2(at.y % width, at.y / width), 0).r,
-        texelFetch(values, ivec2(at.z % width, at.z / width), 0).r);
+// True where a pixel was looked at on the face that this one shows.
+bool is_same_face(vec4 there, vec3 normal) {
+    int other = int(there.w + 0.5) - 1;
+    if (other < 0 || other == element) return other == element;
+    return dot(three(normals, other), normal) > 0.95 && abs(dot(there.xyz - place, normal)) < 2.0 * sun_step.x;
 }
 
-// The share of the sun that is seen: a mean over three texels by three, linear between places. The place is lifted by as much as a
-// plane's own depths reach into these, which also keeps the end of a wall from letting light in at a corner.
-float sun_seen(vec3 normal) {
-    vec3 at = (sun_matrix * vec4(place + 2.5 * sun_step.x * normal, 1.0)).xyz;
-    float depth = at.z - 0.25 * sun_step.y, seen = 0.0;
-    vec2 texels = at.xy * vec2(textureSize(sun_depth, 0)) - 0.5, part = fract(texels);
-    ivec2 low = ivec2(floor(texels)) - 1, most = textureSize(sun_depth, 0) - 1;
-    vec4 across = vec4(1.0 - part.x, 1.0, 1.0, part.x), up = vec4(1.0 - part.y, 1.0, 1.0, part.y);
-    for (int j = 0; j < 4; j++)
-        for (int i = 0; i < 4; i++) seen += across[i] * up[j] * step(depth, texelFetch(sun_depth, clamp(low + ivec2(i, j), ivec2(0), most), 0).r);
-    return seen / 9.0;
+// A pixel and its neighbours, the nearest first.
+const ivec2 AROUND[9] = ivec2[9](ivec2(0, 0), ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), ivec2(0, 1), ivec2(-1, -1), ivec2(1, -1), ivec2(-1, 1), ivec2(1, 1));
+
+// The share of the sun that is seen. A pixel at an edge has several faces, and was looked at on one of them: a neighbour may have been
+// on this one; else the last map tells.
+float sun_share(vec3 normal) {
+    if (is_soft) {
+        ivec2 most = textureSize(sun_places, 0) - 1;
+        for (int k = 0; k < 9; k++) {
+            ivec2 at = clamp(ivec2(gl_FragCoord.xy) + AROUND[k], ivec2(0), most);
+            if (is_same_face(texelFetch(sun_places, at, 0), normal)) return texelFetch(sun_sum, at, 0).r * sun_part;
+        }
+    }
+    return sun_seen(place, normal);
 }
 
 vec3 sunshine() {
@@ -176,7 +180,7 @@ vec3 sunshine() {
     if (cosine <= 0.0) return vec3(0.0);
     vec3 reflected = three(reflectances, element);
     if (is_textured) reflected /= max(three(reflectance, element), 0.004);
-    return reflected * sun_light * cosine * sun_seen(normal);
+    return reflected * sun_light * cosine * sun_share(normal);
 }
 
 float in_range(float value) {
@@ -240,6 +244,7 @@ export function makeUniforms(nothing: Texture): Uniforms {
         is_textured: of(false), reflectance: of(nothing), palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),
         is_sunny: of(false), sun_direction: of(new Vector3(0, 1, 0)), sun_light: of(new Vector3()), sun_matrix: of(new Matrix4()), sun_step: of(new Vector2()),
         sun_depth: of(nothing), normals: of(nothing), reflectances: of(nothing),
+        is_soft: of(false), sun_places: of(nothing), sun_sum: of(nothing), sun_part: of(1),
         compare: of(0), change: of(1), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
     };
 }

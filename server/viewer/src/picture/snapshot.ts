@@ -36,7 +36,7 @@ export function snapshot(stage: Stage, width: number, height: number, split: num
                 // This sets the camera's aspect, too.
                 camera.setViewOffset(width, height, x, y, w, h);
                 uniforms.split.value = split * width - x;
-                stage.draw();
+                stage.drawFinished();
                 context.drawImage(renderer.domElement, x, y);
             }
     } finally {

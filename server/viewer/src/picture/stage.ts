@@ -2,16 +2,15 @@
 // Knows no daemon and no panel; what it shows is set by its methods.
 import {
     BufferAttribute, BufferGeometry, Color, HalfFloatType, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry, RGBAFormat,
-    Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type Matrix4, type PerspectiveCamera, type RawShaderMaterial, type Texture,
+    Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type PerspectiveCamera, type RawShaderMaterial, type Texture,
 } from "three";
 import type { Palette, Tone } from "../state/state.ts";
 import type { Field } from "./field.ts";
 import { channelWeights } from "./field.ts";
 import type { SceneMesh } from "./glb.ts";
 import { findNodes } from "./nodes.ts";
-import { normalsOf, reflectancesOf } from "./elements.ts";
-import { SunShadow } from "./sun_shadow.ts";
 import { splitEdges, type Drawn } from "./split_edges.ts";
+import { Sunlight } from "./sunlight.ts";
 import { makeUniforms, nodesMaterial, sceneMaterial, type Uniforms } from "./material.ts";
 import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor, whiteTexture } from "./textures.ts";
 
@@ -36,6 +35,9 @@ export interface Look {
     split: number;
 }
 
+/** Points of the sun's disc that a frame takes in: a map of depths takes graphics cards some milliseconds. */
+const POINTS_AT_ONCE = 2;
+
 const TONES: { [name in Tone]: number } = { linear: 0, agx: 1, aces: 2 };
 
 export class Stage {
@@ -59,9 +61,8 @@ export class Stage {
     private paletteName: Palette | null = null;
     private wanted = false;
     private look: Look | null = null;
-    private shadow: SunShadow | null = null;
-    private sun: Vector3 | null = null;
-    private shadowIsOld = false;
+    private sunlight: Sunlight | null = null;
+    private restTimer = 0;
 
     constructor(readonly canvas: HTMLCanvasElement, readonly camera: PerspectiveCamera,
         /** Moves the camera; true if it goes on moving. */
@@ -72,7 +73,7 @@ export class Stage {
         const plane = new Mesh(new PlaneGeometry(2, 2), nodesMaterial(this.uniforms));
         plane.frustumCulled = false;
         this.nodesScene.add(plane);
-        canvas.addEventListener("webglcontextrestored", () => { this.nodesAreOld = this.shadowIsOld = true; this.invalidate(); });
+        canvas.addEventListener("webglcontextrestored", () => { this.nodesAreOld = true; this.sunlight?.lose(); this.invalidate(); });
         new ResizeObserver(() => this.resize()).observe(canvas.parentElement as HTMLElement);
     }
 
@@ -176,19 +177,12 @@ export class Stage {
         const u = this.uniforms, { mesh, geometry } = this;
         u.is_sunny.value = sun !== null && mesh !== null;
         this.invalidate();
-        if (sun === null || mesh === null || geometry === null) return;
-        if (this.shadow === null) {
-            this.shadow = new SunShadow(this.renderer, geometry);
-            u.sun_depth.value = this.shadow.depth;
-            u.normals.value = floatTexture(normalsOf(mesh));
-            u.reflectances.value = floatTexture(reflectancesOf(mesh));
+        if (sun === null || mesh === null || geometry === null) {
+            this.sunlight?.rest();
+            return;
         }
-        (u.sun_light.value as Vector3).set(...sun.light);
-        const direction = new Vector3(...sun.direction);
-        if (this.sun !== null && this.sun.equals(direction)) return;
-        this.sun = direction;
-        this.shadowIsOld = true;
-        (u.sun_direction.value as Vector3).copy(direction);
+        this.sunlight ??= new Sunlight(this.renderer, u, geometry, mesh);
+        this.sunlight.set(new Vector3(...sun.direction), sun.light);
     }
 
     setLook(look: Look): void {
@@ -257,14 +251,27 @@ export class Stage {
             this.renderer.render(this.nodesScene, this.nodesCamera);
             this.renderer.setRenderTarget(null);
         }
-        if (this.shadowIsOld && this.shadow !== null && this.sun !== null && this.uniforms.is_sunny.value === true) {
-            this.shadowIsOld = false;
-            this.shadow.draw(this.sun);
-            (this.uniforms.sun_matrix.value as Matrix4).copy(this.shadow.matrix);
-            (this.uniforms.sun_step.value as Vector2).set(this.shadow.texel, this.shadow.texel / this.shadow.range);
-        }
+        this.sun?.prepare(this.camera);
         this.renderer.render(this.scene, this.camera);
         this.frames += 1;
+    }
+
+    /** Draws at once with all that pictures get while they stand still. */
+    drawFinished(): void {
+        const { sun, camera } = this;
+        sun?.prepare(camera);
+        while (sun?.hasMore === true) sun.refine(camera);
+        this.draw();
+    }
+
+    /** True if the next picture is the same, where nothing changes. */
+    get isFinished(): boolean {
+        return !this.wanted && this.restTimer === 0;
+    }
+
+    /** The light of the sun, where it is drawn. */
+    private get sun(): Sunlight | null {
+        return this.uniforms.is_sunny.value === true ? this.sunlight : null;
     }
 
     resize(): void {
@@ -289,8 +296,29 @@ export class Stage {
         const seconds = Math.min(0.1, (time - this.lastTime) / 1000);
         this.lastTime = time;
         const goesOn = this.advance(seconds);
+        if (!goesOn) this.refine();
         this.draw();
         if (goesOn) this.invalidate();
+        else this.goOnRefining();
+    }
+
+    /** Makes the next picture of a view that stood still a better one. */
+    private refine(): void {
+        const { sun, camera } = this;
+        if (sun === null || sun.restLeft > 0 || !sun.isOf(camera)) return;
+        for (let k = 0; k < POINTS_AT_ONCE && sun.hasMore; k++) sun.refine(camera);
+    }
+
+    private goOnRefining(): void {
+        const { sun } = this;
+        clearTimeout(this.restTimer);
+        this.restTimer = 0;
+        if (sun === null || !sun.hasMore) return;
+        if (sun.restLeft === 0) this.invalidate();
+        else this.restTimer = window.setTimeout(() => {
+            this.restTimer = 0;
+            this.invalidate();
+        }, sun.restLeft);
     }
 
     private clear(): void {
@@ -300,8 +328,8 @@ export class Stage {
         this.nodes?.dispose();
         this.images.forEach((texture) => texture.dispose());
         this.images = [];
-        this.shadow?.dispose();
-        this.shadow = this.sun = null;
+        this.sunlight?.dispose();
+        this.sunlight = null;
         this.uniforms.is_sunny.value = false;
         for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance", "normals", "reflectances"])
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();

@@ -7,6 +7,35 @@ import {
 /** Texels of a side: a room of 10 m has some of 3 mm. */
 const SIDE = 4096;
 
+/** Reads the map. */
+export const sunSeen = `
+uniform mat4 sun_matrix;      // of places to those in the map of depths
+uniform vec2 sun_step;        // a texel: m, and as a part of the range of depths
+uniform highp sampler2D sun_depth;
+uniform highp sampler2D normals;          // [3][elements], as reflectances are
+uniform int elements;
+
+vec3 three(highp sampler2D values, int i) {
+    int width = textureSize(values, 0).x;
+    ivec3 at = i + ivec3(0, elements, 2 * elements);
+    return vec3(texelFetch(values, ivec2(at.x % width, at.x / width), 0).r, texelFetch(values, ivec2(at.y % width, at.y / width), 0).r,
+        texelFetch(values, ivec2(at.z % width, at.z / width), 0).r);
+}
+
+// The share of the sun that is seen: a mean over three texels by three, linear between places. The place is lifted by as much as a
+// plane's own depths reach into these, which also keeps the end of a wall from letting light in at a corner.
+float sun_seen(vec3 place, vec3 normal) {
+    vec3 at = (sun_matrix * vec4(place + 2.5 * sun_step.x * normal, 1.0)).xyz;
+    float depth = at.z - 0.25 * sun_step.y, seen = 0.0;
+    vec2 texels = at.xy * vec2(textureSize(sun_depth, 0)) - 0.5, part = fract(texels);
+    ivec2 low = ivec2(floor(texels)) - 1, most = textureSize(sun_depth, 0) - 1;
+    vec4 across = vec4(1.0 - part.x, 1.0, 1.0, part.x), up = vec4(1.0 - part.y, 1.0, 1.0, part.y);
+    for (int j = 0; j < 4; j++)
+        for (int i = 0; i < 4; i++) seen += across[i] * up[j] * step(depth, texelFetch(sun_depth, clamp(low + ivec2(i, j), ivec2(0), most), 0).r);
+    return seen / 9.0;
+}
+`;
+
 const vertexShader = `
 precision highp float;
 uniform mat4 modelViewMatrix, projectionMatrix;
@@ -30,7 +59,7 @@ export class SunShadow {
     private readonly target: WebGLRenderTarget;
     private readonly camera = new OrthographicCamera();
     private readonly scene = new Scene();
-    private readonly material = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, fragmentShader, side: DoubleSide });
+    private readonly material = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, fragmentShader, side: DoubleSide, colorWrite: false });
     private readonly box: Box3;
 
     constructor(private readonly renderer: WebGLRenderer, geometry: BufferGeometry) {
