@@ -1,6 +1,6 @@
 // The sun that is drawn: shadows where the sun's direction puts them, light as bright as the sky's figures say; numbers stay the store's.
 import assert from "node:assert/strict";
-import { writeFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
 import { Daemon, inFolder, lambert, near, openPage, pixel, settled, sourceOf, toSrgb, violations } from "./page.mjs";
 
@@ -187,7 +187,7 @@ test("a half-shadow is as wide as the sun's disc makes it", async () => {
     await page.context().close();
 });
 
-test("far from the edges of shadows the picture stays as it was", async () => {
+test("far from the edges of shadows the picture stays as it was, and one that is saved is the finished one", async () => {
     const { page, sun } = await openHigh(10), { offset, half } = shadowOf(sun);
     await look(page, [5, 4.9, 13], [5, 5, 0]);
     const changed = await page.evaluate(() => {
@@ -196,7 +196,7 @@ test("far from the edges of shadows the picture stays as it was", async () => {
         stage.draw();
         const before = read();
         stage.drawFinished();
-        const after = read(), places = [];
+        const after = window.finished = read(), places = [];
         for (let i = 0; i < w * h; i++) {
             if (Math.max(...[0, 1, 2].map((c) => Math.abs(after[4 * i + c] - before[4 * i + c]))) <= 2) continue;
             // On the floor, in the axes of the store.
@@ -211,6 +211,28 @@ test("far from the edges of shadows the picture stays as it was", async () => {
     const fromEdge = changed.places.map((p) => { const d = p.map((v, k) => Math.abs(v - 5 - offset[k]) - 2); return Math.max(...d) > 0 ? Math.hypot(...d.map((v) => Math.max(0, v))) : -Math.max(...d); });
     console.log(`${fromEdge.length} pixels changed, the farthest ${(1e3 * Math.max(...fromEdge)).toFixed(0)} mm from an edge of the shadow; ${(1e3 * near).toFixed(0)} mm may`);
     assert.ok(fromEdge.length > 500 && Math.max(...fromEdge) < near);
+    // A picture of the same view that is saved before it stood still.
+    await look(page, [5, 4.8, 13], [5, 5, 0]);
+    await look(page, [5, 4.9, 13], [5, 5, 0]);
+    await page.getByRole("tab", { name: "Export" }).click();
+    await page.getByRole("button", { name: "Window" }).click();
+    const [file] = await Promise.all([page.waitForEvent("download", { timeout: 0 }), page.getByRole("button", { name: "Save PNG" }).click()]);
+    const different = await page.evaluate(async (base64) => {
+        const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))])), { width: w, height: h } = bitmap, canvas = new OffscreenCanvas(w, h).getContext("2d");
+        canvas.drawImage(bitmap, 0, 0);
+        const saved = canvas.getImageData(0, 0, w, h).data, { finished } = window;
+        let sum = saved.length === finished.length ? 0 : NaN;
+        for (let y = 0; y < h; y++) for (let k = 0; k < 4 * w; k++) if (Math.abs(saved[4 * w * (h - 1 - y) + k] - finished[4 * w * y + k]) > 2) sum++;
+        return sum;
+    }, readFileSync(await file.path()).toString("base64"));
+    assert.equal(different, 0);
+    // Textures of a scene are given back when another is opened.
+    const textures = async () => {
+        await page.evaluate(() => window.lambert.open("high", window.lambert.store.now));
+        await settled(page);
+        return page.evaluate(() => { window.lambert.stage.drawFinished(); return window.lambert.stage.renderer.info.memory.textures; });
+    };
+    assert.equal(await textures(), await textures());
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });

@@ -49,6 +49,7 @@ export class Stage {
     /** Pictures drawn so far. */
     frames = 0;
     private readonly nothing = emptyTexture();
+    private readonly white = whiteTexture();
     private readonly scene = new Scene();
     private readonly nodesScene = new Scene();
     private readonly nodesCamera = new OrthographicCamera();
@@ -133,7 +134,7 @@ export class Stage {
 
     /** The materials of the parts of the geometry: the first is that of all without an image. */
     private addImages(geometry: BufferGeometry, mesh: SceneMesh, drawn: Drawn): RawShaderMaterial[] {
-        const white = whiteTexture(), materials = [sceneMaterial(this.uniforms, white, [1, 1, 1])];
+        const { white } = this, materials = [sceneMaterial(this.uniforms, white, [1, 1, 1])];
         this.hasImages = false;
         let first = 0;
         for (const image of drawn.images) {
@@ -181,7 +182,7 @@ export class Stage {
             this.sunlight?.rest();
             return;
         }
-        this.sunlight ??= new Sunlight(this.renderer, u, geometry, mesh);
+        this.sunlight ??= new Sunlight(this.renderer, u, geometry, mesh, this.nothing);
         this.sunlight.set(new Vector3(...sun.direction), sun.light);
     }
 
@@ -331,8 +332,9 @@ export class Stage {
         this.sunlight?.dispose();
         this.sunlight = null;
         this.uniforms.is_sunny.value = false;
-        for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance", "normals", "reflectances"])
+        for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance"])
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
+        this.uniforms.reflectance.value = this.nothing;
         this.geometry = this.drawn = this.mesh = this.values = this.nodes = null;
     }
 }

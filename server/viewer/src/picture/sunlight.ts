@@ -3,7 +3,7 @@
 // elements of the pixels are drawn once for all of them.
 import {
     FloatType, GLSL3, Matrix4, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry, RawShaderMaterial, RedFormat, RGBAFormat, Scene, Vector2, Vector3, WebGLRenderTarget,
-    type BufferGeometry, type Camera, type WebGLRenderer,
+    type BufferGeometry, type Camera, type Texture, type WebGLRenderer,
 } from "three";
 import { normalsOf, reflectancesOf } from "./elements.ts";
 import type { SceneMesh } from "./glb.ts";
@@ -112,8 +112,9 @@ export class Sunlight {
     /** The direction that the map is of; null: of none any more. */
     private mapped: Vector3 | null = null;
 
-    /** The geometry stays the stage's. */
-    constructor(private readonly renderer: WebGLRenderer, private readonly uniforms: Uniforms, geometry: BufferGeometry, mesh: SceneMesh) {
+    /** The geometry stays the stage's; `nothing` takes the place of textures that are gone. */
+    constructor(private readonly renderer: WebGLRenderer, private readonly uniforms: Uniforms, geometry: BufferGeometry, mesh: SceneMesh,
+        private readonly nothing: Texture) {
         this.shadow = new SunShadow(renderer, geometry);
         uniforms.sun_depth.value = this.shadow.depth;
         uniforms.normals.value = floatTexture(normalsOf(mesh));
@@ -227,6 +228,9 @@ export class Sunlight {
 
     dispose(): void {
         this.shadow.dispose();
+        // Textures that uniforms still name would be made anew by the next picture.
+        for (const name of ["normals", "reflectances"]) (this.uniforms[name].value as Texture).dispose();
+        for (const name of ["sun_depth", "sun_places", "sun_sum", "normals", "reflectances"]) this.uniforms[name].value = this.nothing;
         for (const one of [this.places, ...this.sums, this.plane.geometry, this.plane.material, this.body.material as RawShaderMaterial]) one.dispose();
     }
 }
