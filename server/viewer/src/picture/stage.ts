@@ -231,7 +231,13 @@ export class Stage {
         this.invalidate();
     }
 
+    /** Something changes: a picture is drawn, and better ones of the same view wait until nothing does. */
     invalidate(): void {
+        this.sunlight?.hold();
+        this.request();
+    }
+
+    private request(): void {
         if (this.wanted) return;
         this.wanted = true;
         requestAnimationFrame((time) => this.frame(time));
@@ -299,7 +305,7 @@ export class Stage {
         const goesOn = this.advance(seconds);
         if (!goesOn) this.refine();
         this.draw();
-        if (goesOn) this.invalidate();
+        if (goesOn) this.request();
         else this.goOnRefining();
     }
 
@@ -315,10 +321,10 @@ export class Stage {
         clearTimeout(this.restTimer);
         this.restTimer = 0;
         if (sun === null || !sun.hasMore) return;
-        if (sun.restLeft === 0) this.invalidate();
+        if (sun.restLeft === 0) this.request();
         else this.restTimer = window.setTimeout(() => {
             this.restTimer = 0;
-            this.invalidate();
+            this.request();
         }, sun.restLeft);
     }
 

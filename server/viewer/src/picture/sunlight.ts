@@ -21,7 +21,7 @@ export const POINTS = 64;
  * in common with POINTS. */
 const STRIDE = 19;
 
-/** A picture that stood still for so long is looked at from more points, ms: drags and days that go by have the machine for themselves. */
+/** Where nothing changed for so long, more points are looked from, ms: drags and days that go by have the machine for themselves. */
 const REST_MS = 200;
 
 /** Unit vectors to points of the disc, by equal areas: the spiral of Vogel (1979), eq. 1. The first is the nearest to the middle. */
@@ -107,7 +107,7 @@ export class Sunlight {
     private count = 0;
     private readonly view = new Matrix4();
     private readonly size = new Vector2();
-    /** When the view or the sun changed last, ms. */
+    /** When something changed last, ms. */
     private changed = 0;
     /** The direction that the map is of; null: of none any more. */
     private mapped: Vector3 | null = null;
@@ -155,6 +155,11 @@ export class Sunlight {
 
     private begin(): void {
         this.count = 0;
+        this.hold();
+    }
+
+    /** Something changes, if only the colour of a mark: more points wait. */
+    hold(): void {
         this.changed = performance.now();
     }
 
