@@ -1,5 +1,6 @@
 #include "solver/linalg/scaled.h"
 
+#include "solver/base/parallel.h"
 #include "store/status.h"
 
 #include <cblas.h>
@@ -10,8 +11,8 @@
 #include <string.h>
 
 /* Rows that a thread reads from the source at a time; the same for BLAS, enough to pay for its packing;
- * floats of the dense copy that BLAS gets. */
-enum { ROWS = 64, ROWS_OF_BLAS = 512, SPREAD_MOST = 1 << 24 };
+ * floats of the dense copy that BLAS gets; rows of a piece of a block. */
+enum { ROWS = 64, ROWS_OF_BLAS = 512, SPREAD_MOST = 1 << 24, ROWS_OF_PIECE = 128 };
 /* Above this density a product copies rows into dense ones and calls BLAS. */
 static const double dense_above = .08;
 /* Terms that are added in single precision before they join the sum of their row. */
@@ -47,19 +48,60 @@ void sparse_block_free(sparse_block *block) {
     *block = (sparse_block){0};
 }
 
+/* Rows first ... last-1 on the curve, in pieces that threads read at once: a source that computes its rows
+ * needs them all, and holds no more than a piece for each of them beside what it returns. */
+typedef struct pieces_job {
+    const scaled_matrix *S;
+    size_t first, last;
+    row_block *pieces;
+    lam_status *status; /* of the first failure, and its text */
+    lam_error *error;
+} pieces_job;
+
+static void read_piece(const void *context, size_t piece) {
+    const pieces_job *j = context;
+    const size_t first = j->first + piece * ROWS_OF_PIECE;
+    const size_t m = j->last - first < ROWS_OF_PIECE ? j->last - first : ROWS_OF_PIECE;
+    lam_error why = {0};
+    const lam_status status = row_source_get(j->S->rows, j->S->order + first, m, &j->pieces[piece], &why);
+    if (status == LAM_OK) return;
+#pragma omp critical(scaled_failure)
+    if (*j->status == LAM_OK) {
+        *j->status = status;
+        if (j->error != NULL) *j->error = why;
+    }
+}
+
+/* Column c of a block, the rows of which begin at next[0 ... n-1]. */
+static void put_column(const scaled_matrix *S, const row_block *rows, size_t k, size_t first, size_t c,
+                       sparse_block *b, uint64_t *next) {
+    const double root_e = S->root_area[S->order[first + c]];
+    for (size_t p = 0; p < rows->length[k]; p++) {
+        /* S_je = S_ej = A_e^1/2 F_ej A_j^-1/2 */
+        const uint32_t j = rows->indices[k][p];
+        const uint64_t at = next[S->position[j]]++;
+        b->columns[at] = (uint32_t)c;
+        b->data[at] = (float)(root_e * (double)rows->data[k][p] / S->root_area[j]);
+    }
+}
+
 lam_status scaled_block(const scaled_matrix *S, size_t first, size_t last, sparse_block *out,
                         lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = S->n, m = last - first;
-    const double *root = S->root_area;
-    row_block rows = {0};
+    const size_t n = S->n, m = last - first, count = (m + ROWS_OF_PIECE - 1) / ROWS_OF_PIECE;
+    row_block *pieces = NULL;
     sparse_block b = {.n = n, .m = m};
     uint64_t *next = memory_allocate(n, sizeof *next, "columns of form factors", error);
     b.indptr = memory_allocate(n + 1, sizeof *b.indptr, "columns of form factors", error);
-    if (next == NULL || b.indptr == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(row_source_get(S->rows, S->order + first, m, &rows, error));
-    for (size_t c = 0; c < m; c++)
-        for (size_t p = 0; p < rows.length[c]; p++) b.indptr[S->position[rows.indices[c][p]] + 1]++;
+    pieces = memory_allocate(count, sizeof *pieces, "columns of form factors", error);
+    if (next == NULL || b.indptr == NULL || pieces == NULL) TRY(LAM_ERR_MEMORY);
+    const pieces_job job = {S, first, last, pieces, &status, error};
+    parallel_for(read_piece, &job, count);
+    TRY(status);
+    for (size_t piece = 0; piece < count; piece++)
+        for (size_t k = 0; k < pieces[piece].m; k++)
+            for (size_t p = 0; p < pieces[piece].length[k]; p++)
+                b.indptr[S->position[pieces[piece].indices[k][p]] + 1]++;
     for (size_t i = 0; i < n; i++) {
         b.indptr[i + 1] += b.indptr[i];
         next[i] = b.indptr[i];
@@ -67,21 +109,17 @@ lam_status scaled_block(const scaled_matrix *S, size_t first, size_t last, spars
     b.columns = memory_allocate(b.indptr[n], sizeof *b.columns, "columns of form factors", error);
     b.data = memory_allocate(b.indptr[n], sizeof *b.data, "columns of form factors", error);
     if (b.columns == NULL || b.data == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t c = 0; c < m; c++) {
-        const double root_e = root[S->order[first + c]];
-        for (size_t p = 0; p < rows.length[c]; p++) {
-            /* S_je = S_ej = A_e^1/2 F_ej A_j^-1/2 */
-            const uint32_t j = rows.indices[c][p];
-            const uint64_t at = next[S->position[j]]++;
-            b.columns[at] = (uint32_t)c;
-            b.data[at] = (float)(root_e * (double)rows.data[c][p] / root[j]);
-        }
+    for (size_t piece = 0; piece < count; piece++) {
+        for (size_t k = 0; k < pieces[piece].m; k++)
+            put_column(S, &pieces[piece], k, first, piece * ROWS_OF_PIECE + k, &b, next);
+        row_block_free(&pieces[piece]);
     }
     *out = b;
     b = (sparse_block){0};
 done:
+    for (size_t piece = 0; pieces != NULL && piece < count; piece++) row_block_free(&pieces[piece]);
+    free(pieces);
     free(next);
-    row_block_free(&rows);
     sparse_block_free(&b);
     return status;
 }

@@ -37,7 +37,7 @@ static void count_columns(hf_run *run, int level, size_t given, size_t kept) {
 }
 
 /* (Q1 | Q2 | ...) ~ Q_r V_r^T and V = (V1 V_r1 ; V2 V_r2 ; ...), Aguerre 2016, eqs. 3.3, 3.5, 3.6, for two or
- * more parts, whose arrays are freed once they are used. */
+ * more parts, whose arrays are freed as they are used. */
 static lam_status combine(size_t count, tall_factors *parts, const truncation *keep, tall_factors *out,
                           lam_error *error) {
     lam_status status = LAM_OK;
@@ -46,11 +46,7 @@ static lam_status combine(size_t count, tall_factors *parts, const truncation *k
     float *V = NULL;
     TRY(tsvd_joined(count, parts, keep, &joint, error));
     const size_t r = joint.rank;
-    for (size_t k = 0; k < count; k++) {
-        m += parts[k].m;
-        free(parts[k].Q);
-        parts[k].Q = NULL;
-    }
+    for (size_t k = 0; k < count; k++) m += parts[k].m;
     V = memory_allocate(m, r * sizeof *V, "factorization", error);
     if (V == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < count; k++) {
@@ -122,14 +118,6 @@ static lam_status failure(hf_run *run, lam_error *error) {
     return status;
 }
 
-/* The next level that has nodes. A level with error bound 0 has none: its children go to the next level
- * above. */
-static int level_below(const hf_run *run, int level) {
-    do level++;
-    while (level < run->plan.levels && run->plan.left[level] <= 0 && run->options->rank == 0);
-    return level < run->plan.levels ? level : run->plan.levels;
-}
-
 static lam_status factorize_below(hf_run *run, size_t first, size_t last, int level, int below,
                                   tall_factors *parts, lam_error *error);
 
@@ -144,7 +132,7 @@ static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_f
         TRY(leaf(run, level, first, last, out, error));
         goto done;
     }
-    const int below = level_below(run, level);
+    const int below = hf_plan_below(&run->plan, level);
     const truncation keep = truncation_of(run, level);
     count = (size_t)1 << (below - level);
     parts = memory_allocate(count, sizeof *parts, "factorization", error);
@@ -197,24 +185,15 @@ done:
     return status;
 }
 
-/* Bytes of a thread that computes a subtree from this level on: the finished half of each level, and the
- * columns, Gram matrix and result of a leaf. */
-static double subtree_bytes(const hf_run *run, int level) {
-    const double n = (double)run->S->n, levels = run->plan.levels, m = ldexp(n, -run->plan.levels);
-    double halves = n * run->plan.kept[level];
-    for (int l = level + 1; l <= levels; l++)
-        if (run->plan.left[l] > 0) halves += n * run->plan.kept[l];
-    return sizeof(float) * (halves + m * m + 2 * m * n * run->S->rows->density);
-}
-
-/* The number of levels below which memory holds a subtree for each thread. */
+/* The number of levels above which nodes are computed one after the other: the smallest that memory holds. */
 static int levels_alone(const hf_run *run) {
-    const double threads = omp_get_max_threads();
-    int level = 0;
+    const double n = (double)run->S->n;
+    hf_walk walk = {.n = run->S->n, .entries = n * run->S->rows->density, .threads = omp_get_max_threads()};
     if (run->options->memory == 0) return 0;
-    while (level < run->plan.levels && threads * subtree_bytes(run, level) > (double)run->options->memory)
-        level++;
-    return level;
+    while (walk.alone < run->plan.levels &&
+           hf_plan_bytes(&run->plan, &walk, 0) > (double)run->options->memory)
+        walk.alone++;
+    return walk.alone;
 }
 
 static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options *options, tall_factors *out,
@@ -225,6 +204,7 @@ static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options 
     const budget *shares = &options->budget;
     const bool shared = budget_divided(shares) || options->levels == 0;
     if (options->levels >= 0 && shared) {
+        run.plan.every = options->rank > 0;
         run.plan.levels = options->levels < BUDGET_LEVELS_MOST ? options->levels : BUDGET_LEVELS_MOST;
         budget_share(shares, options->epsilon, run.plan.levels, run.plan.left);
         for (int l = 0; l <= run.plan.levels; l++) run.plan.kept[l] = ldexp((double)S->n, -l - 1);

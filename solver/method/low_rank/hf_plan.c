@@ -8,8 +8,9 @@
 /* A sample has at most SAMPLE columns and at most n / SAMPLE_PART, as they are read twice. It is taken at
  * PLACES places and halved HALVINGS times. */
 enum { SAMPLE = 512, SAMPLE_LEAST = 64, SAMPLE_PART = 20, HALVINGS = 3, PLACES = 6, SIZES = HALVINGS + 1 };
-/* Least and most columns of a leaf: beyond these the eigenvectors of a leaf dominate. */
-enum { LEAF_LEAST = 64, LEAF_MOST = 16384 };
+/* Least and most columns of a leaf: below these the eigenvectors of nodes dominate, and beyond these their
+ * work area is beyond LAPACK's integers (eigen.c). */
+enum { LEAF_LEAST = 64, LEAF_MOST = 32766 };
 
 /* Rates of one core per second: flops of BLAS, scattered products of sparse rows, flops of adding scaled
  * rows, and cubed columns of eigenvector problems. Only their ratios matter. */
@@ -75,6 +76,11 @@ done:
     return status;
 }
 
+/* Entries of a column, mean. */
+static double column_entries(const hf_forecast *f) {
+    return f->entries * f->filled * (double)f->n / (double)f->sizes[0];
+}
+
 void hf_forecast_free(hf_forecast *f) {
     free(f);
 }
@@ -134,11 +140,16 @@ static double rank_of_node(const hf_forecast *f, double m, double given, double 
     return light > 0 ? fmin(given, rank_of_light(f, m, sqrt(light))) : given;
 }
 
+/* True if r eigenvectors of a Gram matrix of c columns are so few that gram_leading finds them. */
+static bool are_few(double c, double r) {
+    return 2 * r < c / 3;
+}
+
 /* Eigenvectors of a Gram matrix of c columns, r of which are kept: all of them, or, if they are few, four
  * products with 2 r vectors after one attempt with r (gram_leading). */
 static double seconds_of_eigenvectors(double c, double r) {
     const double all = c * c * c / eigen_rate, few = 2 * c * c * 3 * r * 4 / blas_rate;
-    return 2 * r < c / 3 && few < all ? few : all;
+    return are_few(c, r) && few < all ? few : all;
 }
 
 /* A truncated SVD of dense n x c to rank r. */
@@ -160,7 +171,7 @@ double hf_forecast_seconds(const hf_forecast *f, const factorizer_options *optio
     for (int l = levels; l >= 0; l--) {
         const double m = ldexp(n, -l), nodes = ldexp(1, l), given = l == levels ? m : 2 * below;
         plan->kept[l] = below = given;
-        if (l > 0 && l < levels && plan->left[l] <= 0 && options->rank == 0) continue; /* no nodes */
+        if (l > 0 && l < levels && plan->left[l] <= 0 && !plan->every) continue; /* no nodes */
         const double rank = options->rank > 0 ? (double)options->rank
                             : l == levels     ? hf_forecast_rank(f, m, plan->left[l])
                                               : rank_of_node(f, m, given, plan->left[l]);
@@ -170,6 +181,46 @@ double hf_forecast_seconds(const hf_forecast *f, const factorizer_options *optio
         plan->kept[l] = below = kept;
     }
     return seconds;
+}
+
+int hf_plan_below(const hf_plan *plan, int level) {
+    do level++;
+    while (level < plan->levels && plan->left[level] <= 0 && !plan->every);
+    return level < plan->levels ? level : plan->levels;
+}
+
+/* A Gram matrix of c columns in single precision, r or all of its eigenvectors, and the work area for them:
+ * three times 5/4 r vectors and two small matrices in double, or that of LAPACK's syevd. */
+static double bytes_of_eigenvectors(double c, double r) {
+    const double w = 1.25 * r;
+    return sizeof(float) * (are_few(c, r) ? c * c + 3 * c * w + 8 * w * w : 3 * c * c + c * r);
+}
+
+/* A leaf of m columns that keeps r: its columns twice while they are put in order; then once, beside the
+ * tiles of its rows (gram.c), a panel and the eigenvectors; then beside its result. */
+static double bytes_of_leaf(const hf_walk *walk, double m, double r) {
+    enum { ENTRY = sizeof(float) + sizeof(uint32_t), PANEL = 1024, TILE = 256 };
+    const double n = (double)walk->n, block = m * walk->entries * ENTRY + 8 * n;
+    const double gram = 8 * n * (m / TILE + 2) + 4 * PANEL * m + bytes_of_eigenvectors(m, r);
+    return block + fmax(fmax(block, gram), 4 * (n + m) * r + 4 * PANEL * m);
+}
+
+/* Nodes whose children stand two levels or more below them have more than two. */
+double hf_plan_bytes(const hf_plan *plan, const hf_walk *walk, int level) {
+    const double n = (double)walk->n, m = ldexp(n, -level), r = plan->kept[level];
+    if (level >= plan->levels) return bytes_of_leaf(walk, m, r);
+    const int below = hf_plan_below(plan, level);
+    const double count = ldexp(1, below - level), given = count * plan->kept[below];
+    const double one = 4 * (n + ldexp(n, -below)) * plan->kept[below]; /* Q and V of a child */
+    const int shared = below - (walk->alone > level ? walk->alone : level);
+    const double at_once = shared > 0 ? fmin(walk->threads, ldexp(1, shared)) : 1;
+    hf_walk theirs = *walk;
+    theirs.threads = ceil(walk->threads / at_once);
+    const double children = (count - at_once) * one + at_once * hf_plan_bytes(plan, &theirs, below);
+    /* Q takes the place of those of the children (tsvd_joined). */
+    const double join = count * one + 4 * TSVD_JOINED * given + bytes_of_eigenvectors(given, r);
+    const double V = 4 * (n * r + m * (r + plan->kept[below])); /* in place of the children's, one by one */
+    return fmax(children, fmax(join, V));
 }
 
 /* Moves a part of the budget from one level to another if that is forecast to be faster; true if it is. */
@@ -213,7 +264,7 @@ static double divide(const hf_forecast *f, const factorizer_options *options, bu
     const int levels = plan->levels;
     for (size_t k = 0; k < RATIOS * LEAVES; k++) {
         budget tried = {.alpha = options->budget.alpha};
-        hf_plan other = {.levels = levels};
+        hf_plan other = {.levels = levels, .every = plan->every};
         budget_divide(&tried, levels, ratios[k % RATIOS], leaves[k / RATIOS]);
         budget_share(&tried, options->epsilon, levels, other.left);
         const double seconds = hf_forecast_seconds(f, options, &other);
@@ -229,14 +280,16 @@ hf_plan hf_forecast_plan(const hf_forecast *f, const factorizer_options *options
     /* A division this much slower than the best of another number of levels is not improved. */
     static const double hopeless = 3;
     const bool shared = budget_divided(&options->budget);
+    const hf_walk walk = {.n = f->n, .entries = column_entries(f), .alone = BUDGET_LEVELS_MOST, .threads = 1};
+    const double most = options->memory > 0 ? (double)options->memory : INFINITY;
     hf_plan best = {.levels = 0};
-    double least = INFINITY;
+    double least = INFINITY, fewest = INFINITY; /* seconds, bytes */
     for (int levels = 0; levels <= BUDGET_LEVELS_MOST; levels++) {
         const size_t columns = f->n >> levels;
         if (options->levels >= 0 && levels != options->levels) continue;
         if (options->levels < 0 && levels > 0 && columns < LEAF_LEAST) break;
         if (options->levels < 0 && columns > LEAF_MOST) continue;
-        hf_plan plan = {.levels = levels};
+        hf_plan plan = {.levels = levels, .every = options->rank > 0};
         budget shares = options->budget;
         double seconds;
         if (shared) {
@@ -244,10 +297,14 @@ hf_plan hf_forecast_plan(const hf_forecast *f, const factorizer_options *options
             seconds = hf_forecast_seconds(f, options, &plan);
         } else {
             seconds = divide(f, options, &shares, &plan);
-            if (seconds < hopeless * least) seconds = improve(f, options, &shares, &plan, seconds);
+            if (fewest > most || seconds < hopeless * least)
+                seconds = improve(f, options, &shares, &plan, seconds);
         }
-        if (seconds >= least) continue;
+        const double bytes = hf_plan_bytes(&plan, &walk, 0);
+        const bool better = bytes > most ? bytes < fewest : fewest > most || seconds < least;
+        if (!better) continue;
         least = seconds;
+        fewest = bytes;
         best = plan;
     }
     return best;

@@ -21,8 +21,8 @@ static const double spread_above = 1. / 5;
 /* Rows expanded at a time; columns from which on leading eigenvectors are tried before all. */
 enum { PANEL = 1024, LEADING_LEAST = 768 };
 
-/* Rows of parts joined at a time, and by one thread. */
-enum { JOINED = 4096, JOINED_PIECE = 256 };
+/* Rows of parts joined by one thread at a time. */
+enum { JOINED_PIECE = 256 };
 
 size_t truncation_rank(const truncation *keep, size_t m, const double *values) {
     const double kept = keep->epsilon * keep->epsilon;
@@ -58,7 +58,7 @@ typedef struct tall_block {
     size_t n, m;
     const float *dense;         /* [n][m] */
     const sparse_block *sparse; /* or this */
-    const tall_factors *parts;  /* or these; m is the sum of their ranks */
+    tall_factors *parts;        /* or these; m is the sum of their ranks */
     size_t count;
 } tall_block;
 
@@ -90,20 +90,38 @@ static void join_piece(const void *context, size_t piece) {
     }
 }
 
-/* Calls take for the rows of the parts side by side, a panel at a time. */
-static lam_status each_panel(const tall_block *A,
+/* Keeps rows 0 ... rows-1 of the Q of the parts. A part that cannot be moved stays as long as it is. */
+static void keep_rows(const tall_block *A, size_t rows) {
+    for (size_t k = 0; k < A->count; k++) {
+        tall_factors *part = &A->parts[k];
+        if (rows == 0 || part->rank == 0) {
+            free(part->Q);
+            part->Q = NULL;
+            continue;
+        }
+        float *shorter = realloc(part->Q, rows * part->rank * sizeof *part->Q);
+        if (shorter != NULL) part->Q = shorter;
+    }
+}
+
+/* Calls take for the rows of the parts side by side, a panel at a time. spent: the last one comes first, and
+ * rows are freed once they were taken. */
+static lam_status each_panel(const tall_block *A, bool spent,
                              lam_status (*take)(void *context, size_t first, size_t rows, const float *panel,
                                                 lam_error *error),
                              void *context, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t most = A->n < JOINED ? A->n : JOINED;
+    const size_t most = A->n < TSVD_JOINED ? A->n : TSVD_JOINED;
     float *panel = memory_allocate(most, A->m * sizeof *panel, "factorization", error);
     if (panel == NULL) return LAM_ERR_MEMORY;
-    for (size_t first = 0; first < A->n; first += most) {
+    const size_t count = (A->n + TSVD_JOINED - 1) / TSVD_JOINED;
+    for (size_t k = 0; k < count; k++) {
+        const size_t first = (spent ? count - 1 - k : k) * most;
         const size_t rows = A->n - first < most ? A->n - first : most;
         const join_job job = {A, first, rows, panel};
         parallel_for(join_piece, &job, (rows + JOINED_PIECE - 1) / JOINED_PIECE);
         TRY(take(context, first, rows, panel, error));
+        if (spent) keep_rows(A, first);
     }
 done:
     free(panel);
@@ -117,7 +135,8 @@ static lam_status add_panel(void *context, size_t first, size_t rows, const floa
 
 static lam_status gram_of(const tall_block *A, gram *g, lam_error *error) {
     if (A->dense != NULL) return gram_add(g, A->n, A->dense, error);
-    return A->sparse != NULL ? gram_add_sparse(g, A->sparse, error) : each_panel(A, add_panel, g, error);
+    return A->sparse != NULL ? gram_add_sparse(g, A->sparse, error)
+                             : each_panel(A, false, add_panel, g, error);
 }
 
 /* q = sum_c A_ic V_c. */
@@ -162,7 +181,7 @@ static lam_status project_panel(void *context, size_t first, size_t rows, const 
     return LAM_OK;
 }
 
-/* Q = A V, [n][k]. */
+/* Q = A V, [n][k]; parts lose their Q. */
 static lam_status project(const tall_block *A, size_t k, const float *V, float *Q, lam_error *error) {
     const size_t m = A->m;
     if (A->dense != NULL) {
@@ -171,7 +190,7 @@ static lam_status project(const tall_block *A, size_t k, const float *V, float *
     }
     if (A->sparse == NULL) {
         projection p = {.m = m, .k = k, .V = V, .Q = Q};
-        return each_panel(A, project_panel, &p, error);
+        return each_panel(A, true, project_panel, &p, error);
     }
     const sparse_projection thin = {A->sparse, k, V, Q};
     parallel_for(project_thin_rows, &thin, (A->n + PANEL - 1) / PANEL);
@@ -253,7 +272,7 @@ lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall
     return factorize(&block, keep, out, error);
 }
 
-lam_status tsvd_joined(size_t count, const tall_factors *parts, const truncation *keep, tall_factors *out,
+lam_status tsvd_joined(size_t count, tall_factors *parts, const truncation *keep, tall_factors *out,
                        lam_error *error) {
     tall_block block = {.parts = parts, .count = count};
     for (size_t k = 0; k < count; k++) {

@@ -20,9 +20,13 @@ typedef struct truncation {
 lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall_factors *out,
                 lam_error *error);
 
+/* Rows of parts that are joined at a time. */
+enum { TSVD_JOINED = 4096 };
+
 /* The same of A = (Q_1 | Q_2 | ...), which is never formed as a whole. Empty parts are skipped; one must not
- * be. */
-lam_status tsvd_joined(size_t count, const tall_factors *parts, const truncation *keep, tall_factors *out,
+ * be. The Q of the parts is freed, from its last rows on as those of Q are made, so that memory never holds
+ * both as a whole. */
+lam_status tsvd_joined(size_t count, tall_factors *parts, const truncation *keep, tall_factors *out,
                        lam_error *error);
 
 /* The same of a sparse block: a row with few entries costs the square of their number, not m^2. */

@@ -45,6 +45,95 @@ START_TEST(products_are_right) {
 }
 END_TEST
 
+/* Rows of a source that fails once element `bad` is asked for. */
+typedef struct failing_rows {
+    row_source *good;
+    uint32_t bad;
+} failing_rows;
+
+static lam_status rows_or_failure(void *context, const uint32_t *elements, size_t m, row_block *out,
+                                  lam_error *error) {
+    const failing_rows *f = context;
+    for (size_t k = 0; k < m; k++)
+        if (elements[k] == f->bad) return status_fail(error, LAM_ERR_IO, "element %u", f->bad);
+    return f->good->rows(f->good->context, elements, m, out, error);
+}
+
+/* A block of more columns than are read at once is in order, and a failure of any of its pieces is told. */
+START_TEST(blocks_of_several_pieces) {
+    subject s;
+    lam_error error = {0};
+    sparse_block block = {0};
+    subject_make(&s, room, 8); /* 384 elements, pieces of 128 */
+    const size_t n = s.S.n, first = 7, last = n - 3;
+    float *dense = malloc(n * n * sizeof *dense);
+    size_t entries = 0;
+    ck_assert_int_eq(scaled_dense(&s.S, dense, &error), LAM_OK);
+    ck_assert_int_eq(scaled_block(&s.S, first, last, &block, &error), LAM_OK);
+    ck_assert_uint_eq(block.m, last - first);
+    for (size_t i = 0; i < n; i++) {
+        for (uint64_t p = block.indptr[i]; p < block.indptr[i + 1]; p++) {
+            ck_assert(p == block.indptr[i] || block.columns[p] > block.columns[p - 1]);
+            ck_assert_float_eq_tol(block.data[p], dense[i * n + first + block.columns[p]], 1e-7f);
+        }
+        for (size_t j = first; j < last; j++) entries += dense[i * n + j] != 0;
+    }
+    ck_assert_uint_eq(block.indptr[n], entries);
+    sparse_block_free(&block);
+    for (size_t at = first; at < last; at += 90) {
+        failing_rows f = {&s.rows, s.S.order[at]};
+        row_source bad = {.n = n, .rows = rows_or_failure, .context = &f};
+        scaled_matrix S = s.S;
+        S.rows = &bad;
+        ck_assert_int_eq(scaled_block(&S, first, last, &block, &error), LAM_ERR_IO);
+        ck_assert_ptr_null(block.data);
+        char expected[32];
+        snprintf(expected, sizeof expected, "element %u", f.bad);
+        ck_assert_str_eq(error.message, expected);
+    }
+    free(dense);
+    subject_free(&s);
+}
+END_TEST
+
+/* Parts of more rows than are joined at once, whose Q is freed on the way, give the factors of the whole. */
+START_TEST(joined_parts_are_spent) {
+    enum { N = 2 * TSVD_JOINED + 300, PARTS = 3, M = 12 };
+    static const size_t widths[PARTS] = {5, 0, 7};
+    lam_error error = {0};
+    const truncation keep = {.epsilon = .5};
+    tall_factors parts[PARTS] = {{0}}, joint = {0}, whole = {0};
+    float *dense = malloc((size_t)N * M * sizeof *dense);
+    for (size_t k = 0, column = 0; k < PARTS; column += widths[k++]) {
+        parts[k] = (tall_factors){.n = N, .m = widths[k], .rank = widths[k]};
+        parts[k].Q = malloc(N * (widths[k] + 1) * sizeof *parts[k].Q);
+        for (size_t i = 0; i < N; i++)
+            for (size_t c = 0; c < widths[k]; c++)
+                parts[k].Q[i * widths[k] + c] = dense[i * M + column + c] =
+                    (float)(sin((double)(i * (c + column + 1))) / pow(3, (double)c));
+    }
+    ck_assert_int_eq(tsvd_joined(PARTS, parts, &keep, &joint, &error), LAM_OK);
+    ck_assert_int_eq(tsvd(N, M, dense, &keep, &whole, &error), LAM_OK);
+    for (size_t k = 0; k < PARTS; k++) ck_assert_ptr_null(parts[k].Q);
+    ck_assert_uint_eq(joint.rank, whole.rank);
+    ck_assert_uint_gt(joint.rank, 2);
+    ck_assert_uint_lt(joint.rank, M);
+    for (size_t i = 0; i < N; i += 97) /* Q V^T, as vectors may change their signs */
+        for (size_t j = 0; j < M; j++) {
+            double one = 0, other = 0;
+            for (size_t c = 0; c < joint.rank; c++) {
+                one += (double)joint.Q[i * joint.rank + c] * (double)joint.V[j * joint.rank + c];
+                other += (double)whole.Q[i * whole.rank + c] * (double)whole.V[j * whole.rank + c];
+            }
+            /* Gram matrices in single precision, summed in another order. */
+            ck_assert_double_eq_tol(one, other, 1e-4);
+        }
+    tall_factors_free(&joint);
+    tall_factors_free(&whole);
+    free(dense);
+}
+END_TEST
+
 /* Rows with few entries and rows that are spread out give the same Gram matrix, in either precision. */
 START_TEST(gram_matrices_agree) {
     enum { N = 700, M = 300 };
@@ -184,6 +273,8 @@ int main(void) {
     TCase *cases = tcase_create("factorizer pieces");
     tcase_set_timeout(cases, 300);
     tcase_add_test(cases, products_are_right);
+    tcase_add_test(cases, blocks_of_several_pieces);
+    tcase_add_test(cases, joined_parts_are_spent);
     tcase_add_test(cases, gram_matrices_agree);
     tcase_add_test(cases, leading_eigenvectors);
     tcase_add_test(cases, bases_are_orthonormal);

@@ -190,6 +190,68 @@ START_TEST(forecast_knows_noise) {
 }
 END_TEST
 
+/* Forecast of a plan's bytes where nodes are computed one after the other. */
+static double bytes_alone(const hf_plan *plan, const subject *s) {
+    const double n = (double)s->S.n;
+    const hf_walk walk = {.n = s->S.n, .entries = n * s->rows.density, .alone = 20, .threads = 1};
+    return hf_plan_bytes(plan, &walk, 0);
+}
+
+/* A plan keeps to the memory if any does, and else takes the least; noise below the bound of a leaf makes
+ * some numbers of levels keep all of their columns. */
+START_TEST(plans_keep_to_the_memory) {
+    subject s;
+    lam_error error = {0};
+    hf_forecast *forecast = NULL;
+    subject_make(&s, unit_cube, 15);
+    count_rays(&s.f.F, 100);
+    ck_assert_int_eq(hf_forecast_create(&s.S, &forecast, &error), LAM_OK);
+    factorizer_options options = {.epsilon = .2, .budget = {.alpha = .5}};
+    double fewest = INFINITY, most = 0;
+    for (options.levels = 0; options.levels <= 4; options.levels++) {
+        const hf_plan plan = hf_forecast_plan(forecast, &options);
+        fewest = fmin(fewest, bytes_alone(&plan, &s));
+        most = fmax(most, bytes_alone(&plan, &s));
+    }
+    ck_assert_double_gt(most, 1.5 * fewest); /* there is a choice */
+    options.levels = -1;
+    double before = 0;
+    for (double memory = 2 * most; memory > .5 * fewest; memory *= .8) {
+        options.memory = (size_t)memory;
+        const hf_plan plan = hf_forecast_plan(forecast, &options);
+        const double bytes = bytes_alone(&plan, &s);
+        ck_assert_msg(bytes <= fmax(memory, 1.001 * fewest), "%g bytes of %g, %g are enough", bytes, memory,
+                      fewest);
+        hf_plan copy = plan;
+        const double takes = hf_forecast_seconds(forecast, &options, &copy);
+        ck_assert_double_ge(takes, .999 * before); /* less memory is not faster */
+        before = takes;
+    }
+    hf_forecast_free(forecast);
+    subject_free(&s);
+}
+END_TEST
+
+/* Threads that work at once take more, and nodes one after the other less. */
+START_TEST(bytes_grow_with_threads) {
+    const hf_plan plan = {.levels = 3, .left = {.1, 0, .05, .05}, .kept = {400, 400, 200, 100}};
+    ck_assert_int_eq(hf_plan_below(&plan, 0), 2);
+    ck_assert_int_eq(hf_plan_below(&plan, 2), 3);
+    double before = 0;
+    for (int threads = 1; threads <= 16; threads *= 2) {
+        hf_walk walk = {.n = 10000, .entries = 500, .threads = threads};
+        const double bytes = hf_plan_bytes(&plan, &walk, 0);
+        ck_assert_double_ge(bytes, before);
+        before = bytes;
+        walk.alone = plan.levels;
+        const double fewer = hf_plan_bytes(&plan, &walk, 0);
+        ck_assert(threads == 1 ? fewer == bytes : fewer < bytes);
+        /* Q and V of the four children of the root wait for each other. */
+        ck_assert_double_gt(bytes, 4 * sizeof(float) * (10000 + 2500) * 200.);
+    }
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("hf");
     TCase *cases = tcase_create("hf");
@@ -201,6 +263,8 @@ int main(void) {
     tcase_add_test(cases, bits_do_not_depend_on_threads);
     tcase_add_test(cases, forecast_knows_the_samples);
     tcase_add_test(cases, forecast_knows_noise);
+    tcase_add_test(cases, plans_keep_to_the_memory);
+    tcase_add_test(cases, bytes_grow_with_threads);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
