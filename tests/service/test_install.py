@@ -11,7 +11,7 @@ import unittest
 import h5py
 import numpy as np
 
-BUILD = pathlib.Path(os.environ["BUILD"])
+BUILD = pathlib.Path(os.environ["LAMBERT"]).parent
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "deploy" / "examples"
 
 
