@@ -72,6 +72,11 @@ git ls-files '*.[ch]' '*.inc' | xargs -P "$jobs" -n 40 clang-format --dry-run --
 # Threads that wait should not spin while two of them share a core with a server and its clients.
 export OMP_WAIT_POLICY=passive
 
+step "programs as users have them, by which tests make references, and which the demonstration finds built"
+configure release -DCMAKE_COMPILE_WARNING_AS_ERROR=ON -DLAMBERT_VIEWER=ON
+build release lambert lambertd lambert-bench lambert_shared lambert_static
+export LAMBERT_REFERENCE=$PWD/build/release/lambert
+
 step "all tests under AddressSanitizer and UndefinedBehaviorSanitizer"
 configure asan
 build asan
@@ -83,11 +88,8 @@ export UBSAN_OPTIONS=print_stacktrace=1
 CK_FORK=no run_ctest asan -j $((jobs + 1))
 
 step "the daemon under ThreadSanitizer, which mostly waits; beside it clang: a warning-free build, clang-tidy, tests that compute"
-configure tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/release/lambert"
+configure tsan -DLAMBERT_TEST_PROGRAM="$LAMBERT_REFERENCE"
 build tsan lambertd unit_batch unit_batch_blocked unit_batch_order unit_request_memory unit_thread_budget unit_adjoint_rows unit_guard_parts
-# Programs as users have them; the demonstration finds them built.
-configure release -DCMAKE_COMPILE_WARNING_AS_ERROR=ON -DLAMBERT_VIEWER=ON
-build release lambert lambertd lambert-bench lambert_shared lambert_static
 configure users
 build users ready_server faults
 mkdir -p build/release/tests

@@ -11,12 +11,16 @@ import unittest.mock
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "deploy" / "examples"
 LAMBERT = os.environ["LAMBERT"]
+# The program that makes what others are compared with, where another build has made one that is quicker.
+REFERENCE = os.environ.get("LAMBERT_REFERENCE") or LAMBERT
+# Under sanitizers: scenes of tests that an optimised build runs as they are may be small.
+SMALL = "SMALL" in os.environ
 ENVIRONMENT = dict(os.environ, OMP_NUM_THREADS="2", LC_ALL="C")
 
 
-def lambert(*arguments, threads=2, **more):
+def lambert(*arguments, threads=2, program=LAMBERT, **more):
     environment = dict(ENVIRONMENT, OMP_NUM_THREADS=str(threads))
-    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600,
+    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=600,
                           env=environment, check=False, **more)
 
 

@@ -9,10 +9,10 @@ import h5py
 import numpy
 
 from case import Case
-from command import must
+from command import LAMBERT, REFERENCE, SMALL, must
 from quads import Quads
 
-REFERENCE = "--method", "exact", "--quality", "high", "--seed", 77, "--probes", 0, "--quiet"
+TRUTH = "--method", "exact", "--quality", "high", "--seed", 77, "--probes", 0, "--quiet"
 
 
 def polygon_factors(points, normal, polygon):
@@ -30,17 +30,21 @@ def polygon_factors(points, normal, polygon):
 
 
 class HardLight(Case):
-    def precompute(self, scene, name, *options):
+    def precompute(self, scene, name, *options, program=LAMBERT):
         store = self.path(name)
-        must("precompute", scene, "-o", store, "--quiet", *options)
+        must("precompute", scene, "-o", store, "--quiet", *options, program=program)
         return store
+
+    def truth(self, scene, *options):
+        return self.precompute(scene, "truth.h5", *options, *TRUTH, program=REFERENCE)
 
     def ratios(self, store, reference, groups, *light):
         """|error| of each group's mean of the radiosity over twice what is stated for it; 0 where any error is stated to be
         possible. Groups that get nothing of the light that bounces have neither."""
         reduce = [word for group in groups for word in ("--reduce", f"{group}=mean")]
         asked = json.loads(must("solve", store, *light, *reduce, "--json").stdout)
-        truth, bounced = (json.loads(must("solve", reference, *light, *reduce, "--json", *more).stdout)["groups"]
+        truth, bounced = (json.loads(must("solve", reference, *light, *reduce, "--json", *more,
+                                          program=REFERENCE).stdout)["groups"]
                           for more in ((), ("--quantity", "indirect")))
         self.assertEqual(asked["error"]["light"], "own")
         found = {}
@@ -72,10 +76,10 @@ class HardLight(Case):
     def test_a_skylight_of_a_large_hall(self):
         """Of 1 m2, a share of 4e-5 of all area; what elements see of it is known exactly."""
         hall, scene = Quads(), self.path("hall.obj")
-        hall.box("f", (0, 0, 0), (100, 100, 8), (13, 13, 2), holes={5: (49.5, 50.5, 49.5, 50.5)})
+        hall.box("f", (0, 0, 0), (100, 100, 8), (7, 7, 1) if SMALL else (13, 13, 2), holes={5: (49.5, 50.5, 49.5, 50.5)})
         hall.write(scene, .5)
         store = self.precompute(scene, "hall.h5", "--probes", 16, "--sky", "tregenza")
-        reference = self.precompute(scene, "truth.h5", "--sky", "tregenza", *REFERENCE)
+        reference = self.truth(scene, "--sky", "tregenza")
         with h5py.File(store) as file:
             H0, area = file["sky/first_bounce"][:].sum(0), file["mesh/area"][:]
         hole = numpy.array([[49.5, 49.5, 8], [50.5, 49.5, 8], [50.5, 50.5, 8], [49.5, 50.5, 8]])
@@ -92,14 +96,14 @@ class HardLight(Case):
 
     def test_a_window_of_a_furnished_room(self):
         room, scene = Quads(), self.path("room.obj")
-        room.box("wall", (0, 0, 0), (6, 4, 3), (12, 8, 6), holes={0: (1.25, 2.75, 1, 2.2)})
+        room.box("wall", (0, 0, 0), (6, 4, 3), (6, 4, 3) if SMALL else (12, 8, 6), holes={0: (1.25, 2.75, 1, 2.2)})
         room.box("table", (1.2, 1, .72), (2.8, 1.9, .76), (6, 4, 1), inward=-1)
         room.box("cabinet", (3.4, 3.3, .001), (5.2, 3.95, 1.9), (5, 2, 5), inward=-1)
         room.box("seat", (4.2, .3, .001), (5, 1.1, .45), (3, 3, 2), inward=-1)
         room.write(scene, .6)
         options = "--sky", "tregenza", "--ground-albedo", 1
         store = self.precompute(scene, "room.h5", "--probes", 16, "--method", "hierarchical", *options)
-        reference = self.precompute(scene, "truth.h5", *options, *REFERENCE)
+        reference = self.truth(scene, *options)
         with h5py.File(store) as one, h5py.File(reference) as other:
             self.bounce_is_right(one["sky/first_bounce"][:].sum(0), other["sky/first_bounce"][:].sum(0), one["mesh/area"][:])
         groups, found = sorted(set(room.groups)), []
@@ -110,19 +114,19 @@ class HardLight(Case):
 
     def test_a_hole_between_two_rooms(self):
         """Of .1 m: the rooms are dark for each other's light. Of .5 m they have some."""
-        for size in .1, .5:
-            rooms, scene = Quads(), self.path("rooms.obj")
+        for size in (.5,) if SMALL else (.1, .5):
+            rooms, scene, cells = Quads(), self.path("rooms.obj"), (3, 4, 4) if SMALL else (6, 7, 7)
             low, high = (2 - size / 2, 1.5 - size / 2), (2 + size / 2, 1.5 + size / 2)
             hole = (low[0], high[0], low[1], high[1])
-            rooms.box("a", (0, 0, 0), (4, 4, 3), (6, 7, 7), holes={1: hole})
-            rooms.box("b", (4.02, 0, 0), (8.02, 4, 3), (6, 7, 7), holes={0: hole})
+            rooms.box("a", (0, 0, 0), (4, 4, 3), cells, holes={1: hole})
+            rooms.box("b", (4.02, 0, 0), (8.02, 4, 3), cells, holes={0: hole})
             for axis in 1, 2:
                 for side, at in enumerate((low[axis - 1], high[axis - 1])):
                     us, vs = ((low[1], high[1]), (4, 4.02)) if axis == 1 else ((4, 4.02), (low[0], high[0]))
                     rooms.grid("rim", axis, at, 1 - 2 * side, us, vs)
             rooms.write(scene, .7)
             store = self.precompute(scene, "rooms.h5", "--probes", 16, "--method", "hierarchical")
-            reference = self.precompute(scene, "truth.h5", *REFERENCE)
+            reference = self.truth(scene)
             ceiling = numpy.flatnonzero(numpy.array(rooms.groups) == "b5")
             some = numpy.isin(numpy.arange(len(rooms.groups)), ceiling[len(ceiling) // 2 - 2:len(ceiling) // 2 + 2])
             groups = [name + str(k) for name in "ab" for k in range(6)]
@@ -133,7 +137,7 @@ class HardLight(Case):
         """The scene of `lambert generate`, by several kinds; lights = {name: of the groups of elements, options}."""
         scene = self.path("scene.obj")
         must("generate", *words, "-o", scene)
-        reference = self.precompute(scene, "truth.h5", *REFERENCE)
+        reference = self.truth(scene)
         with h5py.File(reference) as file:
             group = numpy.array([file["mesh/group_names"][k].decode() for k in file["mesh/group"][:]])
         for kind in kinds:
@@ -146,16 +150,17 @@ class HardLight(Case):
             ceiling = numpy.flatnonzero(group == "ceiling")
             return self.lamp(numpy.isin(numpy.arange(len(group)), ceiling[:6]))
 
-        self.generated(["hierarchical", "low-rank"], [six, lambda _: ("--emit", "lamp-1=1")], "rooms", "--elements", 1100)
+        self.generated(["hierarchical", "low-rank"], [six, lambda _: ("--emit", "lamp-1=1")],
+                       "rooms", "--elements", 300 if SMALL else 1100)
 
     def test_streets_of_a_city(self):
         self.generated(["sparse"], [lambda group: self.lamp(numpy.arange(len(group)) // 4 == len(group) // 8)],
-                       "city", "--elements", 900)
+                       "city", "--elements", 300 if SMALL else 900)
 
     def test_bright_walls(self):
         """A closed box of reflectance rho in which all elements emit: B = E / (1 - rho), rho in single precision."""
         box, scene, rho = Quads(), self.path("closed.obj"), .99
-        box.box("f", (0, 0, 0), (1, 1, 1), (5, 5, 5))  # the sparse inverse follows 2,000 bounces of each element
+        box.box("f", (0, 0, 0), (1, 1, 1), [3 if SMALL else 5] * 3)  # the sparse inverse follows 2,000 bounces of each element
         box.write(scene, rho)
         numpy.save(self.path("E.npy"), numpy.ones(len(box.faces), numpy.float32))
         for kind in "exact", "hierarchical", "low-rank", "2msc", "sparse":

@@ -10,7 +10,7 @@ import h5py
 import numpy
 
 from case import Case
-from command import lambert, must
+from command import REFERENCE, SMALL, lambert, must
 
 HOW = "--form-factors", "blocks", "--epsilon", .1, "--trials", 1
 
@@ -20,14 +20,15 @@ class Importance(Case):
     def setUpClass(cls):
         super().setUpClass()
         cls.room = os.path.join(cls.shared.name, "room.obj")
-        must("generate", "cornell", "--closed", "--elements", 1500, "--reflectance", .5, "-o", cls.room)
+        must("generate", "cornell", "--closed", "--elements", 500 if SMALL else 1500, "--reflectance", .5, "-o", cls.room)
         cls.store = os.path.join(cls.shared.name, "some.h5")
         cls.log = must("precompute", cls.room, "-o", cls.store, *HOW, "--receivers", "lamp", "--probes", 8).stderr
         cls.all = os.path.join(cls.shared.name, "all.h5")
         cls.lit = os.path.join(cls.shared.name, "lit.h5")
         cls.log_of_lit = must("precompute", cls.room, "-o", cls.lit, *HOW, "--sources", "lamp", "--probes", 8).stderr
         cls.exact = os.path.join(cls.shared.name, "exact.h5")
-        must("precompute", cls.room, "-o", cls.exact, "--form-factors", "rays", "--method", "exact", "--probes", 0, "--quiet")
+        must("precompute", cls.room, "-o", cls.exact, "--form-factors", "rays", "--method", "exact", "--probes", 0, "--quiet",
+             program=REFERENCE)
         cls.log_of_all = must("precompute", cls.room, "-o", cls.all, *HOW, "--method", "hierarchical", "--probes", 0).stderr
 
     @classmethod
