@@ -23,7 +23,9 @@ typedef struct cell {
     cell_sums sums;
     unsigned bits; /* of the pair's occluders: those that may block its light */
     bool hidden;   /* one of them blocks all of it */
-    bool doubtful; /* all points see, or none does, which is not proven of the whole cell */
+    bool doubtful; /* all points see all, which is not proven of the whole cell */
+    double unseen; /* of a nearly dark cell: about the light that passes beside its points */
+    int turn;      /* the direction along which that changes */
 } cell;
 
 /* normal . x = level: F is not smooth across its line in the plane of the cells. */
@@ -67,27 +69,60 @@ static void set_nodes(cells *c, const projected_pair *pair) {
     }
 }
 
+/* The point of a cell at u, w, and the vector whose length is area there over that of the unit square. */
+static void point_of_cell(const cell *one, double u, double w, double x[3], double area[3]) {
+    const double(*corner)[3] = (const double(*)[3])one->corner;
+    double along_u[3], along_w[3];
+    for (int d = 0; d < 3; d++) {
+        along_u[d] = (1 - w) * (corner[1][d] - corner[0][d]) + w * (corner[2][d] - corner[3][d]);
+        along_w[d] = (1 - u) * (corner[3][d] - corner[0][d]) + u * (corner[2][d] - corner[1][d]);
+        x[d] = (1 - w) * ((1 - u) * corner[0][d] + u * corner[1][d]) +
+               w * ((1 - u) * corner[3][d] + u * corner[2][d]);
+    }
+    cross3(along_u, along_w, area);
+}
+
+/* The light that a gap between occluders sends past the points of a nearly dark cell comes to a strip along a
+ * side, or to a corner: from x of the cell, the shadow of a convex body on a convex target is convex, and so
+ * are the points of the cell that a point of the target does not see. A convex body, of however many
+ * occluders, which hides the target from all four corners therefore hides it from the whole cell; other
+ * occluders nearly always do. Where corners see something, F falls from there to 0 before the first row of
+ * points, about .07 of the side away. The corners lie a little inside, where F is smooth. */
+static void look_at_corners(cells *c, cell *one, double area) {
+    static const double inset = .01, strip = .07;
+    double value[2][2], full;
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++) {
+            double x[3], across[3];
+            point_of_cell(one, i == 0 ? inset : 1 - inset, j == 0 ? inset : 1 - inset, x, across);
+            value[i][j] = shadow_cut_factor(&c->cut, one->bits, x, c->over->normal, &full);
+            if (value[i][j] < 0) c->failed = true;
+        }
+    const double mean = .25 * (value[0][0] + value[0][1] + value[1][0] + value[1][1]);
+    one->unseen = fmax(0, strip * area * mean - one->sums.visible);
+    one->turn = fabs(value[0][0] + value[1][0] - value[0][1] - value[1][1]) >
+                fabs(value[0][0] + value[0][1] - value[1][0] - value[1][1]);
+    c->work += 4 * (1 + __builtin_popcount(one->bits));
+}
+
 static void sum_cell(cells *c, cell *one) {
+    enum { MOSTLY_DARK = NODES * (NODES - 1) }; /* all points but a row */
+    static const double nearly_dark = .03;
     cell_sums s = {.visible = 0};
     size_t n_open = 0, n_dark = 0;
-    const double(*corner)[3] = (const double(*)[3])one->corner;
+    double size = 0;
     for (int i = 0; i < NODES && !c->failed; i++)
         for (int j = 0; j < NODES && !c->failed; j++) {
             const double u = c->node[0][i], w = c->node[1][j];
-            double x[3], along_u[3], along_w[3], area[3], value[2];
-            for (int d = 0; d < 3; d++) {
-                along_u[d] = (1 - w) * (corner[1][d] - corner[0][d]) + w * (corner[2][d] - corner[3][d]);
-                along_w[d] = (1 - u) * (corner[3][d] - corner[0][d]) + u * (corner[2][d] - corner[1][d]);
-                x[d] = (1 - w) * ((1 - u) * corner[0][d] + u * corner[1][d]) +
-                       w * ((1 - u) * corner[3][d] + u * corner[2][d]);
-            }
-            cross3(along_u, along_w, area);
+            double x[3], area[3], value[2];
+            point_of_cell(one, u, w, x, area);
             const double weight = dot3(area, c->over->normal) * c->weight[0][i] * c->weight[1][j];
             value[0] = shadow_cut_factor(&c->cut, one->bits, x, c->over->normal, &value[1]);
             if (one->hidden) value[0] = 0;
             if (value[0] < 0) c->failed = true;
             n_open += value[0] >= value[1];
             n_dark += value[0] <= 0;
+            size += weight;
             s.visible += weight * value[0];
             s.full += weight * value[1];
             for (int k = 0; k < 2; k++) {
@@ -98,24 +133,30 @@ static void sum_cell(cells *c, cell *one) {
             }
         }
     c->work += NODES * NODES * (1 + (one->hidden ? 0 : __builtin_popcount(one->bits)));
-    one->doubtful = one->bits != 0 && !one->hidden && (n_open == NODES * NODES || n_dark == NODES * NODES);
+    const bool proven = one->bits == 0 || one->hidden;
+    one->doubtful = !proven && n_open == NODES * NODES;
     one->sums = s;
+    one->unseen = 0;
+    if (!proven && !c->failed && n_dark >= MOSTLY_DARK && s.visible <= nearly_dark * s.full)
+        look_at_corners(c, one, size);
 }
 
 /* About the error of a cell's part of (integral of F V) - V (integral of F) with V the visible share: by its
  * coefficients of P_3 and P_2, which fall fast where F is smooth. A break of F may leave that of P_3 small by
  * chance. direction: the rougher one. The factors are fits: of pairs of a Cornell box (636 elements) nearly
- * all keep the tolerance. */
+ * all keep the tolerance. Errors of what is unseen all go one way and add up over the pairs of a group, so
+ * that they are kept to a fifth of the tolerance. */
 static double cell_error(const cell *one, double share, int *direction) {
-    static const double of_third = .3, of_second = .06, of_doubt = .002;
+    static const double of_third = .3, of_second = .06, of_doubt = .002, of_unseen = 5;
     double second[2], third[2];
     for (int d = 0; d < 2; d++) {
         second[d] = fabs(one->sums.second[0][d] - share * one->sums.second[1][d]);
         third[d] = fabs(one->sums.third[0][d] - share * one->sums.third[1][d]);
     }
     *direction = third[1] + .1 * second[1] > third[0] + .1 * second[0];
-    return (one->doubtful ? of_doubt * one->sums.full : 0) + of_third * (third[0] + third[1]) +
-           of_second * (second[0] + second[1]);
+    if (one->unseen > 0) *direction = one->turn;
+    return (one->doubtful ? of_doubt * one->sums.full : 0) + of_unseen * one->unseen +
+           of_third * (third[0] + third[1]) + of_second * (second[0] + second[1]);
 }
 
 static bool same_point(const double *a, const double *b) {
@@ -320,8 +361,9 @@ static bool over_first(const projection *p, const projected_pair *pair) {
     return nearer + (pair->b->radius - pair->a->radius) / (pair->b->radius + pair->a->radius) >= 0;
 }
 
-double projection_share(const projection *p, const projected_pair *pair, double tolerance, double *work) {
-    const bool first = over_first(p, pair);
+/* The share by cells of the first element of the pair, or of the other one. */
+static double share_over(const projection *p, const projected_pair *pair, bool first, double tolerance,
+                         double *work) {
     double visible = 0, full = 0;
     cells c; /* large: what is not set here is set before its use */
     c.p = p;
@@ -346,6 +388,34 @@ double projection_share(const projection *p, const projected_pair *pair, double 
     }
     if (c.full > 0) full = c.full;
     return full > 0 ? fmin(fmax(visible / full, 0), 1) : 0;
+}
+
+/* True where a corner of one element of the pair sees something of the other one. */
+static bool corners_see(const projection *p, const projected_pair *pair, bool first, double *work) {
+    static const double inset = .01;
+    const polygon *from = first ? pair->a : pair->b, *to = first ? pair->b : pair->a;
+    shadow_cut cut;
+    bool any = false;
+    shadow_cut_init(&cut, p->occluders, pair->among, to);
+    for (int k = 0; k < from->n && !any; k++) {
+        double x[3], full;
+        for (int d = 0; d < 3; d++)
+            x[d] = from->corner[k][d] + inset * (from->centre[d] - from->corner[k][d]);
+        any = shadow_cut_factor(&cut, ~0u, x, from->normal, &full) > 0;
+        *work += 1 + pair->among->count;
+    }
+    return any;
+}
+
+/* Light past the side of one element may come to a narrow strip in the middle of the other one, between its
+ * points. Of two half planes with edges parallel to each other and to sides of both elements, light in a gap
+ * meets a corner of either. */
+double projection_share(const projection *p, const projected_pair *pair, double tolerance, double *work) {
+    const bool first = over_first(p, pair);
+    const double found = share_over(p, pair, first, tolerance, work);
+    return !(found > 0) && found >= 0 && corners_see(p, pair, !first, work)
+               ? share_over(p, pair, !first, tolerance, work)
+               : found;
 }
 
 double projection_point_factor(const projection *p, const projected_pair *pair, const double x[3],
