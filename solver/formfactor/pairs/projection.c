@@ -70,7 +70,7 @@ static void set_nodes(cells *c, const projected_pair *pair) {
 }
 
 /* The point of a cell at u, w, and the vector whose length is area there over that of the unit square. */
-static void point_of_cell(const cell *one, double u, double w, double x[3], double area[3]) {
+static inline void point_of_cell(const cell *one, double u, double w, double x[3], double area[3]) {
     const double(*corner)[3] = (const double(*)[3])one->corner;
     double along_u[3], along_w[3];
     for (int d = 0; d < 3; d++) {
@@ -90,12 +90,12 @@ static void point_of_cell(const cell *one, double u, double w, double x[3], doub
  * points, about .07 of the side away. The corners lie a little inside, where F is smooth. */
 static void look_at_corners(cells *c, cell *one, double area) {
     static const double inset = .01, strip = .07;
-    double value[2][2], full;
+    double value[2][2];
     for (int i = 0; i < 2; i++)
         for (int j = 0; j < 2; j++) {
             double x[3], across[3];
             point_of_cell(one, i == 0 ? inset : 1 - inset, j == 0 ? inset : 1 - inset, x, across);
-            value[i][j] = shadow_cut_factor(&c->cut, one->bits, x, c->over->normal, &full);
+            value[i][j] = shadow_cut_factor(&c->cut, one->bits, x, c->over->normal, NULL);
             if (value[i][j] < 0) c->failed = true;
         }
     const double mean = .25 * (value[0][0] + value[0][1] + value[1][0] + value[1][1]);
@@ -398,10 +398,10 @@ static bool corners_see(const projection *p, const projected_pair *pair, bool fi
     bool any = false;
     shadow_cut_init(&cut, p->occluders, pair->among, to);
     for (int k = 0; k < from->n && !any; k++) {
-        double x[3], full;
+        double x[3];
         for (int d = 0; d < 3; d++)
             x[d] = from->corner[k][d] + inset * (from->centre[d] - from->corner[k][d]);
-        any = shadow_cut_factor(&cut, ~0u, x, from->normal, &full) > 0;
+        any = shadow_cut_factor(&cut, ~0u, x, from->normal, NULL) > 0;
         *work += 1 + pair->among->count;
     }
     return any;
@@ -421,9 +421,6 @@ double projection_share(const projection *p, const projected_pair *pair, double 
 double projection_point_factor(const projection *p, const projected_pair *pair, const double x[3],
                                const double n[3], double *full) {
     shadow_cut cut;
-    double all;
     shadow_cut_init(&cut, p->occluders, pair->among, pair->b);
-    const double visible = shadow_cut_factor(&cut, ~0u, x, n, &all);
-    if (full != NULL) *full = all;
-    return visible;
+    return shadow_cut_factor(&cut, ~0u, x, n, full);
 }

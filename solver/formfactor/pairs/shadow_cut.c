@@ -58,6 +58,7 @@ void shadow_cut_init(shadow_cut *c, const occluders *o, const pair_occluders *am
     }
     c->rounding = 1e-12 * c->radius;
     for (int k = 0; k < c->n_cones; k++) {
+        c->order[k] = k;
         const occluder *one = &o->of[among->of[k]];
         shadow_cone *cone = &c->cone[k];
         double corner[OCCLUDER_CORNERS][3];
@@ -190,7 +191,14 @@ static double part_factor(const shadow_cut *c, const part *p, const double base[
     return sum / (2 * pi);
 }
 
-double shadow_cut_factor(const shadow_cut *c, unsigned bits, const double point[3], const double n[3],
+/* Points of a cell are mostly dark behind the same occluders. */
+static void put_first(shadow_cut *c, int at) {
+    const int k = c->order[at];
+    memmove(c->order + 1, c->order, (size_t)at * sizeof *c->order);
+    c->order[0] = k;
+}
+
+double shadow_cut_factor(shadow_cut *c, unsigned bits, const double point[3], const double n[3],
                          double *full) {
     part_list lists[2];
     part target = {.n = c->n};
@@ -203,10 +211,11 @@ double shadow_cut_factor(const shadow_cut *c, unsigned bits, const double point[
     }
     memcpy(target.s, c->s, (size_t)c->n * sizeof *c->s);
     memcpy(target.t, c->t, (size_t)c->n * sizeof *c->t);
-    *full = part_factor(c, &target, base, n);
+    if (full != NULL) *full = part_factor(c, &target, base, n);
     lists[0].n = 1;
     lists[0].of[0] = target;
-    for (int k = 0; k < c->n_cones && lists[now].n > 0; k++) {
+    for (int at = 0; at < c->n_cones && lists[now].n > 0; at++) {
+        const int k = c->order[at];
         half_plane cone[OCCLUDER_CORNERS + 1];
         if ((bits >> k & 1) == 0) continue;
         const int n_planes = cone_of(c, &c->cone[k], x, cone);
@@ -220,8 +229,9 @@ double shadow_cut_factor(const shadow_cut *c, unsigned bits, const double point[
                   memcmp(to->of[0].s, from->of[0].s, (size_t)from->of[0].n * sizeof(double)) != 0 ||
                   memcmp(to->of[0].t, from->of[0].t, (size_t)from->of[0].n * sizeof(double)) != 0;
         now = 1 - now;
+        if (to->n == 0) put_first(c, at);
     }
-    if (!changed) return *full;
+    if (!changed) return full != NULL ? *full : part_factor(c, &target, base, n);
     for (int p = 0; p < lists[now].n; p++) sum += part_factor(c, &lists[now].of[p], base, n);
-    return fmin(fmax(sum, 0), *full);
+    return fmin(fmax(sum, 0), full != NULL ? *full : INFINITY);
 }

@@ -24,14 +24,14 @@ typedef struct shadow_cut {
     int n, n_cones;
     double s[POLYGON_CORNERS], t[POLYGON_CORNERS]; /* the target's corners */
     shadow_cone cone[PAIR_OCCLUDERS_MOST];
+    int order[PAIR_OCCLUDERS_MOST]; /* of cones: those first that left points nothing to see */
 } shadow_cut;
 
 void shadow_cut_init(shadow_cut *c, const occluders *o, const pair_occluders *among, const polygon *target);
 
 /* F from the point x, with unit normal n, to the parts of the target that the occluders of the bits given
- * leave, for a target in front of x and x in front of it; full: to all of it. Negative: there are too many
- * parts. */
-double shadow_cut_factor(const shadow_cut *c, unsigned bits, const double x[3], const double n[3],
-                         double *full);
+ * leave, for a target in front of x and x in front of it; full, unless NULL: to all of it. Negative: there
+ * are too many parts. */
+double shadow_cut_factor(shadow_cut *c, unsigned bits, const double x[3], const double n[3], double *full);
 
 #endif
