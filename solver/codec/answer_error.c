@@ -10,7 +10,7 @@
 #define GROUP "/error/by_group"
 
 /* Figures by bin of a law: names in a store, and where they go. */
-enum { LAW_FIGURES = 6, SKY_LAW_FIGURES = 4 };
+enum { LAW_FIGURES = 6, SKY_LAW_FIGURES = 6, SKY_FIGURES_OF_BEFORE = 4 };
 typedef struct law_figure {
     const char *name;
     double **to;
@@ -20,10 +20,10 @@ static void figures_of(error_by_group *e, law_figure law[LAW_FIGURES], law_figur
     const law_figure all[LAW_FIGURES] = {{"rms_one", &e->law.one},         {"rms_many", &e->law.many},
                                          {"rms_even", &e->law.even},       {"mean_one", &e->law.mean_one},
                                          {"mean_many", &e->law.mean_many}, {"mean_even", &e->law.mean_even}};
-    const law_figure of_sky[SKY_LAW_FIGURES] = {{"sky_rms_tiles", &e->sky.tiles},
-                                                {"sky_rms_even", &e->sky.even},
-                                                {"sky_mean_tiles", &e->sky.mean_tiles},
-                                                {"sky_mean_even", &e->sky.mean_even}};
+    const law_figure of_sky[SKY_LAW_FIGURES] = {
+        {"sky_rms_tiles", &e->sky.tiles},       {"sky_rms_even", &e->sky.even},
+        {"sky_mean_tiles", &e->sky.mean_tiles}, {"sky_mean_even", &e->sky.mean_even},
+        {"sky_rms_bounced", &e->sky.bounced},   {"sky_mean_bounced", &e->sky.mean_bounced}};
     memcpy(law, all, sizeof all);
     memcpy(sky, of_sky, sizeof of_sky);
 }
@@ -35,6 +35,9 @@ void error_by_group_free(error_by_group *e) {
     for (size_t k = 0; k < SKY_LAW_FIGURES; k++) free(*sky[k].to);
     free(e->sky_power);
     free(e->sky_first);
+    free(e->elements_off);
+    free(e->means_off);
+    free(e->power_off);
     free(e->area);
     free(e->squares);
     free(e->reflectance);
@@ -73,12 +76,24 @@ done:
     return status;
 }
 
-/* Stores of before have other figures of skies, which are not read. */
+/* The errors of single tiles. */
+static lam_status read_tiles(store *s, size_t n_tiles, error_by_group *e, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(read_numbers(s, "sky_power_off", (size_t[]){e->n_channels, n_tiles}, &e->power_off, error));
+    if (!store_has(s, GROUP "/sky_elements_off")) return LAM_OK;
+    TRY(read_numbers(s, "sky_elements_off", (size_t[]){e->n_groups, n_tiles}, &e->elements_off, error));
+    TRY(read_numbers(s, "sky_means_off", (size_t[]){e->n_groups, n_tiles}, &e->means_off, error));
+done:
+    return status;
+}
+
+/* Stores of before have other figures of skies, which are not read, or fewer. */
 static lam_status read_sky(store *s, const law_figure *figures, error_by_group *e, lam_error *error) {
     lam_status status = LAM_OK;
     size_t dims[2] = {e->n_channels, SIZE_MAX};
     if (!store_has(s, GROUP "/sky_power") || !store_has_attribute(s, GROUP, "sky_direct")) return LAM_OK;
-    TRY(read_figures(s, SKY_LAW_FIGURES, figures, e, error));
+    const bool of_before = !store_has(s, GROUP "/sky_power_off");
+    TRY(read_figures(s, of_before ? SKY_FIGURES_OF_BEFORE : SKY_LAW_FIGURES, figures, e, error));
     TRY(read_numbers(s, "sky_power", dims, &e->sky_power, error));
     TRY(store_get_number(s, GROUP, "sky_direct", &e->sky.direct, error));
     if (!(e->sky.direct >= 0 && isfinite(e->sky.direct)))
@@ -86,6 +101,7 @@ static lam_status read_sky(store *s, const law_figure *figures, error_by_group *
              store_path(s), e->sky.direct);
     if (store_has(s, GROUP "/sky_first"))
         TRY(read_numbers(s, "sky_first", (size_t[]){e->n_groups, dims[1]}, &e->sky_first, error));
+    if (!of_before) TRY(read_tiles(s, dims[1], e, error));
     e->n_tiles = dims[1];
 done:
     return status;
@@ -162,11 +178,11 @@ static double error2(const emission_size *size, double one, double many, double 
            (one * one * share * share + many * many * share * fmax(0, 1 - share) + even * even);
 }
 
-/* The emission and the sky of an answer: P^2 and S of that (sky_law). */
+/* The emission and the sky of an answer: P^2, S and W of that (sky_law). */
 typedef struct light_sizes {
     emission_size size;
     const float *L; /* NULL: no sky, or nothing is stated of skies */
-    double power2, spread;
+    double power2, spread, power_off;
 } light_sizes;
 
 static weighted_sums sky_channel(const error_by_group *e, const float *L, size_t c) {
@@ -179,21 +195,11 @@ static light_sizes light_sizes_of(const error_by_group *e, const emission_size *
         const weighted_sums sums = sky_channel(e, L, c);
         of.power2 += sums.sum * sums.sum;
         of.spread += sums.spread;
+        if (e->power_off != NULL)
+            of.power_off +=
+                weighted_spread(e->n_tiles, e->power_off + c * e->n_tiles, L + c * e->n_tiles, sums.mean);
     }
     return of;
-}
-
-/* D of a group. */
-static double direct_of(const error_by_group *e, const float *L, size_t group) {
-    const size_t m = e->n_tiles;
-    double sum = 0;
-    for (size_t c = 0; e->sky_first != NULL && c < e->n_channels; c++) {
-        const double rho = e->reflectance[c * e->n_groups + group];
-        const double spread =
-            weighted_spread(m, e->sky_first + group * m, L + c * m, sky_channel(e, L, c).mean);
-        sum += rho * rho * spread;
-    }
-    return sum;
 }
 
 /* Squares of the errors of a bin: of its elements, and of its mean. */
@@ -201,20 +207,44 @@ typedef struct bin_error {
     double elements2, mean2;
 } bin_error;
 
+/* D of a group by weights of its tiles, [n_groups][n_tiles]; 0 where these are NULL. */
+static double direct_of(const error_by_group *e, const double *weights, const float *L, size_t group) {
+    const size_t m = e->n_tiles;
+    double sum = 0;
+    for (size_t c = 0; weights != NULL && c < e->n_channels; c++) {
+        const double rho = e->reflectance[c * e->n_groups + group];
+        const double spread = weighted_spread(m, weights + group * m, L + c * m, sky_channel(e, L, c).mean);
+        sum += rho * rho * spread;
+    }
+    return sum;
+}
+
+/* The part of single tiles, beside that of their powers alike. */
+static bin_error error_of_tiles(const error_by_group *e, const light_sizes *of, size_t bin) {
+    const sky_law *sky = &e->sky;
+    const size_t group = bin % e->n_groups;
+    if (e->power_off != NULL) {
+        const double bounced = sky->bounced[bin], mean_bounced = sky->mean_bounced[bin];
+        return (bin_error){direct_of(e, e->elements_off, of->L, group) + bounced * bounced * of->power_off,
+                           direct_of(e, e->means_off, of->L, group) +
+                               mean_bounced * mean_bounced * of->power_off};
+    }
+    double area = 0;
+    for (size_t k = group; k < e->n_bins; k += e->n_groups) area += e->area[k];
+    const double direct = sky->direct * sky->direct * direct_of(e, e->sky_first, of->L, group);
+    return (bin_error){direct, direct * (area > 0 ? e->squares[group] / (area * area) : 1)};
+}
+
 static bin_error error_in(const error_by_group *e, const light_sizes *of, size_t bin) {
     const error_law *law = &e->law;
-    const size_t group = bin % e->n_groups;
     bin_error sum = {error2(&of->size, law->one[bin], law->many[bin], law->even[bin]),
                      error2(&of->size, law->mean_one[bin], law->mean_many[bin], law->mean_even[bin])};
     if (of->L == NULL) return sum;
     const sky_law *sky = &e->sky;
-    double area = 0;
-    for (size_t k = group; k < e->n_bins; k += e->n_groups) area += e->area[k];
-    const double direct = sky->direct * sky->direct * direct_of(e, of->L, group);
-    const double alone = area > 0 ? e->squares[group] / (area * area) : 1;
-    sum.elements2 += direct + sky->tiles[bin] * sky->tiles[bin] * of->spread +
+    const bin_error tiles = error_of_tiles(e, of, bin);
+    sum.elements2 += tiles.elements2 + sky->tiles[bin] * sky->tiles[bin] * of->spread +
                      sky->even[bin] * sky->even[bin] * of->power2;
-    sum.mean2 += direct * alone + sky->mean_tiles[bin] * sky->mean_tiles[bin] * of->spread +
+    sum.mean2 += tiles.mean2 + sky->mean_tiles[bin] * sky->mean_tiles[bin] * of->spread +
                  sky->mean_even[bin] * sky->mean_even[bin] * of->power2;
     return sum;
 }

@@ -26,11 +26,17 @@ typedef struct error_law {
 /* An error of sqrt(direct^2 D + tiles^2 S + even^2 P^2) of a sky L: with M the mean of its radiances weighted
  * by the powers Q of the tiles, P = sum_t L_t Q_t, S = sum_t Q_t (L_t - M)^2, and D = rho^2 sum_t f_t (L_t -
  * M)^2 by the mean first bounce f and reflectance rho of a group, or, of its mean, sum A^2 / (sum A)^2 times
- * that. P^2, S and D are summed over channels. */
+ * that. P^2, S and D are summed over channels.
+ *
+ * Where it is known what single tiles are off by, the square is D + bounced^2 W + tiles^2 S + even^2 P^2 with
+ * D = rho^2 sum_t d_t (L_t - M)^2 and W = sum_t w_t (L_t - M)^2: d_t are squares of what the first bounce of
+ * a group is off by, of its elements or of its mean, and w_t of the power that a tile sends into the scene.
+ */
 typedef struct sky_law {
     double direct;
     double *tiles, *even; /* [n_bins] */
     double *mean_tiles, *mean_even;
+    double *bounced, *mean_bounced; /* [n_bins]; NULL: a store of before */
 } sky_law;
 
 /* A bin is the elements of a group, or of those that are read, and in a second row the others. Zeroed: a
@@ -45,6 +51,8 @@ typedef struct error_by_group {
     uint32_t *bin;       /* [n] */
     double *sky_power;   /* [C][n_tiles], sum A rho first_bounce */
     double *sky_first;   /* [n_groups][n_tiles], mean first_bounce; NULL: not stored, and sky.direct is 0 */
+    double *elements_off, *means_off; /* [n_groups][n_tiles], d_t; NULL: not stored */
+    double *power_off;                /* [C][n_tiles], w_t; NULL: a store of before */
 } error_by_group;
 
 void error_by_group_free(error_by_group *e);

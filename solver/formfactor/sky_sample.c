@@ -84,6 +84,14 @@ static double seen_share(const visibility *v, const element_sampler *from, size_
     return sum / (double)rays;
 }
 
+/* The light of the tile itself, and that of the ground: pi times the share of the ground times what it
+ * reflects, as in sky_bounce_close. */
+static float first_bounce_of(const sky_bounce *sampled, size_t element, size_t tile, double seen) {
+    const sky_tile *at = &sampled->tiling.tiles[tile];
+    const double reflected = sampled->ground[element] * sampled->ground_albedo * at->cosine;
+    return (float)(seen * at->solid_angle + reflected);
+}
+
 lam_status sky_sample_tiles(const mesh *m, const sky_bounce *sampled, size_t rays, uint64_t seed,
                             size_t n_tiles, const size_t *tiles, float *first, lam_error *error) {
     lam_status status = LAM_OK;
@@ -95,12 +103,27 @@ lam_status sky_sample_tiles(const mesh *m, const sky_bounce *sampled, size_t ray
         element_sampler from;
         element_sampler_init(&from, m, v, i, seed);
         for (size_t k = 0; k < n_tiles; k++) {
-            const sky_tile *tile = &tiling->tiles[tiles[k]];
             const double seen = seen_share(v, &from, i, tiling, tiles[k], rays, seed);
-            /* pi times the share of the ground times what it reflects, as in sky_bounce_close. */
-            const double reflected = sampled->ground[i] * sampled->ground_albedo * tile->cosine;
-            first[k * m->n + i] = (float)(seen * tile->solid_angle + reflected);
+            first[k * m->n + i] = first_bounce_of(sampled, i, tiles[k], seen);
         }
+    }
+done:
+    visibility_destroy(v);
+    return status;
+}
+
+lam_status sky_sample_pairs(const mesh *m, const sky_bounce *sampled, size_t rays, uint64_t seed,
+                            size_t count, const size_t *elements, const size_t *tiles, float *first,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    TRY(visibility_create(m, &v, error));
+#pragma omp parallel for schedule(dynamic, 64)
+    for (size_t k = 0; k < count; k++) {
+        element_sampler from;
+        element_sampler_init(&from, m, v, elements[k], seed);
+        const double seen = seen_share(v, &from, elements[k], &sampled->tiling, tiles[k], rays, seed);
+        first[k] = first_bounce_of(sampled, elements[k], tiles[k], seen);
     }
 done:
     visibility_destroy(v);

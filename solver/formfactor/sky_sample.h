@@ -22,4 +22,10 @@ lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounc
 lam_status sky_sample_tiles(const mesh *m, const sky_bounce *sampled, size_t rays, uint64_t seed,
                             size_t n_tiles, const size_t *tiles, float *first, lam_error *error);
 
+/* first [count]: the same of single elements and tiles. Cost: count rays rays at most. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status sky_sample_pairs(const mesh *m, const sky_bounce *sampled, size_t rays, uint64_t seed,
+                            size_t count, const size_t *elements, const size_t *tiles, float *first,
+                            lam_error *error);
+
 #endif

@@ -82,9 +82,22 @@ enum {
  * channels, rho the mean reflectance of the group. The error is about sqrt(direct^2 D + tiles^2 S + even^2
  * P^2). Rays that meet a tile, and with them the noise of the direct light, are as many as it is bright, so
  * that squared errors of direct light grow as D; where all of a window is seen, what one tile has too much
- * another has not, and an even sky is off by far less. Of the mean of a group D counts sum A^2 / (sum A)^2
- * times. */
-enum { SKY_MEAN_TILES, SKY_MEAN_EVEN, SKY_RMS_TILES, SKY_RMS_EVEN, SKY_FIGURES };
+ * another has not, and an even sky is off by far less.
+ *
+ * That is the law of all tiles alike. The errors of single ones are known better (judge_sky_tiles.h): with
+ * d_t, or of the mean of a group d'_t, the squared error of the first bounce of a tile there, and w_t that of
+ * the power that it sends into the scene, which bounces into the group as the light of single tiles does,
+ *     D = rho^2 sum_t d_t (L_t - M)^2,    W = sum_t w_t (L_t - M)^2
+ * are the square of the error D + bounced^2 W + tiles^2 S + even^2 P^2. */
+enum {
+    SKY_MEAN_TILES,
+    SKY_MEAN_EVEN,
+    SKY_MEAN_BOUNCED,
+    SKY_RMS_TILES,
+    SKY_RMS_EVEN,
+    SKY_RMS_BOUNCED,
+    SKY_FIGURES
+};
 typedef struct group_errors {
     size_t n_groups, n_rows;
     double *of[GROUP_FIGURES];
@@ -96,6 +109,8 @@ typedef struct group_errors {
     size_t n_channels, n_tiles;
     double *sky_power; /* [C][n_tiles], Q_t = sum A rho first_bounce_t, m^2 sr */
     double *sky_first; /* [n_groups][n_tiles], mean first_bounce_t over a group, sr; NULL: too many numbers */
+    double *sky_elements_off, *sky_means_off; /* [n_groups][n_tiles], d_t and d'_t, sr^2; NULL: likewise */
+    double *sky_power_off;                    /* [C][n_tiles], w_t, m^4 sr^2 */
 } group_errors;
 void group_errors_free(group_errors *e);
 
@@ -118,7 +133,13 @@ typedef struct judged_sky {
      * there are none. */
     lam_status (*tiles)(void *context, int sample, size_t count, const size_t *tiles, float *first,
                         lam_error *error);
-    void *tiles_context;
+    /* first [count]: of some elements and tiles, likewise. NULL: they are not known. */
+    lam_status (*pairs)(void *context, int sample, size_t count, const size_t *elements, const size_t *tiles,
+                        float *first, lam_error *error);
+    void *tiles_context; /* of both */
+    double own_ray;      /* sr that one of the operator's own rays by the cosine adds; 0: nobody knows */
+    /* Of each the part that the ground sends is ground [n] times reflects [m], sr. NULL: there is none. */
+    const double *ground, *reflects;
 } judged_sky;
 
 /* Skies by which it is judged: two that shine from everywhere, and single tiles. */

@@ -75,6 +75,7 @@ static channel_sums add_channel(const figure_probe *p, size_t c, const by_group_
         to[BIN_RMS_NOISE] += a * noise;
         to[BIN_RMS_SPREAD] += a * a * (off2 - noise) * (off2 - noise);
         to[BIN_LIGHT] += a * one.bounced;
+        to[BIN_LIGHT_RMS] += a * one.bounced * one.bounced;
         sum.power += E;
         sum.squares += E * E;
         sum.light += a * one.bounced;
@@ -136,6 +137,7 @@ static void stack(const by_group_sums *s, const double *channel, double *stacked
         to[BIN_RMS_NOISE] += from[BIN_RMS_NOISE] / area;
         to[BIN_RMS_SPREAD] += from[BIN_RMS_SPREAD] / (area * area);
         to[BIN_LIGHT] += from[BIN_LIGHT] * from[BIN_LIGHT] / (area * area);
+        to[BIN_LIGHT_RMS] += from[BIN_LIGHT_RMS] / area;
     }
 }
 
@@ -256,5 +258,8 @@ void group_errors_free(group_errors *e) {
     for (int f = 0; f < SKY_FIGURES; f++) free(e->sky[f]);
     free(e->sky_power);
     free(e->sky_first);
+    free(e->sky_elements_off);
+    free(e->sky_means_off);
+    free(e->sky_power_off);
     *e = (group_errors){.n_groups = 0};
 }

@@ -36,7 +36,8 @@ typedef struct by_group_sums {
 
 /* Numbers of a bin for one probe, channels stacked: the squared error of its mean, the noise in it, and the
  * same noise where that of its elements is independent; the mean square error of its elements, the noise, and
- * the square of what the rest may be off by it; the squared mean of the reflected light. */
+ * the square of what the rest may be off by it; the squared mean of the reflected light, and the mean of its
+ * squares. */
 enum {
     BIN_MEAN,
     BIN_MEAN_NOISE,
@@ -45,6 +46,7 @@ enum {
     BIN_RMS_NOISE,
     BIN_RMS_SPREAD,
     BIN_LIGHT,
+    BIN_LIGHT_RMS,
     BIN_NUMBERS
 };
 

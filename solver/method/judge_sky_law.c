@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NUMBERS = 6 };
+enum { NUMBERS = 10 };
 
 static size_t group_of(const sky_law_sums *s, size_t bin) {
     return bin % s->input->n_groups;
@@ -48,10 +48,16 @@ lam_status sky_law_begin(const judge_input *input, const group_errors *errors, s
                               .rms_least = first + n_bins,
                               .mean = first + 2 * n_bins,
                               .mean_least = first + 3 * n_bins,
-                              .direct = first + 4 * n_bins,
-                              .direct_mean = first + 5 * n_bins};
+                              .light = first + 4 * n_bins,
+                              .light_mean = first + 5 * n_bins,
+                              .direct = first + 6 * n_bins,
+                              .direct_mean = first + 7 * n_bins,
+                              .unseen = first + 8 * n_bins,
+                              .unseen_mean = first + 9 * n_bins};
     }
     find_means(&s);
+    TRY(tile_errors_begin(input, &s.tiles, error));
+    TRY(tile_errors_aim(&s.tiles, error));
     *out = s;
     s = (sky_law_sums){.n_bins = 0};
 done:
@@ -64,24 +70,31 @@ void sky_law_free(sky_law_sums *s) {
     free(s->reflectance);
     free(s->area);
     free(s->square);
+    tile_errors_free(&s->tiles);
     *s = (sky_law_sums){.n_bins = 0};
 }
 
-/* D of all groups, P^2 and S of a sky L [m], the same in all channels. */
+/* D of all groups, W, P^2 and S of a sky L [m], the same in all channels. */
 static void find_size(const sky_law_sums *s, const float *L, sky_probe *to) {
     const size_t m = s->errors->n_tiles, G = s->input->n_groups;
     for (size_t c = 0; c < s->input->problem->n_channels; c++) {
         const weighted_sums size = weighted_sums_of(m, s->errors->sky_power + c * m, L);
         to->power2 += size.sum * size.sum;
         to->spread += size.spread;
-        for (size_t bin = 0; bin < s->n_bins && s->errors->sky_first != NULL; bin++) {
+        const tile_spread power = tile_errors_of_power(&s->tiles, c, L, size.mean);
+        to->power_off.seen += power.seen;
+        to->power_off.unseen += power.unseen;
+        for (size_t bin = 0; bin < s->n_bins; bin++) {
             const size_t g = group_of(s, bin);
-            const double rho = s->reflectance[c * G + g];
-            to->direct[bin] += rho * rho * weighted_spread(m, s->errors->sky_first + g * m, L, size.mean);
+            const double rho2 = pow(s->reflectance[c * G + g], 2);
+            const tile_spread elements = tile_errors_of_group(&s->tiles, g, false, L, size.mean);
+            const tile_spread mean = tile_errors_of_group(&s->tiles, g, true, L, size.mean);
+            to->direct[bin] += rho2 * elements.seen;
+            to->unseen[bin] += rho2 * elements.unseen;
+            to->direct_mean[bin] += rho2 * mean.seen;
+            to->unseen_mean[bin] += rho2 * mean.unseen;
         }
     }
-    for (size_t bin = 0; bin < s->n_bins; bin++)
-        to->direct_mean[bin] = to->direct[bin] * s->square[group_of(s, bin)];
 }
 
 void sky_law_add(sky_law_sums *s, const figure_probe *one, const float *L, double own_share,
@@ -98,6 +111,8 @@ void sky_law_add(sky_law_sums *s, const figure_probe *one, const float *L, doubl
         to->rms_least[bin] = fmin(sqrt(at[BIN_RMS_SPREAD]), own_share * at[BIN_RMS_NOISE]);
         to->mean[bin] = at[BIN_MEAN] - noise;
         to->mean_least[bin] = own_share * noise;
+        to->light[bin] = at[BIN_LIGHT_RMS];
+        to->light_mean[bin] = at[BIN_LIGHT];
     }
 }
 
@@ -138,35 +153,54 @@ void sky_law_add_direct(sky_law_sums *s, size_t tile, const float *one, const fl
     s->direct.direct += sqrt(D);
 }
 
-/* The figures of one bin, of elements or of the mean: the error of an even sky; of single tiles what neither
- * that nor their direct light tells. */
-static void finish_bin(const sky_law_sums *s, size_t bin, bool of_mean, double direct2, double *tiles,
-                       double *even) {
+/* The square of the light that reaches a bin of a power of 1 that a single tile sends into the scene. */
+static double bounced2_of(const sky_law_sums *s, size_t bin, bool of_mean) {
+    double light2 = 0, power2 = 0;
+    for (size_t v = JUDGE_EVEN_SKIES; v < s->count; v++) {
+        light2 += (of_mean ? s->of[v].light_mean : s->of[v].light)[bin];
+        power2 += s->of[v].power2;
+    }
+    return power2 > 0 ? light2 / power2 : 0;
+}
+
+/* D + bounced^2 W of a sky. */
+static double known_of_tiles(const sky_probe *of, size_t bin, bool of_mean, double direct2, double bounced2) {
+    const double direct = (of_mean ? of->direct_mean : of->direct)[bin];
+    const double unseen = (of_mean ? of->unseen_mean : of->unseen)[bin];
+    return direct2 * (direct + bounced2 * of->power_off.seen) + unseen + bounced2 * of->power_off.unseen;
+}
+
+/* Squares of the figures of one bin, of elements or of the mean. */
+typedef struct bin_figures {
+    double tiles, even, bounced;
+} bin_figures;
+
+/* The error of an even sky; of single tiles the part that neither that nor their own direct light tells. */
+static bin_figures finish_bin(const sky_law_sums *s, size_t bin, bool of_mean, double direct2) {
     double off = 0, least2 = 0, known = 0, spread = 0;
+    bin_figures f = {.bounced = bounced2_of(s, bin, of_mean)};
     for (size_t v = 0; v < s->count; v++) {
         const sky_probe *of = &s->of[v];
         const double at = (of_mean ? of->mean : of->rms)[bin];
         const double least = (of_mean ? of->mean_least : of->rms_least)[bin];
-        const double direct = direct2 * (of_mean ? of->direct_mean : of->direct)[bin];
         if (v == 0) {
-            *even = (fmax(at, 0) + least) / of->power2;
+            f.even = (fmax(at, 0) + least) / of->power2;
         } else if (v >= JUDGE_EVEN_SKIES) {
             off += at;
             least2 += least * least;
-            known += direct + *even * of->power2;
+            known += known_of_tiles(of, bin, of_mean, direct2, f.bounced) + f.even * of->power2;
             spread += of->spread;
         }
     }
-    *tiles = spread > 0 ? (fmax(off - known, 0) + sqrt(least2)) / spread : 0;
+    f.tiles = spread > 0 ? (fmax(off - known, 0) + sqrt(least2)) / spread : 0;
     /* A mean may be right under one sky by chance: the cloudy one counts as much, less its own tiles. */
     if (s->count > 1) {
         const sky_probe *of = &s->of[1];
         const double at = (of_mean ? of->mean : of->rms)[bin];
-        const double tiled = direct2 * (of_mean ? of->direct_mean : of->direct)[bin] + *tiles * of->spread;
-        *even = fmax(*even, .5 * (*even + (at - tiled) / of->power2));
+        const double tiled = known_of_tiles(of, bin, of_mean, direct2, f.bounced) + f.tiles * of->spread;
+        f.even = fmax(f.even, .5 * (f.even + (at - tiled) / of->power2));
     }
-    *tiles = sqrt(*tiles);
-    *even = sqrt(*even);
+    return f;
 }
 
 lam_status sky_law_finish(const sky_law_sums *s, group_errors *errors, lam_error *error) {
@@ -178,13 +212,17 @@ lam_status sky_law_finish(const sky_law_sums *s, group_errors *errors, lam_error
         if ((made[f] = memory_allocate(s->n_bins, sizeof *made[f], "errors of skies", error)) == NULL)
             TRY(LAM_ERR_MEMORY);
     for (size_t bin = 0; bin < s->n_bins; bin++) {
-        finish_bin(s, bin, true, direct2, &made[SKY_MEAN_TILES][bin], &made[SKY_MEAN_EVEN][bin]);
-        finish_bin(s, bin, false, direct2, &made[SKY_RMS_TILES][bin], &made[SKY_RMS_EVEN][bin]);
+        const bin_figures mean = finish_bin(s, bin, true, direct2), rms = finish_bin(s, bin, false, direct2);
         /* No mean is known better than independent errors of the elements leave it. */
-        const double least = sqrt(s->square[group_of(s, bin)]);
-        made[SKY_MEAN_TILES][bin] = fmax(made[SKY_MEAN_TILES][bin], least * made[SKY_RMS_TILES][bin]);
-        made[SKY_MEAN_EVEN][bin] = fmax(made[SKY_MEAN_EVEN][bin], least * made[SKY_RMS_EVEN][bin]);
+        const double least = s->square[group_of(s, bin)];
+        made[SKY_RMS_TILES][bin] = sqrt(rms.tiles);
+        made[SKY_RMS_EVEN][bin] = sqrt(rms.even);
+        made[SKY_RMS_BOUNCED][bin] = sqrt(rms.bounced);
+        made[SKY_MEAN_TILES][bin] = sqrt(fmax(mean.tiles, least * rms.tiles));
+        made[SKY_MEAN_EVEN][bin] = sqrt(fmax(mean.even, least * rms.even));
+        made[SKY_MEAN_BOUNCED][bin] = sqrt(mean.bounced);
     }
+    TRY(tile_errors_finish(&s->tiles, direct2, errors, error));
     errors->sky_direct = sqrt(direct2);
     memcpy(errors->sky, made, sizeof made);
     memset(made, 0, sizeof made);

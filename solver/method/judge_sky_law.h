@@ -4,12 +4,16 @@
 #define LAMBERT_METHOD_JUDGE_SKY_LAW_H
 
 #include "solver/method/judge_by_group.h"
+#include "solver/method/judge_sky_tiles.h"
 
 /* Errors of one sky, by bin, [n_bins] each: mean squares of elements, squares of means, less the noise, and
- * the least that is known of them; its size, D, S and P^2 (sky_errors). */
+ * the least that is known of them; the squares of its reflected light; its size, D, W, S and P^2 (judge.h),
+ * both D and W in two parts. */
 typedef struct sky_probe {
-    double *rms, *rms_least, *mean, *mean_least, *direct, *direct_mean;
+    double *rms, *rms_least, *mean, *mean_least, *light, *light_mean;
+    double *direct, *direct_mean, *unseen, *unseen_mean;
     double spread, power2;
+    tile_spread power_off;
 } sky_probe;
 
 /* Sums over tiles: of what their direct light is off by, sum A off^2 less the noise, over root(sum A D), of
@@ -22,6 +26,7 @@ typedef struct direct_sums {
 typedef struct sky_law_sums {
     const judge_input *input;
     const group_errors *errors; /* with sky_power and sky_first */
+    tile_errors tiles;
     size_t n_bins;
     double *numbers;       /* of all skies */
     double *reflectance;   /* [C][n_groups], mean */
@@ -31,7 +36,8 @@ typedef struct sky_law_sums {
     direct_sums direct;
 } sky_law_sums;
 
-/* errors has the powers of the tiles (judge_sky_powers). Errors: LAM_ERR_MEMORY. */
+/* errors has the powers of the tiles (judge_sky_powers). Errors: LAM_ERR_MEMORY, those of
+ * tile_errors_aim. */
 lam_status sky_law_begin(const judge_input *input, const group_errors *errors, sky_law_sums *out,
                          lam_error *error);
 void sky_law_free(sky_law_sums *s);
@@ -45,7 +51,7 @@ void sky_law_add(sky_law_sums *s, const figure_probe *one, const float *L, doubl
  * shared, beside the operator's own. Cost: O(C n + m groups). */
 void sky_law_add_direct(sky_law_sums *s, size_t tile, const float *one, const float *other);
 
-/* Fills errors->sky and sky_direct. Errors: LAM_ERR_MEMORY. */
+/* Fills errors->sky, sky_direct and what tiles are off by. Errors: LAM_ERR_MEMORY. */
 lam_status sky_law_finish(const sky_law_sums *s, group_errors *errors, lam_error *error);
 
 #endif

@@ -78,10 +78,10 @@ lam_status judge_save_groups(const group_errors *e, store *s, lam_error *error) 
                                                      [GROUP_NEAR_LARGEST] = "near_largest",
                                                      [GROUP_FAR] = "far",
                                                      [GROUP_FAR_LARGEST] = "far_largest"};
-    static const char *const of_sky[SKY_FIGURES] = {[SKY_MEAN_TILES] = "sky_mean_tiles",
-                                                    [SKY_MEAN_EVEN] = "sky_mean_even",
-                                                    [SKY_RMS_TILES] = "sky_rms_tiles",
-                                                    [SKY_RMS_EVEN] = "sky_rms_even"};
+    static const char *const of_sky[SKY_FIGURES] = {
+        [SKY_MEAN_TILES] = "sky_mean_tiles",     [SKY_MEAN_EVEN] = "sky_mean_even",
+        [SKY_MEAN_BOUNCED] = "sky_mean_bounced", [SKY_RMS_TILES] = "sky_rms_tiles",
+        [SKY_RMS_EVEN] = "sky_rms_even",         [SKY_RMS_BOUNCED] = "sky_rms_bounced"};
     lam_status status = LAM_OK;
     char path[64];
     for (int k = 0; k < GROUP_FIGURES && e->n_rows > 0; k++) {
@@ -93,12 +93,21 @@ lam_status judge_save_groups(const group_errors *e, store *s, lam_error *error) 
         TRY(store_write(s, path, STORE_F64, 2, (size_t[]){e->n_rows, e->n_groups}, e->sky[k], error));
     }
     if (e->sky[0] != NULL) TRY(store_set_number(s, "/error/by_group", "sky_direct", e->sky_direct, error));
-    if (e->sky_power != NULL)
-        TRY(store_write(s, "/error/by_group/sky_power", STORE_F64, 2, (size_t[]){e->n_channels, e->n_tiles},
-                        e->sky_power, error));
-    if (e->sky_first != NULL)
-        TRY(store_write(s, "/error/by_group/sky_first", STORE_F64, 2, (size_t[]){e->n_groups, e->n_tiles},
-                        e->sky_first, error));
+    const struct {
+        const char *name;
+        size_t rows;
+        const double *numbers;
+    } of_tiles[] = {{"sky_power", e->n_channels, e->sky_power},
+                    {"sky_first", e->n_groups, e->sky_first},
+                    {"sky_power_off", e->n_channels, e->sky_power_off},
+                    {"sky_elements_off", e->n_groups, e->sky_elements_off},
+                    {"sky_means_off", e->n_groups, e->sky_means_off}};
+    for (size_t k = 0; k < sizeof of_tiles / sizeof *of_tiles; k++) {
+        if (of_tiles[k].numbers == NULL) continue;
+        snprintf(path, sizeof path, "/error/by_group/%s", of_tiles[k].name);
+        TRY(store_write(s, path, STORE_F64, 2, (size_t[]){of_tiles[k].rows, e->n_tiles}, of_tiles[k].numbers,
+                        error));
+    }
 done:
     return status;
 }

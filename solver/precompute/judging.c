@@ -27,6 +27,7 @@ struct judge_references {
     size_t n;
     bool keeps;
     sky_bounce sky[2];     /* samples of the first bounce; n = 0: none */
+    double *reflects;      /* [m], of the ground: albedo times the tile's cosine */
     judged_sky light;      /* a view of these, and of the first bounce that is judged */
     const judging *judged; /* by whom the sky is asked for */
     light_kept lamp;       /* of several elements, which takes as long as that of many single ones */
@@ -54,6 +55,7 @@ void judge_references_free(judge_references *r) {
     block_light_destroy(r->by_blocks);
     light_kept_free(&r->lamp);
     for (int h = 0; h < 2; h++) sky_bounce_free(&r->sky[h]);
+    free(r->reflects);
     free(r);
 }
 
@@ -192,6 +194,20 @@ static lam_status sample_tiles(void *context, int sample, size_t count, const si
                             count, tiles, first, error);
 }
 
+static lam_status sample_pairs(void *context, int sample, size_t count, const size_t *elements,
+                               const size_t *tiles, float *first, lam_error *error) {
+    const judge_references *r = context;
+    return sky_sample_pairs(r->judged->m, &r->sky[sample], TILE_RAYS, seed_of_sky(r->judged, sample, true),
+                            count, elements, tiles, first, error);
+}
+
+/* The first bounce that one of the operator's own rays by the cosine adds. Those for the sky alone are half
+ * as many where others are aimed at openings. Hemicubes have no rays. */
+static double own_ray(const form_factors *f) {
+    if (f->recipe.method == RECIPE_HEMICUBE || f->recipe.rays == 0) return 0;
+    return M_PI * (f->n_aimed > 0 ? 2 : 1) / (double)f->recipe.rays;
+}
+
 /* The share of the variance of an operator's own first bounce in that of the mean of both samples: by the
  * rays of each. Hemicubes have no rays. */
 static double own_share(const recipe *own, size_t n) {
@@ -229,12 +245,22 @@ static lam_status make_references(const judging *j, judge_references *r, lam_err
         if (r->sky[h].first_bounce == NULL)
             TRY(sky_sample_make(j->m, j->order, &j->f->sky, &how, &r->sky[h], error));
     }
+    const sky_tiling *tiling = &j->f->sky.tiling;
+    if (r->reflects == NULL)
+        r->reflects = memory_allocate(tiling->n_tiles, sizeof *r->reflects, "skies", error);
+    if (r->reflects == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t t = 0; t < tiling->n_tiles; t++)
+        r->reflects[t] = j->f->sky.ground_albedo * tiling->tiles[t].cosine;
     r->light = (judged_sky){.n_tiles = j->f->sky.tiling.n_tiles,
                             .own = j->f->sky.first_bounce,
                             .samples = {r->sky[0].first_bounce, r->sky[1].first_bounce},
                             .own_share = own_share(&j->f->recipe, j->m->n),
                             .tiles = sample_tiles,
-                            .tiles_context = r};
+                            .pairs = sample_pairs,
+                            .tiles_context = r,
+                            .own_ray = own_ray(j->f),
+                            .ground = r->sky[0].ground,
+                            .reflects = r->reflects};
     r->judged = j;
 done:
     return status;

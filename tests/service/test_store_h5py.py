@@ -257,10 +257,13 @@ class StoreTest(unittest.TestCase):
             law = [f"{what}_{part}" for what in ("rms", "mean") for part in ("one", "many", "even")]
             by_group = law + [near + largest for near in ("uniform", "near", "far") for largest in ("", "_largest")]
             if "error/by_group/sky_power" in f:  # a sky shines into the scene
-                by_group += [f"sky_{what}_{part}" for what in ("rms", "mean") for part in ("tiles", "even")]
+                by_group += [f"sky_{what}_{part}" for what in ("rms", "mean")
+                             for part in ("tiles", "even", "bounced")]
                 self.assertTrue(np.isfinite(f["error/by_group"].attrs["sky_direct"]))
                 expected["/error/by_group/sky_power"] = ((C, 12), "<f8")
-                expected["/error/by_group/sky_first"] = ((g, 12), "<f8")
+                expected["/error/by_group/sky_power_off"] = ((C, 12), "<f8")
+                for name in "sky_first", "sky_elements_off", "sky_means_off":
+                    expected[f"/error/by_group/{name}"] = ((g, 12), "<f8")
             expected.update({f"/error/by_group/{figure}": ((1, g), "<f8") for figure in by_group})
             names = found.pop("/mesh/group_names")
             self.assertEqual(names[0], (g,))

@@ -175,6 +175,37 @@ START_TEST(means_have_less_of_direct_errors) {
 }
 END_TEST
 
+/* Where a store tells what single tiles are off by, that counts in place of direct^2 D: with spreads (2/3)^2
+ * and (4/3)^2 of the first channel D = rho^2 (4 d_0 + 16 d_1) / 9, the second has none, and W likewise. A
+ * tile that no ray met may be off by all that it sends. */
+START_TEST(single_tiles_have_their_own_errors) {
+    static double elements_off[] = {.01, .02, .03, .04}, means_off[] = {.001, .002, .003, .004};
+    static double power_off[] = {.5, .25, 8, 9}, bounced[] = {.2, .3}, mean_bounced[] = {.1, .15};
+    const double W = (.5 * 4 + .25 * 16) / 9, D = .25 * (.01 * 4 + .02 * 16) / 9;
+    const double D_mean = .25 * (.001 * 4 + .002 * 16) / 9;
+    error_by_group by_tile = stated;
+    const uint32_t desk[] = {0};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}};
+    const double direct[C] = {.1, .2}, none[C] = {0}, value[C] = {1, 2};
+    const name_means means = {
+        .quantity = LAM_INDIRECT, .L = L, .value = value, .emission = none, .direct = direct};
+    by_tile.sky.bounced = bounced;
+    by_tile.sky.mean_bounced = mean_bounced;
+    by_tile.elements_off = elements_off;
+    by_tile.means_off = means_off;
+    by_tile.power_off = power_off;
+    const double rms = D + .04 * W + .07 * .07 * sky_S + .01 * .01 * sky_P2;
+    const double mean = D_mean + .01 * W + .03 * .03 * sky_S + .002 * .002 * sky_P2;
+    const name_error found = name_error_of_means(&by_tile, &list[0], &means);
+    ck_assert_double_eq_tol(found.mean, sqrt(mean / (5 - mean)), 1e-6);
+    ck_assert_double_eq_tol(found.elements, sqrt(rms / (5 - rms)), 1e-6);
+    /* Of too many groups the powers alone are known. */
+    by_tile.elements_off = by_tile.means_off = NULL;
+    const name_error without = name_error_of_means(&by_tile, &list[0], &means);
+    ck_assert_double_eq_tol(without.elements, sqrt((rms - D) / (5 - rms + D)), 1e-6);
+}
+END_TEST
+
 /* A sky of a store that states nothing of skies adds nothing. */
 START_TEST(unknown_skies_are_left) {
     float values[C * N];
@@ -209,6 +240,7 @@ int main(void) {
     tcase_add_test(cases, selected_elements_are_those_of_the_answer);
     tcase_add_loop_test(cases, names_have_errors_of_their_means, 0, 3);
     tcase_add_test(cases, means_have_less_of_direct_errors);
+    tcase_add_test(cases, single_tiles_have_their_own_errors);
     tcase_add_test(cases, unknown_skies_are_left);
     tcase_add_test(cases, darkness_has_no_error_and_no_light_no_ratio);
     suite_add_tcase(suite, cases);

@@ -106,6 +106,29 @@ START_TEST(rays_towards_tiles) {
 }
 END_TEST
 
+/* Single elements have the numbers of the rows of their tiles. */
+START_TEST(pairs_are_parts_of_rows) {
+    enum { SOME = 3, TOWARDS = 32 };
+    const size_t tiles[SOME] = {0, 15, 60};
+    mesh m = plate_and_wall(true);
+    sky_bounce s = sample(&m, "tregenza", .3, 5);
+    float rows[SOME * 8], pairs[SOME * 8];
+    size_t elements[SOME * 8], of[SOME * 8], count = 0;
+    lam_error error = {0};
+    ck_assert_uint_le(m.n, 8);
+    for (size_t k = 0; k < SOME; k++)
+        for (size_t i = 0; i < m.n; i++) {
+            elements[count] = i;
+            of[count++] = tiles[k];
+        }
+    ck_ok(sky_sample_tiles(&m, &s, TOWARDS, 6, SOME, tiles, rows, &error));
+    ck_ok(sky_sample_pairs(&m, &s, TOWARDS, 6, count, elements, of, pairs, &error));
+    ck_assert_mem_eq(rows, pairs, count * sizeof *rows);
+    sky_bounce_free(&s);
+    mesh_free(&m);
+}
+END_TEST
+
 /* Two samples by which a bounce is judged must not share their rays. */
 START_TEST(seeds_differ) {
     mesh m = plate_and_wall(true);
@@ -127,6 +150,7 @@ int main(void) {
     tcase_add_test(tc, open_hemisphere);
     tcase_add_test(tc, wall_beside_and_ground);
     tcase_add_test(tc, rays_towards_tiles);
+    tcase_add_test(tc, pairs_are_parts_of_rows);
     tcase_add_test(tc, seeds_differ);
     suite_add_tcase(suite, tc);
     return suite_run(suite);

@@ -269,6 +269,84 @@ START_TEST(tiles_are_judged_by_their_own_rows) {
 }
 END_TEST
 
+/* Element 1 is the larger one, and none of its own rays met tile 2. Rays that are aimed there find .02 and
+ * .04 sr: its error of .03 sr is stated of its group, and (A rho .03)^2 of the power. Of the other tiles
+ * direct^2 times what is seen counts. */
+static lam_status missed_light(void *context, int sample, size_t count, const size_t *elements,
+                               const size_t *tiles, float *first, lam_error *error) {
+    size_t *asked = context;
+    (void)error;
+    for (size_t k = 0; k < count; k++) {
+        ck_assert(elements[k] == 1 && tiles[k] == 2);
+        first[k] = sample == 0 ? .02f : .04f;
+    }
+    *asked += count;
+    return LAM_OK;
+}
+
+START_TEST(tiles_that_no_ray_met_are_looked_at) {
+    two_elements s = {.F = {0, 0, 0}};
+    static const build_problem problem = {.n = N, .n_channels = 1, .area = area, .reflectance = reflectance};
+    static const double ground[N] = {.5, .25}, reflects[TILES] = {.1, .1, .1, .1, .1, .1};
+    size_t asked = 0;
+    const judged_sky sky = {.n_tiles = TILES,
+                            .own = s.first[0],
+                            .samples = {s.first[1], s.first[2]},
+                            .pairs = missed_light,
+                            .tiles_context = &asked,
+                            .own_ray = .01,
+                            .ground = ground,
+                            .reflects = reflects};
+    const judge_input input = {.problem = &problem, .group = group, .n_groups = N, .sky = &sky};
+    const double off2 = _i == 0 ? .03 * .03 : pow(.03 - .025, 2), direct2 = .01;
+    tile_errors t;
+    group_errors made = {.n_groups = N};
+    lam_error error = {.message = ""};
+    fill(none, s.first[0]);
+    s.first[0][2 * N + 1] = _i == 0 ? 0 : .025f; /* of the ground alone */
+    ck_ok(tile_errors_begin(&input, &t, &error));
+    ck_ok(tile_errors_aim(&t, &error));
+    ck_assert_uint_eq(asked, 2);
+    ck_ok(tile_errors_finish(&t, direct2, &made, &error));
+    for (size_t tile = 0; tile < TILES; tile++) {
+        double power = 0;
+        for (size_t i = 0; i < N; i++) {
+            const double missed = tile == 2 && i == 1 ? off2 : 0;
+            const double e = direct2 * (double)s.first[0][tile * N + i] + missed;
+            ck_assert_double_eq_tol(made.sky_elements_off[i * TILES + tile], e, 1e-8);
+            ck_assert_double_eq_tol(made.sky_means_off[i * TILES + tile], e, 1e-8);
+            power += pow(area[i] * (double)reflectance[i], 2) * e;
+        }
+        ck_assert_double_eq_tol(made.sky_power_off[tile], power, 1e-8);
+    }
+    tile_errors_free(&t);
+    group_errors_free(&made);
+}
+END_TEST
+
+/* Both elements in one group of area 4: its mean has sum A^2 e / 16, and element 0 a sixteenth of e alone. */
+START_TEST(means_of_tiles_add_up_by_area) {
+    two_elements s = {.F = {0, 0, 0}};
+    static const build_problem problem = {.n = N, .n_channels = 1, .area = area, .reflectance = reflectance};
+    static const uint32_t together[N] = {0, 0};
+    const judged_sky sky = {.n_tiles = TILES, .own = s.first[0], .samples = {s.first[1], s.first[2]}};
+    const judge_input input = {.problem = &problem, .group = together, .n_groups = 1, .sky = &sky};
+    tile_errors t;
+    group_errors made = {.n_groups = 1};
+    lam_error error = {.message = ""};
+    fill(none, s.first[0]);
+    s.first[0][2 * N + 1] = 0;
+    ck_ok(tile_errors_begin(&input, &t, &error));
+    ck_ok(tile_errors_finish(&t, 1, &made, &error));
+    ck_assert_double_eq_tol(made.sky_elements_off[0], (1 + 3 * .25) / 4, 1e-6);
+    ck_assert_double_eq_tol(made.sky_means_off[0], (1 + 9 * .25) / 16, 1e-6);
+    ck_assert_double_eq_tol(made.sky_elements_off[2], 3. / 4, 1e-6);
+    ck_assert_double_eq_tol(made.sky_means_off[2], 3. / 16, 1e-6);
+    tile_errors_free(&t);
+    group_errors_free(&made);
+}
+END_TEST
+
 /* Samples of the first bounce that are off by as much up as down, references of F that are: the figure is
  * that of their mean, and the noise is what each of them, and both, make of it. Twins are
  * off together (x_1 - x_2) / 2; of a disturbed reference the noise of F is a whole distance; of a coarser one
@@ -341,6 +419,8 @@ int main(void) {
     tcase_add_test(tc, noise_counts_by_the_own_share);
     tcase_add_test(tc, tiles_are_judged_by_their_own_rows);
     tcase_add_test(tc, powers_of_tiles);
+    tcase_add_loop_test(tc, tiles_that_no_ray_met_are_looked_at, 0, 2);
+    tcase_add_test(tc, means_of_tiles_add_up_by_area);
     suite_add_tcase(suite, tc);
     return suite_run(suite);
 }
