@@ -52,8 +52,8 @@ lam_status sky_law_begin(const judge_input *input, const group_errors *errors, s
                               .light_mean = first + 5 * n_bins,
                               .direct = first + 6 * n_bins,
                               .direct_mean = first + 7 * n_bins,
-                              .unseen = first + 8 * n_bins,
-                              .unseen_mean = first + 9 * n_bins};
+                              .rare = first + 8 * n_bins,
+                              .rare_mean = first + 9 * n_bins};
     }
     find_means(&s);
     TRY(tile_errors_begin(input, &s.tiles, error));
@@ -83,16 +83,16 @@ static void find_size(const sky_law_sums *s, const float *L, sky_probe *to) {
         to->spread += size.spread;
         const tile_spread power = tile_errors_of_power(&s->tiles, c, L, size.mean);
         to->power_off.seen += power.seen;
-        to->power_off.unseen += power.unseen;
+        to->power_off.rare += power.rare;
         for (size_t bin = 0; bin < s->n_bins; bin++) {
             const size_t g = group_of(s, bin);
             const double rho2 = pow(s->reflectance[c * G + g], 2);
             const tile_spread elements = tile_errors_of_group(&s->tiles, g, false, L, size.mean);
             const tile_spread mean = tile_errors_of_group(&s->tiles, g, true, L, size.mean);
             to->direct[bin] += rho2 * elements.seen;
-            to->unseen[bin] += rho2 * elements.unseen;
+            to->rare[bin] += rho2 * elements.rare;
             to->direct_mean[bin] += rho2 * mean.seen;
-            to->unseen_mean[bin] += rho2 * mean.unseen;
+            to->rare_mean[bin] += rho2 * mean.rare;
         }
     }
 }
@@ -166,8 +166,8 @@ static double bounced2_of(const sky_law_sums *s, size_t bin, bool of_mean) {
 /* D + bounced^2 W of a sky. */
 static double known_of_tiles(const sky_probe *of, size_t bin, bool of_mean, double direct2, double bounced2) {
     const double direct = (of_mean ? of->direct_mean : of->direct)[bin];
-    const double unseen = (of_mean ? of->unseen_mean : of->unseen)[bin];
-    return direct2 * (direct + bounced2 * of->power_off.seen) + unseen + bounced2 * of->power_off.unseen;
+    const double rare = (of_mean ? of->rare_mean : of->rare)[bin];
+    return direct2 * (direct + bounced2 * of->power_off.seen) + rare + bounced2 * of->power_off.rare;
 }
 
 /* Squares of the figures of one bin, of elements or of the mean. */

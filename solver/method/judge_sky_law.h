@@ -11,7 +11,7 @@
  * both D and W in two parts. */
 typedef struct sky_probe {
     double *rms, *rms_least, *mean, *mean_least, *light, *light_mean;
-    double *direct, *direct_mean, *unseen, *unseen_mean;
+    double *direct, *direct_mean, *rare, *rare_mean;
     double spread, power2;
     tile_spread power_off;
 } sky_probe;

@@ -6,6 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Fewer of an element's own rays tell little of the light of a tile: their number varies as that of
+ * independent ones does, by its root, and the errors of tiles that many rays meet say nothing of it. */
+static const double few_rays = 8;
+
 /* Pairs of an element and a tile that rays are aimed at, at most. */
 enum { PAIRS_MOST = 8192 };
 
@@ -52,7 +56,7 @@ lam_status tile_errors_begin(const judge_input *input, tile_errors *out, lam_err
     t.area = memory_allocate(input->n_groups, sizeof *t.area, "errors of skies", error);
     if (t.area == NULL) TRY(LAM_ERR_MEMORY);
     TRY(sums_begin(input, &t.seen, error));
-    TRY(sums_begin(input, &t.unseen, error));
+    TRY(sums_begin(input, &t.rare, error));
     for (size_t i = 0; i < n; i++) t.area[input->group[i]] += input->problem->area[i];
 #pragma omp parallel for schedule(static, 4)
     for (size_t tile = 0; tile < input->sky->n_tiles; tile++)
@@ -69,7 +73,7 @@ done:
 void tile_errors_free(tile_errors *t) {
     free(t->area);
     sums_free(&t->seen);
-    sums_free(&t->unseen);
+    sums_free(&t->rare);
     *t = (tile_errors){.input = NULL};
 }
 
@@ -104,14 +108,14 @@ static double own_light(const judged_sky *sky, size_t n, size_t element, size_t 
     return (double)sky->own[tile * n + element] - ground;
 }
 
-/* The pairs of the largest elements and the tiles that less than one of their own rays met. */
+/* The pairs of the largest elements and the tiles that few of their own rays met. */
 static size_t choose(const judge_input *input, const ranked *of, size_t *elements, size_t *tiles) {
     const judged_sky *sky = input->sky;
     const size_t n = input->problem->n;
     size_t count = 0;
     for (size_t k = 0; k < n && of[k].flux > 0; k++)
         for (size_t t = 0; t < sky->n_tiles; t++) {
-            if (own_light(sky, n, of[k].element, t) >= .5 * sky->own_ray) continue;
+            if (own_light(sky, n, of[k].element, t) >= few_rays * sky->own_ray) continue;
             if (count == PAIRS_MOST) return count;
             elements[count] = of[k].element;
             tiles[count++] = t;
@@ -144,7 +148,7 @@ lam_status tile_errors_aim(tile_errors *t, lam_error *error) {
     for (size_t k = 0; k < count; k++) {
         const double own = (double)sky->own[tiles[k] * n + elements[k]];
         const double off = .5 * ((double)first[0][k] + (double)first[1][k]) - own;
-        add(t, elements[k], tiles[k], off * off, &t->unseen);
+        add(t, elements[k], tiles[k], off * off, &t->rare);
     }
 done:
     free(order);
@@ -160,33 +164,33 @@ tile_spread tile_errors_of_group(const tile_errors *t, size_t group, bool of_mea
     if (t->seen.elements == NULL) return (tile_spread){.seen = 0};
     return (tile_spread){
         weighted_spread(m, (of_mean ? t->seen.means : t->seen.elements) + group * m, L, mean),
-        weighted_spread(m, (of_mean ? t->unseen.means : t->unseen.elements) + group * m, L, mean)};
+        weighted_spread(m, (of_mean ? t->rare.means : t->rare.elements) + group * m, L, mean)};
 }
 
 tile_spread tile_errors_of_power(const tile_errors *t, size_t channel, const float *L, double mean) {
     const size_t m = t->input->sky->n_tiles;
     return (tile_spread){weighted_spread(m, t->seen.power + channel * m, L, mean),
-                         weighted_spread(m, t->unseen.power + channel * m, L, mean)};
+                         weighted_spread(m, t->rare.power + channel * m, L, mean)};
 }
 
-/* [count] of direct^2 seen + unseen; NULL where these are. */
-static lam_status finish(size_t count, const double *seen, const double *unseen, double direct2, double **out,
+/* [count] of direct^2 seen + rare; NULL where these are. */
+static lam_status finish(size_t count, const double *seen, const double *rare, double direct2, double **out,
                          lam_error *error) {
     if (seen == NULL) return LAM_OK;
     *out = memory_allocate(count, sizeof **out, "errors of skies", error);
     if (*out == NULL) return LAM_ERR_MEMORY;
-    for (size_t k = 0; k < count; k++) (*out)[k] = direct2 * seen[k] + unseen[k];
+    for (size_t k = 0; k < count; k++) (*out)[k] = direct2 * seen[k] + rare[k];
     return LAM_OK;
 }
 
 lam_status tile_errors_finish(const tile_errors *t, double direct2, group_errors *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t m = t->input->sky->n_tiles, n_means = t->input->n_groups * m;
-    const tile_sums *seen = &t->seen, *unseen = &t->unseen;
+    const tile_sums *seen = &t->seen, *rare = &t->rare;
     tile_sums made = {.power = NULL};
-    TRY(finish(n_means, seen->elements, unseen->elements, direct2, &made.elements, error));
-    TRY(finish(n_means, seen->means, unseen->means, direct2, &made.means, error));
-    TRY(finish(t->input->problem->n_channels * m, seen->power, unseen->power, direct2, &made.power, error));
+    TRY(finish(n_means, seen->elements, rare->elements, direct2, &made.elements, error));
+    TRY(finish(n_means, seen->means, rare->means, direct2, &made.means, error));
+    TRY(finish(t->input->problem->n_channels * m, seen->power, rare->power, direct2, &made.power, error));
     out->sky_elements_off = made.elements;
     out->sky_means_off = made.means;
     out->sky_power_off = made.power;

@@ -269,9 +269,10 @@ START_TEST(tiles_are_judged_by_their_own_rows) {
 }
 END_TEST
 
-/* Element 1 is the larger one, and none of its own rays met tile 2. Rays that are aimed there find .02 and
- * .04 sr: its error of .03 sr is stated of its group, and (A rho .03)^2 of the power. Of the other tiles
- * direct^2 times what is seen counts. */
+/* Element 1 is the larger one, and none of its own rays met tile 2, or none but those of the ground, or five
+ * more than these. Rays that are aimed there find .02 and .04 sr: the distance from .03 sr is the error of
+ * its group, and that of the power A rho times as much. Of the other tiles direct^2 times what is seen
+ * counts. */
 static lam_status missed_light(void *context, int sample, size_t count, const size_t *elements,
                                const size_t *tiles, float *first, lam_error *error) {
     size_t *asked = context;
@@ -284,7 +285,7 @@ static lam_status missed_light(void *context, int sample, size_t count, const si
     return LAM_OK;
 }
 
-START_TEST(tiles_that_no_ray_met_are_looked_at) {
+START_TEST(tiles_that_few_rays_met_are_looked_at) {
     two_elements s = {.F = {0, 0, 0}};
     static const build_problem problem = {.n = N, .n_channels = 1, .area = area, .reflectance = reflectance};
     static const double ground[N] = {.5, .25}, reflects[TILES] = {.1, .1, .1, .1, .1, .1};
@@ -298,12 +299,13 @@ START_TEST(tiles_that_no_ray_met_are_looked_at) {
                             .ground = ground,
                             .reflects = reflects};
     const judge_input input = {.problem = &problem, .group = group, .n_groups = N, .sky = &sky};
-    const double off2 = _i == 0 ? .03 * .03 : pow(.03 - .025, 2), direct2 = .01;
+    static const float own[] = {0, .025f, .075f};
+    const double off2 = pow(.03 - (double)own[_i], 2), direct2 = .01;
     tile_errors t;
     group_errors made = {.n_groups = N};
     lam_error error = {.message = ""};
     fill(none, s.first[0]);
-    s.first[0][2 * N + 1] = _i == 0 ? 0 : .025f; /* of the ground alone */
+    s.first[0][2 * N + 1] = own[_i];
     ck_ok(tile_errors_begin(&input, &t, &error));
     ck_ok(tile_errors_aim(&t, &error));
     ck_assert_uint_eq(asked, 2);
@@ -419,7 +421,7 @@ int main(void) {
     tcase_add_test(tc, noise_counts_by_the_own_share);
     tcase_add_test(tc, tiles_are_judged_by_their_own_rows);
     tcase_add_test(tc, powers_of_tiles);
-    tcase_add_loop_test(tc, tiles_that_no_ray_met_are_looked_at, 0, 2);
+    tcase_add_loop_test(tc, tiles_that_few_rays_met_are_looked_at, 0, 3);
     tcase_add_test(tc, means_of_tiles_add_up_by_area);
     suite_add_tcase(suite, tc);
     return suite_run(suite);
