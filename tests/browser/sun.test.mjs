@@ -226,6 +226,14 @@ test("far from the edges of shadows the picture stays as it was, and one that is
         return sum;
     }, readFileSync(await file.path()).toString("base64"));
     assert.equal(different, 0);
+    // The page goes on meanwhile; a picture that changes is not saved half of it before and half after.
+    await page.getByLabel("Width in pixels").fill("2100");
+    await page.getByRole("button", { name: "Save PNG" }).click();
+    await page.getByText(/^Drawing, \d+ % …$/).waitFor();
+    await set(page, { exposure: -8 }, {});
+    await page.getByText("The picture was changed while it was drawn; save it again.").waitFor();
+    await finished(page);
+    assert.equal(await page.evaluate(() => window.lambert.stage.uniforms.is_soft.value), true);
     // Textures of a scene are given back when another is opened.
     const textures = async () => {
         await page.evaluate(() => window.lambert.open("high", window.lambert.store.now));

@@ -9,13 +9,16 @@ import type { Panel } from "./panel.ts";
 
 const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indirect: "Indirect light" };
 
+/** What was to be saved is not shown any more. */
+class Changed extends Error {}
+
 export function exportPanel(app: App): Panel {
     const said = make("p", { role: "status", "aria-live": "polite" });
     const tries = (what: () => Promise<string>): void => {
         said.textContent = "Working …";
         what().then((text) => { said.textContent = text; }, (reason: unknown) => {
-            said.textContent = "";
-            app.fail(reason);
+            said.textContent = reason instanceof Changed ? reason.message : "";
+            if (!(reason instanceof Changed)) app.fail(reason);
         });
     };
     const numbers = make("div", {}, make("h2", {}, "Numbers"),
@@ -23,11 +26,11 @@ export function exportPanel(app: App): Panel {
         make("div", { class: "row" }, button("Save CSV", null, () => tries(() => saveCsv(app))), button("Save NPY", null, () => tries(() => saveNpy(app)))));
     return {
         id: "export", title: "Export",
-        element: make("div", {}, picturePart(app, tries), numbers, said, requestPart(app)),
+        element: make("div", {}, picturePart(app, tries, said), numbers, said, requestPart(app)),
     };
 }
 
-function picturePart(app: App, tries: (what: () => Promise<string>) => void): HTMLElement {
+function picturePart(app: App, tries: (what: () => Promise<string>) => void, said: HTMLElement): HTMLElement {
     const size = (label: string, value: number): HTMLInputElement =>
         make("input", { type: "number", class: "narrow", min: 16, max: SIDE_MOST, step: 1, value: String(value), "aria-label": label });
     const width = size("Width in pixels", 1920), height = size("Height in pixels", 1080);
@@ -38,7 +41,11 @@ function picturePart(app: App, tries: (what: () => Promise<string>) => void): HT
             if (!(side >= 16 && side <= SIDE_MOST)) return `A side of the picture has 16 to ${SIDE_MOST} pixels.`;
         // A large picture takes seconds without a graphics card; the word on it is to be seen before.
         await new Promise((resolve) => { setTimeout(resolve, 50); });
-        const { compare } = app.store.now, canvas = snapshot(app.stage, w, h, compare?.split ?? 0.5);
+        const { store: { now }, fields } = app, [a, b] = fields;
+        const canvas = await snapshot(app.stage, w, h, now.compare?.split ?? 0.5, (share) => {
+            if (app.store.now !== now || app.fields[0] !== a || app.fields[1] !== b) throw new Changed("The picture was changed while it was drawn; save it again.");
+            said.textContent = `Drawing, ${Math.round(100 * share)} % …`;
+        });
         const colours = legendOf(app);
         if (colours !== null && (legend.querySelector("input") as HTMLInputElement).checked) drawLegend(canvas, colours);
         const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, "image/png"));

@@ -1,4 +1,5 @@
 // The picture at any size: drawn in parts that every graphics card can hold, put together on a canvas, with a legend.
+import { Vector2 } from "three";
 import { changeColour } from "./changes.ts";
 import { toHex } from "../base/colour.ts";
 import { tell } from "../base/numbers.ts";
@@ -18,31 +19,32 @@ export interface Legend extends Axis {
     palette: Palette | "change";
 }
 
-/** Draws what the stage shows at this size; the stage has its own size again afterwards. `split` is the share of the width
- * that is left of the line of a comparison. */
-export function snapshot(stage: Stage, width: number, height: number, split: number): HTMLCanvasElement {
+/** After so many steps a part waits for the graphics card. */
+const STEPS = 8;
+
+/** Draws what the stage shows at this size, while the page goes on. `split` is the share of the width that is left of the line of a
+ * comparison. `step` is told now and then how much is drawn, from 0 to 1; what it throws ends the drawing. */
+export async function snapshot(stage: Stage, width: number, height: number, split: number, step: (share: number) => void): Promise<HTMLCanvasElement> {
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = [width, height];
     const context = canvas.getContext("2d");
     if (context === null) throw new Error(`the browser makes no picture of ${width} × ${height} pixels`);
-    const { renderer, camera, uniforms } = stage, hovered: unknown = uniforms.hovered.value;
-    uniforms.hovered.value = -1;
-    renderer.setPixelRatio(1);
+    const camera = stage.camera.clone(), release = stage.hold();
     try {
         for (let y = 0; y < height; y += PART)
             for (let x = 0; x < width; x += PART) {
-                const [w, h] = [Math.min(PART, width - x), Math.min(PART, height - y)];
-                renderer.setSize(w, h, false);
+                const size = new Vector2(Math.min(PART, width - x), Math.min(PART, height - y));
                 // This sets the camera's aspect, too.
-                camera.setViewOffset(width, height, x, y, w, h);
-                uniforms.split.value = split * width - x;
-                stage.drawFinished();
-                context.drawImage(renderer.domElement, x, y);
+                camera.setViewOffset(width, height, x, y, size.x, size.y);
+                for (let k = 1; stage.improve(camera, size); k++) {
+                    if (k % STEPS > 0) continue;
+                    await stage.caughtUp();
+                    step((y * width + Math.min(height - y, PART) * x) / (width * height));
+                }
+                stage.drawOther(camera, size, split * width - x, (drawn) => context.drawImage(drawn, x, y));
             }
     } finally {
-        camera.clearViewOffset();
-        uniforms.hovered.value = hovered;
-        stage.resize();
+        release();
     }
     return canvas;
 }

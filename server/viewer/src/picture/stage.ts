@@ -64,6 +64,7 @@ export class Stage {
     private look: Look | null = null;
     private sunlight: Sunlight | null = null;
     private restTimer = 0;
+    private isHeld = false;
 
     constructor(readonly canvas: HTMLCanvasElement, readonly camera: PerspectiveCamera,
         /** Moves the camera; true if it goes on moving. */
@@ -243,32 +244,65 @@ export class Stage {
         requestAnimationFrame((time) => this.frame(time));
     }
 
-    /** Draws at once, at another size if one is given; for a picture that is saved. */
-    draw(width?: number, height?: number): void {
-        if (width !== undefined && height !== undefined) {
-            this.renderer.setPixelRatio(1);
-            this.renderer.setSize(width, height, false);
-            this.camera.aspect = width / height;
-            this.camera.updateProjectionMatrix();
-            this.placeSplit();
-        }
+    /** Draws at once. */
+    draw(camera = this.camera): void {
         if (this.nodesAreOld && this.nodes !== null && this.uniforms.is_smooth.value === true) {
             this.nodesAreOld = false;
             this.renderer.setRenderTarget(this.nodes);
             this.renderer.render(this.nodesScene, this.nodesCamera);
             this.renderer.setRenderTarget(null);
         }
-        this.sun?.prepare(this.camera);
-        this.renderer.render(this.scene, this.camera);
+        this.sun?.prepare(camera, this.renderer.getDrawingBufferSize(new Vector2()));
+        this.renderer.render(this.scene, camera);
         this.frames += 1;
     }
 
     /** Draws at once with all that pictures get while they stand still. */
     drawFinished(): void {
-        const { sun, camera } = this;
-        sun?.prepare(camera);
-        while (sun?.hasMore === true) sun.refine(camera);
+        while (this.improve(this.camera, this.renderer.getDrawingBufferSize(new Vector2())));
         this.draw();
+    }
+
+    /** Makes the next picture of this camera and size, in pixels, better; true while that can be done again. */
+    improve(camera: PerspectiveCamera, size: Vector2): boolean {
+        const { sun } = this;
+        sun?.prepare(camera, size);
+        if (sun?.hasMore === true) sun.refine(camera);
+        return sun?.hasMore === true;
+    }
+
+    /** Draws a picture of another camera and size, whose first pixel is that many pixels left of the split, and hands it over; the page shows its own. */
+    drawOther(camera: PerspectiveCamera, size: Vector2, split: number, take: (drawn: HTMLCanvasElement) => void): void {
+        const { renderer, uniforms } = this, hovered: unknown = uniforms.hovered.value;
+        uniforms.hovered.value = -1;
+        renderer.setPixelRatio(1);
+        renderer.setSize(size.x, size.y, false);
+        uniforms.split.value = split;
+        this.draw(camera);
+        take(renderer.domElement);
+        uniforms.hovered.value = hovered;
+        this.resize();
+        this.draw();
+    }
+
+    /** Frames wait until the function that it returns is called. */
+    hold(): () => void {
+        this.isHeld = true;
+        return () => {
+            this.isHeld = false;
+            this.invalidate();
+        };
+    }
+
+    /** Waits until the graphics card has done what it was told to. */
+    async caughtUp(): Promise<void> {
+        const gl = this.renderer.getContext() as WebGL2RenderingContext, fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+        gl.flush();
+        do {
+            if (fence === null || gl.isContextLost()) throw new Error("the graphics card has lost the picture");
+            await new Promise((resolve) => { setTimeout(resolve, 5); });
+        } while (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED);
+        gl.deleteSync(fence);
     }
 
     /** True if the next picture is the same, where nothing changes. */
@@ -300,6 +334,7 @@ export class Stage {
 
     private frame(time: number): void {
         this.wanted = false;
+        if (this.isHeld) return;
         const seconds = Math.min(0.1, (time - this.lastTime) / 1000);
         this.lastTime = time;
         const goesOn = this.advance(seconds);
@@ -312,7 +347,7 @@ export class Stage {
     /** Makes the next picture of a view that stood still a better one. */
     private refine(): void {
         const { sun, camera } = this;
-        if (sun === null || sun.restLeft > 0 || !sun.isOf(camera)) return;
+        if (sun === null || sun.restLeft > 0 || !sun.isOf(camera, this.renderer.getDrawingBufferSize(new Vector2()))) return;
         for (let k = 0; k < POINTS_AT_ONCE && sun.hasMore; k++) sun.refine(camera);
     }
 

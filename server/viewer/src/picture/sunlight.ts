@@ -168,13 +168,13 @@ export class Sunlight {
         return Math.max(0, this.changed + REST_MS - performance.now());
     }
 
-    /** Makes ready for a picture of this camera: of all points so far, or by the middle of the disc. */
-    prepare(camera: Camera): void {
+    /** Makes ready for a picture of this camera, of so many pixels: of all points so far, or by the middle of the disc. */
+    prepare(camera: Camera, size: Vector2): void {
         const u = this.uniforms;
-        if (!this.isOf(camera)) {
+        if (!this.isOf(camera, size)) {
             this.begin();
             this.view.copy(viewOf(camera));
-            this.renderer.getDrawingBufferSize(this.size);
+            this.size.copy(size);
         }
         if (this.count === 0) this.map(u.sun_direction.value as Vector3);
         u.is_soft.value = this.count > 0;
@@ -204,8 +204,8 @@ export class Sunlight {
     }
 
     /** True where the view and its size are those that were prepared for. */
-    isOf(camera: Camera): boolean {
-        return viewOf(camera).equals(this.view) && this.renderer.getDrawingBufferSize(new Vector2()).equals(this.size);
+    isOf(camera: Camera, size: Vector2): boolean {
+        return viewOf(camera).equals(this.view) && size.equals(this.size);
     }
 
     private map(point: Vector3): void {
