@@ -116,13 +116,14 @@ for (const [up, hours] of [["z", [9.5, 12, 15]], ["y", [15]], ["x", [15]]]) test
 /** Waits, however long it takes a machine, until pictures get no better. */
 const finished = (page) => page.evaluate(async () => { while (!window.lambert.stage.isFinished) await new Promise(requestAnimationFrame); });
 
-/** Linear values of red at points given in shares of the picture, which is drawn as it is by now. */
-const lightAt = (page, places) => page.evaluate((all) => {
+/** Linear values of red at points given in shares of the picture, which is drawn as it is by now, or begun anew. */
+const lightAt = (page, places, isNew) => page.evaluate(([all, anew]) => {
     const { stage } = window.lambert, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight], bytes = new Uint8Array(4 * w * h);
+    if (anew) stage.invalidate();
     stage.draw();
     gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
     return all.map(([x, y]) => bytes[4 * (Math.floor((1 - y) * h) * w + Math.floor(x * w))] / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
-}, places);
+}, [places, isNew]);
 
 /** Shadow of the high plate: its offset, and half the width of half-shadows across edges to the east (0) and to the north (1). A point of the
  * plate above m·x = 0 has its shadow of s + δ, δ across s and |δ| ≤ SUN, at −h (s + δ)·m / (s + δ)·up; the largest change of that is
@@ -161,17 +162,19 @@ test("a half-shadow is as wide as the sun's disc makes it", async () => {
         const t = Array.from({ length: 2 * n + 1 }, (_, k) => (k - n) * step);
         lines.push({ step, t, half: half[axis], places: await seenAt(page, "z", t.map(at)) });
     }
-    const profiles = () => Promise.all(lines.map(async ({ places, t, step }) => {
-        const light = await lightAt(page, places), shares = light.map((v) => (v - light.at(-1)) / (light[0] - light.at(-1)));
+    // Of both lines from one picture: the page goes on with it while a test asks.
+    const profiles = async (isNew) => (await lightAt(page, lines.flatMap(({ places }) => places), isNew)).reduce((all, v, k) => {
+        all[k < lines[0].places.length ? 0 : 1].push(v);
+        return all;
+    }, [[], []]).map((light, axis) => {
+        const { t, step } = lines[axis], shares = light.map((v) => (v - light.at(-1)) / (light[0] - light.at(-1)));
         const where = (level) => { const k = shares.findIndex((v) => v < level); return t[k - 1] + (step * (shares[k - 1] - level)) / (shares[k - 1] - shares[k]); };
         return { shares, middle: where(0.5), width: where(0.1) - where(0.9) };
-    }));
+    });
     // The first picture has the middle of the disc alone.
-    assert.equal(await page.evaluate(() => window.lambert.stage.uniforms.is_soft.value), false);
-    const sharp = await profiles();
-    await page.evaluate(() => window.lambert.stage.invalidate());
+    const sharp = await profiles(true);
     await finished(page);
-    const soft = await profiles();
+    const soft = await profiles(false);
     lines.forEach(({ step, t, half: radius }, axis) => {
         // From a tenth to nine tenths of the disc are 0.687 of its radius to either side.
         const { shares, width, middle } = soft[axis], wanted = 2 * 0.687 * radius, off = Math.max(...shares.map((v, k) => Math.abs(v - shareOfDisc((middle - t[k]) / radius))));
