@@ -6,6 +6,9 @@ import { Daemon, inFolder, lambert, near, openPage, pixel, settled, sourceOf, to
 
 const RHO = 0.5, PARTS = 20;
 
+/** Without a graphics card each point of the sun takes time by the pixel. */
+const SMALL = { width: 900, height: 600 };
+
 /** Of a point (east, north, up) the axes of a store, as solver/daylight/sky_tiles.h has them, and those of the picture. */
 const AXES = {
     z: [([e, n, u]) => [e, n, u], ([e, n, u]) => [e, u, -n]], y: [([e, n, u]) => [e, u, -n], ([e, n, u]) => [e, u, -n]], x: [([e, n, u]) => [u, e, n], ([e, n, u]) => [-e, u, n]],
@@ -67,7 +70,7 @@ const seenAt = (page, up, points) => page.evaluate((all) => {
 }, points.map(AXES[up][1]));
 
 async function openFromAbove(up) {
-    const page = await openPage(daemon.address);
+    const page = await openPage(daemon.address, SMALL);
     await page.evaluate((name) => window.lambert.open(name, null), up);
     await settled(page);
     await page.evaluate((place) => {
@@ -136,7 +139,7 @@ function shadowOf([east, north, up]) {
 const shareOfDisc = (x) => (Math.abs(x) >= 1 ? Number(x > 0) : 0.5 + (x * Math.sqrt(1 - x * x) + Math.asin(x)) / Math.PI);
 
 async function openHigh(hour) {
-    const page = await openPage(daemon.address, { width: 900, height: 600 }), source = new daylight.SkySource();
+    const page = await openPage(daemon.address, SMALL), source = new daylight.SkySource();
     source.take(await daemon.json("/v1/scenes/high/sky"));
     await page.evaluate(() => window.lambert.open("high", null));
     await set(page, { smooth: false, tone: "linear", exposure: -9, sharpSun: true }, { ...LIGHT, sun: "spread", hour });
