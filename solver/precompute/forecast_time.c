@@ -56,6 +56,9 @@ static const double probes_expected = 48;
 /* Processor seconds of a probe, per block and per element, with its direct light: of three Cornell boxes
  * (10,249 to 163,811 elements), rooms, a maze and a patio, what the judge takes beside finding its blocks. */
 static const double probe_block_seconds = 9e-9, probe_element_seconds = 3e-7;
+/* The numbers of more elements than these lie in memory, not in caches: what a judge by blocks takes more for
+ * an element, each time that they are twice as many (Cornell boxes of 655,418 and 2,620,549 elements). */
+static const double cached_elements = 163811, uncached_seconds = 3.5e-6;
 
 /* A guide of two solutions gives some eight answers, with vectors and direct light; seconds of an element for
  * all of them, where the method does not tell of its answers. */
@@ -98,7 +101,8 @@ static double solve_seconds(const forecast *f) {
     const double probes = (f->probes_least > 0 ? fmin(most, probes_expected) : most) + others;
     if (f->recipe.method == RECIPE_BLOCKS)
         return (double)f->n_channels * probes *
-               (probe_block_seconds * blocks_of(f, &f->judge_recipe) + probe_element_seconds * n);
+                   (probe_block_seconds * blocks_of(f, &f->judge_recipe) + probe_element_seconds * n) +
+               uncached_seconds * n * fmax(0, log2(n / cached_elements));
     const double own = f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->recipe) / 8;
     const double entries = f->cost.entries > 0 ? own : forecast_rows_bytes(n, &f->judge_recipe) / 8;
     return (double)f->n_channels * (reference_seconds(n, own, fmin(probes, (double)judge_at_once(f->n))) +
