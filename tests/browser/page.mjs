@@ -134,7 +134,7 @@ export async function openPage(address, { width = 1280, height = 800, hash = "",
 
 /** Waits until all that was asked for is shown and drawn. */
 export async function settled(page) {
-    await page.waitForFunction(() => window.lambert?.answers > 0 && window.lambert.isIdle);
+    await page.waitForFunction(() => window.lambert?.answers > 0 && window.lambert.opening.loading === null && window.lambert.isIdle);
     await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 
