@@ -4,7 +4,7 @@
 #include "solver/formfactor/pairs/few_occluders.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/pairs/shadow_cut.h"
-#include "support/plates.h"
+#include "support/plates_pair.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -18,15 +18,6 @@ enum { CUT_SCENES = 1, HOLES_FIRST = 6, HOLES_LAST = 9, SEEN_FIRST = 6, SEEN_LAS
 #else
 enum { CUT_SCENES = 4, HOLES_FIRST = 0, HOLES_LAST = 15, SEEN_FIRST = 3, SEEN_LAST = 9 };
 #endif
-
-/* A pair and the occluders between, by hand. */
-typedef struct setting {
-    mesh m;
-    visibility *v;
-    polygon a, b;
-    occluders occluders;
-    link_occluders all;
-} setting;
 
 static double unit(uint64_t *state) {
     return random_lcg_unit(state);
@@ -53,25 +44,6 @@ static void add_random_occluder(mesh *m, uint64_t *state) {
     }
     mesh_add_quad(m, (const double(*)[3])corner);
     if (unit(state) < .4) m->elements[m->n - 1][3] = MESH_NO_VERTEX;
-}
-
-static void setting_open(setting *s, mesh m) {
-    lam_error error = {0};
-    s->m = m;
-    ck_assert_msg(visibility_create(&s->m, &s->v, &error) == LAM_OK, "%s", error.message);
-    ck_assert(occluders_make(&s->m, visibility_facets(s->v), visibility_rounding(s->v), &s->occluders,
-                             &error) == LAM_OK);
-    polygon_of_element(&s->m, 0, &s->a);
-    polygon_of_element(&s->m, 1, &s->b);
-    s->all.count = 0;
-    ck_assert_uint_le(s->occluders.n, LINK_OCCLUDERS_MOST);
-    for (size_t k = 0; k < s->occluders.n; k++) s->all.of[s->all.count++] = (uint32_t)k;
-}
-
-static void setting_close(setting *s) {
-    occluders_free(&s->occluders);
-    visibility_destroy(s->v);
-    mesh_free(&s->m);
 }
 
 /* Brute force: does the segment cross the occluder? By the signs of volumes of tetrahedra, not by planes. */
@@ -137,24 +109,16 @@ START_TEST(cut_is_brute_subdivision) {
     uint64_t state = 11 + (uint64_t)_i;
     size_t partial = 0;
     for (int trial = 0; trial < 12; trial++) {
-        setting s;
-        pair_occluders among = {.count = 0};
+        plates_pair s;
+        link_occluders all = {.count = 0};
         const size_t count = 1 + (size_t)(unit(&state) * UNCUT_OCCLUDERS_MOST);
         mesh m = plates(NULL);
         for (size_t k = 0; k < count; k++) add_random_occluder(&m, &state);
-        lam_error error = {0};
-        free(m.area);
-        free(m.normal);
-        m.area = NULL;
-        m.normal = NULL;
-        ck_assert_msg(mesh_measure(&m, &error) == LAM_OK, "%s", error.message);
-        setting_open(&s, m);
-        /* Without the plates, which block nothing. */
-        for (size_t k = 0; k < s.occluders.n; k++)
-            if (s.occluders.of[k].facet >= 2 && among.count < UNCUT_OCCLUDERS_MOST)
-                among.of[among.count++] = (uint32_t)k;
+        plates_pair_open(&s, m);
+        ck_assert_uint_le(s.occluders.n, LINK_OCCLUDERS_MOST);
+        for (size_t k = 0; k < s.occluders.n; k++) all.of[all.count++] = (uint32_t)k;
         const projection p = {.occluders = &s.occluders};
-        const projected_pair pair = {0, 1, &s.a, &s.b, &among, 0};
+        const projected_pair pair = {0, 1, &s.a, &s.b, &s.among, 0};
         for (int point = 0; point < 4; point++) {
             const double x[3] = {unit(&state), unit(&state), 0}, up[3] = {0, 0, 1};
             double full, unsure;
@@ -169,13 +133,13 @@ START_TEST(cut_is_brute_subdivision) {
             /* Occluders that planes throw out block nothing. */
             pair_occluders left;
             const uint32_t none[2] = {MESH_NO_VERTEX - 1, MESH_NO_VERTEX - 1};
-            pair_occluders_find(&s.occluders, &s.all, &s.a, &s.b, none, &left);
+            pair_occluders_find(&s.occluders, &all, &s.a, &s.b, none, &left);
             ck_assert_int_ne(left.count, OCCLUDERS_UNCOUNTED);
             const projected_pair sifted = {0, 1, &s.a, &s.b, &left, 0};
             const double again = left.hidden ? 0 : projection_point_factor(&p, &sifted, x, up, NULL);
             ck_assert_double_eq_tol(again, found, 1e-9);
         }
-        setting_close(&s);
+        plates_pair_close(&s);
     }
     ck_assert_uint_gt(partial, 8);
 }
