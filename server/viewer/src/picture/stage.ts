@@ -53,6 +53,7 @@ export class Stage {
     private readonly scene = new Scene();
     private readonly nodesScene = new Scene();
     private readonly nodesCamera = new OrthographicCamera();
+    private readonly nodesPlane: Mesh<PlaneGeometry, RawShaderMaterial>;
     private values: [HalfTexture, HalfTexture] | null = null;
     private nodes: WebGLRenderTarget | null = null;
     private nodesAreOld = false;
@@ -72,9 +73,10 @@ export class Stage {
         this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: false });
         this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
         this.uniforms = makeUniforms(this.nothing);
-        const plane = new Mesh(new PlaneGeometry(2, 2), nodesMaterial(this.uniforms));
-        plane.frustumCulled = false;
-        this.nodesScene.add(plane);
+        this.nodesPlane = new Mesh(new PlaneGeometry(2, 2), nodesMaterial(this.uniforms));
+        this.nodesPlane.frustumCulled = false;
+        this.nodesScene.add(this.nodesPlane);
+        canvas.addEventListener("webglcontextlost", () => this.release());
         canvas.addEventListener("webglcontextrestored", () => { this.nodesAreOld = true; this.sunlight?.lose(); this.invalidate(); });
         new ResizeObserver(() => this.resize()).observe(canvas.parentElement as HTMLElement);
     }
@@ -246,6 +248,7 @@ export class Stage {
 
     /** Draws at once. */
     draw(camera = this.camera): void {
+        if (this.isLost) return;
         if (this.nodesAreOld && this.nodes !== null && this.uniforms.is_smooth.value === true) {
             this.nodesAreOld = false;
             this.renderer.setRenderTarget(this.nodes);
@@ -265,6 +268,7 @@ export class Stage {
 
     /** Makes the next picture of this camera and size, in pixels, better; true while that can be done again. */
     improve(camera: PerspectiveCamera, size: Vector2): boolean {
+        if (this.isLost) return false;
         const { sun } = this;
         sun?.prepare(camera, size);
         if (sun?.hasMore === true) sun.refine(camera);
@@ -310,6 +314,11 @@ export class Stage {
         return !this.wanted && this.restTimer === 0;
     }
 
+    /** The graphics card has lost the picture: until it is back nothing is made on it. */
+    private get isLost(): boolean {
+        return this.renderer.getContext().isContextLost();
+    }
+
     /** The light of the sun, where it is drawn. */
     private get sun(): Sunlight | null {
         return this.uniforms.is_sunny.value === true ? this.sunlight : null;
@@ -334,7 +343,7 @@ export class Stage {
 
     private frame(time: number): void {
         this.wanted = false;
-        if (this.isHeld) return;
+        if (this.isHeld || this.isLost) return;
         const seconds = Math.min(0.1, (time - this.lastTime) / 1000);
         this.lastTime = time;
         const goesOn = this.advance(seconds);
@@ -361,6 +370,15 @@ export class Stage {
             this.restTimer = 0;
             this.request();
         }, sun.restLeft);
+    }
+
+    /** Gives back all that the graphics card had, which has lost it: what is given back later is deleted from a context that it is
+     * not of, an error. The next picture makes it anew. */
+    private release(): void {
+        const { body, geometry, nodes, nodesPlane, uniforms, white, images, sunlight } = this;
+        const materials = (body?.material ?? []) as RawShaderMaterial[], textures = Object.values(uniforms).map(({ value }) => value as { dispose?: () => void } | null);
+        for (const one of [...materials, ...textures, geometry, nodes, nodesPlane.geometry, nodesPlane.material, white, ...images]) one?.dispose?.();
+        sunlight?.release();
     }
 
     private clear(): void {

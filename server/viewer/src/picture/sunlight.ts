@@ -147,6 +147,13 @@ export class Sunlight {
         for (const one of [this.places, ...this.sums]) one.setSize(1, 1);
     }
 
+    /** Gives back all that the graphics card has; the next picture makes it anew. */
+    release(): void {
+        this.shadow.dispose();
+        for (const name of ["normals", "reflectances"]) (this.uniforms[name].value as Texture).dispose();
+        for (const one of [this.places, ...this.sums, this.plane.geometry, this.plane.material, this.body.material as RawShaderMaterial]) one.dispose();
+    }
+
     /** The graphics card has lost all that was drawn. */
     lose(): void {
         this.mapped = null;
@@ -232,10 +239,8 @@ export class Sunlight {
     }
 
     dispose(): void {
-        this.shadow.dispose();
+        this.release();
         // Textures that uniforms still name would be made anew by the next picture.
-        for (const name of ["normals", "reflectances"]) (this.uniforms[name].value as Texture).dispose();
         for (const name of ["sun_depth", "sun_places", "sun_sum", "normals", "reflectances"]) this.uniforms[name].value = this.nothing;
-        for (const one of [this.places, ...this.sums, this.plane.geometry, this.plane.material, this.body.material as RawShaderMaterial]) one.dispose();
     }
 }
