@@ -8,6 +8,15 @@
 typedef double lanes __attribute__((vector_size(8 * AFFINE_SEGMENTS), may_alias));
 typedef long long mask __attribute__((vector_size(8 * AFFINE_SEGMENTS), may_alias));
 typedef float floats __attribute__((vector_size(4 * AFFINE_SEGMENTS), may_alias));
+typedef signed char lane_bytes __attribute__((vector_size(AFFINE_SEGMENTS)));
+
+/* The bits of lanes that are -1, not 0: byte k keeps bit k, and the product adds all bytes. */
+static inline __attribute__((always_inline)) unsigned bits_of(mask m) {
+    const lane_bytes signs = __builtin_convertvector(m, lane_bytes);
+    uint64_t bytes;
+    memcpy(&bytes, &signs, sizeof bytes);
+    return (unsigned)((bytes & 0x8040201008040201u) * 0x0101010101010101u >> 56);
+}
 
 /* Twice the area of the triangle at a corner of a quad. */
 static double area_at(const polygon *p, int corner) {
@@ -40,12 +49,12 @@ affine_map affine_map_of(const polygon *p) {
 #define CPU_KERNELS "solver/formfactor/pairs/affine_segments_kernels.inc"
 #include "solver/base/cpu_kernels.inc"
 
-void affine_segments(const affine_pair *p, const double x[4][AFFINE_SEGMENTS], const double centre[3],
-                     float origin[3][AFFINE_SEGMENTS], float direction[3][AFFINE_SEGMENTS],
-                     double K[AFFINE_SEGMENTS]) {
-    typedef void kernel(const affine_pair *, const double[4][AFFINE_SEGMENTS], const double[3],
-                        float[3][AFFINE_SEGMENTS], float[3][AFFINE_SEGMENTS], double[AFFINE_SEGMENTS]);
+unsigned affine_segments(const affine_pair *p, const double x[4][AFFINE_SEGMENTS], const double centre[3],
+                         float origin[3][AFFINE_SEGMENTS], float direction[3][AFFINE_SEGMENTS],
+                         double K[AFFINE_SEGMENTS]) {
+    typedef unsigned kernel(const affine_pair *, const double[4][AFFINE_SEGMENTS], const double[3],
+                            float[3][AFFINE_SEGMENTS], float[3][AFFINE_SEGMENTS], double[AFFINE_SEGMENTS]);
     static kernel *const table[] =
         CPU_TABLE(affine_segments_portable, affine_segments_avx2, affine_segments_avx512);
-    table[cpu_best()](p, x, centre, origin, direction, K);
+    return table[cpu_best()](p, x, centre, origin, direction, K);
 }

@@ -24,9 +24,9 @@ typedef struct affine_pair {
 
 /* The segments from (x[0], x[1]) of the one to (x[2], x[3]) of the other map: origin, relative to centre, and
  * direction in single precision; K = cos cos' / r^2 of each, times both Jacobians, 0 behind either polygon. K
- * leaves out the areas, so that only ratios of it count. */
-void affine_segments(const affine_pair *p, const double x[4][AFFINE_SEGMENTS], const double centre[3],
-                     float origin[3][AFFINE_SEGMENTS], float direction[3][AFFINE_SEGMENTS],
-                     double K[AFFINE_SEGMENTS]);
+ * leaves out the areas, so that only ratios of it count. Returns the bits of those in front of both. */
+unsigned affine_segments(const affine_pair *p, const double x[4][AFFINE_SEGMENTS], const double centre[3],
+                         float origin[3][AFFINE_SEGMENTS], float direction[3][AFFINE_SEGMENTS],
+                         double K[AFFINE_SEGMENTS]);
 
 #endif

@@ -52,7 +52,7 @@ bool few_occluders_pay(const few_occluders *f, const cluster_tree *t, const clus
 }
 
 bool few_occluders_are_listed(const few_occluders *f, const cluster_tree *t, const cluster_links *links) {
-    return f->most > 0 && f->occluders.n > 0 && are_mostly_few(f, t, links, LINK_OCCLUDERS_MOST);
+    return f->most > 0 && f->occluders.n > 0 && are_mostly_few(f, t, links, TESTED_OCCLUDERS_MOST);
 }
 
 double few_occluders_tolerance(const few_occluders *f, uint32_t i, uint32_t j, double g, double accuracy) {

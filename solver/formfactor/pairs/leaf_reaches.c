@@ -48,8 +48,8 @@ reach *leaf_reaches_at(leaf_reaches *r, uint32_t position) {
     return &r->reaches[low];
 }
 
-const link_occluders *leaf_reaches_among(const cluster_tree *t, const occluders *o, int most, leaf_reaches *r,
-                                         reach *partner) {
+link_occluders *leaf_reaches_among(const cluster_tree *t, const occluders *o, int most, leaf_reaches *r,
+                                   reach *partner) {
     if (!partner->searched) {
         const cluster *a = &t->clusters[r->leaf], *b = &t->clusters[partner->cluster];
         shaft s;

@@ -33,7 +33,7 @@ reach *leaf_reaches_at(leaf_reaches *r, uint32_t position);
 
 /* The occluders between the leaf and a partner, up to `most`, searched for at the first call. Valid until the
  * next call; NULL: out of memory. */
-const link_occluders *leaf_reaches_among(const cluster_tree *t, const occluders *o, int most, leaf_reaches *r,
-                                         reach *partner);
+link_occluders *leaf_reaches_among(const cluster_tree *t, const occluders *o, int most, leaf_reaches *r,
+                                   reach *partner);
 
 #endif

@@ -7,7 +7,7 @@
 
 /* Occluders that may stand between two clusters, at most. Where more than asked for are between, count is
  * OCCLUDERS_UNCOUNTED. */
-enum { LINK_OCCLUDERS_MOST = 128, FEW_OCCLUDERS = 256 };
+enum { LINK_OCCLUDERS_MOST = 512, TESTED_OCCLUDERS_MOST = 128, FEW_OCCLUDERS = 256 };
 enum { OCCLUDERS_UNCOUNTED = -1 };
 typedef struct link_occluders {
     int count;

@@ -63,58 +63,86 @@ static void segment_set(segment_bundle *s, const occlusion *o, int k, uint32_t i
 typedef struct piece_pair {
     uint32_t i, j;
     const polygon *a, *b;
-    const segment_list *among; /* see occlusion_estimate */
+    segment_list *among; /* see occlusion_estimate */
+    bool lifts;          /* both ends, above the planes of the elements */
     affine_pair maps;
     pair_sampler sampler;
 } piece_pair;
 
-static piece_pair piece_pair_of(uint64_t seed, const segment_list *among, uint32_t i, const polygon *a,
-                                uint32_t j, const polygon *b) {
+static piece_pair piece_pair_of(uint64_t seed, segment_list *among, uint32_t i, const polygon *a, uint32_t j,
+                                const polygon *b) {
     piece_pair two = {.i = i, .j = j, .a = a, .b = b, .among = among};
     two.maps = (affine_pair){affine_map_of(a), affine_map_of(b)};
     pair_sampler_init(&two.sampler, seed, i, j);
     return two;
 }
 
-static void segments_of(segment_bundle *s, const occlusion *o, const piece_pair *two, size_t first) {
+/* Sets segments first ... first+7 and their kernels; returns which lie in front of both pieces. */
+static unsigned segments_of(const occlusion *o, const piece_pair *two, size_t first, ray_packet *s,
+                            double kernel[VISIBILITY_PACKET]) {
     double x[4][VISIBILITY_PACKET];
     pair_sampler_packet(&two->sampler, (uint32_t)first, x);
-    affine_segments(&two->maps, x, visibility_centre(o->v), s->segments.origin, s->segments.direction,
-                    s->kernel);
-    for (int k = 0; k < VISIBILITY_PACKET; k++) {
-        s->from[k] = two->i;
-        s->to[k] = two->j;
+    return affine_segments(&two->maps, x, visibility_centre(o->v), s->origin, s->direction, kernel);
+}
+
+/* As visibility_blocked does, so that no occluder in the plane of either piece blocks a segment. */
+static void lift(const occlusion *o, const piece_pair *two, ray_packet *s) {
+    const double height = 2 * visibility_rounding(o->v);
+    for (int d = 0; d < 3; d++) {
+        const float from = (float)(height * two->a->normal[d]), to = (float)(height * two->b->normal[d]);
+        for (int k = 0; k < VISIBILITY_PACKET; k++) {
+            s->origin[d][k] += from;
+            s->direction[d][k] += to - from;
+        }
     }
 }
 
-/* Casts segments first ... first+7; returns which are blocked. */
-static unsigned cast(const occlusion *o, const piece_pair *two, size_t first,
-                     double kernel[VISIBILITY_PACKET]) {
-    segment_bundle s;
-    segments_of(&s, o, two, first);
-    memcpy(kernel, s.kernel, sizeof s.kernel);
-    if (two->among != NULL) return segment_occluders_block(o->occluders, two->among, &s.segments);
-    return visibility_blocked(o->v, &s.segments, VISIBILITY_PACKET, s.from, s.to);
+/* The segments of some packets that were cast. Those behind either piece have the kernel 0 and no bit. */
+typedef struct cast_segments {
+    double kernel[SEGMENT_PACKETS][VISIBILITY_PACKET];
+    unsigned facing[SEGMENT_PACKETS], blocked[SEGMENT_PACKETS];
+} cast_segments;
+
+/* Casts as many packets, from segment `first` on. */
+static void cast(const occlusion *o, const piece_pair *two, size_t first, int packets, cast_segments *out) {
+    ray_packet s[SEGMENT_PACKETS];
+    for (int p = 0; p < packets; p++) {
+        out->facing[p] = segments_of(o, two, first + (size_t)p * VISIBILITY_PACKET, &s[p], out->kernel[p]);
+        out->blocked[p] = ~out->facing[p];
+        if (two->lifts) lift(o, two, &s[p]);
+    }
+    if (two->among != NULL) {
+        segment_occluders_block(o->occluders, two->among, s, packets, out->blocked);
+        return;
+    }
+    uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET];
+    for (int k = 0; k < VISIBILITY_PACKET; k++) {
+        from[k] = two->i;
+        to[k] = two->j;
+    }
+    for (int p = 0; p < packets; p++)
+        out->blocked[p] = visibility_blocked(o->v, &s[p], VISIBILITY_PACKET, from, to);
 }
 
 bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double g) {
     return segments_for(o, factor_of(o, i, j, g), o->accuracy) <= VISIBILITY_PACKET;
 }
 
-occlusion_verdict occlusion_test(const occlusion *o, uint32_t i, uint32_t j, double g, double *seen) {
+occlusion_verdict occlusion_test(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g,
+                                 double *seen) {
     const size_t segments = first_segments(factor_of(o, i, j, g));
     double part = 0, all = 0;
     bool any_open = false, any_blocked = false;
-    const piece_pair two = piece_pair_of(o->seed, NULL, i, &o->polygons[i], j, &o->polygons[j]);
+    piece_pair two = piece_pair_of(o->seed, among, i, &o->polygons[i], j, &o->polygons[j]);
+    two.lifts = among != NULL;
     for (size_t first = 0; first < segments && !(any_open && any_blocked); first += VISIBILITY_PACKET) {
-        double kernel[VISIBILITY_PACKET];
-        const unsigned blocked = cast(o, &two, first, kernel);
+        cast_segments s;
+        cast(o, &two, first, 1, &s);
+        any_open = any_open || (s.facing[0] & ~s.blocked[0]) != 0;
+        any_blocked = any_blocked || (s.facing[0] & s.blocked[0]) != 0;
         for (int k = 0; k < VISIBILITY_PACKET; k++) {
-            if (kernel[k] <= 0) continue; /* behind either element */
-            any_open = any_open || (blocked >> k & 1) == 0;
-            any_blocked = any_blocked || (blocked >> k & 1) != 0;
-            all += kernel[k];
-            if ((blocked >> k & 1) == 0) part += kernel[k];
+            all += s.kernel[0][k];
+            if ((s.blocked[0] >> k & 1) == 0) part += s.kernel[0][k];
         }
     }
     *seen = all > 0 ? g * part / all : g;
@@ -128,15 +156,19 @@ static double visible_share(const occlusion *o, const piece_pair *two, size_t n_
     enum { TIMES_MOST = 32 };
     double seen = 0, all = 0;
     size_t facing = 0;
-    for (size_t first = 0; facing < n_segments && first < TIMES_MOST * n_segments;
-         first += VISIBILITY_PACKET) {
-        double kernel[VISIBILITY_PACKET];
-        const unsigned blocked = cast(o, two, first, kernel);
-        for (int k = 0; k < VISIBILITY_PACKET; k++) {
-            all += kernel[k];
-            facing += kernel[k] > 0;
-            if ((blocked >> k & 1) == 0) seen += kernel[k];
+    for (size_t first = 0; facing < n_segments && first < TIMES_MOST * n_segments;) {
+        cast_segments s;
+        const size_t wanted = (n_segments - facing + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET;
+        const int packets = wanted < SEGMENT_PACKETS ? (int)wanted : SEGMENT_PACKETS;
+        cast(o, two, first, packets, &s);
+        for (int p = 0; p < packets; p++) {
+            facing += (size_t)__builtin_popcount(s.facing[p]);
+            for (int k = 0; k < VISIBILITY_PACKET; k++) {
+                all += s.kernel[p][k];
+                if ((s.blocked[p] >> k & 1) == 0) seen += s.kernel[p][k];
+            }
         }
+        first += (size_t)packets * VISIBILITY_PACKET;
     }
     return all > 0 ? seen / all : 1;
 }
@@ -144,8 +176,8 @@ static double visible_share(const occlusion *o, const piece_pair *two, size_t n_
 /* A pair that is estimated piece by piece. */
 typedef struct segment_budget {
     uint32_t i, j;
-    const segment_list *among; /* see occlusion_estimate */
-    double segments_per_area;  /* segments for each m^2 of exchange area: pieces share the pair's segments */
+    segment_list *among;      /* see occlusion_estimate */
+    double segments_per_area; /* segments for each m^2 of exchange area: pieces share the pair's segments */
 } segment_budget;
 
 /* Effective sample size over sample size, (sum K)^2 / (N sum K^2): 1 where the kernel is constant. */
@@ -153,11 +185,12 @@ static double effective_share(const occlusion *o, const piece_pair *two) {
     enum { SEGMENTS = 64 };
     double sum = 0, sum2 = 0;
     for (size_t first = 0; first < SEGMENTS; first += VISIBILITY_PACKET) {
-        segment_bundle s;
-        segments_of(&s, o, two, first);
+        ray_packet s;
+        double kernel[VISIBILITY_PACKET];
+        segments_of(o, two, first, &s, kernel);
         for (int k = 0; k < VISIBILITY_PACKET; k++) {
-            sum += s.kernel[k];
-            sum2 += s.kernel[k] * s.kernel[k];
+            sum += kernel[k];
+            sum2 += kernel[k] * kernel[k];
         }
     }
     return sum2 > 0 ? sum * sum / (SEGMENTS * sum2) : 0;
@@ -199,7 +232,7 @@ static double visible_exchange(const occlusion *o, const segment_budget *pair, c
 
 /* The standard error to reach: o->accuracy, relaxed to 10 F V o->accuracy where the visible factor F V, by
  * PILOT segments, is above .1. */
-static double accuracy_for(const occlusion *o, const segment_list *among, uint32_t i, uint32_t j, double F) {
+static double accuracy_for(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double F) {
     enum { PILOT = 64 };
     if (F <= .1) return o->accuracy;
     const piece_pair two = piece_pair_of(o->seed, among, i, &o->polygons[i], j, &o->polygons[j]);
@@ -212,7 +245,7 @@ double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g) 
     return (double)segments_for(o, F, o->accuracy * fmax(1, 5 * F));
 }
 
-double occlusion_estimate(const occlusion *o, const segment_list *among, uint32_t i, uint32_t j, double g) {
+double occlusion_estimate(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g) {
     const double F = factor_of(o, i, j, g), accuracy = accuracy_for(o, among, i, j, F);
     const segment_budget pair = {
         .i = i, .j = j, .among = among, .segments_per_area = (double)segments_for(o, F, accuracy) / g};

@@ -31,8 +31,11 @@ typedef struct occlusion {
 typedef enum occlusion_verdict { OCCLUSION_NONE, OCCLUSION_TOTAL, OCCLUSION_PARTIAL } occlusion_verdict;
 
 /* The occlusion test of the pair i, j whose unoccluded exchange area is g > 0: eight segments, up to 256 for
- * a large factor, until one is blocked and one is not. seen is the estimate of the visible part of g. */
-occlusion_verdict occlusion_test(const occlusion *o, uint32_t i, uint32_t j, double g, double *seen);
+ * a large factor, until one is blocked and one is not. seen is the estimate of the visible part of g. among:
+ * all occluders, but for those in the planes of the two, that may block a segment of the pair; NULL: any of
+ * the scene may. */
+occlusion_verdict occlusion_test(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g,
+                                 double *seen);
 
 /* True where eight segments already reach o->accuracy, because the factor is small: seen is then final. */
 bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double g);
@@ -40,7 +43,7 @@ bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double 
 /* The visible part of g, never more than g. Its standard error is o->accuracy as a factor; for a visible
  * factor F above .1 it is 10 F times that. among: all occluders that may block a segment of the pair; NULL:
  * any of the scene may. */
-double occlusion_estimate(const occlusion *o, const segment_list *among, uint32_t i, uint32_t j, double g);
+double occlusion_estimate(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g);
 
 /* About how many segments occlusion_estimate will cast. */
 double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g);

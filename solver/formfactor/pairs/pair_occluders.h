@@ -11,7 +11,7 @@
 enum { PAIR_OCCLUDERS_MOST = 16, UNCUT_OCCLUDERS_MOST = 8 };
 
 /* As many as segments are tested against one by one; of more, the whole scene is searched. */
-enum { LISTED_OCCLUDERS_MOST = 64 };
+enum { LISTED_OCCLUDERS_MOST = 128 };
 
 typedef struct pair_occluders {
     int count;   /* or OCCLUDERS_UNCOUNTED */

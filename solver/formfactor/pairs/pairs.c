@@ -38,11 +38,9 @@ static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) 
     return 2 * g / (run->m->area[i] + run->m->area[j]);
 }
 
-/* Settles a pair with few occluders by projection: g becomes its visible part. PAIR_UNKNOWN: it has more.
- * among: NULL where none is projected. */
+/* Settles a pair with few occluders by projection: g becomes its visible part. PAIR_UNKNOWN: it has more. */
 static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occluders *among, double *g) {
     double share = 1, work = 0;
-    if (among == NULL) return PAIR_UNKNOWN;
     const double tolerance = few_occluders_tolerance(&run->few, i, j, *g, run->options->accuracy);
     const few_verdict found = few_occluders_share(&run->few, among, i, j, *g, tolerance, &share, &work);
     *g *= share;
@@ -53,15 +51,20 @@ static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occl
 }
 
 /* The occlusion of a pair by projection, or its occlusion test; where that is accurate enough the pair is
- * settled and g becomes its visible part. */
-static int look_at(const pairs_run *run, uint32_t i, uint32_t j, const link_occluders *among, double *g) {
+ * settled and g becomes its visible part. among: the occluders of the link, unless pairs need none. */
+static int look_at(const pairs_run *run, uint32_t i, uint32_t j, link_occluders *among, double *g) {
     double seen;
     const known_pairs *known = run->options->known;
     const int before = known != NULL ? known_pairs_look(known, i, j, run->options->seed, g) : PAIR_UNKNOWN;
     if (before != PAIR_UNKNOWN) return before;
-    const int projected = project(run, i, j, among, g);
+    const int projected = run->projects ? project(run, i, j, among, g) : PAIR_UNKNOWN;
     if (projected != PAIR_UNKNOWN) return projected;
-    const occlusion_verdict verdict = occlusion_test(&run->occlusion, i, j, *g, &seen);
+    segment_list list, *tested = NULL;
+    if (run->listed != NULL && among->count != OCCLUDERS_UNCOUNTED) {
+        list = (segment_list){among->count, among->of};
+        tested = &list;
+    }
+    const occlusion_verdict verdict = occlusion_test(&run->occlusion, tested, i, j, *g, &seen);
     const int state = verdict == OCCLUSION_NONE    ? PAIR_OPEN
                       : verdict == OCCLUSION_TOTAL ? PAIR_HIDDEN
                                                    : PAIR_MIXED;
@@ -70,9 +73,11 @@ static int look_at(const pairs_run *run, uint32_t i, uint32_t j, const link_occl
     return state | PAIR_SETTLED;
 }
 
-static const link_occluders *among_projected(const pairs_run *run, leaf_reaches *to, reach *r) {
+/* The occluders of a link, which its pairs are projected with or tested against. */
+static link_occluders *among_tested(const pairs_run *run, leaf_reaches *to, reach *r) {
     const occluders *o = &run->few.occluders;
-    return leaf_reaches_among(&run->tree, o, link_occluders_projected(o), to, r);
+    const int most = run->projects ? link_occluders_projected(o) : TESTED_OCCLUDERS_MOST;
+    return leaf_reaches_among(&run->tree, o, most, to, r);
 }
 
 /* The pairs of one position: unoccluded exchange areas and, unless the shaft was empty, occlusion tests. */
@@ -81,7 +86,7 @@ static bool find_row(const pairs_run *run, uint32_t position, leaf_reaches *to, 
     const uint32_t i = run->tree.element[position];
     for (size_t k = 0; k < to->n; k++) {
         reach *r = &to->reaches[k];
-        const link_occluders *among = NULL;
+        link_occluders *among = NULL;
         const uint32_t begin = r->first > position ? r->first : position + 1;
         for (uint32_t first = begin; first < r->last; first += PIECE) {
             double exchange[PIECE];
@@ -95,8 +100,8 @@ static bool find_row(const pairs_run *run, uint32_t position, leaf_reaches *to, 
                     g = pair_factor_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
                                              run->options->tolerance);
                 if (!((float)g > 0) || factor_of(run, i, j, g) < run->options->threshold) continue;
-                if (among == NULL && !r->open && run->projects) {
-                    among = among_projected(run, to, r);
+                if (among == NULL && !r->open && (run->projects || run->listed != NULL)) {
+                    among = among_tested(run, to, r);
                     if (among == NULL) return false;
                 }
                 const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, among, &g);

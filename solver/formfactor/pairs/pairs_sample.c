@@ -119,7 +119,7 @@ static void count_row(const sample_run *run, uint32_t position, uint32_t first, 
             }
             if (count_projection(run, i, j, g, &link->projected, work)) continue;
             work->tests++;
-            const occlusion_verdict verdict = occlusion_test(&run->occlusion, i, j, g, &seen);
+            const occlusion_verdict verdict = occlusion_test(&run->occlusion, NULL, i, j, g, &seen);
             work->seen += verdict != OCCLUSION_TOTAL;
             if (occlusion_test_suffices(&run->occlusion, i, j, g)) continue;
             count_segments(run, i, j, g, verdict == OCCLUSION_PARTIAL ? 1 : at_border, link, sum);

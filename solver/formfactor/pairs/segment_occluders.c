@@ -8,6 +8,18 @@
 
 typedef float lanes __attribute__((vector_size(4 * VISIBILITY_PACKET), may_alias));
 typedef int mask __attribute__((vector_size(4 * VISIBILITY_PACKET), may_alias));
+typedef signed char lane_bytes __attribute__((vector_size(VISIBILITY_PACKET)));
+
+static const mask bit_of_lane = {1, 2, 4, 8, 16, 32, 64, 128};
+enum { ALL_BLOCKED = (1 << VISIBILITY_PACKET) - 1 };
+
+/* The sign of each lane, in its bit: byte k keeps bit k, and the product adds all bytes. */
+static inline __attribute__((always_inline)) unsigned bits_of(mask m) {
+    const lane_bytes signs = __builtin_convertvector(m >> 31, lane_bytes);
+    uint64_t bytes;
+    memcpy(&bytes, &signs, sizeof bytes);
+    return (unsigned)((bytes & 0x8040201008040201u) * 0x0101010101010101u >> 56);
+}
 
 lam_status segment_occluders_make(const occluders *o, const double centre[3], segment_occluder **out,
                                   lam_error *error) {
@@ -30,9 +42,14 @@ lam_status segment_occluders_make(const occluders *o, const double centre[3], se
 #define CPU_KERNELS "solver/formfactor/pairs/segment_occluders_kernels.inc"
 #include "solver/base/cpu_kernels.inc"
 
-unsigned segment_occluders_block(const segment_occluder *of, const segment_list *list, const ray_packet *s) {
-    typedef unsigned kernel(const segment_occluder *, int, const uint32_t *, const ray_packet *);
-    static kernel *const table[] =
-        CPU_TABLE(block_segments_portable, block_segments_avx2, block_segments_avx512);
-    return table[cpu_best()](of, list->count, list->of, s);
+void segment_occluders_block(const segment_occluder *of, segment_list *list, const ray_packet *s, int packets,
+                             unsigned *bits) {
+    typedef void kernel(const segment_occluder *, segment_list *, const ray_packet *, unsigned *);
+    static kernel *const one[] = CPU_TABLE(block_one_portable, block_one_avx2, block_one_avx512);
+    static kernel *const all[] = CPU_TABLE(block_all_portable, block_all_avx2, block_all_avx512);
+    if (packets == SEGMENT_PACKETS) {
+        all[cpu_best()](of, list, s, bits);
+        return;
+    }
+    for (int p = 0; p < packets; p++) one[cpu_best()](of, list, &s[p], &bits[p]);
 }

@@ -16,17 +16,24 @@ typedef struct segment_occluder {
 /* Segments of a pair for which a list is made, at least: making it takes the time of some packets. */
 enum { SEGMENTS_LISTED = 8 * VISIBILITY_PACKET };
 
-/* The occluders that may block the segments of a pair. */
+/* The occluders that may block the segments of a pair. Where all segments are blocked those that do it are
+ * moved to the front, because the next ones are mostly blocked by the same: results do not depend on the
+ * order. */
 typedef struct segment_list {
     int count;
-    const uint32_t *of;
+    uint32_t *of;
 } segment_list;
+
+/* Packets that are tested together. */
+enum { SEGMENT_PACKETS = 2 };
 
 /* centre: that of the recentred coordinates. *out is freed by free. Errors: LAM_ERR_MEMORY. */
 lam_status segment_occluders_make(const occluders *o, const double centre[3], segment_occluder **out,
                                   lam_error *error);
 
-/* Bit k is set where one of the list blocks segment k, from its origin to origin + direction. */
-unsigned segment_occluders_block(const segment_occluder *of, const segment_list *list, const ray_packet *s);
+/* Sets bit k of bits[p] where one of the list blocks segment k of s[p], from its origin to origin +
+ * direction, for up to SEGMENT_PACKETS packets. Those set before need no test. */
+void segment_occluders_block(const segment_occluder *of, segment_list *list, const ray_packet *s, int packets,
+                             unsigned *bits);
 
 #endif

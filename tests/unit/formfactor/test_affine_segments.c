@@ -62,8 +62,9 @@ START_TEST(eight_segments_are_as_one) {
         float origin[3][AFFINE_SEGMENTS], direction[3][AFFINE_SEGMENTS];
         for (int d = 0; d < 4; d++)
             for (int k = 0; k < AFFINE_SEGMENTS; k++) x[d][k] = random_unit(&seed);
-        affine_segments(&pair, x, centre, origin, direction, K);
+        const unsigned bits = affine_segments(&pair, x, centre, origin, direction, K);
         for (int k = 0; k < AFFINE_SEGMENTS; k++) {
+            ck_assert((bits >> k & 1) == (K[k] > 0));
             double from[3], to[3];
             const double areas =
                 polygon_point(&a, x[0][k], x[1][k], from) * polygon_point(&b, x[2][k], x[3][k], to);

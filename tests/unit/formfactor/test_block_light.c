@@ -124,7 +124,7 @@ static void find_truth_by_pairs(lit *s, const visibility *v, const polygon *poly
             if (e == i || s->E[e] == 0) continue;
             const double g = pair_factor_exchange(&rules, &polygons[e], &polygons[i], o.tolerance);
             if (!(g > 0)) continue;
-            if (occlusion_test(&o, low, high, g, &seen) == OCCLUSION_PARTIAL)
+            if (occlusion_test(&o, NULL, low, high, g, &seen) == OCCLUSION_PARTIAL)
                 seen = occlusion_estimate(&o, NULL, low, high, g);
             s->truth[i] += (double)s->E[e] * seen / s->m->area[i];
         }

@@ -175,7 +175,7 @@ START_TEST(links_are_right) {
             /* Many segments, independent of those that decided. */
             occlusion other = s->occlusion;
             for (other.seed = 100; held[p * n + q] != 1 && other.seed < 104; other.seed++) {
-                occlusion_test(&other, i, j, g, &seen);
+                occlusion_test(&other, NULL, i, j, g, &seen);
                 if (held[p * n + q] == 2) ck_assert_double_eq_tol(seen, g, 1e-12 * g);
                 if (held[p * n + q] == 0) lost += seen / s->m.area[i] / 4;
             }
@@ -221,7 +221,7 @@ START_TEST(threshold_keeps_what_is_above) {
             if (2 * g / (s->m.area[i] + s->m.area[j]) < threshold) continue;
             above++;
             if (held[p * n + q] == 0)
-                ck_assert_int_eq(occlusion_test(&s->occlusion, i, j, g, &seen), OCCLUSION_TOTAL);
+                ck_assert_int_eq(occlusion_test(&s->occlusion, NULL, i, j, g, &seen), OCCLUSION_TOTAL);
         }
     ck_assert_uint_gt(above, 0);
     ck_assert_uint_lt(held_pairs, n * n / 4); /* and most pairs below it have no link */
