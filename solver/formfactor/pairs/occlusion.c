@@ -246,9 +246,17 @@ double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g) 
 }
 
 double occlusion_estimate(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g) {
+    return occlusion_estimate_by(o, among, i, j, g, 0);
+}
+
+double occlusion_estimate_by(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g,
+                             double segments) {
     const double F = factor_of(o, i, j, g), accuracy = accuracy_for(o, among, i, j, F);
-    const segment_budget pair = {
-        .i = i, .j = j, .among = among, .segments_per_area = (double)segments_for(o, F, accuracy) / g};
+    const segment_budget pair = {.i = i,
+                                 .j = j,
+                                 .among = among,
+                                 .segments_per_area =
+                                     fmax((double)segments_for(o, F, accuracy), segments) / g};
     /* The exchange areas of the pieces sum to g only within the tolerance, and occlusion never adds. */
     return fmin(g, visible_exchange(o, &pair, &o->polygons[i], &o->polygons[j], 0, 0));
 }

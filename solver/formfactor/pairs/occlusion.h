@@ -45,6 +45,10 @@ bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double 
  * any of the scene may. */
 double occlusion_estimate(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g);
 
+/* The same by at least so many segments. */
+double occlusion_estimate_by(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g,
+                             double segments);
+
 /* About how many segments occlusion_estimate will cast. */
 double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g);
 

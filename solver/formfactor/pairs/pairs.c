@@ -1,11 +1,7 @@
 #include "solver/formfactor/pairs/pairs.h"
 
 #include "solver/formfactor/pairs/cluster_links.h"
-#include "solver/formfactor/pairs/element_neighbours.h"
-#include "solver/formfactor/pairs/few_occluders.h"
-#include "solver/formfactor/pairs/leaf_reaches.h"
-#include "solver/formfactor/pairs/pair_far.h"
-#include "solver/formfactor/pairs/pair_rows.h"
+#include "solver/formfactor/pairs/pairs_refine.h"
 #include "solver/formfactor/pairs/pairs_twice.h"
 
 #include <math.h>
@@ -13,24 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-typedef struct pairs_run {
-    const mesh *m;
-    const pairs_options *options;
-    pair_factor_rules rules;
-    polygon *polygons; /* [n], by element */
-    occlusion occlusion;
-    few_occluders few;
-    bool projects;            /* pairs with few occluders */
-    segment_occluder *listed; /* for lists of the occluders of pairs; NULL: there are none */
-    cluster_tree tree;
-    uint32_t *leaf;   /* [n], the leaf of a position */
-    uint32_t *parent; /* of each cluster */
-    pair_far_table far;
-    cluster_links links;
-    uint32_t (*neighbours)[NEIGHBOURS_MOST]; /* [n], by element */
-    pair_rows rows;
-} pairs_run;
 
 /* The mean factor of a pair, (A_i F_ij + A_j F_ji) / (A_i + A_j). Two ray estimates merged by their inverse
  * variances (upper.h) have the variance this / (2 rays) in S = A^1/2 F A^-1/2. */
@@ -51,7 +29,8 @@ static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occl
 }
 
 /* The occlusion of a pair by projection, or its occlusion test; where that is accurate enough the pair is
- * settled and g becomes its visible part. among: the occluders of the link, unless pairs need none. */
+ * settled, and g becomes its visible part unless nothing was seen. among: the occluders of the link, unless
+ * pairs need none. */
 static int look_at(const pairs_run *run, uint32_t i, uint32_t j, link_occluders *among, double *g) {
     double seen;
     const known_pairs *known = run->options->known;
@@ -69,7 +48,7 @@ static int look_at(const pairs_run *run, uint32_t i, uint32_t j, link_occluders 
                       : verdict == OCCLUSION_TOTAL ? PAIR_HIDDEN
                                                    : PAIR_MIXED;
     if (!occlusion_test_suffices(&run->occlusion, i, j, *g)) return state;
-    *g = seen;
+    if (state != PAIR_HIDDEN) *g = seen;
     return state | PAIR_SETTLED;
 }
 
@@ -128,133 +107,6 @@ static bool find_block(pairs_run *run, size_t index, leaf_reaches *to) {
     return enough;
 }
 
-static pair_state state_of(const pairs_run *run, uint32_t i, uint32_t j) {
-    return pair_rows_state(&run->rows, run->tree.position[i], run->tree.position[j]);
-}
-
-/* True where a neighbouring pair, with either element replaced by one that shares an edge with it, is mixed
- * or has the opposite state: a shadow edge may cross this pair. */
-static bool at_a_border(const pairs_run *run, uint32_t i, uint32_t j, pair_state state) {
-    for (int side = 0; side < 2; side++) {
-        const uint32_t kept = side == 0 ? i : j;
-        const uint32_t *others = run->neighbours[side == 0 ? j : i];
-        for (int k = 0; k < NEIGHBOURS_MOST && others[k] != UINT32_MAX; k++) {
-            if (others[k] == kept) continue;
-            const pair_state other = state_of(run, kept, others[k]);
-            if (other == PAIR_MIXED ||
-                (state == PAIR_OPEN ? other == PAIR_HIDDEN : other == PAIR_OPEN || other == PAIR_CERTAIN))
-                return true;
-        }
-    }
-    return false;
-}
-
-/* True where a pair gets occlusion_estimate. */
-static bool is_mixed(const pairs_run *run, uint32_t i, uint32_t j, uint8_t state) {
-    if (state == PAIR_CERTAIN || (state & (PAIR_SETTLED | PAIR_EXACT)) != 0) return false;
-    return state == PAIR_MIXED || at_a_border(run, i, j, (pair_state)state);
-}
-
-/* The number of segments that pairs take at the accuracy asked for: mixed ones, and those that projection has
- * saved. */
-typedef struct segment_count {
-    double mixed, saved;
-} segment_count;
-
-static segment_count segments_of_block(const pairs_run *run, size_t index) {
-    const pair_block *block = &run->rows.blocks[index];
-    segment_count sum = {0, 0};
-    size_t r = 0;
-    for (size_t at = 0; at < block->used; at++) {
-        while (at >= block->begin[r + 1]) r++;
-        const uint32_t i = run->tree.element[pair_rows_first(index) + r],
-                       j = run->tree.element[block->other[at]];
-        if (is_mixed(run, i, j, block->state[at]))
-            sum.mixed += occlusion_segments(&run->occlusion, i, j, (double)block->exchange[at]);
-        else if (block->state[at] == (PAIR_MIXED | PAIR_EXACT))
-            sum.saved += occlusion_segments(&run->occlusion, i, j, (double)block->exchange[at]);
-    }
-    return sum;
-}
-
-/* Scales the accuracy so that all mixed pairs together take between segments_least, or their share of it, and
- * segments_most segments: the error of N segments is proportional to N^-SEGMENTS_POWER. */
-static lam_status share_segments(pairs_run *run, lam_error *error) {
-    const size_t n_blocks = run->rows.n_blocks;
-    segment_count all = {0, 0};
-    segment_count *of_block = memory_allocate(n_blocks, sizeof *of_block, "pairs", error);
-    if (of_block == NULL) return LAM_ERR_MEMORY;
-#pragma omp parallel for schedule(dynamic, 4)
-    for (size_t b = 0; b < n_blocks; b++) of_block[b] = segments_of_block(run, b);
-    for (size_t b = 0; b < n_blocks; b++) {
-        all.mixed += of_block[b].mixed;
-        all.saved += of_block[b].saved;
-    }
-    free(of_block);
-    if (!(all.mixed > 0)) return LAM_OK;
-    const double least = run->options->segments_least * all.mixed / (all.mixed + all.saved);
-    const double cast = fmin(fmax(all.mixed, least), run->options->segments_most);
-    run->occlusion.accuracy *= pow(all.mixed / cast, SEGMENTS_POWER);
-    return LAM_OK;
-}
-
-/* Sets *g to the visible part of a mixed pair. Segments are tested against a list of the pair's occluders
- * where there are enough of them. */
-static bool refine_pair(const pairs_run *run, uint32_t position, uint32_t other, leaf_reaches *to, float *g) {
-    const uint32_t i = run->tree.element[position], j = run->tree.element[other], leaf = run->leaf[position];
-    pair_occluders between;
-    segment_list list, *among = NULL;
-    if (run->listed != NULL && occlusion_segments(&run->occlusion, i, j, (double)*g) >= SEGMENTS_LISTED) {
-        if ((to->n == 0 || to->leaf != leaf) &&
-            !leaf_reaches_find(&run->tree, &run->links, run->parent, leaf, to))
-            return false;
-        const link_occluders *of_link = leaf_reaches_among(
-            &run->tree, &run->few.occluders, LINK_OCCLUDERS_MOST, to, leaf_reaches_at(to, other));
-        if (of_link == NULL) return false;
-        const few_verdict found = few_occluders_between(&run->few, of_link, i, j, &between);
-        if (found == FEW_OPEN) return true;
-        if (between.count != OCCLUDERS_UNCOUNTED) {
-            list = (segment_list){between.count, between.of};
-            among = &list;
-        }
-    }
-    *g = (float)occlusion_estimate(&run->occlusion, among, i, j, (double)*g);
-    return true;
-}
-
-/* Estimates the mixed pairs of one block. States stay unchanged, because at_a_border reads them. known: the
- * exchange areas come from a scratch file and are only counted. */
-static bool refine_block(pairs_run *run, size_t index, bool known, leaf_reaches *to, pairs_report *sum) {
-    pair_block *block = &run->rows.blocks[index];
-    size_t r = 0;
-    for (size_t at = 0; at < block->used; at++) {
-        while (at >= block->begin[r + 1]) r++;
-        const pair_state state = (pair_state)(block->state[at] & ~(PAIR_SETTLED | PAIR_EXACT));
-        const uint32_t i = run->tree.element[pair_rows_first(index) + r],
-                       j = run->tree.element[block->other[at]];
-        sum->facing++;
-        if (state == PAIR_CERTAIN) {
-            sum->certain++;
-        } else if (block->state[at] & PAIR_SETTLED) {
-            sum->settled++;
-        } else if (block->state[at] & PAIR_EXACT) {
-            sum->projected += state == PAIR_MIXED;
-            sum->hidden += state == PAIR_HIDDEN;
-        } else if (is_mixed(run, i, j, block->state[at])) {
-            sum->mixed++;
-            if (!known && !refine_pair(run, (uint32_t)(pair_rows_first(index) + r), block->other[at], to,
-                                       &block->exchange[at]))
-                return false;
-        } else if (state == PAIR_OPEN) {
-            sum->open++;
-        } else {
-            sum->hidden++;
-            block->exchange[at] = 0;
-        }
-    }
-    return true;
-}
-
 /* One pass over all blocks, either of tests or of estimates, and its scratch file. */
 typedef struct pass {
     pairs_run *run;
@@ -299,7 +151,7 @@ static lam_status pass_block(pass *p, size_t index, leaf_reaches *to, pairs_repo
         if (status != LAM_OK) return status;
     }
     const bool enough =
-        p->refine ? refine_block(run, index, known, to, more) : known || find_block(run, index, to);
+        p->refine ? pairs_refine_block(run, index, known, to, more) : known || find_block(run, index, to);
     if (!enough)
         return status_fail(error, LAM_ERR_MEMORY, "pairs of %zu elements: out of memory; use --quality draft",
                            run->m->n);
@@ -360,7 +212,7 @@ static lam_status run_passes(pairs_run *run, pairs_report *report, size_t *kept,
     TRY(open_file(run, "found", &find.file, error));
     TRY(open_file(run, "seen", &refine.file, error));
     TRY(pass_run(&find, error));
-    TRY(share_segments(run, error));
+    TRY(pairs_share_segments(run, error));
     TRY(pass_run(&refine, error));
     *report = refine.report;
     report->accuracy = run->occlusion.accuracy;
@@ -437,6 +289,7 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
     if (options->keep != NULL) keep_pairs(&run, options->keep);
 done:
     pair_rows_free(&run.rows);
+    pair_demand_free(&run.demand);
     free(run.polygons);
     free(run.neighbours);
     free(run.parent);

@@ -36,9 +36,11 @@ typedef struct pairs_options {
  * 2. Of the others, a pair with few occluders is projected, and each other pair gets an occlusion test.
  * 3. A pair is mixed where its segments disagree, or where the pair of a neighbouring element came out
  *    differently, which finds shadow edges that eight segments miss. Mixed pairs get occlusion_estimate.
- * The result is the same for any number of threads. Memory: 9 bytes for each pair that faces and is not
- * hidden, and 8 in the rows. kept, which may be NULL, is set to the number of rows that the scratch folder
- * already held. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of row_file.h. */
+ * 4. Where pairs are projected, so do others of which eight segments saw nothing or a part, if that is much
+ * of the light of one of both elements (pair_demand.h). The result is the same for any number of threads.
+ * Memory: 9 bytes for each pair that faces and is not hidden, and 8 in the rows. kept, which may be NULL, is
+ * set to the number of rows that the scratch folder already held. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED,
+ * those of row_file.h. */
 lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
                           pairs_report *report, size_t *kept, lam_error *error);
 
