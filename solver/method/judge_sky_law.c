@@ -203,6 +203,50 @@ static bin_figures finish_bin(const sky_law_sums *s, size_t bin, bool of_mean, d
     return f;
 }
 
+typedef struct weighted_ratio {
+    double ratio, weight;
+} weighted_ratio;
+
+static int compare_ratios(const void *a, const void *b) {
+    const double x = ((const weighted_ratio *)a)->ratio, y = ((const weighted_ratio *)b)->ratio;
+    return (x > y) - (x < y);
+}
+
+lam_status sky_law_share_even(size_t n, const double *light, const double *weight, double *even,
+                              lam_error *error) {
+    size_t count = 0;
+    double left = 0;
+    weighted_ratio *of = memory_allocate(n, sizeof *of, "errors of skies", error);
+    if (of == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < n; k++) {
+        if (!(light[k] > 0)) continue;
+        of[count++] = (weighted_ratio){even[k] / light[k], weight[k]};
+        left += .5 * weight[k];
+    }
+    qsort(of, count, sizeof *of, compare_ratios);
+    size_t at = 0;
+    while (at + 1 < count && (left -= of[at].weight) > 0) at++;
+    for (size_t k = 0; k < n && count > 0; k++)
+        even[k] = fmax(even[k], .5 * (even[k] + of[at].ratio * light[k]));
+    free(of);
+    return LAM_OK;
+}
+
+/* The light of an even sky of power 1 in the bins, squared, and how much of it there is. */
+static lam_status share_even(const sky_law_sums *s, double *even, lam_error *error) {
+    lam_status status = LAM_OK;
+    double *light = memory_allocate(s->n_bins, 2 * sizeof *light, "errors of skies", error);
+    if (light == NULL) return LAM_ERR_MEMORY;
+    for (size_t bin = 0; bin < s->n_bins; bin++) {
+        light[bin] = s->of[0].light_mean[bin] / s->of[0].power2;
+        light[s->n_bins + bin] = s->area[group_of(s, bin)] * sqrt(light[bin]);
+    }
+    TRY(sky_law_share_even(s->n_bins, light, light + s->n_bins, even, error));
+done:
+    free(light);
+    return status;
+}
+
 lam_status sky_law_finish(const sky_law_sums *s, group_errors *errors, lam_error *error) {
     lam_status status = LAM_OK;
     double *made[SKY_FIGURES] = {NULL};
@@ -219,9 +263,11 @@ lam_status sky_law_finish(const sky_law_sums *s, group_errors *errors, lam_error
         made[SKY_RMS_EVEN][bin] = sqrt(rms.even);
         made[SKY_RMS_BOUNCED][bin] = sqrt(rms.bounced);
         made[SKY_MEAN_TILES][bin] = sqrt(fmax(mean.tiles, least * rms.tiles));
-        made[SKY_MEAN_EVEN][bin] = sqrt(fmax(mean.even, least * rms.even));
+        made[SKY_MEAN_EVEN][bin] = fmax(mean.even, least * rms.even);
         made[SKY_MEAN_BOUNCED][bin] = sqrt(mean.bounced);
     }
+    TRY(share_even(s, made[SKY_MEAN_EVEN], error));
+    for (size_t bin = 0; bin < s->n_bins; bin++) made[SKY_MEAN_EVEN][bin] = sqrt(made[SKY_MEAN_EVEN][bin]);
     TRY(tile_errors_finish(&s->tiles, direct2, errors, error));
     errors->sky_direct = sqrt(direct2);
     memcpy(errors->sky, made, sizeof made);

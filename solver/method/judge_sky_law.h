@@ -51,6 +51,14 @@ void sky_law_add(sky_law_sums *s, const figure_probe *one, const float *L, doubl
  * shared, beside the operator's own. Cost: O(C n + m groups). */
 void sky_law_add_direct(sky_law_sums *s, size_t tile, const float *one, const float *other);
 
+/* Light that is too much at a window is too much in all groups that it bounces into: their errors over their
+ * light are alike, and one sky is a single sample of each, small by chance in some. even [n]: squares of
+ * errors of means by a sky of power 1, light [n] of that light, weight [n]. Where an error is less than the
+ * weighted median of all over their light leaves it, the mean of both squares counts. Errors: LAM_ERR_MEMORY.
+ */
+lam_status sky_law_share_even(size_t n, const double *light, const double *weight, double *even,
+                              lam_error *error);
+
 /* Fills errors->sky, sky_direct and what tiles are off by. Errors: LAM_ERR_MEMORY. */
 lam_status sky_law_finish(const sky_law_sums *s, group_errors *errors, lam_error *error);
 

@@ -4,6 +4,7 @@
 #include "support/suite.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { N = 2, TILES = 6, SKIES = JUDGE_EVEN_SKIES + JUDGE_SUNS };
 static const double area[N] = {1, 3};
@@ -411,6 +412,24 @@ START_TEST(powers_of_tiles) {
 }
 END_TEST
 
+/* Of five groups one was right by chance, and one is off by more; what is all but dark weighs nothing, nor
+ * does a group without light. */
+START_TEST(even_errors_are_shared) {
+    enum { GROUPS = 7 };
+    static const double light[GROUPS] = {4, 1, 1, 9, 1, 1e-9, 0}, weight[GROUPS] = {2, 1, 1, 3, 1, 1e-4, 5};
+    static const double before[GROUPS] = {4e-4, 1e-4, 1e-8, 9e-4, 25e-4, 1e-6, 1e-5};
+    double even[GROUPS];
+    lam_error error = {.message = ""};
+    memcpy(even, before, sizeof even);
+    ck_ok(sky_law_share_even(GROUPS, light, weight, even, &error));
+    for (size_t k = 0; k < GROUPS; k++)
+        ck_assert_double_eq_tol(even[k], k == 2 ? .5 * (1e-8 + 1e-4) : before[k], 1e-15);
+    even[0] = before[0];
+    ck_ok(sky_law_share_even(1, light + 6, weight, even, &error)); /* no light at all */
+    ck_assert_double_eq(even[0], before[0]);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("judge_sky");
     TCase *tc = tcase_create("closed forms");
@@ -423,6 +442,7 @@ int main(void) {
     tcase_add_test(tc, powers_of_tiles);
     tcase_add_loop_test(tc, tiles_that_few_rays_met_are_looked_at, 0, 3);
     tcase_add_test(tc, means_of_tiles_add_up_by_area);
+    tcase_add_test(tc, even_errors_are_shared);
     suite_add_tcase(suite, tc);
     return suite_run(suite);
 }
