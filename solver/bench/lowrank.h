@@ -5,7 +5,7 @@
 #include "solver/bench/bench.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/first_light.h"
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 #include "solver/method/low_rank/factorizer.h"
 
 /* A scene with its form factors as a matrix. */

@@ -4,7 +4,7 @@
 #define LAMBERT_PRECOMPUTE_ERROR_ADVICE_H
 
 #include "solver/formfactor/recipe.h"
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 
 enum { ERROR_ADVICE_BYTES = 320 };
 

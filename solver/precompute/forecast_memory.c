@@ -1,7 +1,7 @@
 /* Bytes of memory that a precompute takes, and options that would make it fit. */
 #include "solver/base/machine.h"
-#include "solver/method/guided_reference.h"
-#include "solver/method/judge.h"
+#include "solver/method/judge/guided_reference.h"
+#include "solver/method/judge/judge.h"
 #include "solver/precompute/forecast.h"
 
 #include <math.h>

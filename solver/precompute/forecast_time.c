@@ -1,5 +1,5 @@
 /* Seconds that form factors, the operator and the judge take. Bytes as text. */
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 #include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
 

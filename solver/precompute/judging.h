@@ -4,7 +4,7 @@
 #define LAMBERT_PRECOMPUTE_JUDGING_H
 
 #include "solver/formfactor/formfactor.h"
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 #include "solver/scene/mesh.h"
 
 /* The references of a judge, which do not depend on the operator: two samples of form factors, or finer

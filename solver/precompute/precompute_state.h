@@ -7,7 +7,7 @@
 #include "solver/formfactor/pairs/pairs_sample.h"
 #include "solver/formfactor/rays/ray_rows.h"
 #include "solver/method/hierarchical/compress.h"
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 #include "solver/precompute/emitter_list.h"
 #include "solver/precompute/error_advice.h"
 #include "solver/precompute/forecast.h"

@@ -3,7 +3,7 @@
 #define LAMBERT_PRECOMPUTE_TRIAL_H
 
 #include "solver/formfactor/recipe.h"
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 
 /* Operators that are built for one --epsilon, at most. */
 enum { TRIALS_MOST = 3 };

@@ -1,5 +1,5 @@
 /* The builders and the reference against closed forms (exact form factors in, nine digits out). */
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 #include "solver/method/low_rank/factorizer.h"
 #include "solver/method/method.h"
 #include "solver/method/reference.h"

@@ -1,6 +1,6 @@
 /* Corrections with a guide: as near as an operator is, of no use, of no use for one probe, with some probes
  * that speak for others, in two channels, cancelled. */
-#include "solver/method/guided_reference.h"
+#include "solver/method/judge/guided_reference.h"
 #include "support/box.h"
 #include "support/suite.h"
 

@@ -2,8 +2,8 @@
  * with two channels, against two samples that are twins or not, with first light that is known and its
  * spread. And what they say of an operator whose error is known, by noisy references. */
 #include "solver/base/random.h"
-#include "solver/method/judge_figures.h"
-#include "solver/method/judge_probes.h"
+#include "solver/method/judge/judge_figures.h"
+#include "solver/method/judge/judge_probes.h"
 #include "solver/method/reference.h"
 #include "support/box.h"
 #include "support/suite.h"

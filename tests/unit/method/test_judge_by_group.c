@@ -2,7 +2,7 @@
  * groups, two channels, with the noise of twins; and the law of the effective number of emitters on errors
  * that are independent. */
 #include "solver/base/random.h"
-#include "solver/method/judge_by_group.h"
+#include "solver/method/judge/judge_by_group.h"
 #include "support/suite.h"
 
 #include "store/status.h"

@@ -1,5 +1,5 @@
 /* The errors of receivers: sums over probes, channels and elements, written out. */
-#include "solver/method/judge_figures.h"
+#include "solver/method/judge/judge_figures.h"
 #include "support/dense.h"
 #include "support/suite.h"
 

@@ -1,6 +1,6 @@
 /* Skies by which a first bounce is judged, against closed forms of two elements: plates under the open sky,
  * a plate with a wall beside it, references with noise of the first bounce, of F, and of both. */
-#include "solver/method/judge_sky.h"
+#include "solver/method/judge/judge_sky.h"
 #include "support/suite.h"
 
 #include <math.h>

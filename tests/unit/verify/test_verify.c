@@ -1,5 +1,5 @@
 /* `lambert verify` on stores whose checksums are right and whose content is not. */
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 #include "solver/verify/verify.h"
 #include "solver/walk/walk.h"
 #include "support/box.h"

@@ -1,7 +1,7 @@
-#include "solver/method/judge_sky.h"
+#include "solver/method/judge/judge_sky.h"
 
 #include "solver/base/random.h"
-#include "solver/method/guided_reference.h"
+#include "solver/method/judge/guided_reference.h"
 #include "solver/operator/emitters.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_METHOD_JUDGE_SKY_H
 #define LAMBERT_METHOD_JUDGE_SKY_H
 
-#include "solver/method/judge_sky_law.h"
+#include "solver/method/judge/judge_sky_law.h"
 
 /* Adds an even sky, a cloudy one of random radiances, and tiles drawn by the power that they send into the
  * scene, to the figures, and to sums where these are begun. The answer is the operator's to rho H0 by its own

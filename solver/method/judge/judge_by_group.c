@@ -1,4 +1,4 @@
-#include "solver/method/judge_by_group.h"
+#include "solver/method/judge/judge_by_group.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "solver/method/judge_sky_law.h"
+#include "solver/method/judge/judge_sky_law.h"
 
 #include "solver/base/weighted.h"
 

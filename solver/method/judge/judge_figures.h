@@ -3,7 +3,7 @@
 #ifndef LAMBERT_METHOD_JUDGE_FIGURES_H
 #define LAMBERT_METHOD_JUDGE_FIGURES_H
 
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 
 /* Elements are taken together in so many parts of the mesh order, within which noise may be correlated. */
 enum { FIGURE_PARTS = 64 };

@@ -3,8 +3,8 @@
 #ifndef LAMBERT_METHOD_JUDGE_SKY_LAW_H
 #define LAMBERT_METHOD_JUDGE_SKY_LAW_H
 
-#include "solver/method/judge_by_group.h"
-#include "solver/method/judge_sky_tiles.h"
+#include "solver/method/judge/judge_by_group.h"
+#include "solver/method/judge/judge_sky_tiles.h"
 
 /* Errors of one sky, by bin, [n_bins] each: mean squares of elements, squares of means, less the noise, and
  * the least that is known of them; the squares of its reflected light; its size, D, W, S and P^2 (judge.h),

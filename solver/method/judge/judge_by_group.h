@@ -2,8 +2,8 @@
 #ifndef LAMBERT_METHOD_JUDGE_BY_GROUP_H
 #define LAMBERT_METHOD_JUDGE_BY_GROUP_H
 
-#include "solver/method/judge_figures.h"
-#include "solver/method/judge_probes.h"
+#include "solver/method/judge/judge_figures.h"
+#include "solver/method/judge/judge_probes.h"
 
 /* Sums over probes in one bin, a row of one group: of squares of errors and of the noise in them. */
 typedef struct bin_sums {

@@ -35,6 +35,9 @@ lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_
                                    lam_error *error);
 void probe_source_free(probe_source *s);
 
+/* The number of emissions of a group, JUDGE_..., 0 where they are endless. */
+size_t probe_source_all(const probe_source *s, int group);
+
 /* Emissions E and the operator's radiosity and irradiance, [m][C][n]; those of group g are begin[g] ...
  * begin[g + 1] - 1. Of an operator of emitters W are their weights, [m][C][s], and H0 is the light of the
  * sky, which E contains as rho H0; else both are NULL. */

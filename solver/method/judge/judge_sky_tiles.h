@@ -8,7 +8,7 @@
 #ifndef LAMBERT_METHOD_JUDGE_SKY_TILES_H
 #define LAMBERT_METHOD_JUDGE_SKY_TILES_H
 
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 
 /* Sums over elements of the weights above times one number of each element and tile. */
 typedef struct tile_sums {

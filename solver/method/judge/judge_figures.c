@@ -1,4 +1,4 @@
-#include "solver/method/judge_figures.h"
+#include "solver/method/judge/judge_figures.h"
 
 #include <math.h>
 

@@ -1,5 +1,5 @@
 /* Measured errors in a store. */
-#include "solver/method/judge.h"
+#include "solver/method/judge/judge.h"
 
 #include <stdio.h>
 

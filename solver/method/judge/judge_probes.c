@@ -1,4 +1,4 @@
-#include "solver/method/judge_probes.h"
+#include "solver/method/judge/judge_probes.h"
 
 #include "solver/base/random.h"
 #include "solver/operator/emitters.h"
@@ -67,6 +67,11 @@ void probe_source_free(probe_source *s) {
     free(s->deck);
     free(s->whole);
     s->deck = s->whole = NULL;
+}
+
+size_t probe_source_all(const probe_source *s, int group) {
+    if (group == JUDGE_RANDOM) return 0;
+    return group == JUDGE_LIGHTS ? 1 : group == JUDGE_WHOLE ? s->n_whole : s->n_singles;
 }
 
 void probes_free(probes *p) {

@@ -1,4 +1,4 @@
-#include "solver/method/guided_reference.h"
+#include "solver/method/judge/guided_reference.h"
 
 #include "solver/operator/emitters.h"
 
