@@ -176,6 +176,7 @@ static double angle_over_sine(double cross2, double inner, double uu, double vv)
  * from x. The corners run clockwise as x sees n. */
 static double part_factor(const shadow_cut *c, const part *p, const double base[3], const double n[3]) {
     double corner[PART_CORNERS + 1][3], length2[PART_CORNERS + 1], sum = 0;
+    if (p->n < 3) return 0;
     for (int k = 0; k < p->n; k++) {
         for (int d = 0; d < 3; d++) corner[k][d] = base[d] + p->s[k] * c->e1[d] + p->t[k] * c->e2[d];
         length2[k] = dot3(corner[k], corner[k]);
