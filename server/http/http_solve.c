@@ -137,8 +137,7 @@ static double cost_to_solve(const call *c, const route *to) {
     const double n_vectors = (double)c->job.n_vectors, together = fmin(n_vectors, BATCH_PASS);
     if (c->refines) return REFINEMENT;
     const double pass = PER_OPERATOR_BYTE * (double)lam_operator_bytes(c->scene->op) * (1 + together / 8);
-    const double numbers = n_vectors * (double)(c->scene->n * c->scene->n_channels);
-    return fmax(pass, c->accept.type == MEDIA_NPY ? 0 : numbers * PER_NUMBER);
+    return fmax(pass, c->accept.type == MEDIA_NPY ? 0 : (double)c->n_written * PER_NUMBER);
 }
 
 /* Refinements may have a quarter of the places: they take many times as long as other solves. No client has

@@ -186,6 +186,7 @@ static void begin(worker *w, batch_job *job) {
         return;
     }
     job->next_vector = 0;
+    job->was_read = true;
     job->begun = queue->order.n_begun;
     order_enter(&queue->order, job);
     order_add(&queue->order.waiting, job);

@@ -2,10 +2,12 @@
  *     (B_1 | B_2 | ...) = M (E_1 | E_2 | ...),
  * which reads M once for up to BATCH_PASS vectors. Knows neither HTTP nor scenes; a job brings its functions.
  *
- * Order. Jobs of one client, one kind and about one cost (within a factor of 4) stand in one line, in the
- * order in which they came. Every line that has work gets an equal share of the threads' time: a line is
- * charged for the time of its jobs, and the least charged one goes on; a line that was empty begins at the
- * charge of the one that is served (start-time fair queuing: Goyal, Vin and Cheng 1996). Hence these bounds:
+ * Order. Jobs of one client, one kind and about one cost (within a factor of 4), all to be begun or all to be
+ * computed, stand in one line, in the order in which they came: what many long bodies cost to read keeps no
+ * solve that was read from its pass. Every line that has work gets an equal share of the threads' time: a
+ * line is charged for the time of its jobs, and the least charged one goes on; a line that was empty begins
+ * at the charge of the one that is served (start-time fair queuing: Goyal, Vin and Cheng 1996). Hence these
+ * bounds:
  *   - Of two lines that both have work neither is charged more than the other by more than the cost of one
  *     job of each. So with k lines a job waits for at most k times what those before it in its line take,
  *     and for the functions that the threads are in.
@@ -80,6 +82,7 @@ struct batch_job {
     bool brief; /* set at submission: each of the four functions takes about as long as waking a thread */
     size_t next_vector; /* here and below: private to the queue */
     uint64_t ticket;    /* number of its submission */
+    bool was_read;      /* its begin has returned, and passes are left */
     uint64_t begun;     /* jobs that had begun when it was ready for its next pass */
     bool passing;       /* a thread computes some of its vectors */
     bool unblocked;     /* while begin still ran */

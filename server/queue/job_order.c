@@ -43,7 +43,8 @@ static unsigned class_of(double cost) {
 }
 
 static size_t find_line(const batch_job *job) {
-    const uint64_t place = job->client * CLASSES * 64 + job->kind * CLASSES + class_of(job->cost);
+    const uint64_t kind = 2 * job->kind + job->was_read;
+    const uint64_t place = job->client * CLASSES * 128 + kind * CLASSES + class_of(job->cost);
     return (size_t)(place * UINT64_C(0x9E3779B97F4A7C15) >> 56);
 }
 

@@ -160,6 +160,7 @@ static bool begin(call *in, answer *out) {
         return false;
     }
     in->state = s;
+    in->n_written = s->figures != NULL ? 0 : request->n_rhs * of->n_channels * s->shape.n_values;
     in->job.n_vectors = request->n_rhs;
     /* Answers for all elements share passes. Answers for selected elements, and of emitters, have passes of
      * their own. Refined answers take many times as long: one common key lets one such pass run at a time,

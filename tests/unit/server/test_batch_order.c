@@ -189,6 +189,24 @@ START_TEST(a_pass_waits_for_few_begins) {
 }
 END_TEST
 
+/* A job that was read stands in no line with longer ones of about its cost that are still to be read, however
+ * many came before it: it was overtaken by all of them. Costs of its pass are above BATCH_SHORT, and below
+ * theirs, so that they do not share it. */
+START_TEST(a_read_job_waits_for_no_begins_of_its_cost) {
+    enum { N = 100 };
+    static job jobs[N], first, solve;
+    record r;
+    record_open(&r, 1);
+    hold(&r, &first, 1);
+    for (size_t k = 0; k < N; k++) submit(&r, &jobs[k], k, 1, 10e-3, 0, 0);
+    submit(&r, &solve, N, 1, 1e-6, 1, 8e-3);
+    record_close(&r, N + 2);
+    size_t at = 0;
+    while (r.ids[at] != MOST + N) at++;
+    ck_assert_uint_le(at, 3);
+}
+END_TEST
+
 /* All threads are in long functions: short jobs are served all the same, with their passes, and long ones
  * wait. */
 START_TEST(short_jobs_wait_for_no_long_function) {
@@ -342,6 +360,7 @@ int main(void) {
     tcase_add_test(tests, a_pass_is_charged_by_vectors);
     tcase_add_test(tests, a_new_kind_goes_next);
     tcase_add_test(tests, a_pass_waits_for_few_begins);
+    tcase_add_test(tests, a_read_job_waits_for_no_begins_of_its_cost);
     tcase_add_test(tests, short_jobs_wait_for_no_long_function);
     tcase_add_test(tests, a_wrong_estimate_holds_up_no_short_job);
     tcase_add_test(tests, unwanted_jobs_are_dropped);
