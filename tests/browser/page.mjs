@@ -100,14 +100,17 @@ export class Daemon {
 
 let browser = null;
 
+/** Tests draw by software, which is the same everywhere; CARD=vulkan, or another backend of ANGLE, draws by a graphics card. */
+const DRAWING = process.env.CARD === undefined ? ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    : [`--use-angle=${process.env.CARD}`, "--enable-gpu", ...(process.env.CARD === "vulkan" ? ["--enable-features=Vulkan", "--disable-vulkan-surface"] : [])];
+
 /** A page of the viewer, which has shown its first answer. Its `faults` are errors and requests to other origins. */
 export async function openPage(address, { width = 1280, height = 800, hash = "", touch = false, wait = true, before, storage } = {}) {
     if (browser === null) {
         browser = await chromium.launch({
             executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
             args: ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-                "--disable-component-update", "--disable-sync", "--use-angle=swiftshader",
-                "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
+                "--disable-component-update", "--disable-sync", "--ignore-gpu-blocklist", ...DRAWING],
         });
         ends.push(() => browser.close());
     }

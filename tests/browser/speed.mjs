@@ -3,7 +3,9 @@
 // prints the time to the first picture, answers a second while the slider of all lamps is dragged, with the time of drawing
 // counted apart (software draws here; a graphics card takes it off the processor), and what the daemon's memory grew by. Then
 // what the page itself does, which a graphics card leaves to it: its script's time for a picture from another place and for one of
-// another answer, the calls that draw, and the bytes that are uploaded for each.
+// another answer, the calls that draw, and the bytes that are uploaded for each. With CARD=vulkan (page.mjs) last of all a graphics
+// card draws 1920 x 1080: pictures one after the other until all are done, and pictures a second while the view turns, as the
+// browser paces them.
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { Daemon, openPage, settled } from "./page.mjs";
@@ -87,6 +89,40 @@ function work(page, pictures) {
     }, pictures);
 }
 
+/** Milliseconds a picture from another place and with other values, by the card alone; pictures a second as they are shown. */
+function cardWork(page, pictures) {
+    return page.evaluate(async (count) => {
+        const { stage, cameras, asking } = window.lambert, gl = stage.renderer.getContext(), pixel = new Uint8Array(4);
+        const finish = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+        const pause = () => new Promise((resolve) => { setTimeout(resolve, 400); });
+        const each = async (change) => {
+            await pause();
+            finish();
+            const from = performance.now();
+            for (let k = 0; k < count; k++) {
+                change();
+                stage.draw();
+            }
+            finish();
+            return (performance.now() - from) / count;
+        };
+        const turn = () => {
+            void cameras.controls.rotate(0.01, 0, false);
+            cameras.controls.update(0.016);
+        };
+        const move = await each(turn), answer = await each(() => { stage.setField(0, asking.fields[0]); });
+        await pause();
+        const start = performance.now(), { frames } = stage;
+        while (performance.now() - start < 4000) {
+            turn();
+            stage.invalidate();
+            await new Promise((resolve) => { requestAnimationFrame(resolve); });
+        }
+        const info = gl.getExtension("WEBGL_debug_renderer_info");
+        return { move, answer, shown: 1000 * (stage.frames - frames) / (performance.now() - start), by: gl.getParameter(info.UNMASKED_RENDERER_WEBGL) };
+    }, pictures);
+}
+
 test("speed", async () => {
     for (const store of process.argv.slice(2)) {
         const daemon = await Daemon.start([store]);
@@ -111,6 +147,13 @@ test("speed", async () => {
         const told = (of) => `${of.calls} calls that draw, ${of.bytes.toLocaleString("en-US")} bytes uploaded`;
         console.log(`${store}: script ${move.toFixed(1)} ms for a picture from another place (${told(counts.move)}), ${answer.toFixed(1)} ms for one of another `
             + `answer (${told(counts.answer)}); medians of 30`);
+        if (process.env.CARD !== undefined) {
+            await page.setViewportSize({ width: 1920, height: 1080 });
+            await settled(page);
+            const card = await cardWork(page, Number(process.env.PICTURES ?? 120));
+            console.log(`${store}: ${card.by}: ${card.move.toFixed(1)} ms a picture from another place, ${card.answer.toFixed(1)} of other values, `
+                + `${card.shown.toFixed(1)} pictures/s shown while the view turns`);
+        }
         await page.context().close();
         await daemon.stop();
     }
