@@ -2,21 +2,13 @@
 
 #include "solver/base/cpu.h"
 #include "solver/base/vector3.h"
+#include "solver/formfactor/pairs/lane_bits.h"
 
 #include <string.h>
 
 typedef double lanes __attribute__((vector_size(8 * AFFINE_SEGMENTS), may_alias));
 typedef long long mask __attribute__((vector_size(8 * AFFINE_SEGMENTS), may_alias));
 typedef float floats __attribute__((vector_size(4 * AFFINE_SEGMENTS), may_alias));
-typedef signed char lane_bytes __attribute__((vector_size(AFFINE_SEGMENTS)));
-
-/* The bits of lanes that are -1, not 0: byte k keeps bit k, and the product adds all bytes. */
-static inline __attribute__((always_inline)) unsigned bits_of(mask m) {
-    const lane_bytes signs = __builtin_convertvector(m, lane_bytes);
-    uint64_t bytes;
-    memcpy(&bytes, &signs, sizeof bytes);
-    return (unsigned)((bytes & 0x8040201008040201u) * 0x0101010101010101u >> 56);
-}
 
 /* Twice the area of the triangle at a corner of a quad. */
 static double area_at(const polygon *p, int corner) {

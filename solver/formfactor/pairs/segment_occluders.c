@@ -2,24 +2,16 @@
 
 #include "solver/base/cpu.h"
 #include "solver/base/vector3.h"
+#include "solver/formfactor/pairs/lane_bits.h"
 #include "store/status.h"
 
 #include <string.h>
 
 typedef float lanes __attribute__((vector_size(4 * VISIBILITY_PACKET), may_alias));
 typedef int mask __attribute__((vector_size(4 * VISIBILITY_PACKET), may_alias));
-typedef signed char lane_bytes __attribute__((vector_size(VISIBILITY_PACKET)));
 
 static const mask bit_of_lane = {1, 2, 4, 8, 16, 32, 64, 128};
 enum { ALL_BLOCKED = (1 << VISIBILITY_PACKET) - 1 };
-
-/* The sign of each lane, in its bit: byte k keeps bit k, and the product adds all bytes. */
-static inline __attribute__((always_inline)) unsigned bits_of(mask m) {
-    const lane_bytes signs = __builtin_convertvector(m >> 31, lane_bytes);
-    uint64_t bytes;
-    memcpy(&bytes, &signs, sizeof bytes);
-    return (unsigned)((bytes & 0x8040201008040201u) * 0x0101010101010101u >> 56);
-}
 
 lam_status segment_occluders_make(const occluders *o, const double centre[3], segment_occluder **out,
                                   lam_error *error) {
