@@ -23,6 +23,8 @@ typedef struct request {
     char *path;              /* as sent, without scheme and host */
     double start;            /* clock_seconds */
     double submitted;        /* the same, to the queue */
+    double waited;           /* seconds until it was begun */
+    double read;             /* the time when passes were all that was left */
     double deadline;         /* of the last byte of the answer */
     metrics_refusal refusal; /* of a solve that is not wanted any more */
     route_match match;

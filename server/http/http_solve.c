@@ -180,7 +180,7 @@ static bool is_short_of_memory(request *r) {
 static bool has_memory(request *r) {
     r->memory.wanted = 0;
     if (!r->waits_for_memory) {
-        metrics_wait(r->service->metrics, clock_seconds() - r->submitted);
+        r->waited = clock_seconds() - r->submitted;
         return true;
     }
     r->waits_for_memory = false;
@@ -191,7 +191,8 @@ static bool has_memory(request *r) {
     return false;
 }
 
-static bool begin_solve(batch_job *job, batch_workspace *workspace) {
+/* Reads the request; true if passes are left. */
+static bool read_solve(batch_job *job, batch_workspace *workspace) {
     request *r = request_of(job);
     const route *to = r->match.route;
     r->call.workspace = workspace;
@@ -218,7 +219,22 @@ static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     return false;
 }
 
+static bool begin_solve(batch_job *job, batch_workspace *workspace) {
+    request *r = request_of(job);
+    const bool waits = read_solve(job, workspace);
+    if (waits)
+        r->read = clock_seconds();
+    else if (!job->blocked)
+        metrics_wait(r->service->metrics, r->waited);
+    return waits;
+}
+
 static void pass_solve(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    const double now = clock_seconds();
+    for (size_t p = 0; p < n_parts; p++) {
+        const request *r = request_of(parts[p].job);
+        if (parts[p].first == 0) metrics_wait(r->service->metrics, r->waited + now - r->read);
+    }
     map_guard_allow();
     request_of(parts[0].job)->match.route->steps->pass(parts, n_parts, workspace);
 }

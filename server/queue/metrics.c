@@ -186,7 +186,9 @@ static bool write_latencies(const metrics *m, buffer *b) {
 static bool write_waits(const metrics *m, buffer *b) {
     static const char name[] = "lambertd_queue_wait_seconds";
     return write_head(b, name, "histogram",
-                      "From the last byte of a solve's request until a thread begins it.") &&
+                      "The time that a solve waits for a thread: from the last byte of its request until it "
+                      "is read, "
+                      "and from then until its first pass.") &&
            write_times(b, name, "", m->by_wait, m->waited);
 }
 

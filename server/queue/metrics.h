@@ -32,7 +32,7 @@ typedef enum metrics_refusal {
 } metrics_refusal;
 void metrics_refuse(metrics *m, metrics_refusal why);
 
-/* Counts a solve that waited so long before a thread began it. */
+/* Counts a solve that waited so long for a thread: to be read, and then for its first pass. */
 void metrics_wait(metrics *m, double seconds);
 
 /* Counts a pass over an operator by its number of vectors. */

@@ -191,6 +191,9 @@ class Headers(unittest.TestCase):
         counts = {(s.labels["route"], s.labels["status"]): s.value for s in families["lambertd_requests"].samples}
         self.assertEqual(counts, {("/v1/scenes/{name}/radiosity", "200"): 3, ("/v1/scenes/{name}/radiosity", "400"): 1,
                                   ("other", "404"): 1, ("/v1/scenes", "304"): 1})
+        # Each solve waited once, whether passes followed (three) or its body was refused.
+        waits = {s.name: s.value for s in families["lambertd_queue_wait_seconds"].samples}
+        self.assertEqual(waits["lambertd_queue_wait_seconds_count"], 4)
         for name in "lambertd_request_duration_seconds", "lambertd_batch_size", "lambertd_queue_wait_seconds":
             series = {}
             for s in families[name].samples:
