@@ -186,9 +186,8 @@ static bool write_latencies(const metrics *m, buffer *b) {
 static bool write_waits(const metrics *m, buffer *b) {
     static const char name[] = "lambertd_queue_wait_seconds";
     return write_head(b, name, "histogram",
-                      "The time that a solve waits for a thread: from the last byte of its request until it "
-                      "is read, "
-                      "and from then until its first pass.") &&
+                      "The time that a solve waits for a thread: until it is read, and then until its first "
+                      "pass.") &&
            write_times(b, name, "", m->by_wait, m->waited);
 }
 

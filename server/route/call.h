@@ -34,7 +34,7 @@ typedef struct call {
     bool (*is_wanted)(struct call *in); /* of a route with a body, from the thread that serves it: false when
                                          * nobody needs the answer any more; what is done may then be left */
     size_t n_rhs;                       /* set by the handler, for the log */
-    size_t n_written;                   /* set by begin: numbers of the answer */
+    size_t n_written;                   /* set by begin: numbers of the answer, 0 where they are few */
     char *changed; /* the variant that the handler made or removed, owned, for the log; or NULL */
 } call;
 
