@@ -141,14 +141,20 @@ export async function settled(page) {
     await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 
-/** The colour of the picture at a point given in shares of its width and height, [r, g, b] of 255; drawn anew for it. */
-export function pixel(page, x, y) {
-    return page.evaluate(([u, v]) => {
+/** The colours of one picture, drawn anew, at points given in shares of its width and height, each [r, g, b] of 255. */
+export function pixels(page, places) {
+    return page.evaluate((all) => {
         const { stage } = window.lambert, gl = stage.renderer.getContext(), bytes = new Uint8Array(4);
         stage.draw();
-        gl.readPixels(Math.floor(u * gl.drawingBufferWidth), Math.floor((1 - v) * gl.drawingBufferHeight), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-        return [...bytes.subarray(0, 3)];
-    }, [x, y]);
+        return all.map(([u, v]) => {
+            gl.readPixels(Math.floor(u * gl.drawingBufferWidth), Math.floor((1 - v) * gl.drawingBufferHeight), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+            return [...bytes.subarray(0, 3)];
+        });
+    }, places);
+}
+
+export async function pixel(page, x, y) {
+    return (await pixels(page, [[x, y]]))[0];
 }
 
 /** The element under a point, found by the page's own picking. */
