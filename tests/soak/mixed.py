@@ -290,13 +290,14 @@ def memory(process):
 def slowest(log):
     """By the log: the longest time of a request, ms, and the lines."""
     longest, lines, by_status = 0.0, 0, collections.Counter()
-    for line in log.read_text(errors="replace").splitlines():
-        try:
-            entry = json.loads(line)
-        except ValueError:
-            continue  # the disk was full in the middle of it
-        longest, lines = max(longest, entry["ms"]), lines + 1
-        by_status[entry["status"]] += 1
+    with log.open(errors="replace") as text:
+        for line in text:
+            try:
+                entry = json.loads(line)
+            except ValueError:
+                continue  # the disk was full in the middle of it
+            longest, lines = max(longest, entry["ms"]), lines + 1
+            by_status[entry["status"]] += 1
     return longest, lines, by_status
 
 
