@@ -13,14 +13,14 @@
 /* The mean factor of a pair, (A_i F_ij + A_j F_ji) / (A_i + A_j). Two ray estimates merged by their inverse
  * variances (upper.h) have the variance this / (2 rays) in S = A^1/2 F A^-1/2. */
 static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) {
-    return 2 * g / (run->m->area[i] + run->m->area[j]);
+    return 2 * g / (run->on.m->area[i] + run->on.m->area[j]);
 }
 
 /* Settles a pair with few occluders by projection: g becomes its visible part. PAIR_UNKNOWN: it has more. */
 static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occluders *among, double *g) {
     double share = 1, work = 0;
-    const double tolerance = few_occluders_tolerance(&run->few, i, j, *g, run->options->accuracy);
-    const few_verdict found = few_occluders_share(&run->few, among, i, j, *g, tolerance, &share, &work);
+    const double tolerance = few_occluders_tolerance(&run->on.few, i, j, *g, run->on.options->accuracy);
+    const few_verdict found = few_occluders_share(&run->on.few, among, i, j, *g, tolerance, &share, &work);
     *g *= share;
     return found == FEW_UNDECIDED ? PAIR_UNKNOWN
            : found == FEW_OPEN    ? PAIR_CERTAIN
@@ -33,36 +33,36 @@ static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occl
  * pairs need none. */
 static int look_at(const pairs_run *run, uint32_t i, uint32_t j, link_occluders *among, double *g) {
     double seen;
-    const known_pairs *known = run->options->known;
-    const int before = known != NULL ? known_pairs_look(known, i, j, run->options->seed, g) : PAIR_UNKNOWN;
+    const known_pairs *known = run->on.options->known;
+    const int before = known != NULL ? known_pairs_look(known, i, j, run->on.options->seed, g) : PAIR_UNKNOWN;
     if (before != PAIR_UNKNOWN) return before;
-    const int projected = run->projects ? project(run, i, j, among, g) : PAIR_UNKNOWN;
+    const int projected = run->on.projects ? project(run, i, j, among, g) : PAIR_UNKNOWN;
     if (projected != PAIR_UNKNOWN) return projected;
     segment_list list, *tested = NULL;
     if (run->listed != NULL && among->count != OCCLUDERS_UNCOUNTED) {
         list = (segment_list){among->count, among->of};
         tested = &list;
     }
-    const occlusion_verdict verdict = occlusion_test(&run->occlusion, tested, i, j, *g, &seen);
+    const occlusion_verdict verdict = occlusion_test(&run->on.occlusion, tested, i, j, *g, &seen);
     const int state = verdict == OCCLUSION_NONE    ? PAIR_OPEN
                       : verdict == OCCLUSION_TOTAL ? PAIR_HIDDEN
                                                    : PAIR_MIXED;
-    if (!occlusion_test_suffices(&run->occlusion, i, j, *g)) return state;
+    if (!occlusion_test_suffices(&run->on.occlusion, i, j, *g)) return state;
     if (state != PAIR_HIDDEN) *g = seen;
     return state | PAIR_SETTLED;
 }
 
 /* The occluders of a link, which its pairs are projected with or tested against. */
 static link_occluders *among_tested(const pairs_run *run, leaf_reaches *to, reach *r) {
-    const occluders *o = &run->few.occluders;
-    const int most = run->projects ? link_occluders_projected(o) : TESTED_OCCLUDERS_MOST;
-    return leaf_reaches_among(&run->tree, o, most, to, r);
+    const occluders *o = &run->on.few.occluders;
+    const int most = run->on.projects ? link_occluders_projected(o) : TESTED_OCCLUDERS_MOST;
+    return leaf_reaches_among(&run->on.tree, o, most, to, r);
 }
 
 /* The pairs of one position: unoccluded exchange areas and, unless the shaft was empty, occlusion tests. */
 static bool find_row(const pairs_run *run, uint32_t position, leaf_reaches *to, pair_block *block) {
     enum { PIECE = 64 };
-    const uint32_t i = run->tree.element[position];
+    const uint32_t i = run->on.tree.element[position];
     for (size_t k = 0; k < to->n; k++) {
         reach *r = &to->reaches[k];
         link_occluders *among = NULL;
@@ -71,15 +71,15 @@ static bool find_row(const pairs_run *run, uint32_t position, leaf_reaches *to, 
             double exchange[PIECE];
             const uint32_t count = r->last - first < PIECE ? r->last - first : PIECE;
             if (!pair_block_reserve(block, count)) return false;
-            pair_far_row(&run->far, position, first, count, exchange);
+            pair_far_row(&run->on.far, position, first, count, exchange);
             for (uint32_t c = 0; c < count; c++) {
-                const uint32_t j = run->tree.element[first + c];
+                const uint32_t j = run->on.tree.element[first + c];
                 double g = exchange[c];
                 if (g < 0)
-                    g = pair_factor_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
-                                             run->options->tolerance);
-                if (!((float)g > 0) || factor_of(run, i, j, g) < run->options->threshold) continue;
-                if (among == NULL && !r->open && (run->projects || run->listed != NULL)) {
+                    g = pair_factor_exchange(&run->on.rules, &run->on.polygons[i], &run->on.polygons[j],
+                                             run->on.options->tolerance);
+                if (!((float)g > 0) || factor_of(run, i, j, g) < run->on.options->threshold) continue;
+                if (among == NULL && !r->open && (run->on.projects || run->listed != NULL)) {
                     among = among_tested(run, to, r);
                     if (among == NULL) return false;
                 }
@@ -99,7 +99,7 @@ static bool find_block(pairs_run *run, size_t index, leaf_reaches *to) {
         const size_t at = first + r;
         block->begin[r] = block->used;
         if (r == 0 || run->leaf[at] != run->leaf[at - 1])
-            enough = leaf_reaches_find(&run->tree, &run->links, run->parent, run->leaf[at], to);
+            enough = leaf_reaches_find(&run->on.tree, &run->on.links, run->parent, run->leaf[at], to);
         enough = enough && find_row(run, (uint32_t)at, to, block);
     }
     for (size_t r = length; r <= PAIR_BLOCK_ROWS; r++) block->begin[r] = block->used;
@@ -146,25 +146,25 @@ static lam_status pass_block(pass *p, size_t index, leaf_reaches *to, pairs_repo
     const bool known = p->file != NULL && row_file_has(p->file, index);
     if (known) {
         const lam_status status =
-            p->refine ? pair_rows_fetch_exchange(&run->rows, index, run->tree.element, p->file, error)
-                      : pair_rows_fetch(&run->rows, index, run->tree.element, p->file, error);
+            p->refine ? pair_rows_fetch_exchange(&run->rows, index, run->on.tree.element, p->file, error)
+                      : pair_rows_fetch(&run->rows, index, run->on.tree.element, p->file, error);
         if (status != LAM_OK) return status;
     }
     const bool enough =
         p->refine ? pairs_refine_block(run, index, known, to, more) : known || find_block(run, index, to);
     if (!enough)
         return status_fail(error, LAM_ERR_MEMORY, "pairs of %zu elements: out of memory; use --quality draft",
-                           run->m->n);
+                           run->on.m->n);
     if (p->file == NULL || known) return LAM_OK;
     lam_status status;
 #pragma omp critical(pairs_file)
-    status = pair_rows_append(&run->rows, index, run->tree.element, p->file, error);
+    status = pair_rows_append(&run->rows, index, run->on.tree.element, p->file, error);
     return status;
 }
 
 static lam_status pass_run(pass *p, lam_error *error) {
     pairs_run *run = p->run;
-    const pairs_options *o = run->options;
+    const pairs_options *o = run->on.options;
     const size_t n_threads = (size_t)omp_get_max_threads();
     leaf_reaches *reaches = memory_allocate(n_threads, sizeof *reaches, "pairs", error);
     if (reaches == NULL) return LAM_ERR_MEMORY;
@@ -184,7 +184,7 @@ static lam_status pass_run(pass *p, lam_error *error) {
             add_report(&p->report, &more);
             p->finished += pair_rows_length(&run->rows, b);
             progress_report(o->progress, o->stage,
-                            p->share_before + p->share * (double)p->finished / (double)run->m->n);
+                            p->share_before + p->share * (double)p->finished / (double)run->on.m->n);
         }
         if (progress_cancelled(o->progress))
             pass_fail(p, status_fail(&why, LAM_ERR_CANCELLED, "cancelled"), &why);
@@ -197,12 +197,13 @@ static lam_status pass_run(pass *p, lam_error *error) {
 
 /* The file of a pass in the scratch folder; none without one. */
 static lam_status open_file(const pairs_run *run, const char *suffix, row_file **out, lam_error *error) {
-    const pairs_options *o = run->options;
+    const pairs_options *o = run->on.options;
     char name[64], geometry[33];
     if (o->scratch == NULL) return LAM_OK;
     snprintf(name, sizeof name, "%s.%s", o->scratch_name, suffix);
-    mesh_geometry_hash(run->m, geometry);
-    return pair_rows_open(o->scratch, name, geometry, o->recipe, run->m->n, run->tree.element, out, error);
+    mesh_geometry_hash(run->on.m, geometry);
+    return pair_rows_open(o->scratch, name, geometry, o->recipe, run->on.m->n, run->on.tree.element, out,
+                          error);
 }
 
 static lam_status run_passes(pairs_run *run, pairs_report *report, size_t *kept, lam_error *error) {
@@ -215,7 +216,7 @@ static lam_status run_passes(pairs_run *run, pairs_report *report, size_t *kept,
     TRY(pairs_share_segments(run, error));
     TRY(pass_run(&refine, error));
     *report = refine.report;
-    report->accuracy = run->occlusion.accuracy;
+    report->accuracy = run->on.occlusion.accuracy;
     if (kept != NULL) *kept = find.kept;
 done:
     row_file_close(find.file);
@@ -224,7 +225,7 @@ done:
 }
 
 static lam_status find_parents(pairs_run *run, lam_error *error) {
-    const cluster_tree *t = &run->tree;
+    const cluster_tree *t = &run->on.tree;
     run->parent = memory_allocate(t->n_clusters, sizeof *run->parent, "pairs", error);
     run->leaf = memory_allocate(t->n, sizeof *run->leaf, "pairs", error);
     if (run->parent == NULL || run->leaf == NULL) return LAM_ERR_MEMORY;
@@ -240,65 +241,39 @@ static lam_status find_parents(pairs_run *run, lam_error *error) {
 
 /* Moves the pairs that were found. */
 static void keep_pairs(pairs_run *run, known_pairs *to) {
-    *to = (known_pairs){run->rows, run->tree.position};
+    *to = (known_pairs){run->rows, run->on.tree.position};
     run->rows = (pair_rows){.n = 0};
-    run->tree.position = NULL;
+    run->on.tree.position = NULL;
 }
 
 lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
                           pairs_report *report, size_t *kept, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = m->n;
-    const double slack = visibility_rounding(v);
-    pairs_run run = {.m = m, .options = options};
-    cluster_link_options how = {
-        .threshold = options->threshold, .slack = slack, .progress = options->progress};
-    pair_factor_rules_init(&run.rules);
-    run.polygons = memory_allocate(n, sizeof *run.polygons, "pairs", error);
+    pairs_run run = {.listed = NULL};
+    TRY(pair_ground_find(m, v, options, 1, &run.on, error));
+    if (run.on.lists) {
+        TRY(segment_occluders_make(&run.on.few.occluders, visibility_centre(v), &run.listed, error));
+        run.on.occlusion.occluders = run.listed;
+    }
     run.neighbours = memory_allocate(n, sizeof *run.neighbours, "pairs", error);
-    if (run.polygons == NULL || run.neighbours == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(pair_rows_create(n, &run.rows, error));
-    for (size_t i = 0; i < n; i++) polygon_of_element(m, i, &run.polygons[i]);
-    run.occlusion = (occlusion){.v = v,
-                                .area = m->area,
-                                .polygons = run.polygons,
-                                .rules = &run.rules,
-                                .tolerance = options->tolerance,
-                                .accuracy = options->accuracy * fmax(options->coarser, 1),
-                                .segments = options->segments,
-                                .seed = options->seed};
-    if (options->occluders > 0) {
-        TRY(few_occluders_make(m, v, run.polygons, &run.rules, options->seed, options->occluders, &run.few,
-                               error));
-    }
+    if (run.neighbours == NULL) TRY(LAM_ERR_MEMORY);
     TRY(element_neighbours_find(m, run.neighbours, error));
-    TRY(cluster_tree_build(m, slack, &run.tree, error));
-    TRY(pair_far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
-    if (few_occluders_apply(&run.few)) how.occluders = &run.few.occluders;
-    TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
-    run.projects = options->occluders > 0 && few_occluders_pay(&run.few, &run.tree, &run.links);
-    if (options->occluders > 0 && few_occluders_are_listed(&run.few, &run.tree, &run.links)) {
-        TRY(segment_occluders_make(&run.few.occluders, visibility_centre(v), &run.listed, error));
-        run.occlusion.occluders = run.listed;
-    }
+    TRY(pair_rows_create(n, &run.rows, error));
     TRY(find_parents(&run, error));
     TRY(run_passes(&run, report, kept, error));
-    report->hidden += run.links.hidden_pairs;
-    report->facing += run.links.hidden_pairs;
-    TRY(pair_rows_gather(&run.rows, run.tree.element, options->keep_hidden, G, error));
+    report->hidden += run.on.links.hidden_pairs;
+    report->facing += run.on.links.hidden_pairs;
+    TRY(pair_rows_gather(&run.rows, run.on.tree.element, options->keep_hidden, G, error));
     if (options->keep != NULL) keep_pairs(&run, options->keep);
 done:
     pair_rows_free(&run.rows);
     pair_demand_free(&run.demand);
-    free(run.polygons);
     free(run.neighbours);
     free(run.parent);
     free(run.leaf);
     free(run.listed);
-    few_occluders_free(&run.few);
-    pair_far_table_free(&run.far);
-    cluster_links_free(&run.links);
-    cluster_tree_free(&run.tree);
+    pair_ground_free(&run.on);
     return status;
 }
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 static pair_state state_of(const pairs_run *run, uint32_t i, uint32_t j) {
-    return pair_rows_state(&run->rows, run->tree.position[i], run->tree.position[j]);
+    return pair_rows_state(&run->rows, run->on.tree.position[i], run->on.tree.position[j]);
 }
 
 /* True where a neighbouring pair, with either element replaced by one that shares an edge with it, is mixed
@@ -42,12 +42,12 @@ static segment_count segments_of_block(const pairs_run *run, size_t index) {
     size_t r = 0;
     for (size_t at = 0; at < block->used; at++) {
         while (at >= block->begin[r + 1]) r++;
-        const uint32_t i = run->tree.element[pair_rows_first(index) + r],
-                       j = run->tree.element[block->other[at]];
+        const uint32_t i = run->on.tree.element[pair_rows_first(index) + r],
+                       j = run->on.tree.element[block->other[at]];
         if (is_mixed(run, i, j, block->state[at]))
-            sum.mixed += occlusion_segments(&run->occlusion, i, j, (double)block->exchange[at]);
+            sum.mixed += occlusion_segments(&run->on.occlusion, i, j, (double)block->exchange[at]);
         else if (block->state[at] == (PAIR_MIXED | PAIR_EXACT))
-            sum.saved += occlusion_segments(&run->occlusion, i, j, (double)block->exchange[at]);
+            sum.saved += occlusion_segments(&run->on.occlusion, i, j, (double)block->exchange[at]);
     }
     return sum;
 }
@@ -57,9 +57,9 @@ static segment_count segments_of_block(const pairs_run *run, size_t index) {
  * Near pairs need none, as the rays beside them err more. */
 static lam_status demand_segments(pairs_run *run, lam_error *error) {
     static const double an_element = 512;
-    if (!run->projects || run->options->threshold > 0) return LAM_OK;
-    return pair_demand_find(&run->rows, run->tree.element, run->m->area, an_element * (double)run->m->n,
-                            &run->demand, error);
+    if (!run->on.projects || run->on.options->threshold > 0) return LAM_OK;
+    return pair_demand_find(&run->rows, run->on.tree.element, run->on.m->area,
+                            an_element * (double)run->on.m->n, &run->demand, error);
 }
 
 lam_status pairs_share_segments(pairs_run *run, lam_error *error) {
@@ -75,9 +75,9 @@ lam_status pairs_share_segments(pairs_run *run, lam_error *error) {
     }
     free(of_block);
     if (!(all.mixed > 0)) return demand_segments(run, error);
-    const double least = run->options->segments_least * all.mixed / (all.mixed + all.saved);
-    const double cast = fmin(fmax(all.mixed, least), run->options->segments_most);
-    run->occlusion.accuracy *= pow(all.mixed / cast, SEGMENTS_POWER);
+    const double least = run->on.options->segments_least * all.mixed / (all.mixed + all.saved);
+    const double cast = fmin(fmax(all.mixed, least), run->on.options->segments_most);
+    run->on.occlusion.accuracy *= pow(all.mixed / cast, SEGMENTS_POWER);
     return demand_segments(run, error);
 }
 
@@ -85,18 +85,19 @@ lam_status pairs_share_segments(pairs_run *run, lam_error *error) {
  * pair's occluders where there are enough of them. */
 static bool refine_pair(const pairs_run *run, uint32_t position, uint32_t other, double demand,
                         leaf_reaches *to, float *g) {
-    const uint32_t i = run->tree.element[position], j = run->tree.element[other], leaf = run->leaf[position];
+    const uint32_t i = run->on.tree.element[position], j = run->on.tree.element[other],
+                   leaf = run->leaf[position];
     pair_occluders between;
     segment_list list, *among = NULL;
     if (run->listed != NULL &&
-        fmax(occlusion_segments(&run->occlusion, i, j, (double)*g), demand) >= SEGMENTS_LISTED) {
+        fmax(occlusion_segments(&run->on.occlusion, i, j, (double)*g), demand) >= SEGMENTS_LISTED) {
         if ((to->n == 0 || to->leaf != leaf) &&
-            !leaf_reaches_find(&run->tree, &run->links, run->parent, leaf, to))
+            !leaf_reaches_find(&run->on.tree, &run->on.links, run->parent, leaf, to))
             return false;
         const link_occluders *of_link = leaf_reaches_among(
-            &run->tree, &run->few.occluders, LINK_OCCLUDERS_MOST, to, leaf_reaches_at(to, other));
+            &run->on.tree, &run->on.few.occluders, LINK_OCCLUDERS_MOST, to, leaf_reaches_at(to, other));
         if (of_link == NULL) return false;
-        const few_verdict found = few_occluders_between(&run->few, of_link, i, j, &between);
+        const few_verdict found = few_occluders_between(&run->on.few, of_link, i, j, &between);
         if (found == FEW_OPEN) return true;
         if (found == FEW_HIDDEN) {
             *g = 0;
@@ -107,7 +108,7 @@ static bool refine_pair(const pairs_run *run, uint32_t position, uint32_t other,
             among = &list;
         }
     }
-    *g = (float)occlusion_estimate_by(&run->occlusion, among, i, j, (double)*g, demand);
+    *g = (float)occlusion_estimate_by(&run->on.occlusion, among, i, j, (double)*g, demand);
     return true;
 }
 
@@ -115,7 +116,7 @@ static bool refine_pair(const pairs_run *run, uint32_t position, uint32_t other,
  */
 static bool refine_demanded(const pairs_run *run, uint32_t position, uint32_t other, uint8_t state,
                             leaf_reaches *to, float *g) {
-    const uint32_t i = run->tree.element[position], j = run->tree.element[other];
+    const uint32_t i = run->on.tree.element[position], j = run->on.tree.element[other];
     const bool hidden = (state & ~PAIR_SETTLED) == PAIR_HIDDEN;
     /* Of another pair g is what was seen, about half of what there is. */
     const bool demanded = pair_demand_of(&run->demand, i, j, hidden ? (double)*g : 2 * (double)*g) > 0;
@@ -124,8 +125,8 @@ static bool refine_demanded(const pairs_run *run, uint32_t position, uint32_t ot
         return true;
     }
     if (!hidden)
-        *g = (float)pair_factor_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
-                                         run->options->tolerance);
+        *g = (float)pair_factor_exchange(&run->on.rules, &run->on.polygons[i], &run->on.polygons[j],
+                                         run->on.options->tolerance);
     return refine_pair(run, position, other, pair_demand_of(&run->demand, i, j, (double)*g), to, g);
 }
 
@@ -135,8 +136,8 @@ bool pairs_refine_block(pairs_run *run, size_t index, bool known, leaf_reaches *
     for (size_t at = 0; at < block->used; at++) {
         while (at >= block->begin[r + 1]) r++;
         const pair_state state = (pair_state)(block->state[at] & ~(PAIR_SETTLED | PAIR_EXACT));
-        const uint32_t i = run->tree.element[pair_rows_first(index) + r],
-                       j = run->tree.element[block->other[at]];
+        const uint32_t i = run->on.tree.element[pair_rows_first(index) + r],
+                       j = run->on.tree.element[block->other[at]];
         sum->facing++;
         if (state == PAIR_CERTAIN) {
             sum->certain++;

@@ -4,27 +4,15 @@
 #define LAMBERT_FORMFACTOR_PAIRS_PAIRS_REFINE_H
 
 #include "solver/formfactor/pairs/element_neighbours.h"
-#include "solver/formfactor/pairs/few_occluders.h"
 #include "solver/formfactor/pairs/leaf_reaches.h"
-#include "solver/formfactor/pairs/occlusion.h"
 #include "solver/formfactor/pairs/pair_demand.h"
-#include "solver/formfactor/pairs/pair_far.h"
-#include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/pairs/pair_ground.h"
 
 typedef struct pairs_run {
-    const mesh *m;
-    const pairs_options *options;
-    pair_factor_rules rules;
-    polygon *polygons; /* [n], by element */
-    occlusion occlusion;
-    few_occluders few;
-    bool projects;            /* pairs with few occluders */
-    segment_occluder *listed; /* for lists of the occluders of pairs; NULL: there are none */
-    cluster_tree tree;
-    uint32_t *leaf;   /* [n], the leaf of a position */
-    uint32_t *parent; /* of each cluster */
-    pair_far_table far;
-    cluster_links links;
+    pair_ground on;
+    segment_occluder *listed;                /* for lists of the occluders of pairs; NULL: there are none */
+    uint32_t *leaf;                          /* [n], the leaf of a position */
+    uint32_t *parent;                        /* of each cluster */
     uint32_t (*neighbours)[NEIGHBOURS_MOST]; /* [n], by element */
     pair_rows rows;
     pair_demand demand; /* all zero before the first pass is over */

@@ -3,28 +3,11 @@
 #include "solver/formfactor/pairs/pairs_sample.h"
 
 #include "solver/base/clock.h"
-#include "solver/formfactor/pairs/cluster_links.h"
-#include "solver/formfactor/pairs/few_occluders.h"
-#include "solver/formfactor/pairs/pair_far.h"
+#include "solver/formfactor/pairs/pair_ground.h"
 #include "solver/formfactor/pairs/ray_crossings.h"
 
 #include <math.h>
 #include <stdlib.h>
-
-/* The scene and the structures that a sample is drawn from. */
-typedef struct sample_run {
-    const mesh *m;
-    const pairs_options *options;
-    pair_factor_rules rules;
-    polygon *polygons; /* [n], by element */
-    occlusion occlusion;
-    few_occluders few;
-    bool projects; /* pairs with few occluders */
-    bool lists;    /* the occluders of pairs */
-    cluster_tree tree;
-    pair_far_table far;
-    cluster_links links;
-} sample_run;
 
 /* Of the pairs whose segments agree, those that a neighbour's verdict makes mixed all the same: measured .26
  * (a Cornell box of 5,005 elements) to .47 (a furnished room of 516 triangles), but they ask for fewer
@@ -47,7 +30,7 @@ typedef struct sample_count {
 } sample_count;
 
 /* Lists the occluders of a pair, whose segments stand for `share` of all. */
-static void count_list(const sample_run *run, uint32_t i, uint32_t j, double share, sampled_link *link,
+static void count_list(const pair_ground *run, uint32_t i, uint32_t j, double share, sampled_link *link,
                        pairs_work *work) {
     pair_occluders between;
     if (!link->is_searched)
@@ -64,7 +47,7 @@ static void count_list(const sample_run *run, uint32_t i, uint32_t j, double sha
 
 /* Counts the segments of a pair that takes them with some probability; a pair for every EACH of them is
  * looked at closely. */
-static void count_segments(const sample_run *run, uint32_t i, uint32_t j, double g, double probability,
+static void count_segments(const pair_ground *run, uint32_t i, uint32_t j, double g, double probability,
                            sampled_link *link, sample_count *sum) {
     static const double each = 1024;
     const double segments = occlusion_segments(&run->occlusion, i, j, g);
@@ -78,7 +61,7 @@ static void count_segments(const sample_run *run, uint32_t i, uint32_t j, double
 }
 
 /* Counts a pair that is projected; false where it has too many occluders. */
-static bool count_projection(const sample_run *run, uint32_t i, uint32_t j, double g,
+static bool count_projection(const pair_ground *run, uint32_t i, uint32_t j, double g,
                              const link_occluders *among, pairs_work *work) {
     double share;
     if (!run->projects) return false;
@@ -92,7 +75,7 @@ static bool count_projection(const sample_run *run, uint32_t i, uint32_t j, doub
 }
 
 /* Counts the pairs of the position with first ... last-1. */
-static void count_row(const sample_run *run, uint32_t position, uint32_t first, uint32_t last,
+static void count_row(const pair_ground *run, uint32_t position, uint32_t first, uint32_t last,
                       sampled_link *link, sample_count *sum) {
     enum { PIECE = 64 };
     pairs_work *const work = &sum->work;
@@ -137,7 +120,7 @@ static void scale_work(pairs_work *work, double scale) {
 
 /* The rows of all links, one after the other, of which every step-th is counted: some of the pairs of a large
  * scene, a sixteenth of those of a small one, where a sample should cost little beside the work itself. */
-static void count_rows(const sample_run *run, double n_pairs, pairs_work *work, pairs_trial *trial) {
+static void count_rows(const pair_ground *run, double n_pairs, pairs_work *work, pairs_trial *trial) {
     enum { LEAST = 4000, MOST = 40000, SHARE = 16 };
     const double wanted = fmin(fmax(n_pairs / SHARE, LEAST), MOST);
     const double step = fmax(1, floor(n_pairs / wanted));
@@ -169,7 +152,7 @@ static void count_rows(const sample_run *run, double n_pairs, pairs_work *work, 
     scale_work(work, taken > 0 ? rows / taken : 0);
 }
 
-static void scale_to_all(const sample_run *run, pairs_work *work) {
+static void scale_to_all(const pair_ground *run, pairs_work *work) {
     const double all = 1 / run->links.share;
     const cluster_link_work *l = &run->links.work;
     work->shafts = all * l->shafts;
@@ -184,36 +167,10 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
                         pairs_trial *trial, lam_error *error) {
     enum { SAMPLED_FROM = 1500, ONE_OF = 64 };
     lam_status status = LAM_OK;
-    const double slack = visibility_rounding(v);
-    sample_run run = {.m = m, .options = options};
+    pair_ground run;
     pairs_work work = {0};
-    cluster_link_options how = {.threshold = options->threshold,
-                                .slack = slack,
-                                .one_of = m->n < SAMPLED_FROM ? 1 : ONE_OF,
-                                .progress = options->progress};
     double n_pairs = 0;
-    pair_factor_rules_init(&run.rules);
-    run.polygons = memory_allocate(m->n, sizeof *run.polygons, "pairs", error);
-    if (run.polygons == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < m->n; i++) polygon_of_element(m, i, &run.polygons[i]);
-    run.occlusion = (occlusion){.v = v,
-                                .area = m->area,
-                                .polygons = run.polygons,
-                                .rules = &run.rules,
-                                .tolerance = options->tolerance,
-                                .accuracy = options->accuracy,
-                                .segments = options->segments,
-                                .seed = options->seed};
-    if (options->occluders > 0) {
-        TRY(few_occluders_make(m, v, run.polygons, &run.rules, options->seed, options->occluders, &run.few,
-                               error));
-        if (few_occluders_apply(&run.few)) how.occluders = &run.few.occluders;
-    }
-    TRY(cluster_tree_build(m, slack, &run.tree, error));
-    TRY(pair_far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
-    TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
-    run.projects = options->occluders > 0 && few_occluders_pay(&run.few, &run.tree, &run.links);
-    run.lists = options->occluders > 0 && few_occluders_are_listed(&run.few, &run.tree, &run.links);
+    TRY(pair_ground_find(m, v, options, m->n < SAMPLED_FROM ? 1 : ONE_OF, &run, error));
     for (size_t k = 0; k < run.links.n; k++) {
         const cluster *a = &run.tree.clusters[run.links.links[k].a],
                       *b = &run.tree.clusters[run.links.links[k].b];
@@ -224,11 +181,7 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
     if (trial != NULL) trial->link_seconds = run.links.work.seconds / run.links.share;
     *out = work;
 done:
-    free(run.polygons);
-    few_occluders_free(&run.few);
-    pair_far_table_free(&run.far);
-    cluster_links_free(&run.links);
-    cluster_tree_free(&run.tree);
+    pair_ground_free(&run);
     return status;
 }
 
