@@ -10,7 +10,7 @@ import h5py
 import numpy
 
 from case import Case
-from command import must
+from command import REFERENCE, must
 from quads import Quads
 
 TRIAL = re.compile(r"trial (\d): the error of the mean of (\S+) by (.*) is stated as ([\d.e-]+), --group-error asks for ([\d.e-]+)"
@@ -64,7 +64,7 @@ class GroupError(Case):
         must("precompute", cls.rooms, "-o", cls.plain, *how, threads=2)
         cls.done = must("precompute", cls.rooms, "-o", cls.kept, *how, "--group-error", X, "--json", threads=2)
         # Errors of .1 are far above those of exact inverses by pairs, some .002.
-        must("precompute", cls.rooms, "-o", cls.exact, "--method", "exact", "--probes", 0, "--seed", 7, threads=2)
+        must("precompute", cls.rooms, "-o", cls.exact, "--method", "exact", "--probes", 0, "--seed", 7, threads=2, program=REFERENCE)
 
     @staticmethod
     def worst(store):

@@ -8,7 +8,7 @@ import h5py
 import numpy
 
 from case import Case
-from command import must
+from command import REFERENCE, must
 
 
 def values_of(store, name):
@@ -67,7 +67,7 @@ class MeshError(Case):
         about, _, coarse = self.made("coarse.h5", *options)
         stated = about["error"]["mesh"]
         fine = self.path("fine.h5")
-        must("precompute", self.scene, "-o", fine, "--subdivide", 2, "--probes", 0, *options)
+        must("precompute", self.scene, "-o", fine, "--subdivide", 2, "--probes", 0, *options, program=REFERENCE)
         skies = numpy.stack([numpy.ones(145), .2 + .8 * numpy.random.default_rng(1).random(145)])
         numpy.save(self.path("skies.npy"), numpy.repeat(skies[:, None], about["channels"], axis=1))
         light = []

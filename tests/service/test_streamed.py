@@ -11,7 +11,7 @@ import unittest
 import h5py
 import numpy as np
 
-from command import ENVIRONMENT, LAMBERT, lambert, must
+from command import ENVIRONMENT, LAMBERT, REFERENCE, lambert, must
 
 SAID = r"(?m)^rays, wavelets +[\d.]+ s$"
 HELD = r"(?m)^form factors +[\d.]+ s$"
@@ -44,7 +44,7 @@ class Streamed(unittest.TestCase):
     def test_it_is_as_near_as_with_rows_that_are_held(self):
         held, scratch = self.path("held.h5"), self.path("scratch")
         scratch.mkdir()
-        said = must("precompute", self.scene, "-o", held, *self.common, "--probes", 8, "--scratch", scratch).stderr
+        said = must("precompute", self.scene, "-o", held, *self.common, "--probes", 8, "--scratch", scratch, program=REFERENCE).stderr
         self.assertRegex(self.said, SAID)
         self.assertNotRegex(self.said, HELD)
         self.assertRegex(said, HELD)
@@ -95,7 +95,7 @@ class Streamed(unittest.TestCase):
         self.assertIn("too large for the whole inverse, too noisy for a sparse one", said)
         # Rows would take 100 MB more.
         forecast = re.search(r"memory up to (\d+)M", said)
-        held = must("precompute", large, "-o", path, "--rays", 512, "--probes", 0, "--keep-form-factors").stderr
+        held = must("precompute", large, "-o", path, "--rays", 512, "--probes", 0, "--keep-form-factors", program=REFERENCE).stderr
         self.assertGreater(int(re.search(r"memory up to (\d+)M", held)[1]), int(forecast[1]) + 80)
         self.assertRegex(held, HELD)
         # A look at the scene asks for rows itself, and counts them.
@@ -108,7 +108,7 @@ class Streamed(unittest.TestCase):
         scratch.mkdir()
         common = (*self.common, "--probes", 0, "--sky", "reinhart:1")
         self.assertRegex(must("precompute", self.city, "-o", path, *common).stderr, SAID)
-        self.assertRegex(must("precompute", self.city, "-o", held, *common, "--scratch", scratch).stderr, HELD)
+        self.assertRegex(must("precompute", self.city, "-o", held, *common, "--scratch", scratch, program=REFERENCE).stderr, HELD)
         with h5py.File(path) as one, h5py.File(held) as two:
             sky, other = one["sky/first_bounce"][()].astype(float), two["sky/first_bounce"][()].astype(float)
             self.assertEqual(sky.shape, other.shape)
