@@ -21,8 +21,8 @@ typedef struct pairs_report {
     double hidden;    /* every one was */
     double projected; /* partly hidden by few occluders: their visible parts are integrated */
     double mixed;     /* some were, or a neighbouring pair came out differently: estimated by many segments */
-    double accuracy;  /* standard error of a mixed pair's factor: as requested, or as the number of segments
-                         allowed */
+    double accuracy; /* standard error of a mixed pair's factor of .005 (occlusion.h): as requested, or as the
+                        number of segments allowed */
 } pairs_report;
 
 /* The number of blocks that each rule decided. Pairs of elements of different planes are in a block, or are

@@ -20,9 +20,9 @@ typedef struct recipe {
     recipe_method method;
     size_t rays; /* from every element; for pairs and blocks they only find the share that leaves the scene */
     size_t resolution; /* of a hemicube: pixels along its top, even; else 0 */
-    double accuracy;   /* of (near) pairs: standard error of the factor of a partly occluded pair; of blocks:
-                          bound of   the error of one in S, 2-norm; else 0 */
-    uint64_t seed;     /* of all samples */
+    double accuracy; /* of (near) pairs: standard error of a partly occluded factor of .005 (occlusion.h); of
+                        blocks: bound of the error of one in S, 2-norm; else 0 */
+    uint64_t seed;   /* of all samples */
     scene_closure closure;
 } recipe;
 

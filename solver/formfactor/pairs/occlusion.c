@@ -9,14 +9,6 @@
 
 enum { SEGMENTS_MOST = 1 << 22 };
 
-/* The number N of segments with SEGMENTS_ERROR F N^-SEGMENTS_POWER = accuracy. */
-static size_t segments_for(const occlusion *o, double F, double accuracy) {
-    const double wanted = fmin(pow(SEGMENTS_ERROR * F / accuracy, 1 / SEGMENTS_POWER), SEGMENTS_MOST);
-    const size_t packets = ((size_t)wanted + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET;
-    const size_t segments = packets * VISIBILITY_PACKET;
-    return segments > o->segments ? segments : o->segments;
-}
-
 /* Segments of an occlusion test: a packet for each .001 of the factor, from one packet to MOST segments. */
 static size_t first_segments(double F) {
     enum { MOST = 256 };
@@ -27,6 +19,27 @@ static size_t first_segments(double F) {
 /* The larger of F_ij and F_ji. */
 static double factor_of(const occlusion *o, uint32_t i, uint32_t j, double g) {
     return g / fmin(o->area[i], o->area[j]);
+}
+
+/* N with SEGMENTS_ERROR F N^-SEGMENTS_POWER = accuracy. */
+static double segments_for(double F, double accuracy) {
+    return pow(SEGMENTS_ERROR * F / accuracy, 1 / SEGMENTS_POWER);
+}
+
+/* N of a pair of which `visible` is seen, the share of F: see occlusion_estimate. */
+static double segments_of_pair(const occlusion *o, uint32_t i, uint32_t j, double F, double visible) {
+    static const double middle = .005, large = .1; /* factors */
+    const double ratio = fmin(o->area[i], o->area[j]) / fmax(o->area[i], o->area[j]);
+    const double shared = segments_for(middle, o->accuracy) * F / middle * pow(ratio, 1. / 8);
+    const double certain = F > large ? segments_for(F, o->accuracy * fmax(1, F * visible / large))
+                                     : segments_for(large, o->accuracy) * F * F / (large * large);
+    const double wanted = fmin(fmax(shared, certain), SEGMENTS_MOST);
+    const size_t segments = (size_t)ceil(wanted / VISIBILITY_PACKET) * VISIBILITY_PACKET;
+    return (double)(segments > o->segments ? segments : o->segments);
+}
+
+double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g) {
+    return segments_of_pair(o, i, j, factor_of(o, i, j, g), .5);
 }
 
 /* A packet of segments between points of two elements, and the kernel of each: K = cos cos' / r^2 times the
@@ -125,7 +138,7 @@ static void cast(const occlusion *o, const piece_pair *two, size_t first, int pa
 }
 
 bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double g) {
-    return segments_for(o, factor_of(o, i, j, g), o->accuracy) <= VISIBILITY_PACKET;
+    return segments_for(factor_of(o, i, j, g), o->accuracy) <= VISIBILITY_PACKET;
 }
 
 occlusion_verdict occlusion_test(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g,
@@ -230,19 +243,13 @@ static double visible_exchange(const occlusion *o, const segment_budget *pair, c
     return sum;
 }
 
-/* The standard error to reach: o->accuracy, relaxed to 10 F V o->accuracy where the visible factor F V, by
- * PILOT segments, is above .1. */
-static double accuracy_for(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double F) {
+/* N of a pair; what is seen of large factors is estimated by PILOT segments. */
+static double segments_wanted(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g) {
     enum { PILOT = 64 };
-    if (F <= .1) return o->accuracy;
-    const piece_pair two = piece_pair_of(o->seed, among, i, &o->polygons[i], j, &o->polygons[j]);
-    return o->accuracy * fmax(1, 10 * F * visible_share(o, &two, PILOT));
-}
-
-double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g) {
-    /* As accuracy_for, with half of the factor visible. */
     const double F = factor_of(o, i, j, g);
-    return (double)segments_for(o, F, o->accuracy * fmax(1, 5 * F));
+    if (F <= .1) return segments_of_pair(o, i, j, F, .5);
+    const piece_pair two = piece_pair_of(o->seed, among, i, &o->polygons[i], j, &o->polygons[j]);
+    return segments_of_pair(o, i, j, F, visible_share(o, &two, PILOT));
 }
 
 double occlusion_estimate(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g) {
@@ -251,12 +258,10 @@ double occlusion_estimate(const occlusion *o, segment_list *among, uint32_t i, u
 
 double occlusion_estimate_by(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g,
                              double segments) {
-    const double F = factor_of(o, i, j, g), accuracy = accuracy_for(o, among, i, j, F);
     const segment_budget pair = {.i = i,
                                  .j = j,
                                  .among = among,
-                                 .segments_per_area =
-                                     fmax((double)segments_for(o, F, accuracy), segments) / g};
+                                 .segments_per_area = fmax(segments_wanted(o, among, i, j, g), segments) / g};
     /* The exchange areas of the pieces sum to g only within the tolerance, and occlusion never adds. */
     return fmin(g, visible_exchange(o, &pair, &o->polygons[i], &o->polygons[j], 0, 0));
 }

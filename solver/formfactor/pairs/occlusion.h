@@ -22,7 +22,7 @@ typedef struct occlusion {
     const polygon *polygons; /* [n] */
     const pair_factor_rules *rules;
     double tolerance; /* of the unoccluded factor, relative */
-    double accuracy;  /* standard error of the factor of a partly occluded pair */
+    double accuracy;  /* standard error of partly occluded factors of .005, see occlusion_estimate */
     size_t segments;  /* the least that occlusion_estimate casts; a multiple of VISIBILITY_PACKET */
     uint64_t seed;
     const segment_occluder *occluders; /* of the lists; NULL: no pair has one */
@@ -37,12 +37,17 @@ typedef enum occlusion_verdict { OCCLUSION_NONE, OCCLUSION_TOTAL, OCCLUSION_PART
 occlusion_verdict occlusion_test(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g,
                                  double *seen);
 
-/* True where eight segments already reach o->accuracy, because the factor is small: seen is then final. */
+/* True where the standard error of eight segments is o->accuracy at most, because the factor is small: seen
+ * is then final. */
 bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double g);
 
-/* The visible part of g, never more than g. Its standard error is o->accuracy as a factor; for a visible
- * factor F above .1 it is 10 F times that. among: all occluders that may block a segment of the pair; NULL:
- * any of the scene may. */
+/* The visible part of g, never more than g, by N segments. They are shared among pairs as answers need them:
+ * with V known, errors of answers to single elements and to lamps are least, for so many segments of all
+ * pairs together, where N grows like the .83th power of a pair's weight. F, the larger of F_ij and F_ji,
+ * stands for it: N = (SEGMENTS_ERROR F0 / accuracy)^(1 / SEGMENTS_POWER) (F / F0) (A_small / A_large)^(1/8),
+ * F0 = .005 so that the standard error of the factor F0 is accuracy, and that of another (F / F0)^.3 times
+ * it. From .03 to .1 N ~ F^2 comes back to accuracy, and a visible factor F V above .1 has 10 F V times that.
+ * among: all occluders that may block a segment of the pair; NULL: any of the scene may. */
 double occlusion_estimate(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g);
 
 /* The same by at least so many segments. */

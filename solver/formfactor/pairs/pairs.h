@@ -12,7 +12,7 @@ typedef struct known_pairs known_pairs;
 
 typedef struct pairs_options {
     double tolerance; /* of the unoccluded factor, relative */
-    double accuracy;  /* standard error of the factor of a partly occluded pair; a third by projection */
+    double accuracy;  /* standard error of partly occluded factors (occlusion.h); a third by projection */
     size_t segments;  /* the least for a mixed pair; a multiple of 8 */
     /* Bounds for all mixed pairs together: accuracy is relaxed or tightened to meet them. */
     double segments_least, segments_most; /* of segments_least only the share that projection leaves */
