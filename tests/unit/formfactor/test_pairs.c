@@ -1,4 +1,5 @@
 /* Form factors pair by pair: exact where nothing is between, the seen share where something is. */
+#include "solver/formfactor/pairs/occlusion.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "support/plates.h"
 #include "support/suite.h"
@@ -125,9 +126,9 @@ static mesh divided_plates(bool shared) {
                 for (int d = 0; d < 3; d++) off += fabs(m.vertices[v][d] - m.vertices[m.elements[e][c]][d]);
                 if (off < 1e-12) m.elements[e][c] = v;
             }
-    const box_cell occluder = {.axis = 2, .level = .5, .from = {.25, .25, .5}, .to = {.75, .75, .5}};
-    mesh_add_cell(&m, &occluder, true);
-    mesh_add_cell(&m, &occluder, false);
+    const box_cell plate = {.axis = 2, .level = .5, .from = {.25, .25, .5}, .to = {.75, .75, .5}};
+    mesh_add_cell(&m, &plate, true);
+    mesh_add_cell(&m, &plate, false);
     mesh_finish(&m, .5f);
     return m;
 }
@@ -234,6 +235,27 @@ START_TEST(segments_are_shared) {
 }
 END_TEST
 
+/* N ~ F r^(1/8) with the accuracy asked for at .005, and from where F^2 is more on, the accuracy again at .1.
+ */
+START_TEST(segments_are_shared_by_factors) {
+    enum { PACKET = 8 };
+    const double area[] = {1, 1, 256}, accuracy = 7e-5;
+    const occlusion o = {.area = area, .accuracy = accuracy, .segments = PACKET};
+    const double middle = pow(SEGMENTS_ERROR * .005 / accuracy, 1 / SEGMENTS_POWER),
+                 large = pow(SEGMENTS_ERROR * .1 / accuracy, 1 / SEGMENTS_POWER);
+    ck_assert_double_eq_tol(occlusion_segments(&o, 0, 1, .005), middle, PACKET);
+    ck_assert_double_eq_tol(occlusion_segments(&o, 0, 1, .02), 4 * middle, PACKET);
+    ck_assert_double_eq_tol(occlusion_segments(&o, 0, 2, .01), middle, PACKET);
+    ck_assert_double_eq_tol(occlusion_segments(&o, 2, 0, .01), middle, PACKET);
+    ck_assert_double_eq_tol(occlusion_segments(&o, 0, 1, .1), large, PACKET);
+    ck_assert_double_eq_tol(occlusion_segments(&o, 0, 1, .05), large / 4, PACKET);
+    ck_assert_double_eq(occlusion_segments(&o, 0, 1, 1e-6), PACKET);
+    /* Above .1 ten times a visible half. */
+    ck_assert_double_eq_tol(occlusion_segments(&o, 0, 1, .4),
+                            pow(SEGMENTS_ERROR * .4 / (2 * accuracy), 1 / SEGMENTS_POWER), PACKET);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("pairs");
     TCase *cases = tcase_create("pairs");
@@ -244,6 +266,7 @@ int main(void) {
     tcase_add_test(cases, borders_are_found);
     tcase_add_test(cases, an_occluder_never_raises_a_factor);
     tcase_add_test(cases, segments_are_shared);
+    tcase_add_test(cases, segments_are_shared_by_factors);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
