@@ -26,13 +26,17 @@ static double segments_for(double F, double accuracy) {
     return pow(SEGMENTS_ERROR * F / accuracy, 1 / SEGMENTS_POWER);
 }
 
+/* Factors F0 of occlusion_estimate, and from which on the visible part of one counts. */
+static const double middle_factor = .005, large_factor = .1;
+
 /* N of a pair of which `visible` is seen, the share of F: see occlusion_estimate. */
 static double segments_of_pair(const occlusion *o, uint32_t i, uint32_t j, double F, double visible) {
-    static const double middle = .005, large = .1; /* factors */
+    const double at_middle = segments_for(middle_factor, o->accuracy), part = F / large_factor;
+    const double at_large = at_middle * pow(large_factor / middle_factor, 1 / SEGMENTS_POWER);
     const double ratio = fmin(o->area[i], o->area[j]) / fmax(o->area[i], o->area[j]);
-    const double shared = segments_for(middle, o->accuracy) * F / middle * pow(ratio, 1. / 8);
-    const double certain = F > large ? segments_for(F, o->accuracy * fmax(1, F * visible / large))
-                                     : segments_for(large, o->accuracy) * F * F / (large * large);
+    const double shared = at_middle * F / middle_factor * sqrt(sqrt(sqrt(ratio)));
+    const double certain =
+        part > 1 ? segments_for(F, o->accuracy * fmax(1, part * visible)) : at_large * part * part;
     const double wanted = fmin(fmax(shared, certain), SEGMENTS_MOST);
     const size_t segments = (size_t)ceil(wanted / VISIBILITY_PACKET) * VISIBILITY_PACKET;
     return (double)(segments > o->segments ? segments : o->segments);
@@ -247,7 +251,7 @@ static double visible_exchange(const occlusion *o, const segment_budget *pair, c
 static double segments_wanted(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g) {
     enum { PILOT = 64 };
     const double F = factor_of(o, i, j, g);
-    if (F <= .1) return segments_of_pair(o, i, j, F, .5);
+    if (F <= large_factor) return segments_of_pair(o, i, j, F, .5);
     const piece_pair two = piece_pair_of(o->seed, among, i, &o->polygons[i], j, &o->polygons[j]);
     return segments_of_pair(o, i, j, F, visible_share(o, &two, PILOT));
 }

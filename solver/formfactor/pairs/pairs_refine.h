@@ -9,7 +9,7 @@
 #include "solver/formfactor/pairs/pair_ground.h"
 
 typedef struct pairs_run {
-    pair_ground on;
+    pair_ground on;                          /* all links */
     segment_occluder *listed;                /* for lists of the occluders of pairs; NULL: there are none */
     uint32_t *leaf;                          /* [n], the leaf of a position */
     uint32_t *parent;                        /* of each cluster */
