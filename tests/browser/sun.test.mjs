@@ -120,6 +120,9 @@ for (const [up, hours] of [["z", [9.5, 12, 15]], ["y", [15]], ["x", [15]]]) test
         console.log(`${hour} h: ${dark} points in the shadow, ${lit} beside it`);
         assert.ok(dark >= 3 && lit >= 3, `${dark} dark, ${lit} lit`);
     }
+    // A weak card has nothing to add to that picture.
+    await finished(page);
+    assert.equal(await page.evaluate(() => window.lambert.stage.uniforms.is_soft.value), false);
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });
