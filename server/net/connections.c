@@ -41,6 +41,13 @@
 /* Idle connections closed in a second, at most. */
 #define PLACES 64
 
+/* Seconds from which on a client that has ended its sending in the middle of a request is taken as gone: not
+ * at once, as its bytes may be a whole request that is being processed. While all connections are in use it
+ * has less time, and the next look for others waits for a moment, as one asks the kernel for each. */
+#define GONE_AFTER_S 1.0
+#define GONE_AFTER_FULL_S .25
+#define GONE_PAUSE_S .05
+
 typedef enum cut_reason {
     CUT_IDLE,
     CUT_HEAD,
@@ -77,6 +84,7 @@ struct connections {
     client *first;
     double next_end; /* the earliest of all, or earlier */
     bool hurried;    /* an end comes before the next check */
+    double looked;   /* for those that are gone, while all were in use */
     size_t n_open;
     shares kept;        /* connections but those that are being closed */
     uint64_t n_refused; /* not accepted, as their client has most of all */
@@ -162,14 +170,13 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
         return false;
     case STAGE_IDLE:
         *why = CUT_IDLE;
-        return now > c->deadline || (now - c->since > 1.0 && has_hung_up(c));
+        return now > c->deadline || (now - c->since > GONE_AFTER_S && has_hung_up(c));
     case STAGE_HEAD:
     case STAGE_BODY:
         *why = c->stage == STAGE_HEAD ? CUT_HEAD : CUT_BODY;
         moved = (double)(c->bytes - c->seen);
         c->seen = c->bytes;
-        /* Not at once: the received bytes may be a whole request that is being processed. */
-        if (moved <= 0 && now - c->since > 1.0 && has_hung_up(c)) return true;
+        if (moved <= 0 && now - c->since > GONE_AFTER_S && has_hung_up(c)) return true;
         break;
     case STAGE_ANSWER:
         *why = CUT_ANSWER;
@@ -347,8 +354,23 @@ static bool replace_idle(connections *all, uint64_t key) {
     return true;
 }
 
+/* Closes those whose clients are gone without an answer, which would count for their clients until the next
+ * sweep. O(open). */
+static void cut_gone(connections *all) {
+    const double now = clock_seconds();
+    if (now - all->looked < GONE_PAUSE_S) return;
+    all->looked = now;
+    for (client *c = all->first; c != NULL; c = c->after) {
+        const bool in_request = c->stage == STAGE_HEAD || c->stage == STAGE_BODY;
+        if (!c->cut && (in_request || c->stage == STAGE_IDLE) && now - c->since > GONE_AFTER_FULL_S &&
+            has_hung_up(c))
+            cut(all, c, c->stage == STAGE_BODY ? CUT_BODY : c->stage == STAGE_HEAD ? CUT_HEAD : CUT_IDLE);
+    }
+}
+
 bool connections_admit(connections *all, uint64_t key) {
     pthread_mutex_lock(&all->lock);
+    if (all->kept.taken >= all->limits.most) cut_gone(all);
     const size_t kept = all->kept.taken;
     bool admitted = kept < all->limits.most;
     if (!admitted) {

@@ -49,10 +49,10 @@ void connections_reserve(connections *all, size_t n_stores);
 void connections_stop(connections *all);
 
 /* True if a new connection of a client (a key of server/net/peer.h) is to be accepted. When all are in use,
- * one of the client that has most of them is closed for one of a client that has fewer: the one that has been
- * idle for longest, or in its stage. One of the client that has most is accepted beyond the limit, if few
- * are, or for one of its own without a request, or is refused. O(open connections) when all are in use, else
- * O(1). */
+ * those are closed whose clients are gone, and one of the client that has most of them for one of a client
+ * that has fewer: the one that has been idle for longest, or in its stage. One of the client that has most is
+ * accepted beyond the limit, if few are, or for one of its own without a request, or is refused. O(open
+ * connections) when all are in use, else O(1). */
 bool connections_admit(connections *all, uint64_t key);
 
 /* Adds a connection at STAGE_HEAD; NULL if memory is short. counts: it counts for its client, as that of a

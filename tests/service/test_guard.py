@@ -10,6 +10,7 @@ import resource
 import socket
 import struct
 import threading
+import time
 import unittest
 
 from daemon import PATIENCE, Daemon
@@ -98,6 +99,23 @@ class Guard(Case):
             self.assertGreaterEqual(int(re.search(r'cut_total{why="share"} (\d+)', figures).group(1)), 4)
             self.assertLessEqual(int(re.search(r"lambertd_connections (\d+)", figures).group(1)), 8 + 32)
             kept.close()
+
+    def test_the_gone_do_not_fill_their_share(self):
+        """An address drops requests in their middle, quicker than the check of each second finds them: its other ones are served."""
+        part = HEAD + b"Content-Length: %d\r\n\r\n" % len(SOLVE) + SOLVE[:5]
+        whole = HEAD + b"Content-Length: %d\r\n\r\n" % len(SOLVE) + SOLVE
+        with Daemon(self.box, "--max-connections", 8, "--timeout", 3600) as daemon:
+            for _ in range(8 + 16):
+                with daemon.raw() as s:
+                    s.sendall(part)
+            time.sleep(.4)
+            mine = [daemon.raw() for _ in range(8)]
+            for s in mine:
+                s.sendall(whole)
+            for s in mine:
+                self.assertTrue(s.recv(65536).startswith(b"HTTP/1.1 200 "))
+                s.close()
+            self.assertEqual(cuts(daemon, "share"), 0)
 
     def test_connections_are_as_many_as_descriptors_allow(self):
         # 64 are kept for what else is opened, one is of the store.
