@@ -151,6 +151,11 @@ size_t recipe_rays_beside_blocks(size_t n) {
     return each < LEAST ? LEAST : each > RECIPE_RAYS_FEW ? RECIPE_RAYS_FEW : each;
 }
 
+double recipe_coarser(double epsilon) {
+    static const double from = .05 / 16;
+    return fmax(sqrt(epsilon / from), 1);
+}
+
 size_t recipe_auto_rays(double epsilon, double share) {
     /* sqrt(2 / rays) <= share epsilon */
     const double wanted = 2 / (share * epsilon * share * epsilon);

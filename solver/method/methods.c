@@ -82,7 +82,7 @@ const option_row build_rows[] = {
          "low-rank: bound on the error of the factorization in the 2-norm; hierarchical: the "
          "stated indirect error of the scene's own lights, which up to three trials keep where it is given "
          "and measured (--probes), begun with coefficients above a fiftieth of it; auto: the error at which "
-         "methods are compared"},
+         "methods are compared; others: where it is given, form factors follow it (--quality)"},
     {.name = "store-precision",
      .kind = OPTION_CHOICE,
      .offset = offsetof(build_options, precision),

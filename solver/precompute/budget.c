@@ -1,5 +1,7 @@
 #include "solver/precompute/budget.h"
 
+#include "solver/formfactor/recipe.h"
+
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -7,26 +9,31 @@
 /* Epsilon of an operator from blocks or pairs, whose errors follow it. */
 static const char *const epsilons[] = {"0.8",   "0.4",   "0.2",   "0.1",  "0.05",
                                        "0.025", "0.012", "0.006", "0.003"};
-enum { EPSILONS = sizeof epsilons / sizeof *epsilons, PAIRS_FROM = 4 };
+enum { EPSILONS = sizeof epsilons / sizeof *epsilons, PAIRS_FROM = 2 };
 
 /* Errors of single elements: of the operator at epsilon .05 from blocks, and from pairs, whose form factors
  * have hardly any; their power of epsilon; of one ray. */
 static const double error_of_blocks = .022, error_of_operator = .018, power = .6, error_of_ray = 9;
-/* The error that pairs add. */
+/* The error that pairs add, and its power of their accuracy. */
 static const struct {
     const char *quality;
     double error;
 } qualities[] = {{"normal", 1e-3}, {"high", 1e-4}};
 enum { QUALITIES = sizeof qualities / sizeof *qualities };
+static const double power_of_pairs = .65;
 
 enum { RAYS_LEAST = 32, RAYS_MOST = 1 << 16 };
 /* Of the noise of rays, sqrt(2 / rays): the operator's threshold is then that of the noise. */
 static const double epsilon_of_noise = 2.7, epsilon_least = .003, epsilon_most = 1;
 
-static double error_at(double error, const char *epsilon) {
+static double value_of(const char *epsilon) {
     double x = 0;
     (void)sscanf(epsilon, "%lf", &x);
-    return error * pow(x / .05, power);
+    return x;
+}
+
+static double error_at(double error, const char *epsilon) {
+    return error * pow(value_of(epsilon) / .05, power);
 }
 
 size_t budget_list(bool blocks, bool rays, bool pairs, uint64_t probes,
@@ -51,7 +58,9 @@ size_t budget_list(bool blocks, bool rays, bool pairs, uint64_t probes,
             *r = (budget_recipe){
                 .kind = BUDGET_PAIRS, .quality = qualities[q].quality, .probes = probes, .seconds = -1};
             snprintf(r->epsilon, sizeof r->epsilon, "%s", epsilons[k]);
-            r->error = hypot(error_at(error_of_operator, epsilons[k]), qualities[q].error);
+            const double coarser = recipe_coarser(value_of(epsilons[k]));
+            r->error = hypot(error_at(error_of_operator, epsilons[k]),
+                             qualities[q].error * pow(coarser, power_of_pairs));
         }
     return count;
 }

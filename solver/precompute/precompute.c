@@ -215,6 +215,9 @@ static void list_unused(const precompute_state *state, const option_result *give
         bool unused = method_has_option(NULL, name) && !method_has_option(built, name);
         if (!unused && built->ignores != NULL && method_has_option(built, name))
             unused = built->ignores(method_own_const(o, built), &state->built, name);
+        if (strcmp(name, "epsilon") == 0 && state->recipe.method == RECIPE_PAIRS &&
+            state_pairs_follow_epsilon(state, built))
+            unused = false;
         if (strcmp(name, "store-precision") == 0) unused = state->op->kind->narrow == NULL;
         if (unused && length + strlen(name) + 5 < 256)
             length += (size_t)sprintf(list + length, "%s--%s", length > 0 ? ", " : "", name);

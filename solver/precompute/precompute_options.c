@@ -142,8 +142,9 @@ static const option_row form_factor_rows[] = {
      .preset = "normal",
      .choices = "draft|normal|high",
      .help = "draft: rays whose noise is at most 1/2 of epsilon. normal and high: pair by pair, unoccluded "
-             "factors by contour integrals and cubature, and rays for occlusion only; where there are too "
-             "many pairs, near pairs so and other pairs by rays with a noise of 1/4 or 1/8 of epsilon"},
+             "factors by contour integrals and cubature, and rays for occlusion only, so many that they add "
+             "little to the error of an operator of that epsilon; where there are too many pairs, near pairs "
+             "so and other pairs by rays with a noise of 1/4 or 1/8 of epsilon"},
     {.name = "ground-albedo",
      .kind = OPTION_NUMBER,
      .offset = FIELD(ground_albedo),

@@ -172,6 +172,10 @@ lam_status stage_open_scratch(precompute_state *state, lam_error *error);
  * the cheapest, with a warning: stage_budget.c. */
 lam_status stage_budget(precompute_state *state, lam_error *error);
 
+/* True if the operator leaves out what is below epsilon, or epsilon was given: all pairs are then no finer
+ * than it asks for (recipe_coarser). */
+bool state_pairs_follow_epsilon(const precompute_state *state, const build_method *method);
+
 /* All pairs, as defaults take them where they can: stage_scene.c. */
 recipe state_pairs_recipe(const precompute_state *state);
 

@@ -36,11 +36,14 @@ static const double sampled_epsilons[SAMPLES_MOST] = {.4, .05, .012};
 /* Blocks as a power of their accuracy where one sample alone tells (forecast_blocks). */
 static const double power_of_accuracy = -.7;
 
-/* Costs of all pairs at each quality that was weighed. */
+/* Costs of all pairs at each quality that was weighed: beside an operator of an epsilon among those weighed,
+ * as the accuracy of pairs follows it. */
+static const char *const epsilon_of_pairs = "0.012";
 enum { QUALITIES_MOST = 2 };
 typedef struct quality_costs {
     size_t count;
     const char *quality[QUALITIES_MOST];
+    double accuracy[QUALITIES_MOST];
     pairs_cost cost[QUALITIES_MOST];
 } quality_costs;
 
@@ -130,6 +133,7 @@ static lam_status find_seconds(const budget_run *run, budget_recipe *r, lam_erro
         size_t k = 0;
         while (k + 1 < run->pairs.count && run->pairs.quality[k] != r->quality) k++;
         probe.cost = run->pairs.cost[k];
+        probe.cost.measured = pairs_cost_at(&probe.cost, run->pairs.accuracy[k], probe.recipe.accuracy);
     } else {
         probe.cost = run->rays;
         probe.cost.entries = fmin(run->rays.entries * (double)r->rays / RAYS_SAMPLED, n * n);
@@ -143,10 +147,10 @@ done:
     return status;
 }
 
-/* The recipe of defaults at a quality, where that is all pairs, and its cost. */
-static lam_status weigh_pairs(const budget_run *run, const char *quality, bool *taken, pairs_cost *cost,
-                              lam_error *error) {
+/* The recipe of defaults at the next quality, where that is all pairs, and its cost. */
+static lam_status weigh_pairs(budget_run *run, const char *quality, bool *taken, lam_error *error) {
     lam_status status = LAM_OK;
+    const size_t k = run->pairs.count;
     precompute_options options = *run->state->options;
     precompute_state probe = *run->state;
     terminal silent = *probe.t;
@@ -155,13 +159,17 @@ static lam_status weigh_pairs(const budget_run *run, const char *quality, bool *
     options.form_factors = "rays";
     options.quality = quality;
     options.build.method = run->method->name;
+    TRY(build_set(&options.build, "epsilon", epsilon_of_pairs, error));
     probe.options = &options;
     probe.expected = run->method;
     probe.t = &silent;
     probe.recipe = state_pairs_recipe(&probe);
     TRY(state_weigh_pairs(&probe, error));
     *taken = !probe.dear;
-    *cost = probe.cost;
+    run->pairs.quality[k] = quality;
+    run->pairs.accuracy[k] = probe.recipe.accuracy;
+    run->pairs.cost[k] = probe.cost;
+    run->pairs.count++;
 done:
     return status;
 }
@@ -180,13 +188,12 @@ static lam_status find_all_seconds(budget_run *run, double seconds, budget_recip
             (weighed->count == 0 || list[k].quality != weighed->quality[weighed->count - 1])) {
             const double before = clock_seconds();
             if (weighed->count == QUALITIES_MOST) break;
-            pairs_cost *const cost = &weighed->cost[weighed->count];
             if (weighed->count > 0 && high_times * took > share_sampled * seconds) break;
-            weighed->quality[weighed->count] = list[k].quality;
-            TRY(weigh_pairs(run, list[k].quality, &pairs, cost, error));
-            weighed->count++;
+            TRY(weigh_pairs(run, list[k].quality, &pairs, error));
             took = clock_seconds() - before;
-            if (forecast_wall_seconds(cost->measured, &run->state->rates) > seconds) pairs = false;
+            const pairs_cost *cost = &weighed->cost[weighed->count - 1];
+            if (forecast_wall_seconds(cost->measured - cost->segments, &run->state->rates) > seconds)
+                pairs = false;
             if (!pairs) break; /* a higher quality costs more */
         }
         TRY(find_seconds(run, &list[k], error));

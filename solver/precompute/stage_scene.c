@@ -95,6 +95,7 @@ typedef struct choice_request {
     bool plain;        /* no pairs */
     bool sky;          /* light that leaves the scene matters too */
     bool filtered;     /* the method takes out most of the noise of rays: few are enough */
+    bool rounded;      /* all pairs follow epsilon */
 } choice_request;
 
 /* Above this number of elements all pairs take too long. */
@@ -144,6 +145,7 @@ static recipe choice_recipe(const choice_request *asked, bool all_pairs) {
     if (asked->rays != OPTION_AUTO || level->accuracy == 0 || asked->plain) return r;
     r.method = all_pairs ? RECIPE_PAIRS : RECIPE_NEAR_PAIRS;
     r.accuracy = level->accuracy;
+    if (all_pairs && asked->rounded) r.accuracy *= recipe_coarser(asked->epsilon);
     if (all_pairs && !asked->sky) r.rays = RECIPE_RAYS_FEW;
     return r;
 }
@@ -178,6 +180,13 @@ static bool is_hemicube(const precompute_options *o) {
     return strcmp(o->form_factors, "hemicube") == 0;
 }
 
+/* Rows that are kept are for other operators, too. */
+bool state_pairs_follow_epsilon(const precompute_state *state, const build_method *method) {
+    const precompute_options *o = state->options;
+    return !state_keeps(o) && !o->from_store &&
+           (method_has_option(method, "epsilon") || state->trial.asked > 0);
+}
+
 /* The request for a recipe. Beside hemicubes only the judge casts rays, and --quality is not about the judge.
  */
 static choice_request request_of(const precompute_state *state) {
@@ -191,7 +200,8 @@ static choice_request request_of(const precompute_state *state) {
                             .least_rays = state->least_rays,
                             .plain = state->plain,
                             .sky = o->sky != NULL,
-                            .filtered = (state->expected->flags & METHOD_FILTERS_NOISE) != 0};
+                            .filtered = (state->expected->flags & METHOD_FILTERS_NOISE) != 0,
+                            .rounded = state_pairs_follow_epsilon(state, state->expected)};
 }
 
 /* Sets streamed where only a method that can use a stream asks for rows of n elements, and they would take

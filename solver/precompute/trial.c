@@ -7,7 +7,7 @@
 /* Of the error asked for: the laws are no exact ones. */
 static const double aimed_share = .9;
 static const double turn_most = 64;
-static const double power_of_epsilon = .6, power_least = .2, power_of_rays = -.5, power_of_pairs = 1,
+static const double power_of_epsilon = .6, power_least = .2, power_of_rays = -.5, power_of_pairs = .65,
                     power_of_blocks = .5;
 
 const error_group *trial_group(const error_report *errors) {

@@ -57,9 +57,10 @@ void trial_describe_worst(const worst_group *worst, const char *name, char text[
 /* True if a finer trial is worth while for a total error of at most `asked`, which errors->total is above,
  * and sets *next. The larger part is turned, and the smaller one too where it is more than half of the
  * squared error asked for; a part without a free knob stays, and the other is not pushed below half of it.
- * Laws: the noise of rays falls as N^-1/2; an error of pairs as their accuracy; of blocks as the root of
- * theirs (at most); compression as epsilon^.6 (.58 to 1.03 in a Cornell box of 641 elements), or as
- * two trials have it. No knob is turned by more than a factor of 64. */
+ * Laws: the noise of rays falls as N^-1/2; an error of pairs as their accuracy^.65 (.61 to .7 in an atrium,
+ * a patio and an anechoic room); of blocks as the root of theirs (at most); compression as epsilon^.6 (.58
+ * to 1.03 in a Cornell box of 641 elements), or as two trials have it. No knob is turned by more than a
+ * factor of 64. */
 bool trial_turn(double asked, const trial_errors *errors, const trial_limits *limits, const trial_knobs *from,
                 trial_knobs *next);
 

@@ -12,8 +12,8 @@ from command import must
 
 
 class PairsOrRays(Case):
-    def precompute(self, scene, name):
-        done = must("precompute", scene, "-o", self.path(name), "--probes", 0, threads=2)
+    def precompute(self, scene, name, *options):
+        done = must("precompute", scene, "-o", self.path(name), "--probes", 0, *options, threads=2)
         with h5py.File(self.path(name)) as file:
             return done.stderr, dict(file["/operator"].attrs)
 
@@ -33,6 +33,21 @@ class PairsOrRays(Case):
         self.assertRegex(log, r"all pairs are taken: about .* s of one thread, by a sample of them\n")
         self.assertNotIn("not all pairs", log)
         self.assertEqual(operator["form_factors"], b"pairs")
+
+    def test_pairs_are_as_fine_as_the_operator_needs(self):
+        """As the root of epsilon from .0031 on; those of an operator without a threshold, and those that are kept, follow none
+        but one that is given."""
+        room = self.path("room.obj")
+        must("generate", "rooms", "--elements", 300, "-o", room)
+        hierarchical, exact = ("--method", "hierarchical"), ("--method", "exact")
+        for options, times in ((hierarchical, 4), ((*hierarchical, "--epsilon", .2), 8), ((*hierarchical, "--epsilon", .002), 1),
+                               ((*hierarchical, "--keep-form-factors"), 1), (exact, 1), ((*exact, "--epsilon", .0125), 2),
+                               ((*hierarchical, "--quality", "high", "--epsilon", .2), .8)):
+            log, operator = self.precompute(room, "room.h5", *options)
+            self.assertAlmostEqual(operator["accuracy"] / 7e-5, times, 6, options)
+            self.assertNotIn("does not use --epsilon", log)
+        log, _ = self.precompute(room, "room.h5", *exact, "--rays", 64, "--epsilon", .1)
+        self.assertIn("exact does not use --epsilon", log)
 
     def test_a_large_error_names_an_option(self):
         city, store = self.path("city.obj"), self.path("city.h5")

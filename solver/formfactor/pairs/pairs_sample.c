@@ -267,13 +267,20 @@ lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pai
     const double entries = w.seen + of_rays.entries;
     const double links =
         w.shafts * shaft_seconds + w.candidates * candidate_seconds + w.hidden * hidden_seconds;
-    const double rows = rows_seconds(&w), rest = segments_seconds(&w, segments) + entries * entry_seconds;
+    const double cast = segments_seconds(&w, segments);
+    const double rows = rows_seconds(&w), rest = cast + entries * entry_seconds;
     const double pace = sample_pace(trial.seconds, times_apart * rows_seconds(&trial.work));
     *out = (pairs_cost){.seconds = links + rows + rest + of_rays.seconds,
                         .measured = trial.link_seconds + rows * pace + rest + of_rays.seconds,
+                        .segments = cast,
                         .entries = 2 * entries,
                         .hits = of_rays.hits};
 done:
     visibility_destroy(v);
     return status;
+}
+
+double pairs_cost_at(const pairs_cost *cost, double accuracy, double other) {
+    const double more = pow(accuracy / other, 1 / SEGMENTS_POWER);
+    return cost->measured + (more - 1) * cost->segments;
 }

@@ -42,6 +42,7 @@ double sample_pace(double seconds, double expected);
 typedef struct pairs_cost {
     double seconds;  /* of one thread, by fixed costs of each kind of work: for a choice */
     double measured; /* the same at the pace of the sample on this machine: for a forecast */
+    double segments; /* of pairs: of measured, those of segments */
     double entries;  /* of F, or twice the blocks */
     double finer;    /* of blocks: measured, of those that judge them; else 0 */
     double hits;     /* of rays: the share that hits anything; 0: not known */
@@ -52,5 +53,9 @@ typedef struct pairs_cost {
  * machine is. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pairs_cost *out,
                           lam_error *error);
+
+/* pairs_cost.measured of all pairs at another accuracy than that of the forecast, by the law of segments
+ * (occlusion.h). */
+double pairs_cost_at(const pairs_cost *cost, double accuracy, double other);
 
 #endif

@@ -92,6 +92,26 @@ START_TEST(lists_make_pairs_cheaper) {
 }
 END_TEST
 
+/* From an accuracy to one that is three times as coarse the segments' part is within a quarter of what a
+ * sample there has, and within a half the other way, where lists begin to pay. */
+START_TEST(costs_follow_the_accuracy) {
+    lam_error error = {.message = ""};
+    mesh m = scene_of("atrium", 1000);
+    recipe coarse = all_pairs;
+    coarse.accuracy *= 3;
+    pairs_cost fine, less;
+    ck_ok(pairs_forecast(&m, &all_pairs, NULL, &fine, &error));
+    ck_ok(pairs_forecast(&m, &coarse, NULL, &less, &error));
+    const double at_coarse = pairs_cost_at(&fine, all_pairs.accuracy, coarse.accuracy) - fine.measured,
+                 at_fine = pairs_cost_at(&less, coarse.accuracy, all_pairs.accuracy) - less.measured;
+    ck_assert_double_lt(less.segments, .5 * fine.segments);
+    ck_assert_double_eq_tol(at_coarse / (less.segments - fine.segments), 1, .25);
+    ck_assert_double_eq_tol(at_fine / (fine.segments - less.segments), 1, .5);
+    ck_assert_double_eq(pairs_cost_at(&fine, 1e-4, 1e-4), fine.measured);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("pairs_sample");
     TCase *cases = tcase_create("pairs_sample");
@@ -99,6 +119,7 @@ int main(void) {
     tcase_add_loop_test(cases, segments_are_tested_against_lists, 0, 2);
     tcase_add_test(cases, projected_pairs_take_no_segments);
     tcase_add_test(cases, lists_make_pairs_cheaper);
+    tcase_add_test(cases, costs_follow_the_accuracy);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }

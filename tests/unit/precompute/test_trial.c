@@ -35,7 +35,7 @@ END_TEST
 static double predicted(const trial_errors *e, const trial_knobs *from, const trial_knobs *to) {
     const double C = e->compression * pow(to->epsilon / from->epsilon, .6);
     double F = e->factors * pow((double)to->recipe.rays / (double)from->recipe.rays, -.5);
-    if (from->recipe.method == RECIPE_PAIRS) F *= to->recipe.accuracy / from->recipe.accuracy;
+    if (from->recipe.method == RECIPE_PAIRS) F *= pow(to->recipe.accuracy / from->recipe.accuracy, .65);
     if (from->recipe.method == RECIPE_BLOCKS) F *= sqrt(to->recipe.accuracy / from->recipe.accuracy);
     return hypot(C, F);
 }
