@@ -210,41 +210,56 @@ done:
     return status;
 }
 
+/* A part of the descent. A sample has so many and small ones that each begins with the occluders near its
+ * shaft, as the descent would have them there: finding them from the root on is no work of all of it. */
+static void run_task(walk *w, const task *of, size_t n_candidates) {
+    static const uint32_t root = 0;
+    uint32_t within[SHAFT_CANDIDATES];
+    const uint32_t *candidates = &root;
+    if (w->options->one_of > 1 && of->a != of->b && n_candidates > 0) {
+        shaft s;
+        cluster_shaft_init(&s, &w->t->clusters[of->a], &w->t->clusters[of->b], w->options->slack);
+        n_candidates = cluster_shaft_filter(&s, w->m, w->t, candidates, n_candidates, false, within);
+        candidates = within;
+    }
+    const double started = clock_thread_seconds();
+    visit(w, of->a, of->b, candidates, n_candidates);
+    w->found->work.seconds = clock_thread_seconds() - started;
+}
+
 lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlusion *o,
                               const cluster_link_options *options, cluster_links *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t step = options->one_of > 1 ? options->one_of : 1;
     const size_t wanted = step > 1 ? TASKS_TO_SAMPLE : TASKS_WANTED;
-    size_t n_tasks = 0;
+    size_t n_tasks = 0, n_bags = 0;
     bag *bags = NULL;
     task *tasks = memory_allocate(4 * (wanted + 2), sizeof *tasks, "links of clusters", error);
     if (tasks == NULL) return LAM_ERR_MEMORY;
     n_tasks = make_tasks(t, wanted, tasks, tasks + wanted + 2);
-    bags = memory_allocate(n_tasks, sizeof *bags, "links of clusters", error);
+    n_bags = (n_tasks - step / 2 + step - 1) / step;
+    bags = memory_allocate(n_bags, sizeof *bags, "links of clusters", error);
     if (bags == NULL) TRY(LAM_ERR_MEMORY);
     bool cancelled = false;
     const size_t n_candidates = clusters_hide_nothing(m, t) ? 0 : 1;
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t k = step / 2; k < n_tasks; k += step) {
-        static const uint32_t root = 0;
+    for (size_t k = 0; k < n_bags; k++) {
         bool stop;
 #pragma omp atomic read
         stop = cancelled;
         if (stop) continue;
         walk w = {.m = m, .t = t, .o = o, .options = options, .found = &bags[k]};
-        const double started = clock_thread_seconds();
-        visit(&w, tasks[k].a, tasks[k].b, &root, n_candidates);
-        bags[k].work.seconds = clock_thread_seconds() - started;
+        run_task(&w, &tasks[step / 2 + k * step], n_candidates);
         if (progress_cancelled(options->progress)) {
 #pragma omp atomic write
             cancelled = true;
         }
     }
     if (cancelled) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-    TRY(gather(t, bags, n_tasks, out, error));
-    out->share = (double)((n_tasks - step / 2 + step - 1) / step) / (double)n_tasks;
+    TRY(gather(t, bags, n_bags, out, error));
+    out->share = (double)n_bags / (double)n_tasks;
 done:
-    for (size_t k = 0; bags != NULL && k < n_tasks; k++) free(bags[k].links);
+    for (size_t k = 0; bags != NULL && k < n_bags; k++) free(bags[k].links);
     free(bags);
     free(tasks);
     return status;

@@ -27,6 +27,7 @@ typedef struct sampled_link {
 typedef struct sample_count {
     pairs_work work;
     double due;
+    occlusion of_segments; /* at the accuracy that all mixed pairs together are relaxed or tightened to */
 } sample_count;
 
 /* Lists the occluders of a pair, whose segments stand for `share` of all. */
@@ -50,7 +51,7 @@ static void count_list(const pair_ground *run, uint32_t i, uint32_t j, double sh
 static void count_segments(const pair_ground *run, uint32_t i, uint32_t j, double g, double probability,
                            sampled_link *link, sample_count *sum) {
     static const double each = 1024;
-    const double segments = occlusion_segments(&run->occlusion, i, j, g);
+    const double segments = occlusion_segments(&sum->of_segments, i, j, g);
     const bool is_listed = run->lists && segments >= SEGMENTS_LISTED;
     sum->work.segments += probability * segments;
     sum->work.lists += is_listed ? probability : 0;
@@ -120,12 +121,14 @@ static void scale_work(pairs_work *work, double scale) {
 
 /* The rows of all links, one after the other, of which every step-th is counted: some of the pairs of a large
  * scene, a sixteenth of those of a small one, where a sample should cost little beside the work itself. */
-static void count_rows(const pair_ground *run, double n_pairs, pairs_work *work, pairs_trial *trial) {
+static void count_rows(const pair_ground *run, double n_pairs, double accuracy, pairs_work *work,
+                       pairs_trial *trial) {
     enum { LEAST = 4000, MOST = 40000, SHARE = 16 };
     const double wanted = fmin(fmax(n_pairs / SHARE, LEAST), MOST);
     const double step = fmax(1, floor(n_pairs / wanted));
     double at = 0, rows = 0, taken = 0, next = floor(step / 2), started = 0, seconds = 0;
-    sample_count sum = {.due = 0};
+    sample_count sum = {.due = 0, .of_segments = run->occlusion};
+    sum.of_segments.accuracy = accuracy;
     for (size_t k = 0; k < run->links.n; k++) {
         const cluster_link *l = &run->links.links[k];
         const cluster *a = &run->tree.clusters[l->a], *b = &run->tree.clusters[l->b];
@@ -149,7 +152,7 @@ static void count_rows(const pair_ground *run, double n_pairs, pairs_work *work,
     }
     if (trial != NULL) *trial = (pairs_trial){.work = sum.work, .seconds = seconds};
     *work = sum.work;
-    scale_work(work, taken > 0 ? rows / taken : 0);
+    scale_work(work, taken > 0 ? rows / taken / run->links.share : 0);
 }
 
 static void scale_to_all(const pair_ground *run, pairs_work *work) {
@@ -159,24 +162,34 @@ static void scale_to_all(const pair_ground *run, pairs_work *work) {
     work->candidates = all * l->candidates;
     work->occlusion = all * l->occlusion;
     work->hidden = all * l->hidden;
-    scale_work(work, all);
 }
 
-/* The sample of links is a sixty-fourth of the descent, of few elements all of it. */
+/* Segments of all mixed pairs together, between the least and the most that there may be. */
+static double bounded_segments(const pairs_options *options, const pairs_work *w) {
+    const double least =
+        w->segments > 0 ? options->segments_least * w->segments / (w->segments + w->saved) : 0;
+    return fmin(fmax(w->segments, least), options->segments_most);
+}
+
+/* The sample of links is a sixty-fourth of the descent, of few elements all of it. Rows are counted twice:
+ * the first count tells to which accuracy the segments of all together are relaxed or tightened, and the
+ * second one is timed, as a first one waits for memory more than the work itself does. */
 lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options *options, pairs_work *out,
                         pairs_trial *trial, lam_error *error) {
     enum { SAMPLED_FROM = 1500, ONE_OF = 64 };
     lam_status status = LAM_OK;
     pair_ground run;
     pairs_work work = {0};
-    double n_pairs = 0;
+    double n_pairs = 0, accuracy = options->accuracy;
     TRY(pair_ground_find(m, v, options, m->n < SAMPLED_FROM ? 1 : ONE_OF, &run, error));
     for (size_t k = 0; k < run.links.n; k++) {
         const cluster *a = &run.tree.clusters[run.links.links[k].a],
                       *b = &run.tree.clusters[run.links.links[k].b];
         n_pairs += (double)(a->last - a->first) * (double)(b->last - b->first) / (a == b ? 2 : 1);
     }
-    count_rows(&run, n_pairs, &work, trial);
+    count_rows(&run, n_pairs, accuracy, &work, trial);
+    if (work.segments > 0) accuracy *= pow(work.segments / bounded_segments(options, &work), SEGMENTS_POWER);
+    count_rows(&run, n_pairs, accuracy, &work, trial);
     scale_to_all(&run, &work);
     if (trial != NULL) trial->link_seconds = run.links.work.seconds / run.links.share;
     *out = work;
@@ -262,8 +275,7 @@ lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pai
         TRY(visibility_create(m, &v, error));
         TRY(pairs_sample(m, v, &options, &w, &trial, error));
     }
-    const double least = w.segments > 0 ? options.segments_least * w.segments / (w.segments + w.saved) : 0;
-    const double segments = fmin(fmax(w.segments, least), options.segments_most);
+    const double segments = bounded_segments(&options, &w);
     const double entries = w.seen + of_rays.entries;
     const double links =
         w.shafts * shaft_seconds + w.candidates * candidate_seconds + w.hidden * hidden_seconds;
