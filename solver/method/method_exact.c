@@ -13,11 +13,25 @@
  * MOST it takes too long. */
 enum { SMALL = 1024, MOST = 12288 };
 
+/* The two sides of a pair of form factors may differ by this share of the larger one, in A^1/2 F A^-1/2,
+ * where they are taken as one number. */
+static const double reciprocal_within = 1e-5;
+
+static lam_status fail_singular(size_t n, lapack_int info, double rcond, lam_error *error) {
+    return status_fail(
+        error, LAM_ERR_NUMERIC,
+        "I - R F of %zu elements cannot be inverted (its factorization returned %d, reciprocal "
+        "condition %.1e); lower the largest reflectance",
+        n, (int)info, info == 0 ? rcond : 0.);
+}
+
 /* M = (I - R F)^-1 in place and the reciprocal condition number; M is [n][n] row-major. LAPACK reads it as
  * its transpose, whose inverse is the transpose of the inverse: nothing need be moved. */
-static lam_status invert(size_t n, const csr *F, const float *rho, double *M, lapack_int *pivots,
-                         double *rcond, lam_error *error) {
+static lam_status invert(size_t n, const csr *F, const float *rho, double *M, double *rcond,
+                         lam_error *error) {
     lam_status status = LAM_OK;
+    lapack_int *pivots = memory_allocate(n, sizeof *pivots, "exact inverse", error);
+    if (pivots == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) {
         double *row = M + i * n;
         for (size_t j = 0; j < n; j++) row[j] = 0;
@@ -29,16 +43,12 @@ static lam_status invert(size_t n, const csr *F, const float *rho, double *M, la
     const double norm = LAPACKE_dlange(LAPACK_COL_MAJOR, '1', size, size, M, size);
     lapack_int info = LAPACKE_dgetrf(LAPACK_COL_MAJOR, size, size, M, size, pivots);
     if (info == 0) info = LAPACKE_dgecon(LAPACK_COL_MAJOR, '1', size, M, size, norm, rcond);
-    if (info != 0 || *rcond < 1e-12)
-        FAIL(error, LAM_ERR_NUMERIC,
-             "I - R F of %zu elements cannot be inverted (LU returned %d, reciprocal condition %.1e); lower "
-             "the "
-             "largest reflectance",
-             n, (int)info, info == 0 ? *rcond : 0.);
+    if (info != 0 || *rcond < 1e-12) TRY(fail_singular(n, info, *rcond, error));
     info = LAPACKE_dgetri(LAPACK_COL_MAJOR, size, M, size, pivots);
     if (info != 0)
         FAIL(error, LAM_ERR_NUMERIC, "inverse of %zu elements: LAPACK dgetri returned %d", n, (int)info);
 done:
+    free(pivots);
     return status;
 }
 
@@ -60,6 +70,123 @@ static void bounced(size_t n, const csr *F, const float *rho, const double *M, f
     }
 }
 
+/* Blocks of rows by columns that are read across and written down. */
+enum { TILE = 64 };
+
+static size_t tile_end(size_t first, size_t n) {
+    return first + TILE < n ? first + TILE : n;
+}
+
+/* S = I - T K T with T_i = (rho_i / A_i)^1/2 and K = A F. False where F lacks reciprocity, so that K is not
+ * symmetric. */
+static bool make_symmetric(size_t n, const csr *F, const float *rho, const double *area, double *S) {
+    bool reciprocal = true;
+#pragma omp parallel for schedule(static)
+    for (size_t i = 0; i < n; i++) {
+        double *row = S + i * n;
+        for (size_t j = 0; j < n; j++) row[j] = 0;
+        for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
+            row[F->indices[p]] += sqrt(area[i] / area[F->indices[p]]) * (double)F->data[p];
+    }
+#pragma omp parallel for schedule(dynamic, 1) reduction(&& : reciprocal)
+    for (size_t top = 0; top < n; top += TILE)
+        for (size_t left = 0; left <= top; left += TILE)
+            for (size_t i = top; i < tile_end(top, n); i++)
+                for (size_t j = left; j < tile_end(left, n) && j <= i; j++) {
+                    const double x = S[i * n + j], y = S[j * n + i];
+                    reciprocal = reciprocal && fabs(x - y) <= reciprocal_within * fmax(x, y);
+                    S[i * n + j] = S[j * n + i] =
+                        (i == j ? 1 : 0) - sqrt((double)rho[i] * (double)rho[j]) * .5 * (x + y);
+                }
+    return reciprocal;
+}
+
+/* S^-1 in place, whole, and the reciprocal condition number: half the work of an LU. */
+static lam_status invert_symmetric(size_t n, double *S, double *rcond, lam_error *error) {
+    const lapack_int size = (lapack_int)n;
+    const double norm = LAPACKE_dlansy(LAPACK_COL_MAJOR, '1', 'U', size, S, size);
+    lapack_int info = LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', size, S, size);
+    if (info == 0) info = LAPACKE_dpocon(LAPACK_COL_MAJOR, 'U', size, S, size, norm, rcond);
+    if (info != 0 || *rcond < 1e-12) return fail_singular(n, info, *rcond, error);
+    info = LAPACKE_dpotri(LAPACK_COL_MAJOR, 'U', size, S, size);
+    if (info != 0)
+        return status_fail(error, LAM_ERR_NUMERIC, "inverse of %zu elements: LAPACK dpotri returned %d", n,
+                           (int)info);
+        /* The upper triangle by columns is the lower one by rows. */
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t top = 0; top < n; top += TILE)
+        for (size_t left = 0; left <= top; left += TILE)
+            for (size_t i = top; i < tile_end(top, n); i++)
+                for (size_t j = left; j < tile_end(left, n) && j < i; j++) S[j * n + i] = S[i * n + j];
+    return LAM_OK;
+}
+
+/* out_j = sum of F_ik M_kj over the k that reflect. */
+static void gather_row(size_t n, const csr *F, const float *rho, size_t i, const double *M, double *out) {
+    for (size_t j = 0; j < n; j++) out[j] = 0;
+    for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) {
+        const size_t k = F->indices[p];
+        if (!(rho[k] > 0)) continue;
+        const double f = (double)F->data[p];
+        for (size_t j = 0; j < n; j++) out[j] += f * M[k * n + j];
+    }
+}
+
+/* From S^-1 to B - E = M E: M = T (S^-1 - I) T^-1 between elements that reflect, and elsewhere by H = F + F
+ * M, the irradiance of E, with A_i H_ij = A_j H_ji. Rows of elements that do not reflect are H (contract,
+ * /operator). */
+static void scale_symmetric(size_t n, const csr *F, const float *rho, const double *area, double *M) {
+#pragma omp parallel for schedule(dynamic, 16)
+    for (size_t i = 0; i < n; i++) {
+        double *row = M + i * n;
+        for (size_t j = 0; j < n; j++) {
+            const double ratio =
+                rho[i] > 0 && rho[j] > 0 ? sqrt((double)rho[i] / (double)rho[j] * area[j] / area[i]) : 0;
+            row[j] = ratio * (row[j] - (i == j ? 1 : 0));
+        }
+    }
+    /* H_aj of a that does not reflect, by the light of the j that do; then, by reciprocity, M_ja = rho_j
+     * H_ja; then H_ab of two that do not. */
+#pragma omp parallel for schedule(dynamic, 16)
+    for (size_t a = 0; a < n; a++) {
+        if (rho[a] > 0) continue;
+        double *row = M + a * n;
+        gather_row(n, F, rho, a, M, row);
+        for (uint64_t p = F->indptr[a]; p < F->indptr[a + 1]; p++) row[F->indices[p]] += (double)F->data[p];
+    }
+#pragma omp parallel for schedule(dynamic, 16)
+    for (size_t j = 0; j < n; j++)
+        for (size_t a = 0; a < n && rho[j] > 0; a++)
+            if (!(rho[a] > 0)) M[j * n + a] = (double)rho[j] * area[a] / area[j] * M[a * n + j];
+#pragma omp parallel for schedule(dynamic, 16)
+    for (size_t a = 0; a < n; a++)
+        for (uint64_t p = F->indptr[a]; p < F->indptr[a + 1] && !(rho[a] > 0); p++) {
+            const size_t k = F->indices[p];
+            for (size_t b = 0; b < n && rho[k] > 0; b++)
+                if (!(rho[b] > 0)) M[a * n + b] += (double)F->data[p] * M[k * n + b];
+        }
+}
+
+/* P of one channel, through the matrix M [n][n]. */
+static lam_status make_channel(const build_problem *problem, const float *rho, double *M, float *P,
+                               double *rcond, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = problem->n;
+    const csr *F = problem->F;
+    if (!make_symmetric(n, F, rho, problem->area, M)) {
+        TRY(invert(n, F, rho, M, rcond, error));
+        bounced(n, F, rho, M, P);
+        goto done;
+    }
+    TRY(invert_symmetric(n, M, rcond, error));
+    scale_symmetric(n, F, rho, problem->area, M);
+#pragma omp parallel for schedule(static)
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) P[i * n + j] = (float)M[i * n + j];
+done:
+    return status;
+}
+
 static lam_status build(const build_problem *problem, const build_options *options, const void *own,
                         lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
@@ -68,7 +195,6 @@ static lam_status build(const build_problem *problem, const build_options *optio
     double *M = NULL;
     float *P = NULL;
     double worst = 1;
-    lapack_int *pivots = NULL;
     (void)own;
     size_t square, bytes;
     if (n > INT_MAX || !size_multiply(n, n, &square) || !size_multiply(square, 8 + 4 * n_channels, &bytes) ||
@@ -80,16 +206,14 @@ static lam_status build(const build_problem *problem, const build_options *optio
              (double)options->memory * 0x1p-30);
     M = memory_allocate(square, sizeof *M, "exact inverse", error);
     P = memory_allocate(square, n_channels * sizeof *P, "exact operator", error);
-    pivots = memory_allocate(n, sizeof *pivots, "exact inverse", error);
-    if (M == NULL || P == NULL || pivots == NULL) TRY(LAM_ERR_MEMORY);
+    if (M == NULL || P == NULL) TRY(LAM_ERR_MEMORY);
 
     for (size_t c = 0; c < n_channels; c++) {
         const float *rho = problem->reflectance + c * n;
         double rcond = 0;
         progress_report(options->progress, "invert", (double)c / (double)n_channels);
         if (progress_cancelled(options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-        TRY(invert(n, problem->F, rho, M, pivots, &rcond, error));
-        bounced(n, problem->F, rho, M, P + c * square);
+        TRY(make_channel(problem, rho, M, P + c * square, &rcond, error));
         worst = fmin(worst, rcond);
     }
     free(M);
@@ -102,7 +226,6 @@ static lam_status build(const build_problem *problem, const build_options *optio
 done:
     free(M);
     free(P);
-    free(pivots);
     return status;
 }
 

@@ -33,6 +33,7 @@ RECIPES = {"defaults": "",
            **{f"rays {rays}, {epsilon}": f"--form-factors rays --rays {rays} {HIERARCHICAL} {epsilon}"
               for rays, epsilon in ((256, .2), (1024, .05), (4096, .05), (16384, .0125))},
            **{f"normal, {epsilon}": f"--form-factors rays {HIERARCHICAL} {epsilon}" for epsilon in (.2, .05, .0125)},
+           **{f"exact, {epsilon}": f"--form-factors rays --method exact --epsilon {epsilon}" for epsilon in (.2, .05, .0125)},
            "normal, exact": "--form-factors rays --method exact",
            **{f"blocks, {epsilon}": f"--form-factors blocks {HIERARCHICAL} {epsilon}" for epsilon in (.2, .05, .0125, .003)},
            "high, exact": "--form-factors rays --quality high --method exact"}

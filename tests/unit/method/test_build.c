@@ -407,6 +407,48 @@ START_TEST(bad_options_are_refused) {
 }
 END_TEST
 
+/* Black elements, among them a whole wall, and nearly black and bright ones: all columns of the operator
+ * against sums of bounces in double. With form factors that lack reciprocity, too. */
+START_TEST(exact_with_black_elements) {
+    enum { DIVISIONS = 4, N = 6 * DIVISIONS * DIVISIONS, BOUNCES = 400 };
+    fixture f = fixture_box(room, DIVISIONS, .5f);
+    const csr *F = &f.F;
+    build_options options = defaults();
+    build_report report;
+    options.method = "exact";
+    for (size_t i = 0; i < N; i++) {
+        static const float rho[4] = {0, .2f, .9f, 1e-6f};
+        f.m.reflectance[i] = i < N / 6 ? 0 : rho[i * 7 % 4];
+    }
+    if (_i == 1)
+        for (uint64_t p = F->indptr[20]; p < F->indptr[21]; p++) F->data[p] *= .9f;
+    lam_operator *op = build(problem_of(&f), &options, &report);
+    float *E = calloc(N, sizeof *E), *H = calloc(N, sizeof *H);
+    double *B = calloc(N, sizeof *B), *next = calloc(N, sizeof *next);
+    for (size_t j = 0; j < N; j++) {
+        double most = 0;
+        for (size_t i = 0; i < N; i++) E[i] = i == j, B[i] = i == j;
+        for (size_t bounce = 0; bounce < BOUNCES; bounce++) {
+            csr_multiply_rows(F, 0, N, 1, B, next);
+            for (size_t i = 0; i < N; i++) B[i] = (i == j) + (double)f.m.reflectance[i] * next[i];
+        }
+        csr_multiply_rows(F, 0, N, 1, B, next);
+        apply(op, LAM_IRRADIANCE, E, H);
+        for (size_t i = 0; i < N; i++) most = fmax(most, next[i]);
+        for (size_t i = 0; i < N; i++) {
+            const double rho = (double)f.m.reflectance[i], rounding = i == j && rho > 0 ? 6e-8 / rho : 0;
+            ck_assert_double_le(fabs((double)H[i] - next[i]), 2e-6 * most + rounding); /* of 1 + P_ii */
+        }
+    }
+    lam_operator_close(op);
+    free(E);
+    free(H);
+    free(B);
+    free(next);
+    fixture_free(&f);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("build");
     TCase *cases = tcase_create("build");
@@ -415,6 +457,7 @@ int main(void) {
     tcase_add_test(cases, both_ways_of_a_reference_agree);
     tcase_add_test(cases, reference_is_chosen_by_its_cost);
     tcase_add_loop_test(cases, exact_cube, 0, 3);
+    tcase_add_loop_test(cases, exact_with_black_elements, 0, 2);
     tcase_add_test(cases, room_one_element_per_face);
     tcase_add_test(cases, sphere_has_rank_one);
     tcase_add_test(cases, furnace);
