@@ -77,10 +77,10 @@ size_t recipe_rays_beside_blocks(size_t n);
  */
 double recipe_accuracy(const recipe *r);
 
-/* How much coarser than their quality all pairs are, 1 or more, whose operator leaves out what is below
- * epsilon: as its root, from .0031 on. Their error adds .03 of the operator's for single elements at epsilon
- * .05, .08 at .0125, for .6 and .75 of the time (an atrium, a patio and an anechoic room of 1,500 to 2,030
- * elements). */
+/* The factor, 1 or more, by which all pairs are coarser than their quality where the operator leaves out what
+ * is below epsilon: as its root, from .0031 on. Their error adds .03 of the operator's for single elements at
+ * epsilon .05, .08 at .0125, for .6 and .75 of the time (an atrium, a patio and an anechoic room of 1,500 to
+ * 2,030 elements). */
 double recipe_coarser(double epsilon);
 
 /* Rays per element, a power of two, whose sampling noise, sqrt(2/rays) in the 2-norm of the merged S, is at

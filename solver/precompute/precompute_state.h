@@ -172,8 +172,8 @@ lam_status stage_open_scratch(precompute_state *state, lam_error *error);
  * the cheapest, with a warning: stage_budget.c. */
 lam_status stage_budget(precompute_state *state, lam_error *error);
 
-/* True if the operator leaves out what is below epsilon, or epsilon was given: all pairs are then no finer
- * than it asks for (recipe_coarser). */
+/* True if the operator leaves out what is below epsilon, or epsilon was given, and no sky lights the scene:
+ * all pairs are then no finer than it asks for (recipe_coarser). */
 bool state_pairs_follow_epsilon(const precompute_state *state, const build_method *method);
 
 /* All pairs, as defaults take them where they can: stage_scene.c. */

@@ -180,10 +180,11 @@ static bool is_hemicube(const precompute_options *o) {
     return strcmp(o->form_factors, "hemicube") == 0;
 }
 
-/* Rows that are kept are for other operators, too. */
+/* Rows that are kept are for other operators, too; and what an element sees of a sky is what its row leaves
+ * of 1, on which all errors of the row fall. */
 bool state_pairs_follow_epsilon(const precompute_state *state, const build_method *method) {
     const precompute_options *o = state->options;
-    return !state_keeps(o) && !o->from_store &&
+    return !state_keeps(o) && !o->from_store && o->sky == NULL &&
            (method_has_option(method, "epsilon") || state->trial.asked > 0);
 }
 

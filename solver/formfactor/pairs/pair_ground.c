@@ -35,6 +35,11 @@ done:
     return status;
 }
 
+bool pair_ground_projects(const pair_ground *g, uint32_t i, uint32_t j, double exchange) {
+    static const double all_up_to = 1e-4;
+    return g->options->accuracy <= all_up_to || !occlusion_test_suffices(&g->occlusion, i, j, exchange);
+}
+
 void pair_ground_free(pair_ground *g) {
     free(g->polygons);
     few_occluders_free(&g->few);

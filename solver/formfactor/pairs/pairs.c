@@ -16,9 +16,20 @@ static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) 
     return 2 * g / (run->on.m->area[i] + run->on.m->area[j]);
 }
 
-/* Settles a pair with few occluders by projection: g becomes its visible part. PAIR_UNKNOWN: it has more. */
+/* Settles a pair with few occluders by projection: g becomes its visible part. PAIR_UNKNOWN: it has more, or
+ * eight segments are enough and nothing is proven. */
 static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occluders *among, double *g) {
     double share = 1, work = 0;
+    if (!pair_ground_projects(&run->on, i, j, *g)) {
+        pair_occluders between;
+        const few_verdict proven = among->count == OCCLUDERS_UNCOUNTED
+                                       ? FEW_UNDECIDED
+                                       : few_occluders_between(&run->on.few, among, i, j, &between);
+        if (proven == FEW_HIDDEN) *g = 0;
+        return proven == FEW_OPEN     ? PAIR_CERTAIN
+               : proven == FEW_HIDDEN ? PAIR_HIDDEN | PAIR_EXACT
+                                      : PAIR_UNKNOWN;
+    }
     const double tolerance = few_occluders_tolerance(&run->on.few, i, j, *g, run->on.options->accuracy);
     const few_verdict found = few_occluders_share(&run->on.few, among, i, j, *g, tolerance, &share, &work);
     *g *= share;

@@ -67,6 +67,13 @@ static bool count_projection(const pair_ground *run, uint32_t i, uint32_t j, dou
     double share;
     if (!run->projects) return false;
     work->sifted++;
+    if (!pair_ground_projects(run, i, j, g)) {
+        pair_occluders between;
+        if (among->count == OCCLUDERS_UNCOUNTED) return false;
+        const few_verdict proven = few_occluders_between(&run->few, among, i, j, &between);
+        work->seen += proven == FEW_OPEN;
+        return proven != FEW_UNDECIDED;
+    }
     const double tolerance = few_occluders_tolerance(&run->few, i, j, g, run->options->accuracy);
     const few_verdict found =
         few_occluders_share(&run->few, among, i, j, g, tolerance, &share, &work->projection);

@@ -76,6 +76,34 @@ START_TEST(projected_pairs_take_no_segments) {
 }
 END_TEST
 
+/* At a coarse accuracy eight segments are enough for small factors, which are tested unless few occluders
+ * prove them open or hidden. */
+START_TEST(coarse_pairs_are_tested) {
+    lam_error error = {.message = ""};
+    mesh m = scene_of("rooms", 1000);
+    visibility *v = NULL;
+    recipe coarse = all_pairs;
+    coarse.accuracy = 2.8e-4;
+    const pairs_options how[2] = {pairs_options_of(&all_pairs, m.n, 0), pairs_options_of(&coarse, m.n, 0)};
+    pairs_work sampled[2];
+    pairs_report found[2];
+    ck_ok(visibility_create(&m, &v, &error));
+    for (int k = 0; k < 2; k++) {
+        csr G;
+        ck_ok(pairs_sample(&m, v, &how[k], &sampled[k], NULL, &error));
+        ck_ok(pairs_exchange(&m, v, &how[k], &G, &found[k], NULL, &error));
+        csr_free(&G);
+    }
+    ck_assert_double_lt(found[1].projected, .2 * found[0].projected);
+    ck_assert_double_gt(found[1].projected, 0);
+    ck_assert_double_lt(sampled[1].projection, .5 * sampled[0].projection);
+    ck_assert_double_gt(sampled[1].tests, 10 * sampled[0].tests);
+    ck_assert_double_gt(found[1].hidden + found[1].open, 0);
+    visibility_destroy(v);
+    mesh_free(&m);
+}
+END_TEST
+
 /* Segments against lists cost a tenth to a quarter of those cast into the scene, and segments are most of the
  * work of an atrium's pairs: with lists it is less than if each segment took the 1.75e-7 s of a cast one. */
 START_TEST(lists_make_pairs_cheaper) {
@@ -118,6 +146,7 @@ int main(void) {
     tcase_set_timeout(cases, 120);
     tcase_add_loop_test(cases, segments_are_tested_against_lists, 0, 2);
     tcase_add_test(cases, projected_pairs_take_no_segments);
+    tcase_add_test(cases, coarse_pairs_are_tested);
     tcase_add_test(cases, lists_make_pairs_cheaper);
     tcase_add_test(cases, costs_follow_the_accuracy);
     suite_add_tcase(suite, cases);
