@@ -8,7 +8,8 @@ system, the least of --repeats. The error is |P~ - P| / |P|, P = B - E, weighted
 scene's own lights, uniform and random emission. References R, R' are all pairs of NEW at quality --reference by two further seeds, solved in
 double; as their errors are independent, the squared error is <P~ - R, P~ - R'>, which has the noise of neither on average.
 The table has seconds of OLD / seconds of NEW = ratio at errors of its head: each program's recipes that are beaten in time and error by
-another one count nothing, and between two others error and time follow a power; "-": no recipe is as exact. CSV of all runs: --csv.
+another one, or that gain less than a tenth of the error for more time, count nothing, and between two others error and time follow a
+power; "-": no recipe is as exact. CSV of all runs: --csv.
 Asserts nothing.
 """
 
@@ -109,10 +110,10 @@ class Scene:
 
 
 def front(points):
-    """Of (error, time), those that no other one beats in both, from the largest error on."""
+    """Of (error, time), those that no other one beats in both, or nearly so, from the largest error on."""
     kept = []
     for error, time in sorted(points, key=lambda p: (p[1], p[0])):
-        if not kept or error < kept[-1][0]:
+        if not kept or error < .9 * kept[-1][0]:
             kept.append((error, time))
     return kept
 
