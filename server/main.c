@@ -149,6 +149,7 @@ static bool leave(service *s, http *h, unix_socket *own, const sigset_t *signals
  * but its log. */
 static void end_at_once(service *s) {
     fprintf(stderr, "lambertd: what still runs is given up\n");
+    batch_leave(s->queue);
     access_log_close(s->access_log);
     fflush(NULL);
     _exit(EXIT_SUCCESS);

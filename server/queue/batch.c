@@ -425,6 +425,11 @@ void batch_abandon(batch_queue *queue) {
     pthread_mutex_unlock(&queue->lock);
 }
 
+void batch_leave(batch_queue *queue) {
+    for (size_t i = 0; i < queue->n_threads; i++) pthread_detach(queue->threads[i]);
+    if (queue->spare_started) pthread_detach(queue->spare_thread);
+}
+
 void batch_close(batch_queue *queue) {
     pthread_mutex_lock(&queue->lock);
     queue->closed = true;

@@ -127,6 +127,10 @@ void batch_lend(batch_queue *queue);
  * `drop` none. Returns at once. */
 void batch_abandon(batch_queue *queue);
 
+/* Gives up the threads, some of which may still run, as the process ends at once: nobody waits for them. The
+ * queue is never closed. */
+void batch_leave(batch_queue *queue);
+
 /* Refuses further jobs, finishes those that wait and ends the threads. Once. */
 void batch_close(batch_queue *queue);
 
