@@ -185,7 +185,7 @@ done:
 
 lam_status formfactors_error(const bench_run *run, lam_error *error) {
     static const trial quick[] = {
-        {.elements = 160, .rays = {256, 1024}, .resolution = {32}, .accuracy = {7e-4}, .finest = 7e-5},
+        {.elements = 160, .rays = {256, 1024}, .resolution = {32}, .accuracy = {2.8e-4}, .finest = 7e-5},
         {.elements = 0}};
     static const trial usual[] = {{.elements = 640,
                                    .rays = {256, 1024, 4096, 16384},
