@@ -77,16 +77,16 @@ static size_t tile_end(size_t first, size_t n) {
     return first + TILE < n ? first + TILE : n;
 }
 
-/* S = I - T K T with T_i = (rho_i / A_i)^1/2 and K = A F. False where F lacks reciprocity, so that K is not
- * symmetric. */
-static bool make_symmetric(size_t n, const csr *F, const float *rho, const double *area, double *S) {
+/* S = I - T K T, T_i = (rho_i / A_i)^1/2 and K_ij = A_i F_ij. False where F lacks reciprocity, so that K is
+ * not symmetric. */
+static bool make_symmetric(size_t n, const csr *F, const double *T, const double *area, double *S) {
     bool reciprocal = true;
 #pragma omp parallel for schedule(static)
     for (size_t i = 0; i < n; i++) {
         double *row = S + i * n;
         for (size_t j = 0; j < n; j++) row[j] = 0;
         for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
-            row[F->indices[p]] += sqrt(area[i] / area[F->indices[p]]) * (double)F->data[p];
+            row[F->indices[p]] += area[i] * (double)F->data[p];
     }
 #pragma omp parallel for schedule(dynamic, 1) reduction(&& : reciprocal)
     for (size_t top = 0; top < n; top += TILE)
@@ -95,13 +95,22 @@ static bool make_symmetric(size_t n, const csr *F, const float *rho, const doubl
                 for (size_t j = left; j < tile_end(left, n) && j <= i; j++) {
                     const double x = S[i * n + j], y = S[j * n + i];
                     reciprocal = reciprocal && fabs(x - y) <= reciprocal_within * fmax(x, y);
-                    S[i * n + j] = S[j * n + i] =
-                        (i == j ? 1 : 0) - sqrt((double)rho[i] * (double)rho[j]) * .5 * (x + y);
+                    S[i * n + j] = S[j * n + i] = (i == j ? 1 : 0) - T[i] * T[j] * .5 * (x + y);
                 }
     return reciprocal;
 }
 
-/* S^-1 in place, whole, and the reciprocal condition number: half the work of an LU. */
+/* The upper triangle by rows from the lower one. */
+static void mirror(size_t n, double *S) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t top = 0; top < n; top += TILE)
+        for (size_t left = 0; left <= top; left += TILE)
+            for (size_t i = top; i < tile_end(top, n); i++)
+                for (size_t j = left; j < tile_end(left, n) && j < i; j++) S[j * n + i] = S[i * n + j];
+}
+
+/* S^-1 in place, whole, and the reciprocal condition number: half the work of an LU. LAPACK's upper triangle
+ * by columns is the lower one by rows. */
 static lam_status invert_symmetric(size_t n, double *S, double *rcond, lam_error *error) {
     const lapack_int size = (lapack_int)n;
     const double norm = LAPACKE_dlansy(LAPACK_COL_MAJOR, '1', 'U', size, S, size);
@@ -112,12 +121,7 @@ static lam_status invert_symmetric(size_t n, double *S, double *rcond, lam_error
     if (info != 0)
         return status_fail(error, LAM_ERR_NUMERIC, "inverse of %zu elements: LAPACK dpotri returned %d", n,
                            (int)info);
-        /* The upper triangle by columns is the lower one by rows. */
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t top = 0; top < n; top += TILE)
-        for (size_t left = 0; left <= top; left += TILE)
-            for (size_t i = top; i < tile_end(top, n); i++)
-                for (size_t j = left; j < tile_end(left, n) && j < i; j++) S[j * n + i] = S[i * n + j];
+    mirror(n, S);
     return LAM_OK;
 }
 
@@ -135,15 +139,13 @@ static void gather_row(size_t n, const csr *F, const float *rho, size_t i, const
 /* From S^-1 to B - E = M E: M = T (S^-1 - I) T^-1 between elements that reflect, and elsewhere by H = F + F
  * M, the irradiance of E, with A_i H_ij = A_j H_ji. Rows of elements that do not reflect are H (contract,
  * /operator). */
-static void scale_symmetric(size_t n, const csr *F, const float *rho, const double *area, double *M) {
+static void scale_symmetric(size_t n, const csr *F, const float *rho, const double *T, const double *area,
+                            double *M) {
 #pragma omp parallel for schedule(dynamic, 16)
     for (size_t i = 0; i < n; i++) {
         double *row = M + i * n;
-        for (size_t j = 0; j < n; j++) {
-            const double ratio =
-                rho[i] > 0 && rho[j] > 0 ? sqrt((double)rho[i] / (double)rho[j] * area[j] / area[i]) : 0;
-            row[j] = ratio * (row[j] - (i == j ? 1 : 0));
-        }
+        row[i] -= 1;
+        for (size_t j = 0; j < n; j++) row[j] = T[j] > 0 ? T[i] * row[j] / T[j] : 0;
     }
     /* H_aj of a that does not reflect, by the light of the j that do; then, by reciprocity, M_ja = rho_j
      * H_ja; then H_ab of two that do not. */
@@ -173,17 +175,21 @@ static lam_status make_channel(const build_problem *problem, const float *rho, d
     lam_status status = LAM_OK;
     const size_t n = problem->n;
     const csr *F = problem->F;
-    if (!make_symmetric(n, F, rho, problem->area, M)) {
+    double *T = memory_allocate(n, sizeof *T, "exact inverse", error);
+    if (T == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) T[i] = sqrt((double)rho[i] / problem->area[i]);
+    if (!make_symmetric(n, F, T, problem->area, M)) {
         TRY(invert(n, F, rho, M, rcond, error));
         bounced(n, F, rho, M, P);
         goto done;
     }
     TRY(invert_symmetric(n, M, rcond, error));
-    scale_symmetric(n, F, rho, problem->area, M);
+    scale_symmetric(n, F, rho, T, problem->area, M);
 #pragma omp parallel for schedule(static)
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) P[i * n + j] = (float)M[i * n + j];
 done:
+    free(T);
     return status;
 }
 

@@ -22,9 +22,7 @@ static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occl
     double share = 1, work = 0;
     if (!pair_ground_projects(&run->on, i, j, *g)) {
         pair_occluders between;
-        const few_verdict proven = among->count == OCCLUDERS_UNCOUNTED
-                                       ? FEW_UNDECIDED
-                                       : few_occluders_between(&run->on.few, among, i, j, &between);
+        const few_verdict proven = few_occluders_between(&run->on.few, among, i, j, &between);
         if (proven == FEW_HIDDEN) *g = 0;
         return proven == FEW_OPEN     ? PAIR_CERTAIN
                : proven == FEW_HIDDEN ? PAIR_HIDDEN | PAIR_EXACT

@@ -69,7 +69,6 @@ static bool count_projection(const pair_ground *run, uint32_t i, uint32_t j, dou
     work->sifted++;
     if (!pair_ground_projects(run, i, j, g)) {
         pair_occluders between;
-        if (among->count == OCCLUDERS_UNCOUNTED) return false;
         const few_verdict proven = few_occluders_between(&run->few, among, i, j, &between);
         work->seen += proven == FEW_OPEN;
         return proven != FEW_UNDECIDED;

@@ -99,6 +99,7 @@ START_TEST(coarse_pairs_are_tested) {
     ck_assert_double_lt(sampled[1].projection, .5 * sampled[0].projection);
     ck_assert_double_gt(sampled[1].tests, 10 * sampled[0].tests);
     ck_assert_double_gt(found[1].hidden + found[1].open, 0);
+    ck_assert_double_eq_tol(sampled[1].seen / sampled[0].seen, 1, .05);
     visibility_destroy(v);
     mesh_free(&m);
 }
@@ -116,6 +117,24 @@ START_TEST(lists_make_pairs_cheaper) {
     ck_assert_double_gt(cost.seconds, 2e-8 * segments);
     ck_assert_double_lt(cost.seconds, 1.75e-7 * segments);
     ck_assert_double_gt(cost.measured, 0);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Few segments are made finer all together, up to segments_least, and are counted as they will be cast. */
+START_TEST(segments_are_counted_as_they_are_cast) {
+    lam_error error = {.message = ""};
+    mesh m = scene_of("patio", 1000);
+    visibility *v = NULL;
+    recipe coarse = all_pairs;
+    coarse.accuracy = 5.6e-4;
+    const pairs_options how = pairs_options_of(&coarse, m.n, 0);
+    const double wanted = fmin(how.segments_least, how.segments_most);
+    pairs_work w;
+    ck_ok(visibility_create(&m, &v, &error));
+    ck_ok(pairs_sample(&m, v, &how, &w, NULL, &error));
+    ck_assert_double_eq_tol(w.segments / wanted, 1, .15);
+    visibility_destroy(v);
     mesh_free(&m);
 }
 END_TEST
@@ -146,6 +165,7 @@ int main(void) {
     tcase_set_timeout(cases, 120);
     tcase_add_loop_test(cases, segments_are_tested_against_lists, 0, 2);
     tcase_add_test(cases, projected_pairs_take_no_segments);
+    tcase_add_test(cases, segments_are_counted_as_they_are_cast);
     tcase_add_test(cases, coarse_pairs_are_tested);
     tcase_add_test(cases, lists_make_pairs_cheaper);
     tcase_add_test(cases, costs_follow_the_accuracy);

@@ -14,13 +14,16 @@ typedef struct outcome {
     double seconds, entries;
 } outcome;
 
-static outcome weigh_recipe(const char *scene, size_t n, const char *quality, int n_threads,
-                            recipe_method method, double memory) {
+static outcome weigh_kept(const char *scene, size_t n, const char *quality, int n_threads,
+                          recipe_method method, double memory, const char *keep) {
     lam_error error = {0};
     terminal t;
     const generate_options how = {.kind = scene, .elements = n, .seed = 1, .reflectance = -1};
-    const precompute_options options = {
-        .form_factors = "auto", .quality = quality, .rays = OPTION_AUTO, .build = build_presets("auto")};
+    const precompute_options options = {.form_factors = "auto",
+                                        .quality = quality,
+                                        .rays = OPTION_AUTO,
+                                        .build = build_presets("auto"),
+                                        .keep_form_factors = keep};
     precompute_state state = {
         .options = &options, .t = &t, .expected = method_find("hierarchical"), .memory = memory};
     state.recipe =
@@ -35,6 +38,11 @@ static outcome weigh_recipe(const char *scene, size_t n, const char *quality, in
     const outcome found = {state.dear, state.plain, state.least_rays, state.cost.seconds, state.cost.entries};
     mesh_free(&state.m);
     return found;
+}
+
+static outcome weigh_recipe(const char *scene, size_t n, const char *quality, int n_threads,
+                            recipe_method method, double memory) {
+    return weigh_kept(scene, n, quality, n_threads, method, memory, NULL);
 }
 
 static outcome weigh(const char *scene, size_t n, const char *quality, int n_threads) {
@@ -64,6 +72,17 @@ START_TEST(a_plain_room_keeps_its_pairs) {
         ck_assert_uint_eq(found.rays, 0);
         ck_assert_double_gt(found.seconds, 0);
     }
+}
+END_TEST
+
+/* Pairs that are as coarse as an operator allows are worth less than those that are kept. */
+START_TEST(kept_pairs_may_take_longer) {
+    const outcome coarse = weigh("canopy", 2500, "normal", 2),
+                  kept = weigh_kept("canopy", 2500, "normal", 2, RECIPE_PAIRS, 1e15, "");
+    ck_assert_double_gt(kept.seconds, 8);
+    ck_assert_double_lt(kept.seconds, 16);
+    ck_assert(coarse.dear);
+    ck_assert(!kept.dear);
 }
 END_TEST
 
@@ -156,6 +175,7 @@ int main(void) {
     tcase_set_timeout(cases, 300);
     tcase_add_test(cases, a_soup_gets_rays);
     tcase_add_test(cases, a_plain_room_keeps_its_pairs);
+    tcase_add_test(cases, kept_pairs_may_take_longer);
     tcase_add_test(cases, high_quality_keeps_pairs_for_longer);
     tcase_add_test(cases, more_elements_cost_more);
     tcase_add_test(cases, near_pairs_are_weighed_too);
