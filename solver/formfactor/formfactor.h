@@ -34,7 +34,6 @@ typedef struct block_report {
     double even; /* blocks of clusters of several planes, and the pairs of points they were sampled at */
     double sampled;
     double sifted;  /* pieces of facets that might stand between two clusters */
-    double tests;   /* of segments against pieces */
     double cast;    /* segments against the whole scene */
     double reduced; /* whose slopes were reduced so that no form factor is negative */
     double elements_away, elements_hidden, elements_unseen; /* pairs of elements */

@@ -210,6 +210,8 @@ recipe state_near_recipe(const precompute_state *state);
  * both, and near pairs against rays alone, sets cost, dear, plain and least_rays, and logs why:
  * stage_pairs.c. A new choice of the recipe follows where dear is set. */
 lam_status state_weigh_pairs(precompute_state *state, lam_error *error);
+/* The same once, and the new choice: stage_scene.c. */
+lam_status state_weigh_rows(precompute_state *state, lam_error *error);
 
 /* Takes the groups of --portal out of the mesh, and rectangles around them into portals: stage_portals.c. */
 lam_status state_take_portals(precompute_state *state, lam_error *error);

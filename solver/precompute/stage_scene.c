@@ -352,18 +352,23 @@ done:
     return status;
 }
 
-/* The recipe of the mesh as it is now. Blocks are weighed against all pairs once these are weighed against
- * rays, but before near pairs are, which costs more than blocks do in large rooms. */
+lam_status state_weigh_rows(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (state->cost.seconds > 0) return LAM_OK;
+    TRY(state_weigh_pairs(state, error));
+    if (state->dear) TRY(choose_recipe(state, (double)state->m.n, error));
+done:
+    return status;
+}
+
+/* The recipe of the mesh as it is now. Blocks come first: to weigh all pairs or near ones costs more than
+ * blocks do in most rooms. */
 static lam_status choose_final_recipe(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const double n = (double)state->m.n;
-    const bool asked = strcmp(state->options->form_factors, "blocks") == 0;
     TRY(choose_recipe(state, n, error));
-    const bool pairs_first = state->recipe.method == RECIPE_PAIRS && !asked && fits(state, n);
-    if (!pairs_first) TRY(try_blocks(state, error));
-    TRY(state_weigh_pairs(state, error));
-    if (state->dear) TRY(choose_recipe(state, n, error));
-    if (pairs_first) TRY(try_blocks(state, error));
+    TRY(try_blocks(state, error));
+    TRY(state_weigh_rows(state, error));
     const forecast f = state_forecast(state, n);
     TRY(forecast_check(&f, state->memory, error));
 done:

@@ -122,12 +122,12 @@ static void judge(const judged_probes *b, const visibility *v, const plane_tree 
     printf("\n");
     fprintf(stderr,
             "visits %llu: away %llu (%.3g pairs), hidden %llu (%.3g), linear %llu, pairs %llu, shaded %llu, "
-            "shaded pairs %llu, segments %llu, reduced %llu, pieces %.3g, tests %.3g\n",
+            "shaded pairs %llu, segments %llu, reduced %llu, pieces %.3g\n",
             (unsigned long long)found.visits, (unsigned long long)found.away, found.elements_away,
             (unsigned long long)found.hidden, found.elements_hidden, (unsigned long long)found.linear,
             (unsigned long long)found.pairs, (unsigned long long)found.shaded,
             (unsigned long long)found.shaded_pairs, (unsigned long long)found.segments,
-            (unsigned long long)found.reduced, found.sifted, found.tests);
+            (unsigned long long)found.reduced, found.sifted);
     fflush(stdout);
     free(B);
     free(one);

@@ -55,8 +55,8 @@ static void block_by_candidates(const shade_scene *s, const double origin[3], co
     for (int k = 0; k < SEGMENT_LANES; k++) out[k].seen = 1 - (double)blocked[k];
 }
 
-void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidates *among, size_t first,
-                    seen_segment out[SEGMENT_LANES], double *kernel) {
+void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidates *among,
+                    seen_segment out[SEGMENT_LANES]) {
     const flat_clusters *f = s->f;
     const bool by_scene = among->count == CANDIDATES_UNKNOWN;
     segment_ends ends = {.elements = {{0}}};
@@ -64,7 +64,7 @@ void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidat
     pair_sampler_init(&sampler, s->seed, a, b);
     for (size_t begin = 0; begin < SEGMENT_LANES; begin += VISIBILITY_PACKET) {
         double x[4][VISIBILITY_PACKET];
-        pair_sampler_packet(&sampler, (uint32_t)(first + begin), x);
+        pair_sampler_packet(&sampler, (uint32_t)begin, x);
         for (size_t p = 0; p < VISIBILITY_PACKET; p++) {
             const size_t k = begin + p;
             const double from[2] = {x[0][p], x[1][p]}, to[2] = {x[2][p], x[3][p]};
@@ -76,16 +76,4 @@ void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidat
         block_by_scene(s->v, &ends, out);
     else
         block_by_candidates(s, f->of[a].centre, among, &ends, out);
-    if (kernel == NULL) return;
-    const double *normals[2] = {f->planes[f->of[a].plane].normal, f->planes[f->of[b].plane].normal};
-    for (int k = 0; k < SEGMENT_LANES; k++) {
-        double r2 = 0, leaving = 0, arriving = 0;
-        for (int d = 0; d < 3; d++) {
-            const double r = ends.to[k][d] - ends.from[k][d];
-            r2 += r * r;
-            leaving += r * normals[0][d];
-            arriving -= r * normals[1][d];
-        }
-        kernel[k] = leaving > 0 && arriving > 0 ? leaving * arriving / (r2 * r2) : 0;
-    }
 }

@@ -14,9 +14,8 @@ typedef struct shade_scene {
 } shade_scene;
 
 /* Segments between two nodes: with few candidates these alone are tested, else the whole scene by Embree. out
- * [SEGMENT_LANES]; kernel [SEGMENT_LANES], unless NULL, gets cos cos' / r^2 of each. first: the number of
- * segments of the pair before these. Deterministic in (seed, a, b, first). */
-void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidates *among, size_t first,
-                    seen_segment out[SEGMENT_LANES], double *kernel);
+ * [SEGMENT_LANES]. Deterministic in (seed, a, b). */
+void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidates *among,
+                    seen_segment out[SEGMENT_LANES]);
 
 #endif

@@ -5,6 +5,7 @@
 #include "solver/formfactor/blocks/block_shade.h"
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/blocks/joined_kernel.h"
+#include "solver/formfactor/pairs/occlusion.h"
 
 /* All that the walks of a scene share. */
 typedef struct block_finder {
@@ -12,7 +13,9 @@ typedef struct block_finder {
     const plane_tree *tree;
     flat_clusters flat;
     occluders pieces;
+    segment_occluder *segment_pieces; /* [pieces.n], for segments between elements */
     shade_scene shade;
+    occlusion occlusion; /* of pairs of elements */
     pair_factor_rules rules;
     size_t n_clusters;
     bool joined;              /* clusters of several planes have blocks too, and nothing hides anything */

@@ -34,7 +34,7 @@ static lam_status add_work(const block_finder *k, uint32_t a, uint32_t b, pair_l
  * elements, 5.9 in a plane, takes twice the time by blocks that it takes by rays, for the same error. A
  * furnished room of triangles has 1 to 2 in a plane, an atrium with round columns 8, rooms of walls 100 and
  * more. */
-static const double elements_of_plane = 6;
+static const double elements_of_plane = 2;
 
 bool blocks_are_planar(const plane_tree *tree) {
     return tree->n_frames <= BLOCK_PLANES_MOST &&

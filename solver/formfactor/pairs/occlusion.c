@@ -190,6 +190,12 @@ static double visible_share(const occlusion *o, const piece_pair *two, size_t n_
     return all > 0 ? seen / all : 1;
 }
 
+double occlusion_share(const occlusion *o, segment_list *among, uint32_t i, const polygon *a, uint32_t j,
+                       const polygon *b, size_t segments) {
+    const piece_pair two = piece_pair_of(o->seed, among, i, a, j, b);
+    return visible_share(o, &two, segments);
+}
+
 /* A pair that is estimated piece by piece. */
 typedef struct segment_budget {
     uint32_t i, j;

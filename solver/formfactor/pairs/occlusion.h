@@ -57,6 +57,13 @@ double occlusion_estimate_by(const occlusion *o, segment_list *among, uint32_t i
 /* About how many segments occlusion_estimate will cast. */
 double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g);
 
+/* The visible share of elements i and j with the polygons a and b: sum K V / sum K over at least so many
+ * segments, a multiple of VISIBILITY_PACKET, that lie in front of both. 1 where none does. among: all
+ * occluders that may block one of them, none of them in the plane of either element; NULL: any of the scene
+ * may. */
+double occlusion_share(const occlusion *o, segment_list *among, uint32_t i, const polygon *a, uint32_t j,
+                       const polygon *b, size_t segments);
+
 /* True where all of 128 to 1,024 segments between two clusters are blocked: as many as the largest factor
  * from a point of one to the other asks for, so that the visible part is about o->accuracy at most. False for
  * factors that would ask for more. */
