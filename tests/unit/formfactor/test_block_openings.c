@@ -92,11 +92,10 @@ static double opposed_squares(double a, double c) {
  * segment: at most the exchange that a seed found, and in a block that is bounded by its norm about
  * shadow sqrt(A_a A_b) / 16. */
 START_TEST(small_openings_lose_nothing) {
-    static const double cell = .5;
+    static const double cell = .75;
     const double hole = holes[_i / 2], thickness = thicknesses[_i % 2];
     const double truth = hole * hole * opposed_squares(hole, thickness);
-    /* Few segments meet the smallest holes. */
-    const int seeds = hole < .05 ? 64 : 16;
+    const int seeds = 64;
     size_t count[2];
     mesh m = two_rooms(hole, thickness, cell, count);
     double sum = 0, square = 0, most = 0;

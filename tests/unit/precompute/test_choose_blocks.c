@@ -57,15 +57,23 @@ START_TEST(a_room_of_large_planes_gets_blocks) {
 }
 END_TEST
 
-/* Its planes have three elements each, and all sorts of houses stand between them: its blocks cost as much as
- * its pairs, and many times as much as its rays. */
+/* Its planes have three elements each, and all sorts of houses stand between them: its blocks cost many times
+ * as much as its rays. */
 START_TEST(a_city_does_not) {
     ck_assert_int_eq(choose("city", 4200, few_rays, 2).method, RECIPE_RAYS);
 }
 END_TEST
 
-START_TEST(a_small_scene_is_not_weighed) {
-    const outcome found = choose("cornell", 2000, all_pairs, 1);
+/* Blocks that take next to nothing are not weighed against all pairs. */
+START_TEST(a_small_room_gets_blocks_at_once) {
+    const outcome found = choose("cornell", 1200, all_pairs, 1);
+    ck_assert_int_eq(found.method, RECIPE_BLOCKS);
+    ck_assert_double_gt(found.seconds, 0);
+}
+END_TEST
+
+START_TEST(a_smaller_scene_is_not_weighed) {
+    const outcome found = choose("cornell", 900, all_pairs, 1);
     ck_assert_int_eq(found.method, RECIPE_PAIRS);
     ck_assert_double_eq(found.seconds, 0);
 }
@@ -77,7 +85,8 @@ int main(void) {
     tcase_set_timeout(cases, 120);
     tcase_add_test(cases, a_room_of_large_planes_gets_blocks);
     tcase_add_test(cases, a_city_does_not);
-    tcase_add_test(cases, a_small_scene_is_not_weighed);
+    tcase_add_test(cases, a_small_room_gets_blocks_at_once);
+    tcase_add_test(cases, a_smaller_scene_is_not_weighed);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
