@@ -36,7 +36,7 @@ RECIPES = {"defaults": "",
            **{f"normal, {epsilon}": f"--form-factors rays {HIERARCHICAL} {epsilon}" for epsilon in (.2, .05, .0125)},
            **{f"exact, {epsilon}": f"--form-factors rays --method exact --epsilon {epsilon}" for epsilon in (.2, .05, .0125)},
            "normal, exact": "--form-factors rays --method exact",
-           **{f"blocks, {epsilon}": f"--form-factors blocks {HIERARCHICAL} {epsilon}" for epsilon in (.2, .05, .0125, .003)},
+           **{f"blocks, {epsilon}": f"--form-factors blocks {HIERARCHICAL} {epsilon}" for epsilon in (.2, .05, .0125, .006, .003, .001)},
            "high, exact": "--form-factors rays --quality high --method exact"}
 LIGHTS = ("single", "lights", "uniform", "random")
 SINGLES, RANDOMS = 24, 4

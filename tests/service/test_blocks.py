@@ -35,14 +35,20 @@ class Blocks(Case):
         must("generate", "cornell", "--closed", "--elements", 4200, "--reflectance", .5, "-o", self.room)
         store, log = self.precompute("auto.h5", "--probes", 0)
         self.assertEqual(self.attributes(store)["form_factors"], b"blocks")
-        self.assertRegex(log, r"blocks of clusters are taken instead: about .* s of one thread, by a sample of them; "
-                              r"pair by pair to .*: .* s\n")
+        self.assertRegex(log, r"blocks of clusters are taken: about .* s of one thread, by a sample of them\n")
+        self.assertNotIn("pairs are", log)
         self.assertRegex(log, r"forecast: form factors [\d.]+ s,")
         self.assertRegex(log, r"\d+ blocks of \d+ planes: .* linear, .* partly hidden")
         rays, log = self.precompute("rays.h5", "--probes", 0, "--form-factors", "rays", "--quality", "draft",
                                     "--rays", 64, "--method", "hierarchical")
         self.assertEqual(self.attributes(rays)["form_factors"], b"rays")
         self.assertNotIn("blocks of", log)
+
+    def test_at_high_quality_blocks_are_weighed_against_pairs(self):
+        store, log = self.precompute("auto.h5", "--probes", 0, "--quality", "high", "--elements", 1100)
+        self.assertEqual(self.attributes(store)["form_factors"], b"blocks")
+        self.assertRegex(log, r"blocks of clusters are taken instead: about .* s of one thread, by a sample of them; "
+                              r"pair by pair to .*: .* s\n")
 
     def test_memory_that_is_too_small_for_rows_has_room_for_blocks(self):
         self.room = self.path("large.obj")
