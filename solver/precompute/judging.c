@@ -226,11 +226,14 @@ static lam_status make_references(const judging *j, judge_references *r, lam_err
     const bool blocks = j->problem->blocks != NULL;
     if (!fits(j, r)) {
         judge_references_free_samples(r);
+        block_light_destroy(r->by_blocks);
+        r->by_blocks = NULL;
         memcpy(r->halves, j->halves, sizeof r->halves);
         TRY(blocks ? make_blocks(j, r, error) : make_halves(j, r->half, error));
     }
     if (blocks && r->by_blocks == NULL)
-        TRY(block_light_create(j->m, j->problem->blocks->tree, j->first_light_seed, &r->by_blocks, error));
+        TRY(block_light_create(j->m, j->problem->blocks->tree, j->halves[0].accuracy, j->first_light_seed,
+                               &r->by_blocks, error));
     /* The direct illumination of one element by rays is mostly noise. */
     if (!blocks && recipe_noise(&j->f->recipe) > 0 && r->by_rays == NULL)
         TRY(first_light_create(j->m, j->first_light_seed, &r->by_rays, error));

@@ -16,8 +16,10 @@ static const double roughness_most = .003;
 static const double pair_tolerance = 1e-5;
 /* Segments go to points all over a source whose centre is this many of its radii away. */
 static const double radii_away = 2;
-/* Segments of each of two halves between a source and an element that it does not see all of. */
-enum { HALVES = 2, SEGMENTS = 8 };
+/* Independent estimates of a source and an element that it does not see all of, and segments of each: the
+ * least beside blocks of middle_accuracy, those of the judge by preset, more beside finer ones. */
+enum { HALVES = 2, SEGMENTS_LEAST = 8, SEGMENTS_MOST = 64 };
+static const double middle_accuracy = 1.19e-4;
 /* Pairs of a source and a piece at most, each of which takes about a microsecond. */
 static const double visits_most = 5e6;
 /* One of so many elements may shine at most; pieces of the receivers that threads take one at a time. */
@@ -31,6 +33,7 @@ struct block_light {
     block_factors nodes;
     block_finder finder;
     uint64_t seeds[HALVES];
+    uint32_t segments;         /* of each half */
     uint32_t *planes, *pieces; /* the topmost clusters; those below them of few elements each */
     size_t n_planes, n_pieces;
 };
@@ -81,14 +84,26 @@ static lam_status find_planes(block_light *l, lam_error *error) {
     return LAM_OK;
 }
 
-lam_status block_light_create(const mesh *m, const plane_tree *tree, uint64_t seed, block_light **out,
-                              lam_error *error) {
+/* Powers of two, as the sequence of points is even then. */
+static uint32_t segments_of_half(double accuracy) {
+    uint32_t segments = SEGMENTS_LEAST;
+    while (segments < SEGMENTS_MOST && segments * accuracy < SEGMENTS_LEAST * middle_accuracy) segments *= 2;
+    return segments;
+}
+
+uint32_t block_light_segments(double accuracy) {
+    return HALVES * segments_of_half(accuracy);
+}
+
+lam_status block_light_create(const mesh *m, const plane_tree *tree, double accuracy, uint64_t seed,
+                              block_light **out, lam_error *error) {
     lam_status status = LAM_OK;
     block_light *l = memory_allocate(1, sizeof *l, "direct illumination", error);
     if (l == NULL) return LAM_ERR_MEMORY;
     l->m = m;
     l->tree = tree;
     l->options.exact = pair_tolerance;
+    l->segments = segments_of_half(accuracy);
     for (uint64_t h = 0; h < HALVES; h++) l->seeds[h] = random_stream(seed, h);
     TRY(visibility_create(m, &l->v, error));
     TRY(block_finder_make(m, l->v, tree, &l->nodes, &l->finder, error));
@@ -249,7 +264,7 @@ static void add_shaded(const shining *s, uint32_t a, uint32_t b) {
     for (int h = 0; h < HALVES; h++) {
         pair_sampler sampler;
         pair_sampler_init(&sampler, s->l->seeds[h], a, b);
-        for (uint32_t first = 0; first < SEGMENTS; first += VISIBILITY_PACKET)
+        for (uint32_t first = 0; first < s->l->segments; first += VISIBILITY_PACKET)
             cast_packet(s, &sampler, first, a, b, &all[h], &seen[h]);
     }
     for (int h = 0; h < HALVES; h++) {

@@ -60,6 +60,8 @@ static const double finish_seconds = 4.5e-7, element_seconds = 2e-6;
  * as many; their segments are cast against the whole scene, and they are balanced to a coarser tolerance. Of
  * two Cornell boxes, rooms, a maze and a patio, whose blocks became 1.11 to 1.9 times as many. */
 static const double finer_times = 1.9, scene_seconds = 6.5e-8, finer_finish = .7;
+/* Pairs beyond the bound get 2^(1/.7) times as many segments then, those within it as many. */
+static const double finer_segments = 1.4;
 
 /* Of the walk alone. */
 static double walk_seconds(const block_report *w) {
@@ -91,6 +93,7 @@ static block_report finer_of(const block_report *w) {
     double *const others[] = {&finer.linear, &finer.even, &finer.sampled, &finer.shaded};
     for (size_t k = 0; k < sizeof grow / sizeof *grow; k++) *grow[k] *= more;
     for (size_t k = 0; k < sizeof others / sizeof *others; k++) *others[k] *= finer_times;
+    finer.segments *= finer_segments;
     return finer;
 }
 
