@@ -72,6 +72,12 @@ START_TEST(a_small_room_gets_blocks_at_once) {
 }
 END_TEST
 
+/* Of 4.6 elements in a plane. */
+START_TEST(a_small_city_gets_blocks) {
+    ck_assert_int_eq(choose("city", 1500, all_pairs, 1).method, RECIPE_BLOCKS);
+}
+END_TEST
+
 START_TEST(a_smaller_scene_is_not_weighed) {
     const outcome found = choose("cornell", 900, all_pairs, 1);
     ck_assert_int_eq(found.method, RECIPE_PAIRS);
@@ -86,6 +92,7 @@ int main(void) {
     tcase_add_test(cases, a_room_of_large_planes_gets_blocks);
     tcase_add_test(cases, a_city_does_not);
     tcase_add_test(cases, a_small_room_gets_blocks_at_once);
+    tcase_add_test(cases, a_small_city_gets_blocks);
     tcase_add_test(cases, a_smaller_scene_is_not_weighed);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
