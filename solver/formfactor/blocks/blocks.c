@@ -30,10 +30,10 @@ static lam_status add_work(const block_finder *k, uint32_t a, uint32_t b, pair_l
     return LAM_OK;
 }
 
-/* With fewer elements in a plane, on average, clusters are hardly more than elements. A city of 8,005
- * elements, 5.9 in a plane, takes twice the time by blocks that it takes by rays, for the same error. A
- * furnished room of triangles has 1 to 2 in a plane, an atrium with round columns 8, rooms of walls 100 and
- * more. */
+/* With fewer elements in a plane, on average, clusters are hardly more than elements. A furnished room of
+ * triangles has 1 to 2 in a plane, which no sample need tell; an atrium of 2,030 elements with round
+ * columns 2.6, a city of 1,501 4.6, and both take a half to a third of the time of pairs by blocks. Rooms of
+ * walls have 100 and more. */
 static const double elements_of_plane = 2;
 
 bool blocks_are_planar(const plane_tree *tree) {
