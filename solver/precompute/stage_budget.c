@@ -82,6 +82,10 @@ static double entries_of(const pairs_cost *c) {
     return c->entries;
 }
 
+static double finer_of(const pairs_cost *c) {
+    return c->finer;
+}
+
 static lam_status sample_blocks(budget_run *run, double seconds, lam_error *error) {
     lam_status status = LAM_OK;
     precompute_state *state = run->state;
@@ -127,6 +131,7 @@ static lam_status find_seconds(const budget_run *run, budget_recipe *r, lam_erro
         probe.recipe.rays = recipe_rays_beside_blocks(probe.m.n);
         probe.recipe.accuracy = run->method->block_accuracy(method_own_const(&options.build, run->method));
         probe.cost = (pairs_cost){.measured = along(&run->blocks, probe.recipe.accuracy, measured_of),
+                                  .finer = along(&run->blocks, probe.recipe.accuracy, finer_of),
                                   .entries = along(&run->blocks, probe.recipe.accuracy, entries_of)};
     } else if (r->kind == BUDGET_PAIRS) {
         probe.recipe = state_pairs_recipe(&probe);

@@ -70,6 +70,15 @@ class Time(Case):
         self.assertIn("--probes 32", options)
         self.assertLess(last, first / 10)
 
+    def test_the_judge_counts(self):
+        """The forecast of the choice is not far below that of the recipe that is taken: judges of blocks cost more than these."""
+        patio = self.path("patio.obj")
+        must("generate", "patio", "--elements", 600, "-o", patio)
+        log, _, _ = self.chosen(patio, 3600, "--form-factors", "blocks")
+        chosen = float(re.search(r"forecast ([\d.]+) s, indirect", log)[1])
+        line = re.search(r"processor seconds, forecast and taken: form factors (\S+) .*, operator (\S+) .*, judge (\S+) ", log)
+        self.assertGreater(chosen * os.cpu_count(), .6 * sum(float(part) for part in line.groups()))
+
     def test_other_options_are_kept(self):
         _, _, options = self.chosen(self.small, 3600, "--form-factors", "rays", "--probes", 2)
         self.assertNotIn("--probes", options)

@@ -84,15 +84,13 @@ static lam_status find_planes(block_light *l, lam_error *error) {
     return LAM_OK;
 }
 
-/* Powers of two, as the sequence of points is even then. */
+/* As fine as blocks of this bound: with 16 in both halves a patio's lamps (1,508 elements) are stated to be
+ * off by .011 at bounds of 3e-5 and of 7e-6, where they are off by .0040 and .0015. Powers of two, as the
+ * sequence of points is even then. */
 static uint32_t segments_of_half(double accuracy) {
     uint32_t segments = SEGMENTS_LEAST;
     while (segments < SEGMENTS_MOST && segments * accuracy < SEGMENTS_LEAST * middle_accuracy) segments *= 2;
     return segments;
-}
-
-uint32_t block_light_segments(double accuracy) {
-    return HALVES * segments_of_half(accuracy);
 }
 
 lam_status block_light_create(const mesh *m, const plane_tree *tree, double accuracy, uint64_t seed,

@@ -10,13 +10,8 @@
 
 typedef struct block_light block_light;
 
-/* Segments of a source and an element that it does not see all of, beside blocks of this bound: as fine as
- * these. With 16 a patio's lamps (1,508 elements) are stated to be off by .011 at bounds of 3e-5 and of 7e-6,
- * where they are off by .0040 and .0015. */
-uint32_t block_light_segments(double accuracy);
-
-/* Mesh and tree must outlive it; accuracy: the bound of the blocks beside it. Errors: LAM_ERR_MEMORY,
- * LAM_ERR_INTERNAL. */
+/* Mesh and tree must outlive it; accuracy: the bound of the blocks beside it, which segments follow. Errors:
+ * LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
 lam_status block_light_create(const mesh *m, const plane_tree *tree, double accuracy, uint64_t seed,
                               block_light **out, lam_error *error);
 void block_light_destroy(block_light *l);

@@ -32,7 +32,7 @@ static const double rough_most = .3;
 /* Segments of a partly hidden block, and of a pair of elements within the bound of blocks: SEGMENT_LANES, a
  * round of them. A pair beyond the bound, which cannot be split, gets as many rounds as it takes to err by so
  * many times the bound, N segments by N^-SEGMENTS_POWER of its norm. The errors of pairs are independent of
- * each other, and their signs differ, unlike those of what a block leaves out: with fewer times, answers in
+ * each other, and their signs differ, unlike those of what a block leaves out: with fewer, answers in
  * rooms, a patio and an atrium (1,498 to 2,030 elements) gain less by pairs than the time is worth. The
  * number does not depend on how many of the first ones are blocked: small openings would lose the light of
  * pairs in which all are. */
