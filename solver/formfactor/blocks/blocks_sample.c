@@ -44,10 +44,10 @@ done:
     return status;
 }
 
-/* Seconds of one thread of an AMD EPYC with AVX-512, 2026, by a fit to two Cornell boxes, a maze, rooms, a
- * patio, an anechoic chamber, three cities and an atrium of 1,498 to 8,041 elements at four bounds each (.04
- * to 9 s; these say .76 to 1.19 times as much). A linear block takes no more than its visit, and a candidate
- * of a segment next to nothing, as most segments have few. */
+/* Seconds of one thread of an AMD EPYC with AVX-512, 2026, by a fit to a closed Cornell box, a maze, rooms, a
+ * patio, an anechoic chamber, three cities and an atrium of about 1,500 and 6,000 elements at three or four
+ * bounds each (.04 to 10 s; these say .76 to 1.19 times as much). A linear block takes no more than its
+ * visit, and a candidate of a segment next to nothing, as most segments have few. */
 static const double visit_seconds = 1.4e-7, sifted_seconds = 7e-8, even_seconds = 6e-8, pair_seconds = 3.6e-7,
                     shaded_seconds = 2.8e-7, shaded_pair_seconds = 2e-7, segment_seconds = 1.2e-8,
                     cast_seconds = 3.5e-7;
