@@ -140,9 +140,12 @@ double recipe_accuracy(const recipe *r) {
 }
 
 double recipe_shadow(const recipe *r) {
-    /* Measured in a closed Cornell box: single elements, which feel shadows, and lamps then err alike. */
-    static const double shadow_share = 10. / 3;
-    return fmin(shadow_share * r->accuracy, 1);
+    /* Measured in a closed Cornell box: single elements, which feel shadows, and lamps then err alike. Finer
+     * bounds leave more of the shadows to pairs of elements, whose errors are independent: blocks in patio,
+     * atrium, rooms and Cornell box (1,498 to 6,003 elements) take 8 to 20 % less time at equal error with
+     * twice the share at a sixteenth of the accuracy. */
+    static const double shadow_share = 10. / 3, of_accuracy = 2.4e-4, power = .25;
+    return fmin(shadow_share * pow(fmax(of_accuracy / r->accuracy, 1), power) * r->accuracy, 1);
 }
 
 size_t recipe_rays_beside_blocks(size_t n) {

@@ -32,7 +32,7 @@ KINDS = {"cornell": ["cornell", "--closed"], **{kind: [kind] for kind in ("rooms
 HIERARCHICAL = "--method hierarchical --epsilon"
 RECIPES = {"defaults": "",
            **{f"rays {rays}, {epsilon}": f"--form-factors rays --rays {rays} {HIERARCHICAL} {epsilon}"
-              for rays, epsilon in ((256, .2), (1024, .05), (4096, .05), (16384, .0125))},
+              for rays, epsilon in ((256, .2), (1024, .05), (4096, .05), (16384, .0125), (32768, .0125))},
            **{f"normal, {epsilon}": f"--form-factors rays {HIERARCHICAL} {epsilon}" for epsilon in (.2, .05, .0125)},
            **{f"exact, {epsilon}": f"--form-factors rays --method exact --epsilon {epsilon}" for epsilon in (.2, .05, .0125)},
            "normal, exact": "--form-factors rays --method exact",

@@ -57,15 +57,20 @@ void polygon_of_element(const mesh *m, size_t element, polygon *out) {
 }
 
 void polygon_in_front(const polygon *p, const polygon *other, polygon *out) {
-    double height[POLYGON_CORNERS], most = 0;
+    double height[POLYGON_CORNERS], most = 0, least = INFINITY;
     for (int c = 0; c < p->n; c++) {
         double r[3];
         for (int d = 0; d < 3; d++) r[d] = p->corner[c][d] - other->centre[d];
         height[c] = dot3(r, other->normal);
         most = fmax(most, height[c]);
+        least = fmin(least, height[c]);
     }
     /* Rounding moves corners of the plane itself off it. */
     const double rounding = 1e-12 * (p->radius + other->radius);
+    if (least >= 0 && most > rounding) {
+        *out = *p;
+        return;
+    }
     polygon made = *p;
     made.n = 0;
     for (int c = 0; c < p->n && most > rounding; c++) {
