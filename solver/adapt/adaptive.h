@@ -11,7 +11,7 @@
 
 typedef struct adaptive_options {
     double error;    /* |error| / |B - E| that constants on elements may leave, for each light */
-    size_t elements; /* at most, both sides counted; no face is joined with another */
+    size_t elements; /* at most, both sides counted; where there are more faces, as many as these */
     bool two_sided;  /* the mesh will be: both sides of a face are looked at */
     uint64_t seed;
     const progress *progress;
@@ -24,10 +24,11 @@ typedef struct adaptive_report {
     bool reached;       /* both are at most what was asked for */
 } adaptive_report;
 
-/* Divides the faces of a mesh in place. The scene's lamps and 1 from every element are its lights; a coarse
- * solution is found for them first. Deterministic, for any number of threads. Cost: 36 times 128 rays and 256
- * segments for each cell that was looked at, about twice the number of elements, and the coarse solution.
- * Errors: those of coarse_light_make and mesh_of_cells. */
+/* Divides the faces of a mesh in place, which mesh_join_faces has made as large as can be, or not. The
+ * scene's lamps and 1 from every element are its lights; a coarse solution is found for them first.
+ * Deterministic, for any number of threads. Cost: 36 times 128 rays and 256 segments for each cell that was
+ * looked at, about twice the number of elements, and the coarse solution. Errors: those of coarse_light_make
+ * and mesh_of_cells. */
 lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report *report, lam_error *error);
 
 #endif

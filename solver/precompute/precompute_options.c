@@ -53,9 +53,9 @@ static const option_row mesh_rows[] = {
      .least = 0,
      .most = 1,
      .above = true,
-     .help = "Divide where light changes, until constants on elements leave at most this share of the "
-             "reflected light of the scene's lamps and of light that all elements emit; at most --elements, "
-             "else 40,000"},
+     .help = "Join faces of one material that lie in one plane and divide them where light changes, until "
+             "constants on elements leave at most this share of the reflected light of the scene's lamps and "
+             "of light that all elements emit; at most --elements, else 40,000"},
     {.name = "unit",
      .kind = OPTION_NUMBER,
      .offset = FIELD(unit),

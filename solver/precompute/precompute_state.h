@@ -149,7 +149,7 @@ lam_status stage_load_store(precompute_state *state, lam_error *error);
 /* Refines the mesh, orders it, and chooses a recipe that memory has room for. */
 lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
 
-/* Divides the mesh as asked for, and logs what it is. */
+/* Divides the mesh as asked for, and logs what it is: stage_mesh.c. */
 lam_status state_refine_mesh(precompute_state *state, lam_error *error);
 void state_log_mesh(const precompute_state *state);
 
@@ -159,9 +159,7 @@ lam_status stage_positions(precompute_state *state, lam_error *error);
 lam_status state_judge_positions(precompute_state *state, lam_error *error);
 lam_status state_save_positions(const precompute_state *state, store *s, lam_error *error);
 
-/* --mesh-error: divides the mesh, says what that leaves, and warns where it is more than was asked for. The
- * error of the mesh by the operator's answers, and its place in the store: stage_mesh_error.c. */
-lam_status state_refine_by_error(precompute_state *state, lam_error *error);
+/* The error of the mesh by the operator's answers, and its place in the store: stage_mesh_error.c. */
 lam_status stage_mesh_error(precompute_state *state, lam_error *error);
 lam_status state_save_mesh_error(const precompute_state *state, store *s, lam_error *error);
 

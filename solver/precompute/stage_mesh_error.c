@@ -1,41 +1,11 @@
-/* The mesh as a source of error: elements where light changes (--mesh-error), and the error that constants on
- * elements leave, as the store states it. */
-#include "solver/adapt/adaptive.h"
+/* The error that constants on elements leave, as the store states it. */
 #include "solver/adapt/mesh_error.h"
 #include "solver/base/random.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Elements that --mesh-error makes at most, unless --elements gives their number. */
-enum { ADAPTIVE_ELEMENTS = 40000 };
-
-lam_status state_refine_by_error(precompute_state *state, lam_error *error) {
-    lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
-    const adaptive_options how = {.error = o->mesh_error,
-                                  .elements = o->elements > 0 ? o->elements : ADAPTIVE_ELEMENTS,
-                                  .two_sided = o->two_sided,
-                                  .seed = precompute_seed(o->seed, SEED_MESH),
-                                  .progress = &state->progress};
-    adaptive_report made;
-    char lamps[64] = "";
-    TRY(adaptive_refine(&state->m, &how, &made, error));
-    if (made.has_lamps) snprintf(lamps, sizeof lamps, "%.3g of the light of lamps and ", made.lamps);
-    terminal_log(state->t, "constants on elements leave %s%.3g of light that all elements emit", lamps,
-                 made.even);
-    if (!made.reached)
-        terminal_warn(state->t,
-                      "--mesh-error %g is not kept with %zu elements: they leave %.3g; --elements takes more "
-                      "than %zu",
-                      o->mesh_error, state->m.n * (o->two_sided ? 2 : 1),
-                      made.lamps > made.even ? made.lamps : made.even, how.elements);
-done:
-    return status;
-}
 
 /* The lights that errors are stated for: E [n_lights][C][n], freed with free(). An operator of few emitters
  * knows no other light than theirs. */

@@ -425,57 +425,6 @@ done:
     return status;
 }
 
-/* Above this share of the area in one element, a mesh that was not divided is called coarse. */
-static const double coarse_share = .02;
-enum { COARSE_ADVICE = 5000 };
-
-/* Logs what shows a wrong axis or unit, or a mesh too coarse to show light. */
-void state_log_mesh(const precompute_state *state) {
-    const mesh *m = &state->m;
-    const precompute_options *o = state->options;
-    const char axes[] = {'x', 'y', 'z'};
-    double low[3], high[3], size[3] = {0, 0, 0}, height = 0, area = 0, largest = 0;
-    size_t n_wide = 0;
-    mesh_box(m, low, high);
-    for (int k = 0; k < 3; k++)
-        if (axes[k] == m->up)
-            height = high[k] - low[k];
-        else
-            size[n_wide++] = high[k] - low[k];
-    for (size_t i = 0; i < m->n; i++) {
-        area += m->area[i];
-        largest = fmax(largest, m->area[i]);
-    }
-    terminal_log(state->t, "%zu elements in %zu groups, %zu channel%s%s", m->n, m->n_groups, m->n_channels,
-                 m->n_channels == 1 ? "" : "s", m->two_sided ? ", two-sided" : "");
-    terminal_log(state->t, "%.4g m x %.4g m, %.4g m high, %c up; --up and --unit set axis and unit", size[0],
-                 size[1], height, m->up);
-    if (o->subdivide == 0 && o->max_edge == 0 && o->elements == 0 && o->mesh_error == 0 &&
-        largest > coarse_share * area)
-        terminal_log(state->t,
-                     "one element has %.0f %% of the area, and light does not vary across an element: "
-                     "--elements %d divides the faces",
-                     100 * largest / area, COARSE_ADVICE);
-}
-
-lam_status state_refine_mesh(precompute_state *state, lam_error *error) {
-    lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
-    /* --elements counts both sides. */
-    const mesh_refinement refinement = {.subdivide_levels = (unsigned)o->subdivide,
-                                        .max_edge = o->max_edge,
-                                        .elements = o->mesh_error > 0 ? 0
-                                                    : o->two_sided    ? (o->elements + 1) / 2
-                                                                      : o->elements};
-    if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
-        TRY(mesh_refine(&state->m, &refinement, error));
-    if (o->mesh_error > 0) TRY(state_refine_by_error(state, error));
-    if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
-    TRY(mesh_keep_pictures(&state->m, error)); /* every element has its means */
-done:
-    return status;
-}
-
 lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;

@@ -47,6 +47,21 @@ class MeshError(Case):
         uniform, _, _ = self.made("uniform.h5", "--elements", adaptive["elements"])
         self.assertLess(adaptive["error"]["mesh"]["lights"], .9 * uniform["error"]["mesh"]["lights"])
 
+    def test_pieces_of_a_wall_are_joined(self):
+        must("generate", "cornell", "--elements", 641, "-o", self.scene)
+        whole, _, store = self.made("whole.h5")
+        about, log, joined = self.made("joined.h5", "--mesh-error", .2)
+        self.assertLess(about["elements"], .5 * whole["elements"])
+        self.assertRegex(log, rf"\d+ faces are left of {whole['elements']}")
+        self.assertEqual([group["name"] for group in about["groups"]], [group["name"] for group in whole["groups"]])
+        for group in range(len(whole["groups"])):
+            areas = [values_of(path, "mesh/area")[values_of(path, "mesh/group") == group].sum() for path in (store, joined)]
+            self.assertAlmostEqual(areas[0], areas[1], delta=1e-5 * areas[0])
+        # The pieces that --max-edge makes are not joined again.
+        _, _, edges = self.made("edged.h5", "--mesh-error", .2, "--max-edge", .1)
+        corners = values_of(edges, "mesh/vertices")[values_of(edges, "mesh/elements")[:, :3]]
+        self.assertLessEqual(numpy.linalg.norm(numpy.diff(corners, axis=1), axis=2).max(), .1 * 1.001)
+
     def test_limit_is_told(self):
         about, log, _ = self.made("few.h5", "--mesh-error", .001, "--elements", 200)
         self.assertEqual(about["elements"], 200)

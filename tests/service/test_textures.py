@@ -121,6 +121,11 @@ class ObjTexturesTest(TexturesCase):
             self.assertEqual(store.reflectance.shape[0], 3)
             self.assertNotIn("image", errors)
             self.judge_wall(store, pixels, (.8, .9, 1))
+        # The image is laid on each half by itself: it is mirrored in the second, which stays a face of its own.
+        halves = "v 1 0 0\nv 1 1 0\nvt 1.25 0\nvt 1.25 1.25\n"
+        self.write("b.obj", "mtllib a.mtl\n" + SQUARE + halves + "usemtl wood\nf 1/1 5/5 6/6 4/4\nf 5/5 2/1 3/4 6/6\n")
+        store, _ = self.store(self.folder / "b.obj", "--mesh-error", .3, "--elements", 30)
+        self.judge_wall(store, pixels, (.8, .9, 1), to_uv=lambda p: (1.25 * (1 - abs(p[0] - 1)), 1 - 1.25 * p[1]))
         store, _ = self.store(scene, "--two-sided", "--subdivide", 1)
         self.assertEqual(len(store.area), 8)
         self.judge_wall(store, pixels, (.8, .9, 1))

@@ -17,9 +17,9 @@ void occluders_free(occluders *o) {
 }
 
 /* Sets an occluder from its corners; false where it is thinner than slack. */
-static bool set_occluder(const mesh *m, const joined_piece *piece, double slack, occluder *o) {
+static bool set_occluder(const mesh *m, const joined_polygon *piece, double slack, occluder *o) {
     double twice[3] = {0}, longest = 0;
-    *o = (occluder){.n = (int)piece->n, .facet = piece->facet};
+    *o = (occluder){.n = (int)piece->n, .facet = piece->label};
     for (int c = 0; c < o->n; c++) memcpy(o->corner[c], m->vertices[piece->corner[c]], sizeof o->corner[c]);
     for (int c = 1; c + 1 < o->n; c++) {
         double one[3], two[3], part[3];
@@ -160,10 +160,16 @@ static lam_status make_tree(occluders *o, lam_error *error) {
 
 lam_status occluders_make(const mesh *m, const facets *f, double slack, occluders *out, lam_error *error) {
     lam_status status = LAM_OK;
-    joined_piece *pieces = NULL;
+    joined_polygon *pieces = NULL;
     size_t n_pieces = 0;
     occluders o = {.slack = slack};
-    TRY(occluders_join(m, f, slack, &pieces, &n_pieces, error));
+    const polygon_joining how = {.n = f->n_pieces,
+                                 .polygons = (const uint32_t(*)[4])f->pieces,
+                                 .label = f->piece_facet,
+                                 .split = true,
+                                 .corners = OCCLUDER_CORNERS,
+                                 .slack = slack};
+    TRY(polygons_join(m, &how, &pieces, &n_pieces, error));
     o.of = memory_allocate(n_pieces, sizeof *o.of, "occluders", error);
     if (o.of == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < n_pieces; k++)

@@ -3,8 +3,12 @@
 #ifndef LAMBERT_FORMFACTOR_VISIBILITY_OCCLUDERS_H
 #define LAMBERT_FORMFACTOR_VISIBILITY_OCCLUDERS_H
 
-#include "solver/formfactor/visibility/occluder_join.h"
 #include "solver/formfactor/visibility/shaft.h"
+#include "solver/scene/facet/facets.h"
+#include "solver/scene/facet/polygon_join.h"
+
+/* Corners of an occluder at most. */
+enum { OCCLUDER_CORNERS = JOINED_CORNERS };
 
 /* A planar convex polygon that hides from both sides: a point x of its plane is inside where edge[e] . (x, 1)
  * >= 0 for all. */
@@ -32,7 +36,7 @@ typedef struct occluders {
     double slack; /* metres: rounding may move a point by that much */
 } occluders;
 
-/* The joined pieces (occluder_join.h) of all facets. Of two with the same corners one is kept, and those
+/* The joined pieces (polygon_join.h) of all facets. Of two with the same corners one is kept, and those
  * thinner than slack are left out. Cost: O(n log n). Freed by occluders_free. Errors: LAM_ERR_MEMORY. */
 lam_status occluders_make(const mesh *m, const facets *f, double slack, occluders *out, lam_error *error);
 void occluders_free(occluders *o);

@@ -1,4 +1,4 @@
-#include "solver/formfactor/visibility/occluder_join.h"
+#include "solver/scene/facet/polygon_join.h"
 
 #include "solver/base/vector3.h"
 #include "solver/scene/tables.h"
@@ -8,10 +8,10 @@
 #include <string.h>
 
 /* Corners of a piece before the last step; and of a union before straight ones are dropped. */
-enum { FEW_CORNERS = 4, UNION_MOST = 2 * OCCLUDER_CORNERS - 2 };
+enum { FEW_CORNERS = 4, UNION_MOST = 2 * JOINED_CORNERS - 2 };
 
 typedef struct join_piece {
-    joined_piece shape;
+    joined_polygon shape;
     double normal[3], level;
 } join_piece;
 
@@ -22,7 +22,7 @@ typedef struct join_edge {
 
 typedef struct joining {
     const mesh *m;
-    double slack;
+    const polygon_joining *how;
     uint32_t *place; /* [n_vertices], the first vertex at the same point */
     join_piece *of;
     size_t n;
@@ -64,7 +64,7 @@ static bool set_plane(const mesh *m, join_piece *p) {
 static bool lies_in_plane(const joining *j, const join_piece *plane, const join_piece *p) {
     if (!(dot3(plane->normal, p->normal) > 0)) return false;
     for (uint32_t c = 0; c < p->shape.n; c++)
-        if (!(fabs(dot3(plane->normal, j->m->vertices[p->shape.corner[c]]) - plane->level) <= j->slack))
+        if (!(fabs(dot3(plane->normal, j->m->vertices[p->shape.corner[c]]) - plane->level) <= j->how->slack))
             return false;
     return true;
 }
@@ -78,8 +78,8 @@ static uint32_t make_convex(const joining *j, const double normal[3], uint32_t *
         double turn[3];
         cross_of(m, before, corner[c], after, turn);
         const double beyond = dot3(turn, normal) / distance(m, before, after);
-        if (!(beyond >= -j->slack)) return 0;
-        if (beyond > j->slack) {
+        if (!(beyond >= -j->how->slack)) return 0;
+        if (beyond > j->how->slack) {
             c++;
             continue;
         }
@@ -103,6 +103,7 @@ static uint32_t make_convex(const joining *j, const double normal[3], uint32_t *
 static bool unite(const joining *j, const join_piece *p, uint32_t i, const join_piece *q, uint32_t k,
                   uint32_t most, join_piece *out) {
     uint32_t corner[UNION_MOST], n = 0;
+    if (j->how->within_labels && p->shape.label != q->shape.label) return false;
     if (!lies_in_plane(j, p, q) || !lies_in_plane(j, q, p)) return false;
     for (uint32_t c = 1; c <= p->shape.n; c++) corner[n++] = p->shape.corner[(i + c) % p->shape.n];
     for (uint32_t c = 2; c < q->shape.n; c++) corner[n++] = q->shape.corner[(k + c) % q->shape.n];
@@ -111,7 +112,7 @@ static bool unite(const joining *j, const join_piece *p, uint32_t i, const join_
     *out = *p;
     out->shape.n = n;
     memcpy(out->shape.corner, corner, n * sizeof *corner);
-    if (q->shape.facet != p->shape.facet) out->shape.facet = MESH_NO_VERTEX;
+    if (q->shape.label != p->shape.label) out->shape.label = MESH_NO_VERTEX;
     return true;
 }
 
@@ -187,7 +188,7 @@ static size_t find_edge(const joining *j, uint32_t from, uint32_t to) {
 
 /* Joins a piece to another one that is not used in this round. */
 static bool join_one(joining *j, size_t p, join_step step) {
-    const uint32_t most = step == JOIN_WIDE ? OCCLUDER_CORNERS : FEW_CORNERS;
+    const uint32_t most = step == JOIN_WIDE ? JOINED_CORNERS : FEW_CORNERS;
     for (uint32_t c = 0; c < j->of[p].shape.n; c++) {
         const uint32_t from = j->of[p].shape.corner[c],
                        to = j->of[p].shape.corner[(c + 1) % j->of[p].shape.n];
@@ -220,16 +221,16 @@ static bool join_pairs(joining *j, join_step step) {
     return n_joined > 0;
 }
 
-/* Adds the polygon of these corners; without area it blocks nothing. */
-static void add_piece(joining *j, uint32_t n, const uint32_t *corner, uint32_t facet) {
+/* Adds the polygon of these corners, a part of polygon k; without area it is none. */
+static void add_piece(joining *j, uint32_t n, const uint32_t *corner, size_t k) {
     join_piece *made = &j->of[j->n];
-    *made = (join_piece){.shape = {.n = n, .facet = facet}};
+    *made = (join_piece){.shape = {.n = n, .label = j->how->label[k], .first = (uint32_t)k}};
     memcpy(made->shape.corner, corner, n * sizeof *corner);
     j->n += set_plane(j->m, made);
 }
 
-/* A piece of a facet; of four corners that are not plane and convex: two triangles. */
-static void add_piece_of_facet(joining *j, const uint32_t vertices[4], uint32_t facet) {
+static void add_polygon(joining *j, size_t k) {
+    const uint32_t *vertices = j->how->polygons[k];
     uint32_t corner[4], convex[4];
     const uint32_t n = (uint32_t)corner_count(vertices);
     for (uint32_t c = 0; c < n; c++) corner[c] = convex[c] = j->place[vertices[c]];
@@ -238,33 +239,34 @@ static void add_piece_of_facet(joining *j, const uint32_t vertices[4], uint32_t 
         memcpy(whole.shape.corner, corner, sizeof corner);
         const bool plane = set_plane(j->m, &whole) && lies_in_plane(j, &whole, &whole);
         const uint32_t left = plane ? make_convex(j, whole.normal, convex, n) : 0;
-        if (left > 0) {
-            add_piece(j, left, convex, facet);
+        if (left > 0 || !j->how->split) {
+            add_piece(j, left > 0 ? left : n, left > 0 ? convex : corner, k);
             return;
         }
     }
     for (uint32_t c = 1; c + 1 < n; c++)
-        add_piece(j, 3, (uint32_t[]){corner[0], corner[c], corner[c + 1]}, facet);
+        add_piece(j, 3, (uint32_t[]){corner[0], corner[c], corner[c + 1]}, k);
 }
 
-lam_status occluders_join(const mesh *m, const facets *f, double slack, joined_piece **out, size_t *count,
-                          lam_error *error) {
-    enum { OF_PIECE = 2 }; /* triangles */
+lam_status polygons_join(const mesh *m, const polygon_joining *how, joined_polygon **out, size_t *count,
+                         lam_error *error) {
+    enum { OF_POLYGON = 2 }; /* triangles */
     lam_status status = LAM_OK;
-    joining j = {.m = m, .slack = slack};
-    joined_piece *joined = NULL;
-    j.place = memory_allocate(m->n_vertices, sizeof *j.place, "occluders", error);
-    j.of = memory_allocate(f->n_pieces, OF_PIECE * sizeof *j.of, "occluders", error);
+    const int steps = how->corners > FEW_CORNERS ? JOIN_STEPS : JOIN_WIDE;
+    joining j = {.m = m, .how = how};
+    joined_polygon *joined = NULL;
+    j.place = memory_allocate(m->n_vertices, sizeof *j.place, "joined polygons", error);
+    j.of = memory_allocate(how->n, OF_POLYGON * sizeof *j.of, "joined polygons", error);
     if (j.place == NULL || j.of == NULL) TRY(LAM_ERR_MEMORY);
     TRY(points_weld(m->n_vertices, (const double(*)[3])m->vertices, j.place, error));
-    for (size_t p = 0; p < f->n_pieces; p++) add_piece_of_facet(&j, f->pieces[p], f->piece_facet[p]);
+    for (size_t k = 0; k < how->n; k++) add_polygon(&j, k);
     /* A union has no more corners than its two pieces less the two that both have. */
-    j.edges = memory_allocate(j.n, FEW_CORNERS * sizeof *j.edges, "occluders", error);
-    j.used = memory_allocate(j.n, sizeof *j.used, "occluders", error);
+    j.edges = memory_allocate(j.n, FEW_CORNERS * sizeof *j.edges, "joined polygons", error);
+    j.used = memory_allocate(j.n, sizeof *j.used, "joined polygons", error);
     if (j.edges == NULL || j.used == NULL) TRY(LAM_ERR_MEMORY);
-    for (int step = 0; step < JOIN_STEPS; step++)
+    for (int step = 0; step < steps; step++)
         while (join_pairs(&j, (join_step)step)) continue;
-    joined = memory_allocate(j.n, sizeof *joined, "occluders", error);
+    joined = memory_allocate(j.n, sizeof *joined, "joined polygons", error);
     if (joined == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t p = 0; p < j.n; p++) joined[p] = j.of[p].shape;
     *out = joined;

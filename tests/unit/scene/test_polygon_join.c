@@ -1,6 +1,6 @@
-/* Pieces joined into larger convex ones: how many are left, and that they cover the same points once. */
+/* Polygons joined into larger convex ones: how many are left, and that they cover the same points once. */
 #include "solver/base/random.h"
-#include "solver/formfactor/visibility/occluder_join.h"
+#include "solver/scene/facet/polygon_join.h"
 #include "support/dense.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -46,20 +46,25 @@ static mesh grid_mesh(const grid *g) {
     return m;
 }
 
-/* Pieces left of those of a mesh, each element of which is a facet; the caller frees *out. */
-static size_t join(const mesh *m, joined_piece **out) {
+/* Pieces left of those of a mesh, each element of which has a label of its own; the caller frees *out. */
+static size_t join(const mesh *m, joined_polygon **out) {
     size_t count = 0;
-    uint32_t *facet = test_allocate(m->n, sizeof *facet);
-    for (uint32_t k = 0; k < m->n; k++) facet[k] = k;
-    const facets f = {.n = m->n, .n_pieces = m->n, .pieces = m->elements, .piece_facet = facet};
-    ck_ok(occluders_join(m, &f, slack, out, &count, &error));
-    free(facet);
+    uint32_t *label = test_allocate(m->n, sizeof *label);
+    for (uint32_t k = 0; k < m->n; k++) label[k] = k;
+    const polygon_joining how = {.n = m->n,
+                                 .polygons = (const uint32_t(*)[4])m->elements,
+                                 .label = label,
+                                 .split = true,
+                                 .corners = JOINED_CORNERS,
+                                 .slack = slack};
+    ck_ok(polygons_join(m, &how, out, &count, &error));
+    free(label);
     return count;
 }
 
 static size_t count_joined(const grid *g) {
     mesh m = grid_mesh(g);
-    joined_piece *pieces;
+    joined_polygon *pieces;
     const size_t count = join(&m, &pieces);
     free(pieces);
     free(m.vertices);
@@ -118,7 +123,7 @@ START_TEST(the_same_points_are_covered_once) {
             normal[d] = g.axis[0][e] * g.axis[1][h] - g.axis[0][h] * g.axis[1][e];
         }
         mesh m = grid_mesh(&g);
-        joined_piece *pieces;
+        joined_polygon *pieces;
         const size_t count = join(&m, &pieces);
         before += m.n;
         after += count;
@@ -147,7 +152,7 @@ static size_t count_of_two(double rise, bool turned, double aside) {
     uint32_t elements[2][4] = {{0, 1, 2, 3}, {1, 4, 5, 2}};
     if (turned) memcpy(elements[1], (uint32_t[4]){2, 5, 4, 1}, sizeof elements[1]);
     const mesh m = {.n = 2, .n_vertices = 6, .vertices = x, .elements = elements};
-    joined_piece *pieces;
+    joined_polygon *pieces;
     const size_t count = join(&m, &pieces);
     free(pieces);
     return count;
@@ -158,7 +163,7 @@ static size_t count_folded(void) {
     double x[6][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {.5, 0, 0}, {.5, 1, 0}};
     uint32_t elements[2][4] = {{0, 1, 2, 3}, {2, 1, 4, 5}};
     const mesh m = {.n = 2, .n_vertices = 6, .vertices = x, .elements = elements};
-    joined_piece *pieces;
+    joined_polygon *pieces;
     const size_t count = join(&m, &pieces);
     free(pieces);
     return count;
@@ -169,7 +174,7 @@ static size_t count_dart(void) {
     double x[4][3] = {{0, 0, 0}, {3, 1, 0}, {1, 1, 0}, {1, 3, 0}};
     uint32_t elements[2][4] = {{0, 1, 2, MESH_NO_VERTEX}, {0, 2, 3, MESH_NO_VERTEX}};
     const mesh m = {.n = 2, .n_vertices = 4, .vertices = x, .elements = elements};
-    joined_piece *pieces;
+    joined_polygon *pieces;
     const size_t count = join(&m, &pieces);
     free(pieces);
     return count;
@@ -199,7 +204,7 @@ START_TEST(small_bends_do_not_add_up) {
     for (uint32_t k = 0; k < CELLS; k++)
         memcpy(elements[k], (uint32_t[4]){2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1}, sizeof elements[k]);
     const mesh m = {.n = CELLS, .n_vertices = 2 * CELLS + 2, .vertices = x, .elements = elements};
-    joined_piece *pieces;
+    joined_polygon *pieces;
     const size_t count = join(&m, &pieces);
     ck_assert_uint_gt(count, 10);
     for (size_t p = 0; p < count; p++) {
@@ -219,7 +224,7 @@ static size_t count_fan(uint32_t sides, uint32_t *corners) {
     for (uint32_t k = 0; k + 2 < sides; k++)
         memcpy(elements[k], (uint32_t[4]){0, k + 1, k + 2, MESH_NO_VERTEX}, sizeof elements[k]);
     const mesh m = {.n = sides - 2, .n_vertices = sides, .vertices = x, .elements = elements};
-    joined_piece *pieces;
+    joined_polygon *pieces;
     const size_t count = join(&m, &pieces);
     *corners = 0;
     for (size_t p = 0; p < count; p++) *corners += pieces[p].n;
@@ -230,13 +235,13 @@ static size_t count_fan(uint32_t sides, uint32_t *corners) {
 /* k pieces that share k - 1 edges have 2 (k - 1) corners more than the polygon. */
 START_TEST(wide_pieces_have_eight_corners_at_most) {
     uint32_t corners;
-    for (uint32_t sides = 3; sides <= OCCLUDER_CORNERS; sides++) {
+    for (uint32_t sides = 3; sides <= JOINED_CORNERS; sides++) {
         ck_assert_uint_eq(count_fan(sides, &corners), 1);
         ck_assert_uint_eq(corners, sides);
     }
-    const size_t count = count_fan(OCCLUDER_CORNERS + 1, &corners);
+    const size_t count = count_fan(JOINED_CORNERS + 1, &corners);
     ck_assert_uint_eq(count, 2);
-    ck_assert_uint_eq(corners, OCCLUDER_CORNERS + 1 + 2 * (count - 1));
+    ck_assert_uint_eq(corners, JOINED_CORNERS + 1 + 2 * (count - 1));
 }
 END_TEST
 
@@ -247,10 +252,10 @@ START_TEST(vertices_at_one_place_are_one) {
                           {1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1 + 1e-3 * apart, 0}};
         uint32_t elements[2][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}};
         const mesh m = {.n = 2, .n_vertices = 8, .vertices = x, .elements = elements};
-        joined_piece *pieces;
+        joined_polygon *pieces;
         const size_t count = join(&m, &pieces);
         ck_assert_uint_eq(count, 1 + (size_t)apart);
-        ck_assert_uint_eq(pieces[0].facet, apart ? 0 : MESH_NO_VERTEX);
+        ck_assert_uint_eq(pieces[0].label, apart ? 0 : MESH_NO_VERTEX);
         free(pieces);
     }
 }
@@ -270,7 +275,7 @@ START_TEST(quads_that_are_not_plane_and_convex_are_triangles) {
         uint32_t elements[1][4] = {{0, 1, 2, 3}}, corners = 0;
         memcpy(x[2], cases[k].third, sizeof x[2]);
         const mesh m = {.n = 1, .n_vertices = 4, .vertices = x, .elements = elements};
-        joined_piece *pieces;
+        joined_polygon *pieces;
         const size_t count = join(&m, &pieces);
         for (size_t p = 0; p < count; p++) corners += pieces[p].n;
         ck_assert_uint_eq(count, cases[k].count);
@@ -281,8 +286,8 @@ START_TEST(quads_that_are_not_plane_and_convex_are_triangles) {
 END_TEST
 
 int main(void) {
-    Suite *suite = suite_create("occluder join");
-    TCase *tests = tcase_create("occluder join");
+    Suite *suite = suite_create("polygon join");
+    TCase *tests = tcase_create("polygon join");
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, a_grid_becomes_one_piece);
     tcase_add_test(tests, holes_stay_open);
