@@ -81,8 +81,8 @@ step "all tests under AddressSanitizer and UndefinedBehaviorSanitizer"
 configure asan
 build asan
 # Only leaks that pass through our code count; the interpreter and the graphics libraries keep their own.
-# Freed memory waits in 64 MB instead of 256: every open of a store forks, and copies the tables of all pages.
-export ASAN_OPTIONS=detect_leaks=1:quarantine_size_mb=64 LSAN_OPTIONS=suppressions=$PWD/tests/support/lsan.supp:print_suppressions=0
+# Freed memory waits in 16 MB instead of 256: every open of a store forks, and copies the tables of all pages.
+export ASAN_OPTIONS=detect_leaks=1:quarantine_size_mb=16 LSAN_OPTIONS=suppressions=$PWD/tests/support/lsan.supp:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1
 # A process for each check would have its leaks looked for each time: half of the time of the contract. One test more than
 # cores: those of slow clients and of time limits mostly wait.

@@ -105,7 +105,7 @@ const DRAWING = process.env.CARD === undefined ? ["--use-angle=swiftshader", "--
     : [`--use-angle=${process.env.CARD}`, "--enable-gpu", ...(process.env.CARD === "vulkan" ? ["--enable-features=Vulkan", "--disable-vulkan-surface"] : [])];
 
 /** A page of the viewer, which has shown its first answer. Its `faults` are errors and requests to other origins. */
-export async function openPage(address, { width = 1280, height = 800, hash = "", touch = false, wait = true, before, storage } = {}) {
+export async function openPage(address, { width = 1000, height = 600, hash = "", touch = false, wait = true, before, storage } = {}) {
     if (browser === null) {
         browser = await chromium.launch({
             executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
