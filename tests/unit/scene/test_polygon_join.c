@@ -285,6 +285,26 @@ START_TEST(quads_that_are_not_plane_and_convex_are_triangles) {
 }
 END_TEST
 
+/* A bent quad stays one where none is split, and a flat one beside it is not joined with it. */
+START_TEST(bent_quads_stay_whole_where_none_is_split) {
+    double x[6][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, .1}, {0, 1, 0}, {-1, 0, 0}, {-1, 1, 0}};
+    const uint32_t elements[2][4] = {{0, 1, 2, 3}, {4, 0, 3, 5}}, label[2] = {7, 7};
+    const mesh m = {.n_vertices = 6, .vertices = x};
+    const polygon_joining how = {
+        .n = 2, .polygons = elements, .label = label, .within_labels = true, .corners = 4, .slack = slack};
+    joined_polygon *pieces;
+    size_t count = 0;
+    ck_ok(polygons_join(&m, &how, &pieces, &count, &error));
+    ck_assert_uint_eq(count, 2);
+    for (uint32_t p = 0; p < 2; p++) {
+        ck_assert_uint_eq(pieces[p].n, 4);
+        ck_assert_uint_eq(pieces[p].first, p);
+        ck_assert_uint_eq(pieces[p].label, 7);
+    }
+    free(pieces);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("polygon join");
     TCase *tests = tcase_create("polygon join");
@@ -297,6 +317,7 @@ int main(void) {
     tcase_add_test(tests, wide_pieces_have_eight_corners_at_most);
     tcase_add_test(tests, vertices_at_one_place_are_one);
     tcase_add_test(tests, quads_that_are_not_plane_and_convex_are_triangles);
+    tcase_add_test(tests, bent_quads_stay_whole_where_none_is_split);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
