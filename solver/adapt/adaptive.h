@@ -24,7 +24,7 @@ typedef struct adaptive_report {
     bool reached;       /* both are at most what was asked for */
 } adaptive_report;
 
-/* Divides the faces of a mesh in place, which mesh_join_faces has made as large as can be, or not. The
+/* Divides the faces of a mesh in place, which faces_join has made as large as can be, or not. The
  * scene's lamps and 1 from every element are its lights; a coarse solution is found for them first.
  * Deterministic, for any number of threads. Cost: 36 times 128 rays and 256 segments for each cell that was
  * looked at, about twice the number of elements, and the coarse solution. Errors: those of coarse_light_make

@@ -1,6 +1,7 @@
 /* From faces to elements, as the options of the mesh say. */
 #include "solver/adapt/adaptive.h"
 #include "solver/precompute/precompute_state.h"
+#include "solver/scene/facet/face_join.h"
 #include "solver/scene/import/picture_files.h"
 
 #include <math.h>
@@ -11,7 +12,7 @@ enum { ADAPTIVE_ELEMENTS = 40000 };
 
 static lam_status join_faces(precompute_state *state, lam_error *error) {
     const size_t faces = state->m.n;
-    const lam_status status = mesh_join_faces(&state->m, error);
+    const lam_status status = faces_join(&state->m, error);
     if (status == LAM_OK && state->m.n < faces)
         terminal_log(state->t, "%zu faces are left of %zu, as those of one material in one plane are joined",
                      state->m.n, faces);

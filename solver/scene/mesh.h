@@ -65,11 +65,6 @@ typedef struct mesh_refinement {
  * the means over their own areas. */
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
 
-/* Joins faces of one group and one material, without images, that lie in one plane and share a whole edge
- * into larger ones of 3 or 4 corners, in place; the others keep their order. Cost: O(n log n). Errors:
- * LAM_ERR_ARGUMENT for a two-sided mesh, LAM_ERR_MEMORY. */
-lam_status mesh_join_faces(mesh *m, lam_error *error);
-
 /* Doubles every element: all fronts in mesh order, then all backs (`--two-sided`). */
 lam_status mesh_make_two_sided(mesh *m, lam_error *error);
 

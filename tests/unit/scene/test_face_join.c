@@ -1,6 +1,6 @@
 /* Faces that lie in a plane become one: how many are left, whose they are, and that they cover what they did.
  */
-#include "solver/scene/mesh.h"
+#include "solver/scene/facet/face_join.h"
 #include "support/scene.h"
 #include "support/suite.h"
 
@@ -46,7 +46,7 @@ START_TEST(only_faces_of_one_material_are_joined) {
     const double area = total_area(&m), light = light_of(&m), floor = group_area(&m, "floor", NULL);
     ck_assert_uint_eq(m.n, SIDE * SIDE + 2);
     m.reflectance[20] = .3f;
-    ck_ok(mesh_join_faces(&m, &error));
+    ck_ok(faces_join(&m, &error));
     ck_assert_uint_eq(m.n, 1 + 1 + 4 + 1 + 1);
     ck_assert_double_eq_tol(total_area(&m), area, 1e-12 * area);
     ck_assert_double_eq_tol(light_of(&m), light, 1e-12 * light);
@@ -62,7 +62,7 @@ START_TEST(only_faces_of_one_material_are_joined) {
     }
     ck_assert_uint_eq(n_dark, 1);
     const mesh first = m;
-    ck_ok(mesh_join_faces(&m, &error)); /* nothing is left to join */
+    ck_ok(faces_join(&m, &error)); /* nothing is left to join */
     ck_assert_ptr_eq(m.elements, first.elements);
     mesh_free(&m);
     folder_remove(folder);
@@ -70,8 +70,8 @@ START_TEST(only_faces_of_one_material_are_joined) {
 END_TEST
 
 int main(void) {
-    Suite *suite = suite_create("mesh join");
-    TCase *tests = tcase_create("mesh join");
+    Suite *suite = suite_create("face join");
+    TCase *tests = tcase_create("face join");
     tcase_add_test(tests, only_faces_of_one_material_are_joined);
     suite_add_tcase(suite, tests);
     return suite_run(suite);

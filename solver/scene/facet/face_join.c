@@ -1,4 +1,6 @@
 /* Faces of one material and one group that lie in a plane, joined into larger ones. */
+#include "solver/scene/facet/face_join.h"
+
 #include "solver/scene/facet/polygon_join.h"
 #include "solver/scene/mesh_cells.h"
 #include "solver/scene/mesh_refined.h"
@@ -79,7 +81,7 @@ done:
     return status;
 }
 
-lam_status mesh_join_faces(mesh *m, lam_error *error) {
+lam_status faces_join(mesh *m, lam_error *error) {
     lam_status status = LAM_OK;
     uint32_t *label = memory_allocate(m->n, sizeof *label, "joined faces", error);
     joined_polygon *faces = NULL;
