@@ -78,7 +78,7 @@ declare -A home=(
     ["zstd.h"]="server/route/content_coding.c"
 )
 
-for file in $(git ls-files 'include/*.h' 'store/*.[ch]' 'solver/*.[ch]' 'solver/*.inc' 'server/*.[ch]' 'tests/bench/*.[ch]'); do
+for file in $(git ls-files -co --exclude-standard 'include/*.h' 'store/*.[ch]' 'solver/*.[ch]' 'solver/*.inc' 'server/*.[ch]' 'tests/bench/*.[ch]'); do
     folder=$(dirname "$file")
     case $folder in solver/method/*) folder_rule="solver/method/*" ;; *) folder_rule=$folder ;; esac
     checked=$((checked + 1))
