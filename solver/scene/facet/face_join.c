@@ -3,7 +3,6 @@
 
 #include "solver/scene/facet/polygon_join.h"
 #include "solver/scene/mesh_cells.h"
-#include "solver/scene/mesh_refined.h"
 #include "solver/scene/texture.h"
 
 #include <stdlib.h>
@@ -11,12 +10,6 @@
 
 /* Corners that deviate less, in radii of the scene, lie in a line or a plane. */
 static const double flat = 1e-7;
-
-/* A face by all that its parts inherit. */
-typedef struct labelled_face {
-    const mesh *m;
-    uint32_t face;
-} labelled_face;
 
 static int compare_bits(const float *values, size_t n, size_t n_channels, uint32_t i, uint32_t j) {
     for (size_t c = 0; c < n_channels; c++) {
@@ -41,50 +34,47 @@ static int compare_material(const mesh *m, uint32_t i, uint32_t j) {
     return i < j ? -1 : i > j;
 }
 
-static int by_material(const void *left, const void *right) {
-    const labelled_face *a = left, *b = right;
-    const int order = compare_material(a->m, a->face, b->face);
+static int by_material(const void *left, const void *right, void *of) {
+    const uint32_t i = *(const uint32_t *)left, j = *(const uint32_t *)right;
+    const int order = compare_material(of, i, j);
     if (order != 0) return order;
-    return a->face < b->face ? -1 : a->face > b->face;
+    return i < j ? -1 : i > j;
 }
 
 /* label [n]: the first face of the same material and group. */
-static lam_status label_faces(const mesh *m, uint32_t *label, lam_error *error) {
-    labelled_face *order = memory_allocate(m->n, sizeof *order, "joined faces", error);
+static lam_status label_faces(mesh *m, uint32_t *label, lam_error *error) {
+    uint32_t *order = memory_allocate(m->n, sizeof *order, "joined faces", error);
     if (order == NULL) return LAM_ERR_MEMORY;
-    for (uint32_t i = 0; i < m->n; i++) order[i] = (labelled_face){m, i};
-    qsort(order, m->n, sizeof *order, by_material);
+    for (uint32_t i = 0; i < m->n; i++) order[i] = i;
+    qsort_r(order, m->n, sizeof *order, by_material, m);
     for (size_t k = 0; k < m->n; k++) {
-        const uint32_t face = order[k].face;
-        const bool same = k > 0 && compare_material(m, order[k - 1].face, face) == 0;
-        label[face] = same ? label[order[k - 1].face] : face;
+        const bool same = k > 0 && compare_material(m, order[k - 1], order[k]) == 0;
+        label[order[k]] = same ? label[order[k - 1]] : order[k];
     }
     free(order);
     return LAM_OK;
 }
 
-static lam_status make_mesh(const mesh *m, size_t n, const joined_polygon *faces, mesh *out,
-                            lam_error *error) {
-    lam_status status = LAM_OK;
-    refined_mesh joined = {.n = 0};
-    TRY(refined_mesh_begin(m, n, &joined, error));
+/* cells [n], the caller's. */
+static lam_status cells_of(const mesh *m, size_t n, const joined_polygon *faces, mesh_cell **out,
+                           lam_error *error) {
+    mesh_cell *cells = memory_allocate(n, sizeof *cells, "joined faces", error);
+    if (cells == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) {
-        double corner[4][3];
+        cells[i].face = faces[i].first;
+        cells[i].n = faces[i].n;
         for (uint32_t c = 0; c < faces[i].n; c++)
-            memcpy(corner[c], m->vertices[faces[i].corner[c]], sizeof corner[c]);
-        joined.face[i] = faces[i].first;
-        TRY(refined_mesh_add(&joined, i, faces[i].n, (const double(*)[3])corner, error));
+            memcpy(cells[i].corner[c], m->vertices[faces[i].corner[c]], sizeof cells[i].corner[c]);
     }
-    TRY(refined_mesh_end(&joined, m, out, error));
-done:
-    refined_mesh_free(&joined);
-    return status;
+    *out = cells;
+    return LAM_OK;
 }
 
 lam_status faces_join(mesh *m, lam_error *error) {
     lam_status status = LAM_OK;
     uint32_t *label = memory_allocate(m->n, sizeof *label, "joined faces", error);
     joined_polygon *faces = NULL;
+    mesh_cell *cells = NULL;
     size_t n_faces = 0;
     double centre[3], radius;
     mesh joined = {0};
@@ -99,10 +89,12 @@ lam_status faces_join(mesh *m, lam_error *error) {
                                  .slack = flat * radius};
     TRY(polygons_join(m, &how, &faces, &n_faces, error));
     if (n_faces == m->n) goto done;
-    TRY(make_mesh(m, n_faces, faces, &joined, error));
+    TRY(cells_of(m, n_faces, faces, &cells, error));
+    TRY(mesh_of_cells(m, n_faces, cells, &joined, error));
     mesh_replace(m, &joined);
 done:
     free(label);
     free(faces);
+    free(cells);
     return status;
 }

@@ -119,12 +119,25 @@ START_TEST(forecasts_know_receivers) {
 }
 END_TEST
 
+/* Finer blocks have finer shadows, but not in step; coarser ones keep the share of the default's. */
+START_TEST(shadows_grow_finer_with_the_fourth_root) {
+    const double accuracy = 2.4e-4;
+    recipe r = {.method = RECIPE_BLOCKS, .accuracy = accuracy};
+    const double bound = recipe_shadow(&r);
+    r.accuracy = accuracy / 16;
+    ck_assert_double_eq_tol(recipe_shadow(&r), bound / 8, 1e-9 * bound);
+    r.accuracy = accuracy * 16;
+    ck_assert_double_eq_tol(recipe_shadow(&r), bound * 16, 1e-9 * bound);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("blocks sample");
     TCase *cases = tcase_create("blocks sample");
     tcase_set_timeout(cases, 240);
     tcase_add_loop_test(cases, a_sample_tells_the_work, FIRST_SCENE, SCENES);
     tcase_add_test(cases, forecasts_know_receivers);
+    tcase_add_test(cases, shadows_grow_finer_with_the_fourth_root);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
