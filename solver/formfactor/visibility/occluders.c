@@ -163,12 +163,12 @@ lam_status occluders_make(const mesh *m, const facets *f, double slack, occluder
     joined_polygon *pieces = NULL;
     size_t n_pieces = 0;
     occluders o = {.slack = slack};
-    const polygon_joining how = {.n = f->n_pieces,
-                                 .polygons = (const uint32_t(*)[4])f->pieces,
-                                 .label = f->piece_facet,
-                                 .split = true,
-                                 .corners = OCCLUDER_CORNERS,
-                                 .slack = slack};
+    const polygon_join_options how = {.n = f->n_pieces,
+                                      .polygons = (const uint32_t(*)[4])f->pieces,
+                                      .label = f->piece_facet,
+                                      .split = true,
+                                      .corners = OCCLUDER_CORNERS,
+                                      .slack = slack};
     TRY(polygons_join(m, &how, &pieces, &n_pieces, error));
     o.of = memory_allocate(n_pieces, sizeof *o.of, "occluders", error);
     if (o.of == NULL) TRY(LAM_ERR_MEMORY);

@@ -81,12 +81,12 @@ lam_status faces_join(mesh *m, lam_error *error) {
     if (label == NULL) TRY(LAM_ERR_MEMORY);
     TRY(label_faces(m, label, error));
     mesh_bounds(m, centre, &radius);
-    const polygon_joining how = {.n = m->n,
-                                 .polygons = (const uint32_t(*)[4])m->elements,
-                                 .label = label,
-                                 .within_labels = true,
-                                 .corners = 4,
-                                 .slack = flat * radius};
+    const polygon_join_options how = {.n = m->n,
+                                      .polygons = (const uint32_t(*)[4])m->elements,
+                                      .label = label,
+                                      .within_labels = true,
+                                      .corners = 4,
+                                      .slack = flat * radius};
     TRY(polygons_join(m, &how, &faces, &n_faces, error));
     if (n_faces == m->n) goto done;
     TRY(cells_of(m, n_faces, faces, &cells, error));

@@ -10,10 +10,10 @@
 /* Corners of a piece before the last step; and of a union before straight ones are dropped. */
 enum { FEW_CORNERS = 4, UNION_MOST = 2 * JOINED_CORNERS - 2 };
 
-typedef struct join_piece {
+typedef struct piece {
     joined_polygon shape;
     double normal[3], level;
-} join_piece;
+} piece;
 
 /* The edge from its piece's corner `at` to the next, which goes from `from` to `to`. */
 typedef struct join_edge {
@@ -22,9 +22,9 @@ typedef struct join_edge {
 
 typedef struct joining {
     const mesh *m;
-    const polygon_joining *how;
+    const polygon_join_options *options;
     uint32_t *place; /* [n_vertices], the first vertex at the same point */
-    join_piece *of;
+    piece *of;
     size_t n;
     join_edge *edges; /* in order of (from, to) */
     size_t n_edges;
@@ -45,7 +45,7 @@ static double distance(const mesh *m, uint32_t a, uint32_t b) {
 }
 
 /* Sets the plane of a piece, with a unit normal; false where it has no area. */
-static bool set_plane(const mesh *m, join_piece *p) {
+static bool set_plane(const mesh *m, piece *p) {
     double twice[3] = {0};
     for (uint32_t c = 1; c + 1 < p->shape.n; c++) {
         double part[3];
@@ -61,16 +61,17 @@ static bool set_plane(const mesh *m, join_piece *p) {
     return true;
 }
 
-static bool lies_in_plane(const joining *j, const join_piece *plane, const join_piece *p) {
+static bool lies_in_plane(const joining *j, const piece *plane, const piece *p) {
     if (!(dot3(plane->normal, p->normal) > 0)) return false;
     for (uint32_t c = 0; c < p->shape.n; c++)
-        if (!(fabs(dot3(plane->normal, j->m->vertices[p->shape.corner[c]]) - plane->level) <= j->how->slack))
+        if (!(fabs(dot3(plane->normal, j->m->vertices[p->shape.corner[c]]) - plane->level) <=
+              j->options->slack))
             return false;
     return true;
 }
 
-/* Drops straight corners of an outline in the plane of a normal and returns how many are left; 0 where it is
- * not convex. Once around, not twice: the angles between its sides sum to a full turn. */
+/* Drops straight corners of an outline in the plane of a normal and returns how many are left; 0 where it
+ * is not convex. Once around, not twice: the angles between its sides sum to a full turn. */
 static uint32_t make_convex(const joining *j, const double normal[3], uint32_t *corner, uint32_t n) {
     const mesh *m = j->m;
     for (uint32_t c = 0; c < n;) {
@@ -78,8 +79,8 @@ static uint32_t make_convex(const joining *j, const double normal[3], uint32_t *
         double turn[3];
         cross_of(m, before, corner[c], after, turn);
         const double beyond = dot3(turn, normal) / distance(m, before, after);
-        if (!(beyond >= -j->how->slack)) return 0;
-        if (beyond > j->how->slack) {
+        if (!(beyond >= -j->options->slack)) return 0;
+        if (beyond > j->options->slack) {
             c++;
             continue;
         }
@@ -100,10 +101,10 @@ static uint32_t make_convex(const joining *j, const double normal[3], uint32_t *
 
 /* The union of p and q, which share the edge after p's corner i and q's corner k; false where it is none that
  * may be joined. */
-static bool unite(const joining *j, const join_piece *p, uint32_t i, const join_piece *q, uint32_t k,
-                  uint32_t most, join_piece *out) {
+static bool unite(const joining *j, const piece *p, uint32_t i, const piece *q, uint32_t k, uint32_t most,
+                  piece *out) {
     uint32_t corner[UNION_MOST], n = 0;
-    if (j->how->within_labels && p->shape.label != q->shape.label) return false;
+    if (j->options->within_labels && p->shape.label != q->shape.label) return false;
     if (!lies_in_plane(j, p, q) || !lies_in_plane(j, q, p)) return false;
     for (uint32_t c = 1; c <= p->shape.n; c++) corner[n++] = p->shape.corner[(i + c) % p->shape.n];
     for (uint32_t c = 2; c < q->shape.n; c++) corner[n++] = q->shape.corner[(k + c) % q->shape.n];
@@ -125,7 +126,7 @@ static int by_ends(const void *left, const void *right) {
 
 /* True where an edge runs along the rows of its plane, in one of two directions at a right angle that are the
  * same for all grids of the plane. They are turned so that no usual grid lies halfway between them. */
-static bool is_along_rows(const joining *j, const join_piece *p, uint32_t at) {
+static bool is_along_rows(const joining *j, const piece *p, uint32_t at) {
     static const double turn[2] = {.28, .96};
     const double *from = j->m->vertices[p->shape.corner[at]],
                  *to = j->m->vertices[p->shape.corner[(at + 1) % p->shape.n]];
@@ -148,7 +149,7 @@ static bool is_along_rows(const joining *j, const join_piece *p, uint32_t at) {
  * all into pieces of many corners. */
 typedef enum join_step { JOIN_TRIANGLES, JOIN_ROWS, JOIN_ALL, JOIN_WIDE, JOIN_STEPS } join_step;
 
-static bool is_longest(const joining *j, const join_piece *p, uint32_t at) {
+static bool is_longest(const joining *j, const piece *p, uint32_t at) {
     const double own = distance(j->m, p->shape.corner[at], p->shape.corner[(at + 1) % p->shape.n]);
     for (uint32_t c = 0; c < p->shape.n; c++)
         if (distance(j->m, p->shape.corner[c], p->shape.corner[(c + 1) % p->shape.n]) > own) return false;
@@ -156,7 +157,7 @@ static bool is_longest(const joining *j, const join_piece *p, uint32_t at) {
 }
 
 /* True where a step joins pieces across this edge of one of them. */
-static bool is_open_to(const joining *j, const join_piece *p, uint32_t at, join_step step) {
+static bool is_open_to(const joining *j, const piece *p, uint32_t at, join_step step) {
     if (step == JOIN_TRIANGLES) return p->shape.n == 3 && is_longest(j, p, at);
     return step >= JOIN_ALL || !is_along_rows(j, p, at);
 }
@@ -196,7 +197,7 @@ static bool join_one(joining *j, size_t p, join_step step) {
         for (size_t e = find_edge(j, to, from);
              e < j->n_edges && j->edges[e].from == to && j->edges[e].to == from; e++) {
             const join_edge *other = &j->edges[e];
-            join_piece joined;
+            piece joined;
             if (other->piece == p || j->used[other->piece]) continue;
             if (!is_open_to(j, &j->of[other->piece], other->at, step)) continue;
             if (!unite(j, &j->of[p], c, &j->of[other->piece], other->at, most, &joined)) continue;
@@ -223,23 +224,23 @@ static bool join_pairs(joining *j, join_step step) {
 
 /* Adds the polygon of these corners, a part of polygon k; without area it is none. */
 static void add_piece(joining *j, uint32_t n, const uint32_t *corner, size_t k) {
-    join_piece *made = &j->of[j->n];
-    *made = (join_piece){.shape = {.n = n, .label = j->how->label[k], .first = (uint32_t)k}};
+    piece *made = &j->of[j->n];
+    *made = (piece){.shape = {.n = n, .label = j->options->label[k], .first = (uint32_t)k}};
     memcpy(made->shape.corner, corner, n * sizeof *corner);
     j->n += set_plane(j->m, made);
 }
 
 static void add_polygon(joining *j, size_t k) {
-    const uint32_t *vertices = j->how->polygons[k];
+    const uint32_t *vertices = j->options->polygons[k];
     uint32_t corner[4], convex[4];
     const uint32_t n = (uint32_t)corner_count(vertices);
     for (uint32_t c = 0; c < n; c++) corner[c] = convex[c] = j->place[vertices[c]];
     if (n == 4) {
-        join_piece whole = {.shape = {.n = n}};
+        piece whole = {.shape = {.n = n}};
         memcpy(whole.shape.corner, corner, sizeof corner);
         const bool plane = set_plane(j->m, &whole) && lies_in_plane(j, &whole, &whole);
         const uint32_t left = plane ? make_convex(j, whole.normal, convex, n) : 0;
-        if (left > 0 || !j->how->split) {
+        if (left > 0 || !j->options->split) {
             add_piece(j, left > 0 ? left : n, left > 0 ? convex : corner, k);
             return;
         }
@@ -248,18 +249,18 @@ static void add_polygon(joining *j, size_t k) {
         add_piece(j, 3, (uint32_t[]){corner[0], corner[c], corner[c + 1]}, k);
 }
 
-lam_status polygons_join(const mesh *m, const polygon_joining *how, joined_polygon **out, size_t *count,
-                         lam_error *error) {
+lam_status polygons_join(const mesh *m, const polygon_join_options *options, joined_polygon **out,
+                         size_t *count, lam_error *error) {
     enum { OF_POLYGON = 2 }; /* triangles */
     lam_status status = LAM_OK;
-    const int steps = how->corners > FEW_CORNERS ? JOIN_STEPS : JOIN_WIDE;
-    joining j = {.m = m, .how = how};
+    const int steps = options->corners > FEW_CORNERS ? JOIN_STEPS : JOIN_WIDE;
+    joining j = {.m = m, .options = options};
     joined_polygon *joined = NULL;
     j.place = memory_allocate(m->n_vertices, sizeof *j.place, "joined polygons", error);
-    j.of = memory_allocate(how->n, OF_POLYGON * sizeof *j.of, "joined polygons", error);
+    j.of = memory_allocate(options->n, OF_POLYGON * sizeof *j.of, "joined polygons", error);
     if (j.place == NULL || j.of == NULL) TRY(LAM_ERR_MEMORY);
     TRY(points_weld(m->n_vertices, (const double(*)[3])m->vertices, j.place, error));
-    for (size_t k = 0; k < how->n; k++) add_polygon(&j, k);
+    for (size_t k = 0; k < options->n; k++) add_polygon(&j, k);
     /* A union has no more corners than its two pieces less the two that both have. */
     j.edges = memory_allocate(j.n, FEW_CORNERS * sizeof *j.edges, "joined polygons", error);
     j.used = memory_allocate(j.n, sizeof *j.used, "joined polygons", error);

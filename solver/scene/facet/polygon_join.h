@@ -16,7 +16,7 @@ typedef struct joined_polygon {
 } joined_polygon;
 
 /* The polygons that are joined, and how they are. */
-typedef struct polygon_joining {
+typedef struct polygon_join_options {
     size_t n;
     const uint32_t (*polygons)[4]; /* [n], as elements of the mesh */
     const uint32_t *label;         /* [n] */
@@ -24,13 +24,13 @@ typedef struct polygon_joining {
     bool split;       /* a polygon of four corners that is not plane and convex is two triangles */
     uint32_t corners; /* of a union at most: 4, or JOINED_CORNERS */
     double slack;     /* metres: what deviates less from a line or a plane lies in it */
-} polygon_joining;
+} polygon_join_options;
 
 /* Joins two polygons at a time that face the same way, lie in one plane, share a whole edge and make a convex
  * polygon, until there are no more of these: first triangles, then the rows of a grid, then rows with each
  * other, and at last unions of more than four corners. Vertices at the same place are one; polygons without
  * an area are left out. *out [*count] is freed by the caller. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
-lam_status polygons_join(const mesh *m, const polygon_joining *how, joined_polygon **out, size_t *count,
-                         lam_error *error);
+lam_status polygons_join(const mesh *m, const polygon_join_options *options, joined_polygon **out,
+                         size_t *count, lam_error *error);
 
 #endif

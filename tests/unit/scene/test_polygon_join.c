@@ -51,12 +51,12 @@ static size_t join(const mesh *m, joined_polygon **out) {
     size_t count = 0;
     uint32_t *label = test_allocate(m->n, sizeof *label);
     for (uint32_t k = 0; k < m->n; k++) label[k] = k;
-    const polygon_joining how = {.n = m->n,
-                                 .polygons = (const uint32_t(*)[4])m->elements,
-                                 .label = label,
-                                 .split = true,
-                                 .corners = JOINED_CORNERS,
-                                 .slack = slack};
+    const polygon_join_options how = {.n = m->n,
+                                      .polygons = (const uint32_t(*)[4])m->elements,
+                                      .label = label,
+                                      .split = true,
+                                      .corners = JOINED_CORNERS,
+                                      .slack = slack};
     ck_ok(polygons_join(m, &how, out, &count, &error));
     free(label);
     return count;
@@ -290,7 +290,7 @@ START_TEST(bent_quads_stay_whole_where_none_is_split) {
     double x[6][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, .1}, {0, 1, 0}, {-1, 0, 0}, {-1, 1, 0}};
     const uint32_t elements[2][4] = {{0, 1, 2, 3}, {4, 0, 3, 5}}, label[2] = {7, 7};
     const mesh m = {.n_vertices = 6, .vertices = x};
-    const polygon_joining how = {
+    const polygon_join_options how = {
         .n = 2, .polygons = elements, .label = label, .within_labels = true, .corners = 4, .slack = slack};
     joined_polygon *pieces;
     size_t count = 0;
