@@ -235,7 +235,7 @@ lam_status lowrank_of_factorizers(const bench_run *run, const lowrank_scene *con
                  .printed = true};
     for (size_t i = 0; i < n; i++) {
         const lowrank_scene *s = scenes[i];
-        const size_t repeats = s->m.n > 5000 ? 1 : REPEATS;
+        const size_t repeats = run->scale == BENCH_QUICK || s->m.n > 5000 ? 1 : REPEATS;
         const double(*published)[2] = NULL;
         lowrank_result hf = {.rank = 0}, r;
         for (size_t t = 0; t < sizeof theirs / sizeof *theirs; t++)

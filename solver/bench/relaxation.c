@@ -14,7 +14,8 @@ static const double marks[] = {.1, .01, .001, 1e-4, 1e-6};
 enum { MARKS = sizeof marks / sizeof *marks, RAYS_OF_ELEMENT = 16, SOLVES = 15 };
 
 /* A method is given up after so many products with F, or so many seconds. */
-static const double most_products = 3000, most_seconds = 20;
+static const double most_products = 3000;
+static const double most_seconds[] = {[BENCH_QUICK] = 1, [BENCH_DEFAULT] = 20, [BENCH_FULL] = 20};
 
 /* One emission on its way to B; all arrays [n], except those that say otherwise. */
 typedef struct relaxation {
@@ -213,7 +214,7 @@ static lam_status relax(const bench_run *run, const relaxation_case *of, const i
     double started = clock_seconds();
     how->begin(x);
     double seconds = clock_seconds() - started;
-    while (mark < MARKS && x->entries < most_products * product && seconds < most_seconds) {
+    while (mark < MARKS && x->entries < most_products * product && seconds < most_seconds[run->scale]) {
         TRY(bench_check(run, error));
         started = clock_seconds();
         how->step(x);

@@ -97,7 +97,8 @@ class Size:
         self.bench, self.n, self.wanted_k, self.seconds = bench, n, k, seconds
         self.short = .1 if bench.quick else seconds
         self.absent, self.ports, self.running = {}, {}, []
-        self.runs = {key: [] for key in itertools.product(FORMATS, CLIENTS, SERVERS)}
+        clients = (ONE, MANY) if bench.quick else CLIENTS
+        self.runs = {key: [] for key in itertools.product(FORMATS, clients, SERVERS)}
         self.alone, self.beside = [], []
 
     def measure(self):

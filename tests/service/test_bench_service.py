@@ -15,7 +15,7 @@ class Whole(Case):
     def test_with_what_is_installed(self):
         tables = self.tables()
         n, k = 200, 32
-        self.assertEqual(len(tables["load"]), 2 * 3 * len(SERVERS))
+        self.assertEqual(len(tables["load"]), 2 * 2 * len(SERVERS))
         for row in tables["load"]:
             self.assertEqual((row["n"], row["k"]), (str(n), str(k)))
             if shutil.which("wrk") is None:
