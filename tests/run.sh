@@ -1,9 +1,18 @@
 #!/usr/bin/env bash
 # All tests: layers and layout, then all but a few tests under AddressSanitizer and UndefinedBehaviorSanitizer, the
-# daemon's tests under ThreadSanitizer and beside them a warning-free build by the other compiler and clang-tidy, its unit
-# and contract tests, and those few (AS_USERS in tests/CMakeLists.txt) with programs as users build them. The builds are
-# the presets of CMakePresets.json, in build/.
+# daemon's tests under ThreadSanitizer and beside them a warning-free build by the other compiler and clang-tidy, with the
+# tests that try fewer cases under sanitizers, and those few (AS_USERS in tests/CMakeLists.txt) with programs as users build
+# them. The builds are the presets of CMakePresets.json, in build/.
+# usage: tests/run.sh [--all]     --all: all unit and contract tests by the other compiler too, two minutes more
 set -euo pipefail
+case "$*" in
+"") by_clang=optimised ;;
+--all) by_clang='unit|contract|optimised' ;;
+*)
+    echo "tests/run.sh: '$*': nothing or --all must be given" >&2
+    exit 2
+    ;;
+esac
 cd "$(dirname "$0")/.."
 jobs=$(nproc)
 logs=build/logs
@@ -104,7 +113,7 @@ rm -f "$logs/clang.ctest"
     renice -n 19 "$BASHPID"
     failed=0
     clang_build || failed=1
-    CK_FORK=no tests_of clang -L 'unit|contract|optimised' -LE "$waiting" -j "$jobs"
+    CK_FORK=no tests_of clang -L "$by_clang" -LE "$waiting" -j "$jobs"
     exit "$failed"
 ) >"$logs/clang" 2>&1 &
 clang=$!
@@ -118,10 +127,10 @@ unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS
 wait "$clang" || total_failed=$((total_failed + 1))
 cat "$logs/clang"
 
-step "unit tests by clang of rooms whose children and threads have limits of time"
+step "tests by clang of rooms whose children and threads have limits of time"
 if [ -e "$logs/clang.ctest" ]; then # it is built
     tally clang
-    CK_FORK=no run_ctest clang -L "$waiting" -j "$jobs"
+    CK_FORK=no run_ctest clang -L "$by_clang" -L "$waiting" -j "$jobs"
 fi
 
 step "programs as users have them: faults, kills, an installation, the commands of all documents, the bench"

@@ -23,7 +23,7 @@ DOCUMENTS = [path.resolve() for path in (ROOT / "README.md", *sorted(MANUAL.glob
 LAMBERT, LAMBERTD = os.environ["LAMBERT"], os.environ["LAMBERTD"]
 PORT_IN_DOCUMENTS = "127.0.0.1:8317"
 # Options of other programs that the documents name.
-FOREIGN = {"--once", "--data-binary", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static", "--test-dir"}
+FOREIGN = {"--once", "--all", "--data-binary", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static", "--test-dir"}
 
 
 def blocks(document):

@@ -68,8 +68,8 @@ class MeshError(Case):
         self.assertIn("--mesh-error 0.001 is not kept with 200 elements", log)
 
     def test_two_sided_and_repeatable(self):
-        first, _, _ = self.made("first.h5", "--mesh-error", .2, "--two-sided", "--threads", 1)
-        again, _, _ = self.made("again.h5", "--mesh-error", .2, "--two-sided", "--threads", 2)
+        first, _, _ = self.made("first.h5", "--mesh-error", .4, "--two-sided", "--threads", 1)
+        again, _, _ = self.made("again.h5", "--mesh-error", .4, "--two-sided", "--threads", 2)
         self.assertEqual(first["elements"] % 2, 0)
         for member in ("elements", "groups"):
             self.assertEqual(first[member], again[member])

@@ -19,7 +19,7 @@ class PairsOrRays(Case):
 
     def test_a_soup_gets_rays(self):
         soup = self.path("soup.obj")
-        must("generate", "canopy", "--elements", 4000, "-o", soup)
+        must("generate", "canopy", "--elements", 3000, "-o", soup)
         log, operator = self.precompute(soup, "soup.h5")
         self.assertRegex(log, r"not all pairs are taken: all pairs need about .* of one thread, by a sample of them, "
                               r"and \d+ rays per element .* s\n")
