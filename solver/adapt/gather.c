@@ -1,5 +1,6 @@
 #include "solver/adapt/gather.h"
 
+#include "solver/adapt/lamp_groups.h"
 #include "solver/base/cosine.h"
 #include "solver/base/random.h"
 #include "solver/formfactor/visibility/sample.h"
@@ -11,12 +12,11 @@
 struct gather {
     const mesh *m;
     size_t n_lights;
-    const float *B, *lamps;
+    const float *B;
     const gather_sky *sky; /* NULL: none */
     visibility *v;
-    size_t lamp_samples, n_lamps;
-    uint32_t *lamp; /* [n_lamps], elements that emit */
-    double *before; /* [n_lamps + 1]: power of those before, all channels */
+    size_t lamp_samples;
+    lamp_groups lamps;
 };
 
 /* The same for all points of a call. */
@@ -24,6 +24,7 @@ typedef struct gather_samples {
     float direction[GATHER_HALVES][GATHER_RAYS][3];
     uint32_t lamp[GATHER_HALVES][GATHER_LAMP_SAMPLES_MOST];
     double place[GATHER_HALVES][GATHER_LAMP_SAMPLES_MOST][3]; /* recentred */
+    lamp_shares shares;
 } gather_samples;
 
 size_t gather_values(const gather *g) {
@@ -33,31 +34,8 @@ size_t gather_values(const gather *g) {
 void gather_free(gather *g) {
     if (g == NULL) return;
     visibility_destroy(g->v);
-    free(g->lamp);
-    free(g->before);
+    lamp_groups_free(&g->lamps);
     free(g);
-}
-
-/* Emission of all channels. */
-static double brightness(const gather *g, size_t i) {
-    double sum = 0;
-    for (size_t c = 0; c < g->m->n_channels; c++) sum += (double)g->lamps[c * g->m->n + i];
-    return sum;
-}
-
-static lam_status find_lamps(gather *g, lam_error *error) {
-    const mesh *m = g->m;
-    size_t n = 0;
-    for (size_t i = 0; g->lamps != NULL && i < m->n; i++) n += brightness(g, i) > 0;
-    g->lamp = memory_allocate(n, sizeof *g->lamp, "lamps", error);
-    g->before = memory_allocate(n + 1, sizeof *g->before, "lamps", error);
-    if (g->lamp == NULL || g->before == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; n > 0 && i < m->n; i++) {
-        if (!(brightness(g, i) > 0)) continue;
-        g->before[g->n_lamps + 1] = g->before[g->n_lamps] + m->area[i] * brightness(g, i);
-        g->lamp[g->n_lamps++] = (uint32_t)i;
-    }
-    return LAM_OK;
 }
 
 lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps,
@@ -69,10 +47,9 @@ lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const f
              m->n_channels, (int)GATHER_VALUES_MOST);
     g = memory_allocate(1, sizeof *g, "light at points", error);
     if (g == NULL) TRY(LAM_ERR_MEMORY);
-    *g = (gather){
-        .m = m, .n_lights = n_lights, .B = B, .lamps = lamps, .lamp_samples = lamp_samples, .sky = sky};
+    *g = (gather){.m = m, .n_lights = n_lights, .B = B, .lamp_samples = lamp_samples, .sky = sky};
     TRY(visibility_create(m, &g->v, error));
-    TRY(find_lamps(g, error));
+    TRY(lamp_groups_make(m, g->v, lamps, &g->lamps, error));
     *out = g;
     g = NULL;
 done:
@@ -88,65 +65,54 @@ static double spread(const uint64_t shift[2], size_t k, int d) {
     return (double)(uint32_t)(start + (uint32_t)k * step[d % 2]) * 0x1p-32;
 }
 
-static size_t lamp_at(const gather *g, double power) {
-    size_t low = 0, high = g->n_lamps;
-    while (high - low > 1) {
-        const size_t middle = (low + high) / 2;
-        if (g->before[middle] <= power)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
-}
-
-static void draw(const gather *g, uint32_t element, uint64_t key, gather_samples *s) {
+static void draw(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
+                 gather_samples *s) {
     element_frame frame;
+    if (g->lamps.n > 0) lamp_groups_share(&g->lamps, element, key, n_points, points, &s->shares);
     element_frame_init(&frame, g->m, element);
     for (size_t h = 0; h < GATHER_HALVES; h++) {
         const uint64_t first = random_hash(key ^ random_hash(h + 1)), shift[2] = {first, random_hash(first)};
         for (size_t r = 0; r < GATHER_RAYS; r++)
             cosine_direction(frame.tangent, frame.bitangent, frame.normal, spread(shift, r, 0),
                              spread(shift, r, 1), s->direction[h][r]);
-        for (size_t k = 0; k < g->lamp_samples && g->n_lamps > 0; k++) {
+        for (size_t k = 0; k < g->lamp_samples && g->lamps.n > 0; k++) {
             const double turn = random_to_double(random_hash(shift[1]));
-            const size_t lamp =
-                lamp_at(g, ((double)k + turn) / (double)g->lamp_samples * g->before[g->n_lamps]);
+            const uint32_t lamp =
+                lamp_groups_at(&g->lamps, &s->shares, ((double)k + turn) / (double)g->lamp_samples);
             element_sampler sampler;
             float point[3];
-            element_sampler_init(&sampler, g->m, g->v, g->lamp[lamp], 0);
+            element_sampler_init(&sampler, g->m, g->v, lamp, 0);
             element_sampler_point(&sampler, (float)spread(shift, k, 2), (float)spread(shift, k, 3), point);
-            s->lamp[h][k] = g->lamp[lamp];
+            s->lamp[h][k] = lamp;
             for (int d = 0; d < 3; d++) s->place[h][k][d] = (double)point[d];
         }
     }
 }
 
 /* E_j K / (R K + S q_j), to the first light, with K = cos cos' / (pi r^2) the density of rays at the place
- * and q_j = E_j / power that of lamp samples. */
-static void add_lamp(const gather *g, uint32_t j, double K, double *H) {
-    const double power = g->n_lamps > 0 ? g->before[g->n_lamps] : 0;
-    const double q = power > 0 ? brightness(g, j) / power : 0;
+ * and q_j that of lamp samples. */
+static void add_lamp(const gather *g, const gather_samples *s, uint32_t j, double K, double *H) {
+    const double q = lamp_groups_density(&g->lamps, &s->shares, j);
     const double weight = K / (GATHER_RAYS * K + (double)g->lamp_samples * q);
-    for (size_t c = 0; c < g->m->n_channels; c++) H[c] += (double)g->lamps[c * g->m->n + j] * weight;
+    for (size_t c = 0; c < g->m->n_channels; c++) H[c] += (double)g->lamps.E[c * g->m->n + j] * weight;
 }
 
 /* The light that a ray brings from the element that it hits. */
-static void add_hit(const gather *g, const float direction[3], uint32_t j, double distance, double cosine,
-                    double *H) {
+static void add_hit(const gather *g, const gather_samples *s, const float direction[3], uint32_t j,
+                    double distance, double cosine, double *H) {
     const mesh *m = g->m;
     const float *normal = m->normal[j];
     const double facing =
         -(double)(direction[0] * normal[0] + direction[1] * normal[1] + direction[2] * normal[2]);
-    const bool lamp = g->n_lamps > 0 && brightness(g, j) > 0;
+    const bool lamp = g->lamps.n > 0 && lamp_groups_brightness(&g->lamps, j) > 0;
     for (size_t l = 0; l < g->n_lights; l++)
         for (size_t c = 0; c < m->n_channels; c++) {
             const size_t row = l * m->n_channels + c;
             double B = (double)g->B[row * m->n + j];
-            if (l == 0 && lamp) B -= (double)g->lamps[c * m->n + j];
+            if (l == 0 && lamp) B -= (double)g->lamps.E[c * m->n + j];
             H[row] += B / GATHER_RAYS;
         }
-    if (lamp) add_lamp(g, j, cosine * fmax(facing, 0) / (M_PI * fmax(distance * distance, 1e-300)), H);
+    if (lamp) add_lamp(g, s, j, cosine * fmax(facing, 0) / (M_PI * fmax(distance * distance, 1e-300)), H);
 }
 
 /* The light that the rays of a packet bring from where they leave the scene: pi times the radiance there. */
@@ -159,8 +125,9 @@ static void add_sky(const gather *g, const ray_packet *rays, const hit_packet *h
             H[row] += M_PI * g->sky->L[row / channels * (tiles + 1) + tile[i]] / GATHER_RAYS;
 }
 
-static void add_rays(const gather *g, uint32_t element, const float origin[3], float (*direction)[3],
-                     double *H) {
+static void add_rays(const gather *g, const gather_samples *s, size_t half, uint32_t element,
+                     const float origin[3], double *H) {
+    const float(*direction)[3] = s->direction[half];
     const float *normal = g->m->normal[element];
     for (size_t first = 0; first < GATHER_RAYS; first += VISIBILITY_PACKET) {
         ray_packet rays;
@@ -178,7 +145,7 @@ static void add_rays(const gather *g, uint32_t element, const float origin[3], f
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
             const float *to = direction[first + i];
             if (hits.element[i] == VISIBILITY_NOTHING || hits.back[i]) continue;
-            add_hit(g, to, hits.element[i], (double)hits.distance[i],
+            add_hit(g, s, to, hits.element[i], (double)hits.distance[i],
                     (double)(to[0] * normal[0] + to[1] * normal[1] + to[2] * normal[2]), H);
         }
     }
@@ -196,8 +163,10 @@ static double kernel(const mesh *m, uint32_t from, uint32_t to, const double seg
 }
 
 /* Adds the lamp samples of a packet's size that begin with the first. */
-static void add_lamps(const gather *g, uint32_t element, const float origin[3], const uint32_t *lamp,
-                      double (*place)[3], double *H) {
+static void add_lamps(const gather *g, const gather_samples *s, size_t half, size_t first, uint32_t element,
+                      const float origin[3], double *H) {
+    const uint32_t *lamp = s->lamp[half] + first;
+    const double(*place)[3] = (const double(*)[3])s->place[half] + first;
     ray_packet segments = {.origin = {{0}}};
     double K[VISIBILITY_PACKET];
     uint32_t from[VISIBILITY_PACKET] = {0}, to[VISIBILITY_PACKET] = {0};
@@ -217,23 +186,23 @@ static void add_lamps(const gather *g, uint32_t element, const float origin[3], 
     if (n == 0) return;
     const unsigned blocked = visibility_blocked(g->v, &segments, n, from, to);
     for (size_t i = 0; i < n; i++)
-        if (!(blocked >> i & 1)) add_lamp(g, to[i], K[i], H);
+        if (!(blocked >> i & 1)) add_lamp(g, s, to[i], K[i], H);
 }
 
 void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
                double *H) {
     const size_t values = gather_values(g);
     gather_samples s;
-    draw(g, element, key, &s);
+    draw(g, element, key, n_points, points, &s);
     memset(H, 0, n_points * GATHER_HALVES * values * sizeof *H);
     for (size_t p = 0; p < n_points; p++) {
         float origin[3];
         visibility_recentre(g->v, points[p], origin);
         for (size_t h = 0; h < GATHER_HALVES; h++) {
             double *of = H + (p * GATHER_HALVES + h) * values;
-            add_rays(g, element, origin, s.direction[h], of);
-            for (size_t k = 0; g->n_lamps > 0 && k < g->lamp_samples; k += VISIBILITY_PACKET)
-                add_lamps(g, element, origin, s.lamp[h] + k, s.place[h] + k, of);
+            add_rays(g, &s, h, element, origin, of);
+            for (size_t k = 0; g->lamps.n > 0 && k < g->lamp_samples; k += VISIBILITY_PACKET)
+                add_lamps(g, &s, h, k, element, origin, of);
         }
     }
 }
