@@ -33,7 +33,7 @@ typedef struct lamp_shares {
     double before[LAMP_GROUPS_MOST + 1];
 } lamp_shares;
 
-/* E [C][n], or NULL: nothing emits. What is given must outlive out. Freed by lamp_groups_free, also after an
+/* E [C][n], or NULL: nothing emits. The arguments must outlive out. Freed by lamp_groups_free, also after an
  * error. Errors: LAM_ERR_MEMORY. */
 lam_status lamp_groups_make(const mesh *m, const visibility *v, const float *E, lamp_groups *out,
                             lam_error *error);
