@@ -80,7 +80,7 @@ class MadeUp(Case):
                          ["bits as in process (1: yes)"])
         with open(self.environment["CALLS"], encoding="utf-8") as file:
             calls = [line.split() for line in file]
-        self.assertEqual(len(calls), 2 * 3 * 5 + 2)  # two to see what as many are
+        self.assertEqual(len(calls), 2 * 2 * 5 + 2)  # two to see what as many are
         for call in calls:
             self.assertEqual(call[:2] + call[4:6], ["-t", "1", "-d", "1s"])
             self.assertEqual(call[-3:], ["POST", "npy", "application/x-npy"] if "npy" in call
