@@ -2,12 +2,12 @@
 
 #include "solver/base/random.h"
 #include "solver/base/vector3.h"
+#include "solver/base/weighted.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/scene/face_grid.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Shares by power alone, mixed in: what the few segments of a group have missed keeps some samples. */
 static const double by_power = .1;
@@ -109,24 +109,11 @@ static double open_light(const lamp_group *g, const points_ball *b) {
     return g->power * fmin(arrives / r, 1) * fmin(leaves / r, 1) / (r * r);
 }
 
-/* The largest k < n with before[k] <= place. */
-static size_t find_place(const double *before, size_t n, double place) {
-    size_t low = 0, high = n;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (before[middle] <= place)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 /* The lamp of a group at a share of its power. */
 static uint32_t lamp_of_group(const lamp_groups *l, size_t group, double share) {
     const size_t first = l->first[group], count = l->first[group + 1] - first;
     const double power = l->before[first] + share * l->of[group].power;
-    return l->element[first + find_place(l->before + first, count, power)];
+    return l->element[first + weighted_part(l->before + first, count, power)];
 }
 
 /* The share of a packet of segments that a group is seen by, never 0: other segments may be open. */
@@ -171,7 +158,7 @@ void lamp_groups_share(const lamp_groups *l, uint32_t element, uint64_t key, siz
             worth[g] *= seen_by(l, g, element, key, n_points, points);
         left += worth[g];
     }
-    const double power = l->n > 0 ? l->before[l->n] : 0, mixed = left > 0 ? by_power : 1;
+    const double power = l->before[l->n], mixed = left > 0 ? by_power : 1;
     double sum = 0;
     for (size_t g = 0; g < l->n_groups; g++) {
         out->before[g] = sum;
@@ -182,7 +169,7 @@ void lamp_groups_share(const lamp_groups *l, uint32_t element, uint64_t key, siz
 }
 
 uint32_t lamp_groups_at(const lamp_groups *l, const lamp_shares *shares, double place) {
-    const size_t group = find_place(shares->before, l->n_groups, place);
+    const size_t group = weighted_part(shares->before, l->n_groups, place);
     const double share = shares->before[group + 1] - shares->before[group];
     return lamp_of_group(l, group, share > 0 ? (place - shares->before[group]) / share : 0);
 }

@@ -42,8 +42,9 @@ void lamp_groups_free(lamp_groups *l);
 /* Emission of all channels. */
 double lamp_groups_brightness(const lamp_groups *l, size_t element);
 
-/* Shares for points of the plane of an element: by power, distance and cosines, and by a few segments. key:
- * chooses these. Cost: O(n_groups), and a packet of segments for each of 32 groups at most. */
+/* Shares for points of the plane of an element, where anything emits: by power, distance and cosines, and by
+ * a few segments. key: chooses these. Cost: O(n_groups), and a packet of segments for each of 32 groups at
+ * most. */
 void lamp_groups_share(const lamp_groups *l, uint32_t element, uint64_t key, size_t n_points,
                        const double (*points)[3], lamp_shares *out);
 

@@ -1,4 +1,5 @@
-/* Sums of values by weights: w_t x_t, their mean, and what x spreads about a mean. */
+/* Sums of values by weights: w_t x_t, their mean, what x spreads about a mean, and the places of running
+ * sums. */
 #ifndef LAMBERT_BASE_WEIGHTED_H
 #define LAMBERT_BASE_WEIGHTED_H
 
@@ -29,6 +30,20 @@ static inline weighted_sums weighted_sums_of(size_t n, const double *w, const fl
     if (weight > 0) s.mean = s.sum / weight;
     s.spread = weighted_spread(n, w, x, s.mean);
     return s;
+}
+
+/* The largest k < n with before[k] <= place, 0 where there is none: the part that a place of a running sum
+ * lies in. before [n], rising. Cost: O(log n). */
+static inline size_t weighted_part(const double *before, size_t n, double place) {
+    size_t low = 0, high = n;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (before[middle] <= place)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
 }
 
 #endif

@@ -1,6 +1,7 @@
 #include "solver/formfactor/facing.h"
 
 #include "solver/base/random.h"
+#include "solver/base/weighted.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/scene/sides.h"
 
@@ -26,19 +27,6 @@ static double accumulate(const mesh *m, const uint32_t *list, size_t count, doub
     before[0] = 0;
     for (size_t k = 0; k < count; k++) before[k + 1] = before[k] + m->area[list == NULL ? k : list[k]];
     return before[count];
-}
-
-/* The k with before[k] <= x < before[k + 1]. */
-static size_t find_part(const double *before, size_t count, double x) {
-    size_t low = 0, high = count;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (before[middle] <= x)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
 }
 
 /* Casts a packet from the front of an element, or, turned about its plane, from its back. */
@@ -72,7 +60,8 @@ lam_status facing_survey_make(const mesh *m, facing_survey *out, lam_error *erro
 #pragma omp parallel for schedule(static)
     for (size_t p = 0; p < SURVEY_PACKETS; p++) {
         hit_packet hits;
-        cast_from(m, v, find_part(before, m->n, ((double)p + .5) / SURVEY_PACKETS * area), false, p, &hits);
+        cast_from(m, v, weighted_part(before, m->n, ((double)p + .5) / SURVEY_PACKETS * area), false, p,
+                  &hits);
         for (int i = 0; i < VISIBILITY_PACKET; i++)
             if (hits.element[i] != VISIBILITY_NOTHING && hits.back[i]) {
 #pragma omp atomic
@@ -139,7 +128,7 @@ static void look(const mesh *m, const visibility *v, const mesh_sides *s, const 
     uint32_t *met = w->met + side * w->rays;
     for (size_t first = 0; first < w->rays; first += VISIBILITY_PACKET) {
         const double x = ((double)first + .5 * VISIBILITY_PACKET) / (double)w->rays * p->area;
-        const uint32_t i = p->list[find_part(p->before, p->count, x)];
+        const uint32_t i = p->list[weighted_part(p->before, p->count, x)];
         hit_packet hits;
         cast_from(m, v, i, (side % 2 == 1) != s->turned[i], first, &hits);
         for (size_t r = 0; r < VISIBILITY_PACKET; r++) {

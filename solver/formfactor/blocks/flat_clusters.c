@@ -1,6 +1,7 @@
 #include "solver/formfactor/blocks/flat_clusters.h"
 
 #include "solver/base/vector3.h"
+#include "solver/base/weighted.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -225,14 +226,8 @@ double flat_cluster_distance(const flat_clusters *f, uint32_t node, const double
 static uint32_t element_at(const flat_clusters *f, uint32_t node, double share, double *rest) {
     const block_node *range = &f->tree->nodes[node];
     const double at = f->before[range->begin] + share * (f->before[range->end] - f->before[range->begin]);
-    uint32_t low = range->begin, high = range->end - 1;
-    while (low < high) {
-        const uint32_t middle = low + (high - low + 1) / 2;
-        if (f->before[middle] <= at)
-            low = middle;
-        else
-            high = middle - 1;
-    }
+    const uint32_t low =
+        range->begin + (uint32_t)weighted_part(f->before + range->begin, range->end - range->begin, at);
     *rest = fmin(fmax((at - f->before[low]) / (f->before[low + 1] - f->before[low]), 0), 1);
     return low;
 }
