@@ -38,8 +38,8 @@ size_t gather_values(const gather *g); /* n_lights C */
 
 /* H [n_points][GATHER_HALVES][n_lights C] at points of the plane of an element. The halves are independent.
  * All points share the directions of rays and the places on lamps, which the key chooses, so that differences
- * between near points have little noise. Cost: for each point 128 rays and 2 lamp_samples
- * segments. */
+ * between near points have little noise. Lamps have samples as they light the points (lamp_groups.h). Cost:
+ * for each point 128 rays and 2 lamp_samples segments, and once lamp_groups_share. */
 void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
                double *H);
 
