@@ -190,8 +190,9 @@ START_TEST(a_pass_waits_for_few_begins) {
 END_TEST
 
 /* A job that was read stands in no line with longer ones of about its cost that are still to be read, however
- * many came before it: it was overtaken by all of them. Costs of its pass are above BATCH_SHORT, and below
- * theirs, so that they do not share it. */
+ * many came before it: it was overtaken by all of them. Costs are above BATCH_SHORT, so that the one ordinary
+ * thread serves all, one after the other, and that of its pass is below theirs, so that they do not share it.
+ */
 START_TEST(a_read_job_waits_for_no_begins_of_its_cost) {
     enum { N = 100 };
     static job jobs[N], first, solve;
@@ -199,7 +200,7 @@ START_TEST(a_read_job_waits_for_no_begins_of_its_cost) {
     record_open(&r, 1);
     hold(&r, &first, 1);
     for (size_t k = 0; k < N; k++) submit(&r, &jobs[k], k, 1, 10e-3, 0, 0);
-    submit(&r, &solve, N, 1, 1e-6, 1, 8e-3);
+    submit(&r, &solve, N, 1, 20e-3, 1, 8e-3);
     record_close(&r, N + 2);
     size_t at = 0;
     while (r.ids[at] != MOST + N) at++;
