@@ -168,24 +168,31 @@ static bool is_sorted(const block_factors *f) {
     return true;
 }
 
-static int by_b(const void *left, const void *right) {
-    const cluster_block *x = left, *y = right;
-    return x->b < y->b ? -1 : x->b > y->b;
-}
+/* A block's b, and its place among those of its a. */
+typedef struct block_key {
+    uint32_t b, place;
+} block_key;
 
-/* Blocks of one node up to which insertion is quicker. */
-enum { FEW_BLOCKS = 24 };
+/* Keys up to which insertion is quicker. */
+enum { FEW_KEYS = 24 };
 
-static void sort_by_b(size_t count, cluster_block *blocks) {
-    if (count > FEW_BLOCKS) {
-        qsort(blocks, count, sizeof *blocks, by_b);
+/* Sorts keys whose b are below `bound`, byte by byte from the lowest; spare [count]. */
+static void sort_keys(size_t count, block_key *keys, block_key *spare, size_t bound) {
+    if (count <= FEW_KEYS) {
+        for (size_t k = 1; k < count; k++) {
+            const block_key one = keys[k];
+            size_t at = k;
+            for (; at > 0 && keys[at - 1].b > one.b; at--) keys[at] = keys[at - 1];
+            keys[at] = one;
+        }
         return;
     }
-    for (size_t k = 1; k < count; k++) {
-        const cluster_block one = blocks[k];
-        size_t at = k;
-        for (; at > 0 && blocks[at - 1].b > one.b; at--) blocks[at] = blocks[at - 1];
-        blocks[at] = one;
+    for (int shift = 0; shift < 32 && (bound - 1) >> shift > 0; shift += 8) {
+        size_t next[257] = {0};
+        for (size_t k = 0; k < count; k++) next[(keys[k].b >> shift & 255) + 1]++;
+        for (int byte = 0; byte < 256; byte++) next[byte + 1] += next[byte];
+        for (size_t k = 0; k < count; k++) spare[next[keys[k].b >> shift & 255]++] = keys[k];
+        memcpy(keys, spare, count * sizeof *keys);
     }
 }
 
@@ -213,6 +220,7 @@ static lam_status sort_blocks(const block_factors *f, lam_error *error) {
     size_t next[SORTED_PARTS], end[SORTED_PARTS], longest = 0;
     uint32_t first[SORTED_PARTS + 1];
     cluster_block *room = NULL;
+    block_key *keys = NULL; /* twice for each thread */
     size_t *place =
         memory_allocate(n_nodes, sizeof *place, "blocks", error); /* of the next block of a node */
     uint8_t *part_of = memory_allocate(n_nodes, sizeof *part_of, "blocks", error);
@@ -226,19 +234,25 @@ static lam_status sort_blocks(const block_factors *f, lam_error *error) {
         longest = end[p] - next[p] > longest ? end[p] - next[p] : longest;
     }
     room = memory_allocate((size_t)omp_get_max_threads(), longest * sizeof *room, "blocks", error);
-    if (room == NULL) TRY(LAM_ERR_MEMORY);
+    keys = memory_allocate((size_t)omp_get_max_threads(), 2 * longest * sizeof *keys, "blocks", error);
+    if (room == NULL || keys == NULL) TRY(LAM_ERR_MEMORY);
     part_blocks(f->blocks, part_of, next, end);
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t p = 0; p < SORTED_PARTS; p++) {
         const size_t begin = f->from[first[p]], count = end[p] - begin;
-        cluster_block *const own = room + (size_t)omp_get_thread_num() * longest, *const all =
-                                                                                      f->blocks + begin;
+        const size_t thread = (size_t)omp_get_thread_num();
+        cluster_block *const own = room + thread * longest, *const all = f->blocks + begin;
+        block_key *const of = keys + 2 * thread * longest;
         for (size_t k = 0; k < count; k++) own[place[all[k].a]++ - begin] = all[k];
-        for (size_t t = first[p]; t < first[p + 1]; t++)
-            sort_by_b(f->from[t + 1] - f->from[t], own + (f->from[t] - begin));
-        if (count > 0) memcpy(all, own, count * sizeof *own);
+        for (size_t t = first[p]; t < first[p + 1]; t++) {
+            const size_t from = f->from[t] - begin, n_own = f->from[t + 1] - f->from[t];
+            for (size_t k = 0; k < n_own; k++) of[k] = (block_key){own[from + k].b, (uint32_t)k};
+            sort_keys(n_own, of, of + longest, n_nodes);
+            for (size_t k = 0; k < n_own; k++) all[from + k] = own[from + of[k].place];
+        }
     }
 done:
+    free(keys);
     free(room);
     free(place);
     free(part_of);

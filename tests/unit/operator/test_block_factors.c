@@ -267,7 +267,7 @@ START_TEST(memory_runs_out) {
         ck_assert_int_eq(status, LAM_ERR_MEMORY);
         failed++;
     }
-    ck_assert_int_eq(failed, 4 + 9 + 1);
+    ck_assert_int_eq(failed, 4 + 10 + 1);
     block_factors_free(&whole);
     plane_tree_free(&tree);
     free(F);
