@@ -149,9 +149,9 @@ double recipe_shadow(const recipe *r) {
 }
 
 size_t recipe_rays_beside_blocks(size_t n) {
-    enum { OF_ALL = 1 << 21, LEAST = 8 };
+    enum { OF_ALL = 1 << 21, LEAST = 8, MOST = 128 };
     const size_t each = (OF_ALL / n + LEAST - 1) / LEAST * LEAST;
-    return each < LEAST ? LEAST : each > RECIPE_RAYS_FEW ? RECIPE_RAYS_FEW : each;
+    return each < LEAST ? LEAST : each > MOST ? MOST : each;
 }
 
 double recipe_coarser(double epsilon) {
