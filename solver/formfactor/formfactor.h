@@ -33,9 +33,10 @@ typedef struct block_report {
     bool joined; /* there are blocks of clusters of several planes, as nothing hides anything */
     double even; /* blocks of clusters of several planes, and the pairs of points they were sampled at */
     double sampled;
-    double sifted;  /* pieces of facets that might stand between two clusters */
-    double cast;    /* segments against the whole scene */
-    double reduced; /* whose slopes were reduced so that no form factor is negative */
+    double sifted;          /* pieces of facets that might stand between two clusters */
+    double cast;            /* segments against the whole scene */
+    double lines, replaced; /* lines of pairs of elements, and the segments that they stand for */
+    double reduced;         /* whose slopes were reduced so that no form factor is negative */
     double elements_away, elements_hidden, elements_unseen; /* pairs of elements */
 } block_report;
 

@@ -253,11 +253,11 @@ void state_log_blocks(const precompute_state *state) {
         return;
     }
     terminal_log(state->t,
-                 "%zu blocks of %zu planes: %.3g linear, %.3g even, %.3g partly hidden by %.3g segments, "
-                 "%.3g pairs of elements; "
+                 "%zu blocks of %zu planes: %.3g linear, %.3g even, %.3g partly hidden, "
+                 "%.3g pairs of elements, by %.3g segments and %.3g lines; "
                  "%.1f %% of all pairs face away, %.1f %% are plainly hidden",
                  state->blocks.n_blocks, state->tree.n_frames, (double)b->linear, b->even, (double)b->shaded,
-                 (double)b->segments, (double)(b->pairs + b->shaded_pairs), 100 * b->elements_away / all,
+                 (double)(b->pairs + b->shaded_pairs), b->segments, b->lines, 100 * b->elements_away / all,
                  100 * b->elements_hidden / all);
     if (state->f.repair_mean > repair_expected)
         terminal_warn(

@@ -29,15 +29,15 @@ static const double share_of_block = 1. / 2000, spread_times_most = 2;
 static const double share_of_spread = .01;
 /* Clusters in planes that meet others at many edges have linear blocks up to this roughness. */
 static const double rough_most = .3;
-/* Segments of a partly hidden block, and of a pair of elements within the bound of blocks: SEGMENT_LANES, a
- * round of them. A pair beyond the bound, which cannot be split, gets as many rounds as it takes to err by so
- * many times the bound, N segments by N^-SEGMENTS_POWER of its norm. The errors of pairs are independent of
- * each other, and their signs differ, unlike those of what a block leaves out: with fewer, answers in
- * rooms, a patio and an atrium (1,498 to 2,030 elements) gain less by pairs than the time is worth. The
- * number does not depend on how many of the first ones are blocked: small openings would lose the light of
- * pairs in which all are. */
-static const double pair_times_bound = 8;
-enum { PAIR_ROUNDS_LEAST = 2, PAIR_ROUNDS_MOST = 64 };
+/* Standard errors of the visible share of a pair of elements: within the bound of blocks, and beyond it,
+ * where the pair cannot be split and errs by so many times the bound. The errors of pairs are independent of
+ * each other, and their signs differ, unlike those of what a block leaves out: with smaller ones, answers in
+ * rooms, a patio and an atrium (1,498 to 2,030 elements) gain less by pairs than the time is worth. They do
+ * not depend on what the first segments see: small openings would lose the light of pairs in which all are
+ * blocked. */
+static const double error_within = .0675, error_beyond = .0416, pair_error_in_bounds = .54;
+/* Shapes of this many elements at most are kept, 16 MB. */
+enum { SHAPES_MOST = 1 << 16 };
 /* So few candidates cost less to test than to sift. */
 enum { CANDIDATES_FEW = 4 };
 
@@ -84,28 +84,31 @@ done:
 /* Two nodes that are elements. */
 typedef struct element_pair {
     uint32_t element[2];
-    polygon shape[2];
+    const polygon *shape[2];
+    polygon made[2];
 } element_pair;
 
-static element_pair element_pair_of(const block_finder *k, uint32_t a, uint32_t b) {
-    const uint32_t *order = k->flat.tree->order;
-    element_pair two = {.element = {order[a - k->n_clusters], order[b - k->n_clusters]}};
-    for (int side = 0; side < 2; side++) polygon_of_element(k->flat.m, two.element[side], &two.shape[side]);
-    return two;
+static void element_pair_set(const block_finder *k, uint32_t a, uint32_t b, element_pair *out) {
+    const uint32_t nodes[2] = {a, b};
+    for (int side = 0; side < 2; side++) {
+        const uint32_t i = out->element[side] = k->flat.tree->order[nodes[side] - k->n_clusters];
+        out->shape[side] = k->shapes != NULL ? &k->shapes[i] : &out->made[side];
+        if (k->shapes == NULL) polygon_of_element(k->flat.m, i, &out->made[side]);
+    }
 }
 
 static double exchange_of_pair(const block_finder *k, const element_pair *two) {
-    return pair_factor_exchange(&k->rules, &two->shape[0], &two->shape[1], k->exact);
+    return pair_factor_exchange(&k->rules, two->shape[0], two->shape[1], k->exact);
 }
 
-/* The share of two elements that so many rounds of segments find visible. */
+/* The visible share of two elements. */
 static double visible_share_of(const block_finder *k, const element_pair *two, const candidates *among,
-                               int rounds) {
+                               share_effort *effort) {
     uint32_t of[CANDIDATES_MOST];
     segment_list list = {.count = among->count, .of = of};
     if (among->count > 0) memcpy(of, among->of, (size_t)among->count * sizeof *of);
     return occlusion_share(&k->occlusion, among->count == CANDIDATES_UNKNOWN ? NULL : &list, two->element[0],
-                           &two->shape[0], two->element[1], &two->shape[1], (size_t)rounds * SEGMENT_LANES);
+                           two->shape[0], two->element[1], two->shape[1], effort);
 }
 
 /* Times the bounds of a block of two nodes: its error counts as often as the importance between them, y.
@@ -123,8 +126,7 @@ static const candidates *segments_among(const block_walk *w, const candidates *a
     return w->finder->options->by_scene ? &whole_scene : among;
 }
 
-static void count_segments(block_walk *w, const candidates *among, int rounds) {
-    const double segments = rounds * SEGMENT_LANES;
+static void count_segments(block_walk *w, const candidates *among, double segments) {
     w->report.segments += segments;
     if (among->count == CANDIDATES_UNKNOWN) w->report.cast += segments;
 }
@@ -166,7 +168,7 @@ static lam_status add_exchange(block_walk *w, uint32_t a, uint32_t b, double exc
     return add_block(w, &made);
 }
 
-/* Many segments are worth candidates of the pair's own. Where they are few already, those are kept. */
+/* Candidates of the pair's own; where they are few already, those are kept. */
 static const candidates *sift_for_pair(block_walk *w, uint32_t a, uint32_t b, const candidates *among,
                                        candidates *out) {
     const block_finder *k = w->finder;
@@ -178,31 +180,29 @@ static const candidates *sift_for_pair(block_walk *w, uint32_t a, uint32_t b, co
     return out;
 }
 
-static int rounds_of_pair(double norm, double bound) {
-    const double wanted = ceil(pow(norm / (pair_times_bound * bound), 1 / SEGMENTS_POWER));
-    return (int)fmin(fmax(wanted, PAIR_ROUNDS_LEAST), PAIR_ROUNDS_MOST);
-}
-
-/* A pair of elements with candidates between them. Its exchange area is found where the number of segments
- * depends on it, or where some are open. */
+/* A pair of elements with candidates between them. Its exchange area is found where the error of the share
+ * depends on it, or where some of it is open. */
 static lam_status add_shaded_pair(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
                                   const candidates *among) {
     const flat_clusters *f = &w->finder->flat;
-    const element_pair two = element_pair_of(w->finder, a, b);
+    element_pair two;
     const double bound = shadow_most(w, a, b);
     double exchange = -1; /* below 0: not known */
-    int rounds = 1;
+    share_effort effort = {.error = error_within};
     candidates mine;
     w->report.shaded_pairs++;
+    element_pair_set(w->finder, a, b, &two);
     if (norm_of(w, a, b, most) > bound) {
         exchange = exchange_of_pair(w->finder, &two);
         if (!(exchange > 0)) return add_exchange(w, a, b, 0);
-        rounds = rounds_of_pair(exchange / sqrt(f->of[a].area * f->of[b].area), bound);
-        if (rounds > PAIR_ROUNDS_LEAST) among = sift_for_pair(w, a, b, among, &mine);
-        if (among->hidden) rounds = 0;
+        const double norm = exchange / sqrt(f->of[a].area * f->of[b].area);
+        effort.error = fmin(error_beyond, pair_error_in_bounds * bound / norm);
+        if (effort.error < error_beyond) among = sift_for_pair(w, a, b, among, &mine);
     }
-    count_segments(w, among, rounds);
-    const double share = rounds > 0 ? visible_share_of(w->finder, &two, among, rounds) : 0;
+    const double share = among->hidden ? 0 : visible_share_of(w->finder, &two, among, &effort);
+    count_segments(w, among, (double)effort.segments);
+    w->report.lines += (double)effort.lines;
+    w->report.replaced += (double)effort.replaced;
     w->report.elements_unseen += !(share > 0);
     if (!(share > 0)) return LAM_OK;
     if (share >= 1 && is_smooth(w, a, b, most, crosses)) return add_linear(w, a, b);
@@ -228,7 +228,7 @@ static lam_status add_shaded(block_walk *w, uint32_t a, uint32_t b, const candid
     shade_segments(&w->finder->shade, a, b, among, segments);
     for (int k = 0; k < SEGMENT_LANES; k++) seen += segments[k].seen;
     w->report.shaded++;
-    count_segments(w, among, 1);
+    count_segments(w, among, SEGMENT_LANES);
     if (seen == 0) {
         w->report.elements_unseen +=
             (double)block_finder_size(w->finder, a) * (double)block_finder_size(w->finder, b);
@@ -353,7 +353,8 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
     }
     if (are_elements(k, a, b)) {
         w->report.pairs++;
-        const element_pair two = element_pair_of(k, a, b);
+        element_pair two;
+        element_pair_set(k, a, b, &two);
         return add_exchange(w, a, b, exchange_of_pair(k, &two));
     }
     return split_for_smoothness(w, a, b, behind, &mine);
@@ -396,6 +397,8 @@ void block_report_add(const block_report *from, double times, block_report *to) 
     to->shaded += times * from->shaded;
     to->shaded_pairs += times * from->shaded_pairs;
     to->segments += times * from->segments;
+    to->lines += times * from->lines;
+    to->replaced += times * from->replaced;
     to->sifted += times * from->sifted;
     to->cast += times * from->cast;
     to->elements_away += times * from->elements_away;
@@ -421,6 +424,11 @@ lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tre
     out->occlusion = (occlusion){.v = v, .area = m->area, .rules = &out->rules};
     TRY(segment_occluders_make(&out->pieces, visibility_centre(v), &out->segment_pieces, error));
     out->occlusion.occluders = out->segment_pieces;
+    if (m->n <= SHAPES_MOST) {
+        out->shapes = memory_allocate(m->n, sizeof *out->shapes, "blocks", error);
+        if (out->shapes == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t i = 0; i < m->n; i++) polygon_of_element(m, i, &out->shapes[i]);
+    }
 done:
     free(centre);
     return status;
@@ -450,9 +458,11 @@ void block_finder_free(block_finder *k) {
     flat_clusters_free(&k->flat);
     free(k->elements);
     free(k->segment_pieces);
+    free(k->shapes);
     importance_nodes_free(&k->important);
     k->elements = NULL;
     k->segment_pieces = NULL;
+    k->shapes = NULL;
 }
 
 lam_status block_finder_planes(const block_finder *k, uint32_t **out, size_t *count, lam_error *error) {

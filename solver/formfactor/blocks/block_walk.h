@@ -14,6 +14,7 @@ typedef struct block_finder {
     flat_clusters flat;
     occluders pieces;
     segment_occluder *segment_pieces; /* [pieces.n], for segments between elements */
+    polygon *shapes;                  /* [n] of elements; NULL: they are made when they are needed */
     shade_scene shade;
     occlusion occlusion; /* of pairs of elements */
     pair_factor_rules rules;

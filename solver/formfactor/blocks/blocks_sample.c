@@ -50,7 +50,7 @@ done:
  * visit, and a candidate of a segment next to nothing, as most segments have few. */
 static const double visit_seconds = 1.4e-7, sifted_seconds = 7e-8, even_seconds = 6e-8, pair_seconds = 3.6e-7,
                     shaded_seconds = 2.8e-7, shaded_pair_seconds = 2e-7, segment_seconds = 1.2e-8,
-                    cast_seconds = 3.5e-7;
+                    line_seconds = 4e-8, cast_seconds = 3.5e-7;
 /* A pair where elements touch at angles everywhere: a bowl of 40,000 triangles. */
 static const double joined_pair_seconds = 3e-6;
 /* Sorting and balancing, per block and per element: what is left beside the walk in closed Cornell boxes of
@@ -68,7 +68,8 @@ static const double finer_segments = 1.4;
 static double walk_seconds(const block_report *w) {
     return w->visits * visit_seconds + w->sifted * sifted_seconds + w->sampled * even_seconds +
            w->pairs * (w->joined ? joined_pair_seconds : pair_seconds) + w->shaded * shaded_seconds +
-           w->shaded_pairs * shaded_pair_seconds + w->segments * segment_seconds + w->cast * cast_seconds;
+           w->shaded_pairs * shaded_pair_seconds + w->segments * segment_seconds + w->lines * line_seconds +
+           w->cast * cast_seconds;
 }
 
 static double count_of(const block_report *w) {
@@ -90,6 +91,8 @@ static block_report finer_of(const block_report *w) {
     const double blocks = count_of(w), single = blocks > 0 ? (w->pairs + w->shaded_pairs) / blocks : 0;
     const double more = single + (1 - single) * finer_times;
     block_report finer = *w;
+    finer.segments += finer.replaced; /* a judge has no lists, and so no lines */
+    finer.lines = 0;
     double *const grow[] = {&finer.visits, &finer.sifted, &finer.segments, &finer.cast};
     double *const others[] = {&finer.linear, &finer.even, &finer.sampled, &finer.shaded};
     for (size_t k = 0; k < sizeof grow / sizeof *grow; k++) *grow[k] *= more;

@@ -2,6 +2,7 @@
 
 #include "solver/base/random.h"
 #include "solver/formfactor/pairs/affine_segments.h"
+#include "solver/formfactor/pairs/visible_lines.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -190,10 +191,47 @@ static double visible_share(const occlusion *o, const piece_pair *two, size_t n_
     return all > 0 ? seen / all : 1;
 }
 
+/* N of a law error = constant N^-power, in packets of so many. */
+static size_t number_for(double error, double constant, double power, size_t packet, size_t most) {
+    const float wanted = powf((float)(constant / error), (float)(1 / power));
+    return wanted < (float)most ? (size_t)ceilf(wanted / (float)packet) * packet : most;
+}
+
+/* A line takes the time of three segments, and to choose lines that of ten lines. Where more than a few
+ * occluders are listed, shares of more error are found sooner by segments: patio and atrium (1,508 and 2,030
+ * elements) took 10 to 30 % more time for no less error of single elements. */
+static const double lines_from = .03;
+enum { FEW_OCCLUDERS = 8 };
+
+static bool has_lines(const occlusion *o, const piece_pair *two, double error, line_pair *out) {
+    const segment_list *among = two->among;
+    if (among == NULL || (among->count > FEW_OCCLUDERS && error > lines_from)) return false;
+    return line_pair_choose(o->occluders, among, &two->maps.from, &two->maps.to, visibility_centre(o->v),
+                            out);
+}
+
 double occlusion_share(const occlusion *o, segment_list *among, uint32_t i, const polygon *a, uint32_t j,
-                       const polygon *b, size_t segments) {
+                       const polygon *b, share_effort *effort) {
+    enum { SEGMENTS_LAST = 1024, LINES_LAST = 512, SEGMENTS_EACH = SEGMENT_PACKETS * VISIBILITY_PACKET };
     const piece_pair two = piece_pair_of(o->seed, among, i, a, j, b);
-    return visible_share(o, &two, segments);
+    line_sums sums = {0, 0};
+    line_pair lines;
+    const size_t segments =
+        number_for(effort->error, SEGMENTS_ERROR, SEGMENTS_POWER, SEGMENTS_EACH, SEGMENTS_LAST);
+    effort->segments = effort->lines = effort->replaced = 0;
+    if (!has_lines(o, &two, effort->error, &lines)) {
+        effort->segments = segments;
+        return visible_share(o, &two, segments);
+    }
+    effort->replaced = segments;
+    effort->lines = number_for(effort->error, LINES_ERROR, LINES_POWER, VISIBLE_LINES, LINES_LAST);
+    for (size_t first = 0; first < effort->lines; first += VISIBLE_LINES) {
+        double x[4][VISIBLE_LINES];
+        pair_sampler_packet(&two.sampler, (uint32_t)first, x);
+        visible_lines_add(o->occluders, among, &lines, visibility_centre(o->v),
+                          (const double(*)[VISIBLE_LINES])x, &sums);
+    }
+    return sums.all > 0 ? sums.seen / sums.all : 1;
 }
 
 /* A pair that is estimated piece by piece. */

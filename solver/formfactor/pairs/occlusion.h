@@ -14,6 +14,10 @@
  * fifth). */
 #define SEGMENTS_ERROR .47
 #define SEGMENTS_POWER .7
+/* The same of N lines (visible_lines.h): the same program and scenes, N from 8 to 1,024, within two fifths.
+ */
+#define LINES_ERROR .2
+#define LINES_POWER .75
 
 /* The scene and the accuracy of its occlusion tests. All of it is only read, by any number of threads. */
 typedef struct occlusion {
@@ -57,12 +61,17 @@ double occlusion_estimate_by(const occlusion *o, segment_list *among, uint32_t i
 /* About how many segments occlusion_estimate will cast. */
 double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g);
 
-/* The visible share of elements i and j with the polygons a and b: sum K V / sum K over at least so many
- * segments, a multiple of VISIBILITY_PACKET, that lie in front of both. 1 where none does. among: all
- * occluders that may block one of them, none of them in the plane of either element; NULL: any of the scene
- * may. */
+/* The accuracy of a share, and the segments or lines that it took. */
+typedef struct share_effort {
+    double error;                     /* standard error, about; segments are 16 to 1,024, lines 8 to 512 */
+    size_t segments, lines, replaced; /* replaced: the segments that the lines stand for */
+} share_effort;
+
+/* The visible share of elements i and j with the polygons a and b: sum K V / sum K over segments or lines
+ * that lie in front of both. 1 where none does. among: all occluders that may block one of them, none of them
+ * in the plane of either element; NULL: any of the scene may, and segments are cast. */
 double occlusion_share(const occlusion *o, segment_list *among, uint32_t i, const polygon *a, uint32_t j,
-                       const polygon *b, size_t segments);
+                       const polygon *b, share_effort *effort);
 
 /* True where all of 128 to 1,024 segments between two clusters are blocked: as many as the largest factor
  * from a point of one to the other asks for, so that the visible part is about o->accuracy at most. False for
