@@ -267,6 +267,21 @@ done:
     return status;
 }
 
+/* Rays are traced in single precision: the products of lengths that they meet leave its range in scenes of
+ * other sizes, and light leaves through the walls of a room of 1e-15 or 1e20 m. */
+static const double size_least = 1e-12, size_most = 1e15;
+
+static lam_status check_size(const mesh *m, const char *path, double unit, lam_error *error) {
+    double centre[3], radius;
+    mesh_bounds(m, centre, &radius);
+    const double size = 2 * radius;
+    if (size >= size_least && size <= size_most) return LAM_OK;
+    return status_fail(
+        error, LAM_ERR_ARGUMENT,
+        "%s: the scene is %.3g m across with --unit %g, must be from %g to %g m: give another --unit", path,
+        size, unit, size_least, size_most);
+}
+
 static lam_status copy_geometry(imported_faces *s, const char *path, double unit, mesh *m, lam_error *error) {
     lam_status status = LAM_OK;
     m->n = s->n_elements;
@@ -283,6 +298,7 @@ static lam_status copy_geometry(imported_faces *s, const char *path, double unit
                 FAIL(error, LAM_ERR_ARGUMENT, "%s: vertex %zu: coordinate %g m with --unit %g is too large",
                      path, v, m->vertices[v][k], unit);
         }
+    TRY(check_size(m, path, unit, error));
     TRY(mesh_measure(m, error));
 done:
     return status;

@@ -344,6 +344,26 @@ START_TEST(coordinates_are_scaled_but_not_turned) {
 }
 END_TEST
 
+/* The scene is 3,606 units across; a vertex that no face has does not count. */
+START_TEST(scenes_of_any_possible_size_are_read) {
+    static const struct {
+        double unit;
+        bool possible;
+    } cases[] = {{.9e-12 / 3606, false}, {1.1e-12 / 3606, true}, {.9e15 / 3606, true}, {1.1e15 / 3606, false}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char path[256];
+        lam_error error = {0};
+        mesh m = {0};
+        const import_options options = {.unit = cases[i].unit, .reflectance = -1};
+        file_write(folder, "sized.obj", "v 0 0 0\nv 2000 0 0\nv 0 3000 0\nv 1e6 0 0\nf 1 2 3\n", path);
+        const lam_status status = scene_import(path, &options, &m, NULL, &error);
+        ck_assert_msg((status == LAM_OK) == cases[i].possible, "%zu: %s", i, error.message);
+        if (!cases[i].possible) ck_assert_ptr_nonnull(strstr(error.message, "m across with --unit"));
+        mesh_free(&m);
+    }
+}
+END_TEST
+
 START_TEST(single_precision_far_from_the_origin_is_told) {
     char path[256];
     import_report report;
@@ -441,6 +461,7 @@ int main(void) {
     tcase_add_test(tests, planar_convex_quads_stay_and_others_become_triangles);
     tcase_add_test(tests, concave_polygons_keep_area_and_side);
     tcase_add_test(tests, coordinates_are_scaled_but_not_turned);
+    tcase_add_test(tests, scenes_of_any_possible_size_are_read);
     tcase_add_test(tests, single_precision_far_from_the_origin_is_told);
     tcase_add_test(tests, bad_geometry_is_refused_by_line);
     tcase_add_test(tests, files_that_cannot_be_read_are_named);
