@@ -284,8 +284,8 @@ static form_factors trace_blocks(const mesh *m, const char *sky, double albedo, 
 
 /* F as a product with each unit vector. As above: rows sum to 1 with the sky, and the open furnace is white.
  * An element sees as much of the sky as by pairs but for the error of its row sum: some eight of its pairs,
- * with factors of .06 on average, are partly hidden by the slab, each by 32 segments with a standard
- * deviation of at most .5 / 32^1/2. Three standard deviations of all are 3 8^1/2 .06 .088 = .045. */
+ * with factors of .06 on average, are partly hidden by the slab, each by lines that err by no more than 32
+ * segments, at most .5 / 32^1/2. Three standard deviations of all are 3 8^1/2 .06 .088 = .045. */
 START_TEST(blocks_and_the_sky_add_up) {
     mesh m = open_box();
     const size_t n = m.n;
