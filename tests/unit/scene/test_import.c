@@ -349,7 +349,8 @@ START_TEST(scenes_of_any_possible_size_are_read) {
     static const struct {
         double unit;
         bool possible;
-    } cases[] = {{.9e-12 / 3606, false}, {1.1e-12 / 3606, true}, {.9e15 / 3606, true}, {1.1e15 / 3606, false}};
+    } cases[] = {
+        {.9e-12 / 3606, false}, {1.1e-12 / 3606, true}, {.9e15 / 3606, true}, {1.1e15 / 3606, false}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char path[256];
         lam_error error = {0};
