@@ -41,9 +41,9 @@ block_options block_options_of(const recipe *r);
 
 /* Finds the blocks of all pairs of planes of a tree, which must outlive them. Where the tree is not planar
  * and nothing hides anything, clusters of several planes have blocks of one number. Visible shares come from
- * segments against the occluders in between, or from Embree where these are many, and from nothing where none
- * is. The bits do not depend on the number of threads: segments are seeded by the pair of clusters. report
- * may be NULL. out is freed by block_factors_free.
+ * segments, or lines between elements, against the occluders in between, from Embree where these are many,
+ * and from nothing where none is. The bits do not depend on the number of threads: both are seeded by the
+ * pair of clusters. report may be NULL. out is freed by block_factors_free.
  *
  * Cost: blocks grow like n^1/2 in rooms of large planes; partly hidden ones do not grow with n (measured).
  * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
