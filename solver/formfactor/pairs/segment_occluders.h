@@ -24,6 +24,13 @@ typedef struct segment_list {
     uint32_t *of;
 } segment_list;
 
+/* Moves entry c half of the way to the front. */
+static inline void segment_list_forward(segment_list *list, int c) {
+    const uint32_t moved = list->of[c];
+    list->of[c] = list->of[c / 2];
+    list->of[c / 2] = moved;
+}
+
 /* Packets that are tested together. */
 enum { SEGMENT_PACKETS = 2 };
 

@@ -3,17 +3,10 @@
 #include "solver/formfactor/pairs/affine_segments.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "support/box.h"
+#include "support/polygon_corners.h"
 #include "support/suite.h"
 
 #include <math.h>
-
-static polygon make(int n, const double corners[][3]) {
-    polygon p = {.n = n};
-    for (int c = 0; c < n; c++)
-        for (int d = 0; d < 3; d++) p.corner[c][d] = corners[c][d];
-    polygon_measure(&p);
-    return p;
-}
 
 /* The kernel between two points, 0 behind either polygon. */
 static double kernel_of(const polygon *a, const double x[3], const polygon *b, const double y[3]) {
@@ -45,12 +38,12 @@ START_TEST(eight_segments_are_as_one) {
             trapezoid[c][d] += .4 * (parallelogram[1][d] - parallelogram[0][d]);
             kite[c][d] += .5 * (other[1][d] - other[0][d]) + .3 * (other[3][d] - other[0][d]);
         }
-    const polygon a = _i % 3 == 0   ? make(3, triangle)
-                      : _i % 3 == 1 ? make(4, parallelogram)
-                                    : make(4, (const double(*)[3])trapezoid),
-                  b = _i / 3 == 0   ? make(3, tilted)
-                      : _i / 3 == 1 ? make(4, other)
-                                    : make(4, (const double(*)[3])kite);
+    const polygon a = _i % 3 == 0   ? polygon_of_corners(3, triangle)
+                      : _i % 3 == 1 ? polygon_of_corners(4, parallelogram)
+                                    : polygon_of_corners(4, (const double(*)[3])trapezoid),
+                  b = _i / 3 == 0   ? polygon_of_corners(3, tilted)
+                      : _i / 3 == 1 ? polygon_of_corners(4, other)
+                                    : polygon_of_corners(4, (const double(*)[3])kite);
     const affine_pair pair = {affine_map_of(&a), affine_map_of(&b)};
     const double centre[3] = {.7, -.3, .2};
     uint64_t seed = 5;
@@ -88,8 +81,8 @@ END_TEST
 
 /* Where both ends are the same point the kernel is 0, not 0/0. */
 START_TEST(a_segment_of_no_length_has_no_kernel) {
-    const polygon floor = make(3, (const double[3][3]){{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}),
-                  wall = make(3, (const double[3][3]){{0, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+    const polygon floor = polygon_of_corners(3, (const double[3][3]){{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}),
+                  wall = polygon_of_corners(3, (const double[3][3]){{0, 0, 0}, {0, 1, 0}, {0, 0, 1}});
     const affine_pair pair = {affine_map_of(&floor), affine_map_of(&wall)};
     const double x[4][AFFINE_SEGMENTS] = {{0}}, centre[3] = {0};
     double K[AFFINE_SEGMENTS];

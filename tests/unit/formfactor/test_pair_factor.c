@@ -1,28 +1,25 @@
 /* Unoccluded form factors by quadrature, against published closed forms. */
 #include "solver/base/vector3.h"
 #include "solver/formfactor/pairs/pair_factor.h"
+#include "support/polygon_corners.h"
 #include "support/suite.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-static polygon make(int n, const double corners[][3]) {
-    polygon p = {.n = n};
-    memcpy(p.corner, corners, (size_t)n * sizeof *corners);
-    polygon_measure(&p);
-    return p;
-}
-
 /* [x0, x1] x [y0, y1] at height z, facing up or down. */
 static polygon level(double x0, double x1, double y0, double y1, double z, bool up) {
-    if (up) return make(4, (const double[4][3]){{x0, y0, z}, {x1, y0, z}, {x1, y1, z}, {x0, y1, z}});
-    return make(4, (const double[4][3]){{x0, y0, z}, {x0, y1, z}, {x1, y1, z}, {x1, y0, z}});
+    if (up)
+        return polygon_of_corners(4,
+                                  (const double[4][3]){{x0, y0, z}, {x1, y0, z}, {x1, y1, z}, {x0, y1, z}});
+    return polygon_of_corners(4, (const double[4][3]){{x0, y0, z}, {x0, y1, z}, {x1, y1, z}, {x1, y0, z}});
 }
 
 /* A wall in the plane x = at, y in [y0, y1], z in [z0, z1], facing +x. */
 static polygon wall(double at, double y0, double y1, double z0, double z1) {
-    return make(4, (const double[4][3]){{at, y0, z0}, {at, y1, z0}, {at, y1, z1}, {at, y0, z1}});
+    return polygon_of_corners(4,
+                              (const double[4][3]){{at, y0, z0}, {at, y1, z0}, {at, y1, z1}, {at, y0, z1}});
 }
 
 static double form_factor(const polygon *a, const polygon *b) {
@@ -78,7 +75,8 @@ START_TEST(hinged_squares) {
     for (size_t c = 0; c < 3; c++) {
         const double angle = cases[c].degrees * acos(-1) / 180, x = cos(angle), z = sin(angle);
         const polygon floor = level(0, 1, 0, 1, 0, true);
-        const polygon leaf = make(4, (const double[4][3]){{0, 0, 0}, {0, 1, 0}, {x, 1, z}, {x, 0, z}});
+        const polygon leaf =
+            polygon_of_corners(4, (const double[4][3]){{0, 0, 0}, {0, 1, 0}, {x, 1, z}, {x, 0, z}});
         /* The first has nine digits only. */
         ck_assert_double_eq_tol(form_factor(&floor, &leaf), cases[c].F, 1e-8 * cases[c].F + 5e-10);
         ck_assert_double_eq_tol(form_factor(&leaf, &floor), cases[c].F, 1e-8 * cases[c].F + 5e-10);
@@ -87,9 +85,9 @@ START_TEST(hinged_squares) {
 END_TEST
 
 START_TEST(triangles) {
-    const polygon low = make(3, (const double[3][3]){{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
-    const polygon above = make(3, (const double[3][3]){{0, 0, 1}, {0, 1, 1}, {1, 0, 1}});
-    const polygon rest = make(3, (const double[3][3]){{1, 0, 1}, {0, 1, 1}, {1, 1, 1}});
+    const polygon low = polygon_of_corners(3, (const double[3][3]){{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+    const polygon above = polygon_of_corners(3, (const double[3][3]){{0, 0, 1}, {0, 1, 1}, {1, 0, 1}});
+    const polygon rest = polygon_of_corners(3, (const double[3][3]){{1, 0, 1}, {0, 1, 1}, {1, 1, 1}});
     check("above", form_factor(&low, &above), .115049228150);
     check("complement", form_factor(&low, &rest), .084775667549);
 
@@ -100,13 +98,13 @@ START_TEST(triangles) {
         double of_face[3][3];
         for (int k = 0, at = 0; k < 4; k++)
             if (k != f) memcpy(of_face[at++], corner[k], sizeof of_face[0]);
-        face[f] = make(3, (const double(*)[3])of_face);
+        face[f] = polygon_of_corners(3, (const double(*)[3])of_face);
         double towards = 0;
         for (int d = 0; d < 3; d++) towards += face[f].normal[d] * (corner[f][d] - face[f].corner[0][d]);
         if (towards < 0) { /* turn it round */
             memcpy(of_face[0], face[f].corner[1], sizeof of_face[0]);
             memcpy(of_face[1], face[f].corner[0], sizeof of_face[0]);
-            face[f] = make(3, (const double(*)[3])of_face);
+            face[f] = polygon_of_corners(3, (const double(*)[3])of_face);
         }
     }
     for (int f = 0; f < 4; f++)
@@ -156,8 +154,10 @@ START_TEST(halves_sum_to_the_whole) {
         memcpy(one, moved, sizeof one);
         memcpy(two, moved, sizeof two);
         for (int d = 0; d < 3; d++) one[2][d] = two[1][d] = .37 * moved[1][d] + .63 * moved[2][d];
-        const polygon a = make(4, low), whole = make(3, (const double(*)[3])moved),
-                      first = make(3, (const double(*)[3])one), second = make(3, (const double(*)[3])two);
+        const polygon a = polygon_of_corners(4, low),
+                      whole = polygon_of_corners(3, (const double(*)[3])moved),
+                      first = polygon_of_corners(3, (const double(*)[3])one),
+                      second = polygon_of_corners(3, (const double(*)[3])two);
         const double g = pair_factor_exchange(&rules, &a, &whole, 1e-8);
         const double parts =
             pair_factor_exchange(&rules, &a, &first, 1e-8) + pair_factor_exchange(&rules, &a, &second, 1e-8);
@@ -270,13 +270,13 @@ START_TEST(near_pairs_keep_the_tolerance) {
     };
     pair_factor_rules rules;
     pair_factor_rules_init(&rules);
-    const polygon a = make(3, flat);
+    const polygon a = polygon_of_corners(3, flat);
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
-        polygon b = make(3, cases[k].corner);
+        polygon b = polygon_of_corners(3, cases[k].corner);
         if (dot3(b.normal, a.centre) < dot3(b.normal, b.centre)) {
             double turned[3][3];
             for (int c = 0; c < 3; c++) memcpy(turned[c], cases[k].corner[2 - c], sizeof turned[c]);
-            b = make(3, (const double(*)[3])turned);
+            b = polygon_of_corners(3, (const double(*)[3])turned);
         }
         double terms;
         const double slow = slow_exchange(&rules, &a, &b, &terms);
@@ -299,8 +299,8 @@ END_TEST
  * rule, which is exact for areas linear in u and w, as those of a bilinear quad are. */
 START_TEST(pieces_and_points_fill_the_polygon) {
     const polygon shapes[2] = {
-        make(4, (const double[4][3]){{0, 0, 0}, {1, .1, 0}, {1.2, 1.1, 0}, {-.1, .6, 0}}),
-        make(3, (const double[3][3]){{0, 0, 0}, {2, .1, 0}, {.3, 1.1, 0}})};
+        polygon_of_corners(4, (const double[4][3]){{0, 0, 0}, {1, .1, 0}, {1.2, 1.1, 0}, {-.1, .6, 0}}),
+        polygon_of_corners(3, (const double[3][3]){{0, 0, 0}, {2, .1, 0}, {.3, 1.1, 0}})};
     enum { GRID = 8 };
     for (int s = 0; s < 2; s++) {
         const double area = polygon_area(&shapes[s]);

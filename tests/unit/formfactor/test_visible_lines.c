@@ -4,19 +4,12 @@
 #include "solver/base/vector3.h"
 #include "solver/formfactor/pairs/visible_lines.h"
 #include "solver/formfactor/visibility/sample.h"
+#include "support/polygon_corners.h"
 #include "support/suite.h"
 
 #include <math.h>
 
 static const double centre[3] = {.7, -.3, .2}; /* of the recentred coordinates */
-
-static polygon shape_of(int n, const double corners[][3]) {
-    polygon p = {.n = n};
-    for (int c = 0; c < n; c++)
-        for (int d = 0; d < 3; d++) p.corner[c][d] = corners[c][d];
-    polygon_measure(&p);
-    return p;
-}
 
 /* An edge is inside where its distance is above 0, as seen against the normal. */
 static segment_occluder occluder_of(const polygon *p) {
@@ -120,15 +113,15 @@ typedef struct setting {
 
 /* Cases of shapes, and the first n plates from `first` on. */
 static void setting_make(setting *s, int shapes, int first, int n) {
-    const polygon floors[] = {shape_of(4, floor_square), shape_of(3, floor_triangle),
-                              shape_of(4, floor_trapezoid)};
-    const polygon others[] = {shape_of(4, ceiling), shape_of(3, ceiling_triangle),
-                              shape_of(4, ceiling_trapezoid), shape_of(4, wall),
-                              shape_of(4, wall_from_above)};
+    const polygon floors[] = {polygon_of_corners(4, floor_square), polygon_of_corners(3, floor_triangle),
+                              polygon_of_corners(4, floor_trapezoid)};
+    const polygon others[] = {polygon_of_corners(4, ceiling), polygon_of_corners(3, ceiling_triangle),
+                              polygon_of_corners(4, ceiling_trapezoid), polygon_of_corners(4, wall),
+                              polygon_of_corners(4, wall_from_above)};
     s->a = floors[shapes % 3];
     s->b = others[shapes / 3];
     for (int k = 0; k < n; k++) {
-        s->plates[k] = shape_of(4, plates[first + k]);
+        s->plates[k] = polygon_of_corners(4, plates[first + k]);
         s->listed[k] = occluder_of(&s->plates[k]);
         s->of[k] = (uint32_t)k;
     }
@@ -195,7 +188,8 @@ START_TEST(integrals_of_lines_are_exact) {
             const double across[4][3] = {{0, 0, z}, {0, 1, z}, {1, 1, z}, {1, 0, z}},
                          beside[4][3] = {{1 + z, 0, -.3}, {1 + z, 0, 1}, {1 + z, 1, 1}, {1 + z, 1, -.3}};
             if (z == 0 && !upright) continue;
-            const polygon a = shape_of(4, floor_square), b = shape_of(4, upright ? beside : across);
+            const polygon a = polygon_of_corners(4, floor_square),
+                          b = polygon_of_corners(4, upright ? beside : across);
             segment_list none = {.count = 0};
             line_pair lines = {{affine_map_of(&a), affine_map_of(&b)}, 0};
             for (lines.along = 0; lines.along < 2; lines.along++) {
@@ -220,8 +214,8 @@ START_TEST(all_and_nothing_are_exact) {
     const double whole[4][3] = {{-3, -3, .5}, {3, -3, .5}, {3, 3, .5}, {-3, 3, .5}};
     const double halves[2][4][3] = {{{-3, -3, .5}, {.7, -3, .5}, {.7, 3, .5}, {-3, 3, .5}},
                                     {{.7, -3, .5}, {3, -3, .5}, {3, 3, .5}, {.7, 3, .5}}};
-    const polygon shapes[] = {shape_of(4, halves[0]), shape_of(4, whole), shape_of(4, halves[1]),
-                              shape_of(4, plates[4])};
+    const polygon shapes[] = {polygon_of_corners(4, halves[0]), polygon_of_corners(4, whole),
+                              polygon_of_corners(4, halves[1]), polygon_of_corners(4, plates[4])};
     segment_occluder listed[4];
     uint32_t of[4] = {0, 2, 3, 1};
     for (int k = 0; k < 4; k++) listed[k] = occluder_of(&shapes[k]);
@@ -244,7 +238,7 @@ START_TEST(all_and_nothing_are_exact) {
     const affine_map down = s.maps[0];
     lines = (line_pair){{down, affine_map_of(&(polygon){0})}, 0};
     const double below[4][3] = {{0, 0, -1}, {1, 0, -1}, {1, 1, -1}, {0, 1, -1}};
-    const polygon b = shape_of(4, below);
+    const polygon b = polygon_of_corners(4, below);
     lines.maps.to = affine_map_of(&b);
     segment_list none = {.count = 0};
     const line_sums sums = sums_of_lines(NULL, &none, &lines, 7, 64);
@@ -277,7 +271,7 @@ START_TEST(lines_run_across_shadows) {
     const double edge[2][4][3] = {{{.6, -5, .7}, {9, -5, .7}, {9, 9, .7}, {.6, 9, .7}},
                                   {{-5, .6, .7}, {9, .6, .7}, {9, 9, .7}, {-5, 9, .7}}};
     for (int axis = 0; axis < 2; axis++) {
-        const polygon shape = shape_of(4, edge[axis]);
+        const polygon shape = polygon_of_corners(4, edge[axis]);
         const segment_occluder one = occluder_of(&shape);
         double facing, error[2] = {0, 0};
         const double exact = share_by_points(&s.a, &s.b, 1, &shape, &facing);
@@ -292,6 +286,15 @@ START_TEST(lines_run_across_shadows) {
             }
         ck_assert_double_lt(sqrt(error[0]), 2. / 3 * sqrt(error[1]));
     }
+    /* An edge through the middle counts for little where its occluder hardly reaches in from the side. */
+    const double corner[4][3] = {{.69, -5, .7}, {9, -5, .7}, {9, .06, .7}, {.69, .06, .7}},
+                 board[4][3] = {{-5, .8, .7}, {9, .8, .7}, {9, 9, .7}, {-5, 9, .7}};
+    const polygon both[] = {polygon_of_corners(4, corner), polygon_of_corners(4, board)};
+    const segment_occluder two[] = {occluder_of(&both[0]), occluder_of(&both[1])};
+    of[1] = 1;
+    list.count = 2;
+    ck_assert(line_pair_choose(two, &list, &s.maps[0], &s.maps[1], centre, &chosen));
+    ck_assert_double_gt(fabs(chosen.maps.to.side[chosen.along][1]), .5);
     list.count = LINE_OCCLUDERS_MOST + 1;
     ck_assert(!line_pair_choose(NULL, &list, &s.maps[0], &s.maps[1], centre, &chosen));
     setting_make(&s, 8, 0, 1);
