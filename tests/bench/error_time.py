@@ -1,6 +1,6 @@
 """Time of two programs at equal error, scene by scene.
 
-    OMP_WAIT_POLICY=passive /usr/bin/python3 tests/bench/error_time.py OLD NEW [SCENE …] [--elements N] [--only RECIPE,…]
+    OMP_WAIT_POLICY=passive /usr/bin/python3 tests/bench/error_time.py OLD NEW [SCENE …] [--elements N] [--only "RECIPE;…"]
 
 OLD and NEW are two `lambert`. SCENE is the kind of a generated scene or a file (--elements then divides nothing). Each program makes a
 store by each recipe of RECIPES that it knows, without its judge, in turn with the other one. The time is in processor seconds, user and
