@@ -1,6 +1,6 @@
 #include "solver/adapt/adaptive.h"
 
-#include "solver/adapt/cell_look.h"
+#include "solver/adapt/cell_cut.h"
 #include "solver/base/random.h"
 
 #include <math.h>
@@ -15,11 +15,19 @@ static const double largest_share = 1. / 128;
 enum { ROUND_SHARE = 8 };
 static const double round_least = 1. / 8;
 
+/* A look has CELL_STEPS^2 points at least; a cell is cut by what POINTS_ENOUGH show, its own and those that
+ * it inherited. Where the points of all
+ * cells would take more than some bytes, none are kept, and a cell is cut by what one look shows. */
+enum { CELL_STEPS = 6, POINTS_ENOUGH = 192 };
+static const size_t points_bytes_most = (size_t)256 << 20;
+
 typedef struct adaptive_cell {
     mesh_cell cell;
     uint64_t key; /* of its samples */
-    bool looked;
-    cell_look look;
+    size_t steps; /* of the look that it waits for; 0: none */
+    float error[COARSE_LIGHTS];
+    cell_cut best[COARSE_LIGHTS];
+    cell_points points;
 } adaptive_cell;
 
 typedef struct adaptive_run {
@@ -29,25 +37,55 @@ typedef struct adaptive_run {
     cell_light light;
     adaptive_cell *cells;
     size_t n;
-    uint64_t pass; /* the number of times that all cells were looked at afresh */
+    bool keep; /* the points of cells */
 } adaptive_run;
 
-/* Looks at all cells that are new, and sums the squares of errors. */
-static lam_status look_at_new(adaptive_run *r, double *sum, lam_error *error) {
-    const progress *p = r->how->progress;
+/* Looks at those of the cells first ... end - 1 that wait for it. */
+static lam_status look_at_some(adaptive_run *r, size_t first, size_t end, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t values = cell_light_values(&r->light);
+    for (size_t i = first; i < end; i++) {
+        adaptive_cell *c = &r->cells[i];
+        const size_t more = c->steps * c->steps;
+        if (more > 0) TRY(cell_points_reserve(&c->points, values, CELL_POINTS_MOST - more, more, error));
+    }
 #pragma omp parallel for schedule(dynamic, 4)
-    for (size_t i = 0; i < r->n; i++)
-        if (!r->cells[i].looked && !progress_cancelled(p)) {
-            const uint64_t key = random_hash(r->cells[i].key + r->pass);
-            cell_look_at(&r->light, &r->cells[i].cell, key, &r->cells[i].look);
-            r->cells[i].looked = true;
-        }
-    if (progress_cancelled(p)) return status_fail(error, LAM_ERR_CANCELLED, "cancelled");
+    for (size_t i = first; i < end; i++) {
+        adaptive_cell *c = &r->cells[i];
+        if (c->steps == 0 || progress_cancelled(r->how->progress)) continue;
+        cell_look_at(&r->light, &c->cell, c->key, c->steps, &c->points, c->error);
+        cell_cut_find(&r->light, &c->cell, &c->points, c->best);
+        c->key = random_hash(c->key);
+        c->steps = 0;
+    }
+    for (size_t i = first; i < end && !r->keep; i++) cell_points_free(&r->cells[i].points);
+    if (progress_cancelled(r->how->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+done:
+    return status;
+}
+
+/* Looks at all cells that wait for it, and sums the squares of errors. */
+static lam_status look_at_waiting(adaptive_run *r, double *sum, lam_error *error) {
+    enum { BATCH = 4096 };
+    lam_status status = LAM_OK;
+    const size_t bytes = POINTS_ENOUGH * cell_points_bytes(cell_light_values(&r->light));
+    r->keep = r->keep && r->n * bytes <= points_bytes_most;
+    for (size_t i = 0; i < r->n; i += BATCH)
+        TRY(look_at_some(r, i, i + BATCH < r->n ? i + BATCH : r->n, error));
     for (size_t l = 0; l < r->coarse->n_lights; l++) {
         sum[l] = 0;
-        for (size_t i = 0; i < r->n; i++) sum[l] += (double)r->cells[i].look.error[l];
+        for (size_t i = 0; i < r->n; i++) sum[l] += (double)r->cells[i].error[l];
     }
-    return LAM_OK;
+done:
+    return status;
+}
+
+/* True if the squares of errors of all lights are what was asked for. */
+static bool is_enough(const adaptive_run *r, const double *sum) {
+    bool enough = true;
+    for (size_t l = 0; l < r->coarse->n_lights; l++)
+        enough = enough && sum[l] <= r->how->error * r->how->error;
+    return enough;
 }
 
 /* The weights of lights: 0 where the error is small enough, and less the farther it is below the largest, as
@@ -59,20 +97,28 @@ static void weigh_lights(const adaptive_run *r, const double *sum, double *weigh
         weight[l] = sum[l] > r->how->error * r->how->error ? pow(sum[l] / most, 4) : 0;
 }
 
-/* The most that a cut takes off the square of a cell's error, and that cut; 0 where none can be made. */
-static double best_gain(const adaptive_run *r, const cell_look *look, const double *weight, size_t *best) {
+/* The most that a cut takes off the square of a cell's error, and the light that it is best for; 0 where none
+ * can be made. */
+static double best_gain(const adaptive_run *r, const adaptive_cell *c, const double *weight, size_t *best) {
     double most = 0;
-    for (size_t k = 0; k < look->n_cuts; k++) {
+    for (size_t k = 0; k < r->coarse->n_lights; k++) {
         double gain = 0;
-        for (size_t l = 0; l < r->coarse->n_lights; l++) gain += weight[l] * (double)look->of[k].gain[l];
-        if (gain > most) most = gain, *best = k;
+        for (size_t l = 0; l < r->coarse->n_lights; l++) gain += weight[l] * (double)c->best[k].gain[l];
+        if (c->best[k].gain[k] > 0 && gain > most) most = gain, *best = k;
     }
     return most;
 }
 
+/* Steps of a look of at least some points. */
+static size_t steps_of(size_t points) {
+    size_t steps = CELL_STEPS;
+    while (steps * steps < points) steps++;
+    return steps;
+}
+
 typedef struct ranked {
     double gain;
-    size_t cell, cut;
+    size_t cell, light;
 } ranked;
 
 static int by_gain(const void *a, const void *b) {
@@ -81,18 +127,35 @@ static int by_gain(const void *a, const void *b) {
     return x->cell < y->cell ? -1 : 1;
 }
 
-/* Cuts cells i with cut[i] < MESH_CUTS_MOST; the parts take their place. */
-static lam_status cut_cells(adaptive_run *r, const uint8_t *cut, lam_error *error) {
+/* The parts of a cell by a cut, with the points of theirs. */
+static lam_status cut_cell(const adaptive_run *r, const adaptive_cell *c, mesh_cut cut,
+                           adaptive_cell parts[2], lam_error *error) {
+    mesh_cell cells[2];
+    float from[2], to[2];
+    for (int k = 0; k < 2; k++) parts[k] = (adaptive_cell){.steps = 0};
+    if (!mesh_cell_cut(&c->cell, cut, cells)) return status_fail(error, LAM_ERR_INTERNAL, "a cut of nothing");
+    for (int k = 0; k < 2; k++)
+        parts[k] = (adaptive_cell){
+            .cell = cells[k], .key = random_hash(2 * c->key + (uint64_t)k), .steps = CELL_STEPS};
+    cell_cut_way(&r->light, &c->cell, cut, from, to);
+    return cell_points_part(&c->points, from, to, &parts[1].points, &parts[0].points, error);
+}
+
+enum { WHOLE = COARSE_LIGHTS };
+
+/* Cuts cells i with light[i] < WHOLE as is best for that light; the parts take their place. */
+static lam_status cut_cells(adaptive_run *r, const uint8_t *light, lam_error *error) {
+    lam_status status = LAM_OK;
     size_t n = 0, at = 0;
-    for (size_t i = 0; i < r->n; i++) n += cut[i] < MESH_CUTS_MOST ? 2 : 1;
+    for (size_t i = 0; i < r->n; i++) n += light[i] < WHOLE ? 2 : 1;
     adaptive_cell *cells = memory_allocate(n, sizeof *cells, "cells of a mesh", error);
     if (cells == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < r->n; i++) {
-        mesh_cell parts[2];
-        const adaptive_cell *c = &r->cells[i];
-        if (cut[i] < MESH_CUTS_MOST && mesh_cell_cut(&c->cell, c->look.of[cut[i]].cut, parts)) {
-            for (int k = 0; k < 2; k++)
-                cells[at++] = (adaptive_cell){.cell = parts[k], .key = random_hash(2 * c->key + (uint64_t)k)};
+        adaptive_cell *c = &r->cells[i];
+        if (light[i] < WHOLE && status == LAM_OK) {
+            status = cut_cell(r, c, c->best[light[i]].cut, cells + at, error);
+            cell_points_free(&c->points);
+            at += 2;
         } else {
             cells[at++] = *c;
         }
@@ -100,34 +163,43 @@ static lam_status cut_cells(adaptive_run *r, const uint8_t *cut, lam_error *erro
     free(r->cells);
     r->cells = cells;
     r->n = at;
-    return LAM_OK;
+    return status;
 }
 
-/* Cuts the cells of the largest gains; *n_cut is their number. */
-static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_cut, lam_error *error) {
+/* Cuts the cells of the largest gains, or has those looked at again that show too few points for it, until
+ * the gains are what the errors lack; *n_more is the number of both. */
+static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_more, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t sides = r->how->two_sided ? 2 : 1, most = r->how->elements / sides;
-    double weight[COARSE_LIGHTS];
+    double weight[COARSE_LIGHTS], left[COARSE_LIGHTS];
     ranked *order = memory_allocate(r->n, sizeof *order, "cells of a mesh", error);
-    uint8_t *cut = memory_allocate(r->n, sizeof *cut, "cells of a mesh", error);
-    if (order == NULL || cut == NULL) TRY(LAM_ERR_MEMORY);
+    uint8_t *light = memory_allocate(r->n, sizeof *light, "cells of a mesh", error);
+    if (order == NULL || light == NULL) TRY(LAM_ERR_MEMORY);
     weigh_lights(r, sum, weight);
     for (size_t i = 0; i < r->n; i++) {
         order[i] = (ranked){.cell = i};
-        order[i].gain = best_gain(r, &r->cells[i].look, weight, &order[i].cut);
-        cut[i] = MESH_CUTS_MOST;
+        order[i].gain = best_gain(r, &r->cells[i], weight, &order[i].light);
+        light[i] = WHOLE;
     }
     qsort(order, r->n, sizeof *order, by_gain);
     size_t count = r->n / ROUND_SHARE + 1;
     if (most <= r->n) count = 0;
     if (count > 0 && count > most - r->n) count = most - r->n;
-    *n_cut = 0;
-    for (size_t k = 0; k < count && order[k].gain > round_least * order[0].gain; k++, (*n_cut)++)
-        cut[order[k].cell] = (uint8_t)order[k].cut;
-    if (*n_cut > 0) TRY(cut_cells(r, cut, error));
+    *n_more = 0;
+    memcpy(left, sum, sizeof left);
+    for (size_t k = 0; k < count && order[k].gain > round_least * order[0].gain; k++, (*n_more)++) {
+        adaptive_cell *c = &r->cells[order[k].cell];
+        if (is_enough(r, left)) break;
+        for (size_t l = 0; l < r->coarse->n_lights; l++) left[l] -= (double)c->best[order[k].light].gain[l];
+        if (r->keep && c->points.n < POINTS_ENOUGH)
+            c->steps = steps_of(POINTS_ENOUGH - c->points.n);
+        else
+            light[order[k].cell] = (uint8_t)order[k].light;
+    }
+    if (*n_more > 0) TRY(cut_cells(r, light, error));
 done:
     free(order);
-    free(cut);
+    free(light);
     return status;
 }
 
@@ -143,7 +215,8 @@ static lam_status begin(adaptive_run *r, lam_error *error) {
     if (r->cells == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < r->n; i++)
         r->cells[i] = (adaptive_cell){.cell = cells[i],
-                                      .key = random_hash(random_hash(r->how->seed) ^ random_hash(i + 1))};
+                                      .key = random_hash(random_hash(r->how->seed) ^ random_hash(i + 1)),
+                                      .steps = CELL_STEPS};
 done:
     free(cells);
     return status;
@@ -154,20 +227,17 @@ done:
  * it is believed. */
 static lam_status refine_cells(adaptive_run *r, adaptive_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    const double asked = r->how->error * r->how->error;
     double sum[COARSE_LIGHTS] = {0};
-    size_t n_cut = 1;
+    size_t n_more = 1;
     TRY(begin(r, error));
-    for (bool afresh = false; n_cut > 0 || !afresh;) {
-        afresh = n_cut == 0 || report->reached;
-        r->pass += afresh;
-        for (size_t i = 0; afresh && i < r->n; i++) r->cells[i].looked = false;
-        TRY(look_at_new(r, sum, error));
-        report->reached = true;
-        for (size_t l = 0; l < r->coarse->n_lights; l++) report->reached = report->reached && sum[l] <= asked;
+    for (bool afresh = false; n_more > 0 || !afresh;) {
+        afresh = n_more == 0 || report->reached;
+        for (size_t i = 0; afresh && i < r->n; i++) r->cells[i].steps = CELL_STEPS;
+        TRY(look_at_waiting(r, sum, error));
+        report->reached = is_enough(r, sum);
         progress_report(r->how->progress, "mesh", fmin(1, (double)r->n / (double)r->how->elements));
-        n_cut = 0;
-        if (!report->reached) TRY(cut_best(r, sum, &n_cut, error));
+        n_more = 0;
+        if (!report->reached) TRY(cut_best(r, sum, &n_more, error));
     }
     report->has_lamps = r->coarse->lamps;
     report->lamps = r->coarse->lamps ? sqrt(fmax(0, sum[0])) : 0;
@@ -194,11 +264,10 @@ lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report
     gather *g = NULL;
     mesh_cell *cells = NULL;
     mesh fine = {0};
-    adaptive_run r = {.m = m, .how = how, .coarse = &coarse};
+    adaptive_run r = {.m = m, .how = how, .coarse = &coarse, .keep = true};
     adaptive_report made = {.reached = false};
     TRY(coarse_light_make(m, how->two_sided, how->seed, how->progress, &coarse, error));
-    TRY(gather_create(&coarse.m, coarse.n_lights, coarse.B, coarse.lamps ? coarse.E : NULL,
-                      GATHER_LAMP_SAMPLES_MOST, NULL, &g, error));
+    TRY(gather_create(&coarse.m, coarse.n_lights, coarse.B, coarse.lamps ? coarse.E : NULL, NULL, &g, error));
     r.light = (cell_light){.m = m, .coarse = &coarse, .g = g, .two_sided = how->two_sided};
     weigh(&coarse, r.light.all);
     TRY(refine_cells(&r, &made, error));
@@ -212,6 +281,7 @@ lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report
     *report = made;
 done:
     free(cells);
+    for (size_t i = 0; r.cells != NULL && i < r.n; i++) cell_points_free(&r.cells[i].points);
     free(r.cells);
     gather_free(g);
     coarse_light_free(&coarse);

@@ -8,9 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Above PAIRS_MOST elements rays cost less than pairs. */
-enum { PAIRS_MOST = 4096, RAYS = 256 };
-static const double accuracy = 1e-3, tolerance = 1e-4;
+enum { RAYS = 256 };
+static const double tolerance = 1e-4;
 
 void coarse_light_free(coarse_light *c) {
     mesh_free(&c->m);
@@ -85,11 +84,7 @@ lam_status coarse_light_make(const mesh *faces, bool two_sided, uint64_t seed, c
     order = memory_allocate(c.m.n, sizeof *order, "a coarse mesh", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&c.m, order, error));
-    const bool pairs = c.m.n <= PAIRS_MOST;
-    const form_factor_options how = {.recipe = {.method = pairs ? RECIPE_PAIRS : RECIPE_RAYS,
-                                                .rays = RAYS,
-                                                .accuracy = pairs ? accuracy : 0,
-                                                .seed = seed},
+    const form_factor_options how = {.recipe = {.method = RECIPE_RAYS, .rays = RAYS, .seed = seed},
                                      .progress = p,
                                      .stage = "form factors of a coarse mesh"};
     TRY(form_factors_make(&c.m, order, &how, &f, error));

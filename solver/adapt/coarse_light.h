@@ -17,10 +17,11 @@ typedef struct coarse_light {
 
 void coarse_light_free(coarse_light *c);
 
-/* Divides a copy of the faces into at least COARSE_ELEMENTS elements, of which it finds form factors pair by
- * pair, or with 256 rays where there are many, and the converged solution. Cost: a second or two, or 256 rays
- * from each face. Errors: those of form_factors_make and reference_solve. */
-enum { COARSE_ELEMENTS = 1500 };
+/* Divides a copy of the faces into at least COARSE_ELEMENTS elements, as few show too little of the light
+ * that near ones send each other, of which it finds form factors with 256 rays each, and the converged
+ * solution. Cost: about a second, or 256 rays from each face. Errors: those of form_factors_make and
+ * reference_solve. */
+enum { COARSE_ELEMENTS = 8000 };
 lam_status coarse_light_make(const mesh *faces, bool two_sided, uint64_t seed, const progress *p,
                              coarse_light *out, lam_error *error);
 

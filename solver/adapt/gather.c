@@ -15,15 +15,14 @@ struct gather {
     const float *B;
     const gather_sky *sky; /* NULL: none */
     visibility *v;
-    size_t lamp_samples;
     lamp_groups lamps;
 };
 
 /* The same for all points of a call. */
 typedef struct gather_samples {
     float direction[GATHER_HALVES][GATHER_RAYS][3];
-    uint32_t lamp[GATHER_HALVES][GATHER_LAMP_SAMPLES_MOST];
-    double place[GATHER_HALVES][GATHER_LAMP_SAMPLES_MOST][3]; /* recentred */
+    uint32_t lamp[GATHER_HALVES][GATHER_LAMP_SAMPLES];
+    double place[GATHER_HALVES][GATHER_LAMP_SAMPLES][3]; /* recentred */
     lamp_shares shares;
 } gather_samples;
 
@@ -39,7 +38,7 @@ void gather_free(gather *g) {
 }
 
 lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps,
-                         size_t lamp_samples, const gather_sky *sky, gather **out, lam_error *error) {
+                         const gather_sky *sky, gather **out, lam_error *error) {
     lam_status status = LAM_OK;
     gather *g = NULL;
     if (n_lights * m->n_channels > GATHER_VALUES_MOST)
@@ -47,7 +46,7 @@ lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const f
              m->n_channels, (int)GATHER_VALUES_MOST);
     g = memory_allocate(1, sizeof *g, "light at points", error);
     if (g == NULL) TRY(LAM_ERR_MEMORY);
-    *g = (gather){.m = m, .n_lights = n_lights, .B = B, .lamp_samples = lamp_samples, .sky = sky};
+    *g = (gather){.m = m, .n_lights = n_lights, .B = B, .sky = sky};
     TRY(visibility_create(m, &g->v, error));
     TRY(lamp_groups_make(m, g->v, lamps, &g->lamps, error));
     *out = g;
@@ -75,10 +74,10 @@ static void draw(const gather *g, uint32_t element, uint64_t key, size_t n_point
         for (size_t r = 0; r < GATHER_RAYS; r++)
             cosine_direction(frame.tangent, frame.bitangent, frame.normal, spread(shift, r, 0),
                              spread(shift, r, 1), s->direction[h][r]);
-        for (size_t k = 0; k < g->lamp_samples && g->lamps.n > 0; k++) {
+        for (size_t k = 0; k < GATHER_LAMP_SAMPLES && g->lamps.n > 0; k++) {
             const double turn = random_to_double(random_hash(shift[1]));
             const uint32_t lamp =
-                lamp_groups_at(&g->lamps, &s->shares, ((double)k + turn) / (double)g->lamp_samples);
+                lamp_groups_at(&g->lamps, &s->shares, ((double)k + turn) / GATHER_LAMP_SAMPLES);
             element_sampler sampler;
             float point[3];
             element_sampler_init(&sampler, g->m, g->v, lamp, 0);
@@ -93,7 +92,7 @@ static void draw(const gather *g, uint32_t element, uint64_t key, size_t n_point
  * and q_j that of lamp samples. */
 static void add_lamp(const gather *g, const gather_samples *s, uint32_t j, double K, double *H) {
     const double q = lamp_groups_density(&g->lamps, &s->shares, j);
-    const double weight = K / (GATHER_RAYS * K + (double)g->lamp_samples * q);
+    const double weight = K / (GATHER_RAYS * K + GATHER_LAMP_SAMPLES * q);
     for (size_t c = 0; c < g->m->n_channels; c++) H[c] += (double)g->lamps.E[c * g->m->n + j] * weight;
 }
 
@@ -201,7 +200,7 @@ void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points,
         for (size_t h = 0; h < GATHER_HALVES; h++) {
             double *of = H + (p * GATHER_HALVES + h) * values;
             add_rays(g, &s, h, element, origin, of);
-            for (size_t k = 0; g->lamps.n > 0 && k < g->lamp_samples; k += VISIBILITY_PACKET)
+            for (size_t k = 0; g->lamps.n > 0 && k < GATHER_LAMP_SAMPLES; k += VISIBILITY_PACKET)
                 add_lamps(g, &s, h, k, element, origin, of);
         }
     }

@@ -9,9 +9,8 @@
 #include "solver/daylight/sky_tiles.h"
 #include "solver/scene/mesh.h"
 
-/* Samples of a half of an estimate: rays, and places on lamps, as many as are enough for a mean over many
- * elements and as shadows of one need. */
-enum { GATHER_HALVES = 2, GATHER_RAYS = 64, GATHER_LAMP_SAMPLES = 32, GATHER_LAMP_SAMPLES_MOST = 128 };
+/* Samples of a half of an estimate: rays, and places on lamps. */
+enum { GATHER_HALVES = 2, GATHER_RAYS = 64, GATHER_LAMP_SAMPLES = 32 };
 
 /* At most so many lights, and channels of all of them. */
 enum { GATHER_VALUES_MOST = 9 };
@@ -26,12 +25,11 @@ typedef struct gather_sky {
 } gather_sky;
 
 /* The answers that are gathered from: B [n_lights][C][n]. lamps [C][n], or NULL, is the part of the first
- * light that lamps emit, which lamp_samples samples look for, a multiple of VISIBILITY_PACKET up to
- * GATHER_LAMP_SAMPLES_MOST. Rays that leave the scene bring light of a sky, or none
- * where it is NULL. All of these must outlive what is made. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY,
- * LAM_ERR_INTERNAL. */
+ * light that lamps emit, which GATHER_LAMP_SAMPLES samples look for. Rays that leave the scene bring light of
+ * a sky, or none where it is NULL. All of these must outlive what is made. Errors: LAM_ERR_ARGUMENT,
+ * LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
 lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps,
-                         size_t lamp_samples, const gather_sky *sky, gather **out, lam_error *error);
+                         const gather_sky *sky, gather **out, lam_error *error);
 void gather_free(gather *g);
 
 size_t gather_values(const gather *g); /* n_lights C */
@@ -39,7 +37,7 @@ size_t gather_values(const gather *g); /* n_lights C */
 /* H [n_points][GATHER_HALVES][n_lights C] at points of the plane of an element. The halves are independent.
  * All points share the directions of rays and the places on lamps, which the key chooses, so that differences
  * between near points have little noise. Lamps have samples as they light the points (lamp_groups.h). Cost:
- * for each point 128 rays and 2 lamp_samples segments, and once lamp_groups_share. */
+ * for each point 128 rays and at most 64 segments, and once lamp_groups_share. */
 void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
                double *H);
 

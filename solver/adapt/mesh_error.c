@@ -61,7 +61,7 @@ lam_status mesh_error(const mesh *m, size_t n_lights, const float *E, const floa
     uint32_t *chosen = memory_allocate(looks, sizeof *chosen, "error of the mesh", error);
     double *seen = memory_allocate(looks, n_lights * sizeof *seen, "error of the mesh", error);
     if (chosen == NULL || seen == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(gather_create(m, n_lights, B, lamps ? E : NULL, GATHER_LAMP_SAMPLES, sky, &g, error));
+    TRY(gather_create(m, n_lights, B, lamps ? E : NULL, sky, &g, error));
     choose(m, looks, chosen);
 #pragma omp parallel for schedule(dynamic, 8)
     for (size_t k = 0; k < looks; k++)

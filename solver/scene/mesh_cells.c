@@ -16,34 +16,38 @@ mesh_cell mesh_cell_of(const mesh *m, size_t face) {
     return c;
 }
 
-enum { QUARTERS = MESH_CELL_QUARTERS };
+enum { STEPS = MESH_CELL_STEPS };
 
-size_t mesh_cell_cuts(size_t corners, mesh_cut cuts[MESH_CUTS_MOST]) {
-    const size_t places = QUARTERS * corners;
+bool mesh_cut_divides(size_t corners, mesh_cut cut) {
+    /* corners after `from` and before `to`, and those outside */
+    const size_t between = (cut.to + STEPS - 1u) / STEPS - cut.from / STEPS - 1u;
+    const size_t ends = (cut.from % STEPS == 0) + (cut.to % STEPS == 0);
+    const size_t outside = corners - between - ends;
+    return between >= 1 && between <= 2 && outside >= 1 && outside <= 2;
+}
+
+size_t mesh_cell_cuts(size_t corners, size_t every, mesh_cut cuts[MESH_CUTS_MOST]) {
+    const size_t places = STEPS * corners;
     size_t n = 0;
-    for (size_t from = 0; from < places; from++)
-        for (size_t to = from + 1; to < places; to++) {
-            /* corners after `from` and before `to`, and those outside */
-            const size_t between = (to + QUARTERS - 1) / QUARTERS - from / QUARTERS - 1;
-            const size_t ends = (from % QUARTERS == 0) + (to % QUARTERS == 0);
-            const size_t outside = corners - between - ends;
-            if (between < 1 || between > 2 || outside < 1 || outside > 2) continue;
-            cuts[n++] = (mesh_cut){(uint8_t)from, (uint8_t)to};
+    for (size_t from = 0; from < places; from += every)
+        for (size_t to = from + every; to < places; to += every) {
+            const mesh_cut cut = {(uint8_t)from, (uint8_t)to};
+            if (mesh_cut_divides(corners, cut)) cuts[n++] = cut;
         }
     return n;
 }
 
 void mesh_cell_place(const mesh_cell *c, size_t place, double out[3]) {
-    const size_t k = place / QUARTERS;
-    edge_point(c->corner[k], c->corner[(k + 1) % c->n], place % QUARTERS, QUARTERS, out);
+    const size_t k = place / STEPS;
+    edge_point(c->corner[k], c->corner[(k + 1) % c->n], place % STEPS, STEPS, out);
 }
 
 /* The part of a cell on the way from one place to another along its border. */
 static mesh_cell part(const mesh_cell *c, size_t from, size_t to) {
-    const size_t end = to > from ? to : to + QUARTERS * c->n;
+    const size_t end = to > from ? to : to + STEPS * c->n;
     mesh_cell out = {.face = c->face};
     mesh_cell_place(c, from, out.corner[out.n++]);
-    for (size_t k = from / QUARTERS + 1; QUARTERS * k < end; k++) {
+    for (size_t k = from / STEPS + 1; STEPS * k < end; k++) {
         assert(out.n < 3);
         memcpy(out.corner[out.n++], c->corner[k % c->n], sizeof *out.corner);
     }
@@ -62,9 +66,8 @@ bool mesh_cell_cut(const mesh_cell *c, mesh_cut cut, mesh_cell out[2]) {
 }
 
 bool mesh_cell_halve(const mesh_cell *c, size_t side, mesh_cell out[2]) {
-    const size_t middle = QUARTERS * side + QUARTERS / 2;
-    const size_t opposite =
-        c->n == 4 ? (middle + 2 * QUARTERS) % (4 * QUARTERS) : QUARTERS * ((side + 2) % 3);
+    const size_t middle = STEPS * side + STEPS / 2;
+    const size_t opposite = c->n == 4 ? (middle + 2 * STEPS) % (4 * STEPS) : STEPS * ((side + 2) % 3);
     return mesh_cell_cut(c, (mesh_cut){(uint8_t)middle, (uint8_t)opposite}, out);
 }
 

@@ -19,17 +19,21 @@ typedef struct mesh_cell {
 /* The whole of a face. */
 mesh_cell mesh_cell_of(const mesh *m, size_t face);
 
-/* A straight cut between two places on the border of a cell: place 4 k + q is q quarters of the way from
- * corner k to the next one. */
-enum { MESH_CELL_QUARTERS = 4 };
+/* A straight cut between two places on the border of a cell: place MESH_CELL_STEPS k + q is q steps of the
+ * way from corner k to the next one. */
+enum { MESH_CELL_STEPS = 16 };
 typedef struct mesh_cut {
-    uint8_t from, to; /* below 4 n */
+    uint8_t from, to; /* below MESH_CELL_STEPS n, from < to */
 } mesh_cut;
 
-/* All cuts of a cell of 3 or 4 corners into two such cells: those between two sides, between a corner and a
- * side, and the diagonals of a quad. Returns their number. */
-enum { MESH_CUTS_MOST = 44 };
-size_t mesh_cell_cuts(size_t corners, mesh_cut cuts[MESH_CUTS_MOST]);
+/* True if a cut leaves two cells of 3 or 4 corners: it runs between two sides, between a corner and a side
+ * that is not its own, or along a diagonal of a quad. */
+bool mesh_cut_divides(size_t corners, mesh_cut cut);
+
+/* All such cuts between places that are multiples of `every` steps, which divides MESH_CELL_STEPS into
+ * MESH_CELL_STEPS / every parts, 8 at most. Returns their number. */
+enum { MESH_CUTS_MOST = 168 };
+size_t mesh_cell_cuts(size_t corners, size_t every, mesh_cut cuts[MESH_CUTS_MOST]);
 
 /* Cuts a cell. False where it is too small for it. */
 bool mesh_cell_cut(const mesh_cell *c, mesh_cut cut, mesh_cell out[2]);

@@ -1,8 +1,10 @@
 /* Light at points, the error of a mesh and adaptive meshes, against the closed form of a floor below a lamp.
  */
 #include "solver/adapt/adaptive.h"
+#include "solver/adapt/cell_look.h"
 #include "solver/adapt/gather.h"
 #include "solver/adapt/mesh_error.h"
+#include "solver/base/random.h"
 #include "support/box.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -89,7 +91,7 @@ START_TEST(light_at_points) {
     const float B[2] = {0, 1};
     gather *g = NULL;
     lam_error error = {0};
-    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, GATHER_LAMP_SAMPLES, NULL, &g, &error));
+    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, NULL, &g, &error));
     ck_assert_uint_eq(gather_values(g), 1);
     for (int p = 0; p < 3; p++) {
         const double F = truth(points[p][0], points[p][1]);
@@ -128,7 +130,7 @@ START_TEST(shadow) {
     free(m.group);
     mesh_add_cell(&m, &plate, true);
     mesh_finish(&m, rho);
-    ck_ok(gather_create(&m, 1, B, lamps, GATHER_LAMP_SAMPLES_MOST, NULL, &g, &error));
+    ck_ok(gather_create(&m, 1, B, lamps, NULL, &g, &error));
     for (uint64_t key = 0; key < 100; key++) {
         gather_at(g, 0, key, 2, points, H);
         ck_assert(H[0] == 0 && H[1] == 0);
@@ -156,7 +158,7 @@ START_TEST(light_of_skies) {
         for (size_t t = 0; t <= tiling.n_tiles; t++)
             L[l * (tiling.n_tiles + 1) + t] = t < tiling.n_tiles ? 1 + (double)l : 1e9;
     const gather_sky sky = {.tiling = &tiling, .L = L};
-    ck_ok(gather_create(&m, 2, B, NULL, 0, &sky, &g, &error));
+    ck_ok(gather_create(&m, 2, B, NULL, &sky, &g, &error));
     for (int p = 0; p < 2; p++) {
         const double seen = M_PI * (1 - truth(points[p][0], points[p][1]));
         double sum = 0, squares = 0;
@@ -189,7 +191,7 @@ START_TEST(furnace) {
     gather *g = NULL;
     lam_error error = {0};
     for (size_t i = 0; i < m.n; i++) B[i] = 1, B[m.n + i] = 2;
-    ck_ok(gather_create(&m, 2, B, NULL, 0, NULL, &g, &error));
+    ck_ok(gather_create(&m, 2, B, NULL, NULL, &g, &error));
     gather_at(g, 4 * 4, 1, 2, points, H); /* the floor's first element */
     for (size_t k = 0; k < 4; k++) {
         ck_assert_double_eq_tol(H[2 * k], 1, 1e-6);
@@ -234,6 +236,78 @@ START_TEST(no_error) {
     ck_assert(stated[1] == 0);
     free(E);
     free(B);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Looks at a trapezoid of the floor: points in all of it, of equal weight for equal areas in any look, at
+ * which the light is that of the closed form; errors are on average those of constants there. */
+START_TEST(looks_at_a_cell) {
+    enum { KEYS = 300, FINE = 64 };
+    mesh m = floor_and_lamp(1);
+    float E[2] = {0, 1}, B[2] = {0, 1};
+    uint32_t first[3] = {0, 1, 2};
+    const coarse_light coarse = {.m = m, .first = first, .n_lights = 1, .E = E, .B = B, .lamps = true};
+    cell_light light = {.m = &m, .coarse = &coarse, .all = {2, 1}};
+    cell_points p = {.n = 0};
+    mesh_cell parts[2];
+    gather *g = NULL;
+    lam_error error = {0};
+    const mesh_cell whole = mesh_cell_of(&m, 0);
+    ck_ok(gather_create(&m, 1, B, E, NULL, &g, &error));
+    light.g = g;
+    ck_assert(mesh_cell_cut(&whole, (mesh_cut){4, 2 * MESH_CELL_STEPS + 4}, parts));
+    const mesh_cell *c = &parts[_i];
+    /* means by a fine grid of the floor */
+    double area = 0, x = 0, y = 0, F = 0, squares = 0;
+    for (int k = 0; k < FINE * FINE; k++) {
+        const double at[2] = {3 * (k % FINE + .5) / FINE, 3 * (k / FINE + .5) / FINE};
+        bool inside = true;
+        for (size_t e = 0; e < c->n; e++) {
+            const double *a = c->corner[e], *b = c->corner[(e + 1) % c->n];
+            inside = inside && (b[0] - a[0]) * (at[1] - a[1]) > (b[1] - a[1]) * (at[0] - a[0]);
+        }
+        if (!inside) continue;
+        area++;
+        x += at[0];
+        y += at[1];
+        F += truth(at[0], at[1]);
+        squares += truth(at[0], at[1]) * truth(at[0], at[1]);
+    }
+    const double variance = squares / area - F / area * F / area;
+    const double all = mesh_cell_area(c) * (double)rho * (double)rho / light.all[0] * variance;
+    double sum[3] = {0}, weight = 0, off = 0;
+    for (uint64_t key = 0; key < KEYS; key++) {
+        float its[COARSE_LIGHTS];
+        const size_t steps = key % 2 == 0 ? 6 : 9;
+        ck_ok(cell_points_reserve(&p, 1, 0, steps * steps + 36, &error));
+        cell_look_at(&light, c, random_hash(key), steps, &p, its);
+        off += (double)its[0] / KEYS;
+        cell_look_at(&light, c, random_hash(key + KEYS), 6, &p, its);
+        ck_assert_uint_eq(p.n, steps * steps + 36);
+        double first_look = 0;
+        for (size_t k = 0; k < p.n; k++) {
+            const double W = (double)p.weight[k];
+            first_look += k < steps * steps ? W : 0;
+            weight += W;
+            sum[0] += W * (double)p.x[k];
+            sum[1] += W * (double)p.y[k];
+            sum[2] += W * (double)p.H[k] / (double)rho;
+        }
+        ck_assert_double_eq_tol(first_look, (double)(steps * steps), 1e-4);
+    }
+    printf("%g %g %g, %g %g %g; error %g of %g\n", x / area, y / area, F / area, sum[0] / weight,
+           sum[1] / weight, sum[2] / weight, off, all);
+    const face_plane plane = face_plane_of(&m, 0);
+    const double middle[3] = {x / area, y / area, 0};
+    double in[2];
+    face_plane_at(&plane, middle, in);
+    ck_assert_double_eq_tol(sum[0] / weight, in[0], .004);
+    ck_assert_double_eq_tol(sum[1] / weight, in[1], .004);
+    ck_assert_double_eq_tol(sum[2] / weight, F / area, .01 * F / area);
+    ck_assert_double_eq_tol(off, all, .05 * all);
+    cell_points_free(&p);
+    gather_free(g);
     mesh_free(&m);
 }
 END_TEST
@@ -321,6 +395,7 @@ int main(void) {
     tcase_add_test(c, furnace);
     tcase_add_loop_test(c, error_of_a_uniform_mesh, 0, 3);
     tcase_add_test(c, no_error);
+    tcase_add_loop_test(c, looks_at_a_cell, 0, 2);
     tcase_add_test(c, adaptive_floor);
     tcase_add_test(c, limit_and_threads);
     tcase_add_test(c, two_sided);

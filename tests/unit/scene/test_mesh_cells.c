@@ -39,18 +39,22 @@ static void check_convex(const mesh *m, const mesh_cell *c) {
 
 /* Every cut of a quad, of a trapezoid and of a triangle leaves two convex cells of 3 or 4 corners with the
  * normal of the face, whose areas and shares add up and whose common side has the same bits; there are as
- * many cuts as counted by hand: 3 x 3 between each two sides that may be joined, 3 from a corner to each side
- * that is not its own, and two diagonals. */
+ * many cuts as counted by hand: 7 x 7 between each two sides that may be joined, 7 from a corner to each side
+ * that is not its own, and two diagonals; of quarters 3 for each 7. */
 START_TEST(cuts_of_cells_add_up) {
     mesh m = _i == 2 ? make_octahedron() : make_cube();
     mesh_cell cell = mesh_cell_of(&m, 1), of[2], parts[2];
     mesh_cut cuts[MESH_CUTS_MOST];
     if (_i == 1) {
-        ck_assert(mesh_cell_cut(&cell, (mesh_cut){1, 9}, of));
+        ck_assert(mesh_cell_cut(
+            &cell, (mesh_cut){MESH_CELL_STEPS / 4, 2 * MESH_CELL_STEPS + MESH_CELL_STEPS / 4}, of));
         cell = of[0];
     }
-    const size_t n = mesh_cell_cuts(cell.n, cuts);
+    size_t n = mesh_cell_cuts(cell.n, MESH_CELL_STEPS / 4, cuts);
     ck_assert_uint_eq(n, _i == 2 ? 3 * 9 + 3 * 3 : 2 * 9 + 4 * 2 * 3 + 2);
+    n = mesh_cell_cuts(cell.n, MESH_CELL_STEPS / 8, cuts);
+    ck_assert_uint_eq(n, _i == 2 ? 3 * 49 + 3 * 7 : 2 * 49 + 4 * 2 * 7 + 2);
+    ck_assert_uint_le(n, MESH_CUTS_MOST);
     const double area = mesh_cell_area(&cell);
     for (size_t k = 0; k < n; k++) {
         double from[3], to[3];
