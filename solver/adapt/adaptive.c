@@ -80,11 +80,14 @@ done:
     return status;
 }
 
-/* True if the squares of errors of all lights are what was asked for. */
-static bool is_enough(const adaptive_run *r, const double *sum) {
+/* Cuts aim at this share of the error that is asked for, as gains that were chosen look larger than they are.
+ */
+static const double aimed = .99;
+
+/* True if no light has a square of errors above that of an error. */
+static bool is_enough(const adaptive_run *r, const double *sum, double most) {
     bool enough = true;
-    for (size_t l = 0; l < r->coarse->n_lights; l++)
-        enough = enough && sum[l] <= r->how->error * r->how->error;
+    for (size_t l = 0; l < r->coarse->n_lights; l++) enough = enough && sum[l] <= most * most;
     return enough;
 }
 
@@ -189,7 +192,7 @@ static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_more, l
     memcpy(left, sum, sizeof left);
     for (size_t k = 0; k < count && order[k].gain > round_least * order[0].gain; k++, (*n_more)++) {
         adaptive_cell *c = &r->cells[order[k].cell];
-        if (is_enough(r, left)) break;
+        if (is_enough(r, left, aimed * r->how->error)) break;
         for (size_t l = 0; l < r->coarse->n_lights; l++) left[l] -= (double)c->best[order[k].light].gain[l];
         if (r->keep && c->points.n < POINTS_ENOUGH)
             c->steps = steps_of(POINTS_ENOUGH - c->points.n);
@@ -234,7 +237,7 @@ static lam_status refine_cells(adaptive_run *r, adaptive_report *report, lam_err
         afresh = n_more == 0 || report->reached;
         for (size_t i = 0; afresh && i < r->n; i++) r->cells[i].steps = CELL_STEPS;
         TRY(look_at_waiting(r, sum, error));
-        report->reached = is_enough(r, sum);
+        report->reached = is_enough(r, sum, r->how->error);
         progress_report(r->how->progress, "mesh", fmin(1, (double)r->n / (double)r->how->elements));
         n_more = 0;
         if (!report->reached) TRY(cut_best(r, sum, &n_more, error));

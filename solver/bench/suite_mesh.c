@@ -235,7 +235,7 @@ done:
 }
 
 static lam_status add_scene(const bench_run *run, const mesh_scene *scene, table *out, lam_error *error) {
-    static const size_t n_points[3] = {100, 1000, 2000}, walks[3] = {1024, 8192, 32768};
+    static const size_t n_points[3] = {100, 4000, 16000}, walks[3] = {1024, 16384, 8192};
     lam_status status = LAM_OK;
     mesh_points points = {.n = 0};
     mesh pieces = {0};
