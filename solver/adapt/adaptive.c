@@ -15,9 +15,8 @@ static const double largest_share = 1. / 128;
 enum { ROUND_SHARE = 8 };
 static const double round_least = 1. / 8;
 
-/* A look has CELL_STEPS^2 points at least; a cell is cut by what POINTS_ENOUGH show, its own and those that
- * it inherited. Where the points of all
- * cells would take more than some bytes, none are kept, and a cell is cut by what one look shows. */
+/* A cell is cut by what POINTS_ENOUGH points show, its own and those that it inherited. Where the points of
+ * all cells would take more than some bytes, none are kept, and a cell is cut by what one look shows. */
 enum { CELL_STEPS = 6, POINTS_ENOUGH = 192 };
 static const size_t points_bytes_most = (size_t)256 << 20;
 
@@ -80,24 +79,20 @@ done:
     return status;
 }
 
-/* Cuts aim at this share of the error that is asked for, as gains that were chosen look larger than they are.
- */
-static const double aimed = .99;
-
-/* True if no light has a square of errors above that of an error. */
-static bool is_enough(const adaptive_run *r, const double *sum, double most) {
-    bool enough = true;
-    for (size_t l = 0; l < r->coarse->n_lights; l++) enough = enough && sum[l] <= most * most;
-    return enough;
+/* The largest error of all lights. */
+static double largest_error(const adaptive_run *r, const double *sum) {
+    double most = 0;
+    for (size_t l = 0; l < r->coarse->n_lights; l++) most = fmax(most, sum[l]);
+    return sqrt(most);
 }
 
 /* The weights of lights: 0 where the error is small enough, and less the farther it is below the largest, as
  * that one decides. */
-static void weigh_lights(const adaptive_run *r, const double *sum, double *weight) {
+static void weigh_lights(const adaptive_run *r, const double *sum, double aim, double *weight) {
     double most = 0;
     for (size_t l = 0; l < r->coarse->n_lights; l++) most = fmax(most, sum[l]);
     for (size_t l = 0; l < r->coarse->n_lights; l++)
-        weight[l] = sum[l] > r->how->error * r->how->error ? pow(sum[l] / most, 4) : 0;
+        weight[l] = sum[l] > aim * aim ? pow(sum[l] / most, 4) : 0;
 }
 
 /* The most that a cut takes off the square of a cell's error, and the light that it is best for; 0 where none
@@ -170,15 +165,15 @@ static lam_status cut_cells(adaptive_run *r, const uint8_t *light, lam_error *er
 }
 
 /* Cuts the cells of the largest gains, or has those looked at again that show too few points for it, until
- * the gains are what the errors lack; *n_more is the number of both. */
-static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_more, lam_error *error) {
+ * no error is above the aim; *n_more is the number of both. */
+static lam_status cut_best(adaptive_run *r, const double *sum, double aim, size_t *n_more, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t sides = r->how->two_sided ? 2 : 1, most = r->how->elements / sides;
     double weight[COARSE_LIGHTS], left[COARSE_LIGHTS];
     ranked *order = memory_allocate(r->n, sizeof *order, "cells of a mesh", error);
     uint8_t *light = memory_allocate(r->n, sizeof *light, "cells of a mesh", error);
     if (order == NULL || light == NULL) TRY(LAM_ERR_MEMORY);
-    weigh_lights(r, sum, weight);
+    weigh_lights(r, sum, aim, weight);
     for (size_t i = 0; i < r->n; i++) {
         order[i] = (ranked){.cell = i};
         order[i].gain = best_gain(r, &r->cells[i], weight, &order[i].light);
@@ -192,7 +187,7 @@ static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_more, l
     memcpy(left, sum, sizeof left);
     for (size_t k = 0; k < count && order[k].gain > round_least * order[0].gain; k++, (*n_more)++) {
         adaptive_cell *c = &r->cells[order[k].cell];
-        if (is_enough(r, left, aimed * r->how->error)) break;
+        if (largest_error(r, left) <= aim) break;
         for (size_t l = 0; l < r->coarse->n_lights; l++) left[l] -= (double)c->best[order[k].light].gain[l];
         if (r->keep && c->points.n < POINTS_ENOUGH)
             c->steps = steps_of(POINTS_ENOUGH - c->points.n);
@@ -204,6 +199,12 @@ done:
     free(order);
     free(light);
     return status;
+}
+
+/* Steps of a look at all cells: of many of them fewer points say what all leave. */
+static size_t steps_of_all(const adaptive_run *r) {
+    enum { MANY = 4096, MANY_STEPS = 4 };
+    return r->n < MANY ? CELL_STEPS : MANY_STEPS;
 }
 
 /* The cells to begin with. */
@@ -219,7 +220,7 @@ static lam_status begin(adaptive_run *r, lam_error *error) {
     for (size_t i = 0; i < r->n; i++)
         r->cells[i] = (adaptive_cell){.cell = cells[i],
                                       .key = random_hash(random_hash(r->how->seed) ^ random_hash(i + 1)),
-                                      .steps = CELL_STEPS};
+                                      .steps = steps_of_all(r)};
 done:
     free(cells);
     return status;
@@ -227,20 +228,24 @@ done:
 
 /* Cuts cells until the errors of all are small enough or there are as many as may be. Cells stay whole
  * where noise makes their errors look small, so that the sum is too small by then: it is found afresh before
- * it is believed. */
+ * it is believed, and cuts aim lower by as much as it was above what was asked for. */
 static lam_status refine_cells(adaptive_run *r, adaptive_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    double sum[COARSE_LIGHTS] = {0};
+    const double asked = r->how->error;
+    double sum[COARSE_LIGHTS] = {0}, aim = asked;
     size_t n_more = 1;
     TRY(begin(r, error));
+    const size_t n_first = r->n;
     for (bool afresh = false; n_more > 0 || !afresh;) {
-        afresh = n_more == 0 || report->reached;
-        for (size_t i = 0; afresh && i < r->n; i++) r->cells[i].steps = CELL_STEPS;
+        afresh = n_more == 0;
+        for (size_t i = 0; afresh && r->n > n_first && i < r->n; i++) r->cells[i].steps = steps_of_all(r);
         TRY(look_at_waiting(r, sum, error));
-        report->reached = is_enough(r, sum, r->how->error);
         progress_report(r->how->progress, "mesh", fmin(1, (double)r->n / (double)r->how->elements));
+        const double left = largest_error(r, sum);
+        report->reached = afresh && left <= asked;
+        if (afresh) aim *= sqrt(fmin(1, asked / left));
         n_more = 0;
-        if (!report->reached) TRY(cut_best(r, sum, &n_more, error));
+        if (!report->reached && left > aim) TRY(cut_best(r, sum, aim, &n_more, error));
     }
     report->has_lamps = r->coarse->lamps;
     report->lamps = r->coarse->lamps ? sqrt(fmax(0, sum[0])) : 0;

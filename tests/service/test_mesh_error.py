@@ -68,8 +68,8 @@ class MeshError(Case):
         self.assertIn("--mesh-error 0.001 is not kept with 200 elements", log)
 
     def test_two_sided_and_repeatable(self):
-        first, _, _ = self.made("first.h5", "--mesh-error", .13, "--two-sided", "--threads", 1)
-        again, _, _ = self.made("again.h5", "--mesh-error", .13, "--two-sided", "--threads", 2)
+        first, _, _ = self.made("first.h5", "--mesh-error", .12, "--two-sided", "--threads", 1)
+        again, _, _ = self.made("again.h5", "--mesh-error", .12, "--two-sided", "--threads", 2)
         self.assertEqual(first["elements"] % 2, 0)
         self.assertGreater(first["elements"], 400)  # 384 are halves of faces that no light has chosen
         for member in ("elements", "groups"):
