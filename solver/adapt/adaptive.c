@@ -228,7 +228,7 @@ done:
 
 /* Cuts cells until the errors of all are small enough or there are as many as may be. Cells stay whole
  * where noise makes their errors look small, so that the sum is too small by then: it is found afresh before
- * it is believed, and cuts aim lower by as much as it was above what was asked for. */
+ * it is believed, and cuts aim lower by half of what it was above what was asked for. */
 static lam_status refine_cells(adaptive_run *r, adaptive_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     const double asked = r->how->error;

@@ -54,7 +54,7 @@ static void begin(const cell_light *light, const mesh_cell *c, const cell_points
     for (size_t k = 0; k < c->n; k++) face_plane_at(&plane, c->corner[k], s->corner[k]);
     s->all = 0;
     for (size_t k = 0; k < p->n; k++) s->all += (double)p->weight[k];
-    for (size_t l = 0; l < COARSE_LIGHTS; l++) s->weigh[l] = area / light->all[l] / s->all;
+    for (size_t l = 0; l < light->coarse->n_lights; l++) s->weigh[l] = area / light->all[l] / s->all;
     for (size_t v = 0; v < p->values; v++)
         for (size_t h = 0; h < GATHER_HALVES; h++) {
             const float *H = p->H + (v * GATHER_HALVES + h) * p->room;
