@@ -109,12 +109,12 @@ test("a scene that is chosen while the daemon is away is opened when it is back"
     await page.getByRole("tab", { name: "Trust" }).click();
     await own.stop("SIGKILL");
     await page.getByRole("combobox", { name: "Scene" }).selectOption("patio");
-    await page.getByText("The daemon does not answer").waitFor();
+    await page.getByText("The daemon does not answer. This page asks again").waitFor();
     const again = await Daemon.start([cornell, patio], { port });
     await page.waitForFunction(() => window.lambert.store.now.scene === "patio");
     await settled(page);
     assert.equal(await page.getByRole("combobox", { name: "Scene" }).inputValue(), "patio");
-    await page.getByText("The daemon does not answer").waitFor({ state: "hidden" });
+    await page.getByText("The daemon does not answer. This page asks again").waitFor({ state: "hidden" });
     assert.deepEqual(page.faults, []);
     await page.context().close();
     await again.stop();

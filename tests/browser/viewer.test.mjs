@@ -190,9 +190,9 @@ test("it recovers when the daemon was killed", async () => {
     const { port } = own;
     await own.stop("SIGKILL");
     await page.getByLabel("All", { exact: true }).fill("0.5");
-    await page.getByText("The daemon does not answer").waitFor();
+    await page.getByText("The daemon does not answer. This page asks again").waitFor();
     const again = await Daemon.start([store], { port });
-    await page.getByText("The daemon does not answer").waitFor({ state: "hidden" });
+    await page.getByText("The daemon does not answer. This page asks again").waitFor({ state: "hidden" });
     await settled(page);
     const scale = await page.evaluate(() => window.lambert.fields[0].scale);
     const lamp = await lampNow(page);
