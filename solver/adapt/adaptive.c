@@ -88,11 +88,10 @@ static double largest_error(const adaptive_run *r, const double *sum) {
 
 /* The weights of lights: 0 where the error is small enough, and less the farther it is below the largest, as
  * that one decides. */
-static void weigh_lights(const adaptive_run *r, const double *sum, double aim, double *weight) {
-    double most = 0;
-    for (size_t l = 0; l < r->coarse->n_lights; l++) most = fmax(most, sum[l]);
+static void weigh_lights(const adaptive_run *r, const double *sum, double *weight) {
+    const double most = largest_error(r, sum);
     for (size_t l = 0; l < r->coarse->n_lights; l++)
-        weight[l] = sum[l] > aim * aim ? pow(sum[l] / most, 4) : 0;
+        weight[l] = sum[l] > r->how->error * r->how->error ? pow(sum[l] / (most * most), 4) : 0;
 }
 
 /* The most that a cut takes off the square of a cell's error, and the light that it is best for; 0 where none
@@ -164,16 +163,16 @@ static lam_status cut_cells(adaptive_run *r, const uint8_t *light, lam_error *er
     return status;
 }
 
-/* Cuts the cells of the largest gains, or has those looked at again that show too few points for it, until
- * no error is above the aim; *n_more is the number of both. */
-static lam_status cut_best(adaptive_run *r, const double *sum, double aim, size_t *n_more, lam_error *error) {
+/* Cuts the cells of the largest gains, or has those looked at again that show too few points for it; *n_more
+ * is the number of both. */
+static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_more, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t sides = r->how->two_sided ? 2 : 1, most = r->how->elements / sides;
-    double weight[COARSE_LIGHTS], left[COARSE_LIGHTS];
+    double weight[COARSE_LIGHTS];
     ranked *order = memory_allocate(r->n, sizeof *order, "cells of a mesh", error);
     uint8_t *light = memory_allocate(r->n, sizeof *light, "cells of a mesh", error);
     if (order == NULL || light == NULL) TRY(LAM_ERR_MEMORY);
-    weigh_lights(r, sum, aim, weight);
+    weigh_lights(r, sum, weight);
     for (size_t i = 0; i < r->n; i++) {
         order[i] = (ranked){.cell = i};
         order[i].gain = best_gain(r, &r->cells[i], weight, &order[i].light);
@@ -184,11 +183,8 @@ static lam_status cut_best(adaptive_run *r, const double *sum, double aim, size_
     if (most <= r->n) count = 0;
     if (count > 0 && count > most - r->n) count = most - r->n;
     *n_more = 0;
-    memcpy(left, sum, sizeof left);
     for (size_t k = 0; k < count && order[k].gain > round_least * order[0].gain; k++, (*n_more)++) {
         adaptive_cell *c = &r->cells[order[k].cell];
-        if (largest_error(r, left) <= aim) break;
-        for (size_t l = 0; l < r->coarse->n_lights; l++) left[l] -= (double)c->best[order[k].light].gain[l];
         if (r->keep && c->points.n < POINTS_ENOUGH)
             c->steps = steps_of(POINTS_ENOUGH - c->points.n);
         else
@@ -228,24 +224,22 @@ done:
 
 /* Cuts cells until the errors of all are small enough or there are as many as may be. Cells stay whole
  * where noise makes their errors look small, so that the sum is too small by then: it is found afresh before
- * it is believed, and cuts aim lower by half of what it was above what was asked for. */
+ * it is believed. */
 static lam_status refine_cells(adaptive_run *r, adaptive_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    const double asked = r->how->error;
-    double sum[COARSE_LIGHTS] = {0}, aim = asked;
+    double sum[COARSE_LIGHTS] = {0};
     size_t n_more = 1;
+    bool chosen = false; /* by their errors, some have been cut or looked at again */
     TRY(begin(r, error));
-    const size_t n_first = r->n;
     for (bool afresh = false; n_more > 0 || !afresh;) {
         afresh = n_more == 0;
-        for (size_t i = 0; afresh && r->n > n_first && i < r->n; i++) r->cells[i].steps = steps_of_all(r);
+        for (size_t i = 0; afresh && chosen && i < r->n; i++) r->cells[i].steps = steps_of_all(r);
         TRY(look_at_waiting(r, sum, error));
         progress_report(r->how->progress, "mesh", fmin(1, (double)r->n / (double)r->how->elements));
-        const double left = largest_error(r, sum);
-        report->reached = afresh && left <= asked;
-        if (afresh) aim *= sqrt(fmin(1, asked / left));
+        report->reached = largest_error(r, sum) <= r->how->error;
         n_more = 0;
-        if (!report->reached && left > aim) TRY(cut_best(r, sum, aim, &n_more, error));
+        if (!report->reached) TRY(cut_best(r, sum, &n_more, error));
+        chosen = chosen || n_more > 0;
     }
     report->has_lamps = r->coarse->lamps;
     report->lamps = r->coarse->lamps ? sqrt(fmax(0, sum[0])) : 0;

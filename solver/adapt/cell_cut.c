@@ -14,9 +14,9 @@ typedef struct cut_search {
     const cell_light *light;
     const mesh_cell *c;
     const cell_points *points;
+    face_plane plane;
     double slender, uneven;                      /* no part may be worse */
     double weigh[COARSE_LIGHTS];                 /* of products of deviations */
-    double corner[4][2];                         /* in the plane */
     double all;                                  /* sum of weights */
     float off[VALUES_MOST][GATHER_HALVES][MOST]; /* weight (H - mean) */
 } cut_search;
@@ -43,15 +43,14 @@ static bool may_cut(const cut_search *s, mesh_cut cut) {
 }
 
 static void begin(const cell_light *light, const mesh_cell *c, const cell_points *p, cut_search *s) {
-    const face_plane plane = face_plane_of(light->m, c->face);
     const double area = mesh_cell_area(c);
     s->light = light;
     s->c = c;
     s->points = p;
+    s->plane = face_plane_of(light->m, c->face);
     shape(c, &s->slender, &s->uneven);
     s->slender = fmax(s->slender, longest);
     s->uneven = fmax(s->uneven, 1 / shortest);
-    for (size_t k = 0; k < c->n; k++) face_plane_at(&plane, c->corner[k], s->corner[k]);
     s->all = 0;
     for (size_t k = 0; k < p->n; k++) s->all += (double)p->weight[k];
     for (size_t l = 0; l < light->coarse->n_lights; l++) s->weigh[l] = area / light->all[l] / s->all;
@@ -65,10 +64,11 @@ static void begin(const cell_light *light, const mesh_cell *c, const cell_points
         }
 }
 
-static void place_at(const double corner[4][2], size_t n, size_t place, float out[2]) {
-    const double *a = corner[place / MESH_CELL_STEPS], *b = corner[(place / MESH_CELL_STEPS + 1) % n];
-    const double t = (double)(place % MESH_CELL_STEPS) / MESH_CELL_STEPS;
-    for (int d = 0; d < 2; d++) out[d] = (float)((1 - t) * a[d] + t * b[d]);
+static void place_at(const face_plane *plane, const mesh_cell *c, size_t place, float out[2]) {
+    double at[3], in[2];
+    mesh_cell_place(c, place, at);
+    face_plane_at(plane, at, in);
+    for (int d = 0; d < 2; d++) out[d] = (float)in[d];
 }
 
 /* The gain of a cut, what it takes off the squares of errors: with s the sum of a value's deviations on one
@@ -78,8 +78,8 @@ static void find_gain(const cut_search *s, mesh_cut cut, double gain[COARSE_LIGH
     const cell_points *p = s->points;
     const size_t n = p->n, channels = s->light->m->n_channels;
     float from[2], to[2], beyond[MOST], w = 0;
-    place_at(s->corner, s->c->n, cut.from, from);
-    place_at(s->corner, s->c->n, cut.to, to);
+    place_at(&s->plane, s->c, cut.from, from);
+    place_at(&s->plane, s->c, cut.to, to);
     for (size_t l = 0; l < COARSE_LIGHTS; l++) gain[l] = 0;
 #pragma omp simd reduction(+ : w)
     for (size_t k = 0; k < n; k++) {
@@ -140,8 +140,6 @@ void cell_cut_find(const cell_light *light, const mesh_cell *c, const cell_point
 
 void cell_cut_way(const cell_light *light, const mesh_cell *c, mesh_cut cut, float from[2], float to[2]) {
     const face_plane plane = face_plane_of(light->m, c->face);
-    double corner[4][2];
-    for (size_t k = 0; k < c->n; k++) face_plane_at(&plane, c->corner[k], corner[k]);
-    place_at((const double(*)[2])corner, c->n, cut.from, from);
-    place_at((const double(*)[2])corner, c->n, cut.to, to);
+    place_at(&plane, c, cut.from, from);
+    place_at(&plane, c, cut.to, to);
 }

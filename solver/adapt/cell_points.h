@@ -1,5 +1,5 @@
 /* Points of a cell and the light that was found there. The parts of a cell inherit its points, so that a cut
- * rests on more of them than were asked for. Must not know how light is found. */
+ * rests on more of them than were asked for. */
 #ifndef LAMBERT_ADAPT_CELL_POINTS_H
 #define LAMBERT_ADAPT_CELL_POINTS_H
 
