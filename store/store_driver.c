@@ -133,6 +133,10 @@ static herr_t driver_truncate(H5FD_t *base, hid_t transfer, hbool_t closing) {
 }
 
 static const H5FD_class_t driver_class = {
+#ifdef H5FD_CLASS_VERSION /* HDF5 1.14 and later, which keep the values below 512 for themselves */
+    .version = H5FD_CLASS_VERSION,
+    .value = 512,
+#endif
     .name = "lambert",
     .maxaddr = (haddr_t)INT64_MAX,
     .fc_degree = H5F_CLOSE_STRONG,

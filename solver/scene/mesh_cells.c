@@ -89,7 +89,7 @@ void mesh_cell_edges(const mesh_cell *c, double length[4]) {
 
 /* Halves a cell that is larger than an area; false where it is not, or is too small. */
 static bool halve_large(const mesh_cell *c, double area, mesh_cell out[2]) {
-    double length[4];
+    double length[4] = {0};
     size_t side = 0;
     if (mesh_cell_area(c) <= area) return false;
     mesh_cell_edges(c, length);

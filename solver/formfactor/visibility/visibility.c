@@ -84,7 +84,7 @@ static lam_status create(const mesh *m, bool join, visibility **out, lam_error *
     if (v->device == NULL) FAIL(error, LAM_ERR_INTERNAL, "Embree: cannot make a device");
     v->scene = rtcNewScene(v->device);
     if (v->scene == NULL) TRY(device_error(v, "new scene", error));
-    rtcSetSceneFlags(v->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    rtcSetSceneFlags(v->scene, RTC_SCENE_FLAG_ROBUST | (enum RTCSceneFlags)EMBREE_FILTERS_QUERIES);
     rtcSetSceneBuildQuality(v->scene, RTC_BUILD_QUALITY_HIGH);
     TRY(add_geometry(v, TRIANGLES, &first, error));
     TRY(add_geometry(v, QUADS, &first, error));
@@ -132,9 +132,9 @@ double visibility_rounding(const visibility *v) {
     return (double)v->rounding;
 }
 
-/* The data of the filter. Embree's context comes first, because the filter gets it as a pointer to that. */
+/* The data of the filter. The query comes first, because the filter gets a pointer to its context. */
 typedef struct cast_context {
-    struct RTCIntersectContext embree;
+    embree_query query;
     const visibility *visibility;
     bool cull_back;
 } cast_context;
@@ -179,7 +179,7 @@ static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PAC
     }
     if (!any) return;
     context->cull_back = true;
-    rtcIntersect8(active, v->scene, &context->embree, &again);
+    embree_intersect(active, v->scene, &context->query, &again);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         if (cosine[i] <= 0 || again.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
         ray->hit.geomID[i] = again.hit.geomID[i];
@@ -229,9 +229,9 @@ static void cast_lifted(const visibility *v, const ray_packet *rays, const uint3
                         met_packet *met) {
     bool any = false;
     lift(v, self, n_rays, ray);
-    context->embree.filter = NULL;
-    rtcIntersect8(active, v->scene, &context->embree, ray);
-    context->embree.filter = refuse_own_and_culled;
+    context->query.filter = NULL;
+    embree_intersect(active, v->scene, &context->query, ray);
+    context->query.filter = refuse_own_and_culled;
     facets_met(v, ray, n_rays, met);
     for (size_t i = 0; i < n_rays; i++) {
         const uint32_t own = ray->ray.id[i], facet = met->facet[i];
@@ -248,7 +248,7 @@ static void cast_lifted(const visibility *v, const ray_packet *rays, const uint3
         ray->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     }
     if (!any) return;
-    rtcIntersect8(active, v->scene, &context->embree, ray);
+    embree_intersect(active, v->scene, &context->query, ray);
     facets_met(v, ray, n_rays, met);
 }
 
@@ -287,9 +287,9 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
     int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
     met_packet met = {{0}, {0}};
     cast_context context = {.visibility = v, .cull_back = (how & VISIBILITY_CULL_BACK) != 0 && !two_sided};
-    rtcInitIntersectContext(&context.embree);
-    context.embree.filter = refuse_own_and_culled;
-    if ((how & VISIBILITY_TOGETHER) != 0) context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    embree_query_init(&context.query);
+    context.query.filter = refuse_own_and_culled;
+    if ((how & VISIBILITY_TOGETHER) != 0) context.query.coherent = true;
     packet_set(&ray, rays);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         uint32_t own = self != NULL && i < n_rays ? self[i] : VISIBILITY_NOTHING;
@@ -300,7 +300,7 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
     if (self != NULL && !context.cull_back) {
         cast_lifted(v, rays, self, n_rays, &context, active, &ray, &met);
     } else {
-        rtcIntersect8(active, v->scene, &context.embree, &ray);
+        embree_intersect(active, v->scene, &context.query, &ray);
         facets_met(v, &ray, n_rays, &met);
     }
 
@@ -319,8 +319,8 @@ static void report_backs(const visibility *v, const uint32_t *facet, size_t n_ra
                          hit_packet *hits) {
     met_packet met = {{0}, {0}};
     cast_context context = {.visibility = v};
-    rtcInitIntersectContext(&context.embree);
-    context.embree.filter = refuse_own_and_culled;
+    embree_query_init(&context.query);
+    context.query.filter = refuse_own_and_culled;
     for (size_t i = 0; i < VISIBILITY_PACKET; i++)
         ray->ray.id[i] = i < n_rays ? facet[i] : VISIBILITY_NOTHING;
     facets_met(v, ray, n_rays, &met);
@@ -354,13 +354,13 @@ static void cast_packet(const visibility *v, const ray_packet *rays, size_t p, s
                         const uint32_t *facet, hit_packet *hits, open_hits *open) {
     struct RTCRayHit8 ray __attribute__((aligned(32)));
     int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
-    struct RTCIntersectContext context;
+    embree_query query;
     size_t n_open = open->n;
     bool again = false, any_back = false;
-    rtcInitIntersectContext(&context);
+    embree_query_init(&query);
     packet_set(&ray, rays);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) active[i] = i < n ? -1 : 0;
-    rtcIntersect8(active, v->scene, &context, &ray);
+    embree_intersect(active, v->scene, &query, &ray);
     /* Without branches, which would be mispredicted at rays that leave: these take the first primitive. */
     for (size_t i = 0; i < n; i++) {
         const bool met = ray.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;

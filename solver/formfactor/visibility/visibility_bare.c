@@ -10,12 +10,12 @@ static size_t cast_bare(const visibility *v, const ray_packet *rays, const float
     static const int active[VISIBILITY_PACKET]
         __attribute__((aligned(32))) = {-1, -1, -1, -1, -1, -1, -1, -1};
     struct RTCRayHit8 packet __attribute__((aligned(32)));
-    struct RTCIntersectContext context;
+    embree_query query;
     size_t own = 0;
-    rtcInitIntersectContext(&context);
+    embree_query_init(&query);
     packet_set(&packet, rays);
     memcpy(packet.ray.tnear, nearest, sizeof packet.ray.tnear);
-    rtcIntersect8(active, v->scene, &context, &packet);
+    embree_intersect(active, v->scene, &query, &packet);
     for (size_t i = 0; i < VISIBILITY_PACKET && count; i++)
         own += packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID &&
                facet_of(v, packet.hit.geomID[i], packet.hit.primID[i]) == v->facets.of_element[self];

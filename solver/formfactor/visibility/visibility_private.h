@@ -2,10 +2,9 @@
 #ifndef LAMBERT_FORMFACTOR_VISIBILITY_VISIBILITY_PRIVATE_H
 #define LAMBERT_FORMFACTOR_VISIBILITY_VISIBILITY_PRIVATE_H
 
+#include "solver/formfactor/visibility/embree.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/scene/facet/facet_grid.h"
-
-#include <embree3/rtcore.h>
 
 #include <math.h>
 #include <stddef.h>

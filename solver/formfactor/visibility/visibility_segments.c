@@ -3,7 +3,7 @@
 
 /* The data of the filter of segments: the facets at both ends, by lane, which is the segment's id. */
 typedef struct segment_context {
-    struct RTCIntersectContext embree;
+    embree_query query; /* first: the filter gets a pointer to it */
     const visibility *visibility;
     uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET]; /* facets */
 } segment_context;
@@ -49,8 +49,8 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
     struct RTCRayHit8 packet __attribute__((aligned(32)));
     int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
     segment_context context = {.visibility = v};
-    rtcInitIntersectContext(&context.embree);
-    context.embree.filter = refuse_both_ends;
+    embree_query_init(&context.query);
+    context.query.filter = refuse_both_ends;
     packet_set(&packet, segments);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         active[i] = i < n_segments ? -1 : 0;
@@ -61,7 +61,7 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
         context.from[i] = v->facets.of_element[from[i] < v->n_fronts ? from[i] : from[i] - v->n_fronts];
         context.to[i] = v->facets.of_element[to[i] < v->n_fronts ? to[i] : to[i] - v->n_fronts];
     }
-    rtcOccluded8(active, v->scene, &context.embree, &packet.ray);
+    embree_occluded(active, v->scene, &context.query, &packet.ray);
     unsigned blocked = 0;
     for (size_t i = 0; i < n_segments; i++) blocked |= (unsigned)(packet.ray.tfar[i] < 0) << i;
     return blocked;
@@ -70,16 +70,16 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
 unsigned visibility_between(const visibility *v, const ray_packet *segments, size_t n_segments) {
     struct RTCRayHit8 packet __attribute__((aligned(32)));
     int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
-    struct RTCIntersectContext context;
+    embree_query query;
     unsigned blocked = 0;
-    rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    embree_query_init(&query);
+    query.coherent = true;
     packet_set(&packet, segments);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         active[i] = i < n_segments ? -1 : 0;
         packet.ray.tfar[i] = 1;
     }
-    rtcOccluded8(active, v->scene, &context, &packet.ray);
+    embree_occluded(active, v->scene, &query, &packet.ray);
     for (size_t i = 0; i < n_segments; i++) blocked |= (unsigned)(packet.ray.tfar[i] < 0) << i;
     return blocked;
 }

@@ -6,7 +6,7 @@
 
 /* The corners of the column at a height; the last repeats the first. */
 static void ring(const column *c, double z, double radius, double out[COLUMN_SIDES_MOST + 1][3]) {
-    assert(c->sides % 8 == 0 && c->sides <= COLUMN_SIDES_MOST);
+    assert(c->sides > 0 && c->sides % 8 == 0 && c->sides <= COLUMN_SIDES_MOST);
     for (size_t k = 0; k < c->sides; k++) {
         const double angle = 2 * M_PI * (double)k / (double)c->sides;
         out[k][0] = c->middle[0] + radius * cos(angle);
@@ -20,6 +20,7 @@ static void ring(const column *c, double z, double radius, double out[COLUMN_SID
 static void border(const column *c, const double low[2], const double high[2], double z,
                    double out[COLUMN_SIDES_MOST + 1][3]) {
     const size_t eighth = c->sides / 8;
+    assert(c->sides > 0 && c->sides <= COLUMN_SIDES_MOST);
     for (size_t k = 0; k < c->sides; k++) {
         const double angle = 2 * M_PI * (double)k / (double)c->sides;
         const double direction[2] = {cos(angle), sin(angle)};

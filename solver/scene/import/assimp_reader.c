@@ -92,7 +92,7 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     lam_status status = LAM_OK;
     const struct aiMaterial *m = a->scene->mMaterials[index];
     struct aiString given = {0};
-    char name[MAXLEN + 32];
+    char name[sizeof given.data + 32];
     ai_real strength = 1;
     aiGetMaterialString(m, AI_MATKEY_NAME, &given);
     snprintf(name, sizeof name, "%s", given.data);
