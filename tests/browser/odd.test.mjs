@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { copyFileSync, renameSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
-import { Daemon, inFolder, lambert, makeStore, openPage, settled, violations } from "./page.mjs";
+import { PATIENCE, Daemon, inFolder, lambert, makeStore, openPage, settled, violations } from "./page.mjs";
 
 let cornell, patio, few, daemon;
 before(async () => {
@@ -133,7 +133,7 @@ test("a store that is replaced is shown as it is now, and one that is gone is to
         place(store);
         const { created } = (await own.json("/v1/scenes/live")).provenance;
         own.process.kill("SIGHUP");
-        for (let i = 0; i < 100 && (await own.json("/v1/scenes/live")).provenance.created === created; i++) await new Promise((resolve) => setTimeout(resolve, 100));
+        for (let i = 0; i < PATIENCE / 100 && (await own.json("/v1/scenes/live")).provenance.created === created; i++) await new Promise((resolve) => setTimeout(resolve, 100));
     };
     // The same mesh, built otherwise: answers have as many numbers, and the state is kept.
     await new Promise((resolve) => setTimeout(resolve, 1100));

@@ -9,6 +9,7 @@ import tempfile
 import unittest
 
 from command import ENVIRONMENT, LAMBERT
+from patience import PATIENCE
 
 TABLES = {
     "load": "n k format clients server p50_ms p99_ms per_second bytes_sent bytes_got mb_per_second requests runs note",
@@ -54,7 +55,7 @@ class Case(unittest.TestCase):
         return [program, "bench", "service", "--quick", "-o", self.out]
 
     def run_it(self, program=LAMBERT):
-        done = subprocess.run(self.command(program), capture_output=True, text=True, timeout=600,
+        done = subprocess.run(self.command(program), capture_output=True, text=True, timeout=PATIENCE,
                               env=self.environment, check=False)
         # servers, stores and answers are gone, however it ended
         self.assertEqual(os.listdir(self.scratch), [])

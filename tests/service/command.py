@@ -9,6 +9,8 @@ import subprocess
 import sys
 import unittest.mock
 
+from patience import PATIENCE
+
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "deploy" / "examples"
 LAMBERT = os.environ["LAMBERT"]
 # The program that makes what others are compared with, where another build has made one that is quicker.
@@ -20,7 +22,7 @@ ENVIRONMENT = dict(os.environ, OMP_NUM_THREADS="2", LC_ALL="C")
 
 def lambert(*arguments, threads=2, program=LAMBERT, **more):
     environment = dict(ENVIRONMENT, OMP_NUM_THREADS=str(threads))
-    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=600,
+    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE,
                           env=environment, check=False, **more)
 
 

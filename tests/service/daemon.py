@@ -13,10 +13,10 @@ import time
 
 import numpy as np
 
+from patience import PATIENCE
+
 LAMBERTD = os.environ["LAMBERTD"]
 
-# Nothing here is a measure of speed: so long only a daemon that hangs takes.
-PATIENCE = 120
 
 
 class Answer:

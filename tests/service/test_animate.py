@@ -20,6 +20,7 @@ from command import ENVIRONMENT, LAMBERT, lambert, must
 from exr_file import decode_exr
 from png_file import decode_png
 from yard import MATERIALS, YARD
+from patience import PATIENCE
 
 # Joins the frames that its options name, and keeps its options beside itself. A video called refused.mp4 fails.
 FFMPEG = """#!{python}
@@ -89,7 +90,7 @@ class Animate(unittest.TestCase):
         self.assertTrue(one == other)
 
     def run_ffmpeg(self, *arguments):
-        return subprocess.run([LAMBERT, "render", *map(str, arguments)], capture_output=True, text=True, timeout=300,
+        return subprocess.run([LAMBERT, "render", *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE,
                               check=False, **self.tools)
 
     def test_one_frame_is_the_picture(self):
@@ -255,11 +256,11 @@ class Animate(unittest.TestCase):
         frames = self.save(np.linspace(1, 2, 500)[:, None] * self.emission("lamp", 3)[0])
         with subprocess.Popen([LAMBERT, "render", self.box, "--animate", frames, "--size", "600x600", "--smooth", "-o",
                                self.at / "f.png"], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT) as process:
-            until = time.monotonic() + 120
+            until = time.monotonic() + PATIENCE
             while not (self.at / "f-0003.png").exists() and time.monotonic() < until:
                 time.sleep(.02)
             process.send_signal(signal.SIGINT)
-            _, errors = process.communicate(timeout=300)
+            _, errors = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 1, errors)
         found = sorted(set(os.listdir(self.at)) - {"frames.npy"})
         self.assertIn(f"cancelled; {len(found)} of 500 frames were written", errors)
@@ -284,7 +285,7 @@ class Animate(unittest.TestCase):
         """A name that looks like an option or a protocol is a file."""
         frames = self.save(self.emission("lamp", 1)[None])
         done = subprocess.run([LAMBERT, "render", self.box, "--animate", frames, "--size", "9x9", "-o", "http:a.mp4"],
-                              capture_output=True, text=True, timeout=300, check=False, cwd=self.at, **self.tools)
+                              capture_output=True, text=True, timeout=PATIENCE, check=False, cwd=self.at, **self.tools)
         self.assertEqual(done.returncode, 0, done.stderr)
         options = (self.folder / "tools" / "options").read_text().split("\n")
         self.assertEqual(options[options.index("-i") + 1], "./http:a-%04d.png")
@@ -298,7 +299,7 @@ class Animate(unittest.TestCase):
                                          ("refused.mp4", "Unknown encoder 'none'", self.tools["env"])):
             (self.at / name).write_text("older")
             done = subprocess.run([LAMBERT, "render", self.box, "--animate", frames, "--size", "9x9", "-o", self.at / name],
-                                  capture_output=True, text=True, timeout=300, check=False, env=environment)
+                                  capture_output=True, text=True, timeout=PATIENCE, check=False, env=environment)
             self.assertEqual(done.returncode, 1, done.stderr)
             said = [line for line in done.stderr.splitlines() if line.startswith("lambert render: ")]
             self.assertEqual(len(said), 1, done.stderr)
@@ -313,11 +314,11 @@ class Animate(unittest.TestCase):
         runs = self.folder / "tools" / "runs"
         with subprocess.Popen([LAMBERT, "render", self.box, "--animate", frames, "--size", "9x9", "-o", self.at / "slow.mp4"],
                               stderr=subprocess.PIPE, text=True, **self.tools) as process:
-            until = time.monotonic() + 120
+            until = time.monotonic() + PATIENCE
             while not runs.exists() and time.monotonic() < until:
                 time.sleep(.02)
             process.send_signal(signal.SIGTERM)
-            _, errors = process.communicate(timeout=60)
+            _, errors = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 1, errors)
         self.assertIn("cancelled; 1 of 1 frames were written", errors)
         self.assertEqual(sorted(os.listdir(self.at)), ["frames.npy", "slow-0001.png"])

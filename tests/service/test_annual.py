@@ -15,6 +15,7 @@ import numpy as np
 from command import ENVIRONMENT, LAMBERT, lambert, must
 from weather import a_year, sine_of_altitude, wea
 from yard import MATERIALS, YARD, Truth
+from patience import PATIENCE
 
 DAYS = 3
 SQUARE = "mtllib square.mtl\no square\nusemtl grey\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n"
@@ -199,7 +200,7 @@ class Annual(unittest.TestCase):
             work = subprocess.Popen([str(word) for word in command], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
             time.sleep(wait)
             work.send_signal(signal.SIGINT)
-            _, said = work.communicate(timeout=60)
+            _, said = work.communicate(timeout=PATIENCE)
             self.assertEqual(out.exists(), work.returncode == 0)
             out.unlink(missing_ok=True)
             if work.returncode > 0:

@@ -13,6 +13,7 @@ import unittest
 import xml.etree.ElementTree
 
 from command import ENVIRONMENT, LAMBERT, lambert
+from patience import PATIENCE
 
 COLUMNS = {
     "closed-forms": "case source method occluded truth estimate absolute_error relative_error stated_bar repeats "
@@ -472,12 +473,12 @@ class Refusals(unittest.TestCase):
         os.mkdir(scratch)
         with subprocess.Popen([LAMBERT, "bench", "formfactors", "-o", out], stdout=subprocess.DEVNULL,
                               stderr=subprocess.PIPE, text=True, env=dict(ENVIRONMENT, TMPDIR=scratch)) as running:
-            until = time.monotonic() + 60
+            until = time.monotonic() + PATIENCE
             while not os.path.isdir(out) and time.monotonic() < until:
                 time.sleep(.01)
             time.sleep(.3)
             running.send_signal(signal.SIGINT)
-            _, said = running.communicate(timeout=60)
+            _, said = running.communicate(timeout=PATIENCE)
         self.assertEqual(running.returncode, 1, said)
         self.assertIn("cancelled", said)
         self.assertEqual(os.listdir(scratch), [])

@@ -10,8 +10,7 @@ import unittest
 
 from bench_service_case import Case, working_in
 from command import LAMBERT
-
-PATIENCE = 120
+from patience import PATIENCE
 
 # 1000 answers and 10 failures in 2 s, half within .1 ms and 99 of 100 within .3 ms
 WRK = """#!/bin/sh

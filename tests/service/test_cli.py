@@ -13,6 +13,7 @@ import h5py
 
 from case import Case
 from command import LAMBERT, must
+from patience import PATIENCE
 
 
 class Usage(Case):
@@ -232,7 +233,7 @@ class Stopping(Case):
                     self.assertIsNone(process.poll(), "it ended before it could be stopped")
                     time.sleep(.05)
                 process.send_signal(number)
-                status = process.wait(timeout=300)
+                status = process.wait(timeout=PATIENCE)
             finally:
                 if process.poll() is None:
                     process.kill()

@@ -9,13 +9,14 @@ import tempfile
 import unittest
 
 from command import LAMBERT
+from patience import PATIENCE
 
 LAMBERTD = os.environ["LAMBERTD"]
 VERBS = ("generate", "precompute", "info", "classify", "sky", "solve", "verify", "render")
 
 
 def run(*arguments):
-    return subprocess.run(arguments, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(arguments, capture_output=True, text=True, timeout=PATIENCE, check=False)
 
 
 def text(*arguments):
@@ -117,7 +118,7 @@ class Installed(unittest.TestCase):
                 self.assertIn(f"\n.SH {section}\n", page)
             if shutil.which("groff"):
                 done = subprocess.run(["groff", "-man", "-ww", "-Tutf8", "-P-cbou"], input=page, capture_output=True, text=True,
-                                      timeout=60, check=True)
+                                      timeout=PATIENCE, check=True)
                 self.assertEqual(done.stderr, "")
                 found = set(re.findall(r"^ +(?:-\w, )?--([a-z-]+)", done.stdout, re.MULTILINE))
                 for command, shown in helps():

@@ -239,7 +239,7 @@ class Life(Case):
             try:
                 time.sleep(.5)
                 daemon.signal(signal.SIGTERM)
-                self.assertEqual(daemon.process.wait(30), 0)  # the storm goes on until then
+                self.assertEqual(daemon.process.wait(PATIENCE), 0)  # the storm goes on until then
             finally:
                 storm.kill()
                 storm.wait()

@@ -16,6 +16,7 @@ import tempfile
 import unittest
 
 import weather
+from patience import PATIENCE
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MANUAL = ROOT / "deploy" / "docs"
@@ -84,7 +85,7 @@ class Documents(unittest.TestCase):
             path = f"{tools}:{pathlib.Path(LAMBERT).parent}:/usr/bin:{os.environ['PATH']}"
             text = "\n".join(script).replace(PORT_IN_DOCUMENTS, f"127.0.0.1:{port}")
             done = subprocess.run(["bash", "-eu", "-o", "pipefail", "-c", text], cwd=work, capture_output=True, text=True,
-                                  timeout=800, check=False, env={**os.environ, "PATH": path})
+                                  timeout=2 * PATIENCE, check=False, env={**os.environ, "PATH": path})
             self.assertEqual(done.returncode, 0, f"{document.name}: {done.stderr[-2000:]}\n{done.stdout[-2000:]}")
         for i, expected in enumerate(answers):
             printed = done.stdout.split(f"=== answer {i}\n")[0].strip().splitlines()

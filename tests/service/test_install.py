@@ -11,12 +11,14 @@ import unittest
 import h5py
 import numpy as np
 
+from patience import PATIENCE
+
 BUILD = pathlib.Path(os.environ["LAMBERT"]).parent
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "deploy" / "examples"
 
 
 def run(*command, **more):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300, check=False, **more)
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=PATIENCE, check=False, **more)
     assert done.returncode == 0, (command, done.stdout, done.stderr)
     return done.stdout
 

@@ -12,6 +12,7 @@ from scipy.optimize import nnls
 
 from command import EXAMPLES, ENVIRONMENT, must
 from daemon import Daemon
+from patience import PATIENCE
 
 ASKED, WEIGHT = 20, 1e-3
 
@@ -39,7 +40,7 @@ class Inverse(unittest.TestCase):
 
     def run_example(self, *arguments):
         return subprocess.run(["/usr/bin/python3", EXAMPLES / "inverse_light.py", self.store, *map(str, arguments)],
-                              capture_output=True, timeout=600, env=ENVIRONMENT, check=False)
+                              capture_output=True, timeout=PATIENCE, env=ENVIRONMENT, check=False)
 
     def irradiances(self):
         """[targets][sources], mean of the channels, by one request for each source."""

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from daemon import Daemon
+from patience import PATIENCE
 
 LAMBERT = os.environ["LAMBERT"]
 FIXTURES = pathlib.Path(os.environ["FIXTURES"])
@@ -18,7 +19,7 @@ FIXTURES = pathlib.Path(os.environ["FIXTURES"])
 
 def precompute(scene, store, *options):
     done = subprocess.run([LAMBERT, "precompute", scene, "-o", store, "--probes", "4", "--quiet", *map(str, options)],
-                          capture_output=True, text=True, timeout=600)
+                          capture_output=True, text=True, timeout=PATIENCE)
     if done.returncode != 0:
         raise RuntimeError(done.stderr)
 

@@ -18,8 +18,8 @@ class Leaving(Case):
         return clients
 
     def check_end(self, daemon, clients, start, least):
-        """They are told, and the daemon ends with 0. On a machine of which others take all, it may end before the last
-        is told."""
+        """They are told, and the daemon ends with 0. In the time for last answers a slow machine may neither tell them all
+        nor end each pass that runs; it says so then."""
         answers = [answer for s in clients if (answer := read_all(s))]
         for answer in answers:
             self.check_problem(answer, b"shutting down")
@@ -28,8 +28,7 @@ class Leaving(Case):
         took = time.monotonic() - start
         self.assertGreaterEqual(took, least)
         print(f"{len(answers)} of {len(clients)} are told; ended {took - least:.3f} s after it might give up")
-        if len(answers) == len(clients):
-            self.assertEqual(daemon.errors(), "")
+        self.assertIn(daemon.errors(), ("", "lambertd: what still runs is given up\n"))
 
     def test_it_accepts_for_a_while(self):
         with self.daemon("--drain-delay", 2) as daemon:

@@ -16,6 +16,7 @@ import numpy as np
 from daemon import Daemon
 from guard_case import HEAD, metrics, read_all, until
 from make_store import Scene
+from patience import PATIENCE
 
 GROUPS = [f"g{k}" for k in range(20)]
 
@@ -52,7 +53,7 @@ class LongAnswers(unittest.TestCase):
             filler = threading.Thread(target=fill_the_queue)
             filler.start()
             try:
-                seen, deadline, connection = set(), time.monotonic() + 20, daemon.connect()
+                seen, deadline, connection = set(), time.monotonic() + PATIENCE, daemon.connect()
                 while seen != {200, 503} and time.monotonic() < deadline and not failures:
                     seen.add(daemon.radiosity("big", self.figures(400), connection=connection).status)
                     if 503 not in seen and len(seen) > 0:

@@ -16,6 +16,7 @@ import numpy
 from command import LAMBERT, example, lambert, must
 from exr_file import decode_exr
 from png_file import decode_png
+from patience import PATIENCE
 
 BACKGROUND = 38
 GLOW = [word for group in ("floor", "ceiling", "wall-x0", "wall-x1", "wall-y0", "wall-y1", "block-1", "block-2",
@@ -322,7 +323,7 @@ class Render(unittest.TestCase):
                                os.path.join(folder, "a.png")], stderr=subprocess.PIPE, text=True) as process:
             time.sleep(1)  # into the drawing, which takes tens of seconds; earlier is as good
             process.send_signal(signal.SIGINT)
-            _, errors = process.communicate(timeout=300)
+            _, errors = process.communicate(timeout=PATIENCE)
         self.assertIn(process.returncode, (1, -signal.SIGINT), errors)
         self.assertEqual(os.listdir(folder), [])
 

@@ -14,6 +14,7 @@ import unittest
 import h5py
 
 from command import ENVIRONMENT, LAMBERT, must
+from patience import PATIENCE
 
 SEED = 20260301
 
@@ -60,7 +61,7 @@ class Scratch(unittest.TestCase):
                     time.sleep(.002)
                 time.sleep(pause)
                 process.send_signal(number)
-                status = process.wait(timeout=300)
+                status = process.wait(timeout=PATIENCE)
             finally:
                 if process.poll() is None:
                     process.kill()
@@ -111,7 +112,7 @@ class Scratch(unittest.TestCase):
     def test_a_full_disk(self):
         def small():
             resource.setrlimit(resource.RLIMIT_FSIZE, (40000, 40000))
-        done = subprocess.run(self.command, capture_output=True, text=True, timeout=600, check=False, env=ENVIRONMENT,
+        done = subprocess.run(self.command, capture_output=True, text=True, timeout=PATIENCE, check=False, env=ENVIRONMENT,
                               preexec_fn=small)
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertRegex(done.stderr.splitlines()[-1], r"form-factors\.rows: .*; \d+ of \d+ blocks stay there")
@@ -124,7 +125,7 @@ class Scratch(unittest.TestCase):
         self.stop_after(signal.SIGKILL, 1, 0)
         before = self.size()
         for options, words in ((["--rays", "1024"], "other options"), (["--max-edge", ".06"], "another scene")):
-            done = subprocess.run([*self.command, *options], capture_output=True, text=True, timeout=600, check=False,
+            done = subprocess.run([*self.command, *options], capture_output=True, text=True, timeout=PATIENCE, check=False,
                                   env=ENVIRONMENT)
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertIn(words, done.stderr.splitlines()[-1])
@@ -139,7 +140,7 @@ class Scratch(unittest.TestCase):
                     self.assertIsNone(first.poll())
                     time.sleep(.002)
                 second = subprocess.run([*self.command, "-o", self.store + "2"], capture_output=True, text=True,
-                                        timeout=600, check=False, env=ENVIRONMENT)
+                                        timeout=PATIENCE, check=False, env=ENVIRONMENT)
             finally:
                 first.kill()
                 first.wait()
@@ -218,7 +219,7 @@ class Large(unittest.TestCase):
             less = ["--memory", f"{int(needs[1]) * 3 // 4}M"]
             for source, out, more in (scene, narrow, traced), (wide, again, options):
                 command = ["precompute", source, "-o", out, *more, *less]
-                refused = subprocess.run([LAMBERT, *command], capture_output=True, text=True, timeout=600, check=False,
+                refused = subprocess.run([LAMBERT, *command], capture_output=True, text=True, timeout=PATIENCE, check=False,
                                          env=ENVIRONMENT)
                 self.assertEqual(refused.returncode, 1)
                 self.assertIn("fits: --scratch DIR", refused.stderr.splitlines()[-1])

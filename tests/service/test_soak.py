@@ -6,12 +6,14 @@ import subprocess
 import sys
 import unittest
 
+from patience import PATIENCE
+
 SOAK = pathlib.Path(__file__).resolve().parents[1] / "soak"
 
 
 class Soak(unittest.TestCase):
     def run_soak(self, name, *arguments):
-        done = subprocess.run([sys.executable, SOAK / name, *map(str, arguments)], capture_output=True, text=True, timeout=600,
+        done = subprocess.run([sys.executable, SOAK / name, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE,
                               check=False, env=dict(os.environ, OMP_NUM_THREADS="2"))
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         return done.stdout

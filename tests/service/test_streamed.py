@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from command import ENVIRONMENT, LAMBERT, REFERENCE, lambert, must
+from patience import PATIENCE
 
 SAID = r"(?m)^rays, wavelets +[\d.]+ s$"
 HELD = r"(?m)^form factors +[\d.]+ s$"
@@ -127,7 +128,7 @@ class Streamed(unittest.TestCase):
             said += line
         time.sleep(.3)
         run.send_signal(signal.SIGINT)
-        said += run.communicate(timeout=120)[1]
+        said += run.communicate(timeout=PATIENCE)[1]
         self.assertEqual(run.returncode, 1, said)
         self.assertIn("cancelled; nothing was written", said)
         self.assertFalse(path.exists())

@@ -14,9 +14,7 @@ import unittest
 import urllib.parse
 
 from command import ENVIRONMENT, LAMBERT, lambert, must
-
-# Nothing here is a measure of speed: so long only a program that hangs takes.
-PATIENCE = 120
+from patience import PATIENCE
 
 
 def wait_until(condition):
