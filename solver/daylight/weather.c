@@ -1,4 +1,4 @@
-#include "solver/daylight/weather.h"
+#include "solver/daylight/weather_times.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -84,14 +84,15 @@ static lam_status reader_need(reader *r, const char *what, lam_error *error) {
 }
 
 /* Allocates as many hours as there are lines left. */
-static lam_status allocate_hours(reader *r, weather *w, lam_error *error) {
+static lam_status allocate_hours(reader *r, weather *w, weather_row **rows, lam_error *error) {
     size_t lines = 1;
     const long here = ftell(r->stream);
     for (int c; (c = getc(r->stream)) != EOF;) lines += c == '\n';
     if (here < 0 || ferror(r->stream) || fseek(r->stream, here, SEEK_SET) != 0)
         return status_fail(error, LAM_ERR_IO, "%s: cannot be read: %s", r->path, strerror(errno));
     w->hours = memory_allocate(lines, sizeof *w->hours, r->path, error);
-    return w->hours == NULL ? LAM_ERR_MEMORY : LAM_OK;
+    *rows = memory_allocate(lines, sizeof **rows, r->path, error);
+    return w->hours == NULL || *rows == NULL ? LAM_ERR_MEMORY : LAM_OK;
 }
 
 /* Reads a field as a finite number from low to high; blanks around it are ignored. */
@@ -142,6 +143,8 @@ done:
     return status;
 }
 
+static const int days[12] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+
 static bool is_leap(int year) {
     return (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
 }
@@ -149,7 +152,6 @@ static bool is_leap(int year) {
 static lam_status read_date(const reader *r, const char *month, const char *day, weather_hour *h,
                             lam_error *error) {
     lam_status status = LAM_OK;
-    static const int days[12] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
     TRY(read_whole(r, "month", month, 1, 12, &h->month, error));
     const int most = days[h->month - 1] + (h->month == 2 && is_leap(h->year));
     TRY(read_whole(r, "day", day, 1, most, &h->day, error));
@@ -169,12 +171,13 @@ static size_t cut(char *text, char mark, const char **fields, size_t most) {
 }
 
 /* The columns of an EPW that are read, from 0. */
-enum { YEAR, MONTH, DAY, HOUR, DEW_POINT = 7, DIRECT = 14, DIFFUSE = 15, ROW_FIELDS };
+enum { YEAR, MONTH, DAY, HOUR, MINUTE, DEW_POINT = 7, DIRECT = 14, DIFFUSE = 15, ROW_FIELDS };
 
-static lam_status read_epw_row(reader *r, weather_hour *h, lam_error *error) {
+/* The hour is its beginning. */
+static lam_status read_epw_row(reader *r, weather_hour *h, weather_row *row, lam_error *error) {
     lam_status status = LAM_OK;
     const char *fields[ROW_FIELDS];
-    int hour = 0;
+    int hour = 0, minute = 0;
     const size_t n = cut(r->line, ',', fields, ROW_FIELDS);
     if (n < ROW_FIELDS)
         FAIL(error, LAM_ERR_FORMAT, "%s: line %zu has %zu fields between commas, needs at least %d", r->path,
@@ -182,7 +185,10 @@ static lam_status read_epw_row(reader *r, weather_hour *h, lam_error *error) {
     TRY(read_whole(r, "year (field 1)", fields[YEAR], 1900, 2100, &h->year, error));
     TRY(read_date(r, fields[MONTH], fields[DAY], h, error));
     TRY(read_whole(r, "hour (field 4)", fields[HOUR], 1, 24, &hour, error));
-    h->hour = hour - .5;
+    h->hour = hour - 1;
+    /* It matters only where an hour has several rows. */
+    const bool sound = read_whole(r, "minute (field 5)", fields[MINUTE], 0, 60, &minute, NULL) == LAM_OK;
+    row->minute = sound ? minute : NAN;
     TRY(read_number(r, "dew point (field 8)", fields[DEW_POINT], -100, 100, &h->dew_point, error));
     if (h->dew_point >= MISSING_DEW_POINT) h->dew_point = NAN;
     TRY(read_radiation(r, "direct normal radiation (field 15)", fields[DIRECT], &h->direct, error));
@@ -191,7 +197,55 @@ done:
     return status;
 }
 
-static lam_status read_epw_header(reader *r, weather *w, lam_error *error) {
+/* Reads a date of the header: month/day, month/day/year, or the number of a day of 365. */
+static lam_status read_stated_date(const reader *r, size_t field, const char *text, weather_date *out,
+                                   lam_error *error) {
+    lam_status status = LAM_OK;
+    weather_date d = {.year = 0};
+    int end = 0, number = 0;
+    if (sscanf(text, " %4d / %2d / %4d %n", &d.month, &d.day, &d.year, &end) != 3 || text[end] != '\0') {
+        d.year = end = 0;
+        if (sscanf(text, " %2d / %2d %n", &d.month, &d.day, &end) != 2 || text[end] != '\0') end = 0;
+    }
+    if (end == 0 && sscanf(text, " %3d %n", &number, &end) == 1 && text[end] == '\0' && number >= 1 &&
+        number <= 366) {
+        d = (weather_date){.month = 1, .day = number < 366 ? number : 365};
+        for (; d.day > days[d.month - 1]; d.month++) d.day -= days[d.month - 1];
+    }
+    if (d.month < 1 || d.month > 12 || d.day < 1 || d.day > days[d.month - 1] + (d.month == 2))
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: line %zu: date of a data period (field %zu) is \"%.40s\", must be "
+             "MONTH/DAY",
+             r->path, r->number, field + 1, text);
+    /* A year of two digits says nothing. */
+    if (d.year < 1900) d.year = 0;
+    *out = d;
+done:
+    return status;
+}
+
+/* Reads the line DATA PERIODS: number of periods, records an hour, and of each period name, day of the week,
+ * first and last day. */
+static lam_status read_data_periods(const reader *r, size_t n, const char *const *fields, weather_stated *out,
+                                    lam_error *error) {
+    lam_status status = LAM_OK;
+    int periods = 0, steps = 0;
+    weather_stated s = {.line = r->number};
+    TRY(read_whole(r, "data periods (field 2)", fields[1], 1, WEATHER_PERIODS, &periods, error));
+    TRY(read_whole(r, "records an hour (field 3)", fields[2], 1, 60, &steps, error));
+    for (size_t at = 5; s.n < (size_t)periods && at + 1 < n; at += 4) {
+        if (fields[at][strspn(fields[at], " \t")] == '\0') break;
+        TRY(read_stated_date(r, at, fields[at], &s.from[s.n], error));
+        TRY(read_stated_date(r, at + 1, fields[at + 1], &s.to[s.n], error));
+        s.n++;
+    }
+    s.per_hour = (size_t)steps;
+    *out = s;
+done:
+    return status;
+}
+
+static lam_status read_epw_header(reader *r, weather *w, weather_stated *stated, lam_error *error) {
     lam_status status = LAM_OK;
     static const char *const names[8] = {"LOCATION",
                                          "DESIGN CONDITIONS",
@@ -201,13 +255,13 @@ static lam_status read_epw_header(reader *r, weather *w, lam_error *error) {
                                          "COMMENTS 1",
                                          "COMMENTS 2",
                                          "DATA PERIODS"};
-    const char *fields[10];
-    int per_hour = 0;
+    enum { FIELDS = 3 + 4 * WEATHER_PERIODS };
+    const char *fields[FIELDS];
     for (int k = 0; k < 8; k++) {
         TRY(reader_need(r, names[k], error));
         /* The file may begin with a byte order mark. */
         char *line = r->line + (k == 0 && strncmp(r->line, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0);
-        const size_t n = cut(line, ',', fields, 10);
+        const size_t n = cut(line, ',', fields, FIELDS);
         if (n == 0 || strcasecmp(fields[0], names[k]) != 0)
             FAIL(error, LAM_ERR_FORMAT, "%s: line %zu begins with \"%.40s\", an EPW has %s there", r->path,
                  r->number, line, names[k]);
@@ -216,10 +270,7 @@ static lam_status read_epw_header(reader *r, weather *w, lam_error *error) {
             FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: %s has %zu fields, needs %d", r->path, r->number,
                  names[k], n, k == 0 ? 10 : 3);
         if (k == 7) {
-            TRY(read_whole(r, "records an hour (field 3)", fields[2], 1, INT_MAX, &per_hour, error));
-            if (per_hour != 1)
-                FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: %d records an hour, must be 1; take hourly means",
-                     r->path, r->number, per_hour);
+            TRY(read_data_periods(r, n, fields, stated, error));
             continue;
         }
         snprintf(w->place, sizeof w->place, "%s", fields[1]);
@@ -228,6 +279,7 @@ static lam_status read_epw_header(reader *r, weather *w, lam_error *error) {
         TRY(read_number(r, "time zone (field 9)", fields[8], -14, 14, &w->time_zone, error));
         TRY(read_number(r, "elevation (field 10)", fields[9], -1000, 9999.9, &w->elevation, error));
     }
+    w->stated_steps = stated->per_hour;
 done:
     return status;
 }
@@ -299,24 +351,32 @@ lam_status weather_read(const char *path, weather *out, lam_error *error) {
     lam_status status = LAM_OK;
     reader r = {.path = path};
     weather w = {0};
+    weather_row *rows = NULL;
+    weather_stated stated = {0};
     bool more = true, leap = false;
     const bool epw = ends_in(path, ".epw");
     TRY(reader_open(&r, error));
-    TRY(epw ? read_epw_header(&r, &w, error) : read_wea_header(&r, &w, error));
-    TRY(allocate_hours(&r, &w, error));
+    TRY(epw ? read_epw_header(&r, &w, &stated, error) : read_wea_header(&r, &w, error));
+    TRY(allocate_hours(&r, &w, &rows, error));
     for (;;) {
         TRY(reader_next(&r, &more, error));
         if (!more) break;
         if (r.line[0] == '\0') continue;
-        TRY(epw ? read_epw_row(&r, &w.hours[w.n], error) : read_wea_row(&r, &leap, &w.hours[w.n], error));
+        rows[w.n].line = r.number;
+        TRY(epw ? read_epw_row(&r, &w.hours[w.n], &rows[w.n], error)
+                : read_wea_row(&r, &leap, &w.hours[w.n], error));
         w.n++;
     }
     if (w.n == 0) FAIL(error, LAM_ERR_FORMAT, "%s: no hours after its header of %d lines", path, epw ? 8 : 6);
     for (size_t i = 0; i < w.n && !epw; i++) w.hours[i].year = leap ? 2000 : 2001;
+    const weather_times times = {.path = path, .rows = rows, .stated = epw ? &stated : NULL, .w = &w};
+    TRY(weather_find_step(&times, error));
+    TRY(weather_check_gaps(&times, error));
     *out = w;
     w = (weather){0};
 done:
     weather_free(&w);
+    free(rows);
     reader_close(&r);
     return status;
 }

@@ -1,4 +1,4 @@
-/* Reads the hourly irradiances of a year from a weather file: EPW of EnergyPlus, or WEA of Radiance's
+/* Reads the irradiances of a year, row by row, from a weather file: EPW of EnergyPlus, or WEA of Radiance's
  * gendaymtx. Knows neither the position of the sun nor tiles. */
 #ifndef LAMBERT_DAYLIGHT_WEATHER_H
 #define LAMBERT_DAYLIGHT_WEATHER_H
@@ -21,6 +21,11 @@ typedef struct weather {
     double time_zone;           /* hours that standard time is ahead of UTC */
     double elevation;           /* m */
     bool direct_is_horizontal;
+    double step;      /* h, that every row stands for */
+    bool apart;       /* no two rows are neighbours: each stands for an hour because nothing says otherwise */
+    size_t stretches; /* of rows without a gap */
+    size_t stated_steps; /* records an hour in the header of an EPW; 0: none is stated */
+    size_t outside;      /* rows outside of the periods in the header of an EPW */
     size_t n;
     weather_hour *hours; /* [n], freed by weather_free */
 } weather;
@@ -30,12 +35,14 @@ void weather_free(weather *w);
 /* True for a name that ends in .epw or .wea. */
 bool weather_is_named(const char *path);
 
-/* Reads a file in the format of its extension. An EPW row of hour h covers h-1 to h and has its own year. WEA
- * rows get the year 2001, or 2000 where the file has a 29 February, and their hours are the middle of the
- * interval. Errors: LAM_ERR_IO, LAM_ERR_MEMORY, LAM_ERR_FORMAT naming the file, the line, the field, its
- * value and the allowed range. A radiation that an EPW marks as missing (9999) is an error. Source of the
- * formats: EnergyPlus, Auxiliary Programs, "EnergyPlus Weather File (EPW) Data Dictionary"; Radiance,
- * gendaymtx(1). */
+/* Reads a file in the format of its extension. The step between rows comes from their times: an hour, or an
+ * hour over a divisor of 60. An EPW row covers its part of the hour h-1 to h and has its own year. WEA rows
+ * get the year 2001, or 2000 where the file has a 29 February, and their hours are the middle of the
+ * interval; rows of a WEA that fill whole days may also be further apart. Errors: LAM_ERR_IO, LAM_ERR_MEMORY,
+ * LAM_ERR_FORMAT naming the file, the line, the field, its value and the allowed range, or the first row that
+ * is missing, repeated or out of order (weather_times.h). A radiation that an EPW marks as missing (9999) is
+ * an error. Source of the formats: EnergyPlus, Auxiliary Programs, "EnergyPlus Weather File (EPW) Data
+ * Dictionary"; Radiance, gendaymtx(1). */
 lam_status weather_read(const char *path, weather *out, lam_error *error);
 
 #endif

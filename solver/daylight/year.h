@@ -1,4 +1,4 @@
-/* The radiance of every tile of a sky for every hour of weather, by the sky of Perez et al. 1993. */
+/* The radiance of every tile of a sky for every row of weather, by the sky of Perez et al. 1993. */
 #ifndef LAMBERT_DAYLIGHT_YEAR_H
 #define LAMBERT_DAYLIGHT_YEAR_H
 
@@ -22,10 +22,10 @@ size_t year_sun_tile(const sky_tiling *s, const double sun[3]);
  * a high one. The error matters for walls under a low sun and coarse tiles. */
 void year_add_sun(const sky_tiling *s, const double sun[3], double horizontal, double *L);
 
-/* Sums over a year, on a horizontal plane, Wh/m2 where a row is an hour. */
+/* Sums over the rows of a year, on a horizontal plane, W/m2: times the step of the rows they are Wh/m2. */
 typedef struct year_summary {
     double direct, diffuse;
-    double light;    /* direct and diffuse in the unit of the result: lm h/m2 for photometric skies */
+    double light;    /* direct and diffuse in the unit of the result: lux for photometric skies */
     size_t lit;      /* rows with light */
     size_t sunny;    /* rows with direct light from above the horizon */
     size_t sunless;  /* rows whose direct light is omitted: the sun is below the horizon at their middle */

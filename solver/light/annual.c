@@ -10,6 +10,9 @@
 
 enum { AT_ONCE = 64 }; /* vectors in one go */
 
+/* Hours of the day are not exact: a middle that is this close below a bound is on it. */
+#define EARLIER 1e-3
+
 lam_status annual_add(annual_options *w, const char *item, lam_error *error) {
     lam_status status = LAM_OK;
     annual_figure f = {.high = INFINITY};
@@ -69,15 +72,15 @@ static bool all_count(const annual_options *w) {
 
 static bool counts(const annual_options *w, size_t vector) {
     if (all_count(w)) return true;
-    const double middle = fmod(((double)vector + .5) * w->hours, 24);
-    return middle > w->from && middle < w->to;
+    const double middle = w->middle != NULL ? w->middle[vector] : fmod(((double)vector + .5) * w->hours, 24);
+    return middle >= w->from - EARLIER && middle < w->to - EARLIER;
 }
 
-/* Hours of the day need a batch that begins at midnight and holds whole days. */
+/* Hours of the day need a batch that begins at midnight and holds whole days, unless times are known. */
 static lam_status check_days(const annual_options *w, size_t n, lam_error *error) {
     lam_status status = LAM_OK;
     const double a_day = 24 / w->hours;
-    if (all_count(w)) goto done;
+    if (all_count(w) || w->middle != NULL) goto done;
     if (fabs(a_day - round(a_day)) > 1e-9 * a_day)
         FAIL(error, LAM_ERR_ARGUMENT, "--occupied: vectors of %g hours do not make days of 24", w->hours);
     if (n % (size_t)round(a_day) != 0)

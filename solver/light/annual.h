@@ -23,8 +23,9 @@ typedef struct annual_figure {
 typedef struct annual_options {
     size_t n_figures;
     annual_figure figures[ANNUAL_MOST];
-    double hours;    /* that a vector stands for */
-    double from, to; /* hours of the day: vectors count whose middle is between them; 0 and 24: all */
+    double hours;         /* that a vector stands for */
+    double from, to;      /* hours of the day: vectors count whose middle is from <= t < to; 0 and 24: all */
+    const double *middle; /* [vectors], hours of the day; NULL: vectors follow each other from midnight on */
 } annual_options;
 
 /* Adds the figure of an item: sum, autonomy=X or useful=LOW,HIGH. LAM_ERR_ARGUMENT names the item. */

@@ -3,9 +3,16 @@
 #include "solver/daylight/weather.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
+void weather_span_free(weather_span *s) {
+    free(s->middle);
+    *s = (weather_span){0};
+}
+
 void weather_skies_free(weather_skies *w) {
+    weather_span_free(&w->span);
     free(w->L);
     free(w->suns);
     *w = (weather_skies){0};
@@ -16,8 +23,19 @@ static void log_weather(terminal *t, const weather *w) {
     terminal_log(t, "%s: %.2f degrees %s, %.2f %s, UTC%+g", w->place[0] != '\0' ? w->place : "a place",
                  fabs(w->latitude), w->latitude < 0 ? "south" : "north", fabs(w->longitude),
                  w->longitude < 0 ? "west" : "east", w->time_zone);
-    terminal_log(t, "%zu hours, %d-%02d-%02d to %d-%02d-%02d", w->n, first->year, first->month, first->day,
-                 last->year, last->month, last->day);
+    char rows[64] = "", stretches[48] = "";
+    if (w->step != 1) snprintf(rows, sizeof rows, " in %zu rows of %.4g h", w->n, w->step);
+    if (w->stretches > 1) snprintf(stretches, sizeof stretches, " in %zu stretches", w->stretches);
+    terminal_log(t, "%.6g hours%s%s, %d-%02d-%02d to %d-%02d-%02d", (double)w->n * w->step, rows, stretches,
+                 first->year, first->month, first->day, last->year, last->month, last->day);
+    if (w->stated_steps > 0 && fabs((double)w->stated_steps * w->step - 1) > 1e-9)
+        terminal_warn(t, "DATA PERIODS states %zu record%s an hour, but rows are %.4g h apart, which counts",
+                      w->stated_steps, w->stated_steps == 1 ? "" : "s", w->step);
+    if (w->outside > 0)
+        terminal_warn(t, "%.6g hours are outside of the DATA PERIODS that the file states; they count too",
+                      (double)w->outside * w->step);
+    if (w->apart && w->n > 1)
+        terminal_warn(t, "no two rows are an hour apart or less: each stands for one hour");
     /* Clocks are set for political reasons, but not by more than this. */
     const double apart = remainder(w->time_zone * 15 - w->longitude, 360);
     if (fabs(apart) > 60)
@@ -27,18 +45,21 @@ static void log_weather(terminal *t, const weather *w) {
                       w->time_zone, fabs(apart), w->longitude);
 }
 
-static void log_year(terminal *t, const year_summary *sum, bool photometric) {
-    terminal_log(t, "%zu hours with light, %zu with sun", sum->lit, sum->sunny);
-    terminal_log(t, "on a horizontal plane: diffuse %.1f + direct %.1f = %.1f kWh/m2", sum->diffuse * 1e-3,
-                 sum->direct * 1e-3, (sum->diffuse + sum->direct) * 1e-3);
+/* Rows count by their duration, step hours each. */
+static void log_year(terminal *t, const year_summary *sum, double step, bool photometric) {
+    terminal_log(t, "%.6g hours with light, %.6g with sun", (double)sum->lit * step,
+                 (double)sum->sunny * step);
+    terminal_log(t, "on a horizontal plane: diffuse %.1f + direct %.1f = %.1f kWh/m2",
+                 sum->diffuse * step * 1e-3, sum->direct * step * 1e-3,
+                 (sum->diffuse + sum->direct) * step * 1e-3);
     if (photometric)
-        terminal_log(t, "in light: %.0f klx h, %.1f lm/W", sum->light * 1e-3,
+        terminal_log(t, "in light: %.0f klx h, %.1f lm/W", sum->light * step * 1e-3,
                      sum->light / (sum->diffuse + sum->direct));
     if (sum->sunless > 0)
         terminal_warn(t,
-                      "%zu hours have direct light (at most %g W/m2) though the sun is below the horizon in "
+                      "%.6g hours have direct light (at most %g W/m2) though the sun is below the horizon in "
                       "their middle; it is left out",
-                      sum->sunless, sum->left_out);
+                      (double)sum->sunless * step, sum->left_out);
 }
 
 lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *options,
@@ -55,16 +76,19 @@ lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const 
     made.n = w.n;
     made.L = memory_allocate(count, sizeof *made.L, "the skies", error);
     made.suns = memory_allocate(w.n, sizeof *made.suns, "the suns", error);
-    if (made.L == NULL || made.suns == NULL) TRY(LAM_ERR_MEMORY);
+    made.span = (weather_span){.n = w.n, .step = w.step, .apart = w.apart};
+    made.span.middle = memory_allocate(w.n, sizeof *made.span.middle, "the times of weather", error);
+    if (made.L == NULL || made.suns == NULL || made.span.middle == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < w.n; i++) made.span.middle[i] = w.hours[i].hour;
     TRY(year_skies(&w, tiling, options, &steps, made.L, made.suns, &sum, error));
     if (sum.lit == 0)
         FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: the sky is dark all year: of %zu hours none has diffuse light, nor direct light of a sun "
+             "%s: the sky is dark all year: of %.6g hours none has diffuse light, nor direct light of a sun "
              "above the horizon; see its latitude, longitude and time zone, and whether it holds radiation",
-             path, w.n);
+             path, (double)w.n * w.step);
     terminal_clear(t);
     log_weather(t, &w);
-    log_year(t, &sum, options->photometric);
+    log_year(t, &sum, w.step, options->photometric);
     *out = made;
     made = (weather_skies){0};
 done:
@@ -88,7 +112,7 @@ done:
 
 lam_status weather_light_add(const weather_options *options, store *s, const mesh *m, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
-                             emission *e, sunlight *sun, lam_error *error) {
+                             emission *e, sunlight *sun, weather_span *span, lam_error *error) {
     lam_status status = LAM_OK;
     sky_tiling tiling = {0};
     weather_skies made = {0};
@@ -106,6 +130,8 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
     TRY(emission_add_skies(e, options->path, m, tiling.n_tiles, made.n, made.L, error));
     if (e->n_vectors != made.n)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", options->path, e->n_vectors);
+    *span = made.span;
+    made.span = (weather_span){0};
     if (!options->exact) goto done;
     year_sun *suns = made.suns;
     made.suns = NULL;

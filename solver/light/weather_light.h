@@ -7,15 +7,26 @@
 #include "solver/light/emission.h"
 #include "solver/light/sunlight.h"
 
+/* The times of the rows of weather. */
+typedef struct weather_span {
+    size_t n;
+    double step;    /* h, that each row stands for */
+    bool apart;     /* no two rows are neighbours, so that an hour is but assumed */
+    double *middle; /* [n], of each row: hour of the day, standard time */
+} weather_span;
+
+void weather_span_free(weather_span *s);
+
 typedef struct weather_skies {
     size_t n;
     float *L;       /* [n][n_tiles] */
     year_sun *suns; /* [n] */
+    weather_span span;
 } weather_skies;
 
 void weather_skies_free(weather_skies *w);
 
-/* Reads a file, makes the skies of its hours and logs a summary. Errors: those of the file,
+/* Reads a file, makes the skies of its rows and logs a summary. Errors: those of the file,
  * LAM_ERR_ARGUMENT where no hour has any light, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *options,
                               terminal *t, weather_skies *out, lam_error *error);
@@ -28,11 +39,11 @@ typedef struct weather_options {
     size_t sun_points; /* --sun-points */
 } weather_options;
 
-/* Puts e under the hours of a file, on the tiles of an open store. With an exact sun, *sun holds it for the
- * elements selected (NULL: all), and e points there: sunlight_free it after the last use of e.
- * Errors: also LAM_ERR_ARGUMENT for a store without a sky. */
+/* Puts e under the rows of a file, on the tiles of an open store. With an exact sun, *sun holds it for the
+ * elements selected (NULL: all), and e points there: sunlight_free it after the last use of e. *span, freed
+ * by weather_span_free, is of the rows. Errors: also LAM_ERR_ARGUMENT for a store without a sky. */
 lam_status weather_light_add(const weather_options *options, store *s, const mesh *m, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
-                             emission *e, sunlight *sun, lam_error *error);
+                             emission *e, sunlight *sun, weather_span *span, lam_error *error);
 
 #endif

@@ -40,8 +40,8 @@ static const option_row rows[] = {
     OPTION_ROW_OUTPUT(
         FIELD(output), "SKY.npy",
         .help =
-            "Where the skies go: float32 [hours][tiles], W/(m2 sr), the batch that `lambert solve --sky` "
-            "takes for a store of one channel. A store of three channels takes [hours][3][tiles], every row "
+            "Where the skies go: float32 [rows][tiles], W/(m2 sr), the batch that `lambert solve --sky` "
+            "takes for a store of one channel. A store of three channels takes [rows][3][tiles], every row "
             "three times; a matrix whose components differ is written so"),
     {.name = "tiles",
      .kind = OPTION_CUSTOM,
@@ -69,14 +69,17 @@ static const option_command verb = {
     .name = "lambert sky",
     .arguments = "WEATHER.epw|.wea|MATRIX.mtx -o SKY.npy",
     .summary = "Turn the weather of a year, or a sky matrix of Radiance, into the radiance of the tiles of a "
-               "sky, hour by hour.",
+               "sky, row by row.",
     .notes =
-        "The sky of an hour is as bright as the diffuse light in the file, and the one tile that holds the "
+        "The sky of a row is as bright as the diffuse light in the file, and the one tile that holds the "
         "sun has the direct light: a horizontal plane receives exactly what the file states. The sun stands "
-        "where it is in the middle of the hour; direct light of a sun that is below the horizon then is left "
-        "out. A .wea file is of the year 2001, or of 2000 if it has a 29 February.\n"
+        "where it is in the middle of what the row covers; direct light of a sun that is below the horizon "
+        "then is left out. Rows may be an hour apart or less: the step comes from their times, and is one "
+        "for "
+        "the whole file. Rows that are missing, repeated or out of order are refused. A .wea file is of the "
+        "year 2001, or of 2000 if it has a 29 February.\n"
         "A sky matrix of Radiance (gendaymtx, genskyvec) is taken as it is: ascii, float or double, with a "
-        "row for the ground and for each patch, and a column for each hour. The row of the ground is left "
+        "row for the ground and for each patch, and a column for each time. The row of the ground is left "
         "out: --ground-albedo of the store takes its place.",
     .least_arguments = 1,
     .most_arguments = 1,
@@ -96,6 +99,9 @@ static lam_status make_skies(const char *path, const fields *f, terminal *t, lam
     TRY(atomic_file_commit(&file, error));
     printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, made.n, tiling.n_tiles, tiling.name,
            f->photometric ? "cd/m2" : "W/(m2 sr)");
+    /* An array holds no times. */
+    if (made.span.step != 1)
+        terminal_log(t, "figures of a year of this array need --hours-per-vector %.10g", made.span.step);
 done:
     atomic_file_abort(&file);
     weather_skies_free(&made);

@@ -16,6 +16,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define A_LEAP_YEAR (24. * 366)
+
 typedef struct fields {
     light_options light;
     option_list reduce, annual;
@@ -104,16 +106,18 @@ static const option_row year_rows[] = {
      .argument = "FROM-TO",
      .otherwise = "all",
      .help = "Hours of the day in standard time that shares refer to, such as 8-18; the batch must be whole "
-             "days from midnight on"},
+             "days from midnight on, or rows of --weather, which have their times"},
     {.name = "hours-per-vector",
      .kind = OPTION_NUMBER,
      .offset = FIELD(hours),
      .argument = "H",
-     .otherwise = "1",
+     .otherwise = "1, or the step of the rows of --weather",
      .least = 0,
      .above = true,
      .most = 8784,
-     .help = "Duration of each vector of the batch"},
+     .help =
+         "Duration of each vector of the batch. With --weather it must be that of the rows, unless no two "
+         "rows are neighbours"},
     {0},
 };
 
@@ -199,9 +203,26 @@ static lam_status solve_year(const annual_options *annual, const emission *light
     terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light", codec_quantity_name(out->quantity),
                  sum.n, annual->hours, sum.lit);
     if (annual_has_shares(annual)) terminal_log(t, "shares are of %zu vectors", sum.counted);
+    if (annual->middle == NULL && (double)sum.n * annual->hours > A_LEAP_YEAR)
+        terminal_warn(t, "%zu vectors of %g h are %.4g days; --hours-per-vector says how long each lasts",
+                      sum.n, annual->hours, (double)sum.n * annual->hours / 24);
     if (sum.lit == 0) terminal_warn(t, "no vector has any light");
     out->n_vectors = annual->n_figures;
     out->batch = true;
+done:
+    return status;
+}
+
+/* Takes the times of weather for figures of a year. */
+static lam_status take_span(const weather_span *span, const char *path, double given, annual_options *year,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    if (given > 0 && !span->apart && fabs(given - span->step) > .01 * span->step)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--hours-per-vector %g: the rows of %s are %.4g h apart, which counts; leave the option out",
+             given, path, span->step);
+    if (given == 0 || !span->apart) year->hours = span->step;
+    year->middle = span->middle;
 done:
     return status;
 }
@@ -264,6 +285,8 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     error_scene about = {.n = 0};
     name_error *name_errors = NULL;
     sunlight sun = {0};
+    weather_span span = {0};
+    annual_options figures = *year;
     const char *names[ANNUAL_MOST];
     for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
     if (f->output != NULL) TRY(atomic_file_check(f->output, error));
@@ -291,7 +314,8 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                                        .exact = strcmp(f->sun, "exact") == 0,
                                        .sun_points = (size_t)f->sun_points};
         TRY(weather_light_add(&hours, s, &m, lit.op, lit.sky, n_selected, selected, t, &lit.light, &sun,
-                              error));
+                              &span, error));
+        TRY(take_span(&span, f->weather, f->hours, &figures, error));
     }
     if (year->n_figures > 0 && !lit.light.batch)
         FAIL(error, LAM_ERR_ARGUMENT,
@@ -313,7 +337,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     if (f->tolerance == 0) take_error(&stated, &lit.light, n_selected, selected, t, &out);
     if (year->n_figures > 0) {
         out.names = names;
-        TRY(solve_year(year, &lit.light, lit.op, lit.sky, n_selected, selected, t, &out, &values, error));
+        TRY(solve_year(&figures, &lit.light, lit.op, lit.sky, n_selected, selected, t, &out, &values, error));
     } else if (f->tolerance > 0) {
         TRY(emission_refine(&lit.light, path, lit.op, lit.sky, quantity, f->tolerance, terminal_check,
                             &refined, error));
@@ -344,6 +368,7 @@ done:
     refined_light_free(&refined);
     free(row_sums);
     sunlight_free(&sun);
+    weather_span_free(&span);
     light_close(&lit);
     mesh_free(&m);
     store_close(s);

@@ -13,7 +13,7 @@ import unittest
 import numpy as np
 
 from command import ENVIRONMENT, LAMBERT, lambert, must
-from weather import a_year, sine_of_altitude, wea
+from weather import a_year, epw, parts, sine_of_altitude, wea
 from yard import MATERIALS, YARD, Truth
 from patience import PATIENCE
 
@@ -207,6 +207,77 @@ class Annual(unittest.TestCase):
                 self.assertIn("cancelled; nothing was written", said)
                 return
         self.fail("was never stopped within the work")
+
+
+class Rows(unittest.TestCase):
+    """Weather in steps of any length, on a square under one tile of sky."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="lambert-annual-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        (cls.folder / "square.obj").write_text(SQUARE)
+        (cls.folder / "square.mtl").write_text("newmtl grey\nKd 0.5 0.5 0.5\n")
+        cls.store = cls.folder / "square.h5"
+        must("precompute", cls.folder / "square.obj", "-o", cls.store, "--sky", "grid:1x1", "--method", "exact", "--probes", 0,
+             "--rays", 1024)
+
+    def refused(self, status, wanted, *arguments):
+        done = lambert("solve", *arguments)
+        self.assertEqual((done.returncode, done.stdout), (status, ""), done.stderr)
+        self.assertIn(wanted, done.stderr.splitlines()[-1])
+
+    def test_rows_of_parts_of_an_hour(self):
+        """Weather counts by the duration of its rows, in sums and in shares of the hours of the day; a year of half hours is
+        the year of hours. Light is diffuse, which no position of the sun changes: single precision is all that differs."""
+        store, days = self.store, [(m, d, h, 0, diffuse) for m, d, h, _, diffuse in a_year()]
+        some = days[24 * 171:24 * 172]
+        figures = ["--annual", "sum", "--annual", "autonomy=75", "--annual", "useful=45,75", "--occupied", "8-18"]
+
+        def solve(name, text, *more):
+            (self.folder / name).write_text(text)
+            done = must("solve", store, "--weather", self.folder / name, *figures, *more, "-o", self.folder / "year.npy")
+            return np.load(self.folder / "year.npy").ravel(), done.stderr
+
+        whole, _ = solve("day.wea", wea(some))
+        self.assertTrue(0 < whole[1] < 1 and 0 < whole[2] < 1)
+        for n in 2, 4, 12:
+            for name, text in ("parts.wea", wea(parts(some, n))), ("parts.epw", epw(parts(some, n), step=1 / n, periods="6/21,6/21")):
+                got, said = solve(name, text)
+                np.testing.assert_allclose(got, whole, rtol=1e-6)
+                self.assertIn(f"24 hours in {24 * n} rows of {1 / n:.4g} h", said)
+                self.assertIn(f"a year of irradiance: {24 * n} vectors of {1 / n:g} h", said)
+                self.assertIn(f"shares are of {10 * n} vectors\n", said)
+        # The step may be said once more, and no other.
+        got, _ = solve("parts.wea", wea(parts(some, 2)), "--hours-per-vector", .5)
+        np.testing.assert_allclose(got, whole, rtol=1e-6)
+        self.refused(1, "--hours-per-vector 1: the rows of", store, "--weather", self.folder / "parts.wea", *figures,
+                     "--hours-per-vector", 1)
+        # Rows have their hours of the day: those of 8 to 18 alone have the same shares, whether days are whole or not.
+        got, said = solve("window.wea", wea([row for row in parts(some, 2) if 8 < row[2] < 18]))
+        np.testing.assert_allclose(got[1:], whole[1:], rtol=1e-6)
+        self.assertIn("10 hours in 20 rows of 0.5 h", said)
+        # Noons alone are an hour each, or what is said.
+        noons = [row for row in days if row[2] == 12.5]
+        got, said = solve("noons.wea", wea(noons))
+        np.testing.assert_allclose(got[0], sum(row[4] for row in noons) / 1000, rtol=.05)
+        self.assertIn("warning: no two rows are an hour apart or less: each stands for one hour", said)
+        twice, _ = solve("noons.wea", wea(noons), "--hours-per-vector", 2)
+        np.testing.assert_allclose(twice[0], 2 * got[0], rtol=1e-6)
+        year, _ = solve("year.wea", wea(days))
+        halves, said = solve("halves.wea", wea(parts(days, 2)))
+        # Single precision: each hour is rounded for itself.
+        np.testing.assert_allclose(halves, year, rtol=1e-6)
+        self.assertIn("8760 hours in 17520 rows of 0.5 h, 2001-01-01 to 2001-12-31\n", said)
+
+    def test_an_array_that_is_longer_than_a_year(self):
+        np.save(self.folder / "long.npy", np.ones((17520, 1), "<f4"))
+        command = "solve", self.store, "--sky", self.folder / "long.npy", "--annual", "sum"
+        done = must(*command)
+        self.assertIn("warning: 17520 vectors of 1 h are 730 days; --hours-per-vector says", done.stderr)
+        done = must(*command, "--hours-per-vector", .5)
+        self.assertNotIn("warning", done.stderr)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from command import lambert, must
-from weather import LONGITUDE, a_year, epw, sine_of_altitude, wea
+from weather import LONGITUDE, a_year, epw, parts, sine_of_altitude, wea
 
 
 class SkyWeather(unittest.TestCase):
@@ -120,6 +120,41 @@ class SkyWeather(unittest.TestCase):
         must("solve", self.store, "--sky", self.wea, "--quantity", "irradiance", "-o", direct)
         np.testing.assert_array_equal(np.load(direct), light)
 
+    def test_rows_of_parts_of_an_hour(self):
+        """Each row has its own sun, and counts by its duration: sums are the integral of the file's light over its times."""
+        day = [h for h in self.hours if h[:2] == (6, 21)]
+        for n in 2, 4, 12:
+            rows = parts(day, n)
+            wanted = np.array([diffuse + direct * max(0, sine_of_altitude(2001, *when)) for *when, direct, diffuse in rows])
+            from_wea, done = self.sky(self.write("parts.wea", wea(rows)))
+            # Three decimals of an hour are half a thousandth of it, in which the sun turns by .0075 degrees.
+            atol = 950 * math.radians(.02 + .0075)
+            np.testing.assert_allclose(from_wea @ self.cosines(), wanted, rtol=1e-6, atol=atol)
+            self.assertIn(f"24 hours in {24 * n} rows of {1 / n:.4g} h, 2001-06-21 to 2001-06-21\n", done.stderr)
+            self.assertIn(f"{(wanted > 0).sum() / n:.6g} hours with light", done.stderr)
+            self.assertIn(f"need --hours-per-vector {1 / n:.10g}\n", done.stderr)
+            said = re.search(r"diffuse ([\d.]+) \+ direct ([\d.]+) = ([\d.]+) kWh/m2", done.stderr)
+            self.assertAlmostEqual(float(said[1]), sum(h[4] for h in day) / 1000, delta=.06)
+            self.assertAlmostEqual(float(said[3]), wanted.sum() / n / 1000, delta=.06)
+            for stated in 1, n:
+                from_epw, done = self.sky(self.write("parts.epw", epw(rows, step=1 / n, periods="6/21,6/21", stated=stated)))
+                np.testing.assert_allclose(from_epw @ self.cosines(), wanted, rtol=1e-6, atol=atol)
+                self.assertEqual("warning: DATA PERIODS states 1 record an hour, but rows are" in done.stderr, stated == 1)
+
+    def test_rows_that_are_missing_or_repeated(self):
+        out, hours = self.folder / "none.npy", self.hours[24 * 170:24 * 173]  # 20 to 22 June
+        for name, text, wanted in (
+                ("day.epw", epw(hours[:24] + hours[48:], periods="6/20,6/22"),
+                 "line 33 (2001-06-22 00:00): before it 24 hours are missing"),
+                ("end.epw", epw(hours[:48], periods="6/20,6/22"), "line 8 states 6/20 to 6/22, but rows are from line 9"),
+                ("twice.epw", epw(hours[:24] + hours, periods="6/20,6/22"),
+                 "line 33 (2001-06-20 00:00) has the time of line 9: 24 hours are there twice"),
+                ("day.wea", wea(hours[:24] + hours[48:]), "line 31 (2001-06-22 00:30): before it 24 hours are missing"),
+                ("order.wea", wea(hours[24:48] + hours[:24] + hours[48:]),
+                 "line 31 (2001-06-20 00:30) is before the row above it: 24 hours are out of order"),
+                ("mixed.wea", wea(hours[:24] + parts(hours[24:48], 2)), "but most rows are 0.5 h apart")):
+            self.refused(1, wanted, self.write(name, text), "-o", out)
+
     def test_photometric(self):
         skies, _ = self.sky(self.wea)
         light, done = self.sky(self.wea, "--photometric")
@@ -149,7 +184,7 @@ class SkyWeather(unittest.TestCase):
         path = self.write("night.wea", wea(night, latitude=80, longitude=0, zone=0))
         self.refused(1, "night.wea: the sky is dark all year: of 480 hours none has diffuse light", path, "-o",
                      self.folder / "night.npy")
-        dusk = self.write("dusk.wea", wea(night[:-1] + [(12, 20, 12.5, 0, 1)], latitude=80, longitude=0, zone=0))
+        dusk = self.write("dusk.wea", wea([(*row[:4], int(row[:3] == (12, 20, 12.5))) for row in night], latitude=80, longitude=0, zone=0))
         skies, _ = self.sky(dusk)
         self.assertEqual((skies.max(axis=1) > 0).sum(), 1)
 

@@ -54,9 +54,15 @@ def wea(hours, latitude=LATITUDE, longitude=-LONGITUDE, zone=-15 * ZONE, units=1
     return head + "".join(f"{m} {d} {h:.3f} {direct} {diffuse}\n" for m, d, h, direct, diffuse in hours)
 
 
-def epw(hours, dew=99.9):
+def epw(hours, dew=99.9, step=1, periods=" 1/ 1,12/31", stated=1):
+    """Rows of `step` hours by their middles; parts of an hour are named by the minute at which they end."""
     head = (f"LOCATION,Somewhere,XX,USA,TMY3,0,{LATITUDE},{LONGITUDE},{ZONE},2.0\nDESIGN CONDITIONS,0\n"
             "TYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0\nHOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,\n"
-            "COMMENTS 2,\nDATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31\n")
-    return head + "".join(f"2001,{m},{d},{int(h + .5)},0,?,15.0,{dew},60,101300,0,0,300,0,{direct},{diffuse},0,0,0,0\n"
-                          for m, d, h, direct, diffuse in hours)
+            f"COMMENTS 2,\nDATA PERIODS,1,{stated},Data,Sunday,{periods}\n")
+    return head + "".join(f"2001,{m},{d},{int(h) + 1},{round(60 * (h % 1 + step / 2)) % 60 or 60 * (step < 1)},?,15.0,{dew},60,"
+                          f"101300,0,0,300,0,{direct},{diffuse},0,0,0,0\n" for m, d, h, direct, diffuse in hours)
+
+
+def parts(hours, n):
+    """Rows of 1/n h with the values of their hours."""
+    return [(m, d, h - .5 + (k + .5) / n, *light) for m, d, h, *light in hours for k in range(n)]

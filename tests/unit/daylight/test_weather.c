@@ -14,6 +14,7 @@
     "DESIGN CONDITIONS,0\nTYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0\n"                                \
     "HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,none\nCOMMENTS 2,\n"
 #define EPW_HEAD EPW_PLACE EPW_MIDDLE "DATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31\n"
+#define EPW_NO_PERIOD EPW_PLACE EPW_MIDDLE "DATA PERIODS,1,1\n"
 /* Up to the direct radiation: year, month, day, hour; dry bulb 15, then the dew point. */
 #define EPW_ROW(date, dew) date ",0,?9?9,15.0," dew ",60,101300,0,0,300,400,"
 #define EPW_TAIL ",0,0,0,0,180,2.0,5,5,20,1000,9,999999999,100,0.1,0,88,0.2,0,1\n"
@@ -74,8 +75,8 @@ START_TEST(wea) {
 END_TEST
 
 START_TEST(epw) {
-    weather w = must_read(".epw", EPW_HEAD EPW_ROW("1983,1,1,1", "8.5") "0,0" EPW_TAIL EPW_ROW(
-                                      "1990,6,16,13", "99.9") "794, 210" EPW_TAIL);
+    weather w = must_read(".epw", EPW_NO_PERIOD EPW_ROW("1983,5,31,24", "8.5") "0,0" EPW_TAIL EPW_ROW(
+                                      "1990,6,1,1", "99.9") "794, 210" EPW_TAIL);
     ck_assert_str_eq(w.place, "Some Where");
     ck_assert_double_eq(w.latitude, 37.5);
     ck_assert_double_eq(w.longitude, -122.25);
@@ -84,17 +85,17 @@ START_TEST(epw) {
     ck_assert(!w.direct_is_horizontal);
     ck_assert_uint_eq(w.n, 2);
     ck_assert_int_eq(w.hours[0].year, 1983);
-    ck_assert_double_eq(w.hours[0].hour, .5);
+    ck_assert_double_eq(w.hours[0].hour, 23.5);
     ck_assert_double_eq(w.hours[0].dew_point, 8.5);
     ck_assert_int_eq(w.hours[1].year, 1990);
-    ck_assert_int_eq(w.hours[1].day, 16);
-    ck_assert_double_eq(w.hours[1].hour, 12.5);
+    ck_assert_int_eq(w.hours[1].day, 1);
+    ck_assert_double_eq(w.hours[1].hour, .5);
     ck_assert_double_eq(w.hours[1].direct, 794);
     ck_assert_double_eq(w.hours[1].diffuse, 210);
     ck_assert(isnan(w.hours[1].dew_point));
     weather_free(&w);
     /* With a mark of UTF-8 and the ends of lines of another system; a row need not go on after the two. */
-    w = must_read(".Epw", "\xEF\xBB\xBF" EPW_HEAD EPW_ROW("2000,2,29,24", "1") "1,2\r\n");
+    w = must_read(".Epw", "\xEF\xBB\xBF" EPW_NO_PERIOD EPW_ROW("2000,2,29,24", "1") "1,2\r\n");
     ck_assert_uint_eq(w.n, 1);
     ck_assert_double_eq(w.hours[0].hour, 23.5);
     weather_free(&w);
@@ -147,7 +148,10 @@ START_TEST(refused) {
         {".epw", "LOCATION,a,b,c,d,e,0,0,15,0\n", "line 1: time zone (field 9) = 15, must be from -14 to 14"},
         {".epw", "LOCATION,a,b,c,d,e,0,0,0,\n", "line 1: elevation (field 10) is \"\""},
         {".epw", EPW_PLACE EPW_MIDDLE "DATA PERIODS,1\n", "line 8: DATA PERIODS has 2 fields, needs 3"},
-        {".epw", EPW_PLACE EPW_MIDDLE "DATA PERIODS,1,4,\n", "line 8: 4 records an hour, must be 1"},
+        {".epw", EPW_PLACE EPW_MIDDLE "DATA PERIODS,1,0,\n",
+         "line 8: records an hour (field 3) = 0, must be from 1 to 60"},
+        {".epw", EPW_HEAD EPW_ROW("1990,1,1,1", "1") "0,0\n",
+         ": 8759 hours are missing; fill the gap or state"},
         {".epw", EPW_HEAD, "no hours after its header of 8 lines"},
         {".epw", EPW_HEAD "1990,1,1,1,0\n", "line 9 has 5 fields between commas, needs at least 16"},
         {".epw", EPW_HEAD EPW_ROW("90,1,1,1", "1") "0,0\n", "line 9: year (field 1) = 90, must be from 1900"},
