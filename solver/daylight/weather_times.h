@@ -5,7 +5,7 @@
 
 #include "solver/daylight/weather.h"
 
-/* What the parser knows of a row beside its weather_hour. */
+/* The part of a row that is no weather. */
 typedef struct weather_row {
     size_t line;
     double minute; /* of an EPW; NAN: no whole number from 0 to 60 */

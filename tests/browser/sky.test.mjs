@@ -16,7 +16,7 @@ const [LATITUDE, LONGITUDE, ZONE] = [37.5, -122.25, -8];
 const wea = (units = 1) => `place Somewhere_XX\nlatitude ${LATITUDE}\nlongitude ${-LONGITUDE}\ntime_zone ${-15 * ZONE}\nsite_elevation 2.0\n`
     + `weather_data_file_units ${units}\n${HOURS.map((h) => h.join(" ")).join("\n")}\n`;
 const epw = () => `LOCATION,Somewhere,XX,USA,TMY3,0,${LATITUDE},${LONGITUDE},${ZONE},2.0\nDESIGN CONDITIONS,0\nTYPICAL/EXTREME PERIODS,0\n`
-    + "GROUND TEMPERATURES,0\nHOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,\nCOMMENTS 2,\nDATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31\n"
+    + "GROUND TEMPERATURES,0\nHOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,\nCOMMENTS 2,\nDATA PERIODS,3,1,A,Sunday,3/21,3/21,B,Sunday, 6/21, 6/22,C,Sunday,12/21,12/22\n"
     + HOURS.map(([m, d, h, direct, diffuse]) => `1997,${m},${d},${h + 0.5},0,?,15.0,${m},60,101300,0,0,300,0,${direct},${diffuse},0,0,0,0\n`).join("");
 
 let daemon, daylight, state, paths;
@@ -71,6 +71,51 @@ test("skies of weather are those of `lambert sky`", async () => {
                 });
                 assert.ok(lit > 40, `${lit} hours are lit`);
             }
+    }
+});
+
+/** Days of weather by middles of rows, 1/n hours each. */
+const rowsBy = (n, dates, from = 0, to = 24) => dates.flatMap(([month, day]) => Array.from({ length: (to - from) * n }, (_, k) => [month, day, from + (k + 0.5) / n, 300, 90]));
+const headed = (rows) => wea().split("\n").slice(0, 6).concat(rows.map(([m, d, h, ...light]) => [m, d, h.toFixed(3), ...light].join(" ")), "").join("\n");
+const epwOf = (n, periods, rows) => epw().split("\n").slice(0, 7).concat(periods, rows.map(([m, d, h, direct, diffuse]) =>
+    `1997,${m},${d},${Math.floor(h) + 1},${Math.round(60 * (h % 1 + 0.5 / n))},?,15.0,9,60,101300,0,0,300,0,${direct},${diffuse},0,0,0,0`), "").join("\n");
+
+test("rows of any step are read, and the same rows refused, as by `lambert sky`", async () => {
+    const source = new daylight.SkySource(), [june20, june21, june22] = [20, 21, 22].map((day) => [6, day]);
+    source.take(await daemon.json("/v1/scenes/yard/sky"));
+    const hours = (dates) => rowsBy(1, dates), stated = "DATA PERIODS,1,1,Data,Sunday,6/20,6/22", all = [june20, june21, june22];
+    const year = Array.from({ length: 365 }, (_, k) => Object.values(daylight.dateOf(k + 1)));
+    const files = [
+        ["half.wea", headed(rowsBy(2, [june21]))], ["few.wea", headed(rowsBy(12, [june21]))], ["half.epw", epwOf(2, "DATA PERIODS,1,1,Data,Sunday,6/21,6/21", rowsBy(2, [june21]))],
+        ["minutes.epw", epwOf(60, "DATA PERIODS,1,60,Data,Sunday,6/21,6/21", rowsBy(60, [june21]))], ["year.wea", headed(hours(year))],
+        ["july.epw", epwOf(1, "DATA PERIODS,1,1,Data,Sunday,7/1,6/30", hours([...year.slice(181), ...year.slice(0, 181)]))], ["long.wea", headed([1.5, 4.5, 7.5, 10.5, 13.5, 16.5, 19.5, 22.5].map((h) => [6, 21, h, 300, 90]))],
+        ["months.wea", headed(Array.from({ length: 12 }, (_, k) => [k + 1, 21]).flatMap((date) => hours([date])))], ["window.wea", headed(rowsBy(4, all, 8, 18))],
+        ["missing.epw", epwOf(1, stated, hours([june20, june22]))], ["missing.wea", headed(hours([june20, june22]))], ["end.epw", epwOf(1, stated, hours([june20, june21]))],
+        ["twice.epw", epwOf(1, stated, hours([june20, june20, june21, june22]))], ["order.wea", headed(hours([june21, june20, june22]))], ["mixed.wea", headed([...hours([june20]), ...rowsBy(2, [june21])])],
+        ["odd.wea", headed(Array.from({ length: 40 }, (_, k) => [6, 21, 0.2 + 0.4 * k, 300, 90]))], ["march.wea", headed(hours(year.filter(([m, d]) => m !== 3 || d !== 5)))],
+        ["hole.wea", headed(hours([june21]).filter((row) => row[2] !== 12.5))], ["short.wea", headed([...rowsBy(1, [june20], 8, 18), ...rowsBy(1, [june21], 8, 17), ...rowsBy(1, [june22], 8, 18)])],
+        ["half.hour.epw", epwOf(2, stated, rowsBy(2, all).filter((_, k) => k !== 50))], ["years.wea", headed(hours([...year, ...year]))], ["date.epw", epwOf(1, "DATA PERIODS,1,1,Data,Sunday,6/31,7/1", hours([june21]))],
+    ];
+    let refused = 0;
+    for (const [name, text] of files) {
+        writeFileSync(inFolder(name), text);
+        let problem = null;
+        try {
+            lambert("sky", inFolder(name), "--tiles", "grid:2x2", "-o", inFolder("sky.npy"));
+        } catch (fault) {
+            problem = `The weather file, ${fault.stderr.trim().replace(/^.*?: .*?: /, "")}.`;
+            refused += 1;
+        }
+        assert.equal(source.read(text, false), problem === null, `${name}: ${source.problem}, wanted ${problem}`);
+        if (name !== "date.epw") assert.equal(source.problem, problem, name);
+    }
+    assert.equal(refused, 13);
+    // Between the middles of two rows there is a mixture of both, half an hour apart as an hour apart.
+    const ramp = rowsBy(2, [june21]).map(([m, d, h]) => [m, d, h, 10 * h, 5 * h]);
+    for (const text of [headed(ramp), epwOf(2, "DATA PERIODS,1,2,Data,Sunday,6/21,6/21", ramp)]) {
+        assert.ok(source.read(text, false), source.problem);
+        assert.equal(source.weather.step, 0.5);
+        for (const hour of [9.25, 9.4, 9.75]) assert.ok(Math.abs(source.momentOf(lightOf({ model: "perez", day: 172, hour })).direct - 10 * hour) < 0.01);
     }
 });
 

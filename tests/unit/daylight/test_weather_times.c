@@ -239,7 +239,7 @@ START_TEST(rows_that_are_missing) {
     epw_day(&t, 2001, 6, 21, 0, 12, 2, 1);
     epw_day(&t, 2001, 6, 21, 13, 24, 2, 1);
     check_refused(&t, "line 33 (2001-06-21 13:00): before it 1 hour is missing");
-    /* What is cut off shows by what the header states. */
+    /* The header shows that rows are cut off. */
     t = begin(true, "1,1,Data,Sunday,1/1,12/31");
     days_between(&t, 2001, 1, 1, 12, 30, false);
     epw_day(&t, 2001, 12, 31, 0, 23, 1, 1);

@@ -248,7 +248,7 @@ function makeWeather(app: App, source: SkySource, change: Change, done: () => vo
         problem.textContent = source.problem ?? "";
         problem.hidden = source.problem === null;
         about.textContent = weather === null ? "EPW or WEA. Pick it, or drop it on the page. It stays on this machine; nothing is sent."
-            : `${weather.place}: ${count(weather.hours.length)} hours${source.isBeside ? ", from beside the store." : ". A link holds the weather of the time that is shown, not the file."}`;
+            : `${weather.place}: ${count(Math.round(weather.hours.length * weather.step))} hours${weather.step === 1 ? "" : ` in ${count(weather.hours.length)} rows`}${source.isBeside ? ", from beside the store." : ". A link holds the weather of the time that is shown, not the file."}`;
     };
     return { element, update };
 }
