@@ -106,3 +106,9 @@ void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes
     notes->error_of = e->read == NULL || strange ? NULL : receivers ? "receivers" : "all";
     notes->error_from = e->emits == NULL ? NULL : strange ? "others" : "sources";
 }
+
+void stated_error_add_mesh(double mesh, double *relative, double *indirect) {
+    const double both = hypot(*indirect, mesh);
+    *relative = *indirect > 0 ? *relative * (both / *indirect) : hypot(*relative, mesh);
+    *indirect = both;
+}

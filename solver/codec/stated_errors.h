@@ -59,4 +59,9 @@ typedef struct answer_scope {
  * receivers stands in no other answer, and no error in a strange one. */
 void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes *notes);
 
+/* Adds the part of the mesh to an error that is stated without it: indirect' = sqrt(indirect^2 + mesh^2), as
+ * the parts are independent. Both figures are of the reflected light, over another size, so that relative
+ * grows alike; where indirect is 0 it is taken for a share of the same light. */
+void stated_error_add_mesh(double mesh, double *relative, double *indirect);
+
 #endif

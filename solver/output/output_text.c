@@ -1,4 +1,5 @@
 /* A solution as a table on standard output: one line a group, or one a figure. */
+#include "solver/codec/stated_errors.h"
 #include "solver/output/output.h"
 
 #include <string.h>
@@ -54,20 +55,27 @@ static void print_reductions(const solution *s) {
     }
 }
 
+/* The stated error with the part of the mesh, and the parts where the mesh is stated. */
+static void print_error(const solution *s) {
+    const bool own = s->error_light != NULL && strcmp(s->error_light, "own") == 0;
+    double relative = s->relative, indirect = s->indirect;
+    if (s->relative < 0) return;
+    stated_error_add_mesh(s->mesh, &relative, &indirect);
+    printf("stated error of %s%s%s%s%s", own ? "this answer" : "the store",
+           s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
+           s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "");
+    if (own) printf(", %.3g emitters", s->emitters);
+    printf(": relative %.3g, indirect %.3g", relative, indirect);
+    if (s->mesh > 0)
+        printf(" (operator and form factors: relative %.3g, indirect %.3g; mesh: indirect %.3g)", s->relative,
+               s->indirect, s->mesh);
+    putchar('\n');
+}
+
 void output_print(const solution *s) {
     if (s->n_reductions > 0)
         print_reductions(s);
     else
         print_means(s);
-    const bool own = s->error_light != NULL && strcmp(s->error_light, "own") == 0;
-    if (s->relative >= 0 && own)
-        printf("stated error of this answer%s%s%s%s, %.3g emitters: relative %.3g, indirect %.3g\n",
-               s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
-               s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "",
-               s->emitters, s->relative, s->indirect);
-    else if (s->relative >= 0)
-        printf("stated error of the store%s%s%s%s: relative %.3g, indirect %.3g\n",
-               s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
-               s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "",
-               s->relative, s->indirect);
+    print_error(s);
 }

@@ -91,6 +91,33 @@ class Documents(unittest.TestCase):
             printed = done.stdout.split(f"=== answer {i}\n")[0].strip().splitlines()
             self.assertIsNone(alike(expected, json.loads(printed[-1])), f"{document.name}: answer {i}")
 
+    def test_pictures_of_the_tutorial_show_its_light(self):
+        """Lines of equal light are within the room's light, and a unit is named only where the light has it."""
+        text = "".join(text for mark, text in blocks(MANUAL / "tutorial.md") if mark == "sh")
+        script = text[:text.index("lambert precompute")]
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run(["bash", "-eu", "-c", script], cwd=folder, check=True, timeout=60)
+
+            def light(*options):
+                subprocess.run([LAMBERT, "solve", "room.h5", *options, "-o", "light.csv"], cwd=folder, capture_output=True, check=True)
+                rows = [row.split(",") for row in pathlib.Path(folder, "light.csv").read_text().splitlines()[1:]]
+                return sorted(max(map(float, row[3:])) for row in rows if row[1] != "lamp")
+
+            subprocess.run([LAMBERT, "precompute", "room.obj", "-o", "room.h5", "--elements", "300", "--probes", "0", "--quiet"],
+                           cwd=folder, capture_output=True, check=True)
+            ranges = re.findall(r"^lambert render .*--range ([\d.]+),([\d.]+) --iso-lines (\d+)", text, re.M)
+            units = re.findall(r"^lambert render room.h5 --quantity irradiance(?: --emit (\S+))? .*--value-unit lx", text, re.M)
+            self.assertEqual((len(ranges), len(units)), (1, 1))
+            values = light()
+            low, high, lines = map(float, ranges[0])
+            crossed = sum(values[0] < low + k * (high - low) / lines < values[-1] for k in range(1, int(lines) + 1))
+            self.assertGreaterEqual(crossed, 4)  # most of its lines are in sight
+            self.assertLess(values[int(.95 * len(values))], high)
+            # Lux are 179 times the watts of white light (WHITEEFFICACY of Radiance); all of it is linear.
+            self.assertNotEqual(units[0], "", "the light of the room is in watts")
+            lux, watts = light("--quantity", "irradiance", "--emit", units[0]), light("--quantity", "irradiance")
+            self.assertAlmostEqual(lux[-1] / watts[-1], 179, delta=.01)
+
     def test_options_exist(self):
         verbs = re.findall(r"^  (\w+) ", subprocess.run([LAMBERT, "--help"], capture_output=True, text=True, check=True).stdout, re.M)
         self.assertGreater(len(verbs), 5)

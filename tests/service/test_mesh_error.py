@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import unittest
 
 import h5py
@@ -41,6 +42,26 @@ class MeshError(Case):
         must("solve", store, "--emit", "lamp=1", "-o", self.path("answer.json"))
         with open(self.path("answer.json"), encoding="utf-8") as stream:
             self.assertEqual(json.load(stream)["error"]["mesh"], figures["lights"])
+
+    def test_what_solve_states_has_the_part_of_the_mesh(self):
+        """The line is the root of the sum of the squares of the parts, of this answer's light; members of JSON are the parts."""
+        about, _, store = self.made("stated.h5", "--sky", "tregenza")
+        numpy.save(self.path("sky.npy"), numpy.ones((3, 145)))
+        mesh = about["error"]["mesh"]
+        skies = max(mesh["sky_even"], mesh["sky_cloudy"])
+        for light, part in (((), mesh["lights"]), (("--emit", "lamp=1"), mesh["lights"]), (("--sky", self.path("sky.npy")), skies),
+                            (("--emit", "lamp=1", "--reduce", "floor=mean"), mesh["lights"])):
+            parts = json.loads(must("solve", store, *light, "--json").stdout)["error"]
+            self.assertEqual(parts["mesh"], part)
+            line = must("solve", store, *light).stdout.splitlines()[-1]
+            told = re.fullmatch(r"stated error of .*: relative (\S+), indirect (\S+) \(operator and form factors: relative (\S+), "
+                                r"indirect (\S+); mesh: indirect (\S+)\)", line)
+            self.assertIsNotNone(told, line)
+            indirect = math.hypot(parts["indirect_mean"], part)
+            wanted = (parts["relative_mean"] * indirect / parts["indirect_mean"], indirect, parts["relative_mean"], parts["indirect_mean"], part)
+            for number, right in zip(told.groups(), wanted):
+                self.assertAlmostEqual(float(number), right, delta=.005 * right)  # three digits
+            self.assertGreater(indirect, .05)
 
     def test_fewer_elements_than_uniform(self):
         adaptive, _, _ = self.made("adaptive.h5", "--mesh-error", .07)

@@ -1,6 +1,7 @@
 // The frame of the page: the bar above, the panels beside or below the picture, the line of figures, the banner.
 import { button, choice, fill, make } from "../base/dom.ts";
 import { count, percent, tell } from "../base/numbers.ts";
+import { headlineOf } from "../daemon/headline.ts";
 import type { App } from "../app/app.ts";
 import type { Panel } from "./panel.ts";
 
@@ -123,10 +124,11 @@ export function makeStatus(app: App): HTMLElement {
             error.textContent = `certified: no number is off by more than ${tell(app.asking.certificate.bound, 2)} ${app.store.now.view.unit}`;
             return;
         }
-        const figures = description.error?.lights ?? description.error?.random ?? description.error?.single;
-        error.textContent = figures === undefined || figures.total_indirect_mean === undefined ? "error not measured"
-            : `error ${percent(figures.total_indirect_mean)} of the indirect light, ${percent(figures.total_relative_mean)} of all`;
-        error.title = description.reason;
+        const headline = headlineOf(description.error, app.wanted()?.emission ?? null);
+        error.textContent = headline === null ? "error not measured"
+            : `error ${percent(headline.indirect)} of the indirect light, ${percent(headline.relative)} of all`;
+        error.title = headline === null ? description.reason
+            : `${percent(headline.rest)} by operator and form factors, ${headline.mesh > 0 ? `${percent(headline.mesh)} by the mesh` : "that of the mesh is not known"}. ${description.reason}`;
     };
     app.on("field", drawError);
     app.on("scene", () => {
