@@ -97,9 +97,9 @@ function readEpw(lines: string[]): Draft {
     const rows = lines.slice(8).flatMap((text, k): Row[] => {
         if (text.trim() === "") return [];
         const fields = text.split(","), line = k + 9;
-        const dew = read(line, "dew point (field 8)", fields[7], -100, 100), minute = (fields[4] ?? "").trim();
+        const dew = read(line, "dew point (field 8)", fields[7], -100, 100), written = (fields[4] ?? "").trim(), minute = written === "" ? NaN : Number(written);
         return [{
-            line, minute: /^\d+$/.test(minute) && Number(minute) <= 60 ? Number(minute) : NaN,
+            line, minute: Number.isInteger(minute) && minute >= 0 && minute <= 60 ? minute : NaN,
             year: read(line, "year (field 1)", fields[0], 1900, 2100), month: read(line, "month", fields[1], 1, 12),
             day: readDay(line, fields[1], fields[2]), hour: read(line, "hour (field 4)", fields[3], 1, 24) - 1,
             dewPoint: dew >= MISSING_DEW_POINT ? NaN : dew,
