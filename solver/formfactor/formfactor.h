@@ -9,7 +9,7 @@
 #include "solver/linalg/csr.h"
 #include "solver/operator/blocks/block_factors.h"
 #include "solver/operator/blocks/importance.h"
-#include "solver/scene/facet/facet_holes.h"
+#include "solver/scene/facet/face_openings.h"
 #include "solver/scene/mesh.h"
 
 /* The number of pairs of elements that each step of pairs.h decided. */
@@ -88,9 +88,8 @@ typedef struct form_factor_options {
     importance *importance;   /* of blocks alone, which find `of` if it is NULL; NULL: all is read */
     const char *sky;          /* a tiling: rays that leave are binned by its tiles; NULL: none */
     double ground_albedo;
-    sky_bounce *bounce;             /* set by form_factors_make: the bins of the sky */
-    const plane_rectangle *portals; /* rays are aimed at these for the sky; none: at the holes of the mesh */
-    size_t n_portals;
+    sky_bounce *bounce;            /* set by form_factors_make: the bins of the sky */
+    const face_openings *openings; /* rays are aimed at these for the sky; NULL: at those of the mesh */
     size_t *n_aimed; /* set by rays_count: the number of openings that rays were aimed at; NULL: not wanted */
     double *variance;  /* [n], set by rays_count: of leaving; NULL: not wanted */
     bool without_rows; /* rays_count leaves all rows empty: only the shares that leave the scene are wanted */

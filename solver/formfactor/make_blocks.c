@@ -181,8 +181,7 @@ static lam_status find_outside(const mesh *m, const visibility *v, const uint32_
     const recipe *r = &options->recipe;
     const form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = r->rays, .seed = r->seed},
                                      .without_rows = true,
-                                     .portals = options->portals,
-                                     .n_portals = options->n_portals,
+                                     .openings = options->openings,
                                      .n_aimed = &f->n_aimed,
                                      .bounce = f->sky.first_bounce != NULL ? &f->sky : NULL};
     f->leaving = memory_allocate(m->n, sizeof *f->leaving, "form factors", error);

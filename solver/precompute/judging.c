@@ -241,8 +241,7 @@ static lam_status make_references(const judging *j, judge_references *r, lam_err
     for (int h = 0; h < 2; h++) {
         const form_factor_options how = {
             .recipe = {.rays = sky_rays(j->m->n), .seed = seed_of_sky(j, h, false)},
-            .portals = j->portals,
-            .n_portals = j->n_portals,
+            .openings = j->openings,
             .progress = j->progress,
             .stage = "the sky for the judge"};
         if (r->sky[h].first_bounce == NULL)

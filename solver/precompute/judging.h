@@ -21,8 +21,7 @@ typedef struct judging {
     const uint32_t *order;
     const build_problem *problem;   /* with the F that the operator was built from */
     const form_factors *f;          /* of problem: its recipe and row sums */
-    const plane_rectangle *portals; /* through which the sky is sampled; none: holes of the mesh */
-    size_t n_portals;
+    const face_openings *openings; /* through which the sky is sampled; NULL: those of the mesh */
     importance *importance; /* with which blocks were found; NULL: all is read, and emits */
     recipe halves[2];       /* of the two samples; of blocks the first is taken */
     const char *scratch_names[2];

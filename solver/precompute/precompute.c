@@ -31,6 +31,7 @@ void state_free(precompute_state *state) {
     free(state->centre);
     free(state->surface);
     form_factors_free(&state->f);
+    face_openings_free(&state->of_faces);
     ray_rows_destroy(state->rays);
     block_scene_destroy(state->ready);
     plane_tree_free(&state->tree);
@@ -178,8 +179,7 @@ lam_status stage_form_factors(precompute_state *state, lam_error *error) {
                                      .scratch_name = "form-factors.rows",
                                      .large = state_large_place(state),
                                      .sky = state->options->sky,
-                                     .portals = state->portals,
-                                     .n_portals = state->n_portals,
+                                     .openings = state->openings,
                                      .ground_albedo = state->options->ground_albedo};
     TRY(form_factors_make(&state->m, state->order, &how, &state->f, error));
     state_log_kept(state, &state->f);
@@ -193,8 +193,7 @@ lam_status stage_near_pairs(precompute_state *state, lam_error *error) {
                                      .progress = &state->progress,
                                      .stage = "near pairs",
                                      .sky = state->options->sky,
-                                     .portals = state->portals,
-                                     .n_portals = state->n_portals,
+                                     .openings = state->openings,
                                      .ground_albedo = state->options->ground_albedo};
     const lam_status status = ray_rows_create(&state->m, &how, &state->rays, error);
     if (status == LAM_OK)

@@ -79,13 +79,13 @@ typedef struct precompute_state {
     row_stream stream;             /* of rays */
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
     recipe recipe;                 /* of f */
-    plane_rectangle portals[OPTION_LIST_MAX]; /* around the groups of --portal */
-    size_t n_portals;
-    pairs_cost cost;   /* of the recipe, from a sample; seconds is 0 where none was taken */
-    bool dear;         /* the pairs of the recipe so far would take too long */
-    bool plain;        /* near pairs would too: rays alone are taken */
-    size_t least_rays; /* in place of pairs that are dear */
-    bool large;        /* its rows and the judge's lie in the scratch folder */
+    face_openings of_faces;        /* of the faces of the file, or around the groups of --portal */
+    const face_openings *openings; /* these; NULL: there is no sky, or only a store's mesh is known */
+    pairs_cost cost;               /* of the recipe, from a sample; seconds is 0 where none was taken */
+    bool dear;                     /* the pairs of the recipe so far would take too long */
+    bool plain;                    /* near pairs would too: rays alone are taken */
+    size_t least_rays;             /* in place of pairs that are dear */
+    bool large;                    /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
     emitter_list emitters;
@@ -211,8 +211,10 @@ lam_status state_weigh_pairs(precompute_state *state, lam_error *error);
 /* The same once, and the new choice: stage_scene.c. */
 lam_status state_weigh_rows(precompute_state *state, lam_error *error);
 
-/* Takes the groups of --portal out of the mesh, and rectangles around them into portals: stage_portals.c. */
+/* Takes the groups of --portal out of the mesh, and rectangles around them as openings: stage_portals.c. */
 lam_status state_take_portals(precompute_state *state, lam_error *error);
+/* Without --portal finds the openings of the faces, before these are divided, where there is a sky. */
+lam_status state_find_openings(precompute_state *state, lam_error *error);
 
 /* The closure that --closed stands for: precompute.c. */
 scene_closure state_closure(const precompute_options *options);

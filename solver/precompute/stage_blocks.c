@@ -231,8 +231,7 @@ lam_status stage_blocks(precompute_state *state, lam_error *error) {
                                      .ready = state->ready,
                                      .importance = state->importance.n > 0 ? &state->importance : NULL,
                                      .sky = state->options->sky,
-                                     .portals = state->portals,
-                                     .n_portals = state->n_portals,
+                                     .openings = state->openings,
                                      .ground_albedo = state->options->ground_albedo};
     TRY(form_factors_make_blocks(&state->m, state->order, &state->tree, NULL, &how, &state->f, &state->blocks,
                                  error));

@@ -1,4 +1,4 @@
-/* --portal: groups of faces that stand in windows. */
+/* Openings through which the sky is seen: groups of --portal, or those that the faces leave. */
 #include "solver/formfactor/visibility/openings.h"
 #include "solver/light/emission.h"
 #include "solver/precompute/precompute_state.h"
@@ -57,9 +57,12 @@ lam_status state_take_portals(precompute_state *state, lam_error *error) {
     dropped = memory_allocate(m->n, sizeof *dropped, "--portal", error);
     if (dropped == NULL) return LAM_ERR_MEMORY;
     TRY(emission_scene_create(m, &scene, error));
-    for (size_t k = 0; k < names->count; k++)
-        TRY(read_portal(m, &scene.groups, names->items[k], dropped, &state->portals[k], error));
-    state->n_portals = names->count;
+    for (size_t k = 0; k < names->count; k++) {
+        plane_rectangle around;
+        TRY(read_portal(m, &scene.groups, names->items[k], dropped, &around, error));
+        TRY(face_openings_give(&state->of_faces, &around, error));
+    }
+    state->openings = &state->of_faces;
     for (size_t i = 0; i < m->n; i++) n_dropped += dropped[i];
     if (n_dropped == m->n)
         FAIL(error, LAM_ERR_ARGUMENT, "--portal %.200s: every face of the scene is of a portal",
@@ -70,5 +73,19 @@ lam_status state_take_portals(precompute_state *state, lam_error *error) {
 done:
     emission_scene_free(&scene);
     free(dropped);
+    return status;
+}
+
+lam_status state_find_openings(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (state->options->sky == NULL || state->openings != NULL) return LAM_OK;
+    TRY(face_openings_find(&state->m, openings_crack_width(&state->m), &state->of_faces, error));
+    state->openings = &state->of_faces;
+    if (state->of_faces.n_left > 0)
+        terminal_log(state->t,
+                     "the faces leave %zu openings; rays are aimed at none but the %zu largest, or give "
+                     "--portal GROUP",
+                     state->of_faces.n + state->of_faces.n_left, state->of_faces.n);
+done:
     return status;
 }

@@ -67,6 +67,7 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
                      report.clamped, report.clamped == 1 ? "" : "s");
     TRY(state_take_portals(state, error));
     if (o->orient) TRY(orient(state, error));
+    TRY(state_find_openings(state, error));
 done:
     return status;
 }

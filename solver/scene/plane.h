@@ -1,8 +1,14 @@
-/* Elementary geometry of planes: turns, distances, axes and triangle areas. */
+/* Elementary geometry of planes: turns, distances, axes, triangle areas, and how plane a face is. */
 #ifndef LAMBERT_SCENE_PLANE_H
 #define LAMBERT_SCENE_PLANE_H
 
 #include <math.h>
+
+/* The largest distance of a corner from the plane of a planar quad, or from the plane or edge of another face
+ * that it lies in or on, for the diameter of the polygon or of the scene: some roundings of six digits. */
+static inline double plane_flatness(double diameter) {
+    return 1e-5 * diameter;
+}
 
 /* Twice the area of the triangle abc; positive when it runs counter-clockwise. */
 static inline double plane_turn(const double a[2], const double b[2], const double c[2]) {

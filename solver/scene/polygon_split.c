@@ -11,8 +11,6 @@
 
 /* Lengths below this share of a polygon's diameter count as 0: about the rounding of single precision. */
 static const double straightness = 1e-6;
-/* The largest distance, in diameters, of a corner from the plane of a planar quad. */
-static const double flatness = 1e-5;
 
 void polygon_split_scratch_free(polygon_split_scratch *scratch) {
     free(scratch->corners);
@@ -164,7 +162,7 @@ lam_status polygon_split(const double (*vertices)[3], const uint32_t *corners, s
     bool convex = true;
     for (size_t i = 0; i < n; i++)
         convex = convex && plane_turn(s->flat[(i + n - 1) % n], s->flat[i], s->flat[(i + 1) % n]) > 0;
-    if (n == 4 && convex && off <= flatness * diameter)
+    if (n == 4 && convex && off <= plane_flatness(diameter))
         add_piece(s, s->corners[0], s->corners[1], s->corners[2], s->corners[3]);
     else
         clip_ears(s, n, 2 * least_area);

@@ -108,8 +108,9 @@ lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ra
         TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, n, &r->f.sky, error));
     TRY(visibility_create(m, &r->v, error));
     if (options->sky != NULL)
-        TRY(portals_find(m, r->v, options->recipe.seed, options->recipe.rays / 4, options->portals,
-                         options->n_portals, &r->aimed, error));
+        TRY(portals_find(m, r->v, options->recipe.seed, options->recipe.rays / 4, options->openings,
+                         &r->aimed, error));
+    r->f.n_aimed = r->aimed.n_openings;
     r->noise_share = find_noise_share(r);
     TRY(find_parts(r, error));
     if (options->recipe.method == RECIPE_NEAR_PAIRS) {
@@ -225,13 +226,13 @@ static void ray_batch_begin(const ray_rows *r, size_t element, uint64_t seed, co
                             ray_batch *g) {
     g->rays = (ray_context){.m = r->m, .v = r->v, .seed = seed, .sky = sky};
     if (sky != NULL && r->aimed.n > 0) g->rays.portals = &r->aimed;
-    rays_aim(&g->rays, element, r->f.recipe.rays);
     g->near = near_of(r, element);
     g->element = element;
     g->first = 0;
     g->n_rays = r->f.recipe.rays;
     g->tally = (ray_tally){0};
     element_sampler_init(&g->sampler, r->m, r->v, element, seed);
+    rays_aim(&g->rays, &g->sampler, element, r->f.recipe.rays);
 }
 
 /* Casts the next batch; count is the number of entries of met. False after the last one. */
@@ -277,8 +278,7 @@ static void find_row(ray_rows *r, size_t i, double *sky, filling *to) {
             __atomic_fetch_add(&r->received[j], (uint64_t)((each - mine) / unit), __ATOMIC_RELAXED);
         }
     ray_batch_end(r, &g, .5, to);
-    if (g.rays.in_front != 0)
-        portals_cast(&r->aimed, g.rays.in_front, &g.rays, &g.sampler, i, g.n_rays, &g.tally, sky);
+    if (g.rays.aim.n > 0) portals_cast(&g.rays, &g.sampler, i, &g.tally, sky);
     r->own[i] = own;
     r->f.leaving[i] = fmin(g.tally.left / (double)g.n_rays, 1);
     r->f.absorbed[i] = (double)g.tally.lost / (double)g.n_rays;

@@ -17,7 +17,7 @@ static double weight_of(const ray_context *c, const element_sampler *sampler, co
         direction[d] = (double)rays->direction[d][i];
         cosine += direction[d] * (double)sampler->frame.normal[d];
     }
-    return portals_weight(c->portals, c->in_front, c->n_rays, origin, direction, cosine);
+    return portals_weight(c->portals, &c->aim, c->n_rays, origin, direction, cosine);
 }
 
 size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t element, size_t first,
@@ -37,7 +37,7 @@ size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t el
         unsigned leaving = 0;
         for (size_t i = 0; i < n; i++) {
             if (hits.element[i] == VISIBILITY_NOTHING) {
-                weight[i] = c->portals != NULL ? weight_of(c, sampler, &rays, i) : 1;
+                weight[i] = c->portals != NULL && c->aim.n > 0 ? weight_of(c, sampler, &rays, i) : 1;
                 ray_tally_leave(tally, weight[i]);
                 leaving |= 1u << i;
             } else if (hits.back[i]) {
@@ -59,9 +59,10 @@ typedef struct count_context {
     double *variance; /* [n], or NULL */
 } count_context;
 
-void rays_aim(ray_context *c, size_t element, size_t n_rays) {
+void rays_aim(ray_context *c, const element_sampler *sampler, size_t element, size_t n_rays) {
     if (c->portals == NULL) return;
-    c->in_front = portals_in_front(c->portals, c->m, c->v, element);
+    portals_aim(c->portals, c->m, c->v, element, &c->aim);
+    portals_try(c, sampler, element);
     c->n_rays = n_rays;
 }
 
@@ -72,7 +73,8 @@ double rays_variance(const ray_tally *tally, size_t n_rays, bool aimed) {
     return fmax(tally->squares / N - share * share, weight * weight / N) / N;
 }
 
-/* Traces one element; every ray has the weight 1, but for rays that leave beside portals. */
+/* Traces one element; every ray has the weight 1, but for rays that leave beside portals. Rays that find
+ * nothing but the sky are half as many where others are aimed at it. */
 static void trace_element(const void *context, size_t element, row_pool *pool, double *leaving,
                           double *absorbed) {
     const count_context *c = context;
@@ -80,18 +82,20 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
     element_sampler sampler;
     ray_tally tally = {0};
     uint32_t met[RAYS_AT_ONCE];
-    rays_aim(&rays, element, c->n_rays);
+    size_t n_rays = c->n_rays;
     element_sampler_init(&sampler, rays.m, rays.v, element, rays.seed);
-    for (size_t first = 0; first < c->n_rays; first += RAYS_AT_ONCE) {
-        const size_t last = first + RAYS_AT_ONCE < c->n_rays ? first + RAYS_AT_ONCE : c->n_rays;
+    rays_aim(&rays, &sampler, element, n_rays);
+    if (rays.aim.n > 0 && c->without_rows) rays.n_rays = n_rays = (n_rays + 1) / 2;
+    for (size_t first = 0; first < n_rays; first += RAYS_AT_ONCE) {
+        const size_t last = first + RAYS_AT_ONCE < n_rays ? first + RAYS_AT_ONCE : n_rays;
         const size_t count = rays_meet(&rays, &sampler, element, first, last, met, &tally, pool->sky);
         for (size_t k = 0; k < count && !c->without_rows; k++) row_pool_add(pool, met[k], 1);
     }
-    if (rays.in_front != 0)
-        portals_cast(rays.portals, rays.in_front, &rays, &sampler, element, c->n_rays, &tally, pool->sky);
-    if (c->variance != NULL) c->variance[element] = rays_variance(&tally, c->n_rays, rays.in_front != 0);
-    *leaving = fmin(tally.left / (double)c->n_rays, 1);
-    *absorbed = (double)tally.lost / (double)c->n_rays;
+    if (rays.aim.n > 0) portals_cast(&rays, &sampler, element, &tally, pool->sky);
+    if (c->variance != NULL) c->variance[element] = rays_variance(&tally, n_rays, rays.aim.n > 0);
+    pool->whole = (double)n_rays;
+    *leaving = fmin(tally.left / (double)n_rays, 1);
+    *absorbed = (double)tally.lost / (double)n_rays;
 }
 
 lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
@@ -99,13 +103,10 @@ lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                       double *absorbed, lam_error *error) {
     lam_status status = LAM_OK;
     portals aimed = {.n = 0};
-    size_t n_rays = options->recipe.rays;
+    const size_t n_rays = options->recipe.rays;
     if (options->bounce != NULL)
-        TRY(portals_find(m, v, options->recipe.seed, n_rays / 4, options->portals, options->n_portals, &aimed,
-                         error));
-    if (options->n_aimed != NULL) *options->n_aimed = aimed.n;
-    /* Rays that find nothing but the sky are fewer where some are aimed at it. */
-    if (aimed.n > 0 && options->without_rows) n_rays = (n_rays + 1) / 2;
+        TRY(portals_find(m, v, options->recipe.seed, n_rays / 4, options->openings, &aimed, error));
+    if (options->n_aimed != NULL) *options->n_aimed = aimed.n_openings;
     const count_context context = {.rays = {.m = m,
                                             .v = v,
                                             .seed = options->recipe.seed,
@@ -130,6 +131,7 @@ lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                              .scratch_name = options->scratch_name};
     TRY(row_pool_make(&maker, order, counts, leaving, absorbed, error));
 done:
+    portals_free(&aimed);
     return status;
 }
 

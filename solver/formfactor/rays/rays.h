@@ -5,6 +5,7 @@
 #define LAMBERT_FORMFACTOR_RAYS_RAYS_H
 
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/rays/portal_aim.h"
 #include "solver/formfactor/rows/row_code.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/formfactor/visibility/visibility.h"
@@ -20,10 +21,10 @@ typedef struct ray_context {
     const mesh *m;
     const visibility *v;
     uint64_t seed;
-    const sky_bounce *sky;         /* bins the rays that leave; NULL: no sky */
-    const struct portals *portals; /* rays are aimed at these, too; NULL: none */
-    unsigned in_front;             /* the portals that the present element's rays are aimed at */
-    size_t n_rays;                 /* of the present element, where there are portals */
+    const sky_bounce *sky;  /* bins the rays that leave; NULL: no sky */
+    const portals *portals; /* rays are aimed at these, too; NULL: none */
+    portal_aim aim;         /* how the present element aims */
+    size_t n_rays;          /* of the present element by the cosine, where there are portals */
 } ray_context;
 
 /* An element's rays that hit no front. */
@@ -50,8 +51,8 @@ enum { RAYS_AT_ONCE = SAMPLE_ORDERED };
 size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t element, size_t first,
                  size_t last, uint32_t *met, ray_tally *tally, double *sky);
 
-/* Makes a context with portals ready for an element and its number of rays by the cosine. */
-void rays_aim(ray_context *c, size_t element, size_t n_rays);
+/* Makes a context with portals ready for an element, its sampler and its number of rays by the cosine. */
+void rays_aim(ray_context *c, const element_sampler *sampler, size_t element, size_t n_rays);
 
 /* The variance of left / n_rays, at least that of one ray of the mean weight, or, where none left, of weight
  * 1, a sixteenth where rays are aimed at portals. */

@@ -96,8 +96,9 @@ static void make_chunk(rows_run *run, size_t c, row_pool *pool) {
     pool->used = 0;
     for (size_t position = first; position < last && enough; position++) {
         const size_t i = run->order[position];
+        pool->whole = maker->whole;
         maker->make(maker->context, i, pool, &run->leaving[i], &run->absorbed[i]);
-        if (maker->sky != NULL) sky_bounce_put(maker->sky, i, pool->sky, maker->whole);
+        if (maker->sky != NULL) sky_bounce_put(maker->sky, i, pool->sky, pool->whole);
         enough = take_row(pool, maker->kind, &run->rows->rows[i]);
     }
     uint8_t *bytes = enough ? malloc(pool->used + 1) : NULL;

@@ -17,6 +17,7 @@ typedef struct row_pool {
     double *sums;  /* [n], all zero between elements */
     bitset summed; /* where sums were added to */
     double *sky;   /* [m + 1], zero between elements: sums of the tiles and of the ground; NULL: no sky */
+    double whole;  /* weight of all rays of the present element: that of the maker unless make changes it */
     uint8_t *bytes;
     size_t used, capacity;
 } row_pool;
