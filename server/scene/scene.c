@@ -4,6 +4,7 @@
 #include "server/scene/map_guard.h"
 #include "server/scene/tile_places.h"
 #include "solver/base/clock.h"
+#include "solver/base/scene_backs.h"
 #include "solver/codec/describe.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
@@ -135,11 +136,13 @@ static lam_status read_groups(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     void *group = NULL;
     char **names = NULL;
-    size_t n_groups = 0;
+    size_t n_groups = 0, n_backs = 0;
+    bool two_sided;
     lam_error cause;
+    TRY(scene_backs_load(s, made->n, &n_backs, &two_sided, error));
     TRY(store_read(s, "/mesh/group", STORE_U32, 1, (size_t[]){made->n}, &group, error));
     TRY(store_read_texts(s, "/mesh/group_names", &n_groups, &names, error));
-    status = group_index_make(made->n, group, n_groups, names, &made->groups, &cause);
+    status = group_index_make(made->n, n_backs, group, n_groups, names, &made->groups, &cause);
     if (status != LAM_OK) FAIL(error, status, "%s: %s", made->path, cause.message);
 done:
     free(group);

@@ -163,11 +163,15 @@ static lam_status cut_cells(adaptive_run *r, const uint8_t *light, lam_error *er
     return status;
 }
 
+/* The elements that a cell becomes. */
+static size_t sides_of(const adaptive_run *r, const adaptive_cell *c) {
+    return r->m->has_back != NULL && r->m->has_back[c->cell.face] ? 2 : 1;
+}
+
 /* Cuts the cells of the largest gains, or has those looked at again that show too few points for it; *n_more
  * is the number of both. */
 static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_more, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t sides = r->how->two_sided ? 2 : 1, most = r->how->elements / sides;
     double weight[COARSE_LIGHTS];
     ranked *order = memory_allocate(r->n, sizeof *order, "cells of a mesh", error);
     uint8_t *light = memory_allocate(r->n, sizeof *light, "cells of a mesh", error);
@@ -179,12 +183,14 @@ static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_more, l
         light[i] = WHOLE;
     }
     qsort(order, r->n, sizeof *order, by_gain);
-    size_t count = r->n / ROUND_SHARE + 1;
-    if (most <= r->n) count = 0;
-    if (count > 0 && count > most - r->n) count = most - r->n;
+    const size_t count = r->n / ROUND_SHARE + 1;
+    size_t made = 0;
+    for (size_t i = 0; i < r->n; i++) made += sides_of(r, &r->cells[i]);
     *n_more = 0;
     for (size_t k = 0; k < count && order[k].gain > round_least * order[0].gain; k++, (*n_more)++) {
         adaptive_cell *c = &r->cells[order[k].cell];
+        made += sides_of(r, c);
+        if (made > r->how->elements) break;
         if (r->keep && c->points.n < POINTS_ENOUGH)
             c->steps = steps_of(POINTS_ENOUGH - c->points.n);
         else
@@ -209,8 +215,8 @@ static lam_status begin(adaptive_run *r, lam_error *error) {
     mesh_cell *cells = NULL;
     double area = 0;
     for (size_t i = 0; i < r->m->n; i++) area += r->m->area[i];
-    TRY(mesh_cells_even(r->m, largest_share * area, r->how->elements / (r->how->two_sided ? 2 : 1), &cells,
-                        &r->n, error));
+    TRY(mesh_cells_even(r->m, largest_share * area, r->how->elements / (r->m->has_back != NULL ? 2 : 1),
+                        &cells, &r->n, error));
     r->cells = memory_allocate(r->n, sizeof *r->cells, "cells of a mesh", error);
     if (r->cells == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < r->n; i++)
@@ -268,9 +274,9 @@ lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report
     mesh fine = {0};
     adaptive_run r = {.m = m, .how = how, .coarse = &coarse, .keep = true};
     adaptive_report made = {.reached = false};
-    TRY(coarse_light_make(m, how->two_sided, how->seed, how->progress, &coarse, error));
+    TRY(coarse_light_make(m, how->seed, how->progress, &coarse, error));
     TRY(gather_create(&coarse.m, coarse.n_lights, coarse.B, coarse.lamps ? coarse.E : NULL, NULL, &g, error));
-    r.light = (cell_light){.m = m, .coarse = &coarse, .g = g, .two_sided = how->two_sided};
+    r.light = (cell_light){.m = m, .coarse = &coarse, .g = g};
     weigh(&coarse, r.light.all);
     TRY(refine_cells(&r, &made, error));
     if (r.n > m->n) {

@@ -12,7 +12,6 @@
 typedef struct adaptive_options {
     double error;    /* |error| / |B - E| that constants on elements may leave, for each light */
     size_t elements; /* at most, both sides counted; where there are more faces, as many as these */
-    bool two_sided;  /* the mesh will be: both sides of a face are looked at */
     uint64_t seed;
     const progress *progress;
 } adaptive_options;
@@ -24,7 +23,8 @@ typedef struct adaptive_report {
     bool reached;       /* both are at most what was asked for */
 } adaptive_report;
 
-/* Divides the faces of a mesh in place, which faces_join has made as large as can be, or not. The
+/* Divides the faces of a mesh in place, which faces_join has made as large as can be, or not. Both sides are
+ * looked at of those that are to have a back. The
  * scene's lamps and 1 from every element are its lights; a coarse solution is found for them first.
  * Deterministic, for any number of threads. Cost: the coarse solution, and gather_at for about 150 points of
  * each element that is made; memory: at most 256 MiB of points beside the cells. Errors: those of

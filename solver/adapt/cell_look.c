@@ -16,7 +16,7 @@ typedef struct look_points {
 } look_points;
 
 size_t cell_light_values(const cell_light *light) {
-    return gather_values(light->g) * (light->two_sided ? 2 : 1);
+    return gather_values(light->g) * (light->m->has_back != NULL ? 2 : 1);
 }
 
 /* |(b - a) x (d - a)| of each corner a of a quad between its neighbours. */
@@ -96,6 +96,12 @@ static void look_at_side(const cell_light *light, const mesh_cell *c, uint32_t a
     }
 }
 
+/* The values of a back that is not there, behind those of the front. */
+static void see_nothing(size_t values, const look_points *p, cell_points *points) {
+    for (size_t v = values * GATHER_HALVES; v < 2 * values * GATHER_HALVES; v++)
+        memset(points->H + v * points->room + points->n, 0, p->n * sizeof *points->H);
+}
+
 void cell_look_at(const cell_light *light, const mesh_cell *c, uint64_t key, size_t steps,
                   cell_points *points, float error[COARSE_LIGHTS]) {
     const coarse_light *coarse = light->coarse;
@@ -105,9 +111,11 @@ void cell_look_at(const cell_light *light, const mesh_cell *c, uint64_t key, siz
     place_points(c, steps, key, &p);
     for (size_t l = 0; l < COARSE_LIGHTS; l++) error[l] = 0;
     look_at_side(light, c, front, key, 0, &p, points, error);
-    if (light->two_sided)
-        look_at_side(light, c, front + (uint32_t)(coarse->m.n / 2), random_hash(key), gather_values(light->g),
-                     &p, points, error);
+    const size_t values = gather_values(light->g);
+    if (light->m->has_back != NULL && light->m->has_back[c->face])
+        look_at_side(light, c, coarse->back[c->face], random_hash(key), values, &p, points, error);
+    else if (light->m->has_back != NULL)
+        see_nothing(values, &p, points);
     for (size_t k = 0; k < p.n; k++) {
         double at[2];
         face_plane_at(&plane, p.place[k], at);

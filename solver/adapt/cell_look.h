@@ -8,14 +8,14 @@
 
 /* The scene and its lights, the same for all cells. */
 typedef struct cell_light {
-    const mesh *m; /* faces */
+    const mesh *m; /* faces; both sides are looked at of those that are to have a back */
     const coarse_light *coarse;
     const gather *g;
     double all[COARSE_LIGHTS]; /* sum A |B - E|^2, above 0 */
-    bool two_sided;            /* both sides of a cell are looked at */
 } cell_light;
 
-/* Values of a point: lights and channels, of the front and then of the back. */
+/* Values of a point: lights and channels, of the front and then, where the mesh has faces with two sides, of
+ * the back, 0 on faces without one. */
 size_t cell_light_values(const cell_light *light);
 
 /* Adds steps x steps points of a cell with rho H, which fit; error, by light: A |rho (H - mean)|^2 over

@@ -14,6 +14,7 @@ static const double tolerance = 1e-4;
 void coarse_light_free(coarse_light *c) {
     mesh_free(&c->m);
     free(c->first);
+    free(c->back);
     free(c->E);
     free(c->B);
     *c = (coarse_light){.n_lights = 0};
@@ -34,6 +35,19 @@ static lam_status divide(const mesh *faces, coarse_light *c, lam_error *error) {
 done:
     free(cells);
     return status;
+}
+
+/* Both sides of the faces that have two; back is set. */
+static lam_status make_backs(const mesh *faces, coarse_light *c, lam_error *error) {
+    uint32_t at = (uint32_t)c->m.n;
+    if (faces->has_back == NULL) return LAM_OK;
+    c->back = memory_allocate(faces->n, sizeof *c->back, "a coarse mesh", error);
+    if (c->back == NULL) return LAM_ERR_MEMORY;
+    for (size_t f = 0; f < faces->n; f++) {
+        c->back[f] = at;
+        if (faces->has_back[f]) at += c->first[f + 1] - c->first[f];
+    }
+    return mesh_make_backs(&c->m, error);
 }
 
 static lam_status solve(const form_factors *f, const progress *p, coarse_light *c, lam_error *error) {
@@ -72,14 +86,14 @@ static lam_status set_lights(coarse_light *c, lam_error *error) {
     return LAM_OK;
 }
 
-lam_status coarse_light_make(const mesh *faces, bool two_sided, uint64_t seed, const progress *p,
-                             coarse_light *out, lam_error *error) {
+lam_status coarse_light_make(const mesh *faces, uint64_t seed, const progress *p, coarse_light *out,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     coarse_light c = {.n_lights = 0};
     form_factors f = {.row_sums = NULL};
     uint32_t *order = NULL;
     TRY(divide(faces, &c, error));
-    if (two_sided) TRY(mesh_make_two_sided(&c.m, error));
+    TRY(make_backs(faces, &c, error));
     TRY(set_lights(&c, error));
     order = memory_allocate(c.m.n, sizeof *order, "a coarse mesh", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);

@@ -8,8 +8,9 @@
 enum { COARSE_LIGHTS = 2 };
 
 typedef struct coarse_light {
-    mesh m;          /* two-sided where that was asked for */
+    mesh m;          /* with the backs of faces that have one */
     uint32_t *first; /* [faces + 1]: the elements, or fronts, of face f are first[f] ... first[f + 1] - 1 */
+    uint32_t *back;  /* [faces]: the first of its backs, in the order of the fronts; NULL: no face has any */
     size_t n_lights; /* 2, the lamps first; 1, the second alone, where there are no lamps */
     float *E, *B;    /* [n_lights][C][n] */
     bool lamps;
@@ -22,7 +23,7 @@ void coarse_light_free(coarse_light *c);
  * solution. Cost: about a second, or 256 rays from each face. Errors: those of form_factors_make and
  * reference_solve. */
 enum { COARSE_ELEMENTS = 8000 };
-lam_status coarse_light_make(const mesh *faces, bool two_sided, uint64_t seed, const progress *p,
-                             coarse_light *out, lam_error *error);
+lam_status coarse_light_make(const mesh *faces, uint64_t seed, const progress *p, coarse_light *out,
+                             lam_error *error);
 
 #endif

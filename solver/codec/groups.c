@@ -1,6 +1,7 @@
 #include "solver/codec/groups.h"
 
 #include "solver/base/nearest.h"
+#include "solver/base/scene_backs.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,8 +12,25 @@ static int compare_names(const void *a, const void *b, void *names) {
     return strcmp(all[*(const uint32_t *)a], all[*(const uint32_t *)b]);
 }
 
-lam_status group_index_make(size_t n, const uint32_t *group, size_t n_groups, char **names, group_index *out,
-                            lam_error *error) {
+/* Elements of a group are in mesh order, and backs are the last of a mesh. */
+static void sort_groups(group_index *index, size_t n_fronts) {
+    const size_t n = index->n_groups;
+    for (size_t g = 0; g < n; g++)
+        index->n_backs +=
+            index->start[g] < index->start[g + 1] && index->elements[index->start[g]] >= n_fronts;
+    uint32_t *front = index->sorted, *back = index->sorted + (n - index->n_backs);
+    for (size_t g = 0; g < n; g++) {
+        const bool is_back =
+            index->start[g] < index->start[g + 1] && index->elements[index->start[g]] >= n_fronts;
+        *(is_back ? back++ : front++) = (uint32_t)g;
+    }
+    qsort_r(index->sorted, n - index->n_backs, sizeof *index->sorted, compare_names, index->names);
+    qsort_r(index->sorted + (n - index->n_backs), index->n_backs, sizeof *index->sorted, compare_names,
+            index->names);
+}
+
+lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, size_t n_groups, char **names,
+                            group_index *out, lam_error *error) {
     lam_status status = LAM_OK;
     group_index index = {.n_groups = n_groups, .names = names};
     index.start = memory_allocate(n_groups + 1, sizeof *index.start, "groups", error);
@@ -33,8 +51,7 @@ lam_status group_index_make(size_t n, const uint32_t *group, size_t n_groups, ch
     for (size_t i = 0; i < n; i++) index.elements[index.start[group[i]]++] = (uint32_t)i;
     memmove(index.start + 1, index.start, n_groups * sizeof *index.start);
     index.start[0] = 0;
-    for (size_t g = 0; g < n_groups; g++) index.sorted[g] = (uint32_t)g;
-    qsort_r(index.sorted, n_groups, sizeof *index.sorted, compare_names, names);
+    sort_groups(&index, n - n_backs);
     *out = index;
 done:
     if (status != LAM_OK) group_index_free(&index);
@@ -61,7 +78,7 @@ lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam
         names[k] = text;
         text = stpcpy(text, lam_operator_emitter_name(op, k)) + 1;
     }
-    TRY(group_index_make(s, own, s, names, out, error));
+    TRY(group_index_make(s, 0, own, s, names, out, error));
     out->noun = "emitter";
 done:
     free(own);
@@ -85,9 +102,15 @@ static int compare(const char *group, const char *name, size_t length, bool dot)
     return next < wanted ? -1 : next > wanted;
 }
 
-/* The first place in sorted whose name is not before (or, with beyond, is after) the wanted one. */
-static size_t bound(const group_index *index, const char *name, size_t length, bool dot, bool beyond) {
-    size_t low = 0, high = index->n_groups;
+/* A stretch of sorted: groups of fronts, or of backs alone. */
+typedef struct group_range {
+    size_t first, end;
+} group_range;
+
+/* The first place in a range whose name is not before (or, with beyond, is after) the wanted one. */
+static size_t bound(const group_index *index, group_range in, const char *name, size_t length, bool dot,
+                    bool beyond) {
+    size_t low = in.first, high = in.end;
     while (low < high) {
         size_t middle = low + (high - low) / 2;
         int order = compare(index->names[index->sorted[middle]], name, length, dot);
@@ -99,16 +122,25 @@ static size_t bound(const group_index *index, const char *name, size_t length, b
     return low;
 }
 
+/* The groups of a range with exactly this name, or, with dot, all called `name.something`. */
+static size_t find_in(const group_index *index, group_range in, const char *name, size_t length, bool dot,
+                      const uint32_t **groups) {
+    const size_t first = bound(index, in, name, length, dot, false);
+    const size_t last = bound(index, in, name, length, dot, true);
+    if (first < last) *groups = index->sorted + first;
+    return last - first;
+}
+
 size_t group_index_find(const group_index *index, const char *name, size_t length, const uint32_t **groups) {
+    const size_t suffix = sizeof SCENE_BACK - 1, n_fronts = index->n_groups - index->n_backs;
+    const group_range fronts = {0, n_fronts}, backs = {n_fronts, index->n_groups};
     if (memchr(name, '\0', length) != NULL) return 0;
-    for (int dot = 0; dot < 2; dot++) {
-        size_t first = bound(index, name, length, dot, false);
-        size_t last = bound(index, name, length, dot, true);
-        if (first == last) continue;
-        *groups = index->sorted + first;
-        return last - first;
-    }
-    return 0;
+    size_t found = find_in(index, fronts, name, length, false, groups);
+    if (found == 0) found = find_in(index, backs, name, length, false, groups);
+    if (found == 0) found = find_in(index, fronts, name, length, true, groups);
+    if (found == 0 && length > suffix && memcmp(name + length - suffix, SCENE_BACK, suffix) == 0)
+        found = find_in(index, backs, name, length - suffix, true, groups);
+    return found;
 }
 
 /* The name of a group, or of an object of several materials, that is nearest to word; "" where none is near.

@@ -12,12 +12,14 @@ typedef struct group_index {
     char **names;       /* [n_groups], one block, owned */
     uint32_t *start;    /* [n_groups + 1], into elements */
     uint32_t *elements; /* [n]: those of group 0 in mesh order, of group 1, ... */
-    uint32_t *sorted;   /* [n_groups]: groups in the order of their names */
+    uint32_t *sorted;   /* [n_groups]: groups in the order of their names, those of backs alone at the end */
+    size_t n_backs;     /* groups of backs alone */
 } group_index;
 
-/* Takes over names, also on an error. group is [n]. Errors: LAM_ERR_FORMAT (a group that has no name). */
-lam_status group_index_make(size_t n, const uint32_t *group, size_t n_groups, char **names, group_index *out,
-                            lam_error *error);
+/* Takes over names, also on an error. group is [n], of which the last n_backs elements are the backs of
+ * others. Errors: LAM_ERR_FORMAT (a group that has no name). */
+lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, size_t n_groups, char **names,
+                            group_index *out, lam_error *error);
 
 /* The emitters of an operator of few emitters, by name: emitter k is group k of element k. Of another
  * operator it is empty. Errors: LAM_ERR_MEMORY. */
@@ -26,7 +28,8 @@ lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam
 void group_index_free(group_index *index);
 
 /* The groups that a name means: those of exactly this name, or else all called `name.something` (an object of
- * several materials). Returns how many; *groups points at their numbers, owned by index. O(log g). */
+ * several materials), of which none has backs alone; or else, of `name.back`, those of backs called
+ * `name.something`. Returns how many; *groups points at their numbers, owned by index. O(log g). */
 size_t group_index_find(const group_index *index, const char *name, size_t length, const uint32_t **groups);
 
 /* For a name that group_index_find does not know, writes `no group "lmap"; did you mean "lamp"?`, or the

@@ -40,7 +40,7 @@ lam_status emission_scene_create(const mesh *m, emission_scene *out, lam_error *
     emission_scene made = {.m = m};
     char **names = copy_names(m, error);
     if (names == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(group_index_make(m->n, m->group, m->n_groups, names, &made.groups, error));
+    TRY(group_index_make(m->n, m->n_backs, m->group, m->n_groups, names, &made.groups, error));
     *out = made;
 done:
     return status;

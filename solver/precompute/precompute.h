@@ -17,7 +17,8 @@ typedef struct precompute_options {
     double mesh_error;                  /* 0: faces are divided by their size alone */
     const char *up;                     /* NULL: by the file */
     const char *assets;                 /* a folder, or NULL */
-    bool two_sided, orient;
+    bool orient;
+    const char *two_sided;              /* "": every face has a back; "no": none; NULL: materials say it */
     const char *closed;                 /* "": no light leaves; "no": it does; NULL: rays decide */
     const char *form_factors, *quality; /* "rays" or "hemicube"; "draft", ... */
     uint64_t rays, resolution;          /* rays: OPTION_AUTO */

@@ -70,9 +70,11 @@ static const option_row mesh_rows[] = {
      .choices = "x|y|z",
      .help = "Axis that points up"},
     {.name = "two-sided",
-     .kind = OPTION_FLAG,
+     .kind = OPTION_OPTIONAL,
      .offset = FIELD(two_sided),
-     .help = "Make two elements of every face: first all fronts, then all backs"},
+     .choices = "no",
+     .help = "Make two elements of every face: first all fronts, then all backs, whose groups are called "
+             "GROUP.back. no: of none. Without it, of those whose glTF material is double-sided"},
     {.name = "orient",
      .kind = OPTION_FLAG,
      .offset = FIELD(orient),

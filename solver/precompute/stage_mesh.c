@@ -1,11 +1,13 @@
 /* From faces to elements, as the options of the mesh say. */
 #include "solver/adapt/adaptive.h"
+#include "solver/base/scene_backs.h"
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/facet/face_join.h"
 #include "solver/scene/import/picture_files.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 /* Elements that --mesh-error makes at most, unless --elements gives their number. */
 enum { ADAPTIVE_ELEMENTS = 40000 };
@@ -19,6 +21,13 @@ static lam_status join_faces(precompute_state *state, lam_error *error) {
     return status;
 }
 
+/* With the backs that are still to be made. */
+static size_t elements_to_be(const mesh *m) {
+    size_t n = m->n;
+    for (size_t i = 0; m->has_back != NULL && i < m->n; i++) n += m->has_back[i];
+    return n;
+}
+
 /* Divides the mesh where light changes, says what that leaves, and warns where it is more than was asked for.
  */
 static lam_status refine_by_error(precompute_state *state, lam_error *error) {
@@ -26,7 +35,6 @@ static lam_status refine_by_error(precompute_state *state, lam_error *error) {
     const precompute_options *o = state->options;
     const adaptive_options how = {.error = o->mesh_error,
                                   .elements = o->elements > 0 ? o->elements : ADAPTIVE_ELEMENTS,
-                                  .two_sided = o->two_sided,
                                   .seed = precompute_seed(o->seed, SEED_MESH),
                                   .progress = &state->progress};
     adaptive_report made;
@@ -39,10 +47,40 @@ static lam_status refine_by_error(precompute_state *state, lam_error *error) {
         terminal_warn(state->t,
                       "--mesh-error %g is not kept with %zu elements: they leave %.3g; --elements takes more "
                       "than %zu",
-                      o->mesh_error, state->m.n * (o->two_sided ? 2 : 1),
+                      o->mesh_error, elements_to_be(&state->m),
                       made.lamps > made.even ? made.lamps : made.even, how.elements);
 done:
     return status;
+}
+
+/* The fronts of a mesh that shall have some elements, backs included, where they are divided by area. */
+static size_t fronts_of(const mesh *m, size_t elements) {
+    double area = 0, all = 0;
+    if (m->has_back == NULL) return elements;
+    for (size_t i = 0; i < m->n; i++) {
+        area += m->area[i];
+        all += m->has_back[i] ? 2 * m->area[i] : m->area[i];
+    }
+    return (size_t)ceil((double)elements * (area / all));
+}
+
+/* Names a group of backs that could not be called after its fronts. */
+static void log_renamed(precompute_state *state) {
+    const mesh *m = &state->m;
+    size_t n_renamed = 0, first = 0, n_own = 0; /* groups of fronts */
+    for (size_t i = 0; i < m->n - m->n_backs; i++)
+        if (m->group[i] >= n_own) n_own = m->group[i] + (size_t)1;
+    for (size_t g = n_own; g < m->n_groups; g++) {
+        const char *at = strrchr(m->group_names[g], '.');
+        if (at != NULL && strcmp(at, SCENE_BACK) == 0) continue;
+        if (n_renamed++ == 0) first = g;
+    }
+    if (n_renamed > 0)
+        terminal_warn(state->t,
+                      "%zu group%s of backs cannot have the name of %s fronts with " SCENE_BACK
+                      ", which another group has; the first is called '%.60s'",
+                      n_renamed, n_renamed == 1 ? "" : "s", n_renamed == 1 ? "its" : "their",
+                      m->group_names[first]);
 }
 
 lam_status state_refine_mesh(precompute_state *state, lam_error *error) {
@@ -51,14 +89,14 @@ lam_status state_refine_mesh(precompute_state *state, lam_error *error) {
     /* --elements counts both sides. */
     const mesh_refinement refinement = {.subdivide_levels = (unsigned)o->subdivide,
                                         .max_edge = o->max_edge,
-                                        .elements = o->mesh_error > 0 ? 0
-                                                    : o->two_sided    ? (o->elements + 1) / 2
-                                                                      : o->elements};
+                                        .elements =
+                                            o->mesh_error > 0 ? 0 : fronts_of(&state->m, o->elements)};
     if (o->mesh_error > 0) TRY(join_faces(state, error));
     if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
         TRY(mesh_refine(&state->m, &refinement, error));
     if (o->mesh_error > 0) TRY(refine_by_error(state, error));
-    if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
+    TRY(mesh_make_backs(&state->m, error));
+    log_renamed(state);
     TRY(mesh_keep_pictures(&state->m, error)); /* every element has its means */
 done:
     return status;

@@ -49,6 +49,25 @@ done:
     return status;
 }
 
+/* Settles which faces get a back, by --two-sided or by the materials, and says what these ask for. */
+static lam_status choose_backs(precompute_state *state, lam_error *error) {
+    const char *const asked = state->options->two_sided;
+    mesh *const m = &state->m;
+    size_t n = 0;
+    if (asked != NULL && strcmp(asked, "no") != 0) return mesh_mark_two_sided(m, error);
+    for (size_t i = 0; m->has_back != NULL && i < m->n; i++) n += m->has_back[i];
+    if (asked != NULL || n == 0) {
+        free(m->has_back);
+        m->has_back = NULL;
+        return LAM_OK;
+    }
+    terminal_log(state->t,
+                 "%zu of %zu faces get a back, as their materials are double-sided; --two-sided=no leaves "
+                 "these backs out",
+                 n, m->n);
+    return LAM_OK;
+}
+
 lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
@@ -68,6 +87,7 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     TRY(state_take_portals(state, error));
     if (o->orient) TRY(orient(state, error));
     TRY(state_find_openings(state, error));
+    TRY(choose_backs(state, error));
 done:
     return status;
 }
@@ -80,7 +100,9 @@ static double elements_after(const mesh *m, const precompute_options *o) {
         for (size_t i = 0; i < m->n; i++) area += m->area[i];
         n = fmax(n, area / (o->max_edge * o->max_edge));
     }
-    if (o->two_sided) n *= 2;
+    size_t backs = 0;
+    for (size_t i = 0; m->has_back != NULL && i < m->n; i++) backs += m->has_back[i];
+    n *= 1 + (double)backs / (double)m->n;
     /* With --mesh-error they are the most, and nobody knows yet how many it takes. */
     return o->mesh_error > 0 ? n : fmax(n, (double)o->elements);
 }

@@ -19,6 +19,7 @@ void mesh_free(mesh *m) {
     free(m->group_names);
     free(m->reflectance);
     free(m->emission);
+    free(m->has_back);
     mesh_textures_release(m);
     free(m->cameras);
     mesh_pictures_drop(m);
@@ -69,64 +70,6 @@ lam_status mesh_measure(mesh *m, lam_error *error) {
 done:
     free(area);
     free(normal);
-    return status;
-}
-
-/* An array [rows][n] of size-byte values made [rows][2 n], every row followed by its copy; NULL on failure.
- */
-static void *doubled(const void *data, size_t rows, size_t n, size_t size, lam_error *error) {
-    size_t row;
-    if (!size_multiply(n, size, &row)) return NULL;
-    char *out = memory_allocate(rows * 2, row, "two-sided mesh", error);
-    for (size_t r = 0; out != NULL && r < rows && row > 0; r++) {
-        memcpy(out + 2 * r * row, (const char *)data + r * row, row);
-        memcpy(out + (2 * r + 1) * row, (const char *)data + r * row, row);
-    }
-    return out;
-}
-
-lam_status mesh_make_two_sided(mesh *m, lam_error *error) {
-    lam_status status = LAM_OK;
-    mesh wide = {0};
-    if (m->two_sided) return LAM_OK;
-    if (m->n > MESH_NO_VERTEX / 2)
-        FAIL(error, LAM_ERR_ARGUMENT, "mesh: %zu elements are too many to make them two-sided", m->n);
-    wide.elements = doubled(m->elements, 1, m->n, sizeof *m->elements, error);
-    wide.area = doubled(m->area, 1, m->n, sizeof *m->area, error);
-    wide.normal = doubled(m->normal, 1, m->n, sizeof *m->normal, error);
-    wide.group = doubled(m->group, 1, m->n, sizeof *m->group, error);
-    wide.reflectance = doubled(m->reflectance, m->n_channels, m->n, sizeof *m->reflectance, error);
-    wide.emission = doubled(m->emission, m->n_channels, m->n, sizeof *m->emission, error);
-    if (m->textured_face != NULL) {
-        wide.textured_face = doubled(m->textured_face, 1, m->n, sizeof *m->textured_face, error);
-        if (wide.textured_face == NULL) TRY(LAM_ERR_MEMORY);
-    }
-    if (wide.elements == NULL || wide.area == NULL || wide.normal == NULL || wide.group == NULL ||
-        wide.reflectance == NULL || wide.emission == NULL)
-        TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < m->n; i++) {
-        const uint32_t *front = m->elements[i];
-        uint32_t *back = wide.elements[m->n + i];
-        const size_t last = mesh_corners(m, i) - 1;
-        for (size_t k = 0; k <= last; k++) back[k] = front[last - k];
-        for (int k = 0; k < 3; k++) wide.normal[m->n + i][k] = -m->normal[i][k];
-    }
-#define MESH_EXCHANGE(member)                                                                                \
-    free(m->member);                                                                                         \
-    m->member = wide.member;                                                                                 \
-    wide.member = NULL
-    MESH_EXCHANGE(elements);
-    MESH_EXCHANGE(area);
-    MESH_EXCHANGE(normal);
-    MESH_EXCHANGE(group);
-    MESH_EXCHANGE(reflectance);
-    MESH_EXCHANGE(emission);
-    MESH_EXCHANGE(textured_face);
-#undef MESH_EXCHANGE
-    m->n *= 2;
-    m->two_sided = true;
-done:
-    mesh_free(&wide);
     return status;
 }
 
@@ -217,6 +160,7 @@ lam_status mesh_drop(mesh *m, const bool *dropped, lam_error *error) {
         memmove(m->normal[to], m->normal[i], sizeof *m->normal);
         m->area[to] = m->area[i];
         if (m->textured_face != NULL) m->textured_face[to] = m->textured_face[i];
+        if (m->has_back != NULL) m->has_back[to] = m->has_back[i];
         m->group[to++] = m->group[i];
     }
     m->n = n;

@@ -12,7 +12,8 @@
 #define MESH_NO_VERTEX 0xFFFFFFFFu
 
 /* A quad is planar and convex; its front is the side from which its vertices run counter-clockwise.
- * With two_sided, elements n/2 ... n-1 are the backs of elements 0 ... n/2-1, in the same order. */
+ * The last n_backs elements are the backs of others, in the order of these; with two_sided, elements n/2 ...
+ * n-1 are those of elements 0 ... n/2-1. */
 typedef struct mesh {
     size_t n_vertices;
     double (*vertices)[3]; /* [v][3], metres */
@@ -31,7 +32,9 @@ typedef struct mesh {
     uint32_t *textured_face; /* [n], of textures, or TEXTURE_NONE; NULL: no element has a textured face */
     size_t n_cameras;
     scene_camera *cameras; /* [n_cameras], of the scene file */
-    bool two_sided;
+    bool *has_back; /* [n]: faces that mesh_make_backs gives a second element; NULL: none, or all are made */
+    size_t n_backs;
+    bool two_sided;       /* every element has its back, or is one */
     double unit;          /* metres per unit of the scene file, for the record */
     char up;              /* 'x', 'y' or 'z' */
     char name[128];       /* the scene file's stem */
@@ -65,7 +68,15 @@ typedef struct mesh_refinement {
  * the means over their own areas. */
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
 
-/* Doubles every element: all fronts in mesh order, then all backs (`--two-sided`). */
+/* Gives the elements that are marked in has_back their backs, which lie behind all elements, in mesh order,
+ * and have the materials of their fronts. Backs get groups of their own, behind the others: that of `floor`
+ * is called `floor.back`, or `floor.back-2` and so on where the scene has a group of that name. has_back is
+ * NULL then. Once for a mesh, after its last refinement. Errors: LAM_ERR_ARGUMENT (too many elements),
+ * LAM_ERR_MEMORY. */
+lam_status mesh_make_backs(mesh *m, lam_error *error);
+
+/* Marks every element in has_back, and makes the backs, too (`--two-sided`). */
+lam_status mesh_mark_two_sided(mesh *m, lam_error *error);
 lam_status mesh_make_two_sided(mesh *m, lam_error *error);
 
 /* Removes the elements that are marked in dropped [n], and groups that have none left; at least one element

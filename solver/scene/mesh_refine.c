@@ -135,7 +135,7 @@ done:
 lam_status refined_mesh_begin(const mesh *m, size_t n, refined_mesh *out, lam_error *error) {
     lam_status status = LAM_OK;
     refined_mesh r = {.n = n};
-    if (m->two_sided) FAIL(error, LAM_ERR_ARGUMENT, "mesh: refine before making it two-sided");
+    if (m->n_backs > 0) FAIL(error, LAM_ERR_ARGUMENT, "mesh: refine before making it two-sided");
     if (n >= MESH_NO_VERTEX)
         FAIL(error, LAM_ERR_ARGUMENT, "mesh: this would make more than %u elements", MESH_NO_VERTEX - 1);
     r.elements = memory_allocate(n, sizeof *r.elements, "refined mesh", error);
@@ -184,6 +184,11 @@ lam_status refined_mesh_end(refined_mesh *r, const mesh *m, mesh *out, lam_error
         if (fine.textured_face == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t i = 0; i < n; i++) fine.textured_face[i] = m->textured_face[r->face[i]];
         mesh_textures_hold(&fine, m->textures);
+    }
+    if (m->has_back != NULL) {
+        fine.has_back = memory_allocate(n, sizeof *fine.has_back, "refined mesh", error);
+        if (fine.has_back == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t i = 0; i < n; i++) fine.has_back[i] = m->has_back[r->face[i]];
     }
     fine.elements = r->elements;
     fine.vertices = r->points.points;
@@ -263,7 +268,7 @@ lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error) {
     size_t n = 0;
     face_cut *cuts = memory_allocate(m->n, sizeof *cuts, "refined mesh", error);
     if (cuts == NULL) return LAM_ERR_MEMORY;
-    if (m->two_sided) FAIL(error, LAM_ERR_ARGUMENT, "mesh: refine before making it two-sided");
+    if (m->n_backs > 0) FAIL(error, LAM_ERR_ARGUMENT, "mesh: refine before making it two-sided");
     TRY(plan_cuts(m, how, cuts, error));
     for (size_t i = 0; i < m->n && n < MESH_NO_VERTEX; i++) n += cut_pieces(m, i, cuts[i]);
     if (n == m->n) goto done; /* nothing to cut */

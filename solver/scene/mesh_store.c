@@ -1,4 +1,5 @@
 /* /mesh and /cameras of a store: written as it is, read back with every index and value checked. */
+#include "solver/base/scene_backs.h"
 #include "solver/scene/mesh.h"
 #include "solver/scene/texture.h"
 
@@ -28,7 +29,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_set_text(s, "/mesh", "name", m->name, error));
     TRY(store_set_text(s, "/mesh", "up", up, error));
     TRY(store_set_number(s, "/mesh", "unit", m->unit, error));
-    TRY(store_set_integer(s, "/mesh", "two_sided", m->two_sided, error));
+    TRY(scene_backs_save(m->n_backs, m->two_sided, s, error));
     TRY(scene_cameras_save(m->n_cameras, m->cameras, s, error));
 done:
     return status;
@@ -51,22 +52,16 @@ done:
 static lam_status load_attributes(store *s, mesh *m, lam_error *error) {
     lam_status status = LAM_OK;
     char up[8];
-    int64_t two_sided = 0;
     TRY(load_text(s, "source_hash", m->source_hash, sizeof m->source_hash, error));
     TRY(load_text(s, "name", m->name, sizeof m->name, error));
     TRY(load_text(s, "up", up, sizeof up, error));
     TRY(store_get_number(s, "/mesh", "unit", &m->unit, error));
-    TRY(store_get_integer(s, "/mesh", "two_sided", &two_sided, error));
     if (strlen(up) != 1 || strchr("xyz", up[0]) == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute up is '%s', must be x, y or z", store_path(s), up);
     if (!(m->unit > 0) || !isfinite(m->unit))
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute unit is %g, must be positive", store_path(s),
              m->unit);
-    if (two_sided != 0 && two_sided != 1)
-        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute two_sided is %lld, must be 0 or 1", store_path(s),
-             (long long)two_sided);
     m->up = up[0];
-    m->two_sided = two_sided == 1;
 done:
     return status;
 }
@@ -110,9 +105,10 @@ static lam_status load_geometry(store *s, mesh *m, lam_error *error) {
             if (m->elements[i][k] >= m->n_vertices && !(k == 3 && m->elements[i][k] == MESH_NO_VERTEX))
                 FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/elements[%zu][%d] = %u, there are %zu vertices",
                      store_path(s), i, k, m->elements[i][k], m->n_vertices);
-    if (m->n == 0 || m->n >= MESH_NO_VERTEX || (m->two_sided && m->n % 2 != 0))
-        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/elements holds %zu elements, %s", store_path(s), m->n,
-             m->two_sided ? "must be an even number" : "must be 1 to 2^32 - 2");
+    if (m->n == 0 || m->n >= MESH_NO_VERTEX)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/elements holds %zu elements, must be 1 to 2^32 - 2",
+             store_path(s), m->n);
+    TRY(scene_backs_load(s, m->n, &m->n_backs, &m->two_sided, error));
     TRY(load_text(s, "geometry_hash", stated, sizeof stated, error));
     mesh_geometry_hash(m, found);
     if (strcmp(stated, found) != 0)

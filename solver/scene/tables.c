@@ -73,6 +73,15 @@ void name_table_free(name_table *t) {
     *t = (name_table){0};
 }
 
+char **name_table_block(const name_table *t, lam_error *error) {
+    char **block = memory_allocate(1, t->n * sizeof *block + t->text_bytes, "group names", error);
+    if (block == NULL) return NULL;
+    char *text = (char *)(block + t->n);
+    if (t->text_bytes > 0) memcpy(text, t->text, t->text_bytes);
+    for (size_t i = 0; i < t->n; i++) block[i] = text + t->start[i];
+    return block;
+}
+
 static uint64_t point_hash(const void *table, size_t i) {
     const point_table *t = table;
     return XXH3_64bits(t->points[i], sizeof t->points[i]);

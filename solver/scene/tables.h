@@ -31,6 +31,9 @@ lam_status name_table_add(name_table *t, const char *name, size_t length, uint32
 const char *name_table_get(const name_table *t, size_t index);
 void name_table_free(name_table *t);
 
+/* The texts as one block, freed by the caller with free(): [n] pointers, then the texts. NULL on failure. */
+char **name_table_block(const name_table *t, lam_error *error);
+
 /* Points; two are the same when all coordinates are equal (-0 equals 0). */
 typedef struct point_table {
     size_t n;

@@ -211,11 +211,12 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
     return LAM_OK;
 }
 
-/* Per group: area, then area times reflectance and emission of every channel. Refinement changes none. */
+/* Per group of fronts: area, then area times reflectance and emission of every channel. Refinement changes
+ * none. */
 static double *group_content(const mesh *m, size_t width, lam_error *error) {
     double *content = memory_allocate(m->n_groups, width * sizeof *content, "groups", error);
     if (content == NULL) return NULL;
-    for (size_t i = 0; i < m->n; i++) {
+    for (size_t i = 0; i < m->n - m->n_backs; i++) {
         double *of = content + m->group[i] * width;
         of[0] += m->area[i];
         for (size_t k = 0; k < m->n_channels; k++) {
@@ -226,25 +227,33 @@ static double *group_content(const mesh *m, size_t width, lam_error *error) {
     return content;
 }
 
-/* The same groups with the same materials; sides counts a two-sided face twice. */
+/* Groups that are not of backs alone: these lie behind the others. */
+static size_t count_front_groups(const mesh *m) {
+    size_t n = 0;
+    for (size_t i = 0; i < m->n - m->n_backs; i++)
+        if (m->group[i] >= n) n = m->group[i] + (size_t)1;
+    return n;
+}
+
+/* The same groups with the same materials, by their fronts. */
 static lam_status compare_groups(const mesh *stored, const mesh *now, check *c, lam_error *error) {
     lam_status status = LAM_OK;
-    const double sides = stored->two_sided ? 2 : 1;
+    const size_t n_groups = count_front_groups(stored);
     const size_t width = 1 + 2 * stored->n_channels;
     double *a = NULL, *b = NULL;
-    if (stored->n_groups != now->n_groups || stored->n_channels != now->n_channels) {
-        check_say(c, VERDICT_BROKEN, "stale: %zu groups in %zu channels, the scene has %zu in %zu",
-                  stored->n_groups, stored->n_channels, now->n_groups, now->n_channels);
+    if (n_groups != now->n_groups || stored->n_channels != now->n_channels) {
+        check_say(c, VERDICT_BROKEN, "stale: %zu groups in %zu channels, the scene has %zu in %zu", n_groups,
+                  stored->n_channels, now->n_groups, now->n_channels);
         return LAM_OK;
     }
     a = group_content(stored, width, error);
     b = group_content(now, width, error);
     if (a == NULL || b == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t g = 0; g < stored->n_groups && c->verdict == VERDICT_OK; g++) {
+    for (size_t g = 0; g < n_groups && c->verdict == VERDICT_OK; g++) {
         bool same = strcmp(stored->group_names[g], now->group_names[g]) == 0;
         /* Sums over other pieces of the same faces. */
         for (size_t k = 0; k < width; k++)
-            same = same && fabs(a[g * width + k] - sides * b[g * width + k]) <=
+            same = same && fabs(a[g * width + k] - b[g * width + k]) <=
                                1e-5 * fmax(fabs(a[g * width + k]), 1e-6 * a[g * width]);
         if (!same)
             check_say(c, VERDICT_BROKEN, "stale: group %s has another material or size in the scene",

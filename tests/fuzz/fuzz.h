@@ -46,7 +46,7 @@ static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
     lam_error error;
     FUZZ_CHECK(copies != NULL);
     for (int g = 0; g < GROUPS; g++) copies[g] = strcpy((char *)(copies + GROUPS) + 16 * g, names[g]);
-    FUZZ_CHECK(group_index_make(N, group_of, GROUPS, copies, groups, &error) == LAM_OK);
+    FUZZ_CHECK(group_index_make(N, 0, group_of, GROUPS, copies, groups, &error) == LAM_OK);
     return (codec_scene){.n = N,
                          .n_channels = shape & 1 ? 3 : 1,
                          .groups = groups,

@@ -12,7 +12,7 @@ group_index named_groups(size_t n, const uint32_t *group, size_t n_groups, const
     ck_assert_ptr_nonnull(block);
     char *to = (char *)(block + n_groups);
     for (size_t g = 0; g < n_groups; g++, to += strlen(to) + 1) block[g] = strcpy(to, names[g]);
-    ck_assert_int_eq(group_index_make(n, group, n_groups, block, &made, NULL), LAM_OK);
+    ck_assert_int_eq(group_index_make(n, 0, group, n_groups, block, &made, NULL), LAM_OK);
     return made;
 }
 

@@ -30,6 +30,7 @@ static int compare_material(const mesh *m, uint32_t i, uint32_t j) {
     if (reflectance != 0) return reflectance;
     const int emission = compare_bits(m->emission, m->n, m->n_channels, i, j);
     if (emission != 0) return emission;
+    if (m->has_back != NULL && m->has_back[i] != m->has_back[j]) return m->has_back[i] ? 1 : -1;
     if (!is_textured(m, i) && !is_textured(m, j)) return 0;
     return i < j ? -1 : i > j;
 }

@@ -107,6 +107,7 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     colour_of(m, colour_emissive, fresh.emission);
     if (index < a->n_gltf_materials) {
         strength = (ai_real)a->gltf_materials[index].strength;
+        fresh.two_sided = a->gltf_materials[index].two_sided;
         memcpy(fresh.textures, a->gltf_materials[index].textures, sizeof fresh.textures);
     } else if (aiGetMaterialFloatArray(m, emissive_intensity, 0, 0, &strength, NULL) != aiReturn_SUCCESS)
         strength = 1;

@@ -211,14 +211,19 @@ done:
     return status;
 }
 
-/* The texts of a table as one block: pointers, then the texts. */
-static char **name_block(const name_table *names, lam_error *error) {
-    char **block = memory_allocate(1, names->n * sizeof *block + names->text_bytes, "group names", error);
-    if (block == NULL) return NULL;
-    char *text = (char *)(block + names->n);
-    if (names->text_bytes > 0) memcpy(text, names->text, names->text_bytes);
-    for (size_t i = 0; i < names->n; i++) block[i] = text + names->start[i];
-    return block;
+/* Marks the faces whose materials are on both of their sides. */
+static lam_status mark_backs(const imported_faces *s, mesh *m, lam_error *error) {
+    bool any = false;
+    bool *has_back = memory_allocate(m->n, sizeof *has_back, "two-sided faces", error);
+    if (has_back == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++) {
+        const uint32_t material = s->elements[i].material;
+        has_back[i] = material != TABLE_NONE && s->values[material].two_sided != 0;
+        any = any || has_back[i];
+    }
+    if (any) m->has_back = has_back;
+    if (!any) free(has_back);
+    return LAM_OK;
 }
 
 /* Names every element's group by the contract: the object's name, `object.material` where an object has
@@ -258,7 +263,7 @@ static lam_status name_groups(const imported_faces *s, mesh *m, lam_error *error
         TRY(name_table_add(&names, name, strlen(name), &m->group[i], error));
     }
     m->n_groups = names.n;
-    m->group_names = name_block(&names, error);
+    m->group_names = name_table_block(&names, error);
     if (m->group_names == NULL) TRY(LAM_ERR_MEMORY);
 done:
     free(only);
@@ -367,6 +372,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     TRY(name_groups(&s, &made, error));
     TRY(apply_materials(&s, path, options, &made, &found, error));
     TRY(lay_textures(&s, path, options->unit, &made, &found, error));
+    TRY(mark_backs(&s, &made, error));
     if (!is_obj) warn_of_lost_precision(&s, path, &made);
     mesh_geometry_hash(&made, made.source_hash);
     found.dropped_faces = s.dropped;

@@ -19,7 +19,8 @@ typedef struct import_report {
     char warnings[2048];  /* one line each, '\n' between them; cut with a count when there are more */
 } import_report;
 
-/* Reads OBJ+MTL, glTF/GLB, PLY, STL. m is filled and owned by the caller (mesh_free).
+/* Reads OBJ+MTL, glTF/GLB, PLY, STL. m is filled and owned by the caller (mesh_free); faces of double-sided
+ * materials of a glTF are marked in has_back.
  * Every failure is one line that names the file and the place: unreadable, unknown format, missing MTL,
  * non-finite coordinate, empty scene, a crash, time-out or memory limit of the child. */
 lam_status scene_import(const char *path, const import_options *options, mesh *m, import_report *report,

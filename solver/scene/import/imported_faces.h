@@ -31,6 +31,7 @@ typedef struct imported_material {
     double diffuse[3], emission[3];
     uint64_t defined;     /* 0: the file only names it */
     uint64_t has_diffuse; /* 0: the file gives none */
+    uint64_t two_sided;   /* 1: its faces have it on their backs, too */
     imported_texture textures[TEXTURE_QUANTITIES];
 } imported_material;
 
@@ -139,6 +140,7 @@ void imported_faces_fit_images(imported_faces *s);
 /* The parts of a glTF's material that the library does not tell. */
 typedef struct gltf_material {
     double strength; /* KHR_materials_emissive_strength; 1 */
+    bool two_sided;
     imported_texture textures[TEXTURE_QUANTITIES];
 } gltf_material;
 

@@ -372,8 +372,9 @@ START_TEST(two_sided) {
     adaptive_report report;
     lam_error error = {0};
     for (int k = 0; k < 3; k++) {
-        const adaptive_options how = {.error = .05, .elements = 4000, .seed = 1, .two_sided = k != 2};
+        const adaptive_options how = {.error = .05, .elements = 4000, .seed = 1};
         m[k] = floor_and_lamp(1);
+        if (k != 2) ck_ok(mesh_mark_two_sided(&m[k], &error));
         if (k > 0) { /* turned */
             const uint32_t swap = m[k].elements[0][1];
             m[k].elements[0][1] = m[k].elements[0][3];

@@ -61,6 +61,94 @@ START_TEST(two_sided_meshes_have_backs) {
 }
 END_TEST
 
+static lam_status save_and_load(const mesh *m, mesh *loaded, double **row_sums, lam_error *error) {
+    char folder[64], path[256];
+    store *s = NULL;
+    double *ones = malloc(m->n * sizeof *ones);
+    for (size_t i = 0; i < m->n; i++) ones[i] = 1 - (double)i * .01;
+    folder_make(folder);
+    snprintf(path, sizeof path, "%s/mesh.h5", folder);
+    ck_assert_int_eq(store_create(path, &s, error), LAM_OK);
+    ck_assert_int_eq(mesh_save(m, ones, s, error), LAM_OK);
+    ck_assert_int_eq(store_seal(s, error), LAM_OK);
+    ck_assert_int_eq(store_open(path, &s, error), LAM_OK);
+    const lam_status status = mesh_load(s, loaded, row_sums, error);
+    store_close(s);
+    folder_remove(folder);
+    free(ones);
+    return status;
+}
+
+/* A cube of these groups. */
+static mesh named_cube(size_t n_groups, const char *const *names, const uint32_t group[6]) {
+    mesh m = make_cube();
+    free(m.group_names);
+    m.group_names = malloc(n_groups * (sizeof *m.group_names + 16));
+    m.n_groups = n_groups;
+    char *text = (char *)(m.group_names + n_groups);
+    for (size_t g = 0; g < n_groups; g++, text += 16) m.group_names[g] = strcpy(text, names[g]);
+    memcpy(m.group, group, 6 * sizeof *group);
+    return m;
+}
+
+/* Some faces have backs: these lie behind all elements, in groups of their own, whose names are new. */
+START_TEST(some_faces_have_backs) {
+    static const char *const names[] = {"walls", "lid", "walls.back"};
+    static const uint32_t group[6] = {2, 1, 0, 0, 0, 0};
+    static const bool marked[6] = {true, false, true, false, true, false};
+    static const uint32_t fronts[3] = {0, 2, 4}, groups[3] = {4, 3, 3};
+    lam_error error;
+    for (int refined = 0; refined < 2; refined++) {
+        const size_t parts = refined == 0 ? 1 : 4;
+        mesh m = named_cube(3, names, group), back = {0};
+        m.has_back = malloc(sizeof marked);
+        memcpy(m.has_back, marked, sizeof marked);
+        if (refined) ck_ok(mesh_refine(&m, &(mesh_refinement){.subdivide_levels = 1}, &error));
+        ck_ok(mesh_make_backs(&m, &error));
+        ck_assert_uint_eq(m.n, 9 * parts);
+        ck_assert_uint_eq(m.n_backs, 3 * parts);
+        ck_assert(!m.two_sided);
+        ck_assert_uint_eq(m.n_groups, 5);
+        ck_assert_str_eq(m.group_names[3], "walls.back-2");
+        ck_assert_str_eq(m.group_names[4], "walls.back.back");
+        for (size_t k = 0; k < 3 * parts; k++) {
+            const size_t i = 6 * parts + k, front = fronts[k / parts] * parts + k % parts;
+            ck_assert_uint_eq(m.group[i], groups[k / parts]);
+            ck_assert_uint_eq(m.group[front], group[fronts[k / parts]]);
+            ck_assert_float_eq(m.emission[i], m.emission[front]);
+            for (int c = 0; c < 4; c++) ck_assert_uint_eq(m.elements[i][c], m.elements[front][3 - c]);
+            for (int d = 0; d < 3; d++) ck_assert_float_eq(m.normal[i][d], -m.normal[front][d]);
+        }
+        ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.subdivide_levels = 1}, &error),
+                         LAM_ERR_ARGUMENT);
+        ck_ok(mesh_make_backs(&m, &error)); /* nothing is left to be made */
+        ck_assert_uint_eq(m.n, 9 * parts);
+        m.unit = 1, m.up = 'z';
+        ck_assert_msg(save_and_load(&m, &back, NULL, &error) == LAM_OK, "%s", error.message);
+        ck_assert_uint_eq(back.n_backs, 3 * parts);
+        ck_assert(!back.two_sided);
+        mesh_free(&back);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
+/* Marks go with their faces. */
+START_TEST(dropped_faces_take_their_backs) {
+    static const bool marked[6] = {true, true, false, true, false, false}, dropped[6] = {true, false, true};
+    mesh m = make_cube();
+    lam_error error;
+    m.has_back = malloc(sizeof marked);
+    memcpy(m.has_back, marked, sizeof marked);
+    ck_ok(mesh_drop(&m, dropped, &error));
+    ck_ok(mesh_make_backs(&m, &error));
+    ck_assert_uint_eq(m.n, 6);
+    ck_assert_float_eq(m.emission[4], 1);
+    ck_assert_float_eq(m.emission[5], 3);
+    mesh_free(&m);
+}
+END_TEST
+
 START_TEST(centroid_and_bounds) {
     /* A trapezoid with parallel sides 2 and 1 and height 3: its centroid is 3 (2 + 2 * 1) / (3 (2 + 1)) = 4/3
      * up. */
@@ -259,24 +347,6 @@ START_TEST(fewer_elements_than_faces_changes_nothing) {
 }
 END_TEST
 
-static lam_status save_and_load(const mesh *m, mesh *loaded, double **row_sums, lam_error *error) {
-    char folder[64], path[256];
-    store *s = NULL;
-    double *ones = malloc(m->n * sizeof *ones);
-    for (size_t i = 0; i < m->n; i++) ones[i] = 1 - (double)i * .01;
-    folder_make(folder);
-    snprintf(path, sizeof path, "%s/mesh.h5", folder);
-    ck_assert_int_eq(store_create(path, &s, error), LAM_OK);
-    ck_assert_int_eq(mesh_save(m, ones, s, error), LAM_OK);
-    ck_assert_int_eq(store_seal(s, error), LAM_OK);
-    ck_assert_int_eq(store_open(path, &s, error), LAM_OK);
-    const lam_status status = mesh_load(s, loaded, row_sums, error);
-    store_close(s);
-    folder_remove(folder);
-    free(ones);
-    return status;
-}
-
 START_TEST(store_keeps_every_bit) {
     mesh m = make_octahedron(), back = {0};
     double *row_sums = NULL;
@@ -295,9 +365,11 @@ START_TEST(store_keeps_every_bit) {
     ck_assert_mem_eq(back.reflectance, m.reflectance, 16 * sizeof *m.reflectance);
     ck_assert_mem_eq(back.emission, m.emission, 16 * sizeof *m.emission);
     ck_assert_mem_eq(back.group, m.group, 16 * sizeof *m.group);
-    ck_assert_uint_eq(back.n_groups, 1);
+    ck_assert_uint_eq(back.n_groups, 2);
     ck_assert_str_eq(back.group_names[0], "all");
+    ck_assert_str_eq(back.group_names[1], "all.back");
     ck_assert(back.two_sided);
+    ck_assert_uint_eq(back.n_backs, 8);
     ck_assert_double_eq(back.unit, .001);
     ck_assert_int_eq(back.up, 'y');
     ck_assert_str_eq(back.name, "made");
@@ -413,6 +485,8 @@ int main(void) {
     tcase_add_test(tests, areas_and_normals_are_exact);
     tcase_add_test(tests, measuring_refuses_bad_elements);
     tcase_add_test(tests, two_sided_meshes_have_backs);
+    tcase_add_test(tests, some_faces_have_backs);
+    tcase_add_test(tests, dropped_faces_take_their_backs);
     tcase_add_test(tests, centroid_and_bounds);
     tcase_add_test(tests, hash_tells_geometries_apart);
     tcase_add_test(tests, z_order_keeps_neighbours_together);

@@ -39,7 +39,7 @@ static void setup(fixture *f, size_t rows) {
         sprintf(names[g], "g%zu", g);
     }
     memcpy(group, group_of, sizeof group_of);
-    ck_assert_int_eq(group_index_make(N, group, N_GROUPS, names, &f->s.groups, NULL), LAM_OK);
+    ck_assert_int_eq(group_index_make(N, 0, group, N_GROUPS, names, &f->s.groups, NULL), LAM_OK);
     free(group);
     /* Exact in single precision, also as 1 + P. */
     for (size_t k = 0; k < C * N * N; k++) (&f->P[0][0][0])[k] = (float)((k * 7 + 3) % 13) / 16;

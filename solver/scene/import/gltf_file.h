@@ -1,0 +1,49 @@
+/* The JSON of a glTF or GLB and its buffers, for the files that read parts of it. Private to
+ * solver/scene/import; used in the child. */
+#ifndef LAMBERT_SCENE_IMPORT_GLTF_FILE_H
+#define LAMBERT_SCENE_IMPORT_GLTF_FILE_H
+
+#include "solver/scene/import/imported_faces.h"
+
+#include <jansson.h>
+
+typedef struct gltf_buffer {
+    const char *bytes;
+    char *owned;
+    size_t length;
+} gltf_buffer;
+
+typedef struct gltf_file {
+    const char *path;
+    imported_faces *s;
+    json_t *root;
+    const char *chunk; /* the binary one of a GLB, or NULL */
+    size_t chunk_length, n_buffers;
+    gltf_buffer *buffers; /* those read so far */
+} gltf_file;
+
+/* Parses the JSON and finds the binary chunk, into a file that has its path and s; root is NULL where the
+ * file is broken. The bytes are the caller's until gltf_close. */
+void gltf_parse(gltf_file *g, const char *bytes, size_t length);
+
+/* Room for the buffers, of which none is read yet. Errors: LAM_ERR_MEMORY. */
+lam_status gltf_hold_buffers(gltf_file *g, lam_error *error);
+
+void gltf_close(gltf_file *g);
+
+/* The entry of an array of the file, NULL where index is none of it; an extension of a part of the file, or
+ * NULL; a number, or otherwise. */
+const json_t *gltf_entry(const gltf_file *g, const char *array, const json_t *index);
+const json_t *gltf_extension(const json_t *owner, const char *name);
+double gltf_number(const json_t *value, double otherwise);
+
+/* The bytes of a data URI, freed by the caller; NULL where it has none in base64. */
+char *gltf_data_of_uri(const char *uri, size_t *length, lam_error *error);
+
+/* Undoes %20 and the like; longer names are cut, and not found then. */
+void gltf_decode_uri(const char *uri, char out[ASSET_PATH]);
+
+/* The bytes of a buffer, read once; bytes is NULL where there are none. */
+gltf_buffer gltf_read_buffer(gltf_file *g, const json_t *index, lam_error *error);
+
+#endif
