@@ -1,4 +1,4 @@
-/* How many elements of a store are the backs of others: they are its last. Both programs read it. */
+/* The number of elements of a store that are the backs of others, its last ones. Both programs read it. */
 #ifndef LAMBERT_BASE_SCENE_BACKS_H
 #define LAMBERT_BASE_SCENE_BACKS_H
 

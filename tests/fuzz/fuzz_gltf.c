@@ -1,4 +1,5 @@
-/* Materials of a glTF or GLB with the images in it; files that it names do not exist. */
+/* Materials of a glTF or GLB with the images in it, and the file as the library gets it; files that it names
+ * do not exist. */
 #include "fuzz/fuzz.h"
 #include "solver/scene/import/imported_faces.h"
 
@@ -21,7 +22,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     } else {
         FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);
     }
-    free(materials);
+    gltf_materials_free(n, materials);
+    char *rewritten = NULL;
+    size_t length = 0;
+    error.message[0] = '\0';
+    if (gltf_rewrite("none/scene.gltf", (const char *)data, size, &s, &rewritten, &length, &error) != LAM_OK)
+        FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);
+    FUZZ_CHECK(rewritten == NULL || length > 0);
+    free(rewritten);
     imported_faces_free(&s);
     return 0;
 }

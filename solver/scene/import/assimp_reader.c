@@ -21,7 +21,7 @@ typedef struct assimp_state {
     const char *path;
     bool gltf;
     uint32_t *materials;           /* library's index -> ours, or TABLE_NONE */
-    gltf_material *gltf_materials; /* of a glTF, in the library's order */
+    gltf_material *gltf_materials; /* of a glTF, in the file's order */
     size_t n_gltf_materials;
     uint32_t *corners;
     imported_corner *skin;
@@ -88,6 +88,14 @@ static void tell_images(assimp_state *a, const struct aiMaterial *m, const char 
                 a->path, name);
 }
 
+/* The material of a glTF that the library tells by its number in the file, or NULL. */
+static const gltf_material *gltf_material_of(const assimp_state *a, const char *name) {
+    const size_t length = sizeof GLTF_NUMBER - 1;
+    if (a->n_gltf_materials == 0 || strncmp(name, GLTF_NUMBER, length) != 0) return NULL;
+    const size_t number = strtoul(name + length, NULL, 10);
+    return number < a->n_gltf_materials ? &a->gltf_materials[number] : NULL;
+}
+
 static lam_status read_material(assimp_state *a, unsigned index, lam_error *error) {
     lam_status status = LAM_OK;
     const struct aiMaterial *m = a->scene->mMaterials[index];
@@ -95,7 +103,11 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     char name[sizeof given.data + 32];
     ai_real strength = 1;
     aiGetMaterialString(m, AI_MATKEY_NAME, &given);
-    snprintf(name, sizeof name, "%s", given.data);
+    const gltf_material *own = gltf_material_of(a, given.data);
+    snprintf(name, sizeof name, "%.*s", MAXLEN - 1,
+             own == NULL         ? given.data
+             : own->name == NULL ? ""
+                                 : own->name);
     a->materials[index] = TABLE_NONE;
     if (is_made_up(a, index, name)) return LAM_OK;
     if (name[0] == '\0') snprintf(name, sizeof name, "material-%u", index);
@@ -105,10 +117,10 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     fresh.has_diffuse =
         colour_of(m, colour_base, fresh.diffuse) || colour_of(m, colour_diffuse, fresh.diffuse);
     colour_of(m, colour_emissive, fresh.emission);
-    if (index < a->n_gltf_materials) {
-        strength = (ai_real)a->gltf_materials[index].strength;
-        fresh.two_sided = a->gltf_materials[index].two_sided;
-        memcpy(fresh.textures, a->gltf_materials[index].textures, sizeof fresh.textures);
+    if (own != NULL) {
+        strength = (ai_real)own->strength;
+        fresh.two_sided = own->two_sided;
+        memcpy(fresh.textures, own->textures, sizeof fresh.textures);
     } else if (aiGetMaterialFloatArray(m, emissive_intensity, 0, 0, &strength, NULL) != aiReturn_SUCCESS)
         strength = 1;
     for (int c = 0; c < 3; c++) fresh.emission[c] *= strength;
@@ -336,8 +348,8 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
     const char *dot = strrchr(path, '.');
     assimp_state a = {.s = s, .path = path};
-    char *bytes = NULL, *padded = NULL;
-    size_t length = 0, padded_length = 0;
+    char *bytes = NULL, *padded = NULL, *rewritten = NULL;
+    size_t length = 0, padded_length = 0, rewritten_length = 0;
     a.gltf = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
     TRY(file_text(path, &bytes, &length, error));
     if (a.gltf) TRY(glb_padded(bytes, length, &padded, &padded_length, error));
@@ -348,6 +360,8 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
                          .assets = s->assets,
                          .bytes = padded != NULL ? padded : bytes,
                          .length = padded != NULL ? padded_length : length};
+    if (a.gltf) TRY(gltf_rewrite(path, files.bytes, files.length, s, &rewritten, &rewritten_length, error));
+    if (rewritten != NULL) files.bytes = rewritten, files.length = rewritten_length;
     a.scene = import_scene(&files);
     if (files.outside[0] != '\0')
         FAIL(error, LAM_ERR_FORMAT,
@@ -373,8 +387,9 @@ done:
     free(a.materials);
     free(a.corners);
     free(a.skin);
-    free(a.gltf_materials);
+    gltf_materials_free(a.n_gltf_materials, a.gltf_materials);
     free(bytes);
     free(padded);
+    free(rewritten);
     return status;
 }

@@ -43,6 +43,12 @@ char *gltf_data_of_uri(const char *uri, size_t *length, lam_error *error);
 /* Undoes %20 and the like; longer names are cut, and not found then. */
 void gltf_decode_uri(const char *uri, char out[ASSET_PATH]);
 
+/* Gives the nodes with EXT_mesh_gpu_instancing a child for each instance, in the JSON; *any becomes true
+ * where there are such nodes. Errors: LAM_ERR_FORMAT (instances that cannot be read, or too many),
+ * LAM_ERR_MEMORY. */
+#define GLTF_INSTANCES "EXT_mesh_gpu_instancing"
+lam_status gltf_expand_instances(gltf_file *g, bool *any, lam_error *error);
+
 /* The bytes of a buffer, read once; bytes is NULL where there are none. */
 gltf_buffer gltf_read_buffer(gltf_file *g, const json_t *index, lam_error *error);
 

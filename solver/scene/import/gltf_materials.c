@@ -14,7 +14,8 @@ static bool is_readable(const char *extension) {
                                              "MSFT_texture_",
                                              "KHR_lights_",
                                              "KHR_xmp",
-                                             "KHR_draco_mesh_compression"};
+                                             "KHR_draco_mesh_compression",
+                                             GLTF_INSTANCES};
     for (size_t i = 0; i < sizeof beginnings / sizeof *beginnings; i++)
         if (strncmp(extension, beginnings[i], strlen(beginnings[i])) == 0) return true;
     return false;
@@ -28,7 +29,8 @@ static bool is_read(const char *extension) {
                                         "KHR_draco_mesh_compression",
                                         "KHR_lights_punctual",
                                         "KHR_texture_basisu",
-                                        "EXT_texture_webp"};
+                                        "EXT_texture_webp",
+                                        GLTF_INSTANCES};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (strcmp(extension, names[i]) == 0) return true;
     return strncmp(extension, "KHR_xmp", 7) == 0;
@@ -110,6 +112,9 @@ static lam_status read_material(gltf_file *g, const json_t *m, gltf_material *ou
     const json_t *glossy = gltf_extension(m, "KHR_materials_pbrSpecularGlossiness");
     const json_t *strong = gltf_extension(m, "KHR_materials_emissive_strength");
     if (json_object_get(glossy, "diffuseTexture") != NULL) base = json_object_get(glossy, "diffuseTexture");
+    const char *name = json_string_value(json_object_get(m, "name"));
+    if (name != NULL && name[0] != '\0' && (out->name = strdup(name)) == NULL)
+        FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for its materials", g->path);
     out->two_sided = json_is_true(json_object_get(m, "doubleSided"));
     out->strength = gltf_number(json_object_get(strong, "emissiveStrength"), 1);
     TRY(read_texture(g, base, &out->textures[TEXTURE_REFLECTANCE], error));
@@ -186,11 +191,17 @@ static void tell_left_out(const gltf_file *g) {
     if (written > 0) import_warn(w, "%s: these extensions are left out: %s", g->path, list);
 }
 
+void gltf_materials_free(size_t n, gltf_material *materials) {
+    for (size_t i = 0; materials != NULL && i < n; i++) free(materials[i].name);
+    free(materials);
+}
+
 lam_status gltf_read_materials(const char *path, const char *bytes, size_t length, imported_faces *s,
                                gltf_material **out, size_t *n, lam_error *error) {
     lam_status status = LAM_OK;
     gltf_file g = {.path = path, .s = s};
     gltf_material *made = NULL;
+    size_t n_made = 0;
     json_t *name;
     size_t i;
     gltf_parse(&g, bytes, length);
@@ -206,6 +217,7 @@ lam_status gltf_read_materials(const char *path, const char *bytes, size_t lengt
     TRY(gltf_hold_buffers(&g, error));
     made = memory_allocate(n_materials, sizeof *made, "materials", error);
     if (made == NULL) TRY(LAM_ERR_MEMORY);
+    n_made = n_materials;
     for (i = 0; i < n_materials; i++) TRY(read_material(&g, json_array_get(materials, i), &made[i], error));
     leave_out_integers(&g, n_materials, made);
     tell_left_out(&g);
@@ -214,6 +226,6 @@ lam_status gltf_read_materials(const char *path, const char *bytes, size_t lengt
     made = NULL;
 done:
     gltf_close(&g);
-    free(made);
+    gltf_materials_free(n_made, made);
     return status;
 }

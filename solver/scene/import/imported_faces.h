@@ -139,16 +139,26 @@ void imported_faces_fit_images(imported_faces *s);
 
 /* The parts of a glTF's material that the library does not tell. */
 typedef struct gltf_material {
+    char *name;      /* NULL: it has none */
     double strength; /* KHR_materials_emissive_strength; 1 */
     bool two_sided;
     imported_texture textures[TEXTURE_QUANTITIES];
 } gltf_material;
 
-/* Reads the materials of a glTF or GLB with their images, *out [*n], freed by the caller, in the file's
- * order; warns of what is left out. Errors: LAM_ERR_FORMAT where it requires an extension which changes what
- * is read and is not read here; other faults are the library's to tell. */
+/* Reads the materials of a glTF or GLB with their images, *out [*n], freed by gltf_materials_free, in the
+ * file's order; warns of what is left out. Errors: LAM_ERR_FORMAT where it requires an extension which
+ * changes what is read and is not read here; other faults are the library's to tell. */
 lam_status gltf_read_materials(const char *path, const char *bytes, size_t length, imported_faces *s,
                                gltf_material **out, size_t *n, lam_error *error);
+void gltf_materials_free(size_t n, gltf_material *materials);
+
+/* Rewrites a glTF or GLB for the library: with a child for each instance of a node (EXT_mesh_gpu_instancing),
+ * and with GLTF_NUMBER and its place in the file for the name of each material. *out is a copy of the file,
+ * freed by the caller, or NULL where there is nothing to rewrite. Errors: LAM_ERR_FORMAT (instances that
+ * cannot be read, or too many), LAM_ERR_MEMORY. */
+#define GLTF_NUMBER "lambert material "
+lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, imported_faces *s, char **out,
+                        size_t *out_length, lam_error *error);
 
 /* Refuses a PLY that is shorter than its header says: a library may take minutes to notice. */
 lam_status ply_check_head(const char *path, const char *bytes, size_t length, lam_error *error);

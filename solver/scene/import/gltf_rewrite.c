@@ -1,0 +1,81 @@
+/* A glTF as the library gets it: with nodes in place of instances, which it does not know, and with numbers
+ * in place of the names of materials, which it tells in the order that meshes use them first. Runs in the
+ * child. */
+#include "solver/scene/import/gltf_file.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The names of materials tell their places in the file. */
+static lam_status number_materials(gltf_file *g, lam_error *error) {
+    const json_t *materials = json_object_get(g->root, "materials");
+    const size_t n = json_array_size(materials);
+    for (size_t i = 0; i < n; i++) {
+        json_t *material = json_array_get(materials, i);
+        char number[sizeof GLTF_NUMBER + 20];
+        snprintf(number, sizeof number, GLTF_NUMBER "%zu", i);
+        if (json_is_object(material) && json_object_set_new(material, "name", json_string(number)) != 0)
+            return status_fail(error, LAM_ERR_MEMORY, "%s: not enough memory for its materials", g->path);
+    }
+    return LAM_OK;
+}
+
+static void put_little_endian(char *bytes, size_t x) {
+    for (int k = 0; k < 4; k++) bytes[k] = (char)(x >> 8 * k & 255);
+}
+
+/* The file with the JSON of g in place of its own: of a GLB the first chunk. */
+static lam_status write_file(const gltf_file *g, const char *bytes, size_t length, char **out,
+                             size_t *out_length, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *own = bytes;
+    size_t own_length = length;
+    gltf_find_json(&own, &own_length);
+    char *text = json_dumps(g->root, JSON_COMPACT), *made = NULL;
+    if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for its JSON", g->path);
+    if (own == bytes) {
+        *out_length = strlen(text);
+        *out = text;
+        return LAM_OK;
+    }
+    const size_t n = strlen(text), padded = (n + 3) / 4 * 4, rest = length - 20 - own_length;
+    made = memory_allocate(20 + padded + rest, 1, "GLB", error);
+    if (made == NULL) TRY(LAM_ERR_MEMORY);
+    if (20 + padded + rest > UINT32_MAX) FAIL(error, LAM_ERR_FORMAT, "%s: more than 4 GiB", g->path);
+    memcpy(made, bytes, 20);
+    put_little_endian(made + 8, 20 + padded + rest);
+    put_little_endian(made + 12, padded);
+    memset(made + 20, ' ', padded);
+    memcpy(made + 20, text, n);
+    memcpy(made + 20 + padded, own + own_length, rest);
+    *out = made;
+    *out_length = 20 + padded + rest;
+    made = NULL;
+done:
+    free(text);
+    free(made);
+    return status;
+}
+
+lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, imported_faces *s, char **out,
+                        size_t *out_length, lam_error *error) {
+    lam_status status = LAM_OK;
+    gltf_file g = {.path = path, .s = s};
+    const bool names_instances = memmem(bytes, length, GLTF_INSTANCES, sizeof GLTF_INSTANCES - 1) != NULL;
+    bool changed = false;
+    *out = NULL;
+    gltf_parse(&g, bytes, length);
+    if (g.root == NULL && names_instances)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: its JSON is broken, and its instances (" GLTF_INSTANCES ") cannot be read", path);
+    if (g.root == NULL) goto done; /* the library says why */
+    TRY(gltf_hold_buffers(&g, error));
+    TRY(gltf_expand_instances(&g, &changed, error));
+    changed = changed || json_array_size(json_object_get(g.root, "materials")) > 0;
+    TRY(number_materials(&g, error));
+    if (changed) TRY(write_file(&g, bytes, length, out, out_length, error));
+done:
+    gltf_close(&g);
+    return status;
+}
