@@ -2,6 +2,7 @@
 #include "solver/codec/stated_errors.h"
 #include "solver/output/output.h"
 
+#include <math.h>
 #include <string.h>
 
 enum { NARROWEST = 14 };
@@ -65,6 +66,10 @@ static void print_error(const solution *s) {
            s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
            s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "");
     if (own) printf(", %.3g emitters", s->emitters);
+    if (!isfinite(s->indirect)) { /* the error would be divided by light that is 0 */
+        printf(": relative %.3g, no light is reflected there\n", relative);
+        return;
+    }
     printf(": relative %.3g, indirect %.3g", relative, indirect);
     if (s->mesh > 0)
         printf(" (operator and form factors: relative %.3g, indirect %.3g; mesh: indirect %.3g)", s->relative,

@@ -123,6 +123,9 @@ class TwoSided(BacksCase):
         np.save(self.folder / "even.npy", np.full(145, 1 / math.pi, np.float32))
         for sided in ((), ("--two-sided",)):
             store, _ = self.store(scene, *SKY, "--elements", 50, *sided)
+            said = must("solve", store, "--sky", self.folder / "even.npy", "--reduce", "floor=mean").stdout
+            self.assertNotIn("inf", said)
+            self.assertIn(", no light is reflected there\n", said)
             asked = [f"--reduce=floor={figure}" for figure in ("mean", "min", "uniformity")]
             asked += ["--reduce=floor.back=mean", "--reduce=floor.back=min"] if sided else []
             found = self.figures(store, "--sky", self.folder / "even.npy", "--quantity", "irradiance", *asked)
