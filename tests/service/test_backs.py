@@ -56,7 +56,7 @@ class Gltf:
         return len(self.json["accessors"]) - 1
 
     def instances(self, node, required=False, **attributes):
-        """Those of a node: TRANSLATION=(values, component, type)."""
+        """Copies of a node: TRANSLATION=(values, component, type)."""
         self.json["extensionsUsed"] = ["EXT_mesh_gpu_instancing"]
         if required:
             self.json["extensionsRequired"] = ["EXT_mesh_gpu_instancing"]
@@ -122,7 +122,7 @@ class TwoSided(BacksCase):
         scene = self.obj("slab", [("floor", "grey", square(0, 10.))], grey=GREY)
         np.save(self.folder / "even.npy", np.full(145, 1 / math.pi, np.float32))
         for sided in ((), ("--two-sided",)):
-            store, _ = self.store(scene, *SKY, "--elements", 50, *sided)
+            store, _ = self.store(scene, *SKY, "--elements", 50, *sided, quick=("--quiet",))
             said = must("solve", store, "--sky", self.folder / "even.npy", "--reduce", "floor=mean").stdout
             self.assertNotIn("inf", said)
             self.assertIn(", no light is reflected there\n", said)
@@ -248,7 +248,7 @@ class DoubleSided(BacksCase):
         self.assertAlmostEqual(self.figures(store, "--quantity", "irradiance", "--reduce", "floor=mean")["floor", "mean"], FACING, delta=NEAR)
 
     def test_materials_in_any_order(self):
-        """What the file says of a material is that of its own, whichever mesh is the first to have it."""
+        """Emission, strength and sides go with their material, whichever mesh is the first to have it."""
         named = [material(.5, name="grey"), material(.2, 1, name="lamp", doubleSided=True,
                                                      extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 100}})]
         nameless = [{k: v for k, v in m.items() if k != "name"} for m in named]
