@@ -108,6 +108,7 @@ void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes
 }
 
 void stated_error_add_mesh(double mesh, double *relative, double *indirect) {
+    if (!isfinite(*indirect)) return; /* it is divided by reflected light that is 0 */
     const double both = hypot(*indirect, mesh);
     *relative = *indirect > 0 ? *relative * (both / *indirect) : hypot(*relative, mesh);
     *indirect = both;
