@@ -276,9 +276,9 @@ static bool write_answer(call *in, radiosity_solve *s) {
     if (s->refined != NULL)
         return good && refined_end(in, &s->request, s->refined, &s->notes, &s->answer, &s->why);
     if (good && in->accept.type == MEDIA_JSON &&
-        !(s->W != NULL
+        !(in->scene->errors.emitters.s > 0
               ? scene_note_emitters_error(in->scene, &s->request, s->W, s->out, &s->notes, &s->errors)
-              : scene_note_own_error(in->scene, &s->request, s->H0, s->out, &s->notes, &s->errors)))
+              : scene_note_own_error(in->scene, &s->request, s->H0, s->W, s->out, &s->notes, &s->errors)))
         return problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
     if (s->figures != NULL)
         return good && figures_add(in->scene, &s->request, 0, s->shape.n_rhs, s->own, s->figures, &s->why) &&

@@ -98,10 +98,11 @@ error_scene scene_for_errors(const scene *s);
 
 /* Replaces that error by the one of the answer's own emission and sky, where the store states errors by
  * group: of a batch the largest over its vectors. E of the request holds every vector; values are
- * [n_rhs][C][count] of all elements or of those selected, H0 the direct light of the sky or NULL. *names
+ * [n_rhs][C][count] of all elements or of those selected, H0 the direct light of the sky or NULL, W
+ * [n_rhs][C][s] the weights of all that shines in a store of emitters, else NULL. *names
  * (freed with free() after the answer is written) belongs to the notes. O(n_rhs C n). False when memory is
  * short. */
-bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0,
+bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0, const float *W,
                           const float *values, answer_notes *notes, name_error **names);
 
 /* The same of a store of emitters that states their covariance, for weights W [n_rhs][C][s]. O(n_rhs (C n s +
@@ -115,6 +116,10 @@ typedef struct mean_errors {
     name_error *names;    /* [n_names]; NULL: that of the store stays */
     emission_size *sizes; /* [n_rhs] */
     double *emission;     /* [2][n_rhs][C], work */
+    /* Of weights of emitters, which request has; NULL: none. */
+    float *E;     /* [C][n], work */
+    double *sums; /* [n_rhs][C][n_groups], of A E of groups */
+    float *L;     /* [n_rhs][C][m], radiances with those of the request's sky; NULL: no emitter is of a sky */
 } mean_errors;
 bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, answer_notes *notes,
                              mean_errors *out);

@@ -54,12 +54,18 @@ error_scene scene_for_errors(const scene *s) {
                          .read = s->errors.read};
 }
 
+/* True where weights of emitters are given, some of which may be of the sky. */
+static bool has_sky_weights(const scene *s, const radiosity_request *request) {
+    return request->emitters.values != NULL && s->n_emitters > 0 && operator_emitters_of(s->op)->a.L != NULL;
+}
+
 /* True where the error of the answer's own emission can be told. */
 static bool has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes) {
     const error_by_group *e = &s->errors.by_group;
     const bool whole = !request->reduce.linear || e->sky_first != NULL;
-    return e->n_bins > 0 && notes->has_error && s->n_emitters == 0 && request->tolerance == 0 &&
-           (request->sky.values == NULL || (whole && e->n_tiles == lam_sky_tiles(s->sky)));
+    const bool sky = request->sky.values != NULL || has_sky_weights(s, request);
+    return e->n_bins > 0 && notes->has_error && s->errors.emitters.s == 0 && request->tolerance == 0 &&
+           (!sky || (whole && s->sky != NULL && e->n_tiles == lam_sky_tiles(s->sky)));
 }
 
 /* The radiances of the sky of vector v, [C][m]; NULL: it has none. */
@@ -68,11 +74,10 @@ static const float *sky_of(const scene *s, const radiosity_request *request, siz
     return sky->values != NULL && v < sky->n ? sky->values + v * s->n_channels * lam_sky_tiles(s->sky) : NULL;
 }
 
-/* The size of the sky of vector v. */
-static emission_size size_of_sky(const scene *s, const radiosity_request *request, size_t v) {
+/* The size of the sky L [C][m]; NULL: there is none. */
+static emission_size size_of_sky(const scene *s, const float *L) {
     const error_by_group *e = &s->errors.by_group;
     const size_t C = s->n_channels, m = e->n_tiles;
-    const float *L = sky_of(s, request, v);
     emission_size size = {.power2 = 0};
     for (size_t c = 0; L != NULL && c < C; c++) emission_size_add(&size, m, e->sky_power + c * m, L + c * m);
     return size;
@@ -110,7 +115,22 @@ static void begin_own(const reduce_request *reduce, name_error *names, answer_no
     for (size_t k = 0; k < notes->n_name_errors; k++) names[k].name = reduce_text(reduce, k);
 }
 
-bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0,
+/* The light of one vector of an answer. */
+typedef struct vector_light {
+    const float *E, *H0, *L; /* [C][n], [C][m]; NULL: none */
+} vector_light;
+
+/* Of few emitters that of weights [C][s], into own [2][C][n] and then [C][m]. False when memory is short. */
+static bool light_of_weights(const scene *s, const float *weights, float *own, vector_light *out) {
+    const size_t vector = s->n_channels * s->n;
+    const bool sky = operator_emitters_of(s->op)->a.L != NULL;
+    if (operator_emitters_light(s->op, 1, weights, own, own + vector, NULL) != LAM_OK) return false;
+    if (sky) operator_emitters_radiances(s->op, 1, weights, own + 2 * vector);
+    *out = (vector_light){own, sky ? own + vector : NULL, sky ? own + 2 * vector : NULL};
+    return true;
+}
+
+bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0, const float *W,
                           const float *values, answer_notes *notes, name_error **names) {
     const error_scene about = scene_for_errors(s);
     const reduce_request *reduce = &request->reduce;
@@ -120,19 +140,25 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     *names = NULL;
     if (!has_own_error(s, request, notes)) return true;
     name_error *const kept = memory_allocate(reduce->n_names, 2 * sizeof *kept, "errors", NULL);
-    bool good = kept != NULL;
-    begin_own(reduce, kept, &made);
+    const size_t n_own = W != NULL ? 2 * vector + C * s->errors.by_group.n_tiles : 0;
+    float *const own = memory_allocate(n_own, sizeof *own, "errors", NULL);
+    bool good = kept != NULL && own != NULL;
+    if (good) begin_own(reduce, kept, &made);
     for (size_t v = 0; good && v < request->n_rhs; v++) {
+        vector_light light = {request->E + v * vector, H0 != NULL ? H0 + v * vector : NULL,
+                              sky_of(s, request, v)};
+        answer_error one;
+        good = W == NULL || light_of_weights(s, W + v * C * s->n_emitters, own, &light);
+        if (!good) break;
         error_answer of = {.quantity = request->quantity,
-                           .E = request->E + v * vector,
-                           .H0 = H0 != NULL ? H0 + v * vector : NULL,
+                           .E = light.E,
+                           .H0 = light.H0,
                            .count = count,
                            .selected = request->select ? request->selected : NULL,
                            .values = values + v * C * count,
-                           .L = sky_of(s, request, v)};
-        answer_error one;
+                           .L = light.L};
         for (size_t c = 0; c < C; c++) emission_size_add(&of.size, s->n, s->area, of.E + c * s->n);
-        of.sky = size_of_sky(s, request, v);
+        of.sky = size_of_sky(s, light.L);
         if (reduce->on) {
             good = name_errors_of(&s->errors.by_group, &about, &of, reduce, kept + reduce->n_names);
             const emission_size both = emission_size_sum(&of.size, &of.sky);
@@ -145,6 +171,7 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     if (good) *notes = made;
     if (good) *names = kept;
     if (!good) free(kept);
+    free(own);
     return good;
 }
 
@@ -238,9 +265,31 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
     return good;
 }
 
-/* Emissions of a request with spots: their sizes, and their means over a name, [n_rhs][C]. */
+/* The light of the weights of emitters that a request has: adds the power and squares of what elements emit,
+ * their sums over groups and the radiances of the sky. */
+static void add_weights(const scene *s, const radiosity_request *request, double *power, emission_size *size,
+                        mean_errors *to) {
+    const size_t C = s->n_channels, row = C * s->n_emitters, G = s->groups.n_groups;
+    const error_by_group *e = &s->errors.by_group;
+    for (size_t v = 0; v < request->emitters.n; v++) {
+        operator_emitters_emission(s->op, 1, request->emitters.values + v * row, to->E);
+        for (size_t k = 0; k < C * s->n; k++) {
+            const double flux = s->area[k % s->n] * (double)to->E[k];
+            power[v * C + k / s->n] += flux;
+            size[v].squares += flux * flux;
+            to->sums[(v * C + k / s->n) * G + e->bin[k % s->n] % G] += flux;
+        }
+        if (to->L == NULL) continue;
+        const size_t m = e->n_tiles;
+        const float *sky = sky_of(s, request, v);
+        operator_emitters_radiances(s->op, 1, request->emitters.values + v * row, to->L + v * C * m);
+        for (size_t k = 0; sky != NULL && k < C * m; k++) to->L[v * C * m + k] += sky[k];
+    }
+}
+
+/* Emissions of a request: their sizes. */
 static void size_of_spots(const scene *s, const radiosity_request *request, double *power,
-                          emission_size *size) {
+                          emission_size *size, mean_errors *to) {
     const size_t C = s->n_channels;
     const error_by_group *e = &s->errors.by_group;
     for (size_t k = 0; k < request->n_spots; k++) {
@@ -257,18 +306,23 @@ static void size_of_spots(const scene *s, const radiosity_request *request, doub
             size[spot->vector].squares += squares * value * value;
         }
     }
-    for (size_t v = 0; v < request->n_rhs; v++)
-        for (size_t c = 0; c < C; c++) size[v].power2 += power[v * C + c] * power[v * C + c];
     for (size_t v = 0; v < request->n_dense; v++) {
         size[v] = (emission_size){.power2 = 0};
-        for (size_t c = 0; c < C; c++)
-            emission_size_add(&size[v], s->n, s->area, request->E + (v * C + c) * s->n);
+        for (size_t c = 0; c < C; c++) power[v * C + c] = 0;
+        for (size_t k = v * C * s->n; k < (v + 1) * C * s->n; k++) {
+            const double flux = s->area[k % s->n] * (double)request->E[k];
+            power[k / s->n] += flux;
+            size[v].squares += flux * flux;
+        }
     }
+    if (request->emitters.values != NULL && s->n_emitters > 0) add_weights(s, request, power, size, to);
+    for (size_t v = 0; v < request->n_rhs; v++)
+        for (size_t c = 0; c < C; c++) size[v].power2 += power[v * C + c] * power[v * C + c];
 }
 
 /* emission [n_rhs][C]: means over the name. */
 static void emission_of_name(const scene *s, const radiosity_request *request, const reduce_name *name,
-                             double *emission) {
+                             const mean_errors *to, double *emission) {
     const size_t C = s->n_channels;
     const error_by_group *e = &s->errors.by_group;
     double all = 0;
@@ -281,6 +335,8 @@ static void emission_of_name(const scene *s, const radiosity_request *request, c
                 const size_t i = s->groups.elements[k];
                 emission[row] += s->area[i] * (double)request->E[row * s->n + i];
             }
+        for (size_t row = 0; to->sums != NULL && row < request->n_rhs * C; row++)
+            emission[row] += to->sums[row * s->groups.n_groups + group];
     }
     for (size_t k = 0; k < request->n_spots; k++) {
         const emission_spot *spot = &request->spots[k];
@@ -297,20 +353,21 @@ static void emission_of_name(const scene *s, const radiosity_request *request, c
 
 /* direct [n_rhs][C]: means of the direct light of skies over the name. */
 static void direct_of_name(const scene *s, const radiosity_request *request, const reduce_name *name,
-                           double *direct) {
+                           const mean_errors *to, double *direct) {
     const size_t C = s->n_channels;
     const error_by_group *e = &s->errors.by_group;
-    const side_rows *sky = &request->sky;
+    const float *L = to->L != NULL ? to->L : request->sky.values;
+    const size_t rows = (to->L != NULL ? request->n_rhs : request->sky.n) * C;
     double all = 0;
     memset(direct, 0, request->n_rhs * C * sizeof *direct);
-    for (size_t g = 0; sky->values != NULL && g < name->n_groups; g++) {
+    for (size_t g = 0; L != NULL && g < name->n_groups; g++) {
         double area = 0;
         for (size_t bin = name->groups[g]; bin < e->n_bins; bin += e->n_groups) area += e->area[bin];
         all += area;
-        for (size_t row = 0; row < sky->n * C; row++)
+        for (size_t row = 0; row < rows; row++)
             for (size_t t = 0; t < e->n_tiles; t++)
-                direct[row] += area * e->sky_first[name->groups[g] * e->n_tiles + t] *
-                               (double)sky->values[row * e->n_tiles + t];
+                direct[row] +=
+                    area * e->sky_first[name->groups[g] * e->n_tiles + t] * (double)L[row * e->n_tiles + t];
     }
     for (size_t k = 0; all > 0 && k < request->n_rhs * C; k++) direct[k] /= all;
 }
@@ -332,11 +389,19 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
     made.names = memory_allocate(reduce->n_names, sizeof *made.names, "errors", NULL);
     made.sizes = memory_allocate(request->n_rhs, sizeof *made.sizes, "errors", NULL);
     made.emission = memory_allocate(rows, 2 * sizeof *made.emission, "errors", NULL);
-    if (made.names == NULL || made.sizes == NULL || made.emission == NULL) {
+    bool good = made.names != NULL && made.sizes != NULL && made.emission != NULL;
+    if (request->emitters.values != NULL && s->n_emitters > 0) {
+        const bool sky = has_sky_weights(s, request);
+        made.E = memory_allocate(s->n_channels, s->n * sizeof *made.E, "errors", NULL);
+        made.sums = memory_allocate(rows, s->groups.n_groups * sizeof *made.sums, "errors", NULL);
+        if (sky) made.L = memory_allocate(rows, s->errors.by_group.n_tiles * sizeof *made.L, "errors", NULL);
+        good = good && made.E != NULL && made.sums != NULL && (!sky || made.L != NULL);
+    }
+    if (!good) {
         mean_errors_free(&made);
         return false;
     }
-    size_of_spots(s, request, made.emission, made.sizes);
+    size_of_spots(s, request, made.emission, made.sizes, &made);
     begin_own(reduce, made.names, notes);
     *out = made;
     return true;
@@ -347,7 +412,7 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
     const reduce_name *name = &request->reduce.names[k];
     const size_t C = s->n_channels;
     if (to->names == NULL) return true;
-    if (s->n_emitters > 0) {
+    if (emitters_error_knows_groups(&s->errors.emitters)) {
         const emitters_error *e = &s->errors.emitters;
         for (size_t v = 0; v < request->emitters.n; v++) {
             emitters_mix mix;
@@ -360,13 +425,14 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
         return true;
     }
     double *const direct = to->emission + request->n_rhs * C;
-    emission_of_name(s, request, name, to->emission);
-    direct_of_name(s, request, name, direct);
+    emission_of_name(s, request, name, to, to->emission);
+    direct_of_name(s, request, name, to, direct);
     for (size_t v = 0; v < request->n_rhs; v++) {
+        const float *L = to->L != NULL ? to->L + v * C * s->errors.by_group.n_tiles : sky_of(s, request, v);
         const name_means of = {.quantity = request->quantity,
                                .size = to->sizes[v],
-                               .sky = size_of_sky(s, request, v),
-                               .L = sky_of(s, request, v),
+                               .sky = size_of_sky(s, L),
+                               .L = L,
                                .value = means + v * C,
                                .emission = to->emission + v * C,
                                .direct = direct + v * C};
@@ -384,5 +450,8 @@ void mean_errors_free(mean_errors *e) {
     free(e->names);
     free(e->sizes);
     free(e->emission);
+    free(e->E);
+    free(e->sums);
+    free(e->L);
     *e = (mean_errors){.names = NULL};
 }

@@ -41,6 +41,7 @@ void error_by_group_free(error_by_group *e) {
     free(e->area);
     free(e->squares);
     free(e->reflectance);
+    free(e->of_group);
     free(e->bin);
     *e = (error_by_group){.n_bins = 0};
 }
@@ -129,6 +130,17 @@ static void find_sums(const error_scene *scene, error_by_group *e) {
     }
 }
 
+/* Of groups, whose bins of row 0 have their numbers. */
+static lam_status find_reflecting(const error_scene *scene, error_by_group *e, lam_error *error) {
+    uint32_t *group = memory_allocate(scene->n, sizeof *group, "errors of groups", error);
+    if (group == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < scene->n; i++) group[i] = (uint32_t)(e->bin[i] % e->n_groups);
+    const lam_status status = reflecting_make(scene->n, scene->n_channels, scene->area, scene->reflectance,
+                                              e->n_groups, group, &e->of_group, error);
+    free(group);
+    return status;
+}
+
 lam_status error_by_group_read(store *s, const error_scene *scene, error_by_group *out, lam_error *error) {
     lam_status status = LAM_OK;
     error_by_group e = {.n_groups = scene->groups->n_groups, .n_channels = scene->n_channels};
@@ -144,6 +156,7 @@ lam_status error_by_group_read(store *s, const error_scene *scene, error_by_grou
     e.bin = memory_allocate(scene->n, sizeof *e.bin, "errors of groups", error);
     if (e.area == NULL || e.squares == NULL || e.reflectance == NULL || e.bin == NULL) TRY(LAM_ERR_MEMORY);
     find_sums(scene, &e);
+    TRY(find_reflecting(scene, &e, error));
     *out = e;
     e = (error_by_group){.n_bins = 0};
 done:
@@ -178,10 +191,11 @@ static double error2(const emission_size *size, double one, double many, double 
            (one * one * share * share + many * many * share * fmax(0, 1 - share) + even * even);
 }
 
-/* The emission and the sky of an answer: P^2, S and W of that (sky_law). */
+/* The quantity, the emission and the sky of an answer: P^2, S and W of that (sky_law). */
 typedef struct light_sizes {
+    lam_quantity quantity;
     emission_size size;
-    const float *L; /* NULL: no sky, or nothing is stated of skies */
+    const float *L, *L_direct; /* NULL: no sky, or nothing is stated of skies */
     double power2, spread, power_off;
 } light_sizes;
 
@@ -189,8 +203,10 @@ static weighted_sums sky_channel(const error_by_group *e, const float *L, size_t
     return weighted_sums_of(e->n_tiles, e->sky_power + c * e->n_tiles, L + c * e->n_tiles);
 }
 
-static light_sizes light_sizes_of(const error_by_group *e, const emission_size *size, const float *L) {
-    light_sizes of = {.size = *size, .L = e->n_tiles > 0 ? L : NULL};
+static light_sizes light_sizes_of(const error_by_group *e, lam_quantity quantity, const emission_size *size,
+                                  const float *L) {
+    light_sizes of = {.quantity = quantity, .size = *size, .L = e->n_tiles > 0 ? L : NULL};
+    of.L_direct = of.L;
     for (size_t c = 0; of.L != NULL && c < e->n_channels; c++) {
         const weighted_sums sums = sky_channel(e, L, c);
         of.power2 += sums.sum * sums.sum;
@@ -202,51 +218,65 @@ static light_sizes light_sizes_of(const error_by_group *e, const emission_size *
     return of;
 }
 
+static light_sizes sizes_of_answer(const error_by_group *e, const error_answer *of) {
+    light_sizes sizes = light_sizes_of(e, of->quantity, &of->size, of->L);
+    if (of->L_direct != NULL && sizes.L != NULL) sizes.L_direct = of->L_direct;
+    sizes.power_off += of->lost2;
+    return sizes;
+}
+
 /* Squares of the errors of a bin: of its elements, and of its mean. */
 typedef struct bin_error {
     double elements2, mean2;
 } bin_error;
 
-/* D of a group by weights of its tiles, [n_groups][n_tiles]; 0 where these are NULL. */
-static double direct_of(const error_by_group *e, const double *weights, const float *L, size_t group) {
+/* D of a group by weights of its tiles, [n_groups][n_tiles]; 0 where these are NULL. Of irradiance, which is
+ * what stores state where nothing is reflected, rho is 1. */
+static double direct_of(const error_by_group *e, const double *weights, const light_sizes *of, size_t group) {
     const size_t m = e->n_tiles;
+    const float *L = of->L_direct;
+    const bool as_white = of->quantity == LAM_IRRADIANCE;
     double sum = 0;
     for (size_t c = 0; weights != NULL && c < e->n_channels; c++) {
-        const double rho = e->reflectance[c * e->n_groups + group];
+        const double rho = as_white ? 1 : e->reflectance[c * e->n_groups + group];
         const double spread = weighted_spread(m, weights + group * m, L + c * m, sky_channel(e, L, c).mean);
         sum += rho * rho * spread;
     }
     return sum;
 }
 
-/* The part of single tiles, beside that of their powers alike. */
-static bin_error error_of_tiles(const error_by_group *e, const light_sizes *of, size_t bin) {
+/* The part of the direct light of single tiles. */
+static bin_error error_of_direct(const error_by_group *e, const light_sizes *of, size_t bin) {
     const sky_law *sky = &e->sky;
     const size_t group = bin % e->n_groups;
-    if (e->power_off != NULL) {
-        const double bounced = sky->bounced[bin], mean_bounced = sky->mean_bounced[bin];
-        return (bin_error){direct_of(e, e->elements_off, of->L, group) + bounced * bounced * of->power_off,
-                           direct_of(e, e->means_off, of->L, group) +
-                               mean_bounced * mean_bounced * of->power_off};
-    }
+    if (e->power_off != NULL)
+        return (bin_error){direct_of(e, e->elements_off, of, group), direct_of(e, e->means_off, of, group)};
     double area = 0;
     for (size_t k = group; k < e->n_bins; k += e->n_groups) area += e->area[k];
-    const double direct = sky->direct * sky->direct * direct_of(e, e->sky_first, of->L, group);
+    const double direct = sky->direct * sky->direct * direct_of(e, e->sky_first, of, group);
     return (bin_error){direct, direct * (area > 0 ? e->squares[group] / (area * area) : 1)};
 }
 
 static bin_error error_in(const error_by_group *e, const light_sizes *of, size_t bin) {
     const error_law *law = &e->law;
+    const reflecting *group = &e->of_group[bin % e->n_groups];
+    if (group->black && of->quantity != LAM_IRRADIANCE) return (bin_error){0, 0};
     bin_error sum = {error2(&of->size, law->one[bin], law->many[bin], law->even[bin]),
                      error2(&of->size, law->mean_one[bin], law->mean_many[bin], law->mean_even[bin])};
-    if (of->L == NULL) return sum;
-    const sky_law *sky = &e->sky;
-    const bin_error tiles = error_of_tiles(e, of, bin);
-    sum.elements2 += tiles.elements2 + sky->tiles[bin] * sky->tiles[bin] * of->spread +
-                     sky->even[bin] * sky->even[bin] * of->power2;
-    sum.mean2 += tiles.mean2 + sky->mean_tiles[bin] * sky->mean_tiles[bin] * of->spread +
-                 sky->mean_even[bin] * sky->mean_even[bin] * of->power2;
-    return sum;
+    bin_error direct = {0, 0};
+    if (of->L != NULL) {
+        const sky_law *sky = &e->sky;
+        const bool known = e->power_off != NULL;
+        direct = error_of_direct(e, of, bin);
+        sum.elements2 += (known ? sky->bounced[bin] * sky->bounced[bin] * of->power_off : 0) +
+                         sky->tiles[bin] * sky->tiles[bin] * of->spread +
+                         sky->even[bin] * sky->even[bin] * of->power2;
+        sum.mean2 += (known ? sky->mean_bounced[bin] * sky->mean_bounced[bin] * of->power_off : 0) +
+                     sky->mean_tiles[bin] * sky->mean_tiles[bin] * of->spread +
+                     sky->mean_even[bin] * sky->mean_even[bin] * of->power2;
+    }
+    return (bin_error){reflecting_of_elements(group, of->quantity, sum.elements2) + direct.elements2,
+                       reflecting_of_mean(group, of->quantity, sum.mean2) + direct.mean2};
 }
 
 /* The error over the light that there is without it: the light of the answer has the error in it, and its
@@ -255,8 +285,8 @@ static double ratio(double error2, double light2) {
     return error2 > 0 ? sqrt(error2 / fmax(light2 - error2, 0)) : 0;
 }
 
-/* Sums over the values of a bin: A, and of r = B - E - rho H0 and B the sums of A r^2, A B^2 over channels,
- * and of each channel A r and A B. */
+/* Sums over the values of a bin: A, and of r = B - E - rho H0 and B, of irradiance H - H0 and H, the sums of
+ * A r^2, A B^2 over channels, and of each channel A r and A B. */
 typedef struct value_sums {
     double area, reflected2, radiosity2;
     double *reflected, *radiosity; /* [C]; NULL: not wanted */
@@ -267,7 +297,8 @@ typedef struct value_sums {
 static void add_run(const error_scene *scene, const error_answer *of, size_t first, size_t last,
                     value_sums *to) {
     const size_t n = scene->n;
-    const double of_sky = of->quantity == LAM_IRRADIANCE, of_direct = of->quantity == LAM_RADIOSITY;
+    const bool irradiance = of->quantity == LAM_IRRADIANCE;
+    const double of_sky = irradiance, of_direct = of->quantity == LAM_RADIOSITY;
     for (size_t c = 0; c < scene->n_channels; c++) {
         const float *values = of->values + c * (of->whole ? n : of->count);
         double area = 0, reflected = 0, reflected2 = 0, radiosity = 0, radiosity2 = 0;
@@ -277,8 +308,7 @@ static void add_run(const error_scene *scene, const error_answer *of, size_t fir
             const double sky = of->H0 != NULL ? (double)of->H0[c * n + i] : 0;
             const double direct = (of->E != NULL ? (double)of->E[c * n + i] : 0) + rho * sky;
             const double value = (double)values[of->whole ? i : k];
-            const double scale = of->quantity == LAM_IRRADIANCE ? rho : 1;
-            const double r = scale * (value - of_sky * sky - of_direct * direct), b = r + direct;
+            const double r = value - of_sky * sky - of_direct * direct, b = irradiance ? value : r + direct;
             area += a;
             reflected += a * r;
             reflected2 += a * r * r;
@@ -323,7 +353,7 @@ answer_error answer_error_of_square(const error_scene *scene, const error_answer
 bool answer_error_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                      answer_error *out) {
     double off = 0, reflected = 0, radiosity = 0;
-    const light_sizes sizes = light_sizes_of(e, &of->size, of->L);
+    const light_sizes sizes = sizes_of_answer(e, of);
     const emission_size both = emission_size_sum(&of->size, &of->sky);
     value_sums *sums = sum_values(e, scene, of);
     if (sums == NULL) return false;
@@ -369,7 +399,7 @@ static name_error finish_name(const name_sums *s, double reflected2, double radi
 bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                     const reduce_request *names, name_error *errors) {
     const size_t n_rows = e->n_bins / e->n_groups;
-    const light_sizes sizes = light_sizes_of(e, &of->size, of->L);
+    const light_sizes sizes = sizes_of_answer(e, of);
     value_sums *sums = sum_values(e, scene, of);
     if (sums == NULL) return false;
     for (size_t k = 0; k < names->n_names; k++) {
@@ -403,7 +433,7 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
 
 name_error name_error_of_means(const error_by_group *e, const reduce_name *name, const name_means *means) {
     const size_t n_rows = e->n_bins / e->n_groups;
-    const light_sizes sizes = light_sizes_of(e, &means->size, means->L);
+    const light_sizes sizes = light_sizes_of(e, means->quantity, &means->size, means->L);
     name_sums s = {.area = 0};
     double reflected2 = 0, radiosity2 = 0;
     for (size_t g = 0; g < name->n_groups; g++)
@@ -419,11 +449,12 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
                        e->reflectance[c * e->n_groups + name->groups[g]];
         rho /= s.area;
         const double value = means->value[c], direct = means->emission[c] + rho * means->direct[c];
-        const double r = means->quantity == LAM_INDIRECT     ? value
-                         : means->quantity == LAM_IRRADIANCE ? rho * (value - means->direct[c])
-                                                             : value - direct;
+        const bool irradiance = means->quantity == LAM_IRRADIANCE;
+        const double r = value - (irradiance                         ? means->direct[c]
+                                  : means->quantity == LAM_RADIOSITY ? direct
+                                                                     : 0);
         reflected2 += r * r;
-        radiosity2 += (r + direct) * (r + direct);
+        radiosity2 += irradiance ? value * value : (r + direct) * (r + direct);
     }
     return finish_name(&s, reflected2, radiosity2);
 }

@@ -5,6 +5,7 @@
 
 #include "solver/codec/group_figures.h"
 #include "solver/codec/groups.h"
+#include "solver/codec/reflecting.h"
 #include "store/store.h"
 
 /* The scene of an answer; views of the caller's. */
@@ -45,12 +46,13 @@ typedef struct error_by_group {
     size_t n_groups, n_bins, n_channels, n_tiles; /* tiles: 0: none of skies is stated */
     error_law law;                                /* of emissions */
     sky_law sky;
-    double *area;        /* [n_bins] */
-    double *squares;     /* [n_groups], sum A^2 */
-    double *reflectance; /* [C][n_groups], mean */
-    uint32_t *bin;       /* [n] */
-    double *sky_power;   /* [C][n_tiles], sum A rho first_bounce */
-    double *sky_first;   /* [n_groups][n_tiles], mean first_bounce; NULL: not stored, and sky.direct is 0 */
+    double *area;         /* [n_bins] */
+    double *squares;      /* [n_groups], sum A^2 */
+    double *reflectance;  /* [C][n_groups], mean */
+    reflecting *of_group; /* [n_groups] */
+    uint32_t *bin;        /* [n] */
+    double *sky_power;    /* [C][n_tiles], sum A rho first_bounce */
+    double *sky_first;    /* [n_groups][n_tiles], mean first_bounce; NULL: not stored, and sky.direct is 0 */
     double *elements_off, *means_off; /* [n_groups][n_tiles], d_t; NULL: not stored */
     double *power_off;                /* [C][n_tiles], w_t; NULL: a store of before */
 } error_by_group;
@@ -84,13 +86,16 @@ typedef struct error_answer {
     bool whole;
     emission_size size, sky; /* of the emission, and of the sky: of tiles in place of elements */
     const float *L;          /* [C][n_tiles], radiances of the sky; NULL: none */
+    const float *L_direct;   /* of them those whose direct light is by tiles; NULL: all */
+    double
+        lost2; /* square of a power that is not sent on, as that of a tile is, channels added up; 0: none */
 } error_answer;
 
 /* The root of the mean squared error over the light that is left where that error is taken out of the light
  * of the answer, in squares; not finite where none is. */
 typedef struct answer_error {
-    double relative; /* |B~ - B| / |B| */
-    double indirect; /* |B~ - B| / |B - E - rho H0| */
+    double relative; /* |B~ - B| / |B|, of irradiance |H~ - H| / |H| */
+    double indirect; /* |B~ - B| / |B - E - rho H0|, of irradiance |H~ - H| / |H - H0| */
     double emitters; /* effective number */
 } answer_error;
 
@@ -104,7 +109,8 @@ bool answer_error_of(const error_by_group *e, const error_scene *scene, const er
                      answer_error *out);
 
 /* The errors of a name of a reduction: of its mean, and of its elements, root mean square, both over the
- * mean reflected light; relative: of its mean over its mean radiosity. */
+ * mean reflected light, of irradiance over the mean of H - H0; relative: of its mean over its mean radiosity,
+ * or irradiance. */
 typedef struct name_error {
     const char *name; /* of the request; set by the caller */
     double mean, elements, relative;

@@ -14,6 +14,7 @@ void emitters_error_free(emitters_error *e) {
     free(e->reflectance);
     free(e->direct);
     free(e->exitance);
+    free(e->black);
     free(e->group);
     *e = (emitters_error){.s = 0};
 }
@@ -65,6 +66,18 @@ static lam_status sum_groups(const error_scene *scene, const emitters_light *lig
     return LAM_OK;
 }
 
+static lam_status find_whole(const error_scene *scene, reflecting *out, lam_error *error) {
+    reflecting *one = NULL;
+    uint32_t *group = memory_allocate(scene->n, sizeof *group, "errors of emitters", error);
+    if (group == NULL) return LAM_ERR_MEMORY;
+    const lam_status status =
+        reflecting_make(scene->n, scene->n_channels, scene->area, scene->reflectance, 1, group, &one, error);
+    if (status == LAM_OK) *out = *one;
+    free(one);
+    free(group);
+    return status;
+}
+
 lam_status emitters_error_read(store *s, const error_scene *scene, const emitters_light *light,
                                emitters_error *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -73,11 +86,14 @@ lam_status emitters_error_read(store *s, const error_scene *scene, const emitter
     *out = (emitters_error){.s = 0};
     if (light->direct == NULL || !store_has(s, GROUP "/covariance")) return LAM_OK;
     TRY(read_finite(s, "covariance", 2, (size_t[]){count, count}, &e.covariance, error));
+    TRY(find_whole(scene, &e.whole, error));
     if (store_has(s, GROUP "/groups")) {
         const size_t G = scene->groups->n_groups;
         TRY(read_finite(s, "groups", 3, (size_t[]){G, count, count}, &e.of_groups, error));
         TRY(read_finite(s, "group_means", 3, (size_t[]){G, count, count}, &e.of_means, error));
         TRY(sum_groups(scene, light, &e, error));
+        TRY(reflecting_make(scene->n, scene->n_channels, scene->area, scene->reflectance, G, e.group,
+                            &e.black, error));
     }
     *out = e;
     e = (emitters_error){.s = 0};
@@ -141,13 +157,26 @@ void emitters_mix_free(emitters_mix *m) {
     *m = (emitters_mix){.W = NULL};
 }
 
+/* The squared error of all elements: by groups where these are kept apart. */
+static double error2_of_all(const emitters_error *e, lam_quantity quantity, emitters_mix *mix) {
+    double off = 0;
+    if (quantity != LAM_IRRADIANCE || e->of_groups == NULL)
+        return reflecting_of_elements(&e->whole, quantity, square(e, e->covariance, mix->weight));
+    for (size_t g = 0; g < e->n_groups; g++) {
+        find_group(e, g, mix);
+        off += reflecting_of_elements(&e->black[g], quantity, mix->of_group[g]);
+    }
+    return off;
+}
+
 answer_error emitters_error_of(const emitters_error *e, const error_scene *scene, const error_answer *of,
                                emitters_mix *mix) {
-    double off = of->selected != NULL ? 0 : square(e, e->covariance, mix->weight);
+    double off = of->selected != NULL ? 0 : error2_of_all(e, of->quantity, mix);
     for (size_t k = 0; of->selected != NULL && k < of->count; k++) {
         const uint32_t i = of->selected[k], g = e->group[i];
         find_group(e, g, mix);
-        off += scene->area[i] / e->area[g] * mix->of_group[g];
+        off += scene->area[i] / e->area[g] *
+               reflecting_of_elements(&e->black[g], of->quantity, mix->of_group[g]);
     }
     answer_error made = answer_error_of_square(scene, of, off);
     made.emitters = mix->emitters;
@@ -162,8 +191,8 @@ name_error emitters_error_of_name(const emitters_error *e, size_t n_channels, la
         const size_t g = name->groups[k];
         area += e->area[g];
         find_group(e, g, mix);
-        off += e->area[g] * sqrt(mix->of_mean[g]);
-        elements2 += mix->of_group[g];
+        off += e->area[g] * sqrt(reflecting_of_mean(&e->black[g], quantity, mix->of_mean[g]));
+        elements2 += reflecting_of_elements(&e->black[g], quantity, mix->of_group[g]);
     }
     if (!(area > 0)) return (name_error){.mean = 0};
     for (size_t c = 0; c < n_channels; c++) {
@@ -175,11 +204,10 @@ name_error emitters_error_of_name(const emitters_error *e, size_t n_channels, la
                 direct +=
                     e->area[g] / area * (double)mix->W[c * s + l] * e->exitance[c] * e->direct[g * s + l];
         }
-        const double r = quantity == LAM_INDIRECT     ? mean[c]
-                         : quantity == LAM_IRRADIANCE ? rho * (mean[c] - direct)
-                                                      : mean[c] - rho * direct;
+        const bool irradiance = quantity == LAM_IRRADIANCE;
+        const double r = mean[c] - (irradiance ? direct : quantity == LAM_RADIOSITY ? rho * direct : 0);
         reflected2 += r * r;
-        radiosity2 += (r + rho * direct) * (r + rho * direct);
+        radiosity2 += irradiance ? mean[c] * mean[c] : (r + rho * direct) * (r + rho * direct);
     }
     return name_error_of_squares(off * off / (area * area), elements2 / area, reflected2, radiosity2);
 }

@@ -5,8 +5,9 @@
 
 #include "solver/codec/answer_error.h"
 
-/* Weights w have the mean squared error w' K w, channels stacked, of all elements (K, with areas), of those
- * of a group (K_g), and of the mean of a group (M_g). Zeroed: a store that states none. */
+/* Weights w have the mean squared error w' K w of B, channels stacked, of all elements (K, with areas), of
+ * those of a group (K_g), and of the mean of a group (M_g); of a group that reflects nothing, which has no
+ * part in K unless all are so, of H. Zeroed: a store that states none. */
 typedef struct emitters_error {
     size_t s, n_groups;
     double *covariance; /* [s][s] */
@@ -15,8 +16,10 @@ typedef struct emitters_error {
     /* Of groups, with of_groups: areas, mean reflectances [C][n_groups], and the mean irradiance that
      * emitters outside the mesh give directly, [n_groups][s] of 1 W/m^2. */
     double *area, *reflectance, *direct;
-    double *exitance; /* [C], W/m^2 of weight 1 */
-    uint32_t *group;  /* [n] */
+    double *exitance;  /* [C], W/m^2 of weight 1 */
+    reflecting *black; /* [n_groups], with of_groups: how errors of B and H go together */
+    reflecting whole;  /* the same of all elements */
+    uint32_t *group;   /* [n] */
 } emitters_error;
 
 /* The light of emitters outside the mesh, as the operator has it. */

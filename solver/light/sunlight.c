@@ -54,6 +54,13 @@ bool sunlight_shines(const sunlight *s, size_t vector) {
     return s->given != NULL || s->suns[vector].horizontal > 0;
 }
 
+bool sunlight_in_tile(const sunlight *s, size_t vector, size_t *tile, double *radiance) {
+    if (s->sky == NULL || s->given != NULL || !sunlight_shines(s, vector)) return false;
+    *tile = year_sun_tile(&s->tiling, s->suns[vector].direction);
+    *radiance = s->suns[vector].horizontal / s->tiling.tiles[*tile].cosine;
+    return true;
+}
+
 /* H less what the tile that holds the sun gives directly. */
 static void take_tile(const sunlight *s, const year_sun *sun, float *H, float *work) {
     const size_t tile = year_sun_tile(&s->tiling, sun->direction);

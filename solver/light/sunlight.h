@@ -34,6 +34,10 @@ void sunlight_free(sunlight *s);
 /* True where the sun shines in a vector. */
 bool sunlight_shines(const sunlight *s, size_t vector);
 
+/* The tile that holds the sun of a vector, and the radiance that it has there; false where the sun is in no
+ * tile. */
+bool sunlight_in_tile(const sunlight *s, size_t vector, size_t *tile, double *radiance);
+
 enum { SUNLIGHT_MOST = 64 };
 
 /* Numbers that work below must have room for. */

@@ -47,12 +47,18 @@ typedef struct emitters {
 /* The same operator seen from inside; NULL of another kind. */
 const emitters *operator_emitters_of(const lam_operator *op);
 
-/* The emission E [n_rhs][C][n] that weights [n_rhs][C][s] stand for, and H0, the direct irradiance of their
- * sky, in the same shape. Errors: LAM_ERR_MEMORY. */
+/* The emission E [n_rhs][C][n] of elements that weights [n_rhs][C][s] stand for, and H0, the direct
+ * irradiance of their sky, in the same shape. Errors: LAM_ERR_MEMORY. */
 lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const float *W, float *E, float *H0,
                                    lam_error *error);
 
-/* The same in double, for refined answers. */
+/* E alone. */
+void operator_emitters_emission(const lam_operator *op, size_t n_rhs, const float *W, float *E);
+
+/* The radiances L [n_rhs][C][m] of the tiles that the weights stand for: m is n_tiles of the arrays. */
+void operator_emitters_radiances(const lam_operator *op, size_t n_rhs, const float *W, float *L);
+
+/* E and H0 in double, for refined answers. */
 lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, const float *W, double *E,
                                           double *H0, lam_error *error);
 

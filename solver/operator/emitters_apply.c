@@ -150,6 +150,21 @@ lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const f
     return LAM_OK;
 }
 
+void operator_emitters_emission(const lam_operator *op, size_t n_rhs, const float *W, float *E) {
+    const emitters *self = operator_emitters_of(op);
+    const size_t n = op->n, C = op->n_channels;
+    memset(E, 0, n_rhs * C * n * sizeof *E);
+    for (size_t row = 0; row < n_rhs * C; row++)
+        add_emission(self, row % C, W + row * self->a.s, E + row * n);
+}
+
+void operator_emitters_radiances(const lam_operator *op, size_t n_rhs, const float *W, float *L) {
+    const emitters *self = operator_emitters_of(op);
+    const size_t s = self->a.s, m = self->a.n_tiles;
+    for (size_t row = 0; row < n_rhs * op->n_channels; row++)
+        sum_tiles(self, row % op->n_channels, W + row * s, L + row * m);
+}
+
 lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, const float *W, double *E,
                                           double *H0, lam_error *error) {
     const emitters *self = operator_emitters_of(op);

@@ -7,6 +7,13 @@
 
 enum { MIXTURES = 64 };
 
+/* True where nothing reflects: figures are those of the irradiance then. */
+static bool is_black(const mesh *m) {
+    for (size_t k = 0; k < m->n * m->n_channels; k++)
+        if (m->reflectance[k] > 0) return false;
+    return true;
+}
+
 /* Squared norms of mixtures with weights w: w' M w, channels stacked. */
 typedef struct norms {
     size_t s;
@@ -100,6 +107,7 @@ lam_status state_judge_positions(precompute_state *state, lam_error *error) {
     const mesh *m = &state->m;
     const reuse_estimates *e = &state->paths;
     const size_t n = m->n, C = m->n_channels, s = e->n_positions;
+    const bool black = is_black(m);
     norms of = {.s = s, .covariance = e->covariance};
     float *x = memory_allocate(s, n * sizeof *x, "errors of positions", error);
     double *w = memory_allocate(s, sizeof *w, "errors of positions", error);
@@ -112,9 +120,9 @@ lam_status state_judge_positions(precompute_state *state, lam_error *error) {
     for (size_t c = 0; c < C; c++) {
         const float *rho = m->reflectance + c * n, *H = e->H + c * s * n,
                     power = (float)state->light.emission[c];
-        for (size_t k = 0; k < s * n; k++) x[k] = rho[k % n] * H[k];
+        for (size_t k = 0; k < s * n; k++) x[k] = (black ? 1 : rho[k % n]) * H[k];
         add_products(s, n, m->area, x, of.radiosity);
-        for (size_t k = 0; k < s * n; k++) x[k] = rho[k % n] * (H[k] - power * e->direct[k]);
+        for (size_t k = 0; k < s * n; k++) x[k] = (black ? 1 : rho[k % n]) * (H[k] - power * e->direct[k]);
         add_products(s, n, m->area, x, of.reflected);
     }
     measure_all(&of, precompute_seed(state->options->seed, SEED_PROBES), w, state->position_errors,

@@ -313,8 +313,10 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                                        .photometric = f->photometric,
                                        .exact = strcmp(f->sun, "exact") == 0,
                                        .sun_points = (size_t)f->sun_points};
-        TRY(weather_light_add(&hours, s, &m, lit.op, lit.sky, n_selected, selected, t, &lit.light, &sun,
-                              &span, error));
+        /* The error of an answer is told by all that the sun shines on. */
+        const bool some = year->n_figures > 0;
+        TRY(weather_light_add(&hours, s, &m, lit.op, lit.sky, some ? n_selected : 0, some ? selected : NULL,
+                              t, &lit.light, &sun, &span, error));
         TRY(take_span(&span, f->weather, f->hours, &figures, error));
     }
     if (year->n_figures > 0 && !lit.light.batch)

@@ -1,6 +1,7 @@
 #include "solver/verbs/own_error.h"
 
 #include "solver/operator/emitters.h"
+#include "solver/verbs/own_light.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -30,42 +31,30 @@ static lam_status add_own_error(const stated_errors *stated, const error_scene *
 }
 
 /* Replaces the error of the store by that of the answer's own light, of a batch the largest over its vectors,
- * unless the sun itself shines or nothing is stated. */
+ * unless nothing is stated. */
 static lam_status take_emission(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
                                 size_t n_selected, const uint32_t *selected, solution *out,
                                 name_error **names, lam_error *error) {
     lam_status status = LAM_OK;
-    const emission *light = &lit->light;
-    const lam_sky *sky = lit->sky;
     const size_t n = scene->n, row = n * scene->n_channels;
     const error_by_group *by = &stated->by_group;
-    const size_t m = sky != NULL ? lam_sky_tiles(sky) : 0, C = scene->n_channels;
-    float *H0 = NULL;
-    if (by->n_bins == 0 || out->relative < 0 || light->sun != NULL || light->E == NULL ||
-        (light->L != NULL && by->n_tiles != m))
-        return LAM_OK;
-    name_error *made = memory_allocate(out->n_reductions, sizeof *made, "errors", error);
-    if (made == NULL) return LAM_ERR_MEMORY;
-    if (light->L != NULL) {
-        H0 = memory_allocate(row, sizeof *H0, "the light of the sky", error);
-        if (H0 == NULL) TRY(LAM_ERR_MEMORY);
-    }
+    own_light light = {.n_tiles = 0};
+    name_error *made = NULL;
+    if (by->n_bins == 0 || out->relative < 0) return LAM_OK;
+    TRY(own_light_make(lit, scene, &light, error));
+    if (light.n_tiles > 0 && by->n_tiles != light.n_tiles) goto done;
+    made = memory_allocate(out->n_reductions, sizeof *made, "errors", error);
+    if (made == NULL) TRY(LAM_ERR_MEMORY);
     out->relative = out->indirect = 0;
     for (size_t r = 0; r < out->n_reductions; r++) made[r].name = out->reductions[r].group;
     for (size_t v = 0; v < out->n_vectors; v++) {
         error_answer of = {.quantity = out->quantity,
-                           .E = light->E + (light->steady ? 0 : v * row),
-                           .H0 = H0,
                            .count = selected != NULL ? n_selected : n,
                            .selected = selected,
                            .values = out->values + v * row,
-                           .whole = true,
-                           .L = light->L != NULL ? light->L + v * C * m : NULL};
-        for (size_t c = 0; c < scene->n_channels; c++)
-            emission_size_add(&of.size, n, scene->area, of.E + c * n);
-        for (size_t c = 0; light->L != NULL && c < C; c++)
-            emission_size_add(&of.sky, m, by->sky_power + c * m, light->L + (v * C + c) * m);
-        if (light->L != NULL) lam_sky_irradiance(sky, C, light->L + v * C * m, H0);
+                           .whole = true};
+        TRY(own_light_take(&light, v, error));
+        own_light_put(&light, by, &of);
         TRY(add_own_error(stated, scene, &of, out, made, error));
     }
     out->error_light = "own";
@@ -73,7 +62,7 @@ static lam_status take_emission(const stated_errors *stated, const error_scene *
     *names = made;
     made = NULL;
 done:
-    free(H0);
+    own_light_free(&light);
     free(made);
     return status;
 }
@@ -156,6 +145,6 @@ done:
 lam_status own_error_take(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
                           size_t n_selected, const uint32_t *selected, solution *out, name_error **names,
                           lam_error *error) {
-    if (lam_operator_emitters(lit->op) > 0) return take_mixture(stated, scene, lit, out, names, error);
+    if (stated->emitters.s > 0) return take_mixture(stated, scene, lit, out, names, error);
     return take_emission(stated, scene, lit, n_selected, selected, out, names, error);
 }

@@ -39,11 +39,13 @@ typedef struct reuse_estimates {
                          batches */
     float *direct;    /* [s][n]: the part of H that comes straight from the light, of the emission 1 W/m2 */
     /* [s][s] W2/m2: the sum over channels and elements of area rho^2 Cov(H_j, H_l) for the positions j and l,
-     * from batches. The radiosity of a mix of the positions with weights w has the standard error sqrt(w' K
-     * w) in the norm |B|^2 = sum over channels and elements of area B^2. */
+     * from batches; rho is 1 where nothing in the scene reflects. The radiosity of a mix of the positions
+     * with weights w has the standard error sqrt(w' K w) in the norm |B|^2 = sum over channels and elements
+     * of area B^2. */
     double *covariance;
     double *of_groups; /* [groups][s][s]: the same of each group of the mesh, which add up to it; and of the
-                          mean radiosity of a group, summed over channels. NULL: there are too many groups */
+                          mean radiosity of a group, summed over channels. In a group that reflects nothing
+                          rho is 1, and it adds nothing to the sum of all. NULL: there are too many groups */
     double *of_means;
     double rays;                                       /* of a path, mean, the first one included */
     double maps_seconds, trace_seconds, reuse_seconds; /* processor time of all threads */

@@ -138,19 +138,25 @@ done:
 /* The error of the direct light comes to that of the walks, independent for every element and position. */
 static lam_status add_variance(const shared *r, reuse_estimates *e, lam_error *error) {
     const mesh *m = r->scene->m;
+    const bool apart = e->of_groups != NULL;
+    black_groups black = {.of = NULL};
     double *area = memory_allocate(m->n_groups, sizeof *area, "paths", error);
-    if (area == NULL) return LAM_ERR_MEMORY;
+    if (area == NULL || black_groups_find(m, &black, error) != LAM_OK) {
+        free(area);
+        return LAM_ERR_MEMORY;
+    }
     for (size_t i = 0; e->of_groups != NULL && i < r->n; i++) area[m->group[i]] += m->area[i];
     for (size_t i = 0; i < r->n; i++)
         for (size_t c = 0; c < r->C; c++) {
             const double power = r->problem->light->emission[c];
-            const double rho = (double)m->reflectance[c * r->n + i];
+            const double rho = reuse_reflectance(m, &black, apart, c, i);
+            const bool counts = black.all || !black.of[m->group[i]];
             for (size_t l = 0; l < r->s; l++) {
                 const double variance = power * power * (double)r->variance[i * r->s + l];
                 float *const at = &e->error[(c * r->s + l) * r->n + i];
                 *at = (float)sqrt((double)*at * (double)*at + variance);
                 const double square = m->area[i] * rho * rho * variance;
-                e->covariance[l * r->s + l] += square;
+                if (counts) e->covariance[l * r->s + l] += square;
                 if (e->of_groups == NULL) continue;
                 const size_t at_group = (m->group[i] * r->s + l) * r->s + l;
                 e->of_groups[at_group] += square;
@@ -158,6 +164,7 @@ static lam_status add_variance(const shared *r, reuse_estimates *e, lam_error *e
             }
         }
     free(area);
+    free(black.of);
     return LAM_OK;
 }
 

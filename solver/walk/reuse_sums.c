@@ -35,11 +35,22 @@ void reuse_sums_free(reuse_sums *t) {
     free(t->deviation);
     free(t->left);
     free(t->right);
+    free(t->black.of);
     *t = (reuse_sums){.s = 0};
 }
 
 size_t reuse_sums_groups(const mesh *m, size_t s) {
     return m->n_groups > 0 && s * s <= SUMS_GROUPS_MOST / m->n_groups ? m->n_groups * s * s : 0;
+}
+
+lam_status black_groups_find(const mesh *m, black_groups *out, lam_error *error) {
+    bool *black = memory_allocate(m->n_groups, sizeof *black, "paths", error);
+    if (black == NULL) return LAM_ERR_MEMORY;
+    *out = (black_groups){.of = black, .all = true};
+    for (size_t g = 0; g < m->n_groups; g++) black[g] = true;
+    for (size_t k = 0; k < m->n * m->n_channels; k++)
+        if (m->reflectance[k] > 0) black[m->group[k % m->n]] = out->all = false;
+    return LAM_OK;
 }
 
 static size_t group_of(const reuse_sums *t, size_t element) {
@@ -68,9 +79,13 @@ lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shar
         reuse_sums_free(&t);
         return LAM_ERR_MEMORY;
     }
+    if (black_groups_find(m, &t.black, error) != LAM_OK) {
+        reuse_sums_free(&t);
+        return LAM_ERR_MEMORY;
+    }
     for (size_t i = 0; i < m->n; i++)
         for (size_t c = 0; c < m->n_channels; c++) {
-            const double rho = (double)m->reflectance[c * m->n + i];
+            const double rho = reuse_reflectance(m, &t.black, t.groups > 1, c, i);
             t.gain[i * m->n_channels + c] = light->emission[c] * light->area / m->area[i];
             t.norm[i * m->n_channels + c] = m->area[i] * rho * rho;
         }
@@ -192,7 +207,7 @@ void reuse_sums_end(const reuse_sums *t, reuse_estimates *e) {
             for (size_t l = j; l < s; l++) {
                 const size_t from = (g * s + j) * s + l, mirror = (g * s + l) * s + j;
                 const double own = t->covariance[from] * of_mean;
-                e->covariance[j * s + l] += own;
+                if (t->black.all || t->groups == 1 || !t->black.of[g]) e->covariance[j * s + l] += own;
                 e->covariance[l * s + j] = e->covariance[j * s + l];
                 if (e->of_groups == NULL) continue;
                 e->of_groups[from] = e->of_groups[mirror] = own;

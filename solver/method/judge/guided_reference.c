@@ -267,8 +267,13 @@ static double first_at(const reference_answers *a, size_t at) {
     return a->first[at] + (a->spread != NULL ? a->share * a->spread[at] : 0);
 }
 
+static bool is_black(const reference_system *s, size_t i) {
+    return s->black != NULL && s->black[i];
+}
+
 /* r = E - B~ + R F B~, or, where the first light H is known, E - B~ + R H + R F (B~ - E): what B = B~ + x
- * lacks, (I - R F) x = r. x and y are [n][columns], r is [columns][n]. */
+ * lacks, (I - R F) x = r. Of black elements, whose radiosity is E, it is what their irradiance H~ lacks by
+ * the light B~ of the others: direct - H~ + F B~. x and y are [n][columns], r is [columns][n]. */
 static lam_status residual(const reference_system *s, const reference_answers *a, const columns *of,
                            double *x, double *y, double *r, lam_error *error) {
     lam_status status = LAM_OK;
@@ -279,7 +284,8 @@ static lam_status residual(const reference_system *s, const reference_answers *a
             const size_t v = of->which[k / of->n_channels];
             const size_t at = (v * C + of->channel + k % of->n_channels) * n + i;
             const bool known = a->first != NULL && a->known[v];
-            x[i * count + k] = (double)a->B[at] - (known ? (double)a->E[at] : 0);
+            const double B = (double)(is_black(s, i) ? a->E : a->B)[at];
+            x[i * count + k] = B - (known ? (double)a->E[at] : 0);
         }
     TRY(s->F->multiply(s->F->context, count, x, y, error));
 #pragma omp parallel for schedule(static) if (n >= 2048)
@@ -288,15 +294,19 @@ static lam_status residual(const reference_system *s, const reference_answers *a
             const size_t v = of->which[k / of->n_channels], c = of->channel + k % of->n_channels;
             const size_t at = (v * C + c) * n + i;
             const double H = y[i * count + k] + (a->first != NULL && a->known[v] ? first_at(a, at) : 0);
-            r[k * n + i] = (double)a->E[at] - (double)a->B[at] + (double)s->reflectance[c * n + i] * H;
+            const double direct = a->direct != NULL ? (double)a->direct[at] : 0;
+            r[k * n + i] = is_black(s, i)
+                               ? direct - (double)a->B[at] + H
+                               : (double)a->E[at] - (double)a->B[at] + (double)s->reflectance[c * n + i] * H;
         }
 done:
     return status;
 }
 
-/* The numbers of a batch. */
+/* The numbers of a batch; dark: r of black elements, of the others 0; NULL: there are none. */
 typedef struct batch {
-    double *x, *y, *r, *X;
+    double *x, *y, *r, *X, *dark;
+    bool lit; /* some element is not black */
 } batch;
 
 static void batch_free(batch *b) {
@@ -304,16 +314,41 @@ static void batch_free(batch *b) {
     free(b->y);
     free(b->r);
     free(b->X);
+    free(b->dark);
 }
 
-static lam_status batch_init(batch *b, size_t n, size_t count, lam_error *error) {
-    double **const all[] = {&b->x, &b->y, &b->r, &b->X};
-    *b = (batch){.x = NULL};
-    for (size_t k = 0; k < 4; k++) {
-        *all[k] = memory_allocate(count, n * sizeof **all[k], "reference", error);
+static lam_status batch_init(batch *b, const reference_system *s, size_t count, lam_error *error) {
+    double **const all[] = {&b->x, &b->y, &b->r, &b->X, &b->dark};
+    *b = (batch){.x = NULL, .lit = s->black == NULL};
+    for (size_t k = 0; k < (s->black != NULL ? 5 : 4); k++) {
+        *all[k] = memory_allocate(count, s->n * sizeof **all[k], "reference", error);
         if (*all[k] == NULL) return LAM_ERR_MEMORY;
     }
+    for (size_t i = 0; s->black != NULL && i < s->n; i++) b->lit = b->lit || !s->black[i];
     return LAM_OK;
+}
+
+/* Puts r of black elements aside: they send nothing on. */
+static void set_black_aside(const reference_system *s, size_t count, batch *b) {
+    const size_t n = s->n;
+    for (size_t k = 0; b->dark != NULL && k < count * n; k++) {
+        const bool black = s->black[k % n];
+        b->dark[k] = black ? b->r[k] : 0;
+        if (black) b->r[k] = 0;
+    }
+}
+
+/* X of black elements is r and the light of what the others lack, F X. */
+static lam_status finish_black(const reference_system *s, size_t count, batch *b, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = s->n;
+    if (b->dark == NULL) return LAM_OK;
+    for (size_t k = 0; b->lit && k < count * n; k++) b->x[k % n * count + k / n] = b->X[k];
+    if (b->lit) TRY(s->F->multiply(s->F->context, count, b->x, b->y, error));
+    for (size_t k = 0; k < count * n; k++)
+        if (s->black[k % n]) b->X[k] = b->dark[k] + (b->lit ? b->y[k % n * count + k / n] : 0);
+done:
+    return status;
 }
 
 size_t guided_reference_columns(size_t n, size_t n_channels) {
@@ -329,13 +364,15 @@ static lam_status each_guided(const reference_system *s, const reference_answers
     operator_guide of = {.op = NULL};
     const reference_guide guide = {answer_by_operator, &of};
     batch b = {.x = NULL};
-    TRY(batch_init(&b, n, most * C, error));
+    TRY(batch_init(&b, s, most * C, error));
     TRY(operator_guide_init(&of, a->op, most, error));
     for (size_t first = 0; first < m; first += most) {
         const columns some = {which + first, m - first < most ? m - first : most, 0, C};
         TRY(residual(s, a, &some, b.x, b.y, b.r, error));
+        set_black_aside(s, some.count * C, &b);
         TRY(correct(s, some.count, b.r, b.X, correction_tolerance, &guide, b.x, b.y, a->rate, a->progress,
                     error));
+        TRY(finish_black(s, some.count * C, &b, error));
         for (size_t k = 0; k < some.count * C; k++) visit(context, which[first + k / C], k % C, b.X + k * n);
     }
 done:
@@ -352,15 +389,17 @@ static lam_status each_alone(const reference_system *s, const reference_answers 
     const size_t n = s->n, C = s->n_channels;
     reference *one = NULL;
     batch b = {.x = NULL};
-    TRY(batch_init(&b, n, m < ALONE ? m : ALONE, error));
+    TRY(batch_init(&b, s, m < ALONE ? m : ALONE, error));
     for (size_t c = 0; c < C; c++) {
         TRY(reference_create_of(s->F, s->area, s->reflectance + c * n, way, &one, error));
         for (size_t first = 0; first < m; first += ALONE) {
             const columns some = {which + first, m - first < ALONE ? m - first : ALONE, c, 1};
             if (progress_cancelled(a->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
             TRY(residual(s, a, &some, b.x, b.y, b.r, error));
+            set_black_aside(s, some.count, &b);
             memcpy(b.X, b.r, some.count * n * sizeof *b.X);
             TRY(reference_solve(one, some.count, b.r, b.X, correction_tolerance, a->progress, error));
+            TRY(finish_black(s, some.count, &b, error));
             for (size_t k = 0; k < some.count; k++) visit(context, which[first + k], c, b.X + k * n);
         }
         reference_destroy(one);

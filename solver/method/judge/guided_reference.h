@@ -18,6 +18,8 @@ typedef struct reference_system {
     const factor_product *F;  /* with reciprocity */
     const double *area;       /* [n] */
     const float *reflectance; /* [C][n] */
+    const bool *black;        /* [n], true of elements that reflect nothing and are judged by their irradiance
+                                 (reference_answers); NULL: none is */
 } reference_system;
 
 /* X of m right sides r, both [m][C][n]; r is used up. Each is X := X + M r, r := r - (I - R F) M r with the
@@ -33,7 +35,8 @@ lam_status guided_reference_correct(const reference_system *s, size_t m, double 
 /* Emissions of an operator, and its answers. */
 typedef struct reference_answers {
     const lam_operator *op;
-    const float *E, *B; /* [][C][n] emission and the operator's radiosity */
+    const float *E, *B; /* [][C][n] emission and the operator's radiosity, its irradiance of black elements */
+    const float *direct; /* [][C][n] irradiance of black elements that comes from no element; NULL: 0 */
     const double
         *first; /* [][C][n] H, the light that E itself gives, in place of F E where `known`; NULL: F E
                  */
@@ -46,7 +49,7 @@ typedef struct reference_answers {
     const progress *progress;
 } reference_answers;
 
-/* Gets x [n], the converged B - B~ of answer v in a channel. */
+/* Gets x [n], the converged B - B~ of answer v in a channel, of black elements H - H~. */
 typedef void visit_correction(void *context, size_t v, size_t channel, const double *x);
 
 /* Vectors of so many elements are most of a judge's memory, and fewer of them together cost no time. */

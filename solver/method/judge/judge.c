@@ -1,6 +1,7 @@
 #include "solver/method/judge/judge.h"
 
 #include "solver/base/clock.h"
+#include "solver/method/judge/judge_black.h"
 #include "solver/method/judge/judge_round.h"
 #include "solver/method/judge/judge_sky.h"
 
@@ -44,8 +45,8 @@ done:
     return status;
 }
 
-/* Negative power over all power, and sum A E against sum A [(1 - rho) H + B (1 - s)], means of each group.
- * Drops H. */
+/* Negative power over all power, of irradiance where all is black, and sum A E against sum A [(1 - rho) H + B
+ * (1 - s)], means of each group. Drops H. */
 static void add_physics(const judge_input *input, probes *p, error_group *groups[JUDGE_GROUPS]) {
     const build_problem *problem = input->problem;
     const size_t n = problem->n, vector = n * problem->n_channels;
@@ -54,12 +55,13 @@ static void add_physics(const judge_input *input, probes *p, error_group *groups
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             double negative = 0, all = 0, emitted = 0, accounted = 0;
             for (size_t i = 0; i < vector; i++) {
-                const double a = problem->area[i % n], b = (double)p->B[v * vector + i];
+                const bool black = judge_is_black(input, i % n);
+                const double a = problem->area[i % n], b = (double)(black ? p->E : p->B)[v * vector + i];
                 const double s = input->row_sums[i % n],
                              direct = p->H0 != NULL ? (double)p->H0[v * vector + i] : 0;
                 const double h = (double)p->H[v * vector + i] - direct;
-                negative += a * fmax(-b, 0);
-                all += a * fabs(b);
+                negative += a * fmax(-(input->all_black ? h : b), 0);
+                all += a * fabs(input->all_black ? h : b);
                 emitted += a * (double)p->E[v * vector + i];
                 accounted += a * ((1 - (double)problem->reflectance[i]) * h + b * (1 - s));
             }
@@ -169,19 +171,23 @@ done:
     return status;
 }
 
-lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
+lam_status judge_operator(const lam_operator *op, const judge_input *given, error_report *report,
                           lam_error *error) {
     lam_status status = LAM_OK;
     const double start = clock_seconds();
+    judge_input with_black = *given;
+    const judge_input *const input = &with_black;
     error_report found = {0};
     error_group *groups[JUDGE_GROUPS] = {&found.random, &found.whole, &found.lights, &found.single};
     size_t counts[JUDGE_GROUPS], most = 0;
-    probe_source source;
+    probe_source source = {.deck = NULL};
     probes p = {.m = 0};
     judge_rounds rounds = {.input = input};
     group_errors made = {.n_groups = 0};
+    TRY(judge_black_find(&with_black, error));
     TRY(probe_source_make(input->problem, op, input->emission, input->emits, input->probes,
                           JUDGE_RANDOM_PROBES, input->seed, &source, error));
+    source.black = input->black;
     if (input->group != NULL)
         TRY(probe_source_add_groups(&source, input->group, input->n_groups, JUDGE_WHOLE_PROBES, error));
     if (input->by_group != NULL && input->group != NULL && input->independent.n > 0)
@@ -215,5 +221,6 @@ done:
     group_errors_free(&made);
     probe_source_free(&source);
     probes_free(&p);
+    judge_black_free(&with_black);
     return status;
 }

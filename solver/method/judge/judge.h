@@ -185,6 +185,10 @@ typedef struct judge_input {
                             errors is below a tenth of that mean */
     uint64_t seed;
     const progress *progress;
+    /* Set by judge_operator: elements that are judged by their irradiance (judge_black.h), and whether all
+     * are. */
+    bool *black;                /* [n]; NULL: none */
+    bool all_black, black_read; /* all elements; all that is read */
 } judge_input;
 
 /* Measures. With x the correction of an answer by the reference, B = B~ + x, a squared error is |x|^2 less
@@ -194,7 +198,7 @@ typedef struct judge_input {
  * first light, so that its noise and what bounces on of it are in t; without another reference of that
  * quality, t is rho D alone. Of a finer and a coarser reference the noise is stated alone. Cost: a converged
  * solve per probe and reference, started from the operator's own answer. */
-lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
+lam_status judge_operator(const lam_operator *op, const judge_input *given, error_report *report,
                           lam_error *error);
 
 /* /error/by_group of a store. */

@@ -14,11 +14,22 @@ figure_number figure_number_at(const figure_probe *p, size_t k) {
     if (p->relation == REFERENCE_TWIN) one.off = .5 * (x + y), one.noise = .5 * (x - y);
     if (p->relation == REFERENCE_DISTURBED) one.noise = y - x;
     if (p->relation == REFERENCE_COARSER) one.apart = p->other_share * (x - y);
-    if (p->spread != NULL) one.light = (double)p->problem->reflectance[k] * p->spread[k];
+    const bool black = p->black != NULL && p->black[k % p->problem->n];
+    const double rho = black ? 1 : (double)p->problem->reflectance[k];
+    const float *direct = black ? p->direct : p->E;
+    if (p->spread != NULL) one.light = rho * p->spread[k];
     if (p->noise != NULL) one.light += p->noise[k];
     one.b = (double)p->B[k] + one.off;
-    one.bounced = one.b - (double)p->E[k];
+    one.bounced = one.b - (direct != NULL ? (double)direct[k] : 0);
     return one;
+}
+
+/* The same for figures of the whole scene, or of what is read of it: the irradiance of black elements counts
+ * where it is all that there is, and else their radiosity, which is E. */
+static figure_number number_of(const figure_probe *p, size_t k) {
+    if (p->black != NULL && p->black[k % p->problem->n] && !p->all_black)
+        return (figure_number){.b = (double)p->E[k]};
+    return figure_number_at(p, k);
 }
 
 /* Squares, area-weighted, channels stacked. */
@@ -33,7 +44,7 @@ static squares squares_of(const figure_probe *p, const float *read) {
     for (size_t k = 0; k < C * n; k++) {
         const double weight = read != NULL ? (double)read[k % n] : 1;
         const double a = weight * p->problem->area[k % n];
-        const figure_number one = figure_number_at(p, k);
+        const figure_number one = number_of(p, k);
         s.b += a * one.b * one.b;
         s.bounced += a * one.bounced * one.bounced;
         s.off += a * one.off * one.off;
@@ -55,7 +66,7 @@ static void find_noise(const figure_probe *p, noise_sums *out) {
     for (size_t i = 0; i < n; i++) {
         const size_t part = i * FIGURE_PARTS / n;
         for (size_t k = i; k < C * n; k += n) {
-            const figure_number one = figure_number_at(p, k);
+            const figure_number one = number_of(p, k);
             const double at = 2 * p->problem->area[i] * (one.noise + one.light);
             out->off[part] += at * one.off;
             out->bounced[part] += at * one.bounced;

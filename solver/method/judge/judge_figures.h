@@ -15,12 +15,16 @@ typedef struct figure_probe {
     const double *x, *y;  /* [C][n] corrections by the reference and the other one; y: NULL: not known */
     const double *spread; /* [C][n] of the first light; NULL: none */
     const double *noise;  /* [C][n] in x, beside that between x and y; NULL: none */
+    const bool *black;    /* [n], true of elements whose B and x are of the irradiance; NULL: none */
+    bool all_black;       /* such are all that figures of the whole scene are of; else they have none there */
+    const float *direct;  /* [C][n] irradiance of black elements that comes from no element; NULL: 0 */
     reference_relation relation;
     double other_share;
 } figure_probe;
 
 /* Of element k % n in channel k / n: B, B - E, the error x, the noise t in it, that of the first light, and
- * the error of x by the coarser reference. */
+ * the error of x by the coarser reference. Of a black element H stands for B, and H less what is direct for
+ * B - E. */
 typedef struct figure_number {
     double b, bounced, off, noise, light, apart;
 } figure_number;

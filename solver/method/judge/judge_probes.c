@@ -160,7 +160,7 @@ lam_status probes_next(probe_source *source, const size_t counts[JUDGE_GROUPS], 
     p.E = memory_allocate(p.m, vector * sizeof *p.E, "probes", error);
     p.B = memory_allocate(p.m, vector * sizeof *p.B, "probes", error);
     if (p.E == NULL || p.B == NULL) TRY(LAM_ERR_MEMORY);
-    if (irradiance) {
+    if (irradiance || source->black != NULL) {
         p.H = memory_allocate(p.m, vector * sizeof *p.H, "probes", error);
         if (p.H == NULL) TRY(LAM_ERR_MEMORY);
     }
@@ -179,7 +179,13 @@ lam_status probes_next(probe_source *source, const size_t counts[JUDGE_GROUPS], 
                 p.E[v * vector + i] += source->problem->reflectance[i] * p.H0[v * vector + i];
     }
     TRY(apply(source->op, &p, LAM_RADIOSITY, p.B, error));
-    if (irradiance) TRY(apply(source->op, &p, LAM_IRRADIANCE, p.H, error));
+    if (p.H != NULL) TRY(apply(source->op, &p, LAM_IRRADIANCE, p.H, error));
+    for (size_t k = 0; source->black != NULL && k < p.m * vector; k++)
+        if (source->black[k % n]) p.B[k] = p.H[k];
+    if (!irradiance) {
+        free(p.H);
+        p.H = NULL;
+    }
     *out = p;
     p = (probes){.m = 0};
 done:

@@ -15,6 +15,7 @@ typedef struct probe_source {
     const lam_operator *op;
     const float *emission; /* [C][n], the scene's own */
     const float *emits;    /* [n], above 0 of elements that emit; NULL: all */
+    const bool *black;     /* [n], true where B of probes is the irradiance; NULL: nowhere. Set by the user */
     const uint32_t *group; /* [n], of each element; NULL: no whole groups are drawn */
     size_t n_singles;      /* in the deck */
     size_t n_whole;        /* groups in their deck, of which some element may emit */
@@ -38,7 +39,8 @@ void probe_source_free(probe_source *s);
 /* The number of emissions of a group, JUDGE_..., 0 where they are endless. */
 size_t probe_source_all(const probe_source *s, int group);
 
-/* Emissions E and the operator's radiosity and irradiance, [m][C][n]; those of group g are begin[g] ...
+/* Emissions E and the operator's radiosity B (its irradiance where the source is black) and irradiance H,
+ * [m][C][n]; those of group g are begin[g] ...
  * begin[g + 1] - 1. Of an operator of emitters W are their weights, [m][C][s], and H0 is the light of the
  * sky, which E contains as rho H0; else both are NULL. */
 typedef struct probes {

@@ -1,5 +1,7 @@
 #include "solver/method/judge/judge_round.h"
 
+#include "solver/method/judge/judge_emitters.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -65,7 +67,12 @@ done:
 
 reference_system reference_system_of(const judge_input *input, const factor_product *F) {
     const build_problem *problem = input->problem;
-    return (reference_system){problem->n, problem->n_channels, F, problem->area, problem->reflectance};
+    return (reference_system){.n = problem->n,
+                              .n_channels = problem->n_channels,
+                              .F = F,
+                              .area = problem->area,
+                              .reflectance = problem->reflectance,
+                              .black = input->black};
 }
 
 typedef struct corrections {
@@ -97,6 +104,7 @@ static lam_status solve(const lam_operator *op, const measured *m, const factor_
     const reference_answers answers = {.op = op,
                                        .E = m->p->E,
                                        .B = m->p->B,
+                                       .direct = m->p->H0,
                                        .first = first ? m->first : NULL,
                                        .known = m->known,
                                        .spread = m->spread,
@@ -145,6 +153,9 @@ static figure_probe probe_of(const measured *m, size_t v, const float *x, const 
                           .x = numbers_of(m, v, x, m->one_x),
                           .y = y != NULL ? numbers_of(m, v, y, m->one_y) : NULL,
                           .spread = spread ? m->spread + first : NULL,
+                          .black = input->black,
+                          .all_black = input->all_black,
+                          .direct = m->p->H0 != NULL ? m->p->H0 + first : NULL,
                           .relation = input->relation,
                           .other_share = input->other_share};
 }
@@ -163,6 +174,13 @@ static void report(const judge_rounds *r, double part) {
     progress_report(r->input->progress, "judge", 1 - 1 / ((double)r->n + 1 + part));
 }
 
+/* The light of what is read: of black elements their irradiance where such alone are read. */
+static void add_receivers(const judge_input *input, const figure_probe *one, receiver_sums *to) {
+    figure_probe read = *one;
+    read.all_black = input->black_read;
+    if (input->read != NULL) receivers_add(&read, input->read, to);
+}
+
 /* The corrections x by the operator's own F into all sums of its errors. */
 static void add_own(const measured *m, judge_rounds *r) {
     const probes *p = m->p;
@@ -171,23 +189,27 @@ static void add_own(const measured *m, judge_rounds *r) {
             const figure_probe one = probe_of(m, v, m->x, NULL, false);
             figures_add(&one, &r->of[g].own);
             if (r->by_group.own.n > 0) by_group_add(&one, g, &r->by_group.own);
-            if (m->input->read != NULL) receivers_add(&one, m->input->read, &r->of[g].own_receivers);
+            add_receivers(m->input, &one, &r->of[g].own_receivers);
             r->of[g].n_operator++;
         }
 }
 
+void judge_rounds_add_total(judge_rounds *r, int group, const figure_probe *one) {
+    figures_add(one, &r->of[group].total);
+    add_receivers(r->input, one, &r->of[group].total_receivers);
+}
+
 /* The corrections x by the independent reference, and y of the first n_noisy by the other one, into all sums
- * of total errors; same: into those of the probes whose errors against the operator's own F are found, too.
- */
-static void add_total(const measured *m, size_t n_noisy, bool same, judge_rounds *r) {
+ * of total errors; same: into those of the probes whose errors against the operator's own F are found, too;
+ * lit: errors of the first bounce are figures of the whole scene, too, and these are found elsewhere. */
+static void add_total(const measured *m, size_t n_noisy, bool same, bool lit, judge_rounds *r) {
     const probes *p = m->p;
     for (int g = 0; g < JUDGE_GROUPS; g++)
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             const figure_probe one = probe_of(m, v, m->x, v < n_noisy ? m->y : NULL, true);
-            figures_add(&one, &r->of[g].total);
+            if (!lit) judge_rounds_add_total(r, g, &one);
             if (r->by_group.total.n > 0) by_group_add(&one, g, &r->by_group.total);
             if (r->by_group.total.n > 0 && same) by_group_add(&one, g, &r->by_group.same);
-            if (m->input->read != NULL) receivers_add(&one, m->input->read, &r->of[g].total_receivers);
         }
 }
 
@@ -223,7 +245,9 @@ lam_status judge_rounds_add(const lam_operator *op, const probe_source *source, 
         if (n_others > 0)
             TRY(solve(op, &m, &input->other, true, true, n_others, others,
                       by_own ? &r->rates.own : &r->rates.other, m.y, error));
-        add_total(&m, n_noisy, own, r);
+        const bool lit = judge_emitters_are_lit(op, input);
+        if (lit) TRY(judge_emitters_add(op, p, r, error));
+        add_total(&m, n_noisy, own, lit, r);
     }
     for (int g = 0; g < JUDGE_GROUPS; g++) r->of[g].done += p->begin[g + 1] - p->begin[g];
     report(r, 1);

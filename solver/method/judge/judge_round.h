@@ -30,6 +30,7 @@ typedef struct judge_rounds {
     const judge_input *input;
     bool at_once; /* the first round has all emissions */
     size_t n;
+    size_t tiles_left; /* of emitters that are single tiles of a sky, those to be known closer */
     step_rates rates;
     group_tally of[JUDGE_GROUPS];
     group_sums by_group;
@@ -41,6 +42,9 @@ typedef struct judge_rounds {
  * those of the references. */
 lam_status judge_rounds_add(const lam_operator *op, const probe_source *source, const probes *p,
                             judge_rounds *r, lam_error *error);
+
+/* Adds an emission of a group of probes, JUDGE_..., to the total errors of the whole scene. */
+void judge_rounds_add_total(judge_rounds *r, int group, const figure_probe *one);
 
 /* True where the mean of a figure over probes of `all` (0: endless many) is known well enough. */
 bool judge_is_certain(const figure_tally *t, size_t all);

@@ -1,6 +1,7 @@
 #include "solver/method/judge/judge_sky_law.h"
 
 #include "solver/base/weighted.h"
+#include "solver/method/judge/judge_black.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,7 +22,7 @@ static void find_means(sky_law_sums *s) {
         s->area[g] += p->area[i];
         s->square[g] += p->area[i] * p->area[i];
         for (size_t c = 0; c < p->n_channels; c++)
-            s->reflectance[c * G + g] += p->area[i] * (double)p->reflectance[c * n + i];
+            s->reflectance[c * G + g] += p->area[i] * judge_reflectance(s->input, c, i);
     }
     for (size_t g = 0; g < G; g++) {
         if (!(s->area[g] > 0)) continue;
@@ -142,8 +143,9 @@ void sky_law_add_direct(sky_law_sums *s, size_t tile, const float *one, const fl
     double off = 0, off2 = 0;
     for (size_t k = 0; k < p->n * p->n_channels; k++) {
         const size_t i = k % p->n;
+        const double rho = judge_reflectance(s->input, k / p->n, i);
         const double x = (double)one[i] - (double)own[i], y = (double)other[i] - (double)own[i];
-        const double at = p->area[i] * (double)p->reflectance[k] * (double)p->reflectance[k] * x * y;
+        const double at = p->area[i] * rho * rho * x * y;
         off += at;
         off2 += at * at;
     }

@@ -1,6 +1,7 @@
 #include "solver/method/judge/judge_sky_tiles.h"
 
 #include "solver/base/weighted.h"
+#include "solver/method/judge/judge_black.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -44,7 +45,7 @@ static void add(const tile_errors *t, size_t element, size_t tile, double number
         to->means[g * m + tile] += a * a * number / (t->area[g] * t->area[g]);
     }
     for (size_t c = 0; c < p->n_channels; c++) {
-        const double flux = a * (double)p->reflectance[c * p->n + element];
+        const double flux = a * judge_power_share(t->input, c, element);
         to->power[c * m + tile] += flux * flux * number;
     }
 }
@@ -97,7 +98,7 @@ static void rank(const judge_input *input, ranked *of) {
         of[i] = (ranked){.element = i};
         for (size_t t = 0; t < input->sky->n_tiles && !sees; t++) sees = input->sky->own[t * p->n + i] > 0;
         for (size_t c = 0; c < p->n_channels && sees; c++)
-            of[i].flux = fmax(of[i].flux, p->area[i] * (double)p->reflectance[c * p->n + i]);
+            of[i].flux = fmax(of[i].flux, p->area[i] * judge_reflectance(input, c, i));
     }
     qsort(of, p->n, sizeof *of, compare);
 }

@@ -73,6 +73,21 @@ static lam_status check(const void *own, lam_error *error) {
     return LAM_OK;
 }
 
+/* The bound of |S - Q V^T| for an epsilon. Where nothing reflects, all that is asked for is the irradiance F
+ * E, which is off by that bound over |S|: bodies that see little of each other may have an |S| below epsilon.
+ */
+static lam_status bound_of(const build_problem *problem, const scaled_matrix *S, double epsilon,
+                           const progress *p, double *bound, lam_error *error) {
+    const tall_factors none = {.n = problem->n, .m = problem->n};
+    double norm = 1;
+    *bound = epsilon;
+    for (size_t k = 0; k < problem->n * problem->n_channels; k++)
+        if (problem->reflectance[k] > 0) return LAM_OK;
+    const lam_status status = norm_of_error(S, &none, p, &norm, error);
+    if (status == LAM_OK && norm > 0 && norm < 1) *bound = epsilon * norm;
+    return status;
+}
+
 static lam_status build(const build_problem *problem, const build_options *options, const void *own,
                         lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
@@ -81,23 +96,24 @@ static lam_status build(const build_problem *problem, const build_options *optio
     scaled_matrix S = {0};
     tall_factors f = {0};
     factorizer_report factorized = {.name = NULL};
-    double norm, rcond;
+    double norm, rcond, bound;
     const double start = clock_seconds();
-    const factorizer_options how = {
-        .epsilon = o->epsilon,
-        .rank = (size_t)o->rank,
-        .budget = {.alpha = o->alpha},
-        .levels = o->levels == OPTION_AUTO ? -1 : (int)o->levels,
-        .iterations = -1,
-        /* With the rank given, epsilon decides nothing and noise is nothing to it. */
-        .noise = o->rank > 0 ? 0 : problem->noise,
-        .memory = options->memory,
-        .seed = options->seed,
-        .progress = options->progress};
+    factorizer_options how = {.epsilon = o->epsilon,
+                              .rank = (size_t)o->rank,
+                              .budget = {.alpha = o->alpha},
+                              .levels = o->levels == OPTION_AUTO ? -1 : (int)o->levels,
+                              .iterations = -1,
+                              /* With the rank given, epsilon decides nothing and noise is nothing to it. */
+                              .noise = o->rank > 0 ? 0 : problem->noise,
+                              .memory = options->memory,
+                              .seed = options->seed,
+                              .progress = options->progress};
 
     TRY(check(o, error));
     row_source_of_csr(&rows_of_F, problem->F);
     TRY(scaled_init(&S, &rows_of_F, problem->area, problem->order, error));
+    TRY(bound_of(problem, &S, o->epsilon, options->progress, &bound, error));
+    how.epsilon = bound;
     TRY(factorize(o->factorizer, &S, &how, &f, &factorized, error));
     const size_t k = f.rank;
     report_step_add(report, "factorize", clock_seconds() - start);
@@ -108,7 +124,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     report_step_add(report, "invert", clock_seconds() - inverting);
 
     report_text(report, "factorizer", factorized.name);
-    report_number(report, "epsilon", o->rank > 0 ? norm : o->epsilon);
+    report_number(report, "epsilon", o->rank > 0 ? norm : bound);
     report_number(report, "rcond", rcond);
     report_count(report, "levels", factorized.levels);
     report_number(report, "passes", factorized.passes);
@@ -119,11 +135,11 @@ static lam_status build(const build_problem *problem, const build_options *optio
     report_count(report, "rank", (double)k);
     norm_report(problem, norm, report);
     report->cost = cost_of(problem, k, o->keep_factors);
-    report->below_noise = o->rank == 0 && o->epsilon < problem->noise;
+    report->below_noise = o->rank == 0 && bound < problem->noise;
     const double whole = (double)problem->n * (double)problem->n * (double)problem->n_channels;
     snprintf(report->detail, sizeof report->detail,
              "rank %zu of %zu, bound %.3g, %.3g %% of the memory of the whole inverse", k, problem->n,
-             o->rank > 0 ? norm : o->epsilon, 100 * report->cost / whole);
+             o->rank > 0 ? norm : bound, 100 * report->cost / whole);
 done:
     scaled_free(&S);
     tall_factors_free(&f);
@@ -163,6 +179,7 @@ static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_e
     row_source rows_of_F;
     scaled_matrix S = {0};
     spectrum values = {0};
+    double bound;
     out->object = "rank";
     if (o->rank > 0) {
         out->claim = CLAIM_OPTIONS;
@@ -179,8 +196,9 @@ static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_e
     row_source_of_csr(&rows_of_F, p->F);
     TRY(scaled_init(&S, &rows_of_F, p->area, p->order, error));
     TRY(spectrum_find(&S, SPECTRUM_STEPS, so_far->options->seed, so_far->options->progress, &values, error));
-    const double rank = spectrum_rank(&values, o->epsilon);
-    out->left = sqrt(spectrum_left(&values, o->epsilon));
+    TRY(bound_of(p, &S, o->epsilon, so_far->options->progress, &bound, error));
+    const double rank = spectrum_rank(&values, bound);
+    out->left = sqrt(spectrum_left(&values, bound));
     if (2 * n * rank <= so_far->most) out->cost = 2 * n * rank;
     candidate_figure(out, "epsilon", o->epsilon);
     candidate_figure(out, "estimate", rank);

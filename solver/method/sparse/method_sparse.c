@@ -51,29 +51,35 @@ static sparse_correction correction_of(const sparse_options *o) {
                                                  : SPARSE_DISCARDED;
 }
 
-/* The smallest threshold from that asked for on whose entries memory is forecast to hold, of all channels. */
-static lam_status fitting_threshold(const build_problem *problem, size_t memory, double *threshold,
-                                    lam_error *error) {
+/* The smallest threshold from that asked for on whose entries memory is forecast to hold, of all channels;
+ * where it does not hold them at that one, rows of black elements are as the others. */
+static lam_status fitting_limits(const build_problem *problem, size_t memory, sparse_limits *limits,
+                                 lam_error *error) {
     lam_status status = LAM_OK;
     for (double needed = INFINITY; memory > 0 && needed > (double)memory;) {
         needed = 0;
         for (size_t c = 0; c < problem->n_channels; c++) {
             double entries;
-            TRY(sparse_inverse_forecast(problem, problem->reflectance + c * problem->n, *threshold, &entries,
+            TRY(sparse_inverse_forecast(problem, problem->reflectance + c * problem->n, limits, &entries,
                                         error));
             needed += doubt * entries * ENTRY_BYTES;
         }
-        if (needed > (double)memory) *threshold *= rise;
-        if (*threshold >= 1)
+        if (needed > (double)memory && limits->whole_black)
+            limits->whole_black = false;
+        else if (needed > (double)memory)
+            limits->threshold *= rise;
+        if (limits->threshold >= 1)
             FAIL(error, LAM_ERR_MEMORY, "--method sparse: no --threshold below 1 fits into --memory");
     }
 done:
     return status;
 }
 
-/* delta_p = sum_j (P - P~)_pj, from one solution with E = 1: exact for light that is everywhere the same. */
-static lam_status find_delta(const build_problem *problem, const float *rho, const csr *M, float *delta,
-                             const progress *told, lam_error *error) {
+/* delta_p = sum_j (P - P~)_pj, from one solution with E = 1: exact for light that is everywhere the same. Of
+ * a black element from which nothing was discarded it is 0, without rounding. */
+static lam_status find_delta(const build_problem *problem, const float *rho, const sparse_inverse *inverse,
+                             float *delta, const progress *told, lam_error *error) {
+    const csr *M = &inverse->M;
     lam_status status = LAM_OK;
     const size_t n = problem->n;
     reference *r = NULL;
@@ -90,7 +96,8 @@ static lam_status find_delta(const build_problem *problem, const float *rho, con
         const double bounced = rho[i] > 0 ? (double)rho[i] * H[i] : H[i];
         double kept = 0;
         for (uint64_t e = M->indptr[p]; e < M->indptr[p + 1]; e++) kept += (double)M->data[e];
-        delta[p] = (float)(bounced - kept);
+        const bool whole = !(rho[i] > 0) && inverse->discarded[p] == 0;
+        delta[p] = whole ? 0 : (float)(bounced - kept);
     }
 done:
     reference_destroy(r);
@@ -139,7 +146,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const sparse_options *o = own;
     const sparse_correction correction = correction_of(o);
     const double asked = o->threshold > 0 ? o->threshold : usual_threshold;
-    double entries = 0, threshold = asked;
+    sparse_limits limits = {.threshold = asked, .whole_black = true};
+    double entries = 0;
     size_t bounces = 0, left = options->memory, n_parts = 1;
     if (arrays.M == NULL) TRY(LAM_ERR_MEMORY);
     if (correction != SPARSE_NONE) {
@@ -148,10 +156,12 @@ static lam_status build(const build_problem *problem, const build_options *optio
         if (arrays.delta == NULL || arrays.weight == NULL) TRY(LAM_ERR_MEMORY);
         TRY(set_weights(problem, correction, &arrays, &n_parts, error));
     }
-    TRY(fitting_threshold(problem, options->memory, &threshold, error));
+    TRY(fitting_limits(problem, options->memory, &limits, error));
     for (size_t c = 0; c < C; c++) {
         const float *rho = problem->reflectance + c * n;
-        TRY(sparse_inverse_rows(problem, rho, threshold, left / 2, options->progress, &inverse, error));
+        TRY(sparse_inverse_rows(problem, rho, &limits, left / 2, options->progress, &inverse, error));
+        if (correction == SPARSE_DELTA)
+            TRY(find_delta(problem, rho, &inverse, arrays.delta + c * n, options->progress, error));
         arrays.M[c] = inverse.M;
         inverse.M = (csr){.n = 0};
         const size_t stored = (size_t)arrays.M[c].indptr[n];
@@ -160,18 +170,16 @@ static lam_status build(const build_problem *problem, const build_options *optio
         if (inverse.bounces > bounces) bounces = inverse.bounces;
         if (correction == SPARSE_DISCARDED)
             for (size_t p = 0; p < n; p++) arrays.delta[c * n + p] = (float)inverse.discarded[p];
-        if (correction == SPARSE_DELTA)
-            TRY(find_delta(problem, rho, &arrays.M[c], arrays.delta + c * n, options->progress, error));
         sparse_inverse_free(&inverse);
     }
     TRY(operator_sparse_create(n, C, problem->reflectance, &arrays, &made, error));
     TRY(operator_set_order(made, problem->order, error));
-    report_number(report, "threshold", threshold);
+    report_number(report, "threshold", limits.threshold);
     report_text(report, "correction", o->correction);
     report_step_add(report, "invert", clock_seconds() - started);
     snprintf(report->detail, sizeof report->detail, "threshold %.3g, %.3g %% of all entries, %zu bounces%s",
-             threshold, 100 * entries / ((double)n * (double)n * (double)C), bounces,
-             threshold > asked ? ", the threshold raised to fit into --memory" : "");
+             limits.threshold, 100 * entries / ((double)n * (double)n * (double)C), bounces,
+             limits.threshold > asked ? ", the threshold raised to fit into --memory" : "");
     *op = made;
     made = NULL;
 done:
@@ -225,7 +233,8 @@ static lam_status find_threshold(const decision *d, double single, double entrie
     if (!given) tried = optimistic_threshold(&truth, epsilon, single, entries_most);
     while (tried >= threshold_last) {
         if (progress_cancelled(d->options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-        TRY(sparse_inverse_sample(p, p->reflectance, tried, &truth, &sample, error));
+        const sparse_limits limits = {.threshold = tried, .whole_black = true};
+        TRY(sparse_inverse_sample(p, p->reflectance, &limits, &truth, &sample, error));
         const double now = excess(&sample, epsilon, single);
         if (given || now <= 1) {
             *threshold = tried;

@@ -130,14 +130,14 @@ done:
     return status;
 }
 
-lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, double threshold,
+lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, const sparse_limits *limits,
                                size_t memory, const progress *p, sparse_inverse *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, n_blocks = (n + BLOCK - 1) / BLOCK;
     rows_job job;
     gathering g = {.job = &job, .most = memory / (sizeof(uint32_t) + sizeof(float))};
     *out = (sparse_inverse){.bounces = 0};
-    TRY(rows_job_begin(problem, rho, threshold, &job, error));
+    TRY(rows_job_begin(problem, rho, limits, &job, error));
     g.blocks = memory_allocate(n_blocks, sizeof *g.blocks, "sparse inverse", error);
     g.lengths = memory_allocate(n + 1, sizeof *g.lengths, "sparse inverse", error);
     g.discarded = memory_allocate(n, sizeof *g.discarded, "sparse inverse", error);

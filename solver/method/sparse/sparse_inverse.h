@@ -1,15 +1,23 @@
-/* The options of --method sparse. */
-typedef struct sparse_options {
-    double threshold;       /* entries below it are left out; 0: not given */
-    const char *correction; /* "none", "delta", "discarded" */
-} sparse_options;
-
 /* The inverse of I - R F as a sparse matrix: rows of a Neumann series, small terms dropped (Aguerre 2016,
  * chapter 4). */
 #ifndef LAMBERT_METHOD_SPARSE_SPARSE_INVERSE_H
 #define LAMBERT_METHOD_SPARSE_SPARSE_INVERSE_H
 
 #include "solver/method/method.h"
+
+/* The options of --method sparse. */
+typedef struct sparse_options {
+    double threshold;       /* entries below it are left out; 0: not given */
+    const char *correction; /* "none", "delta", "discarded" */
+} sparse_options;
+
+/* What is left out. Rows of black elements are as if rho were 1 there, and their irradiance is all that they
+ * are asked for: whole_black keeps all of their first bounce, which the form factors hold already, so that an
+ * element gets no light from where it sees nothing. */
+typedef struct sparse_limits {
+    double threshold;
+    bool whole_black;
+} sparse_limits;
 
 typedef struct sparse_inverse {
     csr M;             /* M~ - I by position; rows with rho = 0 as if rho were 1 there */
@@ -25,12 +33,12 @@ void sparse_inverse_free(sparse_inverse *s);
  * thesis does not count), is `discarded`. rho is [n] in mesh order. The bits do not depend on the number of
  * threads. Cost: a row of R F for every entry of every T. Errors: LAM_ERR_MEMORY also if the entries would
  * exceed `memory` bytes (0: no limit), LAM_ERR_CANCELLED. */
-lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, double threshold,
+lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, const sparse_limits *limits,
                                size_t memory, const progress *p, sparse_inverse *out, lam_error *error);
 
 /* Estimates the number of entries from a sample of rows. */
-lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho, double threshold,
-                                   double *entries, lam_error *error);
+lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho,
+                                   const sparse_limits *limits, double *entries, lam_error *error);
 
 /* A sample of rows of M - I, exact to single precision, against which a sparse inverse is compared: those of
  * positions k n / count, rows [count][n] by position. */
@@ -58,7 +66,7 @@ typedef struct sparse_sample {
 sparse_sample inverse_rows_truncated(const inverse_rows *r, double threshold);
 
 /* For M~ of algorithm 5. Errors: LAM_ERR_MEMORY. */
-lam_status sparse_inverse_sample(const build_problem *problem, const float *rho, double threshold,
+lam_status sparse_inverse_sample(const build_problem *problem, const float *rho, const sparse_limits *limits,
                                  const inverse_rows *truth, sparse_sample *out, lam_error *error);
 
 #endif

@@ -135,20 +135,21 @@ void row_work_compute(const rows_job *job, size_t row, row_work *d, double *disc
     const double rho = job->rho[i] > 0 ? (double)job->rho[i] : 1;
     for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
         add_to(&d->next, job->position[F->indices[e]], rho * (double)F->data[e]);
-    *discarded = drop_small(d, job->threshold);
+    *discarded = drop_small(d, job->whole_black && !(job->rho[i] > 0) ? 0 : job->threshold);
     for (*bounces = 1; d->n_T > 0 && *bounces <= ROW_BOUNCES; ++*bounces) {
         *discarded += bounce(d, &job->RF);
         *discarded += drop_small(d, job->threshold);
     }
 }
 
-lam_status rows_job_begin(const build_problem *problem, const float *rho, double threshold, rows_job *job,
-                          lam_error *error) {
-    *job = (rows_job){.problem = problem, .rho = rho, .threshold = threshold};
+lam_status rows_job_begin(const build_problem *problem, const float *rho, const sparse_limits *limits,
+                          rows_job *job, lam_error *error) {
+    *job = (rows_job){
+        .problem = problem, .rho = rho, .threshold = limits->threshold, .whole_black = limits->whole_black};
     job->position = memory_allocate(problem->n, sizeof *job->position, "sparse inverse", error);
     if (job->position == NULL) return LAM_ERR_MEMORY;
     for (size_t row = 0; row < problem->n; row++) job->position[problem->order[row]] = (uint32_t)row;
-    return reflected_make(problem, rho, job->position, threshold, &job->RF, error);
+    return reflected_make(problem, rho, job->position, limits->threshold, &job->RF, error);
 }
 
 void rows_job_end(rows_job *job) {

@@ -4,6 +4,7 @@
 
 #include "solver/base/bitset.h"
 #include "solver/method/method.h"
+#include "solver/method/sparse/sparse_inverse.h"
 
 /* R F without its entries below the threshold, rows and columns by position, and the sum dropped from each
  * row. */
@@ -21,12 +22,13 @@ typedef struct rows_job {
     const float *rho;
     uint32_t *position; /* [n], element -> position */
     double threshold;
+    bool whole_black; /* rows of rho = 0 keep all of their first bounce */
     reflected RF;
 } rows_job;
 
 /* job is owned by the caller (rows_job_end), also after an error. Errors: LAM_ERR_MEMORY. */
-lam_status rows_job_begin(const build_problem *problem, const float *rho, double threshold, rows_job *job,
-                          lam_error *error);
+lam_status rows_job_begin(const build_problem *problem, const float *rho, const sparse_limits *limits,
+                          rows_job *job, lam_error *error);
 void rows_job_end(rows_job *job);
 
 /* A dense row, most entries of which are 0, with the set of the others. */

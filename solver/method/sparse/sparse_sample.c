@@ -8,13 +8,13 @@
 
 enum { SAMPLED = 256, COMPARED = 32 };
 
-lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho, double threshold,
-                                   double *entries, lam_error *error) {
+lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho,
+                                   const sparse_limits *limits, double *entries, lam_error *error) {
     lam_status status = LAM_OK;
     rows_job job;
     row_work d = {.n = 0};
     const size_t n = problem->n, sampled = n < SAMPLED ? n : SAMPLED;
-    TRY(rows_job_begin(problem, rho, threshold, &job, error));
+    TRY(rows_job_begin(problem, rho, limits, &job, error));
     TRY(row_work_make(n, &d, error));
     for (size_t k = 0; k < sampled; k++) {
         double discarded;
@@ -102,7 +102,7 @@ sparse_sample inverse_rows_truncated(const inverse_rows *r, double threshold) {
     return sample_of(r, entries, square, sum);
 }
 
-lam_status sparse_inverse_sample(const build_problem *problem, const float *rho, double threshold,
+lam_status sparse_inverse_sample(const build_problem *problem, const float *rho, const sparse_limits *limits,
                                  const inverse_rows *truth, sparse_sample *out, lam_error *error) {
     lam_status status = LAM_OK;
     rows_job job;
@@ -111,7 +111,7 @@ lam_status sparse_inverse_sample(const build_problem *problem, const float *rho,
     double entries = 0, square = 0, sum = 0;
     double *missing = memory_allocate(truth->count, 3 * sizeof *missing, "rows of a sparse inverse", error);
     if (missing == NULL) return LAM_ERR_MEMORY;
-    TRY(rows_job_begin(problem, rho, threshold, &job, error));
+    TRY(rows_job_begin(problem, rho, limits, &job, error));
 #pragma omp parallel
     {
         row_work d;

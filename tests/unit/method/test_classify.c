@@ -70,7 +70,9 @@ START_TEST(samples_tell_of_the_whole) {
     ck_assert_double_eq(all.single, 0);
     for (double threshold = .1; threshold > 1e-9; threshold /= 10) {
         const sparse_sample cut = inverse_rows_truncated(&rows, threshold);
-        ck_assert_int_eq(sparse_inverse_sample(p, p->reflectance, threshold, &rows, &made, &error), LAM_OK);
+        ck_assert_int_eq(
+            sparse_inverse_sample(p, p->reflectance, &(sparse_limits){threshold, true}, &rows, &made, &error),
+            LAM_OK);
         ck_assert_double_le(made.entries, cut.entries);
         ck_assert_double_ge(made.single, cut.single - 1e-6);
         ck_assert_double_ge(made.everywhere, cut.everywhere - 1e-6);
@@ -82,8 +84,11 @@ START_TEST(samples_tell_of_the_whole) {
     ck_assert_double_le(last.everywhere, 1e-4);
     sparse_inverse whole;
     double entries;
-    ck_assert_int_eq(sparse_inverse_rows(p, p->reflectance, 1e-2, 0, NULL, &whole, &error), LAM_OK);
-    ck_assert_int_eq(sparse_inverse_sample(p, p->reflectance, 1e-2, &rows, &made, &error), LAM_OK);
+    ck_assert_int_eq(
+        sparse_inverse_rows(p, p->reflectance, &(sparse_limits){1e-2, true}, 0, NULL, &whole, &error),
+        LAM_OK);
+    ck_assert_int_eq(
+        sparse_inverse_sample(p, p->reflectance, &(sparse_limits){1e-2, true}, &rows, &made, &error), LAM_OK);
     entries = (double)whole.M.indptr[p->n];
     ck_assert_double_eq_tol(made.entries, entries, .2 * entries); /* a third of the rows, in order */
     sparse_inverse_free(&whole);

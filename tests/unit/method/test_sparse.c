@@ -116,8 +116,8 @@ START_TEST(rows_are_those_of_the_thesis) {
     sparse_inverse s;
     dense_inverse d = dense(&f, thresholds[_i]);
     size_t sure = 0;
-    ck_assert_msg(sparse_inverse_rows(problem_of(&f), f.m.reflectance, thresholds[_i], 0, NULL, &s, &error) ==
-                      LAM_OK,
+    ck_assert_msg(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){thresholds[_i], true},
+                                      0, NULL, &s, &error) == LAM_OK,
                   "%s", error.message);
     for (size_t p = 0; p < n; p++) {
         uint64_t e = s.M.indptr[p];
@@ -253,7 +253,8 @@ START_TEST(bits_do_not_depend_on_threads) {
     const int before = omp_get_max_threads();
     for (int k = 0; k < 2; k++) {
         omp_set_num_threads(k == 0 ? 1 : 4);
-        ck_assert_int_eq(sparse_inverse_rows(problem_of(&f), f.m.reflectance, 1e-3, 0, NULL, &s[k], &error),
+        ck_assert_int_eq(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){1e-3, true}, 0,
+                                             NULL, &s[k], &error),
                          LAM_OK);
     }
     omp_set_num_threads(before);
@@ -284,7 +285,8 @@ START_TEST(memory_bounds_the_entries) {
     ck_assert_ptr_nonnull(strstr(report.reason, "raised"));
     lam_operator_close(op);
     sparse_inverse s;
-    ck_assert_int_eq(sparse_inverse_rows(&f.problem, f.m.reflectance, 1e-6, all / 4, NULL, &s, &error),
+    ck_assert_int_eq(sparse_inverse_rows(&f.problem, f.m.reflectance, &(sparse_limits){1e-6, true}, all / 4,
+                                         NULL, &s, &error),
                      LAM_ERR_MEMORY);
     ck_assert_ptr_nonnull(strstr(error.message, "--threshold"));
     ck_assert_ptr_null(s.M.indptr);
