@@ -191,22 +191,18 @@ static double error2(const emission_size *size, double one, double many, double 
            (one * one * share * share + many * many * share * fmax(0, 1 - share) + even * even);
 }
 
-/* The quantity, the emission and the sky of an answer: P^2, S and W of that (sky_law). */
-typedef struct light_sizes {
-    lam_quantity quantity;
-    emission_size size;
-    const float *L, *L_direct; /* NULL: no sky, or nothing is stated of skies */
-    double power2, spread, power_off;
-} light_sizes;
-
 static weighted_sums sky_channel(const error_by_group *e, const float *L, size_t c) {
     return weighted_sums_of(e->n_tiles, e->sky_power + c * e->n_tiles, L + c * e->n_tiles);
 }
 
-static light_sizes light_sizes_of(const error_by_group *e, lam_quantity quantity, const emission_size *size,
-                                  const float *L) {
-    light_sizes of = {.quantity = quantity, .size = *size, .L = e->n_tiles > 0 ? L : NULL};
-    of.L_direct = of.L;
+/* P^2, S and W of a sky (sky_law), [C][n_tiles]. */
+typedef struct sky_sizes {
+    const float *L; /* NULL: no sky, or nothing is stated of skies */
+    double power2, spread, power_off;
+} sky_sizes;
+
+static sky_sizes sky_sizes_of(const error_by_group *e, const float *L) {
+    sky_sizes of = {.L = e->n_tiles > 0 ? L : NULL};
     for (size_t c = 0; of.L != NULL && c < e->n_channels; c++) {
         const weighted_sums sums = sky_channel(e, L, c);
         of.power2 += sums.sum * sums.sum;
@@ -218,10 +214,32 @@ static light_sizes light_sizes_of(const error_by_group *e, lam_quantity quantity
     return of;
 }
 
+/* The quantity of an answer, its emission and its sky, and a sky whose bounced light alone is in it. */
+typedef struct light_sizes {
+    lam_quantity quantity;
+    emission_size size;
+    sky_sizes sky, sent;
+    double lost2; /* of error_answer */
+} light_sizes;
+
+/* Of the light that is reflected the direct light of a sky is no part, nor are errors of it. A store of
+ * before does not tell them apart. */
+static light_sizes light_sizes_of(const error_by_group *e, lam_quantity quantity, const emission_size *size,
+                                  const float *L) {
+    light_sizes of = {.quantity = quantity, .size = *size};
+    *(quantity == LAM_INDIRECT && e->power_off != NULL ? &of.sent : &of.sky) = sky_sizes_of(e, L);
+    return of;
+}
+
 static light_sizes sizes_of_answer(const error_by_group *e, const error_answer *of) {
     light_sizes sizes = light_sizes_of(e, of->quantity, &of->size, of->L);
-    if (of->L_direct != NULL && sizes.L != NULL) sizes.L_direct = of->L_direct;
-    sizes.power_off += of->lost2;
+    const sky_sizes sent = sky_sizes_of(e, e->power_off != NULL ? of->L_sent : NULL);
+    if (sent.L == NULL) return sizes;
+    if (sizes.sent.L == NULL) sizes.sent.L = sent.L;
+    sizes.sent.power2 += sent.power2;
+    sizes.sent.spread += sent.spread;
+    sizes.sent.power_off += sent.power_off;
+    sizes.lost2 = of->lost2;
     return sizes;
 }
 
@@ -234,7 +252,7 @@ typedef struct bin_error {
  * what stores state where nothing is reflected, rho is 1. */
 static double direct_of(const error_by_group *e, const double *weights, const light_sizes *of, size_t group) {
     const size_t m = e->n_tiles;
-    const float *L = of->L_direct;
+    const float *L = of->sky.L;
     const bool as_white = of->quantity == LAM_IRRADIANCE;
     double sum = 0;
     for (size_t c = 0; weights != NULL && c < e->n_channels; c++) {
@@ -249,6 +267,7 @@ static double direct_of(const error_by_group *e, const double *weights, const li
 static bin_error error_of_direct(const error_by_group *e, const light_sizes *of, size_t bin) {
     const sky_law *sky = &e->sky;
     const size_t group = bin % e->n_groups;
+    if (of->sky.L == NULL) return (bin_error){0, 0};
     if (e->power_off != NULL)
         return (bin_error){direct_of(e, e->elements_off, of, group), direct_of(e, e->means_off, of, group)};
     double area = 0;
@@ -257,24 +276,52 @@ static bin_error error_of_direct(const error_by_group *e, const light_sizes *of,
     return (bin_error){direct, direct * (area > 0 ? e->squares[group] / (area * area) : 1)};
 }
 
+/* That of a sky beside its direct light: what single tiles are off by beyond it, and an even sky. */
+static void add_sky(const error_by_group *e, const sky_sizes *of, size_t bin, bin_error *sum) {
+    const sky_law *sky = &e->sky;
+    const bool known = e->power_off != NULL;
+    if (of->L == NULL) return;
+    sum->elements2 += (known ? sky->bounced[bin] * sky->bounced[bin] * of->power_off : 0) +
+                      sky->tiles[bin] * sky->tiles[bin] * of->spread +
+                      sky->even[bin] * sky->even[bin] * of->power2;
+    sum->mean2 += (known ? sky->mean_bounced[bin] * sky->mean_bounced[bin] * of->power_off : 0) +
+                  sky->mean_tiles[bin] * sky->mean_tiles[bin] * of->spread +
+                  sky->mean_even[bin] * sky->mean_even[bin] * of->power2;
+}
+
+/* That of the light of a sky that is reflected alone: what the power is off by that it sends into the scene,
+ * W and, of an even sky, the errors of the means of groups as if independent; and the law of an emission of
+ * that power from all elements. It is at most what the law of skies says of all their light. */
+static void add_sent(const error_by_group *e, const light_sizes *of, size_t bin, bin_error *sum) {
+    const error_law *law = &e->law;
+    const sky_law *sky = &e->sky;
+    double area = 0, squares = 0, off2 = of->sent.power_off + of->lost2;
+    if (of->sent.L == NULL) return;
+    for (size_t b = 0; b < e->n_bins; b++) {
+        const double flux = e->of_group[b % e->n_groups].black ? 0 : e->area[b] * sky->mean_even[b];
+        off2 += flux * flux * of->sent.power2;
+        area += e->area[b];
+    }
+    for (size_t g = 0; g < e->n_groups; g++) squares += e->squares[g];
+    const emission_size size = {of->sent.power2, area > 0 ? of->sent.power2 * squares / (area * area) : 0};
+    bin_error all = {0, 0};
+    add_sky(e, &of->sent, bin, &all);
+    sum->elements2 += fmin(all.elements2, sky->bounced[bin] * sky->bounced[bin] * off2 +
+                                              error2(&size, law->one[bin], law->many[bin], law->even[bin]));
+    sum->mean2 +=
+        fmin(all.mean2, sky->mean_bounced[bin] * sky->mean_bounced[bin] * off2 +
+                            error2(&size, law->mean_one[bin], law->mean_many[bin], law->mean_even[bin]));
+}
+
 static bin_error error_in(const error_by_group *e, const light_sizes *of, size_t bin) {
     const error_law *law = &e->law;
     const reflecting *group = &e->of_group[bin % e->n_groups];
     if (group->black && of->quantity != LAM_IRRADIANCE) return (bin_error){0, 0};
     bin_error sum = {error2(&of->size, law->one[bin], law->many[bin], law->even[bin]),
                      error2(&of->size, law->mean_one[bin], law->mean_many[bin], law->mean_even[bin])};
-    bin_error direct = {0, 0};
-    if (of->L != NULL) {
-        const sky_law *sky = &e->sky;
-        const bool known = e->power_off != NULL;
-        direct = error_of_direct(e, of, bin);
-        sum.elements2 += (known ? sky->bounced[bin] * sky->bounced[bin] * of->power_off : 0) +
-                         sky->tiles[bin] * sky->tiles[bin] * of->spread +
-                         sky->even[bin] * sky->even[bin] * of->power2;
-        sum.mean2 += (known ? sky->mean_bounced[bin] * sky->mean_bounced[bin] * of->power_off : 0) +
-                     sky->mean_tiles[bin] * sky->mean_tiles[bin] * of->spread +
-                     sky->mean_even[bin] * sky->mean_even[bin] * of->power2;
-    }
+    const bin_error direct = error_of_direct(e, of, bin);
+    add_sky(e, &of->sky, bin, &sum);
+    add_sent(e, of, bin, &sum);
     return (bin_error){reflecting_of_elements(group, of->quantity, sum.elements2) + direct.elements2,
                        reflecting_of_mean(group, of->quantity, sum.mean2) + direct.mean2};
 }

@@ -86,9 +86,8 @@ typedef struct error_answer {
     bool whole;
     emission_size size, sky; /* of the emission, and of the sky: of tiles in place of elements */
     const float *L;          /* [C][n_tiles], radiances of the sky; NULL: none */
-    const float *L_direct;   /* of them those whose direct light is by tiles; NULL: all */
-    double
-        lost2; /* square of a power that is not sent on, as that of a tile is, channels added up; 0: none */
+    const float *L_sent;     /* [C][n_tiles], of tiles whose bounced light alone is in it; NULL: none */
+    double lost2; /* with L_sent: (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
 } error_answer;
 
 /* The root of the mean squared error over the light that is left where that error is taken out of the light

@@ -12,7 +12,7 @@ void own_light_free(own_light *l) {
     free(l->E);
     free(l->H0);
     free(l->L);
-    free(l->L_direct);
+    free(l->L_sent);
     free(l->sent);
     free(l->sun);
     free(l->work);
@@ -38,9 +38,8 @@ lam_status own_light_make(const lit_store *lit, const error_scene *scene, own_li
         l.sun = memory_allocate(1, n * sizeof *l.sun, "the light of an answer", error);
         l.work = memory_allocate(1, sunlight_work(light->sun) * sizeof *l.work, "the sun", error);
         l.sent = memory_allocate(C, n * sizeof *l.sent, "the light of an answer", error);
-        l.L_direct =
-            memory_allocate(C, (l.n_tiles + 1) * sizeof *l.L_direct, "the light of an answer", error);
-        if (l.sun == NULL || l.work == NULL || l.sent == NULL || l.L_direct == NULL) TRY(LAM_ERR_MEMORY);
+        l.L_sent = memory_allocate(C, (l.n_tiles + 1) * sizeof *l.L_sent, "the light of an answer", error);
+        if (l.sun == NULL || l.work == NULL || l.sent == NULL || l.L_sent == NULL) TRY(LAM_ERR_MEMORY);
     }
     *out = l;
     l = (own_light){.n_tiles = 0};
@@ -90,8 +89,10 @@ static void add_sun(own_light *l, size_t v) {
             l->sent[c * n + i] = l->E[c * n + i] + (in_tile ? 0 : rho[c * n + i] * l->sun[i]);
         }
         if (in_tile) l->lost2 += power * power + squares;
-        for (size_t t = 0; t < m; t++) l->L_direct[c * m + t] = l->L[c * m + t];
-        if (in_tile && tile < m) l->L_direct[c * m + tile] = fmaxf(l->L[c * m + tile] - (float)radiance, 0);
+        memset(l->L_sent + c * m, 0, m * sizeof *l->L_sent);
+        if (!in_tile || tile >= m) continue;
+        l->L_sent[c * m + tile] = fminf(l->L[c * m + tile], (float)radiance);
+        l->L[c * m + tile] -= l->L_sent[c * m + tile];
     }
 }
 
@@ -117,10 +118,11 @@ void own_light_put(const own_light *l, const error_by_group *by, error_answer *o
     of->E = l->E;
     of->H0 = l->L != NULL || l->sun != NULL ? l->H0 : NULL;
     of->L = l->L;
-    of->L_direct = l->L != NULL ? l->L_direct : NULL;
+    of->L_sent = l->L != NULL ? l->L_sent : NULL;
     of->lost2 = l->lost2;
     for (size_t c = 0; c < l->scene->n_channels; c++) {
         emission_size_add(&of->size, n, l->scene->area, sent + c * n);
         if (l->L != NULL) emission_size_add(&of->sky, m, by->sky_power + c * m, l->L + c * m);
+        if (of->L_sent != NULL) emission_size_add(&of->sky, m, by->sky_power + c * m, l->L_sent + c * m);
     }
 }

@@ -9,10 +9,10 @@
 typedef struct own_light {
     const lit_store *lit;
     const error_scene *scene;
-    size_t n_tiles;  /* of the sky that shines; 0: none */
-    float *E, *H0;   /* [C][n], mesh order; H0 with the sun */
-    float *L;        /* [C][n_tiles]; NULL: no sky */
-    float *L_direct; /* the same without a sun whose direct light is known better; NULL: there is none */
+    size_t n_tiles; /* of the sky that shines; 0: none */
+    float *E, *H0;  /* [C][n], mesh order; H0 with the sun */
+    float *L;       /* [C][n_tiles]; NULL: no sky */
+    float *L_sent; /* of a sun in a tile that is sent on as the light of that, and no part of L; NULL: none */
     float *sent; /* [C][n], E and what the sun alone makes elements send; NULL: no sun, or it is in a tile */
     float *sun, *work;
     double lost2; /* of error_answer */
