@@ -4,6 +4,7 @@
 #include "solver/base/cosine.h"
 #include "solver/base/random.h"
 #include "solver/formfactor/visibility/sample.h"
+#include "solver/scene/element_face.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,6 +23,7 @@ struct gather {
 typedef struct gather_samples {
     float direction[GATHER_HALVES][GATHER_RAYS][3];
     uint32_t lamp[GATHER_HALVES][GATHER_LAMP_SAMPLES];
+    bool unseen[GATHER_HALVES][GATHER_LAMP_SAMPLES];     /* the lamp lies in the plane of the element */
     double place[GATHER_HALVES][GATHER_LAMP_SAMPLES][3]; /* recentred */
     lamp_shares shares;
 } gather_samples;
@@ -83,6 +85,7 @@ static void draw(const gather *g, uint32_t element, uint64_t key, size_t n_point
             element_sampler_init(&sampler, g->m, g->v, lamp, 0);
             element_sampler_point(&sampler, (float)spread(shift, k, 2), (float)spread(shift, k, 3), point);
             s->lamp[h][k] = lamp;
+            s->unseen[h][k] = lamp == element || elements_share_plane(g->m, element, lamp);
             for (int d = 0; d < 3; d++) s->place[h][k][d] = (double)point[d];
         }
     }
@@ -165,6 +168,7 @@ static double kernel(const mesh *m, uint32_t from, uint32_t to, const double seg
 static void add_lamps(const gather *g, const gather_samples *s, size_t half, size_t first, uint32_t element,
                       const float origin[3], double *H) {
     const uint32_t *lamp = s->lamp[half] + first;
+    const bool *unseen = s->unseen[half] + first;
     const double(*place)[3] = (const double(*)[3])s->place[half] + first;
     ray_packet segments = {.origin = {{0}}};
     double K[VISIBILITY_PACKET];
@@ -173,7 +177,7 @@ static void add_lamps(const gather *g, const gather_samples *s, size_t half, siz
     for (size_t k = 0; k < VISIBILITY_PACKET; k++) {
         double segment[3];
         for (int d = 0; d < 3; d++) segment[d] = place[k][d] - (double)origin[d];
-        K[n] = lamp[k] != element ? kernel(g->m, element, lamp[k], segment) : 0;
+        K[n] = !unseen[k] ? kernel(g->m, element, lamp[k], segment) : 0;
         if (!(K[n] > 0)) continue;
         for (int d = 0; d < 3; d++) {
             segments.origin[d][n] = origin[d];

@@ -162,7 +162,7 @@ lam_status polygon_split(const double (*vertices)[3], const uint32_t *corners, s
     bool convex = true;
     for (size_t i = 0; i < n; i++)
         convex = convex && plane_turn(s->flat[(i + n - 1) % n], s->flat[i], s->flat[(i + 1) % n]) > 0;
-    if (n == 4 && convex && off <= plane_flatness(diameter))
+    if (n == 4 && convex && off <= plane_flatness * diameter)
         add_piece(s, s->corners[0], s->corners[1], s->corners[2], s->corners[3]);
     else
         clip_ears(s, n, 2 * least_area);

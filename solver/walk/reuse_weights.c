@@ -140,7 +140,7 @@ lam_status light_maps_create(const walk_scene *s, size_t n, const light_frame *f
 static void see_all(const walk_scene *s, size_t n, const light_frame *frames, const first_hits *h, size_t k,
                     float *f) {
     uint32_t which[VISIBILITY_PACKET];
-    const float lift = 4 * (float)visibility_rounding(s->v);
+    const float lift = 4 * (float)visibility_rounding(s->v) + (float)visibility_rise(s->v, h->element[k]);
     const float local[3] = {h->local[0][k], h->local[1][k], h->local[2][k]};
     float y[3];
     ray_packet segments;

@@ -33,7 +33,7 @@ static void set_shape(const mesh *m, const visibility *v, size_t element, walk_s
     const uint32_t *corner = m->elements[element];
     const double *a = m->vertices[corner[0]], *b = m->vertices[corner[1]], *c = m->vertices[corner[2]];
     const double *last = c;
-    const float lift = 2 * (float)visibility_rounding(v);
+    const float lift = 2 * (float)visibility_rounding(v) + (float)visibility_rise(v, element);
     const size_t n_fronts = m->two_sided ? m->n / 2 : m->n;
     s->facet = visibility_facets(v)->of_element[element % n_fronts] | WALK_TRIANGLE;
     *share = 1;

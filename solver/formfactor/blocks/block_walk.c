@@ -414,7 +414,7 @@ lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tre
     if (centre == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, centre[i]);
     TRY(block_factors_begin(tree, m->area, (const double(*)[3])centre, nodes, error));
-    TRY(flat_clusters_make(m, tree, nodes, &out->flat, error));
+    TRY(flat_clusters_make(m, v, tree, nodes, &out->flat, error));
     TRY(occluders_make(m, visibility_facets(v), out->flat.slack, &out->pieces, error));
     out->joined = tree->view == PLANE_VIEW_UNHIDDEN;
     if (tree->view == PLANE_VIEW_UNKNOWN && !blocks_are_planar(tree))

@@ -2,12 +2,11 @@
 
 #include "solver/base/vector3.h"
 #include "solver/base/weighted.h"
+#include "solver/scene/plane.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-/* Nothing shorter than this share of the extent of the scene is a distance. */
-static const double least_length = 1e-7;
 /* Coordinates that are written with few digits put elements of one plane at heights that differ by less than
  * this share of the extent: millimetres in a kilometre. */
 static const double least_height = 1e-6;
@@ -31,10 +30,10 @@ static void set_plane(const plane_frame *frame, flat_plane *p) {
 
 /* Bounds along both axes and of heights. */
 typedef struct rectangle {
-    double low[3], high[3], lowest_top;
+    double low[3], high[3], lowest_top, contact;
 } rectangle;
 
-static rectangle of_element(const mesh *m, uint32_t element, const flat_plane *p) {
+static rectangle of_element(const mesh *m, const visibility *v, uint32_t element, const flat_plane *p) {
     rectangle r = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
     for (size_t c = 0; c < mesh_corners(m, element); c++) {
         const double *x = m->vertices[m->elements[element][c]];
@@ -44,7 +43,8 @@ static rectangle of_element(const mesh *m, uint32_t element, const flat_plane *p
             r.high[k] = fmax(r.high[k], at);
         }
     }
-    r.lowest_top = r.high[2];
+    r.contact = visibility_rise(v, element);
+    r.lowest_top = r.high[2] + r.contact;
     return r;
 }
 
@@ -57,7 +57,7 @@ static void include(rectangle *r, const double point[2]) {
 }
 
 static rectangle joined(const rectangle *a, const rectangle *b) {
-    rectangle r = {.lowest_top = fmin(a->lowest_top, b->lowest_top)};
+    rectangle r = {.lowest_top = fmin(a->lowest_top, b->lowest_top), .contact = fmax(a->contact, b->contact)};
     for (int k = 0; k < 3; k++) {
         r.low[k] = fmin(a->low[k], b->low[k]);
         r.high[k] = fmax(a->high[k], b->high[k]);
@@ -71,7 +71,8 @@ static void set_cluster(const flat_plane *p, const rectangle *r, double area, ui
                           .plane = plane,
                           .level = .5 * (r->low[2] + r->high[2]),
                           .rise = .5 * (r->high[2] - r->low[2]),
-                          .lowest_top = r->lowest_top};
+                          .lowest_top = r->lowest_top,
+                          .contact = r->contact};
     const double above = out->level - dot3(p->normal, p->origin);
     double middle[2];
     for (int k = 0; k < 2; k++) {
@@ -130,15 +131,15 @@ static double extent_of(const mesh *m) {
     return 2 * radius;
 }
 
-lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_factors *blocks,
-                              flat_clusters *out, lam_error *error) {
+lam_status flat_clusters_make(const mesh *m, const visibility *v, const plane_tree *tree,
+                              block_factors *blocks, flat_clusters *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = m->n, n_clusters = blocks->n_clusters, n_nodes = n_clusters + n;
     const double extent = extent_of(m);
     flat_clusters f = {.m = m,
                        .tree = blocks,
                        .n_planes = tree->n_frames,
-                       .slack = least_length * extent,
+                       .slack = plane_least_length * extent,
                        .flush = least_height * extent};
     rectangle *bounds = memory_allocate(n_nodes, sizeof *bounds, "clusters", error);
     corner_box *boxes = memory_allocate(n_clusters, sizeof *boxes, "clusters", error);
@@ -157,7 +158,7 @@ lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_facto
         const flat_plane *plane = &f.planes[c->frame];
         for (uint32_t p = c->begin; p < c->end; p++) {
             const size_t own = n_clusters + p;
-            bounds[own] = of_element(m, blocks->order[p], plane);
+            bounds[own] = of_element(m, v, blocks->order[p], plane);
             include(&bounds[own], blocks->place[p]);
             bounds[t] = p == c->begin ? bounds[own] : joined(&bounds[t], &bounds[own]);
             set_cluster(plane, &bounds[own], blocks->area[p], c->frame, f.slack, &f.of[own]);

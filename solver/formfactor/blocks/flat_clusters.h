@@ -5,6 +5,7 @@
 #define LAMBERT_FORMFACTOR_BLOCKS_FLAT_CLUSTERS_H
 
 #include "solver/formfactor/pairs/polygon.h"
+#include "solver/formfactor/visibility/visibility.h"
 #include "solver/operator/blocks/block_factors.h"
 
 /* A plane through its origin. Coordinates in it are (x - origin) . axis, a height is normal . x. The elements
@@ -19,6 +20,7 @@ typedef struct flat_cluster {
     /* Heights: that of the rectangle, how far the corners of its elements are from it at most, and the lowest
      * one of the highest corners of each element. 0 above planes. */
     double level, rise, lowest_top;
+    double contact; /* of an element or any of them, visibility_rise; lowest_top has it in it */
     uint32_t plane; /* PLANE_ABOVE: several planes. Centre and radius are those of a box then */
     bool full;      /* the elements fill the rectangle at its height; false above planes */
 } flat_cluster;
@@ -36,8 +38,8 @@ typedef struct flat_clusters {
 
 /* Measures all nodes, and widens nodes of blocks from the rectangles of centroids to those of the elements.
  * mesh and blocks must outlive out. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
-lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_factors *blocks,
-                              flat_clusters *out, lam_error *error);
+lam_status flat_clusters_make(const mesh *m, const visibility *v, const plane_tree *tree,
+                              block_factors *blocks, flat_clusters *out, lam_error *error);
 void flat_clusters_free(flat_clusters *f);
 
 /* The corners of two rectangles side by side, the first's before the second's. */

@@ -8,12 +8,13 @@ lam_status few_occluders_make(const mesh *m, const visibility *v, const polygon 
                               const pair_factor_rules *rules, uint64_t seed, int most, few_occluders *out,
                               lam_error *error) {
     few_occluders f = {.m = m,
-                       .facets = visibility_facets(v),
+                       .v = v,
                        .polygons = polygons,
                        .rules = rules,
                        .seed = seed,
                        .most = most < UNCUT_OCCLUDERS_MOST ? most : UNCUT_OCCLUDERS_MOST};
-    const lam_status status = occluders_make(m, f.facets, visibility_rounding(v), &f.occluders, error);
+    const lam_status status =
+        occluders_make(m, visibility_facets(v), visibility_rounding(v), &f.occluders, error);
     if (status == LAM_OK) *out = f;
     return status;
 }
@@ -62,7 +63,7 @@ double few_occluders_tolerance(const few_occluders *f, uint32_t i, uint32_t j, d
 /* Both sides of a two-sided element lie in one facet. */
 static uint32_t facet_of(const few_occluders *f, uint32_t element) {
     const size_t n_fronts = f->m->two_sided ? f->m->n / 2 : f->m->n;
-    return f->facets->of_element[element < n_fronts ? element : element - n_fronts];
+    return visibility_facets(f->v)->of_element[element < n_fronts ? element : element - n_fronts];
 }
 
 few_verdict few_occluders_share(const few_occluders *f, const link_occluders *among, uint32_t i, uint32_t j,
@@ -74,16 +75,17 @@ few_verdict few_occluders_share(const few_occluders *f, const link_occluders *am
     polygon_in_front(&f->polygons[j], &f->polygons[i], &b);
     if (a.n == 0 || b.n == 0) return FEW_UNDECIDED;
     const uint32_t own[2] = {facet_of(f, i), facet_of(f, j)};
-    pair_occluders_find(&f->occluders, among, &a, &b, own, &between);
+    const double rise[2] = {visibility_rise(f->v, i), visibility_rise(f->v, j)};
+    pair_occluders_find(&f->occluders, among, &a, &b, own, rise, &between);
     if (between.hidden) {
         *share = 0;
         return FEW_HIDDEN;
     }
     double full = 0; /* g where windows cut the pair */
     if (between.count != 0 && between.count != 1) {
-        const windows_found found = windows_cut(&f->occluders, among, own, &a, &b);
+        const windows_found found = windows_cut(&f->occluders, among, own, rise, &a, &b);
         if (found == WINDOWS_CUT) {
-            pair_occluders_find(&f->occluders, among, &a, &b, own, &between);
+            pair_occluders_find(&f->occluders, among, &a, &b, own, rise, &between);
             full = g;
         }
         if (found == WINDOWS_CLOSED || between.hidden) {
@@ -113,7 +115,8 @@ few_verdict few_occluders_between(const few_occluders *f, const link_occluders *
     polygon_in_front(&f->polygons[j], &f->polygons[i], &b);
     if (a.n == 0 || b.n == 0) return FEW_UNDECIDED;
     const uint32_t own[2] = {facet_of(f, i), facet_of(f, j)};
-    pair_occluders_find(&f->occluders, among, &a, &b, own, between);
+    const double rise[2] = {visibility_rise(f->v, i), visibility_rise(f->v, j)};
+    pair_occluders_find(&f->occluders, among, &a, &b, own, rise, between);
     if (between->hidden) return FEW_HIDDEN;
     return between->count == 0 ? FEW_OPEN : FEW_UNDECIDED;
 }

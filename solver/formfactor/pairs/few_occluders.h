@@ -10,7 +10,7 @@
 typedef struct few_occluders {
     occluders occluders;
     const mesh *m;
-    const facets *facets;
+    const visibility *v;
     const polygon *polygons; /* [n] */
     const pair_factor_rules *rules;
     uint64_t seed;

@@ -105,9 +105,10 @@ static unsigned segments_of(const occlusion *o, const piece_pair *two, size_t fi
 
 /* As visibility_blocked does, so that no occluder in the plane of either piece blocks a segment. */
 static void lift(const occlusion *o, const piece_pair *two, ray_packet *s) {
-    const double height = 2 * visibility_rounding(o->v);
+    const double height = 2 * visibility_rounding(o->v), begin = height + visibility_rise(o->v, two->i),
+                 end = height + visibility_rise(o->v, two->j);
     for (int d = 0; d < 3; d++) {
-        const float from = (float)(height * two->a->normal[d]), to = (float)(height * two->b->normal[d]);
+        const float from = (float)(begin * two->a->normal[d]), to = (float)(end * two->b->normal[d]);
         for (int k = 0; k < VISIBILITY_PACKET; k++) {
             s->origin[d][k] += from;
             s->direction[d][k] += to - from;

@@ -2,14 +2,12 @@
 
 #include "solver/base/vector3.h"
 #include "solver/formfactor/pairs/pair_factor.h"
+#include "solver/scene/plane.h"
 #include "store/status.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Nothing shorter than this share of the extent of the scene is a distance. */
-static const double least_length = 1e-7;
 
 /* Clusters that wait while the tree is descended: one at each level, which halve an extent. Deeper ones are
  * looked at in full. */
@@ -71,7 +69,7 @@ static bool refuse(void *context, size_t element) {
 static double slack_of(const mesh *m) {
     double centre[3], radius;
     mesh_bounds(m, centre, &radius);
-    return 2 * radius * least_length;
+    return 2 * radius * plane_least_length;
 }
 
 bool clusters_hide_nothing(const mesh *m, const cluster_tree *t) {
@@ -178,7 +176,7 @@ lam_status mesh_is_unhidden(const mesh *m, bool *out, double *hidden, lam_error 
     double mean = 0;
     bool found = false;
     const double slack = slack_of(m);
-    dents all = {.m = m, .slack = slack, .deepest = slack * (deepest / least_length)};
+    dents all = {.m = m, .slack = slack, .deepest = slack * (deepest / plane_least_length)};
     all.hidden = memory_allocate(m->n, sizeof *all.hidden, "occlusion", error);
     if (all.hidden == NULL) TRY(LAM_ERR_MEMORY);
     pair_factor_rules_init(&all.rules);

@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/pair_far.h"
 
 #include "solver/base/cpu.h"
+#include "solver/scene/plane.h"
 
 #include <math.h>
 #include <stdlib.h>

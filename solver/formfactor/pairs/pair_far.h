@@ -33,9 +33,9 @@ lam_status pair_far_table_build(const polygon *polygons, const cluster_tree *t,
                                 lam_error *error);
 void pair_far_table_free(pair_far_table *t);
 
-/* g[k] = A_i F_ij for the positions i and j = first + k, k < count; 0 where they do not face each other; -1
- * where the rules do not hold (too close, or partly behind each other) and pair_factor_exchange must be
- * called. */
+/* g[k] = A_i F_ij for the positions i and j = first + k, k < count; 0 where they do not face each other or
+ * lie in one plane; -1 where the rules do not hold (too close, or partly behind each other) and
+ * pair_factor_exchange must be called. */
 void pair_far_row(const pair_far_table *t, size_t i, size_t first, size_t count, double *g);
 
 #endif

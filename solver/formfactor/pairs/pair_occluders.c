@@ -15,6 +15,7 @@ typedef struct supports {
 
 typedef struct pair_sides {
     const polygon *side[2];
+    double rise[2]; /* of faces of its plane above each side, which block nothing of it */
     double slack;
     bool has_supports;
     supports supports;
@@ -130,7 +131,7 @@ static standing where_it_stands(pair_sides *p, const occluder *o) {
             subtract3(o->corner[c], one->centre, to);
             front = fmax(front, dot3(one->normal, to));
         }
-        if (front <= p->slack) return STANDS_BESIDE;
+        if (front <= p->slack + p->rise[side]) return STANDS_BESIDE;
     }
     const bool apart =
         (low[0] > p->slack && high[1] < -p->slack) || (low[1] > p->slack && high[0] < -p->slack);
@@ -143,8 +144,8 @@ static standing where_it_stands(pair_sides *p, const occluder *o) {
 }
 
 void pair_occluders_find(const occluders *o, const link_occluders *among, const polygon *a, const polygon *b,
-                         const uint32_t own_facets[2], pair_occluders *out) {
-    pair_sides p = {.side = {a, b}, .slack = o->slack, .has_supports = false};
+                         const uint32_t own_facets[2], const double rise[2], pair_occluders *out) {
+    pair_sides p = {.side = {a, b}, .rise = {rise[0], rise[1]}, .slack = o->slack, .has_supports = false};
     out->count = 0;
     out->hidden = false;
     if (among->count == OCCLUDERS_UNCOUNTED) {

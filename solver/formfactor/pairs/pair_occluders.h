@@ -20,9 +20,10 @@ typedef struct pair_occluders {
 } pair_occluders;
 
 /* Finds the occluders of a link that may block a segment between a and b, which face each other wholly;
- * own_facets: of the two elements, which block no segment of theirs. Count 0 proves that none does. */
+ * own_facets: of the two elements, which block no segment of theirs; rise: what of their planes rises above
+ * them and blocks none either (visibility_rise). Count 0 proves that none does. */
 void pair_occluders_find(const occluders *o, const link_occluders *among, const polygon *a, const polygon *b,
-                         const uint32_t own_facets[2], pair_occluders *out);
+                         const uint32_t own_facets[2], const double rise[2], pair_occluders *out);
 
 /* Bits of those of a pair, among the bits given, that may block a segment between b and a part of a. hidden:
  * one of them covers the part. */

@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/polygon.h"
 
 #include "solver/base/vector3.h"
+#include "solver/scene/plane.h"
 
 #include <math.h>
 #include <string.h>
@@ -56,8 +57,18 @@ void polygon_of_element(const mesh *m, size_t element, polygon *out) {
     polygon_measure(out);
 }
 
+static plane_face face_of(const polygon *p) {
+    return (plane_face){p->n, (const double(*)[3])p->corner, p->centre, p->normal, p->radius};
+}
+
 void polygon_in_front(const polygon *p, const polygon *other, polygon *out) {
     double height[POLYGON_CORNERS], most = 0, least = INFINITY;
+    const plane_face own = face_of(p), others = face_of(other);
+    if (plane_is_shared(&own, &others)) {
+        *out = *p;
+        out->n = 0;
+        return;
+    }
     for (int c = 0; c < p->n; c++) {
         double r[3];
         for (int d = 0; d < 3; d++) r[d] = p->corner[c][d] - other->centre[d];

@@ -23,7 +23,8 @@ void polygon_set_extent(polygon *p);
 
 void polygon_of_element(const mesh *m, size_t element, polygon *out);
 
-/* The part of p in front of the plane of other; empty where no corner is in front by more than rounding. */
+/* The part of p in front of the plane of other; empty where no corner is in front by more than rounding, and
+ * where both lie in one plane (plane_is_shared): then either is empty as seen from the other. */
 void polygon_in_front(const polygon *p, const polygon *other, polygon *out);
 
 double polygon_area(const polygon *p);

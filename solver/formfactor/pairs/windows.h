@@ -11,9 +11,10 @@ typedef enum windows_found { WINDOWS_NONE, WINDOWS_CUT, WINDOWS_CLOSED } windows
 
 /* a and b face each other wholly. WINDOWS_CUT: no segment between them is open outside of the parts that they
  * become; WINDOWS_CLOSED: none is open at all, and a and b stay unchanged; both are proven within the slack
- * of the occluders. own_facets: of the two elements, which block no segment of theirs. Cost: O(occluders^2)
- * in a plane, at most. */
+ * of the occluders. own_facets and rise: as for pair_occluders_find. Cost: O(occluders^2) in a plane, at
+ * most.
+ */
 windows_found windows_cut(const occluders *o, const link_occluders *among, const uint32_t own_facets[2],
-                          polygon *a, polygon *b);
+                          const double rise[2], polygon *a, polygon *b);
 
 #endif

@@ -1,4 +1,5 @@
 #include "solver/formfactor/rays/portal_aim.h"
+#include "solver/scene/plane.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -126,7 +127,7 @@ static double cosine_to(const aiming *from, const double at[3]) {
     double r[3];
     for (int d = 0; d < 3; d++) r[d] = at[d] - from->centre[d];
     const double length = sqrt(dot(r, r));
-    return dot(r, from->normal) > 1e-5 * length ? dot(r, from->normal) / length : 0;
+    return dot(r, from->normal) > plane_flatness * length ? dot(r, from->normal) / length : 0;
 }
 
 /* A group while it is chosen: a node of the tree, or a part of its only portal. */

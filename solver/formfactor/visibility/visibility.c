@@ -91,6 +91,7 @@ static lam_status create(const mesh *m, bool join, visibility **out, lam_error *
     rtcCommitScene(v->scene);
     if (rtcGetDeviceError(v->device) != RTC_ERROR_NONE)
         FAIL(error, LAM_ERR_INTERNAL, "Embree: cannot build the scene of %zu elements", m->n);
+    TRY(visibility_find_contacts(v, error));
     *out = v;
     v = NULL;
 done:
@@ -111,6 +112,7 @@ void visibility_destroy(visibility *v) {
     if (v->scene != NULL) rtcReleaseScene(v->scene);
     if (v->device != NULL) rtcReleaseDevice(v->device);
     free(v->all);
+    free(v->rise);
     facets_free(&v->facets);
     facet_grids_free(&v->grids);
     free(v);
@@ -161,10 +163,19 @@ static void refuse_own_and_culled(const struct RTCFilterFunctionNArguments *args
     }
 }
 
-/* A sheet modelled as two faces in one place is hit at its front and at its back at the same distance. Where
- * a back was found, casts again for a front within rounding and prefers it. */
-static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PACKET], cast_context *context,
+/* The facets that a packet's rays hit first, and the components of the directions along their normals;
+ * VISIBILITY_NOTHING and 0 for rays that hit nothing. */
+typedef struct met_packet {
+    uint32_t facet[VISIBILITY_PACKET];
+    float cosine[VISIBILITY_PACKET];
+} met_packet;
+
+/* A sheet modelled as two faces in one place is hit at its front and at its back at the same distance, or the
+ * back is hit first where it rises above the front. Where a back was found, casts again for such a front and
+ * prefers it; the hit stays where the ray first met the sheet. */
+static void prefer_fronts(const visibility *v, const met_packet *met, cast_context *context,
                           struct RTCRayHit8 *ray) {
+    const float *cosine = met->cosine;
     struct RTCRayHit8 again = *ray;
     int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
     bool any = false;
@@ -172,7 +183,7 @@ static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PAC
         active[i] = cosine[i] > 0 ? -1 : 0;
         if (cosine[i] <= 0) continue;
         any = true;
-        const float slack = v->rounding / cosine[i];
+        const float slack = fmaxf(v->rounding, rise_of(v, met->facet[i])) / cosine[i];
         again.ray.tnear[i] = fmaxf(0, ray->ray.tfar[i] - slack);
         again.ray.tfar[i] = ray->ray.tfar[i] + slack;
         again.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
@@ -182,20 +193,17 @@ static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PAC
     embree_intersect(active, v->scene, &context->query, &again);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         if (cosine[i] <= 0 || again.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        const bool same_place = rise_of(v, met->facet[i]) <= v->rounding ||
+                                fabsf(again.ray.tfar[i] - ray->ray.tfar[i]) <= v->rounding / cosine[i];
+        const uint32_t front = facet_of(v, again.hit.geomID[i], again.hit.primID[i]);
+        if (!same_place && !(cosine_between(v, front, met->facet[i]) < (float)-plane_parallel)) continue;
         ray->hit.geomID[i] = again.hit.geomID[i];
         ray->hit.primID[i] = again.hit.primID[i];
         ray->hit.u[i] = again.hit.u[i];
         ray->hit.v[i] = again.hit.v[i];
-        ray->ray.tfar[i] = again.ray.tfar[i];
+        if (same_place) ray->ray.tfar[i] = again.ray.tfar[i];
     }
 }
-
-/* The facets that a packet's rays hit first, and the components of the directions along their normals;
- * VISIBILITY_NOTHING and 0 for rays that hit nothing. */
-typedef struct met_packet {
-    uint32_t facet[VISIBILITY_PACKET];
-    float cosine[VISIBILITY_PACKET];
-} met_packet;
 
 static void facets_met(const visibility *v, const struct RTCRayHit8 *ray, size_t n_rays, met_packet *met) {
     for (size_t i = 0; i < n_rays; i++) {
@@ -208,12 +216,12 @@ static void facets_met(const visibility *v, const struct RTCRayHit8 *ray, size_t
     }
 }
 
-/* Moves origins above their own facet's plane by more than rounding, so that rays cannot hit it and the cast
- * needs no filter, which would take a third of all time. */
+/* Moves origins above their own facet's plane, and what rises above it, by more than rounding, so that rays
+ * cannot hit it and the cast needs no filter, which would take a third of all time. */
 static void lift(const visibility *v, const uint32_t *self, size_t n_rays, struct RTCRayHit8 *ray) {
-    const float height = 2 * v->rounding;
     for (size_t i = 0; i < n_rays; i++) {
         if (self[i] == VISIBILITY_NOTHING) continue;
+        const float height = 2 * v->rounding + rise_of(v, ray->ray.id[i]);
         const float *normal = v->mesh->normal[self[i]];
         ray->ray.org_x[i] += height * normal[0];
         ray->ray.org_y[i] += height * normal[1];
@@ -307,7 +315,7 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
     bool backs = false;
     for (size_t i = 0; i < n_rays; i++) backs = backs || met.cosine[i] > 0;
     if (backs && !two_sided) {
-        prefer_fronts(v, met.cosine, &context, &ray);
+        prefer_fronts(v, &met, &context, &ray);
         facets_met(v, &ray, n_rays, &met);
     }
 
@@ -324,7 +332,7 @@ static void report_backs(const visibility *v, const uint32_t *facet, size_t n_ra
     for (size_t i = 0; i < VISIBILITY_PACKET; i++)
         ray->ray.id[i] = i < n_rays ? facet[i] : VISIBILITY_NOTHING;
     facets_met(v, ray, n_rays, &met);
-    prefer_fronts(v, met.cosine, &context, ray);
+    prefer_fronts(v, &met, &context, ray);
     facets_met(v, ray, n_rays, &met);
     report(v, ray, n_rays, &met, hits);
 }

@@ -45,6 +45,11 @@ const facets *visibility_facets(const visibility *v);
 /* The distance, in metres, by which single precision may move a point of the scene. */
 double visibility_rounding(const visibility *v);
 
+/* How far faces of the plane of an element that look at it rise above it, in metres, by the rounding of their
+ * coordinates: the back of a sheet, the bottom of a box on a floor. They block nothing that the element sees,
+ * and its rays begin above them. 0 where that is within visibility_rounding, as nearly everywhere. */
+double visibility_rise(const visibility *v, size_t element);
+
 /* CULL_BACK ignores back faces instead of reporting them. TOGETHER declares a coherent packet (near
  * origins, similar directions): the hits are the same, twice as fast (an incoherent packet is cast at two
  * thirds of the speed). */
@@ -56,9 +61,9 @@ enum { VISIBILITY_CULL_BACK = 1, VISIBILITY_TOGETHER = 2 };
 void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
                      unsigned how, hit_packet *hits);
 
-/* visibility_cast with how = 0 for rays that start above the plane of their element by 2 visibility_rounding,
- * as walks make them, n_rays in packets: facet[i] is the facet of self[i] (visibility_facets), or both are
- * VISIBILITY_NOTHING. Many together are faster than a packet alone. */
+/* visibility_cast with how = 0 for rays that start above the plane of their element by 2 visibility_rounding
+ * and visibility_rise, as walks make them, n_rays in packets: facet[i] is the facet of self[i]
+ * (visibility_facets), or both are VISIBILITY_NOTHING. Many together are faster than a packet alone. */
 void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
                             const uint32_t *facet, hit_packet *hits);
 

@@ -5,6 +5,7 @@
 #include "solver/formfactor/visibility/embree.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/scene/facet/facet_grid.h"
+#include "solver/scene/plane.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -32,7 +33,15 @@ struct visibility {
     primitive *primitives[N_GEOMETRIES];
     double centre[3];
     float rounding; /* see visibility_rounding */
+    float *rise;    /* [facets], see visibility_rise; NULL: 0 everywhere */
 };
+
+/* Sets rise. Errors: LAM_ERR_MEMORY. */
+lam_status visibility_find_contacts(visibility *v, lam_error *error);
+
+static inline float rise_of(const visibility *v, uint32_t facet) {
+    return v->rise != NULL ? v->rise[facet] : 0;
+}
 
 /* The component of a direction along a facet's normal: negative where the ray hits the front. */
 static inline float along_normal(const visibility *v, uint32_t facet, float x, float y, float z) {
@@ -53,12 +62,19 @@ enum {
     HIT_GEOMETRY = offsetof(struct RTCHit8, geomID) / (8 * sizeof(unsigned)),
 };
 
+/* The cosine of the angle between the normals of two facets. */
+static inline float cosine_between(const visibility *v, uint32_t one, uint32_t other) {
+    const float *n = v->facets.normal[one], *m = v->facets.normal[other];
+    return n[0] * m[0] + n[1] * m[1] + n[2] * m[2];
+}
+
 /* True for a hit in the ray's own plane at its origin: either the element's other side, modelled as a face of
  * its own, or the bottom of an object that stands on the element and occludes the ray by its other faces
- * anyway. */
+ * anyway. Either may rise above the element. */
 static inline bool in_own_plane(const visibility *v, uint32_t facet, uint32_t own, float travelled) {
-    const float *n = v->facets.normal[own], *m = v->facets.normal[facet];
-    return travelled <= v->rounding && fabsf(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) > 1 - 1e-6f;
+    if (travelled <= v->rounding)
+        return fabsf(cosine_between(v, own, facet)) > 1 - (float)plane_same_direction;
+    return travelled <= rise_of(v, own) && cosine_between(v, own, facet) < (float)-plane_parallel;
 }
 
 static inline void packet_set(struct RTCRayHit8 *ray, const ray_packet *rays) {

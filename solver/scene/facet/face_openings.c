@@ -206,7 +206,7 @@ lam_status face_openings_find(const mesh *m, double narrow, face_openings *out, 
     plane_regions r = {.n_open = 0};
     face_openings made = {.n = 0};
     mesh_bounds(m, centre, &radius);
-    const double slack = plane_flatness(2 * radius);
+    const double slack = 2 * plane_flatness * radius;
     finder f = {
         .m = m, .e = &e, .r = &r, .slack = plane_slack * slack, .narrow = fmax(narrow, slack), .out = &made};
     TRY(face_edges_find(m, n_faces, slack, &e, error));

@@ -3,14 +3,12 @@
 #include "solver/base/array_sort.h"
 #include "solver/base/union_find.h"
 #include "solver/scene/facet/facet_outline.h"
+#include "solver/scene/plane.h"
 #include "solver/scene/tables.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Normals of one plane differ by no more than this, 1 - cosine. */
-static const double same_direction = 1e-6;
 
 /* At most this many sides between the same two places are compared pair by pair; more are not joined. */
 enum { MEETING_MOST = 16 };
@@ -65,7 +63,7 @@ static bool of_one_plane(const joining *j, uint32_t a, uint32_t b) {
     const mesh *m = j->m;
     const double p[3] = {m->normal[a][0], m->normal[a][1], m->normal[a][2]};
     const double q[3] = {m->normal[b][0], m->normal[b][1], m->normal[b][2]};
-    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2] >= 1 - same_direction &&
+    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2] >= 1 - plane_same_direction &&
            off_plane(m, b, m->vertices[m->elements[a][0]], p) <= j->flat &&
            off_plane(m, a, m->vertices[m->elements[b][0]], q) <= j->flat;
 }

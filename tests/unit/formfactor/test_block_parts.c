@@ -26,8 +26,8 @@ static void parts_make(parts *p) {
     for (size_t i = 0; i < p->m.n; i++) mesh_centroid(&p->m, i, centre[i]);
     ck_ok(form_factors_tree(&p->m, &p->tree, &error));
     ck_ok(block_factors_begin(&p->tree, p->m.area, (const double(*)[3])centre, &p->blocks, &error));
-    ck_ok(flat_clusters_make(&p->m, &p->tree, &p->blocks, &p->flat, &error));
     ck_ok(visibility_create(&p->m, &p->v, &error));
+    ck_ok(flat_clusters_make(&p->m, p->v, &p->tree, &p->blocks, &p->flat, &error));
     ck_ok(occluders_make(&p->m, visibility_facets(p->v), p->flat.slack, &p->pieces, &error));
     free(centre);
 }

@@ -133,7 +133,7 @@ START_TEST(cut_is_brute_subdivision) {
             /* Occluders that planes throw out block nothing. */
             pair_occluders left;
             const uint32_t none[2] = {MESH_NO_VERTEX - 1, MESH_NO_VERTEX - 1};
-            pair_occluders_find(&s.occluders, &all, &s.a, &s.b, none, &left);
+            pair_occluders_find(&s.occluders, &all, &s.a, &s.b, none, (const double[2]){0, 0}, &left);
             ck_assert_int_ne(left.count, OCCLUDERS_UNCOUNTED);
             const projected_pair sifted = {0, 1, &s.a, &s.b, &left, 0};
             const double again = left.hidden ? 0 : projection_point_factor(&p, &sifted, x, up, NULL);

@@ -86,7 +86,7 @@ static windows_found cut(const holed_wall *walls, int n, polygon parts[2]) {
     for (size_t k = 0; k < o.n; k++) among.of[among.count++] = (uint32_t)k;
     polygon_of_element(&m, 0, &parts[0]);
     polygon_of_element(&m, 1, &parts[1]);
-    const windows_found found = windows_cut(&o, &among, own, &parts[0], &parts[1]);
+    const windows_found found = windows_cut(&o, &among, own, (const double[2]){0, 0}, &parts[0], &parts[1]);
     occluders_free(&o);
     visibility_destroy(v);
     mesh_free(&m);
