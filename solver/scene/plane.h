@@ -14,8 +14,8 @@ static const double plane_same_direction = 1e-6;
 /* Nothing shorter than this share of the extent of a scene is a distance: single precision has 6e-8. */
 static const double plane_least_length = 1e-7;
 
-/* How far a corner of one face may be from the plane of another one of the same place, such as the back of a
- * sheet, given both diameters. A quad that counts as plane has corners up to f d off its plane, by turns
+/* The distance that a corner of one face may have from the plane of another one of the same place, such as
+ * the back of a sheet, given both diameters. A quad that counts as plane has corners up to f d off its plane, by turns
  * above and below it, so that each of them is up to 4 f d off the plane of the three others: the back may be
  * made of two triangles. A distance of a hundredth of the smaller face is a gap nevertheless: a diode of a
  * millimetre that hangs .1 mm above a large floor shines on it. */

@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/pair_occluders.h"
 
 #include "solver/base/vector3.h"
+#include "solver/scene/plane.h"
 
 #include <math.h>
 #include <string.h>
@@ -110,6 +111,20 @@ static standing compare_crossings(const occluder *o, const polygon *a, const pol
     return all ? STANDS_BEFORE_ALL : STANDS_BETWEEN;
 }
 
+bool occluder_in_contact(const occluder *o, const polygon *element, double rise, double slack) {
+    double top = -INFINITY, most = 0;
+    if (!(rise > 0)) return false;
+    for (int c = 0; c < o->n; c++) {
+        double to[3];
+        subtract3(o->corner[c], element->centre, to);
+        top = fmax(top, dot3(element->normal, to));
+    }
+    for (int c = 0; c < element->n; c++)
+        most = fmax(most, fabs(dot3(o->normal, element->corner[c]) - o->level));
+    return top <= slack + rise ||
+           (most <= slack + rise && fabs(dot3(o->normal, element->normal)) > plane_parallel);
+}
+
 static standing where_it_stands(pair_sides *p, const occluder *o) {
     double height[2][POLYGON_CORNERS], low[2], high[2];
     for (int side = 0; side < 2; side++) {
@@ -131,7 +146,7 @@ static standing where_it_stands(pair_sides *p, const occluder *o) {
             subtract3(o->corner[c], one->centre, to);
             front = fmax(front, dot3(one->normal, to));
         }
-        if (front <= p->slack + p->rise[side]) return STANDS_BESIDE;
+        if (front <= p->slack || occluder_in_contact(o, one, p->rise[side], p->slack)) return STANDS_BESIDE;
     }
     const bool apart =
         (low[0] > p->slack && high[1] < -p->slack) || (low[1] > p->slack && high[0] < -p->slack);

@@ -13,6 +13,10 @@ enum { PAIR_OCCLUDERS_MOST = 16, UNCUT_OCCLUDERS_MOST = 8 };
 /* As many as segments are tested against one by one; of more, the whole scene is searched. */
 enum { LISTED_OCCLUDERS_MOST = 128 };
 
+/* True where an occluder is one of the faces that rise above an element in its plane, by up to `rise`
+ * (visibility_rise), give or take slack: its corners, or those of the element in its plane, are no higher. */
+bool occluder_in_contact(const occluder *o, const polygon *element, double rise, double slack);
+
 typedef struct pair_occluders {
     int count;   /* or OCCLUDERS_UNCOUNTED */
     bool hidden; /* one of them covers the pair */

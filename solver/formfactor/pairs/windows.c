@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/windows.h"
 
 #include "solver/base/vector3.h"
+#include "solver/formfactor/pairs/pair_occluders.h"
 
 #include <math.h>
 #include <string.h>
@@ -228,17 +229,6 @@ static bool drop_repeated(polygon *p) {
     return true;
 }
 
-/* True where an occluder is one of the faces that rise above an element in its plane. */
-static bool rises_above(const occluder *o, const polygon *p, double rise, double slack) {
-    double top = -INFINITY;
-    for (int c = 0; c < o->n && rise > 0; c++) {
-        double to[3];
-        subtract3(o->corner[c], p->centre, to);
-        top = fmax(top, dot3(p->normal, to));
-    }
-    return rise > 0 && top <= slack + rise;
-}
-
 windows_found windows_cut(const occluders *o, const link_occluders *among, const uint32_t own_facets[2],
                           const double rise[2], polygon *a, polygon *b) {
     window found[WINDOWS_MOST];
@@ -251,7 +241,9 @@ windows_found windows_cut(const occluders *o, const link_occluders *among, const
         for (int l = k; l < among->count; l++) {
             const occluder *one = &o->of[among->of[l]];
             if (one->facet == own_facets[0] || one->facet == own_facets[1]) continue;
-            if (rises_above(one, a, rise[0], o->slack) || rises_above(one, b, rise[1], o->slack)) continue;
+            if (occluder_in_contact(one, a, rise[0], o->slack) ||
+                occluder_in_contact(one, b, rise[1], o->slack))
+                continue;
             bool in_plane = true;
             for (int c = 0; c < one->n && in_plane; c++)
                 in_plane = fabs(dot3(first->normal, one->corner[c]) - first->level) <= o->slack;

@@ -9,6 +9,9 @@
 
 #include <stdlib.h>
 
+/* Less than this share of visibility_rounding is left to that. */
+static const double least_rise = .25;
+
 /* The data of the filter: one element, and what it came in contact with. */
 typedef struct contact_search {
     struct RTCIntersectContext embree;
@@ -19,7 +22,7 @@ typedef struct contact_search {
     float *rise; /* [facets] */
 } contact_search;
 
-/* How far corners of `of` rise over `from`, at most; of two-sided faces, how far they are off it. */
+/* The largest height of a corner of `of` over the plane of `from`; of two-sided faces, its distance. */
 static double rise_over(const element_face *of, const element_face *from, bool both_sides) {
     double most = 0;
     for (int c = 0; c < of->n; c++) {
@@ -41,7 +44,7 @@ static void raise(float *rise, double to) {
 }
 
 /* Notes a piece that the element is in contact with. A piece counts as of the size of its facet's elements.
- * Heights are linear over the overlap, so that the smaller one of both bounds holds there. */
+ */
 static void note(const contact_search *s, uint32_t piece) {
     const visibility *v = s->v;
     const uint32_t facet = v->facets.piece_facet[piece];
@@ -49,12 +52,15 @@ static void note(const contact_search *s, uint32_t piece) {
     if (facet == s->own_facet || !element_face_set(v->mesh, v->facets.pieces[piece], &other)) return;
     if (!(dot3(other.normal, s->own->normal) < -plane_parallel)) return;
     if (!element_faces_share_plane(s->own, s->own->radius, &other, (double)s->sizes[facet])) return;
-    const bool both = v->mesh->two_sided;
-    const double height =
-        fmin(rise_over(&other, s->own, both), rise_over(s->own, &other, both)) + s->own->off + other.off;
-    if (!(height > (double)v->rounding)) return;
-    raise(&s->rise[facet], height);
-    raise(&s->rise[s->own_facet], height);
+    const double limit = plane_slack(2 * s->own->radius, 2 * (double)s->sizes[facet]);
+    const double off = s->own->off + other.off, over_own = rise_over(&other, s->own, v->mesh->two_sided),
+                 over_other = rise_over(s->own, &other, v->mesh->two_sided);
+    /* Corners of a much larger face may be far over the plane of a small one that tilts. */
+    const double own_rise = off + (over_own <= limit ? over_own : over_other),
+                 other_rise = off + (over_other <= limit ? over_other : over_own);
+    if (!(fmax(own_rise, other_rise) > least_rise * (double)v->rounding)) return;
+    raise(&s->rise[facet], other_rise);
+    raise(&s->rise[s->own_facet], own_rise);
 }
 
 /* Notes every hit and accepts none. */
@@ -131,7 +137,7 @@ lam_status visibility_find_contacts(visibility *v, lam_error *error) {
             .v = v, .sizes = sizes, .own = &own, .own_facet = v->facets.of_element[i], .rise = rise};
         if (!element_face_set(v->mesh, v->mesh->elements[i], &own)) continue;
         const double reach = plane_slack(2 * largest, 2 * own.radius) + 2 * own.off;
-        if (reach > (double)v->rounding) search(&s, reach + (double)v->rounding);
+        if (reach > least_rise * (double)v->rounding) search(&s, reach + (double)v->rounding);
     }
     for (size_t f = 0; f < v->facets.n; f++) any = any || rise[f] > 0;
     if (!any) goto done;

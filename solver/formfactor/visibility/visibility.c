@@ -183,7 +183,7 @@ static void prefer_fronts(const visibility *v, const met_packet *met, cast_conte
         active[i] = cosine[i] > 0 ? -1 : 0;
         if (cosine[i] <= 0) continue;
         any = true;
-        const float slack = fmaxf(v->rounding, rise_of(v, met->facet[i])) / cosine[i];
+        const float slack = (v->rounding + rise_of(v, met->facet[i])) / cosine[i];
         again.ray.tnear[i] = fmaxf(0, ray->ray.tfar[i] - slack);
         again.ray.tfar[i] = ray->ray.tfar[i] + slack;
         again.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
@@ -193,7 +193,7 @@ static void prefer_fronts(const visibility *v, const met_packet *met, cast_conte
     embree_intersect(active, v->scene, &context->query, &again);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         if (cosine[i] <= 0 || again.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-        const bool same_place = rise_of(v, met->facet[i]) <= v->rounding ||
+        const bool same_place = !(rise_of(v, met->facet[i]) > 0) ||
                                 fabsf(again.ray.tfar[i] - ray->ray.tfar[i]) <= v->rounding / cosine[i];
         const uint32_t front = facet_of(v, again.hit.geomID[i], again.hit.primID[i]);
         if (!same_place && !(cosine_between(v, front, met->facet[i]) < (float)-plane_parallel)) continue;

@@ -45,9 +45,10 @@ const facets *visibility_facets(const visibility *v);
 /* The distance, in metres, by which single precision may move a point of the scene. */
 double visibility_rounding(const visibility *v);
 
-/* How far faces of the plane of an element that look at it rise above it, in metres, by the rounding of their
- * coordinates: the back of a sheet, the bottom of a box on a floor. They block nothing that the element sees,
- * and its rays begin above them. 0 where that is within visibility_rounding, as nearly everywhere. */
+/* The height, in metres, by which faces of the plane of an element that look at it rise above it, as their
+ * coordinates are rounded: the back of a sheet, the bottom of a box on a floor. They block nothing that the
+ * element sees, and its rays begin above them. 0 where that is below a quarter of visibility_rounding, as
+ * nearly everywhere. */
 double visibility_rise(const visibility *v, size_t element);
 
 /* CULL_BACK ignores back faces instead of reporting them. TOGETHER declares a coherent packet (near

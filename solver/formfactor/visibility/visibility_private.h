@@ -74,7 +74,8 @@ static inline float cosine_between(const visibility *v, uint32_t one, uint32_t o
 static inline bool in_own_plane(const visibility *v, uint32_t facet, uint32_t own, float travelled) {
     if (travelled <= v->rounding)
         return fabsf(cosine_between(v, own, facet)) > 1 - (float)plane_same_direction;
-    return travelled <= rise_of(v, own) && cosine_between(v, own, facet) < (float)-plane_parallel;
+    return rise_of(v, own) > 0 && travelled <= v->rounding + rise_of(v, own) &&
+           cosine_between(v, own, facet) < (float)-plane_parallel;
 }
 
 static inline void packet_set(struct RTCRayHit8 *ray, const ray_packet *rays) {

@@ -1,5 +1,6 @@
 /* Trees on open ground: each a trunk and some hundred leaves. A leaf has no thickness: it is two faces back
- * to back, so that light falls on both. */
+ * to back, so that light falls on both. Coordinates have six decimals, as in most files of others, so that
+ * the corners of a leaf lie off its plane. */
 #include "solver/base/random.h"
 #include "solver/scene/generate/column.h"
 
@@ -14,7 +15,7 @@ static const double leaf_length[2] = {.2, .36}, leaf_shape = .55; /* width to le
 static const double trunk_end = .3;                               /* of the crown's rise, above its middle */
 static const double bare_share = .15;                             /* of all elements: ground and trunks */
 
-enum { CANOPY_ELEMENTS = 12000, PER_TREE = 820, TRUNK_SIDES = 8, GROUND = 0, TRUNK, GROUPS };
+enum { CANOPY_ELEMENTS = 12000, PER_TREE = 820, TRUNK_SIDES = 8, DECIMALS = 6, GROUND = 0, TRUNK, GROUPS };
 
 static const scene_draft_material soil = {"soil", {.3, .25, .18}, {0, 0, 0}};
 static const scene_draft_material bark = {"bark", {.25, .19, .14}, {0, 0, 0}};
@@ -26,7 +27,6 @@ typedef struct tree {
         rise; /* radius of the trunk; height, radius and rise of the crown */
 } tree;
 
-/* Coordinates in micrometres are short in a file and add up without rounding off a leaf's plane. */
 static double micrometres(double x) {
     return round(x * 1e6) / 1e6;
 }
@@ -95,12 +95,12 @@ static lam_status draw_leaf(scene_draft *d, uint64_t *r, const tree *t, lam_erro
         norm += across[k] * across[k];
     }
     for (int k = 0; k < 3; k++) {
-        const double p = micrometres(middle[k]), a = micrometres(along[k] * length / 2);
-        const double b = micrometres(across[k] / sqrt(norm) * leaf_shape * length / 2);
-        corners[0][k] = micrometres(p + a);
-        corners[1][k] = micrometres(p + b);
-        corners[2][k] = micrometres(p - a);
-        corners[3][k] = micrometres(p - b);
+        const double p = middle[k], a = along[k] * length / 2;
+        const double b = across[k] / sqrt(norm) * leaf_shape * length / 2;
+        corners[0][k] = p + a;
+        corners[1][k] = p + b;
+        corners[2][k] = p - a;
+        corners[3][k] = p - b;
     }
     for (int k = 0; k < 4; k++) memcpy(behind[k], corners[3 - k], sizeof *behind);
     TRY(scene_draft_face(d, (const double(*)[3])corners, 4, error));
@@ -140,6 +140,7 @@ lam_status generate_canopy(scene_draft *d, const generate_options *options, lam_
     const size_t n = wanted < PER_TREE ? 1 : (wanted + PER_TREE / 2) / PER_TREE;
     tree *trees = memory_allocate(n, sizeof *trees, "trees", error);
     if (trees == NULL) TRY(LAM_ERR_MEMORY);
+    d->decimals = DECIMALS;
     TRY(plant(&list, trees, n, options->seed, error));
     TRY(patches_draw(&list, d, options, (size_t)fmax(1, bare_share * (double)wanted), error));
     const size_t leaves = wanted > d->n_faces + 2 * n ? (wanted - d->n_faces) / 2 : n; /* two faces each */

@@ -133,6 +133,16 @@ static void print_number(FILE *file, double x) {
     fprintf(file, " %s", text);
 }
 
+/* Without zeros at the end. */
+static void print_rounded(FILE *file, double x, int decimals) {
+    char text[400];
+    int length = snprintf(text, sizeof text, "%.*f", decimals, x);
+    while (length > 1 && text[length - 1] == '0') length--;
+    if (text[length - 1] == '.') length--;
+    text[length] = '\0';
+    fprintf(file, " %s", strcmp(text, "-0") == 0 ? "0" : text);
+}
+
 static void write_mtl(const scene_draft *d, FILE *file, double reflectance) {
     for (size_t g = 0; g < d->n_groups; g++) {
         const scene_draft_material *m = d->groups[g].material;
@@ -152,7 +162,11 @@ static void write_obj(const scene_draft *d, FILE *file, const char *mtl) {
     fprintf(file, "# metres, z up; faces counter-clockwise seen from their lit side\nmtllib %s\n", mtl);
     for (size_t v = 0; v < d->points.n; v++) {
         fputc('v', file);
-        for (int k = 0; k < 3; k++) print_number(file, d->points.points[v][k]);
+        for (int k = 0; k < 3; k++)
+            if (d->decimals > 0)
+                print_rounded(file, d->points.points[v][k], d->decimals);
+            else
+                print_number(file, d->points.points[v][k]);
         fputc('\n', file);
     }
     for (size_t i = 0; i < d->n_faces; i++) {

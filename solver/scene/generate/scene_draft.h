@@ -14,6 +14,7 @@ typedef struct scene_draft_material {
 typedef struct scene_draft {
     bool counting;    /* faces are counted, not kept */
     double stretch;   /* of cells along a quad's first edge; 0 means 1 */
+    int decimals;     /* of coordinates in the file; 0: as many as read back as the same number */
     const void *plan; /* of a scene_draft_builder, beside its options; not owned */
     size_t n_faces;
     point_table points;
