@@ -38,13 +38,22 @@ static void log_warnings(terminal *t, const char *warnings) {
     }
 }
 
-/* Turns faces; the hash of the source stays that of the file. */
+static void warn_of_coincident(terminal *t, const coincident_report *found) {
+    if (found->dropped > 0) terminal_warn(t, "%s", found->dropped_line);
+    if (found->overlapping > 0) terminal_warn(t, "%s", found->overlap_line);
+}
+
+/* Turns faces; the hash of the source stays that of the file. Faces that lay back to back may be twins
+ * then. */
 static lam_status orient(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     facing_turned turned;
+    coincident_report found;
     TRY(facing_orient(&state->m, &state->progress, &turned, error));
     terminal_log(state->t, "%zu of %zu faces turned; for %zu the side was not decided", turned.turned,
                  state->m.n, turned.undecided);
+    TRY(mesh_settle_coincident(&state->m, state->options->two_sided, &found, error));
+    if (turned.turned > 0) warn_of_coincident(state->t, &found);
 done:
     return status;
 }
@@ -74,6 +83,7 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     const import_options how = {.unit = o->unit,
                                 .up = o->up != NULL ? o->up[0] : 0,
                                 .reflectance = o->reflectance,
+                                .two_sided = o->two_sided,
                                 .assets = o->assets};
     import_report report = {0};
     TRY(scene_import(o->input, &how, &state->m, &report, error));
@@ -84,6 +94,7 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     if (report.clamped > 0)
         terminal_log(state->t, "%zu material%s reflected all light or more, or nearly: set to .9999",
                      report.clamped, report.clamped == 1 ? "" : "s");
+    warn_of_coincident(state->t, &report.coincident);
     TRY(state_take_portals(state, error));
     if (o->orient) TRY(orient(state, error));
     TRY(state_find_openings(state, error));

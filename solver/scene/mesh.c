@@ -17,6 +17,7 @@ void mesh_free(mesh *m) {
     free(m->normal);
     free(m->group);
     free(m->group_names);
+    free(m->overlap);
     free(m->reflectance);
     free(m->emission);
     free(m->has_back);
@@ -135,6 +136,7 @@ static void drop_empty_groups(mesh *m, uint32_t *number) {
     for (size_t g = 0; g < m->n_groups; g++) {
         if (number[g] == 0) continue;
         m->group_names[kept] = m->group_names[g];
+        if (m->overlap != NULL) m->overlap[kept] = m->overlap[g];
         number[g] = kept++;
     }
     for (size_t i = 0; i < m->n; i++) m->group[i] = number[m->group[i]];

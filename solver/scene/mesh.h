@@ -24,6 +24,8 @@ typedef struct mesh {
     uint32_t *group;    /* [n] */
     size_t n_groups;
     char **group_names;              /* [n_groups], one block freed by one free() */
+    double *overlap;                 /* [n_groups], share of a group's area that other faces cover in the same
+                                        plane (coincident.h); NULL: none */
     size_t n_channels;               /* 1 when every reflectance and emission is grey, else 3 */
     float *reflectance;              /* [C][n], in [0, 1) */
     float *emission;                 /* [C][n], W/m^2 */

@@ -210,6 +210,8 @@ void mesh_replace(mesh *m, mesh *by) {
     by->n_groups = m->n_groups;
     by->group_names = m->group_names;
     m->group_names = NULL;
+    by->overlap = m->overlap;
+    m->overlap = NULL;
     by->n_cameras = m->n_cameras;
     by->cameras = m->cameras;
     m->cameras = NULL;

@@ -22,6 +22,8 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_write(s, "/mesh/emission", STORE_F32, 2, of_channels, m->emission, error));
     TRY(store_write(s, "/mesh/group", STORE_U32, 1, &m->n, m->group, error));
     TRY(store_write_texts(s, "/mesh/group_names", m->n_groups, (const char *const *)m->group_names, error));
+    if (m->overlap != NULL)
+        TRY(store_write(s, "/mesh/overlap", STORE_F64, 1, &m->n_groups, m->overlap, error));
     if (row_sums != NULL) TRY(store_write(s, "/mesh/row_sums", STORE_F64, 1, &m->n, row_sums, error));
     TRY(scene_pictures_save(m->pictures, m->n, s, error));
     TRY(store_set_text(s, "/mesh", "geometry_hash", hash, error));
@@ -165,6 +167,13 @@ lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
         if (loaded.group[i] >= loaded.n_groups)
             FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group[%zu] = %u, there are %zu group names", store_path(s),
                  i, loaded.group[i], loaded.n_groups);
+    if (store_has(s, "/mesh/overlap")) {
+        TRY(load_f64(s, "/mesh/overlap", loaded.n_groups, 0, false, &loaded.overlap, error));
+        for (size_t g = 0; g < loaded.n_groups; g++)
+            if (loaded.overlap[g] > 1)
+                FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/overlap[%zu] = %g, must be at most 1", store_path(s),
+                     g, loaded.overlap[g]);
+    }
     if (store_has(s, "/mesh/row_sums") || store_has(s, "/form_factors") || store_has(s, "/sky"))
         TRY(load_f64(s, "/mesh/row_sums", loaded.n, 0, false, &sums, error));
     TRY(scene_cameras_load(s, &loaded.n_cameras, &loaded.cameras, error));

@@ -276,8 +276,11 @@ lam_status verify_scene(examination *e, check *c, lam_error *error) {
     }
     if (store_has_attribute(e->s, "/mesh", "reflectance_given"))
         TRY(store_get_number(e->s, "/mesh", "reflectance_given", &reflectance, error));
-    const import_options how = {
-        .unit = e->m.unit, .up = e->m.up, .reflectance = reflectance, .assets = e->assets};
+    const import_options how = {.unit = e->m.unit,
+                                .up = e->m.up,
+                                .reflectance = reflectance,
+                                .two_sided = e->m.two_sided,
+                                .assets = e->assets};
     TRY(scene_import(e->scene, &how, &now, &report, error));
     check_say(c, VERDICT_OK, "%s has the same geometry and materials", e->scene);
     if (strcmp(now.source_hash, e->m.source_hash) != 0)

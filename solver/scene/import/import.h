@@ -2,21 +2,24 @@
 #ifndef LAMBERT_SCENE_IMPORT_IMPORT_H
 #define LAMBERT_SCENE_IMPORT_IMPORT_H
 
+#include "solver/scene/coincident.h"
 #include "solver/scene/mesh.h"
 
 typedef struct import_options {
     double unit;          /* metres per unit of the file; 1 */
     char up;              /* 'x', 'y', 'z', or 0: y for glTF, z otherwise */
     double reflectance;   /* for every face, grey; negative: the file's own */
+    bool two_sided;       /* both sides of each face will be elements: `--two-sided` */
     const char *assets;   /* folder that files which the scene names may lie in, beside its own; NULL: none */
     unsigned cpu_seconds; /* limit for the child; 0 gives 120 */
     size_t memory_bytes;  /* limit for the child; 0 gives 8 GiB */
 } import_options;
 
 typedef struct import_report {
-    size_t dropped_faces; /* of zero area */
-    size_t clamped;       /* materials whose diffuse value was too near to 1, or more */
-    char warnings[2048];  /* one line each, '\n' between them; cut with a count when there are more */
+    size_t dropped_faces;         /* of zero area */
+    size_t clamped;               /* materials whose diffuse value was too near to 1, or more */
+    coincident_report coincident; /* faces that were written twice and dropped, or overlap */
+    char warnings[2048];          /* one line each, '\n' between them; cut with a count when there are more */
 } import_report;
 
 /* Reads OBJ+MTL, glTF/GLB, PLY, STL. m is filled and owned by the caller (mesh_free); faces of double-sided

@@ -1,0 +1,189 @@
+#include "solver/scene/coincident.h"
+
+#include "solver/base/union_find.h"
+#include "solver/scene/coincident_pairs.h"
+#include "solver/scene/texture.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Groups that a line names. */
+enum { NAMED = 3 };
+
+static bool emits(const mesh *m, size_t face) {
+    bool any = false;
+    for (size_t c = 0; c < m->n_channels; c++) any |= m->emission[c * m->n + face] > 0;
+    return any;
+}
+
+static bool differ(const mesh *m, size_t a, size_t b) {
+    bool any = m->group[a] != m->group[b];
+    if (m->textured_face != NULL)
+        any |= (m->textured_face[a] == TEXTURE_NONE) != (m->textured_face[b] == TEXTURE_NONE);
+    for (size_t c = 0; c < m->n_channels; c++)
+        any |= m->reflectance[c * m->n + a] != m->reflectance[c * m->n + b] ||
+               m->emission[c * m->n + a] != m->emission[c * m->n + b];
+    return any;
+}
+
+/* "floor 12, roof 3, 5 more": the groups of the largest numbers. numbers [n_groups] is spent. */
+static void name_groups(const mesh *m, double *numbers, const char *unit, char *text, size_t size) {
+    size_t left = 0, used = 0;
+    text[0] = '\0';
+    for (size_t g = 0; g < m->n_groups; g++) left += numbers[g] > 0;
+    for (size_t k = 0; k < NAMED && left > 0; k++, left--) {
+        size_t most = 0;
+        for (size_t g = 1; g < m->n_groups; g++)
+            if (numbers[g] > numbers[most]) most = g;
+        used += (size_t)snprintf(text + used, size - used, "%s%.48s %.4g%s", k == 0 ? "" : ", ",
+                                 m->group_names[most], numbers[most], unit);
+        numbers[most] = 0;
+    }
+    if (left > 0) snprintf(text + used, size - used, ", %zu more", left);
+}
+
+/* Drops all but one face of each set of the same corners. */
+static lam_status drop_repeated(mesh *m, const coincident_pairs *pairs, bool *dropped, coincident_report *out,
+                                lam_error *error) {
+    lam_status status = LAM_OK;
+    char groups[256], lost[96] = "";
+    size_t first = m->n;
+    uint32_t *set = memory_allocate(m->n, sizeof *set, "repeated faces", error);
+    uint32_t *kept =
+        memory_allocate(m->n, sizeof *kept, "repeated faces", error); /* of a set, by its first */
+    double *numbers = memory_allocate(m->n_groups, sizeof *numbers, "repeated faces", error);
+    if (set == NULL || kept == NULL || numbers == NULL) TRY(LAM_ERR_MEMORY);
+    for (uint32_t i = 0; i < m->n; i++) set[i] = kept[i] = i;
+    for (size_t k = 0; k < pairs->n; k++)
+        if (pairs->pairs[k].same) union_find_join(set, pairs->pairs[k].first, pairs->pairs[k].second);
+    for (uint32_t i = 0; i < m->n; i++) {
+        const uint32_t root = union_find_root(set, i);
+        if (root != i && !emits(m, kept[root]) && emits(m, i)) kept[root] = i;
+    }
+    for (uint32_t i = 0; i < m->n; i++) {
+        const uint32_t keeps = kept[union_find_root(set, i)];
+        dropped[i] = keeps != i;
+        if (!dropped[i]) continue;
+        out->dropped++;
+        out->differing += differ(m, i, keeps);
+        numbers[m->group[i]]++;
+        if (first == m->n) first = i;
+    }
+    if (out->dropped == 0) goto done;
+    double at[3];
+    mesh_centroid(m, first, at);
+    name_groups(m, numbers, "", groups, sizeof groups);
+    if (out->differing > 0)
+        snprintf(lost, sizeof lost, "; %zu of them %s another group or material than the one that is kept",
+                 out->differing, out->differing == 1 ? "has" : "have");
+    snprintf(
+        out->dropped_line, sizeof out->dropped_line,
+        "%zu face%s another one and %s dropped (%s; the first at %.6g %.6g %.6g m): of equal faces the first "
+        "that emits is kept, or the first%s",
+        out->dropped, out->dropped == 1 ? " repeats" : "s repeat", out->dropped == 1 ? "is" : "are", groups,
+        at[0], at[1], at[2], lost);
+    TRY(mesh_drop(m, dropped, error));
+done:
+    free(set);
+    free(kept);
+    free(numbers);
+    return status;
+}
+
+/* The overlap of faces that are kept; shared [n], by the faces before some were dropped, is their area that
+ * others cover too. */
+static lam_status share_overlap(const mesh *m, const double *shared, const double first[3], bool cut,
+                                coincident_report *out, double **overlap, lam_error *error) {
+    lam_status status = LAM_OK;
+    char groups[256];
+    double *area = memory_allocate(m->n_groups, sizeof *area, "overlapping faces", error);
+    double *sums = memory_allocate(m->n_groups, sizeof *sums, "overlapping faces", error);
+    if (area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m->n; i++) {
+        area[m->group[i]] += m->area[i];
+        if (!(shared[i] > 0)) continue;
+        out->overlapping++;
+        sums[m->group[i]] += fmin(shared[i], m->area[i]);
+    }
+    if (out->overlapping == 0) goto done;
+    for (size_t g = 0; g < m->n_groups; g++) {
+        out->area += sums[g] / 2;
+        area[g] = area[g] > 0 ? fmin(sums[g] / area[g], 1) : 0;
+    }
+    name_groups(m, sums, " m2", groups, sizeof groups);
+    snprintf(
+        out->overlap_line, sizeof out->overlap_line,
+        "%zu faces overlap others in one plane, %s%.4g m2 in all (%s; the first at %.6g %.6g %.6g m): light "
+        "counts twice there, and stated errors contain it; delete what is covered, or move it by %.2g m",
+        out->overlapping, cut ? "at least " : "", out->area, groups, first[0], first[1], first[2],
+        10 * coincident_distance(m));
+    *overlap = area;
+    area = NULL;
+done:
+    free(area);
+    free(sums);
+    return status;
+}
+
+lam_status mesh_settle_coincident(mesh *m, bool both_sides, coincident_report *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    coincident_pairs pairs = {.n = 0};
+    coincident_report found = {.dropped = 0};
+    bool *dropped = NULL;
+    double *shared = NULL, *overlap = NULL, first[3] = {0, 0, 0};
+    const size_t before = m->n;
+    TRY(coincident_pairs_find(m, both_sides, &pairs, error));
+    if (pairs.n > 0) {
+        size_t least = before, kept = 0;
+        dropped = memory_allocate(before, sizeof *dropped, "repeated faces", error);
+        shared = memory_allocate(before, sizeof *shared, "overlapping faces", error);
+        if (dropped == NULL || shared == NULL) TRY(LAM_ERR_MEMORY);
+        TRY(drop_repeated(m, &pairs, dropped, &found, error));
+        for (size_t k = 0; k < pairs.n; k++) {
+            const coincident_pair *p = &pairs.pairs[k];
+            if (dropped[p->first] || dropped[p->second]) continue;
+            shared[p->first] += p->area;
+            shared[p->second] += p->area;
+            least = p->first < least ? p->first : least;
+        }
+        for (size_t i = 0; i < before; i++) {
+            if (dropped[i]) continue;
+            if (i == least) mesh_centroid(m, kept, first);
+            shared[kept++] = shared[i];
+        }
+        TRY(share_overlap(m, shared, first, pairs.cut, &found, &overlap, error));
+    }
+    free(m->overlap);
+    m->overlap = overlap;
+    *out = found;
+done:
+    free(pairs.pairs);
+    free(dropped);
+    free(shared);
+    return status;
+}
+
+/* Sums over one side of each face. */
+static double overlap_sum(const mesh *m, double *all) {
+    const size_t n = m->two_sided ? m->n / 2 : m->n;
+    double sum = 0, area = 0;
+    for (size_t i = 0; i < n; i++) {
+        area += m->area[i];
+        if (m->overlap != NULL) sum += m->overlap[m->group[i]] * m->area[i];
+    }
+    *all = area;
+    return sum;
+}
+
+double mesh_overlap_area(const mesh *m) {
+    double all;
+    return overlap_sum(m, &all) / 2;
+}
+
+double mesh_overlap_share(const mesh *m) {
+    double all;
+    const double sum = overlap_sum(m, &all);
+    return all > 0 ? sum / all : 0;
+}

@@ -1,0 +1,29 @@
+/* Faces that are written twice, and faces that overlap in one plane: light would be counted twice there. */
+#ifndef LAMBERT_SCENE_COINCIDENT_H
+#define LAMBERT_SCENE_COINCIDENT_H
+
+#include "solver/scene/mesh.h"
+
+enum { COINCIDENT_TEXT = 640 };
+
+typedef struct coincident_report {
+    size_t dropped;     /* faces that repeated another one */
+    size_t differing;   /* of them in another group, or of another material, than the one that is kept */
+    size_t overlapping; /* faces that overlap others in one plane, with the same side */
+    double area;        /* m^2 that they cover more than once */
+    /* A line each for people, "" where there is nothing to say. */
+    char dropped_line[COINCIDENT_TEXT], overlap_line[COINCIDENT_TEXT];
+} coincident_report;
+
+/* Drops faces whose corners are those of another one, in the same sequence from any of them on: of these the
+ * first that emits is kept, or, where none does, the first. Then sets m->overlap, or NULL where no face
+ * overlaps others. The opposite sides of a sheet, or of a box and the floor that it stands on, do not
+ * overlap; with both_sides (`--two-sided`) they do. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
+lam_status mesh_settle_coincident(mesh *m, bool both_sides, coincident_report *out, lam_error *error);
+
+/* The m^2 that the overlapping faces of a mesh cover more than once: half the sum of what each of them
+ * shares; and the share of the mesh's area that they have together. 0 where none overlaps. */
+double mesh_overlap_area(const mesh *m);
+double mesh_overlap_share(const mesh *m);
+
+#endif
