@@ -43,6 +43,7 @@ void error_by_group_free(error_by_group *e) {
     free(e->reflectance);
     free(e->of_group);
     free(e->bin);
+    free(e->overlap);
     *e = (error_by_group){.n_bins = 0};
 }
 
@@ -141,6 +142,26 @@ static lam_status find_reflecting(const error_scene *scene, error_by_group *e, l
     return status;
 }
 
+/* The share of light by which faces that count twice, and repaired rows, are off. */
+static lam_status read_overlap(store *s, error_by_group *e, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *data = NULL;
+    if (store_has_attribute(s, "/error", "repair"))
+        TRY(store_get_number(s, "/error", "repair", &e->repair, error));
+    if (!(e->repair >= 0) || !isfinite(e->repair))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /error attribute repair is %g, must be at least 0", store_path(s),
+             e->repair);
+    if (!store_has(s, "/mesh/overlap")) return LAM_OK;
+    TRY(store_read(s, "/mesh/overlap", STORE_F64, 1, &e->n_groups, &data, error));
+    e->overlap = data;
+    for (size_t g = 0; g < e->n_groups; g++)
+        if (!(e->overlap[g] >= 0 && e->overlap[g] <= 1))
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/overlap[%zu] = %g, must be from 0 to 1", store_path(s), g,
+                 e->overlap[g]);
+done:
+    return status;
+}
+
 lam_status error_by_group_read(store *s, const error_scene *scene, error_by_group *out, lam_error *error) {
     lam_status status = LAM_OK;
     error_by_group e = {.n_groups = scene->groups->n_groups, .n_channels = scene->n_channels};
@@ -149,6 +170,7 @@ lam_status error_by_group_read(store *s, const error_scene *scene, error_by_grou
     figures_of(&e, law, sky);
     TRY(read_figures(s, LAW_FIGURES, law, &e, error));
     TRY(read_sky(s, sky, &e, error));
+    TRY(read_overlap(s, &e, error));
     e.area = memory_allocate(e.n_bins, sizeof *e.area, "errors of groups", error);
     e.squares = memory_allocate(e.n_groups, sizeof *e.squares, "errors of groups", error);
     e.reflectance =
@@ -332,11 +354,11 @@ static double ratio(double error2, double light2) {
     return error2 > 0 ? sqrt(error2 / fmax(light2 - error2, 0)) : 0;
 }
 
-/* Sums over the values of a bin: A, and of r = B - E - rho H0 and B, of irradiance H - H0 and H, the sums of
- * A r^2, A B^2 over channels, and of each channel A r and A B. */
+/* Sums over the values of a bin: A, and of r = B - E - rho H0, B and L = B - E, of irradiance H - H0, H and
+ * H, the sums of A r^2, A B^2, A L^2 over channels, and of each channel A r, A B and A L. */
 typedef struct value_sums {
-    double area, reflected2, radiosity2;
-    double *reflected, *radiosity; /* [C]; NULL: not wanted */
+    double area, reflected2, radiosity2, light2;
+    double *reflected, *radiosity, *light; /* [C]; NULL: not wanted */
 } value_sums;
 
 /* Adds values first ... last - 1 of the answer, whose elements are in one bin: sums in registers, as those in
@@ -348,7 +370,7 @@ static void add_run(const error_scene *scene, const error_answer *of, size_t fir
     const double of_sky = irradiance, of_direct = of->quantity == LAM_RADIOSITY;
     for (size_t c = 0; c < scene->n_channels; c++) {
         const float *values = of->values + c * (of->whole ? n : of->count);
-        double area = 0, reflected = 0, reflected2 = 0, radiosity = 0, radiosity2 = 0;
+        double area = 0, reflected = 0, reflected2 = 0, radiosity = 0, radiosity2 = 0, light = 0, light2 = 0;
         for (size_t k = first; k < last; k++) {
             const size_t i = of->selected != NULL ? of->selected[k] : k;
             const double a = scene->area[i], rho = (double)scene->reflectance[c * n + i];
@@ -356,17 +378,22 @@ static void add_run(const error_scene *scene, const error_answer *of, size_t fir
             const double direct = (of->E != NULL ? (double)of->E[c * n + i] : 0) + rho * sky;
             const double value = (double)values[of->whole ? i : k];
             const double r = value - of_sky * sky - of_direct * direct, b = irradiance ? value : r + direct;
+            const double l = r + (irradiance ? sky : rho * sky);
             area += a;
             reflected += a * r;
             reflected2 += a * r * r;
             radiosity += a * b;
             radiosity2 += a * b * b;
+            light += a * l;
+            light2 += a * l * l;
         }
         if (c == 0) to->area += area;
         if (to->reflected != NULL) to->reflected[c] += reflected;
         if (to->radiosity != NULL) to->radiosity[c] += radiosity;
+        if (to->light != NULL) to->light[c] += light;
         to->reflected2 += reflected2;
         to->radiosity2 += radiosity2;
+        to->light2 += light2;
     }
 }
 
@@ -374,13 +401,14 @@ static void add_run(const error_scene *scene, const error_answer *of, size_t fir
 static value_sums *sum_values(const error_by_group *e, const error_scene *scene, const error_answer *of) {
     const size_t C = scene->n_channels;
     size_t bytes;
-    if (!size_multiply(e->n_bins, sizeof(value_sums) + 2 * C * sizeof(double), &bytes)) return NULL;
+    if (!size_multiply(e->n_bins, sizeof(value_sums) + 3 * C * sizeof(double), &bytes)) return NULL;
     value_sums *sums = memory_allocate(bytes, 1, "errors of groups", NULL);
     if (sums == NULL) return NULL;
     double *numbers = (double *)(void *)(sums + e->n_bins);
     for (size_t b = 0; b < e->n_bins; b++) {
-        sums[b].reflected = numbers + 2 * b * C;
+        sums[b].reflected = numbers + 3 * b * C;
         sums[b].radiosity = sums[b].reflected + C;
+        sums[b].light = sums[b].radiosity + C;
     }
     for (size_t first = 0, last; first < of->count; first = last) {
         const uint32_t bin = e->bin[of->selected != NULL ? of->selected[first] : first];
@@ -389,6 +417,20 @@ static value_sums *sum_values(const error_by_group *e, const error_scene *scene,
         add_run(scene, of, first, last, &sums[bin]);
     }
     return sums;
+}
+
+static double overlap_in(const error_by_group *e, size_t bin) {
+    return e->overlap != NULL ? e->overlap[bin % e->n_groups] : 0;
+}
+
+/* The square, over that of the light, that faces which count twice are off by: of the elements of a bin. */
+static double overlap_elements2(const error_by_group *e, size_t bin) {
+    return e->repair * e->repair + overlap_in(e, bin) / 2;
+}
+
+/* That of a mean, by the sums of its light and of the light that may be covered. */
+static double overlap_mean2(const error_by_group *e, double light, double covered) {
+    return e->repair * e->repair * light * light + covered * covered / 2;
 }
 
 answer_error answer_error_of_square(const error_scene *scene, const error_answer *of, double off2) {
@@ -406,7 +448,7 @@ bool answer_error_of(const error_by_group *e, const error_scene *scene, const er
     if (sums == NULL) return false;
     for (size_t b = 0; b < e->n_bins; b++) {
         if (!(sums[b].area > 0)) continue;
-        off += sums[b].area * error_in(e, &sizes, b).elements2;
+        off += sums[b].area * error_in(e, &sizes, b).elements2 + overlap_elements2(e, b) * sums[b].light2;
         reflected += sums[b].reflected2;
         radiosity += sums[b].radiosity2;
     }
@@ -457,15 +499,20 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
             for (size_t row = 0; row < n_rows; row++) {
                 const size_t bin = row * e->n_groups + name->groups[g];
                 add_bin(e, &sizes, bin, sums[bin].area, &s);
+                s.elements2 += overlap_elements2(e, bin) * sums[bin].light2;
             }
         for (size_t c = 0; c < scene->n_channels; c++) {
-            double reflected = 0, radiosity = 0;
+            double reflected = 0, radiosity = 0, light = 0, covered = 0;
             for (size_t g = 0; g < name->n_groups; g++)
                 for (size_t row = 0; row < n_rows; row++) {
                     const size_t bin = row * e->n_groups + name->groups[g];
                     reflected += sums[bin].reflected[c];
                     radiosity += sums[bin].radiosity[c];
+                    light += sums[bin].light[c];
+                    covered += overlap_in(e, bin) * sums[bin].light[c];
                 }
+            s.mean2 +=
+                overlap_mean2(e, light, covered) / s.area; /* of sums by area, over it once more below */
             reflected2 += reflected * reflected / (s.area * s.area);
             radiosity2 += radiosity * radiosity / (s.area * s.area);
         }
@@ -482,11 +529,12 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
     const size_t n_rows = e->n_bins / e->n_groups;
     const light_sizes sizes = light_sizes_of(e, means->quantity, &means->size, means->L);
     name_sums s = {.area = 0};
-    double reflected2 = 0, radiosity2 = 0;
+    double reflected2 = 0, radiosity2 = 0, covered = 0;
     for (size_t g = 0; g < name->n_groups; g++)
         for (size_t row = 0; row < n_rows; row++) {
             const size_t bin = row * e->n_groups + name->groups[g];
             add_bin(e, &sizes, bin, e->area[bin], &s);
+            covered += overlap_in(e, bin) * e->area[bin];
         }
     for (size_t c = 0; c < e->n_channels; c++) {
         double rho = 0;
@@ -502,6 +550,10 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
                                                                      : 0);
         reflected2 += r * r;
         radiosity2 += irradiance ? value * value : (r + direct) * (r + direct);
+        /* As if it were even over the name. */
+        const double light = r + (irradiance ? 1 : rho) * means->direct[c];
+        s.mean2 += s.area * overlap_mean2(e, light, covered / s.area * light);
+        s.elements2 += s.area * (e->repair * e->repair + covered / s.area / 2) * light * light;
     }
     return finish_name(&s, reflected2, radiosity2);
 }

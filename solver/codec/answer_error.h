@@ -41,7 +41,12 @@ typedef struct sky_law {
 } sky_law;
 
 /* A bin is the elements of a group, or of those that are read, and in a second row the others. Zeroed: a
- * store that states nothing by group. */
+ * store that states nothing by group.
+ *
+ * Faces that count twice make another error, which is as large as the light: of squares of the light B - E,
+ * s^2 + o / 2 of the elements of a group and s^2 + o^2 / 2 of its mean, with s the share of light that
+ * repaired row sums are off by, and o the share of the group's area that overlaps others
+ * (precompute/overlap_error.c). */
 typedef struct error_by_group {
     size_t n_groups, n_bins, n_channels, n_tiles; /* tiles: 0: none of skies is stated */
     error_law law;                                /* of emissions */
@@ -51,6 +56,8 @@ typedef struct error_by_group {
     double *reflectance;  /* [C][n_groups], mean */
     reflecting *of_group; /* [n_groups] */
     uint32_t *bin;        /* [n] */
+    double repair;        /* s; 0: none */
+    double *overlap;      /* [n_groups], o; NULL: none */
     double *sky_power;    /* [C][n_tiles], sum A rho first_bounce */
     double *sky_first;    /* [n_groups][n_tiles], mean first_bounce; NULL: not stored, and sky.direct is 0 */
     double *elements_off, *means_off; /* [n_groups][n_tiles], d_t; NULL: not stored */

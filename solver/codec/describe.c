@@ -315,13 +315,14 @@ done:
 
 lam_status describe_store(store *s, json_t **out, lam_error *error) {
     lam_status status = LAM_OK;
-    json_t *root = NULL, *operator_attributes = NULL, *made = json_object();
+    json_t *root = NULL, *operator_attributes = NULL, *mesh = NULL, *made = json_object();
     size_t dims[STORE_MAX_RANK];
     store_type type;
     int rank;
     uint64_t bytes = 0;
     TRY(attributes_of(s, "/", &root, error));
     TRY(attributes_of(s, "/operator", &operator_attributes, error));
+    TRY(attributes_of(s, "/mesh", &mesh, error));
     TRY(store_array_info(s, "/mesh/reflectance", &type, &rank, dims, error));
     if (rank != 2)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/reflectance has %d dimensions, must have 2", store_path(s),
@@ -344,6 +345,8 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
                         precision != NULL ? json_deep_copy(precision) : json_string("f32"));
     json_object_set_new(made, "bytes", json_integer((json_int_t)bytes));
     add_report(made, operator_attributes);
+    if (json_object_get(mesh, "overlap_area") != NULL)
+        copy_member(made, "overlap_area", mesh, "overlap_area");
     TRY(add_groups(s, dims[1], made, error));
     TRY(add_emitters(s, made, error));
     TRY(add_cameras(s, made, error));
@@ -356,6 +359,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
 done:
     json_decref(made);
     json_decref(root);
+    json_decref(mesh);
     json_decref(operator_attributes);
     return status;
 }

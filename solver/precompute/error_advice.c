@@ -77,8 +77,19 @@ void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]
     char option[64];
     text[0] = '\0';
     if (!e->has_total) return;
-    if (advise_group(input, input->asked > 0 ? judge_total(g) / input->asked : 0, text)) return;
+    if (!input->overlapping &&
+        advise_group(input, input->asked > 0 ? judge_total(g) / input->asked : 0, text))
+        return;
     if (!(judge_total(g) > most)) return;
+    if (input->overlapping) {
+        snprintf(
+            text, ERROR_ADVICE_BYTES,
+            "the indirect error of %s is stated as %.2g, above %g%s: most of it is that faces overlap or "
+            "coincide, and no option lowers it; mend the scene",
+            lights ? "the scene's own lights" : "random emission", judge_total(g), most,
+            input->asked > 0 ? " of --epsilon" : "");
+        return;
+    }
     advise(input, judge_total(g), judge_of_operator(g), most, option);
     snprintf(text, ERROR_ADVICE_BYTES,
              "the indirect error of %s is stated as %.2g, above %g%s; %s%s would lower it",

@@ -6,7 +6,7 @@
 #include "solver/formfactor/recipe.h"
 #include "solver/method/judge/judge.h"
 
-enum { ERROR_ADVICE_BYTES = 320 };
+enum { ERROR_ADVICE_BYTES = 384 };
 
 /* The indirect error of the scene's own lights and of random emission that a store has at most without a
  * warning, unless --epsilon asks for another one: .03. */
@@ -27,6 +27,7 @@ typedef struct error_advice_input {
     bool spent;               /* finer form factors of this recipe were tried and hardly lowered the error */
     bool by_noise;            /* of the operator: build_report */
     bool finest;              /* --quality high already */
+    bool overlapping;         /* most of the error is that faces count twice */
     bool from_store;          /* form factors are those of a store */
 } error_advice_input;
 

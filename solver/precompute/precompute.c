@@ -82,6 +82,20 @@ static void log_closure(const precompute_state *state) {
         terminal_log(state->t, "the scene is %s: %s; --closed%s overrules that", way, why, other);
 }
 
+/* Above this, the part of the repair that no samples make is warned of. */
+static const double repair_warned = .01;
+
+static void warn_of_repair(const precompute_state *state) {
+    const double off = form_factors_repair_error(&state->f);
+    if (off > repair_warned)
+        terminal_warn(
+            state->t,
+            "the form factors of an element add up to %.2g %% too much or too little on average, before "
+            "the repair: some faces may coincide and count twice, or cut through each other; stated "
+            "errors contain it",
+            100 * off);
+}
+
 static void log_form_factors(precompute_state *state) {
     const form_factors *f = &state->f;
     char how[64];
@@ -113,6 +127,7 @@ static void log_form_factors(precompute_state *state) {
             100 * f->pairs.hidden / facing, 100 * f->pairs.projected / facing);
     }
     state_log_blocks(state);
+    warn_of_repair(state);
     const sky_bounce *sky = &f->sky;
     char aimed[64] = "";
     if (f->n_aimed > 0)
@@ -284,6 +299,7 @@ static lam_status run_trials(precompute_state *state, lam_error *error) {
         }
         TRY(status);
     } while (state_next_trial(state));
+    state_add_overlap(state);
     state_report_trials(state);
     state_log_times(state);
     state_advise(state);

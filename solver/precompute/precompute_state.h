@@ -99,6 +99,7 @@ typedef struct precompute_state {
     error_report errors;
     mesh_figures errors_of_mesh;
     group_errors by_group;
+    double repair; /* relative error of reflected light by faces that count twice; 0: none */
     trial_course trial;
     char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
     forecast_rates rates;            /* of the machine; processors is 0 before they are measured */
@@ -162,6 +163,13 @@ lam_status state_save_positions(const precompute_state *state, store *s, lam_err
 /* The error of the mesh by the operator's answers, and its place in the store: stage_mesh_error.c. */
 lam_status stage_mesh_error(precompute_state *state, lam_error *error);
 lam_status state_save_mesh_error(const precompute_state *state, store *s, lam_error *error);
+
+/* Adds what overlapping faces and the repair of row sums are to all stated errors: overlap_error.c. Its place
+ * in the store. */
+void state_add_overlap(precompute_state *state);
+bool state_is_overlapping(const precompute_state *state); /* it is most of the error of random emission */
+lam_status state_add_overlap_of_positions(precompute_state *state, lam_error *error);
+lam_status state_save_overlap(const precompute_state *state, store *s, lam_error *error);
 
 /* Opens the folder for rows where one was given and is needed. */
 lam_status stage_open_scratch(precompute_state *state, lam_error *error);

@@ -240,9 +240,6 @@ done:
     return status;
 }
 
-/* Row sums that are off by more than this, on average, are no error of blocks: measured .0005 to .006. */
-static const double repair_expected = .02;
-
 void state_log_blocks(const precompute_state *state) {
     const block_report *b = &state->f.blocks;
     const double all = .5 * (double)state->m.n * (double)(state->m.n - 1);
@@ -258,10 +255,4 @@ void state_log_blocks(const precompute_state *state) {
                  state->blocks.n_blocks, state->tree.n_frames, (double)b->linear, b->even, (double)b->shaded,
                  (double)(b->pairs + b->shaded_pairs), b->segments, b->lines, 100 * b->elements_away / all,
                  100 * b->elements_hidden / all);
-    if (state->f.repair_mean > repair_expected)
-        terminal_warn(
-            state->t,
-            "the form factors of an element add up to %.0f %% too much or too little on average, before the "
-            "repair: some faces may coincide and count twice",
-            100 * state->f.repair_mean);
 }

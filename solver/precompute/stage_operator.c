@@ -270,6 +270,7 @@ void state_advise(precompute_state *state) {
                                       .by_noise = state->built.by_noise,
                                       .finest = strcmp(o->quality, "high") == 0 ||
                                                 state->f.recipe.accuracy <= state_finest_accuracy(),
+                                      .overlapping = state_is_overlapping(state),
                                       .from_store = o->from_store};
     if (state->probes == 0) return;
     error_advice(&input, state->advice);

@@ -173,6 +173,7 @@ lam_status stage_positions(precompute_state *state, lam_error *error) {
     terminal_log_stage(state->t, "paths", clock_seconds() - started);
     started = clock_seconds();
     report(state, how);
+    TRY(state_add_overlap_of_positions(state, error));
     TRY(state_judge_positions(state, error));
     TRY(make_operator(state, error)); /* it takes the direct light over */
     lam_operator_set_threads(state->op, (size_t)omp_get_max_threads());

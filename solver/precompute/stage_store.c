@@ -76,6 +76,7 @@ lam_status stage_store(precompute_state *state, lam_error *error) {
     if (state->probes > 0 || state->light.n > 0) TRY(judge_save(&state->errors, s, error));
     TRY(state_save_positions(state, s, error));
     TRY(state_save_mesh_error(state, s, error));
+    TRY(state_save_overlap(state, s, error));
     if (state->probes > 0) TRY(judge_save_groups(&state->by_group, s, error));
     TRY(terminal_check(error));
     store *sealing = s;

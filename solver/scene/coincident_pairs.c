@@ -27,14 +27,15 @@ enum { LEAF = 8, CORNERS_MOST = 8 };
  * that do not overlap takes about 40 n. */
 static const double looks_of_face = 1000, looks_of_all = 1e8;
 
+/* About the scene's centre: single precision is off by less than a tenth of the distance of planes. */
 typedef struct box {
-    double low[3], high[3];
+    float low[3], high[3];
 } box;
 
 typedef struct search {
     const mesh *m;
     bool both_sides;
-    double distance, looks;
+    double centre[3], distance, looks;
     uint32_t *order; /* [n]: faces of one size and place follow each other */
     box *faces;      /* [n], in this order */
     box *nodes;      /* of the tree: the children of node k are 2k + 1 and 2k + 2 */
@@ -48,22 +49,32 @@ double coincident_distance(const mesh *m) {
     return same_plane * radius;
 }
 
-static box box_of(const mesh *m, size_t face) {
-    box b = {{HUGE_VAL, HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}};
+/* fminf and fmaxf are calls. */
+static inline float lower(float a, float b) {
+    return a < b ? a : b;
+}
+
+static inline float higher(float a, float b) {
+    return a > b ? a : b;
+}
+
+static box box_of(const mesh *m, size_t face, const double centre[3]) {
+    box b;
     for (size_t c = 0; c < mesh_corners(m, face); c++)
         for (int d = 0; d < 3; d++) {
-            b.low[d] = fmin(b.low[d], m->vertices[m->elements[face][c]][d]);
-            b.high[d] = fmax(b.high[d], m->vertices[m->elements[face][c]][d]);
+            const float x = (float)(m->vertices[m->elements[face][c]][d] - centre[d]);
+            b.low[d] = c == 0 ? x : lower(b.low[d], x);
+            b.high[d] = c == 0 ? x : higher(b.high[d], x);
         }
     return b;
 }
 
 /* True if a part of a plane may be in both: it is longer than `distance` along two axes at least. Faces that
  * share an edge along an axis are no further apart, but their boxes have only that axis in common. */
-static bool boxes_share(const box *a, const box *b, double distance) {
+static inline bool boxes_share(const box *a, const box *b, float distance) {
     int long_axes = 0;
     for (int d = 0; d < 3; d++) {
-        const double length = fmin(a->high[d], b->high[d]) - fmax(a->low[d], b->low[d]);
+        const float length = lower(a->high[d], b->high[d]) - higher(a->low[d], b->low[d]);
         if (length < -distance) return false;
         long_axes += length > distance;
     }
@@ -75,10 +86,10 @@ static bool boxes_share(const box *a, const box *b, double distance) {
 enum { SIZES = 64 };
 
 static size_t size_of(const box *b) {
-    double extent = 0;
+    float extent = 0;
     int exponent;
-    for (int d = 0; d < 3; d++) extent = fmax(extent, b->high[d] - b->low[d]);
-    (void)frexp(extent, &exponent);
+    for (int d = 0; d < 3; d++) extent = higher(extent, b->high[d] - b->low[d]);
+    (void)frexpf(extent, &exponent);
     const int class = exponent / 2 + SIZES / 2;
     return class < 0 ? 0 : class >= SIZES ? SIZES - 1 : (size_t) class;
 }
@@ -87,17 +98,21 @@ static lam_status sort_by_size(search *s) {
     const size_t n = s->m->n;
     size_t from[SIZES + 1] = {0};
     uint32_t *sorted = memory_allocate(n, sizeof *sorted, "overlapping faces", s->error);
-    if (sorted == NULL) return LAM_ERR_MEMORY;
+    uint8_t *size = memory_allocate(n, sizeof *size, "overlapping faces", s->error);
+    if (sorted == NULL || size == NULL) {
+        free(sorted);
+        free(size);
+        return LAM_ERR_MEMORY;
+    }
     for (size_t k = 0; k < n; k++) {
-        const box b = box_of(s->m, k);
-        from[size_of(&b) + 1]++;
+        const box b = box_of(s->m, k, s->centre);
+        size[k] = (uint8_t)size_of(&b);
+        from[size[k] + 1]++;
     }
     for (size_t c = 0; c < SIZES; c++) from[c + 1] += from[c];
-    for (size_t k = 0; k < n; k++) {
-        const box b = box_of(s->m, s->order[k]);
-        sorted[from[size_of(&b)]++] = s->order[k];
-    }
-    for (size_t k = 0; k < n; k++) s->faces[k] = box_of(s->m, sorted[k]);
+    for (size_t k = 0; k < n; k++) sorted[from[size[s->order[k]]]++] = s->order[k];
+    for (size_t k = 0; k < n; k++) s->faces[k] = box_of(s->m, sorted[k], s->centre);
+    free(size);
     free(s->order);
     s->order = sorted;
     return LAM_OK;
@@ -119,8 +134,8 @@ static range child(range r, int which) {
 
 static void add_box(box *to, const box *b) {
     for (int d = 0; d < 3; d++) {
-        to->low[d] = fmin(to->low[d], b->low[d]);
-        to->high[d] = fmax(to->high[d], b->high[d]);
+        to->low[d] = lower(to->low[d], b->low[d]);
+        to->high[d] = higher(to->high[d], b->high[d]);
     }
 }
 
@@ -265,7 +280,7 @@ static lam_status look_between(search *s, range a, range b) {
     lam_status status = LAM_OK;
     for (size_t k = a.first; k < a.last; k++)
         for (size_t l = a.node == b.node ? k + 1 : b.first; l < b.last; l++)
-            if (boxes_share(&s->faces[k], &s->faces[l], s->distance) && may_look(s))
+            if (boxes_share(&s->faces[k], &s->faces[l], (float)s->distance) && may_look(s))
                 TRY(look(s, s->order[k], s->order[l]));
 done:
     return status;
@@ -274,7 +289,7 @@ done:
 /* Both ranges differ. */
 static lam_status find_between(search *s, range a, range b) {
     lam_status status = LAM_OK;
-    if (!boxes_share(&s->nodes[a.node], &s->nodes[b.node], s->distance) || !may_look(s)) return LAM_OK;
+    if (!boxes_share(&s->nodes[a.node], &s->nodes[b.node], (float)s->distance) || !may_look(s)) return LAM_OK;
     if (is_leaf(a) && is_leaf(b)) return look_between(s, a, b);
     const bool divides_a = !is_leaf(a) && (is_leaf(b) || a.last - a.first >= b.last - b.first);
     for (int c = 0; c < 2; c++)
@@ -301,6 +316,7 @@ lam_status coincident_pairs_find(const mesh *m, bool both_sides, coincident_pair
                 .looks = looks_of_all + looks_of_face * (double)m->n,
                 .out = &found,
                 .error = error};
+    double radius;
     const range all = {0, 0, m->n};
     size_t leaves = 1; /* of a tree that is as deep everywhere */
     while (leaves * LEAF < m->n) leaves *= 2;
@@ -308,6 +324,7 @@ lam_status coincident_pairs_find(const mesh *m, bool both_sides, coincident_pair
     s.faces = memory_allocate(m->n, sizeof *s.faces, "overlapping faces", error);
     s.nodes = memory_allocate(2 * leaves, sizeof *s.nodes, "overlapping faces", error);
     if (s.order == NULL || s.faces == NULL || s.nodes == NULL) TRY(LAM_ERR_MEMORY);
+    mesh_bounds(m, s.centre, &radius);
     TRY(mesh_z_order(m, s.order, error));
     TRY(sort_by_size(&s));
     make_boxes(&s, all);

@@ -1,6 +1,8 @@
 /* /mesh and /cameras of a store: written as it is, read back with every index and value checked. */
 #include "solver/base/scene_backs.h"
 #include "solver/scene/mesh.h"
+
+#include "solver/scene/coincident.h"
 #include "solver/scene/texture.h"
 
 #include <math.h>
@@ -24,6 +26,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_write_texts(s, "/mesh/group_names", m->n_groups, (const char *const *)m->group_names, error));
     if (m->overlap != NULL)
         TRY(store_write(s, "/mesh/overlap", STORE_F64, 1, &m->n_groups, m->overlap, error));
+    if (m->overlap != NULL) TRY(store_set_number(s, "/mesh", "overlap_area", mesh_overlap_area(m), error));
     if (row_sums != NULL) TRY(store_write(s, "/mesh/row_sums", STORE_F64, 1, &m->n, row_sums, error));
     TRY(scene_pictures_save(m->pictures, m->n, s, error));
     TRY(store_set_text(s, "/mesh", "geometry_hash", hash, error));

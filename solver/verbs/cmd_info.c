@@ -218,6 +218,12 @@ static void print_groups(const json_t *groups) {
     if (shown < count) printf("%-18sand %zu more (--json names them)\n", "", count - shown);
 }
 
+static void print_overlap(const json_t *area) {
+    if (json_is_number(area))
+        printf("%-18s%.4g m2 of faces in one plane count twice; stated errors contain it\n", "overlap",
+               json_number_value(area));
+}
+
 static void print_sky(const json_t *sky) {
     if (!json_is_object(sky)) return;
     const char *tiling = json_string_value(json_object_get(sky, "tiling"));
@@ -245,6 +251,7 @@ static void print_text(const json_t *about) {
     print_bytes(json_number_value(json_object_get(about, "bytes")));
     print_report(json_object_get(about, "report"));
     print_groups(json_object_get(about, "groups"));
+    print_overlap(json_object_get(about, "overlap_area"));
     print_emitters(json_object_get(about, "emitters"));
     print_cameras(json_object_get(about, "cameras"));
     print_sky(json_object_get(about, "sky"));

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <xxhash.h>
 
 void import_warn(import_warnings *w, const char *format, ...) {
     const size_t used = strlen(w->text), room = sizeof w->text - used;
@@ -272,12 +273,82 @@ done:
     return status;
 }
 
+/* A polygon of more than four corners, and its corner that comes first in a total order of points. */
+typedef struct wide_polygon {
+    XXH64_hash_t hash; /* of its corners from there on */
+    size_t polygon;
+    uint32_t start;
+} wide_polygon;
+
+static int by_hash(const void *a, const void *b) {
+    const wide_polygon *p = a, *q = b;
+    if (p->hash != q->hash) return p->hash < q->hash ? -1 : 1;
+    return (p->polygon > q->polygon) - (p->polygon < q->polygon);
+}
+
+static const double *corner_of(const imported_faces *s, const wide_polygon *w, size_t k) {
+    const struct imported_polygon *polygon = &s->polygons[w->polygon];
+    return s->vertices[s->corners[polygon->first + (w->start + k) % polygon->n_corners]];
+}
+
+static wide_polygon wide_of(const imported_faces *s, size_t polygon) {
+    wide_polygon w = {.polygon = polygon}, other = w;
+    const size_t n = s->polygons[polygon].n_corners;
+    for (other.start = 1; other.start < n; other.start++) {
+        const double *p = corner_of(s, &other, 0), *q = corner_of(s, &w, 0);
+        int d = 0;
+        while (d < 2 && p[d] == q[d]) d++;
+        if (p[d] < q[d]) w.start = other.start;
+    }
+    for (size_t k = 0; k < n; k++)
+        w.hash = XXH3_64bits_withSeed(corner_of(s, &w, k), sizeof *s->vertices, w.hash);
+    return w;
+}
+
+static bool are_twins(const imported_faces *s, const wide_polygon *a, const wide_polygon *b) {
+    const size_t n = s->polygons[a->polygon].n_corners;
+    if (a->hash != b->hash || s->polygons[b->polygon].n_corners != n) return false;
+    for (size_t k = 0; k < n; k++)
+        if (memcmp(corner_of(s, a, k), corner_of(s, b, k), sizeof *s->vertices) != 0) return false;
+    return true;
+}
+
+/* A polygon that is written twice is cut into the same pieces, which are then found to be equal: it begins
+ * with the corner that its twin before it begins with. O(n log n) of polygons of more than four corners. */
+static lam_status align_twins(imported_faces *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    wide_polygon *wide = NULL;
+    uint32_t *turned = NULL;
+    size_t n = 0, room = 0, turned_room = 0;
+    for (size_t i = 0; i < s->n_polygons && s->n_skins == 0; i++) {
+        if (s->polygons[i].n_corners <= 4) continue;
+        TRY(array_grow(&wide, &room, n + 1, sizeof *wide, "faces", error));
+        wide[n++] = wide_of(s, i);
+    }
+    if (n > 1) qsort(wide, n, sizeof *wide, by_hash);
+    for (size_t k = 1; k < n; k++) {
+        if (!are_twins(s, &wide[k - 1], &wide[k])) continue;
+        const size_t corners = s->polygons[wide[k].polygon].n_corners;
+        uint32_t *of = s->corners + s->polygons[wide[k].polygon].first;
+        TRY(array_grow(&turned, &turned_room, corners, sizeof *turned, "face corners", error));
+        for (size_t c = 0; c < corners; c++)
+            turned[c] = of[(c + wide[k].start + corners - wide[k - 1].start) % corners];
+        memcpy(of, turned, corners * sizeof *of);
+        wide[k].start = wide[k - 1].start;
+    }
+done:
+    free(wide);
+    free(turned);
+    return status;
+}
+
 lam_status imported_faces_split(imported_faces *s, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
     polygon_split_scratch scratch = {0};
     double extent = 0;
     size_t next = 0; /* skin */
     TRY(check_polygons(s, path, &extent, error));
+    TRY(align_twins(s, error));
     for (size_t i = 0; i < s->n_polygons; i++) {
         const struct imported_polygon *polygon = &s->polygons[i];
         TRY(polygon_split((const double(*)[3])s->vertices, s->corners + polygon->first, polygon->n_corners,

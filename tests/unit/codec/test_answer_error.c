@@ -211,6 +211,70 @@ START_TEST(single_tiles_have_their_own_errors) {
 END_TEST
 
 /* A sky of a store that states nothing of skies adds nothing. */
+/* Faces that count twice: s = .1 of all light, and half of group 0 overlaps. Of B - E of values r + rho H0
+ * the squared error has s^2 + o / 2 of the elements of a group and s^2 + o^2 / 2 of its mean; of a name of
+ * both groups what overlaps is half of the light in the first. */
+START_TEST(faces_that_count_twice_are_off_by_their_light) {
+    double overlap[G] = {.5, 0};
+    const uint32_t desk[] = {0}, both[] = {0, 1};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}, {.groups = both, .n_groups = 2}};
+    const reduce_request request = {.on = true, .names = list, .n_names = 2};
+    error_by_group off = stated;
+    float values[C * N];
+    answer_error before, found;
+    name_error names_before[2], names[2];
+    off.repair = .1;
+    off.overlap = overlap;
+    fill(LAM_INDIRECT, false, values);
+    error_answer of = answer_of(LAM_INDIRECT, values);
+    ck_assert(answer_error_of(&stated, &scene, &of, &before));
+    ck_assert(answer_error_of(&off, &scene, &of, &found));
+    double light2 = 0, added = 0;
+    for (size_t k = 0; k < C * N; k++) {
+        light2 += area[k % N] * r[k] * r[k];
+        added += area[k % N] * r[k] * r[k] * (.01 + (bin[k % N] == 0 ? .25 : 0));
+    }
+    /* x = e^2 / (l^2 - e^2), so that e^2 = l^2 x / (1 + x). */
+    const double square = before.indirect * before.indirect, own = light2 * square / (1 + square) + added;
+    ck_assert_double_eq_tol(found.indirect, sqrt(own / (light2 - own)), 1e-6);
+    ck_assert(name_errors_of(&stated, &scene, &of, &request, names_before));
+    ck_assert(name_errors_of(&off, &scene, &of, &request, names));
+    const double r0[C] = {(.5 + 2 * .25) / 3, (1 + 2 * .5) / 3}, r1[C] = {.125, .25};
+    for (int name = 0; name < 2; name++) {
+        double mean2 = 0, more = 0;
+        for (size_t c = 0; c < C; c++) {
+            const double mean = name == 0 ? r0[c] : (3 * r0[c] + 4 * r1[c]) / 7;
+            const double covered = .5 * r0[c] * (name == 0 ? 1 : 3. / 7);
+            mean2 += mean * mean;
+            more += .01 * mean * mean + covered * covered / 2;
+        }
+        const double x = names_before[name].mean * names_before[name].mean, e2 = mean2 * x / (1 + x) + more;
+        ck_assert_double_eq_tol(names[name].mean, sqrt(e2 / (mean2 - e2)), 1e-5);
+        ck_assert_double_gt(names[name].elements, names_before[name].elements);
+    }
+    /* By means alone. */
+    const double none[C] = {0};
+    const name_means means = {
+        .quantity = LAM_INDIRECT, .size = of.size, .value = r0, .emission = none, .direct = none};
+    ck_assert_double_eq_tol(name_error_of_means(&off, &list[0], &means).mean, names[0].mean, 1e-5);
+    /* The light of a sky counts too, as a face that is hidden has none of it. */
+    fill(LAM_IRRADIANCE, true, values);
+    of = answer_of(LAM_IRRADIANCE, values);
+    of.H0 = H0;
+    ck_assert(answer_error_of(&stated, &scene, &of, &before));
+    ck_assert(answer_error_of(&off, &scene, &of, &found));
+    double reflected2 = 0;
+    added = 0;
+    for (size_t k = 0; k < C * N; k++) {
+        const double l = r[k] + (double)rho[k] * (double)H0[k];
+        reflected2 += area[k % N] * r[k] * r[k];
+        added += area[k % N] * l * l * (.01 + (bin[k % N] == 0 ? .25 : 0));
+    }
+    const double x = before.indirect * before.indirect, e2 = reflected2 * x / (1 + x) + added;
+    ck_assert_double_eq_tol(found.indirect, sqrt(e2 / (reflected2 - e2)), 1e-5 * found.indirect);
+}
+END_TEST
+
 START_TEST(unknown_skies_are_left) {
     float values[C * N];
     answer_error found, again;
@@ -245,6 +309,7 @@ int main(void) {
     tcase_add_loop_test(cases, names_have_errors_of_their_means, 0, 3);
     tcase_add_test(cases, means_have_less_of_direct_errors);
     tcase_add_test(cases, single_tiles_have_their_own_errors);
+    tcase_add_test(cases, faces_that_count_twice_are_off_by_their_light);
     tcase_add_test(cases, unknown_skies_are_left);
     tcase_add_test(cases, darkness_has_no_error_and_no_light_no_ratio);
     suite_add_tcase(suite, cases);

@@ -1,0 +1,150 @@
+"""Faces that are written twice are dropped, faces that overlap in one plane are named, and stated errors contain them.
+
+The room is of 4 x 4 x 3 m with a lamp under its ceiling; the truth about one floor is the room with one floor, and about a
+rug in the floor's plane the same rug 1e-4 m above it, below which the floor is dark."""
+
+import json
+import unittest
+
+import h5py
+import numpy
+
+from case import Case
+from command import must
+from quads import Quads
+
+
+def room(path, second=None, rug=None, reflectance=.7, triangles=False, lamp=True):
+    """second: of the floor, as the number of its squares along each side; rug: its height."""
+    quads = Quads()
+    quads.box("r", (0, 0, 0), (4, 4, 3), (6, 6, 4))
+    if lamp:
+        quads.grid("lamp", 2, 2.9, -1, numpy.linspace(1.5, 2.5, 3), numpy.linspace(1.5, 2.5, 3))
+    if second:
+        quads.grid("second", 2, 0, 1, numpy.linspace(0, 4, second + 1), numpy.linspace(0, 4, second + 1))
+    if rug is not None:
+        quads.grid("rug", 2, rug, 1, numpy.linspace(1.1, 2.9, 4), numpy.linspace(1.1, 2.9, 4))
+    quads.write(path, reflectance)
+
+
+class Overlap(Case):
+    def store(self, name, *options, **how):
+        room(self.path(name + ".obj"), **how)
+        done = must("precompute", self.path(name + ".obj"), "-o", self.path(name + ".h5"), "--probes", 8, *options)
+        return done.stderr
+
+    def answer(self, name, *emit):
+        options = [x for e in emit for x in ("--emit", e)]
+        groups = [x for g in ("r0", "r2", "r4", "r5") for x in ("--reduce", f"{g}=mean")]
+        done = must("solve", self.path(name + ".h5"), *options, "--quantity", "irradiance", *groups, "--json")
+        return json.loads(done.stdout)
+
+    def off(self, true, found):
+        """By how much each group is off, and what is stated of it."""
+        for group, mean in found["groups"].items():
+            truth = true["groups"][group]["mean"]
+            yield group, abs(mean["mean"] - truth) / mean["mean"], found["error"]["groups"][group]["mean"]
+
+    def test_a_floor_that_is_written_twice_is_one(self):
+        self.store("one")
+        log = self.store("twice", second=6)
+        self.assertIn("36 faces repeat another one and are dropped (second 36; the first at ", log)
+        self.assertIn("36 of them have another group or material", log)
+        for emit in ("lamp=10", "r2=1"):
+            one, twice = self.answer("one", emit), self.answer("twice", emit)
+            self.assertEqual(one["groups"], twice["groups"])
+            self.assertEqual(one["error"], twice["error"])
+        with h5py.File(self.path("one.h5")) as one, h5py.File(self.path("twice.h5")) as twice:
+            for name in ("mesh/elements", "mesh/vertices", "mesh/group_names", "error/by_group/rms_many"):
+                self.assertEqual(one[name][()].tolist(), twice[name][()].tolist())
+            self.assertNotIn("overlap", twice["mesh"])
+            self.assertNotIn("repair", twice["error"].attrs)
+        self.assertIn("has the same geometry", must("verify", self.path("twice.h5"), self.path("twice.obj")).stdout)
+
+    def test_a_face_under_the_tiles_is_named_and_stated(self):
+        """Whatever finds the form factors: walls are off by .13 to .25, and more than half of that is stated."""
+        self.store("one")
+        for options in ((), ("--rays", 1024), ("--form-factors", "hemicube"), ("--method", "low-rank"),
+                        ("--method", "hierarchical", "--form-factors", "blocks"),
+                        ("--method", "sparse", "--quality", "draft")):
+            log = self.store("under", *options, second=1)
+            self.assertIn("37 faces overlap others in one plane, 16 m2 in all (r4 16 m2, second 16 m2; ", log)
+            with h5py.File(self.path("under.h5")) as file:
+                self.assertAlmostEqual(file["mesh"].attrs["overlap_area"], 16, places=9)
+                overlap = dict(zip(file["mesh/group_names"].asstr()[:], file["mesh/overlap"][:]))
+                self.assertEqual({g for g, share in overlap.items() if share > 0}, {"r4", "second"})
+                # Half of the 32 m2 of both, of 16 (floor) + 80 (others) + 1 (lamp) + 16 m2.
+                self.assertGreater(file["error"].attrs["repair"], .9 * 16 / 113)
+            for emit in ("lamp=10", "r0=1"):
+                for group, off, stated in self.off(self.answer("one", emit), self.answer("under", emit)):
+                    if group != "r4":
+                        self.assertLess(stated, .5)
+                    self.assertGreater(stated, off / 2, (options, emit, group))
+        shown = json.loads(must("info", self.path("under.h5"), "--json").stdout)
+        self.assertAlmostEqual(shown["overlap_area"], 16, places=9)
+        text = must("info", self.path("under.h5")).stdout
+        self.assertRegex(text, r"overlap +16 m2 of faces in one plane count twice")
+        for sort in ("single", "random", "whole"):
+            self.assertGreater(shown["error"][sort]["total_indirect_mean"], .14)
+        self.assertIn(" overlap others in one plane, 16 m2", must("classify", self.path("under.obj")).stderr)
+        self.assertIn("most of it is that faces overlap", log)
+
+    def test_a_rug_in_the_plane_of_the_floor(self):
+        above, log = self.store("above", rug=1e-4), self.store("rug", rug=0)
+        self.assertNotIn("overlap", above)
+        self.assertIn(", 3.24 m2 in all (", log)
+        self.assertIn("rug 3.24 m2", log)
+        self.assertIn("some faces may coincide", log)
+        for emit in ("lamp=10", "rug=1", "r0=1"):
+            for group, off, stated in self.off(self.answer("above", emit), self.answer("rug", emit)):
+                self.assertGreater(stated, off / 2, (emit, group))
+
+    def test_an_open_scene_has_no_row_to_repair(self):
+        """A floor and a wall: no row sums to more than 1, and what overlaps is stated nevertheless."""
+        for name, extra in (("alone", False), ("doubled", True)):
+            quads = Quads()
+            quads.grid("floor", 2, 0, 1, numpy.linspace(0, 4, 7), numpy.linspace(0, 4, 7))
+            quads.grid("wall", 0, 0, 1, numpy.linspace(0, 4, 7), numpy.linspace(0, 3, 5))
+            if extra:
+                quads.grid("second", 2, 0, 1, numpy.array([0, 4]), numpy.array([0, 4]))
+            quads.write(self.path(name + ".obj"), .7)
+            must("precompute", self.path(name + ".obj"), "-o", self.path(name + ".h5"), "--probes", 8, "--sky", "grid:4x2")
+        numpy.save(self.path("sky.npy"), numpy.ones((1, 8), "f4"))
+        means = []
+        for name in ("alone", "doubled"):
+            done = must("solve", self.path(name + ".h5"), "--sky", self.path("sky.npy"), "--quantity", "indirect",
+                        "--reduce", "wall=mean", "--json")
+            means.append(json.loads(done.stdout))
+        true, found = (x["groups"]["wall"]["mean"] for x in means)
+        self.assertGreater(abs(found - true), .1 * true)
+        self.assertGreater(means[1]["error"]["groups"]["wall"]["mean"], abs(found - true) / found / 2)
+
+    def test_positions_state_it_too(self):
+        """Walks meet either of two faces; the floor is off by as much as is stated in a room with both."""
+        light = self.path("light.json")
+        with open(light, "w", encoding="ascii") as file:
+            json.dump({"light": {"polygon": [[-.5, .5, 0], [.5, .5, 0], [.5, -.5, 0], [-.5, -.5, 0]], "emission": 10},
+                       "positions": [{"name": "a", "move": [2, 2, 2.9]}, {"name": "b", "move": [1, 1, 2.9]}]}, file)
+        figures = []
+        for name, second in (("one", None), ("under", 1)):
+            room(self.path(name + ".obj"), second=second, lamp=False)
+            done = must("precompute", self.path(name + ".obj"), "-o", self.path(name + ".h5"), "--positions", light, "--paths", 20000)
+            figures.append(json.loads(must("solve", self.path(name + ".h5"), "--emit", "a=1", "--quantity", "irradiance",
+                                           "--reduce", "r0=mean", "--reduce", "r4=mean", "--json").stdout))
+        self.assertIn(" overlap others in one plane, 16 m2", done.stderr)
+        before, after = (x["error"]["groups"] for x in figures)
+        self.assertLess(before["r0"]["mean"], .05)
+        self.assertGreater(after["r0"]["mean"], .12)
+        self.assertGreater(after["r4"]["mean"], .5)
+
+    def test_scenes_without_such_faces_state_none(self):
+        log = self.store("one")
+        self.assertNotIn("overlap", log)
+        self.assertNotIn("coincide", log)
+        with h5py.File(self.path("one.h5")) as file:
+            self.assertNotIn("repair", file["error"].attrs)
+            self.assertNotIn("overlap_area", file["mesh"].attrs)
+
+
+if __name__ == "__main__":
+    unittest.main()
