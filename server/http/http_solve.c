@@ -133,6 +133,7 @@ static double cost_to_begin(const call *c, const route *to) {
 
 /* The cost of a pass, or of the end if that takes longer. */
 static double cost_to_solve(const call *c, const route *to) {
+    if (c->cost > 0) return c->cost;
     if (to->steps->cost != NULL) return to->steps->cost(c);
     const double n_vectors = (double)c->job.n_vectors, together = fmin(n_vectors, BATCH_PASS);
     if (c->refines) return REFINEMENT;
@@ -341,6 +342,7 @@ void http_solve(request *r) {
                               .finish = finish_solve,
                               .is_wanted = is_solve_wanted,
                               .drop = drop_solve,
+                              .key = r->call.scene != NULL ? r->call.scene->op : NULL,
                               .client = r->peer.key,
                               .kind = (unsigned)r->match.label,
                               .cost = cost_to_begin(&r->call, r->match.route),

@@ -4,7 +4,6 @@
 #include "server/queue/thread_budget.h"
 #include "solver/base/clock.h"
 
-#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -27,6 +26,7 @@ struct batch_queue {
     pthread_mutex_t lock;
     pthread_cond_t changed;
     job_order order;
+    double (*seconds)(void); /* the clock */
     size_t max_jobs;
     size_t n_brief; /* threads that run a function of a brief job */
     size_t n_idle;  /* threads that wait for `changed` */
@@ -48,7 +48,7 @@ struct batch_queue {
 static bool all_are_long(const batch_queue *queue) {
     if (queue->n_long == queue->n_threads) return true;
     if (queue->n_idle > 0) return false;
-    const double now = clock_seconds();
+    const double now = queue->seconds();
     for (size_t t = 0; t < queue->n_threads; t++) {
         const worker *w = &queue->workers[t];
         if (!w->is_long && (w->since == 0 || now - w->since < is_slow)) return false;
@@ -83,7 +83,7 @@ static void hand_over(batch_queue *queue) {
  * neither, as it takes no long jobs. */
 static void enter_function(worker *w, const batch_job *job) {
     batch_queue *queue = w->queue;
-    w->since = clock_seconds();
+    w->since = queue->seconds();
     w->is_long = !order_is_short(job);
     if (w->spare) return;
     queue->n_long += w->is_long;
@@ -96,7 +96,7 @@ static void enter_function(worker *w, const batch_job *job) {
 /* Returns the seconds that the function took. */
 static double leave_function(worker *w, bool brief) {
     batch_queue *queue = w->queue;
-    const double took = clock_seconds() - w->since;
+    const double took = queue->seconds() - w->since;
     w->since = 0;
     if (w->spare) return took;
     queue->n_long -= w->is_long;
@@ -162,34 +162,22 @@ static void block(batch_queue *queue, batch_job *job) {
     job->unblocked = false;
 }
 
-/* The line is charged for the estimate at once, so that other threads do not all take it meanwhile, and for
- * what the function took beyond that later. */
 static void begin(worker *w, batch_job *job) {
     batch_queue *queue = w->queue;
     const bool brief = job->brief;
     const double cost = job->cost;
-    job_line *l = &queue->order.lines[job->line];
-    queue->order.n_begun++;
-    l->charge += cost;
+    order_begin(&queue->order, job);
     enter_function(w, job);
     pthread_mutex_unlock(&queue->lock);
     const bool waits = job->begin(job, &w->workspace);
     pthread_mutex_lock(&queue->lock);
-    l->charge += fmax(leave_function(w, brief) - cost, 0);
-    order_leave(&queue->order, job);
-    if (!waits && job->blocked) {
+    order_begun(&queue->order, job, cost, leave_function(w, brief));
+    if (waits)
+        order_wait(&queue->order, job);
+    else if (job->blocked)
         block(queue, job);
-        return;
-    }
-    if (!waits) {
+    else
         finish(w, job);
-        return;
-    }
-    job->next_vector = 0;
-    job->was_read = true;
-    job->begun = queue->order.n_begun;
-    order_enter(&queue->order, job);
-    order_add(&queue->order.waiting, job);
 }
 
 static void end(worker *w, batch_job *job) {
@@ -221,19 +209,13 @@ static bool work(worker *w) {
             end(w, job);
         return true;
     }
-    job = order_find_next(&queue->order, w->spare);
+    bool passes;
+    job = order_find_next(&queue->order, w->spare, queue->seconds(), &passes);
     if (job == NULL) return false;
-    if (order_is_ready(&queue->order, job)) {
-        batch_job *company = order_find_company(&queue->order, job);
-        if (company == NULL) {
-            make_pass(w, job);
-            return true;
-        }
-        job = company;
-    }
-    (void)order_take(&queue->order.lines[job->line].arrived);
-    queue->order.n_arrived--;
-    begin(w, job);
+    if (passes)
+        make_pass(w, job);
+    else
+        begin(w, job);
     return true;
 }
 
@@ -265,7 +247,7 @@ static struct timespec later(struct timespec t, double seconds) {
 }
 
 /* The spare thread. It looks at the jobs also when all others are in functions, or in one that takes longer
- * than was estimated. */
+ * than was estimated: then as soon as that counts as long. */
 static void *serve_short(void *argument) {
     worker *w = argument;
     batch_queue *queue = w->queue;
@@ -275,7 +257,7 @@ static void *serve_short(void *argument) {
         if (work(w)) continue;
         hand_over(queue);
         if (queue->closed && queue->order.n_jobs == 0) break;
-        const struct timespec next = later(clock_now(), BATCH_LOOK);
+        const struct timespec next = later(clock_now(), queue->n_idle > 0 ? BATCH_LOOK : is_slow);
         queue->spare_idle = true;
         queue->spare_asleep = queue->order.n_jobs == 0;
         if (queue->spare_asleep)
@@ -320,7 +302,8 @@ static void start_threads(batch_queue *queue, size_t n_threads) {
     for (size_t i = 0; i < n_beside; i++) pthread_join(beside[i], NULL);
 }
 
-lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam_error *error) {
+lam_status batch_start_by(double (*seconds)(void), size_t n_threads, size_t max_jobs, batch_queue **out,
+                          lam_error *error) {
     lam_status status = LAM_OK;
     sigset_t all, before;
     pthread_condattr_t monotonic;
@@ -333,6 +316,7 @@ lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam
     pthread_cond_init(&queue->spare_changed, &monotonic);
     pthread_condattr_destroy(&monotonic);
     queue->max_jobs = max_jobs;
+    queue->seconds = seconds;
     queue->order.passing = memory_allocate(n_threads + 1, sizeof *queue->order.passing, "threads", error);
     queue->threads = memory_allocate(n_threads, sizeof *queue->threads, "threads", error);
     queue->workers = memory_allocate(n_threads, sizeof *queue->workers, "threads", error);
@@ -350,6 +334,10 @@ done:
         batch_destroy(queue);
     }
     return status;
+}
+
+lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam_error *error) {
+    return batch_start_by(clock_seconds, n_threads, max_jobs, out, error);
 }
 
 /* Wakes a thread that drops the job. */

@@ -11,8 +11,12 @@
  *   - Of two lines that both have work neither is charged more than the other by more than the cost of one
  *     job of each. So with k lines a job waits for at most k times what those before it in its line take,
  *     and for the functions that the threads are in.
- *   - A job that is ready for a pass lets others be begun first, so that they share it, but at most
- *     BATCH_PASS, of its own kind, each not longer than the pass or BATCH_GATHER.
+ *     (Company, below, may put a line ahead by BATCH_GATHER more.)
+ *   - A job that is ready for a pass lets others be begun first, so that they share it: of its own key and
+ *     kind, and of lines that are charged at most BATCH_GATHER more than its own. The first of them starts a
+ *     clock, and none is begun later than BATCH_GATHER, nor one that is estimated to take longer than what
+ *     is left of it. So whatever they take in truth, the pass waits for BATCH_GATHER and for the one begin
+ *     that each thread is in.
  *   - When all threads are in functions of long jobs, one more thread serves the short ones (cost up to
  *     BATCH_SHORT), so that these wait for none of those functions; the processor is then shared.
  * The table of lines has 256 places by hash; lines that meet there are one (stochastic fairness queueing:
@@ -36,9 +40,9 @@ typedef struct batch_workspace {
 /* Most vectors in a pass: enough to use each number read many times, few enough to stay in the cache. */
 #define BATCH_PASS 16
 
-/* Seconds: the cost of a short job, and of a begin that any pass waits for. */
+/* Seconds: the cost of a short job, and the time in which others are begun before a pass, to share it. */
 #define BATCH_SHORT 4e-3
-#define BATCH_GATHER 1e-3
+#define BATCH_GATHER 2e-3
 
 /* Seconds between two looks at a job that waits. */
 #define BATCH_LOOK 50e-3
@@ -53,8 +57,8 @@ typedef struct batch_part {
  *   begin   reads the request. True: it has set key and n_vectors (at least 1), which wait for passes
  *           shared by all jobs of this key and pass function, and cost. False: only finish is left.
  *   pass    computes some vectors of one or several jobs, at most BATCH_PASS in all. It is called until
- *           every vector is computed, by one thread at a time for a job. It may lower n_vectors to what has
- *           been computed.
+ *           every vector is computed, by one thread at a time for a job. It may set n_vectors of a job that
+ *           shares its key with no other: to what has been computed, or beyond that where more is left to do.
  *           Or it sets `blocked` and returns false: it is called again, in the turn that the job had, once
  *           batch_unblock was called, which may be before it returns.
  *   end     makes the answer.
@@ -73,21 +77,21 @@ struct batch_job {
     void (*finish)(batch_job *job);
     bool (*is_wanted)(batch_job *job);
     void (*drop)(batch_job *job);
-    const void *key;
+    const void *key; /* at submission the one that it is likely to get, if it shares passes; or NULL */
     size_t n_vectors;
     double cost;     /* estimated seconds of begin; once begun, of the longest function that is left */
     uint64_t client; /* whose it is */
     unsigned kind;   /* of work; jobs of one kind take similar steps */
     bool blocked;    /* set by begin: it cannot go on before batch_unblock */
     bool brief; /* set at submission: each of the four functions takes about as long as waking a thread */
-    size_t next_vector; /* here and below: private to the queue */
-    uint64_t ticket;    /* number of its submission */
-    bool was_read;      /* its begin has returned, and passes are left */
-    uint64_t begun;     /* jobs that had begun when it was ready for its next pass */
-    bool passing;       /* a thread computes some of its vectors */
-    bool unblocked;     /* while begin still ran */
-    bool evicted;       /* it is unwanted once it has left its pass */
-    double looked;      /* when it was last looked at, or came */
+    size_t next_vector;   /* here and below: private to the queue */
+    uint64_t ticket;      /* number of its submission */
+    bool was_read;        /* its begin has returned, and passes are left */
+    double gathers_until; /* the end of the time in which others are begun before its next pass; 0: not yet */
+    bool passing;         /* a thread computes some of its vectors */
+    bool unblocked;       /* while begin still ran */
+    bool evicted;         /* it is unwanted once it has left its pass */
+    double looked;        /* when it was last looked at, or came */
     size_t line;
     batch_job *next;
 };
@@ -96,6 +100,11 @@ struct batch_job {
  * at least one. At most max_jobs wait or run. An idle thread helps the others with their loops
  * (solver/base/parallel.h). */
 lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam_error *error);
+
+/* The same, where `seconds` tells the time that functions take and gathering ends at, above 0: of tests that
+ * count what goes together. Any thread calls it. */
+lam_status batch_start_by(double (*seconds)(void), size_t n_threads, size_t max_jobs, batch_queue **out,
+                          lam_error *error);
 
 /* Queues a job; false if there are max_jobs already or the queue is closed. When it is full, a job of the
  * client with most jobs that wait is dropped for one of a client that has fewer (longest queue drop: Suter et

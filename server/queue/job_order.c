@@ -204,9 +204,19 @@ static void charge_parts(job_order *order, const batch_part *parts, size_t n_par
         order->lines[parts[p].job->line].charge += took * (double)parts[p].count / (double)count;
 }
 
-/* Jobs of which all vectors are computed move to `computed`, the others to the end of `waiting`. */
+/* A job with vectors left waits for its next pass in `list`, unless nobody wants it any more. */
+static void wait_again(job_order *order, job_list *list, batch_job *job, double now) {
+    const bool unwanted = order_is_unwanted(order, job, now);
+    job->gathers_until = 0;
+    order_add(unwanted ? &order->unwanted : list, job);
+    if (unwanted) order_leave(order, job);
+}
+
+/* Jobs of which all vectors are computed move to `computed`. Of several in a pass the others move to the end
+ * of `waiting`; a single one keeps its place, before jobs that came after it. */
 void order_sort(job_order *order, const batch_part *parts, size_t n_parts, double took) {
     job_list before = order->waiting, again = {0};
+    const double now = clock_seconds();
     order->waiting = (job_list){0};
     charge_parts(order, parts, n_parts, took);
     for (size_t p = 0; p < n_parts; p++) {
@@ -216,19 +226,17 @@ void order_sort(job_order *order, const batch_part *parts, size_t n_parts, doubl
     for (batch_job *job; (job = order_take(&before)) != NULL;) {
         bool served = false;
         for (size_t p = 0; p < n_parts; p++) served = served || parts[p].job == job;
-        const bool computed = served && left_of(job) == 0;
-        order_add(computed ? &order->computed : served ? &again : &order->waiting, job);
-        if (!computed) continue;
-        order_leave(order, job);
-        job->evicted = false; /* little is left to do */
+        if (!served) {
+            order_add(&order->waiting, job);
+        } else if (left_of(job) > 0) {
+            wait_again(order, n_parts == 1 ? &order->waiting : &again, job, now);
+        } else {
+            order_add(&order->computed, job);
+            order_leave(order, job);
+            job->evicted = false; /* little is left to do */
+        }
     }
-    const double now = again.first != NULL ? clock_seconds() : 0;
-    for (batch_job *job; (job = order_take(&again)) != NULL;) {
-        const bool unwanted = order_is_unwanted(order, job, now);
-        job->begun = order->n_begun;
-        order_add(unwanted ? &order->unwanted : &order->waiting, job);
-        if (unwanted) order_leave(order, job);
-    }
+    for (batch_job *job; (job = order_take(&again)) != NULL;) order_add(&order->waiting, job);
 }
 
 batch_job *order_take_computed(job_order *order, bool spare) {
@@ -258,7 +266,8 @@ static batch_job *next_of(const job_line *l, bool spare) {
     return arrived->ticket < l->ready->ticket ? arrived : l->ready;
 }
 
-batch_job *order_find_next(job_order *order, bool spare) {
+/* The first of the least charged line, which is charged no less than most_credit below the others. */
+static batch_job *find_due(job_order *order, bool spare) {
     batch_job *best = NULL;
     find_ready(order, spare);
     for (size_t a = 0; a < order->n_active; a++) {
@@ -275,21 +284,51 @@ batch_job *order_find_next(job_order *order, bool spare) {
     return best;
 }
 
-bool order_is_ready(const job_order *order, const batch_job *job) {
-    return order->lines[job->line].ready == job;
-}
-
-batch_job *order_find_company(const job_order *order, const batch_job *ready) {
+/* The job that came first of those that may be begun before the pass of `ready`, to share it, or NULL: of its
+ * key and kind, in a line that would go on within BATCH_GATHER of charge, and short enough for what is left
+ * of that time by the clock. */
+static batch_job *find_company(const job_order *order, batch_job *ready, double now) {
     batch_job *best = NULL;
-    if (order->n_arrived == 0 || order->n_begun - ready->begun >= BATCH_PASS ||
-        count_alike(order, ready) >= BATCH_PASS)
-        return NULL;
+    const double left = ready->gathers_until == 0 ? BATCH_GATHER : ready->gathers_until - now,
+                 most_charged = order->lines[ready->line].charge + BATCH_GATHER;
+    if (order->n_arrived == 0 || left <= 0 || count_alike(order, ready) >= BATCH_PASS) return NULL;
     for (size_t a = 0; a < order->n_active; a++) {
-        batch_job *job = order->lines[order->active[a]].arrived.first;
-        if (job == NULL || job->kind != ready->kind || job->cost > fmax(ready->cost, BATCH_GATHER)) continue;
+        const job_line *l = &order->lines[order->active[a]];
+        batch_job *job = l->arrived.first;
+        if (job == NULL || job->key != ready->key || job->kind != ready->kind || job->cost > left ||
+            l->charge > most_charged)
+            continue;
         if (best == NULL || job->ticket < best->ticket) best = job;
     }
+    if (best != NULL && ready->gathers_until == 0) ready->gathers_until = now + BATCH_GATHER;
     return best;
+}
+
+batch_job *order_find_next(job_order *order, bool spare, double now, bool *passes) {
+    batch_job *due = find_due(order, spare);
+    const bool ready = due != NULL && order->lines[due->line].ready == due;
+    batch_job *company = ready ? find_company(order, due, now) : NULL;
+    *passes = ready && company == NULL;
+    return company != NULL ? company : due;
+}
+
+void order_begin(job_order *order, batch_job *job) {
+    (void)order_take(&order->lines[job->line].arrived);
+    order->n_arrived--;
+    order->lines[job->line].charge += job->cost;
+}
+
+void order_begun(job_order *order, batch_job *job, double cost, double took) {
+    order->lines[job->line].charge += fmax(took - cost, 0);
+    order_leave(order, job);
+}
+
+void order_wait(job_order *order, batch_job *job) {
+    job->next_vector = 0;
+    job->was_read = true;
+    job->gathers_until = 0;
+    order_enter(order, job);
+    order_add(&order->waiting, job);
 }
 
 /* Clients that meet in a place of this table count as one. */

@@ -27,7 +27,7 @@ typedef struct job_order {
     job_list blocked;           /* until batch_unblock; in no line */
     job_list unwanted;          /* before drop */
     size_t n_arrived, n_jobs;   /* jobs before begin; from submit to finish */
-    uint64_t n_submitted, n_begun;
+    uint64_t n_submitted;
     bool abandoned; /* all that have a drop are unwanted */
     double next_look;
     size_t n_done;     /* jobs since pace_since */
@@ -58,13 +58,18 @@ void order_unblock(job_order *order, batch_job *job);
 /* True if a pass may begin. */
 bool order_is_any_ready(const job_order *order);
 
-/* The job that goes on: the first of the least charged line, to be begun or, where order_is_ready, for a
- * pass; NULL if there is none. spare: of the short ones. */
-batch_job *order_find_next(job_order *order, bool spare);
-bool order_is_ready(const job_order *order, const batch_job *job);
+/* The job that goes on: the first of the least charged line, for a pass (*passes) or to be begun, or one that
+ * is begun to share that pass; NULL if there is none. spare: of the short ones. */
+batch_job *order_find_next(job_order *order, bool spare, double now, bool *passes);
 
-/* The job that came first of those that may be begun before a pass of `ready`, to share it, or NULL. */
-batch_job *order_find_company(const job_order *order, const batch_job *ready);
+/* Before and after the begin of a job that order_find_next gave: takes it out of its line. The line is
+ * charged for the estimate at once, so that other threads do not all take it meanwhile, and for what begin
+ * took beyond that later: `cost` is the one that the job had before. */
+void order_begin(job_order *order, batch_job *job);
+void order_begun(job_order *order, batch_job *job, double cost, double took);
+
+/* A job that has begun waits for its first pass. */
+void order_wait(job_order *order, batch_job *job);
 
 /* The vectors of the next pass with `like`. Returns the number of parts. */
 size_t order_choose_parts(const job_order *order, batch_job *like, batch_part parts[BATCH_PASS]);

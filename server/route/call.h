@@ -31,6 +31,7 @@ typedef struct call {
     batch_workspace *workspace; /* of a route with a body */
     void *state;                /* of a route with solve_steps: its own, from begin to end */
     bool refines;               /* set by begin: to a tolerance */
+    double cost;                /* set by begin: seconds of a pass where they are known, else 0 */
     bool (*is_wanted)(struct call *in); /* of a route with a body, from the thread that serves it: false when
                                          * nobody needs the answer any more; what is done may then be left */
     size_t n_rhs;                       /* set by the handler, for the log */

@@ -1,5 +1,7 @@
 /* POST /v1/scenes/NAME/radiosity: emission in, radiosity out. begin reads the body, pass computes vectors
- * together with those of other clients, end writes the answer; each on any thread. */
+ * together with those of other clients, or goes on with figures, end writes the answer; each on any thread.
+ */
+#include "server/route/linear_figures.h"
 #include "server/route/radiosity_figures.h"
 #include "server/route/refined_answer.h"
 #include "server/route/routes.h"
@@ -24,6 +26,9 @@ typedef struct radiosity_solve {
     double *figures;        /* of reduce, in place of values; else NULL */
     float *W;               /* [n_rhs][C][s], weights of a store of emitters; else NULL */
     refined_solve *refined; /* for a request with a tolerance; else NULL */
+    linear_figures *linear; /* for a linear reduction, which computes no vectors; else NULL */
+    figures_text text;      /* of figures */
+    bool judged;            /* the error of figures was found */
     name_error *errors;     /* of names that are reduced, or NULL */
     problem why;            /* of a pass that failed */
     bool failed;
@@ -34,6 +39,7 @@ static void solve_free(radiosity_solve *s) {
     buffer_free(&s->answer);
     answer_stream_free(s->stream);
     refined_free(s->refined, &s->notes);
+    linear_figures_free(s->linear);
     free(s->own);
     free(s->figures);
     free(s->H0);
@@ -114,6 +120,11 @@ static bool read_body(const call *in, radiosity_request *request, problem *why) 
                     request_memory_take(in->memory, request->n_selected * sizeof *request->selected, why));
 }
 
+/* The vectors that passes compute. Figures take one pass more, or several: each a step of their text. */
+static size_t vectors_of(const radiosity_solve *s) {
+    return s->linear != NULL ? 0 : s->request.n_rhs;
+}
+
 /* True if requests should have passes of their own: these take no longer than one of all, and one could not
  * use all threads. */
 static bool passes_apart(const call *in) {
@@ -144,31 +155,25 @@ static bool begin(call *in, answer *out) {
     in->n_rhs = request->n_rhs;
     if (good) scene_note_error(of, request, &s->notes);
     good = good && figures_acceptable(in, request, &why);
-    /* A linear reduction takes no pass and is answered at once. */
     const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;
-    good = linear   ? figures_linear(in, &s->request, &s->notes, &s->answer, &why)
+    good = linear   ? linear_figures_begin(in, &s->request, &s->notes, &s->linear, &why)
            : refine ? refined_begin(in, request, &s->notes, &s->refined, &why)
                     : good && find_light(in, s, &why) && find_room(in, s, &why);
-    if (!good || linear) {
-        if (good) {
-            answer_json(out, &s->answer, true);
-            answer_set_times(out, &s->notes);
-        } else {
-            answer_problem(out, &why);
-        }
+    if (!good) {
+        answer_problem(out, &why);
         solve_free(s);
         return false;
     }
     in->state = s;
-    in->n_written = s->figures != NULL ? 0 : request->n_rhs * of->n_channels * s->shape.n_values;
-    in->job.n_vectors = request->n_rhs;
-    /* Answers for all elements share passes. Answers for selected elements, and of emitters, have passes of
-     * their own. Refined answers take many times as long: one common key lets one such pass run at a time,
-     * and leaves the other threads to other requests. */
+    in->n_written = request->reduce.on ? 0 : request->n_rhs * of->n_channels * s->shape.n_values;
+    in->job.n_vectors = vectors_of(s) + request->reduce.on;
+    /* Answers for all elements share passes. Answers for selected elements, figures, and answers of emitters
+     * have passes of their own. Refined answers take many times as long: one common key lets one such pass
+     * run at a time, and leaves the other threads to other requests. */
     in->refines = refine;
     in->job.key = refine ? (const void *)in->service->queue
-                  : request->select || of->n_emitters > 0 || passes_apart(in) ? (const void *)in
-                                                                              : of->op;
+                  : linear || request->select || of->n_emitters > 0 || passes_apart(in) ? (const void *)in
+                                                                                        : of->op;
     return true;
 }
 
@@ -197,6 +202,38 @@ static lam_status pass_of_selected(const scene *s, const radiosity_solve *solve,
                                        request->selected, out, work, bytes, error);
 }
 
+/* Finds the error of the answer's own emission, which JSON states. */
+static bool judge(const call *in, radiosity_solve *s) {
+    s->judged = true;
+    return (in->scene->errors.emitters.s > 0
+                ? scene_note_emitters_error(in->scene, &s->request, s->W, s->out, &s->notes, &s->errors)
+                : scene_note_own_error(in->scene, &s->request, s->H0, s->W, s->out, &s->notes, &s->errors)) ||
+           problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
+}
+
+/* A step of figures whose vectors are computed, the last of `computed`. A further one is asked for as if it
+ * were a vector. */
+static void pass_figures(call *in, radiosity_solve *s, size_t computed, batch_workspace *workspace) {
+    bool done = false;
+    if (s->linear != NULL)
+        s->failed = s->failed || !linear_figures_step(in, &s->request, s->linear, workspace, &s->notes,
+                                                      &s->answer, &done, &s->why);
+    else if (s->refined == NULL && !s->judged)
+        s->failed = s->failed || !judge(in, s);
+    else
+        s->failed = s->failed || !figures_write(in->scene, &s->request,
+                                                s->refined != NULL ? refined_figures(s->refined) : s->figures,
+                                                clock_ms() + FIGURES_STEP_MS, &s->text, &s->notes, &s->answer,
+                                                &done, &s->why);
+    in->job.n_vectors = computed + (!s->failed && !done);
+}
+
+static bool add_figures(const scene *of, radiosity_solve *s, const batch_part *part) {
+    const float *x = s->own + part->first * of->n_channels * s->shape.n_values;
+    return s->figures == NULL ||
+           figures_add(of, &s->request, part->first, part->count, x, s->figures, &s->why);
+}
+
 static void pass_refined(const batch_part *parts, size_t n_parts) {
     for (size_t p = 0; p < n_parts; p++) {
         call *in = call_of(parts[p].job);
@@ -210,7 +247,7 @@ static void pass_refined(const batch_part *parts, size_t n_parts) {
 }
 
 /* Parts are of one scene, or all of them refined. There are several only for answers for all elements. */
-static void pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+static void pass_vectors(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
     const call *first = call_of(parts[0].job);
     const scene *s = first->scene;
     lam_part shared[BATCH_PASS];
@@ -246,9 +283,30 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     for (size_t p = 0; p < n_parts; p++) {
         radiosity_solve *solve = call_of(parts[p].job)->state;
         solve->notes.solve_ms += took;
-        if (why.status == 0) continue;
+        if (why.status == 0) {
+            solve->failed = solve->failed || !add_figures(s, solve, &parts[p]);
+            continue;
+        }
         solve->failed = true;
         solve->why = why;
+    }
+}
+
+static void pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    batch_part vectors[BATCH_PASS];
+    size_t count = 0;
+    for (size_t p = 0; p < n_parts; p++) {
+        const size_t first = parts[p].first, all = vectors_of(call_of(parts[p].job)->state);
+        if (first >= all) continue;
+        vectors[count] = parts[p];
+        if (all - first < parts[p].count) vectors[count].count = all - first;
+        count++;
+    }
+    if (count > 0) pass_vectors(vectors, count, workspace);
+    for (size_t p = 0; p < n_parts; p++) {
+        call *in = call_of(parts[p].job);
+        const size_t computed = parts[p].first + parts[p].count;
+        if (computed > vectors_of(in->state)) pass_figures(in, in->state, computed, workspace);
     }
 }
 
@@ -269,20 +327,13 @@ static bool make_stream(const call *in, radiosity_solve *s) {
     return s->stream != NULL;
 }
 
-/* Writes figures or values into the answer; false with s->why. */
+/* Writes values into the answer; figures have been written. False with s->why. */
 static bool write_answer(call *in, radiosity_solve *s) {
     const double start = clock_ms();
     bool good = !s->failed;
-    if (s->refined != NULL)
-        return good && refined_end(in, &s->request, s->refined, &s->notes, &s->answer, &s->why);
-    if (good && in->accept.type == MEDIA_JSON &&
-        !(in->scene->errors.emitters.s > 0
-              ? scene_note_emitters_error(in->scene, &s->request, s->W, s->out, &s->notes, &s->errors)
-              : scene_note_own_error(in->scene, &s->request, s->H0, s->W, s->out, &s->notes, &s->errors)))
-        return problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
-    if (s->figures != NULL)
-        return good && figures_add(in->scene, &s->request, 0, s->shape.n_rhs, s->own, s->figures, &s->why) &&
-               figures_write(in->scene, &s->request, s->figures, &s->notes, &s->answer, &s->why);
+    if (s->request.reduce.on) return good;
+    if (s->refined != NULL) return good && refined_end(s->refined, &s->notes, &s->answer, &s->why);
+    if (good && in->accept.type == MEDIA_JSON) good = judge(in, s);
     if (s->streams) return good && make_stream(in, s);
     good = good && (s->own == NULL
                         ? answer_placed(&s->answer, &s->shape, &s->why)

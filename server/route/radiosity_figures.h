@@ -16,11 +16,22 @@ size_t figures_bytes(const radiosity_request *request, size_t n_channels);
 bool figures_add(const scene *s, const radiosity_request *request, size_t first, size_t count, const float *x,
                  double *figures, problem *why);
 
-/* Writes the whole answer. */
-bool figures_write(const scene *s, const radiosity_request *request, const double *figures,
-                   const answer_notes *notes, buffer *b, problem *why);
+/* Refuses the figure of name k that is not finite. */
+bool figures_refuse(const reduce_request *r, size_t k, size_t statistic, problem *why);
 
-/* Answers a linear reduction by adjoint rows; missing ones are computed. */
-bool figures_linear(call *in, radiosity_request *request, answer_notes *notes, buffer *b, problem *why);
+/* About how long figures are worked on before others get their turn: a batch has up to a hundred thousand
+ * and more, of which each takes up to 2.5 us to write. */
+#define FIGURES_STEP_MS 1.0
+
+/* The place that the text of figures has come to; starts zeroed. */
+typedef struct figures_text {
+    bool begun;
+    size_t next; /* of reduce_vectors_written */
+} figures_text;
+
+/* Writes the answer, or goes on with it, until the time `until` of clock_ms; *done once it is whole. 422 for
+ * a figure that is not finite; 503. */
+bool figures_write(const scene *s, const radiosity_request *request, const double *figures, double until,
+                   figures_text *at, answer_notes *notes, buffer *b, bool *done, problem *why);
 
 #endif

@@ -247,10 +247,12 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     return good;
 }
 
-bool refined_end(const call *in, const radiosity_request *request, const refined_solve *r,
-                 const answer_notes *notes, buffer *b, problem *why) {
-    if (r->figures != NULL) return figures_write(in->scene, request, r->figures, notes, b, why);
+bool refined_end(const refined_solve *r, const answer_notes *notes, buffer *b, problem *why) {
     return answer_end(b, &r->shape, &r->as, notes, why);
+}
+
+const double *refined_figures(const refined_solve *r) {
+    return r->figures;
 }
 
 void refined_free(refined_solve *r, answer_notes *notes) {

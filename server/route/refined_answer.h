@@ -20,9 +20,11 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
 bool refined_pass(call *in, const radiosity_request *request, size_t first, size_t count, refined_solve *r,
                   answer_notes *notes, buffer *b, problem *why);
 
-/* Writes the end of the answer. */
-bool refined_end(const call *in, const radiosity_request *request, const refined_solve *r,
-                 const answer_notes *notes, buffer *b, problem *why);
+/* Writes the end of an answer that has the vectors themselves. */
+bool refined_end(const refined_solve *r, const answer_notes *notes, buffer *b, problem *why);
+
+/* The figures of the vectors that were refined, in place of these; NULL without reduce. */
+const double *refined_figures(const refined_solve *r);
 
 /* r may be NULL. */
 void refined_free(refined_solve *r, answer_notes *notes);

@@ -101,8 +101,8 @@ static size_t pass_bytes(const scene *s, size_t count) {
 }
 
 size_t adjoint_rows_bytes(const scene *s, const radiosity_request *request) {
-    const size_t n_names = request->reduce.n_names;
-    return n_names * row_bytes(s) + pass_bytes(s, n_names < BATCH_PASS ? n_names : BATCH_PASS);
+    const size_t n_names = request->reduce.n_names, count = n_names < BATCH_PASS ? n_names : BATCH_PASS;
+    return count * row_bytes(s) + pass_bytes(s, count);
 }
 
 size_t adjoint_rows_capacity(const scene *s) {
@@ -208,9 +208,10 @@ static bool get_weights(const scene *s, const emitter_weights **weights) {
     return true;
 }
 
-/* Computes the rows of some names by one pass over the operator and adds them to the cache. */
-static bool make_rows(const scene *s, const radiosity_request *request, size_t count, const size_t *which,
-                      batch_workspace *workspace, adjoint_row **rows, problem *why) {
+/* Computes the rows of some names, rows[which[k]] that of names[which[k]], by one pass over the operator and
+ * adds them to the cache. */
+static bool make_rows(const scene *s, const reduce_name *names, lam_quantity quantity, size_t count,
+                      const size_t *which, batch_workspace *workspace, adjoint_row **rows, problem *why) {
     const size_t n = s->n, C = s->n_channels, width = s->n_emitters > 0 ? s->n_emitters : n;
     const size_t work_bytes = lam_operator_work_bytes(s->op, count);
     lam_error error;
@@ -222,18 +223,17 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     void *work = work_bytes > 0 ? batch_workspace_get(workspace, work_bytes) : NULL;
     allocated = g != NULL && work != NULL && get_weights(s, &weights);
     for (size_t k = 0; allocated && k < count; k++)
-        allocated = (made[k] = row_allocate(s, &request->reduce.names[which[k]], request->quantity)) != NULL;
+        allocated = (made[k] = row_allocate(s, &names[which[k]], quantity)) != NULL;
     if (!allocated) {
         problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the adjoint rows of %zu groups", count);
         goto done;
     }
     float *const w = g + count * C * n;
-    for (size_t k = 0; k < count; k++)
-        area[k] = write_cotangent(s, &request->reduce.names[which[k]], g + k * C * n);
+    for (size_t k = 0; k < count; k++) area[k] = write_cotangent(s, &names[which[k]], g + k * C * n);
     const lam_status status =
         s->n_emitters > 0
-            ? lam_operator_adjoint_emitters(s->op, count, request->quantity, g, w, work, work_bytes, &error)
-            : lam_operator_apply_adjoint(s->op, count, request->quantity, g, w, work, work_bytes, &error);
+            ? lam_operator_adjoint_emitters(s->op, count, quantity, g, w, work, work_bytes, &error)
+            : lam_operator_apply_adjoint(s->op, count, quantity, g, w, work, work_bytes, &error);
     if (status != LAM_OK) {
         problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
         goto done;
@@ -244,7 +244,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
             fill_from_emitters(s, weights, w + k * C * width, made[k]);
         else
             fill_from_elements(s, w + k * C * width, g + k * C * n, made[k]);
-        rows[which[k]] = row_cache_publish(s->rows, made[k], &request->reduce.names[which[k]]);
+        rows[which[k]] = row_cache_publish(s->rows, made[k], &names[which[k]]);
         made[k] = NULL;
     }
     good = true;
@@ -254,21 +254,17 @@ done:
     return good;
 }
 
-bool adjoint_rows_get(const scene *s, const radiosity_request *request, batch_workspace *workspace,
-                      adjoint_row **rows, problem *why) {
-    const size_t n_names = request->reduce.n_names;
-    size_t which[BATCH_PASS], count = 0;
-    bool good = true;
-    (void)row_cache_find(s->rows, n_names, request->reduce.names, request->quantity, rows);
-    for (size_t k = 0; good && k < n_names; k++) {
-        if (rows[k] == NULL) which[count++] = k;
-        if (count == BATCH_PASS || (count > 0 && k + 1 == n_names)) {
-            good = make_rows(s, request, count, which, workspace, rows, why);
-            count = 0;
-        }
-    }
-    if (!good) adjoint_rows_release(s, n_names, rows);
-    return good;
+bool adjoint_rows_get(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                      batch_workspace *workspace, adjoint_row **rows, problem *why) {
+    const reduce_name *const names = request->reduce.names + first;
+    size_t which[BATCH_PASS], n_missing = 0;
+    (void)row_cache_find(s->rows, count, names, request->quantity, rows);
+    for (size_t k = 0; k < count; k++)
+        if (rows[k] == NULL) which[n_missing++] = k;
+    if (n_missing == 0 || make_rows(s, names, request->quantity, n_missing, which, workspace, rows, why))
+        return true;
+    adjoint_rows_release(s, count, rows);
+    return false;
 }
 
 size_t adjoint_row_work(const scene *s, const radiosity_request *request) {

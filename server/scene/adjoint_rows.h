@@ -20,13 +20,13 @@ size_t adjoint_rows_capacity(const scene *s);
  * adjoint_rows_release. Does not wait. */
 bool adjoint_rows_find(const scene *s, const radiosity_request *request, adjoint_row **rows);
 
-/* Bytes that adjoint_rows_get takes for a request, with all rows that the cache does not keep. */
+/* The most bytes that adjoint_rows_get takes for a request, with rows that the cache does not keep. */
 size_t adjoint_rows_bytes(const scene *s, const radiosity_request *request);
 
-/* The same; rows that are missing are computed, up to 16 by one pass over the operator. 503 when memory is
- * short. */
-bool adjoint_rows_get(const scene *s, const radiosity_request *request, batch_workspace *workspace,
-                      adjoint_row **rows, problem *why);
+/* The same of names first ... first + count, in rows [count], at most BATCH_PASS; those that are missing are
+ * computed by one pass over the operator. 503 when memory is short. */
+bool adjoint_rows_get(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                      batch_workspace *workspace, adjoint_row **rows, problem *why);
 
 void adjoint_rows_release(const scene *s, size_t count, adjoint_row **rows);
 

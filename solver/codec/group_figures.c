@@ -175,23 +175,32 @@ bool reduce_write_channels(buffer *b, const double *values, size_t n_channels) {
     return written && buffer_append(b, "]", 1);
 }
 
-bool reduce_write_names(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
-                        const double *figures, buffer *b) {
+size_t reduce_vectors_written(const reduce_request *r, size_t n_rhs) {
+    return r->n_names * r->n_with * n_rhs;
+}
+
+bool reduce_write_some(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
+                       const double *figures, size_t first, size_t count, buffer *b) {
     bool written = true;
-    for (size_t k = 0; written && k < r->n_names; k++) {
-        written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, reduce_text(r, k)) &&
-                  buffer_append(b, ":{", 2);
-        for (size_t s = 0; written && s < r->n_with; s++) {
-            written = buffer_printf(b, "%s\"%s\":%s", s == 0 ? "" : ",", reduce_statistic_name(r->with[s]),
-                                    batch ? "[" : "");
-            for (size_t v = 0; written && v < n_rhs; v++, figures += n_channels)
-                written =
-                    (v == 0 || buffer_append(b, ",", 1)) && reduce_write_channels(b, figures, n_channels);
-            written = written && (!batch || buffer_append(b, "]", 1));
-        }
-        written = written && buffer_append(b, "}", 1);
+    for (size_t at = first; written && at < first + count; at++) {
+        const size_t v = at % n_rhs, s = at / n_rhs % r->n_with, k = at / n_rhs / r->n_with;
+        if (v == 0 && s == 0)
+            written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, reduce_text(r, k)) &&
+                      buffer_append(b, ":{", 2);
+        if (v == 0)
+            written = written && buffer_printf(b, "%s\"%s\":%s", s == 0 ? "" : ",",
+                                               reduce_statistic_name(r->with[s]), batch ? "[" : "");
+        written = written && (v == 0 || buffer_append(b, ",", 1)) &&
+                  reduce_write_channels(b, figures + at * n_channels, n_channels);
+        if (v + 1 == n_rhs && batch) written = written && buffer_append(b, "]", 1);
+        if (v + 1 == n_rhs && s + 1 == r->n_with) written = written && buffer_append(b, "}", 1);
     }
     return written;
+}
+
+bool reduce_write_names(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
+                        const double *figures, buffer *b) {
+    return reduce_write_some(r, n_channels, n_rhs, batch, figures, 0, reduce_vectors_written(r, n_rhs), b);
 }
 
 bool reduce_write(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch, const double *figures,

@@ -91,6 +91,12 @@ bool reduce_write(const reduce_request *r, size_t n_channels, size_t n_rhs, bool
 bool reduce_write_names(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
                         const double *figures, buffer *b);
 
+/* Writes a part of the text of reduce_write_names: `first` ... `first` + `count` of the figures of
+ * reduce_vectors_written, each of one vector. */
+size_t reduce_vectors_written(const reduce_request *r, size_t n_rhs);
+bool reduce_write_some(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
+                       const double *figures, size_t first, size_t count, buffer *b);
+
 /* Appends the figure of one vector: a number, or [C] of them; null for NaN. False when memory is short. */
 bool reduce_write_channels(buffer *b, const double *values, size_t n_channels);
 

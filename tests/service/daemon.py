@@ -108,8 +108,9 @@ class Daemon:
         self.process.kill()
         self.process.wait()
 
-    def connect(self):
-        return http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+    def connect(self, source="127.0.0.1"):
+        """source: the address that is the client's, any of 127.0.0.0/8."""
+        return http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE, source_address=(source, 0))
 
     def raw(self):
         return socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE)

@@ -12,6 +12,7 @@ import unittest
 
 from daemon import PATIENCE, Daemon
 from guard_case import Case, until
+from make_store import Scene
 
 SHORT = json.dumps({"emission": {"groups": {"lamp": 1}}, "select": {"elements": [0]}})
 
@@ -52,10 +53,10 @@ class Load:
 
 
 class Fair(Case):
-    def solve(self, daemon, count):
+    def solve(self, daemon, count, source="127.0.0.1"):
         """Seconds of so many solves, one after the other."""
         took = []
-        with contextlib.closing(daemon.connect()) as connection:
+        with contextlib.closing(daemon.connect(source)) as connection:
             for _ in range(count):
                 start = time.monotonic()
                 answer = daemon.radiosity("box", SHORT, connection=connection)
@@ -63,15 +64,15 @@ class Fair(Case):
                 took.append(time.monotonic() - start)
         return took
 
-    def check(self, loads, least):
+    def check(self, loads, least, stores=(), source="127.0.0.1"):
         """While each load goes on, and is answered `least` times in all, 50 solves of another client are answered: more
         than that would be answered in turn with so many others, were a solve one of many that wait."""
-        with Daemon(self.box, self.big, "--threads", 2) as daemon, contextlib.ExitStack() as stack:
+        with Daemon(self.box, self.big, *stores, "--threads", 2) as daemon, contextlib.ExitStack() as stack:
             alone = self.solve(daemon, 50)
             loads = [stack.enter_context(Load(daemon, *load)) for load in loads]
             until(lambda: all(load.answers >= 3 for load in loads))
             solved = []
-            solver = threading.Thread(target=lambda: solved.extend(self.solve(daemon, 50)))
+            solver = threading.Thread(target=lambda: solved.extend(self.solve(daemon, 50, source)))
             before = sum(load.answers for load in loads)
             solver.start()
             deadline = time.monotonic() + PATIENCE
@@ -98,6 +99,18 @@ class Fair(Case):
     def long_solves(self):
         body = json.dumps({"emissions": [{"elements": [i], "values": [1]} for i in range(64)]})
         return 8, "/v1/scenes/big/radiosity", body, 200
+
+    def test_long_reductions(self):
+        """Short bodies of another client, 740 lights by 64 groups, whose figures take far longer than any estimate by
+        the length of the body: a solve of another scene waits for a step of these on each thread, not for a whole one.
+        Before, each solve waited for more than eight of them, so that there were 400 answers in these 50 solves."""
+        store = self.folder / "groups.h5"
+        groups = [f"g{k}" for k in range(64)]
+        Scene(2000, groups=groups).write(store, "groups")
+        body = json.dumps({"emissions": [{"groups": {"g0": .001 * k}} for k in range(740)],
+                           "reduce": {"groups": groups, "with": ["mean", "sum"]}})
+        load = 8, "/v1/scenes/groups/radiosity", body, 200
+        self.check([load], 50, [store], "127.0.0.9")
 
     def test_bad_bodies(self):
         self.check([self.bad()], 400)

@@ -132,7 +132,7 @@ START_TEST(rows_answer_and_are_kept) {
                 adjoint_row *row = NULL;
                 problem why = {0};
                 ck_assert(adjoint_rows_find(&f.s, &request, &row) == (round == 1));
-                if (round == 0) ck_assert(adjoint_rows_get(&f.s, &request, &f.workspace, &row, &why));
+                if (round == 0) ck_assert(adjoint_rows_get(&f.s, &request, 0, 1, &f.workspace, &row, &why));
                 if (round == 0) first[q][g] = row;
                 ck_assert_ptr_eq(first[q][g], row);
                 judge(&f, row, &request, g);
@@ -152,11 +152,11 @@ START_TEST(the_oldest_row_goes) {
     problem why = {0};
     for (size_t g = 0; g < 5; g++) requests[g] = make_request(&f, g, LAM_RADIOSITY);
     for (size_t g = 0; g < 3; g++)
-        ck_assert(adjoint_rows_get(&f.s, &requests[g], &f.workspace, &row[g], &why));
+        ck_assert(adjoint_rows_get(&f.s, &requests[g], 0, 1, &f.workspace, &row[g], &why));
     ck_assert(adjoint_rows_find(&f.s, &requests[0], &again));
     ck_assert_ptr_eq(again, row[0]);
     adjoint_rows_release(&f.s, 1, &again);
-    ck_assert(adjoint_rows_get(&f.s, &requests[3], &f.workspace, &row[3], &why));
+    ck_assert(adjoint_rows_get(&f.s, &requests[3], 0, 1, &f.workspace, &row[3], &why));
     ck_assert(!adjoint_rows_find(&f.s, &requests[1], &again));
     judge(&f, row[1], &requests[1], 1);
     for (size_t g = 0; g < 4; g++) {
@@ -166,7 +166,7 @@ START_TEST(the_oldest_row_goes) {
         adjoint_rows_release(&f.s, 1, &again);
     }
     adjoint_rows_release(&f.s, 4, row);
-    ck_assert(adjoint_rows_get(&f.s, &requests[1], &f.workspace, &again, &why));
+    ck_assert(adjoint_rows_get(&f.s, &requests[1], 0, 1, &f.workspace, &again, &why));
     judge(&f, again, &requests[1], 1);
     adjoint_rows_release(&f.s, 1, &again);
     for (size_t g = 0; g < 5; g++) radiosity_request_free(&requests[g]);
@@ -184,7 +184,7 @@ START_TEST(a_ledger_without_room) {
     for (size_t g = 0; g < 4; g++) requests[g] = make_request(&f, g, LAM_RADIOSITY);
     atomic_store(&f.ledger.room, 2 * row_size + 1);
     for (size_t g = 0; g < 4; g++) {
-        ck_assert(adjoint_rows_get(&f.s, &requests[g], &f.workspace, &row, &why));
+        ck_assert(adjoint_rows_get(&f.s, &requests[g], 0, 1, &f.workspace, &row, &why));
         judge(&f, row, &requests[g], g);
         adjoint_rows_release(&f.s, 1, &row);
         ck_assert_uint_eq(atomic_load(&f.ledger.taken), (g < 1 ? 1 : 2) * row_size);
@@ -194,13 +194,13 @@ START_TEST(a_ledger_without_room) {
     ck_assert(adjoint_rows_find(&f.s, &requests[3], &again));
     adjoint_rows_release(&f.s, 1, &again);
     atomic_store(&f.ledger.room, row_size - 1);
-    ck_assert(adjoint_rows_get(&f.s, &requests[0], &f.workspace, &row, &why));
+    ck_assert(adjoint_rows_get(&f.s, &requests[0], 0, 1, &f.workspace, &row, &why));
     judge(&f, row, &requests[0], 0);
     adjoint_rows_release(&f.s, 1, &row);
     ck_assert(!adjoint_rows_find(&f.s, &requests[0], &again));
     ck_assert_uint_eq(atomic_load(&f.ledger.taken), 0);
     atomic_store(&f.ledger.room, SIZE_MAX);
-    ck_assert(adjoint_rows_get(&f.s, &requests[0], &f.workspace, &row, &why));
+    ck_assert(adjoint_rows_get(&f.s, &requests[0], 0, 1, &f.workspace, &row, &why));
     adjoint_rows_release(&f.s, 1, &row);
     ck_assert_uint_eq(atomic_load(&f.ledger.taken), row_size);
     for (size_t g = 0; g < 4; g++) radiosity_request_free(&requests[g]);
@@ -221,7 +221,7 @@ START_TEST(memory_runs_out) {
         for (long k = 0; !good; k++) {
             ck_assert_int_lt(k, 20);
             allocations_left = k;
-            good = adjoint_rows_get(&f.s, &request, &f.workspace, &row, &why);
+            good = adjoint_rows_get(&f.s, &request, 0, 1, &f.workspace, &row, &why);
             allocations_left = -1;
             ck_assert(good || why.status == 503);
             failed += !good;
@@ -250,7 +250,7 @@ static void *ask_often(void *context) {
         problem why = {0};
         double means[2 * C];
         if (adjoint_rows_find(&f->s, &request, &row) ||
-            adjoint_rows_get(&f->s, &request, &workspace, &row, &why)) {
+            adjoint_rows_get(&f->s, &request, 0, 1, &workspace, &row, &why)) {
             adjoint_row_evaluate(&f->s, row, &request, NULL, means);
             memcpy(me->means[k], means + C, sizeof me->means[k]);
             adjoint_rows_release(&f->s, 1, &row);
