@@ -82,18 +82,28 @@ static bool is_ended(void) {
     return sigtimedwait(&ends, NULL, &now) > 0;
 }
 
-/* Reads the stores again on every SIGHUP until another signal comes. */
+/* The same, remembered: the signal is taken once. context: a bool. */
+static bool is_ended_now(void *context) {
+    bool *const ended = context;
+    *ended = *ended || is_ended();
+    return *ended;
+}
+
+/* Reads the stores again on every SIGHUP until another signal comes, also while it reads. */
 static void serve_until_signal(service *s, const sigset_t *signals) {
     int signal_number = 0;
+    bool ended = false;
+    const stop_check stop = {is_ended_now, &ended};
     for (;;) {
-        if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP || is_ended()) return;
+        if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP || stop_asked(&stop)) return;
         access_log_reopen(s->access_log);
         lam_error error;
         if (tokens_reload(s->tokens, stderr, &error) != LAM_OK) {
             fprintf(stderr, "lambertd: the tokens stay as they were: %s\n", error.message);
             fflush(stderr);
         }
-        size_t served = catalog_reload(s->catalog);
+        size_t served = catalog_reload(s->catalog, &stop);
+        if (ended) return;
         connections_reserve(s->connections, catalog_stores(s->catalog));
         printf("reloaded: %zu scene%s\n", served, served == 1 ? "" : "s");
         fflush(stdout);
@@ -132,8 +142,8 @@ static bool idle_within(service *s, double seconds, const sigset_t *signals) {
 /* Leaves as --drain-delay and --shutdown-timeout say; a second signal hurries. True if no thread is in a
  * function that could take long. */
 static bool leave(service *s, http *h, unix_socket *own, const sigset_t *signals) {
-    atomic_store(&s->state, SERVICE_DRAINING);
-    const bool hurried = hurried_within((double)s->config->drain_delay_s, signals);
+    const bool served = atomic_exchange(&s->state, SERVICE_DRAINING) == SERVICE_READY;
+    const bool hurried = served && hurried_within((double)s->config->drain_delay_s, signals);
     http_quiesce(h);
     listener_unlink(own);
     variants_close(s->variants);
@@ -172,6 +182,8 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     service s = {.config = c};
     http *h = NULL;
     int listen_fd = -1;
+    bool ended = false;
+    const stop_check stop = {is_ended_now, &ended};
     unix_socket own = {.path = NULL};
     char where[256];
     const char **labels = memory_allocate(route_label_count(), sizeof *labels, "routes", error);
@@ -200,12 +212,14 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
                           c->unix_path == NULL ? c->listen_address : NULL, where, &s.origins, error));
     warn_if_open(&s);
     TRY(http_start(&s, listen_fd, &h, error));
-    if (catalog_reload(s.catalog) == 0) FAIL(error, LAM_ERR_IO, "no store can be served");
-    connections_reserve(s.connections, catalog_stores(s.catalog));
-    atomic_store(&s.state, SERVICE_READY);
-    printf("listening on %s\n", where);
-    fflush(stdout);
-    serve_until_signal(&s, signals);
+    if (catalog_reload(s.catalog, &stop) == 0 && !ended) FAIL(error, LAM_ERR_IO, "no store can be served");
+    if (!ended) {
+        connections_reserve(s.connections, catalog_stores(s.catalog));
+        atomic_store(&s.state, SERVICE_READY);
+        printf("listening on %s\n", where);
+        fflush(stdout);
+        serve_until_signal(&s, signals);
+    }
     if (!leave(&s, h, &own, signals)) end_at_once(&s);
 done:
     if (s.queue != NULL) batch_close(s.queue);

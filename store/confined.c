@@ -171,7 +171,8 @@ lam_status confined_start(confined_main *run, void *context, int input, const co
                            strerror(errno));
     clock_gettime(CLOCK_MONOTONIC, &out->end);
     out->end.tv_sec += limits->all_seconds;
-    out->late = false;
+    out->late = out->stopped = false;
+    out->stop = limits->stop;
     out->pid = fork();
     if (out->pid == 0) {
         confine(ends[1], input, limits);
@@ -196,11 +197,17 @@ static int time_left_ms(const struct timespec *end) {
     return ms <= 0 ? 0 : ms < 1e6 ? (int)ms + 1 : 1000000;
 }
 
+/* Milliseconds between two questions whether to wait on. */
+enum { BETWEEN_STOPS_MS = 50 };
+
 bool confined_receive(confined *c, void *out, size_t bytes) {
     for (char *at = out; bytes > 0;) {
         struct pollfd ready = {.fd = c->reply, .events = POLLIN};
         const int left_ms = time_left_ms(&c->end);
-        const int n = left_ms == 0 ? 0 : poll(&ready, 1, left_ms);
+        c->stopped = c->stopped || stop_asked(c->stop);
+        if (c->stopped) return false;
+        const int wait_ms = c->stop != NULL && left_ms > BETWEEN_STOPS_MS ? BETWEEN_STOPS_MS : left_ms;
+        const int n = left_ms == 0 ? 0 : poll(&ready, 1, wait_ms);
         if (n < 0 && errno == EINTR) continue;
         if (n == 0 && left_ms > 0) continue;
         if (n == 0) c->late = true;
@@ -236,7 +243,8 @@ lam_status confined_end(confined *c, bool answered, const char *path, int *how, 
     close(c->reply);
     c->reply = -1;
     /* The pipe of a process that crashes ends before the process. */
-    for (int k = 0; !answered && !c->late && k < 100 && runs(c->pid); k++) nanosleep(&pause, NULL);
+    for (int k = 0; !answered && !c->late && !c->stopped && k < 100 && runs(c->pid); k++)
+        nanosleep(&pause, NULL);
     const bool killed = runs(c->pid);
     if (killed) kill(c->pid, SIGKILL);
     do ended = waitpid(c->pid, &status, 0);

@@ -4,6 +4,7 @@
 #define LAMBERT_STORE_CONFINED_H
 
 #include "store/status.h"
+#include "store/stop.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -19,6 +20,7 @@ typedef struct confined_limits {
     size_t memory_bytes;  /* of address space, beyond that of the caller; a sanitizer needs more: no limit */
     bool filtered;        /* the system lets it read, write, allocate memory and end, nothing else */
     bool reads_files;     /* if filtered: it may also open files to read them, and look at names */
+    const stop_check *stop; /* asked while the answer is waited for; NULL: nobody is */
 } confined_limits;
 
 /* Runs in the child, with default signals; when it returns the child ends. */
@@ -29,6 +31,8 @@ typedef struct confined {
     int reply; /* the end of the pipe to read from; -1: none */
     struct timespec end;
     bool late; /* the answer was not whole when the time was over */
+    const stop_check *stop;
+    bool stopped; /* the answer was not whole when the wait was to be left */
 } confined;
 
 /* Starts a child, a copy of this process, which runs `run`. input: a descriptor that it gets as
@@ -36,12 +40,13 @@ typedef struct confined {
 lam_status confined_start(confined_main *run, void *context, int input, const confined_limits *limits,
                           const char *path, confined *out, lam_error *error);
 
-/* Reads exactly that many bytes of the answer; false where it or the time ends before. */
+/* Reads exactly that many bytes of the answer; false where it or the time ends before, or the wait is to be
+ * left. */
 bool confined_receive(confined *c, void *out, size_t bytes);
 
 /* Ends a child that still runs. answered: the caller has all that it wants; otherwise the child gets a moment
- * to end by itself, unless it is late. *how: its wait status, 0 if it was killed here. Errors: LAM_ERR_IO if
- * the system does not tell the end, as while SIGCHLD is ignored. */
+ * to end by itself, unless it is late or the wait was left. *how: its wait status, 0 if it was killed here.
+ * Errors: LAM_ERR_IO if the system does not tell the end, as while SIGCHLD is ignored. */
 lam_status confined_end(confined *c, bool answered, const char *path, int *how, lam_error *error);
 
 /* In the child: writes all bytes to a descriptor. */

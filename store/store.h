@@ -7,6 +7,7 @@
 #define LAMBERT_STORE_STORE_H
 
 #include "lambert/lambert.h"
+#include "store/stop.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -65,6 +66,11 @@ void store_close(store *s);
  * Errors: LAM_ERR_IO (also where no child can be started, or SIGCHLD is ignored), LAM_ERR_FORMAT (foreign or
  * truncated), LAM_ERR_VERSION, LAM_ERR_DAMAGED (also where HDF5 crashes or does not end), LAM_ERR_MEMORY. */
 lam_status store_open(const char *path, store **out, lam_error *error);
+
+/* The same, where this and everything that reads arrays of the store later is left once `stop` says so
+ * (LAM_ERR_CANCELLED): it is asked at least every 50 ms while headers are waited for, and before each MiB of
+ * an array. stop may be NULL; it outlives the store. */
+lam_status store_open_until(const char *path, const stop_check *stop, store **out, lam_error *error);
 
 /* Reads every dataset and compares it with /checksum; LAM_ERR_DAMAGED names the dataset and its MiB. */
 lam_status store_verify(store *s, lam_error *error);

@@ -181,6 +181,7 @@ lam_status store_array_load(store *s, const char *name, const store_array *array
     for (size_t i = 0; i < sum->n_pieces; i++) {
         size_t start = i * STORE_PIECE, size = piece_size(array->bytes, i);
         char *piece = data == NULL ? scratch : (char *)data + start;
+        if (stop_asked(s->stop)) FAIL(error, LAM_ERR_CANCELLED, "%s: not read to its end", s->path);
         TRY(store_data_read(s, name, array->offset + start, piece, size, error));
         if (store_checksum(piece, size) != sum->pieces[i])
             FAIL(error, LAM_ERR_DAMAGED, "%s: %s is damaged in MiB %zu of %zu; make the store again", s->path,

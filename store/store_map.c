@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -203,15 +204,15 @@ static bool is_finite(store_type type, const void *piece, size_t bytes) {
     return half == 0 && single == 0 && whole == 0;
 }
 
-lam_status store_map_verify(const store_map *map, const atomic_int *cancel, lam_error *error) {
+lam_status store_map_verify(const store_map *map, const stop_check *stop, lam_error *error) {
     for (size_t i = 0; i < map->n_arrays; i++) {
         const map_array *array = &map->arrays[i];
         for (size_t p = 0; p < array->n_pieces; p++) {
             const size_t start = p * STORE_PIECE, rest = array->bytes - start,
                          bytes = rest < STORE_PIECE ? rest : STORE_PIECE;
             const char *piece = map->base + array->offset + start;
-            if (cancel != NULL && atomic_load(cancel) != 0)
-                return status_fail(error, LAM_ERR_CANCELLED, "%s: cancelled", map->path);
+            if (stop_asked(stop))
+                return status_fail(error, LAM_ERR_CANCELLED, "%s: not read to its end", map->path);
             if (store_checksum(piece, bytes) != array->pieces[p])
                 return damaged(map, array, p, "is damaged", error);
             if (!is_finite(array->type, piece, bytes))

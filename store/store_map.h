@@ -11,8 +11,6 @@
 
 #include "store/store.h"
 
-#include <stdatomic.h>
-
 /* Bytes that can be read behind the end of the file. */
 #define STORE_MAP_SLACK 64
 
@@ -58,10 +56,10 @@ bool store_map_changed(const store_map *map);
 /* Bytes of the arrays that store_read_view gave out of the mapping. */
 size_t store_map_bytes(const store_map *map);
 
-/* Compares these arrays with their checksums, and looks for numbers that are not finite, until *cancel is not
- * 0 (LAM_ERR_CANCELLED; cancel may be NULL). Any thread, after the last store_read_view. LAM_ERR_DAMAGED
- * names the file, the array and its MiB. */
-lam_status store_map_verify(const store_map *map, const atomic_int *cancel, lam_error *error);
+/* Compares these arrays with their checksums, and looks for numbers that are not finite, until `stop` says so
+ * (LAM_ERR_CANCELLED; it is asked before each MiB, and may be NULL). Any thread, after the last
+ * store_read_view. LAM_ERR_DAMAGED names the file, the array and its MiB. */
+lam_status store_map_verify(const store_map *map, const stop_check *stop, lam_error *error);
 
 /* The message for an offset in the mapping: names the array and the MiB, as store_map_verify does, or,
  * outside all arrays, the file alone. */

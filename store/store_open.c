@@ -120,6 +120,7 @@ static lam_status read_once(store *s, confined_main *run, const confined_limits 
     TRY(status);
     if (ended != LAM_OK) FAIL(error, ended, "%s", ending.message);
     if (whole) goto done;
+    if (child.stopped) FAIL(error, LAM_ERR_CANCELLED, "%s: not read to its end", s->path);
     *again = !child.late && !(WIFSIGNALED(how) && WTERMSIG(how) == SIGXCPU);
     FAIL(error, LAM_ERR_DAMAGED, "%s: damaged so that HDF5 cannot read its headers; make the store again",
          s->path);
@@ -172,6 +173,7 @@ lam_status store_open_by(const char *path, confined_main *run, const confined_li
     store *s = NULL;
     reply_head head = {.status = LAM_OK};
     TRY(store_new(path, &s, error));
+    s->stop = limits->stop;
     TRY(open_file(s, error));
     for (int trial = 1;; trial++) {
         bool again = false;
@@ -189,6 +191,12 @@ done:
     return status;
 }
 
+lam_status store_open_until(const char *path, const stop_check *stop, store **out, lam_error *error) {
+    confined_limits limits = headers_limits;
+    limits.stop = stop;
+    return store_open_by(path, headers_main(), &limits, out, error);
+}
+
 lam_status store_open(const char *path, store **out, lam_error *error) {
-    return store_open_by(path, headers_main(), &headers_limits, out, error);
+    return store_open_until(path, NULL, out, error);
 }

@@ -88,6 +88,7 @@ struct store {
     store_sums sums;
     store_identity identity; /* of an opened file */
     store_map *map;          /* of an opened file, held; NULL: none */
+    const stop_check *stop;  /* of an opened file; NULL: what reads it is never left */
 };
 
 /* Mutes the error printing of HDF5 while one of our functions runs, and restores it then. */
@@ -181,7 +182,8 @@ lam_status store_sums_read(store *s, lam_error *error);
 lam_status store_data_read(store *s, const char *name, uint64_t offset, void *data, size_t bytes,
                            lam_error *error);
 
-/* Reads an array into data (NULL: nowhere) and compares it with its checksums. */
+/* Reads an array into data (NULL: nowhere) and compares it with its checksums. LAM_ERR_CANCELLED where the
+ * store's `stop` says so. */
 lam_status store_array_load(store *s, const char *name, const store_array *array, void *data,
                             lam_error *error);
 

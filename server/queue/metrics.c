@@ -235,7 +235,10 @@ bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b) {
 }
 
 bool metrics_write_stores(const metrics_stores *stores, buffer *b) {
-    return write_gauge(b, "lambertd_scenes_damaged", "Scenes out of service for damage.",
+    return write_gauge(b, "lambertd_stores_refused",
+                       "Stores that were refused when stores were read last (/readyz names them).",
+                       stores->n_refused) &&
+           write_gauge(b, "lambertd_scenes_damaged", "Scenes out of service for damage.",
                        stores->n_damaged) &&
            write_gauge(b, "lambertd_scenes_unverified", "Scenes whose mapped blocks are still compared.",
                        stores->n_unverified) &&

@@ -55,6 +55,7 @@ bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b);
 
 /* Figures of the scenes' mapped stores. */
 typedef struct metrics_stores {
+    size_t n_refused;               /* stores that could not be read when stores were read last */
     size_t n_damaged, n_unverified; /* scenes out of service; scenes still being compared */
     uint64_t mapped_bytes;
     long long verified_at; /* Unix time of the oldest comparison of a mapped store; 0: none */

@@ -7,7 +7,7 @@ void get_metrics(call *in, answer *out) {
     metrics_gauges gauges = {.queued = batch_jobs(s->queue),
                              .refining = atomic_load(&s->n_refining),
                              .body_bytes = request_ledger_bodies(in->memory->ledger)};
-    metrics_stores stores = {.mapped_bytes = 0};
+    metrics_stores stores = {.n_refused = snapshot->refused->count};
     size_t n_mapped = 0;
     buffer b = {0};
     size_t work_bytes = 0;

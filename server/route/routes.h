@@ -35,7 +35,7 @@ typedef struct route {
     bool also_built;   /* {name} may also be a variant that is not served yet */
 } route;
 
-#define ROUTE_NAME_MAX 256
+#define ROUTE_NAME_MAX CATALOG_NAME_MAX
 
 /* Labels for metrics: the patterns, then "other". */
 size_t route_label_count(void);

@@ -1,16 +1,15 @@
 #include "server/scene/catalog.h"
 
 #include "server/scene/log_line.h"
+#include "server/scene/refusals.h"
+#include "server/scene/sources.h"
 #include "server/scene/verifier.h"
 #include "solver/base/array_grow.h"
 
-#include <dirent.h>
-#include <errno.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 struct catalog {
     const config *config;
@@ -21,74 +20,6 @@ struct catalog {
     catalog_snapshot *present;
     uint64_t n_variants; /* made so far */
 };
-
-/* A store to read: path[path_length] may be the ':' before its name. */
-typedef struct source {
-    char *path;
-    const char *name; /* NULL: the store's own; points behind path's NUL */
-} source;
-
-typedef struct source_list {
-    source *items;
-    size_t count, capacity;
-} source_list;
-
-static void free_sources(source_list *list) {
-    for (size_t i = 0; i < list->count; i++) free(list->items[i].path);
-    free(list->items);
-}
-
-static lam_status add_source(source_list *list, const char *folder, const char *argument, bool may_name,
-                             lam_error *error) {
-    lam_status status = LAM_OK;
-    char *path = NULL;
-    TRY(array_grow(&list->items, &list->capacity, list->count + 1, sizeof *list->items, argument, error));
-    if (asprintf(&path, "%s%s%s", folder == NULL ? "" : folder, folder == NULL ? "" : "/", argument) < 0) {
-        path = NULL;
-        FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
-    }
-    source *added = &list->items[list->count++];
-    *added = (source){path, NULL};
-    /* A file whose own name has a colon is taken as it is. */
-    char *colon = may_name ? strrchr(path, ':') : NULL;
-    if (colon != NULL && colon[1] != '\0' && strchr(colon, '/') == NULL && access(path, F_OK) != 0) {
-        *colon = '\0';
-        added->name = colon + 1;
-    }
-done:
-    return status;
-}
-
-static int compare_names(const void *a, const void *b) {
-    return strcmp(*(char *const *)a, *(char *const *)b);
-}
-
-/* Every *.h5 of a folder, by name. */
-static lam_status add_folder(source_list *list, const char *folder, lam_error *error) {
-    lam_status status = LAM_OK;
-    struct dirent **entries = NULL;
-    char **names = NULL;
-    size_t count = 0;
-    int found = scandir(folder, &entries, NULL, NULL);
-    if (found < 0) FAIL(error, LAM_ERR_IO, "%s: cannot be read: %s", folder, strerror(errno));
-    names = memory_allocate((size_t)found, sizeof *names, folder, error);
-    if (names == NULL) {
-        status = LAM_ERR_MEMORY;
-        goto done;
-    }
-    for (int i = 0; i < found; i++) {
-        char *name = entries[i]->d_name;
-        size_t length = strlen(name);
-        if (name[0] != '.' && length > 3 && strcmp(name + length - 3, ".h5") == 0) names[count++] = name;
-    }
-    qsort(names, count, sizeof *names, compare_names);
-    for (size_t i = 0; i < count; i++) TRY(add_source(list, folder, names[i], false, error));
-done:
-    for (int i = 0; i < found; i++) free(entries[i]);
-    free(entries);
-    free(names);
-    return status;
-}
 
 /* The scenes in service are to be compared again. */
 static void list_again(void *context, verifier *v) {
@@ -103,6 +34,8 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
     catalog_snapshot *empty = memory_allocate(1, sizeof *empty, "catalog", error);
     if (all == NULL || empty == NULL) TRY(LAM_ERR_MEMORY);
     atomic_init(&empty->references, 1);
+    empty->refused = refusals_create();
+    if (empty->refused == NULL) FAIL(error, LAM_ERR_MEMORY, "catalog: not enough memory");
     all->config = c;
     atomic_init(&all->ledger.taken, 0);
     atomic_init(&all->ledger.room, 0); /* until the memory of the stores is known */
@@ -117,6 +50,7 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
     all = NULL;
 done:
     free(all);
+    if (empty != NULL) refusals_release(empty->refused);
     free(empty);
     return status;
 }
@@ -140,6 +74,7 @@ catalog_snapshot *catalog_acquire(catalog *all) {
 void catalog_release(catalog_snapshot *snapshot) {
     if (snapshot == NULL || atomic_fetch_sub(&snapshot->references, 1) != 1) return;
     for (size_t i = 0; i < snapshot->n_scenes; i++) scene_release(snapshot->scenes[i]);
+    refusals_release(snapshot->refused);
     free(snapshot->scenes);
     free(snapshot);
 }
@@ -159,9 +94,7 @@ const scene *catalog_find(const catalog_snapshot *snapshot, const char *name) {
 static scene *find_before(const catalog_snapshot *before, const source *from) {
     for (size_t i = 0; i < before->n_scenes; i++) {
         scene *s = before->scenes[i];
-        if (s->base == NULL && strcmp(s->path, from->path) == 0 && s->renamed == (from->name != NULL) &&
-            (from->name == NULL || strcmp(s->name, from->name) == 0))
-            return s;
+        if (s->base == NULL && strcmp(s->path, from->path) == 0 && strcmp(s->name, from->name) == 0) return s;
     }
     return NULL;
 }
@@ -254,7 +187,7 @@ static lam_status check_kept(const catalog *all, const catalog_snapshot *next, c
 
 /* Opens the store of a source and checks its memory. */
 static lam_status open_source(catalog *all, const catalog_snapshot *next, const source *from, scene *old,
-                              scene **out, lam_error *error) {
+                              const stop_check *stop, scene **out, lam_error *error) {
     lam_status status = LAM_OK;
     scene *opened = NULL;
     /* A store that was damaged is verified as a whole first. */
@@ -266,7 +199,8 @@ static lam_status open_source(catalog *all, const catalog_snapshot *next, const 
                              .memory = memory_left(all, next, memory_grown(next)),
                              .ledger = &all->ledger,
                              .before = old,
-                             .threads = all->config->threads};
+                             .threads = all->config->threads,
+                             .stop = stop};
     status = scene_open(&options, &opened, error);
     if (status == LAM_ERR_MEMORY && memory_grown(next) > 0) {
         drop_all_computed(next);
@@ -282,29 +216,60 @@ done:
     return status;
 }
 
+/* A name that clients can put into a path, which they shorten by "." and "..". */
+static lam_status check_name(const source *from, lam_error *error) {
+    const size_t length = strlen(from->name);
+    if (strcmp(from->name, ".") == 0 || strcmp(from->name, "..") == 0)
+        return status_fail(
+            error, LAM_ERR_ARGUMENT,
+            "%s: no client can ask for a scene called \"%s\"; give it another name: STORE:NAME", from->path,
+            from->name);
+    if (length >= CATALOG_NAME_MAX)
+        return status_fail(
+            error, LAM_ERR_ARGUMENT,
+            "%s: the name has %zu bytes, at most %d can be asked for; give it another: STORE:NAME",
+            from->path, length, CATALOG_NAME_MAX - 1);
+    return LAM_OK;
+}
+
+/* reason: for clients, where the message has the path of another store; or NULL. */
+static void refuse(catalog *all, catalog_snapshot *next, const source *from, const lam_error *error,
+                   const char *reason) {
+    /* Most messages begin with the path, some (out of memory) do not. */
+    const bool named = strncmp(error->message, from->path, strlen(from->path)) == 0;
+    log_line(all->problems, "refused %s%s%s", named ? "" : from->path, named ? "" : ": ", error->message);
+    refusals_add(next->refused, from->path, from->name, reason != NULL ? reason : error->message, false);
+}
+
 static void load_source(catalog *all, catalog_snapshot *next, const catalog_snapshot *before,
-                        const source *from) {
+                        const source *from, const stop_check *stop) {
     lam_error error = {0};
     scene *loaded = NULL, *old = find_before(before, from);
-    FILE *problems = all->problems;
-    if (open_source(all, next, from, old, &loaded, &error) != LAM_OK) {
-        if (old == NULL || check_kept(all, next, old, NULL) != LAM_OK) {
-            /* Most messages begin with the path, some (out of memory) do not. */
-            bool named = strncmp(error.message, from->path, strlen(from->path)) == 0;
-            log_line(problems, "refused %s%s%s", named ? "" : from->path, named ? "" : ": ", error.message);
-            return;
-        }
-        log_line(problems, "kept the %s read before; %s cannot be read now: %s", old->name, from->path,
-                 error.message);
-        loaded = scene_acquire(old);
-    }
-    const scene *taken = insert(next, loaded);
-    if (taken != NULL) {
-        log_line(problems, "refused %s: the name %s is taken by %s; give it another: %s:NAME", from->path,
-                 loaded->name, taken->path, from->path);
-        scene_release(loaded);
+    const scene *taken = catalog_find(next, from->name);
+    lam_status status = check_name(from, &error);
+    if (status == LAM_OK && taken != NULL)
+        status =
+            status_fail(&error, LAM_ERR_ARGUMENT,
+                        "%s: the name %s is taken by %s; rename the file, or give the scene another name: "
+                        "STORE:NAME",
+                        from->path, from->name, taken->path);
+    if (status != LAM_OK) {
+        refuse(all, next, from, &error, taken != NULL ? "another store has its name" : NULL);
         return;
     }
+    status = open_source(all, next, from, old, stop, &loaded, &error);
+    if (status == LAM_ERR_CANCELLED) return; /* it is neither served nor refused */
+    if (status != LAM_OK) {
+        if (old == NULL || check_kept(all, next, old, NULL) != LAM_OK) {
+            refuse(all, next, from, &error, NULL);
+            return;
+        }
+        log_line(all->problems, "kept the %s read before; %s cannot be read now: %s", old->name, from->path,
+                 error.message);
+        refusals_add(next->refused, from->path, from->name, error.message, true);
+        loaded = scene_acquire(old);
+    }
+    (void)insert(next, loaded);
     log_line(all->out, "serving %s: %zu elements, %zu channel%s, %s, from %s", loaded->name, loaded->n,
              loaded->n_channels, loaded->n_channels == 1 ? "" : "s", lam_operator_kind(loaded->op),
              loaded->path);
@@ -369,6 +334,7 @@ static lam_status copy_without(const catalog_snapshot *present, const char *name
     for (size_t i = 0; i < present->n_scenes; i++)
         if (strcmp(present->scenes[i]->name, name) != 0)
             made->scenes[made->n_scenes++] = scene_acquire(present->scenes[i]);
+    made->refused = refusals_hold(present->refused);
     *out = made;
     return LAM_OK;
 }
@@ -415,16 +381,6 @@ done:
     return status;
 }
 
-/* Every store that the configuration names now. */
-static lam_status find_sources(const catalog *all, source_list *sources, lam_error *error) {
-    lam_status status = LAM_OK;
-    for (size_t i = 0; i < all->config->n_stores; i++)
-        TRY(add_source(sources, NULL, all->config->stores[i], true, error));
-    if (all->config->stores_dir != NULL) TRY(add_folder(sources, all->config->stores_dir, error));
-done:
-    return status;
-}
-
 size_t catalog_stores(catalog *all) {
     source_list sources = {0};
     lam_error unused;
@@ -432,25 +388,31 @@ size_t catalog_stores(catalog *all) {
     size_t count = 0;
     for (size_t i = 0; i < present->n_scenes; i++) count += present->scenes[i]->base == NULL;
     catalog_release(present);
-    if (count == 0 && find_sources(all, &sources, &unused) == LAM_OK) count = sources.count;
-    free_sources(&sources);
+    if (count == 0 && sources_find(all->config, &sources, &unused) == LAM_OK) count = sources.count;
+    sources_free(&sources);
     return count;
 }
 
-size_t catalog_reload(catalog *all) {
+size_t catalog_reload(catalog *all, const stop_check *stop) {
     source_list sources = {0};
     lam_error error = {0};
     lam_status status = LAM_OK;
     catalog_snapshot *before = catalog_acquire(all), *next = NULL;
     if (all->config->max_memory > 0) atomic_store(&all->ledger.room, 0); /* no scene grows meanwhile */
-    TRY(find_sources(all, &sources, &error));
+    TRY(sources_find(all->config, &sources, &error));
     next = memory_allocate(1, sizeof *next, "catalog", &error);
     if (next == NULL) TRY(LAM_ERR_MEMORY);
     atomic_init(&next->references, 1);
     const size_t most = sources.count + all->config->max_variants;
     next->scenes = memory_allocate(most, sizeof *next->scenes, "catalog", &error);
     if (next->scenes == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < sources.count; i++) load_source(all, next, before, &sources.items[i]);
+    next->refused = refusals_create();
+    if (next->refused == NULL) FAIL(&error, LAM_ERR_MEMORY, "catalog: not enough memory");
+    for (size_t i = 0; i < sources.count; i++) {
+        load_source(all, next, before, &sources.items[i], stop);
+        if (stop_asked(stop))
+            FAIL(&error, LAM_ERR_CANCELLED, "left off reading stores at %zu of %zu", i + 1, sources.count);
+    }
     pthread_mutex_lock(&all->lock);
     catalog_snapshot *old = all->present;
     keep_variants(all, next,
@@ -464,7 +426,7 @@ done:
     if (status != LAM_OK) log_line(all->problems, "%s", error.message);
     catalog_release(next);
     catalog_release(before);
-    free_sources(&sources);
+    sources_free(&sources);
     /* Returns the memory of the old stores to the system, so that a daemon does not keep its peak for months.
      */
     (void)malloc_trim(0);

@@ -4,12 +4,17 @@
 #define LAMBERT_SERVER_SCENE_CATALOG_H
 
 #include "server/config.h"
+#include "server/scene/refusals.h"
 #include "server/scene/scene.h"
+
+/* More than the bytes of any scene's name, as a path has it. */
+enum { CATALOG_NAME_MAX = 256 };
 
 typedef struct catalog_snapshot {
     atomic_size_t references;
     size_t n_scenes;
-    scene **scenes; /* by name */
+    scene **scenes;    /* by name */
+    refusals *refused; /* held */
 } catalog_snapshot;
 
 typedef struct catalog catalog;
@@ -22,8 +27,9 @@ void catalog_destroy(catalog *all);
 /* Reads every store and replaces the snapshot. An unchanged file keeps its scene. A store that cannot be read
  * keeps the scene read before, or is left out if there is none or it exceeds --max-memory. Mapped arrays of
  * --verify-below or more are verified later. Variants of kept scenes stay, others are dropped. Returns the
- * number of scenes served. One thread at a time. */
-size_t catalog_reload(catalog *all);
+ * number of scenes served. Once `stop` (or NULL) says so, asked as scene_open does, the rest is left, and the
+ * snapshot stays as it was. One thread at a time. */
+size_t catalog_reload(catalog *all, const stop_check *stop);
 
 /* Has the mapped arrays of a scene that is served compared again, as an answer makes one doubt them; at most
  * once in a minute. Any thread. */

@@ -74,7 +74,9 @@ static lam_status describe_scene(store *s, const scene *loaded, char **text, lam
     json_t *made = NULL;
     TRY(describe_store(s, &made, error));
     if (json_object_set_new(made, "name", json_string(loaded->name)) != 0)
-        FAIL(error, LAM_ERR_FORMAT, "%s: its name is not UTF-8; give it one: %s:NAME", loaded->path,
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: its name is not UTF-8; rename the file, or give the scene another "
+             "name: STORE:NAME",
              loaded->path);
     char *written = json_dumps(made, JSON_COMPACT);
     if (written == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", loaded->path);
@@ -230,7 +232,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     const bool first = options->verify || store_map_bytes(store_map_of(s)) < options->verify_below;
     TRY(scene_health_create(made->path, made->map, first, &made->health, error));
     /* Under the guard just made. Only here is it known which numbers are mapped, which must be finite. */
-    if (first && made->map != NULL) TRY(store_map_verify(made->map, NULL, error));
+    if (first && made->map != NULL) TRY(store_map_verify(made->map, options->stop, error));
 done:
     return status;
 }
@@ -252,21 +254,15 @@ lam_status scene_open(const scene_options *options, scene **out, lam_error *erro
     atomic_init(&made->references, 1);
     made->path = strdup(path);
     if (made->path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
-    TRY(store_open(path, &s, error));
+    TRY(store_open_until(path, options->stop, &s, error));
     made->identity = *store_identity_of(s);
     if (is_unchanged(options, s)) {
         if (options->verify) TRY(store_verify(s, error));
         *out = scene_acquire(options->before);
         goto done;
     }
-    made->renamed = options->name != NULL;
-    if (options->name != NULL)
-        made->name = strdup(options->name);
-    else
-        TRY(store_get_text(s, "/", "name", &made->name, error));
+    made->name = strdup(options->name);
     if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
-    if (made->name[0] == '\0')
-        FAIL(error, LAM_ERR_FORMAT, "%s: the store's name is empty; give it one: %s:NAME", path, path);
     TRY(read_store(s, options, made, error));
     *out = made;
     made = NULL;
@@ -351,10 +347,10 @@ void scene_release(scene *s) {
     free(s);
 }
 
-lam_status scene_verify(scene *s, const atomic_int *cancel, lam_error *error) {
+lam_status scene_verify(scene *s, const stop_check *stop, lam_error *error) {
     scene_health *health = s->health;
     lam_error damage;
-    const lam_status status = store_map_verify(s->map, cancel, &damage);
+    const lam_status status = store_map_verify(s->map, stop, &damage);
     if (status == LAM_OK) {
         atomic_store(&health->verified_at, (long long)time(NULL));
         atomic_store(&health->state, HEALTH_SOUND);

@@ -24,8 +24,7 @@ typedef struct scene_health scene_health;
 typedef struct scene scene;
 struct scene {
     atomic_size_t references;
-    char *name;   /* as served */
-    bool renamed; /* the name was given on the command line, it is not the store's own */
+    char *name; /* as served */
     char *path;
     store_identity identity;
     scene *base; /* of a variant, held: path, groups, areas, sky, health and factors belong to it. NULL: this
@@ -60,20 +59,21 @@ struct scene {
 };
 
 typedef struct scene_options {
-    const char *path, *name; /* name NULL: the store's own */
-    bool verify;             /* first compare the whole file with its checksums */
-    uint64_t verify_below;   /* or, where mapped arrays take fewer bytes, first compare these */
-    uint64_t memory;         /* limit of its memory in bytes; UINT64_MAX: none */
-    memory_ledger *ledger;   /* or NULL; outlives the scene */
-    scene *before;           /* the present scene of this path and name, or NULL */
-    size_t threads;          /* for one answer, at most */
+    const char *path, *name;
+    bool verify;            /* first compare the whole file with its checksums */
+    uint64_t verify_below;  /* or, where mapped arrays take fewer bytes, first compare these */
+    uint64_t memory;        /* limit of its memory in bytes; UINT64_MAX: none */
+    memory_ledger *ledger;  /* or NULL; outlives the scene */
+    scene *before;          /* the present scene of this path and name, or NULL */
+    size_t threads;         /* for one answer, at most */
+    const stop_check *stop; /* or NULL; asked at least every 50 ms, and before each MiB that is read */
 } scene_options;
 
 /* Opens a store. The file is closed before this returns, except for its mapped arrays. Headers, checksums of
  * checksums, /mesh and all arrays that are not mapped are verified here; mapped arrays are left to
  * scene_verify, unless the options have them compared here. If the file is still that of options->before, of
  * which no damage is known, that scene is returned. Errors: as store_open and operator_load; LAM_ERR_MEMORY
- * names the sizes if it does not fit. Each names the path. */
+ * names the sizes if it does not fit; LAM_ERR_CANCELLED once `stop` says so. Each names the path. */
 lam_status scene_open(const scene_options *options, scene **out, lam_error *error);
 
 /* Bytes that the scene has taken of its ledger since it was opened. Any thread. */
@@ -138,7 +138,7 @@ void scene_release(scene *s);
 /* Compares mapped arrays with their checksums, again where they were compared before; something is mapped.
  * After LAM_ERR_DAMAGED the scene is out of service. One thread at a time, while others solve. Errors: as
  * store_map_verify. */
-lam_status scene_verify(scene *s, const atomic_int *cancel, lam_error *error);
+lam_status scene_verify(scene *s, const stop_check *stop, lam_error *error);
 
 /* True if mapped arrays were compared, with whatever result, or nothing is mapped. Any thread. */
 bool scene_verified(const scene *s);

@@ -24,6 +24,11 @@ struct verifier {
     atomic_int stopped;
 };
 
+static bool is_stopped(void *context) {
+    verifier *v = context;
+    return atomic_load(&v->stopped) != 0;
+}
+
 void verifier_report_damage(FILE *problems, const scene *s, const lam_error *why) {
     log_line(problems, "took %s out of service: %s", s->name, why->message);
 }
@@ -33,7 +38,8 @@ static void verify(verifier *v, scene *s) {
     bool news;
     /* This thread has the only reference: the scene was replaced while it waited. */
     if (atomic_load(&s->references) == 1) return;
-    const lam_status status = scene_verify(s, &v->stopped, &error);
+    const stop_check stop = {is_stopped, v};
+    const lam_status status = scene_verify(s, &stop, &error);
     if (scene_damaged(s, &error, &news)) {
         if (news) verifier_report_damage(v->problems, s, &error);
     } else if (status == LAM_OK) {

@@ -1,5 +1,6 @@
 #include "solver/verbs/view_link.h"
 
+#include "solver/base/file_stem.h"
 #include "store/store.h"
 
 #include <jansson.h>
@@ -37,12 +38,8 @@ static lam_status read_scene(const char *argument, linked_scene *out, lam_error 
     TRY(store_read_texts(s, "/mesh/group_names", &out->n_groups, &out->groups, error));
     TRY(store_array_info(s, "/mesh/reflectance", &type, &rank, dims, error));
     out->n_channels = dims[0];
-    if (given == NULL) {
-        TRY(store_get_text(s, "/", "name", &out->name, error));
-    } else {
-        out->name = strdup(given);
-        if (out->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
-    }
+    out->name = given != NULL ? strdup(given) : file_stem(path);
+    if (out->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
 done:
     store_close(s);
     free(path);

@@ -58,7 +58,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     for (int verify = 0; verify < 2; verify++) {
         scene *s = NULL;
         const scene_options options = {
-            .path = path, .verify = verify == 1, .memory = UINT64_MAX, .threads = 1};
+            .path = path, .name = "fuzz", .verify = verify == 1, .memory = UINT64_MAX, .threads = 1};
         lam_error error = {.message = ""};
         if (scene_open(&options, &s, &error) == LAM_OK) {
             apply(s);

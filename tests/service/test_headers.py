@@ -170,7 +170,7 @@ class Headers(unittest.TestCase):
         kinds = {"lambertd_requests": "counter", "lambertd_request_duration_seconds": "histogram",
                  "lambertd_batch_size": "histogram", "lambertd_in_flight": "gauge", "lambertd_queued": "gauge",
                  "lambertd_body_bytes": "gauge", "lambertd_scenes": "gauge", "lambertd_operator_bytes": "gauge",
-                 "lambertd_mapped_bytes": "gauge", "lambertd_scenes_damaged": "gauge",
+                 "lambertd_mapped_bytes": "gauge", "lambertd_scenes_damaged": "gauge", "lambertd_stores_refused": "gauge",
                  "lambertd_scenes_unverified": "gauge", "lambertd_connections": "gauge", "lambertd_connections_most": "gauge",
                  "lambertd_connections_cut": "counter", "lambertd_access_log_lost": "counter",
                  "lambertd_queue_wait_seconds": "histogram", "lambertd_refining": "gauge", "lambertd_solves_refused": "counter"}

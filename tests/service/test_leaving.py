@@ -1,6 +1,8 @@
 """A lambertd leaves: balancers are told before it stops to accept, what runs has its time, what is left is told so."""
 
+import pathlib
 import signal
+import tempfile
 import time
 import unittest
 
@@ -65,6 +67,47 @@ class Leaving(Case):
             start = time.monotonic()
             daemon.signal(signal.SIGTERM)
             self.check_end(daemon, clients, start, 0)
+
+    def many_stores(self, count):
+        """A folder of so many names of one store."""
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        for k in range(count):
+            pathlib.Path(folder.name, f"s{k:04}.h5").symlink_to(self.folder / "box.h5")
+        return folder.name
+
+    def check_left_off(self, daemon, signals, before):
+        """It ends while most stores of 1,000 are still to be read: it leaves between two of them, not behind the last
+        one. It is told so when it has read a few; those that it reads until the signal is there are its pace's."""
+        for _ in range(signals):
+            daemon.signal(signal.SIGTERM)
+            time.sleep(.05)
+        self.assertEqual(daemon.wait(), 0)
+        read = daemon.output().count("serving") - before
+        print(f"{read} of 1000 stores were read")
+        self.assertLess(read, 500)
+        self.assertRegex(daemon.errors(), r"left off reading stores at \d+ of 1000\n")
+
+    def test_a_first_load_is_left_off(self):
+        for signals in 1, 2:
+            with self.subTest(signals=signals), Daemon("--stores", self.many_stores(1000), ready=False) as daemon:
+                daemon.wait_for("serving", 3)
+                self.check_left_off(daemon, signals, 0)
+                self.assertNotIn("listening", daemon.output())
+
+    def test_a_reload_is_left_off(self):
+        with tempfile.TemporaryDirectory() as folder:
+            stores = pathlib.Path(folder, "stores")
+            stores.mkdir()
+            (stores / "box.h5").symlink_to(self.folder / "box.h5")
+            with Daemon("--stores", stores) as daemon:
+                for path in pathlib.Path(self.many_stores(999)).iterdir():
+                    path.rename(stores / path.name)
+                daemon.signal(signal.SIGHUP)
+                daemon.wait_for("serving", 4)
+                self.assertEqual(daemon.get("/v1/scenes/box").status, 200)
+                self.check_left_off(daemon, 2, 1)
+                self.assertNotIn("reloaded", daemon.output())
 
     def test_a_solve_that_ends_in_time_is_answered(self):
         with self.daemon() as daemon:

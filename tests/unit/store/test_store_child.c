@@ -133,6 +133,35 @@ START_TEST(what_does_not_end_is_ended) {
 }
 END_TEST
 
+/* Stops once it was asked so often. */
+typedef struct patience {
+    size_t asked, most;
+} patience;
+
+static bool is_over(void *context) {
+    patience *p = context;
+    return ++p->asked > p->most;
+}
+
+/* A child that takes long is ended as soon as nobody waits for it any more, and so is the reading of arrays,
+ * between two MiB. */
+START_TEST(what_is_not_waited_for_is_left) {
+    patience p = {.most = 2};
+    const stop_check stop = {is_over, &p};
+    confined_limits stopped = limits;
+    stopped.stop = &stop;
+    check_refused(sleep_long, &stopped, LAM_ERR_CANCELLED, "not read to its end");
+    ck_assert_uint_eq(p.asked, 3);
+    p = (patience){.most = SIZE_MAX};
+    store *s = NULL;
+    ck_ok(store_open_until(path, &stop, &s, &error));
+    p = (patience){.most = 3};
+    ck_assert(store_verify(s, &error) == LAM_ERR_CANCELLED);
+    ck_assert_uint_eq(p.asked, 4);
+    store_close(s);
+}
+END_TEST
+
 /* A process that may have no children: of an ordinary user, since root may have any number. Afterwards it is
  * as before, as a sanitizer starts a thread when it ends. */
 START_TEST(without_a_child_nothing_is_opened) {
@@ -331,6 +360,7 @@ int main(void) {
     tcase_add_checked_fixture(tests, setup, teardown);
     tcase_add_loop_test(tests, crashes_are_refused, 0, 5);
     tcase_add_test(tests, what_does_not_end_is_ended);
+    tcase_add_test(tests, what_is_not_waited_for_is_left);
     tcase_add_test(tests, without_a_child_nothing_is_opened);
     tcase_add_test(tests, an_unknown_end_is_refused);
     tcase_add_test(tests, it_has_no_rights);
