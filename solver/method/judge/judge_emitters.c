@@ -1,14 +1,20 @@
 #include "solver/method/judge/judge_emitters.h"
 
+#include "solver/method/judge/judge_black.h"
 #include "solver/method/judge/judge_lit.h"
 #include "solver/method/judge/judge_sky.h"
 #include "solver/operator/emitters.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Probes in one go. */
 enum { AT_ONCE = 8 };
+
+/* A sky that sends less than this share of what a tile of its radiance sends on average, by the samples, is
+ * all but hidden: what it is off by is no light, and its ratio to what there is is nothing but noise. */
+static const double hidden = .01;
 
 bool judge_emitters_are_lit(const lam_operator *op, const judge_input *input) {
     return lam_operator_emitters(op) > 0 && input->sky != NULL && judge_sky_is_asked(op);
@@ -99,9 +105,41 @@ done:
     return status;
 }
 
+/* The light that a tile of radiance 1 gives to elements that reflect it, or that are judged by it, on
+ * average.
+ */
+static double light_of_tile(const judge_input *input) {
+    const build_problem *p = input->problem;
+    const size_t n = p->n, m = input->sky->n_tiles;
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) {
+        double seen = 0, rho = 0;
+        for (size_t t = 0; t < m; t++) seen += (double)input->sky->own[t * n + i];
+        for (size_t c = 0; c < p->n_channels; c++) rho += judge_reflectance(input, c, i);
+        sum += p->area[i] * rho * seen;
+    }
+    return sum / (double)m;
+}
+
+/* True where probe v is hidden: of E and direct by both samples, which lit_probes_solve made their mean. */
+static bool is_hidden(const some_probes *s, size_t v, double of_tile) {
+    const judge_input *input = s->input;
+    const size_t n = input->problem->n, vector = n * input->problem->n_channels;
+    const size_t all = input->problem->n_channels * input->sky->n_tiles;
+    double light = 0, brightest = 0;
+    for (size_t k = 0; k < vector; k++) {
+        light += input->problem->area[k % n] * (double)s->lit.E[1][v * vector + k];
+        if (judge_is_black(input, k % n))
+            light += input->problem->area[k % n] * (double)s->lit.direct[1][v * vector + k];
+    }
+    for (size_t k = 0; k < all; k++) brightest = fmax(brightest, (double)s->L[v * all + k]);
+    return light < hidden * brightest * of_tile;
+}
+
 lam_status judge_emitters_add(const lam_operator *op, const probes *p, judge_rounds *r, lam_error *error) {
     lam_status status = LAM_OK;
     some_probes s = {.first = 0};
+    const double of_tile = light_of_tile(r->input);
     if (r->n == 0) r->tiles_left = judge_sky_tiles(r->input->problem->n);
     TRY(some_make(r->input, p, &s, error));
     for (; s.first < p->m; s.first += AT_ONCE) {
@@ -110,6 +148,7 @@ lam_status judge_emitters_add(const lam_operator *op, const probes *p, judge_rou
         TRY(lit_probes_solve(op, r->input, &s.lit, error));
         for (size_t v = 0; v < s.lit.count; v++) {
             const figure_probe one = lit_probes_at(r->input, &s.lit, v);
+            if (is_hidden(&s, v, of_tile)) continue;
             int group = 0;
             while (p->begin[group + 1] <= s.first + v) group++;
             judge_rounds_add_total(r, group, &one);

@@ -3,6 +3,7 @@
 #include "support/suite.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { N = 3, C = 2, G = 2, TILES = 2 };
@@ -21,6 +22,8 @@ static double sky_tiles[] = {.07, .06}, sky_even[] = {.01, .02}, sky_mean_tiles[
               sky_mean_even[] = {.002, .003};
 static double bin_area[] = {3, 4}, squares[] = {5, 16}, mean_rho[] = {.5, .25, .5, .75};
 static uint32_t bin[] = {0, 0, 1};
+/* Means over elements and channels of rho^2; of lamp (.0625 + .5625) / 2. */
+static reflecting of_group[] = {{.25, .25, false}, {.3125, .3125, false}};
 static double sky_power[] = {2, 1, 3, 1}, sky_first[] = {.1, .2, .3, .4};
 static const error_by_group stated = {
     .n_groups = G,
@@ -36,6 +39,7 @@ static const error_by_group stated = {
     .area = bin_area,
     .squares = squares,
     .reflectance = mean_rho,
+    .of_group = of_group,
     .bin = bin,
     .sky_power = sky_power,
     .sky_first = sky_first,
@@ -52,9 +56,16 @@ static double law(double P2, double number, double a, double b, double c) {
 static const float L[C * TILES] = {1, 3, 2, 2};
 static const double sky_P2 = 89, sky_squares = 53, sky_S = 8. / 3, sky_D[G] = {.25 * .4, .0625 * 7.6 / 9};
 
-/* direct^2 D + tiles^2 S + even^2 P^2. */
+/* The same for irradiance, rho being 1 in D: .4 and 7.6 / 9. */
+static const double white_D[G] = {.1 * 4 / 9 + .2 * 16 / 9, .3 * 4 / 9 + .4 * 16 / 9};
+
+/* direct^2 D + tiles^2 S + even^2 P^2, the last two over rho^2. */
+static double law_over(double D, double tiles, double evenly, double rho2) {
+    return .25 * D + (tiles * tiles * sky_S + evenly * evenly * sky_P2) / rho2;
+}
+
 static double law_of_sky(double D, double tiles, double evenly) {
-    return .25 * D + tiles * tiles * sky_S + evenly * evenly * sky_P2;
+    return law_over(D, tiles, evenly, 1);
 }
 
 /* Emission of elements 0 and 2 and the direct light of a sky; the reflected light r. */
@@ -86,18 +97,23 @@ START_TEST(all_elements_count_by_their_group) {
     answer_error found;
     fill(quantity, lit, values);
     error_answer of = answer_of(quantity, values);
-    double off = 3 * law(P2, P2 / A2E2, .03, .04, .01) + 4 * law(P2, P2 / A2E2, .01, .005, .02);
+    /* Of H all of it is over rho^2, and D is that of white elements. */
+    const bool white = quantity == LAM_IRRADIANCE;
+    const double desk = white ? .25 : 1, lamp = white ? .3125 : 1;
+    double off = 3 * law(P2, P2 / A2E2, .03, .04, .01) / desk + 4 * law(P2, P2 / A2E2, .01, .005, .02) / lamp;
     if (lit) {
         of.H0 = H0;
         of.L = L;
         for (size_t c = 0; c < C; c++)
             emission_size_add(&of.sky, TILES, sky_power + c * TILES, L + c * TILES);
-        off += 3 * law_of_sky(sky_D[0], .07, .01) + 4 * law_of_sky(sky_D[1], .06, .02);
+        off += 3 * law_over((white ? white_D : sky_D)[0], .07, .01, desk) +
+               4 * law_over((white ? white_D : sky_D)[1], .06, .02, lamp);
     }
     double reflected = 0, radiosity = 0;
     for (size_t k = 0; k < C * N; k++) {
-        const double b = r[k] + (double)E[k] + (lit ? (double)rho[k] * (double)H0[k] : 0);
-        reflected += area[k % N] * r[k] * r[k];
+        const double sky = lit ? (double)H0[k] : 0, h = r[k] / (double)rho[k];
+        const double d = white ? h : r[k], b = white ? h + sky : r[k] + (double)E[k] + (double)rho[k] * sky;
+        reflected += area[k % N] * d * d;
         radiosity += area[k % N] * b * b;
     }
     ck_assert(answer_error_of(&stated, &scene, &of, &found));
@@ -139,14 +155,18 @@ START_TEST(names_have_errors_of_their_means) {
     fill(quantity, false, values);
     const error_answer of = answer_of(quantity, values);
     ck_assert(name_errors_of(&stated, &scene, &of, &request, found));
-    const double number = P2 / A2E2, mean0 = law(P2, number, .03, .02, .001),
-                 rms0 = law(P2, number, .03, .04, .01);
-    const double r0 = (.5 + 2 * .25) / 3, r1 = (1 + 2 * .5) / 3, reflected = r0 * r0 + r1 * r1;
+    const bool white = quantity == LAM_IRRADIANCE;
+    const double desk_rho2 = white ? .25 : 1, lamp_rho2 = white ? .3125 : 1, rho0 = white ? .25 : 1,
+                 rho1 = white ? .75 : 1, desk_rho = white ? .5 : 1;
+    const double number = P2 / A2E2, mean0 = law(P2, number, .03, .02, .001) / desk_rho2,
+                 rms0 = law(P2, number, .03, .04, .01) / desk_rho2;
+    const double r0 = (.5 + 2 * .25) / 3 / desk_rho, r1 = (1 + 2 * .5) / 3 / desk_rho,
+                 reflected = r0 * r0 + r1 * r1;
     ck_assert_str_eq(found[0].name, "kept");
     ck_assert_double_eq_tol(found[0].mean, sqrt(mean0 / (reflected - mean0)), 1e-5);
     ck_assert_double_eq_tol(found[0].elements, sqrt(rms0 / (reflected - rms0)), 1e-4);
-    const double all = (3 * mean0 + 4 * law(P2, number, .01, .005, .002)) / 7;
-    const double a0 = (3 * r0 + 4 * .125) / 7, a1 = (3 * r1 + 4 * .25) / 7;
+    const double all = (3 * mean0 + 4 * law(P2, number, .01, .005, .002) / lamp_rho2) / 7;
+    const double a0 = (3 * r0 + 4 * .125 / rho0) / 7, a1 = (3 * r1 + 4 * .25 / rho1) / 7;
     ck_assert_double_eq_tol(found[1].mean, sqrt(all / (a0 * a0 + a1 * a1 - all)), 1e-5);
     /* By means alone; in a group that has one reflectance. */
     double value[C] = {0}, emission[C] = {0};
@@ -190,9 +210,9 @@ START_TEST(single_tiles_have_their_own_errors) {
     error_by_group by_tile = stated;
     const uint32_t desk[] = {0};
     reduce_name list[] = {{.groups = desk, .n_groups = 1}};
-    const double direct[C] = {.1, .2}, none[C] = {0}, value[C] = {1, 2};
+    const double direct[C] = {.1, .2}, none[C] = {0}, value[C] = {1 + .5 * .1, 2 + .5 * .2};
     const name_means means = {
-        .quantity = LAM_INDIRECT, .L = L, .value = value, .emission = none, .direct = direct};
+        .quantity = LAM_RADIOSITY, .L = L, .value = value, .emission = none, .direct = direct};
     by_tile.sky.bounced = bounced;
     by_tile.sky.mean_bounced = mean_bounced;
     by_tile.elements_off = elements_off;
@@ -210,7 +230,70 @@ START_TEST(single_tiles_have_their_own_errors) {
 }
 END_TEST
 
-/* A sky of a store that states nothing of skies adds nothing. */
+/* Light that is reflected has no errors of what is direct: bounced^2 times those of the power, W and (A
+ * mean_even)^2 P^2 of the groups, and the law of an emission of all elements, whose number is (sum A)^2 / sum
+ * A^2 = 49 / 21; or what tiles^2 S and even^2 P^2 say, where that is less, as it is here of the mean. */
+START_TEST(reflected_light_has_no_direct_errors) {
+    static double off[] = {.01, .02, .03, .04}, power_off[] = {.5, .25, 8, 9};
+    static double bounced[] = {.02, .3}, mean_bounced[] = {.1, .15};
+    const double W = (.5 * 4 + .25 * 16) / 9, even2 = (9 * .002 * .002 + 16 * .003 * .003) * sky_P2;
+    error_by_group by_tile = stated;
+    const uint32_t desk[] = {0};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}};
+    const double direct[C] = {.1, .2}, none[C] = {0}, value[C] = {3, 4};
+    const name_means means = {
+        .quantity = LAM_INDIRECT, .L = L, .value = value, .emission = none, .direct = direct};
+    by_tile.sky.bounced = bounced;
+    by_tile.sky.mean_bounced = mean_bounced;
+    by_tile.elements_off = by_tile.means_off = off;
+    by_tile.power_off = power_off;
+    const double sent = .0004 * (W + even2) + law(sky_P2, 49. / 21, .03, .04, .01);
+    const double all = .0004 * W + .07 * .07 * sky_S + .01 * .01 * sky_P2;
+    const double mean_all = .01 * W + .03 * .03 * sky_S + .002 * .002 * sky_P2;
+    const double mean_sent = .01 * (W + even2) + law(sky_P2, 49. / 21, .03, .02, .001);
+    const double rms = fmin(all, sent), mean = fmin(mean_all, mean_sent);
+    const name_error found = name_error_of_means(&by_tile, &list[0], &means);
+    ck_assert_double_eq_tol(found.elements, sqrt(rms / (25 - rms)), 1e-6);
+    ck_assert_double_eq_tol(found.mean, sqrt(mean / (25 - mean)), 1e-6);
+}
+END_TEST
+
+/* What is stated of a group that reflects nothing is of its irradiance alone. */
+START_TEST(black_groups_have_errors_of_their_irradiance) {
+    static reflecting with_black[] = {{1, 1, true}, {.3125, .3125, false}};
+    error_by_group black = stated;
+    const uint32_t desk[] = {0};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}};
+    const double none[C] = {0}, value[C] = {3, 4};
+    black.of_group = with_black;
+    for (int k = 0; k < 3; k++) {
+        const lam_quantity quantity = (lam_quantity[]){LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT}[k];
+        const name_means means = {
+            .quantity = quantity, .size = {P2, A2E2}, .value = value, .emission = none, .direct = none};
+        const name_error found = name_error_of_means(&black, &list[0], &means);
+        const double off = quantity == LAM_IRRADIANCE ? law(P2, P2 / A2E2, .03, .02, .001) : 0;
+        ck_assert_double_eq_tol(found.mean, sqrt(off / (25 - off)), 1e-6);
+    }
+}
+END_TEST
+
+/* Means of rho^2 over elements and channels, of a group of two reflectances and of a black one. */
+START_TEST(reflectances_of_groups) {
+    static const double areas[N] = {1, 3, 4};
+    static const float two[C * N] = {.5f, 0, 0, .25f, .75f, 0};
+    static const uint32_t group[N] = {0, 0, 1};
+    reflecting *of = NULL;
+    lam_error error = {.message = ""};
+    ck_ok(reflecting_make(N, C, areas, two, G, group, &of, &error));
+    ck_assert_double_eq_tol(of[0].square, (.25 + .0625 + 3 * .5625) / 4 / 2, 1e-12);
+    ck_assert_double_eq_tol(of[0].mean_square, (.125 * .125 + .625 * .625) / 2, 1e-12);
+    ck_assert(!of[0].black && of[1].black);
+    ck_assert(reflecting_of_mean(&of[1], LAM_IRRADIANCE, 2) == 2 &&
+              reflecting_of_mean(&of[1], LAM_RADIOSITY, 2) == 0);
+    free(of);
+}
+END_TEST
+
 /* Faces that count twice: s = .1 of all light, and half of group 0 overlaps. Of B - E of values r + rho H0
  * the squared error has s^2 + o / 2 of the elements of a group and s^2 + o^2 / 2 of its mean; of a name of
  * both groups what overlaps is half of the light in the first. */
@@ -266,15 +349,16 @@ START_TEST(faces_that_count_twice_are_off_by_their_light) {
     double reflected2 = 0;
     added = 0;
     for (size_t k = 0; k < C * N; k++) {
-        const double l = r[k] + (double)rho[k] * (double)H0[k];
-        reflected2 += area[k % N] * r[k] * r[k];
-        added += area[k % N] * l * l * (.01 + (bin[k % N] == 0 ? .25 : 0));
+        const double H = (double)values[k], reflected = H - (double)H0[k];
+        reflected2 += area[k % N] * reflected * reflected;
+        added += area[k % N] * H * H * (.01 + (bin[k % N] == 0 ? .25 : 0));
     }
     const double x = before.indirect * before.indirect, e2 = reflected2 * x / (1 + x) + added;
     ck_assert_double_eq_tol(found.indirect, sqrt(e2 / (reflected2 - e2)), 1e-5 * found.indirect);
 }
 END_TEST
 
+/* A sky of a store that states nothing of skies adds nothing. */
 START_TEST(unknown_skies_are_left) {
     float values[C * N];
     answer_error found, again;
@@ -310,6 +394,9 @@ int main(void) {
     tcase_add_test(cases, means_have_less_of_direct_errors);
     tcase_add_test(cases, single_tiles_have_their_own_errors);
     tcase_add_test(cases, faces_that_count_twice_are_off_by_their_light);
+    tcase_add_test(cases, reflected_light_has_no_direct_errors);
+    tcase_add_test(cases, black_groups_have_errors_of_their_irradiance);
+    tcase_add_test(cases, reflectances_of_groups);
     tcase_add_test(cases, unknown_skies_are_left);
     tcase_add_test(cases, darkness_has_no_error_and_no_light_no_ratio);
     suite_add_tcase(suite, cases);

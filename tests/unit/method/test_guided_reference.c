@@ -62,7 +62,7 @@ static void subject_make(subject *s) {
     for (size_t k = 0; k < M * VECTOR; k++)
         s->r[k] = k % VECTOR == 11 * (k / VECTOR) ? 1 : .01 * ((double)(k % 5) - 2);
     s->product = (factor_product){.n = N, .multiply = multiply, .context = s};
-    s->system = (reference_system){N, C, &s->product, s->m.area, s->rho};
+    s->system = (reference_system){N, C, &s->product, s->m.area, s->rho, NULL};
     for (size_t c = 0; c < C; c++)
         ck_ok(reference_create(&s->F, s->m.area, s->rho + c * N, REFERENCE_DENSE, &s->dense[c], &error));
     for (size_t k = 0; k < M * C; k++)
@@ -293,7 +293,7 @@ START_TEST(many_elements_are_corrected_alike) {
     ck_assert_ptr_nonnull(work);
     ck_ok(lam_operator_apply(op, MEAN_PROBES, LAM_RADIOSITY, E, B, work, bytes, &error));
     const factor_product F = {.n = n, .multiply = multiply_by_mean, .context = &n};
-    const reference_system system = {n, 1, &F, area, rho};
+    const reference_system system = {n, 1, &F, area, rho, NULL};
     const reference_answers answers = {.op = op, .E = E, .B = B};
     ck_assert_uint_lt(guided_reference_columns(n, 1), MEAN_PROBES);
     ck_ok(guided_reference_each(&system, &answers, MEAN_PROBES, which, see, &seen, &error));
