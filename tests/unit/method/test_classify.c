@@ -71,7 +71,7 @@ START_TEST(samples_tell_of_the_whole) {
     for (double threshold = .1; threshold > 1e-9; threshold /= 10) {
         const sparse_sample cut = inverse_rows_truncated(&rows, threshold);
         ck_assert_int_eq(
-            sparse_inverse_sample(p, p->reflectance, &(sparse_limits){threshold, true}, &rows, &made, &error),
+            sparse_inverse_sample(p, p->reflectance, &(sparse_limits){threshold, false}, &rows, &made, &error),
             LAM_OK);
         ck_assert_double_le(made.entries, cut.entries);
         ck_assert_double_ge(made.single, cut.single - 1e-6);
@@ -85,10 +85,10 @@ START_TEST(samples_tell_of_the_whole) {
     sparse_inverse whole;
     double entries;
     ck_assert_int_eq(
-        sparse_inverse_rows(p, p->reflectance, &(sparse_limits){1e-2, true}, 0, NULL, &whole, &error),
+        sparse_inverse_rows(p, p->reflectance, &(sparse_limits){1e-2, false}, 0, NULL, &whole, &error),
         LAM_OK);
     ck_assert_int_eq(
-        sparse_inverse_sample(p, p->reflectance, &(sparse_limits){1e-2, true}, &rows, &made, &error), LAM_OK);
+        sparse_inverse_sample(p, p->reflectance, &(sparse_limits){1e-2, false}, &rows, &made, &error), LAM_OK);
     entries = (double)whole.M.indptr[p->n];
     ck_assert_double_eq_tol(made.entries, entries, .2 * entries); /* a third of the rows, in order */
     sparse_inverse_free(&whole);

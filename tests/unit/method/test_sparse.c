@@ -116,7 +116,7 @@ START_TEST(rows_are_those_of_the_thesis) {
     sparse_inverse s;
     dense_inverse d = dense(&f, thresholds[_i]);
     size_t sure = 0;
-    ck_assert_msg(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){thresholds[_i], true},
+    ck_assert_msg(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){thresholds[_i], false},
                                       0, NULL, &s, &error) == LAM_OK,
                   "%s", error.message);
     for (size_t p = 0; p < n; p++) {
@@ -253,7 +253,7 @@ START_TEST(bits_do_not_depend_on_threads) {
     const int before = omp_get_max_threads();
     for (int k = 0; k < 2; k++) {
         omp_set_num_threads(k == 0 ? 1 : 4);
-        ck_assert_int_eq(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){1e-3, true}, 0,
+        ck_assert_int_eq(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){1e-3, false}, 0,
                                              NULL, &s[k], &error),
                          LAM_OK);
     }
@@ -285,7 +285,7 @@ START_TEST(memory_bounds_the_entries) {
     ck_assert_ptr_nonnull(strstr(report.reason, "raised"));
     lam_operator_close(op);
     sparse_inverse s;
-    ck_assert_int_eq(sparse_inverse_rows(&f.problem, f.m.reflectance, &(sparse_limits){1e-6, true}, all / 4,
+    ck_assert_int_eq(sparse_inverse_rows(&f.problem, f.m.reflectance, &(sparse_limits){1e-6, false}, all / 4,
                                          NULL, &s, &error),
                      LAM_ERR_MEMORY);
     ck_assert_ptr_nonnull(strstr(error.message, "--threshold"));
