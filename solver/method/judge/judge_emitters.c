@@ -86,7 +86,7 @@ done:
     return status;
 }
 
-/* What elements emit, and the light of the sky by both samples; the answers. */
+/* Sets the emission of elements, the light of the sky by both samples, and the answers. */
 static lam_status light(const lam_operator *op, some_probes *s, size_t *most, lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem *problem = s->input->problem;

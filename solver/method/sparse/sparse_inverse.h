@@ -11,9 +11,9 @@ typedef struct sparse_options {
     const char *correction; /* "none", "delta", "discarded" */
 } sparse_options;
 
-/* What is left out. Rows of black elements are as if rho were 1 there, and their irradiance is all that they
- * are asked for: whole_black keeps all of their first bounce, which the form factors hold already, so that an
- * element gets no light from where it sees nothing. */
+/* The limits of what is kept. Rows of black elements are as if rho were 1 there, and their irradiance is all
+ * that they are asked for: whole_black keeps all of their first bounce, which the form factors hold already,
+ * so that an element gets no light from where it sees nothing. */
 typedef struct sparse_limits {
     double threshold;
     bool whole_black;

@@ -258,7 +258,7 @@ START_TEST(reflected_light_has_no_direct_errors) {
 }
 END_TEST
 
-/* What is stated of a group that reflects nothing is of its irradiance alone. */
+/* The figures of a group that reflects nothing are those of its irradiance alone. */
 START_TEST(black_groups_have_errors_of_their_irradiance) {
     static reflecting with_black[] = {{1, 1, true}, {.3125, .3125, false}};
     error_by_group black = stated;

@@ -70,9 +70,9 @@ START_TEST(samples_tell_of_the_whole) {
     ck_assert_double_eq(all.single, 0);
     for (double threshold = .1; threshold > 1e-9; threshold /= 10) {
         const sparse_sample cut = inverse_rows_truncated(&rows, threshold);
-        ck_assert_int_eq(
-            sparse_inverse_sample(p, p->reflectance, &(sparse_limits){threshold, false}, &rows, &made, &error),
-            LAM_OK);
+        ck_assert_int_eq(sparse_inverse_sample(p, p->reflectance, &(sparse_limits){threshold, false}, &rows,
+                                               &made, &error),
+                         LAM_OK);
         ck_assert_double_le(made.entries, cut.entries);
         ck_assert_double_ge(made.single, cut.single - 1e-6);
         ck_assert_double_ge(made.everywhere, cut.everywhere - 1e-6);
@@ -88,7 +88,8 @@ START_TEST(samples_tell_of_the_whole) {
         sparse_inverse_rows(p, p->reflectance, &(sparse_limits){1e-2, false}, 0, NULL, &whole, &error),
         LAM_OK);
     ck_assert_int_eq(
-        sparse_inverse_sample(p, p->reflectance, &(sparse_limits){1e-2, false}, &rows, &made, &error), LAM_OK);
+        sparse_inverse_sample(p, p->reflectance, &(sparse_limits){1e-2, false}, &rows, &made, &error),
+        LAM_OK);
     entries = (double)whole.M.indptr[p->n];
     ck_assert_double_eq_tol(made.entries, entries, .2 * entries); /* a third of the rows, in order */
     sparse_inverse_free(&whole);

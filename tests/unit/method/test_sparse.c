@@ -116,8 +116,8 @@ START_TEST(rows_are_those_of_the_thesis) {
     sparse_inverse s;
     dense_inverse d = dense(&f, thresholds[_i]);
     size_t sure = 0;
-    ck_assert_msg(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){thresholds[_i], false},
-                                      0, NULL, &s, &error) == LAM_OK,
+    ck_assert_msg(sparse_inverse_rows(problem_of(&f), f.m.reflectance,
+                                      &(sparse_limits){thresholds[_i], false}, 0, NULL, &s, &error) == LAM_OK,
                   "%s", error.message);
     for (size_t p = 0; p < n; p++) {
         uint64_t e = s.M.indptr[p];
@@ -253,8 +253,8 @@ START_TEST(bits_do_not_depend_on_threads) {
     const int before = omp_get_max_threads();
     for (int k = 0; k < 2; k++) {
         omp_set_num_threads(k == 0 ? 1 : 4);
-        ck_assert_int_eq(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){1e-3, false}, 0,
-                                             NULL, &s[k], &error),
+        ck_assert_int_eq(sparse_inverse_rows(problem_of(&f), f.m.reflectance, &(sparse_limits){1e-3, false},
+                                             0, NULL, &s[k], &error),
                          LAM_OK);
     }
     omp_set_num_threads(before);
