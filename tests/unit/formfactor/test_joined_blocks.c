@@ -412,12 +412,15 @@ START_TEST(spheres_hold_their_elements) {
     plane_tree tree;
     block_factors nodes;
     flat_clusters flat;
+    visibility *v;
     size_t tried = 0;
     double(*centre)[3] = test_allocate(m.n, sizeof *centre);
     for (size_t i = 0; i < m.n; i++) mesh_centroid(&m, i, centre[i]);
     ck_ok(form_factors_tree(&m, &tree, &error));
     ck_ok(block_factors_begin(&tree, m.area, (const double(*)[3])centre, &nodes, &error));
-    ck_ok(flat_clusters_make(&m, &tree, &nodes, &flat, &error));
+    ck_ok(visibility_create(&m, &v, &error));
+    ck_ok(flat_clusters_make(&m, v, &tree, &nodes, &flat, &error));
+    visibility_destroy(v);
     for (size_t t = 0; t < tree.n_clusters; t++) {
         const plane_cluster *c = &tree.clusters[t];
         double low[3] = {9, 9, 9}, high[3] = {-9, -9, -9}, square = 0;
