@@ -17,7 +17,7 @@ from quads import Quads
 def room(path, second=None, rug=None, reflectance=.7, triangles=False, lamp=True):
     """second: of the floor, as the number of its squares along each side; rug: its height."""
     quads = Quads()
-    quads.box("r", (0, 0, 0), (4, 4, 3), (6, 6, 4))
+    quads.box("r", (0, 0, 0), (4, 4, 3), (5, 5, 3))
     if lamp:
         quads.grid("lamp", 2, 2.9, -1, numpy.linspace(1.5, 2.5, 3), numpy.linspace(1.5, 2.5, 3))
     if second:
@@ -27,10 +27,17 @@ def room(path, second=None, rug=None, reflectance=.7, triangles=False, lamp=True
     quads.write(path, reflectance)
 
 
+def stated(answer, group):
+    """Of a mean; null says that nothing is known of its light."""
+    error = answer["error"]["groups"][group]["mean"]
+    return numpy.inf if error is None else error
+
+
 class Overlap(Case):
-    def store(self, name, *options, **how):
+    def make(self, name, *options, **how):
         room(self.path(name + ".obj"), **how)
-        done = must("precompute", self.path(name + ".obj"), "-o", self.path(name + ".h5"), "--probes", 8, *options)
+        done = must("precompute", self.path(name + ".obj"), "-o", self.path(name + ".h5"), "--probes", 4, "--threads", 1,
+                    *options)
         return done.stderr
 
     def answer(self, name, *emit):
@@ -43,13 +50,13 @@ class Overlap(Case):
         """By how much each group is off, and what is stated of it."""
         for group, mean in found["groups"].items():
             truth = true["groups"][group]["mean"]
-            yield group, abs(mean["mean"] - truth) / mean["mean"], found["error"]["groups"][group]["mean"]
+            yield group, abs(mean["mean"] - truth) / mean["mean"], stated(found, group)
 
     def test_a_floor_that_is_written_twice_is_one(self):
-        self.store("one")
-        log = self.store("twice", second=6)
-        self.assertIn("36 faces repeat another one and are dropped (second 36; the first at ", log)
-        self.assertIn("36 of them have another group or material", log)
+        self.make("one")
+        log = self.make("twice", second=5)
+        self.assertIn("25 faces repeat another one and are dropped (second 25; the first at ", log)
+        self.assertIn("25 of them have another group or material", log)
         for emit in ("lamp=10", "r2=1"):
             one, twice = self.answer("one", emit), self.answer("twice", emit)
             self.assertEqual(one["groups"], twice["groups"])
@@ -62,24 +69,23 @@ class Overlap(Case):
         self.assertIn("has the same geometry", must("verify", self.path("twice.h5"), self.path("twice.obj")).stdout)
 
     def test_a_face_under_the_tiles_is_named_and_stated(self):
-        """Whatever finds the form factors: walls are off by .13 to .25, and more than half of that is stated."""
-        self.store("one")
-        for options in ((), ("--rays", 1024), ("--form-factors", "hemicube"), ("--method", "low-rank"),
-                        ("--method", "hierarchical", "--form-factors", "blocks"),
-                        ("--method", "sparse", "--quality", "draft")):
-            log = self.store("under", *options, second=1)
-            self.assertIn("37 faces overlap others in one plane, 16 m2 in all (r4 16 m2, second 16 m2; ", log)
+        """Whatever finds the form factors: walls are off by .13 to .44, and more than half of that is stated."""
+        self.make("one")
+        for options in (("--rays", 256), ("--form-factors", "hemicube"),
+                        ("--method", "hierarchical", "--form-factors", "blocks"), ()):
+            log = self.make("under", *options, second=1)
+            self.assertIn("26 faces overlap others in one plane, 16 m2 in all (r4 16 m2, second 16 m2; ", log)
             with h5py.File(self.path("under.h5")) as file:
                 self.assertAlmostEqual(file["mesh"].attrs["overlap_area"], 16, places=9)
                 overlap = dict(zip(file["mesh/group_names"].asstr()[:], file["mesh/overlap"][:]))
                 self.assertEqual({g for g, share in overlap.items() if share > 0}, {"r4", "second"})
-                # Half of the 32 m2 of both, of 16 (floor) + 80 (others) + 1 (lamp) + 16 m2.
-                self.assertGreater(file["error"].attrs["repair"], .9 * 16 / 113)
+                # Half of the 32 m2 of both, of 32 + 16 (ceiling) + 48 (walls) + 1 (lamp), over (1 - .7)^1/2.
+                self.assertGreater(file["error"].attrs["repair"], .99 * 16 / 97 / .3**.5)
             for emit in ("lamp=10", "r0=1"):
-                for group, off, stated in self.off(self.answer("one", emit), self.answer("under", emit)):
+                for group, off, known in self.off(self.answer("one", emit), self.answer("under", emit)):
                     if group != "r4":
-                        self.assertLess(stated, .5)
-                    self.assertGreater(stated, off / 2, (options, emit, group))
+                        self.assertLess(known, .6)
+                    self.assertGreater(known, off / 2, (options, emit, group))
         shown = json.loads(must("info", self.path("under.h5"), "--json").stdout)
         self.assertAlmostEqual(shown["overlap_area"], 16, places=9)
         text = must("info", self.path("under.h5")).stdout
@@ -90,34 +96,35 @@ class Overlap(Case):
         self.assertIn("most of it is that faces overlap", log)
 
     def test_a_rug_in_the_plane_of_the_floor(self):
-        above, log = self.store("above", rug=1e-4), self.store("rug", rug=0)
+        above, log = self.make("above", rug=1e-4), self.make("rug", rug=0)
         self.assertNotIn("overlap", above)
         self.assertIn(", 3.24 m2 in all (", log)
         self.assertIn("rug 3.24 m2", log)
         self.assertIn("some faces may coincide", log)
         for emit in ("lamp=10", "rug=1", "r0=1"):
-            for group, off, stated in self.off(self.answer("above", emit), self.answer("rug", emit)):
-                self.assertGreater(stated, off / 2, (emit, group))
+            for group, off, known in self.off(self.answer("above", emit), self.answer("rug", emit)):
+                self.assertGreater(known, off / 2, (emit, group))
 
     def test_an_open_scene_has_no_row_to_repair(self):
         """A floor and a wall: no row sums to more than 1, and what overlaps is stated nevertheless."""
         for name, extra in (("alone", False), ("doubled", True)):
             quads = Quads()
-            quads.grid("floor", 2, 0, 1, numpy.linspace(0, 4, 7), numpy.linspace(0, 4, 7))
-            quads.grid("wall", 0, 0, 1, numpy.linspace(0, 4, 7), numpy.linspace(0, 3, 5))
+            quads.grid("floor", 2, 0, 1, numpy.linspace(0, 4, 6), numpy.linspace(0, 4, 6))
+            quads.grid("wall", 0, 0, 1, numpy.linspace(0, 4, 6), numpy.linspace(0, 3, 4))
             if extra:
                 quads.grid("second", 2, 0, 1, numpy.array([0, 4]), numpy.array([0, 4]))
             quads.write(self.path(name + ".obj"), .7)
-            must("precompute", self.path(name + ".obj"), "-o", self.path(name + ".h5"), "--probes", 8, "--sky", "grid:4x2")
+            must("precompute", self.path(name + ".obj"), "-o", self.path(name + ".h5"), "--probes", 4,
+                 "--threads", 1, "--sky", "grid:4x2")
         numpy.save(self.path("sky.npy"), numpy.ones((1, 8), "f4"))
         means = []
         for name in ("alone", "doubled"):
             done = must("solve", self.path(name + ".h5"), "--sky", self.path("sky.npy"), "--quantity", "indirect",
                         "--reduce", "wall=mean", "--json")
             means.append(json.loads(done.stdout))
-        true, found = (x["groups"]["wall"]["mean"] for x in means)
+        true, found = (numpy.ravel(x["groups"]["wall"]["mean"])[0] for x in means)
         self.assertGreater(abs(found - true), .1 * true)
-        self.assertGreater(means[1]["error"]["groups"]["wall"]["mean"], abs(found - true) / found / 2)
+        self.assertGreater(stated(means[1], "wall"), abs(found - true) / found / 2)
 
     def test_positions_state_it_too(self):
         """Walks meet either of two faces; the floor is off by as much as is stated in a room with both."""
@@ -132,13 +139,12 @@ class Overlap(Case):
             figures.append(json.loads(must("solve", self.path(name + ".h5"), "--emit", "a=1", "--quantity", "irradiance",
                                            "--reduce", "r0=mean", "--reduce", "r4=mean", "--json").stdout))
         self.assertIn(" overlap others in one plane, 16 m2", done.stderr)
-        before, after = (x["error"]["groups"] for x in figures)
-        self.assertLess(before["r0"]["mean"], .05)
-        self.assertGreater(after["r0"]["mean"], .12)
-        self.assertGreater(after["r4"]["mean"], .5)
+        self.assertLess(stated(figures[0], "r0"), .05)
+        self.assertGreater(stated(figures[1], "r0"), .12)
+        self.assertGreater(stated(figures[1], "r4"), .5)
 
     def test_scenes_without_such_faces_state_none(self):
-        log = self.store("one")
+        log = self.make("one")
         self.assertNotIn("overlap", log)
         self.assertNotIn("coincide", log)
         with h5py.File(self.path("one.h5")) as file:
