@@ -40,4 +40,10 @@ typedef struct error_advice_input {
  * trial that memory had no room for gets more --memory. */
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]);
 
+/* text: about light from the sky, where its error, that of the first bounce included, is above
+ * error_advice_most in a scene of which at most a tenth of the light leaves (leaving_share) and no portals
+ * were given; else empty. */
+void error_advice_sky(const error_advice_input *input, double leaving_share, bool given,
+                      char text[ERROR_ADVICE_BYTES]);
+
 #endif

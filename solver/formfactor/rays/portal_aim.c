@@ -135,6 +135,7 @@ typedef struct choice {
     const portal_node *node;
     double from[2], to[2];
     double weight;
+    bool divisible;
 } choice;
 
 static void point_of(const portal *p, double x, double y, double at[3]) {
@@ -222,11 +223,16 @@ static bool is_divisible(const portals *p, const aiming *from, const choice *c) 
     return size * (one ? far_parts : far_portals) > distance;
 }
 
+static void weigh(const portals *p, const aiming *from, choice *c) {
+    c->weight = weight_of(p, from, c);
+    c->divisible = is_divisible(p, from, c);
+}
+
 /* The group that is worth halving most; n where none is. */
-static size_t widest(const portals *p, const aiming *from, size_t n, const choice *of) {
+static size_t widest(size_t n, const choice *of) {
     size_t best = n;
     for (size_t g = 0; g < n; g++)
-        if ((best == n || of[g].weight > of[best].weight) && is_divisible(p, from, &of[g])) best = g;
+        if ((best == n || of[g].weight > of[best].weight) && of[g].divisible) best = g;
     return best;
 }
 
@@ -303,15 +309,15 @@ void portals_aim(const portals *p, const mesh *m, const visibility *v, size_t el
     }
     if (p->n > 0) {
         of[0] = (choice){.node = p->node, .to = {1, 1}};
-        of[0].weight = weight_of(p, &from, &of[0]);
+        weigh(p, &from, &of[0]);
         n = of[0].weight > 0;
     }
-    for (size_t g; n < PORTAL_GROUPS && (g = widest(p, &from, n, of)) < n;) {
+    for (size_t g; n < PORTAL_GROUPS && (g = widest(n, of)) < n;) {
         choice half[2];
         halve(p, &of[g], half);
         of[g] = of[--n];
         for (int h = 0; h < 2; h++) {
-            half[h].weight = weight_of(p, &from, &half[h]);
+            weigh(p, &from, &half[h]);
             if (half[h].weight > 0) of[n++] = half[h];
         }
     }

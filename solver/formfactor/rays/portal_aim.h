@@ -37,7 +37,7 @@ typedef struct portals {
     size_t rays;   /* that each element aims, a multiple of VISIBILITY_PACKET */
 } portals;
 
-enum { PORTAL_GROUPS = 32 };
+enum { PORTAL_GROUPS = 16 };
 
 /* Portals first ... first + count - 1, or, of one parallelogram, the part of it between from and to along its
  * edges. */
@@ -65,7 +65,7 @@ void portals_free(portals *p);
 /* All portals as one group. */
 portal_aim portals_all(const portals *p);
 
-/* How an element aims: by its place, its normal and the strengths. Cost: O(PORTAL_GROUPS^2). */
+/* How an element aims: by its place, its normal and the strengths. Cost: some microseconds. */
 void portals_aim(const portals *p, const mesh *m, const visibility *v, size_t element, portal_aim *out);
 
 /* Weighs the groups of an element by the share of each that is seen as open, [n], by few rays. */
