@@ -33,8 +33,9 @@ typedef struct portals {
     portal *portal; /* [n], in the order of the tree */
     double *before; /* [n + 1], the area of the portals before each */
     portal_node *node;
-    double margin; /* metres, by which boxes of nodes are widened */
-    size_t rays;   /* that each element aims, a multiple of VISIBILITY_PACKET */
+    double margin;    /* metres, by which boxes of nodes are widened */
+    bool in_the_open; /* the scene is open: elements keep their rays by the cosine */
+    size_t rays;      /* that each element aims, a multiple of VISIBILITY_PACKET */
 } portals;
 
 enum { PORTAL_GROUPS = 16 };

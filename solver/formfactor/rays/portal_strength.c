@@ -13,15 +13,14 @@
 enum { LINES = 64, WALKS = 16, STEPS = 6 };
 
 /* The share of light that leaves a scene, above which it is open, and that of a space behind an opening,
- * above which rays find the sky by themselves: galleries of an open court are left to these, closed rooms of
- * buildings that are seen from outside, too, are not. */
-static const double open_scene = .1, open_space[2] = {.1, .1};
+ * above which rays find the sky by themselves. */
+static const double open_scene = .1, open_space = .1;
 
 /* Elements of a first look, and rays of each by the cosine. */
 enum { LOOK_ELEMENTS = 256, LOOK_PACKETS = 8 };
 
 /* True where much of the light that all elements emit leaves the scene. */
-static bool is_open_scene(const mesh *m, const visibility *v, uint64_t seed) {
+bool portals_are_in_the_open(const mesh *m, const visibility *v, uint64_t seed) {
     const size_t n = m->n, count = n < LOOK_ELEMENTS ? n : LOOK_ELEMENTS;
     double left[LOOK_ELEMENTS], sum = 0, area = 0;
 #pragma omp parallel for schedule(dynamic, 8)
@@ -147,8 +146,7 @@ static uint32_t step_from(const mesh *m, const visibility *v, uint64_t seed, uin
 
 /* True where much of the light around some elements leaves the scene. The first step is left out: what sees
  * the sky through an opening sees more of it than the rest of a room does. */
-static bool is_open_behind(const mesh *m, const visibility *v, uint64_t seed, bool open,
-                           const seen_through *seen) {
+static bool is_open_behind(const mesh *m, const visibility *v, uint64_t seed, const seen_through *seen) {
     size_t left = 0, cast_rays = 0;
     for (size_t k = 0; k < seen->n; k++) {
         size_t first = 0;
@@ -158,12 +156,11 @@ static bool is_open_behind(const mesh *m, const visibility *v, uint64_t seed, bo
             cast_rays += VISIBILITY_PACKET;
         }
     }
-    return !((double)left <= open_space[open] * (double)cast_rays) || cast_rays == 0;
+    return !((double)left <= open_space * (double)cast_rays) || cast_rays == 0;
 }
 
-static lam_status measure_one(const mesh *m, const visibility *v, uint64_t seed, bool open,
-                              const plane_patch *patches, size_t n, double strength[2], seen_through seen[2],
-                              lam_error *error) {
+static lam_status measure_one(const mesh *m, const visibility *v, uint64_t seed, const plane_patch *patches,
+                              size_t n, double strength[2], seen_through seen[2], lam_error *error) {
     lam_status status = LAM_OK;
     portals p = {.n = 0};
     pair_sampler points;
@@ -187,7 +184,7 @@ static lam_status measure_one(const mesh *m, const visibility *v, uint64_t seed,
             add_lines(v, (const double(*)[3])origin, (const double(*)[3])direction, sides, s, &seen[s]);
     }
     for (int s = 0; s < 2; s++) {
-        if (seen[s].n > 0 && is_open_behind(m, v, seed, open, &seen[s])) seen[s].n_lines = 0;
+        if (seen[s].n > 0 && is_open_behind(m, v, seed, &seen[s])) seen[s].n_lines = 0;
         strength[s] = (double)seen[s].n_lines / LINES;
     }
 done:
@@ -269,7 +266,6 @@ lam_status portals_measure(const mesh *m, const visibility *v, uint64_t seed, co
                            double (*strength)[2], bool *doubled, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = openings->n;
-    const bool open = n > 0 && is_open_scene(m, v, seed);
     size_t *first = memory_allocate(n + 1, sizeof *first, "portals", error);
     seen_through(*seen)[2] = memory_allocate(n + 1, sizeof *seen, "portals", error);
     if (first == NULL || seen == NULL) TRY(LAM_ERR_MEMORY);
@@ -277,8 +273,8 @@ lam_status portals_measure(const mesh *m, const visibility *v, uint64_t seed, co
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t o = 0; o < n; o++) {
         lam_error own = {.message = ""};
-        const lam_status one = measure_one(m, v, seed, open, openings->patches + first[o],
-                                           first[o + 1] - first[o], strength[o], seen[o], &own);
+        const lam_status one = measure_one(m, v, seed, openings->patches + first[o], first[o + 1] - first[o],
+                                           strength[o], seen[o], &own);
         if (one == LAM_OK) continue;
 #pragma omp critical(portal_strength)
         {

@@ -131,6 +131,7 @@ lam_status portals_find(const mesh *m, const visibility *v, uint64_t seed, size_
     array = NULL;
     TRY(status);
     made.n_openings = n_openings;
+    made.in_the_open = n > 0 && portals_are_in_the_open(m, v, seed);
     /* Many of the rays into a thick wall meet its reveals. */
     if (doubled) rays *= RAYS_INTO_REVEALS;
     if (n > 0) made.rays = (rays / VISIBILITY_PACKET + 1) * VISIBILITY_PACKET;

@@ -74,7 +74,7 @@ double rays_variance(const ray_tally *tally, size_t n_rays, bool aimed) {
 }
 
 /* Traces one element; every ray has the weight 1, but for rays that leave beside portals. Rays that find
- * nothing but the sky are half as many where others are aimed at it. */
+ * nothing but the sky are half as many where others are aimed at it, unless the scene is open. */
 static void trace_element(const void *context, size_t element, row_pool *pool, double *leaving,
                           double *absorbed) {
     const count_context *c = context;
@@ -85,7 +85,8 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
     size_t n_rays = c->n_rays;
     element_sampler_init(&sampler, rays.m, rays.v, element, rays.seed);
     rays_aim(&rays, &sampler, element, n_rays);
-    if (rays.aim.n > 0 && c->without_rows) rays.n_rays = n_rays = (n_rays + 1) / 2;
+    if (rays.aim.n > 0 && c->without_rows && !rays.portals->in_the_open)
+        rays.n_rays = n_rays = (n_rays + 1) / 2;
     for (size_t first = 0; first < n_rays; first += RAYS_AT_ONCE) {
         const size_t last = first + RAYS_AT_ONCE < n_rays ? first + RAYS_AT_ONCE : n_rays;
         const size_t count = rays_meet(&rays, &sampler, element, first, last, met, &tally, pool->sky);
