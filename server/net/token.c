@@ -33,11 +33,11 @@ static const struct {
     unsigned right;
 } rights[] = {{"read", TOKEN_READ}, {"vary", TOKEN_VARY}, {"metrics", TOKEN_METRICS}};
 
-/* The number of steps depends on the given length alone. */
+/* given has TOKEN_MOST bytes, zeros behind its length. All of them are compared, whatever they are. */
 static unsigned char differ(const char *given, size_t length, const token *one) {
     unsigned char difference = length != one->length;
-    for (size_t i = 0; i < length; i++)
-        difference |= (unsigned char)given[i] ^ (unsigned char)one->bytes[i % one->length];
+    for (size_t i = 0; i < TOKEN_MOST; i++)
+        difference |= (unsigned char)given[i] ^ (unsigned char)one->bytes[i];
     return difference;
 }
 
@@ -176,12 +176,17 @@ bool tokens_find(tokens *t, const char *authorization, token_holder *out) {
     const char *given = authorization + sizeof scheme - 1;
     while (*given == ' ') given++;
     const size_t length = strlen(given);
+    /* No token is longer, which everybody may know. */
+    if (length > TOKEN_MOST) return false;
+    char padded[TOKEN_MOST] = {0};
+    memcpy(padded, given, length);
     size_t found = SIZE_MAX;
     pthread_mutex_lock(&t->lock);
     for (size_t i = 0; i < t->list->count; i++)
-        if (differ(given, length, &t->list->items[i]) == 0) found = i;
+        if (differ(padded, length, &t->list->items[i]) == 0) found = i;
     if (found != SIZE_MAX) *out = t->list->items[found].holder;
     pthread_mutex_unlock(&t->lock);
+    explicit_bzero(padded, sizeof padded);
     return found != SIZE_MAX;
 }
 

@@ -33,7 +33,7 @@ void tokens_close(tokens *t);
 lam_status tokens_reload(tokens *t, FILE *problems, lam_error *error);
 
 /* True if an Authorization header (or NULL) carries a token. The time depends on the length of the header and
- * the number of tokens alone. */
+ * the number of tokens alone; what is longer than any token may be (512 characters) is compared with none. */
 bool tokens_find(tokens *t, const char *authorization, token_holder *out);
 
 /* True if a line of the file names the right to read /metrics: nobody else may. */
