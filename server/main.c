@@ -197,6 +197,8 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     s.audit_log = s.access_log;
     if (s.audit_log == NULL && c->max_variants > 0) TRY(access_log_open(NULL, &s.audit_log, error));
     TRY(metrics_create(route_label_count(), labels, &s.metrics, error));
+    TRY(metrics_page_create(&s.metrics_page, error));
+    TRY(openapi_keep(&s.openapi, error));
     TRY(catalog_create(c, stdout, stderr, &s.catalog, error));
     TRY(variants_start(c, s.catalog, &s.variants, error));
     TRY(batch_start(c->threads, c->max_inflight, &s.queue, error));
@@ -228,6 +230,8 @@ done:
     variants_destroy(s.variants);
     catalog_destroy(s.catalog);
     metrics_destroy(s.metrics);
+    metrics_page_destroy(s.metrics_page);
+    kept_forms_release(s.openapi);
     if (s.audit_log != s.access_log) access_log_close(s.audit_log);
     access_log_close(s.access_log);
     request_ledger_destroy(&s.memory);

@@ -117,6 +117,7 @@ static bool check_head(request *r, const char *method, const char *target, uint6
                      .snapshot = r->snapshot,
                      .variant = variant,
                      .variant_why = &r->variant_why,
+                     .keeps = r->match.route->keeps,
                      .accepted = r->accepted,
                      .memory = &r->memory};
     if (!check_scene(r)) return false;
@@ -148,22 +149,52 @@ static bool hold_body(request *r, const char *bytes, size_t count) {
     return false;
 }
 
+/* True if it is the turn of the request's client, now or when libmicrohttpd calls again. */
+static bool has_turn(request *r) {
+    turns *all = r->service->turns;
+    if (!r->had_turn) {
+        r->turn.client = r->peer.key;
+        r->turn.connection = r->connection;
+        r->had_turn = turns_may(all, &r->turn, clock_seconds());
+        if (r->had_turn) return true;
+        client_enter(r->service->connections, r->client, STAGE_SOLVE, 0);
+        MHD_suspend_connection(r->connection);
+        turns_wait(all, &r->turn);
+    }
+    return r->had_turn;
+}
+
+static void go(turn *t) {
+    MHD_resume_connection(t->connection);
+}
+
+/* Answers on this thread, where the route allows that: its work counts for its client. False, with nothing
+ * done, if the queue has to. */
+static bool answer_here(request *r) {
+    const route *to = r->match.route;
+    const double before = clock_thread_seconds();
+    if (to->shortcut != NULL && to->shortcut(&r->call, &r->answer))
+        http_drop_body(r);
+    else if (to->with_body || to->steps != NULL)
+        return false;
+    else
+        to->handle(&r->call, &r->answer);
+    http_finish_answer(r, true);
+    turns_charge(r->service->turns, r->peer.key, clock_thread_seconds() - before);
+    return true;
+}
+
 /* The whole request has arrived. */
 static enum MHD_Result handle(request *r) {
+    if (!has_turn(r)) return MHD_YES;
     if (!r->answered) {
         r->memory.wanted = 0;
         r->call.body = r->body.bytes == NULL ? "" : r->body.bytes;
         r->call.length = r->body.length;
-        route_shortcut *shortcut = r->match.route->shortcut;
-        if (shortcut != NULL && shortcut(&r->call, &r->answer)) {
-            http_drop_body(r);
-        } else if (r->match.route->with_body || r->match.route->steps != NULL) {
+        if (!answer_here(r)) {
             http_solve(r);
             return MHD_YES;
-        } else {
-            r->match.route->handle(&r->call, &r->answer);
         }
-        http_finish_answer(r, true);
         if (http_wait_for_memory(r, 0)) return MHD_YES;
         r->answered = true;
     }
@@ -277,6 +308,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     if (r == NULL) return;
     *request_context = NULL;
     const double seconds = clock_seconds() - r->start;
+    turns_leave(h->service->turns, &r->turn);
     client_enter(h->service->connections, r->client, STAGE_IDLE, 0);
     unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
     request_log(r, status, seconds * 1e3);
@@ -395,6 +427,7 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
                                 .least_rate = s->config->min_rate};
     TRY(connections_affordable(&limits, catalog_stores(s->catalog), error));
     TRY(connections_start(&limits, &s->connections, error));
+    TRY(turns_create(go, &s->turns, error));
     /* No time-out of libmicrohttpd: it would close a client whose answer waits in a slow socket. At its limit
      * of connections, or out of descriptors, the daemon accepts none until one closes. */
     h->daemon = MHD_start_daemon(
@@ -413,6 +446,8 @@ done:
     if (h != NULL) {
         connections_stop(s->connections);
         s->connections = NULL;
+        turns_destroy(s->turns);
+        s->turns = NULL;
         close(h->listen_fd);
         free(h);
     }
@@ -428,9 +463,12 @@ void http_quiesce(http *h) {
 
 void http_stop(http *h) {
     if (h == NULL) return;
+    turns_close(h->service->turns);
     MHD_stop_daemon(h->daemon);
     connections_stop(h->service->connections);
     h->service->connections = NULL;
+    turns_destroy(h->service->turns);
+    h->service->turns = NULL;
     if (h->listen_fd >= 0) close(h->listen_fd);
     free(h);
 }

@@ -1,5 +1,6 @@
 /* Sends answers: content coding, entity tag, headers. */
 #include "server/http/browser.h"
+#include "server/http/http_parts.h"
 #include "server/http/http_stream.h"
 
 #include <stdio.h>
@@ -8,9 +9,9 @@
 /* Bodies of this capacity give back what they do not use. */
 #define TRIM_LEAST ((size_t)256 << 10)
 
-/* The longest body that the I/O thread compresses, in a millisecond or two; no other client is served
- * meanwhile. */
-#define IO_THREAD_MAX ((size_t)128 << 10)
+/* The longest body that the I/O thread compresses, in a tenth of a millisecond or two; no other client is
+ * served meanwhile. Longer ones are kept, or made by the queue. */
+#define IO_THREAD_MAX ((size_t)16 << 10)
 
 const char *http_header(const request *r, const char *name) {
     return MHD_lookup_connection_value(r->connection, MHD_HEADER_KIND, name);
@@ -22,8 +23,11 @@ const char *http_header(const request *r, const char *name) {
 /* Keeps of the memory of the request what its answer and its body take. */
 static void count_answer(request *r) {
     const answer *a = &r->answer;
-    /* Kept bytes count themselves. */
-    const size_t length = a->stream != NULL ? answer_stream_held(a->stream) + STREAM_BYTES : a->body.capacity;
+    /* Kept bytes count themselves, but for the part that is sent. */
+    const bool by_parts = a->kept != NULL && a->kept->content.length > HTTP_PART;
+    const size_t length = a->stream != NULL ? answer_stream_held(a->stream) + STREAM_BYTES
+                          : by_parts        ? HTTP_PART
+                                            : a->body.capacity;
     const bool free_of =
         a->stream == NULL && (length <= FREE_OF_LEDGER || r->match.route == NULL || r->match.route->open);
     if (request_memory_keep(&r->memory, bytes_plus(r->body.length, free_of ? 0 : length))) return;
@@ -54,13 +58,12 @@ void http_finish_answer(request *r, bool on_io_thread) {
     if (a->fixed != NULL) {
         if (coding_accepts(http_header(r, MHD_HTTP_HEADER_ACCEPT_ENCODING), CODING_GZIP))
             r->coding = CODING_GZIP;
-        etag_make(etag_hash((const char *)a->fixed->plain, a->fixed->length), coding_name(r->coding),
-                  r->etag);
+        etag_make(a->fixed->tag, coding_name(r->coding), r->etag);
         return;
     }
     if (a->kept != NULL) {
         r->coding = a->kept_coding;
-        etag_make(a->tag, coding_name(r->coding), r->etag);
+        if (a->cacheable) etag_make(a->tag, coding_name(r->coding), r->etag);
         return;
     }
     /* The tag is that of the bytes before compression. */
@@ -126,6 +129,24 @@ static void release_kept(void *context) {
     kept_bytes_release(context);
 }
 
+/* A response of bytes that are kept by the program, or by a reference that it takes over. */
+static struct MHD_Response *kept_response(request *r, const char *bytes, size_t length, bool with_body) {
+    answer *a = &r->answer;
+    /* The library takes bytes that are not const, and does not write to them. */
+    union {
+        const char *held;
+        void *taken;
+    } same = {bytes};
+    struct MHD_Response *response;
+    if (with_body && length > HTTP_PART)
+        response = http_parts_response(r, bytes, length, a->kept);
+    else
+        response =
+            MHD_create_response_from_buffer_with_free_callback_cls(length, same.taken, release_kept, a->kept);
+    if (response != NULL) a->kept = NULL;
+    return response;
+}
+
 enum MHD_Result http_send_answer(request *r) {
     answer *a = &r->answer;
     struct MHD_Response *response;
@@ -142,16 +163,10 @@ enum MHD_Result http_send_answer(request *r) {
         r->sent = 0;
         response = http_stream_response(r, &length);
     } else if (a->fixed != NULL) {
-        /* The library takes bytes that are not const, and does not write to them. */
-        union {
-            const unsigned char *held;
-            void *taken;
-        } bytes = {r->coding == CODING_GZIP ? a->fixed->gzip : a->fixed->plain};
-        response = MHD_create_response_from_buffer(length, bytes.taken, MHD_RESPMEM_PERSISTENT);
+        const unsigned char *bytes = r->coding == CODING_GZIP ? a->fixed->gzip : a->fixed->plain;
+        response = kept_response(r, (const char *)bytes, length, with_body);
     } else if (a->kept != NULL) {
-        response = MHD_create_response_from_buffer_with_free_callback_cls(length, a->kept->content.bytes,
-                                                                          release_kept, a->kept);
-        if (response != NULL) a->kept = NULL;
+        response = kept_response(r, a->kept->content.bytes, length, with_body);
     } else if (a->body.bytes == NULL) {
         static char nothing[1];
         response = MHD_create_response_from_buffer(0, nothing, MHD_RESPMEM_PERSISTENT);

@@ -43,6 +43,8 @@ typedef struct request {
     bool queued;            /* the answer was handed to libmicrohttpd */
     buffer body;            /* counted in memory */
     request_memory memory;  /* of the body, of what is computed, of the answer */
+    turn turn;
+    bool had_turn; /* its client's turn came */
     uint64_t received;
     uint64_t announced; /* length of the body; 0: unknown */
     size_t sent;

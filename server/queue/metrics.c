@@ -3,8 +3,10 @@
 #include "solver/codec/problem.h"
 
 #include <pthread.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Statuses of answers that are no problems; 0 stands for a client that left. The other ones are those of the
  * classes of problems. */
@@ -219,18 +221,31 @@ static bool write_gauge(buffer *b, const char *name, const char *help, unsigned 
     return write_head(b, name, "gauge", help) && buffer_printf(b, "%s %llu\n", name, value);
 }
 
-bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b) {
+/* The figures of one moment, freed by the caller; NULL if memory is short. Requests wait for the copy alone,
+ * not for the text. */
+static metrics *copy_of(metrics *m) {
+    const size_t counts = offsetof(metrics, n_labels), /* behind the lock */
+        bytes = sizeof *m + m->n_labels * sizeof m->routes[0];
+    metrics *copy = malloc(bytes);
+    if (copy == NULL) return NULL;
     pthread_mutex_lock(&m->lock);
-    bool written =
-        write_requests(m, b) && write_latencies(m, b) && write_waits(m, b) && write_refusals(m, b) &&
-        write_batches(m, b) &&
+    memcpy((char *)copy + counts, (const char *)m + counts, bytes - counts);
+    pthread_mutex_unlock(&m->lock);
+    return copy;
+}
+
+bool metrics_write(metrics *all, const metrics_gauges *gauges, buffer *b) {
+    metrics *m = copy_of(all);
+    const bool written =
+        m != NULL && write_requests(m, b) && write_latencies(m, b) && write_waits(m, b) &&
+        write_refusals(m, b) && write_batches(m, b) &&
         write_gauge(b, "lambertd_in_flight", "Requests that are not answered yet.", m->in_flight) &&
         write_gauge(b, "lambertd_queued", "Solves that wait or run.", gauges->queued) &&
         write_gauge(b, "lambertd_refining", "Refinements that wait or run.", gauges->refining) &&
         write_gauge(b, "lambertd_body_bytes", "Bytes of request bodies held.", gauges->body_bytes) &&
         write_gauge(b, "lambertd_scenes", "Scenes that are served.", gauges->n_scenes) &&
         write_gauge(b, "lambertd_operator_bytes", "Bytes of operator held.", gauges->operator_bytes);
-    pthread_mutex_unlock(&m->lock);
+    free(m);
     return written;
 }
 

@@ -13,8 +13,16 @@
 
 #include <stddef.h>
 
+typedef struct call call;
+typedef struct answer answer;
+typedef struct kept_source kept_source;
+
+/* Sets *from to the bytes of an answer that is kept (kept_answer.h); or makes another answer, usually a
+ * problem, and returns false. On any thread, at once. */
+typedef bool route_keeps(const call *in, kept_source *from, answer *out);
+
 /* A request that has passed its checks, with its whole body. */
-typedef struct call {
+struct call {
     batch_job job; /* of a route with a body */
     const service *service;
     const catalog_snapshot *snapshot;
@@ -36,8 +44,9 @@ typedef struct call {
                                          * nobody needs the answer any more; what is done may then be left */
     size_t n_rhs;                       /* set by the handler, for the log */
     size_t n_written;                   /* set by begin: numbers of the answer, 0 where they are few */
-    char *changed; /* the variant that the handler made or removed, owned, for the log; or NULL */
-} call;
+    char *changed;      /* the variant that the handler made or removed, owned, for the log; or NULL */
+    route_keeps *keeps; /* of a route whose answer is kept */
+};
 
 /* Bytes that the program holds as long as it runs. */
 typedef struct fixed_bytes {
@@ -45,10 +54,11 @@ typedef struct fixed_bytes {
     size_t length;
     const unsigned char *gzip; /* the same, compressed */
     size_t gzip_length;
+    uint64_t tag; /* a hash of plain */
 } fixed_bytes;
 
 /* Zero at the start. The sender takes the body over. */
-typedef struct answer {
+struct answer {
     unsigned status;
     problem_kind problem; /* PROBLEM_NONE: it is none */
     const char *type;     /* static */
@@ -57,7 +67,7 @@ typedef struct answer {
     kept_bytes *kept; /* in place of body: a reference to bytes in kept_coding, the coding accepted, whose
                          memory is counted by themselves; or NULL */
     content_coding kept_coding;
-    uint64_t tag;             /* of kept: what its ETag is made of */
+    uint64_t tag;             /* of kept, where it is cacheable: what its ETag is made of */
     const fixed_bytes *fixed; /* in place of body; or NULL */
     const char *policy;       /* Content-Security-Policy, static; or NULL */
     char allow[32];           /* of a 405 */
@@ -69,7 +79,7 @@ typedef struct answer {
     double parse_ms, solve_ms, encode_ms;
     char *location; /* of a 202, owned; or NULL */
     bool cacheable; /* gets an ETag */
-} answer;
+};
 
 /* The call that a job is part of. */
 static inline call *call_of(batch_job *job) {

@@ -1,36 +1,31 @@
 /* GET /v1/scenes: the list of all scenes in service. GET /v1/scenes/NAME: the description of one. */
-#include "server/route/routes.h"
-#include "solver/codec/json_writer.h"
+#include "server/route/kept_answer.h"
 
-void get_scenes(call *in, answer *out) {
-    buffer b = {0};
-    bool written = buffer_append_text(&b, "{\"scenes\":[");
-    size_t listed = 0;
-    for (size_t i = 0; i < in->snapshot->n_scenes; i++) {
-        const scene *s = in->snapshot->scenes[i];
-        if (scene_damaged(s, NULL, NULL)) continue;
-        written = written && buffer_append_text(&b, listed++ > 0 ? ",{\"name\":" : "{\"name\":") &&
-                  json_write_text(&b, s->name) &&
-                  buffer_printf(&b, ",\"elements\":%zu,\"channels\":%zu,\"kind\":\"%s\",\"bytes\":%llu}",
-                                s->n, s->n_channels, lam_operator_kind(s->op), (unsigned long long)s->bytes);
+bool keeps_scenes(const call *in, kept_source *from, answer *out) {
+    const catalog_snapshot *all = in->snapshot;
+    kept_forms *text = scene_list_get(all->list, all->n_scenes, all->scenes);
+    if (text == NULL) {
+        answer_refuse(out, PROBLEM_NO_MEMORY, "not enough memory for the answer");
+        return false;
     }
-    answer_json(out, &b, written && buffer_append_text(&b, "]}\n"));
-    out->cacheable = out->status == 200;
+    *from = kept_text(text, "application/json");
+    kept_forms_release(text);
+    return true;
 }
 
 /* A variant that is being built is answered by 202, although an earlier variant of this name may still be
  * served. */
-void get_scene(call *in, answer *out) {
+bool keeps_scene(const call *in, kept_source *from, answer *out) {
     buffer b = {0};
     if (in->variant == VARIANT_FAILED) {
         answer_problem(out, in->variant_why);
-        return;
+        return false;
     }
     if (in->variant == VARIANT_BUILDING) {
         answer_json(out, &b, buffer_append_text(&b, "{\"status\":\"building\"}\n"));
         if (out->status == 200) out->status = 202;
-        return;
+        return false;
     }
-    answer_json(out, &b, buffer_append_text(&b, in->scene->description) && buffer_append_text(&b, "\n"));
-    out->cacheable = out->status == 200;
+    *from = kept_text(in->scene->texts.description, "application/json");
+    return true;
 }

@@ -2,21 +2,24 @@
 
 #include <string.h>
 
+/* An answer that is kept. */
+#define KEPT(text) .keeps = (text), .steps = &send_kept, .shortcut = quick_kept
+
 /* Routes of one pattern follow each other. */
 static const route routes[] = {
     {.method = "GET", .pattern = "/healthz", .handle = get_healthz, .open = true, .any_host = true},
     {.method = "GET", .pattern = "/readyz", .handle = get_readyz, .open = true, .any_host = true},
     {.method = "GET", .pattern = "/metrics", .handle = get_metrics, .open = true, .right = TOKEN_METRICS},
-    {.method = "GET", .pattern = "/v1/scenes", .handle = get_scenes},
-    {.method = "GET", .pattern = "/v1/scenes/{name}", .handle = get_scene, .also_built = true},
+    {.method = "GET", .pattern = "/v1/scenes", KEPT(keeps_scenes)},
+    {.method = "GET", .pattern = "/v1/scenes/{name}", KEPT(keeps_scene), .also_built = true},
     {.method = "DELETE",
      .pattern = "/v1/scenes/{name}",
      .handle = delete_scene,
      .also_built = true,
      .right = TOKEN_VARY},
-    {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", .steps = &get_mesh, .shortcut = quick_mesh},
-    {.method = "GET", .pattern = "/v1/scenes/{name}/sky", .handle = get_sky},
-    {.method = "GET", .pattern = "/v1/scenes/{name}/weather", .handle = get_weather},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", KEPT(keeps_mesh)},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/sky", KEPT(keeps_sky)},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/weather", KEPT(keeps_weather)},
     {.method = "POST",
      .pattern = "/v1/scenes/{name}/radiosity",
      .steps = &post_radiosity,
@@ -34,7 +37,7 @@ static const route routes[] = {
      .with_body = true,
      .also_built = true,
      .right = TOKEN_VARY},
-    {.method = "GET", .pattern = "/v1/openapi.json", .handle = get_openapi},
+    {.method = "GET", .pattern = "/v1/openapi.json", KEPT(keeps_openapi)},
     {.method = "GET", .pattern = "/", .handle = get_viewer_page, .open = true},
     {.method = "GET", .pattern = "/viewer.js", .handle = get_viewer_script, .open = true},
     {.method = "GET", .pattern = "/viewer.css", .handle = get_viewer_style, .open = true},

@@ -27,6 +27,7 @@ typedef struct route {
     route_handler *handle;    /* or */
     const solve_steps *steps; /* of a solve that shares passes */
     route_shortcut *shortcut; /* or NULL */
+    route_keeps *keeps;       /* of an answer that is kept: steps and shortcut are send_kept, quick_kept */
     bool with_body; /* the body may have --max-body bytes; the handler runs on a thread that solves, as steps
                        do */
     bool open;      /* no token is needed, unless one has the right */
@@ -54,10 +55,13 @@ typedef struct route_match {
 /* Sets *match, and *out to 404 or 405 if there is no route. */
 void route_find(const char *method, const char *path, route_match *match, answer *out);
 
-route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_adjoint, put_reflectance,
-    delete_reflectance, delete_scene, get_openapi, get_viewer_page, get_viewer_script, get_viewer_style,
-    get_viewer_icon, get_viewer_licences, get_sky, get_weather;
-route_shortcut quick_radiosity, quick_mesh;
-extern const solve_steps post_radiosity, get_mesh;
+route_handler get_healthz, get_readyz, get_metrics, post_adjoint, put_reflectance, delete_reflectance,
+    delete_scene, get_viewer_page, get_viewer_script, get_viewer_style, get_viewer_icon, get_viewer_licences;
+route_shortcut quick_radiosity, quick_kept;
+route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_sky, keeps_weather, keeps_openapi;
+extern const solve_steps post_radiosity, send_kept;
+
+/* The description of the routes, for service.openapi. Errors: LAM_ERR_MEMORY. */
+lam_status openapi_keep(kept_forms **out, lam_error *error);
 
 #endif

@@ -8,9 +8,11 @@
 #include "server/net/origin.h"
 #include "server/net/peer.h"
 #include "server/net/token.h"
+#include "server/net/turns.h"
 #include "server/queue/batch.h"
 #include "server/queue/metrics.h"
 #include "server/queue/problem_counts.h"
+#include "server/route/metrics_page.h"
 #include "server/route/request_memory.h"
 #include "server/scene/catalog.h"
 #include "server/scene/variants.h"
@@ -31,8 +33,11 @@ typedef struct service {
     access_log
         *audit_log; /* PUT and DELETE; the access log, or standard error; NULL: nothing can be changed */
     problem_counts problems;
+    kept_forms *openapi; /* GET /v1/openapi.json */
+    metrics_page *metrics_page;
     atomic_int state;         /* a service_state */
-    connections *connections; /* from http_start to http_stop */
+    connections *connections; /* from http_start to http_stop, as turns */
+    turns *turns;
     atomic_size_t n_refining; /* refinements that wait or run */
     request_ledger memory;    /* --max-request-memory, --max-buffered */
 } service;

@@ -28,14 +28,30 @@ static void list_again(void *context, verifier *v) {
     catalog_release(now);
 }
 
+/* Without scenes, with room for so many. */
+static lam_status snapshot_create(size_t most, catalog_snapshot **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    catalog_snapshot *made = memory_allocate(1, sizeof *made, "catalog", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    atomic_init(&made->references, 1);
+    TRY(scene_list_create(&made->list, error));
+    made->refused = refusals_create();
+    if (made->refused == NULL) FAIL(error, LAM_ERR_MEMORY, "catalog: not enough memory");
+    made->scenes = memory_allocate(most, sizeof *made->scenes, "catalog", error);
+    if (made->scenes == NULL) TRY(LAM_ERR_MEMORY);
+    *out = made;
+    made = NULL;
+done:
+    catalog_release(made);
+    return status;
+}
+
 lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **made, lam_error *error) {
     lam_status status = LAM_OK;
+    catalog_snapshot *empty = NULL;
     catalog *all = memory_allocate(1, sizeof *all, "catalog", error);
-    catalog_snapshot *empty = memory_allocate(1, sizeof *empty, "catalog", error);
-    if (all == NULL || empty == NULL) TRY(LAM_ERR_MEMORY);
-    atomic_init(&empty->references, 1);
-    empty->refused = refusals_create();
-    if (empty->refused == NULL) FAIL(error, LAM_ERR_MEMORY, "catalog: not enough memory");
+    if (all == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(snapshot_create(0, &empty, error));
     all->config = c;
     atomic_init(&all->ledger.taken, 0);
     atomic_init(&all->ledger.room, 0); /* until the memory of the stores is known */
@@ -50,8 +66,7 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
     all = NULL;
 done:
     free(all);
-    if (empty != NULL) refusals_release(empty->refused);
-    free(empty);
+    catalog_release(empty);
     return status;
 }
 
@@ -76,6 +91,7 @@ void catalog_release(catalog_snapshot *snapshot) {
     for (size_t i = 0; i < snapshot->n_scenes; i++) scene_release(snapshot->scenes[i]);
     refusals_release(snapshot->refused);
     free(snapshot->scenes);
+    scene_list_destroy(snapshot->list);
     free(snapshot);
 }
 
@@ -163,14 +179,8 @@ static lam_status check_work(const catalog *all, const catalog_snapshot *next, c
         (unsigned long long)used);
 }
 
-/* Drops what a scene computed and can compute again. */
-static void drop_computed(const scene *s) {
-    row_cache_clear(s->rows);
-    scene_mesh_clear(s->mesh);
-}
-
 static void drop_all_computed(const catalog_snapshot *next) {
-    for (size_t i = 0; i < next->n_scenes; i++) drop_computed(next->scenes[i]);
+    for (size_t i = 0; i < next->n_scenes; i++) scene_drop_computed(next->scenes[i]);
 }
 
 /* The same, where rows of reductions and meshes go before the scene does: its own, which it may have where it
@@ -179,7 +189,7 @@ static lam_status check_kept(const catalog *all, const catalog_snapshot *next, c
                              lam_error *error) {
     lam_error unused;
     if (check_work(all, next, s, &unused) == LAM_OK) return LAM_OK;
-    drop_computed(s);
+    scene_drop_computed(s);
     if (check_work(all, next, s, &unused) == LAM_OK) return LAM_OK;
     drop_all_computed(next);
     return check_work(all, next, s, error);
@@ -323,14 +333,9 @@ static void report_dropped(const catalog_snapshot *next, const catalog_snapshot 
 /* A copy of the present snapshot without the scene of this name, with room for one more. */
 static lam_status copy_without(const catalog_snapshot *present, const char *name, catalog_snapshot **out,
                                lam_error *error) {
-    catalog_snapshot *made = memory_allocate(1, sizeof *made, "catalog", error);
-    if (made == NULL) return LAM_ERR_MEMORY;
-    atomic_init(&made->references, 1);
-    made->scenes = memory_allocate(present->n_scenes + 1, sizeof *made->scenes, "catalog", error);
-    if (made->scenes == NULL) {
-        free(made);
-        return LAM_ERR_MEMORY;
-    }
+    catalog_snapshot *made = NULL;
+    const lam_status status = snapshot_create(present->n_scenes + 1, &made, error);
+    if (status != LAM_OK) return status;
     for (size_t i = 0; i < present->n_scenes; i++)
         if (strcmp(present->scenes[i]->name, name) != 0)
             made->scenes[made->n_scenes++] = scene_acquire(present->scenes[i]);
@@ -400,14 +405,7 @@ size_t catalog_reload(catalog *all, const stop_check *stop) {
     catalog_snapshot *before = catalog_acquire(all), *next = NULL;
     if (all->config->max_memory > 0) atomic_store(&all->ledger.room, 0); /* no scene grows meanwhile */
     TRY(sources_find(all->config, &sources, &error));
-    next = memory_allocate(1, sizeof *next, "catalog", &error);
-    if (next == NULL) TRY(LAM_ERR_MEMORY);
-    atomic_init(&next->references, 1);
-    const size_t most = sources.count + all->config->max_variants;
-    next->scenes = memory_allocate(most, sizeof *next->scenes, "catalog", &error);
-    if (next->scenes == NULL) TRY(LAM_ERR_MEMORY);
-    next->refused = refusals_create();
-    if (next->refused == NULL) FAIL(&error, LAM_ERR_MEMORY, "catalog: not enough memory");
+    TRY(snapshot_create(sources.count + all->config->max_variants, &next, &error));
     for (size_t i = 0; i < sources.count; i++) {
         load_source(all, next, before, &sources.items[i], stop);
         if (stop_asked(stop))

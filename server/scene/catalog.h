@@ -6,6 +6,7 @@
 #include "server/config.h"
 #include "server/scene/refusals.h"
 #include "server/scene/scene.h"
+#include "server/scene/scene_list.h"
 
 /* More than the bytes of any scene's name, as a path has it. */
 enum { CATALOG_NAME_MAX = 256 };
@@ -15,6 +16,7 @@ typedef struct catalog_snapshot {
     size_t n_scenes;
     scene **scenes;    /* by name */
     refusals *refused; /* held */
+    scene_list *list;  /* of the scenes */
 } catalog_snapshot;
 
 typedef struct catalog catalog;

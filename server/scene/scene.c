@@ -197,6 +197,20 @@ static size_t threads_of(const lam_operator *op, size_t most) {
     return worth < 1 ? 1 : worth < most ? worth : most;
 }
 
+/* Once the scene is described. */
+static lam_status keep_texts(store *s, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    buffer tiles = {0};
+    uint64_t memory;
+    TRY(scene_texts_describe(&made->texts, made->description, made->ledger, error));
+    if (made->sky != NULL) TRY(tile_places_read(s, lam_sky_tiles(made->sky), &tiles, error));
+    TRY(scene_texts_add_sky(&made->texts, &tiles, &made->weather, made->ledger, &memory, error));
+    made->memory += memory;
+done:
+    buffer_free(&tiles);
+    return status;
+}
+
 static lam_status read_store(store *s, const scene_options *options, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     if (!store_has(s, "/operator"))
@@ -215,8 +229,6 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     made->reflectance = made->op->reflectance;
     lam_operator_set_threads(made->op, threads_of(made->op, options->threads));
     TRY(sky_load(s, made->n, &made->sky, error));
-    if (made->sky != NULL) TRY(tile_places_read(s, lam_sky_tiles(made->sky), &made->tiles, error));
-    made->memory += made->tiles.capacity;
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
     made->work_bytes = pass_work_bytes(made);
@@ -227,6 +239,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(refined_create(s, made->op, made->ledger, &made->refined, error));
     TRY(read_errors(s, made, error));
     TRY(describe_scene(s, made, &made->description, error));
+    TRY(keep_texts(s, made, error));
     TRY(scene_mesh_create(s, made, &made->mesh, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
     const bool first = options->verify || store_map_bytes(store_map_of(s)) < options->verify_below;
@@ -303,6 +316,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
     TRY(refined_create_variant(base->refined, op, &made->refined, error));
     TRY(describe_variant(made, groups, &made->description, error));
+    TRY(scene_texts_describe(&made->texts, made->description, made->ledger, error));
     TRY(scene_mesh_create(NULL, made, &made->mesh, error));
     *out = made;
     made = NULL;
@@ -312,7 +326,14 @@ done:
 }
 
 uint64_t scene_grown(const scene *s) {
-    return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) + scene_mesh_held(s->mesh);
+    return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) +
+           kept_forms_held(scene_mesh_forms(s->mesh)) + scene_texts_held(&s->texts);
+}
+
+void scene_drop_computed(const scene *s) {
+    row_cache_clear(s->rows);
+    kept_forms_clear(scene_mesh_forms(s->mesh));
+    scene_texts_clear(&s->texts);
 }
 
 scene *scene_acquire(scene *s) {
@@ -326,9 +347,9 @@ void scene_release(scene *s) {
     lam_operator_close(s->op);
     row_cache_destroy(s->rows);
     scene_mesh_destroy(s->mesh);
+    scene_texts_free(&s->texts);
     if (s->base == NULL) {
         lam_sky_close(s->sky);
-        buffer_free(&s->tiles);
         weather_file_free(&s->weather);
         group_index_free(&s->groups);
         group_index_free(&s->emitters);

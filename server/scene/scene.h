@@ -7,8 +7,7 @@
 #include "server/scene/refined.h"
 #include "server/scene/row_cache.h"
 #include "server/scene/scene_mesh.h"
-#include "server/scene/weather_file.h"
-#include "solver/codec/buffer.h"
+#include "server/scene/scene_texts.h"
 #include "solver/codec/groups.h"
 #include "solver/codec/request.h"
 #include "solver/codec/stated_errors.h"
@@ -38,13 +37,13 @@ struct scene {
     group_index emitters;  /* by name */
     double *area;          /* [n], m^2 */
     lam_sky *sky;          /* NULL: none */
-    buffer tiles;          /* of the sky, as JSON (tile_places_read); a variant has none of its own */
-    weather_file weather;  /* likewise, beside the file */
+    weather_file weather;  /* beside the file; its text is in texts. A variant has none of its own */
     size_t n_emitters;     /* 0: the store answers any emission */
     uint64_t bytes;        /* of /operator as stored; of a variant, of the cores alone */
     uint64_t memory;       /* bytes counted against --max-memory, without work areas */
     size_t work_bytes;     /* largest work area of a thread that solves */
     char *description;     /* the JSON of GET /v1/scenes/NAME */
+    scene_texts texts;     /* that clients ask for */
     stated_errors errors;  /* of the store; of a variant none */
     bool *group_read;      /* [n_groups]: all its elements are receivers; NULL where the store is for all */
     bool *group_emits;     /* [n_groups]: all its elements are sources; NULL where any emission is answered */
@@ -78,6 +77,9 @@ lam_status scene_open(const scene_options *options, scene **out, lam_error *erro
 
 /* Bytes that the scene has taken of its ledger since it was opened. Any thread. */
 uint64_t scene_grown(const scene *s);
+
+/* Drops what it computed and can compute again but for a refiner. Any thread. */
+void scene_drop_computed(const scene *s);
 
 /* Bytes of the work areas of n_threads threads. */
 uint64_t scene_work_memory(size_t n_threads, size_t work_bytes);

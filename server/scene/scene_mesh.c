@@ -4,7 +4,6 @@
 #include "solver/codec/gltf/gltf.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -14,8 +13,7 @@ struct scene_mesh {
     size_t n_vertices;
     size_t n_textured, n_textures, image_bytes; /* of gltf_sizes; 0 where no image is shown */
     uint64_t tag;
-    pthread_mutex_t lock; /* of kept */
-    kept_bytes *kept[SCENE_MESH_FORMS];
+    kept_forms *forms;
 };
 
 /* The store of a scene or of a variant's base. */
@@ -84,8 +82,8 @@ lam_status scene_mesh_create(store *s, const scene *of, scene_mesh **out, lam_er
     lam_status status = LAM_OK;
     scene_mesh *made = memory_allocate(1, sizeof *made, "the mesh of a scene", error);
     if (made == NULL) return LAM_ERR_MEMORY;
-    pthread_mutex_init(&made->lock, NULL);
     made->of = of;
+    TRY(kept_forms_create(of->ledger, "the mesh of a scene", &made->forms, error));
     if (of->base != NULL) {
         const scene_mesh *base = of->base->mesh;
         made->up = base->up;
@@ -108,8 +106,7 @@ done:
 
 void scene_mesh_destroy(scene_mesh *mesh) {
     if (mesh == NULL) return;
-    scene_mesh_clear(mesh);
-    pthread_mutex_destroy(&mesh->lock);
+    kept_forms_release(mesh->forms);
     free(mesh);
 }
 
@@ -117,55 +114,8 @@ uint64_t scene_mesh_tag(const scene_mesh *mesh) {
     return mesh->tag;
 }
 
-kept_bytes *scene_mesh_find(scene_mesh *mesh, size_t form) {
-    pthread_mutex_lock(&mesh->lock);
-    kept_bytes *found = kept_bytes_hold(mesh->kept[form]);
-    pthread_mutex_unlock(&mesh->lock);
-    return found;
-}
-
-static void give_back(void *ledger, size_t bytes) {
-    memory_ledger_give_back(ledger, bytes);
-}
-
-kept_bytes *scene_mesh_keep(scene_mesh *mesh, size_t form, buffer *made) {
-    memory_ledger *ledger = mesh->of->ledger;
-    const size_t bytes = made->capacity;
-    if (!memory_ledger_take(ledger, bytes)) return NULL;
-    kept_bytes *kept = kept_bytes_create(made, give_back, ledger, bytes), *dropped = NULL;
-    if (kept == NULL) {
-        memory_ledger_give_back(ledger, bytes);
-        return NULL;
-    }
-    pthread_mutex_lock(&mesh->lock);
-    if (mesh->kept[form] == NULL) {
-        mesh->kept[form] = kept;
-    } else {
-        dropped = kept;
-        kept = mesh->kept[form];
-    }
-    (void)kept_bytes_hold(kept);
-    pthread_mutex_unlock(&mesh->lock);
-    kept_bytes_release(dropped);
-    return kept;
-}
-
-void scene_mesh_clear(scene_mesh *mesh) {
-    kept_bytes *gone[SCENE_MESH_FORMS];
-    pthread_mutex_lock(&mesh->lock);
-    memcpy(gone, mesh->kept, sizeof gone);
-    memset(mesh->kept, 0, sizeof mesh->kept);
-    pthread_mutex_unlock(&mesh->lock);
-    for (size_t form = 0; form < SCENE_MESH_FORMS; form++) kept_bytes_release(gone[form]);
-}
-
-size_t scene_mesh_held(scene_mesh *mesh) {
-    size_t held = 0;
-    pthread_mutex_lock(&mesh->lock);
-    for (size_t form = 0; form < SCENE_MESH_FORMS; form++)
-        held += mesh->kept[form] != NULL ? mesh->kept[form]->taken : 0;
-    pthread_mutex_unlock(&mesh->lock);
-    return held;
+kept_forms *scene_mesh_forms(scene_mesh *mesh) {
+    return mesh->forms;
 }
 
 static size_t sum(size_t a, size_t b) {

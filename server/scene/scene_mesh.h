@@ -1,16 +1,13 @@
 /* The mesh of a scene as binary glTF (solver/codec/gltf), made from its store when it is first asked for, and
- * kept in every form (content coding) that was asked for. Knows no coding but by its number. Any thread. */
+ * kept. Any thread. */
 #ifndef LAMBERT_SERVER_SCENE_SCENE_MESH_H
 #define LAMBERT_SERVER_SCENE_SCENE_MESH_H
 
-#include "server/scene/kept_bytes.h"
+#include "server/scene/kept_forms.h"
 #include "store/store.h"
 
 typedef struct scene scene;
 typedef struct scene_mesh scene_mesh;
-
-/* Form 0 is the file as it is. */
-#define SCENE_MESH_FORMS 3
 
 /* For a scene that is else complete, with its open store s, or NULL for a variant. The scene outlives it.
  * Errors: LAM_ERR_MEMORY, LAM_ERR_FORMAT. */
@@ -23,18 +20,8 @@ void scene_mesh_destroy(scene_mesh *mesh);
  * collision of 64 bits). It stays the same from one start of the daemon to the next. */
 uint64_t scene_mesh_tag(const scene_mesh *mesh);
 
-/* A form that is kept, to be released by the caller, or NULL. */
-kept_bytes *scene_mesh_find(scene_mesh *mesh, size_t form);
-
-/* Keeps a form that was made, within the scene's ledger (--max-memory): a reference for the caller, or NULL,
- * with nothing taken over, if there is no room. Of two that are made at once the first one stays. */
-kept_bytes *scene_mesh_keep(scene_mesh *mesh, size_t form, buffer *made);
-
-/* Drops all forms; those that are being sent are freed by their last user. */
-void scene_mesh_clear(scene_mesh *mesh);
-
-/* Bytes of the forms that are kept. */
-size_t scene_mesh_held(scene_mesh *mesh);
+/* The file, in every coding that was asked for. */
+kept_forms *scene_mesh_forms(scene_mesh *mesh);
 
 /* Bytes of the file, and bytes that scene_mesh_build takes with those, at most. */
 size_t scene_mesh_bytes_most(const scene_mesh *mesh);

@@ -13,7 +13,7 @@
 
 typedef struct weather_file {
     const char *format; /* "epw" or "wea"; NULL: there is none, or none that can be served: */
-    char *text;         /* [length] */
+    char *text;         /* [length]; NULL once another has taken it over */
     size_t length;
     char why[160]; /* the reason, without the folder */
     struct {

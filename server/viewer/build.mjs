@@ -2,6 +2,7 @@
 //   SOURCES  this folder;  MODULES  the node_modules that `npm ci` made;  OUT  a folder for what is written:
 // the files of the page, each also compressed, and viewer_files.c, which holds them in the daemon.
 import { readFileSync, writeFileSync, mkdirSync } from "node:fs";
+import { createHash } from "node:crypto";
 import { createRequire } from "node:module";
 import { join, resolve } from "node:path";
 import { gzipSync } from "node:zlib";
@@ -55,7 +56,8 @@ files.forEach((file, i) => {
     const bytes = readFileSync(join(out, file)), packed = gzipSync(bytes, { level: 9 });
     writeFileSync(join(out, `${file}.gz`), packed);
     code += include(`viewer_plain_${i}`, join(out, file)) + include(`viewer_gzip_${i}`, join(out, `${file}.gz`));
-    rows += `    {viewer_plain_${i}, ${bytes.length}, viewer_gzip_${i}, ${packed.length}},\n`;
+    const tag = createHash("sha256").update(bytes).digest("hex").slice(0, 16);
+    rows += `    {viewer_plain_${i}, ${bytes.length}, viewer_gzip_${i}, ${packed.length}, 0x${tag}u},\n`;
 });
 code += `\nconst bool viewer_is_built = true;\nconst fixed_bytes viewer_files[VIEWER_PARTS] = {\n${rows}};\n`;
 writeFileSync(join(out, "viewer_files.c"), code);

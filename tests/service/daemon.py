@@ -19,6 +19,10 @@ LAMBERTD = os.environ["LAMBERTD"]
 
 
 
+# The text of /metrics is kept for so long (METRICS_PAGE_S of server/route/metrics_page.h).
+METRICS_S = .1
+
+
 class Answer:
     def __init__(self, status, headers, body):
         self.status, self.headers, self.body = status, headers, body
@@ -36,6 +40,7 @@ class Daemon:
         self.out = tempfile.TemporaryFile("w+")
         self.err = tempfile.TemporaryFile("w+")
         self.port = None
+        self.measured = 0  # when /metrics was asked for last
         where = ["--listen", listen] if listen is not None else []
         self.process = subprocess.Popen([*launcher, LAMBERTD, *where, *map(str, arguments)], stdout=self.out, stderr=self.err)
         try:
@@ -118,11 +123,14 @@ class Daemon:
     def ask(self, method, path, body=None, headers=None, connection=None):
         own = connection is None
         connection = connection or self.connect()
+        if path == "/metrics":  # the figures of now, not those that were answered before
+            time.sleep(max(0, self.measured + METRICS_S - time.monotonic()))
         try:
             connection.request(method, path, body, headers or {})
             response = connection.getresponse()
             return Answer(response.status, response.headers, response.read())
         finally:
+            self.measured = time.monotonic() if path == "/metrics" else self.measured
             if own:
                 connection.close()
 

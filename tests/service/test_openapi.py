@@ -196,10 +196,12 @@ class OpenApi(unittest.TestCase):
         """A problem that the sources of a route name is described there, and no other one is."""
         body = [f"solver/codec/{name}.c" for name in "answer group_figures json json_adjoint json_emission json_parser npy request".split()]
         own = {"get_healthz": ["get_health.c"], "get_readyz": ["get_health.c"], "get_metrics": ["get_metrics.c"],
-               "get_scenes": ["get_scenes.c"], "get_scene": ["get_scenes.c"], "get_mesh": ["get_mesh.c"], "get_openapi": ["get_openapi.c"],
+               **{f"keeps_{name}": ["kept_answer.c", file] for name, file in (
+                   ("scenes", "get_scenes.c"), ("scene", "get_scenes.c"), ("mesh", "get_mesh.c"), ("openapi", "get_openapi.c"),
+                   ("sky", "get_sky.c"), ("weather", "get_sky.c"))},
                "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c"], "post_adjoint": ["post_adjoint.c"],
                "put_reflectance": ["reflectance_variants.c"], "delete_reflectance": ["reflectance_variants.c"],
-               "delete_scene": ["reflectance_variants.c"], "get_sky": ["get_sky.c"], "get_weather": ["get_sky.c"],
+               "delete_scene": ["reflectance_variants.c"],
                **{f"get_viewer_{part}": ["get_viewer.c"] for part in ("page", "script", "style", "icon", "licences")}}
         table = re.findall(r"\{\.method = .*?\}(?=,\s)", ROUTES.read_text(), re.S)
         self.assertGreater(len(table), 10)
@@ -207,7 +209,7 @@ class OpenApi(unittest.TestCase):
         self.assertEqual((framing, pages), ({"400", "501"}, {"403"}))
         for row in table:
             method, path = re.search(r'\.method = "(\w+)",\s+\.pattern = "([^"]+)"', row).groups()
-            handler = re.search(r"\.(?:handle|steps) = &?(\w+)", row)[1]
+            handler = re.search(r"(?:\.(?:handle|steps) = &?|KEPT\()(\w+)", row)[1]
             wanted = framing | self.statuses_of("server/route/call.c")  # 503: memory is short for any answer
             if ".any_host" not in row:
                 wanted |= pages
