@@ -3,6 +3,7 @@
 #include "solver/base/terminal.h"
 #include "solver/linalg/core.h"
 #include "solver/verbs/verbs.h"
+#include "solver/waits.h"
 
 #include <signal.h>
 
@@ -28,6 +29,7 @@ static const option_command program = {
 };
 
 int main(int argc, char **argv) {
+    waits_sleep(argv);
     signal(SIGCHLD, SIG_DFL); /* if the launcher left it ignored, the end of a child would be unknown */
     core_keep_thread_limit();
     return terminal_finish(program.name, options_run_verb(&program, verbs, argc, argv));

@@ -78,7 +78,8 @@ step "layers, layout and comments"
 git ls-files '*.[ch]' '*.inc' | xargs -P "$jobs" -n 40 clang-format --dry-run --Werror
 ./tests/comments.py
 
-# Threads that wait should not spin while two of them share a core with a server and its clients.
+# Threads that wait should not spin while two of them share a core with a server and its clients. Both programs see to that by themselves; unit
+# tests are other programs, whose OpenMP does what the environment says.
 export OMP_WAIT_POLICY=passive
 
 step "programs as users have them, by which tests make references, and which the demonstration finds built"

@@ -8,6 +8,7 @@
 #include "solver/bench/bench.h"
 #include "solver/linalg/core.h"
 #include "solver/precompute/forecast.h"
+#include "solver/waits.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -397,6 +398,7 @@ static int measure(int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
+    waits_sleep(argv);
     signal(SIGCHLD, SIG_DFL); /* if the launcher left it ignored, the end of a child would be unknown */
     core_keep_thread_limit();
     if (argc == 2 && strcmp(argv[1], "service-solver") == 0) return service_solver();
