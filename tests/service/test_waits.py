@@ -28,7 +28,7 @@ def run(program, *arguments, **environment):
 
 def spins(program, **environment):
     """The turns of the last start: lambertd starts itself twice."""
-    said = run(program, "--version", OMP_DISPLAY_ENV="verbose", **environment).stderr
+    said = run(program, "--help", OMP_DISPLAY_ENV="verbose", **environment).stderr
     return int(re.findall(r"GOMP_SPINCOUNT = '(\d+)'", said)[-1])
 
 

@@ -1,11 +1,14 @@
 """A short solve beside greedy clients: its latency alone, beside clients that send bad bodies, that ask for adjoints, and that
-refine, in one run against one daemon. On request only; needs wrk. deploy/docs/performance-service.md has its figures.
+refine, and beside 32 clients of each route of routes.c, by GET, HEAD and with the tag of what they have (304), plain and by gzip, in
+one run against one daemon. The short solve comes from another address than all of them. On request only; needs wrk.
+deploy/docs/performance-service.md has its figures.
 
 usage: beside.py [SECONDS each (10)] [ELEMENTS (100000)]        with LAMBERT= and LAMBERTD= their paths
-Ends with 0 when the 99th percentile beside each of them is at most 20 times the median alone, and the answers were 200 (of the
-greedy ones 200, 422, 429 or 503).
+Ends with 0 when the 99th percentile beside each of them is at most 20 times the median alone, beside clients of what is kept the
+median at most 5 times, and the answers were 200 (of the greedy ones 200, 304, 422, 429 or 503, or 404 where there is no viewer).
 """
 
+import http.client
 import json
 import os
 import pathlib
@@ -14,16 +17,18 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "service"))
 from daemon import Daemon  # noqa: E402
 
 LAMBERT = os.environ["LAMBERT"]
 MOST = 20  # of the time alone
+MOST_KEPT = 5  # the median beside answers that are kept
+ROUTES = pathlib.Path(__file__).resolve().parents[2] / "server" / "route" / "routes.c"
 UNIT = {"us": 1e-3, "ms": 1, "s": 1e3, "m": 6e4}
 LOAD = """
-wrk.method, wrk.body = "POST", %s
-wrk.headers["Content-Type"] = "application/json"
+%s
 local threads = {}
 function setup(thread) table.insert(threads, thread) end
 answers = {}
@@ -44,9 +49,12 @@ def milliseconds(text):
 class Clients:
     """wrk with one thread and some connections, each with one request at a time."""
 
-    def __init__(self, folder, name, url, connections, seconds, body):
+    def __init__(self, folder, name, url, connections, seconds, body=None, method="POST", headers=()):
         script = folder / f"{name}.lua"
-        script.write_text(LOAD % f"[==[{json.dumps(body)}]==]")
+        lines = [f'wrk.method = "{method}"', *(f"wrk.headers[ [==[{key}]==] ] = [==[{value}]==]" for key, value in headers)]
+        if body is not None:
+            lines += [f"wrk.body = [==[{json.dumps(body)}]==]", 'wrk.headers["Content-Type"] = "application/json"']
+        script.write_text(LOAD % "\n".join(lines))
         self.run = subprocess.Popen([shutil.which("wrk"), "-t1", f"-c{connections}", f"-d{seconds}s", "--timeout", "60s", "--latency",
                                      "-s", script, url], stdout=subprocess.PIPE, text=True)
 
@@ -54,6 +62,22 @@ class Clients:
         said = self.run.communicate()[0]
         at = {int(share): milliseconds(time) for share, time in re.findall(r"^ +(50|99)% +([0-9.]+[a-z]+)$", said, re.M)}
         return at, {int(status): int(n) for status, n in re.findall(r"status (\d+) (\d+)", said)}
+
+
+def ask(daemon, solve, seconds):
+    """The 50th and the 99th percentile, ms, of short solves of a client of another address, one after the other, and statuses."""
+    body, took, statuses = json.dumps(solve), [], {}
+    connection = http.client.HTTPConnection("127.0.0.1", daemon.port, 60, source_address=("127.0.0.9", 0))
+    end = time.monotonic() + seconds
+    while (start := time.monotonic()) < end:
+        connection.request("POST", "/v1/scenes/room/radiosity", body, {"Content-Type": "application/json"})
+        answer = connection.getresponse()
+        answer.read()
+        took.append(1e3 * (time.monotonic() - start))
+        statuses[answer.status] = statuses.get(answer.status, 0) + 1
+    connection.close()
+    took.sort()
+    return {share: took[len(took) * share // 100] for share in (50, 99)}, statuses
 
 
 def measure(daemon, folder, seconds, elements):
@@ -68,15 +92,39 @@ def measure(daemon, folder, seconds, elements):
                  for k in (1000, 10000, 40000, 101000, 200000, 400000) if k != elements},
               "32 clients for adjoints": (32, "adjoint", {"cotangent": light, "gradient": ["groups"]}),
               "16 clients that refine": (16, "radiosity", {**solve, "tolerance": 1e-6})}
-    print(f"{'beside':28} {'p50 ms':>8} {'p99 ms':>8} {'p99 / alone':>12}  statuses of the others")
+    print(f"{'beside':40} {'p50 ms':>8} {'p99 ms':>8} {'p99 / alone':>12}  statuses of the others")
     for beside, (connections, route, body) in greedy.items():
         others = Clients(folder, "others", f"{base}/{route}", connections, seconds + 2, body) if connections else None
-        at, statuses = Clients(folder, "solve", f"{base}/radiosity", 1, seconds, solve).finish()
+        at, statuses = ask(daemon, solve, seconds)
         of_others = others.finish()[1] if others else {}
         alone = alone or at[50]
         ratio = at[99] / alone
         failed |= ratio > MOST or set(statuses) != {200} or not set(of_others) <= {200, 422, 429, 503}
-        print(f"{beside:28} {at[50]:8.2f} {at[99]:8.2f} {ratio:12.1f}  {of_others or ''}", flush=True)
+        print(f"{beside:40} {at[50]:8.2f} {at[99]:8.2f} {ratio:12.1f}  {of_others or ''}", flush=True)
+    return measure_kept(daemon, folder, seconds, solve, alone) or failed
+
+
+def kept_requests(daemon):
+    """(words, path, method, headers) of every route of GET."""
+    for path in sorted(set(re.findall(r'\.method = "GET",\s+\.pattern = "([^"]+)"', ROUTES.read_text()))):
+        own = path.replace("{name}", "room")
+        for coding in "identity", "gzip":
+            accept = {"Accept-Encoding": coding}
+            tag = daemon.ask("HEAD", own, headers=accept).headers["ETag"]
+            yield f"GET {own} {coding}", own, "GET", accept
+            yield f"HEAD {own} {coding}", own, "HEAD", accept
+            if tag:
+                yield f"304 {own} {coding}", own, "GET", {**accept, "If-None-Match": tag}
+
+
+def measure_kept(daemon, folder, seconds, solve, alone):
+    failed = False
+    for words, path, method, headers in kept_requests(daemon):
+        others = Clients(folder, "others", f"http://127.0.0.1:{daemon.port}{path}", 32, seconds + 2, None, method, headers.items())
+        at, statuses = ask(daemon, solve, seconds)
+        of_others, ratio = others.finish()[1], at[50] / alone
+        failed |= ratio > MOST_KEPT or set(statuses) != {200} or not set(of_others) <= {200, 304, 404}
+        print(f"{words:40} {at[50]:8.2f} {at[99]:8.2f} {ratio:6.1f} (p50)  {of_others or ''}", flush=True)
     return failed
 
 
@@ -91,6 +139,8 @@ def main():
         for command in (["generate", "cornell", "--elements", str(elements), "--reflectance", ".5", "-o", scene],
                         ["precompute", scene, "-o", store, "--quiet", "--probes", "0", "--keep-form-factors"]):
             subprocess.run([LAMBERT, *map(str, command)], check=True, stdout=subprocess.DEVNULL)
+        # The largest weather file that is served; its sky is that of no scene here.
+        (folder / "room.epw").write_bytes(b"LOCATION,Here\n" + b"1999,1,1,1,60,0,4.4\n" * 400000)
         daemon = Daemon(store)
         try:
             failed = measure(daemon, folder, seconds, elements)
