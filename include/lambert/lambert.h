@@ -63,9 +63,9 @@ const char *lam_operator_kind(const lam_operator *op);
 
 /* Sets the number of threads that one answer may use, 1 by default; short vectors are answered by one. Call
  * it before the operator is shared and before lam_operator_work_bytes. The bits of an answer do not depend on
- * it. The threads are OpenMP's, which spin while they wait unless the environment that the program starts with
- * has OMP_WAIT_POLICY=passive; beside other busy programs they should not. The programs of Lambert see to that
- * by themselves, a library cannot. */
+ * it. The threads are OpenMP's, which spin while they wait unless the environment that the program starts
+ * with has OMP_WAIT_POLICY=passive; beside other busy programs they should not. The programs of Lambert see
+ * to that by themselves, a library cannot. */
 void lam_operator_set_threads(lam_operator *op, size_t n_threads);
 
 /* Bytes of work area that lam_operator_apply, _selected and its adjoint need for n_rhs vectors; 0 when that
