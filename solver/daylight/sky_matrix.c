@@ -124,7 +124,7 @@ static lam_status choose_tiling(const reader *r, const char *tiles, sky_tiling *
         FAIL(error, LAM_ERR_FORMAT,
              "%s: %zu rows, must be 146 (ground and tregenza) or 144 MF^2 + 2 (reinhart:MF, MF to %d)",
              r->path, r->rows, SKY_REINHART_MOST);
-    if (split > 1) snprintf(name, sizeof name, "reinhart:%zu", split);
+    if (split > 1) snprintf(name, sizeof name, "reinhart:%u", (unsigned)split);
     const bool same =
         tiles == NULL || strcmp(tiles, name) == 0 || (split == 1 && strcmp(tiles, "reinhart:1") == 0);
     if (!same)

@@ -86,9 +86,9 @@ lam_status sky_tiling_create(const char *name, char up, sky_tiling *out, lam_err
     if (plan.split == 1 && name[0] == 't')
         snprintf(s.name, sizeof s.name, "tregenza");
     else if (plan.split > 0)
-        snprintf(s.name, sizeof s.name, "reinhart:%zu", plan.split);
+        snprintf(s.name, sizeof s.name, "reinhart:%u", (unsigned)plan.split);
     else
-        snprintf(s.name, sizeof s.name, "grid:%zux%zu", plan.sectors, plan.bands);
+        snprintf(s.name, sizeof s.name, "grid:%ux%u", (unsigned)plan.sectors, (unsigned)plan.bands);
     turn(&s, up);
     const bool cap = plan.split > 0;
     s.n_bands = cap ? TREGENZA_BANDS * plan.split + 1 : plan.bands;

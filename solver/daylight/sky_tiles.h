@@ -24,7 +24,7 @@ typedef struct sky_band {
     uint32_t first, count;
 } sky_band;
 
-enum { SKY_PACKET = 8, SKY_NAME = 48, SKY_REINHART_MOST = 16, SKY_SECTORS_MOST = 360, SKY_BANDS_MOST = 90 };
+enum { SKY_PACKET = 8, SKY_NAME = 28, SKY_REINHART_MOST = 16, SKY_SECTORS_MOST = 360, SKY_BANDS_MOST = 90 };
 
 typedef struct sky_tiling {
     char name[SKY_NAME];

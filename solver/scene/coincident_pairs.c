@@ -7,12 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Planes closer than this share of the scene's radius are one. Coordinates that were rounded to single
- * precision are off by up to 2^-24 = 6e-8 of the largest of them, which is up to two radii where a scene
- * begins at its origin: two faces that were in one plane are up to 2.4e-7 apart. Rays, in single precision
- * too, meet either of two faces up to 1e-7 to 3e-7 apart, and the nearer one from there on. */
-static const double same_plane = 1e-6;
-
 /* Faces that share less of the smaller one count as neighbours. */
 static const double shared_least = 1e-3;
 
@@ -46,7 +40,7 @@ typedef struct search {
 double coincident_distance(const mesh *m) {
     double centre[3], radius;
     mesh_bounds(m, centre, &radius);
-    return same_plane * radius;
+    return plane_same_place * radius;
 }
 
 /* fminf and fmaxf are calls. */

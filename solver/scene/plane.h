@@ -13,12 +13,17 @@ static const double plane_flatness = 1e-5;
 static const double plane_same_direction = 1e-6;
 /* Nothing shorter than this share of the extent of a scene is a distance: single precision has 6e-8. */
 static const double plane_least_length = 1e-7;
+/* Planes closer than this share of the scene's radius are one. Coordinates that were rounded to single
+ * precision are off by up to 2^-24 = 6e-8 of the largest of them, which is up to two radii where a scene
+ * begins at its origin: two faces that were in one plane are up to 2.4e-7 apart. Rays, in single precision
+ * too, meet either of two faces up to 1e-7 to 3e-7 apart, and the nearer one from there on. */
+static const double plane_same_place = 1e-6;
 
 /* The distance that a corner of one face may have from the plane of another one of the same place, such as
- * the back of a sheet, given both diameters. A quad that counts as plane has corners up to f d off its plane, by turns
- * above and below it, so that each of them is up to 4 f d off the plane of the three others: the back may be
- * made of two triangles. A distance of a hundredth of the smaller face is a gap nevertheless: a diode of a
- * millimetre that hangs .1 mm above a large floor shines on it. */
+ * the back of a sheet, given both diameters. A quad that counts as plane has corners up to f d off its plane,
+ * by turns above and below it, so that each of them is up to 4 f d off the plane of the three others: the
+ * back may be made of two triangles. A distance of a hundredth of the smaller face is a gap nevertheless: a
+ * diode of a millimetre that hangs .1 mm above a large floor shines on it. */
 static inline double plane_slack(double one, double other) {
     return fmin(4 * plane_flatness * fmax(one, other), .01 * fmin(one, other));
 }

@@ -49,7 +49,7 @@ class Sheets(unittest.TestCase):
         return turned[2, 2]
 
     def test_a_leaf_alone_sees_nothing(self):
-        """Whatever it emits is its radiosity, to the last bit. With four decimals some leaves are two triangles, of which
+        """Its radiosity is its emission, to the last bit. With four decimals some leaves are two triangles, of which
         those of one side see a little of each other: the square of the angle between them, of up to .001, over 8."""
         for seed in (3,):
             for faces, options in (["1 2 3 4"], ["--two-sided"]), (["1 2 3 4", "4 3 2 1"], []):

@@ -16,7 +16,7 @@ static const double rectangle_share = .7;
 enum { PIECES_MOST = 64, COMPARED_MOST = 1 << 27 };
 
 /* Planes by faces of other sizes agree to some roundings of corners. */
-static const double plane_slack = 4;
+static const double plane_roundings = 4;
 
 typedef struct finder {
     const mesh *m;
@@ -208,9 +208,9 @@ lam_status face_openings_find(const mesh *m, double narrow, face_openings *out, 
     mesh_bounds(m, centre, &radius);
     const double slack = 2 * plane_flatness * radius;
     finder f = {
-        .m = m, .e = &e, .r = &r, .slack = plane_slack * slack, .narrow = fmax(narrow, slack), .out = &made};
+        .m = m, .e = &e, .r = &r, .slack = plane_roundings * slack, .narrow = fmax(narrow, slack), .out = &made};
     TRY(face_edges_find(m, n_faces, slack, &e, error));
-    TRY(plane_regions_find(m, n_faces, &e, plane_slack * slack, narrow, &r, error));
+    TRY(plane_regions_find(m, n_faces, &e, plane_roundings * slack, narrow, &r, error));
     array_sort(r.open, r.n_open, sizeof *r.open, larger_first);
     array_sort(r.covered, r.n_covered, sizeof *r.covered, larger_first);
     if (r.n_open > FACE_OPENINGS_MOST) made.n_left = r.n_open - FACE_OPENINGS_MOST;
