@@ -9,8 +9,8 @@
 /* As `like`, its tiling and ground, by options->recipe.rays rays from each element and recipe.seed, with
  * options->progress, stage and openings: without these, rays are aimed at those of the mesh (portals.h),
  * as they are for the bounce that is judged. order as for form_factors_make. Unlike another bounce it keeps
- * `ground`. Cost: n rays rays, half of them and a quarter towards openings where an element has any, and 4 m n
- * bytes. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+ * `ground`. Cost: n rays rays, half of them and a quarter towards openings where an element has any, and 4 m
+ * n bytes. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounce *like,
                            const form_factor_options *options, sky_bounce *out, lam_error *error);
 

@@ -19,11 +19,11 @@ double judge_references_bytes(const judge_references *r);
 typedef struct judging {
     const mesh *m;
     const uint32_t *order;
-    const build_problem *problem;   /* with the F that the operator was built from */
-    const form_factors *f;          /* of problem: its recipe and row sums */
+    const build_problem *problem;  /* with the F that the operator was built from */
+    const form_factors *f;         /* of problem: its recipe and row sums */
     const face_openings *openings; /* through which the sky is sampled; NULL: those of the mesh */
-    importance *importance; /* with which blocks were found; NULL: all is read, and emits */
-    recipe halves[2];       /* of the two samples; of blocks the first is taken */
+    importance *importance;        /* with which blocks were found; NULL: all is read, and emits */
+    recipe halves[2];              /* of the two samples; of blocks the first is taken */
     const char *scratch_names[2];
     const char *stages[2]; /* for progress */
     scratch *scratch;      /* NULL: none */

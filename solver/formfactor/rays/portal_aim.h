@@ -66,7 +66,7 @@ void portals_free(portals *p);
 /* All portals as one group. */
 portal_aim portals_all(const portals *p);
 
-/* How an element aims: by its place, its normal and the strengths. Cost: some microseconds. */
+/* Chooses the groups of an element by its place, its normal and the strengths. Cost: some microseconds. */
 void portals_aim(const portals *p, const mesh *m, const visibility *v, size_t element, portal_aim *out);
 
 /* Weighs the groups of an element by the share of each that is seen as open, [n], by few rays. */

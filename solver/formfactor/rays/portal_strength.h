@@ -1,4 +1,4 @@
-/* How much light of the sky comes through openings, as far as some rays show. Private to portals.c. */
+/* The light of the sky that comes through openings, as far as some rays show. Private to portals.c. */
 #ifndef LAMBERT_FORMFACTOR_RAYS_PORTAL_STRENGTH_H
 #define LAMBERT_FORMFACTOR_RAYS_PORTAL_STRENGTH_H
 

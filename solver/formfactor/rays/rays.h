@@ -23,7 +23,7 @@ typedef struct ray_context {
     uint64_t seed;
     const sky_bounce *sky;  /* bins the rays that leave; NULL: no sky */
     const portals *portals; /* rays are aimed at these, too; NULL: none */
-    portal_aim aim;         /* how the present element aims */
+    portal_aim aim;         /* the groups that the present element aims at */
     size_t n_rays;          /* of the present element by the cosine, where there are portals */
 } ray_context;
 

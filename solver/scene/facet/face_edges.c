@@ -26,7 +26,7 @@ typedef struct cutter {
     double slack;
     uint32_t *place;
     place_grid grid;
-    uint32_t centre, from, to; /* what is visited for: a place to weld, or a side to cut */
+    uint32_t centre, from, to; /* a place to weld, or a side to cut, while points are visited */
     side_cut *cuts;
     side_piece *pieces;
     size_t n_cuts, cut_capacity, n_pieces, piece_capacity;

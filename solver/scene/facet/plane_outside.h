@@ -1,4 +1,4 @@
-/* What a polygon leaves of its convex hull. Private to plane_regions.c. */
+/* The parts of its convex hull that a polygon leaves. Private to plane_regions.c. */
 #ifndef LAMBERT_SCENE_FACET_PLANE_OUTSIDE_H
 #define LAMBERT_SCENE_FACET_PLANE_OUTSIDE_H
 

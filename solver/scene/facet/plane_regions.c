@@ -207,7 +207,7 @@ done:
     return status;
 }
 
-/* What the outline of a plane leaves of its convex hull: an opening may be closed by a straight line there.
+/* The outline of a plane leaves parts of its convex hull: an opening may be closed by a straight line there.
  */
 static lam_status add_pockets(explorer *x, const plane_loop *l, lam_error *error) {
     lam_status status = LAM_OK;

@@ -20,7 +20,7 @@ typedef struct plane_regions {
 } plane_regions;
 
 /* Open regions as face_openings.h lists them, and the outlines of what is covered, of faces 0 ... n_faces-1.
- * What lies no further than slack metres from a plane lies in it. Regions narrower than `narrow` metres are
+ * A point no further than slack metres from a plane lies in it. Regions narrower than `narrow` metres are
  * left out. Freed by plane_regions_free. Errors: LAM_ERR_MEMORY. */
 lam_status plane_regions_find(const mesh *m, size_t n_faces, const face_edges *e, double slack, double narrow,
                               plane_regions *out, lam_error *error);
