@@ -67,10 +67,12 @@ void store_close(store *s);
  * truncated), LAM_ERR_VERSION, LAM_ERR_DAMAGED (also where HDF5 crashes or does not end), LAM_ERR_MEMORY. */
 lam_status store_open(const char *path, store **out, lam_error *error);
 
-/* The same, where this and everything that reads arrays of the store later is left once `stop` says so
- * (LAM_ERR_CANCELLED): it is asked at least every 50 ms while headers are waited for, and before each MiB of
- * an array. stop may be NULL; it outlives the store. */
-lam_status store_open_until(const char *path, const stop_check *stop, store **out, lam_error *error);
+/* The same within so many bytes of memory for checksums, beside names and attributes (at most 64 MiB); and
+ * this and everything that reads arrays of the store later is left once `stop` says so (LAM_ERR_CANCELLED):
+ * it is asked at least every 50 ms while headers are waited for, and before each MiB of an array. stop may be
+ * NULL; it outlives the store. */
+lam_status store_open_within(const char *path, uint64_t memory, const stop_check *stop, store **out,
+                             lam_error *error);
 
 /* Reads every dataset and compares it with /checksum; LAM_ERR_DAMAGED names the dataset and its MiB. */
 lam_status store_verify(store *s, lam_error *error);
@@ -124,6 +126,12 @@ bool store_has_attribute(store *s, const char *object, const char *name);
 typedef void store_visit(void *context, const char *name, const char *text, double number);
 lam_status store_each_attribute(store *s, const char *object, store_visit *visit, void *context,
                                 lam_error *error);
+
+/* Bytes of an array as stored, and of texts as store_read_texts gives them; 0: there is none. Nothing is
+ * read.
+ */
+uint64_t store_array_bytes(const store *s, const char *name);
+uint64_t store_texts_memory(const store *s, const char *name);
 
 /* Bytes of all datasets below a group, as stored. */
 lam_status store_group_bytes(store *s, const char *group, uint64_t *bytes, lam_error *error);

@@ -84,21 +84,16 @@ lam_status store_sums_add(store_sums *sums, const char *name, const void *data, 
 
 /* XXH3 over, for each entry in order, its name with the NUL and its pieces; as 16 hex digits and a NUL. */
 static lam_status sums_digest(const store_sums *sums, char digest[17], lam_error *error) {
-    size_t size = 0, at = 0;
-    for (size_t i = 0; i < sums->count; i++)
-        size += strlen(sums->entries[i].name) + 1 + sums->entries[i].n_pieces * sizeof(uint64_t);
-    char *all = memory_allocate(size, 1, "checksums", error);
-    if (all == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < sums->count; i++) {
+    XXH3_state_t *all = XXH3_createState();
+    bool good = all != NULL && XXH3_64bits_reset(all) == XXH_OK;
+    for (size_t i = 0; i < sums->count && good; i++) {
         const store_sum *sum = &sums->entries[i];
-        size_t name_size = strlen(sum->name) + 1, bytes = sum->n_pieces * sizeof(uint64_t);
-        memcpy(all + at, sum->name, name_size);
-        memcpy(all + at + name_size, sum->pieces, bytes);
-        at += name_size + bytes;
+        good = XXH3_64bits_update(all, sum->name, strlen(sum->name) + 1) == XXH_OK &&
+               XXH3_64bits_update(all, sum->pieces, sum->n_pieces * sizeof(uint64_t)) == XXH_OK;
     }
-    snprintf(digest, 17, "%016" PRIx64, store_checksum(all, size));
-    free(all);
-    return LAM_OK;
+    if (good) snprintf(digest, 17, "%016" PRIx64, (uint64_t)XXH3_64bits_digest(all));
+    XXH3_freeState(all);
+    return good ? LAM_OK : status_fail(error, LAM_ERR_MEMORY, "not enough memory for checksums");
 }
 
 lam_status store_sums_write(store *s, lam_error *error) {
@@ -135,9 +130,44 @@ done:
     return status;
 }
 
+/* Bytes of checksums of arrays whose size is not known, as they are of a kind that no store has. */
+#define SUMS_UNKNOWN_MOST ((uint64_t)1 << 20)
+
+/* Compares the sizes of all checksums, by the index alone, with those of the arrays that they are of: these
+ * share no bytes of the file, so that all checksums together have 8 bytes for a MiB of the file and for an
+ * array. Only then is it worth the memory to read them. */
+static lam_status check_sizes(const store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    uint64_t total = 0, unknown = 0;
+    for (size_t i = 0; i < s->index.n_objects; i++) {
+        const store_object *sums = &s->index.objects[i];
+        if (sums->kind != OBJECT_ARRAY || strncmp(sums->name, "/checksum/", 10) != 0) continue;
+        const char *name = sums->name + strlen("/checksum");
+        const store_object *of = store_find(s, name);
+        if (of == NULL || of->kind == OBJECT_GROUP)
+            FAIL(error, LAM_ERR_FORMAT, "%s: %s is of no array of the store; make the store again", s->path,
+                 sums->name);
+        if (of->kind == OBJECT_ARRAY && sums->array.bytes != count_pieces(of->array.bytes) * sizeof(uint64_t))
+            FAIL(error, LAM_ERR_DAMAGED, "%s: %s has no checksum of its size; make the store again", s->path,
+                 name);
+        if (of->kind == OBJECT_FAULTY) unknown += sums->array.bytes;
+        total += sums->array.bytes;
+        if (unknown > SUMS_UNKNOWN_MOST)
+            FAIL(error, LAM_ERR_FORMAT,
+                 "%s: %s has %zu bytes for an array that cannot be read; make the store again", s->path,
+                 sums->name, sums->array.bytes);
+    }
+    if (total > s->memory)
+        FAIL(error, LAM_ERR_MEMORY, "%s: its checksums take %llu bytes, %llu are left; allow it more memory",
+             s->path, (unsigned long long)total, (unsigned long long)s->memory);
+done:
+    return status;
+}
+
 lam_status store_sums_read(store *s, lam_error *error) {
     lam_status status = LAM_OK;
     char *expected = NULL, digest[17];
+    TRY(check_sizes(s, error));
     for (size_t i = 0; i < s->index.n_objects; i++) {
         const store_object *object = &s->index.objects[i];
         if (object->kind != OBJECT_GROUP && strncmp(object->name, "/checksum/", 10) == 0)
@@ -231,4 +261,16 @@ lam_status store_group_bytes(store *s, const char *group, uint64_t *bytes, lam_e
     *bytes = total;
 done:
     return status;
+}
+
+uint64_t store_array_bytes(const store *s, const char *name) {
+    const store_object *object = store_find(s, name);
+    return object != NULL && object->kind == OBJECT_ARRAY ? object->array.bytes : 0;
+}
+
+uint64_t store_texts_memory(const store *s, const char *name) {
+    const store_object *object = store_find(s, name);
+    if (object == NULL || object->kind != OBJECT_ARRAY) return 0;
+    /* Each has its pointer and its NUL. */
+    return object->array.bytes + (uint64_t)object->array.dims[0] * (sizeof(char *) + 1);
 }

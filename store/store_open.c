@@ -167,13 +167,17 @@ static lam_status check_sums(const store *s, lam_error *error) {
     return LAM_OK;
 }
 
-lam_status store_open_by(const char *path, confined_main *run, const confined_limits *limits, store **out,
-                         lam_error *error) {
+/* Bytes of checksums, at most: of 8 TiB of arrays. */
+#define SUMS_MOST ((uint64_t)64 << 20)
+
+static lam_status open_within(const char *path, uint64_t memory, confined_main *run,
+                              const confined_limits *limits, store **out, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     reply_head head = {.status = LAM_OK};
     TRY(store_new(path, &s, error));
     s->stop = limits->stop;
+    s->memory = memory;
     TRY(open_file(s, error));
     for (int trial = 1;; trial++) {
         bool again = false;
@@ -191,12 +195,18 @@ done:
     return status;
 }
 
-lam_status store_open_until(const char *path, const stop_check *stop, store **out, lam_error *error) {
+lam_status store_open_by(const char *path, confined_main *run, const confined_limits *limits, store **out,
+                         lam_error *error) {
+    return open_within(path, SUMS_MOST, run, limits, out, error);
+}
+
+lam_status store_open_within(const char *path, uint64_t memory, const stop_check *stop, store **out,
+                             lam_error *error) {
     confined_limits limits = headers_limits;
     limits.stop = stop;
-    return store_open_by(path, headers_main(), &limits, out, error);
+    return open_within(path, memory < SUMS_MOST ? memory : SUMS_MOST, headers_main(), &limits, out, error);
 }
 
 lam_status store_open(const char *path, store **out, lam_error *error) {
-    return store_open_until(path, NULL, out, error);
+    return store_open_within(path, UINT64_MAX, NULL, out, error);
 }

@@ -15,9 +15,10 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "stores are little-endian");
 
 #define STORE_FORMAT "lambert"
-#define STORE_PIECE ((size_t)1 << 20) /* bytes under one checksum */
-#define STORE_NAME_SIZE 256           /* longest HDF5 path here, its NUL included */
-#define STORE_MAX_DEPTH 8             /* groups within groups */
+#define STORE_PIECE ((size_t)1 << 20)     /* bytes under one checksum */
+#define STORE_TEXT_MOST ((size_t)1 << 20) /* bytes of a text in an array */
+#define STORE_NAME_SIZE 256               /* longest HDF5 path here, its NUL included */
+#define STORE_MAX_DEPTH 8                 /* groups within groups */
 
 /* The file below HDF5 (store_driver.c). */
 typedef struct store_file {
@@ -89,6 +90,7 @@ struct store {
     store_identity identity; /* of an opened file */
     store_map *map;          /* of an opened file, held; NULL: none */
     const stop_check *stop;  /* of an opened file; NULL: what reads it is never left */
+    uint64_t memory;         /* bytes that its checksums may take */
 };
 
 /* Mutes the error printing of HDF5 while one of our functions runs, and restores it then. */

@@ -111,6 +111,9 @@ lam_status store_read_texts(store *s, const char *name, size_t *count, char ***t
     TRY(store_array_find(s, name, &array, error));
     if (!array->is_text || array->rank != 1)
         FAIL(error, LAM_ERR_FORMAT, "%s: %s is not a list of texts", s->path, name);
+    if (array->value_size > STORE_TEXT_MOST)
+        FAIL(error, LAM_ERR_FORMAT, "%s: a text of %s takes %zu bytes, at most %zu are read", s->path, name,
+             array->value_size, STORE_TEXT_MOST);
     packed = memory_allocate(array->bytes, 1, name, error);
     if (packed == NULL) TRY(LAM_ERR_MEMORY);
     TRY(store_array_load(s, name, array, packed, error));

@@ -285,12 +285,12 @@ static batch_job *find_due(job_order *order, bool spare) {
 }
 
 /* The job that came first of those that may be begun before the pass of `ready`, to share it, or NULL: of its
- * key and kind, in a line that would go on within BATCH_GATHER of charge, and short, until the clock ends it.
+ * key and kind, in a line that would go on within BATCH_AHEAD of charge, and short, until the clock ends it.
  */
 static batch_job *find_company(const job_order *order, batch_job *ready, double now) {
     batch_job *best = NULL;
     const bool over = ready->gathers_until > 0 && now >= ready->gathers_until;
-    const double most_charged = order->lines[ready->line].charge + BATCH_GATHER;
+    const double most_charged = order->lines[ready->line].charge + BATCH_AHEAD;
     if (order->n_arrived == 0 || over || count_alike(order, ready) >= BATCH_PASS) return NULL;
     for (size_t a = 0; a < order->n_active; a++) {
         const job_line *l = &order->lines[order->active[a]];

@@ -173,16 +173,43 @@ uint64_t scene_work_memory(size_t n_threads, size_t work_bytes) {
     return (uint64_t)n_threads * work_bytes;
 }
 
-/* *memory: bytes of the operator in memory and of the sky, mapped or read, found before anything large is
- * read. */
+/* The bytes below a group; 0: there is none. */
+static lam_status bytes_below(store *s, const char *group, uint64_t *bytes, lam_error *error) {
+    *bytes = 0;
+    return store_has(s, group) ? store_group_bytes(s, group, bytes, error) : LAM_OK;
+}
+
+/* What a scene has of /mesh: areas, reflectances, groups with their names, an index of these. */
+static uint64_t mesh_memory(const store *s) {
+    const uint64_t names = store_texts_memory(s, "/mesh/group_names");
+    return store_array_bytes(s, "/mesh/area") + store_array_bytes(s, "/mesh/reflectance") +
+           store_array_bytes(s, "/mesh/group") + names + names / (sizeof(char *) + 1) * 2 * sizeof(uint32_t);
+}
+
+/* What is read beside that and freed again before the scene is open: groups by element, the names as they are
+ * stored, receivers and sources. */
+static lam_status passing_memory(store *s, uint64_t *memory, lam_error *error) {
+    lam_status status = LAM_OK;
+    uint64_t receivers, sources;
+    TRY(bytes_below(s, "/importance", &receivers, error));
+    TRY(bytes_below(s, "/sources", &sources, error));
+    *memory = store_array_bytes(s, "/mesh/group") + store_texts_memory(s, "/mesh/group_names") + receivers +
+              sources;
+done:
+    return status;
+}
+
+/* *memory: bytes of the operator in memory, of the sky, of the mesh and of errors, mapped or read, found
+ * before anything is read. */
 static lam_status memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error) {
     lam_status status = LAM_OK;
     char *kind = NULL;
-    uint64_t sky = 0;
+    uint64_t sky, errors;
     TRY(store_group_bytes(s, "/operator", operator_bytes, error));
-    if (store_has(s, "/sky")) TRY(store_group_bytes(s, "/sky", &sky, error));
+    TRY(bytes_below(s, "/sky", &sky, error));
+    TRY(bytes_below(s, "/error", &errors, error));
     TRY(store_get_text(s, "/operator", "kind", &kind, error));
-    *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky;
+    *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky + errors + mesh_memory(s);
 done:
     free(kind);
     return status;
@@ -215,10 +242,14 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     lam_status status = LAM_OK;
     if (!store_has(s, "/operator"))
         FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", options->path);
+    uint64_t passing;
     TRY(memory_of(s, &made->memory, &made->bytes, error));
-    if (made->memory > options->memory)
-        FAIL(error, LAM_ERR_MEMORY, "%s: takes %llu bytes, %llu are left of --max-memory; raise it",
-             options->path, (unsigned long long)made->memory, (unsigned long long)options->memory);
+    TRY(passing_memory(s, &passing, error));
+    if (made->memory + passing > options->memory)
+        FAIL(error, LAM_ERR_MEMORY,
+             "%s: takes %llu bytes, and %llu more while it is read, %llu are left of --max-memory; raise it",
+             options->path, (unsigned long long)made->memory, (unsigned long long)passing,
+             (unsigned long long)options->memory);
     TRY(weather_file_read(options->path, options->memory - made->memory, &made->weather, error));
     made->memory += made->weather.length;
     TRY(store_verify_group(s, options->verify ? "/" : "/mesh", error));
@@ -240,6 +271,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(read_errors(s, made, error));
     TRY(describe_scene(s, made, &made->description, error));
     TRY(keep_texts(s, made, error));
+    made->memory += strlen(made->description);
     TRY(scene_mesh_create(s, made, &made->mesh, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
     const bool first = options->verify || store_map_bytes(store_map_of(s)) < options->verify_below;
@@ -267,7 +299,7 @@ lam_status scene_open(const scene_options *options, scene **out, lam_error *erro
     atomic_init(&made->references, 1);
     made->path = strdup(path);
     if (made->path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
-    TRY(store_open_until(path, options->stop, &s, error));
+    TRY(store_open_within(path, options->memory, options->stop, &s, error));
     made->identity = *store_identity_of(s);
     if (is_unchanged(options, s)) {
         if (options->verify) TRY(store_verify(s, error));

@@ -40,11 +40,15 @@ class Kept(Case):
             time.sleep(.002)
         return answer.json()["bytes"]
 
-    def work_bytes(self, path, held):
-        """Of one thread, from the refusal of a store that has no room for it."""
-        ended = subprocess.run([LAMBERTD, "--listen", "127.0.0.1:0", str(path), "--threads", "1", "--max-memory", str(held + 1)],
-                               capture_output=True, text=True, timeout=PATIENCE)
-        return int(re.search(r"and 1 threads (\d+) each to solve", ended.stderr).group(1))
+    def counted(self, path):
+        """Bytes of a store, and of one thread that solves, from refusals of a store that has no room for them."""
+        def refused(most, words):
+            ended = subprocess.run([LAMBERTD, "--listen", "127.0.0.1:0", str(path), "--threads", "1", "--max-memory", str(most)],
+                                   capture_output=True, text=True, timeout=PATIENCE)
+            return [int(number) for number in re.search(words, ended.stderr).groups()]
+
+        to_open = sum(refused(10000, r"takes (\d+) bytes, and (\d+) more while it is read"))
+        return refused(to_open, r"takes (\d+) bytes, and 1 threads (\d+) each to solve")
 
     def test_variants_are_counted_after_stores_were_read_again(self):
         """A store that came later leaves room for one of two variants: the older one stays."""
@@ -54,9 +58,7 @@ class Kept(Case):
         Scene(200, rank=60).write(folder / "base.h5", "base", keep_factors=True)
         Scene(200, rank=60, seed=2).write(self.folder / "later.h5", "later", keep_factors=True)
         headers = {"Authorization": f"Bearer {TOKEN}"}
-        with Daemon(folder / "base.h5") as daemon:
-            held = daemon.get("/v1/scenes/base").json()["bytes"]
-        work, variant = self.work_bytes(folder / "base.h5", held), 60 * 60 * 4
+        (held, work), variant = self.counted(folder / "base.h5"), 60 * 60 * 4
         limit = 2 * held + work + variant * 3 // 2
         with Daemon("--stores", folder, "--threads", 1, "--max-variants", 4, "--token-file", token, "--max-memory", limit) as daemon:
             self.assertEqual([self.put(daemon, name) for name in ("older", "newer")], [variant] * 2)

@@ -122,7 +122,7 @@ static void go_on(simulated *s, size_t t) {
             leader->gathers_since = fmin(leader->gathers_since, s->now);
             ck_assert_double_le(s->now, leader->gathers_since + BATCH_GATHER);
             ck_assert_double_le(s->order.lines[job->line].charge,
-                                s->order.lines[due->line].charge + BATCH_GATHER);
+                                s->order.lines[due->line].charge + BATCH_AHEAD);
             s->n_company++;
         }
         s->in[t] = actor_of(job);
@@ -134,7 +134,7 @@ static void go_on(simulated *s, size_t t) {
 
 /* Costs at random, estimates that lie by up to a factor of 1000. However long begins take in truth, no job is
  * begun before another's pass, ahead of its turn, later than BATCH_GATHER after the first one was, nor one of
- * another key, nor one of a line that is charged more than that pass's and BATCH_GATHER. So the pass waits
+ * another key, nor one of a line that is charged more than that pass's and BATCH_AHEAD. So the pass waits
  * for BATCH_GATHER and for one begin of each thread. Passes are shared all the same. */
 START_TEST(company_is_begun_by_the_clock) {
     static simulated s;

@@ -154,7 +154,7 @@ START_TEST(what_is_not_waited_for_is_left) {
     ck_assert_uint_eq(p.asked, 3);
     p = (patience){.most = SIZE_MAX};
     store *s = NULL;
-    ck_ok(store_open_until(path, &stop, &s, &error));
+    ck_ok(store_open_within(path, UINT64_MAX, &stop, &s, &error));
     p = (patience){.most = 3};
     ck_assert(store_verify(s, &error) == LAM_ERR_CANCELLED);
     ck_assert_uint_eq(p.asked, 4);
