@@ -179,15 +179,15 @@ static lam_status bytes_below(store *s, const char *group, uint64_t *bytes, lam_
     return store_has(s, group) ? store_group_bytes(s, group, bytes, error) : LAM_OK;
 }
 
-/* What a scene has of /mesh: areas, reflectances, groups with their names, an index of these. */
+/* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, an index of these. */
 static uint64_t mesh_memory(const store *s) {
     const uint64_t names = store_texts_memory(s, "/mesh/group_names");
     return store_array_bytes(s, "/mesh/area") + store_array_bytes(s, "/mesh/reflectance") +
            store_array_bytes(s, "/mesh/group") + names + names / (sizeof(char *) + 1) * 2 * sizeof(uint32_t);
 }
 
-/* What is read beside that and freed again before the scene is open: groups by element, the names as they are
- * stored, receivers and sources. */
+/* The bytes that are read beside that and freed again before the scene is open: of groups by element, the
+ * names as they are stored, receivers and sources. */
 static lam_status passing_memory(store *s, uint64_t *memory, lam_error *error) {
     lam_status status = LAM_OK;
     uint64_t receivers, sources;

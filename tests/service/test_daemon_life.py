@@ -137,9 +137,9 @@ class Life(Case):
         one, _ = self.store("one.h5", "box")
         two, _ = self.store("two.h5", "box")
         with_colon, _ = self.store("a:b.h5", "colon")
-        with Daemon(one, two, f"{two}:second", with_colon) as daemon:
-            self.assertEqual(self.names(daemon), ["box", "colon", "second"])
-            self.check_refusals(daemon.errors(), {two: "box"})
+        with Daemon(one, two, f"{two}:second", with_colon, f"{two}:one") as daemon:
+            self.assertEqual(self.names(daemon), ["a:b", "one", "second", "two"])
+            self.check_refusals(daemon.errors(), {two: "the name one is taken"})
             self.assertEqual(daemon.get("/v1/scenes/second").json()["name"], "second")
             self.assertEqual(daemon.radiosity("second", {"emission": [1] * 60}).json()["scene"], "second")
 

@@ -81,10 +81,10 @@ class SkyAndWeather(unittest.TestCase):
 
     def test_weather(self):
         hours = list(a_year())
-        Scene(N).write(self.folder / "box.h5", "served as another", sky=4)
+        Scene(N).write(self.folder / "box.h5", "made from another", sky=4)
         (self.folder / "box.wea").write_text(wea(hours))
         daemon = self.serve("--stores", self.folder)
-        path = "/v1/scenes/served%20as%20another"
+        path = "/v1/scenes/box"
         answer = daemon.get(f"{path}/weather")
         self.assertEqual((answer.status, answer.headers["Content-Type"]), (200, "text/plain; charset=utf-8"))
         self.assertEqual(answer.body.decode(), wea(hours))

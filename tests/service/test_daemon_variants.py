@@ -164,8 +164,8 @@ class Variants(unittest.TestCase):
             self.check(daemon, "colour@red", scene.relit({"floor": .25}))
 
     def test_names(self):
-        self.store(name="a b")
-        with self.daemon() as daemon:
+        self.store("a b.h5")
+        with self.daemon("a b.h5") as daemon:
             answer = self.put(daemon, RED, "weiß~1", scene="a%20b")
             self.assertEqual(answer.headers["Location"], "/v1/scenes/a%20b@wei%C3%9F~1")
             self.assertEqual(self.until(daemon, answer.headers["Location"], 200).json()["name"], "a b@weiß~1")
@@ -313,8 +313,8 @@ class Variants(unittest.TestCase):
 
     def test_a_name_that_a_store_has(self):
         self.store()
-        self.store("other.h5", "colour@red")
-        with self.daemon("colour.h5", "other.h5") as daemon:
+        self.store("colour@red.h5")
+        with self.daemon("colour.h5", "colour@red.h5") as daemon:
             self.problem(self.put(daemon, RED), 409, "taken by a store")
             self.problem(self.ask(daemon, "DELETE", "/v1/scenes/colour@red"), 405)
 

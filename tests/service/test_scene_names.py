@@ -26,7 +26,7 @@ class SceneNames(unittest.TestCase):
         return [s["name"] for s in daemon.get("/v1/scenes").json()["scenes"]]
 
     def refused(self, daemon):
-        """What /readyz names, which is what /metrics counts, and holds no path."""
+        """The stores that /readyz names, as many as /metrics counts, without a path."""
         answer = daemon.get("/readyz")
         self.assertEqual(answer.status, 200)
         self.assertNotIn(str(self.folder).encode(), answer.body)
