@@ -98,17 +98,17 @@ void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]
              option);
 }
 
-void error_advice_sky(const error_advice_input *input, double leaving_share, bool given,
+void error_advice_sky(const error_advice_input *input, double leaving_share, size_t n_aimed,
                       char text[ERROR_ADVICE_BYTES]) {
     static const double open_share = .1;
     const error_report *e = input->errors;
     const double error = e->sky.total_relative.mean;
     text[0] = '\0';
-    if (!e->has_total || e->sky.probes == 0 || given || leaving_share > open_share) return;
+    if (!e->has_total || e->sky.probes == 0 || leaving_share > open_share) return;
     if (!(error > error_advice_most)) return;
-    snprintf(
-        text, ERROR_ADVICE_BYTES,
-        "the error of light from the sky is stated as %.2g, above %g; where windows are not found, --portal "
-        "GROUP names faces that stand in them, and more --rays lower it",
-        error, error_advice_most);
+    snprintf(text, ERROR_ADVICE_BYTES, "the error of light from the sky is stated as %.2g, above %g; %s",
+             error, error_advice_most,
+             n_aimed > 0 ? "more --rays lower it"
+                         : "no window was found: --portal GROUP names faces that stand in one; or take more "
+                           "--rays");
 }

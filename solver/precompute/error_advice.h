@@ -41,9 +41,9 @@ typedef struct error_advice_input {
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]);
 
 /* text: about light from the sky, where its error, that of the first bounce included, is above
- * error_advice_most in a scene of which at most a tenth of the light leaves (leaving_share) and no portals
- * were given; else empty. */
-void error_advice_sky(const error_advice_input *input, double leaving_share, bool given,
+ * error_advice_most in a scene of which at most a tenth of the light leaves (leaving_share); else empty. It
+ * names --portal where rays were aimed at no opening. */
+void error_advice_sky(const error_advice_input *input, double leaving_share, size_t n_aimed,
                       char text[ERROR_ADVICE_BYTES]);
 
 #endif

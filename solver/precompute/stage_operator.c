@@ -276,7 +276,7 @@ void state_advise(precompute_state *state) {
     error_advice(&input, state->advice);
     if (state->advice[0] != '\0') terminal_warn(state->t, "%s", state->advice);
     char of_sky[ERROR_ADVICE_BYTES];
-    error_advice_sky(&input, state->f.leaving_share, state->of_faces.given, of_sky);
+    error_advice_sky(&input, state->f.leaving_share, state->f.n_aimed, of_sky);
     if (of_sky[0] != '\0') terminal_warn(state->t, "%s", of_sky);
 }
 

@@ -148,6 +148,23 @@ START_TEST(an_error_asked_for) {
 }
 END_TEST
 
+START_TEST(a_sky_takes_rays_or_portals) {
+    char text[ERROR_ADVICE_BYTES];
+    error_report errors = {.sky = {.probes = 8, .total_relative = {.12, 0, .2}}, .has_total = true};
+    const error_advice_input input = {.errors = &errors, .recipe = rays, .epsilon = .05};
+    error_advice_sky(&input, .01, 2, text);
+    ck_assert_str_eq(text,
+                     "the error of light from the sky is stated as 0.12, above 0.03; more --rays lower it");
+    error_advice_sky(&input, .01, 0, text);
+    ck_assert_ptr_nonnull(strstr(text, "no window was found: --portal GROUP"));
+    error_advice_sky(&input, .2, 0, text); /* an open scene has no windows */
+    ck_assert_str_eq(text, "");
+    errors.sky.total_relative.mean = .0299;
+    error_advice_sky(&input, .01, 0, text);
+    ck_assert_str_eq(text, "");
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("error_advice");
     TCase *cases = tcase_create("error_advice");
@@ -157,6 +174,7 @@ int main(void) {
     tcase_add_test(cases, compression_takes_epsilon);
     tcase_add_test(cases, other_recipes);
     tcase_add_test(cases, an_error_asked_for);
+    tcase_add_test(cases, a_sky_takes_rays_or_portals);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
