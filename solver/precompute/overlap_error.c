@@ -1,4 +1,4 @@
-/* What faces that count twice are to the stated errors.
+/* The part of stated errors that faces which count twice make.
  *
  * Two faces that cover the same part of a plane both face the same elements, so that the rows of these sum to
  * more than 1 by the form factors of what is covered, and the repair takes from each of their form factors a

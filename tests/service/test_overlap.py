@@ -69,7 +69,7 @@ class Overlap(Case):
         self.assertIn("has the same geometry", must("verify", self.path("twice.h5"), self.path("twice.obj")).stdout)
 
     def test_a_face_under_the_tiles_is_named_and_stated(self):
-        """Whatever finds the form factors: walls are off by .13 to .44, and more than half of that is stated."""
+        """By all sorts of form factors walls are off by .13 to .44, and more than half of that is stated."""
         self.make("one")
         for options in (("--rays", 256), ("--form-factors", "hemicube"),
                         ("--method", "hierarchical", "--form-factors", "blocks"), ()):

@@ -305,7 +305,7 @@ START_TEST(faces_that_count_twice_are_off_by_their_light) {
     error_by_group off = stated;
     float values[C * N];
     answer_error before, found;
-    name_error names_before[2], names[2];
+    name_error means_before[2], means_found[2];
     off.repair = .1;
     off.overlap = overlap;
     fill(LAM_INDIRECT, false, values);
@@ -320,8 +320,8 @@ START_TEST(faces_that_count_twice_are_off_by_their_light) {
     /* x = e^2 / (l^2 - e^2), so that e^2 = l^2 x / (1 + x). */
     const double square = before.indirect * before.indirect, own = light2 * square / (1 + square) + added;
     ck_assert_double_eq_tol(found.indirect, sqrt(own / (light2 - own)), 1e-6);
-    ck_assert(name_errors_of(&stated, &scene, &of, &request, names_before));
-    ck_assert(name_errors_of(&off, &scene, &of, &request, names));
+    ck_assert(name_errors_of(&stated, &scene, &of, &request, means_before));
+    ck_assert(name_errors_of(&off, &scene, &of, &request, means_found));
     const double r0[C] = {(.5 + 2 * .25) / 3, (1 + 2 * .5) / 3}, r1[C] = {.125, .25};
     for (int name = 0; name < 2; name++) {
         double mean2 = 0, more = 0;
@@ -331,15 +331,15 @@ START_TEST(faces_that_count_twice_are_off_by_their_light) {
             mean2 += mean * mean;
             more += .01 * mean * mean + covered * covered / 2;
         }
-        const double x = names_before[name].mean * names_before[name].mean, e2 = mean2 * x / (1 + x) + more;
-        ck_assert_double_eq_tol(names[name].mean, sqrt(e2 / (mean2 - e2)), 1e-5);
-        ck_assert_double_gt(names[name].elements, names_before[name].elements);
+        const double x = means_before[name].mean * means_before[name].mean, e2 = mean2 * x / (1 + x) + more;
+        ck_assert_double_eq_tol(means_found[name].mean, sqrt(e2 / (mean2 - e2)), 1e-5);
+        ck_assert_double_gt(means_found[name].elements, means_before[name].elements);
     }
     /* By means alone. */
     const double none[C] = {0};
     const name_means means = {
         .quantity = LAM_INDIRECT, .size = of.size, .value = r0, .emission = none, .direct = none};
-    ck_assert_double_eq_tol(name_error_of_means(&off, &list[0], &means).mean, names[0].mean, 1e-5);
+    ck_assert_double_eq_tol(name_error_of_means(&off, &list[0], &means).mean, means_found[0].mean, 1e-5);
     /* The light of a sky counts too, as a face that is hidden has none of it. */
     fill(LAM_IRRADIANCE, true, values);
     of = answer_of(LAM_IRRADIANCE, values);
