@@ -26,7 +26,7 @@ START_TEST(groups_follow_objects_then_materials) {
                  "g roof  tiles\nf 1 3 4\n"              /* a group, as written */
                  "o house\nf 2 3 4\n"                    /* an object of two materials, whatever its groups */
                  "g wall\nusemtl grey paint\nf 1 2 3 4\n"
-                 "o roof  tiles\nusemtl red\nf 1 2 3\n" /* the same name again */
+                 "o roof  tiles\nusemtl red\nf 3 2 1\n" /* the same name again */
                  "o mixed.thing\nf 4 3 2 1\n",
                  &report);
     const struct {
