@@ -18,7 +18,7 @@ done
 mapfile -t tested < <(for room in "${rooms[@]}"; do [ ! -d "tests/unit/$room" ] || echo "$room"; done)
 
 ./tests/layers.sh
-git ls-files '*.[ch]' '*.inc' | xargs -P "$(nproc)" -n 40 clang-format --dry-run --Werror
+git ls-files '*.[ch]' '*.inc' | xargs -P "$(nproc)" -n 40 clang-format-19 --dry-run --Werror
 ./tests/comments.py
 
 if [ ${#tested[@]} -eq 0 ]; then

@@ -75,7 +75,7 @@ clang_build() {
 
 step "layers, layout and comments"
 ./tests/layers.sh
-git ls-files '*.[ch]' '*.inc' | xargs -P "$jobs" -n 40 clang-format --dry-run --Werror
+git ls-files '*.[ch]' '*.inc' | xargs -P "$jobs" -n 40 clang-format-19 --dry-run --Werror
 ./tests/comments.py
 
 # Threads that wait should not spin while two of them share a core with a server and its clients. Both programs see to that by themselves; unit

@@ -10,7 +10,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const struct { const char *format, *beginning; } formats[] = {{"epw", "LOCATION,"}, {"wea", "place "}};
+static const struct {
+    const char *format, *beginning;
+} formats[] = {{"epw", "LOCATION,"}, {"wea", "place "}};
 enum { N_FORMATS = sizeof formats / sizeof formats[0] };
 
 void weather_file_free(weather_file *w) {

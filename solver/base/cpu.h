@@ -15,11 +15,9 @@ cpu_level cpu_best(void);
 #if defined(__x86_64__)
 #define CPU_AVX2_TARGET __attribute__((target("avx2,fma,f16c")))
 #define CPU_AVX512_TARGET __attribute__((target("avx512f,avx512vl,avx512dq,fma,f16c")))
-#define CPU_TABLE(portable, avx2, avx512)                                                                    \
-    { portable, avx2, avx512 }
+#define CPU_TABLE(portable, avx2, avx512) {portable, avx2, avx512}
 #else
-#define CPU_TABLE(portable, avx2, avx512)                                                                    \
-    { portable }
+#define CPU_TABLE(portable, avx2, avx512) {portable}
 #endif
 
 #endif

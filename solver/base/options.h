@@ -54,12 +54,14 @@ typedef struct option_row {
 /* Rows that several commands have. place is the offset of the field; further members, such as the help,
  * follow. -o, --output: a const char *, with the name of its value; --seed: a uint64_t. */
 #define OPTION_ROW_OUTPUT(place, value, ...)                                                                 \
-    {                                                                                                        \
-        .name = "output", .letter = 'o', .kind = OPTION_TEXT, .offset = (place), .argument = (value),        \
-        __VA_ARGS__                                                                                          \
-    }
+    {.name = "output",                                                                                       \
+     .letter = 'o',                                                                                          \
+     .kind = OPTION_TEXT,                                                                                    \
+     .offset = (place),                                                                                      \
+     .argument = (value),                                                                                    \
+     __VA_ARGS__}
 #define OPTION_ROW_SEED(place, ...)                                                                          \
-    { .name = "seed", .kind = OPTION_COUNT, .offset = (place), .argument = "S", .preset = "1", __VA_ARGS__ }
+    {.name = "seed", .kind = OPTION_COUNT, .offset = (place), .argument = "S", .preset = "1", __VA_ARGS__}
 
 /* Rows under one heading, and the struct that they fill. Several tables may fill one struct; one name may
  * stand in several tables, and each of them gets the value. */

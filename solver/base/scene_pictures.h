@@ -19,7 +19,7 @@ typedef struct scene_pictures {
     struct picture_surface {
         uint32_t file, wrap[2];
         float factor[3]; /* the reflectance is that of the image times it */
-    } * surfaces;
+    } *surfaces;
     uint64_t *start;      /* [n_files + 1], of each file in bytes */
     unsigned char *bytes; /* JPEG files, one after the other */
 } scene_pictures;

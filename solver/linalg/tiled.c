@@ -347,8 +347,7 @@ typedef struct kernels {
     void (*columns)(const tiled_rows *t, size_t g, const float *x, float *y);
 } kernels;
 
-#define KERNELS(name)                                                                                        \
-    { group_##name, wide_##name, columns_##name }
+#define KERNELS(name) {group_##name, wide_##name, columns_##name}
 static const kernels kernels_of[] = CPU_TABLE(KERNELS(portable), KERNELS(avx2), KERNELS(avx512));
 #undef KERNELS
 

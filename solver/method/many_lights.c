@@ -187,7 +187,7 @@ static lam_status descend(block *b, double tolerance, double *rr, double *uu, la
     float alpha[CSR_FLOATS_WIDTH], beta[CSR_FLOATS_WIDTH];
     for (size_t sweep = 0; sweep < MOST_SWEEPS && !all_below(b, rr, uu, tolerance); sweep++) {
         if (progress_cancelled(b->c->progress)) return status_fail(error, LAM_ERR_CANCELLED, "cancelled");
-            /* q holds R^1/2 p until a row of the product takes its place: rows are read from t alone. */
+        /* q holds R^1/2 p until a row of the product takes its place: rows are read from t alone. */
 #pragma omp parallel for schedule(static) if (b->many)
         for (size_t i = 0; i < b->n; i++)
             for (size_t v = 0; v < b->width; v++)

@@ -175,7 +175,7 @@ lam_status video_write(const frame_names *names, double fps, const progress *wai
     for (size_t k = 0; k < sizeof fixed / sizeof fixed[0]; k++) arguments[n++] = (char *)(uintptr_t)fixed[k];
     for (const char *const *option = kind->options; *option != NULL; option++)
         arguments[n++] = (char *)(uintptr_t)*option;
-    arguments[n++] = (char *)(uintptr_t) "-f";
+    arguments[n++] = (char *)(uintptr_t)"-f";
     arguments[n++] = (char *)(uintptr_t)kind->name;
     arguments[n++] = target;
     arguments[n] = NULL;

@@ -85,7 +85,7 @@ static size_t size_of(const box *b) {
     for (int d = 0; d < 3; d++) extent = higher(extent, b->high[d] - b->low[d]);
     (void)frexpf(extent, &exponent);
     const int class = exponent / 2 + SIZES / 2;
-    return class < 0 ? 0 : class >= SIZES ? SIZES - 1 : (size_t) class;
+    return class < 0 ? 0 : class >= SIZES ? SIZES - 1 : (size_t)class;
 }
 
 static lam_status sort_by_size(search *s) {

@@ -97,7 +97,7 @@ void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, 
         shape[j] = &s->shapes[at];
         share[j] = s->share[at];
         /* VISIBILITY_NOTHING from n_elements on: a branch would be mispredicted half of the time. */
-        self[j] = at | (uint32_t) - (int)((n_elements - 1 - at) >> 31);
+        self[j] = at | (uint32_t)-(int)((n_elements - 1 - at) >> 31);
     }
     walk_leave(filled, shape, share, w->place, rays, facet);
     visibility_cast_lifted(s->v, rays, n, self, facet, hits);

@@ -51,7 +51,7 @@ static size_t refill(const walk_batch *b, walk_stream *w, size_t n, size_t n_fre
 
 /* Element 0 in place of VISIBILITY_NOTHING, without a branch, which would be mispredicted. */
 static inline size_t element_or_first(uint32_t element) {
-    return element & (uint32_t) - (int)(element != VISIBILITY_NOTHING);
+    return element & (uint32_t)-(int)(element != VISIBILITY_NOTHING);
 }
 
 /* Takes n walks to what they have met. Walks that end leave free places, in ascending order; returns how

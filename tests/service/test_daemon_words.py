@@ -41,10 +41,10 @@ class Words(Case):
 
     def test_a_name_with_control_characters(self):
         name = "x\nverified evil\x1b[31m\x7f\u0085"
-        path, _ = self.store(name=name)
-        odd, _ = self.store(file="y\nserving z.h5", name="y")
-        other, _ = self.store(file="other.h5", name=name)
-        with Daemon(path, odd, other) as daemon:
+        path, _ = self.store(file=f"{name}.h5")
+        odd, _ = self.store(file="y\nserving z.h5")
+        other, _ = self.store(file="other.h5")
+        with Daemon(path, odd, f"{other}:{name}") as daemon:
             self.assertIn(name, self.names(daemon))
             daemon.signal(1)
             daemon.wait_for("reloaded")

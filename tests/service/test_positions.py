@@ -114,7 +114,7 @@ class Positions(Case):
         with h5py.File(self.lit) as h5:
             B, direct, K = h5["operator/B"][0], h5["operator/direct"][:], h5["error/emitters/covariance"][:]
         w = np.array([.5, 0, 2])
-        with Daemon(self.lit) as d:
+        with Daemon(f"{self.lit}:box") as d:
             def ask(emission, **more):
                 answer = d.radiosity("box", {"emission": emission, **more})
                 self.assertEqual(answer.status, 200, answer)
@@ -176,7 +176,7 @@ class Positions(Case):
             return np.sqrt(squares / max((self.area * bounced)[np.isin(group, groups)].sum()**2 / area.sum()**2 - squares, 0))
         mean = of_mean(w @ M[g] @ w, [g])
         elements = of_mean(w @ K[g] @ w / self.area[inside].sum(), [g])
-        with Daemon(self.lit) as d:
+        with Daemon(f"{self.lit}:box") as d:
             def ask(**more):
                 answer = d.radiosity("box", {"emission": {"emitters": {"door": .5, "window": 2}}, **more})
                 self.assertEqual(answer.status, 200, answer)

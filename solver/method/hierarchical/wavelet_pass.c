@@ -143,8 +143,7 @@ typedef struct pass_kernels {
     lam_status (*begin_leaf)(const pass_row *, size_t, live_rows *, pass_work *, lam_error *);
 } pass_kernels;
 
-#define KERNELS(name)                                                                                        \
-    { merge_##name, promote_##name, merge_fine_columns_##name, begin_leaf_##name }
+#define KERNELS(name) {merge_##name, promote_##name, merge_fine_columns_##name, begin_leaf_##name}
 static const pass_kernels kernels_of[] = CPU_TABLE(KERNELS(portable), KERNELS(avx2), KERNELS(avx2));
 #undef KERNELS
 

@@ -64,8 +64,7 @@ typedef struct product_kernels {
     void (*store_leaf)(const panel *, size_t);
 } product_kernels;
 
-#define KERNELS(name)                                                                                        \
-    { load_leaf_##name, raise_##name, gather_blocks_##name, lower_##name, store_leaf_##name }
+#define KERNELS(name) {load_leaf_##name, raise_##name, gather_blocks_##name, lower_##name, store_leaf_##name}
 static const product_kernels one_kernels = {load_leaf_one, raise_one, NULL, lower_one, store_leaf_one};
 static const product_kernels wide_kernels[] = CPU_TABLE(KERNELS(portable), KERNELS(avx2), KERNELS(avx512));
 #undef KERNELS

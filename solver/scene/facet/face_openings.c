@@ -207,8 +207,12 @@ lam_status face_openings_find(const mesh *m, double narrow, face_openings *out, 
     face_openings made = {.n = 0};
     mesh_bounds(m, centre, &radius);
     const double slack = 2 * plane_flatness * radius;
-    finder f = {
-        .m = m, .e = &e, .r = &r, .slack = plane_roundings * slack, .narrow = fmax(narrow, slack), .out = &made};
+    finder f = {.m = m,
+                .e = &e,
+                .r = &r,
+                .slack = plane_roundings * slack,
+                .narrow = fmax(narrow, slack),
+                .out = &made};
     TRY(face_edges_find(m, n_faces, slack, &e, error));
     TRY(plane_regions_find(m, n_faces, &e, plane_roundings * slack, narrow, &r, error));
     array_sort(r.open, r.n_open, sizeof *r.open, larger_first);

@@ -20,12 +20,12 @@ typedef struct scene_draft {
     point_table points;
     struct scene_draft_face {
         uint32_t corners[4], group; /* corners[3] TABLE_NONE: a triangle */
-    } * faces;
+    } *faces;
     size_t face_capacity;
     struct scene_draft_group {
         const char *name; /* static, as materials are */
         const scene_draft_material *material;
-    } * groups;
+    } *groups;
     size_t n_groups, group_capacity;
 } scene_draft;
 

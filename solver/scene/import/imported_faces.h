@@ -49,13 +49,13 @@ typedef struct imported_faces {
     struct imported_polygon {
         size_t first;
         uint32_t n_corners, object, material, line; /* line 0: the format has none */
-    } * polygons;
+    } *polygons;
     size_t n_polygons, polygon_capacity;
 
     /* Skins of some of the polygons, in their order: the same number of corners, from first on. */
     struct imported_skin {
         size_t polygon, first;
-    } * skins;
+    } *skins;
     imported_corner *skin_corners;
     size_t n_skins, skin_capacity, n_skin_corners, skin_corner_capacity;
 
@@ -63,7 +63,7 @@ typedef struct imported_faces {
     point_table points;
     struct imported_element {
         uint32_t corners[4], object, material;
-    } * elements;
+    } *elements;
     size_t n_elements, element_capacity;
     uint64_t dropped; /* faces without an area */
 

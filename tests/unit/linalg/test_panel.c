@@ -166,7 +166,7 @@ START_TEST(bits_do_not_depend_on_the_batch) {
                 const size_t m = batches[b];
                 panel_project(&s.a, m, s.X, n + GAP, T, k, s.work);
                 panel_expand(&s.a, m, s.T, k + GAP, Y, n, s.work);
-                for (size_t v = 0; v<m; v += m> 4 ? 5 : 1) {
+                for (size_t v = 0; v < m; v += m > 4 ? 5 : 1) {
                     panel_project(&s.a, 1, s.X + v * (n + GAP), n + GAP, t, k, s.work);
                     panel_expand(&s.a, 1, s.T + v * (k + GAP), k + GAP, y, n, s.work);
                     ck_assert_mem_eq(t, T + v * k, k * sizeof *t);
