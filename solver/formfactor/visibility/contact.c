@@ -14,7 +14,7 @@ static const double least_rise = .25;
 
 /* The data of the filter: one element, and what it came in contact with. */
 typedef struct contact_search {
-    struct RTCIntersectContext embree;
+    embree_query query; /* first: the filter gets a pointer to it */
     const visibility *v;
     const float *sizes; /* [facets]: the radius of the largest element */
     const element_face *own;
@@ -104,10 +104,10 @@ static void search(contact_search *s, double reach) {
     }
     packet_set(&ray, &rays);
     for (int k = 0; k < VISIBILITY_PACKET; k++) ray.ray.tfar[k] = 1;
-    rtcInitIntersectContext(&s->embree);
-    s->embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    s->embree.filter = note_all;
-    rtcOccluded8(active, s->v->scene, &s->embree, &ray.ray);
+    embree_query_init(&s->query);
+    s->query.coherent = true;
+    s->query.filter = note_all;
+    embree_occluded(active, s->v->scene, &s->query, &ray.ray);
 }
 
 /* The radius of the largest element of each facet, and of all. */
