@@ -125,6 +125,38 @@ bool occluder_in_contact(const occluder *o, const polygon *element, double rise,
            (most <= slack + rise && fabs(dot3(o->normal, element->normal)) > plane_parallel);
 }
 
+/* All points are outside of one edge of the other, give or take slack. */
+static bool apart_in_plane(const occluder *o, const polygon *element, double slack) {
+    for (int e = 0; e < o->n; e++) {
+        bool outside = true;
+        for (int c = 0; c < element->n && outside; c++)
+            outside = dot3(o->edge[e], element->corner[c]) + o->edge[e][3] <= slack;
+        if (outside) return true;
+    }
+    for (int e = 0; e < element->n; e++) {
+        double along[3], inwards[3];
+        subtract3(element->corner[(e + 1) % element->n], element->corner[e], along);
+        cross3(element->normal, along, inwards);
+        const double most = slack * sqrt(dot3(inwards, inwards));
+        bool outside = true;
+        for (int c = 0; c < o->n && outside; c++) {
+            double to[3];
+            subtract3(o->corner[c], element->corner[e], to);
+            outside = dot3(inwards, to) <= most;
+        }
+        if (outside) return true;
+    }
+    return false;
+}
+
+bool occluder_lies_beside(const occluder *o, const polygon *element) {
+    if (!(fabs(dot3(o->normal, element->normal)) > plane_parallel)) return false;
+    const double slack = plane_slack(2 * o->radius, 2 * element->radius);
+    for (int c = 0; c < element->n; c++)
+        if (!(fabs(dot3(o->normal, element->corner[c]) - o->level) <= slack)) return false;
+    return o->facet == MESH_NO_VERTEX || apart_in_plane(o, element, slack);
+}
+
 static standing where_it_stands(pair_sides *p, const occluder *o) {
     double height[2][POLYGON_CORNERS], low[2], high[2];
     for (int side = 0; side < 2; side++) {
@@ -146,7 +178,9 @@ static standing where_it_stands(pair_sides *p, const occluder *o) {
             subtract3(o->corner[c], one->centre, to);
             front = fmax(front, dot3(one->normal, to));
         }
-        if (front <= p->slack || occluder_in_contact(o, one, p->rise[side], p->slack)) return STANDS_BESIDE;
+        if (front <= p->slack || occluder_in_contact(o, one, p->rise[side], p->slack) ||
+            occluder_lies_beside(o, one))
+            return STANDS_BESIDE;
     }
     const bool apart =
         (low[0] > p->slack && high[1] < -p->slack) || (low[1] > p->slack && high[0] < -p->slack);

@@ -17,6 +17,12 @@ enum { LISTED_OCCLUDERS_MOST = 128 };
  * (visibility_rise), give or take slack: its corners, or those of the element in its plane, are no higher. */
 bool occluder_in_contact(const occluder *o, const polygon *element, double rise, double slack);
 
+/* True where an occluder lies in the plane of an element, as far as rounded corners say (plane_slack), and is
+ * its neighbour there, or one that was joined from several facets, of which the element may be one: it hides
+ * no more than what leaves the element at angles of that slack over its size, and a segment would have to
+ * tell on which side of it the element begins. */
+bool occluder_lies_beside(const occluder *o, const polygon *element);
+
 typedef struct pair_occluders {
     int count;   /* or OCCLUDERS_UNCOUNTED */
     bool hidden; /* one of them covers the pair */
