@@ -1,4 +1,4 @@
-"""How long a test waits for what must come: so long only a program that hangs takes, also on a machine of which others take
-most. It is no measure of speed, and less than the time that ctest gives a test."""
+"""The time that a test waits for something that must come. Only a program that hangs takes as long, also on a machine of which
+others take most: it is no measure of speed. ctest gives a test more."""
 
 PATIENCE = 600
