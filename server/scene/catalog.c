@@ -339,6 +339,7 @@ static lam_status copy_without(const catalog_snapshot *present, const char *name
     for (size_t i = 0; i < present->n_scenes; i++)
         if (strcmp(present->scenes[i]->name, name) != 0)
             made->scenes[made->n_scenes++] = scene_acquire(present->scenes[i]);
+    refusals_release(made->refused);
     made->refused = refusals_hold(present->refused);
     *out = made;
     return LAM_OK;

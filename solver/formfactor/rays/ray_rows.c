@@ -40,6 +40,7 @@ void ray_rows_destroy(ray_rows *r) {
     visibility_destroy(r->v);
     form_factors_free(&r->f);
     csr_free(&r->near);
+    portals_free(&r->aimed);
     free(r->near_sums);
     free(r->own);
     free(r->received);
