@@ -149,12 +149,16 @@ static bool apart_in_plane(const occluder *o, const polygon *element, double sla
     return false;
 }
 
-bool occluder_lies_beside(const occluder *o, const polygon *element) {
+bool occluder_lies_beside(const occluder *o, const polygon *element, double slack) {
     if (!(fabs(dot3(o->normal, element->normal)) > plane_parallel)) return false;
-    const double slack = plane_slack(2 * o->radius, 2 * element->radius);
-    for (int c = 0; c < element->n; c++)
-        if (!(fabs(dot3(o->normal, element->corner[c]) - o->level) <= slack)) return false;
-    return o->facet == MESH_NO_VERTEX || apart_in_plane(o, element, slack);
+    const double most = plane_slack(2 * o->radius, 2 * element->radius);
+    int in_plane = 0;
+    for (int c = 0; c < element->n; c++) {
+        const double height = fabs(dot3(o->normal, element->corner[c]) - o->level);
+        if (!(height <= most)) return false;
+        in_plane += height <= 2 * slack; /* the plane is that of all corners that were joined */
+    }
+    return (o->facet == MESH_NO_VERTEX && in_plane >= 3) || apart_in_plane(o, element, most);
 }
 
 static standing where_it_stands(pair_sides *p, const occluder *o) {
@@ -179,7 +183,7 @@ static standing where_it_stands(pair_sides *p, const occluder *o) {
             front = fmax(front, dot3(one->normal, to));
         }
         if (front <= p->slack || occluder_in_contact(o, one, p->rise[side], p->slack) ||
-            occluder_lies_beside(o, one))
+            occluder_lies_beside(o, one, p->slack))
             return STANDS_BESIDE;
     }
     const bool apart =

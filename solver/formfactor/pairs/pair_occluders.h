@@ -18,10 +18,11 @@ enum { LISTED_OCCLUDERS_MOST = 128 };
 bool occluder_in_contact(const occluder *o, const polygon *element, double rise, double slack);
 
 /* True where an occluder lies in the plane of an element, as far as rounded corners say (plane_slack), and is
- * its neighbour there, or one that was joined from several facets, of which the element may be one: it hides
- * no more than what leaves the element at angles of that slack over its size, and a segment would have to
- * tell on which side of it the element begins. */
-bool occluder_lies_beside(const occluder *o, const polygon *element);
+ * its neighbour there, or one that was joined from several facets and has three corners of the element in its
+ * plane, give or take slack, so that half of the element is a part of it: it hides no more than what leaves
+ * the element at angles of that slack over its size, and a segment would have to tell on which side of it the
+ * element begins. */
+bool occluder_lies_beside(const occluder *o, const polygon *element, double slack);
 
 typedef struct pair_occluders {
     int count;   /* or OCCLUDERS_UNCOUNTED */

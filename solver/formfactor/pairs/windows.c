@@ -242,8 +242,8 @@ windows_found windows_cut(const occluders *o, const link_occluders *among, const
             const occluder *one = &o->of[among->of[l]];
             if (one->facet == own_facets[0] || one->facet == own_facets[1]) continue;
             if (occluder_in_contact(one, a, rise[0], o->slack) ||
-                occluder_in_contact(one, b, rise[1], o->slack) || occluder_lies_beside(one, a) ||
-                occluder_lies_beside(one, b))
+                occluder_in_contact(one, b, rise[1], o->slack) || occluder_lies_beside(one, a, o->slack) ||
+                occluder_lies_beside(one, b, o->slack))
                 continue;
             bool in_plane = true;
             for (int c = 0; c < one->n && in_plane; c++)
