@@ -212,8 +212,8 @@ class ObjTexturesTest(TexturesCase):
         rgba = np.dstack([noise(6, 6), np.full((6, 6), 20)])
         self.write("thin.png", png_bytes(rgba))
         self.write("a.mtl", "newmtl white\nKd 1 1 1\nmap_Kd white.png\nnewmtl thin\nmap_Kd thin.png\nmap_d thin.png\nmap_Bump b.png\n")
-        scene = self.write("a.obj", "mtllib a.mtl\n" + SQUARE + "usemtl white\n" + FACE + "v 0 0 3\nv 2 0 3\nv 2 1 3\nusemtl thin\n"
-                           "f 5/1 6/2 7/3\nf 5 6 7\n")
+        scene = self.write("a.obj", "mtllib a.mtl\n" + SQUARE + "usemtl white\n" + FACE + "v 0 0 3\nv 2 0 3\nv 2 1 3\nv 0 0 4\nv 2 0 4\nv 2 1 4\n"
+                           "usemtl thin\nf 5/1 6/2 7/3\nf 8 9 10\n")
         store, errors = self.store(scene)
         np.testing.assert_allclose(store.reflectance[:, 0], .9999)
         self.assertIn("material 'white': a mean reflectance above 0.9999 is clamped to it", errors)
