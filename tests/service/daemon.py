@@ -17,8 +17,6 @@ from patience import PATIENCE
 
 LAMBERTD = os.environ["LAMBERTD"]
 
-
-
 # The text of /metrics is kept for so long (METRICS_PAGE_S of server/route/metrics_page.h).
 METRICS_S = .1
 
