@@ -35,7 +35,7 @@ static double rise_over(const element_face *of, const element_face *from, bool b
 }
 
 static void raise(float *rise, double to) {
-    const float above = nextafterf((float)to, INFINITY);
+    float above = nextafterf((float)to, INFINITY);
     float before;
     __atomic_load(rise, &before, __ATOMIC_RELAXED);
     while (before < above &&

@@ -53,7 +53,7 @@ static void light(const view *v, int which, double *x) {
         double middle[3];
         mesh_centroid(&v->m, i, middle);
         x[i] = which == 0   ? (i == v->m.n / 3)
-               : which == 1 ? v->m.group[i] == v->m.group[v->m.n / 2]
+               : which == 1 ? v->m.group[i] == v->m.group[v->m.two_sided ? 0 : v->m.n / 2]
                : which == 2 ? 1
                : which == 3 ? any
                : which == 4 ? any - .5
