@@ -268,6 +268,25 @@ done:
     return status;
 }
 
+/* Adds the light of --weather to the light: of the elements selected, or of all. */
+static lam_status add_weather(const fields *f, store *s, const mesh *m, size_t n_selected,
+                              const uint32_t *selected, terminal *t, lit_store *lit, sunlight *sun,
+                              weather_span *span, lam_error *error) {
+    const weather_options hours = {.path = f->weather,
+                                   .photometric = f->photometric,
+                                   .exact = strcmp(f->sun, "exact") == 0,
+                                   .sun_points = (size_t)f->sun_points};
+    return weather_light_add(&hours, s, m, lit->op, lit->sky, n_selected, selected, t, &lit->light, sun, span,
+                             error);
+}
+
+static lam_status put_out(const solution *out, const fields *f, lam_error *error) {
+    if (f->output != NULL) return output_write(out, f->output, error);
+    if (f->json) return output_print_json(out, error);
+    output_print(out);
+    return LAM_OK;
+}
+
 static lam_status solve(const char *path, const fields *f, const annual_options *year, reduction *reductions,
                         size_t n_reductions, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
@@ -309,14 +328,10 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     TRY(stated_errors_read(s, &about, &outside, &stated, error));
     about.read = stated.read;
     if (f->weather != NULL) {
-        const weather_options hours = {.path = f->weather,
-                                       .photometric = f->photometric,
-                                       .exact = strcmp(f->sun, "exact") == 0,
-                                       .sun_points = (size_t)f->sun_points};
         /* The error of an answer is told by all that the sun shines on. */
         const bool some = year->n_figures > 0;
-        TRY(weather_light_add(&hours, s, &m, lit.op, lit.sky, some ? n_selected : 0, some ? selected : NULL,
-                              t, &lit.light, &sun, &span, error));
+        TRY(add_weather(f, s, &m, some ? n_selected : 0, some ? selected : NULL, t, &lit, &sun, &span,
+                        error));
         TRY(take_span(&span, f->weather, f->hours, &figures, error));
     }
     if (year->n_figures > 0 && !lit.light.batch)
@@ -354,12 +369,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     if (f->smooth) TRY(find_corners(&out, &lit.light, &corners, error));
     out.corners = corners;
     TRY(reductions_fill(&out, error));
-    if (f->output != NULL)
-        TRY(output_write(&out, f->output, error));
-    else if (f->json)
-        TRY(output_print_json(&out, error));
-    else
-        output_print(&out);
+    TRY(put_out(&out, f, error));
 done:
     free(scene);
     free(name_errors);

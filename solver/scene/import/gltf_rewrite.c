@@ -46,8 +46,7 @@ static lam_status write_file(const gltf_file *g, const char *bytes, size_t lengt
     memcpy(made, bytes, 20);
     put_little_endian(made + 8, 20 + padded + rest);
     put_little_endian(made + 12, padded);
-    memset(made + 20, ' ', padded);
-    memcpy(made + 20, text, n);
+    for (size_t k = 0; k < padded; k++) made[20 + k] = (unsigned char)(k < n ? text[k] : ' ');
     memcpy(made + 20 + padded, own + own_length, rest);
     *out = made;
     *out_length = 20 + padded + rest;
