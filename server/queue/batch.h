@@ -14,9 +14,8 @@
  *     (Company, below, may put a line ahead by BATCH_AHEAD more.)
  *   - A job that is ready for a pass lets others be begun first, so that they share it: of its own key and
  *     kind, estimated to take no longer than BATCH_GATHER, and of lines that are charged at most BATCH_AHEAD
- *     more than its own. The first of them starts a clock, and none is begun later than BATCH_GATHER. So
- * however long they take in truth, the pass waits for BATCH_GATHER and for the one begin that each thread is
- * in.
+ *     more than its own. The first of them starts a clock, and none is begun later than BATCH_GATHER. So the
+ *     pass waits for BATCH_GATHER and for the one begin that each thread is in, however long that takes.
  *   - When all threads are in functions of long jobs, one more thread serves the short ones (cost up to
  *     BATCH_SHORT), so that these wait for none of those functions; the processor is then shared.
  * The table of lines has 256 places by hash; lines that meet there are one (stochastic fairness queueing:

@@ -10,10 +10,9 @@
  *
  * Of the two faces one is in front and has that light, the other is dark, and nobody knows which: an element
  * that overlaps is off by its own light with probability 1/2. With o_g the share of a group's area that
- * overlaps, the squared error over the squared light L = B - E in it is s^2 + o_g / 2      of its elements,
- *     s^2 + o_g^2 / 2    of its mean,
- * and over the whole scene, o the share of its area, s^2 + o / 2. It adds up in squares with the other
- * errors, which are independent of it. */
+ * overlaps, the squared error over the squared light L = B - E in it is s^2 + o_g / 2 of its elements and
+ * s^2 + o_g^2 / 2 of its mean, and over the whole scene, o the share of its area, s^2 + o / 2. It adds up in
+ * squares with the other errors, which are independent of it. */
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/coincident.h"
 
@@ -55,9 +54,8 @@ static void add_to_figures(error_group *g, double added2) {
     const double share =
         g->total_indirect.mean > 0 ? fmin(1, g->total_relative.mean / g->total_indirect.mean) : 1;
     if (g->probes == 0) return;
-    double *const indirect[] = {&g->total_indirect.mean, &g->total_indirect.max}, *const relative[] = {
-                                                                                      &g->total_relative.mean,
-                                                                                      &g->total_relative.max};
+    double *const indirect[] = {&g->total_indirect.mean, &g->total_indirect.max};
+    double *const relative[] = {&g->total_relative.mean, &g->total_relative.max};
     for (int k = 0; k < 2; k++) {
         *indirect[k] = sqrt(*indirect[k] * *indirect[k] + added2);
         *relative[k] = sqrt(*relative[k] * *relative[k] + share * share * added2);

@@ -71,6 +71,7 @@ static lam_status part_groups(mesh *m, lam_error *error) {
     char *text = NULL, **block = NULL;
     size_t capacity = 0;
     uint32_t index, *of = NULL;
+    double *overlap = NULL;
     if (m->group_names == NULL) return LAM_OK;
     of = memory_allocate(m->n_groups, sizeof *of, "group names", error);
     if (of == NULL) TRY(LAM_ERR_MEMORY);
@@ -83,6 +84,15 @@ static lam_status part_groups(mesh *m, lam_error *error) {
         if (of[g] != TABLE_NONE) TRY(add_back_name(&names, g, &text, &capacity, &of[g], error));
     block = name_table_block(&names, error);
     if (block == NULL) TRY(LAM_ERR_MEMORY);
+    if (m->overlap != NULL) { /* what is covered on one side is on the other */
+        overlap = memory_allocate(names.n, sizeof *overlap, "overlapping faces", error);
+        if (overlap == NULL) TRY(LAM_ERR_MEMORY);
+        memcpy(overlap, m->overlap, m->n_groups * sizeof *overlap);
+        for (size_t g = 0; g < m->n_groups; g++)
+            if (of[g] != TABLE_NONE) overlap[of[g]] = m->overlap[g];
+        free(m->overlap);
+        m->overlap = overlap;
+    }
     for (size_t i = m->n - m->n_backs; i < m->n; i++) m->group[i] = of[m->group[i]];
     free(m->group_names);
     m->group_names = block;

@@ -167,7 +167,7 @@ done:
 
 /* Sums over one side of each face. */
 static double overlap_sum(const mesh *m, double *all) {
-    const size_t n = m->two_sided ? m->n / 2 : m->n;
+    const size_t n = m->n - m->n_backs;
     double sum = 0, area = 0;
     for (size_t i = 0; i < n; i++) {
         area += m->area[i];

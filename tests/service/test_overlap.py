@@ -125,6 +125,15 @@ class Overlap(Case):
         true, found = (numpy.ravel(x["groups"]["wall"]["mean"])[0] for x in means)
         self.assertGreater(abs(found - true), .1 * true)
         self.assertGreater(stated(means[1], "wall"), abs(found - true) / found / 2)
+        self.assertGreater(means[1]["error"]["relative_mean"], .1) # of all light, of which some is known
+
+    def test_backs_overlap_as_their_fronts(self):
+        self.make("backs", "--two-sided", second=1)
+        with h5py.File(self.path("backs.h5")) as file:
+            overlap = dict(zip(file["mesh/group_names"].asstr()[:], file["mesh/overlap"][:], strict=True))
+            self.assertAlmostEqual(file["mesh"].attrs["overlap_area"], 16, places=9)
+        self.assertEqual({g for g, share in overlap.items() if share > 0}, {"r4", "second", "r4.back", "second.back"})
+        self.assertEqual(overlap["r4.back"], overlap["r4"])
 
     def test_positions_state_it_too(self):
         """Walks meet either of two faces; the floor is off by as much as is stated in a room with both."""
