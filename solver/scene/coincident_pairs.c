@@ -1,6 +1,7 @@
 #include "solver/scene/coincident_pairs.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/scene/element_face.h"
 #include "solver/scene/plane.h"
 
 #include <math.h>
@@ -195,26 +196,6 @@ static bool flatten(const mesh *m, size_t face, const double at[3], const double
     return true;
 }
 
-/* The unit normal of a face in double, and the mean of its corners. */
-static void plane_of(const mesh *m, size_t face, double at[3], double normal[3]) {
-    const uint32_t *e = m->elements[face];
-    const size_t n = mesh_corners(m, face);
-    const double *a = m->vertices[e[0]], *b = m->vertices[e[2]], *c = m->vertices[e[1]],
-                 *d = n == 3 ? a : m->vertices[e[3]];
-    double p[3], q[3], length = 0;
-    for (int k = 0; k < 3; k++) {
-        p[k] = b[k] - a[k];
-        q[k] = d[k] - c[k];
-        at[k] = 0;
-        for (size_t j = 0; j < n; j++) at[k] += m->vertices[e[j]][k] / (double)n;
-    }
-    for (int k = 0; k < 3; k++) {
-        normal[k] = p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3];
-        length += normal[k] * normal[k];
-    }
-    for (int k = 0; k < 3; k++) normal[k] /= sqrt(length);
-}
-
 /* True if the second polygon has the corners of the first, from any of them on. */
 static bool same_corners(const flat_polygon *a, const flat_polygon *b, double distance) {
     if (a->n != b->n) return false;
@@ -238,15 +219,15 @@ static lam_status look(search *s, uint32_t i, uint32_t j) {
     const float *p = m->normal[i], *q = m->normal[j];
     const double cosine =
         (double)p[0] * (double)q[0] + (double)p[1] * (double)q[1] + (double)p[2] * (double)q[2];
-    double at[3], normal[3];
+    element_face plane;
     flat_polygon large, small;
     if (cosine < alike && !(s->both_sides && cosine < -alike)) return LAM_OK;
     const bool swapped = m->area[j] > m->area[i];
     const uint32_t a = swapped ? j : i, b = swapped ? i : j;
-    plane_of(m, a, at, normal);
+    if (!element_face_set(m, m->elements[a], &plane)) return LAM_OK;
     /* The larger face gives the plane. A quad may deviate from its own by a hundred-thousandth. */
-    if (!flatten(m, b, at, normal, s->distance, cosine < 0, &small)) return LAM_OK;
-    (void)flatten(m, a, at, normal, HUGE_VAL, false, &large);
+    if (!flatten(m, b, plane.centre, plane.normal, s->distance, cosine < 0, &small)) return LAM_OK;
+    (void)flatten(m, a, plane.centre, plane.normal, HUGE_VAL, false, &large);
     /* Rounding moves the edge that neighbours share by `distance`, and makes them share a strip beside it. */
     const double least = shared_least * m->area[b] + s->distance * perimeter(&small);
     flat_polygon both = small;

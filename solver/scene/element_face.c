@@ -1,28 +1,26 @@
 #include "solver/scene/element_face.h"
 
+#include "solver/base/vector3.h"
 #include "solver/scene/plane.h"
 
 #include <math.h>
 #include <string.h>
 
 bool element_face_set(const mesh *m, const uint32_t corners[4], element_face *out) {
-    double twice[3] = {0, 0, 0}, length = 0;
+    double twice[3] = {0, 0, 0};
     *out = (element_face){.n = (int)corner_count(corners)};
     for (int c = 0; c < out->n; c++) {
         memcpy(out->corner[c], m->vertices[corners[c]], sizeof out->corner[c]);
         for (int d = 0; d < 3; d++) out->centre[d] += out->corner[c][d] / out->n;
     }
     for (int c = 1; c + 1 < out->n; c++) {
-        double u[3], w[3];
-        for (int d = 0; d < 3; d++) {
-            u[d] = out->corner[c][d] - out->corner[0][d];
-            w[d] = out->corner[c + 1][d] - out->corner[0][d];
-        }
-        for (int d = 0; d < 3; d++)
-            twice[d] += u[(d + 1) % 3] * w[(d + 2) % 3] - u[(d + 2) % 3] * w[(d + 1) % 3];
+        double u[3], w[3], product[3];
+        subtract3(out->corner[c], out->corner[0], u);
+        subtract3(out->corner[c + 1], out->corner[0], w);
+        cross3(u, w, product);
+        for (int d = 0; d < 3; d++) twice[d] += product[d];
     }
-    for (int d = 0; d < 3; d++) length += twice[d] * twice[d];
-    length = sqrt(length);
+    const double length = sqrt(dot3(twice, twice));
     if (!(length > 0)) return false;
     for (int d = 0; d < 3; d++) out->normal[d] = twice[d] / length;
     for (int c = 0; c < out->n; c++) {

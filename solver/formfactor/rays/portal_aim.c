@@ -1,13 +1,11 @@
 #include "solver/formfactor/rays/portal_aim.h"
+
+#include "solver/base/vector3.h"
 #include "solver/scene/plane.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 portal portal_of(const plane_patch *patch, const double centre[3]) {
     portal p = {.triangle = patch->triangle, .opening = patch->opening};
@@ -17,7 +15,7 @@ portal portal_of(const plane_patch *patch, const double centre[3]) {
     }
     const double *a = p.edge[0], *b = p.edge[1];
     const double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    const double whole = sqrt(dot(cross, cross)), aa = dot(a, a), ab = dot(a, b), bb = dot(b, b);
+    const double whole = sqrt(dot3(cross, cross)), aa = dot3(a, a), ab = dot3(a, b), bb = dot3(b, b);
     p.area = p.triangle ? whole / 2 : whole;
     for (int d = 0; d < 3; d++) {
         p.normal[d] = cross[d] / whole;
@@ -122,12 +120,12 @@ typedef struct aiming {
     double centre[3], normal[3], radius;
 } aiming;
 
-/* A quad is planar to a millionth of its size only. */
+/* 0 where a point is in the plane of the element, as far as that is plane. */
 static double cosine_to(const aiming *from, const double at[3]) {
     double r[3];
     for (int d = 0; d < 3; d++) r[d] = at[d] - from->centre[d];
-    const double length = sqrt(dot(r, r));
-    return dot(r, from->normal) > plane_flatness * length ? dot(r, from->normal) / length : 0;
+    const double length = sqrt(dot3(r, r));
+    return dot3(r, from->normal) > plane_flatness * length ? dot3(r, from->normal) / length : 0;
 }
 
 /* A group while it is chosen: a node of the tree, or a part of its only portal. */
@@ -167,7 +165,7 @@ static double weight_of_part(const aiming *from, const portal *p, const choice *
     if (cosine == 0) return 0;
     middle_of_part(p, c, middle);
     for (int d = 0; d < 3; d++) r[d] = from->centre[d] - middle[d];
-    const double square = dot(r, r), height = dot(r, p->normal);
+    const double square = dot3(r, r), height = dot3(r, p->normal);
     const double strength = fabs(height) < from->radius ? fmax(p->strength[0], p->strength[1])
                             : height > 0                ? p->strength[0]
                                                         : p->strength[1];
@@ -246,7 +244,7 @@ static void halve(const portals *p, const choice *whole, choice half[2]) {
     const portal *one = &p->portal[whole->node->first];
     double length[2];
     for (int k = 0; k < 2; k++)
-        length[k] = (whole->to[k] - whole->from[k]) * sqrt(dot(one->edge[k], one->edge[k]));
+        length[k] = (whole->to[k] - whole->from[k]) * sqrt(dot3(one->edge[k], one->edge[k]));
     const int along = length[1] > length[0];
     half[0].to[along] = half[1].from[along] = .5 * (whole->from[along] + whole->to[along]);
 }
@@ -353,15 +351,15 @@ void portals_point(const portals *p, const portal_aim *aim, double x, double y, 
 /* r^2 / cos of the passage through a portal, at x and y of its edges; 0 where there is none. */
 static double passage(const portal *p, const double origin[3], const double direction[3], double *x,
                       double *y) {
-    const double along = dot(direction, p->normal);
+    const double along = dot3(direction, p->normal);
     double r[3];
     if (along == 0) return 0;
     for (int d = 0; d < 3; d++) r[d] = p->corner[d] - origin[d];
-    const double distance = dot(r, p->normal) / along;
+    const double distance = dot3(r, p->normal) / along;
     if (!(distance > 0)) return 0;
     for (int d = 0; d < 3; d++) r[d] = distance * direction[d] - r[d];
-    *x = dot(r, p->inverse[0]);
-    *y = dot(r, p->inverse[1]);
+    *x = dot3(r, p->inverse[0]);
+    *y = dot3(r, p->inverse[1]);
     if (!(*x >= 0 && *y >= 0 && (p->triangle ? *x + *y <= 1 : *x <= 1 && *y <= 1))) return 0;
     return distance * distance / fabs(along);
 }

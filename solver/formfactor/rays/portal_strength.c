@@ -1,6 +1,7 @@
 #include "solver/formfactor/rays/portal_strength.h"
 
 #include "solver/base/random.h"
+#include "solver/base/vector3.h"
 #include "solver/formfactor/rays/portal_aim.h"
 #include "solver/formfactor/visibility/sample.h"
 
@@ -52,12 +53,10 @@ bool portals_are_in_the_open(const mesh *m, const visibility *v, uint64_t seed) 
 static void lines_through(const portals *p, const portal_aim *all, const double x[4][VISIBILITY_PACKET],
                           double origin[VISIBILITY_PACKET][3], double direction[VISIBILITY_PACKET][3]) {
     const portal *first = &p->portal[0]; /* all lie in one plane */
-    double axis[2][3], length = 0;
-    for (int d = 0; d < 3; d++) length += first->edge[0][d] * first->edge[0][d];
-    for (int d = 0; d < 3; d++) axis[0][d] = first->edge[0][d] / sqrt(length);
-    for (int d = 0; d < 3; d++)
-        axis[1][d] = first->normal[(d + 1) % 3] * axis[0][(d + 2) % 3] -
-                     first->normal[(d + 2) % 3] * axis[0][(d + 1) % 3];
+    const double length = sqrt(dot3(first->edge[0], first->edge[0]));
+    double axis[2][3];
+    for (int d = 0; d < 3; d++) axis[0][d] = first->edge[0][d] / length;
+    cross3(first->normal, axis[0], axis[1]);
     for (int i = 0; i < VISIBILITY_PACKET; i++) {
         const double away = sqrt(x[0][i]), turn = 2 * M_PI * x[1][i], up = sqrt(fmax(0, 1 - x[0][i]));
         portals_point(p, all, x[2][i], x[3][i], origin[i]);

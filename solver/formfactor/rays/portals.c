@@ -1,16 +1,13 @@
 #include "solver/formfactor/rays/portals.h"
 
 #include "solver/base/random.h"
+#include "solver/base/vector3.h"
 #include "solver/formfactor/rays/portal_strength.h"
 #include "solver/formfactor/visibility/openings.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 double portals_weight(const portals *p, const portal_aim *aim, size_t n_rays, const double origin[3],
                       const double direction[3], double cosine) {
@@ -33,8 +30,8 @@ static void aim(const portals *p, const portal_aim *to_groups, const element_sam
             to[d] -= (double)from[d];
             normal[d] = (double)sampler->frame.normal[d];
         }
-        const double length = sqrt(dot(to, to));
-        cosine[i] = length > 0 ? fmax(dot(to, normal) / length, 0) : 0;
+        const double length = sqrt(dot3(to, to));
+        cosine[i] = length > 0 ? fmax(dot3(to, normal) / length, 0) : 0;
         for (int d = 0; d < 3; d++) {
             direction[i][d] = cosine[i] > 0 ? to[d] / length : normal[d];
             rays->origin[d][i] = from[d];

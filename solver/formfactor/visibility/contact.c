@@ -34,7 +34,7 @@ static double rise_over(const element_face *of, const element_face *from, bool b
     return most;
 }
 
-static void raise(float *rise, double to) {
+static void lift_to(float *rise, double to) {
     float above = nextafterf((float)to, INFINITY);
     float before;
     __atomic_load(rise, &before, __ATOMIC_RELAXED);
@@ -59,8 +59,8 @@ static void note(const contact_search *s, uint32_t piece) {
     const double own_rise = off + (over_own <= limit ? over_own : over_other),
                  other_rise = off + (over_other <= limit ? over_other : over_own);
     if (!(fmax(own_rise, other_rise) > least_rise * (double)v->rounding)) return;
-    raise(&s->rise[facet], other_rise);
-    raise(&s->rise[s->own_facet], own_rise);
+    lift_to(&s->rise[facet], other_rise);
+    lift_to(&s->rise[s->own_facet], own_rise);
 }
 
 /* Notes every hit and accepts none. */

@@ -2,6 +2,7 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/base/array_sort.h"
+#include "solver/base/vector3.h"
 #include "solver/scene/facet/plane_regions.h"
 #include "solver/scene/facet/polygon_slabs.h"
 #include "solver/scene/plane.h"
@@ -32,10 +33,6 @@ typedef struct finder {
     size_t patch_capacity;
 } finder;
 
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static double squared_length(const finder *f, const uint32_t ends[2]) {
     double sum = 0;
     for (int d = 0; d < 3; d++) {
@@ -47,8 +44,8 @@ static double squared_length(const finder *f, const uint32_t ends[2]) {
 
 /* The place of a corner in the axes of an opening. */
 static void flatten(const finder *f, uint32_t place, const double u[3], const double w[3], double at[2]) {
-    at[0] = dot(f->m->vertices[place], u);
-    at[1] = dot(f->m->vertices[place], w);
+    at[0] = dot3(f->m->vertices[place], u);
+    at[1] = dot3(f->m->vertices[place], w);
 }
 
 static lam_status add_ring(finder *f, const plane_region *r, const double u[3], const double w[3],
@@ -86,8 +83,8 @@ static lam_status add_islands(finder *f, const plane_region *r, const double u[3
         const uint32_t corner = f->r->corners[island->first];
         double at[2];
         if (island->plane == r->plane || island->area >= r->area ||
-            fabs(dot(f->m->vertices[corner], r->normal) - r->level) > f->slack ||
-            !(fabs(dot(island->normal, r->normal)) > .999))
+            fabs(dot3(f->m->vertices[corner], r->normal) - r->level) > f->slack ||
+            !(fabs(dot3(island->normal, r->normal)) > .999))
             continue;
         flatten(f, corner, u, w, at);
         if (!surrounds(f, at)) continue;
@@ -161,12 +158,11 @@ static lam_status add_opening(finder *f, const plane_region *r, lam_error *error
         longest = length;
         for (int d = 0; d < 3; d++) u[d] = f->m->vertices[ends[1]][d] - f->m->vertices[ends[0]][d];
     }
-    const double lean = dot(u, r->normal);
+    const double lean = dot3(u, r->normal);
     for (int d = 0; d < 3; d++) u[d] -= lean * r->normal[d];
-    const double length = sqrt(dot(u, u));
+    const double length = sqrt(dot3(u, u));
     for (int d = 0; d < 3; d++) u[d] /= length;
-    for (int d = 0; d < 3; d++)
-        w[d] = r->normal[(d + 1) % 3] * u[(d + 2) % 3] - r->normal[(d + 2) % 3] * u[(d + 1) % 3];
+    cross3(r->normal, u, w);
     f->n_ring = 0;
     TRY(add_ring(f, r, u, w, error));
     TRY(add_islands(f, r, u, w, &area, error));
@@ -200,7 +196,7 @@ static int larger_first(const void *a, const void *b) {
 
 lam_status face_openings_find(const mesh *m, double narrow, face_openings *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n_faces = m->two_sided ? m->n / 2 : m->n;
+    const size_t n_faces = m->n - m->n_backs;
     double centre[3], radius;
     face_edges e = {.n = 0};
     plane_regions r = {.n_open = 0};

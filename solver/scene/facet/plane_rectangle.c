@@ -1,13 +1,11 @@
 #include "solver/scene/facet/plane_rectangle.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 
 static double length_of(const double a[3]) {
     return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-}
-
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 double plane_rectangle_area(const plane_rectangle *r) {
@@ -29,7 +27,7 @@ bool plane_rectangle_around(const double (*points)[3], size_t n, const uint32_t 
     for (size_t i = 0; i < n; i++) { /* the point that is furthest from the line along u */
         double r[3];
         for (int d = 0; d < 3; d++) r[d] = points[i][d] - points[0][d];
-        const double along = dot(r, u);
+        const double along = dot3(r, u);
         for (int d = 0; d < 3; d++) r[d] -= along * u[d];
         const double width = length_of(r);
         if (width <= widest) continue;
@@ -43,8 +41,8 @@ bool plane_rectangle_around(const double (*points)[3], size_t n, const uint32_t 
     for (size_t i = 0; i < n; i++) {
         double r[3];
         for (int d = 0; d < 3; d++) r[d] = points[i][d] - points[0][d];
-        if (fabs(dot(r, normal)) > flat) return false;
-        const double at[2] = {dot(r, u), dot(r, w)};
+        if (fabs(dot3(r, normal)) > flat) return false;
+        const double at[2] = {dot3(r, u), dot3(r, w)};
         for (int k = 0; k < 2; k++) {
             low[k] = fmin(low[k], at[k]);
             high[k] = fmax(high[k], at[k]);

@@ -3,6 +3,7 @@
 #include "solver/base/array_grow.h"
 #include "solver/base/array_sort.h"
 #include "solver/base/union_find.h"
+#include "solver/base/vector3.h"
 #include "solver/scene/facet/plane_loops.h"
 #include "solver/scene/facet/plane_outside.h"
 #include "solver/scene/facet/plane_rectangle.h"
@@ -39,13 +40,9 @@ typedef struct explorer {
     plane_outside outside;
 } explorer;
 
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static void flatten(const plane_frame *p, const double x[3], double at[3]) {
     const double r[3] = {x[0] - p->origin[0], x[1] - p->origin[1], x[2] - p->origin[2]};
-    for (int k = 0; k < 3; k++) at[k] = dot(r, p->axis[k]);
+    for (int k = 0; k < 3; k++) at[k] = dot3(r, p->axis[k]);
 }
 
 /* The plane of a face; false where it has hardly an area. */
@@ -57,14 +54,13 @@ static bool frame_of_face(const mesh *m, uint32_t face, plane_frame *out) {
     n[0] = n[1] = n[2] = 0;
     for (size_t k = 1; k + 1 < corners; k++) {
         const double *a = m->vertices[m->elements[face][k]], *b = m->vertices[m->elements[face][k + 1]];
-        double u[3], w[3];
-        for (int d = 0; d < 3; d++) {
-            u[d] = a[d] - out->origin[d];
-            w[d] = b[d] - out->origin[d];
-        }
-        for (int d = 0; d < 3; d++) n[d] += u[(d + 1) % 3] * w[(d + 2) % 3] - u[(d + 2) % 3] * w[(d + 1) % 3];
+        double u[3], w[3], product[3];
+        subtract3(a, out->origin, u);
+        subtract3(b, out->origin, w);
+        cross3(u, w, product);
+        for (int d = 0; d < 3; d++) n[d] += product[d];
     }
-    length = sqrt(dot(n, n));
+    length = sqrt(dot3(n, n));
     if (!(length > 0)) return false;
     for (int d = 0; d < 3; d++) n[d] /= length;
     plane_axes(n, out->axis[0], out->axis[1]);
@@ -190,7 +186,7 @@ static lam_status add_region(explorer *x, size_t count, const uint32_t *points, 
     plane_region made = {.first = r->n_corners,
                          .count = count,
                          .area = fabs(area),
-                         .level = dot(x->plane.origin, x->plane.axis[2]),
+                         .level = dot3(x->plane.origin, x->plane.axis[2]),
                          .plane = x->n_planes};
     memcpy(made.normal, x->plane.axis[2], sizeof made.normal);
     for (size_t k = 0; k < count; k++)
@@ -296,10 +292,8 @@ static bool frame_of_chain(explorer *x, const free_edge *edges, size_t count, do
                                 fmax(x->narrow, x->slack), &r))
         return false;
     double *n = x->plane.axis[2];
-    for (int d = 0; d < 3; d++)
-        n[d] =
-            r.edge[0][(d + 1) % 3] * r.edge[1][(d + 2) % 3] - r.edge[0][(d + 2) % 3] * r.edge[1][(d + 1) % 3];
-    const double length = sqrt(dot(n, n));
+    cross3(r.edge[0], r.edge[1], n);
+    const double length = sqrt(dot3(n, n));
     for (int d = 0; d < 3; d++) n[d] /= length;
     plane_axes(n, x->plane.axis[0], x->plane.axis[1]);
     memcpy(x->plane.origin, points[0], sizeof x->plane.origin);
