@@ -7,6 +7,7 @@
 #include "solver/base/options.h"
 #include "solver/codec/reflectance.h"
 #include "solver/linalg/core.h"
+#include "solver/waits.h"
 
 #include <errno.h>
 #include <malloc.h>
@@ -33,15 +34,6 @@ static bool undo_binding(void) {
     return bound;
 }
 
-/* Threads of a team wait asleep, in programs that the daemon starts too, unless the environment has another
- * wish (solver/waits.h). True if that changed. */
-static bool wait_asleep(void) {
-    static const char *const names[] = {"OMP_WAIT_POLICY", "GOMP_SPINCOUNT", "KMP_BLOCKTIME"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (getenv(names[i]) != NULL) return false;
-    return setenv("OMP_WAIT_POLICY", "passive", 1) == 0;
-}
-
 /* Loops are shared by the threads of the queue alone. OpenMP would give each of them a team of its own, and
  * end the program where the system allows no more threads. The environment forbids that only before the
  * program starts, so it starts once more. ps and pgrep would then call it "exe", after the path of the second
@@ -50,8 +42,7 @@ static void forbid_teams(char **argv) {
     const char *limit = getenv("OMP_THREAD_LIMIT");
     const bool right = limit != NULL && strcmp(limit, "1") == 0;
     (void)prctl(PR_SET_NAME, program_invocation_short_name);
-    const bool bound = undo_binding(), chosen = wait_asleep();
-    if ((!bound && !chosen && right) || setenv("OMP_THREAD_LIMIT", "1", 1) != 0) return;
+    if ((!undo_binding() && right) || setenv("OMP_THREAD_LIMIT", "1", 1) != 0) return;
     execv("/proc/self/exe", argv);
 }
 
@@ -252,6 +243,7 @@ done:
 }
 
 int main(int argc, char **argv) {
+    waits_sleep(argv);
     forbid_teams(argv);
     share_one_heap();
     config c;

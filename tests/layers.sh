@@ -56,7 +56,7 @@ declare -A allowed=(
     [server/scene]="$operator solver/codec/ server/queue/ server/config.h"
     [server/route]="$operator solver/codec/ server/net/ server/queue/ server/scene/ server/config.h"
     [server/http]="$operator solver/codec/ server/net/ server/queue/ server/scene/ server/route/ server/config.h"
-    [server]="$operator solver/codec/ server/"
+    [server]="$operator solver/codec/ solver/waits.h server/"
     [tests/bench]="lambert/ store/ solver/ server/ support/"
 )
 
