@@ -155,7 +155,7 @@ static bool has_turn(request *r) {
     if (!r->had_turn) {
         r->turn.client = r->peer.key;
         r->turn.connection = r->connection;
-        r->had_turn = turns_may(all, &r->turn, clock_seconds());
+        r->had_turn = http_has_turn(all, &r->turn);
         if (r->had_turn) return true;
         client_enter(r->service->connections, r->client, STAGE_SOLVE, 0);
         MHD_suspend_connection(r->connection);

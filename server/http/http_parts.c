@@ -14,7 +14,7 @@ typedef struct parts {
 
 static ssize_t read_part(void *context, uint64_t position, char *to, size_t room) {
     parts *p = context;
-    if (!turns_may(p->turns, &p->turn, clock_seconds())) {
+    if (!http_has_turn(p->turns, &p->turn)) {
         MHD_suspend_connection(p->turn.connection);
         turns_wait(p->turns, &p->turn);
         return 0;

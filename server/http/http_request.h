@@ -6,6 +6,7 @@
 #include "server/http/http_fields.h"
 #include "server/route/content_coding.h"
 #include "server/route/routes.h"
+#include "solver/base/clock.h"
 
 #include <microhttpd.h>
 
@@ -60,6 +61,12 @@ static inline bool http_add_header(struct MHD_Response *response, const char *na
 
 /* Lowers the deadline to what the header Lambert-Timeout asks for; false, with 400, if that is no time. */
 bool http_read_timeout(request *r);
+
+/* turns_may now; called by the thread that receives and sends, whose time that is. */
+static inline bool http_has_turn(turns *all, turn *t) {
+    const double now = clock_seconds();
+    return turns_may(all, t, now, now - clock_thread_seconds());
+}
 
 /* Suspends the connection and queues the solve of a request with its whole body, or refuses it. */
 void http_solve(request *r);

@@ -8,8 +8,8 @@
 
 /* Clients that share a place of the table. */
 typedef struct place {
-    double debt;    /* seconds of the thread */
-    double updated; /* when time was taken off it */
+    double debt; /* seconds of the thread */
+    double idle; /* of the thread, when some of it was taken off the debt */
     turn *first, *last;
 } place;
 
@@ -91,7 +91,7 @@ static bool see(turns *all, size_t k, double now) {
     return now - all->another_seen < TURNS_SEEN_S;
 }
 
-static bool may(turns *all, turn *t, double now) {
+static bool may(turns *all, turn *t, double now, double idle) {
     const size_t k = shares_place(t->client);
     place *p = &all->places[k];
     const bool shared = see(all, k, now);
@@ -99,9 +99,9 @@ static bool may(turns *all, turn *t, double now) {
         come_back(all, t);
         return true;
     }
-    /* Time takes nothing off where some wait: rounds do. */
-    if (p->first == NULL) p->debt = fmax(0, p->debt - TURNS_FREE * (now - p->updated));
-    p->updated = now;
+    /* Where some wait rounds take off, and idle time does not. */
+    if (p->first == NULL) p->debt = fmax(0, p->debt - TURNS_FREE * (idle - p->idle));
+    p->idle = idle;
     if (all->closed || !shared) {
         p->debt = 0;
         let_all_go(all);
@@ -112,9 +112,9 @@ static bool may(turns *all, turn *t, double now) {
     return true;
 }
 
-bool turns_may(turns *all, turn *t, double now) {
+bool turns_may(turns *all, turn *t, double now, double idle) {
     pthread_mutex_lock(&all->lock);
-    const bool goes_on = may(all, t, now);
+    const bool goes_on = may(all, t, now, idle);
     pthread_mutex_unlock(&all->lock);
     return goes_on;
 }

@@ -6,9 +6,10 @@
  * waits.
  *
  * Deficit round robin (Shreedhar and Varghese 1996): a client may go while its debt is below TURNS_ROUND_S,
- * each request adds what it costs, each round takes TURNS_ROUND_S off, and time takes off TURNS_FREE of what
- * passes, so that a client who leaves most of the thread to others does not wait. Clients that meet in a
- * place of the table count as one (server/net/shares.h). */
+ * each request adds what it costs, each round takes TURNS_ROUND_S off, and TURNS_FREE of the time in which
+ * the thread has nothing to do is taken off, so that a client who leaves most of the thread to others does
+ * not wait. Where the thread is busy only rounds take off, on slow machines too. Clients that meet in a place
+ * of the table count as one (server/net/shares.h). */
 #ifndef LAMBERT_SERVER_NET_TURNS_H
 #define LAMBERT_SERVER_NET_TURNS_H
 
@@ -47,8 +48,9 @@ lam_status turns_create(void (*go)(turn *t), turns **out, lam_error *error);
 /* NULL is allowed. Nobody waits any more. */
 void turns_destroy(turns *all);
 
-/* True if it may go on now (clock_seconds). Otherwise turns_wait must be called, once the connection does. */
-bool turns_may(turns *all, turn *t, double now);
+/* True if it may go on now (clock_seconds); idle: the seconds in which the thread did nothing so far, give or
+ * take a constant. Otherwise turns_wait must be called, once the connection does. */
+bool turns_may(turns *all, turn *t, double now, double idle);
 void turns_wait(turns *all, turn *t);
 
 /* Counts more of the thread for a client than a request takes by itself. */

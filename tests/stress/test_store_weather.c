@@ -223,7 +223,7 @@ static const struct foreign {
     {"link_soft", LAM_ERR_FORMAT},
     {"link_dangling", LAM_ERR_FORMAT},
     {"link_external", LAM_ERR_FORMAT},
-    {"link_cycle", LAM_ERR_DAMAGED},
+    {"link_cycle", LAM_ERR_FORMAT},
     {"groups_deep", LAM_ERR_FORMAT},
     {"name_long", LAM_ERR_FORMAT},
     {"type_committed", LAM_ERR_FORMAT},

@@ -22,7 +22,7 @@ static turns *create(void) {
 
 /* As the thread does: it may go on, or it waits. */
 static bool ask(turns *all, turn *t, double now) {
-    if (turns_may(all, t, now)) return true;
+    if (turns_may(all, t, now, now)) return true;
     turns_wait(all, t);
     return false;
 }
@@ -96,14 +96,36 @@ START_TEST(a_debt_is_paid_by_rounds_and_by_time) {
     ck_assert(ask(all, &t, 1));
     (void)ask(all, &other, 1);
     turns_charge(all, 1, 1e-3);
-    ck_assert(!turns_may(all, &t, 1));
-    ck_assert(!turns_may(all, &t, 1 + .9e-3 / TURNS_FREE));
-    ck_assert(turns_may(all, &t, 1 + 1e-3 / TURNS_FREE));
+    ck_assert(!turns_may(all, &t, 1, 1));
+    ck_assert(!turns_may(all, &t, 1, 1 + .9e-3 / TURNS_FREE));
+    ck_assert(turns_may(all, &t, 1, 1 + 1e-3 / TURNS_FREE));
     /* Where nobody else goes, rounds pass at once. */
     turns_charge(all, 1, 1);
     ck_assert(!ask(all, &t, 1.01));
     ck_assert_uint_eq(n_gone, 1);
     ck_assert(ask(all, &t, 1.01));
+    turns_destroy(all);
+}
+END_TEST
+
+/* A thread that is always busy, with requests that take ten times what they count for: time itself takes
+ * nothing off, so that of many connections of one client most wait. */
+START_TEST(a_slow_machine_has_the_same_turns) {
+    turns *all = create();
+    turn greedy[MOST] = {{0}}, other = {.client = 2};
+    double now = 1;
+    size_t served = 0;
+    for (size_t k = 0; k < MOST; k++) greedy[k].client = 1;
+    (void)turns_may(all, &other, now, 0);
+    for (size_t k = 0; k < MOST; k++) {
+        now += 10 * TURNS_COST_S;
+        if (turns_may(all, &greedy[k], now, 0))
+            served++;
+        else
+            turns_wait(all, &greedy[k]);
+    }
+    ck_assert_uint_le(served, 3);
+    turns_close(all);
     turns_destroy(all);
 }
 END_TEST
@@ -129,6 +151,7 @@ int main(void) {
     tcase_add_test(tests, rounds_are_shared_by_clients);
     tcase_add_test(tests, nobody_is_forgotten);
     tcase_add_test(tests, a_debt_is_paid_by_rounds_and_by_time);
+    tcase_add_test(tests, a_slow_machine_has_the_same_turns);
     tcase_add_test(tests, all_go_once_the_others_are_away);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
