@@ -84,7 +84,7 @@ static lam_status part_groups(mesh *m, lam_error *error) {
         if (of[g] != TABLE_NONE) TRY(add_back_name(&names, g, &text, &capacity, &of[g], error));
     block = name_table_block(&names, error);
     if (block == NULL) TRY(LAM_ERR_MEMORY);
-    if (m->overlap != NULL) { /* what is covered on one side is on the other */
+    if (m->overlap != NULL) { /* a back lies under the same faces as its front */
         overlap = memory_allocate(names.n, sizeof *overlap, "overlapping faces", error);
         if (overlap == NULL) TRY(LAM_ERR_MEMORY);
         memcpy(overlap, m->overlap, m->n_groups * sizeof *overlap);
