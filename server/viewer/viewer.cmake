@@ -28,6 +28,12 @@ function(npm_packages result source build)
     execute_process(COMMAND ${LAMBERT_NPM} ci ${ARGN} --ignore-scripts --no-audit --no-fund --prefer-offline
                     WORKING_DIRECTORY ${build} RESULT_VARIABLE failed OUTPUT_VARIABLE said ERROR_VARIABLE said)
     if(failed)
+      # npm says why in lines of its own, after any number of warnings.
+      string(REGEX MATCHALL "npm (ERR!|error) [^\n]*" why "${said}")
+      if(why)
+        list(SUBLIST why 0 3 why)
+        list(JOIN why ", " said)
+      endif()
       string(STRIP "${said}" said)
       string(REGEX REPLACE "\n.*" "" said "${said}")
       set(${result} "npm could not install its packages: ${said}" PARENT_SCOPE)
