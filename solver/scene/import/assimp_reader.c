@@ -104,7 +104,7 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     ai_real strength = 1;
     aiGetMaterialString(m, AI_MATKEY_NAME, &given);
     const gltf_material *own = gltf_material_of(a, given.data);
-    snprintf(name, sizeof name, "%.*s", MAXLEN - 1,
+    snprintf(name, sizeof name, "%.*s", (int)sizeof given.data - 1,
              own == NULL         ? given.data
              : own->name == NULL ? ""
                                  : own->name);
