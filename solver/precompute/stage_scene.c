@@ -43,6 +43,11 @@ static void warn_of_coincident(terminal *t, const coincident_report *found) {
     if (found->overlapping > 0) terminal_warn(t, "%s", found->overlap_line);
 }
 
+/* True where both sides of every face will be elements. */
+static bool has_all_backs(const precompute_options *o) {
+    return o->two_sided != NULL && strcmp(o->two_sided, "no") != 0;
+}
+
 /* Turns faces; the hash of the source stays that of the file. Faces that lay back to back may be twins
  * then. */
 static lam_status orient(precompute_state *state, lam_error *error) {
@@ -52,7 +57,7 @@ static lam_status orient(precompute_state *state, lam_error *error) {
     TRY(facing_orient(&state->m, &state->progress, &turned, error));
     terminal_log(state->t, "%zu of %zu faces turned; for %zu the side was not decided", turned.turned,
                  state->m.n, turned.undecided);
-    TRY(mesh_settle_coincident(&state->m, state->options->two_sided, &found, error));
+    TRY(mesh_settle_coincident(&state->m, has_all_backs(state->options), &found, error));
     if (turned.turned > 0) warn_of_coincident(state->t, &found);
 done:
     return status;
@@ -63,7 +68,7 @@ static lam_status choose_backs(precompute_state *state, lam_error *error) {
     const char *const asked = state->options->two_sided;
     mesh *const m = &state->m;
     size_t n = 0;
-    if (asked != NULL && strcmp(asked, "no") != 0) return mesh_mark_two_sided(m, error);
+    if (has_all_backs(state->options)) return mesh_mark_two_sided(m, error);
     for (size_t i = 0; m->has_back != NULL && i < m->n; i++) n += m->has_back[i];
     if (asked != NULL || n == 0) {
         free(m->has_back);
@@ -83,7 +88,7 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     const import_options how = {.unit = o->unit,
                                 .up = o->up != NULL ? o->up[0] : 0,
                                 .reflectance = o->reflectance,
-                                .two_sided = o->two_sided,
+                                .two_sided = has_all_backs(o),
                                 .assets = o->assets};
     import_report report = {0};
     TRY(scene_import(o->input, &how, &state->m, &report, error));

@@ -275,6 +275,15 @@ class DoubleSided(BacksCase):
         done = lambert("precompute", scene, "-o", store, "--two-sided=some")
         self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1))
 
+    def test_both_sides_of_a_sheet_stay(self):
+        """Two faces back to back are its sides, of which one repeats the back of the other where all faces get backs."""
+        scene = self.write("twins.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf 4 3 2 1\n")
+        for options in (), ("--two-sided=no",), ("--two-sided",):
+            store, _ = self.store(scene, *options)
+            with h5py.File(store) as f:
+                np.testing.assert_array_equal(f["mesh/normal"][:, 2], [1, -1], str(options))
+                self.assertNotIn("overlap", f["mesh"])
+
     def test_all_double_sided_is_two_sided(self):
         """The same bits but for what says how a store was made."""
         scene = Gltf([("floor", square(0), 0), ("panel", square(1), 1)], [material(.5, doubleSided=True), material(0, 1, doubleSided=True)])
