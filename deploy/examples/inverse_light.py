@@ -92,7 +92,9 @@ def main(path, address, source, target, irradiance, weight="1e-4"):
     uneven = np.sqrt(max(2 * found.fun - weight * (cost @ found.x**2), 0))
     print(f"{target} has {irradiance} W/m2 within {100 * uneven:.2g} % (root mean square); {len(sources)} unknowns, "
           f"{found.nit} steps, {scene.requests} requests, {scene.requests / seconds:.0f} a second", file=sys.stderr)
-    np.save(sys.stdout.buffer, E.astype("<f4"))
+    npy = io.BytesIO() # a pipe has no position, which numpy asks for
+    np.save(npy, E.astype("<f4"))
+    sys.stdout.buffer.write(npy.getvalue())
 
 
 if __name__ == "__main__":

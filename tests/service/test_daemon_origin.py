@@ -142,7 +142,7 @@ class Origin(Case):
         daemon = self.daemon()
         for answer in (daemon.get("/healthz"), daemon.get("/none"), daemon.get("/v1/scenes"), daemon.radiosity("box", BODY),
                        daemon.radiosity("box", "{"), daemon.get("/v1/scenes", headers={"Host": "evil"}),
-                       daemon.get("/v1/scenes", headers={"X Y": "z"})):
+                       daemon.get("/v1/scenes", headers={"X(Y": "z"})):
             self.assertEqual(answer.headers["X-Content-Type-Options"], "nosniff", answer)
             self.assertEqual(answer.headers["Cross-Origin-Resource-Policy"], "same-origin", answer)
             self.assertIsNone(answer.headers["Access-Control-Allow-Origin"])

@@ -35,7 +35,9 @@ def launcher_with(n_threads):
     if os.geteuid() != 0:
         return ["prlimit", f"--nproc={count_of_user(os.geteuid()) + n_threads}"]
     uid = 100000 + os.getpid() % 100000
-    return ["setpriv", f"--reuid={uid}", "--clear-groups", "prlimit", f"--nproc={n_threads}"]
+    reads = "+dac_read_search" # the program and its store may lie in a folder of root's
+    return ["setpriv", f"--reuid={uid}", "--clear-groups", f"--inh-caps={reads}", f"--ambient-caps={reads}", "prlimit",
+            f"--nproc={n_threads}"]
 
 
 def threads_of(daemon):

@@ -216,6 +216,8 @@ class Guard(Case):
                 with self.subTest(path=path[:80]), daemon.raw() as s:
                     s.sendall(b"GET " + path + b" HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
                     answer = read_all(s)
+                    if b"\x00" in path and answer == b"":
+                        continue # newer versions of libmicrohttpd close such a connection
                     self.assertRegex(answer[:13], rb"^HTTP/1\.1 (400|404|414|431|501)", answer[:200])
                     self.assertNotIn(b"root:x", answer)
             # These are the page of the viewer, whatever they say beside.
@@ -223,6 +225,8 @@ class Guard(Case):
                 with daemon.raw() as s:
                     s.sendall(b"GET " + path + b" HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
                     answer = read_all(s)
+                    if b"\x00" in path and answer == b"":
+                        continue
                     self.assertRegex(answer, rb"^HTTP/1\.1 (200|400|404) ")
                     self.assertNotIn(b"root:x", answer)
             self.serves(daemon)
