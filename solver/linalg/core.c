@@ -145,9 +145,12 @@ lam_status core_factored(size_t k, size_t n, const float *V, const float *U, con
 }
 
 void core_keep_thread_limit(void) {
-    if (openblas_get_num_threads() > omp_get_thread_limit()) openblas_set_num_threads(omp_get_thread_limit());
+    const int limit = omp_get_thread_limit();
+    if (openblas_get_num_threads() > limit) openblas_set_num_threads(limit);
+    if (omp_get_max_threads() > limit) omp_set_num_threads(limit);
 }
 
 void core_use_one_thread(void) {
     openblas_set_num_threads(1);
+    omp_set_num_threads(1);
 }

@@ -36,11 +36,12 @@ lam_status core_factored(size_t k, size_t n, const float *V, const float *U, con
                          double *rcond, lam_error *error);
 
 /* Called once, before any linear algebra: OpenBLAS asks OpenMP for as many threads as there are cores and
- * waits for ever when OMP_THREAD_LIMIT allows fewer. */
+ * waits for ever when OMP_THREAD_LIMIT allows fewer. Version 0.3.29, not 0.3.21, asks for as many as OpenMP
+ * would give the calling thread, whatever number OpenBLAS itself was set to. */
 void core_keep_thread_limit(void);
 
 /* Makes OpenBLAS use the calling thread alone, for a program that needs the other cores of the machine for
- * answers. Called once, by the thread that makes cores. */
+ * answers. Called once by each thread that makes cores. */
 void core_use_one_thread(void);
 
 #endif
