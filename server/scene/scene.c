@@ -31,7 +31,8 @@ struct scene_health {
     atomic_llong verified_at; /* Unix time, s; 0: never */
     atomic_llong doubted_at;  /* of the monotonic clock, s; NEVER_DOUBTED */
     map_range *guard;         /* NULL: nothing is mapped */
-    lam_error damage;         /* of HEALTH_DAMAGED, written before the state is */
+    lam_error damage;         /* of HEALTH_DAMAGED: the first, written once and before the state is */
+    bool is_named;            /* damage is written; the verifier's own */
 };
 
 static void scene_health_free(scene_health *health) {
@@ -409,7 +410,9 @@ lam_status scene_verify(scene *s, const stop_check *stop, lam_error *error) {
         atomic_store(&health->state, HEALTH_SOUND);
     }
     if (status == LAM_ERR_DAMAGED) {
-        health->damage = damage;
+        /* A second look must not touch what other threads read by now. */
+        if (!health->is_named) health->damage = damage;
+        health->is_named = true;
         atomic_store(&health->state, HEALTH_DAMAGED);
     }
     if (status != LAM_OK && error != NULL) *error = damage;
