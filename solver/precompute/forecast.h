@@ -16,7 +16,7 @@ typedef struct forecast {
     size_t n_planes;             /* of the tree of clusters; 0: not known */
     size_t sky_tiles;            /* 0: no sky */
     recipe recipe, judge_recipe; /* of the form factors and of the judge's samples */
-    pairs_cost cost;             /* of recipe, where a sample of its pairs was taken; else 0 */
+    factor_cost cost;            /* of recipe, where a sample of its pairs was taken; else 0 */
     size_t probes;               /* at most; 0: no independent samples */
     size_t probes_least;         /* 0: all */
     bool from_store;             /* form factors are there already */

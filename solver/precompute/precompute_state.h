@@ -81,7 +81,7 @@ typedef struct precompute_state {
     recipe recipe;                 /* of f */
     face_openings of_faces;        /* of the faces of the file, or around the groups of --portal */
     const face_openings *openings; /* these; NULL: there is no sky, or only a store's mesh is known */
-    pairs_cost cost;               /* of the recipe, from a sample; seconds is 0 where none was taken */
+    factor_cost cost;              /* of the recipe, from a sample; seconds is 0 where none was taken */
     bool dear;                     /* the pairs of the recipe so far would take too long */
     bool plain;                    /* near pairs would too: rays alone are taken */
     size_t least_rays;             /* in place of pairs that are dear */
@@ -200,7 +200,7 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
                                lam_error *error);
 /* The cost of blocks by a recipe, from a sample of them; the scene is ready for these then, until they are
  * found or it is forgotten. */
-lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, pairs_cost *cost,
+lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, factor_cost *cost,
                                  lam_error *error);
 void state_forget_ready(precompute_state *state);
 lam_status stage_blocks(precompute_state *state, lam_error *error);

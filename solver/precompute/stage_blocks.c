@@ -84,7 +84,7 @@ done:
 
 /* The cost of the recipe so far, which is not blocks. Rays alone are enough to know where these cost more
  * than blocks. */
-static lam_status find_other_cost(precompute_state *state, const pairs_cost *blocks, pairs_cost *out,
+static lam_status find_other_cost(precompute_state *state, const factor_cost *blocks, factor_cost *out,
                                   lam_error *error) {
     lam_status status = LAM_OK;
     const recipe rays = {.method = RECIPE_RAYS, .rays = state->recipe.rays};
@@ -99,10 +99,11 @@ done:
 }
 
 /* The rays that a sky takes beside blocks; a forecast counts those of any blocks. */
-static lam_status add_sky(precompute_state *state, const recipe *blocks, pairs_cost *cost, lam_error *error) {
+static lam_status add_sky(precompute_state *state, const recipe *blocks, factor_cost *cost,
+                          lam_error *error) {
     lam_status status = LAM_OK;
     const recipe rays = {.method = RECIPE_RAYS, .rays = blocks->rays};
-    pairs_cost of_rays;
+    factor_cost of_rays;
     if (state->options->sky == NULL) return LAM_OK;
     TRY(pairs_forecast(&state->m, &rays, &state->progress, &of_rays, error));
     cost->seconds += of_rays.seconds;
@@ -110,7 +111,7 @@ done:
     return status;
 }
 
-lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, pairs_cost *cost,
+lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, factor_cost *cost,
                                  lam_error *error) {
     lam_status status = LAM_OK;
     importance *const read = state->importance.n > 0 ? &state->importance : NULL;
@@ -131,11 +132,11 @@ void state_forget_ready(precompute_state *state) {
 }
 
 /* Weighs blocks, which take `cost`, against the recipe so far, by samples of both; logs why. */
-static lam_status weigh_against_rows(precompute_state *state, const pairs_cost *cost, bool *taken,
+static lam_status weigh_against_rows(precompute_state *state, const factor_cost *cost, bool *taken,
                                      lam_error *error) {
     lam_status status = LAM_OK;
     const recipe *other = &state->recipe;
-    pairs_cost least;
+    factor_cost least;
     char time[32], other_time[32], what[64];
     if (other->method == RECIPE_PAIRS) TRY(state_weigh_rows(state, error));
     TRY(find_other_cost(state, cost, &least, error));
@@ -153,7 +154,7 @@ done:
 static lam_status weigh(precompute_state *state, const recipe *blocks, bool *taken, lam_error *error) {
     lam_status status = LAM_OK;
     const bool high = strcmp(state->options->quality, "high") == 0;
-    pairs_cost cost;
+    factor_cost cost;
     char time[32];
     TRY(state_forecast_blocks(state, blocks, &cost, error));
     TRY(add_sky(state, blocks, &cost, error));

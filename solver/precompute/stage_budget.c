@@ -29,7 +29,7 @@ enum { SAMPLES_MOST = 3 };
 typedef struct block_costs {
     size_t count;
     double accuracy[SAMPLES_MOST];
-    pairs_cost cost[SAMPLES_MOST];
+    factor_cost cost[SAMPLES_MOST];
 } block_costs;
 
 static const double sampled_epsilons[SAMPLES_MOST] = {.4, .05, .012};
@@ -44,7 +44,7 @@ typedef struct quality_costs {
     size_t count;
     const char *quality[QUALITIES_MOST];
     double accuracy[QUALITIES_MOST];
-    pairs_cost cost[QUALITIES_MOST];
+    factor_cost cost[QUALITIES_MOST];
 } quality_costs;
 
 /* The part that all candidates share. */
@@ -53,7 +53,7 @@ typedef struct budget_run {
     const build_method *method;
     block_costs blocks;
     quality_costs pairs;
-    pairs_cost rays; /* of RAYS_SAMPLED from each element */
+    factor_cost rays; /* of RAYS_SAMPLED from each element */
 } budget_run;
 enum { RAYS_SAMPLED = 1024 };
 
@@ -65,7 +65,7 @@ static double accuracy_of(const budget_run *run, double epsilon) {
 }
 
 /* Of a law y = c x^p through the two samples nearest to an accuracy. */
-static double along(const block_costs *c, double accuracy, double (*figure)(const pairs_cost *)) {
+static double along(const block_costs *c, double accuracy, double (*figure)(const factor_cost *)) {
     size_t k = 0;
     if (c->count == 1) return figure(&c->cost[0]) * pow(accuracy / c->accuracy[0], power_of_accuracy);
     while (k + 2 < c->count && accuracy < c->accuracy[k + 1]) k++;
@@ -74,15 +74,15 @@ static double along(const block_costs *c, double accuracy, double (*figure)(cons
     return low * pow(accuracy / c->accuracy[k], p);
 }
 
-static double measured_of(const pairs_cost *c) {
+static double measured_of(const factor_cost *c) {
     return c->measured;
 }
 
-static double entries_of(const pairs_cost *c) {
+static double entries_of(const factor_cost *c) {
     return c->entries;
 }
 
-static double finer_of(const pairs_cost *c) {
+static double finer_of(const factor_cost *c) {
     return c->finer;
 }
 
@@ -130,9 +130,9 @@ static lam_status find_seconds(const budget_run *run, budget_recipe *r, lam_erro
         probe.recipe.method = RECIPE_BLOCKS;
         probe.recipe.rays = recipe_rays_beside_blocks(probe.m.n);
         probe.recipe.accuracy = run->method->block_accuracy(method_own_const(&options.build, run->method));
-        probe.cost = (pairs_cost){.measured = along(&run->blocks, probe.recipe.accuracy, measured_of),
-                                  .finer = along(&run->blocks, probe.recipe.accuracy, finer_of),
-                                  .entries = along(&run->blocks, probe.recipe.accuracy, entries_of)};
+        probe.cost = (factor_cost){.measured = along(&run->blocks, probe.recipe.accuracy, measured_of),
+                                   .finer = along(&run->blocks, probe.recipe.accuracy, finer_of),
+                                   .entries = along(&run->blocks, probe.recipe.accuracy, entries_of)};
     } else if (r->kind == BUDGET_PAIRS) {
         probe.recipe = state_pairs_recipe(&probe);
         size_t k = 0;
@@ -196,7 +196,7 @@ static lam_status find_all_seconds(budget_run *run, double seconds, budget_recip
             if (weighed->count > 0 && high_times * took > share_sampled * seconds) break;
             TRY(weigh_pairs(run, list[k].quality, &pairs, error));
             took = clock_seconds() - before;
-            const pairs_cost *cost = &weighed->cost[weighed->count - 1];
+            const factor_cost *cost = &weighed->cost[weighed->count - 1];
             if (forecast_wall_seconds(cost->measured - cost->segments, &run->state->rates) > seconds)
                 pairs = false;
             if (!pairs) break; /* a higher quality costs more */

@@ -29,16 +29,16 @@ enum { DOUBLED_MOST = 2 };
  * a town of 36,267 triangles. */
 enum { MORE_RAYS_OF_MANY = 2 };
 
-static lam_status cost_of(precompute_state *state, const recipe *r, pairs_cost *out, lam_error *error) {
+static lam_status cost_of(precompute_state *state, const recipe *r, factor_cost *out, lam_error *error) {
     return pairs_forecast(&state->m, r, &state->progress, out, error);
 }
 
 /* Rays alone in place of near pairs beside fewer rays, where they cost less. */
-static lam_status find_cheaper(precompute_state *state, size_t more_rays, recipe *other, pairs_cost *cost,
+static lam_status find_cheaper(precompute_state *state, size_t more_rays, recipe *other, factor_cost *cost,
                                lam_error *error) {
     lam_status status = LAM_OK;
     const recipe plain = {.method = RECIPE_RAYS, .rays = more_rays * other->rays, .seed = other->seed};
-    pairs_cost more;
+    factor_cost more;
     TRY(cost_of(state, other, cost, error));
     TRY(cost_of(state, &plain, &more, error));
     if (more.seconds >= cost->seconds) goto done;
@@ -57,10 +57,10 @@ static bool fits(precompute_state *state, const recipe *r) {
 }
 
 /* Twice or four times the rays, while they cost little. */
-static lam_status spend_more(precompute_state *state, recipe *other, pairs_cost *cost, lam_error *error) {
+static lam_status spend_more(precompute_state *state, recipe *other, factor_cost *cost, lam_error *error) {
     lam_status status = LAM_OK;
     for (int k = 0; k < DOUBLED_MOST; k++) {
-        pairs_cost more;
+        factor_cost more;
         recipe finer = *other;
         finer.rays *= 2;
         TRY(cost_of(state, &finer, &more, error));
@@ -77,7 +77,7 @@ static lam_status weigh_near_pairs(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe near = state->recipe;
     const recipe plain = {.method = RECIPE_RAYS, .rays = MORE_RAYS_OF_MANY * near.rays, .seed = near.seed};
-    pairs_cost of_plain;
+    factor_cost of_plain;
     char near_time[32], plain_time[32], what[64];
     TRY(cost_of(state, &near, &state->cost, error));
     TRY(cost_of(state, &plain, &of_plain, error));
@@ -103,7 +103,7 @@ lam_status state_weigh_pairs(precompute_state *state, lam_error *error) {
     const bool coarse = state_pairs_follow_epsilon(state, state->expected);
     const double enough = high ? seconds_enough_high : coarse ? seconds_enough_coarse : seconds_enough;
     recipe other = state_near_recipe(state);
-    pairs_cost all, some;
+    factor_cost all, some;
     char all_time[32], other_time[32], what[64];
     if (state->options->from_store) return LAM_OK;
     if (state->recipe.method == RECIPE_NEAR_PAIRS) return weigh_near_pairs(state, error);

@@ -117,7 +117,7 @@ static double bytes_of(precompute_state *state, const trial_knobs *next) {
     state->recipe = before;
     state->streamed = streamed;
     f.build = &how;
-    f.cost = (pairs_cost){.seconds = 0};
+    f.cost = (factor_cost){.seconds = 0};
     return forecast_bytes(&f) + beside;
 }
 

@@ -9,7 +9,7 @@
 #include "solver/base/clock.h"
 #include "solver/bench/stats.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/pairs/occlusion.h"
+#include "solver/formfactor/sight/occlusion.h"
 #include "solver/method/reference.h"
 #include "solver/scene/import/import.h"
 #include "tests/bench/bench_recipe.h"

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_TESTS_PLATES_PAIR_H
 #define LAMBERT_TESTS_PLATES_PAIR_H
 
-#include "solver/formfactor/pairs/projection.h"
+#include "solver/formfactor/sight/projection.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "support/plates.h"
 

@@ -2,7 +2,7 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/base/random.h"
-#include "solver/formfactor/pairs/open_scene.h"
+#include "solver/formfactor/sight/open_scene.h"
 #include "solver/operator/blocks/importance.h"
 
 #include <math.h>

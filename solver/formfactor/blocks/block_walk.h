@@ -5,7 +5,7 @@
 #include "solver/formfactor/blocks/block_shade.h"
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/blocks/joined_kernel.h"
-#include "solver/formfactor/pairs/occlusion.h"
+#include "solver/formfactor/sight/occlusion.h"
 
 /* All that the walks of a scene share. */
 typedef struct block_finder {

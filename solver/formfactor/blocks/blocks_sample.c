@@ -118,7 +118,7 @@ done:
 }
 
 lam_status blocks_forecast(block_scene *scene, const recipe *r, const importance *read, const progress *p,
-                           pairs_cost *out, lam_error *error) {
+                           factor_cost *out, lam_error *error) {
     lam_status status = LAM_OK;
     block_options options = block_options_of(r);
     block_report w, finer;
@@ -127,15 +127,15 @@ lam_status blocks_forecast(block_scene *scene, const recipe *r, const importance
     options.importance = read;
     TRY(blocks_sample(scene, &options, &w, &trial, error));
     const double blocks = count_of(&w), walk = walk_seconds(&w), finish = finish_of(scene, &w);
-    const double pace = sample_pace(trial.seconds, walk_seconds(&trial.work));
+    const double pace = factor_cost_pace(trial.seconds, walk_seconds(&trial.work));
     if (read != NULL)
         TRY(sample_finer(scene, r, read, p, &finer, error));
     else
         finer = finer_of(&w);
-    *out = (pairs_cost){.seconds = walk + finish,
-                        .measured = walk * pace + finish,
-                        .entries = 2 * blocks,
-                        .finer = judge_seconds(scene, &finer, pace)};
+    *out = (factor_cost){.seconds = walk + finish,
+                         .measured = walk * pace + finish,
+                         .entries = 2 * blocks,
+                         .finer = judge_seconds(scene, &finer, pace)};
 done:
     return status;
 }

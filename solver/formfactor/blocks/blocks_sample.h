@@ -3,7 +3,7 @@
 #define LAMBERT_FORMFACTOR_BLOCKS_BLOCKS_SAMPLE_H
 
 #include "solver/formfactor/blocks/blocks.h"
-#include "solver/formfactor/pairs/pairs_sample.h"
+#include "solver/formfactor/factor_cost.h"
 #include "solver/operator/blocks/importance.h"
 
 /* The walk of a sample: the work that it did, and the processor seconds that this took. */
@@ -21,6 +21,6 @@ lam_status blocks_sample(block_scene *scene, const block_options *options, block
 /* The cost of finding blocks by a recipe, from blocks_sample, and, with the importance of elements, of those
  * of a judge from another; NULL: all is read. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status blocks_forecast(block_scene *scene, const recipe *r, const importance *read, const progress *p,
-                           pairs_cost *out, lam_error *error);
+                           factor_cost *out, lam_error *error);
 
 #endif

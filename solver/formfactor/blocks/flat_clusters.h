@@ -4,7 +4,7 @@
 #ifndef LAMBERT_FORMFACTOR_BLOCKS_FLAT_CLUSTERS_H
 #define LAMBERT_FORMFACTOR_BLOCKS_FLAT_CLUSTERS_H
 
-#include "solver/formfactor/pairs/polygon.h"
+#include "solver/formfactor/exchange/polygon.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/operator/blocks/block_factors.h"
 

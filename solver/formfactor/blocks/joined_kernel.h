@@ -4,7 +4,7 @@
 #define LAMBERT_FORMFACTOR_BLOCKS_JOINED_KERNEL_H
 
 #include "solver/formfactor/blocks/flat_clusters.h"
-#include "solver/formfactor/pairs/pair_factor.h"
+#include "solver/formfactor/exchange/pair_factor.h"
 
 /* Pairs of elements that are all taken, and pairs of points that each of the two is sampled at else. */
 enum { JOINED_PAIRS = 64, JOINED_SAMPLES = 16 };

@@ -2,8 +2,8 @@
 
 #include "solver/base/vector3.h"
 #include "solver/formfactor/blocks/blocks.h"
-#include "solver/formfactor/pairs/open_scene.h"
-#include "solver/formfactor/pairs/polygon.h"
+#include "solver/formfactor/exchange/polygon.h"
+#include "solver/formfactor/sight/open_scene.h"
 #include "store/status.h"
 
 #include <math.h>

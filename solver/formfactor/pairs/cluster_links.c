@@ -2,8 +2,8 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/base/clock.h"
-#include "solver/formfactor/pairs/cluster_shaft.h"
-#include "solver/formfactor/pairs/open_scene.h"
+#include "solver/formfactor/clusters/cluster_shaft.h"
+#include "solver/formfactor/sight/open_scene.h"
 
 #include <math.h>
 #include <stdlib.h>

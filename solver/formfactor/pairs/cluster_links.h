@@ -3,8 +3,8 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_CLUSTER_LINKS_H
 #define LAMBERT_FORMFACTOR_PAIRS_CLUSTER_LINKS_H
 
-#include "solver/formfactor/pairs/link_occluders.h"
-#include "solver/formfactor/pairs/occlusion.h"
+#include "solver/formfactor/clusters/link_occluders.h"
+#include "solver/formfactor/sight/occlusion.h"
 
 /* All pairs of an element of a with an element of b, whose positions are greater; a == b: all pairs within
  * it. */

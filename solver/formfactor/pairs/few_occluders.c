@@ -1,6 +1,6 @@
 #include "solver/formfactor/pairs/few_occluders.h"
 
-#include "solver/formfactor/pairs/windows.h"
+#include "solver/formfactor/sight/windows.h"
 
 #include <math.h>
 

@@ -4,7 +4,7 @@
 #define LAMBERT_FORMFACTOR_PAIRS_FEW_OCCLUDERS_H
 
 #include "solver/formfactor/pairs/cluster_links.h"
-#include "solver/formfactor/pairs/projection.h"
+#include "solver/formfactor/sight/projection.h"
 #include "solver/formfactor/visibility/visibility.h"
 
 typedef struct few_occluders {

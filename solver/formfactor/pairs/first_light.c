@@ -1,7 +1,7 @@
 #include "solver/formfactor/pairs/first_light.h"
 
 #include "solver/base/random.h"
-#include "solver/formfactor/pairs/pair_factor.h"
+#include "solver/formfactor/exchange/pair_factor.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/formfactor/visibility/visibility.h"
 

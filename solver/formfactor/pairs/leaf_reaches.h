@@ -2,8 +2,8 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_LEAF_REACHES_H
 #define LAMBERT_FORMFACTOR_PAIRS_LEAF_REACHES_H
 
+#include "solver/formfactor/clusters/link_occluders.h"
 #include "solver/formfactor/pairs/cluster_links.h"
-#include "solver/formfactor/pairs/link_occluders.h"
 
 /* The positions first ... last-1 of a cluster that a leaf, or an ancestor of it, is linked with. */
 typedef struct reach {

@@ -1,6 +1,6 @@
 #include "solver/formfactor/pairs/pair_demand.h"
 
-#include "solver/formfactor/pairs/occlusion.h"
+#include "solver/formfactor/sight/occlusion.h"
 
 #include <math.h>
 #include <stdlib.h>

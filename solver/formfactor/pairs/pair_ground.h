@@ -3,10 +3,10 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_PAIR_GROUND_H
 #define LAMBERT_FORMFACTOR_PAIRS_PAIR_GROUND_H
 
+#include "solver/formfactor/exchange/pair_far.h"
 #include "solver/formfactor/pairs/few_occluders.h"
-#include "solver/formfactor/pairs/occlusion.h"
-#include "solver/formfactor/pairs/pair_far.h"
 #include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/sight/occlusion.h"
 
 typedef struct pair_ground {
     const mesh *m;

@@ -230,26 +230,20 @@ static const double few_ray_seconds = 1e-7;
 static const double ray_entries = .3;
 
 /* Seconds of all rays of a recipe, and the entries that they make. */
-static lam_status rays_forecast(const mesh *m, const recipe *r, pairs_cost *out, lam_error *error) {
+static lam_status rays_forecast(const mesh *m, const recipe *r, factor_cost *out, lam_error *error) {
     enum { SEED = 1 }; /* the choice of a recipe does not depend on --seed */
     lam_status status = LAM_OK;
     const double n = (double)m->n, rays = n * (double)r->rays;
     ray_crossings w;
-    *out = (pairs_cost){.seconds = rays * few_ray_seconds};
+    *out = (factor_cost){.seconds = rays * few_ray_seconds};
     if (r->method == RECIPE_PAIRS) return LAM_OK;
     TRY(ray_crossings_sample(m, SEED, &w, error));
     const double each = fmax((w.boxes - boxes_free) * box_seconds, ray_seconds);
-    *out = (pairs_cost){.seconds = rays * each + n * row_seconds,
-                        .entries = fmin(rays * w.hits * ray_entries, n * n / 2),
-                        .hits = w.hits};
+    *out = (factor_cost){.seconds = rays * each + n * row_seconds,
+                         .entries = fmin(rays * w.hits * ray_entries, n * n / 2),
+                         .hits = w.hits};
 done:
     return status;
-}
-
-double sample_pace(double seconds, double expected) {
-    static const double too_short = 1e-3, most = 8;
-    if (!(seconds > too_short) || !(expected > 0)) return 1;
-    return fmin(fmax(seconds / expected, 1 / most), most);
 }
 
 /* Of segments, which the sample does not cast; `all` are cast in place of those that were counted. */
@@ -266,7 +260,7 @@ static double rows_seconds(const pairs_work *w) {
            w->sifted * sift_seconds + w->projection * projection_seconds;
 }
 
-lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pairs_cost *out,
+lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, factor_cost *out,
                           lam_error *error) {
     lam_status status = LAM_OK;
     const double threshold = r->method == RECIPE_NEAR_PAIRS ? recipe_near(r) : 0;
@@ -274,7 +268,7 @@ lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pai
     pairs_work w = {0};
     pairs_trial trial = {.seconds = 0};
     visibility *v = NULL;
-    pairs_cost of_rays;
+    factor_cost of_rays;
     options.progress = p;
     TRY(rays_forecast(m, r, &of_rays, error));
     if (r->method != RECIPE_RAYS) {
@@ -287,18 +281,18 @@ lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pai
         w.shafts * shaft_seconds + w.candidates * candidate_seconds + w.hidden * hidden_seconds;
     const double cast = segments_seconds(&w, segments);
     const double rows = rows_seconds(&w), rest = cast + entries * entry_seconds;
-    const double pace = sample_pace(trial.seconds, times_apart * rows_seconds(&trial.work));
-    *out = (pairs_cost){.seconds = links + rows + rest + of_rays.seconds,
-                        .measured = trial.link_seconds + rows * pace + rest + of_rays.seconds,
-                        .segments = cast,
-                        .entries = 2 * entries,
-                        .hits = of_rays.hits};
+    const double pace = factor_cost_pace(trial.seconds, times_apart * rows_seconds(&trial.work));
+    *out = (factor_cost){.seconds = links + rows + rest + of_rays.seconds,
+                         .measured = trial.link_seconds + rows * pace + rest + of_rays.seconds,
+                         .segments = cast,
+                         .entries = 2 * entries,
+                         .hits = of_rays.hits};
 done:
     visibility_destroy(v);
     return status;
 }
 
-double pairs_cost_at(const pairs_cost *cost, double accuracy, double other) {
+double pairs_cost_at(const factor_cost *cost, double accuracy, double other) {
     const double more = pow(accuracy / other, 1 / SEGMENTS_POWER);
     return cost->measured + (more - 1) * cost->segments;
 }

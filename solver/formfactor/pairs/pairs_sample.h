@@ -2,6 +2,7 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_PAIRS_SAMPLE_H
 #define LAMBERT_FORMFACTOR_PAIRS_PAIRS_SAMPLE_H
 
+#include "solver/formfactor/factor_cost.h"
 #include "solver/formfactor/pairs/pairs.h"
 
 /* About how often each kind of work occurs in all pairs. */
@@ -35,27 +36,14 @@ typedef struct pairs_trial {
 lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options *options, pairs_work *out,
                         pairs_trial *trial, lam_error *error);
 
-/* The processor seconds of a sample over those that fixed costs let expect: the pace of this machine in this
- * scene, from 1/8 to 8; 1 where the sample was too short to tell. */
-double sample_pace(double seconds, double expected);
-
-typedef struct pairs_cost {
-    double seconds;  /* of one thread, by fixed costs of each kind of work: for a choice */
-    double measured; /* the same at the pace of the sample on this machine: for a forecast */
-    double segments; /* of pairs: of measured, those of segments */
-    double entries;  /* of F, or twice the blocks */
-    double finer;    /* of blocks: measured, of those that judge them; else 0 */
-    double hits;     /* of rays: the share that hits anything; 0: not known */
-} pairs_cost;
-
 /* The cost of form factors by RECIPE_PAIRS, RECIPE_NEAR_PAIRS or RECIPE_RAYS, rays included, from
  * pairs_sample. seconds and entries depend on no clock: the same scene has the same figures, however busy the
  * machine is. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pairs_cost *out,
+lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, factor_cost *out,
                           lam_error *error);
 
-/* pairs_cost.measured of all pairs at another accuracy than that of the forecast, by the law of segments
+/* factor_cost.measured of all pairs at another accuracy than that of the forecast, by the law of segments
  * (occlusion.h). */
-double pairs_cost_at(const pairs_cost *cost, double accuracy, double other);
+double pairs_cost_at(const factor_cost *cost, double accuracy, double other);
 
 #endif

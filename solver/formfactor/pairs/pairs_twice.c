@@ -1,7 +1,7 @@
 #include "solver/formfactor/pairs/pairs_twice.h"
 
 #include "solver/base/random.h"
-#include "solver/formfactor/pairs/occlusion.h"
+#include "solver/formfactor/sight/occlusion.h"
 
 #include <math.h>
 #include <stdlib.h>

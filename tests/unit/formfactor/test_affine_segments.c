@@ -1,6 +1,6 @@
 /* Visibility segments: eight at a time against one point after the other, and which of them are blocked. */
 #include "solver/base/random.h"
-#include "solver/formfactor/pairs/affine_segments.h"
+#include "solver/formfactor/exchange/affine_segments.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "support/box.h"
 #include "support/polygon_corners.h"

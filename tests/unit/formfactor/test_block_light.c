@@ -3,7 +3,7 @@
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/blocks/block_light.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/pairs/occlusion.h"
+#include "solver/formfactor/sight/occlusion.h"
 #include "support/box_problem.h"
 #include "support/dense.h"
 #include "support/scene.h"

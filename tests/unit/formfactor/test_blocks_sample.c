@@ -87,7 +87,7 @@ START_TEST(forecasts_know_receivers) {
     const size_t lamp = group_find(&m, "lamp");
     plane_tree tree;
     block_scene *scene = NULL;
-    pairs_cost of_all, of_read;
+    factor_cost of_all, of_read;
     block_factors f;
     block_report found, halves;
     for (size_t i = 0; i < m.n; i++) read.read[i] = m.group[i] == lamp;

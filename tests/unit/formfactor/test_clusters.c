@@ -1,9 +1,9 @@
 /* Clusters, the shafts between them, their links, and rows of far exchange areas: each against brute force.
  */
 #include "solver/base/random.h"
+#include "solver/formfactor/clusters/cluster_shaft.h"
+#include "solver/formfactor/exchange/pair_far.h"
 #include "solver/formfactor/pairs/cluster_links.h"
-#include "solver/formfactor/pairs/cluster_shaft.h"
-#include "solver/formfactor/pairs/pair_far.h"
 #include "support/box.h"
 #include "support/suite.h"
 

@@ -1,9 +1,9 @@
 /* Blocks of clusters that join several planes, where nothing hides anything, beside all pairs one by one. */
 #include "solver/formfactor/blocks/joined_kernel.h"
 #include "solver/formfactor/blocks/unhidden.h"
-#include "solver/formfactor/pairs/open_scene.h"
-#include "solver/formfactor/pairs/pair_factor.h"
+#include "solver/formfactor/exchange/pair_factor.h"
 #include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/sight/open_scene.h"
 #include "support/blocks.h"
 #include "support/bowl.h"
 #include "support/box.h"

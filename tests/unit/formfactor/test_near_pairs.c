@@ -1,6 +1,6 @@
 /* Near pairs by quadrature and the others by rays: merged without counting anything twice. */
+#include "solver/formfactor/exchange/pair_factor.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/pairs/pair_factor.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/scene/generate/generate.h"
 #include "solver/scene/import/import.h"

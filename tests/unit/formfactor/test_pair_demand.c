@@ -2,9 +2,9 @@
  */
 #include "solver/formfactor/pairs/pair_demand.h"
 
-#include "solver/formfactor/pairs/occlusion.h"
-#include "solver/formfactor/pairs/pair_occluders.h"
 #include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/sight/occlusion.h"
+#include "solver/formfactor/sight/pair_occluders.h"
 #include "support/plates.h"
 #include "support/suite.h"
 

@@ -1,6 +1,6 @@
 /* Unoccluded form factors by quadrature, against published closed forms. */
 #include "solver/base/vector3.h"
-#include "solver/formfactor/pairs/pair_factor.h"
+#include "solver/formfactor/exchange/pair_factor.h"
 #include "support/polygon_corners.h"
 #include "support/suite.h"
 

@@ -1,7 +1,7 @@
 /* Point pairs: a Sobol' sequence with a digital shift for each pair, and what segments between them estimate.
  */
 #include "solver/base/random.h"
-#include "solver/formfactor/pairs/occlusion.h"
+#include "solver/formfactor/sight/occlusion.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "support/box.h"
 #include "support/suite.h"

@@ -1,6 +1,6 @@
 /* Form factors pair by pair: exact where nothing is between, the seen share where something is. */
-#include "solver/formfactor/pairs/occlusion.h"
 #include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/sight/occlusion.h"
 #include "support/plates.h"
 #include "support/suite.h"
 

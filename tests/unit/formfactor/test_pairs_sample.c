@@ -111,7 +111,7 @@ START_TEST(lists_make_pairs_cheaper) {
     lam_error error = {.message = ""};
     mesh m = scene_of("atrium", 1000);
     const pairs_work w = sample(&m, true, 1, NULL);
-    pairs_cost cost;
+    factor_cost cost;
     ck_ok(pairs_forecast(&m, &all_pairs, NULL, &cost, &error));
     const double segments = fmin(w.segments, pairs_options_of(&all_pairs, m.n, 0).segments_most);
     ck_assert_double_gt(cost.seconds, 2e-8 * segments);
@@ -146,7 +146,7 @@ START_TEST(costs_follow_the_accuracy) {
     mesh m = scene_of("atrium", 1000);
     recipe coarse = all_pairs;
     coarse.accuracy *= 3;
-    pairs_cost fine, less;
+    factor_cost fine, less;
     ck_ok(pairs_forecast(&m, &all_pairs, NULL, &fine, &error));
     ck_ok(pairs_forecast(&m, &coarse, NULL, &less, &error));
     const double at_coarse = pairs_cost_at(&fine, all_pairs.accuracy, coarse.accuracy) - fine.measured,

@@ -3,7 +3,7 @@
 #include "solver/base/random.h"
 #include "solver/formfactor/pairs/few_occluders.h"
 #include "solver/formfactor/pairs/pairs.h"
-#include "solver/formfactor/pairs/shadow_cut.h"
+#include "solver/formfactor/sight/shadow_cut.h"
 #include "support/plates_pair.h"
 #include "support/suite.h"
 

@@ -2,9 +2,9 @@
 #include "solver/base/random.h"
 #include "solver/base/vector3.h"
 #include "solver/formfactor/pairs/few_occluders.h"
-#include "solver/formfactor/pairs/occlusion.h"
 #include "solver/formfactor/pairs/pairs.h"
-#include "solver/formfactor/pairs/segment_occluders.h"
+#include "solver/formfactor/sight/occlusion.h"
+#include "solver/formfactor/sight/segment_occluders.h"
 #include "support/box.h"
 #include "support/scene.h"
 

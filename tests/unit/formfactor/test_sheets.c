@@ -1,8 +1,8 @@
 /* Sheets of two faces whose decimals are rounded: neither side sees the other by any kind of form factors,
  * neither hides from the other's side what that sees, and what only looks alike is kept. */
 #include "solver/base/random.h"
-#include "solver/formfactor/pairs/pair_factor.h"
-#include "solver/formfactor/pairs/pair_far.h"
+#include "solver/formfactor/exchange/pair_factor.h"
+#include "solver/formfactor/exchange/pair_far.h"
 #include "solver/scene/plane.h"
 #include "support/blocks.h"
 #include "support/box.h"

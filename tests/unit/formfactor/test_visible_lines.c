@@ -2,7 +2,7 @@
  */
 #include "solver/base/random.h"
 #include "solver/base/vector3.h"
-#include "solver/formfactor/pairs/visible_lines.h"
+#include "solver/formfactor/sight/visible_lines.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "support/polygon_corners.h"
 #include "support/suite.h"

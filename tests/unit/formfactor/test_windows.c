@@ -1,6 +1,6 @@
 /* Windows between two plates, by the segments that brute force finds open. */
 #include "solver/base/random.h"
-#include "solver/formfactor/pairs/windows.h"
+#include "solver/formfactor/sight/windows.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "support/plates.h"
 #include "support/suite.h"

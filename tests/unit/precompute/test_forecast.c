@@ -242,7 +242,7 @@ START_TEST(more_work_takes_longer) {
     ck_assert_double_eq(forecast_wall_seconds(3, &rates), 1.5);
     /* The pace of a sample, where one was taken, in place of constants. */
     f.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 16, .accuracy = 1e-4};
-    f.cost = (pairs_cost){.seconds = 1, .measured = 7, .entries = 1e6};
+    f.cost = (factor_cost){.seconds = 1, .measured = 7, .entries = 1e6};
     ck_assert_double_eq(forecast_seconds(&f, &rates).form_factors, 7);
     f.from_store = true;
     ck_assert_double_eq(forecast_seconds(&f, &rates).form_factors, 0);
