@@ -1,6 +1,7 @@
 #include "solver/adapt/coarse_light.h"
 
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/reference.h"
 #include "solver/scene/mesh_cells.h"
 
@@ -98,7 +99,7 @@ lam_status coarse_light_make(const mesh *faces, uint64_t seed, const progress *p
     order = memory_allocate(c.m.n, sizeof *order, "a coarse mesh", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&c.m, order, error));
-    const form_factor_options how = {.recipe = {.method = RECIPE_RAYS, .rays = RAYS, .seed = seed},
+    const form_factor_options how = {.recipe = {.source = &source_rays, .rays = RAYS, .seed = seed},
                                      .progress = p,
                                      .stage = "form factors of a coarse mesh"};
     TRY(form_factors_make(&c.m, order, &how, &f, error));

@@ -3,6 +3,7 @@
 #include "solver/base/clock.h"
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/many_lights.h"
 
 #include <math.h>
@@ -288,7 +289,7 @@ typedef struct way_of_F {
 
 /* Hemicubes take six minutes for a city of 8,897 elements, half an hour for one of 35,588. */
 static size_t ways_of_F(const bench_run *run, size_t size, way_of_F ways[WAYS]) {
-    const recipe near = {.method = RECIPE_NEAR_PAIRS, .rays = 16384, .accuracy = 7e-5, .seed = run->seed};
+    const recipe near = {.source = &source_near_pairs, .rays = 16384, .accuracy = 7e-5, .seed = run->seed};
     size_t n = 0;
     ways[n++] = (way_of_F){"rays 4096", formfactors_rays(RAYS, run->seed)};
     if (size == 0 && run->scale != BENCH_QUICK)

@@ -2,6 +2,7 @@
 #include "solver/base/clock.h"
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
+#include "solver/formfactor/source.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -31,7 +32,7 @@ typedef struct sampled {
 static lam_status add_recipe(const bench_run *run, unsigned variant, const recipe *how, size_t row,
                              sampled *s, table *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const bool first = s->finest.indptr == NULL, cubes = how->method == RECIPE_HEMICUBE;
+    const bool first = s->finest.indptr == NULL, cubes = recipe_source(how) == &source_hemicube;
     const bool published = cubes && run->scale != BENCH_QUICK;
     csr F = {.n = 0};
     TRY(bench_check(run, error));

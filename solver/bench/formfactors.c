@@ -4,6 +4,7 @@
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
 #include "solver/formfactor/rays/rays.h"
+#include "solver/formfactor/source.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -15,15 +16,15 @@
 enum { FEW_RAYS = 256 };
 
 recipe formfactors_rays(size_t rays, uint64_t seed) {
-    return (recipe){.method = RECIPE_RAYS, .rays = rays, .seed = seed};
+    return (recipe){.source = &source_rays, .rays = rays, .seed = seed};
 }
 
 recipe formfactors_hemicube(size_t resolution) {
-    return (recipe){.method = RECIPE_HEMICUBE, .resolution = resolution};
+    return (recipe){.source = &source_hemicube, .resolution = resolution};
 }
 
 recipe formfactors_pairs(double accuracy, uint64_t seed) {
-    return (recipe){.method = RECIPE_PAIRS, .rays = FEW_RAYS, .accuracy = accuracy, .seed = seed};
+    return (recipe){.source = &source_pairs, .rays = FEW_RAYS, .accuracy = accuracy, .seed = seed};
 }
 
 lam_status formfactors_make_timed(const bench_run *run, const mesh *m, const uint32_t *order,

@@ -3,6 +3,7 @@
 #include "solver/bench/formfactors.h"
 #include "solver/bench/formfactors_truths.h"
 #include "solver/bench/stats.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/reference.h"
 
 #include <math.h>
@@ -53,9 +54,9 @@ static double stated_bar(const recipe *how, const form_factors *f, const mesh *m
                          double F) {
     static const double pairs_tolerance = 1e-6;
     const double a = m->area[t->from], b = m->area[t->to], back = fmin(1, F * a / b);
-    if (how->method == RECIPE_RAYS)
+    if (recipe_source(how) == &source_rays)
         return 2 * sqrt((F * (1 - F) + back * (1 - back)) / (double)how->rays) * b / (a + b);
-    if (how->method == RECIPE_PAIRS) return t->occluded ? 2 * f->pairs.accuracy : pairs_tolerance * F;
+    if (recipe_source(how) == &source_pairs) return t->occluded ? 2 * f->pairs.accuracy : pairs_tolerance * F;
     return NAN;
 }
 
@@ -70,7 +71,7 @@ static lam_status measure_case(const bench_run *run, const formfactors_truth *t,
     char method[64];
     TRY(scene_of_pieces(t->pieces, t->n, &m, error));
     TRY(formfactors_order(&m, &order, error));
-    if (how.method == RECIPE_HEMICUBE) seeds = 1;
+    if (recipe_source(&how) == &source_hemicube) seeds = 1;
     for (size_t s = 0; s < seeds; s++) {
         how.seed = run->seed + s;
         TRY(formfactors_make_timed(run, &m, order, &how, "closed forms", &f, &seconds[s], error));

@@ -3,7 +3,8 @@
 #include "solver/base/clock.h"
 #include "solver/bench/hierarchical.h"
 #include "solver/bench/scenes.h"
-#include "solver/formfactor/rays/ray_rows.h"
+#include "solver/formfactor/pairs/ray_rows.h"
+#include "solver/formfactor/source.h"
 #include "solver/precompute/judging.h"
 
 #include <math.h>
@@ -182,7 +183,7 @@ static lam_status add_blocks(const bench_run *run, box *b, grown *before, table 
     lam_status status = LAM_OK;
     lam_operator *op = NULL;
     cost c = {.peak = 0};
-    const form_factor_options how = {.recipe = {.method = RECIPE_BLOCKS,
+    const form_factor_options how = {.recipe = {.source = &source_blocks,
                                                 .rays = recipe_rays_beside_blocks(b->s.m.n),
                                                 .accuracy = block_accuracy,
                                                 .seed = run->seed},
@@ -209,7 +210,7 @@ static lam_status add_near_pairs(const bench_run *run, const box *b, grown *befo
     ray_rows *rays = NULL;
     row_stream stream;
     const form_factor_options how = {
-        .recipe = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = accuracy, .seed = run->seed},
+        .recipe = {.source = &source_near_pairs, .rays = RAYS, .accuracy = accuracy, .seed = run->seed},
         .progress = run->progress,
         .stage = "near pairs"};
     const double before_it = lowrank_begin_peak(), started = clock_seconds();

@@ -4,6 +4,7 @@
 #include "solver/base/random.h"
 #include "solver/bench/hierarchical.h"
 #include "solver/bench/stats.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/reference.h"
 
 #include <math.h>
@@ -188,7 +189,7 @@ static lam_status find(const bench_run *run, const lowrank_scene *s, const recip
     lam_status status = LAM_OK;
     const form_factor_options options = {
         .recipe = *how, .progress = run->progress, .stage = "form factors of the plane"};
-    if (how->method == RECIPE_BLOCKS) {
+    if (recipe_source(how) == &source_blocks) {
         TRY(form_factors_tree(&s->m, &out->tree, error));
         TRY(form_factors_make_blocks(&s->m, s->z_order, &out->tree, false, &options, &out->f, &out->blocks,
                                      error));
@@ -203,13 +204,13 @@ done:
 static recipe recipe_of(const bench_run *run, const lowrank_scene *s, int way, const build_options *options) {
     const build_method *method = method_find("hierarchical");
     recipe r = {
-        .method = RECIPE_RAYS, .rays = recipe_auto_rays(options->epsilon, noise_share), .seed = run->seed};
+        .source = &source_rays, .rays = recipe_auto_rays(options->epsilon, noise_share), .seed = run->seed};
     if (way == WAY_RAYS) return r;
     r.accuracy = pair_accuracy;
-    r.method = way == WAY_NEAR_PAIRS ? RECIPE_NEAR_PAIRS : RECIPE_PAIRS;
+    r.source = way == WAY_NEAR_PAIRS ? &source_near_pairs : &source_pairs;
     if (way == WAY_PAIRS) r.rays = RECIPE_RAYS_FEW;
     if (way == WAY_BLOCKS) {
-        r.method = RECIPE_BLOCKS;
+        r.source = &source_blocks;
         r.rays = recipe_rays_beside_blocks(s->m.n);
         r.accuracy = method->block_accuracy(method_own_const(options, method));
     }

@@ -3,7 +3,8 @@
 #include "solver/base/clock.h"
 #include "solver/bench/formfactors.h"
 #include "solver/bench/lowrank.h"
-#include "solver/formfactor/rays/ray_rows.h"
+#include "solver/formfactor/pairs/ray_rows.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/norm.h"
 #include "solver/method/tall_factors.h"
 
@@ -173,7 +174,7 @@ static lam_status add_size(const bench_run *run, size_t divisions, const double 
     TRY(factorize_streamed(run, &s, n_rays, limit, &r, error));
     const double n = (double)s.m.n;
     const recipe exact = lowrank_recipe(run, s.m.n);
-    if (exact.method == RECIPE_PAIRS) {
+    if (recipe_source(&exact) == &source_pairs) {
         TRY(lowrank_trace(run, &s, &exact, error));
         TRY(norm_against(run, &s, &r.f, &norm, error));
     }

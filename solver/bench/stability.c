@@ -3,6 +3,7 @@
 #include "solver/bench/bench.h"
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/reference.h"
 #include "solver/scene/surfaces.h"
 
@@ -87,7 +88,7 @@ static lam_status make_room(double rho, stability_problem *p, lam_error *error) 
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&m, order, error));
     const form_factor_options how = {
-        .recipe = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-5, .seed = 1},
+        .recipe = {.source = &source_pairs, .rays = 256, .accuracy = 7e-5, .seed = 1},
         .stage = "form factors"};
     TRY(form_factors_make(&m, order, &how, &f, error));
     TRY(allocate(p, m.n, 1, error));

@@ -4,6 +4,7 @@
 #include "solver/bench/hierarchical.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/choice.h"
 
 #include <libgen.h>
@@ -151,7 +152,7 @@ static lam_status measure_scene(const bench_run *run, const lowrank_scene *s, ki
     TRY(formfactors_make_timed(run, &s->m, s->z_order, &other, "independent form factors", &independent,
                                &seconds, error));
     if (independent.F.indptr == NULL) TRY(form_factors_expand(&independent, s->m.area, error));
-    if (other.method != RECIPE_PAIRS) TRY(first_light_create(&s->m, run->seed, &first, error));
+    if (recipe_source(&other) != &source_pairs) TRY(first_light_create(&s->m, run->seed, &first, error));
     for (size_t k = 0; k < KINDS; k++)
         for (int setting = 0; setting < SETTINGS_MOST; setting++) {
             const double value = settings[k][setting];
@@ -281,7 +282,7 @@ static lam_status open_file(const bench_run *run, char name[64], lowrank_scene *
     char *const dot = strrchr(name, '.');
     if (dot != NULL && dot != name) *dot = '\0';
     recipe how = lowrank_recipe(run, m.n);
-    if (how.method != RECIPE_PAIRS)
+    if (recipe_source(&how) != &source_pairs)
         how.rays = m.n < RAYS_OF_FILE / RAYS_LEAST ? RAYS_OF_FILE / m.n : RAYS_LEAST;
     TRY(lowrank_open(run, name, &m, &how, out, error));
 done:

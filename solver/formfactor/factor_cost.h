@@ -11,6 +11,9 @@ typedef struct factor_cost {
     double hits;     /* of rays: the share that hits anything; 0: not known */
 } factor_cost;
 
+/* Seconds of an entry of the triangle, by whatever it was found. */
+extern const double factor_entry_seconds;
+
 /* The processor seconds of a sample over those that fixed costs let expect: the pace of this machine in this
  * scene, from 1/8 to 8; 1 where the sample was too short to tell. */
 double factor_cost_pace(double seconds, double expected);

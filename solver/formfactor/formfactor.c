@@ -3,6 +3,7 @@
 #include "solver/formfactor/formfactor.h"
 
 #include "solver/formfactor/rows/upper.h"
+#include "solver/formfactor/source.h"
 #include "solver/operator/blocks/block_store.h"
 #include "solver/operator/refine/form_factor_rows.h"
 
@@ -29,31 +30,12 @@ lam_status form_factors_expand(form_factors *f, const double *area, lam_error *e
     return upper_expand(&f->F, area, f->row_sums, error);
 }
 
-/* The mean repair that the samples of a recipe make by themselves. N rays of an element i: its row sums up to
- * 1; the mean of both estimates of an exchange area, weighted by inverse variances, has the variance g_ij / N
- * A_i A_j / (A_i + A_j), so that the sum of a row has at most sum_j F_ij A_j / (A_i + A_j) / N < 1 / N. Pairs
- * have next to none: 1e-8 to 8e-5 in the ten generated scenes. Hemicubes stand at centroids, blocks have few
- * terms, and both are biased: .007 to .015 and 6e-6 to .006 there. The judge casts rays for the first, and
- * makes finer blocks for the second. */
-static double repair_of_samples(const recipe *r) {
-    switch (r->method) {
-    case RECIPE_RAYS:
-    case RECIPE_NEAR_PAIRS:
-        return r->rays > 0 ? 1 / sqrt((double)r->rays) : 0;
-    case RECIPE_HEMICUBE:
-    case RECIPE_BLOCKS:
-        return .02;
-    case RECIPE_PAIRS:
-        break;
-    }
-    return 0;
-}
-
 /* A repair below this is rounding, or what cubatures leave. */
 static const double repair_least = 1e-3;
 
 double form_factors_repair_error(const form_factors *f) {
-    const double own = repair_of_samples(&f->recipe), beyond = f->repair_mean * f->repair_mean - own * own;
+    const double own = recipe_source(&f->recipe)->repair(&f->recipe),
+                 beyond = f->repair_mean * f->repair_mean - own * own;
     return beyond > repair_least * repair_least ? sqrt(beyond) : 0;
 }
 

@@ -126,7 +126,7 @@ typedef struct form_factor_options {
 lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *options,
                              form_factors *out, lam_error *error);
 
-/* By pairs (RECIPE_PAIRS) a reference, and the same disturbed by a sample of its own noise, at about the cost
+/* By pairs (source_pairs) a reference, and the same disturbed by a sample of its own noise, at about the cost
  * of one sample (pairs_twice.h): out[0] is the mean of two samples, by the recipe's seed and another one,
  * which share the pairs that are projected. stages: names for progress. No sky and no scratch folder. */
 lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const form_factor_options *options,
@@ -138,7 +138,7 @@ lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const f
  * known where blocks may depend on it (plane_tree_look). Errors: LAM_ERR_MEMORY. */
 lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error);
 
-/* The same by blocks of clusters (RECIPE_BLOCKS) on a tree of the elements with leaves of PLANE_LEAF, which
+/* The same by blocks of clusters (source_blocks) on a tree of the elements with leaves of PLANE_LEAF, which
  * must outlive blocks: these hold the form factors, freed by block_factors_free, and out all but rows. In a
  * closed scene their balance gives rows the sum 1, in others it keeps sums at most 1. With a sky,
  * recipe.rays of an element find its share of each tile, and what the blocks leave of its row is distributed
@@ -174,7 +174,7 @@ typedef struct ray_trial {
 /* order and errors as for form_factors_make. */
 lam_status form_factors_try_rays(const mesh *m, const uint32_t *order, ray_trial *out, lam_error *error);
 
-/* seen[k]: the number of elements that elements[k] sees by the recipe, RECIPE_RAYS or RECIPE_HEMICUBE:
+/* seen[k]: the number of elements that elements[k] sees by the recipe, of rays or hemicubes:
  * entries of its row before the two estimates of a pair are merged, as in Aguerre 2016, table 4.1. The
  * elements must differ. The same for any number of threads. Cost: that of count rows. Errors:
  * LAM_ERR_ARGUMENT for another recipe, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */

@@ -1,5 +1,6 @@
 /* Makes form factors by blocks of clusters: parts, balance of rows and what leaves. */
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/source.h"
 
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/blocks/blocks_importance.h"
@@ -179,7 +180,7 @@ static lam_status find_outside(const mesh *m, const visibility *v, const uint32_
     lam_status status = LAM_OK;
     packed_rows counts = {0};
     const recipe *r = &options->recipe;
-    const form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = r->rays, .seed = r->seed},
+    const form_factor_options few = {.recipe = {.source = &source_rays, .rays = r->rays, .seed = r->seed},
                                      .without_rows = true,
                                      .openings = options->openings,
                                      .n_aimed = &f->n_aimed,

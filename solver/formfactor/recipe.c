@@ -1,5 +1,7 @@
 #include "solver/formfactor/recipe.h"
 
+#include "solver/formfactor/source.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,21 +9,18 @@
 
 enum { MIN_AUTO_RAYS = 256, MAX_AUTO_RAYS = 65536 };
 
-static const char *const method_names[] = {"rays", "hemicube", "pairs", "near-pairs", "blocks"};
-enum { N_METHODS = sizeof method_names / sizeof method_names[0] };
-
 static const char *const closure_names[] = {"measured", "closed", "open"};
 enum { N_CLOSURES = sizeof closure_names / sizeof closure_names[0] };
 
 const recipe_names recipe_of_form_factors = {"/form_factors", "method", "seed"};
 const recipe_names recipe_of_operator = {"/operator", "form_factors", "ray_seed"};
 
-const char *recipe_name(recipe_method method) {
-    return method_names[method];
+const char *recipe_name(const recipe *r) {
+    return recipe_source(r)->name;
 }
 
 lam_status recipe_check(const recipe *r, lam_error *error) {
-    if (r->method == RECIPE_HEMICUBE) {
+    if (recipe_can(r, SOURCE_RESOLUTION)) {
         if (r->resolution < RECIPE_RESOLUTION_LEAST || r->resolution > RECIPE_RESOLUTION_MOST ||
             r->resolution % 2 != 0)
             return status_fail(error, LAM_ERR_ARGUMENT, "--resolution %zu: must be even, from %d to %d",
@@ -31,39 +30,23 @@ lam_status recipe_check(const recipe *r, lam_error *error) {
     if (r->rays < 1 || r->rays > RECIPE_RAYS_MOST)
         return status_fail(error, LAM_ERR_ARGUMENT, "--rays %zu: must be from 1 to %d", r->rays,
                            RECIPE_RAYS_MOST);
-    if (r->method != RECIPE_RAYS && !(r->accuracy > 0 && r->accuracy <= 1))
+    if (recipe_can(r, SOURCE_ACCURACY) && !(r->accuracy > 0 && r->accuracy <= 1))
         return status_fail(error, LAM_ERR_ARGUMENT, "accuracy %g: must be above 0 and at most 1",
                            r->accuracy);
     return LAM_OK;
 }
 
 void recipe_describe(const recipe *r, char text[64]) {
-    switch (r->method) {
-    case RECIPE_RAYS:
-        snprintf(text, 64, "%zu rays per element", r->rays);
-        break;
-    case RECIPE_HEMICUBE:
-        snprintf(text, 64, "hemicubes of %zu pixels", r->resolution);
-        break;
-    case RECIPE_PAIRS:
-        snprintf(text, 64, "pair by pair to %g", r->accuracy);
-        break;
-    case RECIPE_NEAR_PAIRS:
-        snprintf(text, 64, "near pairs to %.2g, %zu rays per element", recipe_accuracy(r), r->rays);
-        break;
-    case RECIPE_BLOCKS:
-        snprintf(text, 64, "blocks of clusters to %.2g", r->accuracy);
-        break;
-    }
+    recipe_source(r)->describe(r, text);
 }
 
 lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const char *const group = names->group;
-    TRY(store_set_text(s, group, names->method, recipe_name(r->method), error));
+    TRY(store_set_text(s, group, names->method, recipe_name(r), error));
     TRY(store_set_integer(s, group, "rays", (int64_t)r->rays, error));
     TRY(store_set_integer(s, group, names->seed, (int64_t)r->seed, error));
-    if (r->method == RECIPE_HEMICUBE)
+    if (recipe_can(r, SOURCE_RESOLUTION))
         TRY(store_set_integer(s, group, "resolution", (int64_t)r->resolution, error));
     if (r->accuracy > 0) TRY(store_set_number(s, group, "accuracy", r->accuracy, error));
     TRY(recipe_save_closure(r->closure, group, s, error));
@@ -101,19 +84,16 @@ lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_err
     recipe r = {0};
     lam_error why = {0};
     TRY(store_get_text(s, group, names->method, &method, error));
-    size_t k = 0;
-    while (k < N_METHODS && strcmp(method, method_names[k]) != 0) k++;
-    if (k == N_METHODS)
+    r.source = source_find(method);
+    if (r.source == NULL)
         FAIL(error, LAM_ERR_UNSUPPORTED,
              "%s: %s attribute %s is '%.20s', which is not supported; precompute the scene again, or use the "
              "version of lambert that wrote the store",
              store_path(s), group, names->method, method);
-    r.method = (recipe_method)k;
     TRY(store_get_integer(s, group, "rays", &rays, error));
     TRY(store_get_integer(s, group, names->seed, &seed, error));
-    if (r.method == RECIPE_HEMICUBE) TRY(store_get_integer(s, group, "resolution", &resolution, error));
-    if (r.method != RECIPE_RAYS && r.method != RECIPE_HEMICUBE)
-        TRY(store_get_number(s, group, "accuracy", &r.accuracy, error));
+    if (recipe_can(&r, SOURCE_RESOLUTION)) TRY(store_get_integer(s, group, "resolution", &resolution, error));
+    if (recipe_can(&r, SOURCE_ACCURACY)) TRY(store_get_number(s, group, "accuracy", &r.accuracy, error));
     r.rays = rays < 0 ? 0 : (size_t)rays;
     r.resolution = resolution < 0 ? 0 : (size_t)resolution;
     r.seed = (uint64_t)seed;
@@ -136,7 +116,8 @@ double recipe_near(const recipe *r) {
 }
 
 double recipe_accuracy(const recipe *r) {
-    return r->method == RECIPE_NEAR_PAIRS ? fmax(r->accuracy, .5 * recipe_near(r)) : r->accuracy;
+    const factor_source *const source = recipe_source(r);
+    return source->accuracy != NULL ? source->accuracy(r) : r->accuracy;
 }
 
 double recipe_shadow(const recipe *r) {
@@ -170,20 +151,11 @@ size_t recipe_auto_rays(double epsilon, double share) {
 double recipe_noise(const recipe *r) {
     /* For independent rays, after merging the two estimates of a pair. A hemicube samples nothing, and of
      * pairs only the partly occluded ones are sampled, far more finely. */
-    return r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS ? sqrt(2 / (double)r->rays) : 0;
+    return recipe_can(r, SOURCE_NOISE) ? sqrt(2 / (double)r->rays) : 0;
 }
 
-/* Blocks of the judge: errors fall as the square root of this, or faster. */
-static const double judge_share = .5;
-
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed) {
-    recipe r = *judged;
-    if (judged->method == RECIPE_HEMICUBE) r = (recipe){.method = RECIPE_RAYS, .rays = rays_beside_hemicubes};
-    const bool few = r.method == RECIPE_PAIRS || r.method == RECIPE_BLOCKS;
-    if (few && r.rays > RECIPE_RAYS_FEW) r.rays = RECIPE_RAYS_FEW;
-    if (r.method == RECIPE_BLOCKS) r.accuracy *= judge_share;
-    const bool noisy = judged->method == RECIPE_RAYS || judged->method == RECIPE_NEAR_PAIRS;
-    if (noisy && r.rays > 1) r.rays /= 2;
+    recipe r = recipe_source(judged)->judge(judged, rays_beside_hemicubes);
     r.seed = seed;
     r.closure = judged->closure;
     return r;

@@ -5,19 +5,13 @@
 #include "store/status.h"
 #include "store/store.h"
 
-typedef enum recipe_method {
-    RECIPE_RAYS,
-    RECIPE_HEMICUBE,
-    RECIPE_PAIRS,
-    RECIPE_NEAR_PAIRS,
-    RECIPE_BLOCKS
-} recipe_method;
+struct factor_source; /* source.h */
 
 /* Decides whether light leaves a scene: the rays (leaving.h), or the user. */
 typedef enum scene_closure { CLOSURE_MEASURED, CLOSURE_CLOSED, CLOSURE_OPEN } scene_closure;
 
 typedef struct recipe {
-    recipe_method method;
+    const struct factor_source *source; /* NULL: rays */
     size_t rays; /* from every element; for pairs and blocks they only find the share that leaves the scene */
     size_t resolution; /* of a hemicube: pixels along its top, even; else 0 */
     double accuracy; /* of (near) pairs: standard error of a partly occluded factor of .005 (occlusion.h); of
@@ -32,7 +26,7 @@ enum { RECIPE_RAYS_MOST = 1 << 24, RECIPE_RESOLUTION_LEAST = 4, RECIPE_RESOLUTIO
 enum { RECIPE_RAYS_FEW = 256 };
 
 /* "rays", "hemicube", "pairs", "near-pairs", "blocks" */
-const char *recipe_name(recipe_method method);
+const char *recipe_name(const recipe *r);
 
 /* LAM_ERR_ARGUMENT for a value out of bounds, naming the option. */
 lam_status recipe_check(const recipe *r, lam_error *error);

@@ -1,6 +1,7 @@
 #include "solver/formfactor/sky_sample.h"
 
 #include "solver/formfactor/rays/rays.h"
+#include "solver/formfactor/source.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -16,7 +17,7 @@ lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounc
     double *scale = memory_allocate(m->n, 3 * sizeof *scale, "the sky for the judge", error);
     double *ground = memory_allocate(m->n, sizeof *ground, "the sky for the judge", error);
     form_factor_options how = *options;
-    how.recipe.method = RECIPE_RAYS;
+    how.recipe.source = &source_rays;
     how.without_rows = true;
     how.bounce = &made;
     if (scale == NULL || ground == NULL) TRY(LAM_ERR_MEMORY);

@@ -1,5 +1,6 @@
 #include "solver/precompute/error_advice.h"
 
+#include "solver/formfactor/source.h"
 #include "solver/precompute/forecast.h"
 #include "solver/precompute/trial.h"
 
@@ -17,13 +18,6 @@ static double one_digit(double x) {
     return floor(x / unit + 1e-9) * unit;
 }
 
-/* The least power of two times rays that lowers an error, which is as rays^-1/2, to most. */
-static size_t rays_for(size_t rays, double error, double most) {
-    size_t more = 2 * rays;
-    while (more < RECIPE_RAYS_MOST && (double)rays * pow(error / most, 2) > (double)more) more *= 2;
-    return more < RECIPE_RAYS_MOST ? more : RECIPE_RAYS_MOST;
-}
-
 static bool is_compressed(double of_operator, double error) {
     return of_operator * of_operator > compression_share * error * error;
 }
@@ -31,21 +25,15 @@ static bool is_compressed(double of_operator, double error) {
 static void advise(const error_advice_input *input, double error, double of_operator, double most,
                    char option[64]) {
     const recipe *r = &input->recipe;
-    const bool compressed = is_compressed(of_operator, error);
+    const bool compressed = is_compressed(of_operator, error), follows = recipe_can(r, SOURCE_BY_EPSILON);
     char memory[32];
     forecast_format_bytes(input->lacking, memory);
     if (input->lacking > 0)
         snprintf(option, 64, "--memory %s", memory);
-    else if (r->method == RECIPE_BLOCKS && input->spent && !compressed)
-        snprintf(option, 64, "--form-factors rays");
-    else if (r->method == RECIPE_BLOCKS || (compressed && !input->by_noise))
+    else if (follows ? compressed || !input->spent : compressed && !input->by_noise)
         snprintf(option, 64, "--epsilon %g", one_digit(input->epsilon * most / error));
-    else if (r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS)
-        snprintf(option, 64, "--rays %zu", rays_for(r->rays, error, most));
-    else if (r->method == RECIPE_HEMICUBE)
-        snprintf(option, 64, "--form-factors rays");
     else
-        snprintf(option, 64, input->finest || input->spent ? "a finer mesh" : "--quality high");
+        recipe_source(r)->advise(r, error, most, input->finest || input->spent, option);
 }
 
 /* True where --group-error is missed, and --epsilon by no more. */

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_PRECOMPUTE_FORECAST_H
 #define LAMBERT_PRECOMPUTE_FORECAST_H
 
-#include "solver/formfactor/pairs/pairs_sample.h"
+#include "solver/formfactor/factor_cost.h"
 #include "solver/formfactor/recipe.h"
 #include "solver/formfactor/scratch.h"
 #include "solver/linalg/panel.h"
@@ -62,13 +62,7 @@ double forecast_wall_seconds(double processor_seconds, const forecast_rates *rat
  * counted of both: no clock is read, so that the same scene has the same probes on every machine. */
 size_t forecast_probes(const forecast *f);
 
-/* Rays cast from one element; a hemicube is a ray for each of its pixels. Bytes: of the rows
- * of a merged sample, of packed rows, of one tile of a sky, of the judge's two samples, of the
- * operator in the store. */
-double forecast_blocks(double n, const recipe *r);
-double forecast_rays(double n, const recipe *r);
-double forecast_rows_bytes(double n, const recipe *r);
-double forecast_packed_bytes(double n, const recipe *r);
+/* Bytes of one tile of a sky, of the judge's two samples, of the operator in the store. */
 double forecast_tile_bytes(double n);
 double forecast_reference_bytes(const forecast *f);
 double forecast_operator_bytes(const forecast *f);

@@ -1,5 +1,5 @@
 /* Bytes of the store and of the scratch folder, and a check that the disks have room for them. */
-#include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/source.h"
 #include "solver/precompute/forecast.h"
 
 #include <math.h>
@@ -8,28 +8,21 @@
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 
-/* Bytes of a stored block and its share of the tree: measured 19 (a Cornell box of 10,249 elements), 24 (of
- * 40,978) and 28 (of 163,687). */
-static const double kept_block_bytes = 32;
-
 double forecast_store_bytes(const forecast *f) {
-    const double n = (double)f->n, rows = forecast_rows_bytes(n, &f->recipe);
-    const bool blocks = f->recipe.method == RECIPE_BLOCKS;
-    const double kept = !f->keep                        ? 0
-                        : blocks                        ? kept_block_bytes * forecast_blocks(n, &f->recipe)
-                        : f->n > FORM_FACTORS_ROWS_MOST ? rows / 2
-                                                        : rows;
+    const double n = (double)f->n;
+    const double kept = f->keep ? recipe_source(&f->recipe)->stored_bytes(n, &f->recipe) : 0;
     return forecast_operator_bytes(f) + kept + forecast_tile_bytes(n) * (double)f->sky_tiles + 300 * n;
 }
 
 double forecast_scratch_bytes(const forecast *f) {
     const double n = (double)f->n;
+    const factor_source *const own = recipe_source(&f->recipe);
     if (!f->scratch) return 0;
     const double found =
-        (f->from_store ? 0 : forecast_packed_bytes(n, &f->recipe) + 4 * n * (double)f->sky_tiles) +
-        (f->probes > 0 ? 2 * forecast_packed_bytes(n, &f->judge_recipe) : 0);
+        (f->from_store ? 0 : own->packed_bytes(n, &f->recipe) + 4 * n * (double)f->sky_tiles) +
+        (f->probes > 0 ? 2 * recipe_source(&f->judge_recipe)->packed_bytes(n, &f->judge_recipe) : 0);
     if (!f->large) return found;
-    return found + forecast_rows_bytes(n, &f->recipe) + (f->probes > 0 ? forecast_reference_bytes(f) : 0);
+    return found + own->bytes(n, &f->recipe) + (f->probes > 0 ? forecast_reference_bytes(f) : 0);
 }
 
 lam_status forecast_check_disk(const forecast *f, const char *output, const scratch *rows,

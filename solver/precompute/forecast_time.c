@@ -1,4 +1,5 @@
 /* Seconds that form factors, the operator and the judge take. Bytes as text. */
+#include "solver/formfactor/source.h"
 #include "solver/method/judge/judge.h"
 #include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
@@ -6,11 +7,14 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Processor seconds per entry of the triangle, beside rays: packing, merging, sweeps, expanding; of a
- * row of rays; of pair by pair; of a block, found, sorted and balanced. */
-static const double merge_seconds = 6e-8, row_seconds = 2.4e-5, pair_seconds = 4e-7, block_seconds = 1.2e-6;
-/* Entries of the triangle per ray where no sample tells: many rays hit what others hit. */
-static const double ray_entries = .3;
+static bool has_blocks(const forecast *f) {
+    return recipe_can(&f->recipe, SOURCE_BLOCKS);
+}
+
+/* Of its rows. */
+static double entries_of(double n, const recipe *r) {
+    return recipe_source(r)->bytes(n, r) / 8;
+}
 
 static bool is_counted(const forecast *f) {
     return f->cost.measured > 0;
@@ -18,19 +22,16 @@ static bool is_counted(const forecast *f) {
 
 /* Of one sample by a recipe. entries: of the triangle, of f->recipe by its sample, or 0. */
 static double sample_seconds(double n, const recipe *r, double entries, const forecast_rates *rates) {
-    const double pairs = n * n / 2;
-    if (r->method == RECIPE_PAIRS) return pairs * pair_seconds * rates->slowness;
-    if (r->method == RECIPE_BLOCKS) return forecast_blocks(n, r) * block_seconds * rates->slowness;
-    const double rays = n * forecast_rays(n, r);
-    const double merged = entries > 0 ? entries : fmin(pairs, ray_entries * rays);
-    return rays * rates->ray_seconds + (n * row_seconds + merged * merge_seconds) * rates->slowness;
+    return recipe_source(r)->seconds(n, r, entries, rates->ray_seconds, rates->slowness);
 }
 
 /* Blocks that a sample found, or those of a law. */
 static double blocks_of(const forecast *f, const recipe *r) {
-    const double n = (double)f->n, law = forecast_blocks(n, r);
-    if (!is_counted(f) || f->recipe.method != RECIPE_BLOCKS) return law;
-    return f->cost.entries / 2 * law / forecast_blocks(n, &f->recipe);
+    const double n = (double)f->n;
+    const factor_source *const own = recipe_source(&f->recipe), *const source = recipe_source(r);
+    const double law = source->blocks != NULL ? source->blocks(n, r) : 0;
+    if (!is_counted(f) || own->blocks == NULL) return law;
+    return f->cost.entries / 2 * law / own->blocks(n, &f->recipe);
 }
 
 static method_forecast forecast_of_method(const forecast *f) {
@@ -43,10 +44,9 @@ static method_forecast forecast_of_method(const forecast *f) {
                                 .noise = recipe_noise(&f->recipe),
                                 .n_emitters = (double)f->emitters,
                                 .n_planes = (double)f->n_planes,
-                                .n_blocks = f->recipe.method == RECIPE_BLOCKS ? blocks_of(f, &f->recipe) : 0,
+                                .n_blocks = has_blocks(f) ? blocks_of(f, &f->recipe) : 0,
                                 .hits = f->cost.hits,
-                                .entries = f->cost.entries > 0 ? f->cost.entries
-                                                               : forecast_rows_bytes(n, &f->recipe) / 8};
+                                .entries = f->cost.entries > 0 ? f->cost.entries : entries_of(n, &f->recipe)};
     f->method->forecast(&scale, method_own_const(f->build, f->method), &made);
     return made;
 }
@@ -77,9 +77,10 @@ static const double probes_enough = 1;
 /* Of the probes beyond the least. */
 static double probe_seconds(const forecast *f) {
     const double n = (double)f->n, C = (double)f->n_channels;
-    if (f->recipe.method == RECIPE_BLOCKS)
-        return C * (probe_block_seconds * forecast_blocks(n, &f->judge_recipe) + probe_element_seconds * n);
-    const double entries = forecast_rows_bytes(n, &f->judge_recipe) / 8;
+    const factor_source *const judge = recipe_source(&f->judge_recipe);
+    if (has_blocks(f))
+        return C * (probe_block_seconds * judge->blocks(n, &f->judge_recipe) + probe_element_seconds * n);
+    const double entries = judge->bytes(n, &f->judge_recipe) / 8;
     const double least = (double)f->probes_least, most = (double)f->probes;
     const double more = reference_seconds(n, entries, most) - reference_seconds(n, entries, least);
     return C * (2 * more / (most - least) + guide_seconds(f));
@@ -99,12 +100,12 @@ size_t forecast_probes(const forecast *f) {
 static double solve_seconds(const forecast *f) {
     const double others = JUDGE_RANDOM_PROBES + 1, n = (double)f->n, most = (double)forecast_probes(f);
     const double probes = (f->probes_least > 0 ? fmin(most, probes_expected) : most) + others;
-    if (f->recipe.method == RECIPE_BLOCKS)
+    if (has_blocks(f))
         return (double)f->n_channels * probes *
                    (probe_block_seconds * blocks_of(f, &f->judge_recipe) + probe_element_seconds * n) +
                uncached_seconds * n * fmax(0, log2(n / cached_elements));
-    const double own = f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->recipe) / 8;
-    const double entries = f->cost.entries > 0 ? own : forecast_rows_bytes(n, &f->judge_recipe) / 8;
+    const double own = f->cost.entries > 0 ? f->cost.entries : entries_of(n, &f->recipe);
+    const double entries = f->cost.entries > 0 ? own : entries_of(n, &f->judge_recipe);
     return (double)f->n_channels * (reference_seconds(n, own, fmin(probes, (double)judge_at_once(f->n))) +
                                     2 * reference_seconds(n, entries, probes) + probes * guide_seconds(f));
 }
@@ -114,23 +115,24 @@ forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates) 
     const recipe *own = &f->recipe, *of_judge = &f->judge_recipe;
     forecast_times times = {0};
     /* Of rays alone the measured rate says more than the fixed cost of one. */
-    const bool rays = own->method == RECIPE_RAYS, counted = is_counted(f) && !rays;
+    const bool rays = recipe_can(own, SOURCE_TIMED), counted = is_counted(f) && !rays;
     const double entries = rays ? f->cost.entries / 2 : 0;
     const double once = counted ? f->cost.measured : sample_seconds(n, own, entries, rates);
     /* Of blocks, those that find how much light leaves the scene; the judge needs none. */
-    const double beside = own->method == RECIPE_BLOCKS ? n * (double)own->rays * rates->ray_seconds : 0;
-    const bool finer = own->method == RECIPE_BLOCKS; /* the judge's blocks */
+    const double beside = has_blocks(f) ? n * (double)own->rays * rates->ray_seconds : 0;
+    const bool finer = has_blocks(f); /* the judge's blocks */
     const double more = finer ? blocks_of(f, of_judge) / blocks_of(f, own) : 1;
     const double half = f->cost.finer > 0 ? f->cost.finer
                         : counted         ? once * more
                                           : sample_seconds(n, of_judge, entries / 2, rates);
     if (!f->from_store)
-        times.form_factors =
-            f->streamed && !counted ? n * forecast_rays(n, own) * rates->ray_seconds : once + beside;
+        times.form_factors = f->streamed && !counted
+                                 ? n * recipe_source(own)->rays(n, own) * rates->ray_seconds
+                                 : once + beside;
     times.operate = forecast_of_method(f).seconds * rates->slowness;
     /* Both samples of pairs share what is projected, and the number of segments of one, but each finds links
      * and tests pairs: 1.2 of one sample where all is projected, 1.7 where segments are most of the work. */
-    const bool shared = of_judge->method == RECIPE_PAIRS && !f->scratch;
+    const bool shared = recipe_can(of_judge, SOURCE_TWICE) && !f->scratch;
     if (f->probes > 0) times.judge = (finer ? 1 : shared ? 1.5 : 2) * half + (f->streamed ? once : 0);
     if (f->probes > 0) times.solves = solve_seconds(f) * rates->slowness;
     return times;

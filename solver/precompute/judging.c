@@ -4,6 +4,7 @@
 #include "solver/formfactor/blocks/block_light.h"
 #include "solver/formfactor/pairs/first_light.h"
 #include "solver/formfactor/sky_sample.h"
+#include "solver/formfactor/source.h"
 #include "solver/operator/blocks/block_store.h"
 #include "solver/precompute/trial.h"
 
@@ -142,7 +143,7 @@ done:
 
 /* True where both samples share the pairs that are projected: rows in a scratch folder are of one sample. */
 static bool shares_pairs(const judging *j) {
-    return j->halves[0].method == RECIPE_PAIRS && j->scratch == NULL;
+    return recipe_can(&j->halves[0], SOURCE_TWICE) && j->scratch == NULL;
 }
 
 /* Two independent samples, or a reference and the same disturbed by its noise. */
@@ -169,8 +170,7 @@ done:
 /* True where the form factors of references were made for the same recipe. */
 static bool fits(const judging *j, const judge_references *r) {
     return r->half[0].row_sums != NULL && (r->finer.n > 0) == (j->problem->blocks != NULL) &&
-           !trial_recipes_differ(&r->halves[0], &j->halves[0]) &&
-           !trial_recipes_differ(&r->halves[1], &j->halves[1]);
+           !recipes_differ(&r->halves[0], &j->halves[0]) && !recipes_differ(&r->halves[1], &j->halves[1]);
 }
 
 /* Rays of each of the two samples from an element, and towards each single tile by which it is judged. Their
@@ -204,14 +204,14 @@ static lam_status sample_pairs(void *context, int sample, size_t count, const si
 /* The first bounce that one of the operator's own rays by the cosine adds. Those for the sky alone are half
  * as many where others are aimed at openings. Hemicubes have no rays. */
 static double own_ray(const form_factors *f) {
-    if (f->recipe.method == RECIPE_HEMICUBE || f->recipe.rays == 0) return 0;
+    if (recipe_can(&f->recipe, SOURCE_RESOLUTION) || f->recipe.rays == 0) return 0;
     return M_PI * (f->n_aimed > 0 ? 2 : 1) / (double)f->recipe.rays;
 }
 
 /* The share of the variance of an operator's own first bounce in that of the mean of both samples: by the
  * rays of each. Hemicubes have no rays. */
 static double own_share(const recipe *own, size_t n) {
-    const bool by_rays = own->method != RECIPE_HEMICUBE && own->rays > 0;
+    const bool by_rays = !recipe_can(own, SOURCE_RESOLUTION) && own->rays > 0;
     return by_rays ? fmin(1, 2 * (double)sky_rays(n) / (double)own->rays) : 1;
 }
 

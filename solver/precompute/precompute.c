@@ -229,7 +229,7 @@ static void list_unused(const precompute_state *state, const option_result *give
         bool unused = method_has_option(NULL, name) && !method_has_option(built, name);
         if (!unused && built->ignores != NULL && method_has_option(built, name))
             unused = built->ignores(method_own_const(o, built), &state->built, name);
-        if (strcmp(name, "epsilon") == 0 && state->recipe.method == RECIPE_PAIRS &&
+        if (strcmp(name, "epsilon") == 0 && recipe_source(&state->recipe) == &source_pairs &&
             state_pairs_follow_epsilon(state, built))
             unused = false;
         if (strcmp(name, "store-precision") == 0) unused = state->op->kind->narrow == NULL;
@@ -251,11 +251,11 @@ static lam_status run_trial(precompute_state *state, lam_error *error) {
     const bool first = state->trial.count == 0;
     double started = clock_seconds(), used = clock_processor_seconds();
     const bool made = state->f.row_sums != NULL;
-    if (state->recipe.method != RECIPE_BLOCKS) state_forget_ready(state);
+    if (recipe_source(&state->recipe) != &source_blocks) state_forget_ready(state);
     if (!made) {
-        TRY(state->recipe.method == RECIPE_BLOCKS ? stage_blocks(state, error)
-            : state->streamed                     ? stage_near_pairs(state, error)
-                                                  : stage_form_factors(state, error));
+        TRY(recipe_source(&state->recipe) == &source_blocks ? stage_blocks(state, error)
+            : state->streamed                               ? stage_near_pairs(state, error)
+                                                            : stage_form_factors(state, error));
         log_stage(state, state->streamed ? "near pairs" : "form factors", started);
     }
     if (first) state->spent.form_factors = since(&used);

@@ -5,7 +5,8 @@
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/pairs_sample.h"
-#include "solver/formfactor/rays/ray_rows.h"
+#include "solver/formfactor/pairs/ray_rows.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/hierarchical/compress.h"
 #include "solver/method/judge/judge.h"
 #include "solver/precompute/emitter_list.h"
@@ -198,10 +199,9 @@ lam_status state_blocks_possible(precompute_state *state, const build_method *me
 bool state_may_have_blocks(const precompute_state *state, double n);
 lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
                                lam_error *error);
-/* The cost of blocks by a recipe, from a sample of them; the scene is ready for these then, until they are
- * found or it is forgotten. */
-lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, factor_cost *cost,
-                                 lam_error *error);
+/* The cost of form factors by a recipe, from a sample of them; of blocks the scene is ready for these then,
+ * until they are found or it is forgotten. */
+lam_status state_sample(precompute_state *state, const recipe *r, factor_cost *cost, lam_error *error);
 void state_forget_ready(precompute_state *state);
 lam_status stage_blocks(precompute_state *state, lam_error *error);
 

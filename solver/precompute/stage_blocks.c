@@ -1,7 +1,5 @@
 /* Form factors by blocks of clusters: the choice of them by what they cost, and the stage that finds them. */
 #include "solver/base/clock.h"
-#include "solver/formfactor/blocks/blocks_importance.h"
-#include "solver/formfactor/blocks/blocks_sample.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <string.h>
@@ -87,13 +85,11 @@ done:
 static lam_status find_other_cost(precompute_state *state, const factor_cost *blocks, factor_cost *out,
                                   lam_error *error) {
     lam_status status = LAM_OK;
-    const recipe rays = {.method = RECIPE_RAYS, .rays = state->recipe.rays};
+    const recipe rays = {.source = &source_rays, .rays = state->recipe.rays};
     *out = state->cost;
     if (out->seconds > 0) return LAM_OK;
-    if (state->recipe.method != RECIPE_PAIRS)
-        TRY(pairs_forecast(&state->m, &rays, &state->progress, out, error));
-    if (out->seconds < blocks->seconds)
-        TRY(pairs_forecast(&state->m, &state->recipe, &state->progress, out, error));
+    if (recipe_source(&state->recipe) != &source_pairs) TRY(state_sample(state, &rays, out, error));
+    if (out->seconds < blocks->seconds) TRY(state_sample(state, &state->recipe, out, error));
 done:
     return status;
 }
@@ -102,28 +98,22 @@ done:
 static lam_status add_sky(precompute_state *state, const recipe *blocks, factor_cost *cost,
                           lam_error *error) {
     lam_status status = LAM_OK;
-    const recipe rays = {.method = RECIPE_RAYS, .rays = blocks->rays};
+    const recipe rays = {.source = &source_rays, .rays = blocks->rays};
     factor_cost of_rays;
     if (state->options->sky == NULL) return LAM_OK;
-    TRY(pairs_forecast(&state->m, &rays, &state->progress, &of_rays, error));
+    TRY(state_sample(state, &rays, &of_rays, error));
     cost->seconds += of_rays.seconds;
 done:
     return status;
 }
 
-lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, factor_cost *cost,
-                                 lam_error *error) {
-    lam_status status = LAM_OK;
-    importance *const read = state->importance.n > 0 ? &state->importance : NULL;
-    block_options coarse = block_options_of(blocks);
-    coarse.progress = &state->progress;
-    if (state->ready == NULL) TRY(block_scene_make(&state->m, &state->tree, &state->ready, error));
-    if (read != NULL)
-        TRY(blocks_importance(&state->m, block_scene_visibility(state->ready), &state->tree, &coarse, read,
-                              error));
-    TRY(blocks_forecast(state->ready, blocks, read, &state->progress, cost, error));
-done:
-    return status;
+lam_status state_sample(precompute_state *state, const recipe *r, factor_cost *cost, lam_error *error) {
+    const factor_work work = {.m = &state->m,
+                              .progress = &state->progress,
+                              .tree = &state->tree,
+                              .ready = &state->ready,
+                              .importance = &state->importance};
+    return recipe_source(r)->sample(&work, r, cost, error);
 }
 
 void state_forget_ready(precompute_state *state) {
@@ -138,9 +128,9 @@ static lam_status weigh_against_rows(precompute_state *state, const factor_cost 
     const recipe *other = &state->recipe;
     factor_cost least;
     char time[32], other_time[32], what[64];
-    if (other->method == RECIPE_PAIRS) TRY(state_weigh_rows(state, error));
+    if (recipe_source(other) == &source_pairs) TRY(state_weigh_rows(state, error));
     TRY(find_other_cost(state, cost, &least, error));
-    *taken = cost->seconds <= (other->method == RECIPE_PAIRS ? 1 : times_rays) * least.seconds;
+    *taken = cost->seconds <= (recipe_source(other) == &source_pairs ? 1 : times_rays) * least.seconds;
     clock_format_seconds(cost->seconds, time);
     clock_format_seconds(least.seconds, other_time);
     recipe_describe(other, what);
@@ -156,9 +146,9 @@ static lam_status weigh(precompute_state *state, const recipe *blocks, bool *tak
     const bool high = strcmp(state->options->quality, "high") == 0;
     factor_cost cost;
     char time[32];
-    TRY(state_forecast_blocks(state, blocks, &cost, error));
+    TRY(state_sample(state, blocks, &cost, error));
     TRY(add_sky(state, blocks, &cost, error));
-    *taken = state->recipe.method == RECIPE_PAIRS && !high && cost.seconds <= seconds_enough;
+    *taken = recipe_source(&state->recipe) == &source_pairs && !high && cost.seconds <= seconds_enough;
     clock_format_seconds(cost.seconds, time);
     if (*taken)
         terminal_log(state->t, "blocks of clusters are taken: about %s of one thread, by a sample of them",
@@ -186,7 +176,7 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
     if (asked) TRY(check_asked(state, method, final, possible, error));
     if (!asked && !possible) goto done;
     /* The rays of a sky are those that find its share beside pairs, too. */
-    recipe blocks = {.method = RECIPE_BLOCKS,
+    recipe blocks = {.source = &source_blocks,
                      .rays = o->sky != NULL ? state->recipe.rays : recipe_rays_beside_blocks(state->m.n),
                      .accuracy = built->block_accuracy(method_own_const(&o->build, built)),
                      .seed = o->seed};

@@ -1,7 +1,6 @@
 /* --time: forecasts of all recipes before the work begins, and the options of the one that is taken. From
  * there on the run is that of these options, and no clock has a part in it. */
 #include "solver/base/clock.h"
-#include "solver/formfactor/blocks/blocks_sample.h"
 #include "solver/precompute/budget.h"
 #include "solver/precompute/precompute_state.h"
 
@@ -33,7 +32,7 @@ typedef struct block_costs {
 } block_costs;
 
 static const double sampled_epsilons[SAMPLES_MOST] = {.4, .05, .012};
-/* Blocks as a power of their accuracy where one sample alone tells (forecast_blocks). */
+/* Blocks as a power of their accuracy where one sample alone tells (source_blocks). */
 static const double power_of_accuracy = -.7;
 
 /* Costs of all pairs at each quality that was weighed: beside an operator of an epsilon among those weighed,
@@ -91,11 +90,11 @@ static lam_status sample_blocks(budget_run *run, double seconds, lam_error *erro
     precompute_state *state = run->state;
     block_costs *c = &run->blocks;
     for (size_t k = 0; k < SAMPLES_MOST; k++) {
-        const recipe r = {.method = RECIPE_BLOCKS,
+        const recipe r = {.source = &source_blocks,
                           .rays = recipe_rays_beside_blocks(state->m.n),
                           .accuracy = accuracy_of(run, sampled_epsilons[k]),
                           .seed = state->options->seed};
-        TRY(state_forecast_blocks(state, &r, &c->cost[k], error));
+        TRY(state_sample(state, &r, &c->cost[k], error));
         c->accuracy[k] = r.accuracy;
         c->count = k + 1;
         if (forecast_wall_seconds(c->cost[k].measured, &state->rates) > finer_share * seconds) break;
@@ -125,9 +124,9 @@ static lam_status find_seconds(const budget_run *run, budget_recipe *r, lam_erro
     TRY(set_options(r, run->method, &options, error));
     probe.options = &options;
     probe.expected = run->method;
-    probe.recipe = (recipe){.method = RECIPE_RAYS, .rays = r->rays, .seed = options.seed};
+    probe.recipe = (recipe){.source = &source_rays, .rays = r->rays, .seed = options.seed};
     if (r->kind == BUDGET_BLOCKS) {
-        probe.recipe.method = RECIPE_BLOCKS;
+        probe.recipe.source = &source_blocks;
         probe.recipe.rays = recipe_rays_beside_blocks(probe.m.n);
         probe.recipe.accuracy = run->method->block_accuracy(method_own_const(&options.build, run->method));
         probe.cost = (factor_cost){.measured = along(&run->blocks, probe.recipe.accuracy, measured_of),
@@ -186,8 +185,8 @@ static lam_status find_all_seconds(budget_run *run, double seconds, budget_recip
     quality_costs *const weighed = &run->pairs;
     bool pairs = false;
     double took = 0;
-    const recipe rays = {.method = RECIPE_RAYS, .rays = RAYS_SAMPLED};
-    TRY(pairs_forecast(&run->state->m, &rays, &run->state->progress, &run->rays, error));
+    const recipe rays = {.source = &source_rays, .rays = RAYS_SAMPLED};
+    TRY(state_sample(run->state, &rays, &run->rays, error));
     for (size_t k = 0; k < count; k++) {
         if (list[k].kind == BUDGET_PAIRS &&
             (weighed->count == 0 || list[k].quality != weighed->quality[weighed->count - 1])) {

@@ -28,7 +28,7 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, d
     *rays_used = 0;
     if (!o.from_store) {
         if (o.rays == OPTION_AUTO)
-            state.recipe = (recipe){.method = RECIPE_RAYS, .rays = rays_for(state.m.n), .seed = o.seed};
+            state.recipe = (recipe){.source = &source_rays, .rays = rays_for(state.m.n), .seed = o.seed};
         TRY(stage_form_factors(&state, error));
         *rays_used = state.recipe.rays;
     }

@@ -1,6 +1,5 @@
 /* The forecast of a precompute, and how it came true. */
 #include "solver/base/clock.h"
-#include "solver/formfactor/blocks/blocks_sample.h"
 #include "solver/precompute/machine_pace.h"
 #include "solver/precompute/precompute_state.h"
 
@@ -40,9 +39,9 @@ void state_update_processors(precompute_state *state) {
 static lam_status find_cost(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe *r = &state->recipe;
-    if (state->options->from_store || state->cost.measured > 0 || r->method == RECIPE_HEMICUBE) return LAM_OK;
-    TRY(r->method == RECIPE_BLOCKS ? state_forecast_blocks(state, r, &state->cost, error)
-                                   : pairs_forecast(&state->m, r, &state->progress, &state->cost, error));
+    if (state->options->from_store || state->cost.measured > 0 || recipe_source(r)->sample == NULL)
+        return LAM_OK;
+    TRY(state_sample(state, r, &state->cost, error));
 done:
     return status;
 }
@@ -54,8 +53,8 @@ lam_status state_count_entries(precompute_state *state, lam_error *error) {
     size_t count = n / ONE_OF, seen[MOST];
     uint32_t elements[MOST] = {0};
     double sum = 0;
-    recipe twice = {.method = RECIPE_RAYS, .rays = 2 * state->recipe.rays, .seed = state->recipe.seed};
-    if (state->recipe.method != RECIPE_RAYS) return LAM_OK;
+    recipe twice = {.source = &source_rays, .rays = 2 * state->recipe.rays, .seed = state->recipe.seed};
+    if (recipe_source(&state->recipe) != &source_rays) return LAM_OK;
     if (state->options->from_store) {
         if (state->f.F.n > 0) state->cost.entries = (double)state->f.F.indptr[n];
         return LAM_OK;
@@ -84,7 +83,7 @@ lam_status stage_forecast(precompute_state *state, lam_error *error) {
     TRY(state_count_entries(state, error));
     /* Beside blocks few rays are cast, unless there is a sky: a tree of all elements for a trial takes
      * longer. */
-    const bool cast = state->recipe.method != RECIPE_BLOCKS || o->sky != NULL;
+    const bool cast = recipe_source(&state->recipe) != &source_blocks || o->sky != NULL;
     TRY(state_measure_rates(state, cast, error));
     state_update_processors(state);
     f = state_forecast(state, (double)state->m.n);

@@ -95,7 +95,7 @@ static lam_status find_by_rays(precompute_state *state, lam_error *error) {
     enum { RAYS = 64 };
     lam_status status = LAM_OK;
     const form_factor_options how = {
-        .recipe = {.method = RECIPE_RAYS, .rays = RAYS, .seed = state->options->seed},
+        .recipe = {.source = &source_rays, .rays = RAYS, .seed = state->options->seed},
         .progress = &state->progress,
         .stage = "importance"};
     form_factors f = {.row_sums = NULL};

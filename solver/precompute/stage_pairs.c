@@ -29,18 +29,14 @@ enum { DOUBLED_MOST = 2 };
  * a town of 36,267 triangles. */
 enum { MORE_RAYS_OF_MANY = 2 };
 
-static lam_status cost_of(precompute_state *state, const recipe *r, factor_cost *out, lam_error *error) {
-    return pairs_forecast(&state->m, r, &state->progress, out, error);
-}
-
 /* Rays alone in place of near pairs beside fewer rays, where they cost less. */
 static lam_status find_cheaper(precompute_state *state, size_t more_rays, recipe *other, factor_cost *cost,
                                lam_error *error) {
     lam_status status = LAM_OK;
-    const recipe plain = {.method = RECIPE_RAYS, .rays = more_rays * other->rays, .seed = other->seed};
+    const recipe plain = {.source = &source_rays, .rays = more_rays * other->rays, .seed = other->seed};
     factor_cost more;
-    TRY(cost_of(state, other, cost, error));
-    TRY(cost_of(state, &plain, &more, error));
+    TRY(state_sample(state, other, cost, error));
+    TRY(state_sample(state, &plain, &more, error));
     if (more.seconds >= cost->seconds) goto done;
     *other = plain;
     *cost = more;
@@ -63,7 +59,7 @@ static lam_status spend_more(precompute_state *state, recipe *other, factor_cost
         factor_cost more;
         recipe finer = *other;
         finer.rays *= 2;
-        TRY(cost_of(state, &finer, &more, error));
+        TRY(state_sample(state, &finer, &more, error));
         if (more.seconds > seconds_spent || !fits(state, &finer)) break;
         *other = finer;
         *cost = more;
@@ -76,11 +72,11 @@ done:
 static lam_status weigh_near_pairs(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe near = state->recipe;
-    const recipe plain = {.method = RECIPE_RAYS, .rays = MORE_RAYS_OF_MANY * near.rays, .seed = near.seed};
+    const recipe plain = {.source = &source_rays, .rays = MORE_RAYS_OF_MANY * near.rays, .seed = near.seed};
     factor_cost of_plain;
     char near_time[32], plain_time[32], what[64];
-    TRY(cost_of(state, &near, &state->cost, error));
-    TRY(cost_of(state, &plain, &of_plain, error));
+    TRY(state_sample(state, &near, &state->cost, error));
+    TRY(state_sample(state, &plain, &of_plain, error));
     if (of_plain.seconds >= state->cost.seconds || !fits(state, &plain)) goto done;
     clock_format_seconds(state->cost.seconds, near_time);
     clock_format_seconds(of_plain.seconds, plain_time);
@@ -106,9 +102,9 @@ lam_status state_weigh_pairs(precompute_state *state, lam_error *error) {
     factor_cost all, some;
     char all_time[32], other_time[32], what[64];
     if (state->options->from_store) return LAM_OK;
-    if (state->recipe.method == RECIPE_NEAR_PAIRS) return weigh_near_pairs(state, error);
-    if (state->recipe.method != RECIPE_PAIRS) return LAM_OK;
-    TRY(cost_of(state, &state->recipe, &all, error));
+    if (recipe_source(&state->recipe) == &source_near_pairs) return weigh_near_pairs(state, error);
+    if (recipe_source(&state->recipe) != &source_pairs) return LAM_OK;
+    TRY(state_sample(state, &state->recipe, &all, error));
     clock_format_seconds(all.seconds, all_time);
     state->cost = all;
     if (all.seconds <= enough || state->m.n <= other.rays) {
@@ -124,7 +120,7 @@ lam_status state_weigh_pairs(precompute_state *state, lam_error *error) {
                  state->dear ? "not all pairs are" : "all pairs are", all_time, what, other_time);
     if (state->dear) {
         state->cost = some;
-        state->plain = other.method == RECIPE_RAYS;
+        state->plain = recipe_source(&other) == &source_rays;
         state->least_rays = other.rays;
     }
 done:

@@ -178,11 +178,11 @@ static size_t choice_rays(const choice_request *asked) {
  * pairs, all where that is affordable and else the near ones. */
 static recipe choice_recipe(const choice_request *asked, bool all_pairs) {
     const quality_level *level = level_of(asked->quality);
-    recipe r = {.method = RECIPE_RAYS, .rays = choice_rays(asked), .seed = asked->seed};
+    recipe r = {.source = &source_rays, .rays = choice_rays(asked), .seed = asked->seed};
     if (asked->resolution > 0)
-        return (recipe){.method = RECIPE_HEMICUBE, .resolution = asked->resolution, .seed = asked->seed};
+        return (recipe){.source = &source_hemicube, .resolution = asked->resolution, .seed = asked->seed};
     if (asked->rays != OPTION_AUTO || level->accuracy == 0 || asked->plain) return r;
-    r.method = all_pairs ? RECIPE_PAIRS : RECIPE_NEAR_PAIRS;
+    r.source = all_pairs ? &source_pairs : &source_near_pairs;
     r.accuracy = level->accuracy;
     if (all_pairs && asked->rounded) r.accuracy *= recipe_coarser(asked->epsilon);
     if (all_pairs && !asked->sky) r.rays = RECIPE_RAYS_FEW;
@@ -274,7 +274,7 @@ recipe state_pairs_recipe(const precompute_state *state) {
 recipe state_judge_recipe(const precompute_state *state, uint64_t seed) {
     const choice_request asked = request_of(state);
     recipe of = state->recipe;
-    if (state->options->from_store && of.method == RECIPE_RAYS && asked.rays != OPTION_AUTO)
+    if (state->options->from_store && recipe_source(&of) == &source_rays && asked.rays != OPTION_AUTO)
         of.rays = (size_t)asked.rays;
     return recipe_of_judge(&of, choice_rays(&asked), seed);
 }
@@ -370,7 +370,7 @@ static lam_status check_before_mesh(precompute_state *state, double n, lam_error
     TRY(choose_recipe(state, n, error));
     forecast f = state_forecast(state, n);
     if (!fits(state, n) && state_may_have_blocks(state, n))
-        f.recipe = f.judge_recipe = (recipe){.method = RECIPE_BLOCKS, .rays = 1, .accuracy = 1};
+        f.recipe = f.judge_recipe = (recipe){.source = &source_blocks, .rays = 1, .accuracy = 1};
     TRY(forecast_check(&f, state->memory, error));
 done:
     return status;
@@ -478,7 +478,7 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
         o = state->options;
     }
     TRY(choose_final_recipe(state, error));
-    if (state->recipe.method == RECIPE_BLOCKS && state->importance.n > 0 && state_keeps(o))
+    if (recipe_source(&state->recipe) == &source_blocks && state->importance.n > 0 && state_keeps(o))
         FAIL(error, LAM_ERR_ARGUMENT,
              "--keep-form-factors: blocks that are found for %s serve nothing else; leave out one of "
              "both, or give --form-factors rays",

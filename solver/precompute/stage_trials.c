@@ -81,7 +81,7 @@ static bool keeps_group_error(const precompute_state *state) {
  * do it for next to nothing: an operator costs a small part of form factors pair by pair. */
 static bool keeps_preset(const precompute_state *state) {
     return state->trial.asked == 0 && !keeps_group_error(state) && is_judged_keeper(state) &&
-           state->f.recipe.method == RECIPE_PAIRS;
+           recipe_can(&state->f.recipe, SOURCE_TWICE);
 }
 
 /* The error of the lights, or of random emission, to keep; 0: none. */
@@ -105,11 +105,12 @@ static trial_goal goal_of(const precompute_state *state, bool *group) {
 /* Bytes of the next trial, beside the operator, and where they are kept the form factors, of this one. */
 static double bytes_of(precompute_state *state, const trial_knobs *next) {
     const recipe before = state->recipe;
-    const bool streamed = state->streamed, again = trial_recipes_differ(&before, &next->recipe);
+    const bool streamed = state->streamed, again = recipes_differ(&before, &next->recipe);
     build_options how = state_build_options(state);
     lam_error none;
     double beside = (double)lam_operator_bytes(state->op);
-    if (again && state_keeps(state->options)) beside += forecast_rows_bytes((double)state->m.n, &before);
+    if (again && state_keeps(state->options))
+        beside += recipe_source(&before)->bytes((double)state->m.n, &before);
     (void)build_set_number(&how, "epsilon", next->epsilon, &none); /* below one that is in its limits */
     state->recipe = next->recipe;
     state->streamed = streamed && again; /* else the judge's rows are there */
@@ -126,11 +127,11 @@ static bool fit(precompute_state *state, const trial_knobs *from, trial_knobs *n
     while (bytes_of(state, next) > state->memory) {
         recipe *r = &next->recipe;
         state->trial.lacking = bytes_of(state, next);
-        if (!trial_recipes_differ(&from->recipe, r)) return false;
+        if (!recipes_differ(&from->recipe, r)) return false;
         r->rays = r->rays / 2 > from->recipe.rays ? r->rays / 2 : from->recipe.rays;
         r->accuracy = r->accuracy * 2 < from->recipe.accuracy ? r->accuracy * 2 : from->recipe.accuracy;
     }
-    return next->epsilon != from->epsilon || trial_recipes_differ(&from->recipe, &next->recipe);
+    return next->epsilon != from->epsilon || recipes_differ(&from->recipe, &next->recipe);
 }
 
 bool state_follows_epsilon(const precompute_state *state) {
@@ -245,11 +246,11 @@ bool state_next_trial(precompute_state *state) {
         if (!better) state_take_back(state);
         return false;
     }
-    release_references(state, &next, !trial_recipes_differ(&from.recipe, &next.recipe));
+    release_references(state, &next, !recipes_differ(&from.recipe, &next.recipe));
     if (better) set_aside(state, excess);
     lam_operator_close(state->op);
     state->op = NULL;
-    if (trial_recipes_differ(&from.recipe, &next.recipe)) {
+    if (recipes_differ(&from.recipe, &next.recipe)) {
         all->factors = goal.errors.factors / goal.asked;
         release_factors(state);
     } else {

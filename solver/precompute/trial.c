@@ -1,14 +1,14 @@
 #include "solver/precompute/trial.h"
 
+#include "solver/formfactor/source.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 /* Of the error asked for: the laws are no exact ones. */
 static const double aimed_share = .9;
-static const double turn_most = 64;
-static const double power_of_epsilon = .6, power_least = .2, power_of_rays = -.5, power_of_pairs = .65,
-                    power_of_blocks = .5;
+static const double power_of_epsilon = .6, power_least = .2;
 
 const error_group *trial_group(const error_report *errors) {
     return errors->lights.probes > 0 ? &errors->lights : &errors->random;
@@ -46,38 +46,17 @@ void trial_describe_worst(const worst_group *worst, const char *name, char text[
     snprintf(text, TRIAL_WORST_TEXT, "the mean of %.60s by %s", name, light);
 }
 
-/* The factor of a knob that takes an error, which is as its power, from one value to another below it. */
-static double factor_for(double from, double to, double power) {
-    return fmin(fmax(pow(to / from, 1 / power), 1 / turn_most), turn_most);
-}
-
 static bool finer_recipe(const trial_limits *limits, double error, double wanted, recipe *r) {
     const recipe before = *r;
+    const factor_knobs knobs = {.rays = limits->rays, .accuracy = limits->accuracy, .finest = limits->finest};
     if (!(wanted < error)) return false;
-    switch (r->method) {
-    case RECIPE_RAYS:
-    case RECIPE_NEAR_PAIRS:
-        while (limits->rays && r->rays < RECIPE_RAYS_MOST &&
-               (double)r->rays < (double)before.rays * factor_for(error, wanted, power_of_rays))
-            r->rays *= 2;
-        if (r->rays > RECIPE_RAYS_MOST) r->rays = RECIPE_RAYS_MOST;
-        break;
-    case RECIPE_PAIRS:
-        if (limits->accuracy && r->accuracy > limits->finest)
-            r->accuracy = fmax(r->accuracy * factor_for(error, wanted, power_of_pairs), limits->finest);
-        break;
-    case RECIPE_BLOCKS:
-        if (limits->accuracy) r->accuracy *= factor_for(error, wanted, power_of_blocks);
-        break;
-    case RECIPE_HEMICUBE:
-        break;
-    }
-    return trial_recipes_differ(&before, r);
+    recipe_source(r)->finer(r, error, wanted, &knobs);
+    return recipes_differ(&before, r);
 }
 
 static bool finer_epsilon(const trial_limits *limits, double error, double wanted, double *epsilon) {
     if (limits->fixed_epsilon || !(wanted < error)) return false;
-    *epsilon *= factor_for(error, wanted, limits->power > 0 ? limits->power : power_of_epsilon);
+    *epsilon *= source_turn(error, wanted, limits->power > 0 ? limits->power : power_of_epsilon);
     return true;
 }
 
@@ -101,11 +80,6 @@ bool trial_turn(double asked, const trial_errors *errors, const trial_limits *li
     return finer_epsilon(limits, C, wanted_C, &next->epsilon) || turned;
 }
 
-bool trial_recipes_differ(const recipe *a, const recipe *b) {
-    return a->method != b->method || a->rays != b->rays || a->resolution != b->resolution ||
-           a->accuracy != b->accuracy || a->seed != b->seed;
-}
-
 void trial_describe(const trial_knobs *from, const trial_knobs *to, char text[TRIAL_TEXT]) {
     char epsilon[64] = "", rays[48] = "", accuracy[64] = "";
     const bool turned = to->epsilon != from->epsilon;
@@ -117,7 +91,7 @@ void trial_describe(const trial_knobs *from, const trial_knobs *to, char text[TR
                  from->recipe.rays);
     if (to->recipe.accuracy != from->recipe.accuracy)
         snprintf(accuracy, sizeof accuracy, "%s%s to %.2g in place of %.2g", turned ? ", " : "",
-                 to->recipe.method == RECIPE_BLOCKS ? "blocks" : "pairs", to->recipe.accuracy,
+                 recipe_can(&to->recipe, SOURCE_BLOCKS) ? "blocks" : "pairs", to->recipe.accuracy,
                  from->recipe.accuracy);
     snprintf(text, TRIAL_TEXT, "%s%s%s", epsilon, rays, accuracy);
 }

@@ -64,9 +64,6 @@ void trial_describe_worst(const worst_group *worst, const char *name, char text[
 bool trial_turn(double asked, const trial_errors *errors, const trial_limits *limits, const trial_knobs *from,
                 trial_knobs *next);
 
-/* True if the form factors of the two differ. */
-bool trial_recipes_differ(const recipe *a, const recipe *b);
-
 /* "coefficients for --epsilon 0.002 in place of 0.01, 4096 rays in place of 512": the knobs that differ. */
 enum { TRIAL_TEXT = 160 };
 void trial_describe(const trial_knobs *from, const trial_knobs *to, char text[TRIAL_TEXT]);

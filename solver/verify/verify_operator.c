@@ -1,5 +1,6 @@
 /* Checks of the operator: finite, linear, energy, and its error measured again. */
 #include "solver/base/random.h"
+#include "solver/formfactor/source.h"
 #include "solver/operator/emitters.h"
 #include "solver/precompute/forecast.h"
 #include "solver/precompute/judging.h"
@@ -283,7 +284,7 @@ static lam_status find_again(examination *e, const recipe *from, const uint32_t 
     const form_factor_options how = {
         .recipe = *from, .progress = e->progress, .stage = "form factors", .importance = importance_of(e)};
     if (has_form_factors(e)) return LAM_OK;
-    if (from->method != RECIPE_BLOCKS) return form_factors_make(&e->m, order, &how, &e->f, error);
+    if (!recipe_can(from, SOURCE_BLOCKS)) return form_factors_make(&e->m, order, &how, &e->f, error);
     TRY(form_factors_tree(&e->m, &e->tree, error));
     TRY(form_factors_make_blocks(&e->m, order, &e->tree, NULL, &how, &e->f, &e->blocks, error));
 done:

@@ -6,6 +6,7 @@
 #include "solver/base/clock.h"
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/leaving.h"
+#include "solver/formfactor/source.h"
 #include "support/judged_probes.h"
 #include "tests/bench/bench_recipe.h"
 
@@ -28,7 +29,7 @@ static double cpu_seconds(void) {
 /* Few rays tell a closed scene. */
 static bool is_closed(const judged_probes *b) {
     lam_error error = {.message = ""};
-    const form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = 32, .seed = 1}};
+    const form_factor_options few = {.recipe = {.source = &source_rays, .rays = 32, .seed = 1}};
     form_factors f;
     if (form_factors_make(&b->m, b->order, &few, &f, &error) != LAM_OK) die(error.message);
     const bool closed = leaving_nothing(&f);

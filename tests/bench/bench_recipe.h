@@ -3,6 +3,7 @@
 #define LAMBERT_TESTS_BENCH_RECIPE_H
 
 #include "solver/formfactor/recipe.h"
+#include "solver/formfactor/source.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -12,9 +13,9 @@ static inline bool bench_recipe(const char *text, uint64_t seed, recipe *out) {
     const double normal = 7e-5;
     const bool near = strncmp(text, "near:", 5) == 0;
     *out = (recipe){
-        .method = near ? RECIPE_NEAR_PAIRS : RECIPE_RAYS, .seed = seed, .accuracy = near ? normal : 0};
+        .source = near ? &source_near_pairs : &source_rays, .seed = seed, .accuracy = near ? normal : 0};
     if (strcmp(text, "pairs") == 0 || strncmp(text, "pairs@", 6) == 0)
-        *out = (recipe){.method = RECIPE_PAIRS, .rays = 256, .seed = seed, .accuracy = normal};
+        *out = (recipe){.source = &source_pairs, .rays = 256, .seed = seed, .accuracy = normal};
     else
         out->rays = strtoull(near ? text + 5 : text, NULL, 10);
     return out->rays > 0;

@@ -1,15 +1,16 @@
 /* Scenes that break form factors elsewhere, through every recipe: the invariants hold whatever is modelled.
  */
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/source.h"
 #include "support/box.h"
 #include "support/plates.h"
 #include "support/suite.h"
 
 static const recipe recipes[] = {
-    {.method = RECIPE_RAYS, .rays = 1024, .seed = 3},
-    {.method = RECIPE_HEMICUBE, .resolution = 32},
-    {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-4, .seed = 3},
-    {.method = RECIPE_NEAR_PAIRS, .rays = 1024, .accuracy = 7e-4, .seed = 3},
+    {.source = &source_rays, .rays = 1024, .seed = 3},
+    {.source = &source_hemicube, .resolution = 32},
+    {.source = &source_pairs, .rays = 256, .accuracy = 7e-4, .seed = 3},
+    {.source = &source_near_pairs, .rays = 1024, .accuracy = 7e-4, .seed = 3},
 };
 enum { N_RECIPES = sizeof recipes / sizeof *recipes };
 

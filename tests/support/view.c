@@ -1,4 +1,5 @@
 #include "support/view.h"
+#include "solver/formfactor/source.h"
 
 #define view_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
 
@@ -16,7 +17,7 @@ view make_view(int which) {
             if (v.m.normal[i % v.m.n][2] > .5f) v.m.reflectance[i] = 0;
     v.order = test_allocate(v.m.n, sizeof *v.order);
     view_ok(mesh_z_order(&v.m, v.order, &error));
-    const form_factor_options options = {.recipe = {.method = RECIPE_RAYS, .rays = 256, .seed = 3}};
+    const form_factor_options options = {.recipe = {.source = &source_rays, .rays = 256, .seed = 3}};
     view_ok(form_factors_make(&v.m, v.order, &options, &v.f, &error));
     return v;
 }

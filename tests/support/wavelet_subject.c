@@ -1,11 +1,12 @@
 #include "support/wavelet_subject.h"
+#include "solver/formfactor/source.h"
 
 static lam_error error;
 
 void scene(subject *s, const char *kind, size_t elements) {
     const generate_options how = {
         .kind = kind, .variant = 1, .terrain = "flat", .elements = elements, .reflectance = -1, .seed = 1};
-    const form_factor_options options = {.recipe = {.method = RECIPE_RAYS, .rays = 256, .seed = 3}};
+    const form_factor_options options = {.recipe = {.source = &source_rays, .rays = 256, .seed = 3}};
     form_factors f;
     s->m = generate_good(&how);
     s->order = test_allocate(s->m.n, sizeof *s->order);

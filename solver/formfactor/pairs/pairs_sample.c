@@ -4,7 +4,7 @@
 
 #include "solver/base/clock.h"
 #include "solver/formfactor/pairs/pair_ground.h"
-#include "solver/formfactor/pairs/ray_crossings.h"
+#include "solver/formfactor/rays/rays_cost.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -208,43 +208,18 @@ done:
  * room (516 triangles), a pocket of 3,262, Cornell boxes, mazes, rooms, patios, atria, cities, anechoic rooms
  * and canopies of 900 to 4,000 elements: of exact counts they give .7 to 1.2 times what these take. Finding
  * links; the rows of pairs; segments against lists, of which a segment of a list and each occluder of it
- * count, and those cast into the scene; entries. */
+ * count, and those cast into the scene. */
 static const double shaft_seconds = 5e-7, candidate_seconds = 5e-8, hidden_seconds = 5e-5,
                     tried_seconds = 5e-8, close_seconds = 3.2e-6, test_seconds = 1.1e-6, sift_seconds = 7e-7,
                     projection_seconds = 6e-8, list_seconds = 8e-6, listed_seconds = 2e-8,
-                    list_test_seconds = 1.2e-9, cast_seconds = 1.75e-7, entry_seconds = 1e-7;
+                    list_test_seconds = 1.2e-9, cast_seconds = 1.75e-7;
 
 /* The rows of a sample lie apart, so that caches hold little of them: they take so many times as long as rows
  * in turn, 1.1 to 1.5 in these scenes. */
 static const double times_apart = 1.35;
 
-/* Of a ray: each box of a triangle that it crosses, less boxes_free, and at least ray_seconds; of a row,
- * beside its rays. By fits to processor seconds, with other work beside, of 512 to 8,192 rays in a furnished
- * room, a Cornell box, rooms, a city, a canopy, two parts of a town and a hotel room: 59 ns (2.8 boxes) to
- * 345 (11). */
-static const double ray_seconds = 3e-8, box_seconds = 2.65e-8, boxes_free = .3, row_seconds = 2.4e-5;
 /* Few rays beside all pairs: not worth a sample. */
 static const double few_ray_seconds = 1e-7;
-
-/* Entries of the triangle per ray that hits: many hit what others hit. */
-static const double ray_entries = .3;
-
-/* Seconds of all rays of a recipe, and the entries that they make. */
-static lam_status rays_forecast(const mesh *m, const recipe *r, factor_cost *out, lam_error *error) {
-    enum { SEED = 1 }; /* the choice of a recipe does not depend on --seed */
-    lam_status status = LAM_OK;
-    const double n = (double)m->n, rays = n * (double)r->rays;
-    ray_crossings w;
-    *out = (factor_cost){.seconds = rays * few_ray_seconds};
-    if (r->method == RECIPE_PAIRS) return LAM_OK;
-    TRY(ray_crossings_sample(m, SEED, &w, error));
-    const double each = fmax((w.boxes - boxes_free) * box_seconds, ray_seconds);
-    *out = (factor_cost){.seconds = rays * each + n * row_seconds,
-                         .entries = fmin(rays * w.hits * ray_entries, n * n / 2),
-                         .hits = w.hits};
-done:
-    return status;
-}
 
 /* Of segments, which the sample does not cast; `all` are cast in place of those that were counted. */
 static double segments_seconds(const pairs_work *w, double all) {
@@ -255,33 +230,30 @@ static double segments_seconds(const pairs_work *w, double all) {
 }
 
 /* Of rows of pairs, without their segments. */
-static double rows_seconds(const pairs_work *w) {
+static double rows_seconds_of(const pairs_work *w) {
     return w->tried * tried_seconds + w->close * close_seconds + w->tests * test_seconds +
            w->sifted * sift_seconds + w->projection * projection_seconds;
 }
 
-lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, factor_cost *out,
-                          lam_error *error) {
+lam_status pairs_cost(const mesh *m, const recipe *r, double threshold, const progress *p, factor_cost *out,
+                      lam_error *error) {
     lam_status status = LAM_OK;
-    const double threshold = r->method == RECIPE_NEAR_PAIRS ? recipe_near(r) : 0;
     pairs_options options = pairs_options_of(r, m->n, threshold);
     pairs_work w = {0};
     pairs_trial trial = {.seconds = 0};
     visibility *v = NULL;
-    factor_cost of_rays;
+    factor_cost of_rays = {.seconds = (double)m->n * (double)r->rays * few_ray_seconds};
     options.progress = p;
-    TRY(rays_forecast(m, r, &of_rays, error));
-    if (r->method != RECIPE_RAYS) {
-        TRY(visibility_create(m, &v, error));
-        TRY(pairs_sample(m, v, &options, &w, &trial, error));
-    }
+    if (threshold > 0) TRY(rays_work(m, r->rays, &of_rays, error));
+    TRY(visibility_create(m, &v, error));
+    TRY(pairs_sample(m, v, &options, &w, &trial, error));
     const double segments = bounded_segments(&options, &w);
     const double entries = w.seen + of_rays.entries;
     const double links =
         w.shafts * shaft_seconds + w.candidates * candidate_seconds + w.hidden * hidden_seconds;
     const double cast = segments_seconds(&w, segments);
-    const double rows = rows_seconds(&w), rest = cast + entries * entry_seconds;
-    const double pace = factor_cost_pace(trial.seconds, times_apart * rows_seconds(&trial.work));
+    const double rows = rows_seconds_of(&w), rest = cast + entries * factor_entry_seconds;
+    const double pace = factor_cost_pace(trial.seconds, times_apart * rows_seconds_of(&trial.work));
     *out = (factor_cost){.seconds = links + rows + rest + of_rays.seconds,
                          .measured = trial.link_seconds + rows * pace + rest + of_rays.seconds,
                          .segments = cast,

@@ -36,11 +36,11 @@ typedef struct pairs_trial {
 lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options *options, pairs_work *out,
                         pairs_trial *trial, lam_error *error);
 
-/* The cost of form factors by RECIPE_PAIRS, RECIPE_NEAR_PAIRS or RECIPE_RAYS, rays included, from
- * pairs_sample. seconds and entries depend on no clock: the same scene has the same figures, however busy the
- * machine is. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, factor_cost *out,
-                          lam_error *error);
+/* The cost of all pairs, or with a threshold above 0 of near pairs and rays, from pairs_sample; of few rays
+ * by their number. seconds and entries depend on no clock: the same scene has the same figures, however busy
+ * the machine is. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status pairs_cost(const mesh *m, const recipe *r, double threshold, const progress *p, factor_cost *out,
+                      lam_error *error);
 
 /* factor_cost.measured of all pairs at another accuracy than that of the forecast, by the law of segments
  * (occlusion.h). */

@@ -1,4 +1,5 @@
 #include "solver/formfactor/rows/row_file.h"
+#include "solver/formfactor/source.h"
 
 #include "solver/base/clock.h"
 #include "store/store.h"
@@ -123,7 +124,7 @@ static void head_fill(const row_file_contents *c, file_head *head) {
     head->n = c->n;
     head->block_rows = c->block_rows;
     head->kind = c->kind;
-    head->method = c->recipe.method;
+    head->method = (uint32_t)source_number(&c->recipe);
     head->rays = c->recipe.rays;
     head->resolution = c->recipe.resolution;
     head->seed = c->recipe.seed;

@@ -1,6 +1,7 @@
 /* Form factors by blocks: every pair of elements is decided once, and the laws that hold to rounding whatever
  * the blocks are. */
 #include "solver/base/random.h"
+#include "solver/formfactor/source.h"
 #include "support/blocks.h"
 #include "support/scene.h"
 
@@ -111,7 +112,7 @@ typedef struct made_blocks {
 static void make(int scene, const form_factors *judged, made_blocks *made) {
     lam_error error = {.message = ""};
     const form_factor_options how = {
-        .recipe = {.method = RECIPE_BLOCKS, .rays = 64, .accuracy = blocks_open, .seed = 1}};
+        .recipe = {.source = &source_blocks, .rays = 64, .accuracy = blocks_open, .seed = 1}};
     *made = (made_blocks){.m = closed_scene(scene)};
     made->order = malloc(made->m.n * sizeof *made->order);
     ck_ok(mesh_z_order(&made->m, made->order, &error));

@@ -1,6 +1,7 @@
 /* The forecast of the work of blocks beside the work itself. */
 #include "solver/formfactor/blocks/blocks_importance.h"
 #include "solver/formfactor/blocks/blocks_sample.h"
+#include "solver/formfactor/source.h"
 #include "support/blocks.h"
 #include "support/scene.h"
 
@@ -79,7 +80,7 @@ END_TEST
  * these, and those of half the bound that a judge takes. */
 START_TEST(forecasts_know_receivers) {
     const generate_options how = {.kind = "cornell", .elements = 3000, .closed = true, .reflectance = .5};
-    const recipe r = {.method = RECIPE_BLOCKS, .rays = 1, .accuracy = blocks_open, .seed = 1};
+    const recipe r = {.source = &source_blocks, .rays = 1, .accuracy = blocks_open, .seed = 1};
     const recipe judge = recipe_of_judge(&r, 1, 0);
     lam_error error = {.message = ""};
     mesh m = generate_good(&how);
@@ -122,7 +123,7 @@ END_TEST
 /* Finer blocks have finer shadows, but not in step; coarser ones keep the share of the default's. */
 START_TEST(shadows_grow_finer_with_the_fourth_root) {
     const double accuracy = 2.4e-4;
-    recipe r = {.method = RECIPE_BLOCKS, .accuracy = accuracy};
+    recipe r = {.source = &source_blocks, .accuracy = accuracy};
     const double bound = recipe_shadow(&r);
     r.accuracy = accuracy / 16;
     ck_assert_double_eq_tol(recipe_shadow(&r), bound / 8, 1e-9 * bound);

@@ -3,6 +3,7 @@
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/first_light.h"
+#include "solver/formfactor/source.h"
 #include "support/box_problem.h"
 #include "support/dense.h"
 #include "support/scene.h"
@@ -70,7 +71,7 @@ END_TEST
 START_TEST(shadows) {
     const generate_options how = {.kind = "cornell", .elements = ELEMENTS, .reflectance = .5, .seed = 1};
     const form_factor_options options = {
-        .recipe = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-6 * 2000 / ELEMENTS, .seed = 3}};
+        .recipe = {.source = &source_pairs, .rays = 256, .accuracy = 7e-6 * 2000 / ELEMENTS, .seed = 3}};
     mesh m;
     form_factors f;
     ck_ok(scene_generated(&how, &m, &error));

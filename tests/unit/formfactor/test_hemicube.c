@@ -1,6 +1,7 @@
 /* Hemicubes: delta form factors, the row of one centroid against closed forms, and the invariants. */
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/rays/hemicube.h"
+#include "solver/formfactor/source.h"
 #include "support/box.h"
 #include "support/found.h"
 #include "support/plates.h"
@@ -89,7 +90,7 @@ static csr trace_rows(const mesh *m, size_t resolution, double *leaving, double 
     visibility *v = NULL;
     packed_rows found = {0};
     lam_error error = {0};
-    const form_factor_options how = {.recipe = {.method = RECIPE_HEMICUBE, .resolution = resolution}};
+    const form_factor_options how = {.recipe = {.source = &source_hemicube, .resolution = resolution}};
     const uint32_t order[4] = {0, 1, 2, 3};
     ck_assert_uint_le(m->n, 4);
     ck_assert_msg(visibility_create(m, &v, &error) == LAM_OK, "%s", error.message);
@@ -169,7 +170,7 @@ static form_factors make(const mesh *m, size_t resolution, bool reversed) {
     uint32_t *order = malloc(m->n * sizeof *order);
     form_factors f = {0};
     lam_error error = {0};
-    const form_factor_options how = {.recipe = {.method = RECIPE_HEMICUBE, .resolution = resolution}};
+    const form_factor_options how = {.recipe = {.source = &source_hemicube, .resolution = resolution}};
     ck_assert_ptr_nonnull(order);
     for (size_t i = 0; i < m->n; i++) order[i] = (uint32_t)(reversed ? m->n - 1 - i : i);
     ck_assert_msg(form_factors_make(m, order, &how, &f, &error) == LAM_OK, "%s", error.message);
@@ -200,7 +201,7 @@ START_TEST(closed_box_keeps_the_invariants) {
     const double size[3] = {1, 2, 3};
     mesh m = box_mesh(size, 4, .5f);
     form_factors f = make(&m, 64, false);
-    ck_assert_int_eq(f.recipe.method, RECIPE_HEMICUBE);
+    ck_assert_ptr_eq(f.recipe.source, &source_hemicube);
     ck_assert_uint_eq(f.recipe.resolution, 64);
     ck_assert_uint_eq(f.recipe.rays, 0);
     ck_assert(f.closed);
@@ -254,11 +255,11 @@ START_TEST(bad_requests_are_refused) {
     form_factors f = {0};
     lam_error error = {0};
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
-        const form_factor_options how = {.recipe = {.method = RECIPE_HEMICUBE, .resolution = bad[k]}};
+        const form_factor_options how = {.recipe = {.source = &source_hemicube, .resolution = bad[k]}};
         ck_assert_int_eq(form_factors_make(&m, order, &how, &f, &error), LAM_ERR_ARGUMENT);
     }
     const progress cancelled = {.cancelled = stop_at_once};
-    const form_factor_options how = {.recipe = {.method = RECIPE_HEMICUBE, .resolution = 32},
+    const form_factor_options how = {.recipe = {.source = &source_hemicube, .resolution = 32},
                                      .progress = &cancelled};
     ck_assert_int_eq(form_factors_make(&m, order, &how, &f, &error), LAM_ERR_CANCELLED);
     ck_assert_ptr_null(f.F.indptr);
@@ -285,7 +286,7 @@ static void check_rows(const mesh *m, const recipe *how, const uint32_t *chosen,
         for (uint64_t p = rows.indptr[i]; p < rows.indptr[i + 1]; p++) {
             const double x = (double)rows.data[p], truth = csr_entry(&exact, i, rows.indices[p]);
             sum += x;
-            if (how->method == RECIPE_RAYS)
+            if (recipe_source(how) == &source_rays)
                 ck_assert_double_eq_tol(x * 64, round(x * 64), 1e-9);
             else
                 ck_assert_double_eq_tol(x, truth, .02);
@@ -300,9 +301,9 @@ static void check_rows(const mesh *m, const recipe *how, const uint32_t *chosen,
 /* form_factors_count_seen of some rows in any order agrees with the one-sided rows of all elements. */
 START_TEST(some_rows_are_those_of_all) {
     mesh m = box_mesh((const double[3]){2, 1, 1}, 3, .5f);
-    const recipe ways[] = {{.method = RECIPE_HEMICUBE, .resolution = 32},
-                           {.method = RECIPE_RAYS, .rays = 64, .seed = 5},
-                           {.method = RECIPE_PAIRS}};
+    const recipe ways[] = {{.source = &source_hemicube, .resolution = 32},
+                           {.source = &source_rays, .rays = 64, .seed = 5},
+                           {.source = &source_pairs}};
     const uint32_t chosen[] = {40, 3, 17, 0};
     enum { CHOSEN = sizeof chosen / sizeof *chosen };
     lam_error error = {0};

@@ -4,6 +4,7 @@
 #include "solver/formfactor/exchange/pair_factor.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/sight/open_scene.h"
+#include "solver/formfactor/source.h"
 #include "support/blocks.h"
 #include "support/bowl.h"
 #include "support/box.h"
@@ -334,7 +335,7 @@ END_TEST
 START_TEST(rows_have_the_sums_of_the_boundary) {
     mesh m = bowl(RINGS, SECTORS, depths[_i], _i == LID);
     const form_factor_options how = {
-        .recipe = {.method = RECIPE_BLOCKS, .rays = 8, .accuracy = blocks_open, .seed = 1}, .stage = ""};
+        .recipe = {.source = &source_blocks, .rays = 8, .accuracy = blocks_open, .seed = 1}, .stage = ""};
     const int most = omp_get_max_threads();
     uint32_t *order = test_allocate(m.n, sizeof *order);
     double *sums = test_allocate(m.n, sizeof *sums), *product[2], *ones = test_allocate(m.n, sizeof *ones);

@@ -2,6 +2,7 @@
 #include "solver/formfactor/exchange/pair_factor.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/source.h"
 #include "solver/scene/generate/generate.h"
 #include "solver/scene/import/import.h"
 #include "support/box.h"
@@ -38,9 +39,9 @@ static form_factors make(const mesh *m, const recipe *r) {
 
 START_TEST(near_pairs_are_exact_and_nothing_is_counted_twice) {
     mesh m = room();
-    const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9},
-                 near = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = 7e-5, .seed = 2},
-                 rays = {.method = RECIPE_RAYS, .rays = RAYS, .seed = 2};
+    const recipe all = {.source = &source_pairs, .rays = 256, .accuracy = 1e-5, .seed = 9},
+                 near = {.source = &source_near_pairs, .rays = RAYS, .accuracy = 7e-5, .seed = 2},
+                 rays = {.source = &source_rays, .rays = RAYS, .seed = 2};
     form_factors exact = make(&m, &all), joined = make(&m, &near), counted = make(&m, &rays);
     double of_joined = 0, of_counted = 0, worst_near = 0;
     size_t n_near = 0;
@@ -77,7 +78,7 @@ START_TEST(near_pairs_are_those_above_the_threshold) {
     mesh m = room();
     const double threshold = .004 * (1 + _i);
     const form_factor_options how = {
-        .recipe = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = 7e-5, .seed = 2}};
+        .recipe = {.source = &source_near_pairs, .rays = RAYS, .accuracy = 7e-5, .seed = 2}};
     form_factors f = {0};
     csr G = {0};
     visibility *v = NULL;
@@ -87,7 +88,7 @@ START_TEST(near_pairs_are_those_above_the_threshold) {
     ck_assert_ptr_nonnull(polygons);
     for (size_t i = 0; i < m.n; i++) polygon_of_element(&m, i, &polygons[i]);
     pair_factor_rules_init(&rules);
-    const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9};
+    const recipe all = {.source = &source_pairs, .rays = 256, .accuracy = 1e-5, .seed = 9};
     form_factors exact = make(&m, &all);
     ck_assert_int_eq(visibility_create(&m, &v, &error), LAM_OK);
     ck_assert_msg(pairs_find(&m, v, &how, threshold, &f, &G, &error) == LAM_OK, "%s", error.message);
@@ -134,12 +135,12 @@ START_TEST(the_mean_is_right) {
     enum { SEEDS = 24 };
 #endif
     mesh m = room();
-    const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9};
+    const recipe all = {.source = &source_pairs, .rays = 256, .accuracy = 1e-5, .seed = 9};
     form_factors exact = make(&m, &all);
     double *mean = calloc(m.n * m.n, sizeof *mean);
     ck_assert_ptr_nonnull(mean);
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
-        const recipe near = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = 7e-5, .seed = seed};
+        const recipe near = {.source = &source_near_pairs, .rays = RAYS, .accuracy = 7e-5, .seed = seed};
         form_factors f = make(&m, &near);
         for (size_t i = 0; i < m.n; i++)
             for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++)
@@ -177,8 +178,8 @@ START_TEST(pairs_see_what_rays_see) {
     snprintf(path, sizeof path, "%s/scene.obj", folder);
     ck_assert_msg(scene_generate(&scenes[_i], path, &faces, &error) == LAM_OK, "%s", error.message);
     ck_assert_msg(scene_import(path, &how, &m, &report, &error) == LAM_OK, "%s", error.message);
-    const recipe pairs = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-5, .seed = 3},
-                 rays = {.method = RECIPE_RAYS, .rays = MANY, .seed = 4};
+    const recipe pairs = {.source = &source_pairs, .rays = 256, .accuracy = 7e-5, .seed = 3},
+                 rays = {.source = &source_rays, .rays = MANY, .seed = 4};
     form_factors one = make(&m, &pairs), other = make(&m, &rays);
     double off = 0, all = 0;
     for (size_t i = 0; i < m.n; i++) {

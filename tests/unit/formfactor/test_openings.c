@@ -1,5 +1,6 @@
 /* Cracks and openings: which gaps let light out of a scene, whatever share of its area they have. */
 #include "solver/formfactor/leaving.h"
+#include "solver/formfactor/source.h"
 #include "solver/formfactor/visibility/openings.h"
 #include "support/box.h"
 #include "support/suite.h"
@@ -18,7 +19,7 @@ static form_factors make(const mesh *m, recipe how) {
 }
 
 static const recipe by_rays = {.rays = 1024, .seed = 1};
-static const recipe by_pairs = {.method = RECIPE_PAIRS, .rays = 1024, .accuracy = 7e-5, .seed = 1};
+static const recipe by_pairs = {.source = &source_pairs, .rays = 1024, .accuracy = 7e-5, .seed = 1};
 
 static void add(mesh *m, int axis, double level, const double from[3], const double to[3], bool positive) {
     box_cell cell = {

@@ -1,5 +1,6 @@
 /* The work of pairs that a sample of them counts, and its cost. */
 #include "solver/formfactor/pairs/pairs_sample.h"
+#include "solver/formfactor/source.h"
 #include "support/scene.h"
 #include "support/suite.h"
 
@@ -11,7 +12,7 @@ static mesh scene_of(const char *kind, size_t n) {
     return generate_good(&how);
 }
 
-static const recipe all_pairs = {.method = RECIPE_PAIRS, .rays = 16, .accuracy = 7e-5, .seed = 1};
+static const recipe all_pairs = {.source = &source_pairs, .rays = 16, .accuracy = 7e-5, .seed = 1};
 
 /* Of all pairs at normal quality; occluders: 0 where neither projection nor lists are allowed. */
 static pairs_work sample(const mesh *m, bool occluders, int n_threads, pairs_trial *trial) {
@@ -112,7 +113,7 @@ START_TEST(lists_make_pairs_cheaper) {
     mesh m = scene_of("atrium", 1000);
     const pairs_work w = sample(&m, true, 1, NULL);
     factor_cost cost;
-    ck_ok(pairs_forecast(&m, &all_pairs, NULL, &cost, &error));
+    ck_ok(pairs_cost(&m, &all_pairs, 0, NULL, &cost, &error));
     const double segments = fmin(w.segments, pairs_options_of(&all_pairs, m.n, 0).segments_most);
     ck_assert_double_gt(cost.seconds, 2e-8 * segments);
     ck_assert_double_lt(cost.seconds, 1.75e-7 * segments);
@@ -147,8 +148,8 @@ START_TEST(costs_follow_the_accuracy) {
     recipe coarse = all_pairs;
     coarse.accuracy *= 3;
     factor_cost fine, less;
-    ck_ok(pairs_forecast(&m, &all_pairs, NULL, &fine, &error));
-    ck_ok(pairs_forecast(&m, &coarse, NULL, &less, &error));
+    ck_ok(pairs_cost(&m, &all_pairs, 0, NULL, &fine, &error));
+    ck_ok(pairs_cost(&m, &coarse, 0, NULL, &less, &error));
     const double at_coarse = pairs_cost_at(&fine, all_pairs.accuracy, coarse.accuracy) - fine.measured,
                  at_fine = pairs_cost_at(&less, coarse.accuracy, all_pairs.accuracy) - less.measured;
     ck_assert_double_lt(less.segments, .5 * fine.segments);

@@ -1,7 +1,8 @@
 /* Parts of scenes that exchange no light. */
 #include "solver/base/union_find.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/rays/ray_rows.h"
+#include "solver/formfactor/pairs/ray_rows.h"
+#include "solver/formfactor/source.h"
 #include "solver/formfactor/visibility/parts.h"
 #include "support/box.h"
 #include "support/dense.h"
@@ -118,7 +119,7 @@ START_TEST(trees_and_streams_know_parts) {
         plane_tree tree;
         ray_rows *rows;
         row_stream stream;
-        const form_factor_options how = {.recipe = {.method = RECIPE_RAYS, .rays = 64, .seed = 1}};
+        const form_factor_options how = {.recipe = {.source = &source_rays, .rays = 64, .seed = 1}};
         mesh_finish(&m, .5f);
         ck_ok(form_factors_tree(&m, &tree, &error));
         ck_assert_uint_eq(tree.n_alone, 0);

@@ -2,6 +2,7 @@
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/rays/portals.h"
 #include "solver/formfactor/sky_sample.h"
+#include "solver/formfactor/source.h"
 #include "support/box.h"
 #include "support/suite.h"
 
@@ -221,7 +222,7 @@ END_TEST
  * lets in, .64, is distributed whole. Against rays in plenty. */
 START_TEST(pairs_and_rays_together) {
     mesh m = room(true);
-    const recipe few = {.method = RECIPE_PAIRS, .rays = 4096, .accuracy = 1e-3, .seed = 3},
+    const recipe few = {.source = &source_pairs, .rays = 4096, .accuracy = 1e-3, .seed = 3},
                  many = {.rays = 1 << 16, .seed = 4};
     form_factors f = make(&m, few, NULL), g = make(&m, many, NULL);
     double off = 0, all = 0, of_tiles = 0;

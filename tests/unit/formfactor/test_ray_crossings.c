@@ -1,5 +1,5 @@
 /* The work of rays by a sample: exact where each ray crosses the same number of boxes, and by geometry. */
-#include "solver/formfactor/pairs/ray_crossings.h"
+#include "solver/formfactor/rays/ray_crossings.h"
 #include "support/scene.h"
 
 static ray_crossings crossings(const mesh *m, uint64_t seed) {

@@ -2,9 +2,10 @@
  * of rows that are held. */
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/pairs/pairs.h"
-#include "solver/formfactor/rays/ray_rows.h"
+#include "solver/formfactor/pairs/ray_rows.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/rows/upper.h"
+#include "solver/formfactor/source.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/method/method.h"
 #include "solver/method/reference.h"
@@ -49,7 +50,7 @@ static void subject_make(int which, size_t elements, const char *sky, subject *t
     ck_ok(scene_generated(&how, &to->m, &error));
     to->order = test_allocate(to->m.n, sizeof *to->order);
     ck_ok(mesh_z_order(&to->m, to->order, &error));
-    to->how = (form_factor_options){.recipe = {.method = near ? RECIPE_NEAR_PAIRS : RECIPE_RAYS,
+    to->how = (form_factor_options){.recipe = {.source = near ? &source_near_pairs : &source_rays,
                                                .rays = 320,
                                                .accuracy = near ? 7e-5 : 0,
                                                .seed = 5},
@@ -100,7 +101,7 @@ static double *merged(const subject *s) {
     for (size_t i = 0; i < n; i++)
         for (uint64_t e = upper.indptr[i]; e < upper.indptr[i + 1]; e++)
             G[i * n + upper.indices[e]] = G[upper.indices[e] * n + i] = (double)upper.data[e];
-    if (r->method == RECIPE_NEAR_PAIRS) {
+    if (recipe_source(r) == &source_near_pairs) {
         form_factors f = {.recipe = *r};
         ck_ok(pairs_find(&s->m, v, &s->how, recipe_near(r), &f, &near, &error));
         ck_assert_uint_gt(near.indptr[n], n);
@@ -243,7 +244,7 @@ START_TEST(pairs_do_not_come_row_by_row) {
     subject_make(CLOSED, 100, NULL, &s);
     ray_rows *none = NULL;
     form_factor_options how = s.how;
-    how.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-5};
+    how.recipe = (recipe){.source = &source_pairs, .rays = 256, .accuracy = 7e-5};
     ck_assert_int_eq(ray_rows_create(&s.m, &how, &none, &error), LAM_ERR_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(error.message, "pairs"));
     ck_assert_ptr_null(none);
@@ -289,7 +290,7 @@ START_TEST(operators_are_as_good) {
     lam_operator *ops[2] = {NULL, NULL};
     double(*centre)[3] = test_allocate(n, sizeof *centre), sums[2] = {0, 0};
     float *rho = test_allocate(n, sizeof *rho);
-    finer.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 4096, .accuracy = 7e-5, .seed = 9};
+    finer.recipe = (recipe){.source = &source_pairs, .rays = 4096, .accuracy = 7e-5, .seed = 9};
     ck_ok(form_factors_make(&s.m, s.order, &s.how, &held, &error));
     ck_ok(form_factors_make(&s.m, s.order, &finer, &fine, &error));
     for (size_t i = 0; i < n; i++) mesh_centroid(&s.m, i, centre[i]);

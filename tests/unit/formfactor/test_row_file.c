@@ -1,5 +1,6 @@
 /* Rows as they are found: packed, kept in a scratch folder, continued. */
 #include "solver/formfactor/rows/row_file.h"
+#include "solver/formfactor/source.h"
 #include "support/box.h"
 #include "support/found.h"
 #include "support/scene.h"
@@ -56,7 +57,7 @@ enum { BLOCK_ROWS = 8, FILE_ROWS = 43 };
 
 static row_file_contents contents_of(const square *s) {
     return (row_file_contents){.geometry = "0123456789abcdef0123456789abcdef",
-                               .recipe = {.method = RECIPE_RAYS, .rays = 512, .seed = 9},
+                               .recipe = {.source = &source_rays, .rays = 512, .seed = 9},
                                .n = s->n,
                                .block_rows = BLOCK_ROWS,
                                .kind = s->found.kind};
@@ -276,8 +277,8 @@ static bool stop_later(void *context) {
     return --*left < 0;
 }
 
-static const recipe recipes[] = {{.method = RECIPE_RAYS, .rays = 1 << 15, .seed = 3},
-                                 {.method = RECIPE_HEMICUBE, .resolution = 100}};
+static const recipe recipes[] = {{.source = &source_rays, .rays = 1 << 15, .seed = 3},
+                                 {.source = &source_hemicube, .resolution = 100}};
 
 /* Stopped again and again, with another number of threads each time, on a full disk in between: the same bits
  * as in memory and undisturbed. */
@@ -339,7 +340,7 @@ START_TEST(continued_pairs_have_the_same_bits) {
     form_factors plain = {0}, kept = {0};
     int left = 0, runs = 0;
     const progress stopping = {.cancelled = stop_later, .context = &left};
-    form_factor_options how = {.recipe = {.method = RECIPE_PAIRS, .rays = 64, .accuracy = 1e-3, .seed = 3}};
+    form_factor_options how = {.recipe = {.source = &source_pairs, .rays = 64, .accuracy = 1e-3, .seed = 3}};
     for (uint32_t i = 0; i < m.n; i++) order[i] = (i * 5 + 1) % (uint32_t)m.n;
     ck_assert_msg(form_factors_make(&m, order, &how, &plain, &error) == LAM_OK, "%s", error.message);
     how.progress = &stopping;

@@ -3,6 +3,7 @@
 #include "solver/base/random.h"
 #include "solver/formfactor/exchange/pair_factor.h"
 #include "solver/formfactor/exchange/pair_far.h"
+#include "solver/formfactor/source.h"
 #include "solver/scene/plane.h"
 #include "support/blocks.h"
 #include "support/box.h"
@@ -246,7 +247,7 @@ static double *factors_of(const mesh *m, const recipe *r, double *absorbed) {
     form_factors f = {0};
     *absorbed = 0;
     for (uint32_t i = 0; i < m->n; i++) order[i] = i;
-    if (r->method == RECIPE_BLOCKS) {
+    if (recipe_source(r) == &source_blocks) {
         plane_tree tree;
         block_factors blocks = blocks_of(m, &tree, blocks_open, blocks_shadow, NULL);
         double *x = calloc(m->n, sizeof *x), *y = calloc(m->n, sizeof *y);
@@ -272,11 +273,11 @@ static double *factors_of(const mesh *m, const recipe *r, double *absorbed) {
     return F;
 }
 
-static const recipe recipes[] = {{.method = RECIPE_PAIRS, .rays = 64, .accuracy = 7e-5, .seed = 1},
-                                 {.method = RECIPE_NEAR_PAIRS, .rays = 128, .accuracy = 7e-5, .seed = 2},
-                                 {.method = RECIPE_RAYS, .rays = 256, .seed = 3},
-                                 {.method = RECIPE_HEMICUBE, .resolution = 32, .seed = 4},
-                                 {.method = RECIPE_BLOCKS}};
+static const recipe recipes[] = {{.source = &source_pairs, .rays = 64, .accuracy = 7e-5, .seed = 1},
+                                 {.source = &source_near_pairs, .rays = 128, .accuracy = 7e-5, .seed = 2},
+                                 {.source = &source_rays, .rays = 256, .seed = 3},
+                                 {.source = &source_hemicube, .resolution = 32, .seed = 4},
+                                 {.source = &source_blocks}};
 enum { RECIPES = sizeof recipes / sizeof *recipes };
 
 /* The number of the sheet that an element is of. */
@@ -299,19 +300,20 @@ static void check_sheets(int kind, double half, int decimals, const recipe *r) {
             sum += m.area[i] * F[i * m.n + j];
             if (cosine < -.9 && sheet_of(&m, i, half) == sheet_of(&m, j, half))
                 ck_assert_msg(F[i * m.n + j] == 0, "kind %d, %d decimals, %s: %zu sees %zu, %g", kind,
-                              decimals, recipe_name(r->method), i, j, F[i * m.n + j]);
+                              decimals, recipe_name(r), i, j, F[i * m.n + j]);
         }
     for (size_t k = 0; k < fine.n * fine.n; k++) wanted += fine.area[k / fine.n] * G[k];
     /* Light between sheets, and what meets backs, are those of the same sheets with all decimals. Backs are
      * met through slits at edges that rounding leaves: 4 sides of 2 times 2 units of the last decimal, in
      * areas of 4 half^2. Turned sheets have corners that show their backs. Rays count hits: with a fifth of
      * `rays` an element in both, the ratio errs by (2 / hits)^1/2, of which four times is allowed. */
-    const double hits = r->method == RECIPE_PAIRS || r->method == RECIPE_BLOCKS || r->rays == 0
-                            ? 1e6
-                            : .2 * (double)(m.n * r->rays);
+    const double hits =
+        recipe_source(r) == &source_pairs || recipe_source(r) == &source_blocks || r->rays == 0
+            ? 1e6
+            : .2 * (double)(m.n * r->rays);
     ck_assert_msg(fabs(sum / wanted - 1) <= .01 + 4 * sqrt(2 / hits),
-                  "kind %d, half %g, %d decimals, %s: %g of %g", kind, half, decimals, recipe_name(r->method),
-                  sum, wanted);
+                  "kind %d, half %g, %d decimals, %s: %g of %g", kind, half, decimals, recipe_name(r), sum,
+                  wanted);
     ck_assert_double_le(absorbed, of_fine + .001 + (kind == TURNED ? .01 : 0));
     free(F);
     free(G);

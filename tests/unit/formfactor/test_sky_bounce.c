@@ -1,5 +1,6 @@
 /* The first bounce of a sky against closed forms, and the balance of every row. */
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/source.h"
 #include "support/blocks.h"
 #include "support/box.h"
 #include "support/plates.h"
@@ -143,7 +144,7 @@ END_TEST
 /* A pixel counts for the tile that its centre meets: a tile is off by at most what lies within half a pixel's
  * diagonal, an angle of sqrt(2)/resolution, of its border. */
 START_TEST(hemicube_of_a_level_plate) {
-    const recipe how = {.method = RECIPE_HEMICUBE, .resolution = 256};
+    const recipe how = {.source = &source_hemicube, .resolution = 256};
     mesh m = tilted_plate(0);
     form_factors f = trace(&m, &how, "tregenza", 0);
     ck_assert_double_eq_tol(uniform_sky(&f, 0), M_PI, rounded);
@@ -183,8 +184,8 @@ START_TEST(back_faces_take_their_share) {
 END_TEST
 
 static const recipe ways[] = {{.rays = 1024, .seed = 5},
-                              {.method = RECIPE_HEMICUBE, .resolution = 32},
-                              {.method = RECIPE_PAIRS, .rays = 1024, .accuracy = 1e-4, .seed = 5}};
+                              {.source = &source_hemicube, .resolution = 32},
+                              {.source = &source_pairs, .rays = 1024, .accuracy = 1e-4, .seed = 5}};
 enum { N_WAYS = sizeof ways / sizeof ways[0] };
 
 /* A box without a lid, four cells a face, and a slab of two faces in it; and where nobody sees their backs,
@@ -272,7 +273,7 @@ static form_factors trace_blocks(const mesh *m, const char *sky, double albedo, 
     lam_error error = {0};
     form_factors f = {0};
     const form_factor_options options = {
-        .recipe = {.method = RECIPE_BLOCKS, .rays = 1024, .accuracy = 1e-4, .seed = 5},
+        .recipe = {.source = &source_blocks, .rays = 1024, .accuracy = 1e-4, .seed = 5},
         .sky = sky,
         .ground_albedo = albedo};
     ck_ok(mesh_z_order(m, order, &error));

@@ -1,5 +1,6 @@
 /* The upper triangle: merged from packed rows, expanded to rows and gathered again, through a store. */
 #include "solver/formfactor/rows/upper.h"
+#include "solver/formfactor/source.h"
 #include "support/box.h"
 #include "support/scene.h"
 #include "support/square.h"
@@ -85,7 +86,7 @@ static form_factors make_upper(const mesh *m, bool upper) {
     uint32_t order[96];
     form_factors f = {0};
     lam_error error = {0};
-    const form_factor_options how = {.recipe = {.method = RECIPE_RAYS, .rays = 2000, .seed = 4},
+    const form_factor_options how = {.recipe = {.source = &source_rays, .rays = 2000, .seed = 4},
                                      .upper = upper};
     for (uint32_t i = 0; i < 96; i++) order[i] = i;
     ck_assert_msg(form_factors_make(m, order, &how, &f, &error) == LAM_OK, "%s", error.message);

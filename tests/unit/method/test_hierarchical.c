@@ -1,6 +1,7 @@
 /* The hierarchical operator of boxes with exact form factors: how near it comes, and what it says of itself.
  */
 #include "solver/base/random.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/reference.h"
 #include "solver/operator/hierarchical.h"
 #include "solver/precompute/forecast.h"
@@ -40,7 +41,7 @@ START_TEST(epsilon_is_what_it_costs) {
         const build_options how = options_with("hierarchical", epsilons[k]);
         const forecast f = {.n = n,
                             .n_channels = 1,
-                            .recipe = {.method = RECIPE_PAIRS},
+                            .recipe = {.source = &source_pairs},
                             .method = method_find("hierarchical"),
                             .build = &how};
         const forecast without = {.n = n, .n_channels = 1, .recipe = f.recipe};

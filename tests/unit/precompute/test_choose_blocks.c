@@ -1,6 +1,7 @@
 /* Blocks of clusters or pairs and rays: the choice by the cost of samples. */
 #include "solver/base/terminal.h"
 #include "solver/formfactor/blocks/blocks.h"
+#include "solver/formfactor/source.h"
 #include "solver/precompute/precompute_state.h"
 #include "support/building.h"
 #include "support/scene.h"
@@ -10,7 +11,7 @@
 
 /* The choice for a generated scene of about n elements, where the recipe so far is `other`. */
 typedef struct outcome {
-    recipe_method method;
+    const factor_source *source;
     double seconds;
 } outcome;
 
@@ -38,21 +39,21 @@ static outcome choose(const char *scene, size_t n, recipe other, int n_threads) 
     omp_set_num_threads(n_threads);
     ck_ok(state_choose_blocks(&state, method_find("hierarchical"), true, &error));
     omp_set_num_threads(before);
-    const outcome found = {state.recipe.method, state.cost.seconds};
+    const outcome found = {state.recipe.source, state.cost.seconds};
     block_scene_destroy(state.ready);
     mesh_free(&state.m);
     plane_tree_free(&state.tree);
     return found;
 }
 
-static const recipe all_pairs = {.method = RECIPE_PAIRS, .rays = RECIPE_RAYS_FEW, .accuracy = 7e-5},
-                    few_rays = {.method = RECIPE_RAYS, .rays = 256};
+static const recipe all_pairs = {.source = &source_pairs, .rays = RECIPE_RAYS_FEW, .accuracy = 7e-5},
+                    few_rays = {.source = &source_rays, .rays = 256};
 
 START_TEST(a_room_of_large_planes_gets_blocks) {
     const outcome one = choose("cornell", 4200, all_pairs, 1), three = choose("cornell", 4200, all_pairs, 3);
-    ck_assert_int_eq(one.method, RECIPE_BLOCKS);
+    ck_assert_ptr_eq(one.source, &source_blocks);
     ck_assert_double_gt(one.seconds, 0);
-    ck_assert_int_eq(three.method, RECIPE_BLOCKS);
+    ck_assert_ptr_eq(three.source, &source_blocks);
     ck_assert_double_eq(one.seconds, three.seconds);
 }
 END_TEST
@@ -60,20 +61,20 @@ END_TEST
 /* Its planes have three elements each, and all sorts of houses stand between them: its blocks cost many times
  * as much as its rays. */
 START_TEST(a_city_does_not) {
-    ck_assert_int_eq(choose("city", 4200, few_rays, 2).method, RECIPE_RAYS);
+    ck_assert_ptr_eq(choose("city", 4200, few_rays, 2).source, &source_rays);
 }
 END_TEST
 
 /* The city has 4.6 elements in a plane. */
 START_TEST(small_scenes_get_blocks) {
-    ck_assert_int_eq(choose("cornell", 1200, all_pairs, 1).method, RECIPE_BLOCKS);
-    ck_assert_int_eq(choose("city", 1500, all_pairs, 1).method, RECIPE_BLOCKS);
+    ck_assert_ptr_eq(choose("cornell", 1200, all_pairs, 1).source, &source_blocks);
+    ck_assert_ptr_eq(choose("city", 1500, all_pairs, 1).source, &source_blocks);
 }
 END_TEST
 
 START_TEST(a_smaller_scene_is_not_weighed) {
     const outcome found = choose("cornell", 900, all_pairs, 1);
-    ck_assert_int_eq(found.method, RECIPE_PAIRS);
+    ck_assert_ptr_eq(found.source, &source_pairs);
     ck_assert_double_eq(found.seconds, 0);
 }
 END_TEST

@@ -1,4 +1,5 @@
 /* The line about a large error: when there is one, about which emission, and with which option. */
+#include "solver/formfactor/source.h"
 #include "solver/precompute/error_advice.h"
 #include "support/suite.h"
 
@@ -19,10 +20,10 @@ static void advice_of(recipe r, double lights, double of_lights, double random, 
     error_advice(&input, text);
 }
 
-static const recipe rays = {.method = RECIPE_RAYS, .rays = 1024},
-                    pairs = {.method = RECIPE_PAIRS, .rays = 256},
-                    blocks = {.method = RECIPE_BLOCKS, .rays = 8}, cubes = {.method = RECIPE_HEMICUBE},
-                    near = {.method = RECIPE_NEAR_PAIRS, .rays = 512};
+static const recipe rays = {.source = &source_rays, .rays = 1024},
+                    pairs = {.source = &source_pairs, .rays = 256},
+                    blocks = {.source = &source_blocks, .rays = 8}, cubes = {.source = &source_hemicube},
+                    near = {.source = &source_near_pairs, .rays = 512};
 
 START_TEST(a_small_error_needs_none) {
     char text[ERROR_ADVICE_BYTES];

@@ -1,17 +1,18 @@
 /* Forecasts: bounds hold for what is really made, and what does not fit is refused with what would. */
 #include "solver/formfactor/rays/hemicube.h"
 #include "solver/formfactor/rays/rays.h"
+#include "solver/formfactor/source.h"
 #include "solver/precompute/forecast.h"
 #include "support/box.h"
 #include "support/building.h"
 #include "support/scene.h"
 #include "support/suite.h"
 
-static const recipe recipes[] = {{.method = RECIPE_RAYS, .rays = 16, .seed = 1},
-                                 {.method = RECIPE_RAYS, .rays = 300, .seed = 1},
-                                 {.method = RECIPE_RAYS, .rays = 20000, .seed = 1},
-                                 {.method = RECIPE_HEMICUBE, .resolution = 16},
-                                 {.method = RECIPE_HEMICUBE, .resolution = 64}};
+static const recipe recipes[] = {{.source = &source_rays, .rays = 16, .seed = 1},
+                                 {.source = &source_rays, .rays = 300, .seed = 1},
+                                 {.source = &source_rays, .rays = 20000, .seed = 1},
+                                 {.source = &source_hemicube, .resolution = 16},
+                                 {.source = &source_hemicube, .resolution = 64}};
 
 /* A file of all rows, and a store of them, are no larger than forecast, and not much smaller. */
 START_TEST(files_are_within_the_forecast) {
@@ -31,7 +32,7 @@ START_TEST(files_are_within_the_forecast) {
     ck_assert_int_eq(scratch_open(folder, &kept, &error), LAM_OK);
     ck_assert_int_eq(visibility_create(&m, &v, &error), LAM_OK);
     const form_factor_options how = {.recipe = recipes[_i], .scratch = kept, .scratch_name = "a.rows"};
-    if (how.recipe.method == RECIPE_HEMICUBE) {
+    if (recipe_source(&how.recipe) == &source_hemicube) {
         ck_assert_int_eq(hemicube_create(how.recipe.resolution, &h, &error), LAM_OK);
         ck_assert_int_eq(hemicube_trace(&h, &m, v, order, &how, &rows, leaving, absorbed, &error), LAM_OK);
     } else {
@@ -60,7 +61,7 @@ START_TEST(fewer_bits_take_less_of_the_disk) {
     set_number(&how, "rank", 100);
     forecast f = {.n = 5000,
                   .n_channels = 1,
-                  .recipe = {.method = RECIPE_RAYS, .rays = 512},
+                  .recipe = {.source = &source_rays, .rays = 512},
                   .method = method_find("low-rank"),
                   .build = &how};
     const double single = forecast_store_bytes(&f), all = 2. * 5000 * 100;
@@ -85,7 +86,7 @@ START_TEST(kept_blocks_have_room) {
     for (size_t k = 0; k < sizeof measured / sizeof *measured; k++) {
         forecast f = {.n = measured[k].n,
                       .n_channels = 1,
-                      .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
+                      .recipe = {.source = &source_blocks, .rays = 16, .accuracy = 4e-4},
                       .method = method_find("hierarchical"),
                       .build = &how};
         const double without = forecast_store_bytes(&f);
@@ -109,12 +110,12 @@ START_TEST(the_judge_of_blocks_takes_as_long) {
     for (size_t k = 0; k < sizeof measured / sizeof *measured; k++) {
         forecast f = {.n = measured[k].n,
                       .n_channels = 1,
-                      .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
-                      .judge_recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 2e-4},
+                      .recipe = {.source = &source_blocks, .rays = 16, .accuracy = 4e-4},
+                      .judge_recipe = {.source = &source_blocks, .rays = 16, .accuracy = 2e-4},
                       .cost = {.seconds = measured[k].blocks, .measured = measured[k].blocks},
                       .probes = 200,
                       .probes_least = 32};
-        f.cost.entries = 2 * forecast_blocks((double)f.n, &f.recipe);
+        f.cost.entries = 2 * source_blocks.blocks((double)f.n, &f.recipe);
         const forecast_times times = forecast_seconds(&f, &rates);
         ck_assert_double_eq(times.form_factors,
                             measured[k].blocks + (double)f.n * (double)f.recipe.rays * rates.ray_seconds);
@@ -140,8 +141,8 @@ START_TEST(the_operator_takes_as_long) {
     for (size_t k = 0; k < sizeof measured / sizeof *measured; k++) {
         const forecast f = {.n = (size_t)measured[k].n,
                             .n_channels = (size_t)measured[k].n_channels,
-                            .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
-                            .judge_recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 2e-4},
+                            .recipe = {.source = &source_blocks, .rays = 16, .accuracy = 4e-4},
+                            .judge_recipe = {.source = &source_blocks, .rays = 16, .accuracy = 2e-4},
                             .cost = {.measured = 1, .entries = 2 * measured[k].blocks},
                             .method = method_find("hierarchical"),
                             .build = &how};
@@ -162,8 +163,8 @@ START_TEST(small_planes_take_longer_where_light_stays) {
     forecast f = {.n = 99021,
                   .n_channels = 3,
                   .n_planes = 73486,
-                  .recipe = {.method = RECIPE_RAYS, .rays = 1024},
-                  .judge_recipe = {.method = RECIPE_RAYS, .rays = 512},
+                  .recipe = {.source = &source_rays, .rays = 1024},
+                  .judge_recipe = {.source = &source_rays, .rays = 512},
                   .cost = {.seconds = 34, .measured = 34, .entries = 2.1e7, .hits = .93},
                   .method = method_find("hierarchical"),
                   .build = &how,
@@ -192,8 +193,8 @@ END_TEST
 START_TEST(probes_have_a_budget) {
     forecast f = {.n = 99021,
                   .n_channels = 3,
-                  .recipe = {.method = RECIPE_RAYS, .rays = 1024},
-                  .judge_recipe = {.method = RECIPE_RAYS, .rays = 512},
+                  .recipe = {.source = &source_rays, .rays = 1024},
+                  .judge_recipe = {.source = &source_rays, .rays = 512},
                   .probes = 200,
                   .probes_least = 32};
     const size_t some = forecast_probes(&f);
@@ -215,8 +216,8 @@ START_TEST(probes_have_a_budget) {
     ck_assert_uint_eq(forecast_probes(&f), 200);
     f = (forecast){.n = 163811,
                    .n_channels = 1,
-                   .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
-                   .judge_recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 2e-4},
+                   .recipe = {.source = &source_blocks, .rays = 16, .accuracy = 4e-4},
+                   .judge_recipe = {.source = &source_blocks, .rays = 16, .accuracy = 2e-4},
                    .cost = {.seconds = 3.6},
                    .probes = 200,
                    .probes_least = 32};
@@ -241,7 +242,7 @@ START_TEST(more_work_takes_longer) {
     ck_assert_double_eq(forecast_seconds(&f, &slow).solves, 2 * forecast_seconds(&f, &rates).solves);
     ck_assert_double_eq(forecast_wall_seconds(3, &rates), 1.5);
     /* The pace of a sample, where one was taken, in place of constants. */
-    f.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 16, .accuracy = 1e-4};
+    f.recipe = (recipe){.source = &source_pairs, .rays = 16, .accuracy = 1e-4};
     f.cost = (factor_cost){.seconds = 1, .measured = 7, .entries = 1e6};
     ck_assert_double_eq(forecast_seconds(&f, &rates).form_factors, 7);
     f.from_store = true;

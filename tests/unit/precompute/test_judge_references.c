@@ -1,6 +1,7 @@
 /* References of a judge that stay for another operator of the same scene: figures are those of new
  * references, bit by bit, of samples of rays, of pairs with the same disturbed, and of finer blocks; and they
  * are made anew for another recipe. The scene has two lights, in channels of their own. */
+#include "solver/formfactor/source.h"
 #include "solver/precompute/judging.h"
 #include "support/building.h"
 #include "support/scene.h"
@@ -27,7 +28,7 @@ static void subject_make(subject *s, const recipe *r) {
     const generate_options how = {
         .kind = "cornell", .elements = 500, .seed = 1, .reflectance = -1, .closed = true, .terrain = "flat"};
     const form_factor_options of = {.recipe = *r, .stage = ""};
-    const bool blocks = r->method == RECIPE_BLOCKS;
+    const bool blocks = recipe_source(r) == &source_blocks;
     build_report report;
     *s = (subject){.m = generate_good(&how)};
     s->order = malloc(s->m.n * sizeof *s->order);
@@ -114,9 +115,9 @@ static void assert_same(const error_group *a, const error_group *b) {
 static const struct {
     const char *name;
     recipe of;
-} cases[] = {{"rays", {.method = RECIPE_RAYS, .rays = RAYS, .seed = 7}},
-             {"pairs", {.method = RECIPE_PAIRS, .rays = RAYS, .accuracy = 1e-2, .seed = 7}},
-             {"blocks", {.method = RECIPE_BLOCKS, .rays = RAYS, .accuracy = 4e-3, .seed = 7}}};
+} cases[] = {{"rays", {.source = &source_rays, .rays = RAYS, .seed = 7}},
+             {"pairs", {.source = &source_pairs, .rays = RAYS, .accuracy = 1e-2, .seed = 7}},
+             {"blocks", {.source = &source_blocks, .rays = RAYS, .accuracy = 4e-3, .seed = 7}}};
 
 START_TEST(references_serve_the_next_operator) {
     subject *s = malloc(sizeof *s);

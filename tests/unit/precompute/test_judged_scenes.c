@@ -2,6 +2,7 @@
  * and bounds against the truth, by a reference of many rays. Rooms, a soup, a city, and a scene in which some
  * elements see next to nothing, so that their references are all noise. */
 #include "solver/base/random.h"
+#include "solver/formfactor/source.h"
 #include "solver/precompute/judging.h"
 #include "support/building.h"
 #include "support/scene.h"
@@ -144,15 +145,15 @@ static void check_scene(const char *kind, const recipe *r, const recipe *of_trut
 
 START_TEST(noise_by_rays_is_the_spread_of_seeds) {
     static const char *const kinds[] = {"cornell", "rooms", "canopy", "city", "dark"};
-    const recipe r = {.method = RECIPE_RAYS, .rays = RAYS, .seed = 1};
-    const recipe of_truth = {.method = RECIPE_RAYS, .rays = RAYS_OF_TRUTH, .seed = 1};
+    const recipe r = {.source = &source_rays, .rays = RAYS, .seed = 1};
+    const recipe of_truth = {.source = &source_rays, .rays = RAYS_OF_TRUTH, .seed = 1};
     check_scene(kinds[_i], &r, &of_truth);
 }
 END_TEST
 
 /* Both samples share the pairs that are projected. */
 START_TEST(noise_by_pairs_is_the_spread_of_seeds) {
-    const recipe r = {.method = RECIPE_PAIRS, .rays = RECIPE_RAYS_FEW, .accuracy = 2e-3, .seed = 1};
+    const recipe r = {.source = &source_pairs, .rays = RECIPE_RAYS_FEW, .accuracy = 2e-3, .seed = 1};
     recipe of_truth = r;
     of_truth.accuracy = 2e-5;
     check_scene("cornell", &r, &of_truth);

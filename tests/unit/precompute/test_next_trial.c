@@ -1,6 +1,7 @@
 /* The trials of --epsilon and --group-error: which operator and form factors stay, and when they end.
  * Operators and form factors are real, errors are made up. */
 #include "solver/base/terminal.h"
+#include "solver/formfactor/source.h"
 #include "solver/precompute/precompute_state.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -24,7 +25,7 @@ static void begin(precompute_options *options, terminal *t, precompute_state *st
     state->memory = 1e12;
     state->probes = 1;
     state->expected = method_find("hierarchical");
-    state->recipe = (recipe){.method = RECIPE_RAYS, .rays = 256, .seed = 1};
+    state->recipe = (recipe){.source = &source_rays, .rays = 256, .seed = 1};
     state->trial.asked = asked;
     state->m = generate_good(&how);
     state->order = memory_allocate(state->m.n, sizeof *state->order, "order", &error);
@@ -158,7 +159,7 @@ START_TEST(the_preset_is_kept_by_the_threshold) {
     precompute_state state;
     begin(&options, &t, &state);
     state.trial.asked = 0;
-    state.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-4, .seed = 1};
+    state.recipe = (recipe){.source = &source_pairs, .rays = 256, .accuracy = 1e-4, .seed = 1};
     const recipe pairs = state.recipe;
     make(&state, .04, .039);
     const double epsilon = state.trial.epsilon, *sums = state.f.row_sums;
@@ -167,7 +168,7 @@ START_TEST(the_preset_is_kept_by_the_threshold) {
     ck_assert_double_eq_tol(state.trial.epsilon,
                             epsilon * pow(sqrt(.027 * .027 - (.04 * .04 - .039 * .039)) / .039, 1 / .6),
                             1e-9);
-    ck_assert(!trial_recipes_differ(&state.recipe, &pairs));
+    ck_assert(!recipes_differ(&state.recipe, &pairs));
     ck_assert_ptr_eq(state.f.row_sums, sums);
     make(&state, .02, .01);
     ck_assert(!state_next_trial(&state));
@@ -187,7 +188,7 @@ START_TEST(the_preset_has_no_other_trials) {
     precompute_state state;
     begin(&options, &t, &state);
     state.trial.asked = 0;
-    if (_i < 2) state.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-4, .seed = 1};
+    if (_i < 2) state.recipe = (recipe){.source = &source_pairs, .rays = 256, .accuracy = 1e-4, .seed = 1};
     make(&state, errors[_i][0], errors[_i][1]);
     ck_assert_int_eq(state_may_try_again(&state), _i < 2);
     ck_assert(!state_next_trial(&state));

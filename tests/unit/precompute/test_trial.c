@@ -1,4 +1,5 @@
 /* The knobs of --epsilon: which is turned after a trial, and by how much. */
+#include "solver/formfactor/source.h"
 #include "solver/precompute/trial.h"
 #include "support/suite.h"
 
@@ -6,12 +7,12 @@
 #include <string.h>
 
 static const trial_limits free_knobs = {.rays = true, .accuracy = true, .finest = 7e-6};
-static const trial_knobs of_rays = {.epsilon = .01, .recipe = {.method = RECIPE_RAYS, .rays = 512}},
-                         of_near = {.epsilon = .01, .recipe = {.method = RECIPE_NEAR_PAIRS, .rays = 512}},
+static const trial_knobs of_rays = {.epsilon = .01, .recipe = {.source = &source_rays, .rays = 512}},
+                         of_near = {.epsilon = .01, .recipe = {.source = &source_near_pairs, .rays = 512}},
                          of_pairs = {.epsilon = .01,
-                                     .recipe = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-5}},
+                                     .recipe = {.source = &source_pairs, .rays = 256, .accuracy = 7e-5}},
                          of_blocks = {.epsilon = .01,
-                                      .recipe = {.method = RECIPE_BLOCKS, .rays = 8, .accuracy = 8e-5}};
+                                      .recipe = {.source = &source_blocks, .rays = 8, .accuracy = 8e-5}};
 
 static trial_errors parts(double compression, double factors) {
     return (trial_errors){
@@ -35,8 +36,10 @@ END_TEST
 static double predicted(const trial_errors *e, const trial_knobs *from, const trial_knobs *to) {
     const double C = e->compression * pow(to->epsilon / from->epsilon, .6);
     double F = e->factors * pow((double)to->recipe.rays / (double)from->recipe.rays, -.5);
-    if (from->recipe.method == RECIPE_PAIRS) F *= pow(to->recipe.accuracy / from->recipe.accuracy, .65);
-    if (from->recipe.method == RECIPE_BLOCKS) F *= sqrt(to->recipe.accuracy / from->recipe.accuracy);
+    if (recipe_source(&from->recipe) == &source_pairs)
+        F *= pow(to->recipe.accuracy / from->recipe.accuracy, .65);
+    if (recipe_source(&from->recipe) == &source_blocks)
+        F *= sqrt(to->recipe.accuracy / from->recipe.accuracy);
     return hypot(C, F);
 }
 
@@ -64,7 +67,7 @@ START_TEST(only_the_larger_part_is_turned) {
     trial_knobs next;
     ck_assert(trial_turn(.01, &compressed, &free_knobs, &of_pairs, &next));
     ck_assert_double_lt(next.epsilon, of_pairs.epsilon);
-    ck_assert(!trial_recipes_differ(&next.recipe, &of_pairs.recipe));
+    ck_assert(!recipes_differ(&next.recipe, &of_pairs.recipe));
     ck_assert(trial_turn(.01, &noisy, &free_knobs, &of_pairs, &next));
     ck_assert_double_eq(next.epsilon, of_pairs.epsilon);
     ck_assert_double_lt(next.recipe.accuracy, of_pairs.recipe.accuracy);
@@ -83,7 +86,7 @@ START_TEST(noise_leaves_rays_alone) {
     ck_assert_uint_eq(next.recipe.rays, 8192); /* 512 (.03 / .009)^2 = 5,689 */
     const trial_limits given = {.rays = false, .accuracy = true};
     ck_assert(!trial_turn(.01, &e, &given, &of_rays, &next));
-    ck_assert(!trial_recipes_differ(&next.recipe, &of_rays.recipe));
+    ck_assert(!recipes_differ(&next.recipe, &of_rays.recipe));
 }
 END_TEST
 
@@ -95,7 +98,7 @@ START_TEST(a_part_that_stays) {
     ck_assert(!trial_turn(.01, &noisy, &none, &of_pairs, &next));
     ck_assert(!trial_turn(.01, &small, &none, &of_pairs, &next)); /* below half of it: no use */
     ck_assert(trial_turn(.01, &large, &none, &of_pairs, &next));
-    ck_assert(!trial_recipes_differ(&next.recipe, &of_pairs.recipe));
+    ck_assert(!recipes_differ(&next.recipe, &of_pairs.recipe));
     ck_assert_double_le(predicted(&large, &of_pairs, &next), .009 * (1 + 1e-12));
     /* Nor is compression pushed below half of an error of form factors that is too large by itself. */
     const trial_errors hopeless = parts(.03, .02);
@@ -164,7 +167,7 @@ START_TEST(knobs_have_limits) {
     finest.recipe.accuracy = free_knobs.finest;
     const trial_errors coarse = parts(.001, .02);
     ck_assert(!trial_turn(.01, &coarse, &free_knobs, &finest, &next));
-    const trial_knobs cubes = {.epsilon = .01, .recipe = {.method = RECIPE_HEMICUBE, .resolution = 64}};
+    const trial_knobs cubes = {.epsilon = .01, .recipe = {.source = &source_hemicube, .resolution = 64}};
     ck_assert(!trial_turn(.01, &coarse, &free_knobs, &cubes, &next));
 }
 END_TEST

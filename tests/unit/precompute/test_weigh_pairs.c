@@ -1,5 +1,6 @@
 /* All pairs, near pairs or rays: the choice by the cost of a sample. */
 #include "solver/base/terminal.h"
+#include "solver/formfactor/source.h"
 #include "solver/precompute/precompute_state.h"
 #include "support/building.h"
 #include "support/scene.h"
@@ -15,7 +16,7 @@ typedef struct outcome {
 } outcome;
 
 static outcome weigh_kept(const char *scene, size_t n, const char *quality, int n_threads,
-                          recipe_method method, double memory, const char *keep) {
+                          const factor_source *source, double memory, const char *keep) {
     lam_error error = {0};
     terminal t;
     const generate_options how = {.kind = scene, .elements = n, .seed = 1, .reflectance = -1};
@@ -27,7 +28,7 @@ static outcome weigh_kept(const char *scene, size_t n, const char *quality, int 
     precompute_state state = {
         .options = &options, .t = &t, .expected = method_find("hierarchical"), .memory = memory};
     state.recipe =
-        (recipe){.method = method, .rays = method == RECIPE_PAIRS ? RECIPE_RAYS_FEW : 512, .accuracy = 7e-5};
+        (recipe){.source = source, .rays = source == &source_pairs ? RECIPE_RAYS_FEW : 512, .accuracy = 7e-5};
     terminal_open(&t, "test", true, false);
     state.progress = terminal_progress(&t);
     state.m = generate_good(&how);
@@ -41,12 +42,12 @@ static outcome weigh_kept(const char *scene, size_t n, const char *quality, int 
 }
 
 static outcome weigh_recipe(const char *scene, size_t n, const char *quality, int n_threads,
-                            recipe_method method, double memory) {
-    return weigh_kept(scene, n, quality, n_threads, method, memory, NULL);
+                            const factor_source *source, double memory) {
+    return weigh_kept(scene, n, quality, n_threads, source, memory, NULL);
 }
 
 static outcome weigh(const char *scene, size_t n, const char *quality, int n_threads) {
-    return weigh_recipe(scene, n, quality, n_threads, RECIPE_PAIRS, 1e15);
+    return weigh_recipe(scene, n, quality, n_threads, &source_pairs, 1e15);
 }
 
 /* Leaves of a canopy hide one another everywhere: their pairs cost a minute and a half, rays nine seconds. */
@@ -78,7 +79,7 @@ END_TEST
 /* Pairs that are as coarse as an operator allows are worth less than those that are kept. */
 START_TEST(kept_pairs_may_take_longer) {
     const outcome coarse = weigh("canopy", 2500, "normal", 2),
-                  kept = weigh_kept("canopy", 2500, "normal", 2, RECIPE_PAIRS, 1e15, "");
+                  kept = weigh_kept("canopy", 2500, "normal", 2, &source_pairs, 1e15, "");
     ck_assert_double_gt(kept.seconds, 8);
     ck_assert_double_lt(kept.seconds, 16);
     ck_assert(coarse.dear);
@@ -106,9 +107,9 @@ END_TEST
  * nothing.
  */
 START_TEST(near_pairs_are_weighed_too) {
-    const outcome soup = weigh_recipe("canopy", 9000, "normal", 1, RECIPE_NEAR_PAIRS, 1e15),
-                  again = weigh_recipe("canopy", 9000, "normal", 3, RECIPE_NEAR_PAIRS, 1e15),
-                  room = weigh_recipe("cornell", 40000, "normal", 2, RECIPE_NEAR_PAIRS, 1e15);
+    const outcome soup = weigh_recipe("canopy", 9000, "normal", 1, &source_near_pairs, 1e15),
+                  again = weigh_recipe("canopy", 9000, "normal", 3, &source_near_pairs, 1e15),
+                  room = weigh_recipe("cornell", 40000, "normal", 2, &source_near_pairs, 1e15);
     ck_assert(soup.dear);
     ck_assert(soup.plain);
     ck_assert_uint_eq(soup.rays, 2 * 512);
@@ -123,8 +124,8 @@ END_TEST
 
 /* Where there is no memory for the rows of twice the rays, near pairs stay. */
 START_TEST(rays_in_place_of_near_pairs_must_fit) {
-    const outcome tight = weigh_recipe("canopy", 9000, "normal", 2, RECIPE_NEAR_PAIRS, 1e6),
-                  free = weigh_recipe("canopy", 9000, "normal", 2, RECIPE_NEAR_PAIRS, 1e15);
+    const outcome tight = weigh_recipe("canopy", 9000, "normal", 2, &source_near_pairs, 1e6),
+                  free = weigh_recipe("canopy", 9000, "normal", 2, &source_near_pairs, 1e15);
     ck_assert(!tight.dear);
     ck_assert_double_gt(tight.seconds, free.seconds);
     ck_assert(free.dear);
@@ -143,7 +144,7 @@ START_TEST(entries_of_rays_are_counted) {
                                   .elements = 1200,
                                   .seed = 1,
                                   .reflectance = -1};
-    const recipe rays = {.method = RECIPE_RAYS, .rays = 1024, .seed = 3};
+    const recipe rays = {.source = &source_rays, .rays = 1024, .seed = 3};
     const precompute_options options = {.form_factors = "auto"}, of_store = {.from_store = true};
     precompute_state state = {.options = &options, .m = generate_good(&how), .recipe = rays};
     const form_factor_options make = {.recipe = rays};
@@ -159,7 +160,7 @@ START_TEST(entries_of_rays_are_counted) {
     state.options = &of_store;
     ck_ok(state_count_entries(&state, &error));
     ck_assert_double_eq(state.cost.entries, truth);
-    state.recipe.method = RECIPE_PAIRS;
+    state.recipe.source = &source_pairs;
     state.cost.entries = 7;
     ck_ok(state_count_entries(&state, &error));
     ck_assert_double_eq(state.cost.entries, 7);

@@ -1,6 +1,7 @@
 /* Estimates by walks against closed forms and dense solves, their standard errors, and what they must notice.
  */
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/source.h"
 #include "solver/walk/walk.h"
 #include "support/box.h"
 #include "support/dense.h"
@@ -265,7 +266,7 @@ static double *precise_form_factors(const mesh *m, uint64_t seed) {
     uint32_t *order = test_allocate(m->n, sizeof *order);
     double *F = test_allocate(m->n * m->n, sizeof *F);
     const form_factor_options how = {
-        .recipe = {.method = RECIPE_PAIRS, .rays = 1024, .accuracy = 1e-4, .seed = seed}};
+        .recipe = {.source = &source_pairs, .rays = 1024, .accuracy = 1e-4, .seed = seed}};
     ck_ok(mesh_z_order(m, order, &error));
     ck_ok(form_factors_make(m, order, &how, &f, &error));
     for (size_t i = 0; i < m->n; i++)

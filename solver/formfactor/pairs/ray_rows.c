@@ -1,10 +1,11 @@
-#include "solver/formfactor/rays/ray_rows.h"
+#include "solver/formfactor/pairs/ray_rows.h"
 
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/rays/portals.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/rows/upper.h"
+#include "solver/formfactor/source.h"
 #include "solver/formfactor/visibility/parts.h"
 
 #include <math.h>
@@ -32,7 +33,7 @@ struct ray_rows {
 enum { NOISE_ELEMENTS = 1024, NOISE_RAYS = 64 };
 
 bool ray_rows_can(const recipe *r) {
-    return r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS;
+    return recipe_can(r, SOURCE_STREAM);
 }
 
 void ray_rows_destroy(ray_rows *r) {
@@ -95,7 +96,7 @@ lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ra
     r->f.recipe = options->recipe;
     if (!ray_rows_can(&options->recipe))
         FAIL(error, LAM_ERR_ARGUMENT, "form factors by %s do not come row by row",
-             recipe_name(options->recipe.method));
+             recipe_name(&options->recipe));
     TRY(recipe_check(&options->recipe, error));
     r->f.leaving = memory_allocate(n, sizeof *r->f.leaving, "form factors", error);
     r->f.absorbed = memory_allocate(n, sizeof *r->f.absorbed, "form factors", error);
@@ -114,7 +115,7 @@ lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ra
     r->f.n_aimed = r->aimed.n_openings;
     r->noise_share = find_noise_share(r);
     TRY(find_parts(r, error));
-    if (options->recipe.method == RECIPE_NEAR_PAIRS) {
+    if (recipe_can(&options->recipe, SOURCE_ACCURACY)) {
         TRY(pairs_find(m, r->v, options, recipe_near(&options->recipe), &r->f, &r->near, error));
         TRY(upper_expand(&r->near, m->area, r->near_sums, error));
     }

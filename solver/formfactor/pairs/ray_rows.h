@@ -1,7 +1,7 @@
 /* A stream of rows of form factors: each row is computed by rays when it is asked for, once, and not kept, so
  * that memory does not grow with rays. The consumer merges the two estimates of each pair. */
-#ifndef LAMBERT_FORMFACTOR_RAYS_RAY_ROWS_H
-#define LAMBERT_FORMFACTOR_RAYS_RAY_ROWS_H
+#ifndef LAMBERT_FORMFACTOR_PAIRS_RAY_ROWS_H
+#define LAMBERT_FORMFACTOR_PAIRS_RAY_ROWS_H
 
 #include "solver/formfactor/formfactor.h"
 #include "solver/linalg/row_source.h"

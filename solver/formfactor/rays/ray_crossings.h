@@ -1,6 +1,6 @@
 /* The work of casting rays in a scene, counted on a sample of them without a clock. */
-#ifndef LAMBERT_FORMFACTOR_PAIRS_RAY_CROSSINGS_H
-#define LAMBERT_FORMFACTOR_PAIRS_RAY_CROSSINGS_H
+#ifndef LAMBERT_FORMFACTOR_RAYS_RAY_CROSSINGS_H
+#define LAMBERT_FORMFACTOR_RAYS_RAY_CROSSINGS_H
 
 #include "solver/scene/mesh.h"
 

@@ -1,4 +1,4 @@
-#include "solver/formfactor/pairs/ray_crossings.h"
+#include "solver/formfactor/rays/ray_crossings.h"
 
 #include "solver/base/random.h"
 #include "solver/base/vector3.h"
