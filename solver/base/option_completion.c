@@ -34,12 +34,12 @@ static bool takes_file(const option_row *row) {
 }
 
 static bool takes_word(const option_row *row) {
-    return row->kind == OPTION_CHOICE;
+    return row->kind == OPTION_CHOICE || row->kind == OPTION_WORD;
 }
 
 /* A value of the next word: that of an optional one is in the same word. */
 static bool takes_next(const option_row *row) {
-    return row->kind != OPTION_FLAG && row->kind != OPTION_OPTIONAL;
+    return row->kind != OPTION_FLAG && !option_may_stand_alone(row);
 }
 
 static void bash_command(const option_command *command, const option_table *tables) {
@@ -100,7 +100,7 @@ static void bash_verbs(const option_command *program, const option_verb *verbs) 
 static void zsh_row(const option_row *row) {
     static const char escaped[] = "[]\\";
     if (row->kind == OPTION_LIST) putchar('*'); /* may be given again */
-    const char *equals = takes_next(row) ? "=" : row->kind == OPTION_OPTIONAL ? "=-" : "";
+    const char *equals = takes_next(row) ? "=" : option_may_stand_alone(row) ? "=-" : "";
     if (row->letter != 0)
         printf("'(-%c --%s)'{-%c%s,--%s%s}'[", row->letter, row->name, row->letter,
                takes_next(row) ? "+" : "", row->name, equals);
@@ -109,7 +109,7 @@ static void zsh_row(const option_row *row) {
     print_description(row->help, escaped);
     putchar(']');
     if (row->kind == OPTION_FLAG) return;
-    fputs(row->kind == OPTION_OPTIONAL ? "::value:" : ":value:", stdout);
+    fputs(option_may_stand_alone(row) ? "::value:" : ":value:", stdout);
     if (row->choices != NULL) {
         putchar('(');
         print_words(row->choices);

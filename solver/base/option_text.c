@@ -53,7 +53,7 @@ static void option_signature(const option_row *row, char out[TEXT_MOST]) {
     if (row->letter != 0) snprintf(letter, sizeof letter, "-%c, ", row->letter);
     if (argument == NULL)
         snprintf(out, TEXT_MOST, "%s--%s", letter, row->name);
-    else if (row->kind == OPTION_OPTIONAL)
+    else if (option_may_stand_alone(row))
         snprintf(out, TEXT_MOST, "%s--%s[=%s]", letter, row->name, argument);
     else
         snprintf(out, TEXT_MOST, "%s--%s=%s", letter, row->name, argument);

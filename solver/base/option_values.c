@@ -98,14 +98,27 @@ done:
     return status;
 }
 
-bool option_among(const char *word, const char *words) {
-    size_t length = strlen(word);
-    if (length == 0 || strchr(word, '|') != NULL) return false;
-    for (const char *rest = words; rest != NULL; rest = strchr(rest, '|')) {
-        if (*rest == '|') rest++;
-        if (strncmp(rest, word, length) == 0 && (rest[length] == '|' || rest[length] == '\0')) return true;
+unsigned option_place(const char *word, const char *words) {
+    const size_t length = strlen(word);
+    unsigned place = 0;
+    for (const char *at = words;; place++) {
+        const size_t n = strcspn(at, "|");
+        if (n == length && n > 0 && strncmp(at, word, n) == 0) return place;
+        if (at[n] == '\0') return place + 1;
+        at += n + 1;
     }
-    return false;
+}
+
+void option_word(unsigned place, const char *words, char word[OPTION_WORD_BYTES]) {
+    const char *at = words;
+    while (place-- > 0 && strchr(at, '|') != NULL) at = strchr(at, '|') + 1;
+    snprintf(word, OPTION_WORD_BYTES, "%.*s", (int)strcspn(at, "|"), at);
+}
+
+bool option_among(const char *word, const char *words) {
+    unsigned n = 1;
+    for (const char *c = words; *c != '\0'; c++) n += *c == '|';
+    return option_place(word, words) < n;
 }
 
 static lam_status limits_check(const option_row *row, const char *what, const char *text, double value,
@@ -185,6 +198,14 @@ lam_status option_read(const option_row *row, const char *text, void *field, lam
     case OPTION_CHOICE:
         TRY(choice_check(row, what, text, error));
         *(const char **)field = text;
+        break;
+    case OPTION_SWITCH:
+        if (text != NULL && text[0] != '\0') TRY(choice_check(row, what, text, error));
+        *(unsigned *)field = text == NULL || text[0] == '\0' ? 1 : 2 + option_place(text, row->choices);
+        break;
+    case OPTION_WORD:
+        TRY(choice_check(row, what, text, error));
+        *(unsigned *)field = option_place(text, row->choices);
         break;
     case OPTION_CUSTOM:
         TRY(row->parse(text, field, error));

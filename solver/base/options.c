@@ -144,7 +144,7 @@ static lam_status parse_option(const parser *p, int argc, char **argv, int *i, l
         if (word[2] != '\0') value = word + 2;
     }
     if (!takes_value(row) && value != NULL) FAIL(error, LAM_ERR_ARGUMENT, "--%s: takes no value", row->name);
-    if (takes_value(row) && row->kind != OPTION_OPTIONAL && value == NULL) {
+    if (takes_value(row) && !option_may_stand_alone(row) && value == NULL) {
         if (*i + 1 == argc) FAIL(error, LAM_ERR_ARGUMENT, "--%s: needs a value", row->name);
         value = argv[++*i];
     }

@@ -25,7 +25,10 @@ typedef enum option_kind {
     OPTION_COUNT_AUTO, /* the same, or the word auto */
     OPTION_SIZE,       /* uint64_t: bytes, with K, M, G or T for powers of 1024 */
     OPTION_CHOICE,     /* const char *, one of choices */
+    OPTION_WORD,       /* an enum: the place of the word among choices */
     OPTION_OPTIONAL,   /* const char *, one of choices; "" where the value is left out */
+    OPTION_SWITCH,     /* an enum: 1 where the value is left out, else 2 and on, by its place among choices; 0
+                          where the option is not given */
     OPTION_CUSTOM      /* the type that the row's parse fills */
 } option_kind;
 
@@ -127,5 +130,17 @@ lam_status option_read(const option_row *row, const char *text, void *field, lam
 
 /* True if word is one of the words of "a|b|c". */
 bool option_among(const char *word, const char *words);
+
+/* True where the value of an option may be left out. */
+static inline bool option_may_stand_alone(const option_row *row) {
+    return row->kind == OPTION_OPTIONAL || row->kind == OPTION_SWITCH;
+}
+
+/* The place of a word among the words of "a|b|c"; their number where it is none of them. */
+unsigned option_place(const char *word, const char *words);
+
+/* The word at a place, cut to fit. */
+enum { OPTION_WORD_BYTES = 32 };
+void option_word(unsigned place, const char *words, char word[OPTION_WORD_BYTES]);
 
 #endif

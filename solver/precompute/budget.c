@@ -16,9 +16,9 @@ enum { EPSILONS = sizeof epsilons / sizeof *epsilons, PAIRS_FROM = 2 };
 static const double error_of_blocks = .022, error_of_operator = .018, power = .6, error_of_ray = 9;
 /* The error that pairs add, and its power of their accuracy. */
 static const struct {
-    const char *quality;
+    factor_quality quality;
     double error;
-} qualities[] = {{"normal", 1e-3}, {"high", 1e-4}};
+} qualities[] = {{QUALITY_NORMAL, 1e-3}, {QUALITY_HIGH, 1e-4}};
 enum { QUALITIES = sizeof qualities / sizeof *qualities };
 static const double power_of_pairs = .65;
 
@@ -84,9 +84,12 @@ size_t budget_cheapest(const budget_recipe *list, size_t count) {
 }
 
 void budget_options(const budget_recipe *r, const char *method, bool probes, char text[BUDGET_TEXT]) {
-    char of_rays[32] = "", quality[32] = "", of_probes[32] = "";
+    char of_rays[32] = "", quality[OPTION_WORD_BYTES + 16] = "", of_probes[32] = "", word[OPTION_WORD_BYTES];
     if (r->rays > 0) snprintf(of_rays, sizeof of_rays, " --rays %" PRIu64, r->rays);
-    if (r->quality != NULL) snprintf(quality, sizeof quality, " --quality %s", r->quality);
+    if (r->kind == BUDGET_PAIRS) {
+        option_word(r->quality, precompute_quality_words, word);
+        snprintf(quality, sizeof quality, " --quality %s", word);
+    }
     if (probes) snprintf(of_probes, sizeof of_probes, " --probes %" PRIu64, r->probes);
     snprintf(text, BUDGET_TEXT, "--form-factors %s%s%s --method %s --epsilon %s --trials 1%s",
              r->kind == BUDGET_BLOCKS ? "blocks" : "rays", of_rays, quality, method, r->epsilon, of_probes);

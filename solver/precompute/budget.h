@@ -3,6 +3,8 @@
 #ifndef LAMBERT_PRECOMPUTE_BUDGET_H
 #define LAMBERT_PRECOMPUTE_BUDGET_H
 
+#include "solver/precompute/precompute.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -11,9 +13,9 @@ typedef enum budget_kind { BUDGET_BLOCKS, BUDGET_RAYS, BUDGET_PAIRS } budget_kin
 
 typedef struct budget_recipe {
     budget_kind kind;
-    uint64_t rays;       /* BUDGET_RAYS: from every element; else 0 */
-    const char *quality; /* BUDGET_PAIRS: the word of --quality; else NULL */
-    char epsilon[16];    /* as a command line has it */
+    uint64_t rays;          /* BUDGET_RAYS: from every element; else 0 */
+    factor_quality quality; /* BUDGET_PAIRS */
+    char epsilon[16];       /* as a command line has it */
     uint64_t probes;
     double error;   /* that single elements are expected to have, indirect */
     double seconds; /* on the wall, by the forecast; negative: not known, or memory has no room */

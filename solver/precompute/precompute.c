@@ -179,14 +179,9 @@ void state_log_kept(precompute_state *state, const form_factors *f) {
                      state->options->scratch);
 }
 
-scene_closure state_closure(const precompute_options *o) {
-    if (o->closed == NULL) return CLOSURE_MEASURED;
-    return strcmp(o->closed, "no") == 0 ? CLOSURE_OPEN : CLOSURE_CLOSED;
-}
-
 lam_status stage_form_factors(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
-    state->recipe.closure = state_closure(state->options);
+    state->recipe.closure = state->options->closed;
     const form_factor_options how = {.recipe = state->recipe,
                                      .progress = &state->progress,
                                      .stage = "form factors",
@@ -203,7 +198,7 @@ done:
 }
 
 lam_status stage_near_pairs(precompute_state *state, lam_error *error) {
-    state->recipe.closure = state_closure(state->options);
+    state->recipe.closure = state->options->closed;
     const form_factor_options how = {.recipe = state->recipe,
                                      .progress = &state->progress,
                                      .stage = "near pairs",

@@ -2,11 +2,21 @@
 #ifndef LAMBERT_PRECOMPUTE_PRECOMPUTE_H
 #define LAMBERT_PRECOMPUTE_PRECOMPUTE_H
 
+#include "solver/base/options.h"
 #include "solver/base/terminal.h"
+#include "solver/formfactor/recipe.h"
 #include "solver/method/choice.h"
 #include "solver/precompute/error_advice.h"
 #include "solver/precompute/forecast.h"
 #include "solver/scene/mesh.h"
+
+/* --two-sided: materials say which faces have a back; every face has one; none has. */
+typedef enum sides_asked { SIDES_OF_MATERIALS, SIDES_BOTH, SIDES_FRONTS } sides_asked;
+
+/* --form-factors and --quality: places among the words of their rows (option_word). */
+typedef enum factors_asked { FACTORS_AUTO, FACTORS_RAYS, FACTORS_BLOCKS, FACTORS_HEMICUBE } factors_asked;
+typedef enum factor_quality { QUALITY_DRAFT, QUALITY_NORMAL, QUALITY_HIGH } factor_quality;
+extern const char precompute_factor_words[], precompute_quality_words[];
 
 /* The options, as the rows of precompute_tables_make fill them; texts point into argv. The members after
  * progress belong to the verb. */
@@ -18,11 +28,12 @@ typedef struct precompute_options {
     const char *up;                     /* NULL: by the file */
     const char *assets;                 /* a folder, or NULL */
     bool orient;
-    const char *two_sided;              /* "": every face has a back; "no": none; NULL: materials say it */
-    const char *closed;                 /* "": no light leaves; "no": it does; NULL: rays decide */
-    const char *form_factors, *quality; /* "rays" or "hemicube"; "draft", ... */
-    uint64_t rays, resolution;          /* rays: OPTION_AUTO */
-    const char *sky;                    /* a tiling, or NULL; from a store: that of the store */
+    sides_asked two_sided;
+    scene_closure closed;
+    factors_asked form_factors;
+    factor_quality quality;
+    uint64_t rays, resolution; /* rays: OPTION_AUTO */
+    const char *sky;           /* a tiling, or NULL; from a store: that of the store */
     double ground_albedo;
     option_list portals;                /* names of groups */
     const char *keep_form_factors;      /* NULL: they are not kept; "": as they are; "compressed" */

@@ -25,6 +25,9 @@ done:
     return status;
 }
 
+const char precompute_factor_words[] = "auto|rays|blocks|hemicube";
+const char precompute_quality_words[] = "draft|normal|high";
+
 #define FIELD(member) offsetof(precompute_options, member)
 static const option_row output_rows[] = {
     OPTION_ROW_OUTPUT(FIELD(output), "STORE.h5", .help = "Where the store goes"),
@@ -70,7 +73,7 @@ static const option_row mesh_rows[] = {
      .choices = "x|y|z",
      .help = "Axis that points up"},
     {.name = "two-sided",
-     .kind = OPTION_OPTIONAL,
+     .kind = OPTION_SWITCH,
      .offset = FIELD(two_sided),
      .choices = "no",
      .help = "Make two elements of every face: first all fronts, then all backs, whose groups are called "
@@ -80,7 +83,7 @@ static const option_row mesh_rows[] = {
      .offset = FIELD(orient),
      .help = "Turn faces to the side that the light is on, where rays decide which that is"},
     {.name = "closed",
-     .kind = OPTION_OPTIONAL,
+     .kind = OPTION_SWITCH,
      .offset = FIELD(closed),
      .choices = "no",
      .help = "No light leaves the scene, whatever rays find: what they lose goes back to the row. no: light "
@@ -120,10 +123,10 @@ static const option_row sample_rows[] = {
 
 static const option_row form_factor_rows[] = {
     {.name = "form-factors",
-     .kind = OPTION_CHOICE,
+     .kind = OPTION_WORD,
      .offset = FIELD(form_factors),
      .preset = "auto",
-     .choices = "auto|rays|blocks|hemicube",
+     .choices = precompute_factor_words,
      .help =
          "Method that finds them. rays: pairs of elements, near ones or all, and rays, as --quality "
          "says. blocks: "
@@ -139,10 +142,10 @@ static const option_row form_factor_rows[] = {
      .most = RECIPE_RESOLUTION_MOST,
      .help = "Pixels along the top of a hemicube, an even number"},
     {.name = "quality",
-     .kind = OPTION_CHOICE,
+     .kind = OPTION_WORD,
      .offset = FIELD(quality),
      .preset = "normal",
-     .choices = "draft|normal|high",
+     .choices = precompute_quality_words,
      .help = "draft: rays whose noise is at most 1/2 of epsilon. normal and high: pair by pair, unoccluded "
              "factors by contour integrals and cubature, and rays for occlusion only, so many that they add "
              "little to the error of an operator of that epsilon; where there are too many pairs, near pairs "

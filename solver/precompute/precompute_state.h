@@ -224,9 +224,6 @@ lam_status state_take_portals(precompute_state *state, lam_error *error);
 /* Without --portal finds the openings of the faces, before these are divided, where there is a sky. */
 lam_status state_find_openings(precompute_state *state, lam_error *error);
 
-/* The closure that --closed stands for: precompute.c. */
-scene_closure state_closure(const precompute_options *options);
-
 /* Form factors of a scene, or of a stream the near pairs alone: precompute.c. */
 lam_status stage_form_factors(precompute_state *state, lam_error *error);
 lam_status stage_near_pairs(precompute_state *state, lam_error *error);

@@ -16,11 +16,11 @@ enum { ELEMENTS_LEAST = 1025 };
 
 bool state_may_have_blocks(const precompute_state *state, double n) {
     const precompute_options *o = state->options;
-    const bool asked = strcmp(o->form_factors, "blocks") == 0;
-    if (o->from_store || state->holds || !(asked || strcmp(o->form_factors, "auto") == 0)) return false;
+    const bool asked = o->form_factors == FACTORS_BLOCKS;
+    if (o->from_store || state->holds || !(asked || o->form_factors == FACTORS_AUTO)) return false;
     if (asked) return true;
     return !state_compresses(o) && o->scratch == NULL && o->emitters == NULL && o->rays == OPTION_AUTO &&
-           strcmp(o->quality, "draft") != 0 && n >= ELEMENTS_LEAST;
+           o->quality != QUALITY_DRAFT && n >= ELEMENTS_LEAST;
 }
 
 static lam_status make_tree(precompute_state *state, lam_error *error) {
@@ -68,7 +68,7 @@ lam_status state_blocks_possible(precompute_state *state, const build_method *me
                                  lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
-    const bool asked = strcmp(o->form_factors, "blocks") == 0;
+    const bool asked = o->form_factors == FACTORS_BLOCKS;
     *possible = false;
     if (!asked && (state_compresses(o) || state->m.n < ELEMENTS_LEAST)) goto done;
     TRY(make_tree(state, error));
@@ -143,7 +143,7 @@ done:
 /* Weighs blocks against the recipe so far, unless they take next to nothing. */
 static lam_status weigh(precompute_state *state, const recipe *blocks, bool *taken, lam_error *error) {
     lam_status status = LAM_OK;
-    const bool high = strcmp(state->options->quality, "high") == 0;
+    const bool high = state->options->quality == QUALITY_HIGH;
     factor_cost cost;
     char time[32];
     TRY(state_sample(state, blocks, &cost, error));
@@ -167,7 +167,7 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
                                lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
-    const bool asked = strcmp(o->form_factors, "blocks") == 0, able = (method->flags & METHOD_BLOCKS) != 0;
+    const bool asked = o->form_factors == FACTORS_BLOCKS, able = (method->flags & METHOD_BLOCKS) != 0;
     const build_method *built = able ? method : state_method_of_blocks();
     if (!state_may_have_blocks(state, (double)state->m.n) || built == NULL) return LAM_OK;
     if (final && !able && !asked) return LAM_OK;
@@ -180,7 +180,7 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
                      .rays = o->sky != NULL ? state->recipe.rays : recipe_rays_beside_blocks(state->m.n),
                      .accuracy = built->block_accuracy(method_own_const(&o->build, built)),
                      .seed = o->seed};
-    if (strcmp(o->quality, "high") == 0) blocks.accuracy /= 4;
+    if (o->quality == QUALITY_HIGH) blocks.accuracy /= 4;
     bool taken = asked;
     const forecast f = state_forecast(state, (double)state->m.n);
     taken = taken || forecast_bytes(&f) > state->memory;
@@ -215,7 +215,7 @@ done:
 lam_status stage_blocks(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(make_tree(state, error));
-    state->recipe.closure = state_closure(state->options);
+    state->recipe.closure = state->options->closed;
     const form_factor_options how = {.recipe = state->recipe,
                                      .progress = &state->progress,
                                      .stage = "form factors",

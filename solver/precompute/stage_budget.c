@@ -41,7 +41,7 @@ static const char *const epsilon_of_pairs = "0.012";
 enum { QUALITIES_MOST = 2 };
 typedef struct quality_costs {
     size_t count;
-    const char *quality[QUALITIES_MOST];
+    factor_quality quality[QUALITIES_MOST];
     double accuracy[QUALITIES_MOST];
     factor_cost cost[QUALITIES_MOST];
 } quality_costs;
@@ -106,9 +106,9 @@ done:
 /* The options of a candidate. */
 static lam_status set_options(const budget_recipe *r, const build_method *method, precompute_options *o,
                               lam_error *error) {
-    o->form_factors = r->kind == BUDGET_BLOCKS ? "blocks" : "rays";
+    o->form_factors = r->kind == BUDGET_BLOCKS ? FACTORS_BLOCKS : FACTORS_RAYS;
     if (r->rays > 0) o->rays = r->rays;
-    if (r->quality != NULL) o->quality = r->quality;
+    if (r->kind == BUDGET_PAIRS) o->quality = r->quality;
     o->build.method = method->name;
     o->probes = r->probes;
     o->trials = 1;
@@ -152,7 +152,7 @@ done:
 }
 
 /* The recipe of defaults at the next quality, where that is all pairs, and its cost. */
-static lam_status weigh_pairs(budget_run *run, const char *quality, bool *taken, lam_error *error) {
+static lam_status weigh_pairs(budget_run *run, factor_quality quality, bool *taken, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t k = run->pairs.count;
     precompute_options options = *run->state->options;
@@ -160,7 +160,7 @@ static lam_status weigh_pairs(budget_run *run, const char *quality, bool *taken,
     terminal silent = *probe.t;
     silent.quiet = true;
     silent.live = false;
-    options.form_factors = "rays";
+    options.form_factors = FACTORS_RAYS;
     options.quality = quality;
     options.build.method = run->method->name;
     TRY(build_set(&options.build, "epsilon", epsilon_of_pairs, error));
@@ -227,14 +227,14 @@ lam_status stage_budget(precompute_state *state, lam_error *error) {
     TRY(state_measure_rates(state, true, error));
     state_update_processors(state);
     double seconds = share_filled * o->time - (clock_seconds() - state->started);
-    if (strcmp(o->form_factors, "rays") != 0) TRY(state_blocks_possible(state, run.method, &blocks, error));
+    if (o->form_factors != FACTORS_RAYS) TRY(state_blocks_possible(state, run.method, &blocks, error));
     if (blocks) TRY(sample_blocks(&run, seconds, error));
     state_update_processors(state);
     const double all = n * n / 2, sampling = fmin(all, sampled_pairs) * sampled_pair_seconds;
     const bool pairs = n <= PAIRS_ELEMENTS_MOST &&
                        forecast_wall_seconds(all * pair_least_seconds, &state->rates) < seconds &&
                        forecast_wall_seconds(sampling, &state->rates) < share_sampled * seconds;
-    const bool rays = strcmp(o->form_factors, "blocks") != 0;
+    const bool rays = o->form_factors != FACTORS_BLOCKS;
     size_t count = budget_list(blocks, rays, rays && pairs, given ? o->probes : PROBES_OF_BUDGET, list);
     TRY(find_all_seconds(&run, seconds, list, count, error));
     seconds = share_filled * o->time - (clock_seconds() - state->started);

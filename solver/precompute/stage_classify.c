@@ -19,8 +19,8 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, d
     precompute_state state = state_begin(&o, t);
     build_problem problem;
     state.holds = true;
-    o.form_factors = "rays";
-    o.quality = "draft";
+    o.form_factors = FACTORS_RAYS;
+    o.quality = QUALITY_DRAFT;
     TRY(o.from_store ? stage_load_store(&state, error) : stage_load_scene(&state, error));
     TRY(terminal_check(error));
     TRY(stage_prepare_mesh(&state, error));

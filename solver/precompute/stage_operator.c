@@ -268,7 +268,7 @@ void state_advise(precompute_state *state) {
                                       .lacking = state->trial.lacking,
                                       .spent = state->trial.spent,
                                       .by_noise = state->built.by_noise,
-                                      .finest = strcmp(o->quality, "high") == 0 ||
+                                      .finest = o->quality == QUALITY_HIGH ||
                                                 state->f.recipe.accuracy <= state_finest_accuracy(),
                                       .overlapping = state_is_overlapping(state),
                                       .from_store = o->from_store};

@@ -95,7 +95,7 @@ done:
 
 lam_status state_weigh_pairs(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
-    const bool high = strcmp(state->options->quality, "high") == 0;
+    const bool high = state->options->quality == QUALITY_HIGH;
     const bool coarse = state_pairs_follow_epsilon(state, state->expected);
     const double enough = high ? seconds_enough_high : coarse ? seconds_enough_coarse : seconds_enough;
     recipe other = state_near_recipe(state);

@@ -90,7 +90,7 @@ static lam_status walk(precompute_state *state, const emitters_options *how, lam
                                    .progress = &state->progress,
                                    .stage = "paths"};
     walk_scene *scene = NULL;
-    TRY(walk_scene_create(&state->m, state_closure(state->options), &scene, error));
+    TRY(walk_scene_create(&state->m, state->options->closed, &scene, error));
     TRY(walk_reuse(scene, &problem, &state->paths, error));
     terminal_log(state->t, "%zu paths of each position, %.3g rays each", state->paths.paths,
                  state->paths.rays);

@@ -43,11 +43,6 @@ static void warn_of_coincident(terminal *t, const coincident_report *found) {
     if (found->overlapping > 0) terminal_warn(t, "%s", found->overlap_line);
 }
 
-/* True where both sides of every face will be elements. */
-static bool has_all_backs(const precompute_options *o) {
-    return o->two_sided != NULL && strcmp(o->two_sided, "no") != 0;
-}
-
 /* Turns faces; the hash of the source stays that of the file. Faces that lay back to back may be twins
  * then. */
 static lam_status orient(precompute_state *state, lam_error *error) {
@@ -57,7 +52,7 @@ static lam_status orient(precompute_state *state, lam_error *error) {
     TRY(facing_orient(&state->m, &state->progress, &turned, error));
     terminal_log(state->t, "%zu of %zu faces turned; for %zu the side was not decided", turned.turned,
                  state->m.n, turned.undecided);
-    TRY(mesh_settle_coincident(&state->m, has_all_backs(state->options), &found, error));
+    TRY(mesh_settle_coincident(&state->m, state->options->two_sided == SIDES_BOTH, &found, error));
     if (turned.turned > 0) warn_of_coincident(state->t, &found);
 done:
     return status;
@@ -65,12 +60,12 @@ done:
 
 /* Settles which faces get a back, by --two-sided or by the materials, and says what these ask for. */
 static lam_status choose_backs(precompute_state *state, lam_error *error) {
-    const char *const asked = state->options->two_sided;
+    const sides_asked asked = state->options->two_sided;
     mesh *const m = &state->m;
     size_t n = 0;
-    if (has_all_backs(state->options)) return mesh_mark_two_sided(m, error);
+    if (asked == SIDES_BOTH) return mesh_mark_two_sided(m, error);
     for (size_t i = 0; m->has_back != NULL && i < m->n; i++) n += m->has_back[i];
-    if (asked != NULL || n == 0) {
+    if (asked == SIDES_FRONTS || n == 0) {
         free(m->has_back);
         m->has_back = NULL;
         return LAM_OK;
@@ -88,7 +83,7 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     const import_options how = {.unit = o->unit,
                                 .up = o->up != NULL ? o->up[0] : 0,
                                 .reflectance = o->reflectance,
-                                .two_sided = has_all_backs(o),
+                                .two_sided = o->two_sided == SIDES_BOTH,
                                 .assets = o->assets};
     import_report report = {0};
     TRY(scene_import(o->input, &how, &state->m, &report, error));
@@ -125,7 +120,7 @@ static double elements_after(const mesh *m, const precompute_options *o) {
 
 /* The options that decide. */
 typedef struct choice_request {
-    const char *quality; /* "draft", "normal", "high" */
+    factor_quality quality;
     double epsilon;
     uint64_t rays;     /* OPTION_AUTO */
     size_t resolution; /* of hemicubes in place of rays; 0: none */
@@ -142,33 +137,26 @@ enum { CHOICE_PAIRS_MOST = 32768 };
 
 /* The accuracy that a quality stands for. */
 typedef struct quality_level {
-    const char *name;
     double noise_share; /* of rays: part of epsilon that their noise may be */
     double filtered;    /* the same where the method takes most of it out again */
     double accuracy;    /* of pairs: standard error of a factor that is partly hidden; 0: plain rays */
 } quality_level;
 
 static const quality_level levels[] = {
-    {"draft", 1. / 2, 2.5, 0},
-    {"normal", 1. / 4, 1.25, 7e-5},
+    [QUALITY_DRAFT] = {1. / 2, 2.5, 0},
+    [QUALITY_NORMAL] = {1. / 4, 1.25, 7e-5},
     /* A third of the 2e-4 that a partly hidden factor of .1 may be off by. */
-    {"high", 1. / 8, .625, 7e-6},
+    [QUALITY_HIGH] = {1. / 8, .625, 7e-6},
 };
 
-static const quality_level *level_of(const char *name) {
-    size_t k = 0;
-    while (k + 1 < sizeof levels / sizeof levels[0] && strcmp(levels[k].name, name) != 0) k++;
-    return &levels[k];
-}
-
 double state_finest_accuracy(void) {
-    return level_of("high")->accuracy;
+    return levels[QUALITY_HIGH].accuracy;
 }
 
 /* Rays that keep the noise of the samples the quality's part below epsilon, or the number given. */
 static size_t choice_rays(const choice_request *asked) {
     if (asked->rays != OPTION_AUTO) return (size_t)asked->rays;
-    const quality_level *level = level_of(asked->quality);
+    const quality_level *const level = &levels[asked->quality];
     const size_t rays =
         recipe_auto_rays(asked->epsilon, asked->filtered ? level->filtered : level->noise_share);
     return rays > asked->least_rays ? rays : asked->least_rays;
@@ -177,7 +165,7 @@ static size_t choice_rays(const choice_request *asked) {
 /* The recipe: hemicubes where they are asked for, plain rays where their number is given or at draft, else
  * pairs, all where that is affordable and else the near ones. */
 static recipe choice_recipe(const choice_request *asked, bool all_pairs) {
-    const quality_level *level = level_of(asked->quality);
+    const quality_level *const level = &levels[asked->quality];
     recipe r = {.source = &source_rays, .rays = choice_rays(asked), .seed = asked->seed};
     if (asked->resolution > 0)
         return (recipe){.source = &source_hemicube, .resolution = asked->resolution, .seed = asked->seed};
@@ -216,7 +204,7 @@ done:
 }
 
 static bool is_hemicube(const precompute_options *o) {
-    return strcmp(o->form_factors, "hemicube") == 0;
+    return o->form_factors == FACTORS_HEMICUBE;
 }
 
 /* Rows that are kept are for other operators, too; and what an element sees of a sky is what its row leaves
@@ -232,7 +220,7 @@ bool state_pairs_follow_epsilon(const precompute_state *state, const build_metho
 static choice_request request_of(const precompute_state *state) {
     const precompute_options *o = state->options;
     const bool hemicube = is_hemicube(o);
-    return (choice_request){.quality = hemicube ? "normal" : o->quality,
+    return (choice_request){.quality = hemicube ? QUALITY_NORMAL : o->quality,
                             .epsilon = o->build.epsilon,
                             .rays = hemicube && !o->from_store ? OPTION_AUTO : o->rays,
                             .resolution = hemicube && !o->from_store ? (size_t)o->resolution : 0,
@@ -380,7 +368,7 @@ done:
 static lam_status try_blocks(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const double n = (double)state->m.n;
-    const bool rows_fit = fits(state, n), asked = strcmp(state->options->form_factors, "blocks") == 0;
+    const bool rows_fit = fits(state, n), asked = state->options->form_factors == FACTORS_BLOCKS;
     const build_method *method;
     bool final;
     if (!state_may_have_blocks(state, n)) return LAM_OK;

@@ -14,7 +14,7 @@ static lam_status save_report(const precompute_state *state, store *s, lam_error
     TRY(report_save(&state->built, s, error));
     if (about.density >= 0) TRY(store_set_number(s, "/operator", "density", about.density, error));
     if (state->light.n > 0) { /* there are no form factors */
-        TRY(recipe_save_closure(state_closure(state->options), recipe_of_operator.group, s, error));
+        TRY(recipe_save_closure(state->options->closed, recipe_of_operator.group, s, error));
         goto done;
     }
     /* The recipe of the form factors, so that they can be made again where they are not kept. */

@@ -116,7 +116,7 @@ static int check_time(const precompute_options *o, const option_result *given) {
     if (o->from_store)
         return options_usage(command.name, "--time: a store has its form factors already; precompute from "
                                            "its scene instead");
-    if (strcmp(o->form_factors, "hemicube") == 0)
+    if (o->form_factors == FACTORS_HEMICUBE)
         return options_usage(command.name, "--time: is not supported together with --form-factors hemicube");
     if (method != NULL && !(method->flags & METHOD_BLOCKS))
         return options_usage(command.name, "--time: is not supported together with --method %s",
@@ -193,7 +193,7 @@ static int check_together(const precompute_options *o, const option_result *give
 /* True if an option about form factors had no effect. With form factors from a store only the judge casts
  * rays; with a hemicube it chooses their number itself. */
 static bool unused_by_form_factors(const char *name, const precompute_options *o) {
-    const bool hemicube = strcmp(o->form_factors, "hemicube") == 0;
+    const bool hemicube = o->form_factors == FACTORS_HEMICUBE;
     if (strcmp(name, "form-factors") == 0) return o->from_store;
     if (strcmp(name, "resolution") == 0) return o->from_store || !hemicube;
     if (strcmp(name, "quality") == 0) return o->from_store || hemicube || o->rays != OPTION_AUTO;
@@ -217,6 +217,7 @@ static void log_unused(terminal *t, const option_result *given, const precompute
                        const precompute_result *result) {
     char list[256] = "";
     const bool walked = emitters_are_positions(emitters_options_of(&o->build));
+    char asked[OPTION_WORD_BYTES];
     size_t length = 0;
     for (size_t i = 0; i < given->n_given; i++) {
         const char *name = given->given[i];
@@ -225,12 +226,13 @@ static void log_unused(terminal *t, const option_result *given, const precompute
             continue;
         length += (size_t)sprintf(list + length, "%s--%s", length > 0 ? ", " : "", name);
     }
+    option_word(o->form_factors, precompute_factor_words, asked);
     if (length > 0)
         terminal_log(t, "%s%s does not use %s",
                      walked          ? "a light that moves"
                      : o->from_store ? "a store with form factors"
                                      : "--form-factors ",
-                     walked || o->from_store ? "" : o->form_factors, list);
+                     walked || o->from_store ? "" : asked, list);
     if (result->unused[0] != '\0' && !walked)
         terminal_log(t, "%s does not use %s", result->report.method, result->unused);
 }

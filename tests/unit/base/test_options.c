@@ -106,6 +106,30 @@ START_TEST(test_words) {
     ck_assert(!option_among("aa", "a|b|c"));
     ck_assert(!option_among("a", "aa|b"));
     ck_assert(!option_among("a", ""));
+    char word[OPTION_WORD_BYTES];
+    for (unsigned k = 0; k < 3; k++) {
+        option_word(k, "one|two|three", word);
+        ck_assert_uint_eq(option_place(word, "one|two|three"), k);
+    }
+    ck_assert_str_eq(word, "three");
+}
+END_TEST
+
+/* An enum holds the place of a word; of a switch 0 where it is not given, and 1 without a word. */
+START_TEST(words_become_places) {
+    lam_error error;
+    const option_row word = {.name = "w", .kind = OPTION_WORD, .choices = "a|b|c"},
+                     change = {.name = "s", .kind = OPTION_SWITCH, .choices = "no|some"};
+    unsigned value = 7;
+    ck_ok(option_read(&word, "c", &value, &error));
+    ck_assert_uint_eq(value, 2);
+    ck_assert_int_eq(option_read(&word, "d", &value, &error), LAM_ERR_ARGUMENT);
+    ck_assert_uint_eq(value, 2);
+    ck_ok(option_read(&change, NULL, &value, &error));
+    ck_assert_uint_eq(value, 1);
+    ck_ok(option_read(&change, "some", &value, &error));
+    ck_assert_uint_eq(value, 3);
+    ck_assert_int_eq(option_read(&change, "other", &value, &error), LAM_ERR_ARGUMENT);
 }
 END_TEST
 
@@ -360,6 +384,7 @@ int main(void) {
     tcase_add_test(c, test_sizes);
     tcase_add_test(c, test_lists_of_numbers);
     tcase_add_test(c, test_words);
+    tcase_add_test(c, words_become_places);
     tcase_add_test(c, test_presets);
     tcase_add_test(c, test_table);
     tcase_add_test(c, test_words_of_the_command_line);

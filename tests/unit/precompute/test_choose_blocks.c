@@ -25,8 +25,10 @@ static outcome choose(const char *scene, size_t n, recipe other, int n_threads) 
                                   .closed = true,
                                   .variant = 1,
                                   .terrain = "flat"};
-    const precompute_options options = {
-        .form_factors = "auto", .quality = "normal", .rays = OPTION_AUTO, .build = build_presets("auto")};
+    const precompute_options options = {.form_factors = FACTORS_AUTO,
+                                        .quality = QUALITY_NORMAL,
+                                        .rays = OPTION_AUTO,
+                                        .build = build_presets("auto")};
     precompute_state state = {.options = &options,
                               .t = &t,
                               .expected = method_find("hierarchical"),

@@ -14,8 +14,8 @@ static const double asked = .01;
 static void begin(precompute_options *options, terminal *t, precompute_state *state) {
     const generate_options how = {.kind = "box", .size = {1, 1, 1}, .divisions = 2, .reflectance = .5};
     lam_error error = {.message = ""};
-    *options = (precompute_options){.form_factors = "rays",
-                                    .quality = "draft",
+    *options = (precompute_options){.form_factors = FACTORS_RAYS,
+                                    .quality = QUALITY_DRAFT,
                                     .rays = OPTION_AUTO,
                                     .probes = 1,
                                     .trials = TRIALS_MOST,

@@ -15,12 +15,12 @@ typedef struct outcome {
     double seconds, entries;
 } outcome;
 
-static outcome weigh_kept(const char *scene, size_t n, const char *quality, int n_threads,
+static outcome weigh_kept(const char *scene, size_t n, factor_quality quality, int n_threads,
                           const factor_source *source, double memory, const char *keep) {
     lam_error error = {0};
     terminal t;
     const generate_options how = {.kind = scene, .elements = n, .seed = 1, .reflectance = -1};
-    const precompute_options options = {.form_factors = "auto",
+    const precompute_options options = {.form_factors = FACTORS_AUTO,
                                         .quality = quality,
                                         .rays = OPTION_AUTO,
                                         .build = build_presets("auto"),
@@ -41,18 +41,19 @@ static outcome weigh_kept(const char *scene, size_t n, const char *quality, int 
     return found;
 }
 
-static outcome weigh_recipe(const char *scene, size_t n, const char *quality, int n_threads,
+static outcome weigh_recipe(const char *scene, size_t n, factor_quality quality, int n_threads,
                             const factor_source *source, double memory) {
     return weigh_kept(scene, n, quality, n_threads, source, memory, NULL);
 }
 
-static outcome weigh(const char *scene, size_t n, const char *quality, int n_threads) {
+static outcome weigh(const char *scene, size_t n, factor_quality quality, int n_threads) {
     return weigh_recipe(scene, n, quality, n_threads, &source_pairs, 1e15);
 }
 
 /* Leaves of a canopy hide one another everywhere: their pairs cost a minute and a half, rays nine seconds. */
 START_TEST(a_soup_gets_rays) {
-    const outcome one = weigh("canopy", 6000, "normal", 1), three = weigh("canopy", 6000, "normal", 3);
+    const outcome one = weigh("canopy", 6000, QUALITY_NORMAL, 1),
+                  three = weigh("canopy", 6000, QUALITY_NORMAL, 3);
     ck_assert(one.dear);
     ck_assert(one.plain);
     ck_assert_uint_gt(one.rays, 0);
@@ -68,7 +69,7 @@ END_TEST
 
 START_TEST(a_plain_room_keeps_its_pairs) {
     for (int k = 0; k < 2; k++) {
-        const outcome found = weigh("cornell", k == 0 ? 600 : 3000, "normal", 2);
+        const outcome found = weigh("cornell", k == 0 ? 600 : 3000, QUALITY_NORMAL, 2);
         ck_assert(!found.dear);
         ck_assert_uint_eq(found.rays, 0);
         ck_assert_double_gt(found.seconds, 0);
@@ -78,8 +79,8 @@ END_TEST
 
 /* Pairs that are as coarse as an operator allows are worth less than those that are kept. */
 START_TEST(kept_pairs_may_take_longer) {
-    const outcome coarse = weigh("canopy", 2500, "normal", 2),
-                  kept = weigh_kept("canopy", 2500, "normal", 2, &source_pairs, 1e15, "");
+    const outcome coarse = weigh("canopy", 2500, QUALITY_NORMAL, 2),
+                  kept = weigh_kept("canopy", 2500, QUALITY_NORMAL, 2, &source_pairs, 1e15, "");
     ck_assert_double_gt(kept.seconds, 8);
     ck_assert_double_lt(kept.seconds, 16);
     ck_assert(coarse.dear);
@@ -89,14 +90,15 @@ END_TEST
 
 /* High quality asks for the accuracy of pairs, and may take longer. */
 START_TEST(high_quality_keeps_pairs_for_longer) {
-    ck_assert(weigh("canopy", 4000, "normal", 2).dear);
-    ck_assert(!weigh("canopy", 4000, "high", 2).dear);
+    ck_assert(weigh("canopy", 4000, QUALITY_NORMAL, 2).dear);
+    ck_assert(!weigh("canopy", 4000, QUALITY_HIGH, 2).dear);
 }
 END_TEST
 
 /* Twice the elements have four times the pairs. */
 START_TEST(more_elements_cost_more) {
-    const outcome few = weigh("cornell", 1600, "normal", 2), many = weigh("cornell", 3200, "normal", 2);
+    const outcome few = weigh("cornell", 1600, QUALITY_NORMAL, 2),
+                  many = weigh("cornell", 3200, QUALITY_NORMAL, 2);
     /* Four times the pairs, and some of the cost is a floor of segments. */
     ck_assert_double_gt(many.seconds, 1.2 * few.seconds);
     ck_assert_double_gt(many.entries, 2 * few.entries);
@@ -107,9 +109,9 @@ END_TEST
  * nothing.
  */
 START_TEST(near_pairs_are_weighed_too) {
-    const outcome soup = weigh_recipe("canopy", 9000, "normal", 1, &source_near_pairs, 1e15),
-                  again = weigh_recipe("canopy", 9000, "normal", 3, &source_near_pairs, 1e15),
-                  room = weigh_recipe("cornell", 40000, "normal", 2, &source_near_pairs, 1e15);
+    const outcome soup = weigh_recipe("canopy", 9000, QUALITY_NORMAL, 1, &source_near_pairs, 1e15),
+                  again = weigh_recipe("canopy", 9000, QUALITY_NORMAL, 3, &source_near_pairs, 1e15),
+                  room = weigh_recipe("cornell", 40000, QUALITY_NORMAL, 2, &source_near_pairs, 1e15);
     ck_assert(soup.dear);
     ck_assert(soup.plain);
     ck_assert_uint_eq(soup.rays, 2 * 512);
@@ -124,8 +126,8 @@ END_TEST
 
 /* Where there is no memory for the rows of twice the rays, near pairs stay. */
 START_TEST(rays_in_place_of_near_pairs_must_fit) {
-    const outcome tight = weigh_recipe("canopy", 9000, "normal", 2, &source_near_pairs, 1e6),
-                  free = weigh_recipe("canopy", 9000, "normal", 2, &source_near_pairs, 1e15);
+    const outcome tight = weigh_recipe("canopy", 9000, QUALITY_NORMAL, 2, &source_near_pairs, 1e6),
+                  free = weigh_recipe("canopy", 9000, QUALITY_NORMAL, 2, &source_near_pairs, 1e15);
     ck_assert(!tight.dear);
     ck_assert_double_gt(tight.seconds, free.seconds);
     ck_assert(free.dear);
@@ -145,7 +147,7 @@ START_TEST(entries_of_rays_are_counted) {
                                   .seed = 1,
                                   .reflectance = -1};
     const recipe rays = {.source = &source_rays, .rays = 1024, .seed = 3};
-    const precompute_options options = {.form_factors = "auto"}, of_store = {.from_store = true};
+    const precompute_options options = {.form_factors = FACTORS_AUTO}, of_store = {.from_store = true};
     precompute_state state = {.options = &options, .m = generate_good(&how), .recipe = rays};
     const form_factor_options make = {.recipe = rays};
     uint32_t *order = calloc(state.m.n, sizeof *order);
