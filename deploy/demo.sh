@@ -2,8 +2,8 @@
 # From a bare Debian to the light of a scene over HTTP:
 #   deploy/demo.sh [--once] [SCENE [OPTION...]]
 # installs what is missing, builds, precomputes SCENE (without one: a generated Cornell box), starts lambertd on
-# loopback, asks it for two lightings, draws both. --once stops the daemon at the end. OPTIONs go to lambert
-# precompute; --up y for a scene whose second axis points up.
+# loopback (with its page where Node.js and npm are installed already), asks it for two lightings, draws both. --once stops
+# the daemon at the end. OPTIONs go to lambert precompute; --up y for a scene whose second axis points up.
 set -euo pipefail
 
 once=no
@@ -41,6 +41,8 @@ echo "== packages (minutes where many are missing)"
 
 echo "== build (a minute or more the first time; log: $out/build.log)"
 cmake -S . -B build/release -DCMAKE_BUILD_TYPE=Release >"$out/configure.log" || { cat "$out/configure.log"; exit 1; }
+invitation="open its address in a browser, or "
+grep '^-- viewer: .* not built' "$out/configure.log" && invitation=
 cmake --build build/release -j "$(nproc)" --target lambert lambertd >"$out/build.log" 2>&1 ||
     { tail -n 40 "$out/build.log"; exit 1; }
 lambert=$PWD/build/release/lambert
@@ -104,7 +106,7 @@ if [ $once = yes ]; then
 else
     trap - EXIT
     disown "$daemon"
-    echo "the daemon goes on: open $address/ in a browser, or ask it again with"
+    echo "the daemon goes on at $address/: ${invitation}ask it again with"
     echo "  $example"
     echo "and stop it with: kill $daemon"
 fi

@@ -44,7 +44,7 @@ function(npm_packages result source build)
   set(${result} "" PARENT_SCOPE)
 endfunction()
 
-set(viewer_off "it was switched off")
+set(viewer_off "LAMBERT_VIEWER is off")
 if(LAMBERT_VIEWER)
   # Its checks need more packages than its bundle.
   set(which --omit=dev)
@@ -57,7 +57,9 @@ if(LAMBERT_VIEWER)
   endif()
 endif()
 if(viewer_off)
-  message(STATUS "viewer: lambertd is built without it: ${viewer_off}")
+  string(CONCAT how "to get it, install Node.js and npm (Debian: nodejs and npm), "
+                    "run cmake again with -DLAMBERT_VIEWER=ON and build")
+  message(STATUS "viewer: the page of lambertd is not built: ${viewer_off}; ${how}")
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/viewer_files.c CONTENT [[
 #include "server/route/viewer_files.h"
 const bool viewer_is_built = false;
