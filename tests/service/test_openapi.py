@@ -1,8 +1,10 @@
 """GET /v1/openapi.json: a sound OpenAPI 3.1 document, of exactly the routes there are, that says what is answered."""
 
 import json
+import os
 import pathlib
 import re
+import subprocess
 import tempfile
 import unittest
 
@@ -123,6 +125,11 @@ class OpenApi(unittest.TestCase):
     def test_it_is_the_file(self):
         self.assertEqual((self.answer.status, self.answer.headers["Content-Type"]), (200, "application/json"))
         self.assertEqual(self.answer.body, (ROUTES.parent / "openapi.json").read_bytes())
+
+    def test_its_version_is_that_of_the_programs(self):
+        for program in os.environ["LAMBERT"], os.environ["LAMBERTD"]:
+            printed = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+            self.assertEqual(printed.split()[1], self.document["info"]["version"])
 
     def test_it_is_openapi(self):
         Draft202012Validator.check_schema(DOCUMENT)
