@@ -1,4 +1,4 @@
-"""README and manual: every command in them runs, every link leads somewhere, every option they name exists.
+"""README and manual: every command in them runs, every link leads somewhere, every option and file they name exists.
 
 Blocks of a document are one script, run in an empty folder. ```sh runs as it stands. ```sh slow runs on small scenes
 (--elements at most 600, suites of bench with --quick). ```sh elsewhere is run by .ci/run: the test looks the line up
@@ -172,8 +172,28 @@ class Documents(unittest.TestCase):
         for name in names:
             self.assertRegex(text, rf"`(cmake --preset )?{name}`", f"developing.md does not name the preset {name}")
 
+    def test_files_of_the_tree_exist(self):
+        """NAME, x and <room> stand for any name: at least one file or folder must have such a path."""
+        count = 0
+        for document in (ROOT / ".github" / "CONTRIBUTING.md", MANUAL / "developing.md", MANUAL / "releasing.md"):
+            named = re.findall(r"(?<![\w/.])(?:\./)?((?:deploy|include|server|solver|store|tests)/[\w./*<>-]+)", document.read_text())
+            for path in {re.sub(r"NAME|<\w+>|(?<=_)x(?=\.)", "*", name.rstrip(".")) for name in named}:
+                self.assertTrue(list(ROOT.glob(path.rstrip("/"))), f"{document.name} names {path}")
+                count += 1
+        self.assertGreater(count, 20)
+
     def test_readme_is_short(self):
         self.assertLessEqual(len((ROOT / "README.md").read_text().splitlines()), 200)
+
+    def test_changelog_is_short(self):
+        """30 lines of 120 characters a version; the newest one is that of the programs."""
+        _, *versions = re.split(r"^## ", (ROOT / "CHANGELOG.md").read_text(), flags=re.M)
+        for text in versions:
+            lines = text.splitlines()
+            self.assertLessEqual(len(lines), 30, lines[0])
+            self.assertLessEqual(max(map(len, lines)), 120, lines[0])
+        version = subprocess.run([LAMBERT, "--version"], capture_output=True, text=True, check=True).stdout.split()[1]
+        self.assertEqual(versions[0].split()[0], version)
 
 
 def add_document(document):
