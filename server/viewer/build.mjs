@@ -36,7 +36,13 @@ const licence = (name) => {
     const folder = join(modules, name);
     const about = JSON.parse(readFileSync(join(folder, "package.json"), "utf8"));
     const text = ["LICENSE", "LICENSE.md", "LICENSE.txt", "LICENCE"]
-        .map((file) => { try { return readFileSync(join(folder, file), "utf8"); } catch { return null; } })
+        .map((file) => {
+            try {
+                return readFileSync(join(folder, file), "utf8");
+            } catch {
+                return null;
+            }
+        })
         .find((content) => content !== null);
     if (text === undefined) throw new Error(`${name} has no licence file`);
     return `${name} ${about.version} (${about.license})\n\n${text.trim()}\n`;
@@ -47,7 +53,8 @@ for (const file of ["page.html", "icon.svg"]) writeFileSync(join(out, file), rea
 // In the order of viewer_part in server/route/viewer_files.h.
 const files = ["page.html", "viewer.js", "viewer.css", "icon.svg", "licences.txt"];
 const text = (path) => JSON.stringify(path).slice(1, -1).replaceAll("\\", "\\\\");
-const include = (symbol, path) => `__asm__(".section .rodata\\n.hidden ${symbol}\\n.global ${symbol}\\n${symbol}:\\n"
+const include = (symbol, path) =>
+    `__asm__(".section .rodata\\n.hidden ${symbol}\\n.global ${symbol}\\n${symbol}:\\n"
         ".incbin \\"${text(path)}\\"\\n.byte 0\\n.previous\\n");
 extern const unsigned char ${symbol}[];
 `;

@@ -1,7 +1,8 @@
 // Starts the page.
 import { App } from "./app/app.ts";
 import { make } from "./base/dom.ts";
-import { makeBanner, makeBar, makeDrawer, makeLoading, makeStatus, makeTokenDialog, setBackground } from "./panels/frame.ts";
+import { makeBanner, makeBar, makeDrawer, makeLoading, makeStatus, makeTokenDialog,
+    setBackground } from "./panels/frame.ts";
 import { comparePanel } from "./panels/compare.ts";
 import { exportPanel } from "./panels/export.ts";
 import { lightsPanel } from "./panels/lights.ts";
@@ -17,15 +18,24 @@ import "./style.css";
 
 /** The panels, in the order of their tabs. */
 const panelMakers: readonly PanelMaker[] = [
-    lightsPanel, skyPanel, emittersPanel, lookPanel, readingPanel, trustPanel, comparePanel,
-    materialsPanel, exportPanel,
+    lightsPanel,
+    skyPanel,
+    emittersPanel,
+    lookPanel,
+    readingPanel,
+    trustPanel,
+    comparePanel,
+    materialsPanel,
+    exportPanel,
 ];
 
 /** The fragment is written this long after the last change. */
 const LINK_MS = 300;
 
 function start(): void {
-    const canvas = make("canvas", { tabindex: 0, "aria-label": "The scene. Arrow keys turn it, plus and minus move, F shows all of it, R reads values at a cross." });
+    const canvas = make("canvas", { tabindex: 0,
+        "aria-label":
+            "The scene. Arrow keys turn it, plus and minus move, F shows all of it, R reads values at a cross." });
     const frame = make("main", {}, canvas);
     // The canvas needs a place before its size is asked for.
     document.body.append(frame);
@@ -33,13 +43,18 @@ function start(): void {
     try {
         app = new App(canvas);
     } catch (reason) {
-        frame.replaceChildren(make("p", { class: "banner", role: "alert" },
-            `This browser cannot draw the scene, which needs WebGL 2 (${reason instanceof Error ? reason.message : String(reason)}).`));
+        frame.replaceChildren(
+            make("p", { class: "banner", role: "alert" },
+                `This browser cannot draw the scene, which needs WebGL 2 (${
+                    reason instanceof Error ? reason.message : String(reason)
+                }).`),
+        );
         return;
     }
     frame.append(makeBanner(app), makeLoading(app));
     document.body.prepend(makeBar(app));
-    document.body.append(makeDrawer(app, panelMakers.map((makePanel) => makePanel(app))), makeStatus(app), makeTokenDialog(app, () => void begin(app)));
+    document.body.append(makeDrawer(app, panelMakers.map((makePanel) => makePanel(app))), makeStatus(app),
+        makeTokenDialog(app, () => void begin(app)));
     setBackground(app);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setBackground(app));
     holdSteps(app);
@@ -62,13 +77,18 @@ async function begin(app: App): Promise<void> {
         const given = fromFragment(location.hash);
         const name = app.scenes.find((scene) => scene.name === given?.scene)?.name ?? app.scenes[0]?.name;
         if (name === undefined) throw new Error("The daemon serves no scene.");
-        app.notice = given === null && location.hash.length > 1 ? `This link cannot be read; this is ${name} as it comes.`
+        app.notice = given === null && location.hash.length > 1
+            ? `This link cannot be read; this is ${name} as it comes.`
             : given !== null && given.scene !== "" && given.scene !== name
-                ? `The link asks for the scene ${given.scene}, which this daemon does not serve; this is ${name}.` : null;
+            ? `The link asks for the scene ${given.scene}, which this daemon does not serve; this is ${name}.`
+            : null;
         await app.open(name, given !== null && given.scene === name ? given : null);
     } catch (reason) {
         app.fail(reason);
-        if (app.recovery.watch.isLost) app.on("found", () => { if (app.scene === null) void begin(app); });
+        if (app.recovery.watch.isLost)
+            app.on("found", () => {
+                if (app.scene === null) void begin(app);
+            });
     }
 }
 

@@ -15,7 +15,8 @@ import { Opening, type OpenScene } from "./opening.ts";
 import { Recovery } from "./recovery.ts";
 import { SharpSun } from "./sharp_sun.ts";
 
-type Event = "scene" | "scenes" | "field" | "hover" | "timing" | "unlike" | "lost" | "found" | "problem" | "token" | "theme" | "loading";
+type Event = "scene" | "scenes" | "field" | "hover" | "timing" | "unlike" | "lost" | "found" | "problem" | "token"
+    | "theme" | "loading";
 
 export class App extends Events<Event> {
     readonly api = new Api();
@@ -24,7 +25,8 @@ export class App extends Events<Event> {
     readonly cameras: Cameras;
     readonly exposure = new Exposure();
     readonly beside = new Beside((name) => this.api.describe(name), (description) => this.prepareOther(description));
-    readonly asking = new Asking(this, (side, field, wanted) => this.show(side, field, wanted), (reason) => this.fail(reason));
+    readonly asking = new Asking(this, (side, field, wanted) => this.show(side, field, wanted),
+        (reason) => this.fail(reason));
     /** The sun in the picture, where it is drawn sharp. */
     readonly sharp = new SharpSun(this);
     readonly opening = new Opening(this, (scene) => this.take(scene));
@@ -124,9 +126,19 @@ export class App extends Events<Event> {
         const { view, compare } = this.store.now;
         const { low, high } = this.exposure.axis(view);
         this.stage.setLook({
-            picture: view.picture, smooth: view.smooth, textured: view.textured, tone: view.tone, exposure: this.exposure.factor(view), palette: view.palette,
-            range: [low, high], log: view.log, isoLines: view.isoLines, threshold: view.threshold, marked: view.judged !== null,
-            compare: compare === null || this.fields[1] === null ? "none" : compare.how, split: compare?.split ?? 0.5,
+            picture: view.picture,
+            smooth: view.smooth,
+            textured: view.textured,
+            tone: view.tone,
+            exposure: this.exposure.factor(view),
+            palette: view.palette,
+            range: [low, high],
+            log: view.log,
+            isoLines: view.isoLines,
+            threshold: view.threshold,
+            marked: view.judged !== null,
+            compare: compare === null || this.fields[1] === null ? "none" : compare.how,
+            split: compare?.split ?? 0.5,
         });
     }
 
@@ -162,7 +174,8 @@ export class App extends Events<Event> {
         if (now.compare === null && before.compare !== null) this.asking.forget(1);
         if (now.view !== before.view || now.compare !== before.compare) this.setLook();
         const other = now.compare?.scene ?? null;
-        if (this.beside.isNew(other) && other !== null) this.takeOther(other).catch((reason: unknown) => this.fail(reason));
+        if (this.beside.isNew(other) && other !== null)
+            this.takeOther(other).catch((reason: unknown) => this.fail(reason));
         this.ask();
     }
 

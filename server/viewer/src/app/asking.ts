@@ -36,7 +36,8 @@ export class Asking {
 
     /** `took` shows an answer, which is in the fields by then. */
     constructor(private readonly app: Pick<App, "api" | "scene" | "store" | "beside" | "skyOf">,
-        private readonly took: (side: Side, field: Field, wanted: Wanted) => void, fail: (reason: unknown) => void) {
+        private readonly took: (side: Side, field: Field, wanted: Wanted) => void, fail: (reason: unknown) => void)
+    {
         const asker = (side: Side): Newest<Wanted, Field> =>
             new Newest((wanted) => this.solve(wanted), (field, wanted) => this.take(side, field, wanted), fail);
         this.askers = [asker(0), asker(1)];
@@ -46,15 +47,18 @@ export class Asking {
         return this.askers.every((asker) => asker.isIdle);
     }
 
-    /** What is shown now, as a request; null: there is no scene, nothing to compare it with, or no knowledge of that yet. */
+    /** What is shown now, as a request; null: there is no scene, nothing to compare it with, or no knowledge of that
+     * yet. */
     wanted(side: Side): Wanted | null {
         const { scene, store: { now }, beside } = this.app;
         if (scene === null || (side === 1 && now.compare === null)) return null;
         const quantity = now.view.picture === "light" ? "radiosity" : now.view.quantity;
         const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
-        const other = side === 1 ? now.compare?.scene ?? null : null, of = other === null ? scene.description : beside.get(other);
+        const other = side === 1 ? now.compare?.scene ?? null : null,
+            of = other === null ? scene.description : beside.get(other);
         if (of === undefined) return null;
-        return wantedFor(of.name, quantity, lighting, { ...abilitiesOf(of), emitters: of.emitters?.length ?? 0, sky: this.app.skyOf(lighting, of) });
+        return wantedFor(of.name, quantity, lighting, { ...abilitiesOf(of), emitters: of.emitters?.length ?? 0,
+            sky: this.app.skyOf(lighting, of) });
     }
 
     /** Asks for what is to be shown, if that has changed. */
@@ -81,10 +85,12 @@ export class Asking {
         const { mesh: { elements }, description: { channels } } = scene;
         if (wanted.emission === null) return new Field(new Uint16Array(channels * elements), [channels, elements], 1);
         const start = performance.now();
-        const { values, solveMs } = await api.radiosity(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity });
+        const { values, solveMs } = await api.radiosity(wanted.scene, { emission: wanted.emission,
+            quantity: wanted.quantity });
         this.timing = { roundTrip: performance.now() - start, solve: solveMs };
         const field = Field.of(values, wanted.scale);
-        if (field.elements !== elements) throw new Replaced(`${wanted.scene} has ${field.elements} elements, the mesh shown has ${elements}`);
+        if (field.elements !== elements)
+            throw new Replaced(`${wanted.scene} has ${field.elements} elements, the mesh shown has ${elements}`);
         return field;
     }
 

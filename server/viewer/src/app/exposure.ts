@@ -13,7 +13,8 @@ export class Exposure {
     /** The exposure that was chosen last, log2. */
     own = 0;
 
-    /** Measures a field where the view needs it; returns the exposure that is to be held, or null. Groups that shine are left out. */
+    /** Measures a field where the view needs it; returns the exposure that is to be held, or null. Groups that shine
+     * are left out. */
     measure(field: Field, mesh: SceneMesh, view: View, lighting: Lighting): number | null {
         const mustMeasure = view.picture === "false" ? view.range === null : view.exposure === null || view.follow;
         if (!mustMeasure) return null;

@@ -1,4 +1,5 @@
-// Opens scenes: fetches what their first picture needs, and begins with the state of a link or with the scene as it comes.
+// Opens scenes: fetches what their first picture needs, and begins with the state of a link or with the scene as it
+// comes.
 import { Box3, BufferAttribute } from "three";
 import type { Description } from "../daemon/api.ts";
 import { readMesh, type SceneMesh } from "../picture/glb.ts";
@@ -22,7 +23,8 @@ export class Opening {
 
     /** `take` makes a scene the open one, of which nothing is asked yet. */
     constructor(private readonly app: Pick<App, "api" | "stage" | "cameras" | "store" | "tell" | "prepare">,
-        private readonly take: (scene: OpenScene) => void) {}
+        private readonly take: (scene: OpenScene) => void)
+    {}
 
     load(name: string | null): void {
         if (this.loading === name) return;
@@ -30,12 +32,14 @@ export class Opening {
         this.app.tell("loading");
     }
 
-    /** Opens a scene; false: another one was asked for meanwhile. `given` is the rest of the state, null: as the scene comes. */
+    /** Opens a scene; false: another one was asked for meanwhile. `given` is the rest of the state, null: as the scene
+     * comes. */
     async open(name: string, given: State | null): Promise<boolean> {
         const { app } = this, turn = ++this.turn;
         this.load(name);
         const described = app.api.describe(name);
-        const [description, file, takeIn] = await Promise.all([described, app.api.mesh(name), described.then((d) => app.prepare(d))]);
+        const [description, file, takeIn] = await Promise.all([described, app.api.mesh(name),
+            described.then((d) => app.prepare(d))]);
         if (turn !== this.turn) return false;
         const mesh = readMesh(file);
         app.stage.show(mesh, description.channels);
@@ -65,8 +69,8 @@ export class Opening {
     }
 }
 
-/** The state that a scene begins with: a given one, whose lamps that it does not name are the scene's own, or that of the page as it is, in
- * the scene's own light, seen whole. */
+/** The state that a scene begins with: a given one, whose lamps that it does not name are the scene's own, or that of
+ * the page as it is, in the scene's own light, seen whole. */
 function stateOf({ mesh, ownLighting }: OpenScene, given: State | null, before: State): State {
     const base = given ?? { ...firstState, view: { ...before.view, camera: null, exposure: null, range: null } };
     const lighting = { ...base.lighting, groups: { ...ownLighting.groups, ...base.lighting.groups } };

@@ -1,4 +1,5 @@
-// Goes on after what went wrong: a daemon that is away or busy, a token that is missing, a store that was replaced or is gone.
+// Goes on after what went wrong: a daemon that is away or busy, a token that is missing, a store that was replaced or
+// is gone.
 import { Lost, Problem, type Description } from "../daemon/api.ts";
 import { Watch } from "../daemon/watch.ts";
 import type { App } from "./app.ts";
@@ -19,9 +20,15 @@ export class Recovery {
     private looked = -LOOKED_MS;
     private lookTimer = 0;
 
-    constructor(private readonly app: Pick<App, "api" | "scene" | "store" | "opening" | "exposure" | "notice" | "isIdle" | "open" | "ask" | "listScenes" | "tell">) {
+    constructor(
+        private readonly app: Pick<App,
+            "api" | "scene" | "store" | "opening" | "exposure" | "notice" | "isIdle" | "open" | "ask" | "listScenes"
+                | "tell">,
+    ) {
         this.watch = new Watch(() => app.api.isReady(), () => app.tell("lost"), () => this.goOn());
-        document.addEventListener("visibilitychange", () => { if (!document.hidden) this.look(0); });
+        document.addEventListener("visibilitychange", () => {
+            if (!document.hidden) this.look(0);
+        });
     }
 
     /** An answer has come, and the picture shows it. */
@@ -48,22 +55,30 @@ export class Recovery {
             this.watch.lose(`The daemon is busy: ${reason.message}. This page goes on by itself.`);
             return;
         }
-        if (reason instanceof Replaced || (reason instanceof Problem && UNFIT.includes(reason.status) && loading === null)) {
-            this.renew().then((is) => { if (!is) this.complain(reason); }, (why: unknown) => this.complain(why));
+        if (reason instanceof Replaced
+            || (reason instanceof Problem && UNFIT.includes(reason.status) && loading === null))
+        {
+            this.renew().then((is) => {
+                if (!is) this.complain(reason);
+            }, (why: unknown) => this.complain(why));
             return;
         }
         this.complain(reason, loading === null);
     }
 
-    /** Looks a while after the last call, once nothing is asked for, if the store is still the one that is shown: its answers alone do not
-     * tell. */
+    /** Looks a while after the last call, once nothing is asked for, if the store is still the one that is shown: its
+     * answers alone do not tell. */
     look(after = LOOK_MS): void {
         clearTimeout(this.lookTimer);
         this.lookTimer = window.setTimeout(() => {
             const { app, app: { opening } } = this;
-            if (app.scene === null || opening.loading !== null || this.watch.isLost || !app.isIdle || document.hidden) return;
+            if (app.scene === null || opening.loading !== null || this.watch.isLost || !app.isIdle || document.hidden)
+                return;
             this.looked = performance.now();
-            this.renew().catch((reason: unknown) => { if (opening.loading === null) this.complain(reason); else this.fail(reason); });
+            this.renew().catch((reason: unknown) => {
+                if (opening.loading === null) this.complain(reason);
+                else this.fail(reason);
+            });
         }, Math.max(after, this.looked + LOOKED_MS - performance.now()));
     }
 
@@ -76,13 +91,17 @@ export class Recovery {
             void app.listScenes().catch(() => undefined);
             return app.tell("problem");
         }
-        this.problem = reason instanceof Problem ? `The daemon did not do what this page asked for (${reason.status}): ${reason.message}`
-            : reason instanceof Error ? reason.message : String(reason);
+        this.problem = reason instanceof Problem
+            ? `The daemon did not do what this page asked for (${reason.status}): ${reason.message}`
+            : reason instanceof Error
+            ? reason.message
+            : String(reason);
         app.tell("problem");
         app.tell("scenes");
     }
 
-    /** Opens the scene anew if its store is another one by now: as it comes, or in its present state where the mesh is the same. */
+    /** Opens the scene anew if its store is another one by now: as it comes, or in its present state where the mesh is
+     * the same. */
     private async renew(): Promise<boolean> {
         const { app, app: { scene } } = this, name = scene?.description.name ?? "";
         if (scene === null) return false;
@@ -91,7 +110,9 @@ export class Recovery {
         if (JSON.stringify(description) === JSON.stringify(scene.description)) return false;
         app.notice = `The store of ${name} was replaced; this is the new one.`;
         const { now } = app.store;
-        await app.open(name, haveOneMesh(description, scene.description) ? { ...now, view: { ...now.view, exposure: app.exposure.anew(now.view) } } : null);
+        await app.open(name, haveOneMesh(description, scene.description)
+            ? { ...now, view: { ...now.view, exposure: app.exposure.anew(now.view) } }
+            : null);
         return true;
     }
 
@@ -103,7 +124,9 @@ export class Recovery {
         this.missed = null;
         void app.listScenes().catch(() => undefined);
         if (missed !== null) void app.open(missed, null).catch((reason: unknown) => this.fail(reason));
-        else this.renew().then((is) => { if (!is) app.ask(true); }, (reason: unknown) => this.complain(reason));
+        else this.renew().then((is) => {
+                if (!is) app.ask(true);
+            }, (reason: unknown) => this.complain(reason));
     }
 }
 

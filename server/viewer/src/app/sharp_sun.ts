@@ -1,5 +1,5 @@
-// The sun drawn sharp: from its true direction, with shadows by the mesh, in place of the tiles that the store's numbers have for it.
-// The light that the sun's own light casts further, and all other light, stay the daemon's.
+// The sun drawn sharp: from its true direction, with shadows by the mesh, in place of the tiles that the store's
+// numbers have for it. The light that the sun's own light casts further, and all other light, stay the daemon's.
 import { floatsToHalves, halfToNumber } from "../base/half.ts";
 import { Newest } from "../daemon/newest.ts";
 import type { SunParts } from "../daylight/source.ts";
@@ -19,13 +19,18 @@ interface WantedSharp {
 export class SharpSun {
     private key = "";
     private readonly asker = new Newest<WantedSharp, Field>(
-        (wanted) => this.solve(wanted), (field, wanted) => this.show(field, wanted),
+        (wanted) => this.solve(wanted),
+        (field, wanted) => this.show(field, wanted),
         (reason) => {
             this.end();
             this.app.fail(reason);
-        }, 1);
+        },
+        1,
+    );
 
-    constructor(private readonly app: Pick<App, "scene" | "store" | "stage" | "fields" | "asking" | "sunOf" | "fail">) {}
+    constructor(
+        private readonly app: Pick<App, "scene" | "store" | "stage" | "fields" | "asking" | "sunOf" | "fail">,
+    ) {}
 
     /** True while the picture has the sun drawn, or will have. */
     get isOn(): boolean {
@@ -65,20 +70,25 @@ export class SharpSun {
     /** Null where it is off, or the picture shows numbers: in false colour, comparisons and by a threshold. */
     private wanted(): WantedSharp | null {
         const { app, app: { scene, store: { now: { view, lighting, compare } } } } = this;
-        if (scene === null || !view.sharpSun || view.picture !== "light" || view.threshold !== null || compare !== null) return null;
-        const { description } = scene, parts = (description.emitters?.length ?? 0) > 0 ? null : app.sunOf(lighting, description);
+        if (scene === null || !view.sharpSun || view.picture !== "light" || view.threshold !== null || compare !== null)
+            return null;
+        const { description } = scene,
+            parts = (description.emitters?.length ?? 0) > 0 ? null : app.sunOf(lighting, description);
         if (parts === null) return null;
         const can = { ...abilitiesOf(description), emitters: 0 };
         return {
             rest: wantedFor(description.name, "radiosity", lighting, { ...can, sky: parts.sky }),
-            further: wantedFor(description.name, "indirect", { ...lighting, groups: {} }, { ...can, sky: parts.sun }), parts,
+            further: wantedFor(description.name, "indirect", { ...lighting, groups: {} }, { ...can, sky: parts.sun }),
+            parts,
         };
     }
 
     private async solve({ rest, further }: WantedSharp): Promise<Field> {
         const [one, other] = await Promise.all([this.app.asking.solve(rest), this.app.asking.solve(further)]);
         const scale = Math.max(one.scale, other.scale), sum = new Float32Array(one.bits.length);
-        for (let i = 0; i < sum.length; i++) sum[i] = halfToNumber(one.bits[i]) * (one.scale / scale) + halfToNumber(other.bits[i]) * (other.scale / scale);
+        for (let i = 0; i < sum.length; i++)
+            sum[i] = halfToNumber(one.bits[i]) * (one.scale / scale)
+                + halfToNumber(other.bits[i]) * (other.scale / scale);
         return new Field(floatsToHalves(sum), [one.channels, one.elements], scale);
     }
 

@@ -14,8 +14,11 @@ export function csvCell(text: string): string {
 }
 
 /** A line for each element: number, group, area in m², values; values is [C][n] in single precision. */
-export function csvOf(values: Float32Array, names: readonly string[], groupOf: Uint32Array, groups: readonly string[], area: Float64Array): string {
-    const n = area.length, cells = groups.map(csvCell), lines = [["element", "group", "area_m2", ...names.map(csvCell)].join(",")];
+export function csvOf(values: Float32Array, names: readonly string[], groupOf: Uint32Array, groups: readonly string[],
+    area: Float64Array): string
+{
+    const n = area.length, cells = groups.map(csvCell),
+        lines = [["element", "group", "area_m2", ...names.map(csvCell)].join(",")];
     for (let i = 0; i < n; i++) {
         let line = `${i},${cells[groupOf[i]]},${Number(area[i].toPrecision(7))}`;
         for (let c = 0; c < names.length; c++) line += `,${floatText(values[c * n + i])}`;

@@ -6,7 +6,10 @@ type Properties = { [name: string]: unknown } & Handlers;
 
 /** An element with attributes, handlers of events (onclick …) and children; false and null attributes are left out. */
 export function make<K extends keyof HTMLElementTagNameMap>(
-    tag: K, properties: Properties = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+    tag: K,
+    properties: Properties = {},
+    ...children: Child[]
+): HTMLElementTagNameMap[K] {
     const element = document.createElement(tag);
     for (const [name, value] of Object.entries(properties)) {
         if (name.startsWith("on")) element.addEventListener(name.slice(2), value as EventListener);
@@ -39,14 +42,21 @@ export function unique(stem: string): string {
 }
 
 /** A button with a text or a sign. A sign is called by its label; a text keeps its name, and the label is a hint. */
-export function button(text: string, label: string | null, press: () => void, properties: Properties = {}): HTMLButtonElement {
+export function button(text: string, label: string | null, press: () => void,
+    properties: Properties = {}): HTMLButtonElement
+{
     const isSign = !/[a-z]/i.test(text);
-    return make("button", { type: "button", "aria-label": isSign ? label : null, title: label, onclick: press, ...properties }, text);
+    return make("button", { type: "button", "aria-label": isSign ? label : null, title: label, onclick: press,
+        ...properties }, text);
 }
 
 /** A choice of one of several values. */
 export function choice<T extends string>(
-    label: string, values: readonly (readonly [T, string])[], now: T, pick: (value: T) => void): HTMLLabelElement {
+    label: string,
+    values: readonly (readonly [T, string])[],
+    now: T,
+    pick: (value: T) => void,
+): HTMLLabelElement {
     const select = make("select", { onchange: () => pick(select.value as T) },
         ...values.map(([value, text]) => make("option", { value, selected: value === now }, text)));
     return make("label", { class: "field" }, make("span", {}, label), select);

@@ -27,8 +27,11 @@ export function readNpy(buffer: ArrayBuffer): Npy {
         throw new Error(`the NPY answer has ${bytes.length - from} bytes, must have ${count * size}`);
     const aligned = from % size === 0 ? buffer : buffer.slice(from);
     const offset = from % size === 0 ? from : 0;
-    const data = size === 2 ? new Uint16Array(aligned, offset, count)
-        : size === 4 ? new Float32Array(aligned, offset, count) : new Float64Array(aligned, offset, count);
+    const data = size === 2
+        ? new Uint16Array(aligned, offset, count)
+        : size === 4
+        ? new Float32Array(aligned, offset, count)
+        : new Float64Array(aligned, offset, count);
     return { shape: sizes, data };
 }
 

@@ -38,7 +38,9 @@ export interface Description {
     /** In the axes of the store, metres; the field of view is that of the height, in degrees. */
     cameras?: { name: string; eye: Vector; direction: Vector; up: Vector; fov: number }[];
     sky: { tiling: string; tiles: number; ground_albedo: number } | null;
-    error: { [light: string]: ErrorFigures | GroupErrors[] } & { [light in "single" | "lights" | "random" | "sky"]?: ErrorFigures } | null;
+    error: { [light: string]: ErrorFigures | GroupErrors[] } & {
+        [light in "single" | "lights" | "random" | "sky"]?: ErrorFigures;
+    } | null;
     provenance?: { [name: string]: unknown };
     /** What the method reported; paths and reuse are of a lamp in many positions. */
     report?: { [name: string]: unknown };
@@ -100,7 +102,9 @@ export class Api {
 
     private post(path: string, body: unknown, accept: string, signal?: AbortSignal): Promise<Response> {
         return this.ask(path, {
-            method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" },
+            method: "POST",
+            body: JSON.stringify(body),
+            headers: { "Content-Type": "application/json" },
             ...(signal === undefined ? {} : { signal }),
         }, accept);
     }
@@ -141,7 +145,9 @@ export class Api {
     }
 
     /** [C][n] values, or [n] of one channel, in half precision; `request` has the emission and the quantity. */
-    async radiosity(scene: string, request: object, signal?: AbortSignal): Promise<{ values: Npy; solveMs: number | null }> {
+    async radiosity(scene: string, request: object,
+        signal?: AbortSignal): Promise<{ values: Npy; solveMs: number | null }>
+    {
         const response = await this.post(Api.path(scene, "/radiosity"), request, "application/x-npy; dtype=f2", signal);
         return { values: readNpy(await response.arrayBuffer()), solveMs: Api.solveMs(response) };
     }
@@ -149,9 +155,13 @@ export class Api {
     /** The same in single precision, as an NPY file. A request with a tolerance has a certificate. */
     async floats(scene: string, request: object, signal?: AbortSignal): Promise<Floats> {
         const response = await this.post(Api.path(scene, "/radiosity"), request, "application/x-npy; dtype=f4", signal);
-        const number = (name: string): number | null => (response.headers.has(name) ? Number(response.headers.get(name)) : null);
+        const number = (
+            name: string,
+        ): number | null => (response.headers.has(name) ? Number(response.headers.get(name)) : null);
         return {
-            file: await response.arrayBuffer(), certificate: number("Lambert-Certificate"), iterations: number("Lambert-Iterations"),
+            file: await response.arrayBuffer(),
+            certificate: number("Lambert-Certificate"),
+            iterations: number("Lambert-Iterations"),
             solveMs: Api.solveMs(response),
         };
     }
@@ -163,18 +173,22 @@ export class Api {
 
     /** The same as JSON, with its error, for selected elements, reductions and refinements. */
     async answer(scene: string, request: object, signal?: AbortSignal): Promise<{ [member: string]: unknown }> {
-        return (await (await this.post(Api.path(scene, "/radiosity"), request, "application/json", signal)).json()) as
-            { [member: string]: unknown };
+        return (await (await this.post(Api.path(scene, "/radiosity"), request, "application/json", signal)).json()) as {
+            [member: string]: unknown;
+        };
     }
 
     async adjoint(scene: string, request: object, signal?: AbortSignal): Promise<{ [member: string]: unknown }> {
-        return (await (await this.post(Api.path(scene, "/adjoint"), request, "application/json", signal)).json()) as
-            { [member: string]: unknown };
+        return (await (await this.post(Api.path(scene, "/adjoint"), request, "application/json", signal)).json()) as {
+            [member: string]: unknown;
+        };
     }
 
     /** Makes a variant of reflectances, or removes it (groups null); its name is NAME@variant. The path of one that is
      * made answers 202 until it is served. */
-    async vary(scene: string, variant: string, groups: { [name: string]: number | readonly number[] } | null): Promise<string | null> {
+    async vary(scene: string, variant: string,
+        groups: { [name: string]: number | readonly number[] } | null): Promise<string | null>
+    {
         const response = await this.ask(Api.path(scene, "/reflectance"), {
             method: groups === null ? "DELETE" : "PUT",
             headers: { "Content-Type": "application/json" },

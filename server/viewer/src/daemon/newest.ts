@@ -11,7 +11,8 @@ export class Newest<Request, Answer> {
         private readonly ask: (request: Request) => Promise<Answer>,
         private readonly show: (answer: Answer, request: Request) => void,
         private readonly fail: (reason: unknown) => void,
-        private readonly most = 2) {}
+        private readonly most = 2,
+    ) {}
 
     want(request: Request): void {
         this.waiting = request;
@@ -47,6 +48,7 @@ export class Newest<Request, Answer> {
                 this.onTheirWay -= 1;
                 if (turn > this.shown) this.fail(reason);
                 this.send();
-            });
+            },
+        );
     }
 }

@@ -8,7 +8,9 @@ export class Watch {
     /** Why, as a sentence. */
     why = "";
 
-    constructor(private readonly isReady: () => Promise<boolean>, private readonly lost: () => void, private readonly found: () => void) {}
+    constructor(private readonly isReady: () => Promise<boolean>, private readonly lost: () => void,
+        private readonly found: () => void)
+    {}
 
     lose(why: string): void {
         if (this.isLost) return;

@@ -1,5 +1,6 @@
 // Skies for the tiles of a store: even, overcast, clear, and of a weather file, in the unit of the store.
-import { efficacies, gradation, perezOf, scattering, airMass, SOLAR_CONSTANT, type PerezSky, type Shape } from "./perez.ts";
+import { efficacies, gradation, perezOf, scattering, airMass, SOLAR_CONSTANT, type PerezSky,
+    type Shape } from "./perez.ts";
 import { dateOf, sunAt, type Sun } from "./sun.ts";
 import { addSun, horizontalOf, meansOver, type Tiles } from "./tiles.ts";
 import { weatherAt, type Weather } from "./weather.ts";
@@ -36,38 +37,50 @@ function scaled(tiles: Tiles, relative: Float64Array, horizontal: number): Float
 }
 
 function shaped(tiles: Tiles, shape: Shape, sun: Sun, horizontal: number): Float64Array {
-    const relative = meansOver(tiles, sun.direction, (cosZeta) => gradation(shape, cosZeta), (cosGamma) => scattering(shape, cosGamma));
+    const relative = meansOver(tiles, sun.direction, (cosZeta) => gradation(shape, cosZeta),
+        (cosGamma) => scattering(shape, cosGamma));
     return scaled(tiles, relative, horizontal);
 }
 
-/** Normal irradiance by a sun in a clear sky, W/m²: of what is outside the atmosphere, .7 to the power of m^.678 is left
- * after an air mass m (Meinel and Meinel 1976); the sky has a tenth of that, on a horizontal plane. */
+/** Normal irradiance by a sun in a clear sky, W/m²: of what is outside the atmosphere, .7 to the power of m^.678 is
+ * left after an air mass m (Meinel and Meinel 1976); the sky has a tenth of that, on a horizontal plane. */
 function clearDay(sun: Sun): Day {
     if (sun.altitude <= 0) return { direct: 0, diffuse: 0 };
     const direct = (SOLAR_CONSTANT / sun.distance ** 2) * 0.7 ** (airMass(Math.PI / 2 - sun.altitude) ** 0.678);
     return { direct, diffuse: 0.1 * direct };
 }
 
-/** A clear day at sea level by the turbidity T of Linke, for an air mass of 2: the model of the European Solar Radiation Atlas
- * (Rigollier, Bauer and Wald 2000, Solar Energy 68(1):33-48) with the optical thickness of Kasten 1996, made for T from 2 to 7. */
+/** A clear day at sea level by the turbidity T of Linke, for an air mass of 2: the model of the European Solar
+ * Radiation Atlas (Rigollier, Bauer and Wald 2000, Solar Energy 68(1):33-48) with the optical thickness of Kasten 1996,
+ * made for T from 2 to 7. */
 export function turbidDay(sun: Sun, T: number): Day {
     if (sun.altitude <= 0) return { direct: 0, diffuse: 0 };
     const up = Math.sin(sun.altitude), outside = SOLAR_CONSTANT / sun.distance ** 2;
     // Kasten and Young 1989.
     const m = 1 / (up + 0.50572 * ((sun.altitude * 180) / Math.PI + 6.07995) ** -1.6364);
-    const thickness = m <= 20 ? 1 / (6.6296 + m * (1.7513 + m * (-0.1202 + m * (0.0065 - m * 0.00013)))) : 1 / (10.4 + 0.718 * m);
+    const thickness = m <= 20
+        ? 1 / (6.6296 + m * (1.7513 + m * (-0.1202 + m * (0.0065 - m * 0.00013))))
+        : 1 / (10.4 + 0.718 * m);
     // The diffuse light of a sun in the zenith, and its share at this altitude.
     const zenith = -0.015843 + T * (0.030543 + T * 0.0003797);
-    const a = [0.26463 + T * (-0.061581 + T * 0.0031408), 2.0402 + T * (0.018945 - T * 0.011161), -1.3025 + T * (0.039231 + T * 0.0085079)];
+    const a = [0.26463 + T * (-0.061581 + T * 0.0031408), 2.0402 + T * (0.018945 - T * 0.011161),
+        -1.3025 + T * (0.039231 + T * 0.0085079)];
     const share = Math.max(a[0], 0.002 / zenith) + up * (a[1] + up * a[2]);
     return { direct: outside * Math.exp(-0.8662 * T * m * thickness), diffuse: outside * zenith * share };
 }
 
-function put(tiles: Tiles, sun: Sun, light: SkyLight, diffuse: Float64Array, horizontal: number, perez: PerezSky | null = null): Sky {
+function put(tiles: Tiles, sun: Sun, light: SkyLight, diffuse: Float64Array, horizontal: number,
+    perez: PerezSky | null = null): Sky
+{
     const direct = new Float64Array(tiles.count);
     if (horizontal > 0 && light.sun !== "off") addSun(tiles, sun.direction, horizontal, light.sun === "spread", direct);
     return {
-        sun, diffuse, direct, diffuseHorizontal: horizontalOf(tiles, diffuse), directHorizontal: horizontalOf(tiles, direct), perez,
+        sun,
+        diffuse,
+        direct,
+        diffuseHorizontal: horizontalOf(tiles, diffuse),
+        directHorizontal: horizontalOf(tiles, direct),
+        perez,
     };
 }
 
@@ -80,7 +93,8 @@ function sunOf(light: SkyLight, year: number): Sun {
 export function skyFor(tiles: Tiles, light: SkyLight, photometric: boolean, weather: Weather | null): Sky | null {
     if (light.model === "off") return null;
     const sun = sunOf(light, 2001);
-    if (light.model === "even") return put(tiles, sun, light, new Float64Array(tiles.count).fill(light.strength / Math.PI), 0);
+    if (light.model === "even")
+        return put(tiles, sun, light, new Float64Array(tiles.count).fill(light.strength / Math.PI), 0);
     if (light.model === "overcast") {
         // Moon and Spencer 1942: (1 + 2 cos zeta)/3 of the zenith's.
         const relative = meansOver(tiles, ZENITH, (cosZeta) => 1 + 2 * cosZeta, () => 1);
@@ -111,7 +125,8 @@ function perezSky(tiles: Tiles, sun: Sun, light: SkyLight, photometric: boolean,
 function weatherSky(tiles: Tiles, light: SkyLight, photometric: boolean, weather: Weather): Sky | null {
     const hour = weatherAt(weather, light.day, light.hour);
     if (hour === null) return null;
-    const sun = sunAt(light.latitude, light.longitude, light.zone, { year: hour.year, ...dateOf(light.day) }, light.hour), up = sun.direction[2];
+    const sun = sunAt(light.latitude, light.longitude, light.zone, { year: hour.year, ...dateOf(light.day) },
+            light.hour), up = sun.direction[2];
     const direct = up <= 0 ? 0 : weather.directIsHorizontal ? hour.direct / up : hour.direct;
     return perezSky(tiles, sun, light, photometric, { direct, diffuse: hour.diffuse }, hour.dewPoint);
 }

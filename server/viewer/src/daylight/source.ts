@@ -74,7 +74,12 @@ export class SkySource {
         if (this.weather === null || this.isBeside) return light.moment;
         const { day, hour } = light, at = weatherAt(this.weather, day, hour);
         return at === null ? null : {
-            day, hour, year: at.year, direct: at.direct, isHorizontal: this.weather.directIsHorizontal, diffuse: at.diffuse,
+            day,
+            hour,
+            year: at.year,
+            direct: at.direct,
+            isHorizontal: this.weather.directIsHorizontal,
+            diffuse: at.diffuse,
             dewPoint: Number.isNaN(at.dewPoint) ? null : at.dewPoint,
         };
     }
@@ -90,7 +95,10 @@ export class SkySource {
     }
 
     /** One radiance a tile of the open scene (other null) or of another one, or three; null without light. */
-    radiances(light: SkyLight, photometric: boolean, channels: number, other: string | null = null): readonly (number | number[])[] | null {
+    radiances(light: SkyLight, photometric: boolean, channels: number, other: string | null = null):
+        | readonly (number | number[])[]
+        | null
+    {
         return this.find(light, photometric, channels, other).values;
     }
 
@@ -100,16 +108,24 @@ export class SkySource {
         if (sky === null || !(sky.directHorizontal > 0)) return null;
         const isColoured = light.tinted && channels === 3, normal = sky.directHorizontal / sky.sun.direction[2];
         const [one, other] = isColoured ? colouredParts(sky) : [Array.from(sky.diffuse), Array.from(sky.direct)];
-        return { sky: one, sun: other, direction: sky.sun.direction, light: (isColoured ? ofTemperature(SUN_K) : [1, 1, 1]).map((v) => v * normal) as SunParts["light"] };
+        return { sky: one, sun: other, direction: sky.sun.direction,
+            light: (isColoured ? ofTemperature(SUN_K) : [1, 1, 1]).map((v) => v * normal) as SunParts["light"] };
     }
 
-    private find(light: SkyLight, photometric: boolean, channels: number, other: string | null): { sky: Sky | null; values: readonly (number | number[])[] | null } {
+    private find(light: SkyLight, photometric: boolean, channels: number,
+        other: string | null): { sky: Sky | null; values: readonly (number | number[])[] | null }
+    {
         const isColoured = light.tinted && channels === 3;
         const key = JSON.stringify([light, photometric, isColoured, other]);
         let found = this.kept.get(key);
         if (found === undefined) {
-            const tiles = other === null ? this.tiles : this.others.get(other) ?? null, sky = tiles === null ? null : skyFor(tiles, light, photometric, this.weatherFor(light));
-            found = { sky, values: sky === null ? null : isColoured ? coloured(sky) : Array.from(sky.diffuse, (value, t) => value + sky.direct[t]) };
+            const tiles = other === null ? this.tiles : this.others.get(other) ?? null,
+                sky = tiles === null ? null : skyFor(tiles, light, photometric, this.weatherFor(light));
+            found = { sky, values: sky === null
+                ? null
+                : isColoured
+                ? coloured(sky)
+                : Array.from(sky.diffuse, (value, t) => value + sky.direct[t]) };
             this.kept.set(key, found);
             if (this.kept.size > KEPT) this.kept.delete(this.kept.keys().next().value as string);
         }
@@ -120,7 +136,8 @@ export class SkySource {
 /** Sky and sun with their luminances as they are. */
 function colouredParts(sky: Sky): [number[][], number[][]] {
     const blue = ofTemperature(sky.directHorizontal > 0 ? BLUE_K : OVERCAST_K), warm = ofTemperature(SUN_K);
-    const times = (values: Float64Array, colour: readonly number[]): number[][] => Array.from(values, (value) => colour.map((c) => value * c));
+    const times = (values: Float64Array, colour: readonly number[]): number[][] =>
+        Array.from(values, (value) => colour.map((c) => value * c));
     return [times(sky.diffuse, blue), times(sky.direct, warm)];
 }
 

@@ -32,7 +32,8 @@ export function sunAt(latitude: number, longitude: number, zone: number, date: D
     // Mean longitude L, mean anomaly g, ecliptic longitude l, obliquity of the ecliptic e.
     const L = 280.46 + 0.9856474 * n, g = (357.528 + 0.9856003 * n) * DEGREE;
     const l = (L + 1.915 * Math.sin(g) + 0.02 * Math.sin(2 * g)) * DEGREE, e = (23.439 - 4e-7 * n) * DEGREE;
-    const ascension = Math.atan2(Math.cos(e) * Math.sin(l), Math.cos(l)), declination = Math.asin(Math.sin(e) * Math.sin(l));
+    const ascension = Math.atan2(Math.cos(e) * Math.sin(l), Math.cos(l)),
+        declination = Math.asin(Math.sin(e) * Math.sin(l));
     // Sidereal time: hours at Greenwich, radians here.
     const sidereal = ((6.697375 + 0.0657098242 * n + ut) * 15 + longitude) * DEGREE;
     const h = sidereal - ascension, phi = latitude * DEGREE;

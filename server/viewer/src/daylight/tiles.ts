@@ -35,12 +35,18 @@ const SPACING = 3 * DEGREE;
 export function tilesOf(answer: SkyAnswer): Tiles {
     const count = answer.centre.length;
     const tiles: Tiles = {
-        count, centre: new Float64Array(3 * count), altitude: new Float64Array(2 * count), azimuth: new Float64Array(2 * count),
-        solidAngle: Float64Array.from(answer.solid_angle), cosine: Float64Array.from(answer.cosine), bands: [],
+        count,
+        centre: new Float64Array(3 * count),
+        altitude: new Float64Array(2 * count),
+        azimuth: new Float64Array(2 * count),
+        solidAngle: Float64Array.from(answer.solid_angle),
+        cosine: Float64Array.from(answer.cosine),
+        bands: [],
     };
     for (let t = 0; t < count; t++) {
         const [azimuth, altitude] = answer.centre[t].map((angle) => angle * DEGREE);
-        tiles.centre.set([Math.cos(altitude) * Math.sin(azimuth), Math.cos(altitude) * Math.cos(azimuth), Math.sin(altitude)], 3 * t);
+        tiles.centre.set([Math.cos(altitude) * Math.sin(azimuth), Math.cos(altitude) * Math.cos(azimuth),
+            Math.sin(altitude)], 3 * t);
         tiles.altitude.set(answer.altitude[t].map((angle) => angle * DEGREE), 2 * t);
         tiles.azimuth.set(answer.azimuth[t].map((angle) => angle * DEGREE), 2 * t);
         const band = tiles.bands.at(-1);
@@ -52,9 +58,11 @@ export function tilesOf(answer: SkyAnswer): Tiles {
 
 const stepsAcross = (angle: number): number => Math.max(Math.ceil(angle / SPACING - 1e-9), 1);
 
-/** Means over each tile of gradation(cos zeta) scattering(cos gamma), weighted by solid angle; gamma is the angle to `to`. */
+/** Means over each tile of gradation(cos zeta) scattering(cos gamma), weighted by solid angle; gamma is the angle to
+ * `to`. */
 export function meansOver(tiles: Tiles, to: readonly [number, number, number], gradation: (cosZeta: number) => number,
-    scattering: (cosGamma: number) => number): Float64Array {
+    scattering: (cosGamma: number) => number): Float64Array
+{
     const means = new Float64Array(tiles.count);
     const flat = Math.hypot(to[0], to[1]), towards = Math.atan2(to[0], to[1]);
     for (const { first, count } of tiles.bands) {
@@ -98,7 +106,9 @@ export function tileOf(tiles: Tiles, direction: readonly [number, number, number
 
 /** Adds a sun that gives a horizontal plane the irradiance `horizontal`: to its tile, as `lambert sky` does, or to the
  * tiles within a tile and a half of it, by their distance, so that it moves without steps. */
-export function addSun(tiles: Tiles, sun: readonly [number, number, number], horizontal: number, spread: boolean, L: Float64Array): void {
+export function addSun(tiles: Tiles, sun: readonly [number, number, number], horizontal: number, spread: boolean,
+    L: Float64Array): void
+{
     const own = tileOf(tiles, sun);
     if (!spread) {
         L[own] += horizontal / tiles.cosine[own];

@@ -1,5 +1,5 @@
-// Reads the irradiances of a weather file, row by row: EPW of EnergyPlus, or WEA of Radiance's gendaymtx. The page keeps it to
-// itself: nothing is sent anywhere.
+// Reads the irradiances of a weather file, row by row: EPW of EnergyPlus, or WEA of Radiance's gendaymtx. The page
+// keeps it to itself: nothing is sent anywhere.
 import { dateOf, dayOf } from "./sun.ts";
 import { readTimes, type Periods, type Row, type StatedDate } from "./times.ts";
 import type { Moment } from "../state/state.ts";
@@ -36,8 +36,8 @@ const RADIATION_MOST = 3000;
 const MISSING_RADIATION = 9999;
 const MISSING_DEW_POINT = 99.9;
 
-const EPW_HEAD = ["LOCATION", "DESIGN CONDITIONS", "TYPICAL/EXTREME PERIODS", "GROUND TEMPERATURES", "HOLIDAYS/DAYLIGHT SAVINGS",
-    "COMMENTS 1", "COMMENTS 2", "DATA PERIODS"];
+const EPW_HEAD = ["LOCATION", "DESIGN CONDITIONS", "TYPICAL/EXTREME PERIODS", "GROUND TEMPERATURES",
+    "HOLIDAYS/DAYLIGHT SAVINGS", "COMMENTS 1", "COMMENTS 2", "DATA PERIODS"];
 const WEA_HEAD = ["place", "latitude", "longitude", "time_zone", "site_elevation", "weather_data_file_units"];
 
 /** A line of the file, counted from 1, with what is wrong. */
@@ -53,7 +53,8 @@ function read(line: number, what: string, text: string | undefined, low: number,
 }
 
 function readRadiation(line: number, what: string, text: string | undefined): number {
-    if (Number(text) === MISSING_RADIATION) throw wrong(line, `${what} is missing (${MISSING_RADIATION}); fill the gap or take another file`);
+    if (Number(text) === MISSING_RADIATION)
+        throw wrong(line, `${what} is missing (${MISSING_RADIATION}); fill the gap or take another file`);
     return read(line, what, text, 0, RADIATION_MOST);
 }
 
@@ -74,9 +75,13 @@ function readDay(line: number, month: string, text: string): number {
 /** A date of the header: month/day, month/day/year, or the number of a day of 365. */
 function readDate(field: number, text: string): StatedDate {
     const parts = text.split("/").map((part) => (/^\s*\d{1,4}\s*$/.test(part) ? Number(part) : NaN));
-    const [month, day, year = 0] = parts.length === 1 && parts[0] >= 1 && parts[0] <= 366 ? Object.values(dateOf(Math.min(parts[0], 365))) : parts;
-    if (parts.length > 3 || Number.isNaN(year) || !(month >= 1 && month <= 12 && day >= 1 && day <= DAYS[month - 1] + (month === 2 ? 1 : 0)))
-        throw wrong(8, `date of a data period (field ${field + 1}) is "${text.trim().slice(0, 40)}", must be MONTH/DAY`);
+    const [month, day, year = 0] = parts.length === 1 && parts[0] >= 1 && parts[0] <= 366
+        ? Object.values(dateOf(Math.min(parts[0], 365)))
+        : parts;
+    if (parts.length > 3 || Number.isNaN(year)
+        || !(month >= 1 && month <= 12 && day >= 1 && day <= DAYS[month - 1] + (month === 2 ? 1 : 0)))
+        throw wrong(8,
+            `date of a data period (field ${field + 1}) is "${text.trim().slice(0, 40)}", must be MONTH/DAY`);
     return { month, day, year: year < 1900 ? 0 : year };
 }
 
@@ -97,20 +102,28 @@ function readEpw(lines: string[]): Draft {
     const rows = lines.slice(8).flatMap((text, k): Row[] => {
         if (text.trim() === "") return [];
         const fields = text.split(","), line = k + 9;
-        const dew = read(line, "dew point (field 8)", fields[7], -100, 100), written = (fields[4] ?? "").trim(), minute = written === "" ? NaN : Number(written);
+        const dew = read(line, "dew point (field 8)", fields[7], -100, 100), written = (fields[4] ?? "").trim(),
+            minute = written === "" ? NaN : Number(written);
         return [{
-            line, minute: Number.isInteger(minute) && minute >= 0 && minute <= 60 ? minute : NaN,
-            year: read(line, "year (field 1)", fields[0], 1900, 2100), month: read(line, "month", fields[1], 1, 12),
-            day: readDay(line, fields[1], fields[2]), hour: read(line, "hour (field 4)", fields[3], 1, 24) - 1,
+            line,
+            minute: Number.isInteger(minute) && minute >= 0 && minute <= 60 ? minute : NaN,
+            year: read(line, "year (field 1)", fields[0], 1900, 2100),
+            month: read(line, "month", fields[1], 1, 12),
+            day: readDay(line, fields[1], fields[2]),
+            hour: read(line, "hour (field 4)", fields[3], 1, 24) - 1,
             dewPoint: dew >= MISSING_DEW_POINT ? NaN : dew,
             direct: readRadiation(line, "direct normal radiation (field 15)", fields[14]),
             diffuse: readRadiation(line, "diffuse horizontal radiation (field 16)", fields[15]),
         }];
     });
     return {
-        place: head[1]?.trim() ?? "", latitude: read(1, "latitude (field 7)", head[6], -90, 90),
-        longitude: read(1, "longitude (field 8)", head[7], -180, 180), zone: read(1, "time zone (field 9)", head[8], -14, 14),
-        directIsHorizontal: false, rows, periods,
+        place: head[1]?.trim() ?? "",
+        latitude: read(1, "latitude (field 7)", head[6], -90, 90),
+        longitude: read(1, "longitude (field 8)", head[7], -180, 180),
+        zone: read(1, "time zone (field 9)", head[8], -14, 14),
+        directIsHorizontal: false,
+        rows,
+        periods,
     };
 }
 
@@ -122,24 +135,38 @@ function readWea(lines: string[]): Draft {
         return rest.join(" ");
     });
     const units = read(6, "weather_data_file_units", values[5], 1, 2);
-    if (units !== 1 && units !== 2) throw wrong(6, "weather_data_file_units must be 1 (direct light facing the sun) or 2 (on a horizontal plane)");
+    if (units !== 1 && units !== 2)
+        throw wrong(6, "weather_data_file_units must be 1 (direct light facing the sun) or 2 (on a horizontal plane)");
     let isLeap = false;
     const rows = lines.slice(6).flatMap((text, k): Row[] => {
         const line = k + 7, fields = text.trim().split(/\s+/);
         if (fields[0] === "") return [];
-        if (fields.length !== 5) throw wrong(line, "must hold five numbers: month day hour direct-normal diffuse-horizontal");
+        if (fields.length !== 5)
+            throw wrong(line, "must hold five numbers: month day hour direct-normal diffuse-horizontal");
         const month = read(line, "month", fields[0], 1, 12), day = readDay(line, fields[0], fields[1]);
         isLeap ||= month === 2 && day === 29;
         return [{
-            line, minute: NaN, year: 2001, month, day, hour: read(line, "hour", fields[2], 0, 24), dewPoint: NaN,
-            direct: readRadiation(line, "direct radiation", fields[3]), diffuse: readRadiation(line, "diffuse radiation", fields[4]),
+            line,
+            minute: NaN,
+            year: 2001,
+            month,
+            day,
+            hour: read(line, "hour", fields[2], 0, 24),
+            dewPoint: NaN,
+            direct: readRadiation(line, "direct radiation", fields[3]),
+            diffuse: readRadiation(line, "diffuse radiation", fields[4]),
         }];
     });
-    if (isLeap) for (const row of rows) row.year = 2000;
+    if (isLeap) { for (const row of rows) row.year = 2000; }
     const zone = read(4, "time_zone", values[3], -210, 210);
     return {
-        place: values[0], latitude: read(2, "latitude", values[1], -90, 90), longitude: 0 - read(3, "longitude", values[2], -180, 180),
-        zone: 0 - zone / 15, directIsHorizontal: units === 2, rows, periods: null,
+        place: values[0],
+        latitude: read(2, "latitude", values[1], -90, 90),
+        longitude: 0 - read(3, "longitude", values[2], -180, 180),
+        zone: 0 - zone / 15,
+        directIsHorizontal: units === 2,
+        rows,
+        periods: null,
     };
 }
 
@@ -150,7 +177,8 @@ const timeOf = (hour: WeatherHour): number => 24 * (dayOf(hour.month, hour.day) 
 export function readWeather(text: string): Weather {
     const lines = text.replace(/^\uFEFF/, "").split(/\r?\n/);
     const isEpw = /^LOCATION,/i.test(lines[0]);
-    if (!isEpw && !/^place\s/.test(lines[0])) throw new Error("The file is neither an EPW nor a WEA: it begins with neither LOCATION nor place.");
+    if (!isEpw && !/^place\s/.test(lines[0]))
+        throw new Error("The file is neither an EPW nor a WEA: it begins with neither LOCATION nor place.");
     const { rows, periods, ...weather } = isEpw ? readEpw(lines) : readWea(lines);
     if (rows.length === 0) throw new Error("The weather file has no hours after its head.");
     const step = readTimes(rows, periods);
@@ -162,7 +190,8 @@ export function readWeather(text: string): Weather {
 /** The weather of one hour, as a link holds it. */
 export function weatherOf({ day, hour, year, direct, isHorizontal, diffuse, dewPoint }: Moment): Weather {
     const one: WeatherHour = { year, ...dateOf(day), hour, direct, diffuse, dewPoint: dewPoint ?? NaN };
-    return { place: "", latitude: 0, longitude: 0, zone: 0, directIsHorizontal: isHorizontal, step: 1, hours: [one], times: Float64Array.of(24 * (day - 1) + hour) };
+    return { place: "", latitude: 0, longitude: 0, zone: 0, directIsHorizontal: isHorizontal, step: 1, hours: [one],
+        times: Float64Array.of(24 * (day - 1) + hour) };
 }
 
 /** The weather at a time of the year: that of a row at its middle, between two by their distance; `year` is that of the
@@ -181,7 +210,9 @@ export function weatherAt(weather: Weather, day: number, hour: number): WeatherH
     const share = (time - times[low - 1]) / (times[low] - times[low - 1]);
     const mix = (one: number, other: number): number => (share === 0 ? one : one + share * (other - one));
     return {
-        ...(share > 0.5 ? after : before), direct: mix(before.direct, after.direct), diffuse: mix(before.diffuse, after.diffuse),
+        ...(share > 0.5 ? after : before),
+        direct: mix(before.direct, after.direct),
+        diffuse: mix(before.diffuse, after.diffuse),
         dewPoint: mix(before.dewPoint, after.dewPoint),
     };
 }

@@ -20,20 +20,23 @@ const UNFIT_MOST = 8;
 export function comparePanel(app: App): Panel {
     const line = splitLine(app), legend = changeLegend(app);
     app.stage.canvas.parentElement?.append(line.element, legend.element);
-    const choices = make("div", {}), numbers = make("div", { "data-figure": "compared", "aria-live": "polite" }), said = make("p", { role: "status" });
+    const choices = make("div", {}), numbers = make("div", { "data-figure": "compared", "aria-live": "polite" }),
+        said = make("p", { role: "status" });
     const unfit = make("p", { class: "hint" });
-    const how = choice("Shown as", [["split", "A left, B right of a line"], ["difference", "Difference B − A"]], "split",
-        (way) => set({ how: way }));
+    const how = choice("Shown as", [["split", "A left, B right of a line"], ["difference", "Difference B − A"]],
+        "split", (way) => set({ how: way }));
     const set = (to: Partial<Compare> | null): void => {
         const { now } = app.store;
-        const first: Compare = { how: (how.querySelector("select") as HTMLSelectElement).value as Compare["how"], scene: null, lighting: null, split: 0.5 };
+        const first: Compare = { how: (how.querySelector("select") as HTMLSelectElement).value as Compare["how"],
+            scene: null, lighting: null, split: 0.5 };
         said.textContent = "";
         app.store.change({ ...now, compare: to === null ? null : { ...first, ...now.compare, ...to } });
     };
     const pick = async (value: string): Promise<void> => {
         const { now } = app.store, name = value.slice(2);
         if (value === "") set(null);
-        else if (value.startsWith("p:")) set({ scene: null, lighting: now.presets.find((preset) => preset.name === name)?.lighting ?? null });
+        else if (value.startsWith("p:"))
+            set({ scene: null, lighting: now.presets.find((preset) => preset.name === name)?.lighting ?? null });
         else if (value.startsWith("s:")) {
             said.textContent = "";
             if (await app.admit(name)) set({ scene: name, lighting: null });
@@ -42,15 +45,25 @@ export function comparePanel(app: App): Panel {
     const draw = (): void => {
         const { scenes, store: { now } } = app;
         const here = scenes.find((scene) => scene.name === now.scene);
-        const others = scenes.filter((scene) => scene.name !== now.scene && scene.elements === here?.elements && scene.channels === here.channels);
-        const left = scenes.filter((scene) => scene.name !== now.scene && !others.includes(scene)).map((scene) => scene.name);
+        const others = scenes.filter((scene) =>
+            scene.name !== now.scene && scene.elements === here?.elements && scene.channels === here.channels
+        );
+        const left = scenes.filter((scene) => scene.name !== now.scene && !others.includes(scene)).map((scene) =>
+            scene.name
+        );
         unfit.hidden = left.length === 0;
-        unfit.textContent = `Not offered, as their elements or channels are other ones: ${left.slice(0, UNFIT_MOST).join(", ")}${left.length > UNFIT_MOST ? " …" : "."}`;
+        unfit.textContent = `Not offered, as their elements or channels are other ones: ${
+            left.slice(0, UNFIT_MOST).join(", ")
+        }${left.length > UNFIT_MOST ? " …" : "."}`;
         const chosen = chosenOf(app);
-        fill(choices, choice("B is", [["", "nothing: no comparison"], ...(chosen === "kept" ? [["kept", "the lighting that was kept"] as const] : []),
-            ...others.map((scene) => [`s:${scene.name}`, `scene ${scene.name}`] as const),
-            ...now.presets.map((preset) => [`p:${preset.name}`, `lighting ${preset.name}`] as const)],
-        chosen, (value) => { pick(value).catch((reason: unknown) => app.fail(reason)); }));
+        fill(choices,
+            choice("B is", [["", "nothing: no comparison"],
+                ...(chosen === "kept" ? [["kept", "the lighting that was kept"] as const] : []),
+                ...others.map((scene) => [`s:${scene.name}`, `scene ${scene.name}`] as const),
+                ...now.presets.map((preset) => [`p:${preset.name}`, `lighting ${preset.name}`] as const)], chosen,
+                (value) => {
+                    pick(value).catch((reason: unknown) => app.fail(reason));
+                }));
         how.hidden = now.compare === null;
         (how.querySelector("select") as HTMLSelectElement).value = now.compare?.how ?? "split";
         line.name(now.scene, nameOf(now.compare, chosen));
@@ -62,16 +75,22 @@ export function comparePanel(app: App): Panel {
         draw();
         said.textContent = app.unlike ?? "";
     });
-    app.store.listen((now, before) => { if (now.compare !== before.compare || now.presets !== before.presets) draw(); });
+    app.store.listen((now, before) => {
+        if (now.compare !== before.compare || now.presets !== before.presets) draw();
+    });
     measure(app, numbers, (changes) => {
         const most = roundUp(changes.high);
         app.stage.setChange(most);
         legend.set(most);
     });
-    const keep = button("Keep this lighting as B", "Keep the lighting that is shown now as B, then change A", () => set({ scene: null, lighting: app.store.now.lighting }));
+    const keep = button("Keep this lighting as B", "Keep the lighting that is shown now as B, then change A",
+        () => set({ scene: null, lighting: app.store.now.lighting }));
     return {
-        id: "compare", title: "Compare",
-        element: make("div", {}, make("p", { class: "hint" }, "A is what the other panels show. B is another scene with as many elements, or another lighting."),
+        id: "compare",
+        title: "Compare",
+        element: make("div", {},
+            make("p", { class: "hint" },
+                "A is what the other panels show. B is another scene with as many elements, or another lighting."),
             choices, said, unfit, make("div", { class: "row" }, keep), how, numbers),
     };
 }
@@ -98,21 +117,29 @@ function measure(app: App, place: HTMLElement, found: (changes: Changes) => void
     const show = (changes: Changes, isRough: boolean): void => {
         const { scene, store: { now } } = app;
         if (scene === null) return;
-        const { unit } = now.view, group = scene.mesh.groups[scene.mesh.groupOf[changes.mostAt]].name, about = isRough ? "≈ " : "";
+        const { unit } = now.view, group = scene.mesh.groups[scene.mesh.groupOf[changes.mostAt]].name,
+            about = isRough ? "≈ " : "";
         found(changes);
-        fill(place, make("dl", { "data-rough": isRough ? "yes" : "no" },
-            make("dt", {}, "Root mean square of B − A"), make("dd", { "data-number": changes.rms }, `${about}${tell(changes.rms)} ${unit}`),
-            make("dt", {}, "Largest"), make("dd", { "data-number": changes.most },
-                `${about}${changes.most > 0 ? "+" : "−"}${tell(Math.abs(changes.most))} ${unit} at element ${count(changes.mostAt)} of ${group}`),
-            make("dt", {}, "|B − A| / |A|"), make("dd", { "data-number": changes.relative }, `${about}${percent(changes.relative)}`)),
-        make("p", { class: "hint" }, "Weighted by area. The first two are of luminance, the last of all channels."));
+        fill(place,
+            make("dl", { "data-rough": isRough ? "yes" : "no" }, make("dt", {}, "Root mean square of B − A"),
+                make("dd", { "data-number": changes.rms }, `${about}${tell(changes.rms)} ${unit}`),
+                make("dt", {}, "Largest"),
+                make("dd", { "data-number": changes.most },
+                    `${about}${changes.most > 0 ? "+" : "−"}${tell(Math.abs(changes.most))} ${unit} at element ${
+                        count(changes.mostAt)
+                    } of ${group}`), make("dt", {}, "|B − A| / |A|"),
+                make("dd", { "data-number": changes.relative }, `${about}${percent(changes.relative)}`)),
+            make("p", { class: "hint" },
+                "Weighted by area. The first two are of luminance, the last of all channels."));
     };
     const exact = async (wanted: Wanted): Promise<Float32Array> => {
         const { scene } = app, tolerance = app.store.now.tolerance;
-        if (scene === null || wanted.emission === null) return new Float32Array((scene?.description.channels ?? 0) * (scene?.mesh.elements ?? 0));
+        if (scene === null || wanted.emission === null)
+            return new Float32Array((scene?.description.channels ?? 0) * (scene?.mesh.elements ?? 0));
         // A certified A is compared as such.
         const certified = tolerance !== null && app.asking.certificate !== null && wanted === a;
-        const { file } = await app.api.floats(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity, ...(certified ? { tolerance } : {}) });
+        const { file } = await app.api.floats(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity,
+            ...(certified ? { tolerance } : {}) });
         return (readNpy(file).data as Float32Array).map((v) => v * wanted.scale);
     };
     let a: Wanted | null = null;
@@ -121,7 +148,8 @@ function measure(app: App, place: HTMLElement, found: (changes: Changes) => void
         a = app.wanted(0);
         if (scene === null || a === null || b === null || !app.isIdle) return;
         const [first, second] = await Promise.all([exact(a), exact(b)]);
-        if (mine === turn && app.store.now.compare !== null) show(changesOf(first, second, scene.description.channels, scene.mesh.area), false);
+        if (mine === turn && app.store.now.compare !== null)
+            show(changesOf(first, second, scene.description.channels, scene.mesh.area), false);
     };
     app.on("field", () => {
         const { scene, fields: [first, second], store: { now } } = app;
@@ -129,6 +157,8 @@ function measure(app: App, place: HTMLElement, found: (changes: Changes) => void
         clearTimeout(timer);
         if (scene === null || now.compare === null || first === null || second === null) return;
         show(changesOf(planar(first), planar(second), scene.description.channels, scene.mesh.area), true);
-        timer = window.setTimeout(() => { rested().catch((reason: unknown) => app.fail(reason)); }, REST_MS);
+        timer = window.setTimeout(() => {
+            rested().catch((reason: unknown) => app.fail(reason));
+        }, REST_MS);
     });
 }

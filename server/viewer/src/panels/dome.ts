@@ -22,7 +22,8 @@ function colourOf(value: number, mean: number): string {
 
 export function makeDome(): Dome {
     const ratio = Math.min(3, Math.max(1, window.devicePixelRatio));
-    const canvas = make("canvas", { class: "dome", width: SIZE * ratio, height: SIZE * ratio, role: "img", "aria-label": "The sky" });
+    const canvas = make("canvas", { class: "dome", width: SIZE * ratio, height: SIZE * ratio, role: "img",
+        "aria-label": "The sky" });
     const pen = canvas.getContext("2d");
     const radius = SIZE / 2 - MARGIN, middle = SIZE / 2;
     const away = (altitude: number): number => radius * (1 - altitude / (Math.PI / 2));
@@ -52,7 +53,8 @@ export function makeDome(): Dome {
         if (sky !== null && sky.sun.altitude > 0) {
             const { azimuth, altitude } = sky.sun;
             pen.beginPath();
-            pen.arc(middle + away(altitude) * Math.sin(azimuth), middle - away(altitude) * Math.cos(azimuth), 5, 0, 2 * Math.PI);
+            pen.arc(middle + away(altitude) * Math.sin(azimuth), middle - away(altitude) * Math.cos(azimuth), 5, 0,
+                2 * Math.PI);
             pen.fillStyle = sky.directHorizontal > 0 ? "#ffd23f" : "transparent";
             pen.strokeStyle = "#5a3d00";
             pen.lineWidth = 1.5;

@@ -29,7 +29,11 @@ export function emittersPanel(app: App): Panel {
     // Back and forth, as a path need not be closed.
     let way = 1;
     const drive = player({
-        what: "the lamp along its path", speeds: [["1", "1 position a second"], ["3", "3 a second"], ["8", "8 a second"]], speed: "3", step: 1, stepLabel: "One position",
+        what: "the lamp along its path",
+        speeds: [["1", "1 position a second"], ["3", "3 a second"], ["8", "8 a second"]],
+        speed: "3",
+        step: 1,
+        stepLabel: "One position",
         advance: (amount) => {
             const last = names().length - 1;
             let to = (place() ?? 0) + way * amount;
@@ -42,25 +46,39 @@ export function emittersPanel(app: App): Panel {
     });
     const path = make("div", {}, frame, position.element, drive.element);
     const rows = new Map<string, Slider>();
-    const list = make("div", {}), filter = make("input", { type: "text", placeholder: "Part of a name", "aria-label": "Show emitters whose names have", oninput: () => draw() });
-    const setAll = (weight: number) => (): void => change(weight === 0 ? {} : Object.fromEntries(names().map((_, index) => [index, weight])));
+    const list = make("div", {}),
+        filter = make("input", { type: "text", placeholder: "Part of a name",
+            "aria-label": "Show emitters whose names have", oninput: () => draw() });
+    const setAll = (weight: number) => (): void =>
+        change(weight === 0 ? {} : Object.fromEntries(names().map((_, index) => [index, weight])));
     const draw = (): void => {
-        const found = names().map((name, index) => ({ name, index })).filter(({ name }) => name.includes(filter.value.trim()));
+        const found = names().map((name, index) => ({ name, index })).filter(({ name }) =>
+            name.includes(filter.value.trim())
+        );
         rows.clear();
         fill(list, ...found.slice(0, ROWS_MOST).map(({ name, index }) => {
             const key = String(index), row = slider({
-                label: name, unit: "×", least: 0, most: 2, step: 0.01, change: (value) => change({ ...weights(), [key]: value }, `weight ${key}`),
+                label: name,
+                unit: "×",
+                least: 0,
+                most: 2,
+                step: 0.01,
+                change: (value) => change({ ...weights(), [key]: value }, `weight ${key}`),
             }, weights()[key] ?? 0);
             rows.set(key, row);
-            return make("div", { class: "weight" }, row.element, button("Solo", `Only ${name}`, () => change({ [key]: weights()[key] || 1 })));
-        }), found.length > ROWS_MOST && make("p", { class: "hint" }, `${count(found.length - ROWS_MOST)} more: name a part of theirs above.`));
+            return make("div", { class: "weight" }, row.element,
+                button("Solo", `Only ${name}`, () => change({ [key]: weights()[key] || 1 })));
+        }), found.length > ROWS_MOST
+            && make("p", { class: "hint" }, `${count(found.length - ROWS_MOST)} more: name a part of theirs above.`));
     };
     const update = (): void => {
         for (const [key, row] of rows) row.set(weights()[key] ?? 0);
         const at = positionOf(weights());
         if (at !== null) position.set(Number(at.toFixed(3)));
         const near = Math.round(at ?? 0);
-        frame.textContent = at === null ? "Several positions shine." : `Position ${tell(at, 3)} of ${names().length - 1}: ${names()[near] ?? ""}`;
+        frame.textContent = at === null
+            ? "Several positions shine."
+            : `Position ${tell(at, 3)} of ${names().length - 1}: ${names()[near] ?? ""}`;
     };
     app.on("scene", () => {
         drive.stop();
@@ -71,9 +89,16 @@ export function emittersPanel(app: App): Panel {
         draw();
         update();
     });
-    app.store.listen((now, before) => { if (now.lighting.emitters !== before.lighting.emitters) update(); });
+    app.store.listen((now, before) => {
+        if (now.lighting.emitters !== before.lighting.emitters) update();
+    });
     return {
-        id: "emitters", title: "Emitters", isUseful: () => names().length > 0, isFirst: () => app.scene?.description.sky === null,
-        element: make("div", {}, path, make("h2", {}, "Weights"), make("div", { class: "row" }, button("All off", null, setAll(0)), button("All 1", "All weights 1", setAll(1)), filter), list),
+        id: "emitters",
+        title: "Emitters",
+        isUseful: () => names().length > 0,
+        isFirst: () => app.scene?.description.sky === null,
+        element: make("div", {}, path, make("h2", {}, "Weights"),
+            make("div", { class: "row" }, button("All off", null, setAll(0)),
+                button("All 1", "All weights 1", setAll(1)), filter), list),
     };
 }

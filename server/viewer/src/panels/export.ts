@@ -16,23 +16,28 @@ export function exportPanel(app: App): Panel {
     const said = make("p", { role: "status", "aria-live": "polite" });
     const tries = (what: () => Promise<string>): void => {
         said.textContent = "Working …";
-        what().then((text) => { said.textContent = text; }, (reason: unknown) => {
+        what().then((text) => {
+            said.textContent = text;
+        }, (reason: unknown) => {
             said.textContent = reason instanceof Changed ? reason.message : "";
             if (!(reason instanceof Changed)) app.fail(reason);
         });
     };
     const numbers = make("div", {}, make("h2", {}, "Numbers"),
         make("p", { class: "hint" }, "Of every element, asked for again in single precision."),
-        make("div", { class: "row" }, button("Save CSV", null, () => tries(() => saveCsv(app))), button("Save NPY", null, () => tries(() => saveNpy(app)))));
+        make("div", { class: "row" }, button("Save CSV", null, () => tries(() => saveCsv(app))),
+            button("Save NPY", null, () => tries(() => saveNpy(app)))));
     return {
-        id: "export", title: "Export",
+        id: "export",
+        title: "Export",
         element: make("div", {}, picturePart(app, tries, said), numbers, said, requestPart(app)),
     };
 }
 
 function picturePart(app: App, tries: (what: () => Promise<string>) => void, said: HTMLElement): HTMLElement {
     const size = (label: string, value: number): HTMLInputElement =>
-        make("input", { type: "number", class: "narrow", min: 16, max: SIDE_MOST, step: 1, value: String(value), "aria-label": label });
+        make("input", { type: "number", class: "narrow", min: 16, max: SIDE_MOST, step: 1, value: String(value),
+            "aria-label": label });
     const width = size("Width in pixels", 1920), height = size("Height in pixels", 1080);
     const legend = tick("With a legend of colours", true, () => undefined);
     const save = async (): Promise<string> => {
@@ -40,24 +45,31 @@ function picturePart(app: App, tries: (what: () => Promise<string>) => void, sai
         for (const side of [w, h])
             if (!(side >= 16 && side <= SIDE_MOST)) return `A side of the picture has 16 to ${SIDE_MOST} pixels.`;
         // A large picture takes seconds without a graphics card; the word on it is to be seen before.
-        await new Promise((resolve) => { setTimeout(resolve, 50); });
+        await new Promise((resolve) => {
+            setTimeout(resolve, 50);
+        });
         const { store: { now }, fields } = app, [a, b] = fields;
         const canvas = await snapshot(app.stage, w, h, now.compare?.split ?? 0.5, (share) => {
-            if (app.store.now !== now || app.fields[0] !== a || app.fields[1] !== b) throw new Changed("The picture was changed while it was drawn; save it again.");
+            if (app.store.now !== now || app.fields[0] !== a || app.fields[1] !== b)
+                throw new Changed("The picture was changed while it was drawn; save it again.");
             said.textContent = `Drawing, ${Math.round(100 * share)} % …`;
         });
         const colours = legendOf(app);
-        if (colours !== null && (legend.querySelector("input") as HTMLInputElement).checked) drawLegend(canvas, colours);
+        if (colours !== null && (legend.querySelector("input") as HTMLInputElement).checked)
+            drawLegend(canvas, colours);
         const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, "image/png"));
         if (blob === null) throw new Error(`the browser makes no picture of ${w} × ${h} pixels`);
         download(blob, `${fileName(app)}.png`);
         return `Saved ${w} × ${h} pixels.`;
     };
-    const update = (): void => { legend.hidden = legendOf(app) === null; };
+    const update = (): void => {
+        legend.hidden = legendOf(app) === null;
+    };
     app.store.listen(update);
     update();
     return make("section", { "aria-label": "PNG" }, make("h2", {}, "Picture"),
-        make("div", { class: "row" }, width, make("span", { "aria-hidden": "true" }, "×"), height, make("span", { class: "hint" }, "pixels"),
+        make("div", { class: "row" }, width, make("span", { "aria-hidden": "true" }, "×"), height,
+            make("span", { class: "hint" }, "pixels"),
             button("Window", "The size of the picture on this screen", () => {
                 width.value = String(app.stage.canvas.width);
                 height.value = String(app.stage.canvas.height);
@@ -85,7 +97,9 @@ function request(app: App): PlainRequest | null {
 /** A name that every system of files takes. */
 function fileName(app: App): string {
     const { scene, view } = app.store.now;
-    return `${scene.replace(/[^\p{L}\p{N}._@-]+/gu, "-").slice(0, 80) || "scene"}-${view.picture === "light" ? "radiosity" : view.quantity}`;
+    return `${scene.replace(/[^\p{L}\p{N}._@-]+/gu, "-").slice(0, 80) || "scene"}-${
+        view.picture === "light" ? "radiosity" : view.quantity
+    }`;
 }
 
 async function ask(app: App): Promise<ArrayBuffer> {
@@ -105,11 +119,18 @@ async function saveCsv(app: App): Promise<string> {
     const { data } = readNpy(await ask(app));
     if (scene === null || what === null) return "";
     const { channels } = scene.description, { quantity } = what.body;
-    const channelNames = channels === 3 ? ["red", "green", "blue"] : channels === 1 ? [""] : Array.from({ length: channels }, (_, c) => String(c));
+    const channelNames = channels === 3
+        ? ["red", "green", "blue"]
+        : channels === 1
+        ? [""]
+        : Array.from({ length: channels }, (_, c) => String(c));
     const names = channelNames.map((name) => `${quantity}${name === "" ? "" : `_${name}`} (${unit})`);
     const { mesh } = scene;
-    download(new Blob([csvOf(data as Float32Array, names, mesh.groupOf, mesh.groups.map((group) => group.name), mesh.area)], { type: "text/csv;charset=utf-8" }),
-        `${fileName(app)}.csv`);
+    download(
+        new Blob([csvOf(data as Float32Array, names, mesh.groupOf, mesh.groups.map((group) => group.name), mesh.area)],
+            { type: "text/csv;charset=utf-8" }),
+        `${fileName(app)}.csv`,
+    );
     return `Saved ${mesh.elements} lines.`;
 }
 
@@ -125,13 +146,17 @@ function download(blob: Blob, name: string): void {
 function requestPart(app: App): HTMLElement {
     const curl = snippet("Command of curl"), python = snippet("Program in Python");
     const hint = make("p", { class: "hint" });
-    const part = make("section", { "aria-label": "Request" }, make("h2", {}, "Request"), hint, curl.element, python.element);
+    const part = make("section", { "aria-label": "Request" }, make("h2", {}, "Request"), hint, curl.element,
+        python.element);
     let isSeen = false;
     const update = (): void => {
         if (!isSeen || app.scene === null) return;
         const what = request(app), withToken = app.api.token !== null;
-        hint.textContent = what === null ? "Nothing shines, so there is nothing to ask for."
-            : withToken ? "Asks the daemon for what is shown. The token is read from LAMBERT_TOKEN." : "Asks the daemon for what is shown.";
+        hint.textContent = what === null
+            ? "Nothing shines, so there is nothing to ask for."
+            : withToken
+            ? "Asks the daemon for what is shown. The token is read from LAMBERT_TOKEN."
+            : "Asks the daemon for what is shown.";
         curl.set(what === null ? "" : curlCommand(location.origin, what, withToken));
         python.set(what === null ? "" : pythonProgram(location.origin, what, withToken));
     };
@@ -139,7 +164,10 @@ function requestPart(app: App): HTMLElement {
         isSeen = entries.some((entry) => entry.isIntersecting);
         update();
     }).observe(part);
-    app.store.listen((now, before) => { if (now.lighting !== before.lighting || now.tolerance !== before.tolerance || now.view !== before.view) update(); });
+    app.store.listen((now, before) => {
+        if (now.lighting !== before.lighting || now.tolerance !== before.tolerance || now.view !== before.view)
+            update();
+    });
     app.on("scene", update);
     return part;
 }
@@ -149,7 +177,9 @@ function snippet(label: string): { element: HTMLElement; set(text: string): void
     const copy = button("Copy", `Copy: ${label}`, () => {
         const done = (): void => {
             copy.textContent = "Copied";
-            setTimeout(() => { copy.textContent = "Copy"; }, 1500);
+            setTimeout(() => {
+                copy.textContent = "Copy";
+            }, 1500);
         };
         // Pages without TLS have no clipboard; the text is then marked, to be copied by hand.
         if (navigator.clipboard === undefined) text.select();

@@ -15,12 +15,16 @@ export function makeBar(app: App): HTMLElement {
     const share = button("Link", "Copy a link to this state", () => {
         void navigator.clipboard?.writeText(location.href).then(() => {
             share.textContent = "Copied";
-            setTimeout(() => { share.textContent = "Link"; }, 1500);
+            setTimeout(() => {
+                share.textContent = "Link";
+            }, 1500);
         }, () => undefined);
     });
     const theme = button("◐", "Dark or light page", () => {
         const root = document.documentElement;
-        const isDark = root.dataset.theme === undefined ? matchMedia("(prefers-color-scheme: dark)").matches : root.dataset.theme === "dark";
+        const isDark = root.dataset.theme === undefined
+            ? matchMedia("(prefers-color-scheme: dark)").matches
+            : root.dataset.theme === "dark";
         root.dataset.theme = isDark ? "light" : "dark";
         setBackground(app);
     });
@@ -34,24 +38,29 @@ export function makeBar(app: App): HTMLElement {
         update();
         // The scene that is shown may be served no more.
         const own = app.store.now.scene, names = app.scenes.map((scene) => scene.name);
-        fill(scenes, choice("Scene", (names.includes(own) || own === "" ? names : [own, ...names]).map((name) => [name, name] as const), app.store.now.scene, (name) => {
-            app.notice = null;
-            void app.open(name, null).catch((reason: unknown) => app.fail(reason));
-        }));
+        fill(scenes,
+            choice("Scene",
+                (names.includes(own) || own === "" ? names : [own, ...names]).map((name) => [name, name] as const),
+                app.store.now.scene, (name) => {
+                app.notice = null;
+                void app.open(name, null).catch((reason: unknown) => app.fail(reason));
+            }));
     };
     app.on("scene", list);
     app.on("scenes", list);
     document.addEventListener("keydown", (event) => {
         if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
         // Fields of text take their own changes back.
-        if (event.target instanceof HTMLInputElement && /^(text|number|password|search)$/.test(event.target.type)) return;
+        if (event.target instanceof HTMLInputElement && /^(text|number|password|search)$/.test(event.target.type))
+            return;
         const key = event.key.toLowerCase();
         if (key === "z" && !event.shiftKey) app.store.undo();
         else if (key === "y" || (key === "z" && event.shiftKey)) app.store.redo();
         else return;
         event.preventDefault();
     });
-    return make("header", {}, make("h1", {}, "Lambert"), scenes, make("div", { class: "row", role: "group", "aria-label": "State" }, undo, redo, share, theme));
+    return make("header", {}, make("h1", {}, "Lambert"), scenes,
+        make("div", { class: "row", role: "group", "aria-label": "State" }, undo, redo, share, theme));
 }
 
 /** Takes over the colours of a page that became dark or light. */
@@ -64,11 +73,18 @@ export function setBackground(app: App): void {
 export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
     let current = panels[0].id, isChosen = false;
     const tabs = new Map(panels.map((panel) => [panel.id, make("button", {
-        type: "button", role: "tab", id: `tab-${panel.id}`, "aria-controls": `panel-${panel.id}`,
-        onclick: () => choose(panel.id), onkeydown: (event: KeyboardEvent) => move(event, panel.id),
+        type: "button",
+        role: "tab",
+        id: `tab-${panel.id}`,
+        "aria-controls": `panel-${panel.id}`,
+        onclick: () => choose(panel.id),
+        onkeydown: (event: KeyboardEvent) => move(event, panel.id),
     }, panel.title)]));
     const bodies = new Map(panels.map((panel) => [panel.id, make("div", {
-        role: "tabpanel", id: `panel-${panel.id}`, "aria-labelledby": `tab-${panel.id}`, tabindex: 0,
+        role: "tabpanel",
+        id: `panel-${panel.id}`,
+        "aria-labelledby": `tab-${panel.id}`,
+        tabindex: 0,
     }, panel.element)]));
     const useful = (): Panel[] => panels.filter((panel) => panel.isUseful?.(app) ?? true);
     const show = (id: string): void => {
@@ -101,7 +117,8 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
     };
     app.on("scene", update);
     update();
-    const drawer = make("aside", { "aria-label": "Panels" }, make("div", { role: "tablist", "aria-label": "Panels" }, ...tabs.values()),
+    const drawer = make("aside", { "aria-label": "Panels" },
+        make("div", { role: "tablist", "aria-label": "Panels" }, ...tabs.values()),
         make("div", { class: "bodies" }, ...bodies.values()));
     const fold = button("▾", "Fold the panels", () => {
         const folded = document.body.classList.toggle("folded");
@@ -114,21 +131,30 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
 
 /** Size, error and time: always in sight. */
 export function makeStatus(app: App): HTMLElement {
-    const size = make("span", {}), error = make("span", {}), time = make("span", { "data-figure": "time" }), sun = make("span", {});
-    const drawSun = (): void => { sun.textContent = app.sharp.isOn ? "sun drawn sharp, numbers have it in tiles" : ""; };
+    const size = make("span", {}), error = make("span", {}), time = make("span", { "data-figure": "time" }),
+        sun = make("span", {});
+    const drawSun = (): void => {
+        sun.textContent = app.sharp.isOn ? "sun drawn sharp, numbers have it in tiles" : "";
+    };
     app.on("field", drawSun);
     app.store.listen(drawSun);
     const drawError = (): void => {
         const { description } = app.scene as NonNullable<App["scene"]>;
         if (app.asking.certificate !== null) {
-            error.textContent = `certified: no number is off by more than ${tell(app.asking.certificate.bound, 2)} ${app.store.now.view.unit}`;
+            error.textContent = `certified: no number is off by more than ${
+                tell(app.asking.certificate.bound, 2)
+            } ${app.store.now.view.unit}`;
             return;
         }
         const headline = headlineOf(description.error, app.wanted()?.emission ?? null);
-        error.textContent = headline === null ? "error not measured"
+        error.textContent = headline === null
+            ? "error not measured"
             : `error ${percent(headline.indirect)} of the indirect light, ${percent(headline.relative)} of all`;
-        error.title = headline === null ? description.reason
-            : `${percent(headline.rest)} by operator and form factors, ${headline.mesh > 0 ? `${percent(headline.mesh)} by the mesh` : "that of the mesh is not known"}. ${description.reason}`;
+        error.title = headline === null
+            ? description.reason
+            : `${percent(headline.rest)} by operator and form factors, ${
+                headline.mesh > 0 ? `${percent(headline.mesh)} by the mesh` : "that of the mesh is not known"
+            }. ${description.reason}`;
     };
     app.on("field", drawError);
     app.on("scene", () => {
@@ -138,7 +164,9 @@ export function makeStatus(app: App): HTMLElement {
     });
     app.on("timing", () => {
         const { roundTrip, solve } = app.asking.timing;
-        time.textContent = solve === null ? `answer ${tell(roundTrip, 2)} ms` : `solve ${tell(solve, 2)} ms, answer ${tell(roundTrip, 2)} ms`;
+        time.textContent = solve === null
+            ? `answer ${tell(roundTrip, 2)} ms`
+            : `solve ${tell(solve, 2)} ms, answer ${tell(roundTrip, 2)} ms`;
     });
     return make("footer", { "aria-label": "Figures" }, size, error, time, sun);
 }
@@ -156,13 +184,16 @@ export function makeBanner(app: App): HTMLElement {
         const isNote = text !== null && text === app.notice;
         banner.classList.toggle("note", isNote);
         const now = banner.firstChild?.textContent ?? null;
-        if (now !== text || isNote !== banner.contains(close)) fill(banner, make("span", {}, text ?? ""), isNote && close);
+        if (now !== text || isNote !== banner.contains(close))
+            fill(banner, make("span", {}, text ?? ""), isNote && close);
     };
     app.on("lost", () => show(app.recovery.watch.why));
     app.on("found", () => show(app.notice));
     app.on("scene", () => show(app.notice));
     app.on("problem", () => show(app.recovery.problem));
-    app.on("field", () => { if (!app.recovery.watch.isLost) show(app.notice); });
+    app.on("field", () => {
+        if (!app.recovery.watch.isLost) show(app.notice);
+    });
     return banner;
 }
 
@@ -174,9 +205,9 @@ export function makeLoading(app: App): HTMLElement {
         clearTimeout(timer);
         if (app.opening.loading === null) note.hidden = true;
         else timer = window.setTimeout(() => {
-            note.textContent = `Loading ${app.opening.loading || "the scene"} …`;
-            note.hidden = false;
-        }, LOADING_MS);
+                note.textContent = `Loading ${app.opening.loading || "the scene"} …`;
+                note.hidden = false;
+            }, LOADING_MS);
     };
     app.on("loading", update);
     update();
@@ -186,14 +217,17 @@ export function makeLoading(app: App): HTMLElement {
 /** Asks for a token, which is kept as long as this tab. */
 export function makeTokenDialog(app: App, again: () => void): HTMLDialogElement {
     const field = make("input", { type: "password", autocomplete: "off", required: true, "aria-label": "Token" });
-    const dialog = make("dialog", { "aria-label": "A token is needed" },
-        make("form", {
-            method: "dialog", onsubmit: () => {
-                app.api.token = field.value.trim();
-                field.value = "";
-                again();
-            },
-        }, make("p", {}, "This daemon asks for a token. It is kept until this tab is closed."), field, make("button", { type: "submit" }, "Go on")));
-    app.on("token", () => { if (!dialog.open) dialog.showModal(); });
+    const dialog = make("dialog", { "aria-label": "A token is needed" }, make("form", {
+        method: "dialog",
+        onsubmit: () => {
+            app.api.token = field.value.trim();
+            field.value = "";
+            again();
+        },
+    }, make("p", {}, "This daemon asks for a token. It is kept until this tab is closed."), field,
+        make("button", { type: "submit" }, "Go on")));
+    app.on("token", () => {
+        if (!dialog.open) dialog.showModal();
+    });
     return dialog;
 }

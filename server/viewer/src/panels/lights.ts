@@ -2,7 +2,7 @@
 import { fromHex, luminance, ofTemperature, toHex, type Rgb } from "../base/colour.ts";
 import { button, choice, fill, make, tick, unique } from "../base/dom.ts";
 import type { App } from "../app/app.ts";
-import type { GroupLight, Lighting } from "../state/state.ts";
+import type { GroupLight, Lighting, Preset } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
 import { slider, type Slider } from "./slider.ts";
 
@@ -26,13 +26,18 @@ export function lightsPanel(app: App): Panel {
         const { groups } = app.store.now.lighting;
         change({ groups: { ...groups, [name]: { ...groups[name], ...to } } }, tag);
     };
-    const dim = slider({ label: "All", unit: "×", least: 0, most: 2, step: 0.01, change: (value) => change({ dim: value }, "dim") }, 1);
+    const dim = slider({ label: "All", unit: "×", least: 0, most: 2, step: 0.01,
+        change: (value) => change({ dim: value }, "dim") }, 1);
     const more = make("div", {});
     const hasEmitters = (): boolean => (app.scene?.description.emitters?.length ?? 0) > 0;
     // Stores of few emitters answer these alone.
-    const shining = (): string[] => (hasEmitters() ? []
-        : Object.keys(app.store.now.lighting.groups).filter((name) => app.scene?.mesh.groups.some((g) => g.name === name)));
-    const filter = make("input", { type: "text", placeholder: "Part of a name", "aria-label": "Show lamps whose names have", oninput: () => draw() });
+    const shining = (): string[] => (hasEmitters()
+        ? []
+        : Object.keys(app.store.now.lighting.groups).filter((name) =>
+            app.scene?.mesh.groups.some((g) => g.name === name)
+        ));
+    const filter = make("input", { type: "text", placeholder: "Part of a name",
+        "aria-label": "Show lamps whose names have", oninput: () => draw() });
     const found = (): string[] => {
         const part = filter.value.trim().toLowerCase();
         return shining().filter((name) => name.toLowerCase().includes(part));
@@ -40,9 +45,11 @@ export function lightsPanel(app: App): Panel {
     /** Of the lamps that the filter finds. */
     const turn = (on: boolean): void => {
         const { groups } = app.store.now.lighting;
-        change({ groups: { ...groups, ...Object.fromEntries(found().map((name) => [name, { ...groups[name], on }])) } }, null);
+        change({ groups: { ...groups, ...Object.fromEntries(found().map((name) => [name, { ...groups[name], on }])) } },
+            null);
     };
-    const several = make("div", { class: "row" }, button("All on", "Turn on all lamps listed", () => turn(true)), button("All off", "Turn off all lamps listed", () => turn(false)), filter);
+    const several = make("div", { class: "row" }, button("All on", "Turn on all lamps listed", () => turn(true)),
+        button("All off", "Turn off all lamps listed", () => turn(false)), filter);
     several.hidden = true;
     const draw = (): void => {
         const { lighting } = app.store.now, all = found(), names = all.slice(0, ROWS_MOST);
@@ -54,18 +61,26 @@ export function lightsPanel(app: App): Panel {
             rows.set(name, row);
             return row.element;
         }));
-        if (all.length > names.length) list.append(make("p", { class: "hint" }, `${all.length - names.length} more: name a part of theirs above.`));
-        if (app.scene?.mesh.groups.every((group) => group.emission === null) && app.scene.description.sky === null && names.length > 0)
+        if (all.length > names.length)
+            list.append(
+                make("p", { class: "hint" }, `${all.length - names.length} more: name a part of theirs above.`),
+            );
+        if (app.scene?.mesh.groups.every((group) => group.emission === null) && app.scene.description.sky === null
+            && names.length > 0)
             list.append(make("p", { class: "hint" }, "No group of this scene emits light: these do it in its place."));
-        if (hasEmitters()) list.append(make("p", { class: "hint" }, "This store answers its own emitters alone: see the panel Emitters."));
+        if (hasEmitters())
+            list.append(
+                make("p", { class: "hint" }, "This store answers its own emitters alone: see the panel Emitters."),
+            );
         drawMore();
     };
     const drawMore = (): void => {
         const { groups } = app.store.now.lighting;
         const others = app.scene?.mesh.groups.filter((g) => !(g.name in groups)).map((g) => g.name) ?? [];
-        fill(more, others.length > 0 && !hasEmitters() && choice("Let another group shine", [["", "…"], ...others.map((n) => [n, n] as const)], "", (name) => {
-            if (name !== "") changeGroup(name, { on: true, power: 1, colour: [1, 1, 1], kelvin: null }, null);
-        }));
+        fill(more, others.length > 0 && !hasEmitters()
+            && choice("Let another group shine", [["", "…"], ...others.map((n) => [n, n] as const)], "", (name) => {
+                if (name !== "") changeGroup(name, { on: true, power: 1, colour: [1, 1, 1], kelvin: null }, null);
+            }));
     };
     const update = (): void => {
         const { lighting } = app.store.now;
@@ -74,7 +89,11 @@ export function lightsPanel(app: App): Panel {
         if (known.length !== rows.size || known.some((name) => !rows.has(name))) draw();
         for (const [name, row] of rows) row.update(lighting.groups[name], lighting.solo);
     };
-    app.on("scene", () => { filter.value = ""; draw(); drawPresets(app, presets); });
+    app.on("scene", () => {
+        filter.value = "";
+        draw();
+        drawPresets(app, presets);
+    });
     app.store.listen((now, before) => {
         if (now.lighting !== before.lighting) update();
         if (now.presets !== before.presets) drawPresets(app, presets);
@@ -82,32 +101,47 @@ export function lightsPanel(app: App): Panel {
     const reset = button("As the scene comes", null, () => {
         if (app.scene !== null) app.store.change({ ...app.store.now, lighting: app.scene.ownLighting });
     });
-    return { id: "lights", title: "Lights", element: make("div", {}, dim.element, several, list, more, reset, presets) };
+    return { id: "lights", title: "Lights",
+        element: make("div", {}, dim.element, several, list, more, reset, presets) };
 }
 
 function lightRow(app: App, name: string, light: GroupLight,
-    change: (name: string, to: Partial<GroupLight>, tag: string | null) => void, solo: (name: string | null) => void): Row {
+    change: (name: string, to: Partial<GroupLight>, tag: string | null) => void,
+    solo: (name: string | null) => void): Row
+{
     const id = unique("light");
     const coloured = app.scene?.description.channels === 3;
     const on = tick(name, light.on, (is) => change(name, { on: is }, null));
     on.querySelector("span")?.setAttribute("id", id);
     const most = Math.max(1e-6, 4 * (light.power || 1));
     const power: Slider = slider({
-        label: "Power", unit: app.store.now.view.unit === "lx" ? "lm/m²" : "W/m²", least: 0, most, log: true,
+        label: "Power",
+        unit: app.store.now.view.unit === "lx" ? "lm/m²" : "W/m²",
+        least: 0,
+        most,
+        log: true,
         change: (value) => change(name, { power: value }, `power ${name}`),
     }, light.power);
     const swatch = make("input", {
-        type: "color", "aria-label": `Colour of ${name}`,
+        type: "color",
+        "aria-label": `Colour of ${name}`,
         oninput: () => {
             const rgb = fromHex(swatch.value), L = luminance(rgb);
             change(name, { colour: L > 0 ? rgb.map((v) => v / L) as Rgb : [1, 1, 1], kelvin: null }, `colour ${name}`);
         },
     });
     const kelvin = slider({
-        label: "Temperature", unit: "K", least: 1800, most: 12000, step: 50,
+        label: "Temperature",
+        unit: "K",
+        least: 1800,
+        most: 12000,
+        step: 50,
         change: (value) => change(name, { kelvin: value, colour: ofTemperature(value) }, `kelvin ${name}`),
     }, light.kelvin ?? 4000);
-    const alone = button("Solo", `Only ${name}`, () => solo(app.store.now.lighting.solo === name ? null : name), { "aria-pressed": "false", "aria-label": `Solo ${name}` });
+    const alone = button("Solo", `Only ${name}`, () => solo(app.store.now.lighting.solo === name ? null : name), {
+        "aria-pressed": "false",
+        "aria-label": `Solo ${name}`,
+    });
     const element = make("section", { class: "light", "aria-labelledby": id },
         make("div", { class: "row" }, on, coloured && swatch, alone), power.element, coloured && kelvin.element);
     const update = (now: GroupLight, soloed: string | null): void => {
@@ -126,18 +160,25 @@ function lightRow(app: App, name: string, light: GroupLight,
 
 /** Lightings with names, which stand in the link. */
 function drawPresets(app: App, place: HTMLElement): void {
-    const name = make("input", { type: "text", placeholder: "Name of this lighting", "aria-label": "Name of this lighting", maxlength: 60 });
+    const name = make("input", { type: "text", placeholder: "Name of this lighting",
+        "aria-label": "Name of this lighting", maxlength: 60 });
     const keep = (): void => {
         const { now } = app.store, text = name.value.trim();
         if (text === "") return;
         const others = now.presets.filter((preset) => preset.name !== text);
         app.store.change({ ...now, presets: [...others, { name: text, lighting: now.lighting }] });
     };
+    const shine = ({ lighting }: Preset): void => app.store.change({ ...app.store.now, lighting });
+    const forget = (preset: Preset): void => {
+        const { now } = app.store;
+        app.store.change({ ...now, presets: now.presets.filter((other) => other !== preset) });
+    };
     fill(place, make("h2", { class: "sub" }, "Presets"),
-        ...app.store.now.presets.map((preset) => make("div", { class: "row" },
-            button(preset.name, null, () => app.store.change({ ...app.store.now, lighting: preset.lighting }), { class: "grow" }),
-            button("×", `Forget ${preset.name}`, () => app.store.change(
-                { ...app.store.now, presets: app.store.now.presets.filter((other) => other !== preset) })))),
-        make("form", { class: "row", onsubmit: (event: Event) => { event.preventDefault(); keep(); } }, name,
-            make("button", { type: "submit" }, "Keep")));
+        ...app.store.now.presets.map((preset) =>
+            make("div", { class: "row" }, button(preset.name, null, () => shine(preset), { class: "grow" }),
+                button("×", `Forget ${preset.name}`, () => forget(preset)))
+        ), make("form", { class: "row", onsubmit: (event: Event) => {
+            event.preventDefault();
+            keep();
+        } }, name, make("button", { type: "submit" }, "Keep")));
 }

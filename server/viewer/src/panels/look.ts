@@ -5,9 +5,13 @@ import type { App } from "../app/app.ts";
 import type { Description } from "../daemon/api.ts";
 import { placeOf } from "../picture/cameras.ts";
 import { turned } from "../picture/glb.ts";
-import type { View } from "../state/state.ts";
+import type { KeptView, View } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
 import { slider } from "./slider.ts";
+
+const QUANTITIES = [["radiosity", "Radiosity B"], ["irradiance", "Irradiance H"], ["indirect", "Indirect"]] as const;
+
+type Camera = NonNullable<Description["cameras"]>[number];
 
 export function lookPanel(app: App): Panel {
     const change = (to: Partial<View>, tag: string | null = null): void => {
@@ -15,39 +19,53 @@ export function lookPanel(app: App): Panel {
         app.store.change({ ...now, view: { ...now.view, ...to } }, tag);
     };
     const { view } = app.store.now;
-    const exposure = slider({ label: "Exposure", unit: "EV", least: -16, most: 16, step: 0.1, change: (value) => change({ exposure: value, follow: false }, "exposure") }, 0);
-    const iso = slider({ label: "Iso-lines", least: 0, most: 20, step: 1, change: (value) => change({ isoLines: Math.round(value) }, "iso") }, 0);
-    const follow = tick("Exposure follows the light", view.follow, (on) => change({ follow: on, exposure: on ? null : app.store.now.view.exposure }));
+    const exposure = slider({ label: "Exposure", unit: "EV", least: -16, most: 16, step: 0.1,
+        change: (value) => change({ exposure: value, follow: false }, "exposure") }, 0);
+    const iso = slider({ label: "Iso-lines", least: 0, most: 20, step: 1,
+        change: (value) => change({ isoLines: Math.round(value) }, "iso") }, 0);
+    const follow = tick("Exposure follows the light", view.follow,
+        (on) => change({ follow: on, exposure: on ? null : app.store.now.view.exposure }));
     const smooth = tick("Smooth", view.smooth, (on) => change({ smooth: on }));
     const textured = tick("Images of materials", view.textured, (on) => change({ textured: on }));
     const log = tick("Logarithmic", view.log, (on) => change({ log: on }));
     const fields = {
-        picture: choice("Picture", [["light", "As the eye sees it"], ["false", "False colour"]], view.picture, (picture) => change({ picture, range: null })),
-        quantity: choice("Quantity", [["radiosity", "Radiosity B"], ["irradiance", "Irradiance H"], ["indirect", "Indirect"]], view.quantity, (quantity) => change({ quantity, range: null })),
-        tone: choice("Tone curve", [["agx", "AgX"], ["aces", "ACES"], ["linear", "Linear"]], view.tone, (tone) => change({ tone })),
-        palette: choice("Palette", [["viridis", "Viridis"], ["inferno", "Inferno"], ["turbo", "Turbo"]], view.palette, (palette) => change({ palette })),
-        unit: choice("Unit of the store", [["W/m²", "W/m²"], ["lx", "lm/m² (lx)"]], view.unit, (unit) => change({ unit })),
-        walk: choice("Camera", [["orbit", "Around the scene"], ["walk", "On foot (W A S D)"]], view.walk ? "walk" : "orbit", (way) => change({ walk: way === "walk" })),
+        picture: choice("Picture", [["light", "As the eye sees it"], ["false", "False colour"]], view.picture,
+            (picture) => change({ picture, range: null })),
+        quantity: choice("Quantity", QUANTITIES, view.quantity, (quantity) => change({ quantity, range: null })),
+        tone: choice("Tone curve", [["agx", "AgX"], ["aces", "ACES"], ["linear", "Linear"]], view.tone,
+            (tone) => change({ tone })),
+        palette: choice("Palette", [["viridis", "Viridis"], ["inferno", "Inferno"], ["turbo", "Turbo"]], view.palette,
+            (palette) => change({ palette })),
+        unit: choice("Unit of the store", [["W/m²", "W/m²"], ["lx", "lm/m² (lx)"]], view.unit,
+            (unit) => change({ unit })),
+        walk: choice("Camera", [["orbit", "Around the scene"], ["walk", "On foot (W A S D)"]],
+            view.walk ? "walk" : "orbit", (way) => change({ walk: way === "walk" })),
     };
     const least = make("input", { type: "number", step: "any", "aria-label": "Least value of the palette" });
     const most = make("input", { type: "number", step: "any", "aria-label": "Largest value of the palette" });
     const setRange = (): void => {
         // An end that is left open is that of the values.
-        const low = least.value === "" ? 0 : Number(least.value), high = most.value === "" ? app.exposure.spread.high : Number(most.value);
+        const low = least.value === "" ? 0 : Number(least.value),
+            high = most.value === "" ? app.exposure.spread.high : Number(most.value);
         change({ range: (least.value !== "" || most.value !== "") && high > low ? [low, high] : null });
     };
     least.addEventListener("change", setRange);
     most.addEventListener("change", setRange);
-    const light = make("div", {}, exposure.element, follow, button("Expose for this light", null, () => change({ exposure: null })), fields.tone);
-    const colour = make("div", {}, fields.quantity, fields.palette, log, iso.element, make("div", { class: "row" }, make("span", {}, "Range"), least, most,
-        button("Auto", "Range from the values", () => change({ range: null }))));
+    const light = make("div", {}, exposure.element, follow,
+        button("Expose for this light", null, () => change({ exposure: null })), fields.tone);
+    const colour = make("div", {}, fields.quantity, fields.palette, log, iso.element,
+        make("div", { class: "row" }, make("span", {}, "Range"), least, most,
+            button("Auto", "Range from the values", () => change({ range: null }))));
     const update = (): void => {
         const now = app.store.now.view;
         exposure.set(now.exposure ?? 0);
         iso.set(now.isoLines);
         for (const [name, field] of Object.entries(fields))
-            (field.querySelector("select") as HTMLSelectElement).value = name === "walk" ? (now.walk ? "walk" : "orbit") : String(now[name as keyof View]);
-        for (const [box, on] of [[follow, now.follow], [smooth, now.smooth], [textured, now.textured], [log, now.log]] as const)
+            (field.querySelector("select") as HTMLSelectElement).value = name === "walk"
+                ? (now.walk ? "walk" : "orbit")
+                : String(now[name as keyof View]);
+        const boxes = [[follow, now.follow], [smooth, now.smooth], [textured, now.textured], [log, now.log]] as const;
+        for (const [box, on] of boxes)
             (box.querySelector("input") as HTMLInputElement).checked = on;
         if (document.activeElement !== least) least.value = now.range === null ? "" : String(now.range[0]);
         if (document.activeElement !== most) most.value = now.range === null ? "" : String(now.range[1]);
@@ -55,7 +73,9 @@ export function lookPanel(app: App): Panel {
         light.hidden = now.picture !== "light";
         colour.hidden = now.picture !== "false";
     };
-    app.store.listen((now, before) => { if (now.view !== before.view) update(); });
+    app.store.listen((now, before) => {
+        if (now.view !== before.view) update();
+    });
     app.on("scene", update);
     app.on("field", () => {
         least.placeholder = "0";
@@ -68,7 +88,8 @@ export function lookPanel(app: App): Panel {
     });
     update();
     return {
-        id: "look", title: "View",
+        id: "look",
+        title: "View",
         element: make("div", {}, fields.picture, light, colour, smooth, textured, fields.unit, fields.walk,
             button("Fit (F)", "Show the whole scene", () => app.cameras.fit(true)), keptViews(app)),
     };
@@ -77,27 +98,42 @@ export function lookPanel(app: App): Panel {
 /** Places of the camera with names: those of the scene file, and those that were kept on the page. */
 function keptViews(app: App): HTMLElement {
     const place = make("div", {});
-    const name = make("input", { type: "text", placeholder: "Name of this place", "aria-label": "Name of this place", maxlength: 60 });
+    const name = make("input", { type: "text", placeholder: "Name of this place", "aria-label": "Name of this place",
+        maxlength: 60 });
     const keep = (): void => {
         const { now } = app.store, text = name.value.trim();
         if (text === "") return;
         name.value = "";
-        app.store.change({ ...now, views: [...now.views.filter((view) => view.name !== text), { name: text, camera: app.cameras.now }] });
+        app.store.change({ ...now,
+            views: [...now.views.filter((view) => view.name !== text), { name: text, camera: app.cameras.now }] });
     };
-    const form = make("form", { class: "row", onsubmit: (event: Event) => { event.preventDefault(); keep(); } }, name,
-        make("button", { type: "submit" }, "Keep"));
-    const look = ({ eye, direction, up, fov }: NonNullable<Description["cameras"]>[number]): void => {
+    const form = make("form", { class: "row", onsubmit: (event: Event) => {
+        event.preventDefault();
+        keep();
+    } }, name, make("button", { type: "submit" }, "Keep"));
+    const look = ({ eye, direction, up, fov }: Camera): void => {
         const axis = app.scene?.mesh.up ?? "y";
         app.cameras.place(placeOf(turned(axis, eye), turned(axis, direction), turned(axis, up), fov), true);
     };
-    const draw = (): void => fill(place, make("h2", { class: "sub" }, "Places"),
-        ...(app.scene?.description.cameras ?? []).map((camera) => make("div", { class: "row" },
-            button(camera.name, "A camera of the scene", () => look(camera), { class: "grow" }))),
-        ...app.store.now.views.map((view) => make("div", { class: "row" },
-            button(view.name, null, () => app.cameras.place(view.camera, true), { class: "grow" }),
-            button("×", `Forget ${view.name}`, () => app.store.change(
-                { ...app.store.now, views: app.store.now.views.filter((other) => other !== view) })))), form);
-    app.store.listen((now, before) => { if (now.views !== before.views) draw(); });
+    const forget = (view: KeptView): void => {
+        const { now } = app.store;
+        app.store.change({ ...now, views: now.views.filter((other) => other !== view) });
+    };
+    const own = (camera: Camera): HTMLElement => {
+        const go = (): void => look(camera);
+        return make("div", { class: "row" }, button(camera.name, "A camera of the scene", go, { class: "grow" }));
+    };
+    const kept = (view: KeptView): HTMLElement => {
+        const go = (): void => app.cameras.place(view.camera, true);
+        return make("div", { class: "row" }, button(view.name, null, go, { class: "grow" }),
+            button("×", `Forget ${view.name}`, () => forget(view)));
+    };
+    const draw = (): void =>
+        fill(place, make("h2", { class: "sub" }, "Places"), ...(app.scene?.description.cameras ?? []).map(own),
+            ...app.store.now.views.map(kept), form);
+    app.store.listen((now, before) => {
+        if (now.views !== before.views) draw();
+    });
     app.on("scene", draw);
     draw();
     return place;

@@ -1,8 +1,10 @@
-// Reflectances of groups, which make a variant of the scene where the daemon allows it; and the variants that there are.
+// Reflectances of groups, which make a variant of the scene where the daemon allows it; and the variants that there
+// are.
 import { fromHex, toHex } from "../base/colour.ts";
 import { button, fill, make } from "../base/dom.ts";
-import { Problem } from "../daemon/api.ts";
+import { Problem, type Api } from "../daemon/api.ts";
 import type { App } from "../app/app.ts";
+import type { OpenScene } from "../app/opening.ts";
 import type { MeshGroup } from "../picture/glb.ts";
 import { baseOf, checkReflectances, type Reflectances } from "../state/variants.ts";
 import type { Panel } from "./panel.ts";
@@ -10,11 +12,36 @@ import type { Panel } from "./panel.ts";
 /** A variant that is not ready after this time is left to itself. */
 const PATIENCE_MS = 120_000;
 
-const pause = (ms: number): Promise<void> => new Promise((resolve) => { setTimeout(resolve, ms); });
+const pause = (ms: number): Promise<void> =>
+    new Promise((resolve) => {
+        setTimeout(resolve, ms);
+    });
+
+function reflectancesOf({ mesh: { groups }, description: { channels } }: OpenScene): Reflectances {
+    const values = ({ reflectance }: MeshGroup): number[] => (channels === 3 ? [...reflectance] : [reflectance[0]]);
+    return Object.fromEntries(groups.map((group) => [group.name, values(group)]));
+}
+
+/** As the daemon takes them: one number where there is one. */
+function plain(all: Reflectances): { [group: string]: number | number[] } {
+    return Object.fromEntries(Object.entries(all).map(([name, of]) => [name, of.length === 1 ? of[0] : of]));
+}
+
+/** Waits for a variant that is being made; false: it takes too long. */
+async function isServed(api: Api, path: string): Promise<boolean> {
+    const start = performance.now();
+    for (let wait = 100;; wait = Math.min(2000, 1.5 * wait)) {
+        if ((await api.ask(path)).status === 200) return true;
+        if (performance.now() - start > PATIENCE_MS) return false;
+        await pause(wait);
+    }
+}
 
 export function materialsPanel(app: App): Panel {
-    const rows = make("div", {}), variants = make("div", {}), said = make("p", { role: "status", "aria-live": "polite" });
-    const name = make("input", { type: "text", value: "variant-1", maxlength: 60, "aria-label": "Name of the variant" });
+    const rows = make("div", {}), variants = make("div", {}),
+        said = make("p", { role: "status", "aria-live": "polite" });
+    const name = make("input", { type: "text", value: "variant-1", maxlength: 60,
+        "aria-label": "Name of the variant" });
     let draft: Reflectances = {}, isBusy = false;
     const base = (): string => baseOf(app.store.now.scene, app.scenes.map((scene) => scene.name));
     const draw = (): void => {
@@ -22,7 +49,11 @@ export function materialsPanel(app: App): Panel {
         if (scene === null) return;
         draft = {};
         const { channels } = scene.description;
-        fill(rows, ...scene.mesh.groups.map((group) => groupRow(group, channels, (to) => { draft[group.name] = to; })));
+        fill(rows, ...scene.mesh.groups.map((group) =>
+            groupRow(group, channels, (to) => {
+                draft[group.name] = to;
+            })
+        ));
     };
     const tries = async (what: () => Promise<void>): Promise<void> => {
         if (isBusy) return;
@@ -40,58 +71,69 @@ export function materialsPanel(app: App): Panel {
         const { scene, store: { now } } = app, variant = name.value.trim();
         if (scene === null) return;
         // A variant begins from its store, so one of a variant has all of its own reflectances.
-        const own: Reflectances = now.scene === base() ? {} : Object.fromEntries(scene.mesh.groups.map((group) =>
-            [group.name, scene.description.channels === 3 ? [...group.reflectance] : [group.reflectance[0]]]));
+        const own = now.scene === base() ? {} : reflectancesOf(scene);
         const groups = { ...own, ...draft }, wrong = checkReflectances(variant, groups);
         if (wrong !== null) {
             said.textContent = wrong;
             return;
         }
         said.textContent = `${variant} is being built …`;
-        const from = base(), path = await app.api.vary(from, variant, Object.fromEntries(Object.entries(groups).map(
-            ([group, values]) => [group, values.length === 1 ? values[0] : values])));
-        const start = performance.now();
-        for (let wait = 100; path !== null; wait = Math.min(2000, 1.5 * wait)) {
-            if ((await app.api.ask(path)).status === 200) break;
-            if (performance.now() - start > PATIENCE_MS) {
-                said.textContent = `${variant} is not ready after two minutes. It is listed here once it is, when the page is opened again.`;
-                return;
-            }
-            await pause(wait);
+        const from = base(), path = await app.api.vary(from, variant, plain(groups));
+        if (path !== null && !(await isServed(app.api, path))) {
+            said.textContent = `${variant} is not ready after two minutes. `
+                + "It is listed here once it is, when the page is opened again.";
+            return;
         }
         await app.listScenes();
         said.textContent = `${from}@${variant} is ready.`;
     };
-    const open = (to: string): Promise<void> => tries(() => app.open(to, { ...app.store.now, scene: to, compare: null }));
+    const open = (to: string): Promise<void> =>
+        tries(() => app.open(to, { ...app.store.now, scene: to, compare: null }));
     const compare = (to: string): void => {
         const { now } = app.store;
         app.store.change({ ...now, compare: { how: "split", split: 0.5, lighting: null, ...now.compare, scene: to } });
     };
-    const remove = (variant: string): Promise<void> => tries(async () => {
-        const from = base(), { now } = app.store;
-        await app.api.vary(from, variant.slice(from.length + 1), null);
-        if (now.compare?.scene === variant) app.store.change({ ...now, compare: null });
-        await app.listScenes();
-        if (app.store.now.scene === variant) await app.open(from, { ...app.store.now, scene: from });
-        said.textContent = `${variant} is gone.`;
-    });
+    const remove = (variant: string): Promise<void> =>
+        tries(async () => {
+            const from = base(), { now } = app.store;
+            await app.api.vary(from, variant.slice(from.length + 1), null);
+            if (now.compare?.scene === variant) app.store.change({ ...now, compare: null });
+            await app.listScenes();
+            if (app.store.now.scene === variant) await app.open(from, { ...app.store.now, scene: from });
+            said.textContent = `${variant} is gone.`;
+        });
     const drawVariants = (): void => {
-        const from = base(), now = app.store.now.scene, known = app.scenes.filter((scene) => scene.name.startsWith(`${from}@`));
+        const from = base(), now = app.store.now.scene,
+            known = app.scenes.filter((scene) => scene.name.startsWith(`${from}@`));
         fill(variants, known.length > 0 && make("h2", {}, `Variants of ${from}`),
             now !== from && make("div", { class: "row" }, button(`Back to ${from}`, null, () => void open(from))),
-            ...known.map((scene) => make("div", { class: "row", role: "group", "aria-label": scene.name },
-                make("span", { class: "grow" }, scene.name.slice(from.length + 1)),
-                button("Open", null, () => void open(scene.name), { disabled: scene.name === now }),
-                button("Compare", null, () => compare(scene.name), { disabled: scene.name === now }),
-                button("Delete", null, () => void remove(scene.name)))));
+            ...known.map(({ name }) => {
+                const disabled = name === now;
+                return make("div", { class: "row", role: "group", "aria-label": name },
+                    make("span", { class: "grow" }, name.slice(from.length + 1)),
+                    button("Open", null, () => void open(name), { disabled }),
+                    button("Compare", null, () => compare(name), { disabled }),
+                    button("Delete", null, () => void remove(name)));
+            }));
     };
-    app.on("scene", () => { draw(); drawVariants(); });
+    app.on("scene", () => {
+        draw();
+        drawVariants();
+    });
     app.on("scenes", drawVariants);
-    const form = make("form", { onsubmit: (event: Event) => { event.preventDefault(); void tries(build); } },
-        make("div", { class: "row" }, name, make("button", { type: "submit" }, "Make variant"), button("Reset", "The reflectances of the open scene", draw)));
+    const submit = (event: Event): void => {
+        event.preventDefault();
+        void tries(build);
+    };
+    const form = make("form", { onsubmit: submit },
+        make("div", { class: "row" }, name, make("button", { type: "submit" }, "Make variant"),
+            button("Reset", "The reflectances of the open scene", draw)));
     return {
-        id: "materials", title: "Materials",
-        element: make("div", {}, make("p", { class: "hint" }, "Mean reflectance of each group. Changes make a variant beside the scene; groups that stay as they are keep their own."),
+        id: "materials",
+        title: "Materials",
+        element: make("div", {},
+            make("p", { class: "hint" },
+                "Mean reflectance of each group. Changes make a variant beside the scene; groups that stay as they are keep their own."),
             rows, form, said, variants),
     };
 }
@@ -99,8 +141,12 @@ export function materialsPanel(app: App): Panel {
 /** A refusal in plain words; the daemon's own say which option it lacks. */
 function inWords(problem: Problem): string {
     const lead: { [status: number]: string } = {
-        403: "This daemon does not allow that", 404: "It is not there any more", 409: "This store cannot have variants",
-        422: "That is no variant", 429: "There are as many variants as the daemon keeps", 501: "This daemon cannot do that yet",
+        403: "This daemon does not allow that",
+        404: "It is not there any more",
+        409: "This store cannot have variants",
+        422: "That is no variant",
+        429: "There are as many variants as the daemon keeps",
+        501: "This daemon cannot do that yet",
     };
     const start = lead[problem.status];
     return start === undefined ? problem.message : `${start}: ${problem.message}.`;
@@ -110,24 +156,40 @@ function inWords(problem: Problem): string {
 function groupRow(group: MeshGroup, channels: number, change: (to: number[]) => void): HTMLElement {
     const count = channels === 3 ? 3 : 1, letters = count === 3 ? ["red", "green", "blue"] : ["reflectance"];
     const now = group.reflectance.slice(0, count).map((v) => Number(v.toPrecision(4)));
-    const fields = letters.map((letter, c) => make("input", {
-        type: "number", min: 0, max: 0.999, step: "any", value: String(now[c]), "aria-label": `${group.name}: ${letter}`, class: "narrow",
-        onchange: () => {
-            now[c] = fields[c].value === "" ? NaN : Number(fields[c].value);
-            paint();
-            change([...now]);
-        },
-    }));
+    const fields = letters.map((letter, c) =>
+        make("input", {
+            type: "number",
+            min: 0,
+            max: 0.999,
+            step: "any",
+            value: String(now[c]),
+            "aria-label": `${group.name}: ${letter}`,
+            class: "narrow",
+            onchange: () => {
+                now[c] = fields[c].value === "" ? NaN : Number(fields[c].value);
+                paint();
+                change([...now]);
+            },
+        })
+    );
     const swatch = make("input", {
-        type: "color", "aria-label": `${group.name}: colour`,
+        type: "color",
+        "aria-label": `${group.name}: colour`,
         oninput: () => {
             // The brightest colour of a screen is 1, which no material reaches.
-            fromHex(swatch.value).forEach((v, c) => { now[c] = Math.min(0.98, Number(v.toPrecision(4))); });
-            fields.forEach((field, c) => { field.value = String(now[c]); });
+            fromHex(swatch.value).forEach((v, c) => {
+                now[c] = Math.min(0.98, Number(v.toPrecision(4)));
+            });
+            fields.forEach((field, c) => {
+                field.value = String(now[c]);
+            });
             change([...now]);
         },
     });
-    const paint = (): void => { if (now.every(Number.isFinite)) swatch.value = toHex(now); };
+    const paint = (): void => {
+        if (now.every(Number.isFinite)) swatch.value = toHex(now);
+    };
     paint();
-    return make("fieldset", { class: "material" }, make("legend", {}, group.name), make("div", { class: "row" }, count === 3 && swatch, ...fields));
+    return make("fieldset", { class: "material" }, make("legend", {}, group.name),
+        make("div", { class: "row" }, count === 3 && swatch, ...fields));
 }

@@ -23,7 +23,9 @@ const FRAME_S = 1 / 30;
 export function player(options: PlayerOptions): Player {
     let running = 0, last = 0, speed = Number(options.speed);
     const calm = matchMedia("(prefers-reduced-motion: reduce)");
-    const play = button("▶ Play", `Play ${options.what}`, () => (running === 0 ? start() : stop()), { "aria-pressed": "false" });
+    const play = button("▶ Play", `Play ${options.what}`, () => (running === 0 ? start() : stop()), {
+        "aria-pressed": "false",
+    });
     const show = (): void => {
         play.textContent = running === 0 ? "▶ Play" : "❚❚ Pause";
         play.setAttribute("aria-pressed", String(running !== 0));
@@ -47,7 +49,9 @@ export function player(options: PlayerOptions): Player {
         running = 0;
         show();
     };
-    const pace = choice("Speed", options.speeds, options.speed, (value) => { speed = Number(value); });
+    const pace = choice("Speed", options.speeds, options.speed, (value) => {
+        speed = Number(value);
+    });
     const setMotion = (): void => {
         if (calm.matches) stop();
         play.hidden = calm.matches;
@@ -56,7 +60,7 @@ export function player(options: PlayerOptions): Player {
     calm.addEventListener("change", setMotion);
     setMotion();
     const element = make("div", { class: "player", role: "group", "aria-label": `Animation of ${options.what}` },
-        make("div", { class: "row" }, button("−", `${options.stepLabel} back`, () => options.advance(-options.step)), play,
-            button("+", `${options.stepLabel} on`, () => options.advance(options.step))), pace);
+        make("div", { class: "row" }, button("−", `${options.stepLabel} back`, () => options.advance(-options.step)),
+            play, button("+", `${options.stepLabel} on`, () => options.advance(options.step))), pace);
     return { element, stop };
 }

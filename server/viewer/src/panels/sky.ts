@@ -17,7 +17,8 @@ import { slider } from "./slider.ts";
 /** A year has 1.6 MB. */
 const FILE_MOST = 16e6;
 
-const MONTHS = ["January", "February", "March", "April", "May", "June", "July", "August", "September", "October", "November", "December"];
+const MONTHS = ["January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
+    "November", "December"];
 
 export function dateText(day: number): string {
     const date = dateOf(day);
@@ -50,19 +51,30 @@ export function skyPanel(app: App): Panel {
     let tiledScene: OpenScene | null = null;
     app.skyOf = (lighting, description) => {
         const isOpen = description === tiledScene?.description;
-        if (description.sky === null || lighting.solo !== null || !(isOpen || source.knows(description.name))) return null;
+        if (description.sky === null || lighting.solo !== null || !(isOpen || source.knows(description.name)))
+            return null;
         return source.radiances(lighting.sky, isPhotometric(), description.channels, isOpen ? null : description.name);
     };
-    app.sunOf = (lighting, description) => (description !== tiledScene?.description || lighting.solo !== null ? null
+    app.sunOf = (lighting, description) => (description !== tiledScene?.description || lighting.solo !== null
+        ? null
         : source.parts(lighting.sky, isPhotometric(), description.channels));
     app.momentOf = (light) => source.momentOf(light);
-    app.prepareOther = async ({ name, sky }) => { if (sky !== null) source.takeOther(name, await app.api.sky(name)); };
+    app.prepareOther = async ({ name, sky }) => {
+        if (sky !== null) source.takeOther(name, await app.api.sky(name));
+    };
     const controls = makeControls(app, change);
     const weather = makeWeather(app, source, change, () => update());
-    const dome = makeDome(), figures = make("table", { class: "figures" }), moment = make("p", { class: "moment", "aria-live": "off" });
+    const dome = makeDome(), figures = make("table", { class: "figures" }),
+        moment = make("p", { class: "moment", "aria-live": "off" });
     const day = player({
-        what: "the day", speeds: [["0.5", "½ hour a second"], ["1", "1 hour a second"], ["2", "2 hours a second"], ["4", "4 hours a second"]],
-        speed: "1", step: 0.5, stepLabel: "Half an hour", advance: (hours) => change({ hour: Number(goOn(app.store.now.lighting.sky, hours).toFixed(3)) }, "hour of the sky"),
+        what: "the day",
+        speeds: [["0.5", "½ hour a second"], ["1", "1 hour a second"], ["2", "2 hours a second"], ["4",
+            "4 hours a second"]],
+        speed: "1",
+        step: 0.5,
+        stepLabel: "Half an hour",
+        advance: (hours) =>
+            change({ hour: Number(goOn(app.store.now.lighting.sky, hours).toFixed(3)) }, "hour of the sky"),
     });
     const note = make("p", { class: "hint", role: "status" });
     const update = (): void => {
@@ -88,13 +100,16 @@ export function skyPanel(app: App): Panel {
     });
     app.on("theme", update);
     app.store.listen((now, before) => {
-        if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit || now.view.sharpSun !== before.view.sharpSun) update();
+        if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit
+            || now.view.sharpSun !== before.view.sharpSun) update();
     });
     return {
-        id: "sky", title: "Sky", isUseful: () => app.scene?.description.sky !== null && app.scene !== null,
+        id: "sky",
+        title: "Sky",
+        isUseful: () => app.scene?.description.sky !== null && app.scene !== null,
         isFirst: () => app.scene?.mesh.groups.every((group) => group.emission === null) ?? false,
-        element: make("div", {}, controls.model, note, controls.strength, moment, controls.time, day.element, dome.element, figures,
-            weather.element, controls.place),
+        element: make("div", {}, controls.model, note, controls.strength, moment, controls.time, day.element,
+            dome.element, figures, weather.element, controls.place),
     };
 }
 
@@ -124,25 +139,35 @@ function takeSky(app: App, source: SkySource, fetched: Fetched, scene: OpenScene
     const { weather } = source;
     if (weather === null) return;
     const sky: SkyLight = {
-        ...scene.ownLighting.sky, model: "perez", latitude: weather.latitude, longitude: weather.longitude, zone: weather.zone,
+        ...scene.ownLighting.sky,
+        model: "perez",
+        latitude: weather.latitude,
+        longitude: weather.longitude,
+        zone: weather.zone,
     };
     scene.ownLighting = { ...scene.ownLighting, sky };
 }
 
 function noteOf(light: SkyLight, source: SkySource, app: App): string {
     if (source.tiles === null) return "The tiles of this sky are not known yet.";
-    if (app.store.now.lighting.solo !== null) return `Only ${app.store.now.lighting.solo} shines now (Lights, Solo), not the sky.`;
+    if (app.store.now.lighting.solo !== null)
+        return `Only ${app.store.now.lighting.solo} shines now (Lights, Solo), not the sky.`;
     if (light.model === "perez" && source.weather === null && source.weatherFor(light) === null)
-        return light.moment === null ? "Pick a weather file below; until then this sky is dark."
-            : `The link holds the weather of ${dateText(light.moment.day)}, ${clockOf(light.moment.hour)}, alone. Pick its file below; until then the sky of other times is dark.`;
-    if (light.model === "perez" && source.sky(light, false) === null) return "The weather file has nothing at this time.";
+        return light.moment === null
+            ? "Pick a weather file below; until then this sky is dark."
+            : `The link holds the weather of ${dateText(light.moment.day)}, ${
+                clockOf(light.moment.hour)
+            }, alone. Pick its file below; until then the sky of other times is dark.`;
+    if (light.model === "perez" && source.sky(light, false) === null)
+        return "The weather file has nothing at this time.";
     return "";
 }
 
 /** Other skies are ten times as bright: an exposure that the page chose is found anew, that of a person stays. */
 function changeModel(app: App, model: SkyLight["model"]): void {
     const { now } = app.store, exposure = app.exposure.anew(now.view);
-    app.store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, model } }, view: { ...now.view, exposure } });
+    app.store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, model } },
+        view: { ...now.view, exposure } });
 }
 
 interface Controls {
@@ -155,36 +180,52 @@ interface Controls {
 
 function makeControls(app: App, change: Change): Controls {
     const first = skyOff;
-    const model = choice("Sky", [["off", "None"], ["overcast", "Overcast (CIE)"], ["clear", "Clear (CIE)"],
-        ["turbid", "Clear, by turbidity (Linke)"], ["given", "By direct and diffuse light (Perez)"], ["even", "Even"], ["perez", "Of a weather file (Perez)"]],
-        first.model, (to) => changeModel(app, to));
-    const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]], first.sun, (to) => change({ sun: to }));
+    const model = choice("Sky", [["off", "None"], ["overcast", "Overcast (CIE)"], ["clear", "Clear (CIE)"], ["turbid",
+        "Clear, by turbidity (Linke)"], ["given", "By direct and diffuse light (Perez)"], ["even", "Even"], ["perez",
+        "Of a weather file (Perez)"]], first.model, (to) => changeModel(app, to));
+    const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]],
+        first.sun, (to) => change({ sun: to }));
     const sharp = tick("Sharp sun (drawn)", app.store.now.view.sharpSun, (on) => {
         const { now } = app.store;
         app.store.change({ ...now, view: { ...now.view, sharpSun: on } });
     });
     const drawn = make("p", { class: "hint" });
     const tellDrawn = (): void => {
-        drawn.textContent = app.sharp.isOn ? "The picture has the sun in its true place, with the half-shadows of its disc once the view rests; all numbers have it in tiles of the sky."
+        drawn.textContent = app.sharp.isOn
+            ? "The picture has the sun in its true place, with the half-shadows of its disc once the view rests; all numbers have it in tiles of the sky."
             : "Not now: no sun shines, or the picture shows numbers (false colour, a threshold, a comparison).";
     };
     app.store.listen(tellDrawn);
     app.on("field", tellDrawn);
     const tinted = tick("Blue sky, warm sun", first.tinted, (on) => change({ tinted: on }));
     const unit = (): string => (app.store.now.view.unit === "lx" ? "lx" : "W/m²");
-    const strength = slider({ label: "On the ground", unit: unit(), least: 0, most: 1000, log: true, change: (value) => change({ strength: value }, "strength of the sky") }, first.strength);
-    const turbidity = slider({ label: "Turbidity", least: 1.5, most: 8, step: 0.1, change: (value) => change({ turbidity: Math.min(20, Math.max(1, value)) }, "turbidity of the sky") }, first.turbidity);
+    const strength = slider({ label: "On the ground", unit: unit(), least: 0, most: 1000, log: true,
+        change: (value) => change({ strength: value }, "strength of the sky") }, first.strength);
+    const turbidity = slider({ label: "Turbidity", least: 1.5, most: 8, step: 0.1,
+        change: (value) => change({ turbidity: Math.min(20, Math.max(1, value)) }, "turbidity of the sky") },
+        first.turbidity);
     const haze = make("p", { class: "hint" }, "2: very clean, cold air; 3: clear; 5: hazy; 7: polluted.");
-    const direct = slider({ label: "Facing the sun", unit: "W/m²", least: 0, most: 1100, step: 5, change: (value) => change({ direct: Math.min(3000, value) }, "direct light") }, first.direct);
-    const diffuse = slider({ label: "Sky on the ground", unit: "W/m²", least: 0, most: 600, step: 5, change: (value) => change({ diffuse: Math.min(3000, value) }, "diffuse light") }, first.diffuse);
-    const factor = slider({ label: "Times", unit: "×", least: 0, most: 3, step: 0.01, change: (value) => change({ factor: value }, "factor of the sky") }, first.factor);
-    const day = slider({ label: "Day", unit: "of 365", least: 1, most: 365, step: 1, change: (value) => change({ day: Math.min(365, Math.round(value)) }, "day of the sky") }, first.day);
-    const hour = slider({ label: "Hour", unit: "h", least: 0, most: 24, step: 0.05, change: (value) => change({ hour: Math.min(24, value) }, "hour of the sky") }, first.hour);
-    const latitude = slider({ label: "Latitude", unit: "° N", least: -90, most: 90, step: 0.1, change: (value) => change({ latitude: Math.min(90, value) }, "latitude") }, first.latitude);
-    const longitude = slider({ label: "Longitude", unit: "° E", least: -180, most: 180, step: 0.1, change: (value) => change({ longitude: Math.min(180, value) }, "longitude") }, first.longitude);
-    const zone = slider({ label: "Clock", unit: "h UTC", least: -12, most: 14, step: 0.25, change: (value) => change({ zone: Math.min(14, value) }, "zone") }, first.zone);
-    const jumps = make("div", { class: "row" }, ...([[3, 21], [6, 21], [9, 23], [12, 21]] as const).map(([month, d]) =>
-        button(`${d} ${MONTHS[month - 1].slice(0, 3)}`, `${d} ${MONTHS[month - 1]}`, () => change({ day: dayOf(month, d) }))));
+    const direct = slider({ label: "Facing the sun", unit: "W/m²", least: 0, most: 1100, step: 5,
+        change: (value) => change({ direct: Math.min(3000, value) }, "direct light") }, first.direct);
+    const diffuse = slider({ label: "Sky on the ground", unit: "W/m²", least: 0, most: 600, step: 5,
+        change: (value) => change({ diffuse: Math.min(3000, value) }, "diffuse light") }, first.diffuse);
+    const factor = slider({ label: "Times", unit: "×", least: 0, most: 3, step: 0.01,
+        change: (value) => change({ factor: value }, "factor of the sky") }, first.factor);
+    const day = slider({ label: "Day", unit: "of 365", least: 1, most: 365, step: 1,
+        change: (value) => change({ day: Math.min(365, Math.round(value)) }, "day of the sky") }, first.day);
+    const hour = slider({ label: "Hour", unit: "h", least: 0, most: 24, step: 0.05,
+        change: (value) => change({ hour: Math.min(24, value) }, "hour of the sky") }, first.hour);
+    const latitude = slider({ label: "Latitude", unit: "° N", least: -90, most: 90, step: 0.1,
+        change: (value) => change({ latitude: Math.min(90, value) }, "latitude") }, first.latitude);
+    const longitude = slider({ label: "Longitude", unit: "° E", least: -180, most: 180, step: 0.1,
+        change: (value) => change({ longitude: Math.min(180, value) }, "longitude") }, first.longitude);
+    const zone = slider({ label: "Clock", unit: "h UTC", least: -12, most: 14, step: 0.25,
+        change: (value) => change({ zone: Math.min(14, value) }, "zone") }, first.zone);
+    const jumps = make("div", { class: "row" },
+        ...([[3, 21], [6, 21], [9, 23], [12, 21]] as const).map(([month, d]) => {
+            const name = MONTHS[month - 1], go = (): void => change({ day: dayOf(month, d) });
+            return button(`${d} ${name.slice(0, 3)}`, `${d} ${name}`, go);
+        }));
     const update = (light: SkyLight): void => {
         (model.querySelector("select") as HTMLSelectElement).value = light.model;
         (sun.querySelector("select") as HTMLSelectElement).value = light.sun;
@@ -201,17 +242,26 @@ function makeControls(app: App, change: Change): Controls {
         tinted.hidden = app.scene?.description.channels !== 3 || light.model === "off";
         strength.setMost(Math.max(app.store.now.view.unit === "lx" ? 1e5 : 1000, light.strength));
         (strength.element.querySelector(".unit") as HTMLElement).textContent = unit();
-        for (const [one, value] of [[strength, light.strength], [factor, light.factor], [turbidity, light.turbidity], [direct, light.direct], [diffuse, light.diffuse], [day, light.day], [hour, light.hour], [latitude, light.latitude],
-            [longitude, light.longitude], [zone, light.zone]] as const) one.set(value);
+        for (const [one, value] of [[strength, light.strength], [factor, light.factor], [turbidity, light.turbidity], [
+            direct,
+            light.direct,
+        ], [diffuse, light.diffuse], [day, light.day], [hour, light.hour], [latitude, light.latitude], [longitude,
+            light.longitude], [zone, light.zone]] as const) one.set(value);
     };
     return {
-        model, strength: make("div", {}, strength.element, turbidity.element, haze, direct.element, diffuse.element, factor.element, sun, sharp, drawn, tinted), time: make("div", {}, day.element, jumps, hour.element),
-        place: make("div", {}, make("h2", {}, "Place"), latitude.element, longitude.element, zone.element), update,
+        model,
+        strength: make("div", {}, strength.element, turbidity.element, haze, direct.element, diffuse.element,
+            factor.element, sun, sharp, drawn, tinted),
+        time: make("div", {}, day.element, jumps, hour.element),
+        place: make("div", {}, make("h2", {}, "Place"), latitude.element, longitude.element, zone.element),
+        update,
     };
 }
 
 /** The weather file: picked or dropped, read by the page itself. */
-function makeWeather(app: App, source: SkySource, change: Change, done: () => void): { element: HTMLElement; update(light: SkyLight): void } {
+function makeWeather(app: App, source: SkySource, change: Change,
+    done: () => void): { element: HTMLElement; update(light: SkyLight): void }
+{
     const about = make("p", { class: "hint" }), problem = make("p", { class: "bad", role: "alert" });
     const place = (): void => {
         const { weather } = source;
@@ -219,27 +269,34 @@ function makeWeather(app: App, source: SkySource, change: Change, done: () => vo
         change({ model: "perez", latitude: weather.latitude, longitude: weather.longitude, zone: weather.zone });
     };
     const take = async (file: File): Promise<void> => {
-        if (file.size > FILE_MOST) source.problem = `${file.name} has ${count(file.size)} bytes, a weather file at most ${count(FILE_MOST)}.`;
+        if (file.size > FILE_MOST)
+            source.problem = `${file.name} has ${count(file.size)} bytes, a weather file at most ${count(FILE_MOST)}.`;
         else if (source.read(await file.text(), false)) place();
         done();
         app.ask();
     };
     const picker = make("input", {
-        type: "file", accept: ".epw,.wea,.EPW,.WEA", "aria-label": "Weather file (EPW or WEA)",
+        type: "file",
+        accept: ".epw,.wea,.EPW,.WEA",
+        "aria-label": "Weather file (EPW or WEA)",
         onchange: () => {
             const file = picker.files?.[0];
             if (file !== undefined) take(file).catch((reason: unknown) => app.fail(reason));
             picker.value = "";
         },
     });
-    const element = make("div", { class: "drop" }, make("h2", {}, "Weather file"), about, problem, picker, button("Its place", "Latitude, longitude and clock of the weather file", place));
+    const element = make("div", { class: "drop" }, make("h2", {}, "Weather file"), about, problem, picker,
+        button("Its place", "Latitude, longitude and clock of the weather file", place));
     // Anywhere on the page, as a file that is dropped beside would replace the page.
-    document.addEventListener("dragover", (event) => { if (event.dataTransfer?.types.includes("Files")) event.preventDefault(); });
+    document.addEventListener("dragover", (event) => {
+        if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
+    });
     document.addEventListener("drop", (event) => {
         const file = event.dataTransfer?.files[0];
         if (file === undefined) return;
         event.preventDefault();
-        if (app.scene?.description.sky !== null && /\.(epw|wea)$/i.test(file.name)) take(file).catch((reason: unknown) => app.fail(reason));
+        if (app.scene?.description.sky !== null && /\.(epw|wea)$/i.test(file.name))
+            take(file).catch((reason: unknown) => app.fail(reason));
     });
     const update = (light: SkyLight): void => {
         const { weather } = source;
@@ -247,21 +304,41 @@ function makeWeather(app: App, source: SkySource, change: Change, done: () => vo
         (element.querySelector("button") as HTMLButtonElement).hidden = weather === null;
         problem.textContent = source.problem ?? "";
         problem.hidden = source.problem === null;
-        about.textContent = weather === null ? "EPW or WEA. Pick it, or drop it on the page. It stays on this machine; nothing is sent."
-            : `${weather.place}: ${count(Math.round(weather.hours.length * weather.step))} hours${weather.step === 1 ? "" : ` in ${count(weather.hours.length)} rows`}${source.isBeside ? ", from beside the store." : ". A link holds the weather of the time that is shown, not the file."}`;
+        about.textContent = weather === null
+            ? "EPW or WEA. Pick it, or drop it on the page. It stays on this machine; nothing is sent."
+            : `${weather.place}: ${count(Math.round(weather.hours.length * weather.step))} hours${
+                weather.step === 1 ? "" : ` in ${count(weather.hours.length)} rows`
+            }${
+                source.isBeside
+                    ? ", from beside the store."
+                    : ". A link holds the weather of the time that is shown, not the file."
+            }`;
     };
     return { element, update };
 }
 
 function drawFigures(table: HTMLTableElement, dome: HTMLElement, light: SkyLight, sky: Sky | null, unit: string): void {
-    const sun = sky?.sun ?? sunAt(light.latitude, light.longitude, light.zone, { year: 2001, ...dateOf(light.day) }, light.hour);
+    const sun = sky?.sun
+        ?? sunAt(light.latitude, light.longitude, light.zone, { year: 2001, ...dateOf(light.day) }, light.hour);
     const altitude = `${((sun.altitude * 180) / Math.PI).toFixed(1)}°`;
     const rows: [string, string, string][] = [
-        ["Sun's altitude", sun.altitude > 0 ? altitude : `${altitude}, below the horizon`, "altitude"], ["Sun's azimuth", windOf(sun.azimuth), "azimuth"],
+        ["Sun's altitude", sun.altitude > 0 ? altitude : `${altitude}, below the horizon`, "altitude"],
+        ["Sun's azimuth", windOf(sun.azimuth), "azimuth"],
         ["Sky on the ground", sky === null ? "–" : `${tell(sky.diffuseHorizontal)} ${unit}`, "diffuse"],
-        ["Sun on the ground", sky === null ? "–" : `${tell(sky.directHorizontal)} ${unit}`, "direct"]];
+        ["Sun on the ground", sky === null ? "–" : `${tell(sky.directHorizontal)} ${unit}`, "direct"],
+    ];
     if (sky !== null && sky.perez !== null)
-        rows.push(["Clearness ε", Number.isFinite(sky.perez.clearness) ? sky.perez.clearness.toFixed(2) : "no diffuse light", "clearness"], ["Brightness Δ", sky.perez.brightness.toFixed(3), "brightness"]);
-    fill(table, make("tbody", {}, ...rows.map(([name, text, figure]) => make("tr", {}, make("th", { scope: "row" }, name), make("td", { "data-sky": figure }, text)))));
-    dome.setAttribute("aria-label", `Map of the sky, north above: sun at altitude ${altitude}, azimuth ${windOf(sun.azimuth)}.`);
+        rows.push(["Clearness ε",
+            Number.isFinite(sky.perez.clearness) ? sky.perez.clearness.toFixed(2) : "no diffuse light", "clearness"], [
+            "Brightness Δ",
+            sky.perez.brightness.toFixed(3),
+            "brightness",
+        ]);
+    fill(table,
+        make("tbody", {},
+            ...rows.map(([name, text, figure]) =>
+                make("tr", {}, make("th", { scope: "row" }, name), make("td", { "data-sky": figure }, text))
+            )));
+    dome.setAttribute("aria-label",
+        `Map of the sky, north above: sun at altitude ${altitude}, azimuth ${windOf(sun.azimuth)}.`);
 }

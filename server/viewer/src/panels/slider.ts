@@ -34,7 +34,11 @@ export function slider(options: SliderOptions, now: number): Slider {
     const toValue = (place: number): number => (!log ? place : place <= 0 ? 0 : most * 10 ** (3 * (place / STEPS - 1)));
     const id = unique("slider");
     const range = make("input", {
-        type: "range", id, min: log ? 0 : least, max: log ? STEPS : most, step: log ? 1 : options.step ?? "any",
+        type: "range",
+        id,
+        min: log ? 0 : least,
+        max: log ? STEPS : most,
+        step: log ? 1 : options.step ?? "any",
         oninput: () => {
             const value = Number(toValue(Number(range.value)).toPrecision(4));
             box.value = tell(value).replaceAll(",", "");
@@ -42,7 +46,10 @@ export function slider(options: SliderOptions, now: number): Slider {
         },
     });
     const box = make("input", {
-        type: "number", min: least, step: "any", "aria-label": `${options.label}${options.unit === undefined ? "" : ` in ${options.unit}`}`,
+        type: "number",
+        min: least,
+        step: "any",
+        "aria-label": `${options.label}${options.unit === undefined ? "" : ` in ${options.unit}`}`,
         onchange: () => {
             const value = Number(box.value);
             if (box.value === "" && box.placeholder !== "") return;
@@ -67,7 +74,8 @@ export function slider(options: SliderOptions, now: number): Slider {
     const element = make("div", { class: "slider" }, make("label", { for: id }, options.label), range, box,
         options.unit !== undefined && make("span", { class: "unit" }, options.unit));
     return {
-        element, set,
+        element,
+        set,
         unset: (word) => {
             if (document.activeElement === box) return;
             box.value = "";

@@ -12,8 +12,13 @@ const STEP = 0.01, LEAP = 0.1;
 export function splitLine(app: App): { element: HTMLElement; name(a: string, b: string): void } {
     const left = make("span", { class: "side left" }), right = make("span", { class: "side right" });
     const line = make("div", {
-        class: "split", role: "slider", tabindex: 0, "aria-label": "Line between A and B", "aria-orientation": "horizontal",
-        "aria-valuemin": 0, "aria-valuemax": 100,
+        class: "split",
+        role: "slider",
+        tabindex: 0,
+        "aria-label": "Line between A and B",
+        "aria-orientation": "horizontal",
+        "aria-valuemin": 0,
+        "aria-valuemax": 100,
         onpointerdown: (event: PointerEvent) => {
             line.setPointerCapture(event.pointerId);
             line.focus();
@@ -27,8 +32,14 @@ export function splitLine(app: App): { element: HTMLElement; name(a: string, b: 
         onkeydown: (event: KeyboardEvent) => {
             const now = app.store.now.compare?.split ?? 0.5;
             const to: { [key: string]: number } = {
-                ArrowLeft: now - STEP, ArrowDown: now - STEP, ArrowRight: now + STEP, ArrowUp: now + STEP,
-                PageDown: now - LEAP, PageUp: now + LEAP, Home: 0, End: 1,
+                ArrowLeft: now - STEP,
+                ArrowDown: now - STEP,
+                ArrowRight: now + STEP,
+                ArrowUp: now + STEP,
+                PageDown: now - LEAP,
+                PageUp: now + LEAP,
+                Home: 0,
+                End: 1,
             };
             if (to[event.key] === undefined) return;
             event.preventDefault();
@@ -50,7 +61,9 @@ export function splitLine(app: App): { element: HTMLElement; name(a: string, b: 
         line.setAttribute("aria-valuenow", String(percent));
         line.setAttribute("aria-valuetext", `${percent} % of the width is A`);
     };
-    app.store.listen((now, before) => { if (now.compare !== before.compare) update(); });
+    app.store.listen((now, before) => {
+        if (now.compare !== before.compare) update();
+    });
     return {
         element,
         name: (a, b) => {
@@ -69,9 +82,11 @@ export function changeLegend(app: App): { element: HTMLElement; set(most: number
         context.fillRect(x, 0, 1, 1);
     }
     const low = make("span", {}), high = make("span", {});
-    const element = make("div", { class: "changes", hidden: true, "data-figure": "changes" },
-        make("div", {}, "B − A"), ramp, make("div", { class: "ends" }, low, make("span", {}, "0"), high));
-    const update = (): void => { element.hidden = app.store.now.compare?.how !== "difference"; };
+    const element = make("div", { class: "changes", hidden: true, "data-figure": "changes" }, make("div", {}, "B − A"),
+        ramp, make("div", { class: "ends" }, low, make("span", {}, "0"), high));
+    const update = (): void => {
+        element.hidden = app.store.now.compare?.how !== "difference";
+    };
     app.store.listen(update);
     return {
         element,

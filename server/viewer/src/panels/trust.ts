@@ -1,4 +1,5 @@
-// How far the numbers can be trusted: the error of this lighting and of the store, how it was made, a certificate on request.
+// How far the numbers can be trusted: the error of this lighting and of the store, how it was made, a certificate on
+// request.
 import { fill, make, button } from "../base/dom.ts";
 import { floatsToHalves } from "../base/half.ts";
 import { readNpy } from "../base/npy.ts";
@@ -17,7 +18,10 @@ const REST_MS = 400;
 const GROUPS_MOST = 100;
 
 const LIGHTS: { [name: string]: string } = {
-    lights: "The scene's own lamps", single: "One bright element", random: "All elements at random", whole: "One group, evenly",
+    lights: "The scene's own lamps",
+    single: "One bright element",
+    random: "All elements at random",
+    whole: "One group, evenly",
     sky: "A sky alone",
 };
 
@@ -38,7 +42,9 @@ export function trustPanel(app: App): Panel {
             const names = app.scene?.mesh.groups.slice(0, GROUPS_MOST).map((group) => group.name) ?? [];
             if (wanted.emission === null || names.length === 0) return null;
             const answer = await app.api.answer(wanted.scene, {
-                emission: wanted.emission, quantity: wanted.quantity, reduce: { groups: names, with: ["mean", "max"] },
+                emission: wanted.emission,
+                quantity: wanted.quantity,
+                reduce: { groups: names, with: ["mean", "max"] },
             });
             return (answer.error ?? null) as OwnError | null;
         },
@@ -46,7 +52,9 @@ export function trustPanel(app: App): Panel {
         (reason) => {
             asked = "";
             fill(own, make("p", { class: "hint" }, reason instanceof Error ? reason.message : String(reason)));
-        }, 1);
+        },
+        1,
+    );
     // Nobody is asked for figures that nobody sees.
     let timer = 0, asked = "", isSeen = false;
     const rest = (): void => {
@@ -62,7 +70,8 @@ export function trustPanel(app: App): Panel {
         }, REST_MS);
     };
     app.on("field", rest);
-    const figures = make("section", { "aria-label": "Error of this lighting" }, make("h2", {}, "Error of this lighting"), own);
+    const figures = make("section", { "aria-label": "Error of this lighting" },
+        make("h2", {}, "Error of this lighting"), own);
     new IntersectionObserver((entries) => {
         isSeen = entries.some((entry) => entry.isIntersecting);
         if (isSeen) rest();
@@ -74,7 +83,8 @@ export function trustPanel(app: App): Panel {
         fill(store, ...ofStore((app.scene as NonNullable<App["scene"]>).description));
     });
     return {
-        id: "trust", title: "Trust",
+        id: "trust",
+        title: "Trust",
         element: make("div", {}, figures, certificate.element, store),
     };
 }
@@ -87,21 +97,41 @@ function table(label: string, head: readonly string[], rows: readonly (readonly 
     return make("div", { class: "wide", tabindex: 0, role: "region", "aria-label": label },
         make("table", { "aria-label": label },
             make("thead", {}, make("tr", {}, ...head.map((text) => make("th", { scope: "col" }, text)))),
-            make("tbody", {}, ...rows.map(([name, ...cells]) => make("tr", {}, make("th", { scope: "row" }, name),
-                ...cells.map((text) => make("td", {}, text)))))));
+            make("tbody", {},
+                ...rows.map(([name, ...cells]) =>
+                    make("tr", {}, make("th", { scope: "row" }, name), ...cells.map((text) => make("td", {}, text)))
+                ))));
 }
 
 /** The error of the lighting that is shown, as the daemon states it. */
 function ownError(error: OwnError | null): Node[] {
     if (error === null) return [make("p", { class: "hint" }, "This store states no error for this lighting.")];
     if (error.from === "others")
-        return [make("p", { class: "hint" }, "This store was built for light from some groups alone; others shine, too, and no error is known for these.")];
-    const of = error.light === "own" ? "" : error.light === "lights" ? " (measured for the scene's own lamps)" : " (measured for single elements)";
-    const out: Node[] = [make("p", { "data-figure": "own-error" },
-        `Means of groups are off by up to ${share(error.indirect_mean)} of the reflected light, ${share(error.relative_mean)} of all light${of}.`)];
+        return [
+            make("p", { class: "hint" },
+                "This store was built for light from some groups alone; others shine, too, and no error is known for these."),
+        ];
+    const of = error.light === "own"
+        ? ""
+        : error.light === "lights"
+        ? " (measured for the scene's own lamps)"
+        : " (measured for single elements)";
+    const out: Node[] = [
+        make("p", { "data-figure": "own-error" },
+            `Means of groups are off by up to ${share(error.indirect_mean)} of the reflected light, ${
+                share(error.relative_mean)
+            } of all light${of}.`),
+    ];
     if (error.mesh !== undefined)
-        out.push(make("p", {}, `One value for each element leaves ${share(error.mesh)} of the reflected light; a finer mesh alone lowers that.`));
-    const rows = Object.entries(error.groups ?? {}).map(([name, group]) => [name, share(group.mean), share(group.elements)] as const);
+        out.push(
+            make("p", {},
+                `One value for each element leaves ${
+                    share(error.mesh)
+                } of the reflected light; a finer mesh alone lowers that.`),
+        );
+    const rows = Object.entries(error.groups ?? {}).map(([name, group]) =>
+        [name, share(group.mean), share(group.elements)] as const
+    );
     if (rows.length > 0) {
         out.push(table("Error of this lighting by group", ["Group", "Its mean", "Its elements"], rows),
             make("p", { class: "hint" }, "Shares of the light that each group reflects."));
@@ -114,20 +144,27 @@ function ofStore(description: Description): Node[] {
         .filter((entry): entry is [string, ErrorFigures] => LIGHTS[entry[0]] !== undefined && !Array.isArray(entry[1]));
     const groups = description.error?.by_group;
     const out: Node[] = [make("h2", {}, "Error of the store")];
-    if (figures.length === 0) out.push(make("p", { class: "hint" }, description.name.includes("@")
-        ? "Errors were measured under the reflectances of the store, not under those of this variant." : "No error was measured."));
-    else out.push(table("Error of the store by kind of light", ["Light", "of reflected", "of all"],
-        figures.map(([name, f]) => [LIGHTS[name], share(f.total_indirect_mean), share(f.total_relative_mean)])));
+    if (figures.length === 0)
+        out.push(make("p", { class: "hint" }, description.name.includes("@")
+            ? "Errors were measured under the reflectances of the store, not under those of this variant."
+            : "No error was measured."));
+    else out.push(
+            table("Error of the store by kind of light", ["Light", "of reflected", "of all"],
+                figures.map(([name, f]) => [LIGHTS[name], share(f.total_indirect_mean), share(f.total_relative_mean)])),
+        );
     if (Array.isArray(groups) && groups.length > 0)
-        out.push(make("details", {}, make("summary", {}, "By group that is lit"),
-            table("Error of the store by group", ["Group", "All shine", "Near light", "Far light"],
-                (groups as GroupErrors[]).map((g) => [g.name, share(g.uniform), share(g.near), share(g.far)])),
-            make("p", { class: "hint" }, "Error of the group's mean as a share of the light it reflects.")));
+        out.push(
+            make("details", {}, make("summary", {}, "By group that is lit"),
+                table("Error of the store by group", ["Group", "All shine", "Near light", "Far light"],
+                    (groups as GroupErrors[]).map((g) => [g.name, share(g.uniform), share(g.near), share(g.far)])),
+                make("p", { class: "hint" }, "Error of the group's mean as a share of the light it reflects.")),
+        );
     out.push(make("h2", {}, "How it was made"),
         make("p", {}, `${description.method ?? description.kind}: ${reasonOf(description)}`),
         list(description.provenance ?? {}));
     const report = Object.entries(description.report ?? {}).filter(([, value]) => value !== null);
-    if (report.length > 0) out.push(make("details", {}, make("summary", {}, "Figures of the method"), list(Object.fromEntries(report))));
+    if (report.length > 0)
+        out.push(make("details", {}, make("summary", {}, "Figures of the method"), list(Object.fromEntries(report))));
     return out;
 }
 
@@ -140,12 +177,15 @@ function reasonOf(description: Description): string {
 function list(values: { [name: string]: unknown }): HTMLElement {
     return make("dl", {}, ...Object.entries(values).flatMap(([name, value]) => [
         make("dt", {}, name.replaceAll("_", " ")),
-        make("dd", {}, typeof value === "number" ? (Number.isInteger(value) ? count(value) : tell(value)) : String(value))]));
+        make("dd", {},
+            typeof value === "number" ? (Number.isInteger(value) ? count(value) : tell(value)) : String(value)),
+    ]));
 }
 
 /** Asks for a bound on the error of every number, and shows the refined values in place of the others. */
 function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): void } {
-    const tolerance = make("input", { type: "number", min: 0, step: "any", value: "0.001", "aria-label": "Tolerance, a share of the most reflected light" });
+    const tolerance = make("input", { type: "number", min: 0, step: "any", value: "0.001",
+        "aria-label": "Tolerance, a share of the most reflected light" });
     const said = make("p", { role: "status", "aria-live": "polite", "data-figure": "certificate" });
     const wish = (value: number | null): void => app.store.change({ ...app.store.now, tolerance: value });
     const start = button("Certify", null, () => {
@@ -166,28 +206,41 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
     let certified = "", onItsWay: AbortController | null = null;
     const rested = (wanted: Wanted): void => {
         const wished = app.store.now.tolerance, key = JSON.stringify([wanted, wished]);
-        if (wished === null || wanted.emission === null || (key === certified && app.asking.certificate !== null)) return;
+        if (wished === null || wanted.emission === null || (key === certified && app.asking.certificate !== null))
+            return;
         if (key === certified && onItsWay !== null) return;
         certified = key;
         onItsWay?.abort();
         const mine = onItsWay = new AbortController();
         said.textContent = "Refining …";
         const start = performance.now();
-        app.api.floats(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity, tolerance: wished }, mine.signal).then((answer) => {
-            // Another lighting may be shown meanwhile.
-            if (mine.signal.aborted || JSON.stringify([app.wanted(), app.store.now.tolerance]) !== key) return;
-            const { data, shape } = readNpy(answer.file);
-            const bound = (answer.certificate ?? NaN) * wanted.scale, iterations = answer.iterations ?? 0;
-            app.certify(new Field(floatsToHalves(data as Float32Array), shape, wanted.scale), { bound, iterations, solve: answer.solveMs });
-            said.textContent = `Certified: no number of this answer is off by more than ${tell(bound, 2)} ${app.store.now.view.unit}. `
-                + `${iterations} multiplications by the form factors, ${tell(answer.solveMs ?? performance.now() - start, 2)} ms. The picture rounds to 11 bits.`;
-        }, (reason: unknown) => {
-            if (mine.signal.aborted) return;
-            app.store.settle({ ...app.store.now, tolerance: null });
-            said.textContent = reason instanceof Problem && reason.status === 422
-                ? `Not certified: ${reason.message}.` : reason instanceof Error ? reason.message : String(reason);
-            if (!(reason instanceof Problem) || reason.status === 401) app.fail(reason);
-        }).finally(() => { if (onItsWay === mine) onItsWay = null; });
+        app.api.floats(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity, tolerance: wished },
+            mine.signal).then((answer) => {
+                // Another lighting may be shown meanwhile.
+                if (mine.signal.aborted || JSON.stringify([app.wanted(), app.store.now.tolerance]) !== key) return;
+                const { data, shape } = readNpy(answer.file);
+                const bound = (answer.certificate ?? NaN) * wanted.scale, iterations = answer.iterations ?? 0;
+                app.certify(new Field(floatsToHalves(data as Float32Array), shape, wanted.scale), { bound, iterations,
+                    solve: answer.solveMs });
+                said.textContent =
+                    `Certified: no number of this answer is off by more than ${
+                        tell(bound, 2)
+                    } ${app.store.now.view.unit}. `
+                    + `${iterations} multiplications by the form factors, ${
+                        tell(answer.solveMs ?? performance.now() - start, 2)
+                    } ms. The picture rounds to 11 bits.`;
+            }, (reason: unknown) => {
+                if (mine.signal.aborted) return;
+                app.store.settle({ ...app.store.now, tolerance: null });
+                said.textContent = reason instanceof Problem && reason.status === 422
+                    ? `Not certified: ${reason.message}.`
+                    : reason instanceof Error
+                    ? reason.message
+                    : String(reason);
+                if (!(reason instanceof Problem) || reason.status === 401) app.fail(reason);
+            }).finally(() => {
+                if (onItsWay === mine) onItsWay = null;
+            });
     };
     app.store.listen((now, before) => {
         if (now.tolerance === before.tolerance) return;
@@ -200,7 +253,9 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
             said.textContent = "";
         }
     });
-    app.on("field", () => { if (app.asking.certificate === null && onItsWay === null) said.textContent = ""; });
+    app.on("field", () => {
+        if (app.asking.certificate === null && onItsWay === null) said.textContent = "";
+    });
     app.on("scene", () => {
         certified = "";
         stop.disabled = app.store.now.tolerance === null;
@@ -208,7 +263,9 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
     return {
         rested,
         element: make("section", { "aria-label": "Certificate" }, make("h2", {}, "Certificate"),
-            make("p", { class: "hint" }, "Refines the answer until a bound on its error holds for every element. The store has to keep its form factors."),
-            make("div", { class: "row" }, make("label", { class: "field" }, make("span", {}, "Tolerance"), tolerance), start, stop), said),
+            make("p", { class: "hint" },
+                "Refines the answer until a bound on its error holds for every element. The store has to keep its form factors."),
+            make("div", { class: "row" }, make("label", { class: "field" }, make("span", {}, "Tolerance"), tolerance),
+                start, stop), said),
     };
 }

@@ -1,7 +1,6 @@
 // Moves the camera: around the scene, or on foot through it.
-import {
-    Box3, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Sphere, Spherical, Vector2, Vector3, Vector4,
-} from "three";
+import { Box3, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Sphere, Spherical, Vector2, Vector3,
+    Vector4 } from "three";
 import CameraControls from "camera-controls";
 import type { Place } from "../state/state.ts";
 
@@ -12,9 +11,11 @@ CameraControls.install({
 /** Angle of view of the page's own camera, of the height, in degrees. */
 const ANGLE = 50;
 
-/** That of a camera of the scene file, whose up is at right angles to its direction. One that is not tilted sideways turns about the
- * vertical, as that of the page does. The target stands at an arm's length, which turning goes around. */
-export function placeOf(eye: readonly number[], direction: readonly number[], up: readonly number[], angle: number): Place {
+/** That of a camera of the scene file, whose up is at right angles to its direction. One that is not tilted sideways
+ * turns about the vertical, as that of the page does. The target stands at an arm's length, which turning goes around. */
+export function placeOf(eye: readonly number[], direction: readonly number[], up: readonly number[],
+    angle: number): Place
+{
     const target = eye.map((v, k) => v + direction[k]);
     const upright = [0, 1, 0].map((v, k) => v - direction[1] * direction[k]), length = Math.hypot(...upright);
     const isUpright = length > 0.01 && upright.every((v, k) => Math.abs(v / length - up[k]) < 1e-3);
@@ -127,8 +128,8 @@ export class Cameras {
         return moves || this.held.size > 0;
     }
 
-    /** Depths z are parted by z² / (near · 2^24): from outside the nearest plane stands between eye and scene, far from the eye. An
-     * eighth of the way is before all that even a wide picture sees at its corners. */
+    /** Depths z are parted by z² / (near · 2^24): from outside the nearest plane stands between eye and scene, far from
+     * the eye. An eighth of the way is before all that even a wide picture sees at its corners. */
     private setNear(): void {
         const { camera } = this, near = Math.max(this.nearest, this.box.distanceToPoint(camera.position) / 8);
         if (Math.abs(near - camera.near) <= 0.01 * near) return;

@@ -31,7 +31,10 @@ export function changesOf(a: Float32Array, b: Float32Array, channels: number, ar
         if (size[i] > Math.abs(most)) [most, mostAt] = [change, i];
     }
     return {
-        rms: total > 0 ? Math.sqrt(square / total) : 0, most, mostAt, relative: whole > 0 ? Math.sqrt(apart / whole) : NaN,
+        rms: total > 0 ? Math.sqrt(square / total) : 0,
+        most,
+        mostAt,
+        relative: whole > 0 ? Math.sqrt(apart / whole) : NaN,
         high: spreadOf(size, area, () => true).high,
     };
 }

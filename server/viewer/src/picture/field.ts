@@ -50,7 +50,8 @@ export interface Spread {
 
 const BINS = 1024;
 /** Bins of log2 from 2^−40 to 2^40. */
-const binOf = (value: number): number => Math.min(BINS - 1, Math.max(0, Math.floor((Math.log2(value) + 40) * (BINS / 80))));
+const binOf = (value: number): number =>
+    Math.min(BINS - 1, Math.max(0, Math.floor((Math.log2(value) + 40) * (BINS / 80))));
 const valueOf = (bin: number): number => 2 ** (((bin + 0.5) * 80) / BINS - 40);
 
 /** How the values of elements (those for which `counts` is true) spread over the area. O(n). */
@@ -77,5 +78,6 @@ export function spreadOf(values: Float32Array, area: Float64Array, counts: (elem
         }
         return most;
     };
-    return { low: dark > 0.01 * (total + dark) ? 0 : below(0.01), high: Math.min(most, below(0.99)), most, logMean: total > 0 ? logs / total : 0 };
+    return { low: dark > 0.01 * (total + dark) ? 0 : below(0.01), high: Math.min(most, below(0.99)), most,
+        logMean: total > 0 ? logs / total : 0 };
 }

@@ -46,7 +46,13 @@ export interface SceneMesh {
     reflectance: Float32Array | null;
 }
 
-interface Accessor { bufferView: number; byteOffset?: number; componentType: number; count: number; type: string }
+interface Accessor {
+    bufferView: number;
+    byteOffset?: number;
+    componentType: number;
+    count: number;
+    type: string;
+}
 interface Gltf {
     nodes: { name?: string; mesh?: number; children?: number[] }[];
     meshes: { primitives: { attributes: { [name: string]: number }; indices: number; material?: number }[] }[];
@@ -90,10 +96,12 @@ function materialOf(gltf: Gltf, index: number | undefined): { reflectance: Rgb; 
 export function readMesh(file: ArrayBuffer): SceneMesh {
     const { gltf, start } = chunks(file);
     const floats = (accessor: Accessor): Float32Array =>
-        new Float32Array(file, start + (gltf.bufferViews[accessor.bufferView].byteOffset ?? 0) + (accessor.byteOffset ?? 0),
+        new Float32Array(file,
+            start + (gltf.bufferViews[accessor.bufferView].byteOffset ?? 0) + (accessor.byteOffset ?? 0),
             accessor.count * WIDTHS[accessor.type]);
     const parts = gltf.nodes.filter((node) => node.mesh !== undefined).flatMap((node) =>
-        gltf.meshes[node.mesh as number].primitives.map((primitive) => ({ name: node.name ?? "", primitive })));
+        gltf.meshes[node.mesh as number].primitives.map((primitive) => ({ name: node.name ?? "", primitive }))
+    );
     let vertices = 0, indices = 0;
     for (const { primitive } of parts) {
         vertices += gltf.accessors[primitive.attributes.POSITION].count;
@@ -113,7 +121,8 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
         }
         const accessor = gltf.accessors[primitive.indices];
         const from = start + (gltf.bufferViews[accessor.bufferView].byteOffset ?? 0) + (accessor.byteOffset ?? 0);
-        const own = accessor.componentType === 5125 ? new Uint32Array(file, from, accessor.count)
+        const own = accessor.componentType === 5125
+            ? new Uint32Array(file, from, accessor.count)
             : new Uint16Array(file, from, accessor.count);
         for (let i = 0; i < own.length; i++) index[atIndex + i] = own[i] + atVertex;
         ranges.push({ name, vertices: [atVertex, atVertex + ids.length], material: primitive.material });
@@ -135,8 +144,18 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
     });
     const { up } = gltf.extras?.lambert ?? {};
     const mesh: SceneMesh = {
-        elements, positions, normals, elementOf, index, groupOf, area, groups, up: up === "x" || up === "z" ? up : "y",
-        images: [], uv: null, reflectance: null,
+        elements,
+        positions,
+        normals,
+        elementOf,
+        index,
+        groupOf,
+        area,
+        groups,
+        up: up === "x" || up === "z" ? up : "y",
+        images: [],
+        uv: null,
+        reflectance: null,
     };
     addImages(mesh, file, start, gltf, parts.map(({ primitive }) => primitive));
     return mesh;
@@ -145,27 +164,42 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
 type Primitive = Gltf["meshes"][number]["primitives"][number];
 
 /** Takes in images, the places of vertices in them, and the reflectances that their groups' elements have. */
-function addImages(mesh: SceneMesh, file: ArrayBuffer, start: number, gltf: Gltf, primitives: readonly Primitive[]): void {
+function addImages(mesh: SceneMesh, file: ArrayBuffer, start: number, gltf: Gltf,
+    primitives: readonly Primitive[]): void
+{
     const floats = (index: number): Float32Array => {
         const accessor = gltf.accessors[index], view = gltf.bufferViews[accessor.bufferView];
-        return new Float32Array(file, start + (view.byteOffset ?? 0) + (accessor.byteOffset ?? 0), accessor.count * WIDTHS[accessor.type]);
+        return new Float32Array(file, start + (view.byteOffset ?? 0) + (accessor.byteOffset ?? 0),
+            accessor.count * WIDTHS[accessor.type]);
     };
     let vertex = 0, first = 0;
     primitives.forEach((primitive, group) => {
-        const vertices = gltf.accessors[primitive.attributes.POSITION].count, { count } = gltf.accessors[primitive.indices];
-        const material = primitive.material === undefined ? undefined : gltf.materials?.[primitive.material]?.pbrMetallicRoughness;
-        const texture = material?.baseColorTexture === undefined ? undefined : gltf.textures?.[material.baseColorTexture.index];
-        const view = texture === undefined ? undefined : gltf.bufferViews[gltf.images?.[texture.source].bufferView ?? -1];
+        const vertices = gltf.accessors[primitive.attributes.POSITION].count,
+            { count } = gltf.accessors[primitive.indices];
+        const material = primitive.material === undefined
+            ? undefined
+            : gltf.materials?.[primitive.material]?.pbrMetallicRoughness;
+        const texture = material?.baseColorTexture === undefined
+            ? undefined
+            : gltf.textures?.[material.baseColorTexture.index];
+        const view = texture === undefined
+            ? undefined
+            : gltf.bufferViews[gltf.images?.[texture.source].bufferView ?? -1];
         if (texture !== undefined && view !== undefined) {
             mesh.uv ??= new Float32Array(2 * mesh.elementOf.length);
             mesh.reflectance ??= new Float32Array(3 * mesh.elements).fill(1);
             mesh.uv.set(floats(primitive.attributes.TEXCOORD_0), 2 * vertex);
             const own = floats(primitive.attributes._REFLECTANCE);
             for (let v = 0; v < vertices; v++)
-                for (let c = 0; c < 3; c++) mesh.reflectance[c * mesh.elements + mesh.elementOf[vertex + v]] = own[3 * v + c];
+                for (let c = 0; c < 3; c++)
+                    mesh.reflectance[c * mesh.elements + mesh.elementOf[vertex + v]] = own[3 * v + c];
             const sampler = gltf.samplers?.[texture.sampler ?? -1];
             mesh.images.push({
-                group, first, count, factor: rgb(material?.baseColorFactor, 1), wrap: [sampler?.wrapS ?? 10497, sampler?.wrapT ?? 10497],
+                group,
+                first,
+                count,
+                factor: rgb(material?.baseColorFactor, 1),
+                wrap: [sampler?.wrapS ?? 10497, sampler?.wrapT ?? 10497],
                 jpeg: new Uint8Array(file, start + (view.byteOffset ?? 0), view.byteLength),
             });
             mesh.groups[group].reflectance = meanOf(mesh, mesh.groups[group]);
@@ -179,7 +213,8 @@ function addImages(mesh: SceneMesh, file: ArrayBuffer, start: number, gltf: Gltf
 function meanOf(mesh: SceneMesh, group: MeshGroup): Rgb {
     const sum: Rgb = [0, 0, 0];
     for (const element of group.elements)
-        for (let c = 0; c < 3; c++) sum[c] += (mesh.reflectance?.[c * mesh.elements + element] ?? 1) * mesh.area[element];
+        for (let c = 0; c < 3; c++)
+            sum[c] += (mesh.reflectance?.[c * mesh.elements + element] ?? 1) * mesh.area[element];
     return sum.map((v) => v / Math.max(group.area, 1e-30)) as Rgb;
 }
 

@@ -1,5 +1,6 @@
-// Hanging nodes: where elements of different sizes meet, the corner of a small one stands inside an edge of a large one. Along
-// that edge the large one is drawn linear; so the node has that value, or the picture has steps and cracks there.
+// Hanging nodes: where elements of different sizes meet, the corner of a small one stands inside an edge of a large
+// one. Along that edge the large one is drawn linear; so the node has that value, or the picture has steps and cracks
+// there.
 import type { SceneMesh } from "./glb.ts";
 import type { Nodes } from "./nodes.ts";
 
@@ -21,21 +22,24 @@ interface Ties {
     extra: number;
 }
 
-/** Gives hanging nodes the elements of their edge's ends, with weights. O(vertices), where edges meet few parts of others. */
+/** Gives hanging nodes the elements of their edge's ends, with weights. O(vertices), where edges meet few parts of
+ * others. */
 export function tieHanging(mesh: SceneMesh, nodes: Nodes): Nodes {
     const edges = loneEdges(mesh, nodes);
     const ties = findTies(mesh, nodes, edges);
     return ties.node.length === 0 ? nodes : withWeights(nodes, ties);
 }
 
-/** The edges that belong to one element alone, as pairs of vertices. Only these have hanging nodes, and only their ends hang. */
+/** The edges that belong to one element alone, as pairs of vertices. Only these have hanging nodes, and only their ends
+ * hang. */
 function loneEdges(mesh: SceneMesh, { nodeOf, first, elements }: Nodes): number[] {
     const out: number[] = [], { elementOf } = mesh, vertices = elementOf.length;
     for (let begin = 0, end = 0; begin < vertices; begin = end) {
         const own = elementOf[begin];
         while (end < vertices && elementOf[end] === own) end++;
         for (let v = begin; v < end; v++) {
-            const w = v + 1 < end ? v + 1 : begin, a = nodeOf[v], b = nodeOf[w], endOfA = first[a + 1], endOfB = first[b + 1];
+            const w = v + 1 < end ? v + 1 : begin, a = nodeOf[v], b = nodeOf[w], endOfA = first[a + 1],
+                endOfB = first[b + 1];
             let isShared = false;
             for (let i = first[a]; i < endOfA && !isShared; i++) {
                 const other = elements[i];
@@ -59,7 +63,8 @@ class Grid {
         this.heads = new Int32Array(slots).fill(-1);
         this.next = new Int32Array(candidates.length);
         candidates.forEach((v, i) => {
-            const p = mesh.positions, slot = this.slot(this.cellOf(p[3 * v]), this.cellOf(p[3 * v + 1]), this.cellOf(p[3 * v + 2]));
+            const p = mesh.positions,
+                slot = this.slot(this.cellOf(p[3 * v]), this.cellOf(p[3 * v + 1]), this.cellOf(p[3 * v + 2]));
             this.next[i] = this.heads[slot];
             this.heads[slot] = i;
         });
@@ -86,11 +91,13 @@ class Grid {
 }
 
 function findTies(mesh: SceneMesh, { nodeOf, count, inner }: Nodes, edges: readonly number[]): Ties {
-    const { positions: p, normals: n } = mesh, ties: Ties = { node: [], from: [], to: [], at: [], length: [], extra: 0 };
+    const { positions: p, normals: n } = mesh,
+        ties: Ties = { node: [], from: [], to: [], at: [], length: [], extra: 0 };
     const tieOf = new Int32Array(count).fill(-1), isCandidate = new Uint8Array(count), candidates: number[] = [];
     let total = 0, longest = 0, most = 0;
     for (let e = 0; e < edges.length; e += 2) {
-        const a = 3 * edges[e], b = 3 * edges[e + 1], length = size(p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]);
+        const a = 3 * edges[e], b = 3 * edges[e + 1],
+            length = size(p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]);
         total += length;
         longest = Math.max(longest, length);
         for (let d = 0; d < 3; d++) most = Math.max(most, Math.abs(p[a + d]));
@@ -102,7 +109,8 @@ function findTies(mesh: SceneMesh, { nodeOf, count, inner }: Nodes, edges: reado
     // Positions are floats, and many scene files have six digits.
     const tolerance = Math.max(1e-6 * most, 1e-30);
     // Some cells for an edge, as small objects have many nodes, and no edge through more than some thousand cells.
-    const cell = Math.max(total / (edges.length + 1), longest / 4096, 4 * tolerance), grid = new Grid(mesh, candidates, cell);
+    const cell = Math.max(total / (edges.length + 1), longest / 4096, 4 * tolerance),
+        grid = new Grid(mesh, candidates, cell);
     const groupOf = (vertex: number): number => mesh.groupOf[mesh.elementOf[vertex]];
     const low = [0, 0, 0], high = [0, 0, 0], way = [0, 0, 0];
     for (let e = 0; e < edges.length; e += 2) {
@@ -110,7 +118,8 @@ function findTies(mesh: SceneMesh, { nodeOf, count, inner }: Nodes, edges: reado
         for (let d = 0; d < 3; d++) way[d] = p[b + d] - p[a + d];
         const length = size(way[0], way[1], way[2]), pieces = Math.ceil(length / cell);
         const add = (at: number, node: number, t: number, length: number): void => {
-            [ties.node[at], ties.from[at], ties.to[at], ties.at[at], ties.length[at]] = [node, nodeOf[v], nodeOf[w], t, length];
+            [ties.node[at], ties.from[at], ties.to[at], ties.at[at], ties.length[at]] = [node, nodeOf[v], nodeOf[w], t,
+                length];
         };
         const tie = (u: number): void => {
             const node = nodeOf[u], q = 3 * u, known = tieOf[node];
@@ -120,9 +129,12 @@ function findTies(mesh: SceneMesh, { nodeOf, count, inner }: Nodes, edges: reado
             if (!(t * length > tolerance && (1 - t) * length > tolerance)) return;
             if (size(x - t * way[0], y - t * way[1], z - t * way[2]) > tolerance) return;
             const mx = n[a] + n[b], my = n[a + 1] + n[b + 1], mz = n[a + 2] + n[b + 2];
-            const isOwn = mx * n[q] + my * n[q + 1] + mz * n[q + 2] >= SURFACE_COS * size(mx, my, mz) && groupOf(u) === groupOf(v);
+            const isOwn = mx * n[q] + my * n[q + 1] + mz * n[q + 2] >= SURFACE_COS * size(mx, my, mz)
+                && groupOf(u) === groupOf(v);
             // An edge is drawn with all corners inside it; one of another surface has a node of its own there.
-            const within = inner.get(v) ?? [], same = within.find((other) => Math.abs(other.along - t) * length <= tolerance);
+            const within = inner.get(v) ?? [], same = within.find((other) =>
+                Math.abs(other.along - t) * length <= tolerance
+            );
             if (same === undefined) {
                 inner.set(v, [...within, { vertex: u, along: t, node: isOwn ? node : count + ties.extra }]);
                 if (!isOwn) add(ties.node.length, count + ties.extra++, t, length);
@@ -148,10 +160,11 @@ function findTies(mesh: SceneMesh, { nodeOf, count, inner }: Nodes, edges: reado
     return ties;
 }
 
-/** Takes the ties in, long edges first; one by which a node would hang on itself is left out: parts of 1/3 and of 1/4 of one
- * edge have such, and agree only where both have a node. */
+/** Takes the ties in, long edges first; one by which a node would hang on itself is left out: parts of 1/3 and of 1/4
+ * of one edge have such, and agree only where both have a node. */
 function withWeights(nodes: Nodes, ties: Ties): Nodes {
-    const count = nodes.count + ties.extra, tieOf = new Int32Array(count).fill(-1), order = ties.node.map((_, i) => i).sort((i, k) => ties.length[k] - ties.length[i]);
+    const count = nodes.count + ties.extra, tieOf = new Int32Array(count).fill(-1),
+        order = ties.node.map((_, i) => i).sort((i, k) => ties.length[k] - ties.length[i]);
     const hangsOn = (from: number, on: number): boolean => {
         if (from === on) return true;
         if (tieOf[from] < 0) return false;
@@ -165,13 +178,16 @@ function withWeights(nodes: Nodes, ties: Ties): Nodes {
         }
         return false;
     };
-    for (const i of order) if (!hangsOn(ties.from[i], ties.node[i]) && !hangsOn(ties.to[i], ties.node[i])) tieOf[ties.node[i]] = i;
+    for (const i of order)
+        if (!hangsOn(ties.from[i], ties.node[i]) && !hangsOn(ties.to[i], ties.node[i])) tieOf[ties.node[i]] = i;
     const lists = new Map<number, Map<number, number>>();
     /** Elements and weights of a node that hangs on others that hang. */
     const listOf = (node: number): Map<number, number> => {
         const known = lists.get(node), i = tieOf[node], out = new Map<number, number>();
         if (known !== undefined) return known;
-        const add = (element: number, weight: number): void => { out.set(element, (out.get(element) ?? 0) + weight); };
+        const add = (element: number, weight: number): void => {
+            out.set(element, (out.get(element) ?? 0) + weight);
+        };
         if (i < 0) {
             const { first, elements } = nodes, begin = first[node], end = first[node + 1];
             for (let k = begin; k < end; k++) add(elements[k], 1 / (end - begin));
@@ -182,12 +198,14 @@ function withWeights(nodes: Nodes, ties: Ties): Nodes {
         lists.set(node, out);
         return out;
     };
-    const countOf = (node: number): number => nodes.first[node + 1] - nodes.first[node], isFree = (node: number): boolean => tieOf[node] < 0;
+    const countOf = (node: number): number => nodes.first[node + 1] - nodes.first[node],
+        isFree = (node: number): boolean => tieOf[node] < 0;
     const isPlain = (i: number): boolean => isFree(ties.from[i]) && isFree(ties.to[i]);
     const first = new Uint32Array(count + 1);
     for (let node = 0; node < count; node++) {
         const i = tieOf[node];
-        first[node + 1] = first[node] + (i < 0 ? countOf(node) : isPlain(i) ? countOf(ties.from[i]) + countOf(ties.to[i]) : listOf(node).size);
+        first[node + 1] = first[node]
+            + (i < 0 ? countOf(node) : isPlain(i) ? countOf(ties.from[i]) + countOf(ties.to[i]) : listOf(node).size);
     }
     const elements = new Uint32Array(first[count]), weights = new Float32Array(first[count]);
     const put = (at: number, node: number, share: number): number => {

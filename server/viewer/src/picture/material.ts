@@ -1,7 +1,8 @@
 // The shaders. One texel per element and channel, half precision as the daemon sent it; a vertex looks up the texel of
 // its element (flat) or of its node (smooth, whose means a pass over the nodes makes). Tone curve, exposure, palette,
 // iso-lines, threshold and the comparison are in the fragment shader: none of them costs a request.
-import { GLSL3, Matrix4, RawShaderMaterial, ShaderChunk, Vector2, Vector3, Vector4, type IUniform, type Texture } from "three";
+import { GLSL3, Matrix4, RawShaderMaterial, ShaderChunk, Vector2, Vector3, Vector4, type IUniform,
+    type Texture } from "three";
 import { sunSeen } from "./sun_shadow.ts";
 
 const fetchElement = `
@@ -22,7 +23,8 @@ vec3 element_colour(highp sampler2D values, int i) {
         vec3 value = vec3(texel(values, i), texel(values, elements + i), texel(values, 2 * elements + i));
         if (!is_textured) return value;
         // B / rho = H: the image at each pixel takes the place of its mean.
-        return value / max(vec3(texel(reflectance, i), texel(reflectance, elements + i), texel(reflectance, 2 * elements + i)), 0.004);
+        return value / max(vec3(texel(reflectance, i), texel(reflectance, elements + i),
+            texel(reflectance, 2 * elements + i)), 0.004);
     }
     float sum = 0.0;
     for (int c = 0; c < channels; c++) sum += texel(values, c * elements + i);
@@ -85,7 +87,8 @@ in vec3 position;
 in vec2 uv;
 in uvec2 ids; // element, node
 centroid out vec3 place; // beyond a wall's edge the sun shines
-// Where a pixel's middle is outside a triangle, light is taken inside: a narrow one would have it far off its corners' there.
+// Where a pixel's middle is outside a triangle, light is taken inside: a narrow one would have it far off its corners'
+// there.
 centroid out vec3 colour_a, colour_b;
 centroid out vec2 place_in_image;
 flat out int element;
@@ -159,10 +162,11 @@ bool is_same_face(vec4 there, vec3 normal) {
 }
 
 // A pixel and its neighbours, the nearest first.
-const ivec2 AROUND[9] = ivec2[9](ivec2(0, 0), ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), ivec2(0, 1), ivec2(-1, -1), ivec2(1, -1), ivec2(-1, 1), ivec2(1, 1));
+const ivec2 AROUND[9] = ivec2[9](ivec2(0, 0), ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), ivec2(0, 1), ivec2(-1, -1),
+    ivec2(1, -1), ivec2(-1, 1), ivec2(1, 1));
 
-// The share of the sun that is seen. A pixel at an edge has several faces, and was looked at on one of them: a neighbour may have been
-// on this one; else the last map tells.
+// The share of the sun that is seen. A pixel at an edge has several faces, and was looked at on one of them: a
+// neighbour may have been on this one; else the last map tells.
 float sun_share(vec3 normal) {
     if (is_soft) {
         ivec2 most = textureSize(sun_places, 0) - 1;
@@ -184,7 +188,8 @@ vec3 sunshine() {
 }
 
 float in_range(float value) {
-    return is_log ? log2(max(value, 1e-30) / range.x) / log2(range.y / range.x) : (value - range.x) / (range.y - range.x);
+    return is_log ? log2(max(value, 1e-30) / range.x) / log2(range.y / range.x)
+        : (value - range.x) / (range.y - range.x);
 }
 
 vec3 to_srgb(vec3 c) {
@@ -206,17 +211,19 @@ void main() {
     if (compare == 2) {
         // Blue where b is darker, red where it is brighter; the colours stand in changes.ts, too.
         float t = clamp((dot(colour_b, weights) * scale.y - value) / change, -1.0, 1.0);
-        shown = to_srgb(t < 0.0 ? mix(vec3(0.8), vec3(0.02, 0.13, 0.65), -t) : mix(vec3(0.8), vec3(0.62, 0.02, 0.05), t));
+        shown = to_srgb(mix(vec3(0.8), t < 0.0 ? vec3(0.02, 0.13, 0.65) : vec3(0.62, 0.02, 0.05), abs(t)));
     } else if (picture == 1) {
         float t = clamp(in_range(value), 0.0, 1.0);
         shown = texture(palette, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
         if (iso_lines > 0.0) {
             float level = in_range(value) * iso_lines, width = fwidth(level);
-            if (width > 1e-9 && abs(level - round(level)) < 0.75 * width && round(level) > 0.5 && round(level) < iso_lines + 0.5) shown *= 0.25;
+            if (width > 1e-9 && abs(level - round(level)) < 0.75 * width && round(level) > 0.5
+                && round(level) < iso_lines + 0.5) shown *= 0.25;
         }
     } else {
         vec3 exposed = colour * exposure;
-        vec3 toned = tone == 1 ? AgXToneMapping(exposed) : tone == 2 ? ACESFilmicToneMapping(exposed) : saturate(exposed * toneMappingExposure);
+        vec3 toned = tone == 1 ? AgXToneMapping(exposed) : tone == 2 ? ACESFilmicToneMapping(exposed)
+            : saturate(exposed * toneMappingExposure);
         shown = to_srgb(saturate(toned));
     }
     if (threshold >= 0.0 && is_judged(element)) {
@@ -237,28 +244,72 @@ export type Uniforms = { [name: string]: IUniform };
 export function makeUniforms(nothing: Texture): Uniforms {
     const of = (value: unknown): IUniform => ({ value });
     return {
-        values_a: of(nothing), values_b: of(nothing), nodes_a: of(nothing), nodes_b: of(nothing), judged: of(nothing),
-        node_first: of(null), node_elements: of(null), node_weights: of(nothing), node_count: of(0), is_weighted: of(false),
-        elements: of(1), channels: of(1), weights: of(new Vector3(1, 0, 0)), is_smooth: of(false),
-        picture: of(0), tone: of(1), scale: of(new Vector2(1, 1)), exposure: of(1), toneMappingExposure: of(1),
-        is_textured: of(false), reflectance: of(nothing), palette: of(nothing), range: of(new Vector2(0, 1)), is_log: of(false), iso_lines: of(0), threshold: of(-1), is_marked: of(false),
-        is_sunny: of(false), sun_direction: of(new Vector3(0, 1, 0)), sun_light: of(new Vector3()), sun_matrix: of(new Matrix4()), sun_step: of(new Vector2()),
-        sun_depth: of(nothing), normals: of(nothing), reflectances: of(nothing),
-        is_soft: of(false), sun_places: of(nothing), sun_sum: of(nothing), sun_part: of(1),
-        compare: of(0), change: of(1), split: of(0), hovered: of(-1), pins: of(new Vector4(-1, -1, -1, -1)),
+        values_a: of(nothing),
+        values_b: of(nothing),
+        nodes_a: of(nothing),
+        nodes_b: of(nothing),
+        judged: of(nothing),
+        node_first: of(null),
+        node_elements: of(null),
+        node_weights: of(nothing),
+        node_count: of(0),
+        is_weighted: of(false),
+        elements: of(1),
+        channels: of(1),
+        weights: of(new Vector3(1, 0, 0)),
+        is_smooth: of(false),
+        picture: of(0),
+        tone: of(1),
+        scale: of(new Vector2(1, 1)),
+        exposure: of(1),
+        toneMappingExposure: of(1),
+        is_textured: of(false),
+        reflectance: of(nothing),
+        palette: of(nothing),
+        range: of(new Vector2(0, 1)),
+        is_log: of(false),
+        iso_lines: of(0),
+        threshold: of(-1),
+        is_marked: of(false),
+        is_sunny: of(false),
+        sun_direction: of(new Vector3(0, 1, 0)),
+        sun_light: of(new Vector3()),
+        sun_matrix: of(new Matrix4()),
+        sun_step: of(new Vector2()),
+        sun_depth: of(nothing),
+        normals: of(nothing),
+        reflectances: of(nothing),
+        is_soft: of(false),
+        sun_places: of(nothing),
+        sun_sum: of(nothing),
+        sun_part: of(1),
+        compare: of(0),
+        change: of(1),
+        split: of(0),
+        hovered: of(-1),
+        pins: of(new Vector4(-1, -1, -1, -1)),
     };
 }
 
 /** The material of what has this image; all others of its uniforms are shared. */
-export function sceneMaterial(uniforms: Uniforms, image: Texture, factor: readonly [number, number, number]): RawShaderMaterial {
+export function sceneMaterial(uniforms: Uniforms, image: Texture,
+    factor: readonly [number, number, number]): RawShaderMaterial
+{
     return new RawShaderMaterial({
-        glslVersion: GLSL3, uniforms: { ...uniforms, image: { value: image }, factor: { value: new Vector3(...factor) } }, vertexShader: sceneVertex, fragmentShader: sceneFragment,
+        glslVersion: GLSL3,
+        uniforms: { ...uniforms, image: { value: image }, factor: { value: new Vector3(...factor) } },
+        vertexShader: sceneVertex,
+        fragmentShader: sceneFragment,
     });
 }
 
 export function nodesMaterial(uniforms: Uniforms): RawShaderMaterial {
     return new RawShaderMaterial({
-        glslVersion: GLSL3, uniforms, vertexShader: nodesVertex, fragmentShader: nodesFragment,
-        depthTest: false, depthWrite: false,
+        glslVersion: GLSL3,
+        uniforms,
+        vertexShader: nodesVertex,
+        fragmentShader: nodesFragment,
+        depthTest: false,
+        depthWrite: false,
     });
 }

@@ -1,6 +1,6 @@
-// Nodes of smooth shading: corners of equal position, normal and group share one; its value is the mean of theirs;
-// one inside an edge of a larger element has the value there.
-// Creases stand in the normals, which the daemon makes; so light does not bleed around an edge or into another material.
+// Nodes of smooth shading: corners of equal position, normal and group share one; its value is the mean of theirs; one
+// inside an edge of a larger element has the value there. Creases stand in the normals, which the daemon makes; so
+// light does not bleed around an edge or into another material.
 import type { SceneMesh } from "./glb.ts";
 import { tieHanging } from "./hanging.ts";
 
@@ -13,7 +13,8 @@ export interface Nodes {
     elements: Uint32Array;
     /** Of each of `elements` its weight; null: nodes are plain means. */
     weights: Float32Array | null;
-    /** Of the edges that begin at these vertices, vertices of other elements inside them, where (0 to 1), and the node there. */
+    /** Of the edges that begin at these vertices, vertices of other elements inside them, where (0 to 1), and the node
+     * there. */
     inner: Map<number, { vertex: number; along: number; node: number }[]>;
 }
 
@@ -42,7 +43,9 @@ export function findNodes(mesh: SceneMesh): Nodes {
                 nodeOf[v] = count++;
                 break;
             }
-            if (mesh.groupOf[mesh.elementOf[other]] === group && isEqual(position, v, other) && isEqual(normal, v, other)) {
+            if (mesh.groupOf[mesh.elementOf[other]] === group && isEqual(position, v, other)
+                && isEqual(normal, v, other))
+            {
                 nodeOf[v] = nodeOf[other];
                 break;
             }

@@ -3,7 +3,9 @@ import { interpolateInferno, interpolateTurbo, interpolateViridis } from "d3-sca
 import type { Palette } from "../state/state.ts";
 
 const ramps: { [name in Palette]: (t: number) => string } = {
-    viridis: interpolateViridis, inferno: interpolateInferno, turbo: interpolateTurbo,
+    viridis: interpolateViridis,
+    inferno: interpolateInferno,
+    turbo: interpolateTurbo,
 };
 
 /** #rrggbb or rgb(r, g, b), as the ramps write them. */

@@ -7,7 +7,9 @@ export class Picker {
     private tree: MeshBVH | null = null;
     private readonly caster = new Raycaster();
 
-    constructor(private readonly geometry: BufferGeometry, private readonly mesh: Pick<SceneMesh, "elementOf" | "index">) {}
+    constructor(private readonly geometry: BufferGeometry,
+        private readonly mesh: Pick<SceneMesh, "elementOf" | "index">)
+    {}
 
     /** Makes the tree: about a second for 300,000 elements. */
     prepare(): void {
@@ -28,7 +30,8 @@ export class Picker {
     floorAt(x: number, z: number): number | null {
         this.prepare();
         this.geometry.computeBoundingBox();
-        const top = (this.geometry.boundingBox?.max.y ?? 0) + 1, down = new Ray(new Vector3(x, top, z), new Vector3(0, -1, 0));
+        const top = (this.geometry.boundingBox?.max.y ?? 0) + 1,
+            down = new Ray(new Vector3(x, top, z), new Vector3(0, -1, 0));
         const heights = (this.tree as MeshBVH).raycast(down, FrontSide).map((hit) => hit.point.y);
         return heights.length === 0 ? null : Math.min(...heights);
     }

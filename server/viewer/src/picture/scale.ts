@@ -22,7 +22,7 @@ export function ticksOf(axis: Axis, wanted: number): number[] {
     const { low, high, log } = axis;
     if (!(high > low) || (log && low <= 0)) return [];
     if (log) {
-        for (const of of [[1, 2, 5], [1, 3], [1]]) {
+        for (const  of of[[1, 2, 5], [1, 3], [1]]) {
             const all = decades(low, high, of);
             if (all.length >= 2 && all.length <= 1.5 * wanted) return all;
         }
@@ -36,7 +36,8 @@ export function ticksOf(axis: Axis, wanted: number): number[] {
     const rough = (high - low) / wanted, ten = 10 ** Math.floor(Math.log10(rough));
     const step = ten * ([1, 2, 5, 10].find((m) => m * ten >= rough * 0.999) ?? 10);
     const out: number[] = [];
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) out.push(Number((k * step).toPrecision(12)));
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++)
+        out.push(Number((k * step).toPrecision(12)));
     return out;
 }
 
@@ -51,7 +52,9 @@ function decades(low: number, high: number, of: readonly number[]): number[] {
 }
 
 /** Area of the elements in each of `bins` equal parts of the axis. Values beyond its ends count in the parts there. */
-export function areaByValue(values: Float32Array, area: Float64Array, counts: (element: number) => boolean, axis: Axis, bins: number): Float64Array {
+export function areaByValue(values: Float32Array, area: Float64Array, counts: (element: number) => boolean, axis: Axis,
+    bins: number): Float64Array
+{
     const out = new Float64Array(bins);
     for (let i = 0; i < values.length; i++)
         if (counts(i)) out[Math.min(bins - 1, Math.max(0, Math.floor(placeOf(values[i], axis) * bins)))] += area[i];
@@ -70,7 +73,9 @@ export interface Figures {
 }
 
 /** Figures of the elements of a list; NaN where it has no area. */
-export function figuresOf(values: Float32Array, area: Float64Array, elements: Iterable<number>, threshold = 0): Figures {
+export function figuresOf(values: Float32Array, area: Float64Array, elements: Iterable<number>,
+    threshold = 0): Figures
+{
     let total = 0, sum = 0, above = 0, min = Infinity, max = -Infinity;
     for (const i of elements) {
         const value = values[i];

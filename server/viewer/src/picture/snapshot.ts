@@ -22,9 +22,12 @@ export interface Legend extends Axis {
 /** After so many steps a part waits for the graphics card. */
 const STEPS = 8;
 
-/** Draws what the stage shows at this size, while the page goes on. `split` is the share of the width that is left of the line of a
- * comparison. `step` is told now and then how much is drawn, from 0 to 1; what it throws ends the drawing. */
-export async function snapshot(stage: Stage, width: number, height: number, split: number, step: (share: number) => void): Promise<HTMLCanvasElement> {
+/** Draws what the stage shows at this size, while the page goes on. `split` is the share of the width that is left of
+ * the line of a comparison. `step` is told now and then how much is drawn, from 0 to 1; what it throws ends the
+ * drawing. */
+export async function snapshot(stage: Stage, width: number, height: number, split: number,
+    step: (share: number) => void): Promise<HTMLCanvasElement>
+{
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = [width, height];
     const context = canvas.getContext("2d");
@@ -52,13 +55,16 @@ export async function snapshot(stage: Stage, width: number, height: number, spli
 /** Draws a ramp with its ticks into the lower left corner. */
 export function drawLegend(canvas: HTMLCanvasElement, legend: Legend): void {
     const context = canvas.getContext("2d") as CanvasRenderingContext2D;
-    const unit = Math.max(8, Math.min(canvas.width / 40, canvas.height / 28)), [width, height] = [unit * 18, unit * 4.2];
+    const unit = Math.max(8, Math.min(canvas.width / 40, canvas.height / 28)),
+        [width, height] = [unit * 18, unit * 4.2];
     const left = unit, top = canvas.height - height - unit, ramp = width - 2 * unit;
     context.fillStyle = "rgb(0 0 0 / .75)";
     context.fillRect(left, top, width, height);
     const bytes = legend.palette === "change" ? null : paletteBytes(legend.palette);
     for (let k = 0; k < 256; k++) {
-        context.fillStyle = bytes === null ? toHex(changeColour((2 * k) / 255 - 1)) : `rgb(${bytes[4 * k]} ${bytes[4 * k + 1]} ${bytes[4 * k + 2]})`;
+        context.fillStyle = bytes === null
+            ? toHex(changeColour((2 * k) / 255 - 1))
+            : `rgb(${bytes[4 * k]} ${bytes[4 * k + 1]} ${bytes[4 * k + 2]})`;
         const from = Math.floor(left + unit + (ramp * k) / 256);
         context.fillRect(from, top + unit * 1.4, Math.ceil(left + unit + (ramp * (k + 1)) / 256) - from, unit);
     }
@@ -69,7 +75,8 @@ export function drawLegend(canvas: HTMLCanvasElement, legend: Legend): void {
     context.textAlign = "center";
     let free = -Infinity;
     for (const value of ticksOf(legend, 5)) {
-        const x = left + unit + ramp * placeOf(value, legend), text = tell(value), half = context.measureText(text).width / 2;
+        const x = left + unit + ramp * placeOf(value, legend), text = tell(value),
+            half = context.measureText(text).width / 2;
         context.fillRect(x - Math.max(1, unit / 16), top + unit * 2.4, Math.max(2, unit / 8), unit * 0.3);
         // A number that would touch the one before it is left out.
         if (x - half < free) continue;

@@ -1,5 +1,5 @@
-// Elements with hanging corners in their edges are drawn as polygons that have these, too: triangles that meet only half of an
-// edge leave single pixels between them free, as their edges are rounded apart.
+// Elements with hanging corners in their edges are drawn as polygons that have these, too: triangles that meet only
+// half of an edge leave single pixels between them free, as their edges are rounded apart.
 import type { MeshImage, SceneMesh } from "./glb.ts";
 import type { Nodes } from "./nodes.ts";
 
@@ -17,7 +17,8 @@ export interface Drawn {
 export function trianglesOf(corners: readonly number[], isFlat: readonly boolean[]): number[] {
     const left = [...corners], flat = [...isFlat], out: number[] = [];
     while (left.length > 3) {
-        const before = (k: number): number => (k + left.length - 1) % left.length, after = (k: number): number => (k + 1) % left.length;
+        const before = (k: number): number => (k + left.length - 1) % left.length, after = (k: number): number =>
+            (k + 1) % left.length;
         // A corner beside a flat one is cut off first, which is flat no more then.
         let k = left.findIndex((_, i) => !flat[i] && (flat[before(i)] || flat[after(i)]));
         if (k < 0) k = flat.indexOf(false);
@@ -33,7 +34,9 @@ export function trianglesOf(corners: readonly number[], isFlat: readonly boolean
 export function splitEdges(mesh: SceneMesh, nodes: Nodes): Drawn {
     const { positions, elementOf, index, uv, images } = mesh, { nodeOf, inner } = nodes;
     if (inner.size === 0) return { positions, elementOf, nodeOf, index, uv, images };
-    const vertices = elementOf.length, own: { like: number; node: number; element: number; uv: [number, number] }[] = [], all: number[] = [];
+    const vertices = elementOf.length,
+        own: { like: number; node: number; element: number; uv: [number, number] }[] = [],
+        all: number[] = [];
     // Of each place in the index, what it became.
     const moved = new Map<number, number>(images.flatMap(({ first, count }) => [[first, 0], [first + count, 0]]));
     let at = 0;
@@ -49,11 +52,13 @@ export function splitEdges(mesh: SceneMesh, nodes: Nodes): Drawn {
             for (const { vertex, along, node } of (inner.get(v) ?? []).sort((one, other) => one.along - other.along)) {
                 corners.push(vertices + own.length);
                 flat.push(true);
-                const mix = (d: number): number => (uv === null ? 0 : uv[2 * v + d] + along * (uv[2 * w + d] - uv[2 * v + d]));
+                const mix = (
+                    d: number,
+                ): number => (uv === null ? 0 : uv[2 * v + d] + along * (uv[2 * w + d] - uv[2 * v + d]));
                 own.push({ like: vertex, node, element: elementOf[v], uv: [mix(0), mix(1)] });
             }
         }
-        if (corners.length === end - begin) for (let k = 0; k < indices; k++) all.push(index[at + k]);
+        if (corners.length === end - begin) { for (let k = 0; k < indices; k++) all.push(index[at + k]); }
         else all.push(...trianglesOf(corners, flat));
         at += indices;
     }
@@ -63,8 +68,10 @@ export function splitEdges(mesh: SceneMesh, nodes: Nodes): Drawn {
         return to;
     };
     const drawn: Drawn = {
-        positions: longer(new Float32Array(3 * (vertices + own.length)), positions), elementOf: longer(new Uint32Array(vertices + own.length), elementOf),
-        nodeOf: longer(new Uint32Array(vertices + own.length), nodeOf), index: Uint32Array.from(all),
+        positions: longer(new Float32Array(3 * (vertices + own.length)), positions),
+        elementOf: longer(new Uint32Array(vertices + own.length), elementOf),
+        nodeOf: longer(new Uint32Array(vertices + own.length), nodeOf),
+        index: Uint32Array.from(all),
         uv: uv === null ? null : longer(new Float32Array(2 * (vertices + own.length)), uv),
         images: images.map((image) => {
             const first = moved.get(image.first) as number;

@@ -1,9 +1,8 @@
 // Draws the scene: buffers, textures of values, the pass over the nodes, the loop that draws when something changed.
 // Knows no daemon and no panel; what it shows is set by its methods.
-import {
-    BufferAttribute, BufferGeometry, Color, HalfFloatType, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry, RGBAFormat,
-    Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type PerspectiveCamera, type RawShaderMaterial, type Texture,
-} from "three";
+import { BufferAttribute, BufferGeometry, Color, HalfFloatType, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry,
+    RGBAFormat, Scene, Vector2, Vector3, Vector4, WebGLRenderer, WebGLRenderTarget, type PerspectiveCamera,
+    type RawShaderMaterial, type Texture } from "three";
 import type { Palette, Tone } from "../state/state.ts";
 import type { Field } from "./field.ts";
 import { channelWeights } from "./field.ts";
@@ -12,7 +11,8 @@ import { findNodes } from "./nodes.ts";
 import { splitEdges, type Drawn } from "./split_edges.ts";
 import { Sunlight } from "./sunlight.ts";
 import { makeUniforms, nodesMaterial, sceneMaterial, type Uniforms } from "./material.ts";
-import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor, whiteTexture } from "./textures.ts";
+import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor,
+    whiteTexture } from "./textures.ts";
 
 export interface Look {
     picture: "light" | "false";
@@ -69,7 +69,8 @@ export class Stage {
 
     constructor(readonly canvas: HTMLCanvasElement, readonly camera: PerspectiveCamera,
         /** Moves the camera; true if it goes on moving. */
-        private readonly advance: (seconds: number) => boolean) {
+        private readonly advance: (seconds: number) => boolean)
+    {
         this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: false });
         this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
         this.uniforms = makeUniforms(this.nothing);
@@ -77,7 +78,11 @@ export class Stage {
         this.nodesPlane.frustumCulled = false;
         this.nodesScene.add(this.nodesPlane);
         canvas.addEventListener("webglcontextlost", () => this.release());
-        canvas.addEventListener("webglcontextrestored", () => { this.nodesAreOld = true; this.sunlight?.lose(); this.invalidate(); });
+        canvas.addEventListener("webglcontextrestored", () => {
+            this.nodesAreOld = true;
+            this.sunlight?.lose();
+            this.invalidate();
+        });
         new ResizeObserver(() => this.resize()).observe(canvas.parentElement as HTMLElement);
     }
 
@@ -88,12 +93,14 @@ export class Stage {
 
     /** Smooth shading needs textures that can be drawn into. */
     get canSmooth(): boolean {
-        return this.renderer.extensions.has("EXT_color_buffer_float") || this.renderer.extensions.has("EXT_color_buffer_half_float");
+        return this.renderer.extensions.has("EXT_color_buffer_float")
+            || this.renderer.extensions.has("EXT_color_buffer_half_float");
     }
 
     show(mesh: SceneMesh, channels: number): void {
         this.clear();
-        const nodes = findNodes(mesh), drawn = splitEdges(mesh, nodes), vertices = drawn.elementOf.length, ids = new Uint32Array(2 * vertices);
+        const nodes = findNodes(mesh), drawn = splitEdges(mesh, nodes), vertices = drawn.elementOf.length,
+            ids = new Uint32Array(2 * vertices);
         for (let v = 0; v < vertices; v++) {
             ids[2 * v] = drawn.elementOf[v];
             ids[2 * v + 1] = drawn.nodeOf[v];
@@ -115,8 +122,13 @@ export class Stage {
         this.values = [new HalfTexture(channels * mesh.elements), new HalfTexture(channels * mesh.elements)];
         const { width, height } = rowsFor(nodes.count);
         this.nodes = new WebGLRenderTarget(width, height, {
-            count: 2, format: RGBAFormat, type: HalfFloatType, minFilter: NearestFilter, magFilter: NearestFilter,
-            depthBuffer: false, generateMipmaps: false,
+            count: 2,
+            format: RGBAFormat,
+            type: HalfFloatType,
+            minFilter: NearestFilter,
+            magFilter: NearestFilter,
+            depthBuffer: false,
+            generateMipmaps: false,
         });
         const u = this.uniforms;
         u.values_a.value = this.values[0].texture;
@@ -154,7 +166,9 @@ export class Stage {
         // Until all are decoded, groups have their means; images that no browser can decode leave it at that.
         void Promise.all(mesh.images.map((image) => imageTexture(image, anisotropy))).then((textures) => {
             if (this.mesh !== mesh) return;
-            textures.forEach((texture, k) => { materials[k + 1].uniforms.image.value = texture; });
+            textures.forEach((texture, k) => {
+                materials[k + 1].uniforms.image.value = texture;
+            });
             this.images = textures;
             this.hasImages = true;
             this.nodesAreOld = true;
@@ -175,9 +189,11 @@ export class Stage {
         this.invalidate();
     }
 
-    /** Draws the sun from this direction (a unit vector, y up), with shadows; null: values have it already. `light` is what
-     * faces the sun receive, by red, green and blue. */
-    setSun(sun: { direction: readonly [number, number, number]; light: readonly [number, number, number] } | null): void {
+    /** Draws the sun from this direction (a unit vector, y up), with shadows; null: values have it already. `light` is
+     * what faces the sun receive, by red, green and blue. */
+    setSun(
+        sun: { direction: readonly [number, number, number]; light: readonly [number, number, number] } | null,
+    ): void {
         const u = this.uniforms, { mesh, geometry } = this;
         u.is_sunny.value = sun !== null && mesh !== null;
         this.invalidate();
@@ -275,7 +291,8 @@ export class Stage {
         return sun?.hasMore === true;
     }
 
-    /** Draws a picture of another camera and size, whose first pixel is that many pixels left of the split, and hands it over; the page shows its own. */
+    /** Draws a picture of another camera and size, whose first pixel is that many pixels left of the split, and hands
+     * it over; the page shows its own. */
     drawOther(camera: PerspectiveCamera, size: Vector2, split: number, take: (drawn: HTMLCanvasElement) => void): void {
         const { renderer, uniforms } = this, hovered: unknown = uniforms.hovered.value;
         uniforms.hovered.value = -1;
@@ -300,11 +317,14 @@ export class Stage {
 
     /** Waits until the graphics card has done what it was told to. */
     async caughtUp(): Promise<void> {
-        const gl = this.renderer.getContext() as WebGL2RenderingContext, fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+        const gl = this.renderer.getContext() as WebGL2RenderingContext,
+            fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
         gl.flush();
         do {
             if (fence === null || gl.isContextLost()) throw new Error("the graphics card has lost the picture");
-            await new Promise((resolve) => { setTimeout(resolve, 5); });
+            await new Promise((resolve) => {
+                setTimeout(resolve, 5);
+            });
         } while (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED);
         gl.deleteSync(fence);
     }
@@ -356,7 +376,8 @@ export class Stage {
     /** Makes the next picture of a view that stood still a better one. */
     private refine(): void {
         const { sun, camera } = this;
-        if (sun === null || sun.restLeft > 0 || !sun.isOf(camera, this.renderer.getDrawingBufferSize(new Vector2()))) return;
+        if (sun === null || sun.restLeft > 0 || !sun.isOf(camera, this.renderer.getDrawingBufferSize(new Vector2())))
+            return;
         for (let k = 0; k < POINTS_AT_ONCE && sun.hasMore; k++) sun.refine(camera);
     }
 
@@ -367,17 +388,19 @@ export class Stage {
         if (sun === null || !sun.hasMore) return;
         if (sun.restLeft === 0) this.request();
         else this.restTimer = window.setTimeout(() => {
-            this.restTimer = 0;
-            this.request();
-        }, sun.restLeft);
+                this.restTimer = 0;
+                this.request();
+            }, sun.restLeft);
     }
 
-    /** Gives back all that the graphics card had, which has lost it: what is given back later is deleted from a context that it is
-     * not of, an error. The next picture makes it anew. */
+    /** Gives back all that the graphics card had, which has lost it: what is given back later is deleted from a context
+     * that it is not of, an error. The next picture makes it anew. */
     private release(): void {
         const { body, geometry, nodes, nodesPlane, uniforms, white, images, sunlight } = this;
-        const materials = (body?.material ?? []) as RawShaderMaterial[], textures = Object.values(uniforms).map(({ value }) => value as { dispose?: () => void } | null);
-        for (const one of [...materials, ...textures, geometry, nodes, nodesPlane.geometry, nodesPlane.material, white, ...images]) one?.dispose?.();
+        const materials = (body?.material ?? []) as RawShaderMaterial[],
+            textures = Object.values(uniforms).map(({ value }) => value as { dispose?: () => void } | null);
+        for (const one of [...materials, ...textures, geometry, nodes, nodesPlane.geometry, nodesPlane.material, white,
+            ...images]) one?.dispose?.();
         sunlight?.release();
     }
 
@@ -394,6 +417,11 @@ export class Stage {
         for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance"])
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
         this.uniforms.reflectance.value = this.nothing;
-        this.geometry = this.drawn = this.mesh = this.values = this.nodes = null;
+        this.geometry =
+            this.drawn =
+            this.mesh =
+            this.values =
+            this.nodes =
+                null;
     }
 }

@@ -1,10 +1,9 @@
-// The sun that is drawn. A picture is there at once, by the middle of the sun's disc; while it stands still, points all over the disc are
-// looked from, some at each frame, and their mean is shown, in which shadows have half-shadows. Each point has a map of depths; places and
-// elements of the pixels are drawn once for all of them.
-import {
-    FloatType, GLSL3, Matrix4, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry, RawShaderMaterial, RedFormat, RGBAFormat, Scene, Vector2, Vector3, WebGLRenderTarget,
-    type BufferGeometry, type Camera, type Texture, type WebGLRenderer,
-} from "three";
+// The sun that is drawn. A picture is there at once, by the middle of the sun's disc; while it stands still, points all
+// over the disc are looked from, some at each frame, and their mean is shown, in which shadows have half-shadows. Each
+// point has a map of depths; places and elements of the pixels are drawn once for all of them.
+import { FloatType, GLSL3, Matrix4, Mesh, NearestFilter, OrthographicCamera, PlaneGeometry, RawShaderMaterial,
+    RedFormat, RGBAFormat, Scene, Vector2, Vector3, WebGLRenderTarget, type BufferGeometry, type Camera, type Texture,
+    type WebGLRenderer } from "three";
 import { normalsOf, reflectancesOf } from "./elements.ts";
 import type { SceneMesh } from "./glb.ts";
 import { SunShadow, sunSeen } from "./sun_shadow.ts";
@@ -17,21 +16,24 @@ const RADIUS = 0.00465;
 /** Points of the disc: a half-shadow has as many steps, which the maps' own filter smooths. */
 export const POINTS = 64;
 
-/** Points next to each other in the order of looking are far apart, so that the mean of the first is near that of all. It has no divisor
- * in common with POINTS. */
+/** Points next to each other in the order of looking are far apart, so that the mean of the first is near that of all.
+ * It has no divisor in common with POINTS. */
 const STRIDE = 19;
 
-/** Where nothing changed for so long, more points are looked from, ms: drags and days that go by have the machine for themselves. */
+/** Where nothing changed for so long, more points are looked from, ms: drags and days that go by have the machine for
+ * themselves. */
 const REST_MS = 200;
 
-/** Unit vectors to points of the disc, by equal areas: the spiral of Vogel (1979), eq. 1. The first is the nearest to the middle. */
+/** Unit vectors to points of the disc, by equal areas: the spiral of Vogel (1979), eq. 1. The first is the nearest to
+ * the middle. */
 export function towardsDisc(sun: Vector3): Vector3[] {
     const across = new Vector3(0, 1, 0);
     if (Math.abs(sun.y) > 0.99) across.set(0, 0, 1);
     const x = across.clone().cross(sun).normalize(), y = sun.clone().cross(x), golden = Math.PI * (3 - Math.sqrt(5));
     return Array.from({ length: POINTS }, (_, k) => {
         const i = (k * STRIDE) % POINTS, r = RADIUS * Math.sqrt((i + 0.5) / POINTS);
-        return sun.clone().addScaledVector(x, r * Math.cos(i * golden)).addScaledVector(y, r * Math.sin(i * golden)).normalize();
+        return sun.clone().addScaledVector(x, r * Math.cos(i * golden)).addScaledVector(y, r * Math.sin(i * golden))
+            .normalize();
     });
 }
 
@@ -90,7 +92,8 @@ function viewOf(camera: Camera): Matrix4 {
 }
 
 function target(format: typeof RGBAFormat | typeof RedFormat, depthBuffer: boolean): WebGLRenderTarget {
-    return new WebGLRenderTarget(1, 1, { format, type: FloatType, minFilter: NearestFilter, magFilter: NearestFilter, depthBuffer, generateMipmaps: false });
+    return new WebGLRenderTarget(1, 1, { format, type: FloatType, minFilter: NearestFilter, magFilter: NearestFilter,
+        depthBuffer, generateMipmaps: false });
 }
 
 export class Sunlight {
@@ -113,19 +116,26 @@ export class Sunlight {
     private mapped: Vector3 | null = null;
 
     /** The geometry stays the stage's; `nothing` takes the place of textures that are gone. */
-    constructor(private readonly renderer: WebGLRenderer, private readonly uniforms: Uniforms, geometry: BufferGeometry, mesh: SceneMesh,
-        private readonly nothing: Texture) {
+    constructor(private readonly renderer: WebGLRenderer, private readonly uniforms: Uniforms, geometry: BufferGeometry,
+        mesh: SceneMesh, private readonly nothing: Texture)
+    {
         this.shadow = new SunShadow(renderer, geometry);
         uniforms.sun_depth.value = this.shadow.depth;
         uniforms.normals.value = floatTexture(normalsOf(mesh));
         uniforms.reflectances.value = floatTexture(reflectancesOf(mesh));
         uniforms.sun_places.value = this.places.texture;
-        this.body = new Mesh(geometry, new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: placesVertex, fragmentShader: placesFragment }));
+        this.body = new Mesh(geometry,
+            new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: placesVertex, fragmentShader: placesFragment }));
         this.body.frustumCulled = false;
         this.bodyScene.add(this.body);
         this.plane = new Mesh(new PlaneGeometry(2, 2), new RawShaderMaterial({
-            glslVersion: GLSL3, vertexShader: sumVertex, fragmentShader: sumFragment, depthTest: false, depthWrite: false,
-            uniforms: { ...uniforms, sum_before: { value: null }, is_first: { value: true }, sun_point: { value: new Vector3() } },
+            glslVersion: GLSL3,
+            vertexShader: sumVertex,
+            fragmentShader: sumFragment,
+            depthTest: false,
+            depthWrite: false,
+            uniforms: { ...uniforms, sum_before: { value: null }, is_first: { value: true },
+                sun_point: { value: new Vector3() } },
         }));
         this.plane.frustumCulled = false;
         this.sumScene.add(this.plane);
@@ -151,7 +161,8 @@ export class Sunlight {
     release(): void {
         this.shadow.dispose();
         for (const name of ["normals", "reflectances"]) (this.uniforms[name].value as Texture).dispose();
-        for (const one of [this.places, ...this.sums, this.plane.geometry, this.plane.material, this.body.material as RawShaderMaterial]) one.dispose();
+        for (const one of [this.places, ...this.sums, this.plane.geometry, this.plane.material,
+            this.body.material as RawShaderMaterial]) one.dispose();
     }
 
     /** The graphics card has lost all that was drawn. */
@@ -241,6 +252,7 @@ export class Sunlight {
     dispose(): void {
         this.release();
         // Textures that uniforms still name would be made anew by the next picture.
-        for (const name of ["sun_depth", "sun_places", "sun_sum", "normals", "reflectances"]) this.uniforms[name].value = this.nothing;
+        for (const name of ["sun_depth", "sun_places", "sun_sum", "normals", "reflectances"])
+            this.uniforms[name].value = this.nothing;
     }
 }

@@ -1,9 +1,7 @@
 // Arrays of numbers as textures of texels in rows.
-import {
-    ClampToEdgeWrapping, DataTexture, FloatType, HalfFloatType, LinearFilter, LinearMipmapLinearFilter, MirroredRepeatWrapping,
-    NearestFilter, RedFormat, RedIntegerFormat, RepeatWrapping, RGBAFormat, SRGBColorSpace, Texture, UnsignedByteType,
-    UnsignedIntType, type Wrapping,
-} from "three";
+import { ClampToEdgeWrapping, DataTexture, FloatType, HalfFloatType, LinearFilter, LinearMipmapLinearFilter,
+    MirroredRepeatWrapping, NearestFilter, RedFormat, RedIntegerFormat, RepeatWrapping, RGBAFormat, SRGBColorSpace,
+    Texture, UnsignedByteType, UnsignedIntType, type Wrapping } from "three";
 import type { MeshImage } from "./glb.ts";
 import { paletteBytes } from "./palettes.ts";
 import type { Palette } from "../state/state.ts";
@@ -89,7 +87,9 @@ const WRAPS: { [gltf: number]: Wrapping } = { 33648: MirroredRepeatWrapping, 330
 
 /** An image of the mesh; its pixels are decoded to linear light where they are read. */
 export async function imageTexture(image: MeshImage, anisotropy: number): Promise<Texture> {
-    const bitmap = await createImageBitmap(new Blob([image.jpeg], { type: "image/jpeg" }), { colorSpaceConversion: "none" });
+    const bitmap = await createImageBitmap(new Blob([image.jpeg], { type: "image/jpeg" }), {
+        colorSpaceConversion: "none",
+    });
     const texture = new Texture(bitmap);
     texture.flipY = false;
     texture.colorSpace = SRGBColorSpace;

@@ -9,7 +9,8 @@ export class Beside {
 
     constructor(private readonly describe: (name: string) => Promise<Description>,
         /** Fetches what the lighting of a scene needs. */
-        private readonly prepare: (description: Description) => Promise<void>) {}
+        private readonly prepare: (description: Description) => Promise<void>)
+    {}
 
     /** Another scene is open. */
     reset(open: Description): void {

@@ -1,6 +1,7 @@
 // The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
 import { QUANTITIES } from "../daemon/api.ts";
-import { firstLighting, firstState, firstView, PALETTES, SKY_MODELS, skyOff, TONES, UNITS, type Lighting, type Moment, type Place, type SkyLight, type State, type View } from "./state.ts";
+import { firstLighting, firstState, firstView, PALETTES, SKY_MODELS, skyOff, TONES, UNITS, type Lighting, type Moment,
+    type Place, type SkyLight, type State, type View } from "./state.ts";
 
 /** Of powers and weights: products of two of them are still numbers of single precision. */
 const LIGHT_MOST = 1e12;
@@ -33,7 +34,8 @@ function restore<T extends object>(first: T, given: unknown, loose: readonly str
 }
 
 /** One of the names that there are, or the first state's. */
-const oneOf = <T extends string>(names: readonly T[], value: unknown, otherwise: T): T => names.find((name) => name === value) ?? otherwise;
+const oneOf = <T extends string>(names: readonly T[], value: unknown, otherwise: T): T =>
+    names.find((name) => name === value) ?? otherwise;
 
 const number = (value: unknown, otherwise: number): number =>
     typeof value === "number" && Number.isFinite(value) ? value : otherwise;
@@ -44,10 +46,15 @@ const held = (value: number, otherwise: number, low: number, high: number): numb
 
 function restoreMoment(given: unknown): Moment | null {
     if (!isPlain(given)) return null;
-    const { dewPoint } = given, of = (name: string, low: number, high: number): number => held(given[name] as number, low, low, high);
+    const { dewPoint } = given,
+        of = (name: string, low: number, high: number): number => held(given[name] as number, low, low, high);
     return {
-        day: Math.round(of("day", 1, 365)), hour: of("hour", 0, 24), year: Math.round(of("year", 1900, 2100)), direct: of("direct", 0, 3000),
-        isHorizontal: given.isHorizontal === true, diffuse: of("diffuse", 0, 3000),
+        day: Math.round(of("day", 1, 365)),
+        hour: of("hour", 0, 24),
+        year: Math.round(of("year", 1900, 2100)),
+        direct: of("direct", 0, 3000),
+        isHorizontal: given.isHorizontal === true,
+        diffuse: of("diffuse", 0, 3000),
         dewPoint: typeof dewPoint === "number" ? held(dewPoint, 0, -100, 100) : null,
     };
 }
@@ -56,12 +63,19 @@ function restoreSky(given: unknown): SkyLight {
     const out = restore(skyOff, given, ["moment"]);
     return {
         model: oneOf(SKY_MODELS, out.model, "off"),
-        strength: held(out.strength, skyOff.strength, 0, 1e6), factor: held(out.factor, 1, 0, 1e3),
-        turbidity: held(out.turbidity, skyOff.turbidity, 1, 20), direct: held(out.direct, skyOff.direct, 0, 3000), diffuse: held(out.diffuse, skyOff.diffuse, 0, 3000),
-        sun: oneOf(["spread", "tile", "off"], out.sun, "spread"), tinted: out.tinted,
-        latitude: held(out.latitude, skyOff.latitude, -90, 90), longitude: held(out.longitude, skyOff.longitude, -180, 180),
-        zone: held(out.zone, skyOff.zone, -14, 14), day: Math.round(held(out.day, skyOff.day, 1, 365)),
-        hour: held(out.hour, skyOff.hour, 0, 24), moment: restoreMoment(out.moment),
+        strength: held(out.strength, skyOff.strength, 0, 1e6),
+        factor: held(out.factor, 1, 0, 1e3),
+        turbidity: held(out.turbidity, skyOff.turbidity, 1, 20),
+        direct: held(out.direct, skyOff.direct, 0, 3000),
+        diffuse: held(out.diffuse, skyOff.diffuse, 0, 3000),
+        sun: oneOf(["spread", "tile", "off"], out.sun, "spread"),
+        tinted: out.tinted,
+        latitude: held(out.latitude, skyOff.latitude, -90, 90),
+        longitude: held(out.longitude, skyOff.longitude, -180, 180),
+        zone: held(out.zone, skyOff.zone, -14, 14),
+        day: Math.round(held(out.day, skyOff.day, 1, 365)),
+        hour: held(out.hour, skyOff.hour, 0, 24),
+        moment: restoreMoment(out.moment),
     };
 }
 
@@ -83,25 +97,42 @@ function restoreLighting(given: unknown): Lighting {
     const emitters: Lighting["emitters"] = {};
     for (const [index, weight] of Object.entries(out.emitters)) emitters[index] = held(weight, 0, 0, LIGHT_MOST);
     return {
-        groups, emitters, dim: held(out.dim, 1, 0, LIGHT_MOST), sky: restoreSky(out.sky),
+        groups,
+        emitters,
+        dim: held(out.dim, 1, 0, LIGHT_MOST),
+        sky: restoreSky(out.sky),
         solo: typeof out.solo === "string" ? out.solo : null,
     };
 }
 
 function isPlace(value: unknown): value is Place {
     if (!Array.isArray(value) || !value.every((v) => Number.isFinite(v))) return false;
-    return value.length === 6 || (value.length === 10 && value[6] > 0 && value[6] < 180 && Math.hypot(value[7], value[8], value[9]) > 0.5);
+    return value.length === 6
+        || (value.length === 10 && value[6] > 0 && value[6] < 180 && Math.hypot(value[7], value[8], value[9]) > 0.5);
 }
 
 function restoreView(given: unknown): View {
     const view = restore(firstView, given, ["exposure", "range", "threshold", "judged", "camera"]);
-    const orNull = (value: unknown): number | null => (typeof value === "number" && Number.isFinite(value) ? value : null);
-    const range = Array.isArray(view.range) && view.range.length === 2 && view.range.every((v) => Number.isFinite(v)) ? view.range : null;
+    const orNull = (
+        value: unknown,
+    ): number | null => (typeof value === "number" && Number.isFinite(value) ? value : null);
+    const range = Array.isArray(view.range) && view.range.length === 2 && view.range.every((v) => Number.isFinite(v))
+        ? view.range
+        : null;
     return {
-        ...view, picture: oneOf(["light", "false"], view.picture, "light"), quantity: oneOf(QUANTITIES, view.quantity, firstView.quantity),
-        tone: oneOf(TONES, view.tone, firstView.tone), palette: oneOf(PALETTES, view.palette, firstView.palette), unit: oneOf(UNITS, view.unit, firstView.unit),
-        isoLines: Math.round(held(view.isoLines, 0, 0, 100)), uniformity: held(view.uniformity, firstView.uniformity, 0, 1), range, exposure: view.exposure === null ? null : held(view.exposure, 0, -60, 60), threshold: orNull(view.threshold),
-        judged: typeof view.judged === "string" ? view.judged : null, camera: isPlace(view.camera) ? view.camera : null,
+        ...view,
+        picture: oneOf(["light", "false"], view.picture, "light"),
+        quantity: oneOf(QUANTITIES, view.quantity, firstView.quantity),
+        tone: oneOf(TONES, view.tone, firstView.tone),
+        palette: oneOf(PALETTES, view.palette, firstView.palette),
+        unit: oneOf(UNITS, view.unit, firstView.unit),
+        isoLines: Math.round(held(view.isoLines, 0, 0, 100)),
+        uniformity: held(view.uniformity, firstView.uniformity, 0, 1),
+        range,
+        exposure: view.exposure === null ? null : held(view.exposure, 0, -60, 60),
+        threshold: orNull(view.threshold),
+        judged: typeof view.judged === "string" ? view.judged : null,
+        camera: isPlace(view.camera) ? view.camera : null,
     };
 }
 
@@ -119,11 +150,14 @@ function fromBase64Url(text: string): string {
 
 /** `momentOf` is the weather of a light, where a link has to hold that. */
 export function toFragment(state: State, momentOf: (light: SkyLight) => Moment | null): string {
-    const whole = (lighting: Lighting): Lighting => ({ ...lighting, sky: { ...lighting.sky, moment: momentOf(lighting.sky) } });
+    const whole = (lighting: Lighting): Lighting => ({ ...lighting,
+        sky: { ...lighting.sky, moment: momentOf(lighting.sky) } });
     const plain = difference(state as unknown as Plain, firstState as unknown as Plain), { compare } = state;
     plain.lighting = whole(state.lighting);
-    if (state.presets.length > 0) plain.presets = state.presets.map((preset) => ({ ...preset, lighting: whole(preset.lighting) }));
-    if (compare !== null && compare.lighting !== null) plain.compare = { ...compare, lighting: whole(compare.lighting) };
+    if (state.presets.length > 0)
+        plain.presets = state.presets.map((preset) => ({ ...preset, lighting: whole(preset.lighting) }));
+    if (compare !== null && compare.lighting !== null)
+        plain.compare = { ...compare, lighting: whole(compare.lighting) };
     plain.view = difference(state.view as unknown as Plain, firstView as unknown as Plain);
     return "#1." + toBase64Url(JSON.stringify(plain));
 }
@@ -146,7 +180,8 @@ export function fromFragment(fragment: string): State | null {
         view: restoreView(given.view),
         presets: (state.presets as unknown[]).filter(isPlain)
             .map((p) => ({ name: String(p.name), lighting: restoreLighting(p.lighting) })),
-        views: (state.views as unknown[]).filter(isPlain).flatMap((v) => (isPlace(v.camera) ? [{ name: String(v.name), camera: v.camera }] : [])),
+        views: (state.views as unknown[]).filter(isPlain)
+            .flatMap((v) => (isPlace(v.camera) ? [{ name: String(v.name), camera: v.camera }] : [])),
         pins: state.pins.filter((pin) => Number.isInteger(pin) && pin >= 0),
         tolerance: typeof state.tolerance === "number" ? state.tolerance : null,
         compare: compare === null ? null : {

@@ -8,13 +8,18 @@ import { firstState, type GroupLight, type Lighting } from "./state.ts";
 export function lightingOf(mesh: SceneMesh, description: Description): Lighting {
     const groups: { [name: string]: GroupLight } = {};
     for (const group of mesh.groups) if (group.emission !== null) groups[group.name] = lightOf(group.emission);
-    const isDark = Object.keys(groups).length === 0 && description.sky === null && (description.emitters ?? []).length === 0;
+    const isDark = Object.keys(groups).length === 0 && description.sky === null
+        && (description.emitters ?? []).length === 0;
     if (isDark) groups[ceilingOf(mesh)] = lightOf([1, 1, 1]);
     const emitters: { [index: string]: number } = {};
     // A lamp begins at its first position; tiles of a sky shine as the panel of skies says.
     const shine = description.sky !== null ? 0 : description.report?.paths !== undefined ? 1 : Infinity;
-    description.emitters?.forEach((_, index) => { if (index < shine) emitters[index] = 1; });
-    const sky = description.sky === null ? firstState.lighting.sky : { ...firstState.lighting.sky, model: "overcast" as const };
+    description.emitters?.forEach((_, index) => {
+        if (index < shine) emitters[index] = 1;
+    });
+    const sky = description.sky === null
+        ? firstState.lighting.sky
+        : { ...firstState.lighting.sky, model: "overcast" as const };
     return { ...firstState.lighting, groups, emitters, sky };
 }
 
@@ -25,7 +30,8 @@ function ceilingOf(mesh: SceneMesh): string {
     for (let v = 1; v < mesh.positions.length; v += 3) floor = Math.min(floor, mesh.positions[v]);
     for (let i = 0; i < mesh.index.length; i += 3) {
         const v = mesh.index[i], element = mesh.elementOf[v];
-        low[mesh.groupOf[element]] += Math.max(0, -mesh.normals[3 * v + 1]) * (mesh.positions[3 * v + 1] - floor) * mesh.area[element];
+        low[mesh.groupOf[element]] += Math.max(0, -mesh.normals[3 * v + 1]) * (mesh.positions[3 * v + 1] - floor)
+            * mesh.area[element];
     }
     return mesh.groups[low.indexOf(Math.max(...low))].name;
 }
@@ -33,7 +39,9 @@ function ceilingOf(mesh: SceneMesh): string {
 function lightOf(emission: Rgb): GroupLight {
     const power = luminance(emission);
     return {
-        on: true, power: Number(power.toPrecision(6)), kelvin: null,
+        on: true,
+        power: Number(power.toPrecision(6)),
+        kelvin: null,
         colour: power > 0 ? emission.map((v) => Number((v / power).toPrecision(6))) as Rgb : [1, 1, 1],
     };
 }

@@ -10,7 +10,8 @@ export function alongOf(position: number, power: number): Weights {
 
 /** The position whose weights these are, whatever their sum; null where they are of no single one. */
 export function positionOf(weights: Weights): number | null {
-    const lit = Object.entries(weights).filter(([, weight]) => weight > 0).map(([index, weight]) => [Number(index), weight]);
+    const lit = Object.entries(weights).filter(([, weight]) => weight > 0)
+        .map(([index, weight]) => [Number(index), weight]);
     if (lit.length === 1) return lit[0][0];
     if (lit.length !== 2) return null;
     lit.sort(([one], [other]) => one - other);

@@ -22,16 +22,20 @@ export interface Abilities {
 
 export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting, can: Abilities): Wanted {
     // Lamps of the scene are not in the answers of a store of few emitters, nor in what these are scaled by.
-    const groups = can.emitters > 0 ? [] : Object.entries(emissionOf(lighting, can.channels)).filter(([name]) => can.groups.includes(name));
+    const groups = can.emitters > 0
+        ? []
+        : Object.entries(emissionOf(lighting, can.channels)).filter(([name]) => can.groups.includes(name));
     const sky = can.sky !== null && can.sky.some((v) => [v].flat().some((x) => x > 0)) ? can.sky : null;
-    const weights = Object.entries(lighting.emitters).filter(([index, weight]) => weight > 0 && Number(index) < can.emitters);
+    const weights = Object.entries(lighting.emitters).filter(([index, weight]) =>
+        weight > 0 && Number(index) < can.emitters
+    );
     const largest = (values: Iterable<number>): number => {
         let most = 0;
         for (const value of values) if (value > most) most = value;
         return most;
     };
-    const most = Math.max(largest(groups.flatMap(([, v]) => [v].flat())), largest((sky ?? []).flatMap((v) => [v].flat())),
-        lighting.dim * largest(weights.map(([, weight]) => weight)));
+    const most = Math.max(largest(groups.flatMap(([, v]) => [v].flat())),
+        largest((sky ?? []).flatMap((v) => [v].flat())), lighting.dim * largest(weights.map(([, weight]) => weight)));
     if (most <= 0 || !Number.isFinite(most)) return { scene, quantity, emission: null, scale: 1 };
     const scaled = <T extends number | number[]>(value: T): T =>
         (typeof value === "number" ? value / most : value.map((v) => v / most)) as T;

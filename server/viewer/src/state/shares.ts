@@ -19,26 +19,34 @@ export interface Part {
 function product(rows: number[] | number[][], k: number, value: number | readonly number[]): number {
     const channels = Array.isArray(rows[0]) ? rows as number[][] : [rows as number[]];
     let sum = 0;
-    channels.forEach((row, c) => { sum += row[k] * (typeof value === "number" ? value : value[c] ?? 0); });
+    channels.forEach((row, c) => {
+        sum += row[k] * (typeof value === "number" ? value : value[c] ?? 0);
+    });
     return sum;
 }
 
-/** What each group that shines, the sky and each emitter give; the largest first. `groups` and `emitters` are names in the order of the store. */
+/** What each group that shines, the sky and each emitter give; the largest first. `groups` and `emitters` are names in
+ * the order of the store. */
 export function partsOf(gradient: Gradient, lighting: Lighting, channels: number, groups: readonly string[],
-    emitters: readonly string[], sky: readonly (number | readonly number[])[] | null): Part[] {
+    emitters: readonly string[], sky: readonly (number | readonly number[])[] | null): Part[]
+{
     const parts: Part[] = [];
-    if (gradient.groups !== undefined)
+    if (gradient.groups !== undefined) {
         for (const [name, value] of Object.entries(emissionOf(lighting, channels))) {
             const k = groups.indexOf(name);
             if (k >= 0) parts.push({ name, value: product(gradient.groups, k, value) });
         }
-    if (gradient.emitters !== undefined)
+    }
+    if (gradient.emitters !== undefined) {
         for (const [index, weight] of Object.entries(lighting.emitters)) {
             const k = Number(index);
-            if (weight > 0 && k < emitters.length) parts.push({ name: emitters[k], value: product(gradient.emitters, k, weight * lighting.dim) });
+            if (weight > 0 && k < emitters.length)
+                parts.push({ name: emitters[k], value: product(gradient.emitters, k, weight * lighting.dim) });
         }
+    }
     // A store of the tiles of a sky has these as its emitters.
-    const rows = gradient.sky ?? (parts.length === 0 && sky !== null && sky.length === emitters.length ? gradient.emitters : undefined);
+    const rows = gradient.sky
+        ?? (parts.length === 0 && sky !== null && sky.length === emitters.length ? gradient.emitters : undefined);
     if (rows !== undefined && sky !== null) {
         const value = sky.reduce((sum: number, radiance, tile) => sum + product(rows, tile, radiance), 0);
         if (value !== 0) parts.push({ name: "sky", value });

@@ -21,7 +21,8 @@ export function plainRequest(wanted: Wanted, tolerance: number | null): PlainReq
     };
     return {
         scene: wanted.scene,
-        body: { emission: times(wanted.emission) as Emission, quantity: wanted.quantity, ...(tolerance === null ? {} : { tolerance }) },
+        body: { emission: times(wanted.emission) as Emission, quantity: wanted.quantity,
+            ...(tolerance === null ? {} : { tolerance }) },
     };
 }
 
@@ -42,7 +43,9 @@ function pythonValue(value: unknown): string {
     if (typeof value === "string") return pythonString(value);
     if (Array.isArray(value)) return `[${value.map(pythonValue).join(", ")}]`;
     if (typeof value === "object" && value !== null)
-        return `{${Object.entries(value).map(([name, inner]) => `${pythonString(name)}: ${pythonValue(inner)}`).join(", ")}}`;
+        return `{${
+            Object.entries(value).map(([name, inner]) => `${pythonString(name)}: ${pythonValue(inner)}`).join(", ")
+        }}`;
     return String(value);
 }
 
@@ -51,7 +54,8 @@ const urlOf = (origin: string, request: PlainRequest): string => origin + Api.pa
 /** The token itself stays out of what is copied: it is read from LAMBERT_TOKEN. */
 export function curlCommand(origin: string, request: PlainRequest, withToken: boolean): string {
     const body = JSON.stringify(request.body), isLong = new TextEncoder().encode(body).length > ARGUMENT_MOST;
-    const parts = [`curl -sS --fail-with-body ${shellWord(urlOf(origin, request))}`, "-H 'Content-Type: application/json'"];
+    const parts = [`curl -sS --fail-with-body ${shellWord(urlOf(origin, request))}`,
+        "-H 'Content-Type: application/json'"];
     if (withToken) parts.push('-H "Authorization: Bearer $LAMBERT_TOKEN"');
     // A body of JSON has no line breaks, so no line of it ends the text.
     parts.push(isLong ? `--data-binary @- <<'BODY'\n${body}\nBODY` : `-d ${shellWord(body)}`);
@@ -60,15 +64,23 @@ export function curlCommand(origin: string, request: PlainRequest, withToken: bo
 
 export function pythonProgram(origin: string, request: PlainRequest, withToken: boolean): string {
     return [
-        "import json", ...(withToken ? ["import os"] : []), "import urllib.request", "",
+        "import json",
+        ...(withToken ? ["import os"] : []),
+        "import urllib.request",
+        "",
         `body = ${pythonValue(request.body)}`,
         "request = urllib.request.Request(",
         `    ${pythonString(urlOf(origin, request))},`,
         "    json.dumps(body).encode(),",
-        `    {"Content-Type": "application/json"${withToken ? ', "Authorization": "Bearer " + os.environ["LAMBERT_TOKEN"]' : ""}})`,
+        `    {"Content-Type": "application/json"${
+            withToken ? ', "Authorization": "Bearer " + os.environ["LAMBERT_TOKEN"]' : ""
+        }})`,
         "with urllib.request.urlopen(request) as answer:",
         "    answer = json.load(answer)",
-        `values = answer[${pythonString(request.body.quantity)}]  # one number for each element, a list for each channel`,
-        "print(json.dumps(values))", "",
+        `values = answer[${
+            pythonString(request.body.quantity)
+        }]  # one number for each element, a list for each channel`,
+        "print(json.dumps(values))",
+        "",
     ].join("\n");
 }

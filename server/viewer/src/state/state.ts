@@ -30,7 +30,8 @@ export const SKY_MODELS = ["off", "overcast", "clear", "turbid", "given", "even"
 export type SkyModel = (typeof SKY_MODELS)[number];
 
 export interface SkyLight {
-    /** "turbid" is a clear day of a turbidity, "given" has the two irradiances below, "perez" is that of a weather file. */
+    /** "turbid" is a clear day of a turbidity, "given" has the two irradiances below, "perez" is that of a weather
+     * file. */
     model: SkyModel;
     /** Horizontal irradiance of an even or overcast sky, in the store's unit. */
     strength: number;
@@ -65,9 +66,10 @@ export interface Lighting {
     emitters: { [index: string]: number };
 }
 
-/** Eye and target in metres, y up; and, where they are not those of the page, the angle of view (of the height, in degrees) and the
- * direction that is up in the picture. */
-export type Place = [number, number, number, number, number, number] | [number, number, number, number, number, number, number, number, number, number];
+/** Eye and target in metres, y up; and, where they are not those of the page, the angle of view (of the height, in
+ * degrees) and the direction that is up in the picture. */
+export type Place = [number, number, number, number, number, number] | [number, number, number, number, number, number,
+    number, number, number, number];
 
 export const TONES = ["agx", "aces", "linear"] as const;
 export const PALETTES = ["viridis", "inferno", "turbo"] as const;
@@ -138,20 +140,54 @@ export interface State {
 }
 
 export const skyOff: SkyLight = {
-    model: "off", strength: 100, factor: 1, turbidity: 3, direct: 700, diffuse: 120, sun: "spread", tinted: false, latitude: 48, longitude: 11, zone: 1, day: 172, hour: 12,
+    model: "off",
+    strength: 100,
+    factor: 1,
+    turbidity: 3,
+    direct: 700,
+    diffuse: 120,
+    sun: "spread",
+    tinted: false,
+    latitude: 48,
+    longitude: 11,
+    zone: 1,
+    day: 172,
+    hour: 12,
     moment: null,
 };
 
 export const firstView: View = {
-    picture: "light", quantity: "radiosity", smooth: true, textured: true, sharpSun: false, tone: "agx", exposure: null, follow: false,
-    palette: "viridis", range: null, log: false, isoLines: 0, unit: "W/m²", threshold: null, judged: null,
-    uniformity: 0.6, walk: false, camera: null,
+    picture: "light",
+    quantity: "radiosity",
+    smooth: true,
+    textured: true,
+    sharpSun: false,
+    tone: "agx",
+    exposure: null,
+    follow: false,
+    palette: "viridis",
+    range: null,
+    log: false,
+    isoLines: 0,
+    unit: "W/m²",
+    threshold: null,
+    judged: null,
+    uniformity: 0.6,
+    walk: false,
+    camera: null,
 };
 
 export const firstLighting: Lighting = { groups: {}, dim: 1, solo: null, sky: skyOff, emitters: {} };
 
 export const firstState: State = {
-    scene: "", lighting: firstLighting, view: firstView, presets: [], views: [], pins: [], compare: null, tolerance: null,
+    scene: "",
+    lighting: firstLighting,
+    view: firstView,
+    presets: [],
+    views: [],
+    pins: [],
+    compare: null,
+    tolerance: null,
 };
 
 /** Emission of each group under a lighting, per channel, in the store's unit; groups that are dark are absent. */

@@ -3,7 +3,8 @@ import type { State } from "./state.ts";
 
 type Listener = (now: State, before: State) => void;
 
-/** Changes with one tag that follow each other within this time are one step of undo: keys that are pressed again and again. */
+/** Changes with one tag that follow each other within this time are one step of undo: keys that are pressed again and
+ * again. */
 const ONE_STEP_MS = 1500;
 const STEPS_MOST = 200;
 
@@ -39,7 +40,8 @@ export class Store {
         this.set(to);
     }
 
-    /** A pointer is down, or up again: what it drags meanwhile is one step, however slowly, and another drag another one. */
+    /** A pointer is down, or up again: what it drags meanwhile is one step, however slowly, and another drag another
+     * one. */
     hold(is: boolean): void {
         if (this.held !== is) this.lastTag = null;
         this.held = is;

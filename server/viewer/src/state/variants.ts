@@ -15,6 +15,7 @@ export function checkReflectances(name: string, groups: Reflectances): string | 
     if (Object.keys(groups).length === 0) return "Change a reflectance first.";
     for (const [group, values] of Object.entries(groups))
         for (const value of values)
-            if (!(value >= 0 && value < 1)) return `A reflectance is at least 0 and below 1; ${group} has ${Number.isNaN(value) ? "none" : value}.`;
+            if (!(value >= 0 && value < 1))
+                return `A reflectance is at least 0 and below 1; ${group} has ${Number.isNaN(value) ? "none" : value}.`;
     return null;
 }

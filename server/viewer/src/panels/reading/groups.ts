@@ -1,5 +1,6 @@
-// The quantity shown, by group. The mean is the daemon's, by `reduce`: linear, so that its adjoint rows answer it whatever
-// the number of elements. Least, largest and uniformity are of the luminance of each element, which the picture has.
+// The quantity shown, by group. The mean is the daemon's, by `reduce`: linear, so that its adjoint rows answer it
+// whatever the number of elements. Least, largest and uniformity are of the luminance of each element, which the
+// picture has.
 import { button, fill, make } from "../../base/dom.ts";
 import { tell } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
@@ -9,9 +10,14 @@ import { figuresOf, type Figures } from "../../picture/scale.ts";
 import type { Wanted } from "../../state/request.ts";
 
 type Column = "name" | "mean" | "min" | "max" | "uniformity";
-const COLUMNS: readonly (readonly [Column, string, string])[] = [["name", "Group", "By name"], ["mean", "Mean", "By the mean over the area"],
-    ["min", "Min", "By the least value"], ["max", "Max", "By the largest value"], ["uniformity", "U0", "By the uniformity, least over mean"]];
-/** The daemon keeps adjoint rows for so many groups of a request; more cost whole solves, and are taken from the picture. */
+const COLUMNS: readonly (readonly [Column, string, string])[] = [["name", "Group", "By name"], ["mean", "Mean",
+    "By the mean over the area"], ["min", "Min", "By the least value"], ["max", "Max", "By the largest value"], [
+    "uniformity",
+    "U0",
+    "By the uniformity, least over mean",
+]];
+/** The daemon keeps adjoint rows for so many groups of a request; more cost whole solves, and are taken from the
+ * picture. */
 const REDUCED_MOST = 64;
 
 interface Line extends Figures {
@@ -33,12 +39,16 @@ export class Groups {
             this.means = means;
             this.draw();
         }, (reason) => app.fail(reason), 1);
-        this.heads = COLUMNS.map(([column, text, label]) => make("th", { scope: "col" }, button(text, label, () => {
-            this.isUp = this.column === column ? !this.isUp : column === "name";
-            this.column = column;
-            this.draw();
-        }, { class: "plain" })));
-        this.element.append(this.head, make("div", { class: "wide" }, make("table", {}, make("thead", {}, make("tr", {}, ...this.heads)), this.body)));
+        this.heads = COLUMNS.map(([column, text, label]) =>
+            make("th", { scope: "col" }, button(text, label, () => {
+                this.isUp = this.column === column ? !this.isUp : column === "name";
+                this.column = column;
+                this.draw();
+            }, { class: "plain" }))
+        );
+        this.element.append(this.head,
+            make("div", { class: "wide" },
+                make("table", {}, make("thead", {}, make("tr", {}, ...this.heads)), this.body)));
         app.on("scene", () => {
             this.asker.forget();
             this.means.clear();
@@ -49,21 +59,28 @@ export class Groups {
             this.draw();
             this.want();
         });
-        app.store.listen((now, before) => { if (now.view.judged !== before.view.judged || now.view.unit !== before.view.unit) this.draw(); });
+        app.store.listen((now, before) => {
+            if (now.view.judged !== before.view.judged || now.view.unit !== before.view.unit) this.draw();
+        });
     }
 
     want(): void {
         const wanted = this.app.wanted();
-        if (this.isSeen() && wanted !== null && wanted.emission !== null && (this.app.scene?.mesh.groups.length ?? 0) <= REDUCED_MOST) this.asker.want(wanted);
+        if (this.isSeen() && wanted !== null && wanted.emission !== null
+            && (this.app.scene?.mesh.groups.length ?? 0) <= REDUCED_MOST) this.asker.want(wanted);
     }
 
     private async ask({ scene, emission, quantity, scale }: Wanted): Promise<Map<string, number>> {
         const groups = this.app.scene?.mesh.groups.map((group) => group.name) ?? [];
         const answer = await this.app.api.answer(scene, { emission, quantity, reduce: { groups, with: ["mean"] } });
-        return new Map(Object.entries(answer.groups as { [name: string]: { mean: number | number[] | null } }).map(([name, { mean }]) => {
-            const values = [mean ?? NaN].flat(), weights = channelWeights(values.length);
-            return [name, scale * values.reduce((sum, value, c) => sum + value * weights[c], 0)];
-        }));
+        return new Map(
+            Object.entries(answer.groups as { [name: string]: { mean: number | number[] | null } }).map(
+                ([name, { mean }]) => {
+                    const values = [mean ?? NaN].flat(), weights = channelWeights(values.length);
+                    return [name, scale * values.reduce((sum, value, c) => sum + value * weights[c], 0)];
+                },
+            ),
+        );
     }
 
     private get lines(): Line[] {
@@ -94,7 +111,9 @@ export class Groups {
         const rows = new Map([...this.body.rows].map((row) => [row.dataset.group ?? "", row]));
         const ordered = lines.map((line) => {
             const row = rows.get(line.name) ?? this.makeRow(line.name);
-            [line.mean, line.min, line.max].forEach((value, i) => { row.cells[i + 1].textContent = tell(value); });
+            [line.mean, line.min, line.max].forEach((value, i) => {
+                row.cells[i + 1].textContent = tell(value);
+            });
             row.cells[4].textContent = Number.isFinite(line.uniformity) ? line.uniformity.toFixed(2) : "–";
             row.cells[0].querySelector("button")?.setAttribute("aria-pressed", String(line.name === view.judged));
             return row;
@@ -111,6 +130,7 @@ export class Groups {
             const { store } = this.app, { view } = store.now;
             store.change({ ...store.now, view: { ...view, judged: view.judged === name ? null : name } });
         }, { class: "plain" });
-        return make("tr", { "data-group": name }, make("th", { scope: "row" }, mark), make("td", {}), make("td", {}), make("td", {}), make("td", {}));
+        return make("tr", { "data-group": name }, make("th", { scope: "row" }, mark), make("td", {}), make("td", {}),
+            make("td", {}), make("td", {}));
     }
 }

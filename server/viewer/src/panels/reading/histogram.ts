@@ -18,69 +18,102 @@ export class Histogram {
     private axis: Axis = { low: 0, high: 1, log: false };
 
     constructor(private readonly app: App, private readonly isSeen: () => boolean) {
-        const set = (): void => this.setRange(this.low.value === "" ? NaN : Number(this.low.value), this.high.value === "" ? NaN : Number(this.high.value));
+        const set = (): void =>
+            this.setRange(this.low.value === "" ? NaN : Number(this.low.value),
+                this.high.value === "" ? NaN : Number(this.high.value));
         this.low.addEventListener("change", set);
         this.high.addEventListener("change", set);
         this.place.setAttribute("role", "img");
-        this.element.append(this.head, this.place, make("div", { class: "row" }, make("span", {}, "Palette"), this.low, make("span", {}, "to"), this.high,
-            make("button", { type: "button", title: "Ends of the palette from the values", onclick: () => this.setRange(NaN, NaN) }, "Auto")));
+        this.element.append(this.head, this.place,
+            make("div", { class: "row" }, make("span", {}, "Palette"), this.low, make("span", {}, "to"), this.high,
+                make("button", { type: "button", title: "Ends of the palette from the values",
+                    onclick: () => this.setRange(NaN, NaN) }, "Auto")));
         app.on("field", () => this.draw());
         app.on("theme", () => this.draw());
-        app.store.listen((now, before) => { if (now.view !== before.view) this.draw(); });
-        new MutationObserver(() => this.plot?.redraw()).observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });
-        new ResizeObserver(() => { if (this.plot !== null && this.place.clientWidth > 0) this.plot.setSize({ width: this.place.clientWidth, height: HEIGHT }); }).observe(this.place);
+        app.store.listen((now, before) => {
+            if (now.view !== before.view) this.draw();
+        });
+        new MutationObserver(() => this.plot?.redraw()).observe(document.documentElement, { attributes: true,
+            attributeFilter: ["data-theme"] });
+        new ResizeObserver(() => {
+            if (this.plot !== null && this.place.clientWidth > 0)
+                this.plot.setSize({ width: this.place.clientWidth, height: HEIGHT });
+        }).observe(this.place);
     }
 
     private setRange(low: number, high: number): void {
         const { store } = this.app;
-        store.change({ ...store.now, view: { ...store.now.view, range: high > low ? [Number(low.toPrecision(3)), Number(high.toPrecision(3))] : null } });
+        store.change({ ...store.now,
+            view: { ...store.now.view,
+                range: high > low ? [Number(low.toPrecision(3)), Number(high.toPrecision(3))] : null } });
     }
 
     draw(): void {
         const { app: { scene, fields: [field], store: { now: { view } }, exposure } } = this, { spread } = exposure;
         if (!this.isSeen() || scene === null || field === null || this.place.clientWidth === 0) return;
         const group = view.judged === null ? undefined : scene.mesh.groups.find((g) => g.name === view.judged);
-        const counts = group === undefined ? (): boolean => true : (i: number): boolean => scene.mesh.groups[scene.mesh.groupOf[i]] === group;
-        // The ends of the palette are in sight, and all but the last hundredth of the area; in log four decades at most.
+        const counts = group === undefined
+            ? (): boolean => true
+            : (i: number): boolean => scene.mesh.groups[scene.mesh.groupOf[i]] === group;
+        // The ends of the palette are in sight, and all but the last hundredth of the area; in log four decades at
+        // most.
         const palette = exposure.axis(view);
         const high = Math.max(spread.high * 1.15, view.range?.[1] ?? 0) || 1;
-        this.axis = view.log ? { low: Math.min(Math.max(spread.low / 1.5, high / 1e4), palette.low > 0 ? palette.low : Infinity), high, log: true }
+        this.axis = view.log
+            ? { low: Math.min(Math.max(spread.low / 1.5, high / 1e4), palette.low > 0 ? palette.low : Infinity), high,
+                log: true }
             : { low: Math.min(0, view.range?.[0] ?? 0), high, log: false };
         const { axis } = this;
         const areas = areaByValue(field.values, scene.mesh.area, counts, axis, BINS);
         const total = areas.reduce((sum, a) => sum + a, 0) || 1;
-        this.head.textContent = `Spread over the area of ${view.judged ?? "all groups"}, ${view.unit}${spread.most > high ? "; the last bar has all above" : ""}`;
+        this.head.textContent = `Spread over the area of ${view.judged ?? "all groups"}, ${view.unit}${
+            spread.most > high ? "; the last bar has all above" : ""
+        }`;
         if (document.activeElement !== this.low) this.low.value = String(Number(palette.low.toPrecision(4)));
         if (document.activeElement !== this.high) this.high.value = String(Number(palette.high.toPrecision(4)));
         const at = Array.from(areas, (_, k) => (k + 0.5) / BINS);
         const largest = areas.indexOf(Math.max(...areas));
-        this.place.setAttribute("aria-label", `Histogram of values from ${tell(axis.low)} to ${tell(axis.high)} ${view.unit}; most area, ${percent(areas[largest] / total)}, `
-            + `has ${tell(valueAt(largest / BINS, axis))} to ${tell(valueAt((largest + 1) / BINS, axis))} ${view.unit}.`);
+        this.place.setAttribute("aria-label",
+            `Histogram of values from ${tell(axis.low)} to ${tell(axis.high)} ${view.unit}; most area, ${
+                percent(areas[largest] / total)
+            }, `
+                + `has ${tell(valueAt(largest / BINS, axis))} to ${
+                    tell(valueAt((largest + 1) / BINS, axis))
+                } ${view.unit}.`);
         this.plot ??= this.makePlot();
         this.plot.setData([at, Array.from(areas, (a) => (100 * a) / total)]);
     }
 
     /** The plot's own axis is the place on ours, 0 to 1, so that equal bars are equal parts of a logarithmic axis too. */
     private makePlot(): uPlot {
-        const colour = (name: string) => (): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+        const colour = (name: string) => (): string =>
+            getComputedStyle(document.documentElement).getPropertyValue(name).trim();
         const toPlace = (value: number): number => {
             const { low, high, log } = this.axis;
             return log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
         };
-        const line = { stroke: colour("--soft"), grid: { stroke: colour("--line"), width: 0.5 }, ticks: { stroke: colour("--line"), width: 1 }, font: "12px system-ui, sans-serif" };
+        const line = { stroke: colour("--soft"), grid: { stroke: colour("--line"), width: 0.5 },
+            ticks: { stroke: colour("--line"), width: 1 }, font: "12px system-ui, sans-serif" };
         return new uPlot({
-            width: this.place.clientWidth, height: HEIGHT, legend: { show: false }, padding: [6, 10, 0, 0],
+            width: this.place.clientWidth,
+            height: HEIGHT,
+            legend: { show: false },
+            padding: [6, 10, 0, 0],
             cursor: { y: false, points: { show: false }, drag: { x: true, y: false, setScale: false } },
             scales: { x: { time: false, range: () => [0, 1] }, y: { range: (_, __, most) => [0, most || 1] } },
-            series: [{}, { fill: colour("--soft"), stroke: colour("--soft"), width: 0, points: { show: false }, paths: uPlot.paths.bars?.({ size: [0.9], align: 0 }) ?? (() => null) }],
+            series: [{}, { fill: colour("--soft"), stroke: colour("--soft"), width: 0, points: { show: false },
+                paths: uPlot.paths.bars?.({ size: [0.9], align: 0 }) ?? (() => null) }],
             axes: [
-                { ...line, size: 28, splits: () => ticksOf(this.axis, 5).map(toPlace), values: (_, places) => places.map((place) => tell(valueAt(place, this.axis))) },
+                { ...line, size: 28, splits: () => ticksOf(this.axis, 5).map(toPlace),
+                    values: (_, places) => places.map((place) => tell(valueAt(place, this.axis))) },
                 { ...line, size: 50, values: (_, shares) => shares.map((share) => `${tell(share, 2)} %`) },
             ],
             hooks: {
                 setSelect: [(plot) => {
                     if (plot.select.width < 3) return;
-                    const ends = [plot.select.left, plot.select.left + plot.select.width].map((px) => valueAt(plot.posToVal(px, "x"), this.axis));
+                    const ends = [plot.select.left, plot.select.left + plot.select.width].map((px) =>
+                        valueAt(plot.posToVal(px, "x"), this.axis)
+                    );
                     plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
                     this.setRange(ends[0], ends[1]);
                 }],

@@ -1,5 +1,5 @@
-// Is there light enough, and evenly? The share of the area that reaches a value, mean, least value and uniformity beside
-// the targets of a task, in words and in colour. The shader paints the elements.
+// Is there light enough, and evenly? The share of the area that reaches a value, mean, least value and uniformity
+// beside the targets of a task, in words and in colour. The shader paints the elements.
 import { choice, fill, make, tick } from "../../base/dom.ts";
 import { percent, tell } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
@@ -8,8 +8,14 @@ import type { View } from "../../state/state.ts";
 
 /** Maintained illuminance Em and uniformity U0 of task areas, after EN 12464-1. */
 const TASKS: readonly (readonly [string, number, number])[] = [
-    ["Office: writing, reading", 500, 0.6], ["Technical drawing", 750, 0.7], ["Classroom", 500, 0.6], ["Meeting room", 500, 0.6],
-    ["Reception desk", 300, 0.6], ["Archive", 200, 0.4], ["Corridor", 100, 0.4], ["Stairs", 100, 0.4],
+    ["Office: writing, reading", 500, 0.6],
+    ["Technical drawing", 750, 0.7],
+    ["Classroom", 500, 0.6],
+    ["Meeting room", 500, 0.6],
+    ["Reception desk", 300, 0.6],
+    ["Archive", 200, 0.4],
+    ["Corridor", 100, 0.4],
+    ["Stairs", 100, 0.4],
 ];
 
 export class Judge {
@@ -17,28 +23,45 @@ export class Judge {
     private readonly on: HTMLLabelElement;
     private readonly fields = make("div", {});
     private readonly verdict = make("div", { role: "status" });
-    private readonly level = make("input", { type: "number", min: 0, step: "any", "aria-label": "Threshold, target of the mean" });
-    private readonly evenness = make("input", { type: "number", min: 0, max: 1, step: 0.05, "aria-label": "Target of the uniformity U0" });
+    private readonly level = make("input", { type: "number", min: 0, step: "any",
+        "aria-label": "Threshold, target of the mean" });
+    private readonly evenness = make("input", { type: "number", min: 0, max: 1, step: 0.05,
+        "aria-label": "Target of the uniformity U0" });
     private readonly unit = make("span", {});
     private group: HTMLElement = make("div", {});
 
     constructor(private readonly app: App, private readonly isSeen: () => boolean) {
-        this.on = tick("Judge by a threshold", false, (on) => this.change(on
-            ? { threshold: 500, ...(app.store.now.view.picture === "false" ? {} : { picture: "false", range: null }), quantity: "irradiance" } : { threshold: null }));
-        const task = choice("Task", [["", "…"], ...TASKS.map(([name, level, even], i) => [String(i), `${name}: ${level} lx, U0 ${even.toFixed(2)}`] as const)], "", (which) => {
+        this.on = tick("Judge by a threshold", false, (on) =>
+            this.change(on
+                ? { threshold: 500,
+                    ...(app.store.now.view.picture === "false" ? {} : { picture: "false", range: null }),
+                    quantity: "irradiance" }
+                : { threshold: null }));
+        const task = choice("Task", [["", "…"],
+            ...TASKS.map(([name, level, even], i) =>
+                [String(i), `${name}: ${level} lx, U0 ${even.toFixed(2)}`] as const
+            )], "", (which) => {
             if (which !== "") this.change({ threshold: TASKS[Number(which)][1], uniformity: TASKS[Number(which)][2] });
         });
-        this.level.addEventListener("change", () => { if (this.level.value !== "" && Number(this.level.value) >= 0) this.change({ threshold: Number(this.level.value) }); });
+        this.level.addEventListener("change", () => {
+            if (this.level.value !== "" && Number(this.level.value) >= 0)
+                this.change({ threshold: Number(this.level.value) });
+        });
         this.evenness.addEventListener("change", () => {
             const value = Number(this.evenness.value);
             if (this.evenness.value !== "" && value >= 0 && value <= 1) this.change({ uniformity: value });
         });
-        this.fields.append(task, this.group, make("div", { class: "row" }, make("span", {}, "At least"), this.level, this.unit, make("span", {}, "U0"), this.evenness), this.verdict,
-            make("p", { class: "hint" }, "Tasks are examples after EN 12464-1; the tables of the standard, its maintenance factor and its grid of points have to be consulted."));
+        this.fields.append(task, this.group,
+            make("div", { class: "row" }, make("span", {}, "At least"), this.level, this.unit, make("span", {}, "U0"),
+                this.evenness), this.verdict,
+            make("p", { class: "hint" },
+                "Tasks are examples after EN 12464-1; the tables of the standard, its maintenance factor and its grid of points have to be consulted."));
         this.element.append(make("h2", { class: "sub" }, "Enough light?"), this.on, this.fields);
         app.on("scene", () => this.drawGroups());
         app.on("field", () => this.draw());
-        app.store.listen((now, before) => { if (now.view !== before.view) this.draw(); });
+        app.store.listen((now, before) => {
+            if (now.view !== before.view) this.draw();
+        });
     }
 
     private change(to: Partial<View>): void {
@@ -48,8 +71,8 @@ export class Judge {
 
     private drawGroups(): void {
         const names = this.app.scene?.mesh.groups.map((group) => group.name) ?? [];
-        const group = choice("Of", [["", "all groups"], ...names.map((name) => [name, name] as const)], this.app.store.now.view.judged ?? "",
-            (name) => this.change({ judged: name === "" ? null : name }));
+        const group = choice("Of", [["", "all groups"], ...names.map((name) => [name, name] as const)],
+            this.app.store.now.view.judged ?? "", (name) => this.change({ judged: name === "" ? null : name }));
         this.group.replaceWith(group);
         this.group = group;
         this.draw();
@@ -65,18 +88,30 @@ export class Judge {
         this.unit.textContent = view.unit;
         const select = this.group.querySelector("select");
         if (select !== null) select.value = view.judged ?? "";
-        const elements = scene.mesh.groups.find((group) => group.name === view.judged)?.elements ?? scene.mesh.groupOf.keys();
+        const elements = scene.mesh.groups.find((group) => group.name === view.judged)?.elements
+            ?? scene.mesh.groupOf.keys();
         const figures = figuresOf(field.values, scene.mesh.area, elements, view.threshold);
-        const line = (name: string, text: string, target: string, isMet: boolean): HTMLElement => make("tr", {}, make("th", { scope: "row" }, name), make("td", {}, text), make("td", {}, target),
-            make("td", { class: isMet ? "good" : "bad" }, isMet ? "✓ met" : "✗ not met"));
+        const line = (name: string, text: string, target: string, isMet: boolean): HTMLElement =>
+            make("tr", {}, make("th", { scope: "row" }, name), make("td", {}, text), make("td", {}, target),
+                make("td", { class: isMet ? "good" : "bad" }, isMet ? "✓ met" : "✗ not met"));
         const isIrradiance = view.picture === "false" && view.quantity === "irradiance";
         fill(this.verdict,
-            make("p", { class: "reached" }, `${percent(figures.reached)} of ${view.judged ?? "all"} (${tell(figures.area * figures.reached)} of ${tell(figures.area)} m²) has at least ${tell(view.threshold)} ${view.unit}.`),
-            make("table", {}, make("tbody", {},
-                line("Mean Em", `${tell(figures.mean)} ${view.unit}`, `≥ ${tell(view.threshold)}`, figures.mean >= view.threshold),
-                line("U0 = min/mean", Number.isFinite(figures.uniformity) ? figures.uniformity.toFixed(2) : "–", `≥ ${view.uniformity.toFixed(2)}`, figures.uniformity >= view.uniformity),
-                make("tr", {}, make("th", { scope: "row" }, "Min"), make("td", {}, `${tell(figures.min)} ${view.unit}`), make("td", {}), make("td", {})))),
-            !isIrradiance && make("p", { class: "bad" }, "The picture does not show irradiance, which such targets are about."),
-            view.unit !== "lx" && make("p", { class: "hint" }, "Targets of the standard are in lx. If the store's numbers are photometric, say so: “Unit of the store” in View."));
+            make("p", { class: "reached" },
+                `${percent(figures.reached)} of ${view.judged ?? "all"} (${tell(figures.area * figures.reached)} of ${
+                    tell(figures.area)
+                } m²) has at least ${tell(view.threshold)} ${view.unit}.`),
+            make("table", {},
+                make("tbody", {},
+                    line("Mean Em", `${tell(figures.mean)} ${view.unit}`, `≥ ${tell(view.threshold)}`,
+                        figures.mean >= view.threshold),
+                    line("U0 = min/mean", Number.isFinite(figures.uniformity) ? figures.uniformity.toFixed(2) : "–",
+                        `≥ ${view.uniformity.toFixed(2)}`, figures.uniformity >= view.uniformity),
+                    make("tr", {}, make("th", { scope: "row" }, "Min"),
+                        make("td", {}, `${tell(figures.min)} ${view.unit}`), make("td", {}), make("td", {})))),
+            !isIrradiance
+                && make("p", { class: "bad" }, "The picture does not show irradiance, which such targets are about."),
+            view.unit !== "lx"
+                && make("p", { class: "hint" },
+                    "Targets of the standard are in lx. If the store's numbers are photometric, say so: “Unit of the store” in View."));
     }
 }

@@ -11,12 +11,14 @@ const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indir
 export function addLegend(app: App): void {
     const ramp = make("canvas", { width: 1, height: 256, "aria-hidden": "true" });
     const head = make("div", {}), ticks = make("div", { class: "ticks", "aria-hidden": "true" });
-    const legend = make("figure", { class: "legend", hidden: true, role: "img" }, head, make("div", { class: "scale" }, ramp, ticks));
+    const legend = make("figure", { class: "legend", hidden: true, role: "img" }, head,
+        make("div", { class: "scale" }, ramp, ticks));
     app.stage.canvas.parentElement?.append(legend);
     let palette: Palette | null = null, drawn = "";
     const draw = (): void => {
         const { view, compare } = app.store.now, axis = app.exposure.axis(view);
-        legend.hidden = view.picture !== "false" || app.scene === null || app.fields[0] === null || compare?.how === "difference";
+        legend.hidden = view.picture !== "false" || app.scene === null || app.fields[0] === null
+            || compare?.how === "difference";
         if (legend.hidden) return;
         if (palette !== view.palette) {
             palette = view.palette;
@@ -31,11 +33,14 @@ export function addLegend(app: App): void {
         drawn = key;
         // Iso-lines stand at equal parts of the palette; of many every second or third has its number.
         const every = Math.ceil(view.isoLines / rows);
-        const values = view.isoLines > 0 ? Array.from({ length: view.isoLines }, (_, k) => k + 1).filter((k) => k % every === 0)
-            .map((k) => valueAt(k / view.isoLines, axis)) : ticksOf(axis, Math.min(6, rows - 1));
+        const values = view.isoLines > 0
+            ? Array.from({ length: view.isoLines }, (_, k) => k + 1).filter((k) => k % every === 0)
+                .map((k) => valueAt(k / view.isoLines, axis))
+            : ticksOf(axis, Math.min(6, rows - 1));
         head.textContent = text;
-        legend.setAttribute("aria-label", `False colour: ${text}, from ${tell(axis.low)} to ${tell(axis.high)}${axis.log ? ", logarithmic" : ""}`
-            + (view.isoLines > 0 ? `; iso-lines at ${values.map((v) => tell(v)).join(", ")}` : ""));
+        legend.setAttribute("aria-label",
+            `False colour: ${text}, from ${tell(axis.low)} to ${tell(axis.high)}${axis.log ? ", logarithmic" : ""}`
+                + (view.isoLines > 0 ? `; iso-lines at ${values.map((v) => tell(v)).join(", ")}` : ""));
         fill(ticks, ...values.map((value) => {
             const tick = make("span", {}, tell(value));
             tick.style.bottom = `${100 * placeOf(value, axis)}%`;
@@ -44,5 +49,7 @@ export function addLegend(app: App): void {
     };
     app.on("field", draw);
     app.on("scene", draw);
-    app.store.listen((now, before) => { if (now.view !== before.view || now.compare !== before.compare) draw(); });
+    app.store.listen((now, before) => {
+        if (now.view !== before.view || now.compare !== before.compare) draw();
+    });
 }

@@ -36,10 +36,14 @@ export class Pins {
         this.asker = new Newest(
             async ({ wanted, elements }) => this.ask(wanted, elements),
             (answer) => {
-                this.exact = new Map(answer.elements.map((element, k) => [element, { B: answer.B[k], H: answer.H[k] }]));
+                this.exact = new Map(
+                    answer.elements.map((element, k) => [element, { B: answer.B[k], H: answer.H[k] }]),
+                );
                 this.draw();
             },
-            (reason) => app.fail(reason), 1);
+            (reason) => app.fail(reason),
+            1,
+        );
         const again = (): void => {
             this.draw();
             this.want();
@@ -73,10 +77,15 @@ export class Pins {
     }
 
     private async ask({ scene, emission, scale }: Wanted, elements: number[]): Promise<Exact> {
-        const dark = (): number[][] => elements.map(() => new Array<number>(this.app.scene?.description.channels ?? 1).fill(0));
+        const dark = (): number[][] =>
+            elements.map(() => new Array<number>(this.app.scene?.description.channels ?? 1).fill(0));
         if (emission === null) return { elements, B: dark(), H: dark() };
-        const [B, H] = await Promise.all((["radiosity", "irradiance"] as const).map(async (quantity) =>
-            rowsOf((await this.app.api.answer(scene, { emission, quantity, select: { elements } }))[quantity], elements.length, scale)));
+        const [B, H] = await Promise.all(
+            (["radiosity", "irradiance"] as const).map(async (quantity) =>
+                rowsOf((await this.app.api.answer(scene, { emission, quantity, select: { elements } }))[quantity],
+                    elements.length, scale)
+            ),
+        );
         return { elements, B, H };
     }
 
@@ -84,20 +93,26 @@ export class Pins {
         if (!this.isSeen()) return;
         const { app } = this, { store } = app;
         const { pins } = store.now;
+        const forget = (pin: number): void =>
+            store.change({ ...store.now, pins: store.now.pins.filter((other) => other !== pin) });
         const hovered = app.hovered !== null && !pins.includes(app.hovered) ? app.hovered : null;
         // Buttons stay where they are while numbers change, so that a click meets them.
         const cards = [...this.element.querySelectorAll<HTMLElement>(".pin")];
         const wanted = [...pins.map(String), ...(hovered === null ? [] : ["hover"])];
         if (this.element.childElementCount === 0 || cards.map((card) => card.dataset.pin).join() !== wanted.join()) {
             fill(this.element, pins.length === 0 && hovered === null
-                && make("p", { class: "hint" }, "Click or tap the picture to pin an element; Shift adds another, a second click removes it."),
-            ...wanted.map((pin) => make("section", { class: "pin", "data-pin": pin },
-                make("div", { class: "row" }, make("h2", { class: "sub grow" }), pin !== "hover" && button("×", `Forget element ${pin}`, () =>
-                    store.change({ ...store.now, pins: store.now.pins.filter((other) => other !== Number(pin)) }))),
-                make("table", {}))));
+                && make("p", { class: "hint" },
+                    "Click or tap the picture to pin an element; Shift adds another, a second click removes it."),
+                ...wanted.map((pin) =>
+                    make("section", { class: "pin", "data-pin": pin },
+                        make("div", { class: "row" }, make("h2", { class: "sub grow" }),
+                            pin !== "hover" && button("×", `Forget element ${pin}`, () => forget(Number(pin)))),
+                        make("table", {}))
+                ));
         }
         this.element.querySelectorAll<HTMLElement>(".pin").forEach((card) => {
-            this.fillCard(card, card.dataset.pin === "hover" ? hovered as number : Number(card.dataset.pin), card.dataset.pin === "hover");
+            this.fillCard(card, card.dataset.pin === "hover" ? hovered as number : Number(card.dataset.pin),
+                card.dataset.pin === "hover");
         });
     }
 
@@ -106,21 +121,36 @@ export class Pins {
         if (scene === null || element >= scene.mesh.elements) return;
         const { mesh, description: { channels, emitters } } = scene;
         const group = mesh.groups[mesh.groupOf[element]]?.name ?? "";
-        (card.querySelector("h2") as HTMLElement).textContent =
-            `${isHovered ? "Under the pointer: " : ""}${group}, element ${count(element)}, ${tell(mesh.area[element])} m²`;
+        (card.querySelector("h2") as HTMLElement).textContent = `${
+            isHovered ? "Under the pointer: " : ""
+        }${group}, element ${count(element)}, ${tell(mesh.area[element])} m²`;
         const exact = this.exact.get(element), emission = emissionOf(now.lighting, channels)[group] ?? 0;
-        const E = (emitters?.length ?? 0) > 0 ? null : typeof emission === "number" ? new Array<number>(channels).fill(emission) : emission;
+        const E = (emitters?.length ?? 0) > 0
+            ? null
+            : typeof emission === "number"
+            ? new Array<number>(channels).fill(emission)
+            : emission;
         const shown = this.app.wanted()?.quantity, live = field?.at(element);
         const rows: [string, string, number[] | null | undefined][] = [
             ["B", "Radiosity", exact?.B ?? (shown === "radiosity" ? live : undefined)],
-            ["H", "Irradiance", exact?.H ?? (shown === "irradiance" ? live : undefined)], ["E", "Emission", E]];
-        const weights = channelWeights(channels), names = channels === 3 ? ["red", "green", "blue"] : Array.from({ length: channels }, (_, c) => `${c + 1}`);
+            ["H", "Irradiance", exact?.H ?? (shown === "irradiance" ? live : undefined)],
+            ["E", "Emission", E],
+        ];
+        const weights = channelWeights(channels),
+            names = channels === 3 ? ["red", "green", "blue"] : Array.from({ length: channels }, (_, c) => `${c + 1}`);
         fill(card.querySelector("table") as HTMLElement,
-            make("thead", {}, make("tr", {}, make("th", { scope: "col" }, now.view.unit),
-                ...(channels > 1 ? [...names, channels === 3 ? "lum." : "mean"] : ["value"]).map((name) => make("th", { scope: "col", title: name === "lum." ? "luminance" : null }, name)))),
-            make("tbody", {}, ...rows.map(([letter, name, values]) => make("tr", { "data-row": letter },
-                make("th", { scope: "row", title: name }, `${name} ${letter}`),
-                ...(channels > 1 ? [...(values ?? new Array<number>(channels).fill(NaN)), values?.reduce((sum, v, c) => sum + v * weights[c], 0) ?? NaN]
-                    : [values?.[0] ?? NaN]).map((value) => make("td", {}, tell(value)))))));
+            make("thead", {},
+                make("tr", {}, make("th", { scope: "col" }, now.view.unit),
+                    ...(channels > 1 ? [...names, channels === 3 ? "lum." : "mean"] : ["value"]).map((name) =>
+                        make("th", { scope: "col", title: name === "lum." ? "luminance" : null }, name)
+                    ))),
+            make("tbody", {},
+                ...rows.map(([letter, name, values]) =>
+                    make("tr", { "data-row": letter }, make("th", { scope: "row", title: name }, `${name} ${letter}`),
+                        ...(channels > 1
+                            ? [...(values ?? new Array<number>(channels).fill(NaN)), values?.reduce((sum, v, c) =>
+                                sum + v * weights[c], 0) ?? NaN]
+                            : [values?.[0] ?? NaN]).map((value) => make("td", {}, tell(value))))
+                )));
     }
 }

@@ -25,19 +25,25 @@ export class Pointer {
     private element: number | null = null;
 
     constructor(private readonly app: App, /** True while the panel is seen: then elements are marked and pinned. */
-        private readonly isReading: () => boolean) {
+        private readonly isReading: () => boolean)
+    {
         this.canvas = app.stage.canvas;
         this.frame = this.canvas.parentElement as HTMLElement;
         this.frame.append(this.tip, this.cross, this.told);
-        this.keys = button("Read by keys (R)", "A cross on the picture that arrow keys move; Enter pins, Escape ends", () => this.setKeys(!this.isByKeys), { "aria-pressed": "false" });
+        this.keys = button("Read by keys (R)", "A cross on the picture that arrow keys move; Enter pins, Escape ends",
+            () => this.setKeys(!this.isByKeys), { "aria-pressed": "false" });
         this.canvas.addEventListener("pointermove", (event) => {
             if (this.isByKeys) return;
             // What was read belongs to the picture before it was turned.
             if (event.buttons !== 0 || event.pointerType === "touch") this.leave();
             else this.moveTo(event.offsetX, event.offsetY);
         });
-        this.canvas.addEventListener("wheel", () => { if (!this.isByKeys) this.leave(); }, { passive: true });
-        this.canvas.addEventListener("pointerleave", () => { if (!this.isByKeys) this.leave(); });
+        this.canvas.addEventListener("wheel", () => {
+            if (!this.isByKeys) this.leave();
+        }, { passive: true });
+        this.canvas.addEventListener("pointerleave", () => {
+            if (!this.isByKeys) this.leave();
+        });
         this.canvas.addEventListener("pointerdown", (event) => {
             this.down = event.isPrimary && event.button === 0 ? [event.clientX, event.clientY, event.pointerId] : null;
         });
@@ -46,7 +52,9 @@ export class Pointer {
         this.frame.addEventListener("keydown", (event) => this.press(event), true);
         app.on("field", () => this.tell());
         // After the camera moved by itself or by keys, another element is under the cross or the pointer.
-        app.store.listen((now, before) => { if (now.view.camera !== before.view.camera && this.place !== null) this.moveTo(...this.place); });
+        app.store.listen((now, before) => {
+            if (now.view.camera !== before.view.camera && this.place !== null) this.moveTo(...this.place);
+        });
         app.on("scene", () => {
             this.leave();
             const prepare = (): void => app.scene?.picker.prepare();
@@ -79,8 +87,12 @@ export class Pointer {
         } else if (key.startsWith("arrow") && this.place !== null) {
             const step = STEP_PX * (event.shiftKey ? 5 : 1);
             const [x, y] = this.place;
-            this.moveTo(clamp(x + (key === "arrowright" ? step : key === "arrowleft" ? -step : 0), 0, this.canvas.clientWidth - 1),
-                clamp(y + (key === "arrowdown" ? step : key === "arrowup" ? -step : 0), 0, this.canvas.clientHeight - 1));
+            this.moveTo(
+                clamp(x + (key === "arrowright" ? step : key === "arrowleft" ? -step : 0), 0,
+                    this.canvas.clientWidth - 1),
+                clamp(y + (key === "arrowdown" ? step : key === "arrowup" ? -step : 0), 0,
+                    this.canvas.clientHeight - 1),
+            );
         } else return;
         event.preventDefault();
         event.stopPropagation();
@@ -99,7 +111,8 @@ export class Pointer {
 
     private pin(isMore: boolean): void {
         const { store } = this.app;
-        if (this.element !== null) store.change({ ...store.now, pins: pinsAfter(store.now.pins, this.element, isMore) });
+        if (this.element !== null)
+            store.change({ ...store.now, pins: pinsAfter(store.now.pins, this.element, isMore) });
         else if (!isMore && store.now.pins.length > 0) store.change({ ...store.now, pins: [] });
     }
 
@@ -125,7 +138,8 @@ export class Pointer {
         const { app: { scene, cameras }, place } = this;
         if (scene === null || place === null) return;
         cameras.camera.updateMatrixWorld();
-        this.element = scene.picker.at((2 * place[0]) / this.canvas.clientWidth - 1, 1 - (2 * place[1]) / this.canvas.clientHeight, cameras.camera);
+        this.element = scene.picker.at((2 * place[0]) / this.canvas.clientWidth - 1,
+            1 - (2 * place[1]) / this.canvas.clientHeight, cameras.camera);
         this.app.hover(this.isReading() || this.isByKeys ? this.element : null);
         this.tell();
     }
@@ -141,7 +155,9 @@ export class Pointer {
             if (this.isByKeys) this.told.textContent = "nothing";
             return;
         }
-        const text = `${tell(field.values[element])} ${view.unit} · ${scene.mesh.groups[scene.mesh.groupOf[element]]?.name ?? ""}`;
+        const text = `${tell(field.values[element])} ${view.unit} · ${
+            scene.mesh.groups[scene.mesh.groupOf[element]]?.name ?? ""
+        }`;
         this.tip.textContent = text;
         if (this.isByKeys) this.told.textContent = `${text}, element ${element}`;
         // It stays within the picture, and beside the pointer.

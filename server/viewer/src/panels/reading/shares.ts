@@ -37,13 +37,17 @@ export class Shares {
         }, 1);
         app.on("scene", () => this.draw());
         app.on("field", () => this.draw());
-        app.store.listen((now, before) => { if (now.pins !== before.pins || now.view !== before.view || now.lighting !== before.lighting) this.draw(); });
+        app.store.listen((now, before) => {
+            if (now.pins !== before.pins || now.view !== before.view || now.lighting !== before.lighting) this.draw();
+        });
     }
 
     /** The last pin, of the quantity shown. */
     private get asked(): Asked | null {
         const { pins, scene, view } = this.app.store.now, element = pins[pins.length - 1];
-        return element === undefined ? null : { scene, element, quantity: view.picture === "light" ? "radiosity" : view.quantity };
+        return element === undefined
+            ? null
+            : { scene, element, quantity: view.picture === "light" ? "radiosity" : view.quantity };
     }
 
     private async ask(asked: Asked): Promise<Gradient> {
@@ -51,10 +55,16 @@ export class Shares {
         // It may have been answered while this request waited.
         if (there !== undefined) return there;
         const { description } = this.app.scene as OpenScene, { channels } = description;
-        const gradient = (description.emitters?.length ?? 0) > 0 ? ["emitters"] : description.sky === null ? ["groups"] : ["groups", "sky"];
+        const gradient = (description.emitters?.length ?? 0) > 0
+            ? ["emitters"]
+            : description.sky === null
+            ? ["groups"]
+            : ["groups", "sky"];
         const weights = channelWeights(channels);
         const answer = await this.app.api.adjoint(asked.scene, {
-            cotangent: { elements: [asked.element], values: [channels === 1 ? 1 : weights] }, quantity: asked.quantity, gradient,
+            cotangent: { elements: [asked.element], values: [channels === 1 ? 1 : weights] },
+            quantity: asked.quantity,
+            gradient,
         });
         const [oldest] = known.keys();
         if (known.size >= KNOWN_MOST) known.delete(oldest);
@@ -84,20 +94,26 @@ export class Shares {
             return;
         }
         const { description, mesh } = scene;
-        const parts = partsOf(gradient, now.lighting, description.channels, description.groups.map((group) => group.name),
-            description.emitters ?? [], description.sky === null ? null : app.skyOf(now.lighting, description));
+        const parts = partsOf(gradient, now.lighting, description.channels,
+            description.groups.map((group) => group.name), description.emitters ?? [],
+            description.sky === null ? null : app.skyOf(now.lighting, description));
         const total = parts.reduce((sum, part) => sum + part.value, 0);
         const group = mesh.groups[mesh.groupOf[asked.element]]?.name ?? "";
-        const listed = parts.slice(0, LINES_MOST), rest = parts.slice(LINES_MOST).reduce((sum, part) => sum + part.value, 0);
+        const listed = parts.slice(0, LINES_MOST),
+            rest = parts.slice(LINES_MOST).reduce((sum, part) => sum + part.value, 0);
         if (parts.length > LINES_MOST) listed.push({ name: `${parts.length - LINES_MOST} others`, value: rest });
-        fill(this.body, make("p", {}, `${group}, element ${count(asked.element)}: ${asked.quantity} ${tell(total)} ${now.view.unit}`),
+        fill(this.body,
+            make("p", {},
+                `${group}, element ${count(asked.element)}: ${asked.quantity} ${tell(total)} ${now.view.unit}`),
             parts.length === 0 && make("p", { class: "hint" }, "Nothing shines."),
             make("ol", {}, ...listed.map(({ name, value }) => {
                 const share = total > 0 ? value / total : 0;
                 const bar = make("span", { class: "bar", "aria-hidden": "true" });
                 bar.style.inlineSize = `${100 * Math.min(1, Math.max(0, share))}%`;
-                return make("li", { "data-part": name }, make("span", { class: "row" }, make("span", { class: "grow" }, name),
-                    make("span", { class: "figures" }, `${percent(share)} · ${tell(value)} ${now.view.unit}`)), make("span", { class: "track", "aria-hidden": "true" }, bar));
+                return make("li", { "data-part": name },
+                    make("span", { class: "row" }, make("span", { class: "grow" }, name),
+                        make("span", { class: "figures" }, `${percent(share)} · ${tell(value)} ${now.view.unit}`)),
+                    make("span", { class: "track", "aria-hidden": "true" }, bar));
             })));
     }
 }

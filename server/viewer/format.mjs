@@ -1,0 +1,39 @@
+// Layout of the viewer's sources: node format.mjs MODULES [--write]
+//   MODULES  the node_modules that `npm ci` made, with the packages for development
+// Names the files that dprint would lay out otherwise, and with --write lays them out.
+import { readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { dirname, join, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+
+const [modules, write] = process.argv.slice(2), folder = dirname(fileURLToPath(import.meta.url));
+const require = createRequire(join(resolve(modules), "of-the-viewer.js"));
+const formatter = require("@dprint/formatter").createFromBuffer(readFileSync(require("@dprint/typescript").getPath()));
+formatter.setConfig({ lineWidth: 120, indentWidth: 4 }, {
+    "preferHanging": true,
+    "quoteStyle": "preferDouble",
+    "useBraces": "maintain",
+    "singleBodyPosition": "maintain",
+    "arrowFunction.useParentheses": "force",
+    "module.sortImportDeclarations": "maintain",
+    "importDeclaration.sortNamedImports": "maintain",
+});
+/** What is laid out once may still be laid out otherwise. */
+const PASSES_MOST = 4;
+
+const files = [...readdirSync(join(folder, "src"), { recursive: true }).map((name) => join("src", name)),
+    ...readdirSync(folder)].filter((name) => /\.(ts|mjs)$/.test(name));
+for (const name of files) {
+    const filePath = join(folder, name), text = readFileSync(filePath, "utf8");
+    let laid = text;
+    for (let pass = 0, before = ""; pass < PASSES_MOST && laid !== before; pass++) {
+        before = laid;
+        laid = formatter.formatText({ filePath, fileText: laid });
+    }
+    if (laid === text) continue;
+    if (write === "--write") writeFileSync(filePath, laid);
+    else {
+        console.error(`${name} is laid out otherwise: node server/viewer/format.mjs MODULES --write`);
+        process.exitCode = 1;
+    }
+}
