@@ -7,7 +7,7 @@ import { comparePanel } from "./panels/compare.ts";
 import { exportPanel } from "./panels/export.ts";
 import { lightsPanel } from "./panels/lights.ts";
 import { emittersPanel } from "./panels/emitters.ts";
-import { lookPanel } from "./panels/look.ts";
+import { viewPanel } from "./panels/view.ts";
 import { materialsPanel } from "./panels/materials.ts";
 import { trustPanel } from "./panels/trust.ts";
 import type { PanelMaker } from "./panels/panel.ts";
@@ -21,7 +21,7 @@ const panelMakers: readonly PanelMaker[] = [
     lightsPanel,
     skyPanel,
     emittersPanel,
-    lookPanel,
+    viewPanel,
     readingPanel,
     trustPanel,
     comparePanel,

@@ -5,7 +5,7 @@ import type { SunParts } from "../daylight/source.ts";
 import { Cameras } from "../picture/cameras.ts";
 import type { Field } from "../picture/field.ts";
 import { Stage } from "../picture/stage.ts";
-import { Beside } from "../state/beside.ts";
+import { Comparable } from "../state/comparable.ts";
 import type { Wanted } from "../state/request.ts";
 import { firstState, type Lighting, type Moment, type SkyLight, type State } from "../state/state.ts";
 import { Store } from "../state/store.ts";
@@ -24,7 +24,8 @@ export class App extends Events<Event> {
     readonly stage: Stage;
     readonly cameras: Cameras;
     readonly exposure = new Exposure();
-    readonly beside = new Beside((name) => this.api.describe(name), (description) => this.prepareOther(description));
+    readonly comparable = new Comparable((name) => this.api.describe(name),
+        (description) => this.prepareOther(description));
     readonly asking = new Asking(this, (side, field, wanted) => this.show(side, field, wanted),
         (reason) => this.fail(reason));
     /** The sun in the picture, where it is drawn sharp. */
@@ -97,7 +98,7 @@ export class App extends Events<Event> {
 
     /** Finds out if a scene can be compared with the open one; `unlike` says why not. */
     async admit(name: string): Promise<boolean> {
-        this.unlike = await this.beside.admit(name);
+        this.unlike = await this.comparable.admit(name);
         if (this.unlike !== null) this.tell("unlike");
         return this.unlike === null;
     }
@@ -122,10 +123,10 @@ export class App extends Events<Event> {
     }
 
     /** Hands all that shapes the picture, but the values, to the stage. */
-    private setLook(): void {
+    private setDisplay(): void {
         const { view, compare } = this.store.now;
         const { low, high } = this.exposure.axis(view);
-        this.stage.setLook({
+        this.stage.setDisplay({
             picture: view.picture,
             smooth: view.smooth,
             textured: view.textured,
@@ -144,7 +145,7 @@ export class App extends Events<Event> {
 
     private take(scene: OpenScene): void {
         this.scene = scene;
-        this.beside.reset(scene.description);
+        this.comparable.reset(scene.description);
         this.asking.forget(0);
         this.asking.forget(1);
         this.sharp.forget();
@@ -154,7 +155,7 @@ export class App extends Events<Event> {
         this.recovery.answered();
         if (side === 1 || !this.sharp.isOn) this.stage.setField(side, field);
         if (side === 0 && wanted.emission !== null) this.expose(field);
-        this.setLook();
+        this.setDisplay();
         this.opening.load(null);
         this.tell("field");
         this.tell("timing");
@@ -172,9 +173,9 @@ export class App extends Events<Event> {
         if (now.pins !== before.pins) this.stage.mark(this.hovered ?? -1, now.pins);
         if (now.view.judged !== before.view.judged || now.scene !== before.scene) this.judge(now);
         if (now.compare === null && before.compare !== null) this.asking.forget(1);
-        if (now.view !== before.view || now.compare !== before.compare) this.setLook();
+        if (now.view !== before.view || now.compare !== before.compare) this.setDisplay();
         const other = now.compare?.scene ?? null;
-        if (this.beside.isNew(other) && other !== null)
+        if (this.comparable.isNew(other) && other !== null)
             this.takeOther(other).catch((reason: unknown) => this.fail(reason));
         this.ask();
     }

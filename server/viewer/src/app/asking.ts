@@ -35,7 +35,7 @@ export class Asking {
     private asked = ["", ""];
 
     /** `took` shows an answer, which is in the fields by then. */
-    constructor(private readonly app: Pick<App, "api" | "scene" | "store" | "beside" | "skyOf">,
+    constructor(private readonly app: Pick<App, "api" | "scene" | "store" | "comparable" | "skyOf">,
         private readonly took: (side: Side, field: Field, wanted: Wanted) => void, fail: (reason: unknown) => void)
     {
         const asker = (side: Side): Newest<Wanted, Field> =>
@@ -50,12 +50,12 @@ export class Asking {
     /** What is shown now, as a request; null: there is no scene, nothing to compare it with, or no knowledge of that
      * yet. */
     wanted(side: Side): Wanted | null {
-        const { scene, store: { now }, beside } = this.app;
+        const { scene, store: { now }, comparable } = this.app;
         if (scene === null || (side === 1 && now.compare === null)) return null;
         const quantity = now.view.picture === "light" ? "radiosity" : now.view.quantity;
         const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
         const other = side === 1 ? now.compare?.scene ?? null : null,
-            of = other === null ? scene.description : beside.get(other);
+            of = other === null ? scene.description : comparable.get(other);
         if (of === undefined) return null;
         return wantedFor(of.name, quantity, lighting, { ...abilitiesOf(of), emitters: of.emitters?.length ?? 0,
             sky: this.app.skyOf(lighting, of) });

@@ -4,7 +4,7 @@ import { Box3, BufferAttribute } from "three";
 import type { Description } from "../daemon/api.ts";
 import { readMesh, type SceneMesh } from "../picture/glb.ts";
 import { Picker } from "../picture/pick.ts";
-import { lightingOf } from "../state/own_lighting.ts";
+import { defaultLightingOf } from "../state/default_lighting.ts";
 import { firstState, type Lighting, type State, type View } from "../state/state.ts";
 import type { App } from "./app.ts";
 
@@ -13,7 +13,7 @@ export interface OpenScene {
     mesh: SceneMesh;
     picker: Picker;
     /** Lighting that the scene comes with. */
-    ownLighting: Lighting;
+    defaultLighting: Lighting;
 }
 
 export class Opening {
@@ -44,7 +44,7 @@ export class Opening {
         const mesh = readMesh(file);
         app.stage.show(mesh, description.channels);
         const picker = new Picker(app.stage.geometry as never, app.stage.drawn ?? mesh);
-        const scene = { description, mesh, picker, ownLighting: lightingOf(mesh, description) };
+        const scene = { description, mesh, picker, defaultLighting: defaultLightingOf(mesh, description) };
         takeIn(scene);
         this.take(scene);
         app.cameras.floorAt = (x, z) => picker.floorAt(x, z);
@@ -71,9 +71,9 @@ export class Opening {
 
 /** The state that a scene begins with: a given one, whose lamps that it does not name are the scene's own, or that of
  * the page as it is, in the scene's own light, seen whole. */
-function stateOf({ mesh, ownLighting }: OpenScene, given: State | null, before: State): State {
+function stateOf({ mesh, defaultLighting }: OpenScene, given: State | null, before: State): State {
     const base = given ?? { ...firstState, view: { ...before.view, camera: null, exposure: null, range: null } };
-    const lighting = { ...base.lighting, groups: { ...ownLighting.groups, ...base.lighting.groups } };
-    if (base.lighting === firstState.lighting) Object.assign(lighting, ownLighting);
+    const lighting = { ...base.lighting, groups: { ...defaultLighting.groups, ...base.lighting.groups } };
+    if (base.lighting === firstState.lighting) Object.assign(lighting, defaultLighting);
     return { ...base, lighting, pins: base.pins.filter((pin) => pin < mesh.elements) };
 }

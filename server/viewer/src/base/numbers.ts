@@ -1,7 +1,7 @@
 // Numbers as people read them.
 
 /** Three digits that count, without an exponent where a plain number is short. */
-export function tell(value: number, digits = 3): string {
+export function numberText(value: number, digits = 3): string {
     if (!Number.isFinite(value)) return "–";
     if (value === 0) return "0";
     const size = Math.abs(value);
@@ -11,7 +11,7 @@ export function tell(value: number, digits = 3): string {
 }
 
 export function percent(share: number): string {
-    return `${tell(100 * share, 2)} %`;
+    return `${numberText(100 * share, 2)} %`;
 }
 
 export function count(n: number): string {

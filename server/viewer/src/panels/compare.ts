@@ -2,7 +2,7 @@
 import { button, choice, fill, make } from "../base/dom.ts";
 import { halvesToFloats } from "../base/half.ts";
 import { readNpy } from "../base/npy.ts";
-import { count, percent, tell } from "../base/numbers.ts";
+import { count, percent, numberText } from "../base/numbers.ts";
 import type { App } from "../app/app.ts";
 import { changesOf, roundUp, type Changes } from "../picture/changes.ts";
 import type { Field } from "../picture/field.ts";
@@ -122,10 +122,10 @@ function measure(app: App, place: HTMLElement, found: (changes: Changes) => void
         found(changes);
         fill(place,
             make("dl", { "data-rough": isRough ? "yes" : "no" }, make("dt", {}, "Root mean square of B − A"),
-                make("dd", { "data-number": changes.rms }, `${about}${tell(changes.rms)} ${unit}`),
+                make("dd", { "data-number": changes.rms }, `${about}${numberText(changes.rms)} ${unit}`),
                 make("dt", {}, "Largest"),
                 make("dd", { "data-number": changes.most },
-                    `${about}${changes.most > 0 ? "+" : "−"}${tell(Math.abs(changes.most))} ${unit} at element ${
+                    `${about}${changes.most > 0 ? "+" : "−"}${numberText(Math.abs(changes.most))} ${unit} at element ${
                         count(changes.mostAt)
                     } of ${group}`), make("dt", {}, "|B − A| / |A|"),
                 make("dd", { "data-number": changes.relative }, `${about}${percent(changes.relative)}`)),

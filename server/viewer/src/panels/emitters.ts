@@ -1,7 +1,7 @@
 // Stores of precomputed emitters: a weight for each, and for a lamp in many positions the way along them.
 import type { App } from "../app/app.ts";
 import { button, fill, make } from "../base/dom.ts";
-import { count, tell } from "../base/numbers.ts";
+import { count, numberText } from "../base/numbers.ts";
 import { alongOf, positionOf, type Weights } from "../state/path.ts";
 import type { Panel } from "./panel.ts";
 import { player } from "./player.ts";
@@ -78,7 +78,7 @@ export function emittersPanel(app: App): Panel {
         const near = Math.round(at ?? 0);
         frame.textContent = at === null
             ? "Several positions shine."
-            : `Position ${tell(at, 3)} of ${names().length - 1}: ${names()[near] ?? ""}`;
+            : `Position ${numberText(at, 3)} of ${names().length - 1}: ${names()[near] ?? ""}`;
     };
     app.on("scene", () => {
         drive.stop();

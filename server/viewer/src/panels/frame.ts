@@ -1,6 +1,6 @@
 // The frame of the page: the bar above, the panels beside or below the picture, the line of figures, the banner.
 import { button, choice, fill, make } from "../base/dom.ts";
-import { count, percent, tell } from "../base/numbers.ts";
+import { count, percent, numberText } from "../base/numbers.ts";
 import { headlineOf } from "../daemon/headline.ts";
 import type { App } from "../app/app.ts";
 import type { Panel } from "./panel.ts";
@@ -142,7 +142,7 @@ export function makeStatus(app: App): HTMLElement {
         const { description } = app.scene as NonNullable<App["scene"]>;
         if (app.asking.certificate !== null) {
             error.textContent = `certified: no number is off by more than ${
-                tell(app.asking.certificate.bound, 2)
+                numberText(app.asking.certificate.bound, 2)
             } ${app.store.now.view.unit}`;
             return;
         }
@@ -165,8 +165,8 @@ export function makeStatus(app: App): HTMLElement {
     app.on("timing", () => {
         const { roundTrip, solve } = app.asking.timing;
         time.textContent = solve === null
-            ? `answer ${tell(roundTrip, 2)} ms`
-            : `solve ${tell(solve, 2)} ms, answer ${tell(roundTrip, 2)} ms`;
+            ? `answer ${numberText(roundTrip, 2)} ms`
+            : `solve ${numberText(solve, 2)} ms, answer ${numberText(roundTrip, 2)} ms`;
     });
     return make("footer", { "aria-label": "Figures" }, size, error, time, sun);
 }

@@ -99,7 +99,7 @@ export function lightsPanel(app: App): Panel {
         if (now.presets !== before.presets) drawPresets(app, presets);
     });
     const reset = button("As the scene comes", null, () => {
-        if (app.scene !== null) app.store.change({ ...app.store.now, lighting: app.scene.ownLighting });
+        if (app.scene !== null) app.store.change({ ...app.store.now, lighting: app.scene.defaultLighting });
     });
     return { id: "lights", title: "Lights",
         element: make("div", {}, dim.element, several, list, more, reset, presets) };

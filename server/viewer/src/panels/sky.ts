@@ -2,7 +2,7 @@
 import type { App } from "../app/app.ts";
 import type { OpenScene } from "../app/opening.ts";
 import { button, choice, fill, make, tick } from "../base/dom.ts";
-import { count, tell } from "../base/numbers.ts";
+import { count, numberText } from "../base/numbers.ts";
 import type { Description } from "../daemon/api.ts";
 import { clockOf, SkySource, windOf } from "../daylight/source.ts";
 import type { Sky } from "../daylight/skies.ts";
@@ -139,13 +139,13 @@ function takeSky(app: App, source: SkySource, fetched: Fetched, scene: OpenScene
     const { weather } = source;
     if (weather === null) return;
     const sky: SkyLight = {
-        ...scene.ownLighting.sky,
+        ...scene.defaultLighting.sky,
         model: "perez",
         latitude: weather.latitude,
         longitude: weather.longitude,
         zone: weather.zone,
     };
-    scene.ownLighting = { ...scene.ownLighting, sky };
+    scene.defaultLighting = { ...scene.defaultLighting, sky };
 }
 
 function noteOf(light: SkyLight, source: SkySource, app: App): string {
@@ -324,8 +324,8 @@ function drawFigures(table: HTMLTableElement, dome: HTMLElement, light: SkyLight
     const rows: [string, string, string][] = [
         ["Sun's altitude", sun.altitude > 0 ? altitude : `${altitude}, below the horizon`, "altitude"],
         ["Sun's azimuth", windOf(sun.azimuth), "azimuth"],
-        ["Sky on the ground", sky === null ? "–" : `${tell(sky.diffuseHorizontal)} ${unit}`, "diffuse"],
-        ["Sun on the ground", sky === null ? "–" : `${tell(sky.directHorizontal)} ${unit}`, "direct"],
+        ["Sky on the ground", sky === null ? "–" : `${numberText(sky.diffuseHorizontal)} ${unit}`, "diffuse"],
+        ["Sun on the ground", sky === null ? "–" : `${numberText(sky.directHorizontal)} ${unit}`, "direct"],
     ];
     if (sky !== null && sky.perez !== null)
         rows.push(["Clearness ε",

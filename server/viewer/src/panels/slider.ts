@@ -1,6 +1,6 @@
 // A slider with the number beside it: either changes the value.
 import { make, unique } from "../base/dom.ts";
-import { tell } from "../base/numbers.ts";
+import { numberText } from "../base/numbers.ts";
 
 export interface SliderOptions {
     label: string;
@@ -41,7 +41,7 @@ export function slider(options: SliderOptions, now: number): Slider {
         step: log ? 1 : options.step ?? "any",
         oninput: () => {
             const value = Number(toValue(Number(range.value)).toPrecision(4));
-            box.value = tell(value).replaceAll(",", "");
+            box.value = numberText(value).replaceAll(",", "");
             options.change(value);
         },
     });
@@ -66,7 +66,7 @@ export function slider(options: SliderOptions, now: number): Slider {
     const set = (value: number): void => {
         current = value;
         box.placeholder = "";
-        if (document.activeElement !== box) box.value = tell(value).replaceAll(",", "");
+        if (document.activeElement !== box) box.value = numberText(value).replaceAll(",", "");
         if (document.activeElement !== range || Math.abs(toValue(Number(range.value)) - value) > 1e-3 * Math.abs(value))
             range.value = String(toPlace(value));
     };

@@ -1,6 +1,6 @@
 // The line on the picture between A and B, and the legend of their difference.
 import { make } from "../base/dom.ts";
-import { clamp, tell } from "../base/numbers.ts";
+import { clamp, numberText } from "../base/numbers.ts";
 import { toHex } from "../base/colour.ts";
 import type { App } from "../app/app.ts";
 import { changeColour } from "../picture/changes.ts";
@@ -91,8 +91,8 @@ export function changeLegend(app: App): { element: HTMLElement; set(most: number
     return {
         element,
         set: (most) => {
-            low.textContent = `−${tell(most)}`;
-            high.textContent = `+${tell(most)} ${app.store.now.view.unit}`;
+            low.textContent = `−${numberText(most)}`;
+            high.textContent = `+${numberText(most)} ${app.store.now.view.unit}`;
         },
     };
 }

@@ -3,7 +3,7 @@
 import { fill, make, button } from "../base/dom.ts";
 import { floatsToHalves } from "../base/half.ts";
 import { readNpy } from "../base/npy.ts";
-import { count, percent, tell } from "../base/numbers.ts";
+import { count, percent, numberText } from "../base/numbers.ts";
 import { Problem, type Description, type ErrorFigures, type GroupErrors } from "../daemon/api.ts";
 import { Newest } from "../daemon/newest.ts";
 import type { App } from "../app/app.ts";
@@ -178,7 +178,7 @@ function list(values: { [name: string]: unknown }): HTMLElement {
     return make("dl", {}, ...Object.entries(values).flatMap(([name, value]) => [
         make("dt", {}, name.replaceAll("_", " ")),
         make("dd", {},
-            typeof value === "number" ? (Number.isInteger(value) ? count(value) : tell(value)) : String(value)),
+            typeof value === "number" ? (Number.isInteger(value) ? count(value) : numberText(value)) : String(value)),
     ]));
 }
 
@@ -224,10 +224,10 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
                     solve: answer.solveMs });
                 said.textContent =
                     `Certified: no number of this answer is off by more than ${
-                        tell(bound, 2)
+                        numberText(bound, 2)
                     } ${app.store.now.view.unit}. `
                     + `${iterations} multiplications by the form factors, ${
-                        tell(answer.solveMs ?? performance.now() - start, 2)
+                        numberText(answer.solveMs ?? performance.now() - start, 2)
                     } ms. The picture rounds to 11 bits.`;
             }, (reason: unknown) => {
                 if (mine.signal.aborted) return;

@@ -2,7 +2,7 @@
 // inside an edge of a larger element has the value there. Creases stand in the normals, which the daemon makes; so
 // light does not bleed around an edge or into another material.
 import type { SceneMesh } from "./glb.ts";
-import { tieHanging } from "./hanging.ts";
+import { tieTJunctions } from "./t_junctions.ts";
 
 export interface Nodes {
     count: number;
@@ -57,7 +57,7 @@ export function findNodes(mesh: SceneMesh): Nodes {
     for (let i = 0; i < count; i++) first[i + 1] += first[i];
     const at = first.slice(0, count), elements = new Uint32Array(vertices);
     for (let v = 0; v < vertices; v++) elements[at[nodeOf[v]]++] = mesh.elementOf[v];
-    return tieHanging(mesh, { count, nodeOf, first, elements, weights: null, inner: new Map() });
+    return tieTJunctions(mesh, { count, nodeOf, first, elements, weights: null, inner: new Map() });
 }
 
 function isEqual(bits: Int32Array, a: number, b: number): boolean {

@@ -2,7 +2,7 @@
 import { Vector2 } from "three";
 import { changeColour } from "./changes.ts";
 import { toHex } from "../base/colour.ts";
-import { tell } from "../base/numbers.ts";
+import { numberText } from "../base/numbers.ts";
 import { paletteBytes } from "./palettes.ts";
 import { placeOf, ticksOf, type Axis } from "./scale.ts";
 import type { Stage } from "./stage.ts";
@@ -75,7 +75,7 @@ export function drawLegend(canvas: HTMLCanvasElement, legend: Legend): void {
     context.textAlign = "center";
     let free = -Infinity;
     for (const value of ticksOf(legend, 5)) {
-        const x = left + unit + ramp * placeOf(value, legend), text = tell(value),
+        const x = left + unit + ramp * placeOf(value, legend), text = numberText(value),
             half = context.measureText(text).width / 2;
         context.fillRect(x - Math.max(1, unit / 16), top + unit * 2.4, Math.max(2, unit / 8), unit * 0.3);
         // A number that would touch the one before it is left out.

@@ -14,7 +14,7 @@ import { makeUniforms, nodesMaterial, sceneMaterial, type Uniforms } from "./mat
 import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor,
     whiteTexture } from "./textures.ts";
 
-export interface Look {
+export interface Display {
     picture: "light" | "false";
     smooth: boolean;
     tone: Tone;
@@ -62,7 +62,7 @@ export class Stage {
     private images: Texture[] = [];
     private paletteName: Palette | null = null;
     private wanted = false;
-    private look: Look | null = null;
+    private display: Display | null = null;
     private sunlight: Sunlight | null = null;
     private restTimer = 0;
     private isHeld = false;
@@ -172,7 +172,7 @@ export class Stage {
             this.images = textures;
             this.hasImages = true;
             this.nodesAreOld = true;
-            if (this.look !== null) this.setLook(this.look);
+            if (this.display !== null) this.setDisplay(this.display);
         }, () => undefined);
         return materials;
     }
@@ -205,25 +205,26 @@ export class Stage {
         this.sunlight.set(new Vector3(...sun.direction), sun.light);
     }
 
-    setLook(look: Look): void {
+    setDisplay(display: Display): void {
         const u = this.uniforms;
-        this.look = look;
-        u.picture.value = look.picture === "false" ? 1 : 0;
-        u.is_smooth.value = look.smooth && this.canSmooth;
-        u.tone.value = TONES[look.tone];
-        u.exposure.value = look.exposure;
-        (u.range.value as Vector2).set(look.range[0], Math.max(look.range[1], look.range[0] + 1e-12));
-        u.is_log.value = look.log && look.range[0] > 0;
-        u.iso_lines.value = look.isoLines;
-        u.threshold.value = look.threshold ?? -1;
-        u.is_marked.value = look.marked;
-        const isTextured = look.textured && look.picture === "light" && look.compare !== "difference" && this.hasImages;
+        this.display = display;
+        u.picture.value = display.picture === "false" ? 1 : 0;
+        u.is_smooth.value = display.smooth && this.canSmooth;
+        u.tone.value = TONES[display.tone];
+        u.exposure.value = display.exposure;
+        (u.range.value as Vector2).set(display.range[0], Math.max(display.range[1], display.range[0] + 1e-12));
+        u.is_log.value = display.log && display.range[0] > 0;
+        u.iso_lines.value = display.isoLines;
+        u.threshold.value = display.threshold ?? -1;
+        u.is_marked.value = display.marked;
+        const isTextured = display.textured && display.picture === "light" && display.compare !== "difference"
+            && this.hasImages;
         if (isTextured !== u.is_textured.value) this.nodesAreOld = true;
         u.is_textured.value = isTextured;
-        u.compare.value = look.compare === "split" ? 1 : look.compare === "difference" ? 2 : 0;
-        if (this.paletteName !== look.palette) {
-            this.paletteName = look.palette;
-            u.palette.value = paletteTexture(look.palette);
+        u.compare.value = display.compare === "split" ? 1 : display.compare === "difference" ? 2 : 0;
+        if (this.paletteName !== display.palette) {
+            this.paletteName = display.palette;
+            u.palette.value = paletteTexture(display.palette);
         }
         this.placeSplit();
         this.invalidate();
@@ -356,7 +357,7 @@ export class Stage {
     }
 
     private placeSplit(): void {
-        this.uniforms.split.value = (this.look?.split ?? 0) * this.renderer.domElement.width;
+        this.uniforms.split.value = (this.display?.split ?? 0) * this.renderer.domElement.width;
     }
 
     private lastTime = 0;

@@ -2,7 +2,7 @@
 // whatever the number of elements. Least, largest and uniformity are of the luminance of each element, which the
 // picture has.
 import { button, fill, make } from "../../base/dom.ts";
-import { tell } from "../../base/numbers.ts";
+import { numberText } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
@@ -112,7 +112,7 @@ export class Groups {
         const ordered = lines.map((line) => {
             const row = rows.get(line.name) ?? this.makeRow(line.name);
             [line.mean, line.min, line.max].forEach((value, i) => {
-                row.cells[i + 1].textContent = tell(value);
+                row.cells[i + 1].textContent = numberText(value);
             });
             row.cells[4].textContent = Number.isFinite(line.uniformity) ? line.uniformity.toFixed(2) : "–";
             row.cells[0].querySelector("button")?.setAttribute("aria-pressed", String(line.name === view.judged));

@@ -1,7 +1,7 @@
 // How the values shown spread over the area. Dragging over a part of it makes that part the range of the palette.
 import uPlot from "uplot";
 import { make } from "../../base/dom.ts";
-import { percent, tell } from "../../base/numbers.ts";
+import { percent, numberText } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
 import { areaByValue, ticksOf, valueAt, type Axis } from "../../picture/scale.ts";
 
@@ -74,11 +74,11 @@ export class Histogram {
         const at = Array.from(areas, (_, k) => (k + 0.5) / BINS);
         const largest = areas.indexOf(Math.max(...areas));
         this.place.setAttribute("aria-label",
-            `Histogram of values from ${tell(axis.low)} to ${tell(axis.high)} ${view.unit}; most area, ${
+            `Histogram of values from ${numberText(axis.low)} to ${numberText(axis.high)} ${view.unit}; most area, ${
                 percent(areas[largest] / total)
             }, `
-                + `has ${tell(valueAt(largest / BINS, axis))} to ${
-                    tell(valueAt((largest + 1) / BINS, axis))
+                + `has ${numberText(valueAt(largest / BINS, axis))} to ${
+                    numberText(valueAt((largest + 1) / BINS, axis))
                 } ${view.unit}.`);
         this.plot ??= this.makePlot();
         this.plot.setData([at, Array.from(areas, (a) => (100 * a) / total)]);
@@ -105,8 +105,8 @@ export class Histogram {
                 paths: uPlot.paths.bars?.({ size: [0.9], align: 0 }) ?? (() => null) }],
             axes: [
                 { ...line, size: 28, splits: () => ticksOf(this.axis, 5).map(toPlace),
-                    values: (_, places) => places.map((place) => tell(valueAt(place, this.axis))) },
-                { ...line, size: 50, values: (_, shares) => shares.map((share) => `${tell(share, 2)} %`) },
+                    values: (_, places) => places.map((place) => numberText(valueAt(place, this.axis))) },
+                { ...line, size: 50, values: (_, shares) => shares.map((share) => `${numberText(share, 2)} %`) },
             ],
             hooks: {
                 setSelect: [(plot) => {

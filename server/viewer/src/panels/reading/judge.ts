@@ -1,7 +1,7 @@
 // Is there light enough, and evenly? The share of the area that reaches a value, mean, least value and uniformity
 // beside the targets of a task, in words and in colour. The shader paints the elements.
 import { choice, fill, make, tick } from "../../base/dom.ts";
-import { percent, tell } from "../../base/numbers.ts";
+import { percent, numberText } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
 import { figuresOf } from "../../picture/scale.ts";
 import type { View } from "../../state/state.ts";
@@ -97,17 +97,17 @@ export class Judge {
         const isIrradiance = view.picture === "false" && view.quantity === "irradiance";
         fill(this.verdict,
             make("p", { class: "reached" },
-                `${percent(figures.reached)} of ${view.judged ?? "all"} (${tell(figures.area * figures.reached)} of ${
-                    tell(figures.area)
-                } m²) has at least ${tell(view.threshold)} ${view.unit}.`),
+                `${percent(figures.reached)} of ${view.judged ?? "all"} (${
+                    numberText(figures.area * figures.reached)
+                } of ${numberText(figures.area)} m²) has at least ${numberText(view.threshold)} ${view.unit}.`),
             make("table", {},
                 make("tbody", {},
-                    line("Mean Em", `${tell(figures.mean)} ${view.unit}`, `≥ ${tell(view.threshold)}`,
+                    line("Mean Em", `${numberText(figures.mean)} ${view.unit}`, `≥ ${numberText(view.threshold)}`,
                         figures.mean >= view.threshold),
                     line("U0 = min/mean", Number.isFinite(figures.uniformity) ? figures.uniformity.toFixed(2) : "–",
                         `≥ ${view.uniformity.toFixed(2)}`, figures.uniformity >= view.uniformity),
                     make("tr", {}, make("th", { scope: "row" }, "Min"),
-                        make("td", {}, `${tell(figures.min)} ${view.unit}`), make("td", {}), make("td", {})))),
+                        make("td", {}, `${numberText(figures.min)} ${view.unit}`), make("td", {}), make("td", {})))),
             !isIrradiance
                 && make("p", { class: "bad" }, "The picture does not show irradiance, which such targets are about."),
             view.unit !== "lx"

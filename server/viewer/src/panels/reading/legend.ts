@@ -1,6 +1,6 @@
 // The legend of false colour, on the picture: the palette with round numbers, or with the values of the iso-lines.
 import { fill, make } from "../../base/dom.ts";
-import { tell } from "../../base/numbers.ts";
+import { numberText } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
 import { paletteBytes } from "../../picture/palettes.ts";
 import { placeOf, ticksOf, valueAt } from "../../picture/scale.ts";
@@ -39,10 +39,12 @@ export function addLegend(app: App): void {
             : ticksOf(axis, Math.min(6, rows - 1));
         head.textContent = text;
         legend.setAttribute("aria-label",
-            `False colour: ${text}, from ${tell(axis.low)} to ${tell(axis.high)}${axis.log ? ", logarithmic" : ""}`
-                + (view.isoLines > 0 ? `; iso-lines at ${values.map((v) => tell(v)).join(", ")}` : ""));
+            `False colour: ${text}, from ${numberText(axis.low)} to ${numberText(axis.high)}${
+                axis.log ? ", logarithmic" : ""
+            }`
+                + (view.isoLines > 0 ? `; iso-lines at ${values.map((v) => numberText(v)).join(", ")}` : ""));
         fill(ticks, ...values.map((value) => {
-            const tick = make("span", {}, tell(value));
+            const tick = make("span", {}, numberText(value));
             tick.style.bottom = `${100 * placeOf(value, axis)}%`;
             return tick;
         }));

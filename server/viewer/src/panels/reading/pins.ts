@@ -1,7 +1,7 @@
 // The elements that are pinned, and the one under the pointer, with all that is known of them. What the picture shows
 // follows each answer at once; radiosity and irradiance come exactly, by JSON of these elements alone.
 import { button, fill, make } from "../../base/dom.ts";
-import { count, tell } from "../../base/numbers.ts";
+import { count, numberText } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
@@ -123,7 +123,7 @@ export class Pins {
         const group = mesh.groups[mesh.groupOf[element]]?.name ?? "";
         (card.querySelector("h2") as HTMLElement).textContent = `${
             isHovered ? "Under the pointer: " : ""
-        }${group}, element ${count(element)}, ${tell(mesh.area[element])} m²`;
+        }${group}, element ${count(element)}, ${numberText(mesh.area[element])} m²`;
         const exact = this.exact.get(element), emission = emissionOf(now.lighting, channels)[group] ?? 0;
         const E = (emitters?.length ?? 0) > 0
             ? null
@@ -150,7 +150,7 @@ export class Pins {
                         ...(channels > 1
                             ? [...(values ?? new Array<number>(channels).fill(NaN)), values?.reduce((sum, v, c) =>
                                 sum + v * weights[c], 0) ?? NaN]
-                            : [values?.[0] ?? NaN]).map((value) => make("td", {}, tell(value))))
+                            : [values?.[0] ?? NaN]).map((value) => make("td", {}, numberText(value))))
                 )));
     }
 }

@@ -1,6 +1,6 @@
 // Points at elements: the mouse hovers and clicks, a finger taps, and keys move a cross over the picture.
 import { button, make } from "../../base/dom.ts";
-import { clamp, tell } from "../../base/numbers.ts";
+import { clamp, numberText } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
 import { pinsAfter } from "../../state/shares.ts";
 
@@ -50,7 +50,7 @@ export class Pointer {
         window.addEventListener("pointerup", (event) => this.release(event));
         // Before the camera, which listens to the canvas itself.
         this.frame.addEventListener("keydown", (event) => this.press(event), true);
-        app.on("field", () => this.tell());
+        app.on("field", () => this.showNumber());
         // After the camera moved by itself or by keys, another element is under the cross or the pointer.
         app.store.listen((now, before) => {
             if (now.view.camera !== before.view.camera && this.place !== null) this.moveTo(...this.place);
@@ -141,11 +141,11 @@ export class Pointer {
         this.element = scene.picker.at((2 * place[0]) / this.canvas.clientWidth - 1,
             1 - (2 * place[1]) / this.canvas.clientHeight, cameras.camera);
         this.app.hover(this.isReading() || this.isByKeys ? this.element : null);
-        this.tell();
+        this.showNumber();
     }
 
     /** The number beside the pointer: what the picture shows there. */
-    private tell(): void {
+    private showNumber(): void {
         const { app: { scene, fields: [field], store: { now: { view } } }, place, element } = this;
         if (place === null) return;
         this.cross.style.left = `${place[0]}px`;
@@ -155,7 +155,7 @@ export class Pointer {
             if (this.isByKeys) this.told.textContent = "nothing";
             return;
         }
-        const text = `${tell(field.values[element])} ${view.unit} · ${
+        const text = `${numberText(field.values[element])} ${view.unit} · ${
             scene.mesh.groups[scene.mesh.groupOf[element]]?.name ?? ""
         }`;
         this.tip.textContent = text;

@@ -1,6 +1,6 @@
 // Which lamp lights this point: one adjoint request for an element, then every lighting is read off it without another.
 import { fill, make } from "../../base/dom.ts";
-import { count, percent, tell } from "../../base/numbers.ts";
+import { count, percent, numberText } from "../../base/numbers.ts";
 import type { App } from "../../app/app.ts";
 import type { OpenScene } from "../../app/opening.ts";
 import { Newest } from "../../daemon/newest.ts";
@@ -104,7 +104,7 @@ export class Shares {
         if (parts.length > LINES_MOST) listed.push({ name: `${parts.length - LINES_MOST} others`, value: rest });
         fill(this.body,
             make("p", {},
-                `${group}, element ${count(asked.element)}: ${asked.quantity} ${tell(total)} ${now.view.unit}`),
+                `${group}, element ${count(asked.element)}: ${asked.quantity} ${numberText(total)} ${now.view.unit}`),
             parts.length === 0 && make("p", { class: "hint" }, "Nothing shines."),
             make("ol", {}, ...listed.map(({ name, value }) => {
                 const share = total > 0 ? value / total : 0;
@@ -112,7 +112,8 @@ export class Shares {
                 bar.style.inlineSize = `${100 * Math.min(1, Math.max(0, share))}%`;
                 return make("li", { "data-part": name },
                     make("span", { class: "row" }, make("span", { class: "grow" }, name),
-                        make("span", { class: "figures" }, `${percent(share)} · ${tell(value)} ${now.view.unit}`)),
+                        make("span", { class: "figures" },
+                            `${percent(share)} · ${numberText(value)} ${now.view.unit}`)),
                     make("span", { class: "track", "aria-hidden": "true" }, bar));
             })));
     }

@@ -1,6 +1,6 @@
-// Hanging nodes: where elements of different sizes meet, the corner of a small one stands inside an edge of a large
-// one. Along that edge the large one is drawn linear; so the node has that value, or the picture has steps and cracks
-// there.
+// T-junctions, or hanging nodes: where elements of different sizes meet, the corner of a small one stands inside an
+// edge of a large one. Along that edge the large one is drawn linear; so the node has that value, or the picture has
+// steps and cracks there.
 import type { SceneMesh } from "./glb.ts";
 import type { Nodes } from "./nodes.ts";
 
@@ -24,7 +24,7 @@ interface Ties {
 
 /** Gives hanging nodes the elements of their edge's ends, with weights. O(vertices), where edges meet few parts of
  * others. */
-export function tieHanging(mesh: SceneMesh, nodes: Nodes): Nodes {
+export function tieTJunctions(mesh: SceneMesh, nodes: Nodes): Nodes {
     const edges = loneEdges(mesh, nodes);
     const ties = findTies(mesh, nodes, edges);
     return ties.node.length === 0 ? nodes : withWeights(nodes, ties);

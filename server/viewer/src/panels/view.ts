@@ -1,6 +1,6 @@
 // How the picture is drawn: tone, exposure, false colour, cameras. Nothing here costs a request but the quantity.
 import { button, choice, fill, make, tick } from "../base/dom.ts";
-import { tell } from "../base/numbers.ts";
+import { numberText } from "../base/numbers.ts";
 import type { App } from "../app/app.ts";
 import type { Description } from "../daemon/api.ts";
 import { placeOf } from "../picture/cameras.ts";
@@ -13,7 +13,7 @@ const QUANTITIES = [["radiosity", "Radiosity B"], ["irradiance", "Irradiance H"]
 
 type Camera = NonNullable<Description["cameras"]>[number];
 
-export function lookPanel(app: App): Panel {
+export function viewPanel(app: App): Panel {
     const change = (to: Partial<View>, tag: string | null = null): void => {
         const { now } = app.store;
         app.store.change({ ...now, view: { ...now.view, ...to } }, tag);
@@ -79,7 +79,7 @@ export function lookPanel(app: App): Panel {
     app.on("scene", update);
     app.on("field", () => {
         least.placeholder = "0";
-        most.placeholder = tell(app.exposure.spread.high).replaceAll(",", "");
+        most.placeholder = numberText(app.exposure.spread.high).replaceAll(",", "");
     });
     app.store.listen((now, before) => {
         // An exposure that was left to the page is found from the next answer.
@@ -88,7 +88,7 @@ export function lookPanel(app: App): Panel {
     });
     update();
     return {
-        id: "look",
+        id: "view",
         title: "View",
         element: make("div", {}, fields.picture, light, colour, smooth, textured, fields.unit, fields.walk,
             button("Fit (F)", "Show the whole scene", () => app.cameras.fit(true)), keptViews(app)),

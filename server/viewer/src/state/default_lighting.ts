@@ -5,7 +5,7 @@ import type { SceneMesh } from "../picture/glb.ts";
 import { firstState, type GroupLight, type Lighting } from "./state.ts";
 
 /** Lights as the scene has them: each group that emits, with its power and colour. */
-export function lightingOf(mesh: SceneMesh, description: Description): Lighting {
+export function defaultLightingOf(mesh: SceneMesh, description: Description): Lighting {
     const groups: { [name: string]: GroupLight } = {};
     for (const group of mesh.groups) if (group.emission !== null) groups[group.name] = lightOf(group.emission);
     const isDark = Object.keys(groups).length === 0 && description.sky === null
