@@ -32,7 +32,7 @@ test("narrow elements have light between that of their corners, and hide what is
     const daemon = await Daemon.start([inFolder("walls.h5")]);
     const page = await openPage(daemon.address);
     const found = await page.evaluate(() => {
-        const { stage, cameras, scene: { mesh } } = window.lambert, gl = stage.renderer.getContext();
+        const { stage, cameras, now: { mesh } } = window.lambert.scene, gl = stage.renderer.getContext();
         // A quarter or half, in no order that the strips' pixels could have; 0 behind.
         const bits = new Uint16Array(mesh.elements), isWall = mesh.groups.map((group) => group.name === "wall");
         let seed = 1;

@@ -34,7 +34,7 @@ async function openOdd() {
     const page = await openPage(daemon.address);
     if (await page.evaluate(() => window.lambert.store.now.scene) !== SCENE) {
         await page.locator("header select").selectOption(SCENE);
-        await page.waitForFunction((name) => window.lambert.store.now.scene === name && window.lambert.fields[0] !== null, SCENE);
+        await page.waitForFunction((name) => window.lambert.store.now.scene === name && window.lambert.scene.fields[0] !== null, SCENE);
         await settled(page);
     }
     await openTab(page, "Export");
@@ -59,7 +59,7 @@ test("the command and the program give the numbers shown", async () => {
         writeFileSync(inFolder("asks.py"), program);
         assert.deepEqual(JSON.parse((await run("sh", ["-c", command])).stdout)[quantity], own[quantity]);
         assert.deepEqual(JSON.parse((await run("python3", [inFolder("asks.py")])).stdout), own[quantity]);
-        const shown = await page.evaluate(() => [0, 7, 100].map((element) => window.lambert.fields[0].at(element)));
+        const shown = await page.evaluate(() => [0, 7, 100].map((element) => window.lambert.scene.fields[0].at(element)));
         [0, 7, 100].forEach((element, k) => shown[k].forEach((v, c) => assert.ok(Math.abs(v - own[quantity][c][element]) <= 2 ** -11 * v, `${v}`)));
     }
     await page.getByRole("button", { name: "Copy" }).first().click();
@@ -90,7 +90,7 @@ test("CSV and NPY are the daemon's numbers in single precision", async () => {
         assert.deepEqual(values.map((v) => Math.fround(Number(v))), own.map((channel) => Math.fround(channel[i])));
     });
     assert.ok(lamps > 0);
-    const whole = await page.evaluate(() => window.lambert.scene.mesh.groups.reduce((sum, group) => sum + group.area, 0));
+    const whole = await page.evaluate(() => window.lambert.scene.now.mesh.groups.reduce((sum, group) => sum + group.area, 0));
     assert.ok(Math.abs(area - whole) < 1e-5 * whole);
     const npy = await saved(page, "Save NPY");
     const head = 10 + npy.bytes.readUInt16LE(8), text = npy.bytes.toString("latin1", 10, head);
@@ -105,12 +105,12 @@ test("a picture of any size, in parts, with a legend", async () => {
     const page = await openOdd();
     await change(page, "view", { smooth: false, tone: "linear", exposure: -5 });
     await settled(page);
-    const before = await page.evaluate(() => [window.lambert.stage.canvas.width, window.lambert.stage.canvas.height]);
+    const before = await page.evaluate(() => [window.lambert.scene.stage.canvas.width, window.lambert.scene.stage.canvas.height]);
     await page.getByLabel("Width in pixels").fill("3000");
     await page.getByLabel("Height in pixels").fill("2200");
     const first = await saved(page, "Save PNG");
     assert.deepEqual([first.bytes.readUInt32BE(16), first.bytes.readUInt32BE(20)], [3000, 2200]);
-    assert.deepEqual(await page.evaluate(() => [window.lambert.stage.canvas.width, window.lambert.stage.canvas.height]), before);
+    assert.deepEqual(await page.evaluate(() => [window.lambert.scene.stage.canvas.width, window.lambert.scene.stage.canvas.height]), before);
     const places = [[0.5, 0.9], [0.3, 0.4], [0.7, 0.5], [0.6, 0.93]];
     const read = (bytes, at) => page.evaluate(async ([text, points]) => {
         const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))]));
@@ -119,7 +119,7 @@ test("a picture of any size, in parts, with a legend", async () => {
         return points.map(([x, y]) => [...context.getImageData(Math.floor(x * bitmap.width), Math.floor(y * bitmap.height), 1, 1).data.slice(0, 3)]);
     }, [bytes.toString("base64"), at]);
     const elements = await page.evaluate((points) => {
-        const { scene, stage, cameras: { camera } } = window.lambert;
+        const { now: scene, stage, cameras: { camera } } = window.lambert.scene;
         camera.aspect = 3000 / 2200;
         camera.updateProjectionMatrix();
         camera.updateMatrixWorld();
@@ -171,18 +171,18 @@ test("colours make a variant, which is opened, compared and deleted", async () =
     await said.getByText("is ready").waitFor();
     const row = page.getByRole("group", { name: "box@bleu-“é”" });
     await row.getByRole("button", { name: "Compare" }).click();
-    await page.waitForFunction(() => window.lambert.fields[1] !== null && window.lambert.isIdle);
+    await page.waitForFunction(() => window.lambert.scene.fields[1] !== null && window.lambert.ask.isIdle);
     const ask = async (scene) => (await fetch(`${own.address}/v1/scenes/${encodeURIComponent(scene)}/radiosity`, {
         method: "POST", headers: { "Content-Type": "application/json", Authorization: "Bearer writer" },
         body: JSON.stringify({ emission: { groups: await lampOf(page) } }),
     })).json();
     const [plain, varied] = [(await ask("box")).radiosity, (await ask("box@bleu-“é”")).radiosity];
-    const floor = await page.evaluate(() => window.lambert.scene.mesh.groups.find((g) => g.name === "floor").elements[3]);
-    const shown = await page.evaluate((i) => window.lambert.fields.map((field) => field.at(i)[0]), floor);
+    const floor = await page.evaluate(() => window.lambert.scene.now.mesh.groups.find((g) => g.name === "floor").elements[3]);
+    const shown = await page.evaluate((i) => window.lambert.scene.fields.map((field) => field.at(i)[0]), floor);
     [plain[0][floor], varied[0][floor]].forEach((v, k) => assert.ok(Math.abs(shown[k] - v) <= 2 ** -10 * v, `${shown[k]} for ${v}`));
     assert.ok(varied[0][floor] < 0.3 * plain[0][floor]);
     await row.getByRole("button", { name: "Open" }).click();
-    await page.waitForFunction(() => window.lambert.store.now.scene.includes("@") && window.lambert.fields[0] !== null);
+    await page.waitForFunction(() => window.lambert.store.now.scene.includes("@") && window.lambert.scene.fields[0] !== null);
     assert.equal(Number(await page.getByLabel("floor: red").inputValue()), 0.1);
     await page.getByLabel("Name of the variant").fill("other");
     await make(page, "0.2");
@@ -203,7 +203,7 @@ test("colours make a variant, which is opened, compared and deleted", async () =
 test("refusals of variants are told in words", async () => {
     const page = await openPage(daemon.address);
     await page.locator("header select").selectOption("box");
-    await page.waitForFunction(() => window.lambert.store.now.scene === "box" && window.lambert.fields[0] !== null);
+    await page.waitForFunction(() => window.lambert.store.now.scene === "box" && window.lambert.scene.fields[0] !== null);
     await openTab(page, "Materials");
     await make(page, "0.3");
     await page.getByText(/does not allow that: .*--max-variants/).waitFor();

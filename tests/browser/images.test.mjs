@@ -47,16 +47,16 @@ function withImage(name, ...options) {
 for (const name of ["two", "grey"]) test(`an image keeps its pixels within an element, ${name}`, async () => {
     const daemon = await Daemon.start([withImage(name)]), channels = name === "grey" ? 1 : 3;
     const page = await openPage(daemon.address);
-    await page.waitForFunction(() => window.lambert.stage.uniforms.is_textured.value);
+    await page.waitForFunction(() => window.lambert.scene.stage.uniforms.is_textured.value);
     await page.evaluate(() => {
-        const { store: s, cameras } = window.lambert;
+        const { store: s, scene: { cameras } } = window.lambert;
         s.change({ ...s.now, view: { ...s.now.view, smooth: false, tone: "linear", exposure: -2 } });
         cameras.place([2, 2.5, 1.5, 2, 0, -2], false);
     });
     await settled(page);
     // Points of the floor on both sides of the edge, within one element; y is up in the picture, and -z the store's y.
     const points = await page.evaluate((edge) => [-1, 1].map((side) => {
-        const { cameras: { camera }, scene } = window.lambert;
+        const { cameras: { camera }, now: scene } = window.lambert.scene;
         camera.updateMatrixWorld();
         const p = camera.position.clone().set(4 * edge + 0.08 * side, 0, -2.3).project(camera);
         return { x: (p.x + 1) / 2, y: (1 - p.y) / 2, element: scene.picker.at(p.x, p.y, camera) };
@@ -101,9 +101,9 @@ test("a variant keeps the images of groups that it does not change", async () =>
 
 test("an image under the sun that is drawn keeps its pixels, too", async () => {
     const daemon = await Daemon.start([withImage("two", "--sky", "tregenza")]), page = await openPage(daemon.address);
-    await page.waitForFunction(() => window.lambert.stage.uniforms.is_textured.value);
+    await page.waitForFunction(() => window.lambert.scene.stage.uniforms.is_textured.value);
     await page.evaluate(() => {
-        const { store: s, cameras } = window.lambert, { lighting, view } = s.now;
+        const { store: s, scene: { cameras } } = window.lambert, { lighting, view } = s.now;
         const sky = { ...lighting.sky, model: "given", direct: 700, diffuse: 100, latitude: 0, longitude: 0, zone: 0, day: 80, hour: 12, sun: "tile" };
         s.change({ ...s.now, lighting: { ...lighting, groups: {}, sky }, view: { ...view, smooth: false, tone: "linear", exposure: -8, sharpSun: true } });
         cameras.place([1.4, 2.5, 1.5, 1.4, 0, -0.5], false);
@@ -111,14 +111,14 @@ test("an image under the sun that is drawn keeps its pixels, too", async () => {
     await settled(page);
     // In front of the lamp's shadow, on both sides of the edge in the image.
     const { points, parts } = await page.evaluate((edge) => {
-        const app = window.lambert, { cameras: { camera }, scene } = app;
+        const { store: { now }, scene: { cameras: { camera }, now: scene, sky } } = window.lambert;
         camera.updateMatrixWorld();
         return {
             points: [-1, 1].map((side) => {
                 const p = camera.position.clone().set(4 * edge + 0.08 * side, 0, -0.5).project(camera);
                 return { x: (p.x + 1) / 2, y: (1 - p.y) / 2, element: scene.picker.at(p.x, p.y, camera) };
             }),
-            parts: app.sunOf(app.store.now.lighting, scene.description),
+            parts: sky.parts(now.lighting, scene.description),
         };
     }, EDGE / SIZE);
     const ask = async (sky, quantity, element) => (await daemon.json("/v1/scenes/two/radiosity", { emission: { sky }, select: { elements: [element] }, quantity }))[quantity].map((channel) => channel[0]);

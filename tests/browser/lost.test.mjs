@@ -7,7 +7,7 @@ const SKY = { model: "given", direct: 700, diffuse: 100, latitude: 20, longitude
 
 /** Each call that leaves an error behind is kept, with its number. */
 const watchCalls = (page) => page.evaluate(() => {
-    const gl = window.lambert.stage.renderer.getContext(), names = new Set();
+    const gl = window.lambert.scene.stage.renderer.getContext(), names = new Set();
     for (let of = gl; of !== Object.prototype; of = Object.getPrototypeOf(of))
         for (const name of Object.getOwnPropertyNames(of)) if (typeof Object.getOwnPropertyDescriptor(of, name).value === "function") names.add(name);
     window.wrong = [];
@@ -22,7 +22,7 @@ const watchCalls = (page) => page.evaluate(() => {
 });
 
 const lose = (page) => page.evaluate(async () => {
-    const { canvas, renderer } = window.lambert.stage, ext = renderer.getContext().getExtension("WEBGL_lose_context");
+    const { canvas, renderer } = window.lambert.scene.stage, ext = renderer.getContext().getExtension("WEBGL_lose_context");
     const told = (name) => new Promise((resolve) => canvas.addEventListener(name, resolve, { once: true })), lost = told("webglcontextlost");
     ext.loseContext();
     await lost;
@@ -35,7 +35,7 @@ const lose = (page) => page.evaluate(async () => {
 
 /** All that the picture has, drawn anew; the sun by its middle alone, however much of it was drawn. */
 const pixels = (page) => page.evaluate(() => {
-    const { stage, stage: { canvas } } = window.lambert, gl = stage.renderer.getContext(), bytes = new Uint8Array(4 * canvas.width * canvas.height);
+    const { stage, stage: { canvas } } = window.lambert.scene, gl = stage.renderer.getContext(), bytes = new Uint8Array(4 * canvas.width * canvas.height);
     stage.sunlight?.begin();
     stage.invalidate();
     stage.draw();
@@ -59,10 +59,10 @@ test("after a lost graphics context the picture is the same, and no call fails",
         "a smaller window": () => page.setViewportSize({ width: 600, height: 400 }),
         "no drawn sun": () => set(page, { sharpSun: false }, {}),
         "another lighting": () => set(page, {}, { dim: 0.5 }),
-        "another scene": () => page.evaluate(() => window.lambert.open(window.lambert.store.now.scene === "patio" ? "cornell" : "patio", null)),
+        "another scene": () => page.evaluate(() => window.lambert.ask.open(window.lambert.store.now.scene === "patio" ? "cornell" : "patio", null)),
     };
     // Everything there is has been used before: what is lost is more than one picture takes.
-    await page.evaluate(() => window.lambert.open("patio", null));
+    await page.evaluate(() => window.lambert.ask.open("patio", null));
     await settled(page);
     await set(page, { sharpSun: true }, { sky: SKY });
     await settled(page);

@@ -13,7 +13,7 @@ before(async () => {
 });
 
 const linkOf = (state) => `#1.${Buffer.from(JSON.stringify(state)).toString("base64url")}`;
-const sceneNow = (page) => page.evaluate(() => [window.lambert.store.now.scene, window.lambert.scene.mesh.elements]);
+const sceneNow = (page) => page.evaluate(() => [window.lambert.store.now.scene, window.lambert.scene.now.mesh.elements]);
 const dim = (page, factor) => page.evaluate((f) => {
     const { store } = window.lambert, { now } = store;
     store.change({ ...now, lighting: { ...now.lighting, dim: now.lighting.dim * f } });
@@ -127,7 +127,7 @@ test("a store that is replaced is shown as it is now, and one that is gone is to
     };
     place(cornell);
     const own = await Daemon.start([`${inFolder("live.h5")}:live`, few]), page = await openPage(own.address);
-    await page.evaluate(() => window.lambert.open("live", null));
+    await page.evaluate(() => window.lambert.ask.open("live", null));
     await settled(page);
     const replace = async (store) => {
         place(store);
@@ -146,7 +146,7 @@ test("a store that is replaced is shown as it is now, and one that is gone is to
     // Another scene: its own lamps, and the whole of it is seen.
     await replace(patio);
     await dim(page, 0.5);
-    await page.waitForFunction(() => window.lambert.scene.mesh.groups.some((group) => group.name === "pillar"));
+    await page.waitForFunction(() => window.lambert.scene.now.mesh.groups.some((group) => group.name === "pillar"));
     await settled(page);
     assert.deepEqual(await sceneNow(page), ["live", (await own.json("/v1/scenes/live")).elements]);
     await page.getByRole("tab", { name: "Sky" }).waitFor();

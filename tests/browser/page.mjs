@@ -137,14 +137,14 @@ export async function openPage(address, { width = 1000, height = 600, hash = "",
 
 /** Waits until all that was asked for is shown and drawn. */
 export async function settled(page) {
-    await page.waitForFunction(() => window.lambert?.answers > 0 && window.lambert.opening.loading === null && window.lambert.isIdle);
+    await page.waitForFunction(() => window.lambert?.scene.answers > 0 && window.lambert.scene.loading === null && window.lambert.ask.isIdle);
     await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 
 /** The colours of one picture, drawn anew, at points given in shares of its width and height, each [r, g, b] of 255. */
 export function pixels(page, places) {
     return page.evaluate((all) => {
-        const { stage } = window.lambert, gl = stage.renderer.getContext(), bytes = new Uint8Array(4);
+        const { stage } = window.lambert.scene, gl = stage.renderer.getContext(), bytes = new Uint8Array(4);
         stage.draw();
         return all.map(([u, v]) => {
             gl.readPixels(Math.floor(u * gl.drawingBufferWidth), Math.floor((1 - v) * gl.drawingBufferHeight), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
@@ -160,7 +160,7 @@ export async function pixel(page, x, y) {
 /** The element under a point, found by the page's own picking. */
 export function elementAt(page, x, y) {
     return page.evaluate(([u, v]) => {
-        const { scene, cameras } = window.lambert;
+        const { now: scene, cameras } = window.lambert.scene;
         cameras.camera.updateMatrixWorld();
         return scene.picker.at(2 * u - 1, 1 - 2 * v, cameras.camera);
     }, [x, y]);

@@ -39,7 +39,7 @@ async function openReading({ scene = "yard", ...options } = {}) {
     const page = await openPage(daemon.address, options);
     await page.evaluate(() => {
         const { store } = window.lambert, { now } = store;
-        window.lambert.cameras.place([2, 7, -1, 2, 0, -2.2], false);
+        window.lambert.scene.cameras.place([2, 7, -1, 2, 0, -2.2], false);
         store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, model: "even", strength: 40 } } });
     });
     await settled(page);
@@ -53,14 +53,14 @@ const ask = async (emission, more, scene = "yard") => daemon.json(`/v1/scenes/${
 /** Nothing failed, and no request was refused. */
 async function isFine(page) {
     assert.deepEqual(page.faults, []);
-    assert.equal(await page.evaluate(() => window.lambert.recovery.problem), null);
+    assert.equal(await page.evaluate(() => window.lambert.tell.problem), null);
 }
 
 /** What shines, as the page says: by group, and of the sky's tiles. */
 const lightsOf = (page) => page.evaluate(() => {
-    const { store: { now: { lighting } }, scene, skyOf } = window.lambert;
+    const { store: { now: { lighting } }, scene: { now: scene, sky } } = window.lambert;
     const groups = Object.fromEntries(Object.entries(lighting.groups).map(([name, light]) => [name, light.colour.map((c) => c * light.power * lighting.dim)]));
-    return { groups, sky: skyOf(lighting, scene.description) };
+    return { groups, sky: sky.radiances(lighting, scene.description) };
 });
 
 /** [C] of one element. */
@@ -185,7 +185,7 @@ test("shares are those of each lamp and of the sky alone", async () => {
     await page.waitForTimeout(200);
     assert.equal(adjoints, 2);
     // A store that is opened anew is asked once, though its state comes before its picture.
-    await page.evaluate(async () => { const { store: s } = window.lambert; await window.lambert.open(s.now.scene, { ...s.now, pins: [s.now.pins[0] + 1] }); });
+    await page.evaluate(async () => { const { store: s } = window.lambert; await window.lambert.ask.open(s.now.scene, { ...s.now, pins: [s.now.pins[0] + 1] }); });
     await page.getByText(`element ${last + 1}: irradiance`).waitFor();
     await settled(page);
     await page.waitForTimeout(200);
@@ -217,7 +217,7 @@ test("groups, threshold and legend say what the answer says", async () => {
     await settled(page);
     const answer = (await ask(await lightsOf(page), { quantity: "irradiance" })).irradiance;
     const { groups, areas } = await page.evaluate(() => ({
-        areas: [...window.lambert.scene.mesh.area], groups: window.lambert.scene.mesh.groups.map((g) => ({ name: g.name, elements: [...g.elements] })),
+        areas: [...window.lambert.scene.now.mesh.area], groups: window.lambert.scene.now.mesh.groups.map((g) => ({ name: g.name, elements: [...g.elements] })),
     }));
     const H = answer[0].map((_, i) => luminance(answer.map((row) => row[i])));
     const figures = ({ elements }) => {
@@ -291,7 +291,7 @@ test("a histogram's part that is dragged over becomes the range", async () => {
     await page.mouse.move(box.x + box.width * 0.4, box.y + 40, { steps: 4 });
     await page.mouse.move(box.x + box.width * 0.6, box.y + 40, { steps: 4 });
     await page.mouse.up();
-    const { range, high } = await page.evaluate(() => ({ range: window.lambert.store.now.view.range, high: window.lambert.exposure.spread.high * 1.15 }));
+    const { range, high } = await page.evaluate(() => ({ range: window.lambert.store.now.view.range, high: window.lambert.scene.exposure.spread.high * 1.15 }));
     assert.ok(range !== null && Math.abs(range[0] - 0.2 * high) < 0.02 * high && Math.abs(range[1] - 0.6 * high) < 0.02 * high, `${range} of ${high}`);
     await page.getByLabel("High end of the palette").fill("77");
     await page.keyboard.press("Enter");
@@ -306,7 +306,7 @@ test("keys and fingers read too, and a link keeps the pins", async () => {
     const page = await openReading();
     await page.locator("main canvas").first().focus();
     await page.keyboard.press("r");
-    const eye = await page.evaluate(() => window.lambert.cameras.now);
+    const eye = await page.evaluate(() => window.lambert.scene.cameras.now);
     for (let i = 0; i < 4; i++) await page.keyboard.press("ArrowDown");
     await page.keyboard.press("Shift+ArrowLeft");
     await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
@@ -314,8 +314,8 @@ test("keys and fingers read too, and a link keeps the pins", async () => {
     await page.keyboard.press("Enter");
     const pins = await page.evaluate(() => window.lambert.store.now.pins);
     assert.equal(pins.length, 1);
-    assert.equal(pins[0], await page.evaluate(() => window.lambert.hovered));
-    assert.deepEqual(await page.evaluate(() => window.lambert.cameras.now), eye);
+    assert.equal(pins[0], await page.evaluate(() => window.lambert.scene.hovered));
+    assert.deepEqual(await page.evaluate(() => window.lambert.scene.cameras.now), eye);
     await page.keyboard.press("Escape");
     assert.ok(await page.locator(".cross").isHidden());
     await page.waitForTimeout(800);

@@ -210,7 +210,7 @@ const skyNow = (page) => page.evaluate(() => window.lambert.store.now.lighting.s
 /** A page that shows a scene as the scene comes. */
 async function openScene(name, options) {
     const page = await openPage(daemon.address, options);
-    await page.evaluate((to) => window.lambert.open(to, null), name);
+    await page.evaluate((to) => window.lambert.ask.open(to, null), name);
     await settled(page);
     return page;
 }
@@ -254,10 +254,10 @@ test("a link restores a sky, and one that is spoilt is held within its range", a
     await settled(page);
     await page.waitForFunction(() => location.hash.length > 3);
     await page.waitForTimeout(500);
-    const [hash, wanted, sky] = await page.evaluate(() => [location.hash, window.lambert.wanted(), window.lambert.store.now.lighting.sky]);
+    const [hash, wanted, sky] = await page.evaluate(() => [location.hash, window.lambert.ask.wanted(), window.lambert.store.now.lighting.sky]);
     const other = await openPage(daemon.address, { hash });
     assert.deepEqual(await skyNow(other), sky);
-    assert.deepEqual(await other.evaluate(() => window.lambert.wanted()), wanted);
+    assert.deepEqual(await other.evaluate(() => window.lambert.ask.wanted()), wanted);
     assert.equal(wanted.emission.sky.length, 145);
     // What strangers put into a link is held within its range.
     const spoilt = (to) => `#1.${Buffer.from(JSON.stringify({ scene: "yard", lighting: { sky: to } })).toString("base64url")}`;
@@ -274,11 +274,11 @@ test("a store of the tiles of a sky takes a sky, or their weights", async () => 
     await page.getByRole("tab", { name: "Sky" }).click();
     await skyTo(page, { model: "clear", tinted: true, hour: 10 });
     await settled(page);
-    const { emission, scale } = await page.evaluate(() => window.lambert.wanted());
+    const { emission, scale } = await page.evaluate(() => window.lambert.ask.wanted());
     assert.deepEqual(Object.keys(emission), ["sky"]);
     assert.ok(emission.sky.length === 60 && emission.sky.every((v) => v.length === 3));
     const shownNow = () => page.evaluate(() => {
-        const [field] = window.lambert.fields;
+        const [field] = window.lambert.scene.fields;
         return [0, 1, 2].flatMap((c) => Array.from({ length: field.elements }, (_, i) => field.at(i)[c]));
     });
     // Answers come in half precision of the emission scaled to at most 1: 11 digits, and steps of 2^-24 below 2^-14.
@@ -349,7 +349,7 @@ test("a weather file that is picked stays on the page", async () => {
     await settled(page);
     await page.waitForTimeout(500);
     const other = await openPage(daemon.address, { hash: await page.evaluate(() => location.hash), width: 360, height: 740 });
-    const [one, two] = await Promise.all([page, other].map((p) => p.evaluate(() => ({ scale: window.lambert.fields[0].scale, bits: [...window.lambert.fields[0].bits] }))));
+    const [one, two] = await Promise.all([page, other].map((p) => p.evaluate(() => ({ scale: window.lambert.scene.fields[0].scale, bits: [...window.lambert.scene.fields[0].bits] }))));
     assert.ok(Math.max(...one.bits) > 0);
     assert.deepEqual(two, one);
     assert.equal((await skyNow(other)).moment.hour, 10.25);
@@ -358,7 +358,7 @@ test("a weather file that is picked stays on the page", async () => {
     await other.getByText("The link holds the weather of 21 June, 10:15, alone.").waitFor();
     await other.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("good.wea"));
     await settled(other);
-    assert.ok(Math.max(...await other.evaluate(() => [...window.lambert.fields[0].bits])) > 0);
+    assert.ok(Math.max(...await other.evaluate(() => [...window.lambert.scene.fields[0].bits])) > 0);
     assert.deepEqual(other.faults, []);
     await other.context().close();
     assert.deepEqual(await violations(page), []);
@@ -375,7 +375,7 @@ test("a lamp on its way is the mixture of its neighbouring positions", async () 
     await settled(page);
     assert.deepEqual(await page.evaluate(() => window.lambert.store.now.lighting.emitters), { 1: 0.75, 2: 0.25 });
     const values = await page.evaluate(() => {
-        const [field] = window.lambert.fields;
+        const [field] = window.lambert.scene.fields;
         return [0, 1, 2].flatMap((c) => Array.from({ length: field.elements }, (_, i) => field.at(i)[c]));
     });
     const answers = await daemon.json("/v1/scenes/way/radiosity", { emissions: [{ emitters: [0, 1, 0, 0, 0] }, { emitters: [0, 0, 1, 0, 0] }] });

@@ -16,34 +16,34 @@ const middle = (values) => values.sort((a, b) => a - b)[values.length >> 1];
 /** Changes the dimmer at each turn of the page's loop; resolves to figures by second. */
 function drag(page, isDrawn) {
     return page.evaluate(async ([milliseconds, draws]) => {
-        const app = window.lambert, { draw } = app.stage, start = performance.now(), first = app.answers;
+        const { store, scene, scene: { stage, stage: { draw } } } = window.lambert, start = performance.now(), first = scene.answers;
         let drawing = 0, frames = 0;
         // A page that is not seen is not painted either: without a graphics card that takes both cores from the daemon.
         document.body.hidden = !draws;
-        app.stage.draw = (...size) => {
+        stage.draw = (...size) => {
             if (!draws) return;
             const from = performance.now();
-            draw.apply(app.stage, size);
-            app.stage.renderer.getContext().finish();
+            draw.apply(stage, size);
+            stage.renderer.getContext().finish();
             drawing += performance.now() - from;
             frames += 1;
         };
         for (let i = 0; performance.now() - start < milliseconds; i++) {
-            const { now } = app.store;
-            app.store.change({ ...now, lighting: { ...now.lighting, dim: 0.3 + 0.001 * (i % 700) } }, "drag");
+            const { now } = store;
+            store.change({ ...now, lighting: { ...now.lighting, dim: 0.3 + 0.001 * (i % 700) } }, "drag");
             await new Promise((resolve) => { setTimeout(resolve, 4); });
         }
-        app.stage.draw = draw;
+        stage.draw = draw;
         document.body.hidden = false;
         const seconds = (performance.now() - start) / 1000;
-        return { answers: (app.answers - first) / seconds, apart: (app.answers - first) / (seconds - drawing / 1000), frames: frames / seconds };
+        return { answers: (scene.answers - first) / seconds, apart: (scene.answers - first) / (seconds - drawing / 1000), frames: frames / seconds };
     }, [DRAG_MS, isDrawn]);
 }
 
 /** Medians of the script's time, ms, and counts, of pictures that are drawn one by one; the time until they are done is left out. */
 function work(page, pictures) {
     return page.evaluate(async (count) => {
-        const app = window.lambert, { stage, cameras } = app, gl = stage.renderer.getContext(), counted = { calls: 0, bytes: 0 };
+        const { store, scene, scene: { stage, cameras }, ask } = window.lambert, gl = stage.renderer.getContext(), counted = { calls: 0, bytes: 0 };
         for (const name of ["drawElements", "drawArrays"]) {
             const own = gl[name];
             gl[name] = (...args) => { counted.calls += 1; own.apply(gl, args); };
@@ -63,11 +63,11 @@ function work(page, pictures) {
             return spent;
         };
         picture();
-        const { take } = app;
+        const { show } = scene;
         let taken = 0;
-        app.take = (...args) => {
+        scene.show = (...args) => {
             const from = performance.now();
-            take.apply(app, args);
+            show.apply(scene, args);
             taken = performance.now() - from;
         };
         for (let i = 0; i < count; i++) {
@@ -76,14 +76,14 @@ function work(page, pictures) {
             cameras.camera.updateMatrixWorld();
             figures.move.push(picture());
             counts.move = { ...counted };
-            const { now } = app.store, { answers } = app;
-            app.store.change({ ...now, lighting: { ...now.lighting, dim: 0.3 + 0.01 * (i % 50) } }, "drag");
-            while (app.answers === answers || !app.isIdle) await new Promise((resolve) => { setTimeout(resolve, 5); });
+            const { now } = store, { answers } = scene;
+            store.change({ ...now, lighting: { ...now.lighting, dim: 0.3 + 0.01 * (i % 50) } }, "drag");
+            while (scene.answers === answers || !ask.isIdle) await new Promise((resolve) => { setTimeout(resolve, 5); });
             Object.assign(counted, { calls: 0, bytes: 0 });
             figures.answer.push(picture() + taken);
             counts.answer = { ...counted };
         }
-        app.take = take;
+        scene.show = show;
         stage.draw = draw;
         return { move: middle(figures.move), answer: middle(figures.answer), counts };
     }, pictures);
@@ -92,7 +92,7 @@ function work(page, pictures) {
 /** Milliseconds a picture from another place and with other values, by the card alone; pictures a second as they are shown. */
 function cardWork(page, pictures) {
     return page.evaluate(async (count) => {
-        const { stage, cameras, asking } = window.lambert, gl = stage.renderer.getContext(), pixel = new Uint8Array(4);
+        const { stage, cameras, fields } = window.lambert.scene, gl = stage.renderer.getContext(), pixel = new Uint8Array(4);
         const finish = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
         const pause = () => new Promise((resolve) => { setTimeout(resolve, 400); });
         const each = async (change) => {
@@ -110,7 +110,7 @@ function cardWork(page, pictures) {
             void cameras.controls.rotate(0.01, 0, false);
             cameras.controls.update(0.016);
         };
-        const move = await each(turn), answer = await each(() => { stage.setField(0, asking.fields[0]); });
+        const move = await each(turn), answer = await each(() => { stage.setField(0, fields[0]); });
         await pause();
         const start = performance.now(), { frames } = stage;
         while (performance.now() - start < 4000) {
@@ -128,7 +128,7 @@ test("speed", async () => {
         const daemon = await Daemon.start([store]);
         const memory = () => Number(/RssAnon:\s+(\d+)/.exec(readFileSync(`/proc/${daemon.process.pid}/status`, "utf8"))[1]) / 1024;
         const before = memory(), page = await openPage(daemon.address), firsts = [];
-        const { elements, channels } = await page.evaluate(() => window.lambert.scene.description);
+        const { elements, channels } = await page.evaluate(() => window.lambert.scene.now.description);
         for (let i = 0; i < 5; i++) {
             const start = performance.now();
             await page.goto(`${daemon.address}/?inspect&${i}`);

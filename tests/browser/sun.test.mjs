@@ -72,17 +72,17 @@ const weakCard = (page) => page.addInitScript(() => {
 
 /** Where points (east, north, up) are seen, in shares of the picture. */
 const seenAt = (page, up, points) => page.evaluate((all) => {
-    const { camera } = window.lambert.cameras;
+    const { camera } = window.lambert.scene.cameras;
     camera.updateMatrixWorld();
     return all.map((at) => camera.position.clone().set(...at).project(camera)).map((p) => [(p.x + 1) / 2, (1 - p.y) / 2]);
 }, points.map(AXES[up][1]));
 
 async function openFromAbove(up) {
     const page = await openPage(daemon.address, { ...SMALL, before: weakCard });
-    await page.evaluate((name) => window.lambert.open(name, null), up);
+    await page.evaluate((name) => window.lambert.ask.open(name, null), up);
     await settled(page);
     await page.evaluate((place) => {
-        const { cameras } = window.lambert;
+        const { cameras } = window.lambert.scene;
         cameras.place(place, false);
         cameras.advance(1);
     }, [[5, 4.9, 13], [5, 5, 0]].flatMap(AXES[up][1]));
@@ -122,17 +122,17 @@ for (const [up, hours] of [["z", [9.5, 12, 15]], ["y", [15]], ["x", [15]]]) test
     }
     // A weak card has nothing to add to that picture.
     await finished(page);
-    assert.equal(await page.evaluate(() => window.lambert.stage.uniforms.is_soft.value), false);
+    assert.equal(await page.evaluate(() => window.lambert.scene.stage.uniforms.is_soft.value), false);
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });
 
 /** Waits, however long it takes a machine, until pictures get no better. */
-const finished = (page) => page.evaluate(async () => { while (!window.lambert.stage.isFinished) await new Promise(requestAnimationFrame); });
+const finished = (page) => page.evaluate(async () => { while (!window.lambert.scene.stage.isFinished) await new Promise(requestAnimationFrame); });
 
 /** Linear values of red at points given in shares of the picture, which is drawn as it is by now, or begun anew. */
 const lightAt = (page, places, isNew) => page.evaluate(([all, anew]) => {
-    const { stage } = window.lambert, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight], bytes = new Uint8Array(4 * w * h);
+    const { stage } = window.lambert.scene, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight], bytes = new Uint8Array(4 * w * h);
     if (anew) {
         stage.sunlight.lose();
         stage.invalidate();
@@ -155,14 +155,14 @@ const shareOfDisc = (x) => (Math.abs(x) >= 1 ? Number(x > 0) : 0.5 + (x * Math.s
 async function openHigh(hour) {
     const page = await openPage(daemon.address, SMALL), source = new daylight.SkySource();
     source.take(await daemon.json("/v1/scenes/high/sky"));
-    await page.evaluate(() => window.lambert.open("high", null));
+    await page.evaluate(() => window.lambert.ask.open("high", null));
     await set(page, { smooth: false, tone: "linear", exposure: -9, sharpSun: true }, { ...LIGHT, sun: "spread", hour });
     await settled(page);
     return { page, sun: source.sky({ ...state.skyOff, ...LIGHT, sun: "spread", hour }, false).sun.direction };
 }
 
 const look = (page, eye, target) => page.evaluate((place) => {
-    const { cameras, stage } = window.lambert;
+    const { cameras, stage } = window.lambert.scene;
     cameras.place(place, false);
     cameras.advance(1);
     stage.draw();
@@ -172,7 +172,7 @@ test("a half-shadow is as wide as the sun's disc makes it", async () => {
     const { page, sun } = await openHigh(15), { offset, half } = shadowOf(sun), corner = [3 + offset[0], 3 + offset[1]];
     // From less than 2 m above, a pixel is some 2 mm; half-shadows of edges along both axes are in the picture, apart from each other's.
     await look(page, [corner[0] + 0.2, corner[1] + 0.19, 1.6], [corner[0] + 0.2, corner[1] + 0.2, 0]);
-    const canvas = await page.evaluate(() => [window.lambert.stage.canvas.width, window.lambert.stage.canvas.height]), lines = [];
+    const canvas = await page.evaluate(() => [window.lambert.scene.stage.canvas.width, window.lambert.scene.stage.canvas.height]), lines = [];
     for (const axis of [0, 1]) {
         const at = (t) => [...corner.map((v, k) => v + (k === axis ? t : 0.5)), 0], [a, b] = await seenAt(page, "z", [at(-0.1), at(0.1)]);
         const step = 0.2 / Math.hypot(...a.map((v, k) => (v - b[k]) * canvas[k])), n = Math.ceil((2 * half[axis]) / step);
@@ -211,7 +211,7 @@ test("far from the edges of shadows the picture stays as it was, and one that is
     const { page, sun } = await openHigh(10), { offset, half } = shadowOf(sun);
     await look(page, [5, 4.9, 13], [5, 5, 0]);
     const changed = await page.evaluate(() => {
-        const { stage, cameras: { camera } } = window.lambert, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+        const { stage, cameras: { camera } } = window.lambert.scene, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
         const read = () => { const bytes = new Uint8Array(4 * w * h); gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, bytes); return bytes; };
         stage.draw();
         const before = read();
@@ -252,15 +252,15 @@ test("far from the edges of shadows the picture stays as it was, and one that is
     await page.getByText(/^Drawing, \d+ % …$/).waitFor();
     await set(page, { exposure: -8 }, {});
     await page.getByText("The picture was changed while it was drawn; save it again.").waitFor();
-    await page.waitForFunction(() => window.lambert.stage.uniforms.is_soft.value);
+    await page.waitForFunction(() => window.lambert.scene.stage.uniforms.is_soft.value);
     // Textures of a scene are given back when another is opened.
     const textures = async () => {
-        await page.evaluate(() => window.lambert.open("high", window.lambert.store.now));
+        await page.evaluate(() => window.lambert.ask.open("high", window.lambert.store.now));
         await settled(page);
         return page.evaluate(() => {
             // Half-shadows take their textures one after the other, as far as the page has come.
-            window.lambert.stage.drawFinished();
-            return window.lambert.stage.renderer.info.memory.textures;
+            window.lambert.scene.stage.drawFinished();
+            return window.lambert.scene.stage.renderer.info.memory.textures;
         });
     };
     assert.equal(await textures(), await textures());
@@ -269,8 +269,8 @@ test("far from the edges of shadows the picture stays as it was, and one that is
 });
 
 test("numbers, false colour and comparisons have the store's sun, and the page says which is shown", async () => {
-    const page = await openFromAbove("z"), isDrawn = () => page.evaluate(() => window.lambert.stage.uniforms.is_sunny.value);
-    const bits = () => page.evaluate(() => [...window.lambert.fields[0].bits].join());
+    const page = await openFromAbove("z"), isDrawn = () => page.evaluate(() => window.lambert.scene.stage.uniforms.is_sunny.value);
+    const bits = () => page.evaluate(() => [...window.lambert.scene.fields[0].bits].join());
     const note = page.getByText("sun drawn sharp, numbers have it in tiles");
     await set(page, { smooth: false, tone: "linear", exposure: EXPOSURE }, { ...LIGHT, hour: 15 });
     await settled(page);
@@ -295,7 +295,7 @@ test("numbers, false colour and comparisons have the store's sun, and the page s
     // A link has it, too.
     await page.waitForTimeout(500);
     const other = await openPage(daemon.address, { hash: await page.evaluate(() => location.hash), before: weakCard });
-    assert.equal(await other.evaluate(() => window.lambert.stage.uniforms.is_sunny.value), true);
+    assert.equal(await other.evaluate(() => window.lambert.scene.stage.uniforms.is_sunny.value), true);
     await other.context().close();
     await set(page, {}, { sun: "off" });
     await settled(page);

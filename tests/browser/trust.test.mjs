@@ -21,7 +21,7 @@ async function values(page, scene, extra = {}) {
     return daemon.json(`/v1/scenes/${encodeURIComponent(scene)}/radiosity`, { emission, ...extra });
 }
 
-const areas = (page) => page.evaluate(() => [...window.lambert.scene.mesh.area]);
+const areas = (page) => page.evaluate(() => [...window.lambert.scene.now.mesh.area]);
 const close = (a, b, relative, what) => assert.ok(Math.abs(a - b) <= relative * Math.abs(b), `${what}: ${a} is not near ${b}`);
 
 test("the error of a lighting and a certificate", async () => {
@@ -39,7 +39,7 @@ test("the error of a lighting and a certificate", async () => {
     await page.getByRole("button", { name: "Certify" }).click();
     await page.getByText(/^Certified: no number/).waitFor();
     const exact = await values(page, "box", { tolerance: 1e-5 });
-    const shown = await page.evaluate(() => ({ values: [...window.lambert.fields[0].values], ...window.lambert.asking.certificate }));
+    const shown = await page.evaluate(() => ({ values: [...window.lambert.scene.fields[0].values], ...window.lambert.scene.certificate }));
     assert.equal(shown.iterations, exact.iterations);
     // The bound is that of the answer scaled to 1, in single precision: its rounding is counted.
     const largest = Math.max(...exact.radiosity.flat());
@@ -49,14 +49,14 @@ test("the error of a lighting and a certificate", async () => {
     assert.match(await page.getByRole("contentinfo").textContent(), /certified.*solve [\d.]+ ms/);
     // Another lighting is certified when it rests; the link has the tolerance.
     await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, lighting: { ...s.now.lighting, dim: 0.5 } }); });
-    await page.waitForFunction((bound) => window.lambert.asking.certificate !== null && window.lambert.asking.certificate.bound < 0.9 * bound, shown.bound);
+    await page.waitForFunction((bound) => window.lambert.scene.certificate !== null && window.lambert.scene.certificate.bound < 0.9 * bound, shown.bound);
     await page.waitForTimeout(500);
     const other = await openPage(daemon.address, { hash: await page.evaluate(() => location.hash) });
-    await other.waitForFunction(() => window.lambert.asking.certificate !== null);
+    await other.waitForFunction(() => window.lambert.scene.certificate !== null);
     assert.equal(await other.evaluate(() => window.lambert.store.now.tolerance), 1e-5);
     await other.context().close();
     await page.getByRole("button", { name: "As stored" }).click();
-    await page.waitForFunction(() => window.lambert.asking.certificate === null && window.lambert.isIdle);
+    await page.waitForFunction(() => window.lambert.scene.certificate === null && window.lambert.ask.isIdle);
     assert.deepEqual(page.faults, []);
     assert.deepEqual(await violations(page), []);
     await page.context().close();
@@ -133,7 +133,7 @@ for (const ratio of [1, 2])
         assert.ok(middle.width >= 32);
         await settled(page);
         const side = () => page.evaluate(() => {
-            const { stage } = window.lambert, gl = stage.renderer.getContext(), width = gl.drawingBufferWidth, row = new Uint8Array(4 * width);
+            const { stage } = window.lambert.scene, gl = stage.renderer.getContext(), width = gl.drawingBufferWidth, row = new Uint8Array(4 * width);
             stage.draw();
             gl.readPixels(0, Math.floor(gl.drawingBufferHeight / 2), width, 1, gl.RGBA, gl.UNSIGNED_BYTE, row);
             // The line is white, where the picture is not.

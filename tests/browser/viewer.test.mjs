@@ -50,7 +50,7 @@ test("dragging a slider changes the picture as the numbers say", async () => {
     await change(page, "view", { smooth: false, tone: "linear", exposure: -5 });
     await settled(page);
     const element = await elementAt(page, 0.5, 0.9), first = await pixel(page, 0.5, 0.9);
-    const before = await page.evaluate(() => window.lambert.answers);
+    const before = await page.evaluate(() => window.lambert.scene.answers);
     const slider = page.getByLabel("All", { exact: true });
     const box = await slider.boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
@@ -67,7 +67,7 @@ test("dragging a slider changes the picture as the numbers say", async () => {
     const last = await pixel(page, 0.5, 0.9);
     near(last, toSrgb(B.map((v) => v * 2 ** -5)), 2);
     assert.ok(last[0] < first[0]);
-    assert.ok(await page.evaluate(() => window.lambert.answers) > before);
+    assert.ok(await page.evaluate(() => window.lambert.scene.answers) > before);
     // One drag is one step of undo, and another one at once another step.
     await page.mouse.move(box.x + box.width / 4, box.y + box.height / 2);
     await page.mouse.down();
@@ -91,7 +91,7 @@ test("smooth shading is the mean at a corner", async () => {
     await change(page, "view", { smooth: true, tone: "linear", exposure: -5 });
     await settled(page);
     const found = await page.evaluate(() => {
-        const { scene: { mesh }, cameras: { camera }, stage } = window.lambert;
+        const { now: { mesh }, cameras: { camera }, stage } = window.lambert.scene;
         camera.updateMatrixWorld();
         // A corner of the floor where four elements meet, and its place in the picture.
         const floor = mesh.groups.findIndex((g) => g.name === "floor"), at = new Map();
@@ -104,7 +104,7 @@ test("smooth shading is the mean at a corner", async () => {
             if (elements.length !== 4) continue;
             const p = camera.position.clone().set(...key.split(",").map(Number)).project(camera);
             const seen = scene => scene.picker.at(p.x, p.y, camera);
-            if (Math.abs(p.x) < 0.9 && Math.abs(p.y) < 0.9 && elements.includes(seen(window.lambert.scene)))
+            if (Math.abs(p.x) < 0.9 && Math.abs(p.y) < 0.9 && elements.includes(seen(window.lambert.scene.now)))
                 return { elements, x: (p.x + 1) / 2, y: (1 - p.y) / 2, width: stage.canvas.width };
         }
         return null;
@@ -158,7 +158,7 @@ test("a link restores the state", async () => {
     await page.keyboard.press("Enter");
     await page.getByPlaceholder("Name of this lighting").fill("Evening “7”");
     await page.getByRole("button", { name: "Keep" }).click();
-    await page.evaluate(() => window.lambert.cameras.place([1, 1, 4, 1, 1, 0], false));
+    await page.evaluate(() => window.lambert.scene.cameras.place([1, 1, 4, 1, 1, 0], false));
     await settled(page);
     await page.waitForTimeout(800);
     const [hash, state] = await page.evaluate(() => [location.hash, window.lambert.store.now]);
@@ -194,7 +194,7 @@ test("it recovers when the daemon was killed", async () => {
     const again = await Daemon.start([store], { port });
     await page.getByText("The daemon does not answer. This page asks again").waitFor({ state: "hidden" });
     await settled(page);
-    const scale = await page.evaluate(() => window.lambert.fields[0].scale);
+    const scale = await page.evaluate(() => window.lambert.scene.fields[0].scale);
     const lamp = await lampNow(page);
     assert.ok(Math.abs(scale - Math.max(...lamp)) < 1e-6 * scale, `${scale} is shown, ${lamp} was asked for`);
     assert.deepEqual(page.faults, []);
@@ -237,9 +237,9 @@ test("everything is reached by keyboard", async () => {
     for (const wanted of ["CANVAS", "SELECT", "BUTTON Link", "INPUT All", "BUTTON Solo lamp"])
         assert.ok([...reached].some((name) => name.startsWith(wanted)), `${wanted} is not among ${[...reached]}`);
     await page.locator("main canvas").first().focus();
-    const eye = await page.evaluate(() => window.lambert.cameras.now);
+    const eye = await page.evaluate(() => window.lambert.scene.cameras.now);
     await page.keyboard.down("ArrowLeft");
-    await page.waitForFunction((from) => window.lambert.cameras.now.some((v, i) => Math.abs(v - from[i]) > 0.05), eye);
+    await page.waitForFunction((from) => window.lambert.scene.cameras.now.some((v, i) => Math.abs(v - from[i]) > 0.05), eye);
     await page.keyboard.up("ArrowLeft");
     await page.keyboard.press("f");
     await page.getByRole("tab", { name: "Lights" }).focus();

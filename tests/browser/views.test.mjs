@@ -41,7 +41,7 @@ function seenAt({ eye, direction: d, up, fov }, aspect, point) {
 const POINTS = [[0, 0, 0], [-1.5, 0.2, 1], [1, 3, -1]];
 
 const shown = (page) => page.evaluate((points) => {
-    const { camera } = window.lambert.cameras;
+    const { camera } = window.lambert.scene.cameras;
     camera.updateMatrixWorld();
     return { aspect: camera.aspect, points: points.map((p) => { const at = camera.position.clone().set(...p).project(camera); return [at.x, at.y]; }) };
 }, POINTS);
@@ -59,10 +59,10 @@ test("a camera of the scene shows what it sees: its angle of view and its up", a
         const turned = ([x, y, z]) => (up === "z" ? [x, z, -y] : [x, y, z]);
         for (const camera of cameras) {
             await page.getByRole("button", { name: camera.name }).click();
-            await page.waitForFunction((angle) => window.lambert.cameras.camera.fov === angle, camera.fov);
+            await page.waitForFunction((angle) => window.lambert.scene.cameras.camera.fov === angle, camera.fov);
             const of = { ...camera, eye: turned(camera.eye), direction: turned(camera.direction), up: turned(camera.up) };
             await page.waitForFunction(({ eye, direction }) => {
-                const { camera } = window.lambert.cameras, now = camera.getWorldDirection(camera.position.clone());
+                const { camera } = window.lambert.scene.cameras, now = camera.getWorldDirection(camera.position.clone());
                 return [...camera.position.toArray(), ...now.toArray()].every((v, k) => Math.abs(v - [...eye, ...direction][k]) < 1e-4);
             }, of);
             await settled(page);
@@ -76,7 +76,7 @@ test("a camera of the scene shows what it sees: its angle of view and its up", a
         for (const k of POINTS.keys()) near(one.points[k], two.points[k], 2e-3);
         await other.getByRole("tab", { name: "View" }).click();
         await other.getByRole("button", { name: "Fit (F)" }).click();
-        await other.waitForFunction(() => window.lambert.cameras.camera.fov === 50 && window.lambert.cameras.camera.up.y === 1);
+        await other.waitForFunction(() => window.lambert.scene.cameras.camera.fov === 50 && window.lambert.scene.cameras.camera.up.y === 1);
         assert.deepEqual([...page.faults, ...other.faults], []);
         await other.context().close();
         await page.context().close();
@@ -172,10 +172,10 @@ test("smooth light has no step where elements of different sizes meet", async ()
     await settled(page);
     // Corners that stand in the middle of an edge, found the plain way, and both sides of that edge; those where means differ most.
     const places = await page.evaluate(() => {
-        const { scene: { mesh, picker }, cameras: { camera } } = window.lambert, { positions: p, elementOf } = mesh, out = [];
+        const { now: { mesh, picker }, cameras: { camera } } = window.lambert.scene, { positions: p, elementOf } = mesh, out = [];
         camera.updateMatrixWorld();
         const at = (v) => [p[3 * v], p[3 * v + 1], p[3 * v + 2]];
-        const { values } = window.lambert.fields[0], far = (a, b) => Math.max(...a.map((x, d) => Math.abs(x - b[d])));
+        const { values } = window.lambert.scene.fields[0], far = (a, b) => Math.max(...a.map((x, d) => Math.abs(x - b[d])));
         const meanAt = (point, group) => {
             const all = [];
             for (let v = 0; v < elementOf.length; v++) if (mesh.groupOf[elementOf[v]] === group && far(at(v), point) < 1e-5) all.push(values[elementOf[v]]);
@@ -203,7 +203,7 @@ test("smooth light has no step where elements of different sizes meet", async ()
     });
     // The box is closed where it is looked into: nothing of the background is seen through it.
     const holes = await page.evaluate(() => {
-        const { stage } = window.lambert, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+        const { stage } = window.lambert.scene, gl = stage.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
         const bytes = new Uint8Array(4 * w * h);
         stage.background = "#ff00ff";
         stage.draw();
@@ -239,12 +239,12 @@ test("who walks into a scene stands on its ground and looks ahead, and a cross r
     const daemon = await Daemon.start([store]), page = await openPage(daemon.address);
     await page.locator("main canvas").first().focus();
     await page.keyboard.press("r");
-    await page.waitForFunction(() => window.lambert.hovered !== null);
+    await page.waitForFunction(() => window.lambert.scene.hovered !== null);
     await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, view: { ...s.now.view, walk: true } }); });
     await page.waitForFunction(() => { const { camera } = window.lambert.store.now.view; return camera !== null && Math.abs(camera[1] - camera[4]) < 1e-3; });
     await settled(page);
     const found = await page.evaluate(() => {
-        const { scene: { mesh, picker }, cameras, store: { now }, hovered } = window.lambert, [x, y, z] = now.view.camera, { positions: p, index } = mesh;
+        const { scene: { now: { mesh, picker }, cameras, hovered }, store: { now } } = window.lambert, [x, y, z] = now.view.camera, { positions: p, index } = mesh;
         // Heights of the triangles that face up at x and z, the plain way.
         const heights = [], side = (a, b) => (p[3 * b] - p[3 * a]) * (z - p[3 * a + 2]) - (p[3 * b + 2] - p[3 * a + 2]) * (x - p[3 * a]);
         for (let t = 0; t < index.length; t += 3) {
@@ -257,9 +257,9 @@ test("who walks into a scene stands on its ground and looks ahead, and a cross r
     assert.ok(found.heights.length > 0 && Math.abs(found.y - Math.min(...found.heights) - 1.6) < 0.01, JSON.stringify(found));
     assert.equal(found.hovered, found.under);
     // Another scene is entered on foot, too.
-    await page.evaluate(() => window.lambert.open("hill", null));
+    await page.evaluate(() => window.lambert.ask.open("hill", null));
     await settled(page);
-    assert.ok(Math.abs((await page.evaluate(() => window.lambert.cameras.now))[1] - found.y) < 0.01);
+    assert.ok(Math.abs((await page.evaluate(() => window.lambert.scene.cameras.now))[1] - found.y) < 0.01);
     assert.deepEqual(page.faults, []);
     await page.context().close();
     await daemon.stop();

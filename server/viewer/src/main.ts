@@ -1,5 +1,6 @@
 // Starts the page.
 import { App } from "./app/app.ts";
+import type { Page } from "./app/page.ts";
 import { make } from "./base/dom.ts";
 import { makeBanner, makeBar, makeDrawer, makeLoading, makeStatus, makeTokenDialog,
     setBackground } from "./panels/frame.ts";
@@ -55,8 +56,8 @@ function start(): void {
     document.body.prepend(makeBar(app));
     document.body.append(makeDrawer(app, panelMakers.map((makePanel) => makePanel(app))), makeStatus(app),
         makeTokenDialog(app, () => void begin(app)));
-    setBackground(app);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setBackground(app));
+    setBackground(app.scene);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setBackground(app.scene));
     holdSteps(app);
     keepLink(app);
     // For tests, and for those who look into the page by the browser's console.
@@ -65,29 +66,29 @@ function start(): void {
 }
 
 /** A slider may tell of its last value after its pointer is up. */
-function holdSteps(app: App): void {
-    const release = (): void => void setTimeout(() => app.store.hold(false));
-    window.addEventListener("pointerdown", () => app.store.hold(true), true);
+function holdSteps({ store }: Page): void {
+    const release = (): void => void setTimeout(() => store.hold(false));
+    window.addEventListener("pointerdown", () => store.hold(true), true);
     for (const end of ["pointerup", "pointercancel", "blur"]) window.addEventListener(end, release, true);
 }
 
 async function begin(app: App): Promise<void> {
     try {
-        app.scenes = await app.api.scenes();
-        const given = fromFragment(location.hash);
-        const name = app.scenes.find((scene) => scene.name === given?.scene)?.name ?? app.scenes[0]?.name;
+        app.scene.all = await app.ask.api.scenes();
+        const { all } = app.scene, given = fromFragment(location.hash);
+        const name = all.find((scene) => scene.name === given?.scene)?.name ?? all[0]?.name;
         if (name === undefined) throw new Error("The daemon serves no scene.");
-        app.notice = given === null && location.hash.length > 1
+        app.tell.notice = given === null && location.hash.length > 1
             ? `This link cannot be read; this is ${name} as it comes.`
             : given !== null && given.scene !== "" && given.scene !== name
             ? `The link asks for the scene ${given.scene}, which this daemon does not serve; this is ${name}.`
             : null;
-        await app.open(name, given !== null && given.scene === name ? given : null);
+        await app.ask.open(name, given !== null && given.scene === name ? given : null);
     } catch (reason) {
-        app.fail(reason);
-        if (app.recovery.watch.isLost)
-            app.on("found", () => {
-                if (app.scene === null) void begin(app);
+        app.tell.fail(reason);
+        if (app.tell.isLost)
+            app.tell.on("found", () => {
+                if (app.scene.now === null) void begin(app);
             });
     }
 }
@@ -97,8 +98,8 @@ function keepLink(app: App): void {
     app.store.listen(() => {
         clearTimeout(timer);
         timer = window.setTimeout(() => {
-            if (app.scene === null) return;
-            written = toFragment(app.store.now, app.momentOf);
+            if (app.scene.now === null) return;
+            written = toFragment(app.store.now, (light) => app.scene.sky.source.momentOf(light));
             history.replaceState(null, "", written);
         }, LINK_MS);
     });

@@ -1,45 +1,35 @@
-// Asks the daemon for what the state wants, for both sides of a comparison, and holds the answers that are shown.
-import type { Description } from "../daemon/api.ts";
+// Asks the daemon for the values that the state wants, for both sides of a comparison, and has the answers shown.
+import type { Api, Description } from "../daemon/api.ts";
 import { Newest } from "../daemon/newest.ts";
 import { Field } from "../picture/field.ts";
+import type { Comparable } from "../state/comparable.ts";
 import { wantedFor, type Wanted } from "../state/request.ts";
-import type { App } from "./app.ts";
-
-/** The scene that is open, and what it is compared with. */
-export type Side = 0 | 1;
-
-export interface Timing {
-    /** From the request to the picture's textures, and in the daemon, ms. */
-    roundTrip: number;
-    solve: number | null;
-}
-
-/** A bound on the error of every number shown, and what it took, ms. */
-export interface Certificate {
-    bound: number;
-    iterations: number;
-    solve: number | null;
-}
+import type { Store } from "../state/store.ts";
+import type { Side, Timing } from "./page.ts";
+import type { Shown } from "./shown.ts";
 
 /** An answer was of another mesh than the one that is shown. */
 export class Replaced extends Error {}
 
+/** What becomes of requests. */
+export interface Outcome {
+    /** An answer has come, and is shown next. */
+    answered(): void;
+    fail(reason: unknown): void;
+}
+
 export class Asking {
-    fields: [Field | null, Field | null] = [null, null];
-    timing: Timing = { roundTrip: 0, solve: null };
-    /** Where the daemon has certified what is shown. */
-    certificate: Certificate | null = null;
-    /** Answers shown so far. */
-    answers = 0;
+    private timing: Timing = { roundTrip: 0, solve: null };
     private readonly askers: readonly [Newest<Wanted, Field>, Newest<Wanted, Field>];
     private asked = ["", ""];
 
-    /** `took` shows an answer, which is in the fields by then. */
-    constructor(private readonly app: Pick<App, "api" | "scene" | "store" | "comparable" | "skyOf">,
-        private readonly took: (side: Side, field: Field, wanted: Wanted) => void, fail: (reason: unknown) => void)
+    constructor(private readonly api: Pick<Api, "radiosity">, private readonly store: Store,
+        private readonly scene: Pick<Shown, "now" | "fields" | "sky" | "show" | "tell">,
+        private readonly comparable: Comparable, private readonly outcome: Outcome)
     {
         const asker = (side: Side): Newest<Wanted, Field> =>
-            new Newest((wanted) => this.solve(wanted), (field, wanted) => this.take(side, field, wanted), fail);
+            new Newest((wanted) => this.solve(wanted), (field, wanted) => this.take(side, field, wanted), (reason) =>
+                outcome.fail(reason));
         this.askers = [asker(0), asker(1)];
     }
 
@@ -47,18 +37,19 @@ export class Asking {
         return this.askers.every((asker) => asker.isIdle);
     }
 
-    /** What is shown now, as a request; null: there is no scene, nothing to compare it with, or no knowledge of that
-     * yet. */
     wanted(side: Side): Wanted | null {
-        const { scene, store: { now }, comparable } = this.app;
+        const { scene: { now: scene, sky }, store: { now } } = this;
         if (scene === null || (side === 1 && now.compare === null)) return null;
         const quantity = now.view.picture === "light" ? "radiosity" : now.view.quantity;
         const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
         const other = side === 1 ? now.compare?.scene ?? null : null,
-            of = other === null ? scene.description : comparable.get(other);
+            of = other === null ? scene.description : this.comparable.get(other);
         if (of === undefined) return null;
-        return wantedFor(of.name, quantity, lighting, { ...abilitiesOf(of), emitters: of.emitters?.length ?? 0,
-            sky: this.app.skyOf(lighting, of) });
+        return wantedFor(of.name, quantity, lighting, {
+            ...abilitiesOf(of),
+            emitters: of.emitters?.length ?? 0,
+            sky: sky.radiances(lighting, of),
+        });
     }
 
     /** Asks for what is to be shown, if that has changed. */
@@ -74,18 +65,19 @@ export class Asking {
 
     /** Of another scene, or of a comparison that ended, nothing is shown yet. */
     forget(side: Side): void {
-        this.fields[side] = null;
+        this.scene.fields[side] = null;
         this.asked[side] = "";
         this.askers[side].forget();
     }
 
     async solve(wanted: Wanted): Promise<Field> {
-        const { scene, api } = this.app;
+        const { now: scene } = this.scene;
         if (scene === null) throw new Error("no scene is open");
         const { mesh: { elements }, description: { channels } } = scene;
-        if (wanted.emission === null) return new Field(new Uint16Array(channels * elements), [channels, elements], 1);
+        if (wanted.emission === null)
+            return new Field(new Uint16Array(channels * elements), [channels, elements], 1);
         const start = performance.now();
-        const { values, solveMs } = await api.radiosity(wanted.scene, { emission: wanted.emission,
+        const { values, solveMs } = await this.api.radiosity(wanted.scene, { emission: wanted.emission,
             quantity: wanted.quantity });
         this.timing = { roundTrip: performance.now() - start, solve: solveMs };
         const field = Field.of(values, wanted.scale);
@@ -95,10 +87,9 @@ export class Asking {
     }
 
     private take(side: Side, field: Field, wanted: Wanted): void {
-        if (side === 0) this.certificate = null;
-        this.fields[side] = field;
-        this.answers += 1;
-        this.took(side, field, wanted);
+        this.outcome.answered();
+        this.scene.show(side, field, wanted.emission === null);
+        this.scene.tell("timing", this.timing);
     }
 }
 

@@ -1,9 +1,12 @@
 // Goes on after what went wrong: a daemon that is away or busy, a token that is missing, a store that was replaced or
 // is gone.
+import { Events } from "../base/events.ts";
 import { Lost, Problem, type Description } from "../daemon/api.ts";
 import { Watch } from "../daemon/watch.ts";
-import type { App } from "./app.ts";
+import type { Store } from "../state/store.ts";
 import { Replaced } from "./asking.ts";
+import type { Ask, News, Tell } from "./page.ts";
+import type { Shown } from "./shown.ts";
 
 /** Statuses of requests that fitted the store that was there before. */
 const UNFIT = [400, 404, 422];
@@ -11,44 +14,50 @@ const UNFIT = [400, 404, 422];
 /** After the last answer, and after the last look, the page looks if the store is still the same, ms. */
 const LOOK_MS = 1000, LOOKED_MS = 5000;
 
-export class Recovery {
+export class Recovery extends Events<News> implements Tell {
+    notice: string | null = null;
     /** What the daemon did not do, as a sentence, until its next answer. */
     problem: string | null = null;
-    readonly watch: Watch;
+    private readonly watch: Watch;
     /** A scene that was chosen while the daemon was away. */
     private missed: string | null = null;
     private looked = -LOOKED_MS;
     private lookTimer = 0;
 
-    constructor(
-        private readonly app: Pick<App,
-            "api" | "scene" | "store" | "opening" | "exposure" | "notice" | "isIdle" | "open" | "ask" | "listScenes"
-                | "tell">,
-    ) {
-        this.watch = new Watch(() => app.api.isReady(), () => app.tell("lost"), () => this.goOn());
+    constructor(private readonly store: Store,
+        private readonly scene: Pick<Shown, "now" | "loading" | "exposure" | "load" | "tell">,
+        private readonly ask: Ask)
+    {
+        super();
+        this.watch = new Watch(() => ask.api.isReady(), () => this.tell("lost", this.watch.why), () => this.goOn());
         document.addEventListener("visibilitychange", () => {
             if (!document.hidden) this.look(0);
         });
+    }
+
+    get isLost(): boolean {
+        return this.watch.isLost;
     }
 
     /** An answer has come, and the picture shows it. */
     answered(): void {
         this.watch.find();
         this.problem = null;
+        this.look();
     }
 
     /** Does what helps after a request that failed, and tells of it. */
     fail(reason: unknown): void {
         if (reason instanceof DOMException && reason.name === "AbortError") return;
-        const { app, app: { opening, opening: { loading } } } = this;
-        opening.load(null);
+        const { scene, scene: { loading } } = this;
+        scene.load(null);
         if (reason instanceof Lost) {
-            if (loading !== null && loading !== "" && app.scene !== null) this.missed = loading;
+            if (loading !== null && loading !== "" && scene.now !== null) this.missed = loading;
             this.watch.lose("The daemon does not answer. This page asks again each second and goes on by itself.");
             return;
         }
         if (reason instanceof Problem && reason.status === 401) {
-            app.tell("token");
+            this.tell("token");
             return;
         }
         if (reason instanceof Problem && reason.status === 503) {
@@ -68,15 +77,14 @@ export class Recovery {
 
     /** Looks a while after the last call, once nothing is asked for, if the store is still the one that is shown: its
      * answers alone do not tell. */
-    look(after = LOOK_MS): void {
+    private look(after = LOOK_MS): void {
         clearTimeout(this.lookTimer);
         this.lookTimer = window.setTimeout(() => {
-            const { app, app: { opening } } = this;
-            if (app.scene === null || opening.loading !== null || this.watch.isLost || !app.isIdle || document.hidden)
-                return;
+            const { scene, ask } = this;
+            if (scene.now === null || scene.loading !== null || this.isLost || !ask.isIdle || document.hidden) return;
             this.looked = performance.now();
             this.renew().catch((reason: unknown) => {
-                if (opening.loading === null) this.complain(reason);
+                if (scene.loading === null) this.complain(reason);
                 else this.fail(reason);
             });
         }, Math.max(after, this.looked + LOOKED_MS - performance.now()));
@@ -85,47 +93,47 @@ export class Recovery {
     /** `isShown`: the request was for the scene that is shown. */
     private complain(reason: unknown, isShown = true): void {
         if (reason instanceof Lost) return this.fail(reason);
-        const { app } = this, name = app.scene?.description.name ?? "";
+        const name = this.scene.now?.description.name ?? "";
         if (reason instanceof Problem && reason.status === 404 && isShown && name !== "") {
             this.problem = `The daemon serves ${name} no more; the picture is its last. Choose another scene above.`;
-            void app.listScenes().catch(() => undefined);
-            return app.tell("problem");
+            void this.ask.scenes().catch(() => undefined);
+            return this.tell("problem", this.problem);
         }
         this.problem = reason instanceof Problem
             ? `The daemon did not do what this page asked for (${reason.status}): ${reason.message}`
             : reason instanceof Error
             ? reason.message
             : String(reason);
-        app.tell("problem");
-        app.tell("scenes");
+        this.tell("problem", this.problem);
+        this.scene.tell("scenes");
     }
 
     /** Opens the scene anew if its store is another one by now: as it comes, or in its present state where the mesh is
      * the same. */
     private async renew(): Promise<boolean> {
-        const { app, app: { scene } } = this, name = scene?.description.name ?? "";
+        const { ask, scene: { now: scene, exposure } } = this, name = scene?.description.name ?? "";
         if (scene === null) return false;
-        const description = await app.api.describe(name);
-        if (scene !== app.scene) return true;
+        const description = await ask.api.describe(name);
+        if (scene !== this.scene.now) return true;
         if (JSON.stringify(description) === JSON.stringify(scene.description)) return false;
-        app.notice = `The store of ${name} was replaced; this is the new one.`;
-        const { now } = app.store;
-        await app.open(name, haveOneMesh(description, scene.description)
-            ? { ...now, view: { ...now.view, exposure: app.exposure.anew(now.view) } }
+        this.notice = `The store of ${name} was replaced; this is the new one.`;
+        const { now } = this.store;
+        await ask.open(name, haveOneMesh(description, scene.description)
+            ? { ...now, view: { ...now.view, exposure: exposure.anew(now.view) } }
             : null);
         return true;
     }
 
     /** After the daemon was away. */
     private goOn(): void {
-        const { app, missed } = this;
-        app.tell("found");
-        if (app.scene === null) return;
+        const { ask, missed } = this;
+        this.tell("found");
+        if (this.scene.now === null) return;
         this.missed = null;
-        void app.listScenes().catch(() => undefined);
-        if (missed !== null) void app.open(missed, null).catch((reason: unknown) => this.fail(reason));
+        void ask.scenes().catch(() => undefined);
+        if (missed !== null) void ask.open(missed, null).catch((reason: unknown) => this.fail(reason));
         else this.renew().then((is) => {
-                if (!is) app.ask(true);
+                if (!is) ask.shown(true);
             }, (reason: unknown) => this.complain(reason));
     }
 }

@@ -6,8 +6,9 @@ import type { SunParts } from "../daylight/source.ts";
 import { Field } from "../picture/field.ts";
 import { turned } from "../picture/glb.ts";
 import { wantedFor, type Wanted } from "../state/request.ts";
-import type { App } from "./app.ts";
+import type { Store } from "../state/store.ts";
 import { abilitiesOf } from "./asking.ts";
+import type { Shown } from "./shown.ts";
 
 interface WantedSharp {
     /** Radiosity without the sun, and what the sun's light gives further. */
@@ -19,23 +20,20 @@ interface WantedSharp {
 export class SharpSun {
     private key = "";
     private readonly asker = new Newest<WantedSharp, Field>(
-        (wanted) => this.solve(wanted),
+        (wanted) => this.sum(wanted),
         (field, wanted) => this.show(field, wanted),
         (reason) => {
             this.end();
-            this.app.fail(reason);
+            this.fail(reason);
         },
         1,
     );
 
-    constructor(
-        private readonly app: Pick<App, "scene" | "store" | "stage" | "fields" | "asking" | "sunOf" | "fail">,
-    ) {}
-
-    /** True while the picture has the sun drawn, or will have. */
-    get isOn(): boolean {
-        return this.key !== "";
-    }
+    /** `solve` asks for the values of a request. */
+    constructor(private readonly store: Store,
+        private readonly scene: Pick<Shown, "now" | "stage" | "fields" | "sky" | "isSunSharp">,
+        private readonly solve: (wanted: Wanted) => Promise<Field>, private readonly fail: (reason: unknown) => void)
+    {}
 
     get isIdle(): boolean {
         return this.asker.isIdle;
@@ -45,35 +43,40 @@ export class SharpSun {
     ask(again: boolean): void {
         const wanted = this.wanted();
         if (wanted === null) {
-            if (this.isOn) this.end();
+            if (this.scene.isSunSharp) this.end();
             return;
         }
         const key = JSON.stringify(wanted);
         if (key === this.key && !again) return;
-        this.key = key;
+        this.set(key);
         this.asker.want(wanted);
     }
 
     /** Of another scene nothing is drawn yet. */
     forget(): void {
-        this.key = "";
+        this.set("");
         this.asker.forget();
-        this.app.stage.setSun(null);
+        this.scene.stage.setSun(null);
+    }
+
+    private set(key: string): void {
+        this.key = key;
+        this.scene.isSunSharp = key !== "";
     }
 
     private end(): void {
         this.forget();
-        const [field] = this.app.fields;
-        if (field !== null) this.app.stage.setField(0, field);
+        const { fields: [field], stage } = this.scene;
+        if (field !== null) stage.setField(0, field);
     }
 
     /** Null where it is off, or the picture shows numbers: in false colour, comparisons and by a threshold. */
     private wanted(): WantedSharp | null {
-        const { app, app: { scene, store: { now: { view, lighting, compare } } } } = this;
+        const { scene: { now: scene, sky }, store: { now: { view, lighting, compare } } } = this;
         if (scene === null || !view.sharpSun || view.picture !== "light" || view.threshold !== null || compare !== null)
             return null;
         const { description } = scene,
-            parts = (description.emitters?.length ?? 0) > 0 ? null : app.sunOf(lighting, description);
+            parts = (description.emitters?.length ?? 0) > 0 ? null : sky.parts(lighting, description);
         if (parts === null) return null;
         const can = { ...abilitiesOf(description), emitters: 0 };
         return {
@@ -83,8 +86,8 @@ export class SharpSun {
         };
     }
 
-    private async solve({ rest, further }: WantedSharp): Promise<Field> {
-        const [one, other] = await Promise.all([this.app.asking.solve(rest), this.app.asking.solve(further)]);
+    private async sum({ rest, further }: WantedSharp): Promise<Field> {
+        const [one, other] = await Promise.all([this.solve(rest), this.solve(further)]);
         const scale = Math.max(one.scale, other.scale), sum = new Float32Array(one.bits.length);
         for (let i = 0; i < sum.length; i++)
             sum[i] = halfToNumber(one.bits[i]) * (one.scale / scale)
@@ -93,8 +96,8 @@ export class SharpSun {
     }
 
     private show(field: Field, { parts: { direction: [east, north, up], light } }: WantedSharp): void {
-        const { stage, scene } = this.app;
-        if (!this.isOn || scene === null || field.elements !== scene.mesh.elements) return;
+        const { stage, now: scene, isSunSharp } = this.scene;
+        if (!isSunSharp || scene === null || field.elements !== scene.mesh.elements) return;
         stage.setField(0, field);
         // The axes of stores, as solver/daylight/sky_tiles.h has them.
         const axes = { x: [up, east, north], y: [east, up, -north], z: [east, north, up] } as const;

@@ -1,14 +1,17 @@
-// Tells those who listen of events, by their names.
+// Tells those who listen of events, by their names. `Told` has for each event what is told with it.
 
-export class Events<Event extends string> {
-    private readonly listeners = new Map<Event, Set<() => void>>();
+export interface Observable<Told extends { [event: string]: unknown[] }> {
+    on<Event extends keyof Told>(event: Event, listener: (...of: Told[Event]) => void): void;
+}
 
-    on(event: Event, listener: () => void): void {
-        if (!this.listeners.has(event)) this.listeners.set(event, new Set());
-        this.listeners.get(event)?.add(listener);
+export class Events<Told extends { [event: string]: unknown[] }> implements Observable<Told> {
+    private readonly listeners: { [Event in keyof Told]?: Set<(...of: Told[Event]) => void> } = {};
+
+    on<Event extends keyof Told>(event: Event, listener: (...of: Told[Event]) => void): void {
+        (this.listeners[event] ??= new Set()).add(listener);
     }
 
-    tell(event: Event): void {
-        for (const listener of this.listeners.get(event) ?? []) listener();
+    tell<Event extends keyof Told>(event: Event, ...of: Told[Event]): void {
+        for (const listener of this.listeners[event] ?? []) listener(...of);
     }
 }

@@ -1,6 +1,19 @@
 // The times of the rows of a weather file, by the rules of solver/daylight/weather_times.h, which lambert has: the step
 // between rows, and rows that are missing, repeated or out of order.
-import type { WeatherHour } from "./weather.ts";
+
+export interface WeatherHour {
+    year: number;
+    month: number;
+    day: number;
+    /** Of standard time: the middle of what the row covers. */
+    hour: number;
+    /** W/m², normal to the sun, or on a horizontal plane: see Weather.directIsHorizontal. */
+    direct: number;
+    /** W/m², on a horizontal plane. */
+    diffuse: number;
+    /** Degrees Celsius; NaN: unknown. */
+    dewPoint: number;
+}
 
 /** A row with the line that it stands in; `minute` is of an EPW, NaN: no whole number from 0 to 60. */
 export interface Row extends WeatherHour {

@@ -1,22 +1,8 @@
 // Reads the irradiances of a weather file, row by row: EPW of EnergyPlus, or WEA of Radiance's gendaymtx. The page
 // keeps it to itself: nothing is sent anywhere.
 import { dateOf, dayOf } from "./sun.ts";
-import { readTimes, type Periods, type Row, type StatedDate } from "./times.ts";
+import { readTimes, type Periods, type Row, type StatedDate, type WeatherHour } from "./times.ts";
 import type { Moment } from "../state/state.ts";
-
-export interface WeatherHour {
-    year: number;
-    month: number;
-    day: number;
-    /** Of standard time: the middle of what the row covers. */
-    hour: number;
-    /** W/m², normal to the sun, or on a horizontal plane: see directIsHorizontal. */
-    direct: number;
-    /** W/m², on a horizontal plane. */
-    diffuse: number;
-    /** Degrees Celsius; NaN: unknown. */
-    dewPoint: number;
-}
 
 export interface Weather {
     place: string;

@@ -1,5 +1,5 @@
 // Stores of precomputed emitters: a weight for each, and for a lamp in many positions the way along them.
-import type { App } from "../app/app.ts";
+import type { Page } from "../app/page.ts";
 import { button, fill, make } from "../base/dom.ts";
 import { count, numberText } from "../base/numbers.ts";
 import { alongOf, positionOf, type Weights } from "../state/path.ts";
@@ -10,14 +10,14 @@ import { slider, type Slider } from "./slider.ts";
 /** So many rows are drawn; a filter finds the others. */
 const ROWS_MOST = 40;
 
-export function emittersPanel(app: App): Panel {
-    const names = (): readonly string[] => app.scene?.description.emitters ?? [];
-    const isPath = (): boolean => app.scene?.description.report?.paths !== undefined;
+export function emittersPanel({ store, scene }: Page): Panel {
+    const names = (): readonly string[] => scene.now?.description.emitters ?? [];
+    const isPath = (): boolean => scene.now?.description.report?.paths !== undefined;
     const change = (emitters: Weights, tag: string | null = null): void => {
-        const { now } = app.store;
-        app.store.change({ ...now, lighting: { ...now.lighting, emitters } }, tag);
+        const { now } = store;
+        store.change({ ...now, lighting: { ...now.lighting, emitters } }, tag);
     };
-    const weights = (): Weights => app.store.now.lighting.emitters;
+    const weights = (): Weights => store.now.lighting.emitters;
     const place = (): number | null => positionOf(weights());
     const go = (to: number): void => {
         const last = names().length - 1, all = Object.values(weights());
@@ -80,7 +80,7 @@ export function emittersPanel(app: App): Panel {
             ? "Several positions shine."
             : `Position ${numberText(at, 3)} of ${names().length - 1}: ${names()[near] ?? ""}`;
     };
-    app.on("scene", () => {
+    scene.on("scene", () => {
         drive.stop();
         filter.value = "";
         filter.hidden = names().length <= ROWS_MOST;
@@ -89,14 +89,14 @@ export function emittersPanel(app: App): Panel {
         draw();
         update();
     });
-    app.store.listen((now, before) => {
+    store.listen((now, before) => {
         if (now.lighting.emitters !== before.lighting.emitters) update();
     });
     return {
         id: "emitters",
         title: "Emitters",
         isUseful: () => names().length > 0,
-        isFirst: () => app.scene?.description.sky === null,
+        isFirst: () => scene.now?.description.sky === null,
         element: make("div", {}, path, make("h2", {}, "Weights"),
             make("div", { class: "row" }, button("All off", null, setAll(0)),
                 button("All 1", "All weights 1", setAll(1)), filter), list),

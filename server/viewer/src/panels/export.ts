@@ -2,9 +2,10 @@
 import { button, make, tick } from "../base/dom.ts";
 import { csvOf } from "../base/csv.ts";
 import { readNpy } from "../base/npy.ts";
-import type { App } from "../app/app.ts";
+import type { Page } from "../app/page.ts";
 import { drawLegend, SIDE_MOST, snapshot, type Legend } from "../picture/snapshot.ts";
 import { curlCommand, plainRequest, pythonProgram, type PlainRequest } from "../state/snippets.ts";
+import type { Store } from "../state/store.ts";
 import type { Panel } from "./panel.ts";
 
 const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indirect: "Indirect light" };
@@ -12,7 +13,8 @@ const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indir
 /** What was to be saved is not shown any more. */
 class Changed extends Error {}
 
-export function exportPanel(app: App): Panel {
+export function exportPanel(page: Page): Panel {
+    const { tell } = page;
     const said = make("p", { role: "status", "aria-live": "polite" });
     const tries = (what: () => Promise<string>): void => {
         said.textContent = "Working …";
@@ -20,21 +22,22 @@ export function exportPanel(app: App): Panel {
             said.textContent = text;
         }, (reason: unknown) => {
             said.textContent = reason instanceof Changed ? reason.message : "";
-            if (!(reason instanceof Changed)) app.fail(reason);
+            if (!(reason instanceof Changed)) tell.fail(reason);
         });
     };
     const numbers = make("div", {}, make("h2", {}, "Numbers"),
         make("p", { class: "hint" }, "Of every element, asked for again in single precision."),
-        make("div", { class: "row" }, button("Save CSV", null, () => tries(() => saveCsv(app))),
-            button("Save NPY", null, () => tries(() => saveNpy(app)))));
+        make("div", { class: "row" }, button("Save CSV", null, () => tries(() => saveCsv(page))),
+            button("Save NPY", null, () => tries(() => saveNpy(page)))));
     return {
         id: "export",
         title: "Export",
-        element: make("div", {}, picturePart(app, tries, said), numbers, said, requestPart(app)),
+        element: make("div", {}, picturePart(page, tries, said), numbers, said, requestPart(page)),
     };
 }
 
-function picturePart(app: App, tries: (what: () => Promise<string>) => void, said: HTMLElement): HTMLElement {
+function picturePart(page: Page, tries: (what: () => Promise<string>) => void, said: HTMLElement): HTMLElement {
+    const { store, scene } = page;
     const size = (label: string, value: number): HTMLInputElement =>
         make("input", { type: "number", class: "narrow", min: 16, max: SIDE_MOST, step: 1, value: String(value),
             "aria-label": label });
@@ -48,88 +51,88 @@ function picturePart(app: App, tries: (what: () => Promise<string>) => void, sai
         await new Promise((resolve) => {
             setTimeout(resolve, 50);
         });
-        const { store: { now }, fields } = app, [a, b] = fields;
-        const canvas = await snapshot(app.stage, w, h, now.compare?.split ?? 0.5, (share) => {
-            if (app.store.now !== now || app.fields[0] !== a || app.fields[1] !== b)
+        const { now } = store, [a, b] = scene.fields;
+        const canvas = await snapshot(scene.stage, w, h, now.compare?.split ?? 0.5, (share) => {
+            if (store.now !== now || scene.fields[0] !== a || scene.fields[1] !== b)
                 throw new Changed("The picture was changed while it was drawn; save it again.");
             said.textContent = `Drawing, ${Math.round(100 * share)} % …`;
         });
-        const colours = legendOf(app);
+        const colours = legendOf(page);
         if (colours !== null && (legend.querySelector("input") as HTMLInputElement).checked)
             drawLegend(canvas, colours);
         const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, "image/png"));
         if (blob === null) throw new Error(`the browser makes no picture of ${w} × ${h} pixels`);
-        download(blob, `${fileName(app)}.png`);
+        download(blob, `${fileName(page.store)}.png`);
         return `Saved ${w} × ${h} pixels.`;
     };
     const update = (): void => {
-        legend.hidden = legendOf(app) === null;
+        legend.hidden = legendOf(page) === null;
     };
-    app.store.listen(update);
+    store.listen(update);
     update();
     return make("section", { "aria-label": "PNG" }, make("h2", {}, "Picture"),
         make("div", { class: "row" }, width, make("span", { "aria-hidden": "true" }, "×"), height,
             make("span", { class: "hint" }, "pixels"),
             button("Window", "The size of the picture on this screen", () => {
-                width.value = String(app.stage.canvas.width);
-                height.value = String(app.stage.canvas.height);
+                width.value = String(scene.stage.canvas.width);
+                height.value = String(scene.stage.canvas.height);
             })), legend, make("div", { class: "row" }, button("Save PNG", null, () => tries(save))));
 }
 
 /** Null where the picture is that of the eye. */
-function legendOf(app: App): Legend | null {
-    const { view, compare } = app.store.now, title = `${QUANTITIES[view.quantity]}, ${view.unit}`;
-    if (compare !== null && compare.how === "difference" && app.fields[1] !== null) {
-        const most = app.stage.uniforms.change.value as number;
+function legendOf({ store, scene }: Page): Legend | null {
+    const { view, compare } = store.now, title = `${QUANTITIES[view.quantity]}, ${view.unit}`;
+    if (compare !== null && compare.how === "difference" && scene.fields[1] !== null) {
+        const most = scene.stage.uniforms.change.value as number;
         return { title: `B − A, ${view.unit}`, low: -most, high: most, log: false, palette: "change" };
     }
     if (view.picture !== "false") return null;
-    const range = app.stage.uniforms.range.value as { x: number; y: number };
-    return { title, low: range.x, high: range.y, log: app.stage.uniforms.is_log.value === true, palette: view.palette };
+    const range = scene.stage.uniforms.range.value as { x: number; y: number };
+    return { title, low: range.x, high: range.y, log: scene.stage.uniforms.is_log.value === true,
+        palette: view.palette };
 }
 
 /** The request for what is shown; its numbers are the daemon's own, in the store's unit. */
-function request(app: App): PlainRequest | null {
-    const wanted = app.wanted();
-    return wanted === null ? null : plainRequest(wanted, app.store.now.tolerance);
+function request({ store, ask }: Page): PlainRequest | null {
+    const wanted = ask.wanted();
+    return wanted === null ? null : plainRequest(wanted, store.now.tolerance);
 }
 
 /** A name that every system of files takes. */
-function fileName(app: App): string {
-    const { scene, view } = app.store.now;
+function fileName(store: Store): string {
+    const { scene, view } = store.now;
     return `${scene.replace(/[^\p{L}\p{N}._@-]+/gu, "-").slice(0, 80) || "scene"}-${
         view.picture === "light" ? "radiosity" : view.quantity
     }`;
 }
 
-async function ask(app: App): Promise<ArrayBuffer> {
-    const what = request(app);
+async function values(page: Page): Promise<ArrayBuffer> {
+    const what = request(page);
     if (what === null) throw new Error("Nothing shines, so there are no numbers to save.");
-    return (await app.api.floats(what.scene, what.body)).file;
+    return (await page.ask.api.floats(what.scene, what.body)).file;
 }
 
-async function saveNpy(app: App): Promise<string> {
-    const file = await ask(app), { shape } = readNpy(file);
-    download(new Blob([file]), `${fileName(app)}.npy`);
+async function saveNpy(page: Page): Promise<string> {
+    const file = await values(page), { shape } = readNpy(file);
+    download(new Blob([file]), `${fileName(page.store)}.npy`);
     return `Saved an array of ${shape.join(" × ")} numbers.`;
 }
 
-async function saveCsv(app: App): Promise<string> {
-    const { scene } = app, unit = app.store.now.view.unit, what = request(app);
-    const { data } = readNpy(await ask(app));
-    if (scene === null || what === null) return "";
-    const { channels } = scene.description, { quantity } = what.body;
+async function saveCsv(page: Page): Promise<string> {
+    const loaded = page.scene.now, { unit } = page.store.now.view, what = request(page);
+    const { data } = readNpy(await values(page));
+    if (loaded === null || what === null) return "";
+    const { mesh, description: { channels } } = loaded, { quantity } = what.body;
     const channelNames = channels === 3
         ? ["red", "green", "blue"]
         : channels === 1
         ? [""]
         : Array.from({ length: channels }, (_, c) => String(c));
     const names = channelNames.map((name) => `${quantity}${name === "" ? "" : `_${name}`} (${unit})`);
-    const { mesh } = scene;
     download(
         new Blob([csvOf(data as Float32Array, names, mesh.groupOf, mesh.groups.map((group) => group.name), mesh.area)],
             { type: "text/csv;charset=utf-8" }),
-        `${fileName(app)}.csv`,
+        `${fileName(page.store)}.csv`,
     );
     return `Saved ${mesh.elements} lines.`;
 }
@@ -143,15 +146,16 @@ function download(blob: Blob, name: string): void {
 }
 
 /** The texts are made when the panel is in sight: a dense sky makes long ones. */
-function requestPart(app: App): HTMLElement {
+function requestPart(page: Page): HTMLElement {
+    const { store, scene, ask } = page;
     const curl = snippet("Command of curl"), python = snippet("Program in Python");
     const hint = make("p", { class: "hint" });
     const part = make("section", { "aria-label": "Request" }, make("h2", {}, "Request"), hint, curl.element,
         python.element);
     let isSeen = false;
     const update = (): void => {
-        if (!isSeen || app.scene === null) return;
-        const what = request(app), withToken = app.api.token !== null;
+        if (!isSeen || scene.now === null) return;
+        const what = request(page), withToken = ask.api.token !== null;
         hint.textContent = what === null
             ? "Nothing shines, so there is nothing to ask for."
             : withToken
@@ -164,11 +168,11 @@ function requestPart(app: App): HTMLElement {
         isSeen = entries.some((entry) => entry.isIntersecting);
         update();
     }).observe(part);
-    app.store.listen((now, before) => {
+    store.listen((now, before) => {
         if (now.lighting !== before.lighting || now.tolerance !== before.tolerance || now.view !== before.view)
             update();
     });
-    app.on("scene", update);
+    scene.on("scene", update);
     return part;
 }
 

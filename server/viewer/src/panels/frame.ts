@@ -2,16 +2,16 @@
 import { button, choice, fill, make } from "../base/dom.ts";
 import { count, percent, numberText } from "../base/numbers.ts";
 import { headlineOf } from "../daemon/headline.ts";
-import type { App } from "../app/app.ts";
+import type { OpenScene, Page, Scene } from "../app/page.ts";
 import type { Panel } from "./panel.ts";
 
 /** What takes less is not told of. */
 const LOADING_MS = 300;
 
-export function makeBar(app: App): HTMLElement {
+export function makeBar({ store, scene, ask, tell }: Page): HTMLElement {
     const scenes = make("div", { class: "scenes" });
-    const undo = button("↶", "Undo (Ctrl+Z)", () => app.store.undo());
-    const redo = button("↷", "Redo (Ctrl+Y)", () => app.store.redo());
+    const undo = button("↶", "Undo (Ctrl+Z)", () => store.undo());
+    const redo = button("↷", "Redo (Ctrl+Y)", () => store.redo());
     const share = button("Link", "Copy a link to this state", () => {
         void navigator.clipboard?.writeText(location.href).then(() => {
             share.textContent = "Copied";
@@ -26,36 +26,36 @@ export function makeBar(app: App): HTMLElement {
             ? matchMedia("(prefers-color-scheme: dark)").matches
             : root.dataset.theme === "dark";
         root.dataset.theme = isDark ? "light" : "dark";
-        setBackground(app);
+        setBackground(scene);
     });
     const update = (): void => {
-        undo.disabled = !app.store.canUndo;
-        redo.disabled = !app.store.canRedo;
+        undo.disabled = !store.canUndo;
+        redo.disabled = !store.canRedo;
     };
-    app.store.listen(update);
+    store.listen(update);
     update();
     const list = (): void => {
         update();
         // The scene that is shown may be served no more.
-        const own = app.store.now.scene, names = app.scenes.map((scene) => scene.name);
+        const own = store.now.scene, names = scene.all.map((one) => one.name);
         fill(scenes,
             choice("Scene",
                 (names.includes(own) || own === "" ? names : [own, ...names]).map((name) => [name, name] as const),
-                app.store.now.scene, (name) => {
-                app.notice = null;
-                void app.open(name, null).catch((reason: unknown) => app.fail(reason));
+                store.now.scene, (name) => {
+                tell.notice = null;
+                void ask.open(name, null).catch((reason: unknown) => tell.fail(reason));
             }));
     };
-    app.on("scene", list);
-    app.on("scenes", list);
+    scene.on("scene", list);
+    scene.on("scenes", list);
     document.addEventListener("keydown", (event) => {
         if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
         // Fields of text take their own changes back.
         if (event.target instanceof HTMLInputElement && /^(text|number|password|search)$/.test(event.target.type))
             return;
         const key = event.key.toLowerCase();
-        if (key === "z" && !event.shiftKey) app.store.undo();
-        else if (key === "y" || (key === "z" && event.shiftKey)) app.store.redo();
+        if (key === "z" && !event.shiftKey) store.undo();
+        else if (key === "y" || (key === "z" && event.shiftKey)) store.redo();
         else return;
         event.preventDefault();
     });
@@ -64,13 +64,12 @@ export function makeBar(app: App): HTMLElement {
 }
 
 /** Takes over the colours of a page that became dark or light. */
-export function setBackground(app: App): void {
-    app.stage.background = getComputedStyle(document.documentElement).getPropertyValue("--stage").trim();
-    app.tell("theme");
+export function setBackground(scene: Scene): void {
+    scene.setBackground(getComputedStyle(document.documentElement).getPropertyValue("--stage").trim());
 }
 
 /** Tabs after the pattern of WAI-ARIA: arrows move between them. */
-export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
+export function makeDrawer({ scene }: Page, panels: readonly Panel[]): HTMLElement {
     let current = panels[0].id, isChosen = false;
     const tabs = new Map(panels.map((panel) => [panel.id, make("button", {
         type: "button",
@@ -86,7 +85,7 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
         "aria-labelledby": `tab-${panel.id}`,
         tabindex: 0,
     }, panel.element)]));
-    const useful = (): Panel[] => panels.filter((panel) => panel.isUseful?.(app) ?? true);
+    const useful = (): Panel[] => panels.filter((panel) => panel.isUseful?.() ?? true);
     const show = (id: string): void => {
         current = id;
         for (const panel of panels) {
@@ -112,10 +111,10 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
     const update = (): void => {
         const all = useful();
         for (const panel of panels) (tabs.get(panel.id) as HTMLElement).hidden = !all.includes(panel);
-        const first = all.find((panel) => panel.isFirst?.(app)) ?? all[0];
+        const first = all.find((panel) => panel.isFirst?.()) ?? all[0];
         if (!isChosen || !all.some((panel) => panel.id === current)) show(first.id);
     };
-    app.on("scene", update);
+    scene.on("scene", update);
     update();
     const drawer = make("aside", { "aria-label": "Panels" },
         make("div", { role: "tablist", "aria-label": "Panels" }, ...tabs.values()),
@@ -130,23 +129,23 @@ export function makeDrawer(app: App, panels: readonly Panel[]): HTMLElement {
 }
 
 /** Size, error and time: always in sight. */
-export function makeStatus(app: App): HTMLElement {
+export function makeStatus({ store, scene, ask }: Page): HTMLElement {
     const size = make("span", {}), error = make("span", {}), time = make("span", { "data-figure": "time" }),
         sun = make("span", {});
     const drawSun = (): void => {
-        sun.textContent = app.sharp.isOn ? "sun drawn sharp, numbers have it in tiles" : "";
+        sun.textContent = scene.isSunSharp ? "sun drawn sharp, numbers have it in tiles" : "";
     };
-    app.on("field", drawSun);
-    app.store.listen(drawSun);
+    scene.on("field", drawSun);
+    store.listen(drawSun);
     const drawError = (): void => {
-        const { description } = app.scene as NonNullable<App["scene"]>;
-        if (app.asking.certificate !== null) {
+        const { description } = scene.now as OpenScene;
+        if (scene.certificate !== null) {
             error.textContent = `certified: no number is off by more than ${
-                numberText(app.asking.certificate.bound, 2)
-            } ${app.store.now.view.unit}`;
+                numberText(scene.certificate.bound, 2)
+            } ${store.now.view.unit}`;
             return;
         }
-        const headline = headlineOf(description.error, app.wanted()?.emission ?? null);
+        const headline = headlineOf(description.error, ask.wanted()?.emission ?? null);
         error.textContent = headline === null
             ? "error not measured"
             : `error ${percent(headline.indirect)} of the indirect light, ${percent(headline.relative)} of all`;
@@ -156,14 +155,13 @@ export function makeStatus(app: App): HTMLElement {
                 headline.mesh > 0 ? `${percent(headline.mesh)} by the mesh` : "that of the mesh is not known"
             }. ${description.reason}`;
     };
-    app.on("field", drawError);
-    app.on("scene", () => {
-        const { description } = app.scene as NonNullable<App["scene"]>;
+    scene.on("field", drawError);
+    scene.on("scene", () => {
+        const { description } = scene.now as OpenScene;
         drawError();
         size.textContent = `${count(description.elements)} elements · ${description.kind}`;
     });
-    app.on("timing", () => {
-        const { roundTrip, solve } = app.asking.timing;
+    scene.on("timing", ({ roundTrip, solve }) => {
         time.textContent = solve === null
             ? `answer ${numberText(roundTrip, 2)} ms`
             : `solve ${numberText(solve, 2)} ms, answer ${numberText(roundTrip, 2)} ms`;
@@ -172,61 +170,61 @@ export function makeStatus(app: App): HTMLElement {
 }
 
 /** Tells that the daemon is gone, or of a request that failed. */
-export function makeBanner(app: App): HTMLElement {
+export function makeBanner({ scene, tell }: Page): HTMLElement {
     const banner = make("div", { class: "banner", role: "status", "aria-live": "polite", hidden: true });
     const close = button("×", "Close this note", () => {
-        app.notice = null;
+        tell.notice = null;
         show(null);
     });
     const show = (text: string | null): void => {
         banner.hidden = text === null;
         // A note is no fault, and stays until it is closed.
-        const isNote = text !== null && text === app.notice;
+        const isNote = text !== null && text === tell.notice;
         banner.classList.toggle("note", isNote);
         const now = banner.firstChild?.textContent ?? null;
         if (now !== text || isNote !== banner.contains(close))
             fill(banner, make("span", {}, text ?? ""), isNote && close);
     };
-    app.on("lost", () => show(app.recovery.watch.why));
-    app.on("found", () => show(app.notice));
-    app.on("scene", () => show(app.notice));
-    app.on("problem", () => show(app.recovery.problem));
-    app.on("field", () => {
-        if (!app.recovery.watch.isLost) show(app.notice);
+    tell.on("lost", show);
+    tell.on("found", () => show(tell.notice));
+    scene.on("scene", () => show(tell.notice));
+    tell.on("problem", show);
+    scene.on("field", () => {
+        if (!tell.isLost) show(tell.notice);
     });
     return banner;
 }
 
 /** Tells that a scene is on its way, if that takes a while. */
-export function makeLoading(app: App): HTMLElement {
+export function makeLoading({ scene }: Page): HTMLElement {
     const note = make("p", { class: "loading", role: "status", hidden: true });
     let timer = 0;
-    const update = (): void => {
+    const update = (name: string | null): void => {
         clearTimeout(timer);
-        if (app.opening.loading === null) note.hidden = true;
+        if (name === null) note.hidden = true;
         else timer = window.setTimeout(() => {
-                note.textContent = `Loading ${app.opening.loading || "the scene"} …`;
+                note.textContent = `Loading ${name || "the scene"} …`;
                 note.hidden = false;
             }, LOADING_MS);
     };
-    app.on("loading", update);
-    update();
+    scene.on("loading", update);
+    update("");
     return note;
 }
 
 /** Asks for a token, which is kept as long as this tab. */
-export function makeTokenDialog(app: App, again: () => void): HTMLDialogElement {
+export function makeTokenDialog({ ask, tell }: Page, again: () => void): HTMLDialogElement {
     const field = make("input", { type: "password", autocomplete: "off", required: true, "aria-label": "Token" });
     const dialog = make("dialog", { "aria-label": "A token is needed" }, make("form", {
         method: "dialog",
         onsubmit: () => {
-            app.api.token = field.value.trim();
+            ask.api.token = field.value.trim();
             field.value = "";
             again();
         },
     }, make("p", {}, "This daemon asks for a token. It is kept until this tab is closed."), field,
         make("button", { type: "submit" }, "Go on")));
-    app.on("token", () => {
+    tell.on("token", () => {
         if (!dialog.open) dialog.showModal();
     });
     return dialog;

@@ -1,7 +1,7 @@
 // The lights: every group that emits, and any other that a person lets shine.
 import { fromHex, luminance, ofTemperature, toHex, type Rgb } from "../base/colour.ts";
 import { button, choice, fill, make, tick, unique } from "../base/dom.ts";
-import type { App } from "../app/app.ts";
+import type { Page } from "../app/page.ts";
 import type { GroupLight, Lighting, Preset } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
 import { slider, type Slider } from "./slider.ts";
@@ -14,28 +14,27 @@ interface Row {
 /** So many rows are drawn; a filter, which is there from so many lamps on, finds the others. */
 const ROWS_MOST = 40, FILTER_FROM = 8;
 
-export function lightsPanel(app: App): Panel {
+export function lightsPanel(page: Page): Panel {
+    const { store, scene } = page;
     const rows = new Map<string, Row>();
     const list = make("div", { class: "lights" });
     const presets = make("div", { class: "presets" });
     const change = (to: Partial<Lighting>, tag: string | null): void => {
-        const { now } = app.store;
-        app.store.change({ ...now, lighting: { ...now.lighting, ...to } }, tag);
+        const { now } = store;
+        store.change({ ...now, lighting: { ...now.lighting, ...to } }, tag);
     };
     const changeGroup = (name: string, to: Partial<GroupLight>, tag: string | null): void => {
-        const { groups } = app.store.now.lighting;
+        const { groups } = store.now.lighting;
         change({ groups: { ...groups, [name]: { ...groups[name], ...to } } }, tag);
     };
     const dim = slider({ label: "All", unit: "×", least: 0, most: 2, step: 0.01,
         change: (value) => change({ dim: value }, "dim") }, 1);
     const more = make("div", {});
-    const hasEmitters = (): boolean => (app.scene?.description.emitters?.length ?? 0) > 0;
+    const hasEmitters = (): boolean => (scene.now?.description.emitters?.length ?? 0) > 0;
     // Stores of few emitters answer these alone.
     const shining = (): string[] => (hasEmitters()
         ? []
-        : Object.keys(app.store.now.lighting.groups).filter((name) =>
-            app.scene?.mesh.groups.some((g) => g.name === name)
-        ));
+        : Object.keys(store.now.lighting.groups).filter((name) => scene.now?.mesh.groups.some((g) => g.name === name)));
     const filter = make("input", { type: "text", placeholder: "Part of a name",
         "aria-label": "Show lamps whose names have", oninput: () => draw() });
     const found = (): string[] => {
@@ -44,7 +43,7 @@ export function lightsPanel(app: App): Panel {
     };
     /** Of the lamps that the filter finds. */
     const turn = (on: boolean): void => {
-        const { groups } = app.store.now.lighting;
+        const { groups } = store.now.lighting;
         change({ groups: { ...groups, ...Object.fromEntries(found().map((name) => [name, { ...groups[name], on }])) } },
             null);
     };
@@ -52,12 +51,12 @@ export function lightsPanel(app: App): Panel {
         button("All off", "Turn off all lamps listed", () => turn(false)), filter);
     several.hidden = true;
     const draw = (): void => {
-        const { lighting } = app.store.now, all = found(), names = all.slice(0, ROWS_MOST);
+        const { lighting } = store.now, all = found(), names = all.slice(0, ROWS_MOST);
         several.hidden = shining().length < 2;
         filter.hidden = shining().length < FILTER_FROM;
         rows.clear();
         fill(list, ...names.map((name) => {
-            const row = lightRow(app, name, lighting.groups[name], changeGroup, (solo) => change({ solo }, null));
+            const row = lightRow(page, name, lighting.groups[name], changeGroup, (solo) => change({ solo }, null));
             rows.set(name, row);
             return row.element;
         }));
@@ -65,7 +64,7 @@ export function lightsPanel(app: App): Panel {
             list.append(
                 make("p", { class: "hint" }, `${all.length - names.length} more: name a part of theirs above.`),
             );
-        if (app.scene?.mesh.groups.every((group) => group.emission === null) && app.scene.description.sky === null
+        if (scene.now?.mesh.groups.every((group) => group.emission === null) && scene.now.description.sky === null
             && names.length > 0)
             list.append(make("p", { class: "hint" }, "No group of this scene emits light: these do it in its place."));
         if (hasEmitters())
@@ -75,48 +74,48 @@ export function lightsPanel(app: App): Panel {
         drawMore();
     };
     const drawMore = (): void => {
-        const { groups } = app.store.now.lighting;
-        const others = app.scene?.mesh.groups.filter((g) => !(g.name in groups)).map((g) => g.name) ?? [];
+        const { groups } = store.now.lighting;
+        const others = scene.now?.mesh.groups.filter((g) => !(g.name in groups)).map((g) => g.name) ?? [];
         fill(more, others.length > 0 && !hasEmitters()
             && choice("Let another group shine", [["", "…"], ...others.map((n) => [n, n] as const)], "", (name) => {
                 if (name !== "") changeGroup(name, { on: true, power: 1, colour: [1, 1, 1], kelvin: null }, null);
             }));
     };
     const update = (): void => {
-        const { lighting } = app.store.now;
+        const { lighting } = store.now;
         dim.set(lighting.dim);
         const known = found().slice(0, ROWS_MOST);
         if (known.length !== rows.size || known.some((name) => !rows.has(name))) draw();
         for (const [name, row] of rows) row.update(lighting.groups[name], lighting.solo);
     };
-    app.on("scene", () => {
+    scene.on("scene", () => {
         filter.value = "";
         draw();
-        drawPresets(app, presets);
+        drawPresets(page, presets);
     });
-    app.store.listen((now, before) => {
+    store.listen((now, before) => {
         if (now.lighting !== before.lighting) update();
-        if (now.presets !== before.presets) drawPresets(app, presets);
+        if (now.presets !== before.presets) drawPresets(page, presets);
     });
     const reset = button("As the scene comes", null, () => {
-        if (app.scene !== null) app.store.change({ ...app.store.now, lighting: app.scene.defaultLighting });
+        if (scene.now !== null) store.change({ ...store.now, lighting: scene.now.defaultLighting });
     });
     return { id: "lights", title: "Lights",
         element: make("div", {}, dim.element, several, list, more, reset, presets) };
 }
 
-function lightRow(app: App, name: string, light: GroupLight,
+function lightRow({ store, scene }: Page, name: string, light: GroupLight,
     change: (name: string, to: Partial<GroupLight>, tag: string | null) => void,
     solo: (name: string | null) => void): Row
 {
     const id = unique("light");
-    const coloured = app.scene?.description.channels === 3;
+    const coloured = scene.now?.description.channels === 3;
     const on = tick(name, light.on, (is) => change(name, { on: is }, null));
     on.querySelector("span")?.setAttribute("id", id);
     const most = Math.max(1e-6, 4 * (light.power || 1));
     const power: Slider = slider({
         label: "Power",
-        unit: app.store.now.view.unit === "lx" ? "lm/m²" : "W/m²",
+        unit: store.now.view.unit === "lx" ? "lm/m²" : "W/m²",
         least: 0,
         most,
         log: true,
@@ -138,7 +137,7 @@ function lightRow(app: App, name: string, light: GroupLight,
         step: 50,
         change: (value) => change(name, { kelvin: value, colour: ofTemperature(value) }, `kelvin ${name}`),
     }, light.kelvin ?? 4000);
-    const alone = button("Solo", `Only ${name}`, () => solo(app.store.now.lighting.solo === name ? null : name), {
+    const alone = button("Solo", `Only ${name}`, () => solo(store.now.lighting.solo === name ? null : name), {
         "aria-pressed": "false",
         "aria-label": `Solo ${name}`,
     });
@@ -154,27 +153,27 @@ function lightRow(app: App, name: string, light: GroupLight,
         alone.setAttribute("aria-pressed", String(soloed === name));
         element.classList.toggle("dark", !now.on || (soloed !== null && soloed !== name));
     };
-    update(light, app.store.now.lighting.solo);
+    update(light, store.now.lighting.solo);
     return { element, update };
 }
 
 /** Lightings with names, which stand in the link. */
-function drawPresets(app: App, place: HTMLElement): void {
+function drawPresets({ store }: Page, place: HTMLElement): void {
     const name = make("input", { type: "text", placeholder: "Name of this lighting",
         "aria-label": "Name of this lighting", maxlength: 60 });
     const keep = (): void => {
-        const { now } = app.store, text = name.value.trim();
+        const { now } = store, text = name.value.trim();
         if (text === "") return;
         const others = now.presets.filter((preset) => preset.name !== text);
-        app.store.change({ ...now, presets: [...others, { name: text, lighting: now.lighting }] });
+        store.change({ ...now, presets: [...others, { name: text, lighting: now.lighting }] });
     };
-    const shine = ({ lighting }: Preset): void => app.store.change({ ...app.store.now, lighting });
+    const shine = ({ lighting }: Preset): void => store.change({ ...store.now, lighting });
     const forget = (preset: Preset): void => {
-        const { now } = app.store;
-        app.store.change({ ...now, presets: now.presets.filter((other) => other !== preset) });
+        const { now } = store;
+        store.change({ ...now, presets: now.presets.filter((other) => other !== preset) });
     };
     fill(place, make("h2", { class: "sub" }, "Presets"),
-        ...app.store.now.presets.map((preset) =>
+        ...store.now.presets.map((preset) =>
             make("div", { class: "row" }, button(preset.name, null, () => shine(preset), { class: "grow" }),
                 button("×", `Forget ${preset.name}`, () => forget(preset)))
         ), make("form", { class: "row", onsubmit: (event: Event) => {

@@ -3,8 +3,7 @@
 import { fromHex, toHex } from "../base/colour.ts";
 import { button, fill, make } from "../base/dom.ts";
 import { Problem, type Api } from "../daemon/api.ts";
-import type { App } from "../app/app.ts";
-import type { OpenScene } from "../app/opening.ts";
+import type { OpenScene, Page } from "../app/page.ts";
 import type { MeshGroup } from "../picture/glb.ts";
 import { baseOf, checkReflectances, type Reflectances } from "../state/variants.ts";
 import type { Panel } from "./panel.ts";
@@ -37,19 +36,19 @@ async function isServed(api: Api, path: string): Promise<boolean> {
     }
 }
 
-export function materialsPanel(app: App): Panel {
+export function materialsPanel({ store, scene, ask, tell }: Page): Panel {
     const rows = make("div", {}), variants = make("div", {}),
         said = make("p", { role: "status", "aria-live": "polite" });
     const name = make("input", { type: "text", value: "variant-1", maxlength: 60,
         "aria-label": "Name of the variant" });
     let draft: Reflectances = {}, isBusy = false;
-    const base = (): string => baseOf(app.store.now.scene, app.scenes.map((scene) => scene.name));
+    const base = (): string => baseOf(store.now.scene, scene.all.map((one) => one.name));
     const draw = (): void => {
-        const { scene } = app;
-        if (scene === null) return;
+        const loaded = scene.now;
+        if (loaded === null) return;
         draft = {};
-        const { channels } = scene.description;
-        fill(rows, ...scene.mesh.groups.map((group) =>
+        const { channels } = loaded.description;
+        fill(rows, ...loaded.mesh.groups.map((group) =>
             groupRow(group, channels, (to) => {
                 draft[group.name] = to;
             })
@@ -62,49 +61,47 @@ export function materialsPanel(app: App): Panel {
             await what();
         } catch (reason) {
             said.textContent = reason instanceof Problem ? inWords(reason) : "";
-            if (!(reason instanceof Problem) || reason.status === 401) app.fail(reason);
+            if (!(reason instanceof Problem) || reason.status === 401) tell.fail(reason);
         } finally {
             isBusy = false;
         }
     };
     const build = async (): Promise<void> => {
-        const { scene, store: { now } } = app, variant = name.value.trim();
-        if (scene === null) return;
+        const { now } = store, loaded = scene.now, variant = name.value.trim();
+        if (loaded === null) return;
         // A variant begins from its store, so one of a variant has all of its own reflectances.
-        const own = now.scene === base() ? {} : reflectancesOf(scene);
+        const own = now.scene === base() ? {} : reflectancesOf(loaded);
         const groups = { ...own, ...draft }, wrong = checkReflectances(variant, groups);
         if (wrong !== null) {
             said.textContent = wrong;
             return;
         }
         said.textContent = `${variant} is being built …`;
-        const from = base(), path = await app.api.vary(from, variant, plain(groups));
-        if (path !== null && !(await isServed(app.api, path))) {
+        const from = base(), path = await ask.api.vary(from, variant, plain(groups));
+        if (path !== null && !(await isServed(ask.api, path))) {
             said.textContent = `${variant} is not ready after two minutes. `
                 + "It is listed here once it is, when the page is opened again.";
             return;
         }
-        await app.listScenes();
+        await ask.scenes();
         said.textContent = `${from}@${variant} is ready.`;
     };
-    const open = (to: string): Promise<void> =>
-        tries(() => app.open(to, { ...app.store.now, scene: to, compare: null }));
+    const open = (to: string): Promise<void> => tries(() => ask.open(to, { ...store.now, scene: to, compare: null }));
     const compare = (to: string): void => {
-        const { now } = app.store;
-        app.store.change({ ...now, compare: { how: "split", split: 0.5, lighting: null, ...now.compare, scene: to } });
+        const { now } = store;
+        store.change({ ...now, compare: { how: "split", split: 0.5, lighting: null, ...now.compare, scene: to } });
     };
     const remove = (variant: string): Promise<void> =>
         tries(async () => {
-            const from = base(), { now } = app.store;
-            await app.api.vary(from, variant.slice(from.length + 1), null);
-            if (now.compare?.scene === variant) app.store.change({ ...now, compare: null });
-            await app.listScenes();
-            if (app.store.now.scene === variant) await app.open(from, { ...app.store.now, scene: from });
+            const from = base(), { now } = store;
+            await ask.api.vary(from, variant.slice(from.length + 1), null);
+            if (now.compare?.scene === variant) store.change({ ...now, compare: null });
+            await ask.scenes();
+            if (store.now.scene === variant) await ask.open(from, { ...store.now, scene: from });
             said.textContent = `${variant} is gone.`;
         });
     const drawVariants = (): void => {
-        const from = base(), now = app.store.now.scene,
-            known = app.scenes.filter((scene) => scene.name.startsWith(`${from}@`));
+        const from = base(), now = store.now.scene, known = scene.all.filter((one) => one.name.startsWith(`${from}@`));
         fill(variants, known.length > 0 && make("h2", {}, `Variants of ${from}`),
             now !== from && make("div", { class: "row" }, button(`Back to ${from}`, null, () => void open(from))),
             ...known.map(({ name }) => {
@@ -116,11 +113,11 @@ export function materialsPanel(app: App): Panel {
                     button("Delete", null, () => void remove(name)));
             }));
     };
-    app.on("scene", () => {
+    scene.on("scene", () => {
         draw();
         drawVariants();
     });
-    app.on("scenes", drawVariants);
+    scene.on("scenes", drawVariants);
     const submit = (event: Event): void => {
         event.preventDefault();
         void tries(build);

@@ -1,14 +1,14 @@
 // What a panel is: a part of the page beside the picture.
-import type { App } from "../app/app.ts";
+import type { Page } from "../app/page.ts";
 
 export interface Panel {
     id: string;
     title: string;
     element: HTMLElement;
     /** True while it has something to offer for the scene that is open; absent: always. */
-    isUseful?: (app: App) => boolean;
+    isUseful?: () => boolean;
     /** True where it is the panel of the scene's lights, so that it is shown first. */
-    isFirst?: (app: App) => boolean;
+    isFirst?: () => boolean;
 }
 
-export type PanelMaker = (app: App) => Panel;
+export type PanelMaker = (page: Page) => Panel;

@@ -1,13 +1,10 @@
 // The sky of a store that has one: its model, place and time, a day that goes by, and the weather file.
-import type { App } from "../app/app.ts";
-import type { OpenScene } from "../app/opening.ts";
+import type { Page } from "../app/page.ts";
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { count, numberText } from "../base/numbers.ts";
-import type { Description } from "../daemon/api.ts";
-import { clockOf, SkySource, windOf } from "../daylight/source.ts";
+import { clockOf, windOf, type SkySource } from "../daylight/source.ts";
 import type { Sky } from "../daylight/skies.ts";
 import { dateOf, dayOf, sunAt } from "../daylight/sun.ts";
-import type { SkyAnswer } from "../daylight/tiles.ts";
 import { skyOff, type SkyLight } from "../state/state.ts";
 import { makeDome } from "./dome.ts";
 import type { Panel } from "./panel.ts";
@@ -40,30 +37,14 @@ export function goOn(light: SkyLight, hours: number): number {
     return next;
 }
 
-export function skyPanel(app: App): Panel {
-    const source = new SkySource();
+export function skyPanel(page: Page): Panel {
+    const { store, scene } = page, { source } = scene.sky;
     const change: Change = (to, tag = null) => {
-        const { now } = app.store;
-        app.store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, ...to } } }, tag);
+        const { now } = store;
+        store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, ...to } } }, tag);
     };
-    const isPhotometric = (): boolean => app.store.now.view.unit === "lx";
-    // Tiles are of the scene that they were read for: another one may be shown before its own have come.
-    let tiledScene: OpenScene | null = null;
-    app.skyOf = (lighting, description) => {
-        const isOpen = description === tiledScene?.description;
-        if (description.sky === null || lighting.solo !== null || !(isOpen || source.knows(description.name)))
-            return null;
-        return source.radiances(lighting.sky, isPhotometric(), description.channels, isOpen ? null : description.name);
-    };
-    app.sunOf = (lighting, description) => (description !== tiledScene?.description || lighting.solo !== null
-        ? null
-        : source.parts(lighting.sky, isPhotometric(), description.channels));
-    app.momentOf = (light) => source.momentOf(light);
-    app.prepareOther = async ({ name, sky }) => {
-        if (sky !== null) source.takeOther(name, await app.api.sky(name));
-    };
-    const controls = makeControls(app, change);
-    const weather = makeWeather(app, source, change, () => update());
+    const controls = makeControls(page, change);
+    const weather = makeWeather(page, change, () => update());
     const dome = makeDome(), figures = make("table", { class: "figures" }),
         moment = make("p", { class: "moment", "aria-live": "off" });
     const day = player({
@@ -73,85 +54,41 @@ export function skyPanel(app: App): Panel {
         speed: "1",
         step: 0.5,
         stepLabel: "Half an hour",
-        advance: (hours) =>
-            change({ hour: Number(goOn(app.store.now.lighting.sky, hours).toFixed(3)) }, "hour of the sky"),
+        advance: (hours) => change({ hour: Number(goOn(store.now.lighting.sky, hours).toFixed(3)) }, "hour of the sky"),
     });
     const note = make("p", { class: "hint", role: "status" });
     const update = (): void => {
-        const light = app.store.now.lighting.sky, sky = source.sky(light, isPhotometric());
+        const light = store.now.lighting.sky, { isPhotometric } = scene.sky, sky = source.sky(light, isPhotometric);
         controls.update(light);
         weather.update(light);
         moment.textContent = `${dateText(light.day)}, ${clockOf(light.hour)}`;
         dome.draw(source.tiles, sky);
-        drawFigures(figures, dome.element, light, sky, isPhotometric() ? "lx" : "W/m²");
-        note.textContent = noteOf(light, source, app);
+        drawFigures(figures, dome.element, light, sky, isPhotometric ? "lx" : "W/m²");
+        note.textContent = noteOf(light, source, store.now.lighting.solo);
         note.hidden = note.textContent === "";
     };
-    app.prepare = async (description) => {
-        const fetched = await fetchSky(app, description);
-        return (scene) => {
-            tiledScene = scene;
-            takeSky(app, source, fetched, scene);
-        };
-    };
-    app.on("scene", () => {
+    scene.on("scene", () => {
         day.stop();
         update();
     });
-    app.on("theme", update);
-    app.store.listen((now, before) => {
+    scene.on("theme", update);
+    store.listen((now, before) => {
         if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit
             || now.view.sharpSun !== before.view.sharpSun) update();
     });
     return {
         id: "sky",
         title: "Sky",
-        isUseful: () => app.scene?.description.sky !== null && app.scene !== null,
-        isFirst: () => app.scene?.mesh.groups.every((group) => group.emission === null) ?? false,
+        isUseful: () => scene.now?.description.sky !== null && scene.now !== null,
+        isFirst: () => scene.now?.mesh.groups.every((group) => group.emission === null) ?? false,
         element: make("div", {}, controls.model, note, controls.strength, moment, controls.time, day.element,
             dome.element, figures, weather.element, controls.place),
     };
 }
 
-interface Fetched {
-    answer: SkyAnswer | null;
-    weather: string | null;
-    reason: unknown;
-}
-
-/** The tiles and the weather beside the store. Without them a scene can still be shown. */
-async function fetchSky(app: App, { name, sky }: Description): Promise<Fetched> {
-    if (sky === null) return { answer: null, weather: null, reason: null };
-    try {
-        const answer = await app.api.sky(name);
-        return { answer, weather: answer.weather === null ? null : await app.api.weather(name), reason: null };
-    } catch (reason) {
-        return { answer: null, weather: null, reason };
-    }
-}
-
-/** A scene that is opened without a link begins with the weather beside it. */
-function takeSky(app: App, source: SkySource, fetched: Fetched, scene: OpenScene): void {
-    source.take(fetched.answer);
-    if (fetched.reason !== null) app.fail(fetched.reason);
-    source.forget();
-    if (fetched.weather !== null) source.read(fetched.weather, true);
-    const { weather } = source;
-    if (weather === null) return;
-    const sky: SkyLight = {
-        ...scene.defaultLighting.sky,
-        model: "perez",
-        latitude: weather.latitude,
-        longitude: weather.longitude,
-        zone: weather.zone,
-    };
-    scene.defaultLighting = { ...scene.defaultLighting, sky };
-}
-
-function noteOf(light: SkyLight, source: SkySource, app: App): string {
+function noteOf(light: SkyLight, source: SkySource, solo: string | null): string {
     if (source.tiles === null) return "The tiles of this sky are not known yet.";
-    if (app.store.now.lighting.solo !== null)
-        return `Only ${app.store.now.lighting.solo} shines now (Lights, Solo), not the sky.`;
+    if (solo !== null) return `Only ${solo} shines now (Lights, Solo), not the sky.`;
     if (light.model === "perez" && source.weather === null && source.weatherFor(light) === null)
         return light.moment === null
             ? "Pick a weather file below; until then this sky is dark."
@@ -164,9 +101,9 @@ function noteOf(light: SkyLight, source: SkySource, app: App): string {
 }
 
 /** Other skies are ten times as bright: an exposure that the page chose is found anew, that of a person stays. */
-function changeModel(app: App, model: SkyLight["model"]): void {
-    const { now } = app.store, exposure = app.exposure.anew(now.view);
-    app.store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, model } },
+function changeModel({ store, scene }: Page, model: SkyLight["model"]): void {
+    const { now } = store, exposure = scene.exposure.anew(now.view);
+    store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, model } },
         view: { ...now.view, exposure } });
 }
 
@@ -178,27 +115,28 @@ interface Controls {
     update(light: SkyLight): void;
 }
 
-function makeControls(app: App, change: Change): Controls {
+function makeControls(page: Page, change: Change): Controls {
+    const { store, scene } = page;
     const first = skyOff;
     const model = choice("Sky", [["off", "None"], ["overcast", "Overcast (CIE)"], ["clear", "Clear (CIE)"], ["turbid",
         "Clear, by turbidity (Linke)"], ["given", "By direct and diffuse light (Perez)"], ["even", "Even"], ["perez",
-        "Of a weather file (Perez)"]], first.model, (to) => changeModel(app, to));
+        "Of a weather file (Perez)"]], first.model, (to) => changeModel(page, to));
     const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]],
         first.sun, (to) => change({ sun: to }));
-    const sharp = tick("Sharp sun (drawn)", app.store.now.view.sharpSun, (on) => {
-        const { now } = app.store;
-        app.store.change({ ...now, view: { ...now.view, sharpSun: on } });
+    const sharp = tick("Sharp sun (drawn)", store.now.view.sharpSun, (on) => {
+        const { now } = store;
+        store.change({ ...now, view: { ...now.view, sharpSun: on } });
     });
     const drawn = make("p", { class: "hint" });
     const tellDrawn = (): void => {
-        drawn.textContent = app.sharp.isOn
+        drawn.textContent = scene.isSunSharp
             ? "The picture has the sun in its true place, with the half-shadows of its disc once the view rests; all numbers have it in tiles of the sky."
             : "Not now: no sun shines, or the picture shows numbers (false colour, a threshold, a comparison).";
     };
-    app.store.listen(tellDrawn);
-    app.on("field", tellDrawn);
+    store.listen(tellDrawn);
+    scene.on("field", tellDrawn);
     const tinted = tick("Blue sky, warm sun", first.tinted, (on) => change({ tinted: on }));
-    const unit = (): string => (app.store.now.view.unit === "lx" ? "lx" : "W/m²");
+    const unit = (): string => (store.now.view.unit === "lx" ? "lx" : "W/m²");
     const strength = slider({ label: "On the ground", unit: unit(), least: 0, most: 1000, log: true,
         change: (value) => change({ strength: value }, "strength of the sky") }, first.strength);
     const turbidity = slider({ label: "Turbidity", least: 1.5, most: 8, step: 0.1,
@@ -235,12 +173,12 @@ function makeControls(app: App, change: Change): Controls {
         factor.element.hidden = isPlain || light.model === "off";
         sun.hidden = factor.element.hidden;
         sharp.hidden = sun.hidden || light.sun === "off";
-        (sharp.querySelector("input") as HTMLInputElement).checked = app.store.now.view.sharpSun;
-        drawn.hidden = sharp.hidden || !app.store.now.view.sharpSun;
+        (sharp.querySelector("input") as HTMLInputElement).checked = store.now.view.sharpSun;
+        drawn.hidden = sharp.hidden || !store.now.view.sharpSun;
         turbidity.element.hidden = haze.hidden = light.model !== "turbid";
         direct.element.hidden = diffuse.element.hidden = light.model !== "given";
-        tinted.hidden = app.scene?.description.channels !== 3 || light.model === "off";
-        strength.setMost(Math.max(app.store.now.view.unit === "lx" ? 1e5 : 1000, light.strength));
+        tinted.hidden = scene.now?.description.channels !== 3 || light.model === "off";
+        strength.setMost(Math.max(store.now.view.unit === "lx" ? 1e5 : 1000, light.strength));
         (strength.element.querySelector(".unit") as HTMLElement).textContent = unit();
         for (const [one, value] of [[strength, light.strength], [factor, light.factor], [turbidity, light.turbidity], [
             direct,
@@ -259,9 +197,10 @@ function makeControls(app: App, change: Change): Controls {
 }
 
 /** The weather file: picked or dropped, read by the page itself. */
-function makeWeather(app: App, source: SkySource, change: Change,
+function makeWeather({ scene, ask, tell }: Page, change: Change,
     done: () => void): { element: HTMLElement; update(light: SkyLight): void }
 {
+    const { source } = scene.sky;
     const about = make("p", { class: "hint" }), problem = make("p", { class: "bad", role: "alert" });
     const place = (): void => {
         const { weather } = source;
@@ -273,7 +212,7 @@ function makeWeather(app: App, source: SkySource, change: Change,
             source.problem = `${file.name} has ${count(file.size)} bytes, a weather file at most ${count(FILE_MOST)}.`;
         else if (source.read(await file.text(), false)) place();
         done();
-        app.ask();
+        ask.shown();
     };
     const picker = make("input", {
         type: "file",
@@ -281,7 +220,7 @@ function makeWeather(app: App, source: SkySource, change: Change,
         "aria-label": "Weather file (EPW or WEA)",
         onchange: () => {
             const file = picker.files?.[0];
-            if (file !== undefined) take(file).catch((reason: unknown) => app.fail(reason));
+            if (file !== undefined) take(file).catch((reason: unknown) => tell.fail(reason));
             picker.value = "";
         },
     });
@@ -295,8 +234,8 @@ function makeWeather(app: App, source: SkySource, change: Change,
         const file = event.dataTransfer?.files[0];
         if (file === undefined) return;
         event.preventDefault();
-        if (app.scene?.description.sky !== null && /\.(epw|wea)$/i.test(file.name))
-            take(file).catch((reason: unknown) => app.fail(reason));
+        if (scene.now?.description.sky !== null && /\.(epw|wea)$/i.test(file.name))
+            take(file).catch((reason: unknown) => tell.fail(reason));
     });
     const update = (light: SkyLight): void => {
         const { weather } = source;

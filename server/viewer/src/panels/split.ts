@@ -2,14 +2,14 @@
 import { make } from "../base/dom.ts";
 import { clamp, numberText } from "../base/numbers.ts";
 import { toHex } from "../base/colour.ts";
-import type { App } from "../app/app.ts";
+import type { Page } from "../app/page.ts";
 import { changeColour } from "../picture/changes.ts";
 
 /** Parts of the width that a key moves the line by. */
 const STEP = 0.01, LEAP = 0.1;
 
 /** A slider over the whole picture, with the names of its sides. */
-export function splitLine(app: App): { element: HTMLElement; name(a: string, b: string): void } {
+export function splitLine({ store }: Page): { element: HTMLElement; name(a: string, b: string): void } {
     const left = make("span", { class: "side left" }), right = make("span", { class: "side right" });
     const line = make("div", {
         class: "split",
@@ -30,7 +30,7 @@ export function splitLine(app: App): { element: HTMLElement; name(a: string, b: 
             move((event.clientX - from) / width);
         },
         onkeydown: (event: KeyboardEvent) => {
-            const now = app.store.now.compare?.split ?? 0.5;
+            const now = store.now.compare?.split ?? 0.5;
             const to: { [key: string]: number } = {
                 ArrowLeft: now - STEP,
                 ArrowDown: now - STEP,
@@ -48,12 +48,12 @@ export function splitLine(app: App): { element: HTMLElement; name(a: string, b: 
     });
     const element = make("div", { class: "compared", hidden: true }, left, right, line);
     const move = (to: number): void => {
-        const { now } = app.store;
+        const { now } = store;
         if (now.compare === null) return;
-        app.store.change({ ...now, compare: { ...now.compare, split: Number(clamp(to, 0, 1).toFixed(4)) } }, "split");
+        store.change({ ...now, compare: { ...now.compare, split: Number(clamp(to, 0, 1).toFixed(4)) } }, "split");
     };
     const update = (): void => {
-        const { compare } = app.store.now;
+        const { compare } = store.now;
         element.hidden = compare === null || compare.how !== "split";
         if (compare === null) return;
         const share = clamp(compare.split, 0, 1), percent = Math.round(100 * share);
@@ -61,7 +61,7 @@ export function splitLine(app: App): { element: HTMLElement; name(a: string, b: 
         line.setAttribute("aria-valuenow", String(percent));
         line.setAttribute("aria-valuetext", `${percent} % of the width is A`);
     };
-    app.store.listen((now, before) => {
+    store.listen((now, before) => {
         if (now.compare !== before.compare) update();
     });
     return {
@@ -74,7 +74,7 @@ export function splitLine(app: App): { element: HTMLElement; name(a: string, b: 
 }
 
 /** The ramp of differences, blue where B is darker and red where it is brighter. */
-export function changeLegend(app: App): { element: HTMLElement; set(most: number): void } {
+export function changeLegend({ store }: Page): { element: HTMLElement; set(most: number): void } {
     const ramp = make("canvas", { width: 256, height: 1, class: "ramp", "aria-hidden": "true" });
     const context = ramp.getContext("2d") as CanvasRenderingContext2D;
     for (let x = 0; x < 256; x++) {
@@ -85,14 +85,14 @@ export function changeLegend(app: App): { element: HTMLElement; set(most: number
     const element = make("div", { class: "changes", hidden: true, "data-figure": "changes" }, make("div", {}, "B − A"),
         ramp, make("div", { class: "ends" }, low, make("span", {}, "0"), high));
     const update = (): void => {
-        element.hidden = app.store.now.compare?.how !== "difference";
+        element.hidden = store.now.compare?.how !== "difference";
     };
-    app.store.listen(update);
+    store.listen(update);
     return {
         element,
         set: (most) => {
             low.textContent = `−${numberText(most)}`;
-            high.textContent = `+${numberText(most)} ${app.store.now.view.unit}`;
+            high.textContent = `+${numberText(most)} ${store.now.view.unit}`;
         },
     };
 }

@@ -6,7 +6,7 @@ import { readNpy } from "../base/npy.ts";
 import { count, percent, numberText } from "../base/numbers.ts";
 import { Problem, type Description, type ErrorFigures, type GroupErrors } from "../daemon/api.ts";
 import { Newest } from "../daemon/newest.ts";
-import type { App } from "../app/app.ts";
+import type { OpenScene, Page } from "../app/page.ts";
 import { Field } from "../picture/field.ts";
 import type { Wanted } from "../state/request.ts";
 import type { Panel } from "./panel.ts";
@@ -34,14 +34,15 @@ interface OwnError {
     groups?: { [name: string]: { mean: number | null; elements: number | null } };
 }
 
-export function trustPanel(app: App): Panel {
-    const own = make("div", {}), store = make("div", {});
-    const certificate = certifier(app);
+export function trustPanel(page: Page): Panel {
+    const { scene, ask } = page;
+    const own = make("div", {}), ofAll = make("div", {});
+    const certificate = certifier(page);
     const asker = new Newest<Wanted, OwnError | null>(
         async (wanted) => {
-            const names = app.scene?.mesh.groups.slice(0, GROUPS_MOST).map((group) => group.name) ?? [];
+            const names = scene.now?.mesh.groups.slice(0, GROUPS_MOST).map((group) => group.name) ?? [];
             if (wanted.emission === null || names.length === 0) return null;
-            const answer = await app.api.answer(wanted.scene, {
+            const answer = await ask.api.answer(wanted.scene, {
                 emission: wanted.emission,
                 quantity: wanted.quantity,
                 reduce: { groups: names, with: ["mean", "max"] },
@@ -60,8 +61,8 @@ export function trustPanel(app: App): Panel {
     const rest = (): void => {
         clearTimeout(timer);
         timer = window.setTimeout(() => {
-            const wanted = app.wanted();
-            if (wanted === null || !app.isIdle) return;
+            const wanted = ask.wanted();
+            if (wanted === null || !ask.isIdle) return;
             if (isSeen && asked !== JSON.stringify(wanted)) {
                 asked = JSON.stringify(wanted);
                 asker.want(wanted);
@@ -69,23 +70,23 @@ export function trustPanel(app: App): Panel {
             certificate.rested(wanted);
         }, REST_MS);
     };
-    app.on("field", rest);
+    scene.on("field", rest);
     const figures = make("section", { "aria-label": "Error of this lighting" },
         make("h2", {}, "Error of this lighting"), own);
     new IntersectionObserver((entries) => {
         isSeen = entries.some((entry) => entry.isIntersecting);
         if (isSeen) rest();
     }).observe(figures);
-    app.on("scene", () => {
+    scene.on("scene", () => {
         asked = "";
         asker.forget();
         fill(own);
-        fill(store, ...ofStore((app.scene as NonNullable<App["scene"]>).description));
+        fill(ofAll, ...ofStore((scene.now as OpenScene).description));
     });
     return {
         id: "trust",
         title: "Trust",
-        element: make("div", {}, figures, certificate.element, store),
+        element: make("div", {}, figures, certificate.element, ofAll),
     };
 }
 
@@ -183,11 +184,11 @@ function list(values: { [name: string]: unknown }): HTMLElement {
 }
 
 /** Asks for a bound on the error of every number, and shows the refined values in place of the others. */
-function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): void } {
+function certifier({ store, scene, ask, tell }: Page): { element: HTMLElement; rested(wanted: Wanted): void } {
     const tolerance = make("input", { type: "number", min: 0, step: "any", value: "0.001",
         "aria-label": "Tolerance, a share of the most reflected light" });
     const said = make("p", { role: "status", "aria-live": "polite", "data-figure": "certificate" });
-    const wish = (value: number | null): void => app.store.change({ ...app.store.now, tolerance: value });
+    const wish = (value: number | null): void => store.change({ ...store.now, tolerance: value });
     const start = button("Certify", null, () => {
         const value = Number(tolerance.value);
         if (!(value > 0)) {
@@ -196,17 +197,17 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
         }
         certified = "";
         wish(value);
-        const wanted = app.wanted();
+        const wanted = ask.wanted();
         if (wanted !== null) rested(wanted);
     });
     const stop = button("As stored", "Show the answer of the store again", () => {
         wish(null);
-        app.ask(true);
+        ask.shown(true);
     }, { disabled: true });
     let certified = "", onItsWay: AbortController | null = null;
     const rested = (wanted: Wanted): void => {
-        const wished = app.store.now.tolerance, key = JSON.stringify([wanted, wished]);
-        if (wished === null || wanted.emission === null || (key === certified && app.asking.certificate !== null))
+        const wished = store.now.tolerance, key = JSON.stringify([wanted, wished]);
+        if (wished === null || wanted.emission === null || (key === certified && scene.certificate !== null))
             return;
         if (key === certified && onItsWay !== null) return;
         certified = key;
@@ -214,35 +215,35 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
         const mine = onItsWay = new AbortController();
         said.textContent = "Refining …";
         const start = performance.now();
-        app.api.floats(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity, tolerance: wished },
+        ask.api.floats(wanted.scene, { emission: wanted.emission, quantity: wanted.quantity, tolerance: wished },
             mine.signal).then((answer) => {
                 // Another lighting may be shown meanwhile.
-                if (mine.signal.aborted || JSON.stringify([app.wanted(), app.store.now.tolerance]) !== key) return;
+                if (mine.signal.aborted || JSON.stringify([ask.wanted(), store.now.tolerance]) !== key) return;
                 const { data, shape } = readNpy(answer.file);
                 const bound = (answer.certificate ?? NaN) * wanted.scale, iterations = answer.iterations ?? 0;
-                app.certify(new Field(floatsToHalves(data as Float32Array), shape, wanted.scale), { bound, iterations,
+                scene.certify(new Field(floatsToHalves(data as Float32Array), shape, wanted.scale), { bound, iterations,
                     solve: answer.solveMs });
                 said.textContent =
                     `Certified: no number of this answer is off by more than ${
                         numberText(bound, 2)
-                    } ${app.store.now.view.unit}. `
+                    } ${store.now.view.unit}. `
                     + `${iterations} multiplications by the form factors, ${
                         numberText(answer.solveMs ?? performance.now() - start, 2)
                     } ms. The picture rounds to 11 bits.`;
             }, (reason: unknown) => {
                 if (mine.signal.aborted) return;
-                app.store.settle({ ...app.store.now, tolerance: null });
+                store.settle({ ...store.now, tolerance: null });
                 said.textContent = reason instanceof Problem && reason.status === 422
                     ? `Not certified: ${reason.message}.`
                     : reason instanceof Error
                     ? reason.message
                     : String(reason);
-                if (!(reason instanceof Problem) || reason.status === 401) app.fail(reason);
+                if (!(reason instanceof Problem) || reason.status === 401) tell.fail(reason);
             }).finally(() => {
                 if (onItsWay === mine) onItsWay = null;
             });
     };
-    app.store.listen((now, before) => {
+    store.listen((now, before) => {
         if (now.tolerance === before.tolerance) return;
         stop.disabled = now.tolerance === null;
         if (now.tolerance !== null) tolerance.value = String(now.tolerance);
@@ -253,12 +254,12 @@ function certifier(app: App): { element: HTMLElement; rested(wanted: Wanted): vo
             said.textContent = "";
         }
     });
-    app.on("field", () => {
-        if (app.asking.certificate === null && onItsWay === null) said.textContent = "";
+    scene.on("field", () => {
+        if (scene.certificate === null && onItsWay === null) said.textContent = "";
     });
-    app.on("scene", () => {
+    scene.on("scene", () => {
         certified = "";
-        stop.disabled = app.store.now.tolerance === null;
+        stop.disabled = store.now.tolerance === null;
     });
     return {
         rested,

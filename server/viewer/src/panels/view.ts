@@ -1,7 +1,7 @@
 // How the picture is drawn: tone, exposure, false colour, cameras. Nothing here costs a request but the quantity.
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { numberText } from "../base/numbers.ts";
-import type { App } from "../app/app.ts";
+import type { Page } from "../app/page.ts";
 import type { Description } from "../daemon/api.ts";
 import { placeOf } from "../picture/cameras.ts";
 import { turned } from "../picture/glb.ts";
@@ -13,18 +13,19 @@ const QUANTITIES = [["radiosity", "Radiosity B"], ["irradiance", "Irradiance H"]
 
 type Camera = NonNullable<Description["cameras"]>[number];
 
-export function viewPanel(app: App): Panel {
+export function viewPanel(page: Page): Panel {
+    const { store, scene, ask } = page;
     const change = (to: Partial<View>, tag: string | null = null): void => {
-        const { now } = app.store;
-        app.store.change({ ...now, view: { ...now.view, ...to } }, tag);
+        const { now } = store;
+        store.change({ ...now, view: { ...now.view, ...to } }, tag);
     };
-    const { view } = app.store.now;
+    const { view } = store.now;
     const exposure = slider({ label: "Exposure", unit: "EV", least: -16, most: 16, step: 0.1,
         change: (value) => change({ exposure: value, follow: false }, "exposure") }, 0);
     const iso = slider({ label: "Iso-lines", least: 0, most: 20, step: 1,
         change: (value) => change({ isoLines: Math.round(value) }, "iso") }, 0);
     const follow = tick("Exposure follows the light", view.follow,
-        (on) => change({ follow: on, exposure: on ? null : app.store.now.view.exposure }));
+        (on) => change({ follow: on, exposure: on ? null : store.now.view.exposure }));
     const smooth = tick("Smooth", view.smooth, (on) => change({ smooth: on }));
     const textured = tick("Images of materials", view.textured, (on) => change({ textured: on }));
     const log = tick("Logarithmic", view.log, (on) => change({ log: on }));
@@ -46,7 +47,7 @@ export function viewPanel(app: App): Panel {
     const setRange = (): void => {
         // An end that is left open is that of the values.
         const low = least.value === "" ? 0 : Number(least.value),
-            high = most.value === "" ? app.exposure.spread.high : Number(most.value);
+            high = most.value === "" ? scene.exposure.spread.high : Number(most.value);
         change({ range: (least.value !== "" || most.value !== "") && high > low ? [low, high] : null });
     };
     least.addEventListener("change", setRange);
@@ -57,7 +58,7 @@ export function viewPanel(app: App): Panel {
         make("div", { class: "row" }, make("span", {}, "Range"), least, most,
             button("Auto", "Range from the values", () => change({ range: null }))));
     const update = (): void => {
-        const now = app.store.now.view;
+        const now = store.now.view;
         exposure.set(now.exposure ?? 0);
         iso.set(now.isoLines);
         for (const [name, field] of Object.entries(fields))
@@ -69,72 +70,72 @@ export function viewPanel(app: App): Panel {
             (box.querySelector("input") as HTMLInputElement).checked = on;
         if (document.activeElement !== least) least.value = now.range === null ? "" : String(now.range[0]);
         if (document.activeElement !== most) most.value = now.range === null ? "" : String(now.range[1]);
-        textured.hidden = (app.scene?.mesh.images.length ?? 0) === 0;
+        textured.hidden = (scene.now?.mesh.images.length ?? 0) === 0;
         light.hidden = now.picture !== "light";
         colour.hidden = now.picture !== "false";
     };
-    app.store.listen((now, before) => {
+    store.listen((now, before) => {
         if (now.view !== before.view) update();
     });
-    app.on("scene", update);
-    app.on("field", () => {
+    scene.on("scene", update);
+    scene.on("field", () => {
         least.placeholder = "0";
-        most.placeholder = numberText(app.exposure.spread.high).replaceAll(",", "");
+        most.placeholder = numberText(scene.exposure.spread.high).replaceAll(",", "");
     });
-    app.store.listen((now, before) => {
+    store.listen((now, before) => {
         // An exposure that was left to the page is found from the next answer.
-        if (now.view.exposure === null && before.view.exposure !== null) app.ask(true);
-        else if (now.view.range === null && before.view.range !== null) app.ask(true);
+        if (now.view.exposure === null && before.view.exposure !== null) ask.shown(true);
+        else if (now.view.range === null && before.view.range !== null) ask.shown(true);
     });
     update();
     return {
         id: "view",
         title: "View",
         element: make("div", {}, fields.picture, light, colour, smooth, textured, fields.unit, fields.walk,
-            button("Fit (F)", "Show the whole scene", () => app.cameras.fit(true)), keptViews(app)),
+            button("Fit (F)", "Show the whole scene", () => scene.cameras.fit(true)), keptViews(page)),
     };
 }
 
 /** Places of the camera with names: those of the scene file, and those that were kept on the page. */
-function keptViews(app: App): HTMLElement {
+function keptViews({ store, scene }: Page): HTMLElement {
     const place = make("div", {});
     const name = make("input", { type: "text", placeholder: "Name of this place", "aria-label": "Name of this place",
         maxlength: 60 });
     const keep = (): void => {
-        const { now } = app.store, text = name.value.trim();
+        const { now } = store, text = name.value.trim();
         if (text === "") return;
         name.value = "";
-        app.store.change({ ...now,
-            views: [...now.views.filter((view) => view.name !== text), { name: text, camera: app.cameras.now }] });
+        store.change({ ...now,
+            views: [...now.views.filter((view) => view.name !== text), { name: text, camera: scene.cameras.now }] });
     };
     const form = make("form", { class: "row", onsubmit: (event: Event) => {
         event.preventDefault();
         keep();
     } }, name, make("button", { type: "submit" }, "Keep"));
     const look = ({ eye, direction, up, fov }: Camera): void => {
-        const axis = app.scene?.mesh.up ?? "y";
-        app.cameras.place(placeOf(turned(axis, eye), turned(axis, direction), turned(axis, up), fov), true);
+        const axis = scene.now?.mesh.up ?? "y";
+        scene.cameras.place(placeOf(turned(axis, eye), turned(axis, direction), turned(axis, up), fov), true);
     };
     const forget = (view: KeptView): void => {
-        const { now } = app.store;
-        app.store.change({ ...now, views: now.views.filter((other) => other !== view) });
+        const { now } = store;
+        store.change({ ...now, views: now.views.filter((other) => other !== view) });
     };
     const own = (camera: Camera): HTMLElement => {
         const go = (): void => look(camera);
         return make("div", { class: "row" }, button(camera.name, "A camera of the scene", go, { class: "grow" }));
     };
     const kept = (view: KeptView): HTMLElement => {
-        const go = (): void => app.cameras.place(view.camera, true);
+        const go = (): void => scene.cameras.place(view.camera, true);
         return make("div", { class: "row" }, button(view.name, null, go, { class: "grow" }),
             button("×", `Forget ${view.name}`, () => forget(view)));
     };
     const draw = (): void =>
-        fill(place, make("h2", { class: "sub" }, "Places"), ...(app.scene?.description.cameras ?? []).map(own),
-            ...app.store.now.views.map(kept), form);
-    app.store.listen((now, before) => {
+        fill(place, make("h2", { class: "sub" }, "Places"), ...(scene.now?.description.cameras ?? []).map(own),
+            ...store.now.views.map(kept), form);
+    store.listen((now, before) => {
         if (now.views !== before.views) draw();
     });
-    app.on("scene", draw);
+    scene.on("scene", draw);
     draw();
     return place;
 }

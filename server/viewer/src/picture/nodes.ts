@@ -2,21 +2,7 @@
 // inside an edge of a larger element has the value there. Creases stand in the normals, which the daemon makes; so
 // light does not bleed around an edge or into another material.
 import type { SceneMesh } from "./glb.ts";
-import { tieTJunctions } from "./t_junctions.ts";
-
-export interface Nodes {
-    count: number;
-    /** Of each vertex, its node. */
-    nodeOf: Uint32Array;
-    /** The elements at node i stand in elements[first[i]] to elements[first[i + 1] − 1]. */
-    first: Uint32Array;
-    elements: Uint32Array;
-    /** Of each of `elements` its weight; null: nodes are plain means. */
-    weights: Float32Array | null;
-    /** Of the edges that begin at these vertices, vertices of other elements inside them, where (0 to 1), and the node
-     * there. */
-    inner: Map<number, { vertex: number; along: number; node: number }[]>;
-}
+import { tieTJunctions, type Nodes } from "./t_junctions.ts";
 
 /** O(vertices), by a hash table of open addressing over the bits of the six numbers. */
 export function findNodes(mesh: SceneMesh): Nodes {

@@ -1,7 +1,7 @@
 // Elements with hanging corners in their edges are drawn as polygons that have these, too: triangles that meet only
 // half of an edge leave single pixels between them free, as their edges are rounded apart.
 import type { MeshImage, SceneMesh } from "./glb.ts";
-import type { Nodes } from "./nodes.ts";
+import type { Nodes } from "./t_junctions.ts";
 
 /** What is drawn of a mesh; vertices of its own stand behind those of the mesh. */
 export interface Drawn {

@@ -2,7 +2,21 @@
 // edge of a large one. Along that edge the large one is drawn linear; so the node has that value, or the picture has
 // steps and cracks there.
 import type { SceneMesh } from "./glb.ts";
-import type { Nodes } from "./nodes.ts";
+
+/** Nodes of smooth shading, of which those at T-junctions hang on others. */
+export interface Nodes {
+    count: number;
+    /** Of each vertex, its node. */
+    nodeOf: Uint32Array;
+    /** The elements at node i stand in elements[first[i]] to elements[first[i + 1] − 1]. */
+    first: Uint32Array;
+    elements: Uint32Array;
+    /** Of each of `elements` its weight; null: nodes are plain means. */
+    weights: Float32Array | null;
+    /** Of the edges that begin at these vertices, vertices of other elements inside them, where (0 to 1), and the node
+     * there. */
+    inner: Map<number, { vertex: number; along: number; node: number }[]>;
+}
 
 /** Cosine of 30 degrees, at which the daemon parts surfaces. */
 const SURFACE_COS = 0.866;

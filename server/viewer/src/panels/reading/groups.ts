@@ -3,7 +3,7 @@
 // picture has.
 import { button, fill, make } from "../../base/dom.ts";
 import { numberText } from "../../base/numbers.ts";
-import type { App } from "../../app/app.ts";
+import type { Page } from "../../app/page.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { figuresOf, type Figures } from "../../picture/scale.ts";
@@ -34,11 +34,12 @@ export class Groups {
     private means = new Map<string, number>();
     private readonly asker: Newest<Wanted, Map<string, number>>;
 
-    constructor(private readonly app: App, private readonly isSeen: () => boolean) {
+    constructor(private readonly page: Page, private readonly isSeen: () => boolean) {
+        const { store, scene, tell } = page;
         this.asker = new Newest((wanted) => this.ask(wanted), (means) => {
             this.means = means;
             this.draw();
-        }, (reason) => app.fail(reason), 1);
+        }, (reason) => tell.fail(reason), 1);
         this.heads = COLUMNS.map(([column, text, label]) =>
             make("th", { scope: "col" }, button(text, label, () => {
                 this.isUp = this.column === column ? !this.isUp : column === "name";
@@ -49,30 +50,31 @@ export class Groups {
         this.element.append(this.head,
             make("div", { class: "wide" },
                 make("table", {}, make("thead", {}, make("tr", {}, ...this.heads)), this.body)));
-        app.on("scene", () => {
+        scene.on("scene", () => {
             this.asker.forget();
             this.means.clear();
             this.body.replaceChildren();
         });
-        app.on("field", () => {
+        scene.on("field", () => {
             this.means.clear();
             this.draw();
             this.want();
         });
-        app.store.listen((now, before) => {
+        store.listen((now, before) => {
             if (now.view.judged !== before.view.judged || now.view.unit !== before.view.unit) this.draw();
         });
     }
 
     want(): void {
-        const wanted = this.app.wanted();
+        const wanted = this.page.ask.wanted();
         if (this.isSeen() && wanted !== null && wanted.emission !== null
-            && (this.app.scene?.mesh.groups.length ?? 0) <= REDUCED_MOST) this.asker.want(wanted);
+            && (this.page.scene.now?.mesh.groups.length ?? 0) <= REDUCED_MOST) this.asker.want(wanted);
     }
 
     private async ask({ scene, emission, quantity, scale }: Wanted): Promise<Map<string, number>> {
-        const groups = this.app.scene?.mesh.groups.map((group) => group.name) ?? [];
-        const answer = await this.app.api.answer(scene, { emission, quantity, reduce: { groups, with: ["mean"] } });
+        const groups = this.page.scene.now?.mesh.groups.map((group) => group.name) ?? [];
+        const answer = await this.page.ask.api.answer(scene, { emission, quantity,
+            reduce: { groups, with: ["mean"] } });
         return new Map(
             Object.entries(answer.groups as { [name: string]: { mean: number | number[] | null } }).map(
                 ([name, { mean }]) => {
@@ -84,7 +86,7 @@ export class Groups {
     }
 
     private get lines(): Line[] {
-        const { scene, fields: [field] } = this.app;
+        const { now: scene, fields: [field] } = this.page.scene;
         if (scene === null || field === null) return [];
         const lines = scene.mesh.groups.map((group): Line => {
             const figures = figuresOf(field.values, scene.mesh.area, group.elements);
@@ -100,9 +102,9 @@ export class Groups {
     }
 
     draw(): void {
-        if (!this.isSeen() || this.app.scene === null) return;
-        const { view } = this.app.store.now, { lines } = this;
-        this.head.textContent = `Groups: ${this.app.wanted()?.quantity ?? ""}, ${view.unit}`;
+        if (!this.isSeen() || this.page.scene.now === null) return;
+        const { view } = this.page.store.now, { lines } = this;
+        this.head.textContent = `Groups: ${this.page.ask.wanted()?.quantity ?? ""}, ${view.unit}`;
         this.heads.forEach((head, i) => {
             if (COLUMNS[i][0] === this.column) head.setAttribute("aria-sort", this.isUp ? "ascending" : "descending");
             else head.removeAttribute("aria-sort");
@@ -127,7 +129,7 @@ export class Groups {
 
     private makeRow(name: string): HTMLTableRowElement {
         const mark = button(name, `Mark ${name} in the picture`, () => {
-            const { store } = this.app, { view } = store.now;
+            const { store } = this.page, { view } = store.now;
             store.change({ ...store.now, view: { ...view, judged: view.judged === name ? null : name } });
         }, { class: "plain" });
         return make("tr", { "data-group": name }, make("th", { scope: "row" }, mark), make("td", {}), make("td", {}),

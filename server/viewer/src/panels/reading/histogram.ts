@@ -2,7 +2,7 @@
 import uPlot from "uplot";
 import { make } from "../../base/dom.ts";
 import { percent, numberText } from "../../base/numbers.ts";
-import type { App } from "../../app/app.ts";
+import type { Page } from "../../app/page.ts";
 import { areaByValue, ticksOf, valueAt, type Axis } from "../../picture/scale.ts";
 
 const BINS = 60;
@@ -17,7 +17,8 @@ export class Histogram {
     private plot: uPlot | null = null;
     private axis: Axis = { low: 0, high: 1, log: false };
 
-    constructor(private readonly app: App, private readonly isSeen: () => boolean) {
+    constructor(private readonly page: Page, private readonly isSeen: () => boolean) {
+        const { store, scene } = page;
         const set = (): void =>
             this.setRange(this.low.value === "" ? NaN : Number(this.low.value),
                 this.high.value === "" ? NaN : Number(this.high.value));
@@ -28,9 +29,9 @@ export class Histogram {
             make("div", { class: "row" }, make("span", {}, "Palette"), this.low, make("span", {}, "to"), this.high,
                 make("button", { type: "button", title: "Ends of the palette from the values",
                     onclick: () => this.setRange(NaN, NaN) }, "Auto")));
-        app.on("field", () => this.draw());
-        app.on("theme", () => this.draw());
-        app.store.listen((now, before) => {
+        scene.on("field", () => this.draw());
+        scene.on("theme", () => this.draw());
+        store.listen((now, before) => {
             if (now.view !== before.view) this.draw();
         });
         new MutationObserver(() => this.plot?.redraw()).observe(document.documentElement, { attributes: true,
@@ -42,14 +43,15 @@ export class Histogram {
     }
 
     private setRange(low: number, high: number): void {
-        const { store } = this.app;
+        const { store } = this.page;
         store.change({ ...store.now,
             view: { ...store.now.view,
                 range: high > low ? [Number(low.toPrecision(3)), Number(high.toPrecision(3))] : null } });
     }
 
     draw(): void {
-        const { app: { scene, fields: [field], store: { now: { view } }, exposure } } = this, { spread } = exposure;
+        const { store: { now: { view } }, scene: { now: scene, fields: [field], exposure } } = this.page,
+            { spread } = exposure;
         if (!this.isSeen() || scene === null || field === null || this.place.clientWidth === 0) return;
         const group = view.judged === null ? undefined : scene.mesh.groups.find((g) => g.name === view.judged);
         const counts = group === undefined
@@ -123,7 +125,8 @@ export class Histogram {
     }
 
     private drawEnds(plot: uPlot, toPlace: (value: number) => number, colour: string): void {
-        const { store: { now: { view } }, exposure } = this.app, axis = exposure.axis(view), { ctx, bbox } = plot;
+        const { store: { now: { view } }, scene: { exposure } } = this.page, axis = exposure.axis(view),
+            { ctx, bbox } = plot;
         if (view.picture !== "false") return;
         ctx.save();
         ctx.strokeStyle = colour;

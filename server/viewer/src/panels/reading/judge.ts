@@ -2,7 +2,7 @@
 // beside the targets of a task, in words and in colour. The shader paints the elements.
 import { choice, fill, make, tick } from "../../base/dom.ts";
 import { percent, numberText } from "../../base/numbers.ts";
-import type { App } from "../../app/app.ts";
+import type { Page } from "../../app/page.ts";
 import { figuresOf } from "../../picture/scale.ts";
 import type { View } from "../../state/state.ts";
 
@@ -30,11 +30,11 @@ export class Judge {
     private readonly unit = make("span", {});
     private group: HTMLElement = make("div", {});
 
-    constructor(private readonly app: App, private readonly isSeen: () => boolean) {
+    constructor(private readonly page: Page, private readonly isSeen: () => boolean) {
+        const { store, scene } = page;
         this.on = tick("Judge by a threshold", false, (on) =>
             this.change(on
-                ? { threshold: 500,
-                    ...(app.store.now.view.picture === "false" ? {} : { picture: "false", range: null }),
+                ? { threshold: 500, ...(store.now.view.picture === "false" ? {} : { picture: "false", range: null }),
                     quantity: "irradiance" }
                 : { threshold: null }));
         const task = choice("Task", [["", "…"],
@@ -57,29 +57,29 @@ export class Judge {
             make("p", { class: "hint" },
                 "Tasks are examples after EN 12464-1; the tables of the standard, its maintenance factor and its grid of points have to be consulted."));
         this.element.append(make("h2", { class: "sub" }, "Enough light?"), this.on, this.fields);
-        app.on("scene", () => this.drawGroups());
-        app.on("field", () => this.draw());
-        app.store.listen((now, before) => {
+        scene.on("scene", () => this.drawGroups());
+        scene.on("field", () => this.draw());
+        store.listen((now, before) => {
             if (now.view !== before.view) this.draw();
         });
     }
 
     private change(to: Partial<View>): void {
-        const { store } = this.app;
+        const { store } = this.page;
         store.change({ ...store.now, view: { ...store.now.view, ...to } });
     }
 
     private drawGroups(): void {
-        const names = this.app.scene?.mesh.groups.map((group) => group.name) ?? [];
+        const names = this.page.scene.now?.mesh.groups.map((group) => group.name) ?? [];
         const group = choice("Of", [["", "all groups"], ...names.map((name) => [name, name] as const)],
-            this.app.store.now.view.judged ?? "", (name) => this.change({ judged: name === "" ? null : name }));
+            this.page.store.now.view.judged ?? "", (name) => this.change({ judged: name === "" ? null : name }));
         this.group.replaceWith(group);
         this.group = group;
         this.draw();
     }
 
     draw(): void {
-        const { scene, fields: [field], store: { now: { view } } } = this.app;
+        const { scene: { now: scene, fields: [field] }, store: { now: { view } } } = this.page;
         (this.on.querySelector("input") as HTMLInputElement).checked = view.threshold !== null;
         this.fields.hidden = view.threshold === null;
         if (!this.isSeen() || view.threshold === null || scene === null || field === null) return;

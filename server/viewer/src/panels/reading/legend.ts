@@ -1,23 +1,23 @@
 // The legend of false colour, on the picture: the palette with round numbers, or with the values of the iso-lines.
 import { fill, make } from "../../base/dom.ts";
 import { numberText } from "../../base/numbers.ts";
-import type { App } from "../../app/app.ts";
+import type { Page } from "../../app/page.ts";
 import { paletteBytes } from "../../picture/palettes.ts";
 import { placeOf, ticksOf, valueAt } from "../../picture/scale.ts";
 import type { Palette } from "../../state/state.ts";
 
 const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indirect: "Indirect" };
 
-export function addLegend(app: App): void {
+export function addLegend({ store, scene }: Page): void {
     const ramp = make("canvas", { width: 1, height: 256, "aria-hidden": "true" });
     const head = make("div", {}), ticks = make("div", { class: "ticks", "aria-hidden": "true" });
     const legend = make("figure", { class: "legend", hidden: true, role: "img" }, head,
         make("div", { class: "scale" }, ramp, ticks));
-    app.stage.canvas.parentElement?.append(legend);
+    scene.stage.canvas.parentElement?.append(legend);
     let palette: Palette | null = null, drawn = "";
     const draw = (): void => {
-        const { view, compare } = app.store.now, axis = app.exposure.axis(view);
-        legend.hidden = view.picture !== "false" || app.scene === null || app.fields[0] === null
+        const { view, compare } = store.now, axis = scene.exposure.axis(view);
+        legend.hidden = view.picture !== "false" || scene.now === null || scene.fields[0] === null
             || compare?.how === "difference";
         if (legend.hidden) return;
         if (palette !== view.palette) {
@@ -49,9 +49,9 @@ export function addLegend(app: App): void {
             return tick;
         }));
     };
-    app.on("field", draw);
-    app.on("scene", draw);
-    app.store.listen((now, before) => {
+    scene.on("field", draw);
+    scene.on("scene", draw);
+    store.listen((now, before) => {
         if (now.view !== before.view || now.compare !== before.compare) draw();
     });
 }

@@ -2,7 +2,7 @@
 // follows each answer at once; radiosity and irradiance come exactly, by JSON of these elements alone.
 import { button, fill, make } from "../../base/dom.ts";
 import { count, numberText } from "../../base/numbers.ts";
-import type { App } from "../../app/app.ts";
+import type { Page } from "../../app/page.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { emissionOf } from "../../state/state.ts";
@@ -32,7 +32,8 @@ export class Pins {
     private last = 0;
     private readonly asker: Newest<{ wanted: Wanted; elements: number[] }, Exact>;
 
-    constructor(private readonly app: App, private readonly isSeen: () => boolean) {
+    constructor(private readonly page: Page, private readonly isSeen: () => boolean) {
+        const { store, scene, tell } = page;
         this.asker = new Newest(
             async ({ wanted, elements }) => this.ask(wanted, elements),
             (answer) => {
@@ -41,27 +42,27 @@ export class Pins {
                 );
                 this.draw();
             },
-            (reason) => app.fail(reason),
+            (reason) => tell.fail(reason),
             1,
         );
         const again = (): void => {
             this.draw();
             this.want();
         };
-        for (const event of ["field", "hover"] as const) app.on(event, again);
-        app.on("scene", () => {
+        for (const event of ["field", "hover"] as const) scene.on(event, again);
+        scene.on("scene", () => {
             this.asker.forget();
             this.exact.clear();
             again();
         });
-        app.store.listen((now, before) => {
+        store.listen((now, before) => {
             if (now.pins !== before.pins || now.view.unit !== before.view.unit) again();
         });
     }
 
     /** The pins, and the element under the pointer where it is none of them. */
     private get listed(): number[] {
-        const { hovered, store: { now: { pins } } } = this.app;
+        const { scene: { hovered }, store: { now: { pins } } } = this.page;
         return hovered === null || pins.includes(hovered) ? [...pins] : [...pins, hovered];
     }
 
@@ -71,18 +72,18 @@ export class Pins {
         this.timer = window.setTimeout(() => {
             this.timer = 0;
             this.last = performance.now();
-            const wanted = this.app.wanted(), elements = this.listed;
+            const wanted = this.page.ask.wanted(), elements = this.listed;
             if (wanted !== null && elements.length > 0 && this.isSeen()) this.asker.want({ wanted, elements });
         }, Math.max(40, this.last + PACE_MS - performance.now()));
     }
 
     private async ask({ scene, emission, scale }: Wanted, elements: number[]): Promise<Exact> {
         const dark = (): number[][] =>
-            elements.map(() => new Array<number>(this.app.scene?.description.channels ?? 1).fill(0));
+            elements.map(() => new Array<number>(this.page.scene.now?.description.channels ?? 1).fill(0));
         if (emission === null) return { elements, B: dark(), H: dark() };
         const [B, H] = await Promise.all(
             (["radiosity", "irradiance"] as const).map(async (quantity) =>
-                rowsOf((await this.app.api.answer(scene, { emission, quantity, select: { elements } }))[quantity],
+                rowsOf((await this.page.ask.api.answer(scene, { emission, quantity, select: { elements } }))[quantity],
                     elements.length, scale)
             ),
         );
@@ -91,11 +92,11 @@ export class Pins {
 
     draw(): void {
         if (!this.isSeen()) return;
-        const { app } = this, { store } = app;
+        const { store, scene } = this.page;
         const { pins } = store.now;
         const forget = (pin: number): void =>
             store.change({ ...store.now, pins: store.now.pins.filter((other) => other !== pin) });
-        const hovered = app.hovered !== null && !pins.includes(app.hovered) ? app.hovered : null;
+        const hovered = scene.hovered !== null && !pins.includes(scene.hovered) ? scene.hovered : null;
         // Buttons stay where they are while numbers change, so that a click meets them.
         const cards = [...this.element.querySelectorAll<HTMLElement>(".pin")];
         const wanted = [...pins.map(String), ...(hovered === null ? [] : ["hover"])];
@@ -117,7 +118,7 @@ export class Pins {
     }
 
     private fillCard(card: HTMLElement, element: number, isHovered: boolean): void {
-        const { scene, fields: [field], store: { now } } = this.app;
+        const { scene: { now: scene, fields: [field] }, store: { now } } = this.page;
         if (scene === null || element >= scene.mesh.elements) return;
         const { mesh, description: { channels, emitters } } = scene;
         const group = mesh.groups[mesh.groupOf[element]]?.name ?? "";
@@ -130,7 +131,7 @@ export class Pins {
             : typeof emission === "number"
             ? new Array<number>(channels).fill(emission)
             : emission;
-        const shown = this.app.wanted()?.quantity, live = field?.at(element);
+        const shown = this.page.ask.wanted()?.quantity, live = field?.at(element);
         const rows: [string, string, number[] | null | undefined][] = [
             ["B", "Radiosity", exact?.B ?? (shown === "radiosity" ? live : undefined)],
             ["H", "Irradiance", exact?.H ?? (shown === "irradiance" ? live : undefined)],

@@ -1,7 +1,7 @@
 // Points at elements: the mouse hovers and clicks, a finger taps, and keys move a cross over the picture.
 import { button, make } from "../../base/dom.ts";
 import { clamp, numberText } from "../../base/numbers.ts";
-import type { App } from "../../app/app.ts";
+import type { Page } from "../../app/page.ts";
 import { pinsAfter } from "../../state/shares.ts";
 
 /** A pointer that moved less than this, in pixels, between down and up has clicked. */
@@ -24,10 +24,11 @@ export class Pointer {
     private isWaiting = false;
     private element: number | null = null;
 
-    constructor(private readonly app: App, /** True while the panel is seen: then elements are marked and pinned. */
+    constructor(private readonly page: Page, /** True while the panel is seen: then elements are marked and pinned. */
         private readonly isReading: () => boolean)
     {
-        this.canvas = app.stage.canvas;
+        const { store, scene } = page;
+        this.canvas = scene.stage.canvas;
         this.frame = this.canvas.parentElement as HTMLElement;
         this.frame.append(this.tip, this.cross, this.told);
         this.keys = button("Read by keys (R)", "A cross on the picture that arrow keys move; Enter pins, Escape ends",
@@ -50,14 +51,14 @@ export class Pointer {
         window.addEventListener("pointerup", (event) => this.release(event));
         // Before the camera, which listens to the canvas itself.
         this.frame.addEventListener("keydown", (event) => this.press(event), true);
-        app.on("field", () => this.showNumber());
+        scene.on("field", () => this.showNumber());
         // After the camera moved by itself or by keys, another element is under the cross or the pointer.
-        app.store.listen((now, before) => {
+        store.listen((now, before) => {
             if (now.view.camera !== before.view.camera && this.place !== null) this.moveTo(...this.place);
         });
-        app.on("scene", () => {
+        scene.on("scene", () => {
             this.leave();
-            const prepare = (): void => app.scene?.picker.prepare();
+            const prepare = (): void => scene.now?.picker.prepare();
             if ("requestIdleCallback" in window) requestIdleCallback(prepare, { timeout: 4000 });
             else setTimeout(prepare, 2000);
         });
@@ -110,7 +111,7 @@ export class Pointer {
     }
 
     private pin(isMore: boolean): void {
-        const { store } = this.app;
+        const { store } = this.page;
         if (this.element !== null)
             store.change({ ...store.now, pins: pinsAfter(store.now.pins, this.element, isMore) });
         else if (!isMore && store.now.pins.length > 0) store.change({ ...store.now, pins: [] });
@@ -120,7 +121,7 @@ export class Pointer {
         this.place = null;
         this.element = null;
         this.tip.hidden = true;
-        this.app.hover(null);
+        this.page.scene.hover(null);
     }
 
     private moveTo(x: number, y: number): void {
@@ -135,18 +136,18 @@ export class Pointer {
     }
 
     private look(): void {
-        const { app: { scene, cameras }, place } = this;
+        const { page: { scene: { now: scene, cameras } }, place } = this;
         if (scene === null || place === null) return;
         cameras.camera.updateMatrixWorld();
         this.element = scene.picker.at((2 * place[0]) / this.canvas.clientWidth - 1,
             1 - (2 * place[1]) / this.canvas.clientHeight, cameras.camera);
-        this.app.hover(this.isReading() || this.isByKeys ? this.element : null);
+        this.page.scene.hover(this.isReading() || this.isByKeys ? this.element : null);
         this.showNumber();
     }
 
     /** The number beside the pointer: what the picture shows there. */
     private showNumber(): void {
-        const { app: { scene, fields: [field], store: { now: { view } } }, place, element } = this;
+        const { page: { scene: { now: scene, fields: [field] }, store: { now: { view } } }, place, element } = this;
         if (place === null) return;
         this.cross.style.left = `${place[0]}px`;
         this.cross.style.top = `${place[1]}px`;

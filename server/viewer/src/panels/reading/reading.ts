@@ -1,6 +1,6 @@
 // The panel of readings: what the light is at a point, in a group, over an area.
 import { choice, make } from "../../base/dom.ts";
-import type { App } from "../../app/app.ts";
+import type { Page } from "../../app/page.ts";
 import type { Panel } from "../panel.ts";
 import { Groups } from "./groups.ts";
 import { Histogram } from "./histogram.ts";
@@ -10,28 +10,29 @@ import { Pins } from "./pins.ts";
 import { Pointer } from "./pointer.ts";
 import { Shares } from "./shares.ts";
 
-export function readingPanel(app: App): Panel {
+export function readingPanel(page: Page): Panel {
     const element = make("div", { class: "reading" });
+    const { store, scene } = page;
     let isSeen = false;
     const seen = (): boolean => isSeen;
-    const pointer = new Pointer(app, seen);
-    const pins = new Pins(app, seen), shares = new Shares(app, seen), groups = new Groups(app, seen);
-    const histogram = new Histogram(app, seen), judge = new Judge(app, seen);
-    addLegend(app);
+    const pointer = new Pointer(page, seen);
+    const pins = new Pins(page, seen), shares = new Shares(page, seen), groups = new Groups(page, seen);
+    const histogram = new Histogram(page, seen), judge = new Judge(page, seen);
+    addLegend(page);
     const shown = choice("Shows", [["light", "Radiosity, as the eye sees it"], ["radiosity",
         "Radiosity B, false colour"], ["irradiance", "Irradiance H, false colour"], ["indirect",
         "Indirect, false colour"]], "light", (what) => {
-        const { now } = app.store;
-        app.store.change({ ...now, view: what === "light"
+        const { now } = store;
+        store.change({ ...now, view: what === "light"
             ? { ...now.view, picture: "light" }
             : { ...now.view, picture: "false", quantity: what, range: null } });
     });
     const update = (): void => {
-        const { view } = app.store.now;
+        const { view } = store.now;
         (shown.querySelector("select") as HTMLSelectElement).value = view.picture === "light" ? "light" : view.quantity;
     };
-    app.on("scene", update);
-    app.store.listen((now, before) => {
+    scene.on("scene", update);
+    store.listen((now, before) => {
         if (now.view !== before.view) update();
     });
     element.append(shown, make("div", { class: "row" }, pointer.keys), pins.element, shares.element, judge.element,
@@ -39,7 +40,7 @@ export function readingPanel(app: App): Panel {
     new IntersectionObserver((entries) => {
         isSeen = entries[entries.length - 1].isIntersecting;
         if (!isSeen) {
-            app.hover(null);
+            scene.hover(null);
             return;
         }
         for (const part of [pins, shares, judge, histogram, groups]) part.draw();

@@ -1,8 +1,7 @@
 // Which lamp lights this point: one adjoint request for an element, then every lighting is read off it without another.
 import { fill, make } from "../../base/dom.ts";
 import { count, percent, numberText } from "../../base/numbers.ts";
-import type { App } from "../../app/app.ts";
-import type { OpenScene } from "../../app/opening.ts";
+import type { OpenScene, Page } from "../../app/page.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { partsOf, type Gradient } from "../../state/shares.ts";
@@ -29,22 +28,23 @@ export class Shares {
     /** What was asked for last: the picture may change before it is answered. */
     private wanted = "";
 
-    constructor(private readonly app: App, private readonly isSeen: () => boolean) {
+    constructor(private readonly page: Page, private readonly isSeen: () => boolean) {
+        const { store, scene, tell } = page;
         this.element.append(this.head, this.body);
         this.asker = new Newest((asked) => this.ask(asked), () => this.draw(), (reason) => {
             this.wanted = "";
-            app.fail(reason);
+            tell.fail(reason);
         }, 1);
-        app.on("scene", () => this.draw());
-        app.on("field", () => this.draw());
-        app.store.listen((now, before) => {
+        scene.on("scene", () => this.draw());
+        scene.on("field", () => this.draw());
+        store.listen((now, before) => {
             if (now.pins !== before.pins || now.view !== before.view || now.lighting !== before.lighting) this.draw();
         });
     }
 
     /** The last pin, of the quantity shown. */
     private get asked(): Asked | null {
-        const { pins, scene, view } = this.app.store.now, element = pins[pins.length - 1];
+        const { pins, scene, view } = this.page.store.now, element = pins[pins.length - 1];
         return element === undefined
             ? null
             : { scene, element, quantity: view.picture === "light" ? "radiosity" : view.quantity };
@@ -54,14 +54,14 @@ export class Shares {
         const { known } = this, key = JSON.stringify(asked), there = known.get(key);
         // It may have been answered while this request waited.
         if (there !== undefined) return there;
-        const { description } = this.app.scene as OpenScene, { channels } = description;
+        const { description } = this.page.scene.now as OpenScene, { channels } = description;
         const gradient = (description.emitters?.length ?? 0) > 0
             ? ["emitters"]
             : description.sky === null
             ? ["groups"]
             : ["groups", "sky"];
         const weights = channelWeights(channels);
-        const answer = await this.app.api.adjoint(asked.scene, {
+        const answer = await this.page.ask.api.adjoint(asked.scene, {
             cotangent: { elements: [asked.element], values: [channels === 1 ? 1 : weights] },
             quantity: asked.quantity,
             gradient,
@@ -82,7 +82,7 @@ export class Shares {
     }
 
     draw(): void {
-        const { app, asked } = this, { scene, store: { now } } = app;
+        const { page: { scene: { now: scene, sky }, store: { now } }, asked } = this;
         this.take(scene);
         this.element.hidden = asked === null || scene === null;
         if (!this.isSeen() || asked === null || scene === null) return;
@@ -96,7 +96,7 @@ export class Shares {
         const { description, mesh } = scene;
         const parts = partsOf(gradient, now.lighting, description.channels,
             description.groups.map((group) => group.name), description.emitters ?? [],
-            description.sky === null ? null : app.skyOf(now.lighting, description));
+            description.sky === null ? null : sky.radiances(now.lighting, description));
         const total = parts.reduce((sum, part) => sum + part.value, 0);
         const group = mesh.groups[mesh.groupOf[asked.element]]?.name ?? "";
         const listed = parts.slice(0, LINES_MOST),
