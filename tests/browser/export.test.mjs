@@ -4,7 +4,7 @@ import { execFile } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
 import { promisify } from "node:util";
-import { Daemon, inFolder, lambert, makeStore, openPage, settled, sourceOf, violations } from "./page.mjs";
+import { Daemon, inFolder, lambert, makeStore, openPage, settled, violations } from "./page.mjs";
 
 const run = promisify(execFile);
 /** Names that shells, Python and CSV have to take as they are. */
@@ -215,41 +215,4 @@ test("refusals of variants are told in words", async () => {
     await other.getByText(/cannot have variants: .*--keep-factors/).waitFor();
     await other.context().close();
     await own.stop();
-});
-
-test("parts without a page", async () => {
-    const [half, csv, snippets, changes, variants] = await Promise.all(
-        ["base/half", "base/csv", "state/snippets", "picture/changes", "state/variants"].map(sourceOf));
-    // Every half is its own nearest; between two neighbours the nearer one is taken, the even one in the middle.
-    for (let bits = 0; bits < 0x7c00; bits++) {
-        const value = half.halfToNumber(bits), next = half.halfToNumber(bits + 1);
-        for (const sign of [1, -1]) assert.equal(half.numberToHalf(sign * value) & 0x7fff, bits);
-        if (bits === 0x7bff) continue;
-        const middle = (value + next) / 2;
-        assert.equal(half.numberToHalf(middle), bits + (bits & 1));
-        assert.equal(half.numberToHalf(value + 0.4375 * (next - value)), bits);
-        assert.equal(half.numberToHalf(value + 0.5625 * (next - value)), bits + 1);
-    }
-    assert.deepEqual([65519, 65520, 1e9, -1e9, Infinity].map(half.numberToHalf), [0x7bff, 0x7c00, 0x7c00, 0xfc00, 0x7c00]);
-    assert.ok(Number.isNaN(half.halfToNumber(half.numberToHalf(NaN))));
-    for (const value of [0, 1, 0.1, 1 / 3, 16777217, 1e-38, 3.4e38, 17, 1e-45].map(Math.fround))
-        assert.equal(Math.fround(Number(csv.floatText(value))), value);
-    assert.equal(csv.floatText(Math.fround(0.1)), "0.1");
-    const odd = ["plain", "it's", '"$(id)`id`', "a\\b\nc", "ä “é” \u2028 😀", "-n", "!x"];
-    for (const text of odd) {
-        assert.equal((await run("sh", ["-c", `printf %s ${snippets.shellWord(text)}`])).stdout, text);
-        assert.equal((await run("python3", ["-c", `import sys; sys.stdout.buffer.write(${snippets.pythonString(text)}.encode())`])).stdout, text);
-    }
-    // A body beyond what a command may hold goes by standard input.
-    const sky = Array.from({ length: 20000 }, (_, i) => 0.001 * i);
-    const long = snippets.curlCommand("http://127.0.0.1:1", { scene: "it's", body: { emission: { sky }, quantity: "radiosity" } }, false);
-    assert.match(long, /--data-binary @- <<'BODY'\n/);
-    writeFileSync(inFolder("long.sh"), long.replace(/^curl .*\\\n.*\\\n.*--data-binary @-/, "cat"));
-    const echoed = await run("sh", [inFolder("long.sh")], { maxBuffer: 1e7 });
-    assert.deepEqual(JSON.parse(echoed.stdout).emission.sky, sky);
-    assert.deepEqual([0.0017, 1, 1.01, 4.9, 700].map(changes.roundUp), [0.002, 1, 2, 5, 1000]);
-    assert.deepEqual(["a", "a@b", "a@b@c"].map((name) => variants.baseOf(name, ["a", "a@b", "a@b@c"])), ["a", "a", "a@b"]);
-    assert.equal(variants.checkReflectances("v", { wall: [0, 0.999] }), null);
-    for (const [name, groups] of [["", { wall: [0] }], ["v", {}], ["v", { wall: [1] }], ["v", { wall: [NaN] }], ["a b", { wall: [0] }], ["v", { wall: [-0.1] }]])
-        assert.equal(typeof variants.checkReflectances(name, groups), "string", JSON.stringify([name, groups]));
 });

@@ -1,13 +1,11 @@
-// Stores, daemons and pages for the tests in a browser. LAMBERT and LAMBERTD name the programs, CHROMIUM the browser; VIEWER
-// is the folder of the viewer's sources, MODULES the one of their packages.
+// Stores, daemons and pages for the tests in a browser. LAMBERT and LAMBERTD name the programs, CHROMIUM the browser; MODULES
+// is the folder of the viewer's packages.
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
-import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after } from "node:test";
-import { pathToFileURL } from "node:url";
 import { chromium } from "playwright-core";
 
 export const LAMBERT = process.env.LAMBERT ?? "lambert";
@@ -36,16 +34,6 @@ export function makeStore(name, kind, { generate = [], precompute = ["--probes",
     lambert("generate", kind, ...generate, "-o", scene);
     lambert("precompute", scene, "-o", store, "--quiet", ...precompute);
     return store;
-}
-
-/** A module of the viewer's sources (picture/nodes), for tests of parts that need no page. */
-export function sourceOf(module) {
-    const { buildSync } = createRequire(join(process.env.MODULES, "of-the-test.js"))("esbuild");
-    const out = inFolder(`${module.replaceAll("/", "-")}.mjs`);
-    buildSync({
-        entryPoints: [join(process.env.VIEWER, "src", `${module}.ts`)], bundle: true, format: "esm", outfile: out, nodePaths: [process.env.MODULES],
-    });
-    return import(pathToFileURL(out));
 }
 
 /** sRGB of linear values, as IEC 61966-2-1 has it, of 255. */

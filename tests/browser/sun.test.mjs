@@ -2,7 +2,8 @@
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
-import { Daemon, inFolder, lambert, near, openPage, pixel, pixels, settled, sourceOf, toSrgb, violations } from "./page.mjs";
+import { Daemon, inFolder, lambert, near, openPage, pixel, pixels, settled, toSrgb, violations } from "./page.mjs";
+import { sourceOf } from "./source.mjs";
 
 const RHO = 0.5, PARTS = 20;
 

@@ -1,7 +1,7 @@
 // The panels of trust and of comparisons: their numbers are those that the daemon's own answers give.
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
-import { Daemon, inFolder, lambert, makeStore, openPage, pixel, settled, sourceOf, violations, elementAt } from "./page.mjs";
+import { Daemon, inFolder, lambert, makeStore, openPage, pixel, settled, violations, elementAt } from "./page.mjs";
 
 let daemon;
 before(async () => {
@@ -63,7 +63,6 @@ test("the error of a lighting and a certificate", async () => {
 });
 
 test("the line at the bottom has the part of the mesh", async () => {
-    const { headlineOf } = await sourceOf("daemon/headline");
     const page = await openPage(daemon.address), line = page.getByRole("contentinfo");
     await settled(page);
     const { error } = await daemon.json("/v1/scenes/box"), percent = (v) => `${Number((100 * v).toPrecision(2))} %`;
@@ -73,15 +72,6 @@ test("the line at the bottom has the part of the mesh", async () => {
     assert.ok(text.includes(`error ${percent(whole)} of the indirect light, ${percent((error.lights.total_relative_mean * whole) / error.lights.total_indirect_mean)} of all`), text);
     const title = await line.locator("span").nth(1).getAttribute("title");
     assert.ok(title.includes(`${percent(error.lights.total_indirect_mean)} by operator and form factors, ${percent(error.mesh.lights)} by the mesh`), title);
-    // Of skies alone it is theirs; without a figure of the mesh it is the rest; without any it is not known.
-    const figures = (indirect, relative) => ({ total_indirect_mean: indirect, total_relative_mean: relative });
-    const made = { lights: figures(0.03, 0.01), sky: figures(0.05, 0.04), mesh: { lights: 0.04, even: 0.9, sky_even: 0.1, sky_cloudy: 0.12 } };
-    close(headlineOf(made, { groups: {} }).indirect, 0.05, 1e-9, "of lamps");
-    close(headlineOf(made, { groups: {} }).relative, 0.05 / 3, 1e-9, "of lamps, of all");
-    close(headlineOf(made, { sky: [1] }).indirect, 0.13, 1e-9, "of skies");
-    close(headlineOf({ random: figures(0.03, 0.01), mesh: { even: 0.04 } }, null).indirect, 0.05, 1e-9, "without lamps");
-    close(headlineOf({ lights: figures(0.03, 0.01) }, null).indirect, 0.03, 1e-9, "without a mesh");
-    assert.equal(headlineOf({ mesh: { even: 0.1 } }, null), null);
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 import { pathToFileURL } from "node:url";
-import { Daemon, elementAt, makeStore, near, openPage, pixel, settled, sourceOf, toSrgb, violations } from "./page.mjs";
+import { Daemon, elementAt, makeStore, near, openPage, pixel, settled, toSrgb, violations } from "./page.mjs";
 
 let daemon, store;
 before(async () => {
@@ -115,21 +115,6 @@ test("smooth shading is the mean at a corner", async () => {
     const mean = [0, 1, 2].map((c) => all.reduce((sum, B) => sum + B[c], 0) / 4);
     near(await pixel(page, found.x, found.y), toSrgb(mean.map((v) => v * 2 ** -5)), 3);
     await page.context().close();
-});
-
-test("corners of other groups, normals or places are no node", async () => {
-    const { findNodes } = await sourceOf("picture/nodes");
-    // Three triangles at one corner in the plane z = 0: two of group 0, one of group 1; and one of group 0 that stands upright.
-    const corners = [[0, 0, 0, 1, 0, 0, 0, 1, 0], [0, 0, 0, 0, 1, 0, -1, 0, 0], [0, 0, 0, -1, 0, 0, 0, -1, 0], [0, 0, 0, 0, -1, 0, 0, 0, 1]];
-    const normals = [[0, 0, 1], [0, 0, 1], [0, 0, 1], [1, 0, 0]];
-    const nodes = findNodes({
-        positions: Float32Array.from(corners.flat()), normals: Float32Array.from(normals.flatMap((n) => [...n, ...n, ...n])),
-        elementOf: Uint32Array.from([0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3]), groupOf: Uint32Array.of(0, 0, 1, 0),
-    });
-    const at = (vertex) => [...nodes.elements.subarray(nodes.first[nodes.nodeOf[vertex]], nodes.first[nodes.nodeOf[vertex] + 1])].sort();
-    assert.deepEqual([at(0), at(3), at(6), at(9)], [[0, 1], [0, 1], [2], [3]]);
-    assert.deepEqual([at(2), at(4), at(1)], [[0, 1], [0, 1], [0]]);
-    assert.equal(nodes.count, 10);
 });
 
 test("false colour is the palette at the value", async () => {

@@ -1,0 +1,55 @@
+// What leaves the page: halves, numbers as text, commands and programs; differences, and names of variants.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { test } from "node:test";
+import { sourceOf } from "../source.mjs";
+
+const [half, csv, snippets, changes, variants] = await Promise.all(
+    ["base/half", "base/csv", "state/snippets", "picture/changes", "state/variants"].map(sourceOf));
+const run = (program, args, options = {}) => execFileSync(program, args, { encoding: "utf8", ...options });
+
+test("a number has the nearest half", () => {
+    // Every half is its own nearest; between two neighbours the nearer one is taken, the even one in the middle.
+    for (let bits = 0; bits < 0x7c00; bits++) {
+        const value = half.halfToNumber(bits), next = half.halfToNumber(bits + 1);
+        for (const sign of [1, -1]) assert.equal(half.numberToHalf(sign * value) & 0x7fff, bits);
+        if (bits === 0x7bff) continue;
+        const middle = (value + next) / 2;
+        assert.equal(half.numberToHalf(middle), bits + (bits & 1));
+        assert.equal(half.numberToHalf(value + 0.4375 * (next - value)), bits);
+        assert.equal(half.numberToHalf(value + 0.5625 * (next - value)), bits + 1);
+    }
+    assert.deepEqual([65519, 65520, 1e9, -1e9, Infinity].map(half.numberToHalf), [0x7bff, 0x7c00, 0x7c00, 0xfc00, 0x7c00]);
+    assert.ok(Number.isNaN(half.halfToNumber(half.numberToHalf(NaN))));
+});
+
+test("a number in text reads as the same", () => {
+    for (const value of [0, 1, 0.1, 1 / 3, 16777217, 1e-38, 3.4e38, 17, 1e-45].map(Math.fround))
+        assert.equal(Math.fround(Number(csv.floatText(value))), value);
+    assert.equal(csv.floatText(Math.fround(0.1)), "0.1");
+});
+
+test("shells and Python read what was written for them", () => {
+    const odd = ["plain", "it's", '"$(id)`id`', "a\\b\nc", "ä “é” \u2028 😀", "-n", "!x"];
+    for (const text of odd) {
+        assert.equal(run("sh", ["-c", `printf %s ${snippets.shellWord(text)}`]), text);
+        assert.equal(run("python3", ["-c", `import sys; sys.stdout.buffer.write(${snippets.pythonString(text)}.encode())`]), text);
+    }
+    // A body beyond what a command may hold goes by standard input.
+    const sky = Array.from({ length: 20000 }, (_, i) => 0.001 * i);
+    const long = snippets.curlCommand("http://127.0.0.1:1", { scene: "it's", body: { emission: { sky }, quantity: "radiosity" } }, false);
+    assert.match(long, /--data-binary @- <<'BODY'\n/);
+    const echoed = run("sh", [], { input: long.replace(/^curl .*\\\n.*\\\n.*--data-binary @-/, "cat"), maxBuffer: 1e7 });
+    assert.deepEqual(JSON.parse(echoed).emission.sky, sky);
+});
+
+test("ends of the scale of differences are round", () => {
+    assert.deepEqual([0.0017, 1, 1.01, 4.9, 700].map(changes.roundUp), [0.002, 1, 2, 5, 1000]);
+});
+
+test("variants have names and reflectances, or a sentence on what is wrong", () => {
+    assert.deepEqual(["a", "a@b", "a@b@c"].map((name) => variants.baseOf(name, ["a", "a@b", "a@b@c"])), ["a", "a", "a@b"]);
+    assert.equal(variants.checkReflectances("v", { wall: [0, 0.999] }), null);
+    for (const [name, groups] of [["", { wall: [0] }], ["v", {}], ["v", { wall: [1] }], ["v", { wall: [NaN] }], ["a b", { wall: [0] }], ["v", { wall: [-0.1] }]])
+        assert.equal(typeof variants.checkReflectances(name, groups), "string", JSON.stringify([name, groups]));
+});
