@@ -66,6 +66,10 @@ test("a corner inside an edge has the edge's value there", async () => {
     close(at(3, 0.5), (at(3, 0) + at(3, 1)) / 2);
     // The lower edge of the last one has a corner of an element below it.
     close(at(3.5, 1), (at(3, 1) + at(4, 1)) / 2);
+    // A corner a quarter along an edge whose end hangs itself, a third along another one.
+    const uneven = quads([[0, 0, 3, 3], [3, 0, 0.5, 1], [3.5, 0, 1.5, 1], [3, 1, 2, 2]]), hung = findNodes(uneven), of = (x, y) => nodeAt(uneven, hung, values, x, y);
+    close(of(3, 1), (2 * of(3, 0) + of(3, 3)) / 3);
+    close(of(3.5, 1), (3 * of(3, 1) + of(5, 1)) / 4);
     // Even meshes have plain means.
     assert.equal(findNodes(quads([[0, 0, 1, 1], [1, 0, 1, 1], [0, 1, 1, 1], [1, 1, 1, 1]])).weights, null);
     // Another group, or a surface that stands upright, has no part in it.
