@@ -63,6 +63,7 @@ test("rows of any step are read, and the same rows refused, as by `lambert sky`"
         ["hole.wea", headed(hours([june21]).filter((row) => row[2] !== 12.5))], ["short.wea", headed([...rowsBy(1, [june20], 8, 18), ...rowsBy(1, [june21], 8, 17), ...rowsBy(1, [june22], 8, 18)])],
         ["half.hour.epw", epwOf(2, stated, rowsBy(2, all).filter((_, k) => k !== 50))], ["years.wea", headed(hours([...year, ...year]))], ["date.epw", epwOf(1, "DATA PERIODS,1,1,Data,Sunday,6/31,7/1", hours([june21]))],
     ];
+    const steps = {};
     let refused = 0;
     for (const [name, text] of files) {
         writeFileSync(inFolder(name), text);
@@ -75,7 +76,10 @@ test("rows of any step are read, and the same rows refused, as by `lambert sky`"
         }
         assert.equal(source.read(text, false), problem === null, `${name}: ${source.problem}, wanted ${problem}`);
         if (name !== "date.epw") assert.equal(source.problem, problem, name);
+        if (problem === null) steps[name] = source.weather.step;
     }
+    for (const [name, step] of [["half.wea", 1 / 2], ["few.wea", 1 / 12], ["half.epw", 1 / 2], ["minutes.epw", 1 / 60], ["year.wea", 1], ["long.wea", 3], ["window.wea", 1 / 4]])
+        assert.equal(steps[name], step, name);
     assert.equal(refused, 13);
     // Between the middles of two rows there is a mixture of both, half an hour apart as an hour apart.
     const ramp = rowsBy(2, [june21]).map(([m, d, h]) => [m, d, h, 10 * h, 5 * h]);
