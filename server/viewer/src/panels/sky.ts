@@ -22,6 +22,16 @@ export function dateText(day: number): string {
     return `${date.day} ${MONTHS[date.month - 1]}`;
 }
 
+const MODELS = [
+    ["off", "None"],
+    ["overcast", "Overcast (CIE)"],
+    ["clear", "Clear (CIE)"],
+    ["turbid", "Clear, by turbidity (Linke)"],
+    ["given", "By direct and diffuse light (Perez)"],
+    ["even", "Even"],
+    ["perez", "Of a weather file (Perez)"],
+] as const;
+
 type Change = (to: Partial<SkyLight>, tag?: string | null) => void;
 
 /** The hour that is so many hours later, and by day where the sun rises at all. */
@@ -49,8 +59,12 @@ export function skyPanel(page: Page): Panel {
         moment = make("p", { class: "moment", "aria-live": "off" });
     const day = player({
         what: "the day",
-        speeds: [["0.5", "½ hour a second"], ["1", "1 hour a second"], ["2", "2 hours a second"], ["4",
-            "4 hours a second"]],
+        speeds: [
+            ["0.5", "½ hour a second"],
+            ["1", "1 hour a second"],
+            ["2", "2 hours a second"],
+            ["4", "4 hours a second"],
+        ],
         speed: "1",
         step: 0.5,
         stepLabel: "Half an hour",
@@ -118,9 +132,7 @@ interface Controls {
 function makeControls(page: Page, change: Change): Controls {
     const { store, scene } = page;
     const first = skyOff;
-    const model = choice("Sky", [["off", "None"], ["overcast", "Overcast (CIE)"], ["clear", "Clear (CIE)"], ["turbid",
-        "Clear, by turbidity (Linke)"], ["given", "By direct and diffuse light (Perez)"], ["even", "Even"], ["perez",
-        "Of a weather file (Perez)"]], first.model, (to) => changeModel(page, to));
+    const model = choice("Sky", MODELS, first.model, (to) => changeModel(page, to));
     const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]],
         first.sun, (to) => change({ sun: to }));
     const sharp = tick("Sharp sun (drawn)", store.now.view.sharpSun, (on) => {
@@ -180,11 +192,8 @@ function makeControls(page: Page, change: Change): Controls {
         tinted.hidden = scene.now?.description.channels !== 3 || light.model === "off";
         strength.setMost(Math.max(store.now.view.unit === "lx" ? 1e5 : 1000, light.strength));
         (strength.element.querySelector(".unit") as HTMLElement).textContent = unit();
-        for (const [one, value] of [[strength, light.strength], [factor, light.factor], [turbidity, light.turbidity], [
-            direct,
-            light.direct,
-        ], [diffuse, light.diffuse], [day, light.day], [hour, light.hour], [latitude, light.latitude], [longitude,
-            light.longitude], [zone, light.zone]] as const) one.set(value);
+        const sliders = { strength, factor, turbidity, direct, diffuse, day, hour, latitude, longitude, zone };
+        for (const [name, one] of Object.entries(sliders)) one.set(light[name as keyof typeof sliders]);
     };
     return {
         model,
@@ -267,12 +276,11 @@ function drawFigures(table: HTMLTableElement, dome: HTMLElement, light: SkyLight
         ["Sun on the ground", sky === null ? "–" : `${numberText(sky.directHorizontal)} ${unit}`, "direct"],
     ];
     if (sky !== null && sky.perez !== null)
-        rows.push(["Clearness ε",
-            Number.isFinite(sky.perez.clearness) ? sky.perez.clearness.toFixed(2) : "no diffuse light", "clearness"], [
-            "Brightness Δ",
-            sky.perez.brightness.toFixed(3),
-            "brightness",
-        ]);
+        rows.push(
+            ["Clearness ε", Number.isFinite(sky.perez.clearness) ? sky.perez.clearness.toFixed(2) : "no diffuse light",
+                "clearness"],
+            ["Brightness Δ", sky.perez.brightness.toFixed(3), "brightness"],
+        );
     fill(table,
         make("tbody", {},
             ...rows.map(([name, text, figure]) =>

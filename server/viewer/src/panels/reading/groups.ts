@@ -10,12 +10,13 @@ import { figuresOf, type Figures } from "../../picture/scale.ts";
 import type { Wanted } from "../../state/request.ts";
 
 type Column = "name" | "mean" | "min" | "max" | "uniformity";
-const COLUMNS: readonly (readonly [Column, string, string])[] = [["name", "Group", "By name"], ["mean", "Mean",
-    "By the mean over the area"], ["min", "Min", "By the least value"], ["max", "Max", "By the largest value"], [
-    "uniformity",
-    "U0",
-    "By the uniformity, least over mean",
-]];
+const COLUMNS: readonly (readonly [Column, string, string])[] = [
+    ["name", "Group", "By name"],
+    ["mean", "Mean", "By the mean over the area"],
+    ["min", "Min", "By the least value"],
+    ["max", "Max", "By the largest value"],
+    ["uniformity", "U0", "By the uniformity, least over mean"],
+];
 /** The daemon keeps adjoint rows for so many groups of a request; more cost whole solves, and are taken from the
  * picture. */
 const REDUCED_MOST = 64;

@@ -10,6 +10,13 @@ import { Pins } from "./pins.ts";
 import { Pointer } from "./pointer.ts";
 import { Shares } from "./shares.ts";
 
+const SHOWN = [
+    ["light", "Radiosity, as the eye sees it"],
+    ["radiosity", "Radiosity B, false colour"],
+    ["irradiance", "Irradiance H, false colour"],
+    ["indirect", "Indirect, false colour"],
+] as const;
+
 export function readingPanel(page: Page): Panel {
     const element = make("div", { class: "reading" });
     const { store, scene } = page;
@@ -19,9 +26,7 @@ export function readingPanel(page: Page): Panel {
     const pins = new Pins(page, seen), shares = new Shares(page, seen), groups = new Groups(page, seen);
     const histogram = new Histogram(page, seen), judge = new Judge(page, seen);
     addLegend(page);
-    const shown = choice("Shows", [["light", "Radiosity, as the eye sees it"], ["radiosity",
-        "Radiosity B, false colour"], ["irradiance", "Irradiance H, false colour"], ["indirect",
-        "Indirect, false colour"]], "light", (what) => {
+    const shown = choice("Shows", SHOWN, "light", (what) => {
         const { now } = store;
         store.change({ ...now, view: what === "light"
             ? { ...now.view, picture: "light" }
