@@ -1,15 +1,17 @@
 // Layout of the viewer's sources: node format.mjs MODULES [--write]
 //   MODULES  the node_modules that `npm ci` made, with the packages for development
-// Names the files that dprint would lay out otherwise, and with --write lays them out.
+// Names the files that dprint would lay out otherwise, and with --write lays them out. It breaks no comments: files
+// with long ones are named, too.
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 
 const [modules, write] = process.argv.slice(2), folder = dirname(fileURLToPath(import.meta.url));
+const WIDTH = 120, COMMENT = /^\s*(\/\/|\/?\*)/;
 const require = createRequire(join(resolve(modules), "of-the-viewer.js"));
 const formatter = require("@dprint/formatter").createFromBuffer(readFileSync(require("@dprint/typescript").getPath()));
-formatter.setConfig({ lineWidth: 120, indentWidth: 4 }, {
+formatter.setConfig({ lineWidth: WIDTH, indentWidth: 4 }, {
     "preferHanging": true,
     "quoteStyle": "preferDouble",
     "useBraces": "maintain",
@@ -30,10 +32,10 @@ for (const name of files) {
         before = laid;
         laid = formatter.formatText({ filePath, fileText: laid });
     }
-    if (laid === text) continue;
-    if (write === "--write") writeFileSync(filePath, laid);
-    else {
+    const isLong = laid.split("\n").some((line) => line.length > WIDTH && COMMENT.test(line));
+    if (isLong) console.error(`${name} has comments beyond column ${WIDTH}`);
+    if (laid !== text && write === "--write") writeFileSync(filePath, laid);
+    else if (laid !== text)
         console.error(`${name} is laid out otherwise: node server/viewer/format.mjs MODULES --write`);
-        process.exitCode = 1;
-    }
+    if (isLong || (laid !== text && write !== "--write")) process.exitCode = 1;
 }

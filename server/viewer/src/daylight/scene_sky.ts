@@ -1,5 +1,5 @@
-// The sky of the scene that is open, from the tiles of its store and the weather beside it, and those of scenes that it is
-// compared with.
+// The sky of the scene that is open, from the tiles of its store and the weather beside it, and those of scenes that
+// it is compared with.
 import type { Api, Description } from "../daemon/api.ts";
 import type { Lighting, SkyLight } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
@@ -32,8 +32,8 @@ export class SceneSky {
         return this.source.parts(lighting.sky, this.isPhotometric, of.channels);
     }
 
-    /** Fetches what a scene that is opened needs, without which it can still be shown. The function that it returns takes
-     * that in; of the scene's default lighting it makes the one by the weather beside the store. */
+    /** Fetches what a scene that is opened needs, without which it can still be shown. The function that it returns
+     * takes that in; of the scene's default lighting it makes the one by the weather beside the store. */
     async prepare(description: Description): Promise<(lighting: Lighting) => Lighting> {
         const { answer, weather, reason } = await this.fetch(description);
         return (lighting) => {

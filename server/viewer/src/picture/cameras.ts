@@ -12,7 +12,8 @@ CameraControls.install({
 const ANGLE = 50;
 
 /** That of a camera of the scene file, whose up is at right angles to its direction. One that is not tilted sideways
- * turns about the vertical, as that of the page does. The target stands at an arm's length, which turning goes around. */
+ * turns about the vertical, as that of the page does. The target stands at an arm's length, which turning goes
+ * around. */
 export function placeOf(eye: readonly number[], direction: readonly number[], up: readonly number[],
     angle: number): Place
 {

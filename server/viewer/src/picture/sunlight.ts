@@ -186,7 +186,8 @@ export class Sunlight {
         return Math.max(0, this.changed + REST_MS - performance.now());
     }
 
-    /** Makes ready for a picture of this camera, of so many pixels: of all points so far, or by the middle of the disc. */
+    /** Makes ready for a picture of this camera, of so many pixels: of all points so far, or by the middle of the
+     * disc. */
     prepare(camera: Camera, size: Vector2): void {
         const u = this.uniforms;
         if (!this.isOf(camera, size)) {

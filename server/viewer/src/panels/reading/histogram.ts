@@ -86,7 +86,8 @@ export class Histogram {
         this.plot.setData([at, Array.from(areas, (a) => (100 * a) / total)]);
     }
 
-    /** The plot's own axis is the place on ours, 0 to 1, so that equal bars are equal parts of a logarithmic axis too. */
+    /** The plot's own axis is the place on ours, 0 to 1, so that equal bars are equal parts of a logarithmic axis
+     * too. */
     private makePlot(): uPlot {
         const colour = (name: string) => (): string =>
             getComputedStyle(document.documentElement).getPropertyValue(name).trim();
