@@ -141,8 +141,7 @@ lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_
                                       lam_error *error);
 
 /* The form factors F that a store keeps (lambert precompute --keep-form-factors), as rows of single
- * precision, 8 bytes per entry, as blocks of clusters, or compressed, with bounds on what that leaves out;
- * immutable once open. */
+ * precision, 8 bytes per entry, or as blocks of clusters; immutable once open. */
 typedef struct lam_form_factors lam_form_factors;
 
 /* Opens the store at path and loads them; *F is NULL when it keeps none. The caller closes them with
@@ -153,7 +152,7 @@ lam_status lam_form_factors_open(const char *path, lam_form_factors **F, lam_err
 /* Frees them; NULL is allowed. */
 void lam_form_factors_close(lam_form_factors *F);
 
-/* Bytes that one product with F reads, and of compressed ones its bounds. */
+/* Bytes that one product with F reads. */
 size_t lam_form_factors_bytes(const lam_form_factors *F);
 
 /* Answers of an operator refined in double until their error is certified against F; immutable. */

@@ -77,6 +77,15 @@ static lam_status no_such_option(const parser *p, const char *name, lam_error *e
                        p->command->name);
 }
 
+/* Fails for an option, or a value of one, that the command has no longer. */
+static lam_status check_gone(const parser *p, const char *word, size_t name_length, lam_error *error) {
+    for (const option_gone *g = p->command->gone; g != NULL && g->word != NULL; g++)
+        if (strcmp(g->word, word) == 0 ||
+            (strlen(g->word) == name_length && strncmp(g->word, word, name_length) == 0))
+            return status_fail(error, LAM_ERR_ARGUMENT, "--%s: was removed; %s", g->word, g->instead);
+    return LAM_OK;
+}
+
 /* The row of a name, or of the only name that begins so and is in the help. */
 static lam_status find_name(const parser *p, const char *name, const option_row **found, lam_error *error) {
     lam_status status = LAM_OK;
@@ -137,6 +146,7 @@ static lam_status parse_option(const parser *p, int argc, char **argv, int *i, l
         char name[64];
         const size_t length = strcspn(word + 2, "=");
         snprintf(name, sizeof name, "%.*s", (int)length, word + 2);
+        TRY(check_gone(p, word + 2, length, error));
         TRY(find_name(p, name, &row, error));
         if (word[2 + length] == '=') value = word + 2 + length + 1;
     } else {

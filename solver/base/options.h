@@ -74,6 +74,12 @@ typedef struct option_table {
     void *fields;
 } option_table;
 
+/* An option that earlier versions had, "subdivide", or one of its values, "keep-form-factors=compressed". */
+typedef struct option_gone {
+    const char *word;
+    const char *instead; /* "give --elements N" */
+} option_gone;
+
 typedef struct option_command {
     const char *name;      /* "lambertd", or "lambert solve" of a verb; messages begin with it */
     const char *arguments; /* "STORE", for --help */
@@ -81,6 +87,7 @@ typedef struct option_command {
     const char *summary;
     const char *notes; /* paragraphs after the options; may be NULL */
     size_t least_arguments, most_arguments;
+    const option_gone *gone; /* refused with advice, and in no help; NULL: none. The last has no word */
 } option_command;
 
 /* A verb of a program, with options of its own. */

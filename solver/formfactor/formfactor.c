@@ -46,8 +46,9 @@ lam_status form_factors_gather(form_factors *f, const double *area, lam_error *e
     return upper_gather(&f->upper, area, error);
 }
 
-lam_status form_factors_save_about(const form_factors *f, size_t n, const char *storage, store *s,
-                                   lam_error *error) {
+/* Everything of n elements but the rows; storage is the attribute that says how these are stored. */
+static lam_status save_about(const form_factors *f, size_t n, const char *storage, store *s,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     TRY(store_write(s, GROUP "/leaving", STORE_F64, 1, &n, f->leaving, error));
     TRY(store_write(s, GROUP "/absorbed", STORE_F64, 1, &n, f->absorbed, error));
@@ -71,7 +72,7 @@ lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) 
     lam_status status = LAM_OK;
     const bool rows = f->upper.indptr == NULL;
     TRY(csr_save(rows ? &f->F : &f->upper, GROUP, s, error));
-    TRY(form_factors_save_about(f, rows ? f->F.n : f->upper.n, rows ? "rows" : "upper", s, error));
+    TRY(save_about(f, rows ? f->F.n : f->upper.n, rows ? "rows" : "upper", s, error));
 done:
     return status;
 }
@@ -80,7 +81,7 @@ lam_status form_factors_save_blocks(const form_factors *f, const block_factors *
                                     lam_error *error) {
     lam_status status = LAM_OK;
     TRY(block_factors_save(blocks, s, error));
-    TRY(form_factors_save_about(f, blocks->n, "blocks", s, error));
+    TRY(save_about(f, blocks->n, "blocks", s, error));
 done:
     return status;
 }

@@ -188,9 +188,6 @@ lam_status form_factors_some_rows(const mesh *m, const recipe *how, const uint32
 /* /form_factors of a store, rows or the upper triangle as they are; sky_bounce_save and sky_bounce_load
  * handle /sky. large as above. */
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error);
-/* Saves everything of n elements but the rows; storage is the attribute that says how these are stored. */
-lam_status form_factors_save_about(const form_factors *f, size_t n, const char *storage, store *s,
-                                   lam_error *error);
 lam_status form_factors_load(store *s, const mesh *m, const large_place *large, form_factors *out,
                              lam_error *error);
 

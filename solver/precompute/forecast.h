@@ -23,7 +23,6 @@ typedef struct forecast {
     bool scratch;                /* rows go to a scratch folder as they are found */
     bool large;                  /* and whole samples lie there, as memory is too small for them */
     bool keep;                   /* the store keeps the form factors */
-    bool compress;               /* compressed, where that takes less */
     bool streamed;               /* the method asks for rows one after the other; none are held */
     size_t emitters;             /* 0: none, or not read yet */
     const build_method *method;  /* NULL: no operator is built */

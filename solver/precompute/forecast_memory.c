@@ -50,18 +50,6 @@ double forecast_operator_bytes(const forecast *f) {
     return method_bytes(f).stored;
 }
 
-/* Stored coefficients per element of compressed form factors, at most: measured 255 (a Cornell box of 10,249
- * elements) to 885 (an atrium of 6,000) at epsilon .05, 902 at .0025 (a box of 40,978); where they were as
- * many as F has they are not kept. Bytes of a coefficient and of an element while they are found. */
-static const double compressed_most = 900, compressed_number_bytes = 26, compressed_element_bytes = 2500;
-
-static double compress_bytes(const forecast *f) {
-    const double n = (double)f->n;
-    if (!f->compress || recipe_noise(&f->recipe) > 0) return 0;
-    const double numbers = fmin(compressed_most * pow(.05 / f->build->epsilon, .25), n / 2);
-    return n * (compressed_element_bytes + compressed_number_bytes * numbers);
-}
-
 /* Of each probe of a round its emission, an answer, its first light with its spread, and corrections by two
  * references; the vectors of the solutions that are found at once; an LU, which takes all probes in one
  * round; and the walk of first light, whose nodes are those of blocks. */
@@ -98,7 +86,7 @@ double forecast_bytes(const forecast *f) {
     const double trace = f->from_store ? 0 : own->making_bytes(n, &f->recipe, place);
     const double streamed = own->stream_bytes != NULL ? own->stream_bytes(n, &f->recipe) : 0;
     const double held = f->streamed ? streamed : sample;
-    double peak = fmax(f->streamed ? held : trace, held + fmax(op.building, op.loaded + compress_bytes(f)));
+    double peak = fmax(f->streamed ? held : trace, held + fmax(op.building, op.loaded));
     if (f->probes > 0) {
         const recipe *r = &f->judge_recipe;
         const double references = held_bytes(f, forecast_reference_bytes(f), r);

@@ -36,7 +36,6 @@ void state_free(precompute_state *state) {
     block_scene_destroy(state->ready);
     plane_tree_free(&state->tree);
     block_factors_free(&state->blocks);
-    compressed_free(&state->compressed);
     emitter_list_free(&state->emitters);
     importance_free(&state->importance);
     scratch_close(state->scratch, false);
@@ -321,13 +320,6 @@ static lam_status run_stages(precompute_state *state, lam_error *error) {
     TRY(stage_forecast(state, error));
     TRY(run_trials(state, error));
     if (state->probes > 0) TRY(stage_mesh_error(state, error));
-
-    if (state_compresses(options)) {
-        started = clock_seconds();
-        TRY(stage_compress(state, error));
-        log_stage(state, "compress", started);
-        TRY(terminal_check(error));
-    }
 done:
     return status;
 }

@@ -35,8 +35,8 @@ typedef struct precompute_options {
     uint64_t rays, resolution; /* rays: OPTION_AUTO */
     const char *sky;           /* a tiling, or NULL; from a store: that of the store */
     double ground_albedo;
-    option_list portals;                /* names of groups */
-    const char *keep_form_factors;      /* NULL: they are not kept; "": as they are; "compressed" */
+    option_list portals; /* names of groups */
+    bool keep_form_factors;
     const char *emitters;               /* FILE, group=NAME, sky; or NULL */
     const char *receivers, *importance; /* NAME,NAME; FILE; one of them, or both NULL */
     const char *sources;                /* NAME,NAME; or NULL */
@@ -63,6 +63,9 @@ typedef struct precompute_tables {
     option_row method_rows[2];
     char methods[METHOD_CHOICES_BYTES];
 } precompute_tables;
+
+/* Refuses options of earlier versions with advice on others. */
+extern const option_gone precompute_gone[];
 
 /* Makes the tables that fill o, whose fields without presets it sets first. to_classify: only those of the
  * scene and of the choice of a method. */

@@ -28,6 +28,12 @@ done:
 const char precompute_factor_words[] = "auto|rays|blocks|hemicube";
 const char precompute_quality_words[] = "draft|normal|high";
 
+const option_gone precompute_gone[] = {
+    {"keep-form-factors=compressed",
+     "give --keep-form-factors, and --form-factors blocks where rows take too much memory"},
+    {0},
+};
+
 #define FIELD(member) offsetof(precompute_options, member)
 static const option_row output_rows[] = {
     OPTION_ROW_OUTPUT(FIELD(output), "STORE.h5", .help = "Where the store goes"),
@@ -159,13 +165,10 @@ static const option_row form_factor_rows[] = {
      .most = 1,
      .help = "Share of the light of the sky that the ground below the horizon reflects"},
     {.name = "keep-form-factors",
-     .kind = OPTION_OPTIONAL,
+     .kind = OPTION_FLAG,
      .offset = FIELD(keep_form_factors),
-     .choices = "compressed",
      .help = "Keep the form factors in the store, for refined answers and for other operators of the same "
-             "scene; blocks are kept as blocks, which other methods than hierarchical cannot use. "
-             "compressed: for refined answers only, in a wavelet basis without its small coefficients, "
-             "whose loss the certificates include"},
+             "scene; blocks are kept as blocks, which other methods than hierarchical cannot use"},
     {0},
 };
 

@@ -7,7 +7,6 @@
 #include "solver/formfactor/pairs/pairs_sample.h"
 #include "solver/formfactor/pairs/ray_rows.h"
 #include "solver/formfactor/source.h"
-#include "solver/method/hierarchical/compress.h"
 #include "solver/method/judge/judge.h"
 #include "solver/precompute/emitter_list.h"
 #include "solver/precompute/error_advice.h"
@@ -78,7 +77,6 @@ typedef struct precompute_state {
     block_scene *ready;            /* the mesh on that tree, from a forecast of blocks to these; or NULL */
     block_factors blocks;          /* the form factors where the recipe is blocks; f has no rows then */
     row_stream stream;             /* of rays */
-    compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
     recipe recipe;                 /* of f */
     face_openings of_faces;        /* of the faces of the file, or around the groups of --portal */
     const face_openings *openings; /* these; NULL: there is no sky, or only a store's mesh is known */
@@ -130,9 +128,8 @@ void state_log_times(const precompute_state *state);
 /* Says how many rows were in the scratch folder already. */
 void state_log_kept(precompute_state *state, const form_factors *f);
 
-/* True if the store keeps form factors; compressed ones. */
+/* True if the store keeps form factors. */
 bool state_keeps(const precompute_options *o);
-bool state_compresses(const precompute_options *o);
 
 /* The recipe of the judge's samples: with --rays given, of as many also where a store's form factors had
  * others: stage_scene.c. */
@@ -261,9 +258,6 @@ void trial_made_free(trial_made *made);
 
 /* The accuracy of pairs at --quality high: stage_scene.c. */
 double state_finest_accuracy(void);
-
-/* Compresses the form factors where that was asked for and takes less than they do: stage_compress.c. */
-lam_status stage_compress(precompute_state *state, lam_error *error);
 
 /* The sealed store: stage_store.c. */
 lam_status stage_store(precompute_state *state, lam_error *error);

@@ -19,7 +19,7 @@ bool state_may_have_blocks(const precompute_state *state, double n) {
     const bool asked = o->form_factors == FACTORS_BLOCKS;
     if (o->from_store || state->holds || !(asked || o->form_factors == FACTORS_AUTO)) return false;
     if (asked) return true;
-    return !state_compresses(o) && o->scratch == NULL && o->emitters == NULL && o->rays == OPTION_AUTO &&
+    return o->scratch == NULL && o->emitters == NULL && o->rays == OPTION_AUTO &&
            o->quality != QUALITY_DRAFT && n >= ELEMENTS_LEAST;
 }
 
@@ -37,7 +37,6 @@ static lam_status check_asked(const precompute_state *state, const build_method 
                               bool possible, lam_error *error) {
     const precompute_options *o = state->options;
     const char *other = NULL;
-    if (state_compresses(o)) other = "--keep-form-factors=compressed";
     if (o->scratch != NULL) other = "--scratch";
     if (o->emitters != NULL) other = "--emitters";
     if (other != NULL)
@@ -70,7 +69,7 @@ lam_status state_blocks_possible(precompute_state *state, const build_method *me
     const precompute_options *o = state->options;
     const bool asked = o->form_factors == FACTORS_BLOCKS;
     *possible = false;
-    if (!asked && (state_compresses(o) || state->m.n < ELEMENTS_LEAST)) goto done;
+    if (!asked && state->m.n < ELEMENTS_LEAST) goto done;
     TRY(make_tree(state, error));
     *possible = is_possible(state);
     if (!asked) goto done;
@@ -199,7 +198,6 @@ lam_status state_load_blocks(precompute_state *state, store *s, lam_error *error
     const bool named = strcmp(o->build.method, "auto") != 0;
     const char *asked = NULL;
     if (o->emitters != NULL) asked = "--emitters";
-    if (state_compresses(o)) asked = "--keep-form-factors=compressed";
     if (named && !(state->expected->flags & METHOD_BLOCKS)) asked = state->expected->name;
     if (asked != NULL)
         FAIL(error, LAM_ERR_ARGUMENT,

@@ -178,11 +178,7 @@ static recipe choice_recipe(const choice_request *asked, bool all_pairs) {
 }
 
 bool state_keeps(const precompute_options *o) {
-    return o->keep_form_factors != NULL;
-}
-
-bool state_compresses(const precompute_options *o) {
-    return state_keeps(o) && *o->keep_form_factors != '\0';
+    return o->keep_form_factors;
 }
 
 /* Rows of more bytes than these are computed a second time for the judge, not held. */
@@ -292,7 +288,6 @@ forecast state_forecast(const precompute_state *state, double n) {
                       .scratch = o->scratch != NULL,
                       .large = state->large,
                       .keep = state_keeps(o),
-                      .compress = state_compresses(o),
                       .streamed = state->streamed,
                       .emitters = state->emitters.s,
                       .method = state->expected,

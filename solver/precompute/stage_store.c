@@ -59,10 +59,7 @@ lam_status stage_store(precompute_state *state, lam_error *error) {
     TRY(mesh_save(&state->m, state->f.row_sums, s, error));
     if (o->reflectance >= 0) TRY(store_set_number(s, "/mesh", "reflectance_given", o->reflectance, error));
     TRY(terminal_check(error));
-    if (state->compressed.n > 0) {
-        TRY(compressed_save(&state->compressed, s, error));
-        TRY(form_factors_save_about(&state->f, state->m.n, "compressed", s, error));
-    } else if (state_keeps(o) && state->blocks.n > 0) {
+    if (state_keeps(o) && state->blocks.n > 0) {
         TRY(form_factors_save_blocks(&state->f, &state->blocks, s, error));
     } else if (state_keeps(o)) {
         if (state->m.n > FORM_FACTORS_ROWS_MOST) TRY(form_factors_gather(&state->f, state->m.area, error));

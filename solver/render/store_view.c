@@ -1,5 +1,6 @@
 #include "solver/render/store_view.h"
 
+#include "solver/operator/refine/form_factor_rows.h"
 #include "solver/operator/two_mesh.h"
 #include "solver/render/tone.h"
 
@@ -90,19 +91,14 @@ lam_status store_view_visible(store *s, size_t n, float **values, double *mean, 
                               lam_error *error) {
     lam_status status = LAM_OK;
     void *ends = NULL, *columns = NULL;
-    char *storage = NULL;
+    form_factor_storage how = STORAGE_ROWS;
     float *counts = NULL;
     size_t dims[STORE_MAX_RANK] = {n + 1}, entries[STORE_MAX_RANK] = {SIZE_MAX};
-    if (!store_has(s, "/form_factors"))
+    if (!store_has(s, FORM_FACTORS_GROUP))
         FAIL(error, LAM_ERR_ARGUMENT, "%s: keeps no form factors; precompute it with --keep-form-factors",
              store_path(s));
-    TRY(store_get_text(s, "/form_factors", "storage", &storage, error));
-    if (strcmp(storage, "compressed") == 0)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: compressed form factors do not tell which elements see each other; precompute it with "
-             "--keep-form-factors alone",
-             store_path(s));
-    if (strcmp(storage, "blocks") == 0)
+    TRY(form_factors_storage(s, &how, error));
+    if (how == STORAGE_BLOCKS)
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: blocks of form factors do not tell which elements see each other; precompute it with "
              "--form-factors rays --keep-form-factors",
@@ -113,7 +109,7 @@ lam_status store_view_visible(store *s, size_t n, float **values, double *mean, 
     if (counts == NULL) TRY(LAM_ERR_MEMORY);
     const uint64_t *row = ends;
     const uint32_t *column = columns;
-    const bool upper = strcmp(storage, "upper") == 0; /* an entry is a pair: both see each other */
+    const bool upper = how == STORAGE_UPPER; /* an entry is a pair: both see each other */
     for (size_t i = 0; i < n; i++)
         for (uint64_t e = row[i]; e < row[i + 1]; e++) {
             if (row[i + 1] > entries[0] || column[e] >= n)
@@ -132,7 +128,6 @@ lam_status store_view_visible(store *s, size_t n, float **values, double *mean, 
 done:
     free(ends);
     free(columns);
-    free(storage);
     free(counts);
     return status;
 }

@@ -85,6 +85,7 @@ int cmd_classify(int argc, char **argv) {
             "--method auto would build; of a store that keeps form factors these are taken.",
         .least_arguments = 1,
         .most_arguments = 1,
+        .gone = precompute_gone,
     };
     option_result given = {0};
     lam_error error = {0};

@@ -19,6 +19,7 @@ static const option_command command = {
                "operator from any emission to its radiosity, with its measured error.",
     .least_arguments = 1,
     .most_arguments = 1,
+    .gone = precompute_gone,
 };
 
 static const option_row json_rows[] = {

@@ -2,6 +2,7 @@
 
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
+#include "solver/operator/refine/form_factor_rows.h"
 #include "solver/operator/sky_light.h"
 
 #include <omp.h>
@@ -46,6 +47,7 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
                       lam_error *error) {
     lam_status status = LAM_OK;
     char *tiling = NULL;
+    form_factor_storage how;
     const emission_options given = {.items = &options->emit,
                                     .path = options->emission,
                                     .frames = options->frames,
@@ -54,6 +56,8 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
     TRY(emission_scene_create(m, &out->scene, error));
     TRY(sky_load(s, m->n, &out->sky, error));
     TRY(operator_load(s, &out->op, error));
+    /* A store whose form factors cannot be read is refused whole, as lambertd does. */
+    if (store_has(s, FORM_FACTORS_GROUP)) TRY(form_factors_storage(s, &how, error));
     TRY(emission_scene_sources(&out->scene, out->op, out->sky, error));
     if (out->sky != NULL) TRY(store_get_text(s, "/sky", "tiling", &tiling, error));
     if (tiling != NULL) snprintf(out->scene.tiling, sizeof out->scene.tiling, "%s", tiling);

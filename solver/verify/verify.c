@@ -111,45 +111,6 @@ static double entry(const csr *F, size_t i, uint32_t j) {
     return at == NULL ? 0 : (double)F->data[F->indptr[i] + (uint64_t)(at - first)];
 }
 
-/* Row sums of compressed form factors, by their product with 1, within the bounds that they state. */
-static lam_status verify_compressed(examination *e, check *c, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = e->m.n;
-    lam_form_factors *F = NULL;
-    double *one = memory_allocate(n, sizeof *one, "form factors", error), *work = NULL, most;
-    double *sums = memory_allocate(n, sizeof *sums, "form factors", error);
-    double *bound = memory_allocate(n, sizeof *bound, "form factors", error);
-    if (one == NULL || sums == NULL || bound == NULL) TRY(LAM_ERR_MEMORY);
-    status = form_factors_open(e->s, &F, error);
-    if (status != LAM_OK) {
-        status = check_failed(c, status, error);
-        goto done;
-    }
-    /* By S alone: the stored first light of the groups would give the whole of this product. */
-    compressed_factors *held = F->compressed;
-    held->n_lit = 0;
-    work = memory_allocate(compressed_work(held), sizeof *work, "form factors", error);
-    if (work == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) one[i] = 1;
-    compressed_multiply(held, one, sums, work, 1);
-    most = compressed_error(held, one, bound, work);
-    for (size_t i = 0; i < n; i++)
-        if (!(fabs(sums[i] - e->row_sums[i]) <= bound[i] + held->rounding + 1e-6)) {
-            check_say(c, VERDICT_BROKEN, "row %zu sums to %.9g within %.2g, /mesh/row_sums says %.9g", i,
-                      sums[i], bound[i], e->row_sums[i]);
-            goto done;
-        }
-    check_say(c, VERDICT_OK,
-              "compressed, row sums agree with /mesh/row_sums within their bounds, %.2g at most", most);
-done:
-    lam_form_factors_close(F);
-    free(one);
-    free(sums);
-    free(bound);
-    free(work);
-    return status;
-}
-
 /* Blocks have been checked once they are loaded; their row sums here. */
 static lam_status verify_blocks(examination *e, check *c, lam_error *error) {
     const lam_status loaded = form_factors_load_blocks(e->s, &e->m, &e->tree, &e->blocks, &e->f, error);
@@ -176,7 +137,6 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
         return LAM_OK;
     }
     lam_status loaded = form_factors_storage(e->s, &how, error);
-    if (loaded == LAM_OK && how == STORAGE_COMPRESSED) return verify_compressed(e, c, error);
     if (loaded == LAM_OK && how == STORAGE_BLOCKS) return verify_blocks(e, c, error);
     if (loaded == LAM_OK) loaded = form_factors_load(e->s, &e->m, NULL, &e->f, error);
     if (loaded == LAM_OK) loaded = form_factors_expand(&e->f, e->m.area, error);

@@ -54,8 +54,6 @@ with tempfile.TemporaryDirectory() as scratch:
         run("precompute", "box.obj", "--rays", 64, "--probes", 0, "--quiet", "-o", folder / "store" / f"{k}.h5",
             "--method", *how)
     run("generate", "box", "--divisions", 3, "-o", "box.obj")
-    run("precompute", "box.obj", "--probes", 0, "--quiet", "-o", folder / "store" / "compressed.h5", "--method",
-        "hierarchical", "--epsilon", .99, "--keep-form-factors=compressed")
     run("precompute", "box.obj", "--probes", 0, "--quiet", "-o", folder / "store" / "blocks.h5", "--form-factors", "blocks",
         "--epsilon", .99, "--keep-form-factors")
 

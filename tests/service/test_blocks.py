@@ -99,8 +99,7 @@ class Blocks(Case):
         self.assertRegex(done.stdout, r"ok +error")
 
     def test_what_needs_rows_is_refused(self):
-        for options, reason in ((("--keep-form-factors=compressed",), "--keep-form-factors=compressed"),
-                                (("--scratch", self.path("rows")), "--scratch"),
+        for options, reason in ((("--scratch", self.path("rows")), "--scratch"),
                                 (("--method", "low-rank", "--rank", 8), "--method low-rank needs rows")):
             done = self.failed(reason, "precompute", self.room, "-o", self.path("no.h5"), "--form-factors", "blocks",
                                *options)

@@ -196,8 +196,6 @@ class KeptBlocks(Case):
         out = self.path("no.h5")
         for wanted, line in (
                 ("--method low-rank needs rows", ("precompute", self.kept, "-o", out, "--method", "low-rank")),
-                ("--keep-form-factors=compressed needs rows",
-                 ("precompute", self.kept, "-o", out, "--keep-form-factors=compressed")),
                 ("--emitters needs rows", ("precompute", self.kept, "-o", out, "--emitters", "group=lamp")),
                 ("where rows are needed", ("classify", self.kept)),
                 ("do not tell which elements see each other",
@@ -278,6 +276,36 @@ class KeptBlocks(Case):
             self.assertEqual(done.returncode, 1, (wanted, done.stderr))
             self.assertIn(wanted, done.stderr)
             self.assertEqual(len(done.stderr.strip().splitlines()), 1, done.stderr)
+
+    def test_compressed_form_factors_are_refused(self):
+        """Earlier versions wrote them. They are hand-made here: of the group only the attribute `storage` is read."""
+        def change(o):
+            for name in list(o):
+                if name not in ("leaving", "absorbed", "repair"):
+                    del o[name]
+            o.attrs.modify("storage", np.bytes_(b"compressed"))
+            o["order"], o["indptr"] = np.arange(self.truth.n, dtype="<u4"), np.arange(self.truth.n + 1, dtype="<u8")
+            o["indices"], o["data"] = np.arange(self.truth.n, dtype="<u4"), np.zeros(self.truth.n, "<f4")
+
+        path, out = self.broken(change), self.path("no.h5")
+        wanted = (f"{path}: its form factors are compressed, which is not supported any more; precompute the scene again, with "
+                  "--form-factors blocks --keep-form-factors")
+        for line in (("solve", path, "--emit", "lamp=1", "-o", self.path("a.npy")),
+                     ("solve", path, "--emit", "lamp=1", "--tolerance", .1, "-o", self.path("a.npy")),
+                     ("render", path, "--emit", "lamp=1", "-o", self.path("a.png")),
+                     ("render", path, "--quantity", "visible", "-o", self.path("a.png")),
+                     ("precompute", path, "-o", out), ("classify", path)):
+            self.assertEqual(self.failed(wanted, *line).stderr.count("\n"), 1)
+            self.assertFalse([name for name in ("a.npy", "a.png", "no.h5") if os.path.exists(self.path(name))])
+        done = lambert("verify", path)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("its form factors are compressed", done.stdout)
+        with Daemon(f"{path}:old", f"{self.kept}:kept") as daemon:
+            self.assertEqual([scene["name"] for scene in json.loads(daemon.get("/v1/scenes").body)["scenes"]], ["kept"])
+            self.assertIn(wanted, daemon.errors())
+        done = lambert("precompute", self.scene, "-o", out, "--keep-form-factors=compressed")
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1))
+        self.assertIn("--keep-form-factors=compressed: was removed; give --keep-form-factors", done.stderr)
 
     def test_any_value_is_survived(self):
         """Numbers of any array replaced by any bytes: an answer or one line, also of the daemon, which lives on."""

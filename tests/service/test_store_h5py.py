@@ -469,6 +469,26 @@ class StoreTest(unittest.TestCase):
             E = f["mesh/emission"][()].astype(float)
         np.testing.assert_allclose(names["B"], store.answer(E)[0][0], rtol=1e-12)
 
+    def test_python_of_a_hierarchical_store(self):
+        """The reader in deploy/examples says what `lambert solve` does."""
+        scene, path, answer = (self.root / name for name in ("made.obj", "made.h5", "made.npy"))
+        for kind, group, rays, made_up in (("cornell", "lamp", "auto", False), ("city", "street", 64, True)):
+            for line in (("generate", kind, "--elements", 1000, "-o", scene),
+                         ("precompute", scene, "-o", path, "--method", "hierarchical", "--probes", 0, "--reflectance", 0.5,
+                          "--rays", rays),
+                         ("solve", path, "--emit", f"{group}=2", "-o", answer)):
+                done = run(*line)
+                self.assertEqual(done.returncode, 0, done.stderr)
+            with h5py.File(path, "r+") as f:
+                bright = [name.decode() for name in f["mesh/group_names"][()]].index(group)
+                f["mesh/emission"][0] = np.where(f["mesh/group"][()] == bright, 2, 0)
+                self.assertEqual("missing" in f["operator"], made_up)
+            names = example("read_hierarchical.py", path)
+            B = np.load(answer)
+            B = B[0] if B.ndim == 2 else B
+            # Two transforms and a product in single precision, of numbers that half precision has exactly.
+            np.testing.assert_allclose(names["B"], B, atol=1e-5 * B.max())
+
     def test_upper_triangle(self):
         """Above 10,240 elements: read by the reader in deploy/examples, and as `precompute` and `verify` do."""
         scene, path, again = (self.root / name for name in ("many.obj", "many.h5", "again.h5"))

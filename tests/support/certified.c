@@ -1,20 +1,16 @@
 #include "support/certified.h"
 
-certified certified_make_of(const char *name, lam_operator *op, lam_form_factors *F, const csr *rows) {
-    certified s = {.name = name, .op = op, .F = F, .rows = rows != NULL ? rows : &F->F};
+certified certified_make(const char *name, lam_operator *op, lam_form_factors *F) {
+    certified s = {.name = name, .op = op, .F = F};
     lam_error error = {0};
     const size_t C = lam_operator_channels(op);
     ck_assert_msg(lam_refiner_create(op, F, &s.refiner, &error) == LAM_OK, "%s: %s", name, error.message);
     s.truth = calloc(C, sizeof *s.truth);
     for (size_t c = 0; c < C; c++)
-        ck_assert_msg(reference_create(s.rows, F->area, op->reflectance + c * op->n, REFERENCE_DENSE,
+        ck_assert_msg(reference_create(&F->F, F->area, op->reflectance + c * op->n, REFERENCE_DENSE,
                                        &s.truth[c], &error) == LAM_OK,
                       "%s: %s", name, error.message);
     return s;
-}
-
-certified certified_make(const char *name, lam_operator *op, lam_form_factors *F) {
-    return certified_make_of(name, op, F, NULL);
 }
 
 void certified_free(certified *s) {
@@ -47,7 +43,7 @@ static void certified_truth(const certified *s, size_t c, const double *E, const
     /* Each round leaves about n cond u = 1e-8 of the error at most (cond < 1e5 here). */
     for (int round = 0; round < 3; round++) {
         for (size_t i = 0; i < n; i++)
-            right[i] = (double)(lit[i] - B[i] + (long double)rho[i] * certified_received(s->rows, i, B));
+            right[i] = (double)(lit[i] - B[i] + (long double)rho[i] * certified_received(&s->F->F, i, B));
         ck_assert(reference_solve(s->truth[c], 1, right, step, 1e-15, NULL, &error) == LAM_OK);
         for (size_t i = 0; i < n; i++) B[i] += (long double)step[i];
     }
@@ -77,7 +73,7 @@ double certified_check(const certified *s, size_t n_rhs, lam_quantity quantity, 
             long double right = B[i];
             if (quantity == LAM_INDIRECT) right -= lit[i];
             if (quantity == LAM_IRRADIANCE)
-                right = (H0 != NULL ? (long double)H0[at + i] : 0) + certified_received(s->rows, i, B);
+                right = (H0 != NULL ? (long double)H0[at + i] : 0) + certified_received(&s->F->F, i, B);
             worst = fmaxl(worst, fabsl((long double)out[at + i] - right));
             indirect = fmaxl(indirect, fabsl(B[i] - lit[i]));
             largest = fmaxl(largest, fabsl(right));

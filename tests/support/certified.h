@@ -16,14 +16,11 @@ typedef struct certified {
     const char *name;
     lam_operator *op;
     lam_form_factors *F;
-    const csr *rows; /* of F, or of what it was compressed from */
     lam_refiner *refiner;
     reference **truth; /* [C] */
 } certified;
 
-/* op and F are taken over; rows, NULL: those of F. */
-certified certified_make_of(const char *name, lam_operator *op, lam_form_factors *F, const csr *rows);
-
+/* op and F, which has rows, are taken over. */
 certified certified_make(const char *name, lam_operator *op, lam_form_factors *F);
 
 void certified_free(certified *s);

@@ -8,11 +8,16 @@
 #define GROUP FORM_FACTORS_GROUP
 
 lam_status form_factors_storage(store *s, form_factor_storage *out, lam_error *error) {
-    static const char *const names[STORAGES] = {"rows", "upper", "compressed", "blocks"};
+    static const char *const names[STORAGES] = {"rows", "upper", "blocks"};
     lam_status status = LAM_OK;
     char *text = NULL;
     int k = 0;
     TRY(store_get_text(s, GROUP, "storage", &text, error));
+    if (strcmp(text, "compressed") == 0)
+        FAIL(error, LAM_ERR_UNSUPPORTED,
+             "%s: its form factors are compressed, which is not supported any more; precompute the scene "
+             "again, with --form-factors blocks --keep-form-factors where rows take too much memory",
+             store_path(s));
     while (k < STORAGES && strcmp(text, names[k]) != 0) k++;
     if (k == STORAGES)
         FAIL(error, LAM_ERR_UNSUPPORTED,
@@ -101,11 +106,6 @@ lam_status form_factor_rows_read(store *s, size_t n, const double *area, const l
     form_factor_storage how = STORAGE_ROWS;
     *held = (csr){.n = n, .place = place};
     TRY(form_factors_storage(s, &how, error));
-    if (how == STORAGE_COMPRESSED)
-        FAIL(error, LAM_ERR_UNSUPPORTED,
-             "%s: its form factors are compressed, which refines answers but makes no operator; precompute "
-             "the scene again, or keep them with --keep-form-factors alone",
-             store_path(s));
     if (how == STORAGE_BLOCKS)
         FAIL(error, LAM_ERR_UNSUPPORTED,
              "%s: its form factors are blocks of clusters, where rows are needed; precompute the scene with "
@@ -196,11 +196,6 @@ lam_status form_factors_size(store *s, size_t *kept, size_t *most, lam_error *er
     form_factor_storage how = STORAGE_ROWS;
     TRY(form_factors_storage(s, &how, error));
     const bool rows = how == STORAGE_ROWS;
-    if (how == STORAGE_COMPRESSED) {
-        TRY(compressed_size(s, kept, error));
-        *most = *kept;
-        goto done;
-    }
     if (how == STORAGE_BLOCKS) {
         TRY(block_factors_stored(s, kept, most, error));
         goto done;
@@ -211,24 +206,6 @@ lam_status form_factors_size(store *s, size_t *kept, size_t *most, lam_error *er
     *kept = (rows ? 1 : 2) * entries[0] * entry + rows_of[0] * row;
     *most = *kept + (rows ? 0 : entries[0] * entry + rows_of[0] * 2 * sizeof(uint64_t));
 done:
-    return status;
-}
-
-/* The row sums of compressed form factors are stored with the mesh. */
-static lam_status open_compressed(store *s, lam_form_factors *f, lam_error *error) {
-    lam_status status = LAM_OK;
-    void *row_sums = NULL;
-    f->compressed = memory_allocate(1, sizeof *f->compressed, "form factors", error);
-    if (f->compressed == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(store_read(s, "/mesh/row_sums", STORE_F64, 1, (size_t[]){f->n}, &row_sums, error));
-    memcpy(f->row_sums, row_sums, f->n * sizeof *f->row_sums);
-    for (size_t i = 0; i < f->n; i++)
-        if (!(f->row_sums[i] >= 0 && f->row_sums[i] <= 1 + 1e-5))
-            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be from 0 to 1",
-                 store_path(s), i, f->row_sums[i]);
-    TRY(compressed_load(s, f->n, f->area, f->compressed, error));
-done:
-    free(row_sums);
     return status;
 }
 
@@ -260,8 +237,8 @@ lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error)
     made->row_sums = memory_allocate(n, sizeof *made->row_sums, "form factors", error);
     if (made->row_sums == NULL) TRY(LAM_ERR_MEMORY);
     TRY(form_factors_storage(s, &how, error));
-    if (how == STORAGE_COMPRESSED || how == STORAGE_BLOCKS) {
-        TRY(how == STORAGE_BLOCKS ? open_blocks(s, made, error) : open_compressed(s, made, error));
+    if (how == STORAGE_BLOCKS) {
+        TRY(open_blocks(s, made, error));
         *out = made;
         made = NULL;
         goto done;
@@ -301,29 +278,6 @@ lam_status form_factors_of_rows(csr *F, const double *area, lam_form_factors **o
     made = NULL;
 done:
     csr_free(F);
-    lam_form_factors_close(made);
-    return status;
-}
-
-lam_status form_factors_of_compressed(compressed_factors *c, const double *area, const double *row_sums,
-                                      lam_form_factors **out, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = c->n;
-    lam_form_factors *made = memory_allocate(1, sizeof *made, "form factors", error);
-    if (made == NULL) TRY(LAM_ERR_MEMORY);
-    made->n = n;
-    made->area = memory_allocate(n, sizeof *made->area, "form factors", error);
-    made->row_sums = memory_allocate(n, sizeof *made->row_sums, "form factors", error);
-    made->compressed = memory_allocate(1, sizeof *made->compressed, "form factors", error);
-    if (made->area == NULL || made->row_sums == NULL || made->compressed == NULL) TRY(LAM_ERR_MEMORY);
-    memcpy(made->area, area, n * sizeof *area);
-    memcpy(made->row_sums, row_sums, n * sizeof *row_sums);
-    *made->compressed = *c;
-    *c = (compressed_factors){.n = 0};
-    *out = made;
-    made = NULL;
-done:
-    compressed_free(c);
     lam_form_factors_close(made);
     return status;
 }
@@ -370,15 +324,12 @@ void lam_form_factors_close(lam_form_factors *f) {
     free(f->area);
     free(f->row_sums);
     free(f->row_norms);
-    if (f->compressed != NULL) compressed_free(f->compressed);
-    free(f->compressed);
     if (f->blocks != NULL) kept_blocks_free(f->blocks);
     free(f->blocks);
     free(f);
 }
 
 size_t lam_form_factors_bytes(const lam_form_factors *f) {
-    if (f->compressed != NULL) return compressed_bytes(f->compressed);
     if (f->blocks != NULL) return kept_blocks_bytes(f->blocks);
     return (size_t)f->F.indptr[f->F.n] * (sizeof *f->F.indices + sizeof *f->F.data) +
            (f->F.n + 1) * sizeof *f->F.indptr;

@@ -4,7 +4,6 @@
 #define LAMBERT_OPERATOR_REFINE_FORM_FACTOR_ROWS_H
 
 #include "solver/linalg/csr.h"
-#include "solver/operator/refine/compressed_factors.h"
 #include "solver/operator/refine/kept_blocks.h"
 
 #include <math.h>
@@ -27,25 +26,23 @@ lam_status form_factor_rows_read(store *s, size_t n, const double *area, const l
 typedef enum form_factor_storage {
     STORAGE_ROWS,
     STORAGE_UPPER,
-    STORAGE_COMPRESSED,
     STORAGE_BLOCKS,
     STORAGES
 } form_factor_storage;
 
-/* Of a store that has form factors. Errors: those of store_get_text, LAM_ERR_UNSUPPORTED for another storage.
- */
+/* Of a store that has form factors. Errors: those of store_get_text; LAM_ERR_UNSUPPORTED for another storage,
+ * such as compressed coefficients. */
 lam_status form_factors_storage(store *s, form_factor_storage *out, lam_error *error);
 
-/* F of an open store, as rows, compressed or as blocks; the certificate of a refined answer refers to it. */
+/* F of an open store, as rows or as blocks; the certificate of a refined answer refers to it. */
 struct lam_form_factors {
     size_t n;
-    csr F;                          /* rows; else empty */
-    double *area;                   /* [n], m^2 */
-    double *row_sums;               /* [n], of F */
-    double *row_norms;              /* [n], (sum_j F_ij^2 / A_j)^1/2; NULL when compressed */
-    uint64_t longest;               /* entries of the longest row */
-    compressed_factors *compressed; /* NULL: not so */
-    kept_blocks *blocks;            /* NULL: not so */
+    csr F;               /* rows; else empty */
+    double *area;        /* [n], m^2 */
+    double *row_sums;    /* [n], of F */
+    double *row_norms;   /* [n], (sum_j F_ij^2 / A_j)^1/2 */
+    uint64_t longest;    /* entries of the longest row */
+    kept_blocks *blocks; /* NULL: not so */
 };
 
 /* Loads them; *out = NULL when the store has none. lam_form_factors_close frees them. Errors: as
@@ -54,10 +51,6 @@ lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error)
 
 /* From rows in memory (taken over, also on an error) and areas [n] (copied). */
 lam_status form_factors_of_rows(csr *F, const double *area, lam_form_factors **out, lam_error *error);
-
-/* From finished compressed ones (taken over, also on an error), areas and row sums of F [n] (copied). */
-lam_status form_factors_of_compressed(compressed_factors *c, const double *area, const double *row_sums,
-                                      lam_form_factors **out, lam_error *error);
 
 /* From blocks with a balance and their tree (taken over, also on an error). Errors: those of
  * kept_blocks_make. */

@@ -36,25 +36,18 @@ done:
     return status;
 }
 
-/* 1 - r_i less the bounds of its rounding and compression. */
-static double bounded_v(const refinement *s, size_t c, size_t i, const double *compression) {
-    const refine_column *col = &s->columns[c];
-    const double lost = compression != NULL ? (double)col->channel->rho[i] * compression[i] : 0;
-    return (1 - s->r[c * s->refiner->op->n + i] - col->error - lost) * (1 - 4 * REFINE_U);
+/* 1 - r_i less the bound of its rounding. */
+static double bounded_v(const refinement *s, size_t c, size_t i) {
+    return (1 - s->r[c * s->refiner->op->n + i] - s->columns[c].error) * (1 - 4 * REFINE_U);
 }
 
 /* w = E' + P for E' = 1 and v = A w = 1 - r; taken when its bound is sharper than the present one. */
 static void bound_by_light(refinement *s, size_t c, refine_channel *channel) {
     const size_t n = s->refiner->op->n;
-    const double *P = s->P + c * n, *compression = NULL;
-    double w_least = INFINITY, w_most = 0, v_least = INFINITY, largest;
-    if (s->scratch != NULL) {
-        double *const w = s->scratch + c * s->scratch_stride + 2 * n;
-        for (size_t i = 0; i < n; i++) w[i] = 1 + P[i];
-        compression = refinement_compression(s, c, false, w, &largest);
-    }
+    const double *P = s->P + c * n;
+    double w_least = INFINITY, w_most = 0, v_least = INFINITY;
     for (size_t i = 0; i < n; i++) {
-        const double w = 1 + P[i], v = bounded_v(s, c, i, compression);
+        const double w = 1 + P[i], v = bounded_v(s, c, i);
         w_least = fmin(w_least, w);
         w_most = fmax(w_most, w);
         v_least = fmin(v_least, v);
@@ -63,7 +56,7 @@ static void bound_by_light(refinement *s, size_t c, refine_channel *channel) {
     if (!(w_least > 0 && v_least > 0 && w_most / v_least < channel->w_most / channel->v_least)) return;
     channel->w_most = w_most;
     channel->v_least = v_least;
-    for (size_t i = 0; i < n; i++) channel->v[i] = bounded_v(s, c, i, compression);
+    for (size_t i = 0; i < n; i++) channel->v[i] = bounded_v(s, c, i);
 }
 
 static int by_falling_mean(const void *left, const void *right) {
@@ -77,9 +70,8 @@ static void prepare_judging(const lam_refiner *refiner, refine_channel *channel)
     channel->peak = 0;
     for (size_t i = 0; i < refiner->op->n; i++) {
         const double rho = (double)channel->rho[i];
-        const double norm = F->row_norms != NULL ? F->row_norms[i] : 0;
         channel->peak = fmax(channel->peak, rho * F->row_sums[i] / channel->v[i]);
-        channel->rows[i] = (refine_row){rho * norm / channel->v[i], (uint32_t)i};
+        channel->rows[i] = (refine_row){rho * F->row_norms[i] / channel->v[i], (uint32_t)i};
     }
     qsort(channel->rows, refiner->op->n, sizeof *channel->rows, by_falling_mean);
 }
@@ -304,11 +296,6 @@ static void find_irradiance(refinement *s, const int *exponents, const double *H
                        refiner->roundings * (largest - 2 * col->least * refiner->row_most);
         if (!refiner_has_rows(refiner))
             moved += refiner_product_rounding(refiner, refine_most(n, s->z + c * n));
-        if (s->scratch != NULL) {
-            double lost;
-            (void)refinement_compression(s, c, false, s->z + c * n, &lost);
-            moved += lost;
-        }
         certificates[c / C] = fmax(certificates[c / C], ldexp(moved, exponents[c]) + rounded);
     }
 }
@@ -351,9 +338,8 @@ static lam_status refine_pass(refinement *s, size_t first, const request *asked,
         if (col->done) continue;
         FAIL(error, LAM_ERR_NUMERIC,
              "tolerance %g is not reached: vector %zu is certified to %.2g of its indirect light after %zu "
-             "products with the form factors%s; use a larger tolerance",
-             asked->tolerance, first + c / C, col->bound / col->P, col->passes,
-             s->scratch != NULL ? ", which are compressed" : "");
+             "products with the form factors; use a larger tolerance",
+             asked->tolerance, first + c / C, col->bound / col->P, col->passes);
     }
     for (size_t v = 0; v < s->n_vectors; v++) asked->certificates[first + v] = 0;
     if (asked->quantity == LAM_IRRADIANCE)

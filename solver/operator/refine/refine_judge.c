@@ -10,9 +10,6 @@
 static const double weights_good = .02;
 enum { WEIGHTS_PASSES_MOST = 300 };
 
-/* Steps end when the bound is at most this factor above the share that compression alone causes. */
-static const double compressed_rest = 1.1;
-
 /* Factor for the rounding of the bounds themselves, at most n u = 2^32 2^-53. */
 #define BOUND_MARGIN 1.000001
 
@@ -110,33 +107,6 @@ double refine_left(const lam_refiner *refiner, const refine_channel *channel, co
     return scale * largest;
 }
 
-double *refinement_compression(refinement *s, size_t column, bool second, const double *x, double *largest) {
-    const size_t n = s->refiner->op->n;
-    double *const out = s->scratch + column * s->scratch_stride + (second ? n : 0);
-    *largest =
-        compressed_error(s->refiner->F->compressed, x, out, s->scratch + column * s->scratch_stride + 3 * n);
-    return out;
-}
-
-/* refine_left for compressed form factors; *stays is its last term, which does not decrease with r. */
-static double left_compressed(refinement *s, size_t c, double r_most, double *stays) {
-    const refine_channel *channel = s->columns[c].channel;
-    const size_t n = s->refiner->op->n;
-    const double *row_sums = s->refiner->F->row_sums, *r = s->r + c * n;
-    double *const light = s->scratch + c * s->scratch_stride + 2 * n;
-    double unused, all = 0, own = 0;
-    for (size_t i = 0; i < n; i++) light[i] = s->lit[c * n + i] + s->P[c * n + i] + r[i];
-    const double *of_light = refinement_compression(s, c, false, light, &unused);
-    const double *of_r = refinement_compression(s, c, true, r, &unused);
-    for (size_t i = 0; i < n; i++) {
-        const double share = (double)channel->rho[i] / channel->v[i];
-        own = fmax(own, share * of_light[i]);
-        all = fmax(all, share * (row_sums[i] * r_most + of_r[i] + of_light[i]));
-    }
-    *stays = BOUND_MARGIN * channel->w_most * own;
-    return BOUND_MARGIN * channel->w_most * all;
-}
-
 bool refinement_judge(refinement *s, size_t c) {
     refine_column *col = &s->columns[c];
     const refine_channel *channel = col->channel;
@@ -157,15 +127,11 @@ bool refinement_judge(refinement *s, size_t c) {
     /* The caller's B~ - E' may be below P by the rounding of B~. */
     const double sum = refinement_sum_rounding(s, c), wanted = s->tolerance * (answer - sum);
     const double rounded = BOUND_MARGIN * channel->w_most * col->error / channel->v_least;
-    double stays = 0;
-    const double left = s->scratch != NULL
-                            ? left_compressed(s, c, col->r, &stays)
-                            : refine_left(s->refiner, channel, r, col->r, wanted - rounded - sum);
+    const double left = refine_left(s->refiner, channel, r, col->r, wanted - rounded - sum);
     col->bound = left + rounded + sum;
     col->done = col->bound <= wanted || (answer == 0 && left + rounded == 0);
     if (col->done) return false;
-    if (col->passes >= REFINE_PASSES_MOST || (stays > 0 && left <= compressed_rest * stays))
-        col->stuck = true;
+    if (col->passes >= REFINE_PASSES_MOST) col->stuck = true;
     if (left > rounded) return false;
     /* Rounding dominates. Computing r anew from P reduces it, unless it did not the last time. When the
      * answer is far below the P that it began with (0 when E' meets no surface), the rounding is that of the

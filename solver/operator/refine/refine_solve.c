@@ -33,16 +33,8 @@ void refinement_free(refinement *s) {
     free(s->active);
     free(s->again);
     free(s->helped);
-    free(s->scratch);
     free(s->product_work);
     *s = (refinement){.n_columns = 0};
-}
-
-/* Doubles of scratch of a column with compressed form factors: two error bounds, one vector, and the work of
- * a product. */
-static size_t scratch_of(const lam_refiner *refiner) {
-    const compressed_factors *c = refiner->F->compressed;
-    return c == NULL ? 0 : 3 * c->n + compressed_work(c);
 }
 
 /* Bytes of work of a product with n_columns vectors by blocks. */
@@ -53,8 +45,7 @@ static size_t work_of_product(const lam_refiner *refiner, size_t n_columns) {
 
 size_t refinement_bytes(const lam_refiner *refiner) {
     const size_t C = refiner->op->n_channels, n = refiner->op->n;
-    return C * (n * ((5 + 2 * REFINE_WINDOW) * sizeof(double) + 2 * sizeof(float)) +
-                scratch_of(refiner) * sizeof(double)) +
+    return C * n * ((5 + 2 * REFINE_WINDOW) * sizeof(double) + 2 * sizeof(float)) +
            work_of_product(refiner, C);
 }
 
@@ -73,7 +64,6 @@ lam_status refinement_create(const lam_refiner *refiner, size_t n_vectors, refin
                     .n_vectors = n_vectors,
                     .n_columns = m,
                     .help = op->kind->apply != NULL,
-                    .scratch_stride = scratch_of(refiner),
                     .work_bytes = lam_operator_work_bytes(op, n_vectors)};
     const size_t helper_bytes = lam_operator_work_bytes(refiner_help(refiner), n_vectors);
     if (helper_bytes > s.work_bytes) s.work_bytes = helper_bytes;
@@ -82,7 +72,6 @@ lam_status refinement_create(const lam_refiner *refiner, size_t n_vectors, refin
         TRY(reserve(m, n * sizeof(double), rows[k], error));
     TRY(reserve(REFINE_WINDOW * m, n * sizeof(double), &s.kept_Z, error));
     TRY(reserve(REFINE_WINDOW * m, n * sizeof(double), &s.kept_Q, error));
-    if (s.scratch_stride > 0) TRY(reserve(m, s.scratch_stride * sizeof(double), &s.scratch, error));
     if (refiner->F->blocks != NULL) TRY(reserve(work_of_product(refiner, m), 1, &s.product_work, error));
     if (m > 1 && refiner_has_rows(refiner)) { /* one vector is not copied */
         TRY(reserve(n, CSR_DOUBLES_WIDTH * sizeof(double), &s.X, error));
@@ -178,7 +167,6 @@ static void multiply_by_blocks(refinement *s, const bool *chosen, const double *
 }
 
 void refinement_multiply(refinement *s, const bool *chosen, const double *X, double *Y) {
-    const size_t n = s->refiner->op->n;
     size_t some[CSR_DOUBLES_WIDTH], m = 0;
     if (s->refiner->F->blocks != NULL) {
         multiply_by_blocks(s, chosen, X, Y);
@@ -187,11 +175,6 @@ void refinement_multiply(refinement *s, const bool *chosen, const double *X, dou
     for (size_t c = 0; c < s->n_columns; c++) {
         if (!chosen[c]) continue;
         s->columns[c].passes++;
-        if (s->scratch != NULL) {
-            compressed_multiply(s->refiner->F->compressed, X + c * n, Y + c * n, s->scratch,
-                                s->refiner->op->n_threads);
-            continue;
-        }
         some[m++] = c;
         if (m < CSR_DOUBLES_WIDTH) continue;
         multiply_some(s, m, some, X, Y);

@@ -13,12 +13,6 @@
  * few large entries (where walls meet). When only those exceed the bound that is allowed, F r is computed for
  * them and b_i is exact. The rounding of r is bounded separately.
  *
- * Compressed form factors. Products are with F~, |F x - F~ x|_i <= delta_i(x) (compressed_factors.h), and the
- * certificate still holds for F: the residual of the answer Q = P + r = R F~ (E' + P) is
- *     R F (E' + Q) - Q = R F~ r + R (F - F~)(E' + Q),
- *     so   b_i = rho_i (s_i |r|_max + delta_i(r) + delta_i(E' + Q)).
- * The last term does not decrease with r.
- *
  * Blocks. Products are with F itself, but for a rounding that has a bound of its own, and no pair is negative
  * (kept_blocks.h). s and k are upper bounds. A row of F is not multiplied alone. */
 #ifndef LAMBERT_OPERATOR_REFINE_REFINEMENT_H
@@ -104,8 +98,6 @@ typedef struct refinement {
     size_t work_bytes;
     refine_column *columns;
     bool *active, *again, *helped; /* [columns] */
-    double *scratch;               /* [columns][scratch_stride], for compressed form factors; NULL: rows */
-    size_t scratch_stride;
 } refinement;
 
 /* Allocates room for n_vectors. The caller frees with refinement_free. Errors: LAM_ERR_MEMORY. */
@@ -127,7 +119,7 @@ bool refinement_judge(refinement *s, size_t column);
 
 /* True where F is there as rows: their products are rounded relative to themselves. */
 static inline bool refiner_has_rows(const lam_refiner *refiner) {
-    return refiner->F->compressed == NULL && refiner->F->blocks == NULL;
+    return refiner->F->blocks == NULL;
 }
 
 /* A bound on |A^-1 R F r|_max for an r of this maximum norm; it is sharpened only until it is at most
@@ -148,15 +140,9 @@ static inline double refine_most(size_t n, const double *x) {
 /* A bound on the rounding of (F x)_i for an x of this maximum norm. */
 static inline double refiner_product_rounding(const lam_refiner *refiner, double x_most) {
     const lam_form_factors *F = refiner->F;
-    const double of_product = F->compressed != NULL ? F->compressed->rounding
-                              : F->blocks != NULL   ? F->blocks->rounding
-                                                    : 0;
+    const double of_product = F->blocks != NULL ? F->blocks->rounding : 0;
     return (refiner->roundings * refiner->row_most + of_product) * x_most;
 }
-
-/* delta(x) of compressed form factors, [n], in the column's scratch, and its largest; `second` takes the
- * second of two places. */
-double *refinement_compression(refinement *s, size_t column, bool second, const double *x, double *largest);
 
 /* A bound on the rounding of lit + P + r, or of P + r. */
 double refinement_sum_rounding(const refinement *s, size_t column);

@@ -151,7 +151,7 @@ done:
     return status;
 }
 
-/* out = Q in; the columns of Q lie eight apart. The rows of Q in their place give Q^T in. */
+/* out = Q in; the columns of Q lie eight apart. */
 static void turn(const float *columns, size_t inputs, const double *in, double *out) {
     memset(out, 0, WAVELET_INPUTS * sizeof *out);
     for (size_t m = 0; m < inputs; m++)
@@ -175,25 +175,6 @@ void wavelets_forward(const wavelets *w, const double *x, double *c, double *wor
     }
     const size_t scaling = w->nodes[w->n_nodes - 1].scaling;
     memcpy(c + w->n - scaling, work + (w->n_nodes - 1) * WAVELET_SCALING, scaling * sizeof *c);
-}
-
-void wavelets_inverse(const wavelets *w, const double *c, double *x, double *work) {
-    const size_t scaling = w->nodes[w->n_nodes - 1].scaling;
-    memcpy(work + (w->n_nodes - 1) * WAVELET_SCALING, c + w->n - scaling, scaling * sizeof *c);
-    for (size_t t = w->n_nodes; t-- > 0;) {
-        const wavelet_node *a = &w->nodes[t];
-        double in[WAVELET_INPUTS], out[WAVELET_INPUTS];
-        memcpy(in, work + t * WAVELET_SCALING, a->scaling * sizeof *in);
-        memcpy(in + a->scaling, c + a->first, (a->inputs - a->scaling) * sizeof *in);
-        turn(wavelet_columns(w, a) + WAVELET_INPUTS * WAVELET_INPUTS, a->inputs, in, out);
-        if (a->from_left == 0) {
-            memcpy(x + a->begin, out, a->inputs * sizeof *out);
-        } else {
-            memcpy(work + (size_t)a->left * WAVELET_SCALING, out, a->from_left * sizeof *out);
-            memcpy(work + (t - 1) * WAVELET_SCALING, out + a->from_left,
-                   (a->inputs - a->from_left) * sizeof *out);
-        }
-    }
 }
 
 lam_status wavelets_save(const wavelets *w, const char *group, store *s, lam_error *error) {

@@ -75,10 +75,9 @@ static inline size_t wavelets_work(const wavelets *w) {
     return w->n_nodes * WAVELET_SCALING;
 }
 
-/* c = W x and x = W^T c for one vector in double: x [n] by position, c [n] by coefficient. A number is
- * rounded in a sum of at most eight products for each node above its element. */
+/* c = W x for one vector in double: x [n] by position, c [n] by coefficient. A number is rounded in a sum of
+ * at most eight products for each node above its element. */
 void wavelets_forward(const wavelets *w, const double *x, double *c, double *work);
-void wavelets_inverse(const wavelets *w, const double *c, double *x, double *work);
 
 /* GROUP/shape [n_shapes][3] u32, basis [basis_count] f32, node [n_nodes] u32. Errors: as store_read;
  * LAM_ERR_NUMERIC as wavelets_create. */

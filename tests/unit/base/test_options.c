@@ -214,8 +214,13 @@ static const option_row other_rows[] = {
     {.name = "quick", .kind = OPTION_FLAG, .offset = offsetof(other_fields, quick), .help = "?"},
     {0},
 };
-static const option_command command = {
-    .name = "lambert test", .arguments = "FILE", .summary = "?", .least_arguments = 1, .most_arguments = 2};
+static const option_gone gone[] = {{"past", "give --number X"}, {"flag=slow", "give --flag alone"}, {0}};
+static const option_command command = {.name = "lambert test",
+                                       .arguments = "FILE",
+                                       .summary = "?",
+                                       .least_arguments = 1,
+                                       .most_arguments = 2,
+                                       .gone = gone};
 
 /* Parses words with standard error in said. */
 static int parse_both(const char *const *words, fields *f, other_fields *other, option_result *result,
@@ -347,6 +352,10 @@ START_TEST(test_table_refuses_in_one_line) {
         {{"--flag"}, "too few arguments"},
         {{"a", "--nope"}, "--nope: no such option"},
         {{"a", "-x"}, "-x: no such option"},
+        {{"a", "--past", "1"}, "--past: was removed; give --number X"},
+        {{"a", "--past=1"}, "--past: was removed; give --number X"},
+        {{"a", "--pas"}, "--pas: no such option"},
+        {{"a", "--flag=slow"}, "--flag=slow: was removed; give --flag alone"},
         {{"a", "--c", "2"}, "--c: ambiguous"},
         {{"a", "--flag=1"}, "--flag: takes no value"},
         {{"a", "--number"}, "--number: needs a value"},
