@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import re
+import runpy
 import subprocess
 import tempfile
 import unittest
@@ -130,6 +131,10 @@ class OpenApi(unittest.TestCase):
         for program in os.environ["LAMBERT"], os.environ["LAMBERTD"]:
             printed = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
             self.assertEqual(printed.split()[1], self.document["info"]["version"])
+
+    def test_its_layout(self):
+        layout = runpy.run_path(SOURCE / "tests" / "openapi.py")
+        self.assertEqual(self.answer.body.decode(), layout["text"](), "run tests/openapi.py")
 
     def test_it_is_openapi(self):
         Draft202012Validator.check_schema(DOCUMENT)
