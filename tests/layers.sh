@@ -51,7 +51,6 @@ declare -A allowed=(
     [solver/adapt]="solver/daylight/ $method $scene solver/formfactor/"
     [solver/precompute]="solver/daylight/ $method $scene solver/formfactor/ solver/light/ solver/adapt/ solver/walk/"
     [solver/verify]="$method $scene solver/formfactor/ solver/light/ solver/precompute/ solver/walk/walk.h"
-    [solver/bench]="$method $scene solver/formfactor/ solver/precompute/ solver/render/shade.h solver/walk/walk.h solver/walk/reuse.h solver/walk/moving_light.h solver/adapt/ solver/waits.h"
     [solver/verbs]="lambert/ store/ solver/"
     [solver]="lambert/ store/ solver/"
     [server/net]="$below_linalg solver/codec/"
@@ -60,7 +59,8 @@ declare -A allowed=(
     [server/route]="$operator solver/codec/ server/net/ server/queue/ server/scene/ server/config.h"
     [server/http]="$operator solver/codec/ server/net/ server/queue/ server/scene/ server/route/ server/config.h"
     [server]="$operator solver/codec/ solver/waits.h server/"
-    [tests/bench]="lambert/ store/ solver/ server/ support/"
+    [tests/bench]="lambert/ store/ solver/ server/ support/ tests/bench/suites/stats.h"
+    [tests/bench/suites]="$method $scene solver/formfactor/ solver/precompute/ solver/render/shade.h solver/walk/walk.h solver/walk/reuse.h solver/walk/moving_light.h solver/adapt/ solver/waits.h"
 )
 
 # third-party header: the only files or folders that may include it
@@ -76,7 +76,7 @@ declare -A home=(
     ["png.h"]="solver/render/image.c solver/scene/import/image_decode.c"
     ["turbojpeg.h"]="solver/scene/import/image_decode.c solver/scene/import/picture_files.c"
     ["webp/"]="solver/scene/import/image_decode.c"
-    ["jansson.h"]="solver/codec/ solver/light/light_path.c solver/scene/import/gltf_file.h solver/scene/import/gltf_cameras.c solver/verbs/ solver/bench/ tests/bench/"
+    ["jansson.h"]="solver/codec/ solver/light/light_path.c solver/scene/import/gltf_file.h solver/scene/import/gltf_cameras.c solver/verbs/ tests/bench/"
     ["microhttpd.h"]="server/http/ tests/bench/ready_server.c"
     ["zlib.h"]="server/route/content_coding.c"
     ["zstd.h"]="server/route/content_coding.c"

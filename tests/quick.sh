@@ -9,7 +9,7 @@ if [ $# -eq 0 ]; then
     base=$(git merge-base main HEAD 2>/dev/null || git rev-parse HEAD)
     mapfile -t rooms < <({ git diff --name-only "$base"; git ls-files --others --exclude-standard; } |
         sed -nE 's,^(solver|tests/unit)/([a-z]+)/.*,\2,p; s,^(server|store)/.*,\1,p
-                 s,^(include|tests/contract|tests/support)/.*,operator,p' | sort -u)
+                 s,^tests/(bench)/.*,\1,p; s,^(include|tests/contract|tests/support)/.*,operator,p' | sort -u)
 fi
 for room in "${rooms[@]}"; do
     [ -d "solver/$room" ] || [ -d "tests/unit/$room" ] ||

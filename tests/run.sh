@@ -69,7 +69,7 @@ run_ctest() {
 clang_build() {
     configure clang
     build clang
-    git ls-files 'solver/*.c' 'server/*.c' 'store/*.c' | xargs -P "$jobs" -n 8 clang-tidy --quiet -p build/clang \
+    git ls-files 'solver/*.c' 'server/*.c' 'store/*.c' 'tests/bench/suites/*.c' | xargs -P "$jobs" -n 8 clang-tidy --quiet -p build/clang \
         >"$logs/tidy" 2>/dev/null || { cat "$logs/tidy"; return 1; }
 }
 

@@ -7,10 +7,10 @@
  */
 #include "solver/base/clock.h"
 #include "solver/base/random.h"
-#include "solver/bench/stats.h"
 #include "solver/operator/operator.h"
 #include "support/judged_probes.h"
 #include "tests/bench/bench_recipe.h"
+#include "tests/bench/suites/stats.h"
 
 #include <math.h>
 #include <omp.h>

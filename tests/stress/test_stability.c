@@ -2,10 +2,10 @@
  * allows, or a crash; what cannot be done is refused with a remedy. */
 #include "solver/base/random.h"
 #include "solver/base/work_area.h"
-#include "solver/bench/stability.h"
 #include "solver/linalg/panel.h"
 #include "support/building.h"
 #include "support/suite.h"
+#include "tests/bench/suites/stability.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,10 +1,10 @@
 /* Quantiles and tables of the suites of measurements, the scenes that they build, and the figures of cities.
  */
-#include "solver/bench/bench.h"
-#include "solver/bench/cities.h"
-#include "solver/bench/scenes.h"
-#include "solver/bench/stats.h"
 #include "support/suite.h"
+#include "tests/bench/suites/bench.h"
+#include "tests/bench/suites/cities.h"
+#include "tests/bench/suites/scenes.h"
+#include "tests/bench/suites/stats.h"
 
 #include <jansson.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* Form factors by blocks against all closed forms of the suite formfactors, at the bounds of the defaults and
  * at bounds ten times finer. */
-#include "solver/bench/formfactors_truths.h"
 #include "support/blocks.h"
+#include "tests/bench/suites/formfactors_truths.h"
 
 #include <math.h>
 

@@ -1,6 +1,5 @@
 /* Direct illumination by a walk of the tree, against exact form factors without occlusion and those of pairs
  * with it: how far it is off, and that half the difference of its halves says so. */
-#include "solver/bench/scenes.h"
 #include "solver/formfactor/blocks/block_light.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/sight/occlusion.h"
@@ -8,6 +7,7 @@
 #include "support/dense.h"
 #include "support/scene.h"
 #include "support/suite.h"
+#include "tests/bench/suites/scenes.h"
 
 #include <math.h>
 #include <omp.h>

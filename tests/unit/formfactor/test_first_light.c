@@ -1,6 +1,5 @@
 /* Direct illumination by few elements, against exact form factors without occlusion and those of pairs with
  * it. */
-#include "solver/bench/scenes.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/first_light.h"
 #include "solver/formfactor/source.h"
@@ -8,6 +7,7 @@
 #include "support/dense.h"
 #include "support/scene.h"
 #include "support/suite.h"
+#include "tests/bench/suites/scenes.h"
 
 #include <math.h>
 

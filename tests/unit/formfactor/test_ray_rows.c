@@ -1,6 +1,5 @@
 /* Rows that rays find as they are asked for: what both sides of each pair make together is what merging makes
  * of rows that are held. */
-#include "solver/bench/scenes.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/pairs/ray_rows.h"
 #include "solver/formfactor/rays/rays.h"
@@ -13,6 +12,7 @@
 #include "support/dense.h"
 #include "support/scene.h"
 #include "support/suite.h"
+#include "tests/bench/suites/scenes.h"
 
 #include <math.h>
 #include <omp.h>

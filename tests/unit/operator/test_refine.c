@@ -1,8 +1,6 @@
 /* Refined answers of scenes and of problems that are hard on numbers, against a dense LU; form factors of
  * both storages. */
 #include "solver/base/random.h"
-#include "solver/bench/scenes.h"
-#include "solver/bench/stability.h"
 #include "solver/operator/refine/refinement.h"
 #include "support/building.h"
 #include "support/certified.h"
@@ -10,6 +8,8 @@
 #include "support/scene.h"
 #include "support/suite.h"
 #include "support/view.h"
+#include "tests/bench/suites/scenes.h"
+#include "tests/bench/suites/stability.h"
 
 #include <omp.h>
 

@@ -1,13 +1,13 @@
 /* Facets: rays meet the elements of one plane as one facet, and the element is found from the place of the
  * hit. */
 #include "solver/base/random.h"
-#include "solver/bench/scenes.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/scene/facet/facet_grid.h"
 #include "support/box.h"
 #include "support/suite.h"
 #include "support/transport.h"
+#include "tests/bench/suites/scenes.h"
 
 static lam_error error;
 
