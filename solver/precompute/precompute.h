@@ -22,7 +22,7 @@ extern const char precompute_factor_words[], precompute_quality_words[];
  * progress belong to the verb. */
 typedef struct precompute_options {
     const char *output;
-    uint64_t subdivide, elements;
+    uint64_t elements;
     double max_edge, unit, reflectance; /* reflectance: negative, the file's own */
     double mesh_error;                  /* 0: faces are divided by their size alone */
     const char *up;                     /* NULL: by the file */

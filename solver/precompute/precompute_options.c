@@ -31,6 +31,7 @@ const char precompute_quality_words[] = "draft|normal|high";
 const option_gone precompute_gone[] = {
     {"keep-form-factors=compressed",
      "give --keep-form-factors, and --form-factors blocks where rows take too much memory"},
+    {"subdivide", "give --elements N or --max-edge METRES"},
     {0},
 };
 
@@ -41,13 +42,6 @@ static const option_row output_rows[] = {
 };
 
 static const option_row mesh_rows[] = {
-    {.name = "subdivide",
-     .kind = OPTION_COUNT,
-     .offset = FIELD(subdivide),
-     .argument = "LEVELS",
-     .least = 1,
-     .most = 12,
-     .help = "Divide each face into 4, LEVELS times"},
     {.name = "max-edge",
      .kind = OPTION_NUMBER,
      .offset = FIELD(max_edge),

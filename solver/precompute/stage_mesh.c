@@ -87,13 +87,10 @@ lam_status state_refine_mesh(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
     /* --elements counts both sides. */
-    const mesh_refinement refinement = {.subdivide_levels = (unsigned)o->subdivide,
-                                        .max_edge = o->max_edge,
-                                        .elements =
-                                            o->mesh_error > 0 ? 0 : fronts_of(&state->m, o->elements)};
+    const mesh_refinement refinement = {
+        .max_edge = o->max_edge, .elements = o->mesh_error > 0 ? 0 : fronts_of(&state->m, o->elements)};
     if (o->mesh_error > 0) TRY(join_faces(state, error));
-    if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
-        TRY(mesh_refine(&state->m, &refinement, error));
+    if (refinement.max_edge > 0 || refinement.elements > 0) TRY(mesh_refine(&state->m, &refinement, error));
     if (o->mesh_error > 0) TRY(refine_by_error(state, error));
     TRY(mesh_make_backs(&state->m, error));
     log_renamed(state);
@@ -127,8 +124,7 @@ void state_log_mesh(const precompute_state *state) {
                  m->n_channels == 1 ? "" : "s", m->two_sided ? ", two-sided" : "");
     terminal_log(state->t, "%.4g m x %.4g m, %.4g m high, %c up; --up and --unit set axis and unit", size[0],
                  size[1], height, m->up);
-    if (o->subdivide == 0 && o->max_edge == 0 && o->elements == 0 && o->mesh_error == 0 &&
-        largest > coarse_share * area)
+    if (o->max_edge == 0 && o->elements == 0 && o->mesh_error == 0 && largest > coarse_share * area)
         terminal_log(state->t,
                      "one element has %.0f %% of the area, and light does not vary across an element: "
                      "--elements %d divides the faces",

@@ -106,7 +106,6 @@ done:
 /* About how many elements there will be; never fewer than now. */
 static double elements_after(const mesh *m, const precompute_options *o) {
     double n = (double)m->n, area = 0;
-    if (o->subdivide > 0) n *= pow(4, (double)o->subdivide);
     if (o->max_edge > 0) {
         for (size_t i = 0; i < m->n; i++) area += m->area[i];
         n = fmax(n, area / (o->max_edge * o->max_edge));

@@ -146,15 +146,14 @@ static int check_positions(const precompute_options *o, const option_result *giv
 
 /* 0, or the status of wrong usage where arguments do not go together. */
 static int check_together(const precompute_options *o, const option_result *given) {
-    static const char *const of_mesh[] = {"subdivide", "max-edge",  "elements", "mesh-error", "unit",
-                                          "up",        "two-sided", "orient",   "closed",     "assets"};
+    static const char *const of_mesh[] = {"max-edge",  "elements", "mesh-error", "unit",  "up",
+                                          "two-sided", "orient",   "closed",     "assets"};
     static const char *const of_sky[] = {"sky", "ground-albedo", "portal"};
-    const int refinements = (o->subdivide > 0) + (o->max_edge > 0) + (o->elements > 0);
     const build_method *method = method_find(o->build.method);
     lam_error error = {.message = ""};
     if (o->output == NULL) return options_usage(command.name, "no -o STORE.h5 given");
-    if (refinements > 1)
-        return options_usage(command.name, "--subdivide, --max-edge and --elements exclude each other");
+    if (o->max_edge > 0 && o->elements > 0)
+        return options_usage(command.name, "--max-edge and --elements exclude each other");
     for (size_t i = 0; o->from_store && i < sizeof of_sky / sizeof of_sky[0]; i++)
         if (options_given(given, of_sky[i]))
             return options_usage(command.name,

@@ -68,7 +68,7 @@ class Classify(unittest.TestCase):
         for word in ("elements", "density", "4096 rays", "rank estimate", "sparse inverse", "method", "reason", "<-"):
             self.assertIn(word, first)
         self.assertEqual(self.look("cornell.obj")["rays"], 256)
-        finer = self.look("cornell.obj", "--subdivide", 1)
+        finer = self.look("cornell.obj", "--elements", 5200)
         self.assertGreater(finer["elements"], 4 * 1250)
 
     def test_what_low_rank_alone_has(self):
@@ -112,7 +112,7 @@ class Classify(unittest.TestCase):
         for status, wanted, *arguments in (
                 (1, "nothing.obj", self.path("nothing.obj")),
                 (2, "--epsilon", self.path("city.obj"), "--epsilon", 0),
-                (2, "exclude each other", self.path("city.obj"), "--subdivide", 1, "--elements", 5000),
+                (2, "exclude each other", self.path("city.obj"), "--max-edge", 1, "--elements", 5000),
                 (1, "--memory", self.path("city.obj"), "--memory", "1M"),
                 (1, "--sky", self.path("city.obj"), "--emitters", "sky"),
                 (2, "SCENE",)):

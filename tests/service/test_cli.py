@@ -28,7 +28,7 @@ class Usage(Case):
 
     def test_help_names_every_option_of_the_contract(self):
         known = must("precompute", "--help").stdout
-        for option in ("subdivide max-edge elements mesh-error unit up two-sided reflectance form-factors rays resolution quality "
+        for option in ("max-edge elements mesh-error unit up two-sided reflectance form-factors rays resolution quality "
                        "sky ground-albedo keep-form-factors method factorizer epsilon alpha levels rank keep-factors "
                        "coherence min-area assign threshold correction emitters "
                        "store-precision threads memory scratch seed probes quiet progress").split():
@@ -78,7 +78,9 @@ class Usage(Case):
                 ("--quality fine: must be one of: draft normal high", "precompute a.obj -o b.h5 --quality fine"),
                 ("--method magic: must be one of: auto emitters exact hierarchical low-rank", "precompute a.obj -o b.h5 --method magic"),
                 ("--up w: must be one of: x y z", "precompute a.obj -o b.h5 --up w"),
-                ("exclude each other", "precompute a.obj -o b.h5 --subdivide 1 --elements 9"),
+                ("exclude each other", "precompute a.obj -o b.h5 --max-edge 1 --elements 9"),
+                ("--subdivide: was removed; give --elements N or --max-edge METRES", "precompute a.obj -o b.h5 --subdivide 1"),
+                ("--subdivide: was removed; give --elements N or --max-edge METRES", "classify a.obj --subdivide=1"),
                 ("no such scene", "generate castle -o a.obj"),
                 ("no -o", "generate box"),
                 ("must end in .obj", "generate box -o a.stl"),

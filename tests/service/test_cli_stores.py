@@ -149,7 +149,7 @@ class Stores(Case):
                 for name in one["operator"]:
                     numpy.testing.assert_array_equal(one["operator"][name][:], two["operator"][name][:])
                 self.assertEqual(one.attrs["name"], two.attrs["name"])
-        self.refused(2, "--subdivide", "precompute", self.store, "--subdivide", 1, "-o", self.path("b.h5"))
+        self.refused(2, "--max-edge", "precompute", self.store, "--max-edge", 1, "-o", self.path("b.h5"))
         self.refused(2, "--mesh-error", "precompute", self.store, "--mesh-error", .1, "-o", self.path("b.h5"))
         self.failed("holds no /form_factors", "precompute", self.path("exact.h5"), "-o", self.path("b.h5"))
 

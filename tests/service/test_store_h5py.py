@@ -190,7 +190,7 @@ class StoreTest(unittest.TestCase):
             (scene / "cube.obj").write_text(CUBE)
             (scene / "cube.mtl").write_text(MATERIALS.format(red=red))
             store = scene / "cube.h5"
-            made = run("precompute", scene / "cube.obj", "-o", store, "--method", method, "--subdivide", 2,
+            made = run("precompute", scene / "cube.obj", "-o", store, "--method", method, "--max-edge", 0.25,
                        "--epsilon", 0.05, "--rays", 4096, "--seed", 7, "--keep-form-factors",
                        "--sky", "grid:4x3", "--quiet", "--store-precision", precision or "f32")
             if made.returncode != 0:
@@ -380,7 +380,7 @@ class StoreTest(unittest.TestCase):
         scene, path = self.root / "factored" / "cube.obj", self.root / "norm.h5"
         for factorizer, rank in (("hf", None), ("svd", None), ("hf", 20)):
             with self.subTest(factorizer=factorizer, rank=rank):
-                made = run("precompute", scene, "-o", path, "--method", "low-rank", "--subdivide", 2, "--epsilon", 0.2,
+                made = run("precompute", scene, "-o", path, "--method", "low-rank", "--max-edge", 0.25, "--epsilon", 0.2,
                            "--rays", 4096, "--probes", 0, "--keep-form-factors", "--factorizer", factorizer,
                            "--levels", 2, *(() if rank is None else ("--rank", rank)))
                 self.assertEqual(made.returncode, 0, made.stderr)

@@ -116,7 +116,7 @@ class ObjTexturesTest(TexturesCase):
         self.write("wood.png", png_bytes(pixels))
         self.write("a.mtl", "newmtl wood\nKd .8 .9 1\nmap_Kd wood.png\n")
         scene = self.write("a.obj", "mtllib a.mtl\n" + SQUARE + "usemtl wood\n" + FACE)
-        for options in ([], ["--subdivide", 2], ["--max-edge", .3], ["--mesh-error", .3, "--elements", 30]):
+        for options in ([], ["--elements", 16], ["--max-edge", .3], ["--mesh-error", .3, "--elements", 30]):
             store, errors = self.store(scene, *options)
             self.assertEqual(store.reflectance.shape[0], 3)
             self.assertNotIn("image", errors)
@@ -126,7 +126,7 @@ class ObjTexturesTest(TexturesCase):
         self.write("b.obj", "mtllib a.mtl\n" + SQUARE + halves + "usemtl wood\nf 1/1 5/5 6/6 4/4\nf 5/5 2/1 3/4 6/6\n")
         store, _ = self.store(self.folder / "b.obj", "--mesh-error", .3, "--elements", 30)
         self.judge_wall(store, pixels, (.8, .9, 1), to_uv=lambda p: (1.25 * (1 - abs(p[0] - 1)), 1 - 1.25 * p[1]))
-        store, _ = self.store(scene, "--two-sided", "--subdivide", 1)
+        store, _ = self.store(scene, "--two-sided", "--elements", 8)
         self.assertEqual(len(store.area), 8)
         self.judge_wall(store, pixels, (.8, .9, 1))
         must("verify", self.folder / "made.h5", scene)
@@ -142,12 +142,12 @@ class ObjTexturesTest(TexturesCase):
         above = "v 0 0 3\nv 2 0 3\nv 2 1 3\n"
         scene = self.write("a.obj", "mtllib a.mtl\n" + SQUARE + "usemtl wood\n" + FACE + above + "usemtl tile\nf 5/1 7/3 6/2\n"
                            "usemtl plain\nf 5 6 7\n")
-        self.store(scene, "--subdivide", 1, "--keep-form-factors")
+        self.store(scene, "--max-edge", 1.2, "--keep-form-factors")
         must("precompute", self.folder / "made.h5", "-o", self.folder / "again.h5", "--probes", 0)
         for name in ("made.h5", "again.h5"):
             with h5py.File(self.folder / name) as file:
                 mesh = {key: value[()] for key, value in file["mesh"].items()}
-            np.testing.assert_array_equal(mesh["surface"], [0] * 4 + [1] * 4 + [0xFFFFFFFF] * 4)
+            np.testing.assert_array_equal(mesh["surface"], [0] * 2 + [1] * 4 + [0xFFFFFFFF] * 4)
             np.testing.assert_array_equal(mesh["surface_image"][:, 1:], [[2, 2], [0, 0]])
             np.testing.assert_allclose(mesh["surface_factor"], [[.8, .9, 1], [1, 1, 1]], rtol=1e-6)
             self.assertEqual(len(mesh["image_start"]), len(np.unique(mesh["surface_image"][:, 0])) + 1)
@@ -169,7 +169,7 @@ class ObjTexturesTest(TexturesCase):
             pixels = decode_png(FIXTURES / "textures" / f"{name}.png")
             self.write("a.mtl", f"newmtl wood\nmap_Kd {name}\n")
             scene = self.write("a.obj", "mtllib a.mtl\n" + SQUARE + "usemtl wood\n" + FACE)
-            self.judge_wall(self.store(scene, "--subdivide", 1)[0], pixels)
+            self.judge_wall(self.store(scene, "--elements", 4)[0], pixels)
 
     def test_coordinates_before_the_materials(self):
         pixels = noise(30, 20)
@@ -192,7 +192,7 @@ class ObjTexturesTest(TexturesCase):
         self.write("my wood.png", png_bytes(pixels))
         self.write("a.mtl", "newmtl wood\nKd 1 1 1\nmap_Kd -s 2 .5 -o .1 -.2 1 -mm 0 1 -clamp on my wood.png\n")
         scene = self.write("a.obj", "mtllib a.mtl\n" + SQUARE + "usemtl wood\n" + FACE)
-        store, errors = self.store(scene, "--subdivide", 1)
+        store, errors = self.store(scene, "--elements", 4)
         self.assertNotIn("image", errors)
         self.judge_wall(store, pixels, to_uv=lambda p: (2.5 * p[0] + .1, 1 - (.625 * p[1] - .2)), wrap=("clamp", "clamp"))
 
@@ -201,7 +201,7 @@ class ObjTexturesTest(TexturesCase):
         self.write("lamp.png", png_bytes(pixels))
         self.write("a.mtl", "newmtl lamp\nKd .5 .5 .5\nKe 10 20 30\nmap_Ke lamp.png\n")
         scene = self.write("a.obj", "mtllib a.mtl\n" + SQUARE + "usemtl lamp\n" + FACE)
-        store, _ = self.store(scene, "--subdivide", 1)
+        store, _ = self.store(scene, "--elements", 4)
         for i in range(4):
             uv = [(1.25 * p[0], 1 - 1.25 * p[1]) for p in store.corners(i)]
             self.close(store.emission[:, i], mean_of(pixels, uv) * (10, 20, 30), f"element {i}")
@@ -279,7 +279,7 @@ class GltfTexturesTest(TexturesCase):
         uri = "data:image/png;base64," + base64.b64encode(data).decode()
         for image in ({"uri": "sub/my%20wood.png"}, {"uri": "sub/my wood.png"}, {"uri": uri}):
             scene = Gltf(base_texture((.5, .75, 1, 1)), [image])
-            store, errors = self.store(self.write("a.gltf", scene.text()), "--subdivide", 1)
+            store, errors = self.store(self.write("a.gltf", scene.text()), "--elements", 8)
             self.assertEqual(errors.count("\n"), 0, errors)
             self.assertEqual(len(store.area), 8)
             self.judge(store, pixels, colour=(.5, .75, 1))
@@ -304,7 +304,7 @@ class GltfTexturesTest(TexturesCase):
             scene = Gltf(base_texture(**turned), [{"uri": "a.png"}], extensionsUsed=["KHR_texture_transform"],
                          samplers=[{"wrapS": codes[wrap[0]], "wrapT": codes[wrap[1]]}])
             scene.json["textures"] = [{"source": 0, "sampler": 0}]
-            store, errors = self.store(self.write("a.gltf", scene.text()), "--subdivide", 1)
+            store, errors = self.store(self.write("a.gltf", scene.text()), "--elements", 8)
             self.assertEqual(errors.count("\n"), 0, errors)
             self.judge(store, pixels, lambda u, v: (c * 2 * u + s * 1.5 * v + .3, -s * 2 * u + c * 1.5 * v - .2), wrap)
 
@@ -315,7 +315,7 @@ class GltfTexturesTest(TexturesCase):
         self.write("a.png", png_bytes(pixels))
         turned = {"extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": math.pi / 2, "scale": [.5, .5]}}}
         scene = Gltf(base_texture(**turned), [{"uri": "a.png"}])
-        store, _ = self.store(self.write("a.gltf", scene.text()), "--subdivide", 1)
+        store, _ = self.store(self.write("a.gltf", scene.text()), "--elements", 8)
         # The corner of the quadrant at the lower left comes to the upper left, where u and v are 0.
         self.judge(store, pixels, lambda u, v: (.5 * v, 1 - .5 * u))
 
@@ -327,7 +327,7 @@ class GltfTexturesTest(TexturesCase):
                     "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 12}}}
         scene = Gltf(material, [{"uri": "a.png"}, {"uri": "lamp.png"}], extensionsUsed=["KHR_materials_emissive_strength"])
         scene.attribute("TEXCOORD_1", (scene.corners * [1.5, -2]).astype(np.float32), 5126, "VEC2")
-        store, errors = self.store(self.write("a.gltf", scene.text()), "--subdivide", 1)
+        store, errors = self.store(self.write("a.gltf", scene.text()), "--elements", 8)
         self.assertEqual(errors.count("\n"), 0, errors)
         self.judge(store, pixels, lambda u, v: (3 * u, -2 * v))
         for i in range(8):
@@ -341,7 +341,7 @@ class GltfTexturesTest(TexturesCase):
             scene = Gltf({"pbrMetallicRoughness": {"baseColorFactor": [.8, .8, .8, 1], "metallicFactor": 0}})
             more = {} if component == 5126 else {"normalized": True}
             scene.attribute("COLOR_0", values, component, f"VEC{values.shape[1]}", **more)
-            store, errors = self.store(self.write("a.gltf", scene.text()), "--subdivide", 2)
+            store, errors = self.store(self.write("a.gltf", scene.text()), "--elements", 32)
             self.assertEqual(errors.count("\n"), 0, errors)
             for i in range(len(store.area)):
                 x, y = np.mean(store.corners(i), axis=0)[:2]
