@@ -283,7 +283,8 @@ class KeptBlocks(Case):
             for name in list(o):
                 if name not in ("leaving", "absorbed", "repair"):
                     del o[name]
-            o.attrs.modify("storage", np.bytes_(b"compressed"))
+            del o.attrs["storage"]  # whose length is fixed
+            o.attrs["storage"] = np.bytes_(b"compressed")
             o["order"], o["indptr"] = np.arange(self.truth.n, dtype="<u4"), np.arange(self.truth.n + 1, dtype="<u8")
             o["indices"], o["data"] = np.arange(self.truth.n, dtype="<u4"), np.zeros(self.truth.n, "<f4")
 
