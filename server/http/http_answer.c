@@ -2,6 +2,7 @@
 #include "server/http/browser.h"
 #include "server/http/http_parts.h"
 #include "server/http/http_stream.h"
+#include "store/store.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -67,7 +68,7 @@ void http_finish_answer(request *r, bool on_io_thread) {
         return;
     }
     /* The tag is that of the bytes before compression. */
-    const uint64_t hash = a->cacheable ? etag_hash(a->body.bytes, a->body.length) : 0;
+    const uint64_t hash = a->cacheable ? store_checksum(a->body.bytes, a->body.length) : 0;
     if (!on_io_thread || a->body.length <= IO_THREAD_MAX) code_body(r);
     if (a->cacheable) etag_make(hash, coding_name(r->coding), r->etag);
 }

@@ -1,7 +1,5 @@
 #include "server/http/http_fields.h"
 
-#include "store/store.h"
-
 #include <stdio.h>
 #include <string.h>
 #include <sys/random.h>
@@ -23,10 +21,6 @@ void request_id_choose(const char *own, uint64_t seed, uint64_t count, char id[R
     else
         snprintf(id, REQUEST_ID_MAX + 1, "%012llx-%llu", (unsigned long long)(seed >> 16),
                  (unsigned long long)count);
-}
-
-uint64_t etag_hash(const void *bytes, size_t length) {
-    return store_checksum(bytes, length);
 }
 
 void etag_make(uint64_t hash, const char *coding, char tag[ETAG_MAX]) {

@@ -17,10 +17,8 @@ void request_id_choose(const char *own, uint64_t seed, uint64_t count, char id[R
 
 #define ETAG_MAX 40
 
-/* The hash of a body, equal for equal bytes. O(length). */
-uint64_t etag_hash(const void *bytes, size_t length);
-
-/* The tag of a body in a coding (its name, "identity" for none), quotes included. */
+/* The tag of a body of this hash (store_checksum) in a coding (its name, "identity" for none), quotes
+ * included. */
 void etag_make(uint64_t hash, const char *coding, char tag[ETAG_MAX]);
 
 /* True if an If-None-Match header (or NULL) lists the tag, with or without W/, or is a star. */

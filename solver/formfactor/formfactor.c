@@ -86,9 +86,6 @@ done:
     return status;
 }
 
-/* Stores without the attribute fronts_only took a smaller share of rays that meet backs for cracks. */
-static const double older_cracks = 1e-4;
-
 static lam_status load_attributes(store *s, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     int64_t closed, fronts_only;
@@ -99,9 +96,7 @@ static lam_status load_attributes(store *s, form_factors *f, lam_error *error) {
         TRY(store_get_number(s, GROUP, "accuracy_reached", &f->pairs.accuracy, error));
     TRY(store_get_number(s, GROUP, "leaving_share", &f->leaving_share, error));
     TRY(store_get_number(s, GROUP, "absorbed_share", &f->absorbed_share, error));
-    fronts_only = f->absorbed_share < older_cracks;
-    if (store_has_attribute(s, GROUP, "fronts_only"))
-        TRY(store_get_integer(s, GROUP, "fronts_only", &fronts_only, error));
+    TRY(store_get_integer(s, GROUP, "fronts_only", &fronts_only, error));
     f->outlet.fronts_only = fronts_only != 0;
     TRY(store_get_number(s, GROUP, "closure_error", &f->closure_error, error));
     TRY(store_get_number(s, GROUP, "reciprocity_error", &f->reciprocity_error, error));

@@ -58,7 +58,7 @@ typedef struct form_factors {
     double *row_sums; /* [n], of F after repair, <= 1 */
     double *leaving;  /* [n], share of an element's rays that left the scene */
     double *absorbed; /* [n], share that hit a back face */
-    double *repair;   /* [n], row sum + outside share - 1 before repair; NULL for older stores */
+    double *repair;   /* [n], row sum + outside share - 1 before repair; NULL: blocks */
     sky_bounce sky;   /* zero without a sky */
     recipe recipe;
     size_t rows_kept;     /* rows that an interrupted run had left in the scratch folder */

@@ -45,11 +45,9 @@ lam_status csr_load(store *s, const char *name, size_t n, csr *out, lam_error *e
 /* Y[first..last) = A X for rows first <= i < last: X and Y are [n][m] row-major, double. */
 void csr_multiply_rows(const csr *a, size_t first, size_t last, size_t m, const double *X, double *Y);
 
-/* out = u A + w B without entries that are 0; the caller frees it with csr_free. Both have n rows.
- * It lies in the place of A. Cost: O(nnz). Errors: LAM_ERR_MEMORY, LAM_ERR_IO. */
-lam_status csr_combine(const csr *A, float u, const csr *B, float w, csr *out, lam_error *error);
-
-/* out = A with the entries of B added or put in place of its own; entries that are 0 in B are dropped. */
+/* out = A with the entries of B added or put in place of its own, without entries that are 0; the caller
+ * frees it with csr_free. Both have n rows. It lies in the place of A. Cost: O(nnz). Errors:
+ * LAM_ERR_ARGUMENT, LAM_ERR_MEMORY, LAM_ERR_IO. */
 lam_status csr_replace(const csr *A, const csr *B, csr *out, lam_error *error);
 
 /* Both triangles of a symmetric matrix from its upper one, whose rows ascend, without zeros; freed with

@@ -66,10 +66,6 @@ void reference_destroy(reference *r) {
     free(r);
 }
 
-bool reference_is_dense(const reference *r) {
-    return r->lu != NULL;
-}
-
 /* Seconds of one thread of an AMD EPYC with AVX-512, 2026: of an LU per n^3, of its solves per n^2 and
  * emission, of an iteration per entry of F, emission and sweep. */
 static const double lu_seconds = 1.6e-11, solve_seconds = 6e-11, sweep_seconds = 1e-10;

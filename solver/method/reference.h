@@ -33,9 +33,6 @@ lam_status reference_create_of(const factor_product *F, const double *area, cons
                                reference_way way, reference **out, lam_error *error);
 void reference_destroy(reference *r);
 
-/* True for an LU, which needs no guess. */
-bool reference_is_dense(const reference *r);
-
 /* B of m emissions, both [m][n]. B holds a guess on entry (E will do), which an iteration starts from.
  * Iterated: conjugate gradients on the symmetric form I - R^1/2 S R^1/2, S = A^1/2 F A^-1/2, safe for a
  * reflectance of 0, until each vector's residual is below tolerance times its solution.

@@ -185,32 +185,6 @@ done:
     return status;
 }
 
-/* Reads numbers in half precision and rounds them as if they had just been found. */
-static lam_status load_halves(hierarchical *self, store *s, lam_error *error) {
-    lam_status status = LAM_OK;
-    char group[48];
-    const size_t C = self->base.n_channels;
-    double threshold;
-    float *step = NULL;
-    csr *K = memory_allocate(C, sizeof *K, "operator", error);
-    if (K == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t c = 0; c < C; c++) {
-        snprintf(group, sizeof group, "/operator/K/%zu", c);
-        TRY(hierarchical_load_halves(s, group, self->base.n, &K[c], error));
-    }
-    TRY(store_get_number(s, "/operator", "threshold", &threshold, error));
-    if (!(threshold > 0 && threshold <= 1))
-        FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the threshold %g, must be above 0 and at most 1",
-             store_path(s), threshold);
-    TRY(hierarchical_steps(&self->basis, threshold, &step, error));
-    TRY(round_K(self, K, step, error));
-done:
-    for (size_t c = 0; K != NULL && c < C; c++) csr_free(&K[c]);
-    free(K);
-    free(step);
-    return status;
-}
-
 /* Areas in the order of positions, and that order; NULL: mesh order. */
 static lam_status read_area(store *s, size_t n, double **out, uint32_t **out_order, lam_error *error) {
     lam_status status = LAM_OK;
@@ -248,7 +222,7 @@ static lam_status hierarchical_load(store *s, size_t n, size_t n_channels, const
     TRY(wavelets_load(s, "/operator/basis", n, &self->basis, error));
     TRY(mean_correction_load(s, n, n_channels, &self->even, error));
     TRY(lift_even_light(self, error));
-    TRY(store_has(s, "/operator/groups") ? load_tiles(self, s, error) : load_halves(self, s, error));
+    TRY(load_tiles(self, s, error));
     *op = &self->base;
     self = NULL;
 done:

@@ -77,10 +77,6 @@ lam_status hierarchical_save_tiles(const tile_matrix *m, size_t n_groups, const 
 lam_status hierarchical_load_tiles(store *s, const char *group, size_t n_groups, const tile_group *groups,
                                    tile_matrix *out, lam_error *error);
 
-/* The upper triangle of a K of n rows in half precision: GROUP/count, gap, data and the group's attribute
- * scale. Errors: as of tiles. */
-lam_status hierarchical_load_halves(store *s, const char *group, size_t n, csr *out, lam_error *error);
-
 /* /operator/groups: rows [n_groups][2] u32 and step [n_groups] f32, the rows ascending and below n. Errors:
  * as store_read; LAM_ERR_NUMERIC. */
 lam_status hierarchical_save_groups(size_t n_groups, const tile_group *groups, const float *step, store *s,

@@ -1,6 +1,4 @@
-/* The arrays of K in a store: tiles of signed bytes (tiles.h), and to read alone, the layout of stores before
- * those: rows of the upper triangle in half precision. */
-#include "solver/base/half.h"
+/* The arrays of K in a store: tiles of signed bytes (tiles.h). */
 #include "solver/operator/hierarchical.h"
 
 #include <math.h>
@@ -90,17 +88,16 @@ done:
 }
 
 /* Widens counts [dims[0]][dims[1]] where they are stored narrow. */
-static lam_status read_counts(store *s, const char *name, int rank, size_t *dims, uint32_t **out,
-                              lam_error *error) {
+static lam_status read_counts(store *s, const char *name, size_t *dims, uint32_t **out, lam_error *error) {
     lam_status status = LAM_OK;
     store_type type;
-    int found;
-    size_t shape[STORE_MAX_RANK], count = 1;
+    int rank;
+    size_t shape[STORE_MAX_RANK];
     void *read = NULL;
     uint32_t *counts = NULL;
-    TRY(store_array_info(s, name, &type, &found, shape, error));
-    TRY(store_read(s, name, type == STORE_U16 ? STORE_U16 : STORE_U32, rank, dims, &read, error));
-    for (int k = 0; k < rank; k++) count *= dims[k];
+    TRY(store_array_info(s, name, &type, &rank, shape, error));
+    TRY(store_read(s, name, type == STORE_U16 ? STORE_U16 : STORE_U32, 2, dims, &read, error));
+    const size_t count = dims[0] * dims[1];
     counts = memory_allocate(count, sizeof *counts, "operator", error);
     if (counts == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < count; i++)
@@ -166,7 +163,7 @@ lam_status hierarchical_load_tiles(store *s, const char *group, size_t n_groups,
     void *tiles = NULL, *far = NULL, *digits = NULL;
     tile_matrix made = {.count = {0}};
     snprintf(name, sizeof name, "%s/count", group);
-    TRY(read_counts(s, name, 2, planes, &counts, error));
+    TRY(read_counts(s, name, planes, &counts, error));
     snprintf(name, sizeof name, "%s/tile", group);
     TRY(store_read(s, name, STORE_U16, 1, n_tiles, &tiles, error));
     snprintf(name, sizeof name, "%s/far", group);
@@ -210,68 +207,6 @@ done:
     free(far);
     free(digits);
     tile_matrix_free(&made);
-    return status;
-}
-
-/* The upper triangle in single precision, zeros of long steps left out. */
-static lam_status decode(const char *group, size_t n, const uint32_t *counts, const uint16_t *steps,
-                         const uint16_t *halves, float scale, csr *upper, lam_error *error) {
-    lam_status status = LAM_OK;
-    size_t from = 0;
-    uint64_t used = 0;
-    for (size_t i = 0; i < n; i++) {
-        size_t j = i;
-        for (size_t k = 0; k < counts[i]; k++, from++) {
-            const float value = scale * float_of_half(halves[from]);
-            j += steps[from];
-            if (j >= n || (k > 0 && steps[from] == 0))
-                FAIL(error, LAM_ERR_NUMERIC,
-                     "%s: row %zu steps to column %zu, must be ascending and below %zu", group, i, j, n);
-            if (!isfinite(value))
-                FAIL(error, LAM_ERR_NUMERIC, "%s/data[%zu] = %g, must be finite", group, from, (double)value);
-            if (value == 0) continue;
-            upper->indices[used] = (uint32_t)j;
-            upper->data[used++] = value;
-        }
-        upper->indptr[i + 1] = used;
-    }
-done:
-    return status;
-}
-
-lam_status hierarchical_load_halves(store *s, const char *group, size_t n, csr *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    char name[64];
-    uint32_t *counts = NULL;
-    void *steps = NULL, *halves = NULL;
-    double scale;
-    size_t rows[STORE_MAX_RANK] = {n}, stored[STORE_MAX_RANK] = {SIZE_MAX}, total = 0;
-    csr upper = {.n = n};
-    snprintf(name, sizeof name, "%s/count", group);
-    TRY(read_counts(s, name, 1, rows, &counts, error));
-    snprintf(name, sizeof name, "%s/gap", group);
-    TRY(store_read(s, name, STORE_U16, 1, stored, &steps, error));
-    snprintf(name, sizeof name, "%s/data", group);
-    TRY(store_read(s, name, STORE_F16, 1, stored, &halves, error));
-    TRY(store_get_number(s, group, "scale", &scale, error));
-    for (size_t i = 0; i < n; i++) total += counts[i];
-    if (total != stored[0])
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s has %zu numbers, its rows want %zu", store_path(s), group,
-             stored[0], total);
-    if (!(scale > 0 && scale <= (double)0x1p112f))
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s has the scale %g, must be above 0", store_path(s), group, scale);
-    upper.indptr = memory_allocate(n + 1, sizeof *upper.indptr, "operator", error);
-    upper.indices = memory_allocate(total, sizeof *upper.indices, "operator", error);
-    upper.data = memory_allocate(total, sizeof *upper.data, "operator", error);
-    if (upper.indptr == NULL || upper.indices == NULL || upper.data == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(decode(group, n, counts, steps, halves, (float)scale, &upper, error));
-    *out = upper;
-    upper = (csr){.n = 0};
-done:
-    free(counts);
-    free(steps);
-    free(halves);
-    csr_free(&upper);
     return status;
 }
 

@@ -38,8 +38,9 @@ done:
 }
 
 /* Both forms; core is NULL when folded. */
-static lam_status create(size_t n, size_t k, size_t n_channels, const float *reflectance, float *left,
-                         float *V, float *core, lam_operator **op, lam_error *error) {
+lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channels, const float *reflectance,
+                                             float *left, float *V, float *core, lam_operator **op,
+                                             lam_error *error) {
     lam_status status = LAM_OK;
     factors f = {.core = NULL};
     panel V_panel = {0};
@@ -56,13 +57,7 @@ done:
 
 lam_status operator_low_rank_create_folded(size_t n, size_t k, const float *reflectance, float *Y, float *V,
                                            lam_operator **op, lam_error *error) {
-    return create(n, k, 1, reflectance, Y, V, NULL, op, error);
-}
-
-lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channels, const float *reflectance,
-                                             float *U, float *V, float *core, lam_operator **op,
-                                             lam_error *error) {
-    return create(n, k, n_channels, reflectance, U, V, core, op, error);
+    return operator_low_rank_create_factored(n, k, 1, reflectance, Y, V, NULL, op, error);
 }
 
 static lam_status low_rank_load(store *s, size_t n, size_t n_channels, const float *reflectance,

@@ -167,8 +167,8 @@ static void add_dropped(const sparse *self, size_t c, const float *E, size_t n_r
 }
 
 /* P = M E + delta (weight . E), of all rows or (selected not NULL) some. */
-static void multiply(const lam_operator *op, size_t n_rhs, const float *E, size_t n_rows,
-                     const uint32_t *selected, float *P, void *work) {
+static void sparse_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_rows,
+                                  const uint32_t *selected, float *P, void *work) {
     const sparse *self = (const sparse *)op;
     const size_t n = op->n, C = op->n_channels;
     work = work_area_begin(work);
@@ -183,12 +183,7 @@ static void multiply(const lam_operator *op, size_t n_rhs, const float *E, size_
 }
 
 static void sparse_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
-    multiply(op, n_rhs, E, op->n, NULL, P, work);
-}
-
-static void sparse_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
-                                  const uint32_t *selected, float *P, void *work) {
-    multiply(op, n_rhs, E, n_selected, selected, P, work);
+    sparse_apply_selected(op, n_rhs, E, op->n, NULL, P, work);
 }
 
 /* w = M^T g + weight (delta . g) */

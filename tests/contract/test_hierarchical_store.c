@@ -1,6 +1,4 @@
-/* Hierarchical operators in a store: what the arrays of K mean, those in half precision of older stores too,
- * and what is refused in one clear line. */
-#include "solver/base/half.h"
+/* Hierarchical operators in a store: what the arrays of K mean, and what is refused in one clear line. */
 #include "support/operator_file.h"
 #include "support/suite.h"
 
@@ -14,14 +12,14 @@ static const uint32_t element_of[N] = {3, 7, 4, 5, 6, 0, 1, 2};
 /* A file's differences from a good one: what is 0 or NULL is as it should be. */
 typedef struct recipe {
     const char *what;
-    bool halves, no_threshold, wide_counts;     /* of an older store: K in half precision */
+    bool wide_counts;
     const char *without, *other_type;           /* this dataset is left out, or in double */
     size_t n_groups, n_planes, n_far, n_digits; /* n_far and n_digits: one more than there are */
     uint32_t group, first, size;                /* size > 0: of this group */
     float step;                                 /* of the last group */
     uint16_t tile, code;                        /* code > 0: of this tile */
-    uint16_t count, far, steps; /* of the first row, of its tile, to the first number in halves */
-    const char *word;           /* NULL: it is good */
+    uint16_t count, far;                        /* of the first row, of its tile */
+    const char *word;                           /* NULL: it is good */
 } recipe;
 
 #define CODE(gap, mask) (uint16_t)((gap) << 9 | (mask))
@@ -29,10 +27,10 @@ typedef struct recipe {
 static const recipe recipes[] = {
     {.what = "good"},
     {.what = "good, wide counts", .wide_counts = true},
-    {.what = "good, halves", .halves = true},
     {.what = "a step of 0", .step = -0.0f, .word = "groups/step[2] = -0, must be above 0"},
     {.what = "a step too large", .step = 0x1p41f, .word = "groups/step[2] = 2.19902e+12"},
     {.what = "a step of NaN", .step = NAN, .word = "groups/step[2] = nan"},
+    {.what = "no groups", .without = "/operator/groups/rows", .word = "/operator/groups/rows"},
     {.what = "no steps", .without = "/operator/groups/step", .word = "/operator/groups/step"},
     {.what = "a group of four", .group = 1, .first = 2, .size = 4, .word = "groups/rows[1] = 2, 4"},
     {.what = "groups that overlap", .group = 1, .first = 1, .size = 3, .word = "groups/rows[1] = 1, 3"},
@@ -65,10 +63,6 @@ static const recipe recipes[] = {
      .word = "has 8 digits and 2 far distances, its tiles want 8 and 1"},
     {.what = "too few digits", .tile = 4, .code = CODE(0, 3), .word = "K/0/digit has 8 numbers"},
     {.what = "too many digits", .n_digits = 9, .word = "has 9 digits and 1 far distances"},
-    {.what = "halves without a threshold", .halves = true, .no_threshold = true, .word = "threshold"},
-    {.what = "halves, no gaps", .halves = true, .without = "/operator/K/0/gap", .word = "/operator/K/0/gap"},
-    {.what = "halves, a row too long", .halves = true, .count = 5, .word = "has 7 numbers, its rows want 8"},
-    {.what = "halves, a step beyond", .halves = true, .steps = 9, .word = "row 0 steps to column 9"},
 };
 
 /* K by coefficient: the tiles of the good file, in integers and in steps of .5, 1, 2. */
@@ -120,27 +114,6 @@ static void write_tiles(store *s, const recipe *r) {
                 digits);
 }
 
-static void write_halves(store *s, const recipe *r) {
-    const double scale = .5;
-    uint16_t counts[N] = {0}, gap[N * N], data[N * N];
-    size_t used = 0;
-    for (size_t i = 0; i < N; i++)
-        for (size_t j = i, at = i; j < N; j++) {
-            if (K_of(i, j) == 0) continue;
-            gap[used] = (uint16_t)(j - at);
-            data[used++] = half_of_float((float)(K_of(i, j) / scale));
-            counts[i]++;
-            at = j;
-        }
-    if (r->count > 0) counts[0] = (uint16_t)(counts[0] + 1);
-    if (r->steps > 0) gap[0] = r->steps;
-    write_array(s, r, "/operator/K/0/count", STORE_U16, 1, &(size_t){N}, counts);
-    write_array(s, r, "/operator/K/0/gap", STORE_U16, 1, &used, gap);
-    write_array(s, r, "/operator/K/0/data", STORE_F16, 1, &used, data);
-    ck_ok(store_set_number(s, "/operator/K/0", "scale", scale, &error));
-    if (!r->no_threshold) ck_ok(store_set_number(s, "/operator", "threshold", 1e-3, &error));
-}
-
 static double area_of(size_t i) {
     return i % 2 == 0 ? 1 : 4;
 }
@@ -163,10 +136,7 @@ static void write_recipe(const recipe *r) {
     ck_ok(store_write(s, "/operator/basis/shape", STORE_U32, 2, (const size_t[]){3, 3}, shapes, &error));
     ck_ok(store_write(s, "/operator/basis/basis", STORE_F32, 1, &(size_t){4 * 4 * 2 + 6 * 6}, basis, &error));
     ck_ok(store_write(s, "/operator/basis/node", STORE_U32, 1, &(size_t){3}, nodes, &error));
-    if (r->halves)
-        write_halves(s, r);
-    else
-        write_tiles(s, r);
+    write_tiles(s, r);
     ck_ok(store_seal(s, &error));
 }
 
@@ -192,10 +162,7 @@ START_TEST(arrays_mean_what_the_format_says) {
                 for (size_t j = 0; j < N; j++) {
                     const double x = K_of(i, j) * sqrt(area_of(element_of[j])) * (double)E[element_of[j]];
                     sum += x;
-                    /* The steps of the smallest weight at a threshold of 1e-3: K is off by less than .002. */
-                    size += 1e-6 * fabs(x) + (recipes[k].halves && K_of(i, j) != 0
-                                                  ? .002 * sqrt(area_of(j)) * (double)E[element_of[j]]
-                                                  : 0);
+                    size += 1e-6 * fabs(x);
                 }
                 const double root = sqrt(area_of(element_of[i]));
                 ck_assert_msg(fabs((double)H[element_of[i]] - sum / root) <= 2 * size / root,

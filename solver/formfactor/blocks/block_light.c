@@ -400,8 +400,3 @@ done:
     shining_free(&s);
     return status;
 }
-
-lam_status block_light_for_judge(void *context, const float *E, double *H, double *D, bool *known,
-                                 lam_error *error) {
-    return block_light_of(context, E, H, D, known, error);
-}

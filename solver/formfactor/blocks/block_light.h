@@ -24,8 +24,4 @@ void block_light_destroy(block_light *l);
 lam_status block_light_of(const block_light *l, const float *E, double *H, double *D, bool *known,
                           lam_error *error);
 
-/* block_light_of in the signature of judge.h; context is a block_light. */
-lam_status block_light_for_judge(void *context, const float *E, double *H, double *D, bool *known,
-                                 lam_error *error);
-
 #endif

@@ -91,7 +91,7 @@ static csr rows_of(const square *s, const large_place *place) {
     ck_assert_msg(upper_expand(&F, s->area, row_sums, &error) == LAM_OK, "%s", error.message);
     ck_assert_msg(upper_gather(&F, s->area, &error) == LAM_OK, "%s", error.message);
     ck_assert_msg(upper_expand(&F, s->area, row_sums, &error) == LAM_OK, "%s", error.message);
-    ck_assert_msg(csr_combine(&F, .25f, &F, .5f, &sum, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(csr_replace(&F, &F, &sum, &error) == LAM_OK, "%s", error.message);
     ck_assert((sum.place != NULL) == (place != NULL));
     ck_assert((sum.files[0] != NULL && sum.files[1] != NULL) == (place != NULL));
     ck_assert((F.files[0] != NULL && F.files[1] != NULL) == (place != NULL));
