@@ -1,4 +1,5 @@
 /* Creates, seals and closes stores: a new file is written beside the target and renamed onto it. */
+#include "store/groups.h"
 #include "store/store_private.h"
 
 #include <errno.h>
@@ -78,7 +79,7 @@ lam_status store_hdf5_failure(store *s, const char *name, const char *what, lam_
 
 lam_status store_name_check(const store *s, const char *name, lam_error *error) {
     size_t length = strlen(name), depth = 0;
-    bool good = name[0] == '/' && length < STORE_NAME_SIZE - sizeof "/checksum";
+    bool good = name[0] == '/' && length < STORE_NAME_SIZE - sizeof STORE_CHECKSUM;
     for (size_t i = 0; good && i < length; i++) {
         if (name[i] != '/') continue;
         depth++;

@@ -1,4 +1,5 @@
 /* Checksums: XXH3 of every MiB of every array, and one XXH3 over all of these. */
+#include "store/groups.h"
 #include "store/store_private.h"
 
 #include <inttypes.h>
@@ -99,7 +100,7 @@ static lam_status sums_digest(const store_sums *sums, char digest[17], lam_error
 lam_status store_sums_write(store *s, lam_error *error) {
     lam_status status = LAM_OK;
     char digest[17];
-    TRY(store_set_integer(s, "/checksum", "piece_bytes", (int64_t)STORE_PIECE, error));
+    TRY(store_set_integer(s, STORE_CHECKSUM, "piece_bytes", (int64_t)STORE_PIECE, error));
     for (size_t i = 0; i < s->sums.count; i++) {
         char name[STORE_NAME_SIZE];
         const store_sum *sum = &s->sums.entries[i];
@@ -107,7 +108,7 @@ lam_status store_sums_write(store *s, lam_error *error) {
         TRY(store_write_plain(s, name, H5T_STD_U64LE, 1, &sum->n_pieces, sum->pieces, error));
     }
     TRY(sums_digest(&s->sums, digest, error));
-    TRY(store_set_text(s, "/checksum", "xxh3", digest, error));
+    TRY(store_set_text(s, STORE_CHECKSUM, "xxh3", digest, error));
 done:
     return status;
 }
@@ -123,7 +124,7 @@ static lam_status sums_load(store *s, const char *name, lam_error *error) {
     pieces = memory_allocate(array->bytes, 1, name, error);
     if (pieces == NULL) TRY(LAM_ERR_MEMORY);
     TRY(store_data_read(s, name, array->offset, pieces, array->bytes, error));
-    TRY(sums_insert(&s->sums, name + strlen("/checksum"), array->dims[0], pieces, error));
+    TRY(sums_insert(&s->sums, name + strlen(STORE_CHECKSUM), array->dims[0], pieces, error));
     pieces = NULL;
 done:
     free(pieces);
@@ -141,8 +142,8 @@ static lam_status check_sizes(const store *s, lam_error *error) {
     uint64_t total = 0, unknown = 0;
     for (size_t i = 0; i < s->index.n_objects; i++) {
         const store_object *sums = &s->index.objects[i];
-        if (sums->kind != OBJECT_ARRAY || strncmp(sums->name, "/checksum/", 10) != 0) continue;
-        const char *name = sums->name + strlen("/checksum");
+        if (sums->kind != OBJECT_ARRAY || strncmp(sums->name, STORE_CHECKSUM "/", 10) != 0) continue;
+        const char *name = sums->name + strlen(STORE_CHECKSUM);
         const store_object *of = store_find(s, name);
         if (of == NULL || of->kind == OBJECT_GROUP)
             FAIL(error, LAM_ERR_FORMAT, "%s: %s is of no array of the store; make the store again", s->path,
@@ -170,11 +171,11 @@ lam_status store_sums_read(store *s, lam_error *error) {
     TRY(check_sizes(s, error));
     for (size_t i = 0; i < s->index.n_objects; i++) {
         const store_object *object = &s->index.objects[i];
-        if (object->kind != OBJECT_GROUP && strncmp(object->name, "/checksum/", 10) == 0)
+        if (object->kind != OBJECT_GROUP && strncmp(object->name, STORE_CHECKSUM "/", 10) == 0)
             TRY(sums_load(s, object->name, error));
     }
     TRY(sums_digest(&s->sums, digest, error));
-    TRY(store_get_text(s, "/checksum", "xxh3", &expected, error));
+    TRY(store_get_text(s, STORE_CHECKSUM, "xxh3", &expected, error));
     if (strcmp(digest, expected) != 0)
         FAIL(error, LAM_ERR_DAMAGED, "%s: /checksum is damaged; make the store again", s->path);
     memcpy(s->identity.digest, digest, sizeof digest);

@@ -1,5 +1,6 @@
 /* Opens a store for reading: the file once, by one descriptor; its headers by HDF5 in a child process that
  * has this descriptor and no right to anything else; then checks of all that the child sent. */
+#include "store/groups.h"
 #include "store/store_private.h"
 
 #include <errno.h>
@@ -130,7 +131,7 @@ done:
 
 static lam_status check_root(const store *s, const reply_head *head, lam_error *error) {
     lam_status status = LAM_OK;
-    const store_object *root = store_find(s, "/"), *sums = store_find(s, "/checksum");
+    const store_object *root = store_find(s, "/"), *sums = store_find(s, STORE_CHECKSUM);
     if (root == NULL) goto done; /* it could not be read: the child says why */
     const store_attribute *format = store_attribute_find(root, "format"),
                           *version = store_attribute_find(root, "version");
@@ -159,7 +160,7 @@ done:
 static lam_status check_sums(const store *s, lam_error *error) {
     for (size_t i = 0; i < s->index.n_objects; i++) {
         const store_object *object = &s->index.objects[i];
-        if (object->kind != OBJECT_GROUP && strncmp(object->name, "/checksum/", 10) != 0 &&
+        if (object->kind != OBJECT_GROUP && strncmp(object->name, STORE_CHECKSUM "/", 10) != 0 &&
             store_sums_find(&s->sums, object->name) == NULL)
             return status_fail(error, LAM_ERR_DAMAGED, "%s: %s has no checksum; make the store again",
                                s->path, object->name);

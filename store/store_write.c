@@ -1,4 +1,5 @@
 /* Writing: arrays, texts, and the groups they are in. */
+#include "store/groups.h"
 #include "store/store_private.h"
 
 #include <assert.h>
@@ -118,7 +119,7 @@ static lam_status write_summed(store *s, const char *name, hid_t type, size_t va
     lam_status status = LAM_OK;
     size_t bytes = value_size;
     TRY(store_name_check(s, name, error));
-    if (strcmp(name, "/") == 0 || strncmp(name, "/checksum", 9) == 0)
+    if (strcmp(name, "/") == 0 || strncmp(name, STORE_CHECKSUM, 9) == 0)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: %s is no name for an array", s->path, name);
     for (int i = 0; i < rank; i++)
         if (!size_multiply(bytes, dims[i], &bytes))

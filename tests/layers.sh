@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Proves who includes whom: every quoted include against the list of its folder, every third-party header in its home.
+# Proves who includes whom: every quoted include against the list of its folder, every third-party header in its home;
+# and that the paths of a store's groups are spelled in one header.
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 broken=0
@@ -119,9 +120,16 @@ for file in $(git ls-files -co --exclude-standard 'include/*.h' 'store/*.[ch]' '
     done < <(sed -n 's/^ *# *include *<\([^>]*\)>.*/\1/p' "$file")
 done
 
+# The paths of a store's groups stand in store/groups.h alone.
+groups=$(sed -n 's/^#define STORE_[A-Z_]* "\(\/[a-z_]*\)".*/\1/p' store/groups.h | paste -sd'|')
+while read -r place; do
+    echo "layers: $place: store/groups.h has this path"
+    broken=$((broken + 1))
+done < <(git grep --untracked -noE "\"($groups)[]\"/ :,[]" -- 'solver/*.[ch]' 'server/*.[ch]' 'store/*.[ch]' ':!store/groups.h')
+
 if [ $checked -lt 20 ]; then
     echo "layers: only $checked files found, is this the repository?"
     exit 1
 fi
-echo "layers: $checked files, $broken wrong includes"
+echo "layers: $checked files, $broken wrong includes and paths"
 [ $broken -eq 0 ]

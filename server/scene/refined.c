@@ -1,6 +1,7 @@
 #include "server/scene/refined.h"
 
 #include "solver/operator/refine/form_factor_rows.h"
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <stdlib.h>
@@ -26,7 +27,7 @@ static size_t helper_bytes_of(const lam_operator *op) {
 }
 
 static lam_status read_checksum(store *s, char **checksum, lam_error *error) {
-    return store_get_text(s, "/checksum", "xxh3", checksum, error);
+    return store_get_text(s, STORE_CHECKSUM, "xxh3", checksum, error);
 }
 
 lam_status refined_create(store *s, const lam_operator *op, memory_ledger *ledger, refined **out,
@@ -38,7 +39,7 @@ lam_status refined_create(store *s, const lam_operator *op, memory_ledger *ledge
     made->ledger = ledger;
     made->helper_bytes = helper_bytes_of(op);
     pthread_mutex_init(&made->lock, NULL);
-    if (store_has(s, FORM_FACTORS_GROUP)) {
+    if (store_has(s, STORE_FORM_FACTORS)) {
         TRY(read_checksum(s, &made->checksum, error));
         TRY(form_factors_size(s, &made->bytes, &made->most_bytes, error));
         made->path = strdup(store_path(s));

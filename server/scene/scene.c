@@ -9,6 +9,7 @@
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
+#include "store/groups.h"
 #include "store/store.h"
 
 #include <math.h>
@@ -143,8 +144,8 @@ static lam_status read_groups(store *s, scene *made, lam_error *error) {
     bool two_sided;
     lam_error cause;
     TRY(scene_backs_load(s, made->n, &n_backs, &two_sided, error));
-    TRY(store_read(s, "/mesh/group", STORE_U32, 1, (size_t[]){made->n}, &group, error));
-    TRY(store_read_texts(s, "/mesh/group_names", &n_groups, &names, error));
+    TRY(store_read(s, STORE_MESH "/group", STORE_U32, 1, (size_t[]){made->n}, &group, error));
+    TRY(store_read_texts(s, STORE_MESH "/group_names", &n_groups, &names, error));
     status = group_index_make(made->n, n_backs, group, n_groups, names, &made->groups, &cause);
     if (status != LAM_OK) FAIL(error, status, "%s: %s", made->path, cause.message);
 done:
@@ -155,7 +156,7 @@ done:
 static lam_status read_area(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     void *area = NULL;
-    TRY(store_read(s, "/mesh/area", STORE_F64, 1, (size_t[]){made->n}, &area, error));
+    TRY(store_read(s, STORE_MESH "/area", STORE_F64, 1, (size_t[]){made->n}, &area, error));
     made->area = area;
     for (size_t i = 0; i < made->n; i++)
         if (!(made->area[i] >= 0 && isfinite(made->area[i])))
@@ -182,9 +183,10 @@ static lam_status bytes_below(store *s, const char *group, uint64_t *bytes, lam_
 
 /* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, an index of these. */
 static uint64_t mesh_memory(const store *s) {
-    const uint64_t names = store_texts_memory(s, "/mesh/group_names");
-    return store_array_bytes(s, "/mesh/area") + store_array_bytes(s, "/mesh/reflectance") +
-           store_array_bytes(s, "/mesh/group") + names + names / (sizeof(char *) + 1) * 2 * sizeof(uint32_t);
+    const uint64_t names = store_texts_memory(s, STORE_MESH "/group_names");
+    return store_array_bytes(s, STORE_MESH "/area") + store_array_bytes(s, STORE_MESH "/reflectance") +
+           store_array_bytes(s, STORE_MESH "/group") + names +
+           names / (sizeof(char *) + 1) * 2 * sizeof(uint32_t);
 }
 
 /* The bytes that are read beside that and freed again before the scene is open: of groups by element, the
@@ -192,10 +194,10 @@ static uint64_t mesh_memory(const store *s) {
 static lam_status passing_memory(store *s, uint64_t *memory, lam_error *error) {
     lam_status status = LAM_OK;
     uint64_t receivers, sources;
-    TRY(bytes_below(s, "/importance", &receivers, error));
-    TRY(bytes_below(s, "/sources", &sources, error));
-    *memory = store_array_bytes(s, "/mesh/group") + store_texts_memory(s, "/mesh/group_names") + receivers +
-              sources;
+    TRY(bytes_below(s, STORE_IMPORTANCE, &receivers, error));
+    TRY(bytes_below(s, STORE_SOURCES, &sources, error));
+    *memory = store_array_bytes(s, STORE_MESH "/group") + store_texts_memory(s, STORE_MESH "/group_names") +
+              receivers + sources;
 done:
     return status;
 }
@@ -206,10 +208,10 @@ static lam_status memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes
     lam_status status = LAM_OK;
     char *kind = NULL;
     uint64_t sky, errors;
-    TRY(store_group_bytes(s, "/operator", operator_bytes, error));
-    TRY(bytes_below(s, "/sky", &sky, error));
-    TRY(bytes_below(s, "/error", &errors, error));
-    TRY(store_get_text(s, "/operator", "kind", &kind, error));
+    TRY(store_group_bytes(s, STORE_OPERATOR, operator_bytes, error));
+    TRY(bytes_below(s, STORE_SKY, &sky, error));
+    TRY(bytes_below(s, STORE_ERROR, &errors, error));
+    TRY(store_get_text(s, STORE_OPERATOR, "kind", &kind, error));
     *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky + errors + mesh_memory(s);
 done:
     free(kind);
@@ -241,7 +243,7 @@ done:
 
 static lam_status read_store(store *s, const scene_options *options, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
-    if (!store_has(s, "/operator"))
+    if (!store_has(s, STORE_OPERATOR))
         FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", options->path);
     uint64_t passing;
     TRY(memory_of(s, &made->memory, &made->bytes, error));
@@ -253,7 +255,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
              (unsigned long long)options->memory);
     TRY(weather_file_read(options->path, options->memory - made->memory, &made->weather, error));
     made->memory += made->weather.length;
-    TRY(store_verify_group(s, options->verify ? "/" : "/mesh", error));
+    TRY(store_verify_group(s, options->verify ? "/" : STORE_MESH, error));
     TRY(store_map_file(s, error));
     TRY(operator_load(s, &made->op, error));
     made->n = lam_operator_elements(made->op);

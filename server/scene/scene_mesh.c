@@ -2,6 +2,7 @@
 
 #include "server/scene/scene.h"
 #include "solver/codec/gltf/gltf.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -24,7 +25,7 @@ static const scene *root_of(const scene *s) {
 static lam_status read_up(store *s, char *up, lam_error *error) {
     lam_status status = LAM_OK;
     char *text = NULL;
-    TRY(store_get_text(s, "/mesh", "up", &text, error));
+    TRY(store_get_text(s, STORE_MESH, "up", &text, error));
     if (strlen(text) != 1 || strchr("xyz", text[0]) == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute up is '%s', must be x, y or z", store_path(s), text);
     *up = text[0];
@@ -38,7 +39,7 @@ static lam_status read_vertices(store *s, size_t *count, lam_error *error) {
     store_type type;
     size_t dims[STORE_MAX_RANK];
     int rank;
-    TRY(store_array_info(s, "/mesh/vertices", &type, &rank, dims, error));
+    TRY(store_array_info(s, STORE_MESH "/vertices", &type, &rank, dims, error));
     if (type != STORE_F64 || rank != 2 || dims[1] != 3)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/vertices must be [v][3] of f64", store_path(s));
     *count = dims[0];
@@ -53,13 +54,13 @@ static lam_status read_sizes_of_images(store *s, scene_mesh *made, lam_error *er
     size_t dims[STORE_MAX_RANK];
     int rank;
     const size_t C = made->of->n_channels;
-    if ((C != 1 && C != 3) || !store_has(s, "/mesh/surface")) return LAM_OK;
+    if ((C != 1 && C != 3) || !store_has(s, STORE_MESH "/surface")) return LAM_OK;
     made->n_textured = made->of->n;
-    TRY(store_array_info(s, "/mesh/surface_image", &type, &rank, dims, error));
+    TRY(store_array_info(s, STORE_MESH "/surface_image", &type, &rank, dims, error));
     made->n_textures = dims[0];
-    TRY(store_array_info(s, "/mesh/image_start", &type, &rank, dims, error));
+    TRY(store_array_info(s, STORE_MESH "/image_start", &type, &rank, dims, error));
     made->n_textures += dims[0];
-    TRY(store_array_info(s, "/mesh/images", &type, &rank, dims, error));
+    TRY(store_array_info(s, STORE_MESH "/images", &type, &rank, dims, error));
     /* Each begins at a multiple of 4. */
     made->image_bytes = dims[0] + 3 * made->n_textures;
 done:
@@ -165,10 +166,11 @@ typedef struct arrays {
 static lam_status read_arrays(store *s, const scene_mesh *mesh, arrays *a, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = mesh->of->n, C = mesh->of->n_channels;
-    TRY(store_read(s, "/mesh/vertices", STORE_F64, 2, (size_t[]){mesh->n_vertices, 3}, &a->vertices, error));
-    TRY(store_read(s, "/mesh/elements", STORE_U32, 2, (size_t[]){n, 4}, &a->elements, error));
-    TRY(store_read(s, "/mesh/normal", STORE_F32, 2, (size_t[]){n, 3}, &a->normal, error));
-    TRY(store_read(s, "/mesh/emission", STORE_F32, 2, (size_t[]){C, n}, &a->emission, error));
+    TRY(store_read(s, STORE_MESH "/vertices", STORE_F64, 2, (size_t[]){mesh->n_vertices, 3}, &a->vertices,
+                   error));
+    TRY(store_read(s, STORE_MESH "/elements", STORE_U32, 2, (size_t[]){n, 4}, &a->elements, error));
+    TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, (size_t[]){n, 3}, &a->normal, error));
+    TRY(store_read(s, STORE_MESH "/emission", STORE_F32, 2, (size_t[]){C, n}, &a->emission, error));
     if (mesh->n_textured > 0) TRY(scene_pictures_load(s, n, &a->pictures, error));
     const uint32_t(*elements)[4] = a->elements;
     for (size_t i = 0; i < n; i++)

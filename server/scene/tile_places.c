@@ -1,6 +1,7 @@
 #include "server/scene/tile_places.h"
 
 #include "solver/codec/json_writer.h"
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -104,13 +105,13 @@ lam_status tile_places_read(store *s, size_t n_tiles, buffer *out, lam_error *er
     tile_places p = {.n_tiles = n_tiles};
     buffer written = {0};
     void *tiles = NULL;
-    if (!store_has(s, "/sky/tiles")) return LAM_OK;
-    TRY(store_read(s, "/sky/tiles", STORE_F64, 2, (size_t[]){n_tiles, TILE_COLUMNS}, &tiles, error));
+    if (!store_has(s, STORE_SKY "/tiles")) return LAM_OK;
+    TRY(store_read(s, STORE_SKY "/tiles", STORE_F64, 2, (size_t[]){n_tiles, TILE_COLUMNS}, &tiles, error));
     p.tiles = tiles;
     TRY(check_tiles(s, &p, error));
-    TRY(store_get_text(s, "/sky", "tiling", &p.tiling, error));
-    TRY(store_get_text(s, "/sky", "up", &p.up, error));
-    TRY(store_get_number(s, "/sky", "ground_albedo", &p.ground_albedo, error));
+    TRY(store_get_text(s, STORE_SKY, "tiling", &p.tiling, error));
+    TRY(store_get_text(s, STORE_SKY, "up", &p.up, error));
+    TRY(store_get_number(s, STORE_SKY, "ground_albedo", &p.ground_albedo, error));
     if (way_of(p.up[0]) == N_WAYS || p.up[1] != '\0')
         FAIL(error, LAM_ERR_FORMAT, "%s: attribute \"up\" of /sky is \"%.20s\", must be x, y or z",
              store_path(s), p.up);

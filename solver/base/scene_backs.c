@@ -1,10 +1,11 @@
 #include "solver/base/scene_backs.h"
 
+#include "store/groups.h"
 #include "store/status.h"
 
 static lam_status load(store *s, const char *name, int64_t *value, lam_error *error) {
-    if (!store_has_attribute(s, "/mesh", name)) return LAM_OK;
-    return store_get_integer(s, "/mesh", name, value, error);
+    if (!store_has_attribute(s, STORE_MESH, name)) return LAM_OK;
+    return store_get_integer(s, STORE_MESH, name, value, error);
 }
 
 lam_status scene_backs_load(store *s, size_t n, size_t *n_backs, bool *two_sided, lam_error *error) {
@@ -30,8 +31,8 @@ done:
 
 lam_status scene_backs_save(size_t n_backs, bool two_sided, store *s, lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(store_set_integer(s, "/mesh", "two_sided", two_sided, error));
-    if (!two_sided && n_backs > 0) TRY(store_set_integer(s, "/mesh", "backs", (int64_t)n_backs, error));
+    TRY(store_set_integer(s, STORE_MESH, "two_sided", two_sided, error));
+    if (!two_sided && n_backs > 0) TRY(store_set_integer(s, STORE_MESH, "backs", (int64_t)n_backs, error));
 done:
     return status;
 }

@@ -2,6 +2,7 @@
 
 #include "solver/base/utf8.h"
 #include "solver/base/vector3.h"
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -36,7 +37,7 @@ const scene_camera *scene_camera_find(size_t n, const scene_camera *cameras, con
 }
 
 /* The numbers of one dataset: [n][3], of eyes, directions or ups. */
-static const char *const vectors[] = {"/cameras/eye", "/cameras/direction", "/cameras/up"};
+static const char *const vectors[] = {STORE_CAMERAS "/eye", STORE_CAMERAS "/direction", STORE_CAMERAS "/up"};
 
 static double *vector_of(scene_camera *c, size_t which) {
     return which == 0 ? c->eye : which == 1 ? c->direction : c->up;
@@ -56,7 +57,7 @@ lam_status scene_cameras_save(size_t n, const scene_camera *cameras, store *s, l
         names[k] = cameras[k].name;
         fov[k] = cameras[k].fov;
     }
-    TRY(store_write_texts(s, "/cameras/names", n, names, error));
+    TRY(store_write_texts(s, STORE_CAMERAS "/names", n, names, error));
     for (size_t which = 0; which < 3; which++) {
         for (size_t k = 0; k < n; k++) {
             scene_camera c = cameras[k];
@@ -64,7 +65,7 @@ lam_status scene_cameras_save(size_t n, const scene_camera *cameras, store *s, l
         }
         TRY(store_write(s, vectors[which], STORE_F64, 2, dims, numbers, error));
     }
-    TRY(store_write(s, "/cameras/fov", STORE_F64, 1, &n, fov, error));
+    TRY(store_write(s, STORE_CAMERAS "/fov", STORE_F64, 1, &n, fov, error));
 done:
     free(names);
     free(numbers);
@@ -92,12 +93,12 @@ lam_status scene_cameras_load(store *s, size_t *n, scene_camera **out, lam_error
     scene_camera *made = NULL;
     void *data = NULL;
     size_t count = 0;
-    if (!store_has(s, "/cameras")) {
+    if (!store_has(s, STORE_CAMERAS)) {
         *n = 0;
         *out = NULL;
         return LAM_OK;
     }
-    TRY(store_read_texts(s, "/cameras/names", &count, &names, error));
+    TRY(store_read_texts(s, STORE_CAMERAS "/names", &count, &names, error));
     if (count == 0 || count > SCENE_CAMERAS_MOST)
         FAIL(error, LAM_ERR_FORMAT, "%s: /cameras holds %zu cameras, must be 1 to %d", store_path(s), count,
              SCENE_CAMERAS_MOST);
@@ -112,7 +113,7 @@ lam_status scene_cameras_load(store *s, size_t *n, scene_camera **out, lam_error
         free(data);
         data = NULL;
     }
-    TRY(store_read(s, "/cameras/fov", STORE_F64, 1, &count, &data, error));
+    TRY(store_read(s, STORE_CAMERAS "/fov", STORE_F64, 1, &count, &data, error));
     for (size_t k = 0; k < count; k++) {
         made[k].fov = ((const double *)data)[k];
         if (!scene_camera_settle(&made[k]))

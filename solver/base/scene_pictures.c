@@ -1,5 +1,6 @@
 #include "solver/base/scene_pictures.h"
 
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -30,12 +31,12 @@ lam_status scene_pictures_save(const scene_pictures *p, size_t n, store *s, lam_
         memcpy(&place[k][1], p->surfaces[k].wrap, sizeof p->surfaces[k].wrap);
         memcpy(factor[k], p->surfaces[k].factor, sizeof factor[k]);
     }
-    TRY(store_write(s, "/mesh/surface", STORE_U32, 1, &n, p->surface, error));
-    TRY(store_write(s, "/mesh/texcoord", STORE_F32, 3, of_coordinates, p->texcoord, error));
-    TRY(store_write(s, "/mesh/surface_image", STORE_U32, 2, of_surfaces, place, error));
-    TRY(store_write(s, "/mesh/surface_factor", STORE_F32, 2, of_surfaces, factor, error));
-    TRY(store_write(s, "/mesh/image_start", STORE_U64, 1, &n_starts, p->start, error));
-    TRY(store_write(s, "/mesh/images", STORE_I8, 1, &n_bytes, p->bytes, error));
+    TRY(store_write(s, STORE_MESH "/surface", STORE_U32, 1, &n, p->surface, error));
+    TRY(store_write(s, STORE_MESH "/texcoord", STORE_F32, 3, of_coordinates, p->texcoord, error));
+    TRY(store_write(s, STORE_MESH "/surface_image", STORE_U32, 2, of_surfaces, place, error));
+    TRY(store_write(s, STORE_MESH "/surface_factor", STORE_F32, 2, of_surfaces, factor, error));
+    TRY(store_write(s, STORE_MESH "/image_start", STORE_U64, 1, &n_starts, p->start, error));
+    TRY(store_write(s, STORE_MESH "/images", STORE_I8, 1, &n_bytes, p->bytes, error));
 done:
     free(place);
     free(factor);
@@ -47,9 +48,9 @@ static lam_status load_files(store *s, scene_pictures *p, lam_error *error) {
     lam_status status = LAM_OK;
     void *data = NULL;
     size_t n_starts = SIZE_MAX, n_bytes = SIZE_MAX;
-    TRY(store_read(s, "/mesh/image_start", STORE_U64, 1, &n_starts, &data, error));
+    TRY(store_read(s, STORE_MESH "/image_start", STORE_U64, 1, &n_starts, &data, error));
     p->start = data;
-    TRY(store_read(s, "/mesh/images", STORE_I8, 1, &n_bytes, &data, error));
+    TRY(store_read(s, STORE_MESH "/images", STORE_I8, 1, &n_bytes, &data, error));
     p->bytes = data;
     for (size_t k = 0; k < n_starts; k++)
         if (k == 0 ? p->start[k] != 0 : p->start[k] < p->start[k - 1])
@@ -67,8 +68,8 @@ static lam_status load_surfaces(store *s, scene_pictures *p, lam_error *error) {
     lam_status status = LAM_OK;
     void *places = NULL, *factors = NULL;
     size_t dims[2] = {SIZE_MAX, 3};
-    TRY(store_read(s, "/mesh/surface_image", STORE_U32, 2, dims, &places, error));
-    TRY(store_read(s, "/mesh/surface_factor", STORE_F32, 2, dims, &factors, error));
+    TRY(store_read(s, STORE_MESH "/surface_image", STORE_U32, 2, dims, &places, error));
+    TRY(store_read(s, STORE_MESH "/surface_factor", STORE_F32, 2, dims, &factors, error));
     p->surfaces = memory_allocate(dims[0], sizeof *p->surfaces, "textures", error);
     if (p->surfaces == NULL) TRY(LAM_ERR_MEMORY);
     p->n_surfaces = dims[0];
@@ -97,10 +98,10 @@ lam_status scene_pictures_load(store *s, size_t n, scene_pictures **out, lam_err
     void *data = NULL;
     size_t of_coordinates[3] = {n, 4, 2};
     *out = NULL;
-    if (!store_has(s, "/mesh/surface")) return LAM_OK;
-    TRY(store_read(s, "/mesh/surface", STORE_U32, 1, &n, &data, error));
+    if (!store_has(s, STORE_MESH "/surface")) return LAM_OK;
+    TRY(store_read(s, STORE_MESH "/surface", STORE_U32, 1, &n, &data, error));
     p.surface = data;
-    TRY(store_read(s, "/mesh/texcoord", STORE_F32, 3, of_coordinates, &data, error));
+    TRY(store_read(s, STORE_MESH "/texcoord", STORE_F32, 3, of_coordinates, &data, error));
     p.texcoord = data;
     TRY(load_files(s, &p, error));
     TRY(load_surfaces(s, &p, error));

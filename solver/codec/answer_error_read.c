@@ -1,13 +1,14 @@
 /* The laws of errors by group as a store has them (/error/by_group, FORMAT.md), and what their formulas need
  * of its mesh. */
 #include "solver/codec/answer_error.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define GROUP "/error/by_group"
+#define GROUP STORE_ERROR "/by_group"
 
 /* Figures by bin of a law: names in a store, and where they go. */
 enum { LAW_FIGURES = 6, SKY_LAW_FIGURES = 6, SKY_FIGURES_OF_BEFORE = 4 };
@@ -146,13 +147,13 @@ static lam_status find_reflecting(const error_scene *scene, error_by_group *e, l
 static lam_status read_overlap(store *s, error_by_group *e, lam_error *error) {
     lam_status status = LAM_OK;
     void *data = NULL;
-    if (store_has_attribute(s, "/error", "repair"))
-        TRY(store_get_number(s, "/error", "repair", &e->repair, error));
+    if (store_has_attribute(s, STORE_ERROR, "repair"))
+        TRY(store_get_number(s, STORE_ERROR, "repair", &e->repair, error));
     if (!(e->repair >= 0) || !isfinite(e->repair))
         FAIL(error, LAM_ERR_FORMAT, "%s: /error attribute repair is %g, must be at least 0", store_path(s),
              e->repair);
-    if (!store_has(s, "/mesh/overlap")) return LAM_OK;
-    TRY(store_read(s, "/mesh/overlap", STORE_F64, 1, &e->n_groups, &data, error));
+    if (!store_has(s, STORE_MESH "/overlap")) return LAM_OK;
+    TRY(store_read(s, STORE_MESH "/overlap", STORE_F64, 1, &e->n_groups, &data, error));
     e->overlap = data;
     for (size_t g = 0; g < e->n_groups; g++)
         if (!(e->overlap[g] >= 0 && e->overlap[g] <= 1))

@@ -2,6 +2,7 @@
 
 #include "solver/base/scene_cameras.h"
 #include "solver/operator/operator.h"
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -42,8 +43,8 @@ static lam_status add_groups(store *s, size_t n, json_t *out, lam_error *error) 
     char **names = NULL;
     size_t *counts = NULL, n_groups = 0;
     json_t *groups = NULL;
-    TRY(store_read(s, "/mesh/group", STORE_U32, 1, (size_t[]){n}, &data, error));
-    TRY(store_read_texts(s, "/mesh/group_names", &n_groups, &names, error));
+    TRY(store_read(s, STORE_MESH "/group", STORE_U32, 1, (size_t[]){n}, &data, error));
+    TRY(store_read_texts(s, STORE_MESH "/group_names", &n_groups, &names, error));
     counts = memory_allocate(n_groups, sizeof *counts, "group sizes", error);
     if (counts == NULL) TRY(LAM_ERR_MEMORY);
     const uint32_t *group = data;
@@ -113,11 +114,11 @@ static lam_status add_error_by_group(store *s, json_t *figures, const json_t *gr
     void *data[NAMES] = {NULL};
     bool *taken = NULL;
     json_t *list = NULL;
-    if (!store_has(s, "/error/by_group")) return LAM_OK;
+    if (!store_has(s, STORE_ERROR "/by_group")) return LAM_OK;
     for (size_t k = 0; k < NAMES; k++) {
         char path[64];
         size_t dims[2] = {SIZE_MAX, n};
-        snprintf(path, sizeof path, "/error/by_group/%s", names[k]);
+        snprintf(path, sizeof path, STORE_ERROR "/by_group/%s", names[k]);
         TRY(store_read(s, path, STORE_F64, 2, dims, &data[k], error));
         if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: %s is empty", store_path(s), path);
     }
@@ -148,12 +149,12 @@ static lam_status add_emitter_errors(store *s, json_t *figures, lam_error *error
     lam_status status = LAM_OK;
     json_t *errors = NULL;
     void *data = NULL;
-    if (!store_has(s, "/error/emitters")) return LAM_OK;
+    if (!store_has(s, STORE_ERROR "/emitters")) return LAM_OK;
     errors = json_object();
     for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
         char path[64];
         size_t count = SIZE_MAX;
-        snprintf(path, sizeof path, "/error/emitters/%s", names[k]);
+        snprintf(path, sizeof path, STORE_ERROR "/emitters/%s", names[k]);
         TRY(store_read(s, path, STORE_F64, 1, &count, &data, error));
         json_t *list = json_array();
         for (size_t i = 0; i < count; i++) { /* an error that is no number becomes null */
@@ -175,15 +176,15 @@ static lam_status add_error(store *s, json_t *out, lam_error *error) {
     static const char *const groups[] = {"single", "lights", "random", "whole", "sky", "mesh"};
     lam_status status = LAM_OK;
     json_t *figures = NULL;
-    if (!store_has(s, "/error")) {
+    if (!store_has(s, STORE_ERROR)) {
         json_object_set_new(out, "error", json_object());
         return LAM_OK;
     }
-    TRY(attributes_of(s, "/error", &figures, error));
+    TRY(attributes_of(s, STORE_ERROR, &figures, error));
     for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
         char path[32];
         json_t *group = NULL;
-        snprintf(path, sizeof path, "/error/%s", groups[i]);
+        snprintf(path, sizeof path, STORE_ERROR "/%s", groups[i]);
         if (!store_has(s, path)) continue;
         TRY(attributes_of(s, path, &group, error));
         json_object_set_new(figures, groups[i], group);
@@ -202,10 +203,10 @@ static lam_status add_provenance(store *s, const json_t *root, json_t *out, lam_
     json_t *mesh = NULL, *form_factors = NULL, *provenance = json_object();
     for (size_t i = 0; i < sizeof members / sizeof members[0]; i++)
         copy_member(provenance, members[i], root, members[i]);
-    TRY(attributes_of(s, "/mesh", &mesh, error));
+    TRY(attributes_of(s, STORE_MESH, &mesh, error));
     copy_member(provenance, "geometry_hash", mesh, "geometry_hash");
-    if (store_has(s, "/form_factors")) {
-        TRY(attributes_of(s, "/form_factors", &form_factors, error));
+    if (store_has(s, STORE_FORM_FACTORS)) {
+        TRY(attributes_of(s, STORE_FORM_FACTORS, &form_factors, error));
         json_object_set(provenance, "form_factors", form_factors);
     }
     json_object_set(out, "provenance", provenance);
@@ -222,8 +223,8 @@ static lam_status add_emitters(store *s, json_t *out, lam_error *error) {
     size_t count = 0;
     json_t *list = NULL;
     lam_status status = LAM_OK;
-    if (store_has(s, "/operator/names")) {
-        TRY(store_read_texts(s, "/operator/names", &count, &names, error));
+    if (store_has(s, STORE_OPERATOR "/names")) {
+        TRY(store_read_texts(s, STORE_OPERATOR "/names", &count, &names, error));
         list = json_array();
         for (size_t k = 0; k < count; k++)
             if (json_array_append_new(list, json_string(names[k])) != 0)
@@ -267,12 +268,12 @@ static lam_status add_sky(store *s, json_t *out, lam_error *error) {
     size_t dims[STORE_MAX_RANK];
     store_type type;
     int rank;
-    if (!store_has(s, "/sky")) {
+    if (!store_has(s, STORE_SKY)) {
         json_object_set_new(out, "sky", json_null());
         return LAM_OK;
     }
-    TRY(attributes_of(s, "/sky", &attributes, error));
-    TRY(store_array_info(s, "/sky/first_bounce", &type, &rank, dims, error));
+    TRY(attributes_of(s, STORE_SKY, &attributes, error));
+    TRY(store_array_info(s, STORE_SKY "/first_bounce", &type, &rank, dims, error));
     if (rank != 2)
         FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce has %d dimensions, must have 2", store_path(s),
              rank);
@@ -321,13 +322,13 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     int rank;
     uint64_t bytes = 0;
     TRY(attributes_of(s, "/", &root, error));
-    TRY(attributes_of(s, "/operator", &operator_attributes, error));
-    TRY(attributes_of(s, "/mesh", &mesh, error));
-    TRY(store_array_info(s, "/mesh/reflectance", &type, &rank, dims, error));
+    TRY(attributes_of(s, STORE_OPERATOR, &operator_attributes, error));
+    TRY(attributes_of(s, STORE_MESH, &mesh, error));
+    TRY(store_array_info(s, STORE_MESH "/reflectance", &type, &rank, dims, error));
     if (rank != 2)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/reflectance has %d dimensions, must have 2", store_path(s),
              rank);
-    TRY(store_group_bytes(s, "/operator", &bytes, error));
+    TRY(store_group_bytes(s, STORE_OPERATOR, &bytes, error));
     copy_member(made, "name", root, "name");
     json_object_set_new(made, "elements", json_integer((json_int_t)dims[1]));
     json_object_set_new(made, "channels", json_integer((json_int_t)dims[0]));
@@ -351,8 +352,8 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     TRY(add_emitters(s, made, error));
     TRY(add_cameras(s, made, error));
     TRY(add_sky(s, made, error));
-    TRY(add_elements(s, "/importance", "importance", made, error));
-    TRY(add_elements(s, "/sources", "sources", made, error));
+    TRY(add_elements(s, STORE_IMPORTANCE, "importance", made, error));
+    TRY(add_elements(s, STORE_SOURCES, "sources", made, error));
     TRY(add_error(s, made, error));
     TRY(add_provenance(s, root, made, error));
     *out = json_incref(made);

@@ -1,10 +1,11 @@
 #include "solver/codec/emitters_error.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-#define GROUP "/error/emitters"
+#define GROUP STORE_ERROR "/emitters"
 
 void emitters_error_free(emitters_error *e) {
     free(e->covariance);

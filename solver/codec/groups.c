@@ -2,6 +2,7 @@
 
 #include "solver/base/nearest.h"
 #include "solver/base/scene_backs.h"
+#include "store/groups.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,8 +43,8 @@ lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, siz
     }
     for (size_t i = 0; i < n; i++) {
         if (group[i] >= n_groups)
-            FAIL(error, LAM_ERR_FORMAT, "/mesh/group[%zu] = %u, must be below the %zu names", i, group[i],
-                 n_groups);
+            FAIL(error, LAM_ERR_FORMAT, STORE_MESH "/group[%zu] = %u, must be below the %zu names", i,
+                 group[i], n_groups);
         index.start[group[i] + 1]++;
     }
     for (size_t g = 0; g < n_groups; g++) index.start[g + 1] += index.start[g];

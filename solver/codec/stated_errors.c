@@ -1,6 +1,7 @@
 #include "solver/codec/stated_errors.h"
 
 #include "solver/operator/blocks/importance.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,10 +15,10 @@ void stated_errors_free(stated_errors *e) {
 }
 
 static stated_error read_error(store *s, const char *relative, const char *indirect) {
-    static const char *const groups[] = {"/error/lights", "/error/single"};
+    static const char *const groups[] = {STORE_ERROR "/lights", STORE_ERROR "/single"};
     stated_error found = {.known = false};
     for (size_t i = 0; i < sizeof groups / sizeof groups[0] && !found.known; i++) {
-        found.light = groups[i] + sizeof "/error/" - 1;
+        found.light = groups[i] + sizeof STORE_ERROR "/" - 1;
         found.known = store_has(s, groups[i]) && store_has_attribute(s, groups[i], relative) &&
                       store_has_attribute(s, groups[i], indirect) &&
                       store_get_number(s, groups[i], relative, &found.relative, NULL) == LAM_OK &&
@@ -30,8 +31,9 @@ static stated_error read_error(store *s, const char *relative, const char *indir
 /* A figure of /error/mesh; 0: there is none. */
 static double read_mesh_error(store *s, const char *light) {
     double found = 0;
-    const bool good = store_has(s, "/error/mesh") && store_has_attribute(s, "/error/mesh", light) &&
-                      store_get_number(s, "/error/mesh", light, &found, NULL) == LAM_OK && isfinite(found);
+    const bool good =
+        store_has(s, STORE_ERROR STORE_MESH) && store_has_attribute(s, STORE_ERROR STORE_MESH, light) &&
+        store_get_number(s, STORE_ERROR STORE_MESH, light, &found, NULL) == LAM_OK && isfinite(found);
     return good ? found : 0;
 }
 

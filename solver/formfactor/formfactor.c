@@ -6,11 +6,12 @@
 #include "solver/formfactor/source.h"
 #include "solver/operator/blocks/block_store.h"
 #include "solver/operator/refine/form_factor_rows.h"
+#include "store/groups.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#define GROUP FORM_FACTORS_GROUP
+#define GROUP STORE_FORM_FACTORS
 
 void form_factors_free(form_factors *f) {
     csr_free(&f->F);
@@ -115,7 +116,7 @@ static lam_status load_about(store *s, const mesh *m, form_factors *f, lam_error
     if (!store_has(s, GROUP))
         FAIL(error, LAM_ERR_FORMAT, "%s holds no /form_factors; make it again with --keep-form-factors",
              store_path(s));
-    TRY(store_get_text(s, "/mesh", "geometry_hash", &recorded, error));
+    TRY(store_get_text(s, STORE_MESH, "geometry_hash", &recorded, error));
     mesh_geometry_hash(m, found);
     if (strcmp(recorded, found) != 0)
         FAIL(error, LAM_ERR_FORMAT,

@@ -1,4 +1,5 @@
 #include "solver/formfactor/recipe.h"
+#include "store/groups.h"
 
 #include "solver/formfactor/source.h"
 
@@ -12,8 +13,8 @@ enum { MIN_AUTO_RAYS = 256, MAX_AUTO_RAYS = 65536 };
 static const char *const closure_names[] = {"measured", "closed", "open"};
 enum { N_CLOSURES = sizeof closure_names / sizeof closure_names[0] };
 
-const recipe_names recipe_of_form_factors = {"/form_factors", "method", "seed"};
-const recipe_names recipe_of_operator = {"/operator", "form_factors", "ray_seed"};
+const recipe_names recipe_of_form_factors = {STORE_FORM_FACTORS, "method", "seed"};
+const recipe_names recipe_of_operator = {STORE_OPERATOR, "form_factors", "ray_seed"};
 
 const char *recipe_name(const recipe *r) {
     return recipe_source(r)->name;

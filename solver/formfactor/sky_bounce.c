@@ -1,10 +1,11 @@
 #include "solver/formfactor/sky_bounce.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define GROUP "/sky"
+#define GROUP STORE_SKY
 
 /* A row of /sky/tiles is a tile. */
 enum { TILE_COLUMNS = 9 };

@@ -1,6 +1,7 @@
 #include "solver/light/weather_light.h"
 
 #include "solver/daylight/weather.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -101,8 +102,8 @@ done:
 static lam_status load_tiling(store *s, sky_tiling *out, lam_error *error) {
     lam_status status = LAM_OK;
     char *name = NULL, *up = NULL;
-    TRY(store_get_text(s, "/sky", "tiling", &name, error));
-    TRY(store_get_text(s, "/sky", "up", &up, error));
+    TRY(store_get_text(s, STORE_SKY, "tiling", &name, error));
+    TRY(store_get_text(s, STORE_SKY, "up", &up, error));
     TRY(sky_tiling_create(name, up[0], out, error));
 done:
     free(name);

@@ -1,4 +1,5 @@
 #include "solver/linalg/panel_store.h"
+#include "store/groups.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -80,8 +81,8 @@ done:
 lam_status panel_check_precision(store *s, panel_precision precision, lam_error *error) {
     lam_status status = LAM_OK;
     char *said = NULL;
-    if (!store_has_attribute(s, "/operator", "precision")) goto done;
-    TRY(store_get_text(s, "/operator", "precision", &said, error));
+    if (!store_has_attribute(s, STORE_OPERATOR, "precision")) goto done;
+    TRY(store_get_text(s, STORE_OPERATOR, "precision", &said, error));
     if (strcmp(said, panel_precision_name(precision)) != 0)
         FAIL(error, LAM_ERR_FORMAT, "%s: /operator says precision '%s', its arrays are of %s", store_path(s),
              said, panel_precision_name(precision));

@@ -66,6 +66,7 @@ TARGET static inline __attribute__((always_inline)) void load_four_avx512(const 
     *lanes = (half)_mm256_cvtps_pd(_mm_maskz_loadu_ps((__mmask8)((1u << count) - 1), x));
 }
 #include "solver/linalg/segment_kernels.inc"
+#include "store/groups.h"
 static const segment_kernels kernels_avx512 = {sum_avx512};
 #endif
 
@@ -78,17 +79,19 @@ const segment_kernels *segment_kernels_of(cpu_level level) {
 lam_status segments_create(size_t n, size_t k, uint64_t *begin, float *weight, segments *s,
                            lam_error *error) {
     lam_status status = LAM_OK;
-    if (begin[0] != 0) FAIL(error, LAM_ERR_NUMERIC, "/operator/I[0] = %" PRIu64 ", must be 0", begin[0]);
+    if (begin[0] != 0)
+        FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/I[0] = %" PRIu64 ", must be 0", begin[0]);
     for (size_t p = 0; p < k; p++)
         if (begin[p + 1] < begin[p] || begin[p + 1] > n)
             FAIL(error, LAM_ERR_NUMERIC,
-                 "/operator/I[%zu] = %" PRIu64 ", must be at least %" PRIu64 " and at most %zu", p + 1,
+                 STORE_OPERATOR "/I[%zu] = %" PRIu64 ", must be at least %" PRIu64 " and at most %zu", p + 1,
                  begin[p + 1], begin[p], n);
     if (k > 0 && begin[k] != n)
-        FAIL(error, LAM_ERR_NUMERIC, "/operator/I[%zu] = %" PRIu64 ", must be %zu", k, begin[k], n);
+        FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/I[%zu] = %" PRIu64 ", must be %zu", k, begin[k], n);
     for (size_t j = 0; weight != NULL && j < n; j++)
         if (!isfinite(weight[j]))
-            FAIL(error, LAM_ERR_NUMERIC, "/operator/weight[%zu] = %g, must be finite", j, (double)weight[j]);
+            FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/weight[%zu] = %g, must be finite", j,
+                 (double)weight[j]);
     *s = (segments){
         .n = n, .k = k, .begin = begin, .weight = weight, .kernels = segment_kernels_of(cpu_best())};
 done:

@@ -1,5 +1,6 @@
 #include "solver/method/report.h"
 
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <assert.h>
@@ -113,11 +114,11 @@ lam_status report_save(const build_report *report, store *s, lam_error *error) {
     for (size_t k = 0; k < report->n_figures; k++) {
         const report_figure *f = &report->figures[k];
         if (f->text != NULL)
-            TRY(store_set_text(s, "/operator", f->name, f->text, error));
+            TRY(store_set_text(s, STORE_OPERATOR, f->name, f->text, error));
         else if (f->whole)
-            TRY(store_set_integer(s, "/operator", f->name, (int64_t)f->number, error));
+            TRY(store_set_integer(s, STORE_OPERATOR, f->name, (int64_t)f->number, error));
         else
-            TRY(store_set_number(s, "/operator", f->name, f->number, error));
+            TRY(store_set_number(s, STORE_OPERATOR, f->name, f->number, error));
     }
 done:
     return status;

@@ -5,6 +5,7 @@
 #include "solver/base/work_area.h"
 #include "solver/linalg/csr.h"
 #include "solver/operator/sky_light.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -53,34 +54,36 @@ const emitters *operator_emitters_of(const lam_operator *op) {
 static lam_status check_light(const emitter_arrays *a, size_t n, size_t n_channels, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t rows = n_channels * a->s;
-    if (a->s == 0) FAIL(error, LAM_ERR_FORMAT, "/operator/names is empty, there must be an emitter");
-    if (a->ends[0] != 0) FAIL(error, LAM_ERR_FORMAT, "/operator/E/indptr[0] must be 0");
+    if (a->s == 0) FAIL(error, LAM_ERR_FORMAT, STORE_OPERATOR "/names is empty, there must be an emitter");
+    if (a->ends[0] != 0) FAIL(error, LAM_ERR_FORMAT, STORE_OPERATOR "/E/indptr[0] must be 0");
     for (size_t row = 0; row < rows; row++) {
         if (a->ends[row + 1] < a->ends[row] || a->ends[row + 1] > a->ends[rows])
-            FAIL(error, LAM_ERR_FORMAT, "/operator/E: emission %zu ends before it begins", row);
+            FAIL(error, LAM_ERR_FORMAT, STORE_OPERATOR "/E: emission %zu ends before it begins", row);
         for (uint64_t e = a->ends[row]; e < a->ends[row + 1]; e++) {
             if (a->elements[e] >= n || (e > a->ends[row] && a->elements[e] <= a->elements[e - 1]))
                 FAIL(error, LAM_ERR_FORMAT,
-                     "/operator/E: emission %zu has element %u, must ascend and be below %zu", row,
+                     STORE_OPERATOR "/E: emission %zu has element %u, must ascend and be below %zu", row,
                      (unsigned)a->elements[e], n);
             if (!(a->values[e] > 0 && isfinite(a->values[e])))
-                FAIL(error, LAM_ERR_NUMERIC, "/operator/E: emission %zu has the value %g, must be above 0",
-                     row, (double)a->values[e]);
+                FAIL(error, LAM_ERR_NUMERIC,
+                     STORE_OPERATOR "/E: emission %zu has the value %g, must be above 0", row,
+                     (double)a->values[e]);
         }
     }
     for (size_t k = 0; a->L != NULL && k < rows * a->n_tiles; k++)
         if (!(a->L[k] >= 0 && isfinite(a->L[k])))
-            FAIL(error, LAM_ERR_NUMERIC, "/operator/L[%zu] = %g, must be at least 0", k, (double)a->L[k]);
+            FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/L[%zu] = %g, must be at least 0", k,
+                 (double)a->L[k]);
     if (a->L != NULL &&
         (a->sky == NULL || lam_sky_tiles(a->sky) != a->n_tiles || lam_sky_elements(a->sky) != n))
-        FAIL(error, LAM_ERR_FORMAT, "/operator/L is of %zu tiles, the store's sky is not", a->n_tiles);
+        FAIL(error, LAM_ERR_FORMAT, STORE_OPERATOR "/L is of %zu tiles, the store's sky is not", a->n_tiles);
     for (size_t k = 0; a->direct != NULL && k < a->s * n; k++)
         if (!(a->direct[k] >= 0 && isfinite(a->direct[k])))
-            FAIL(error, LAM_ERR_NUMERIC, "/operator/direct[%zu] = %g, must be at least 0", k,
+            FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/direct[%zu] = %g, must be at least 0", k,
                  (double)a->direct[k]);
     for (size_t c = 0; a->direct != NULL && c < n_channels; c++)
         if (!(a->exitance[c] >= 0 && isfinite(a->exitance[c])))
-            FAIL(error, LAM_ERR_NUMERIC, "/operator/exitance[%zu] = %g, must be at least 0", c,
+            FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/exitance[%zu] = %g, must be at least 0", c,
                  (double)a->exitance[c]);
 done:
     return status;
@@ -107,7 +110,7 @@ static lam_status make_panels(emitters *self, lam_error *error) {
             for (size_t k = 0; k < s; k++)
                 for (size_t i = first; i < n && i < first + 64; i++)
                     rows[i * s + k] = self->a.T[(c * s + k) * n + i];
-        snprintf(name, sizeof name, "/operator/B[%zu]", c);
+        snprintf(name, sizeof name, STORE_OPERATOR "/B[%zu]", c);
         TRY(panel_create(n, s, rows, name, &self->T[c], error));
     }
     free(self->a.T);
@@ -174,7 +177,7 @@ done:
 
 static lam_status load_emission(store *s, size_t rows, emitter_arrays *a, lam_error *error) {
     csr E;
-    const lam_status status = csr_load(s, "/operator/E", rows, &E, error);
+    const lam_status status = csr_load(s, STORE_OPERATOR "/E", rows, &E, error);
     if (status != LAM_OK) return status;
     a->ends = E.indptr;
     a->elements = E.indices;
@@ -188,29 +191,29 @@ static lam_status emitters_load(store *s, size_t n, size_t n_channels, const flo
     emitter_arrays a = {.s = 0};
     void *data = NULL;
     size_t dims[STORE_MAX_RANK] = {n_channels, SIZE_MAX, n};
-    TRY(store_read_texts(s, "/operator/names", &a.s, &a.names, error));
+    TRY(store_read_texts(s, STORE_OPERATOR "/names", &a.s, &a.names, error));
     dims[1] = a.s;
-    TRY(store_read(s, "/operator/B", STORE_F32, 3, dims, &data, error));
+    TRY(store_read(s, STORE_OPERATOR "/B", STORE_F32, 3, dims, &data, error));
     a.T = data;
     data = NULL;
     TRY(load_emission(s, n_channels * a.s, &a, error));
     for (size_t row = 0; row < n_channels * a.s; row++)
         for (uint64_t e = a.ends[row]; e < a.ends[row + 1] && e < a.ends[n_channels * a.s]; e++)
             if (a.elements[e] < n) a.T[row * n + a.elements[e]] -= a.values[e];
-    if (store_has(s, "/operator/L")) {
+    if (store_has(s, STORE_OPERATOR "/L")) {
         size_t tiles[STORE_MAX_RANK] = {n_channels, a.s, SIZE_MAX};
-        TRY(store_read(s, "/operator/L", STORE_F32, 3, tiles, &data, error));
+        TRY(store_read(s, STORE_OPERATOR "/L", STORE_F32, 3, tiles, &data, error));
         a.L = data;
         data = NULL;
         a.n_tiles = tiles[2];
         TRY(sky_load(s, n, &a.sky, error));
     }
-    if (store_has(s, "/operator/direct")) {
+    if (store_has(s, STORE_OPERATOR "/direct")) {
         size_t direct[STORE_MAX_RANK] = {a.s, n}, channels[STORE_MAX_RANK] = {n_channels};
-        TRY(store_read(s, "/operator/direct", STORE_F32, 2, direct, &data, error));
+        TRY(store_read(s, STORE_OPERATOR "/direct", STORE_F32, 2, direct, &data, error));
         a.direct = data;
         data = NULL;
-        TRY(store_read(s, "/operator/exitance", STORE_F32, 1, channels, &data, error));
+        TRY(store_read(s, STORE_OPERATOR "/exitance", STORE_F32, 1, channels, &data, error));
         a.exitance = data;
         data = NULL;
     }
@@ -228,8 +231,8 @@ static lam_status emitters_save(const lam_operator *op, store *s, lam_error *err
     const size_t n = op->n, C = op->n_channels, rows = C * a->s;
     const csr E = {.n = rows, .indptr = a->ends, .indices = a->elements, .data = a->values};
     const size_t dims[3] = {C, a->s, n}, tiles[3] = {C, a->s, a->n_tiles};
-    float *B = memory_allocate(rows, n * sizeof *B, "/operator/B", error), *by_row = NULL;
-    by_row = memory_allocate(n, a->s * sizeof *by_row, "/operator/B", error);
+    float *B = memory_allocate(rows, n * sizeof *B, STORE_OPERATOR "/B", error), *by_row = NULL;
+    by_row = memory_allocate(n, a->s * sizeof *by_row, STORE_OPERATOR "/B", error);
     if (B == NULL || by_row == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < C; c++) {
         panel_copy_rows(&self->T[c], by_row);
@@ -239,13 +242,13 @@ static lam_status emitters_save(const lam_operator *op, store *s, lam_error *err
     for (size_t row = 0; row < rows; row++)
         for (uint64_t e = a->ends[row]; e < a->ends[row + 1]; e++)
             B[row * n + a->elements[e]] += a->values[e];
-    TRY(store_write_texts(s, "/operator/names", a->s, (const char *const *)a->names, error));
-    TRY(store_write(s, "/operator/B", STORE_F32, 3, dims, B, error));
-    TRY(csr_save(&E, "/operator/E", s, error));
-    if (a->L != NULL) TRY(store_write(s, "/operator/L", STORE_F32, 3, tiles, a->L, error));
+    TRY(store_write_texts(s, STORE_OPERATOR "/names", a->s, (const char *const *)a->names, error));
+    TRY(store_write(s, STORE_OPERATOR "/B", STORE_F32, 3, dims, B, error));
+    TRY(csr_save(&E, STORE_OPERATOR "/E", s, error));
+    if (a->L != NULL) TRY(store_write(s, STORE_OPERATOR "/L", STORE_F32, 3, tiles, a->L, error));
     if (a->direct != NULL) {
-        TRY(store_write(s, "/operator/direct", STORE_F32, 2, dims + 1, a->direct, error));
-        TRY(store_write(s, "/operator/exitance", STORE_F32, 1, dims, a->exitance, error));
+        TRY(store_write(s, STORE_OPERATOR "/direct", STORE_F32, 2, dims + 1, a->direct, error));
+        TRY(store_write(s, STORE_OPERATOR "/exitance", STORE_F32, 1, dims, a->exitance, error));
     }
 done:
     free(B);

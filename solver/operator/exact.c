@@ -2,6 +2,7 @@
  * the other kinds. */
 #include "solver/linalg/panel.h"
 #include "solver/operator/operator.h"
+#include "store/groups.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -43,7 +44,7 @@ lam_status operator_exact_create(size_t n, size_t n_channels, const float *refle
             float M_ii = 1.0f + P_c[i * n + i];
             P_c[i * n + i] = M_ii - 1.0f;
         }
-        snprintf(name, sizeof name, "/operator/M[%zu]", c);
+        snprintf(name, sizeof name, STORE_OPERATOR "/M[%zu]", c);
         TRY(panel_create(n, n, P_c, name, &self->P[c], error));
     }
     *op = &self->base;
@@ -59,7 +60,7 @@ static lam_status exact_load(store *s, size_t n, size_t n_channels, const float 
     lam_status status = LAM_OK;
     void *data = NULL;
     size_t dims[STORE_MAX_RANK] = {n_channels, n, n};
-    TRY(store_read(s, "/operator/M", STORE_F32, 3, dims, &data, error));
+    TRY(store_read(s, STORE_OPERATOR "/M", STORE_F32, 3, dims, &data, error));
     float *P = data;
     for (size_t c = 0; c < n_channels; c++)
         for (size_t i = 0; i < n; i++) P[(c * n + i) * n + i] -= 1.0f;
@@ -77,8 +78,8 @@ static lam_status exact_save(const lam_operator *op, store *s, lam_error *error)
     size_t dims[3] = {op->n_channels, n, n};
     float *M = NULL;
     if (!size_multiply(n, n, &count) || !size_multiply(count, op->n_channels, &count))
-        FAIL(error, LAM_ERR_MEMORY, "/operator/M is larger than memory can have");
-    M = memory_allocate(count, sizeof *M, "/operator/M", error);
+        FAIL(error, LAM_ERR_MEMORY, STORE_OPERATOR "/M is larger than memory can have");
+    M = memory_allocate(count, sizeof *M, STORE_OPERATOR "/M", error);
     if (M == NULL) {
         status = LAM_ERR_MEMORY;
         goto done;
@@ -87,7 +88,7 @@ static lam_status exact_save(const lam_operator *op, store *s, lam_error *error)
         panel_copy_rows(&self->P[c], M + c * n * n);
         for (size_t i = 0; i < n; i++) M[(c * n + i) * n + i] += 1.0f;
     }
-    TRY(store_write(s, "/operator/M", STORE_F32, 3, dims, M, error));
+    TRY(store_write(s, STORE_OPERATOR "/M", STORE_F32, 3, dims, M, error));
 done:
     free(M);
     return status;

@@ -2,13 +2,14 @@
 
 #include "solver/base/work_area.h"
 #include "solver/linalg/panel_store.h"
+#include "store/groups.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const char *name_of_left(const factors *f) {
-    return f->core == NULL ? "/operator/Y" : "/operator/U";
+    return f->core == NULL ? STORE_OPERATOR "/Y" : STORE_OPERATOR "/U";
 }
 
 void factors_free(factors *f) {
@@ -26,7 +27,7 @@ static lam_status add_cores(size_t k, const store_view *core, factors *f, lam_er
     f->core = memory_allocate(f->n_channels, sizeof *f->core, "operator", error);
     if (f->core == NULL) return LAM_ERR_MEMORY;
     for (size_t c = 0; c < f->n_channels; c++) {
-        snprintf(name, sizeof name, "/operator/core[%zu]", c);
+        snprintf(name, sizeof name, STORE_OPERATOR "/core[%zu]", c);
         TRY(panel_from_view(k, k, PANEL_F32, core, c * k * k * sizeof(float), NULL, name, &f->core[c],
                             error));
     }
@@ -40,7 +41,7 @@ static lam_status copy_cores(const factors *f, float **core, lam_error *error) {
     if (f->core == NULL) return LAM_OK;
     /* The padded panels were allocated, so the square of k cannot overflow. */
     const size_t k = f->left.k;
-    float *rows = memory_allocate(f->n_channels, k * k * sizeof *rows, "/operator/core", error);
+    float *rows = memory_allocate(f->n_channels, k * k * sizeof *rows, STORE_OPERATOR "/core", error);
     if (rows == NULL) return LAM_ERR_MEMORY;
     for (size_t c = 0; c < f->n_channels; c++) panel_copy_rows(&f->core[c], rows + c * k * k);
     *core = rows;
@@ -51,7 +52,7 @@ lam_status factors_create(size_t n, size_t k, size_t n_channels, float *left, fl
                           lam_error *error) {
     lam_status status = LAM_OK;
     factors f = {.n_channels = n_channels};
-    TRY(panel_create(n, k, left, core == NULL ? "/operator/Y" : "/operator/U", &f.left, error));
+    TRY(panel_create(n, k, left, core == NULL ? STORE_OPERATOR "/Y" : STORE_OPERATOR "/U", &f.left, error));
     /* Gone as soon as the panel stands, so that it is not there twice for longer than that. */
     free(left);
     left = NULL;
@@ -71,7 +72,7 @@ lam_status factors_load(store *s, size_t n, size_t n_channels, factors *out, lam
     store_view core = {.data = NULL};
     factors f = {.n_channels = n_channels};
     size_t k = SIZE_MAX;
-    TRY(store_get_text(s, "/operator", "form", &form, error));
+    TRY(store_get_text(s, STORE_OPERATOR, "form", &form, error));
     const bool folded = strcmp(form, "folded") == 0;
     if (!folded && strcmp(form, "factored") != 0)
         FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the unknown form '%s', must be folded or factored",
@@ -80,11 +81,11 @@ lam_status factors_load(store *s, size_t n, size_t n_channels, factors *out, lam
         FAIL(error, LAM_ERR_FORMAT,
              "%s: /operator is folded, which needs 1 channel, /mesh/reflectance has %zu", store_path(s),
              n_channels);
-    TRY(panel_load(s, folded ? "/operator/Y" : "/operator/U", n, &k, &f.left, error));
+    TRY(panel_load(s, folded ? STORE_OPERATOR "/Y" : STORE_OPERATOR "/U", n, &k, &f.left, error));
     TRY(panel_check_precision(s, f.left.precision, error));
     if (!folded)
-        TRY(store_read_view(s, "/operator/core", STORE_F32, 3, (size_t[STORE_MAX_RANK]){n_channels, k, k},
-                            &core, error));
+        TRY(store_read_view(s, STORE_OPERATOR "/core", STORE_F32, 3,
+                            (size_t[STORE_MAX_RANK]){n_channels, k, k}, &core, error));
     TRY(add_cores(k, &core, &f, error));
     *out = f;
     f = (factors){0};
@@ -99,10 +100,10 @@ lam_status factors_save(const factors *f, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t dims[3] = {f->n_channels, f->left.k, f->left.k};
     float *core = NULL;
-    TRY(store_set_integer(s, "/operator", "rank", (int64_t)f->left.k, error));
+    TRY(store_set_integer(s, STORE_OPERATOR, "rank", (int64_t)f->left.k, error));
     TRY(panel_save(&f->left, s, name_of_left(f), error));
     TRY(copy_cores(f, &core, error));
-    if (core != NULL) TRY(store_write(s, "/operator/core", STORE_F32, 3, dims, core, error));
+    if (core != NULL) TRY(store_write(s, STORE_OPERATOR "/core", STORE_F32, 3, dims, core, error));
 done:
     free(core);
     return status;

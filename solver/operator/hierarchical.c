@@ -2,6 +2,7 @@
  * (Gortler et al. 1993; Beylkin et al. 1991) and K sparse, as most of its coefficients lie below the
  * threshold. An answer is two transforms of O(n) and a product with K. */
 #include "solver/operator/hierarchical.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -171,12 +172,12 @@ static lam_status load_tiles(hierarchical *self, store *s, lam_error *error) {
              "groups/rows has %zu coefficients, must have all %zu of its nodes and of the root", count,
              self->plan.n_used);
     for (size_t c = 0; c < self->base.n_channels; c++) {
-        snprintf(group, sizeof group, "/operator/K/%zu", c);
+        snprintf(group, sizeof group, STORE_OPERATOR "/K/%zu", c);
         if (!store_has(s, group)) self->of_channel[c] = operator_like_channel(n, self->base.reflectance, c);
     }
     for (size_t c = 0; c < self->base.n_channels; c++) {
         if (self->of_channel[c] != c) continue;
-        snprintf(group, sizeof group, "/operator/K/%zu", c);
+        snprintf(group, sizeof group, STORE_OPERATOR "/K/%zu", c);
         TRY(hierarchical_load_tiles(s, group, self->n_groups, self->groups, &tiles, error));
         TRY(take_tiles(self, c, &tiles, error));
     }
@@ -192,9 +193,9 @@ static lam_status read_area(store *s, size_t n, double **out, uint32_t **out_ord
     double *placed = memory_allocate(n, sizeof *placed, "operator", error);
     size_t dims[STORE_MAX_RANK] = {n};
     if (placed == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(store_read(s, "/mesh/area", STORE_F64, 1, dims, &area, error));
-    if (store_has(s, "/operator/order"))
-        TRY(store_read(s, "/operator/order", STORE_U32, 1, dims, &order, error));
+    TRY(store_read(s, STORE_MESH "/area", STORE_F64, 1, dims, &area, error));
+    if (store_has(s, STORE_OPERATOR "/order"))
+        TRY(store_read(s, STORE_OPERATOR "/order", STORE_U32, 1, dims, &order, error));
     for (size_t p = 0; p < n; p++) {
         const size_t i = order != NULL ? ((uint32_t *)order)[p] : p;
         if (i >= n) FAIL(error, LAM_ERR_NUMERIC, "order[%zu] = %zu, must be below %zu", p, i, n);
@@ -219,7 +220,7 @@ static lam_status hierarchical_load(store *s, size_t n, size_t n_channels, const
     hierarchical *self = NULL;
     TRY(read_area(s, n, &area, &order, error));
     TRY(start(n, n_channels, reflectance, area, order, &self, error));
-    TRY(wavelets_load(s, "/operator/basis", n, &self->basis, error));
+    TRY(wavelets_load(s, STORE_OPERATOR "/basis", n, &self->basis, error));
     TRY(mean_correction_load(s, n, n_channels, &self->even, error));
     TRY(lift_even_light(self, error));
     TRY(load_tiles(self, s, error));
@@ -237,11 +238,11 @@ static lam_status hierarchical_save(const lam_operator *op, store *s, lam_error 
     const hierarchical *self = (const hierarchical *)op;
     char group[48];
     tile_matrix tiles = {.count = {0}};
-    TRY(wavelets_save(&self->basis, "/operator/basis", s, error));
+    TRY(wavelets_save(&self->basis, STORE_OPERATOR "/basis", s, error));
     TRY(hierarchical_save_groups(self->n_groups, self->groups, self->step, s, error));
     for (size_t c = 0; c < op->n_channels; c++) {
         if (self->of_channel[c] != c) continue;
-        snprintf(group, sizeof group, "/operator/K/%zu", c);
+        snprintf(group, sizeof group, STORE_OPERATOR "/K/%zu", c);
         TRY(tiled_upper(&self->K[c], &tiles, error));
         TRY(hierarchical_save_tiles(&tiles, self->n_groups, group, s, error));
         tile_matrix_free(&tiles);

@@ -1,5 +1,6 @@
 /* The arrays of K in a store: tiles of signed bytes (tiles.h). */
 #include "solver/operator/hierarchical.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -213,8 +214,9 @@ done:
 lam_status hierarchical_save_groups(size_t n_groups, const tile_group *groups, const float *step, store *s,
                                     lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(store_write(s, "/operator/groups/rows", STORE_U32, 2, (const size_t[]){n_groups, 2}, groups, error));
-    TRY(store_write(s, "/operator/groups/step", STORE_F32, 1, &n_groups, step, error));
+    TRY(store_write(s, STORE_OPERATOR "/groups/rows", STORE_U32, 2, (const size_t[]){n_groups, 2}, groups,
+                    error));
+    TRY(store_write(s, STORE_OPERATOR "/groups/step", STORE_F32, 1, &n_groups, step, error));
 done:
     return status;
 }
@@ -227,8 +229,8 @@ lam_status hierarchical_load_groups(store *s, size_t n, size_t *n_groups, tile_g
     lam_status status = LAM_OK;
     void *rows = NULL, *steps = NULL;
     size_t dims[STORE_MAX_RANK] = {SIZE_MAX, 2}, end = 0;
-    TRY(store_read(s, "/operator/groups/rows", STORE_U32, 2, dims, &rows, error));
-    TRY(store_read(s, "/operator/groups/step", STORE_F32, 1, dims, &steps, error));
+    TRY(store_read(s, STORE_OPERATOR "/groups/rows", STORE_U32, 2, dims, &rows, error));
+    TRY(store_read(s, STORE_OPERATOR "/groups/step", STORE_F32, 1, dims, &steps, error));
     const tile_group *const found = rows;
     for (size_t g = 0; g < dims[0]; g++) {
         const float by = ((float *)steps)[g];

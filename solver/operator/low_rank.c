@@ -1,6 +1,7 @@
 /* kind "low_rank": B = E + P E with P of rank k (Aguerre 2016, eq. 2.8); V is [n][k]. */
 #include "solver/linalg/panel_store.h"
 #include "solver/operator/factors.h"
+#include "store/groups.h"
 
 #include <stdlib.h>
 
@@ -45,7 +46,7 @@ lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channe
     factors f = {.core = NULL};
     panel V_panel = {0};
     TRY(factors_create(n, k, n_channels, left, core, &f, error));
-    TRY(panel_create(n, k, V, "/operator/V", &V_panel, error));
+    TRY(panel_create(n, k, V, STORE_OPERATOR "/V", &V_panel, error));
     free(V);
     V = NULL;
     TRY(assemble(n, reflectance, &f, &V_panel, op, error));
@@ -67,7 +68,7 @@ static lam_status low_rank_load(store *s, size_t n, size_t n_channels, const flo
     panel V = {0};
     TRY(factors_load(s, n, n_channels, &f, error));
     size_t k = f.left.k;
-    TRY(panel_load(s, "/operator/V", n, &k, &V, error));
+    TRY(panel_load(s, STORE_OPERATOR "/V", n, &k, &V, error));
     if (V.precision != f.left.precision)
         FAIL(error, LAM_ERR_FORMAT, "%s: /operator has one array of %s and one of %s, must be the same",
              store_path(s), panel_precision_name(f.left.precision), panel_precision_name(V.precision));
@@ -82,7 +83,7 @@ static lam_status low_rank_save(const lam_operator *op, store *s, lam_error *err
     lam_status status = LAM_OK;
     const low_rank *self = (const low_rank *)op;
     TRY(factors_save(&self->f, s, error));
-    TRY(panel_save(&self->V, s, "/operator/V", error));
+    TRY(panel_save(&self->V, s, STORE_OPERATOR "/V", error));
 done:
     return status;
 }
@@ -94,7 +95,7 @@ static lam_status low_rank_narrow(const lam_operator *op, panel_precision precis
     factors f = {.core = NULL};
     panel V = {0};
     TRY(factors_convert(&self->f, precision, &f, error));
-    TRY(panel_convert(&self->V, precision, "/operator/V", &V, error));
+    TRY(panel_convert(&self->V, precision, STORE_OPERATOR "/V", &V, error));
     TRY(assemble(op->n, op->reflectance, &f, &V, out, error));
 done:
     factors_free(&f);

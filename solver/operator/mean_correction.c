@@ -2,6 +2,7 @@
 
 #include "solver/base/half.h"
 
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -59,8 +60,9 @@ lam_status mean_correction_save(const mean_correction *e, store *s, lam_error *e
     halves = memory_allocate(count, sizeof *halves, "operator", error);
     if (halves == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < count; k++) halves[k] = half_of_float(e->missing[k]);
-    TRY(store_write(s, "/operator/missing", STORE_F16, 2, (size_t[]){e->n_channels, e->n}, halves, error));
-    TRY(store_write(s, "/operator/even_light", STORE_F64, 1, &e->n_channels, e->light, error));
+    TRY(store_write(s, STORE_OPERATOR "/missing", STORE_F16, 2, (size_t[]){e->n_channels, e->n}, halves,
+                    error));
+    TRY(store_write(s, STORE_OPERATOR "/even_light", STORE_F64, 1, &e->n_channels, e->light, error));
 done:
     free(halves);
     return status;
@@ -71,13 +73,13 @@ lam_status mean_correction_load(store *s, size_t n, size_t n_channels, mean_corr
     lam_status status = LAM_OK;
     mean_correction e = {.n = 0};
     void *halves = NULL, *light = NULL;
-    if (!store_has(s, "/operator/missing")) {
+    if (!store_has(s, STORE_OPERATOR "/missing")) {
         *out = e;
         return LAM_OK;
     }
     TRY(reserve(n, n_channels, &e, error));
-    TRY(store_read(s, "/operator/missing", STORE_F16, 2, (size_t[]){n_channels, n}, &halves, error));
-    TRY(store_read(s, "/operator/even_light", STORE_F64, 1, (size_t[]){n_channels}, &light, error));
+    TRY(store_read(s, STORE_OPERATOR "/missing", STORE_F16, 2, (size_t[]){n_channels, n}, &halves, error));
+    TRY(store_read(s, STORE_OPERATOR "/even_light", STORE_F64, 1, (size_t[]){n_channels}, &light, error));
     for (size_t k = 0; k < n * n_channels; k++) e.missing[k] = float_of_half(((const uint16_t *)halves)[k]);
     memcpy(e.light, light, n_channels * sizeof *e.light);
     TRY(check(&e, error));

@@ -1,6 +1,7 @@
 /* The list of operator kinds, and what all of them share: loading, saving, mesh order.
  * Knows no kind from inside. */
 #include "solver/operator/operator.h"
+#include "store/groups.h"
 
 #include <float.h>
 #include <stdlib.h>
@@ -94,13 +95,13 @@ done:
 static lam_status load_kind(store *s, const operator_kind **kind, lam_error *error) {
     lam_status status = LAM_OK;
     char *name = NULL, *layout = NULL;
-    TRY(store_get_text(s, "/operator", "kind", &name, error));
+    TRY(store_get_text(s, STORE_OPERATOR, "kind", &name, error));
     *kind = operator_kind_find(name);
     if (*kind == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the unknown kind '%s'; precompute it again",
              store_path(s), name);
-    if (store_has_attribute(s, "/operator", "layout")) {
-        TRY(store_get_text(s, "/operator", "layout", &layout, error));
+    if (store_has_attribute(s, STORE_OPERATOR, "layout")) {
+        TRY(store_get_text(s, STORE_OPERATOR, "layout", &layout, error));
         if (strcmp(layout, "rows") != 0)
             FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the unknown layout '%s'", store_path(s), layout);
     }
@@ -117,19 +118,19 @@ lam_status operator_load(store *s, lam_operator **out, lam_error *error) {
     void *reflectance = NULL, *order = NULL;
     size_t dims[STORE_MAX_RANK] = {SIZE_MAX, SIZE_MAX};
     lam_error cause = {.message = ""};
-    if (!store_has(s, "/operator"))
+    if (!store_has(s, STORE_OPERATOR))
         FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", store_path(s));
     TRY(load_kind(s, &kind, error));
-    TRY(store_read(s, "/mesh/reflectance", STORE_F32, 2, dims, &reflectance, error));
+    TRY(store_read(s, STORE_MESH "/reflectance", STORE_F32, 2, dims, &reflectance, error));
     size_t n_channels = dims[0], n = dims[1];
     if (n == 0 || n_channels == 0 || n > UINT32_MAX)
         FAIL(error, LAM_ERR_FORMAT,
              "%s: /mesh/reflectance is %zu x %zu, must be channels x elements, not empty", store_path(s),
              n_channels, n);
     status = kind->load(s, n, n_channels, reflectance, &op, &cause);
-    if (status == LAM_OK && store_has(s, "/operator/order")) {
+    if (status == LAM_OK && store_has(s, STORE_OPERATOR "/order")) {
         dims[0] = n;
-        status = store_read(s, "/operator/order", STORE_U32, 1, dims, &order, &cause);
+        status = store_read(s, STORE_OPERATOR "/order", STORE_U32, 1, dims, &order, &cause);
         if (status == LAM_OK) status = operator_set_order(op, order, &cause);
     }
     /* Values that cannot be, met in a file, make it a file that is not ours. */
@@ -148,12 +149,13 @@ lam_status operator_save(const lam_operator *op, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     operator_description description = {0};
     op->kind->describe(op, &description);
-    TRY(store_set_text(s, "/operator", "kind", op->kind->name, error));
-    if (description.form != NULL) TRY(store_set_text(s, "/operator", "form", description.form, error));
-    TRY(store_set_text(s, "/operator", "layout", "rows", error));
+    TRY(store_set_text(s, STORE_OPERATOR, "kind", op->kind->name, error));
+    if (description.form != NULL) TRY(store_set_text(s, STORE_OPERATOR, "form", description.form, error));
+    TRY(store_set_text(s, STORE_OPERATOR, "layout", "rows", error));
     if (description.precision != NULL)
-        TRY(store_set_text(s, "/operator", "precision", description.precision, error));
-    if (op->order != NULL) TRY(store_write(s, "/operator/order", STORE_U32, 1, &op->n, op->order, error));
+        TRY(store_set_text(s, STORE_OPERATOR, "precision", description.precision, error));
+    if (op->order != NULL)
+        TRY(store_write(s, STORE_OPERATOR "/order", STORE_U32, 1, &op->n, op->order, error));
     TRY(op->kind->save(op, s, error));
 done:
     return status;

@@ -1,5 +1,6 @@
 #include "solver/operator/sky_light.h"
 
+#include "store/groups.h"
 #include "store/status.h"
 #include "store/store_map.h"
 
@@ -19,11 +20,11 @@ lam_status sky_load(store *s, size_t n, lam_sky **out, lam_error *error) {
     size_t dims[STORE_MAX_RANK] = {SIZE_MAX, n};
     store_view view = {.data = NULL};
     lam_sky *made = NULL;
-    if (!store_has(s, "/sky")) {
+    if (!store_has(s, STORE_SKY)) {
         *out = NULL;
         return LAM_OK;
     }
-    TRY(store_read_view(s, "/sky/first_bounce", STORE_F32, 2, dims, &view, error));
+    TRY(store_read_view(s, STORE_SKY "/first_bounce", STORE_F32, 2, dims, &view, error));
     const float *values = view.data;
     if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce has no tiles", store_path(s));
     /* A mapped array is compared with its checksums later; its writer has checked the values. */
@@ -67,7 +68,7 @@ lam_status lam_sky_open(const char *path, lam_sky **sky, lam_error *error) {
     if (path == NULL || sky == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "a path and a place for the sky are needed");
     TRY(store_open(path, &s, error));
-    TRY(store_array_info(s, "/mesh/area", &type, &rank, dims, error));
+    TRY(store_array_info(s, STORE_MESH "/area", &type, &rank, dims, error));
     if (rank != 1)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/area has %d dimensions, must have 1", store_path(s), rank);
     TRY(sky_load(s, dims[0], sky, error));

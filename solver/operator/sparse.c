@@ -5,6 +5,7 @@
 
 #include "solver/base/work_area.h"
 #include "solver/linalg/sparse_product.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -12,7 +13,7 @@
 #include <string.h>
 
 /* Another name than without parts, so that programs that know of none refuse the store. */
-#define WEIGHT_IN_PART "/operator/delta_weight_in_part"
+#define WEIGHT_IN_PART STORE_OPERATOR "/delta_weight_in_part"
 
 typedef struct sparse {
     lam_operator base;
@@ -54,16 +55,16 @@ lam_status operator_sparse_create(size_t n, size_t n_channels, const float *refl
     self->base.kind = &operator_sparse;
     TRY(operator_init(&self->base, &operator_sparse, n, n_channels, reflectance, error));
     for (size_t c = 0; c < n_channels; c++) {
-        snprintf(name, sizeof name, "/operator/M/%zu", c);
+        snprintf(name, sizeof name, STORE_OPERATOR "/M/%zu", c);
         TRY(csr_check(&arrays->M[c], (size_t)arrays->M[c].indptr[n], name, error));
     }
     if (arrays->delta != NULL) {
-        TRY(check_finite(arrays->delta, n * n_channels, "/operator/delta", error));
-        TRY(check_finite(arrays->weight, n, "/operator/delta_weight", error));
+        TRY(check_finite(arrays->delta, n * n_channels, STORE_OPERATOR "/delta", error));
+        TRY(check_finite(arrays->weight, n, STORE_OPERATOR "/delta_weight", error));
     }
     for (size_t p = 0; arrays->part != NULL && p < n; p++) {
         if (arrays->part[p] >= n)
-            FAIL(error, LAM_ERR_NUMERIC, "/operator/delta_part[%zu] = %u, must be below %zu", p,
+            FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/delta_part[%zu] = %u, must be below %zu", p,
                  arrays->part[p], n);
         if (arrays->part[p] >= self->n_parts) self->n_parts = (size_t)arrays->part[p] + 1;
     }
@@ -85,20 +86,20 @@ static lam_status sparse_load(store *s, size_t n, size_t n_channels, const float
     lam_status status = LAM_OK;
     char name[48];
     void *delta = NULL, *weight = NULL, *part = NULL;
-    const bool parts = store_has(s, "/operator/delta_part");
+    const bool parts = store_has(s, STORE_OPERATOR "/delta_part");
     sparse_arrays arrays = {.M = memory_allocate(n_channels, sizeof *arrays.M, "operator", error)};
     if (arrays.M == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < n_channels; c++) {
-        snprintf(name, sizeof name, "/operator/M/%zu", c);
+        snprintf(name, sizeof name, STORE_OPERATOR "/M/%zu", c);
         TRY(csr_load(s, name, n, &arrays.M[c], error));
     }
-    if (store_has(s, "/operator/delta")) {
-        TRY(store_read(s, "/operator/delta", STORE_F32, 2, (size_t[STORE_MAX_RANK]){n_channels, n}, &delta,
-                       error));
-        TRY(store_read(s, parts ? WEIGHT_IN_PART : "/operator/delta_weight", STORE_F32, 1,
+    if (store_has(s, STORE_OPERATOR "/delta")) {
+        TRY(store_read(s, STORE_OPERATOR "/delta", STORE_F32, 2, (size_t[STORE_MAX_RANK]){n_channels, n},
+                       &delta, error));
+        TRY(store_read(s, parts ? WEIGHT_IN_PART : STORE_OPERATOR "/delta_weight", STORE_F32, 1,
                        (size_t[STORE_MAX_RANK]){n}, &weight, error));
         if (parts)
-            TRY(store_read(s, "/operator/delta_part", STORE_U32, 1, (size_t[STORE_MAX_RANK]){n}, &part,
+            TRY(store_read(s, STORE_OPERATOR "/delta_part", STORE_U32, 1, (size_t[STORE_MAX_RANK]){n}, &part,
                            error));
     }
     arrays.delta = delta;
@@ -120,15 +121,15 @@ static lam_status sparse_save(const lam_operator *op, store *s, lam_error *error
     const size_t n = op->n, both[2] = {op->n_channels, n};
     char name[48];
     for (size_t c = 0; c < op->n_channels; c++) {
-        snprintf(name, sizeof name, "/operator/M/%zu", c);
+        snprintf(name, sizeof name, STORE_OPERATOR "/M/%zu", c);
         TRY(csr_save(&self->a.M[c], name, s, error));
     }
     if (self->a.delta == NULL) goto done;
-    TRY(store_write(s, "/operator/delta", STORE_F32, 2, both, self->a.delta, error));
-    TRY(store_write(s, self->a.part != NULL ? WEIGHT_IN_PART : "/operator/delta_weight", STORE_F32, 1, &n,
-                    self->a.weight, error));
+    TRY(store_write(s, STORE_OPERATOR "/delta", STORE_F32, 2, both, self->a.delta, error));
+    TRY(store_write(s, self->a.part != NULL ? WEIGHT_IN_PART : STORE_OPERATOR "/delta_weight", STORE_F32, 1,
+                    &n, self->a.weight, error));
     if (self->a.part != NULL)
-        TRY(store_write(s, "/operator/delta_part", STORE_U32, 1, &n, self->a.part, error));
+        TRY(store_write(s, STORE_OPERATOR "/delta_part", STORE_U32, 1, &n, self->a.part, error));
 done:
     return status;
 }

@@ -4,6 +4,7 @@
 
 #include "solver/linalg/segments.h"
 #include "solver/operator/factors.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -51,7 +52,7 @@ static lam_status assemble(size_t n, const float *reflectance, factors *f, two_m
     arrays->weight = NULL;
     for (size_t p = 0; arrays->coherence != NULL && p < k; p++)
         if (!(arrays->coherence[p] >= 0 && arrays->coherence[p] <= 1))
-            FAIL(error, LAM_ERR_NUMERIC, "/operator/coherence[%zu] = %g, must be from 0 to 1", p,
+            FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/coherence[%zu] = %g, must be from 0 to 1", p,
                  (double)arrays->coherence[p]);
     self->coherence = arrays->coherence;
     arrays->coherence = NULL;
@@ -87,11 +88,12 @@ static lam_status two_mesh_load(store *s, size_t n, size_t n_channels, const flo
     if (k == 0 || k > n)
         FAIL(error, LAM_ERR_FORMAT, "%s: /operator has %zu patches, must be at least 1 and at most %zu",
              store_path(s), k, n);
-    TRY(store_read(s, "/operator/I", STORE_U64, 1, (size_t[STORE_MAX_RANK]){k + 1}, &I, error));
-    if (store_has(s, "/operator/weight"))
-        TRY(store_read(s, "/operator/weight", STORE_F32, 1, (size_t[STORE_MAX_RANK]){n}, &weight, error));
-    if (store_has(s, "/operator/coherence"))
-        TRY(store_read(s, "/operator/coherence", STORE_F32, 1, (size_t[STORE_MAX_RANK]){k}, &coherence,
+    TRY(store_read(s, STORE_OPERATOR "/I", STORE_U64, 1, (size_t[STORE_MAX_RANK]){k + 1}, &I, error));
+    if (store_has(s, STORE_OPERATOR "/weight"))
+        TRY(store_read(s, STORE_OPERATOR "/weight", STORE_F32, 1, (size_t[STORE_MAX_RANK]){n}, &weight,
+                       error));
+    if (store_has(s, STORE_OPERATOR "/coherence"))
+        TRY(store_read(s, STORE_OPERATOR "/coherence", STORE_F32, 1, (size_t[STORE_MAX_RANK]){k}, &coherence,
                        error));
     two_mesh_arrays arrays = {.begin = I, .weight = weight, .coherence = coherence};
     I = weight = coherence = NULL;
@@ -109,11 +111,11 @@ static lam_status two_mesh_save(const lam_operator *op, store *s, lam_error *err
     const two_mesh *self = (const two_mesh *)op;
     const size_t k = self->f.left.k, n_ends = k + 1;
     TRY(factors_save(&self->f, s, error));
-    TRY(store_write(s, "/operator/I", STORE_U64, 1, &n_ends, self->V.begin, error));
+    TRY(store_write(s, STORE_OPERATOR "/I", STORE_U64, 1, &n_ends, self->V.begin, error));
     if (self->V.weight != NULL)
-        TRY(store_write(s, "/operator/weight", STORE_F32, 1, &op->n, self->V.weight, error));
+        TRY(store_write(s, STORE_OPERATOR "/weight", STORE_F32, 1, &op->n, self->V.weight, error));
     if (self->coherence != NULL)
-        TRY(store_write(s, "/operator/coherence", STORE_F32, 1, &k, self->coherence, error));
+        TRY(store_write(s, STORE_OPERATOR "/coherence", STORE_F32, 1, &k, self->coherence, error));
 done:
     return status;
 }

@@ -15,6 +15,7 @@
  * squares with the other errors, which are independent of it. */
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/coincident.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -141,5 +142,5 @@ done:
 lam_status state_save_overlap(const precompute_state *state, store *s, lam_error *error) {
     const bool stated = state->probes > 0 || state->position_errors != NULL;
     if (!(state->repair > 0) || !stated) return LAM_OK;
-    return store_set_number(s, "/error", "repair", state->repair, error);
+    return store_set_number(s, STORE_ERROR, "repair", state->repair, error);
 }

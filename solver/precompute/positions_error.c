@@ -1,6 +1,7 @@
 /* The errors of the positions of a light and of mixtures of them, from the covariance of the walks. */
 #include "solver/base/random.h"
 #include "solver/precompute/precompute_state.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -150,9 +151,9 @@ static lam_status save_light(const moving_light *l, size_t n_channels, store *s,
             for (size_t e = 0; e < 3; e++) pose[12 * k + 4 * d + e] = l->pose[k].turn[d][e];
             pose[12 * k + 4 * d + 3] = l->pose[k].move[d];
         }
-    TRY(store_write(s, "/positions/polygon", STORE_F64, 2, corners, l->corner, error));
-    TRY(store_write(s, "/positions/emission", STORE_F64, 1, &n_channels, l->emission, error));
-    TRY(store_write(s, "/positions/pose", STORE_F64, 3, poses, pose, error));
+    TRY(store_write(s, STORE_POSITIONS "/polygon", STORE_F64, 2, corners, l->corner, error));
+    TRY(store_write(s, STORE_POSITIONS "/emission", STORE_F64, 1, &n_channels, l->emission, error));
+    TRY(store_write(s, STORE_POSITIONS "/pose", STORE_F64, 3, poses, pose, error));
 done:
     free(pose);
     return status;
@@ -164,14 +165,15 @@ lam_status state_save_positions(const precompute_state *state, store *s, lam_err
     const size_t positions = e->n_positions, dims[2] = {positions, positions};
     if (state->position_errors == NULL) return LAM_OK;
     TRY(save_light(&state->light, e->n_channels, s, error));
-    TRY(store_write(s, "/error/emitters/covariance", STORE_F64, 2, dims, e->covariance, error));
+    TRY(store_write(s, STORE_ERROR "/emitters/covariance", STORE_F64, 2, dims, e->covariance, error));
     if (e->of_groups != NULL) {
         const size_t by_group[3] = {state->m.n_groups, positions, positions};
-        TRY(store_write(s, "/error/emitters/groups", STORE_F64, 3, by_group, e->of_groups, error));
-        TRY(store_write(s, "/error/emitters/group_means", STORE_F64, 3, by_group, e->of_means, error));
+        TRY(store_write(s, STORE_ERROR "/emitters/groups", STORE_F64, 3, by_group, e->of_groups, error));
+        TRY(store_write(s, STORE_ERROR "/emitters/group_means", STORE_F64, 3, by_group, e->of_means, error));
     }
-    TRY(store_write(s, "/error/emitters/relative", STORE_F64, 1, &positions, state->position_errors, error));
-    TRY(store_write(s, "/error/emitters/indirect", STORE_F64, 1, &positions,
+    TRY(store_write(s, STORE_ERROR "/emitters/relative", STORE_F64, 1, &positions, state->position_errors,
+                    error));
+    TRY(store_write(s, STORE_ERROR "/emitters/indirect", STORE_F64, 1, &positions,
                     state->position_errors + positions, error));
 done:
     return status;

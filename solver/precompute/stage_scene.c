@@ -5,6 +5,7 @@
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/import/import.h"
 #include "solver/scene/import/picture_files.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -423,7 +424,7 @@ lam_status stage_load_store(precompute_state *state, lam_error *error) {
     form_factor_storage how = STORAGE_ROWS;
     TRY(store_open(state->options->input, &s, error));
     TRY(mesh_load(s, &state->m, &row_sums, error));
-    if (store_has(s, "/form_factors")) {
+    if (store_has(s, STORE_FORM_FACTORS)) {
         TRY(form_factors_storage(s, &how, error));
         TRY(recipe_load(s, &recipe_of_form_factors, &state->f.recipe, error));
         TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
@@ -435,7 +436,7 @@ lam_status stage_load_store(precompute_state *state, lam_error *error) {
         TRY(form_factors_load(s, &state->m, state_large_place(state), &state->f, error));
         TRY(form_factors_expand(&state->f, state->m.area, error));
     }
-    if (store_has(s, "/sky")) TRY(sky_bounce_load(s, state->m.n, &state->f.sky, error));
+    if (store_has(s, STORE_SKY)) TRY(sky_bounce_load(s, state->m.n, &state->f.sky, error));
     if (state->options->reflectance >= 0) mesh_pictures_drop(&state->m);
     if (state->options->reflectance >= 0)
         for (size_t i = 0; i < state->m.n * state->m.n_channels; i++)

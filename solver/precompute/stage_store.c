@@ -1,5 +1,6 @@
 /* The store that a precompute writes, and its seal. */
 #include "solver/precompute/precompute_state.h"
+#include "store/groups.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,10 +10,10 @@ static lam_status save_report(const precompute_state *state, store *s, lam_error
     lam_status status = LAM_OK;
     operator_description about;
     operator_describe(state->op, &about);
-    TRY(store_set_text(s, "/operator", "method", state->built.method, error));
-    TRY(store_set_text(s, "/operator", "reason", state->built.reason, error));
+    TRY(store_set_text(s, STORE_OPERATOR, "method", state->built.method, error));
+    TRY(store_set_text(s, STORE_OPERATOR, "reason", state->built.reason, error));
     TRY(report_save(&state->built, s, error));
-    if (about.density >= 0) TRY(store_set_number(s, "/operator", "density", about.density, error));
+    if (about.density >= 0) TRY(store_set_number(s, STORE_OPERATOR, "density", about.density, error));
     if (state->light.n > 0) { /* there are no form factors */
         TRY(recipe_save_closure(state->options->closed, recipe_of_operator.group, s, error));
         goto done;
@@ -57,7 +58,7 @@ lam_status stage_store(precompute_state *state, lam_error *error) {
     TRY(store_set_integer(s, "/", "seed", (int64_t)o->seed, error));
     TRY(store_set_number(s, "/", "unit", state->m.unit, error));
     TRY(mesh_save(&state->m, state->f.row_sums, s, error));
-    if (o->reflectance >= 0) TRY(store_set_number(s, "/mesh", "reflectance_given", o->reflectance, error));
+    if (o->reflectance >= 0) TRY(store_set_number(s, STORE_MESH, "reflectance_given", o->reflectance, error));
     TRY(terminal_check(error));
     if (state_keeps(o) && state->blocks.n > 0) {
         TRY(form_factors_save_blocks(&state->f, &state->blocks, s, error));

@@ -3,6 +3,7 @@
 #include "solver/operator/refine/form_factor_rows.h"
 #include "solver/operator/two_mesh.h"
 #include "solver/render/tone.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -94,7 +95,7 @@ lam_status store_view_visible(store *s, size_t n, float **values, double *mean, 
     form_factor_storage how = STORAGE_ROWS;
     float *counts = NULL;
     size_t dims[STORE_MAX_RANK] = {n + 1}, entries[STORE_MAX_RANK] = {SIZE_MAX};
-    if (!store_has(s, FORM_FACTORS_GROUP))
+    if (!store_has(s, STORE_FORM_FACTORS))
         FAIL(error, LAM_ERR_ARGUMENT, "%s: keeps no form factors; precompute it with --keep-form-factors",
              store_path(s));
     TRY(form_factors_storage(s, &how, error));
@@ -103,8 +104,8 @@ lam_status store_view_visible(store *s, size_t n, float **values, double *mean, 
              "%s: blocks of form factors do not tell which elements see each other; precompute it with "
              "--form-factors rays --keep-form-factors",
              store_path(s));
-    TRY(store_read(s, "/form_factors/indptr", STORE_U64, 1, dims, &ends, error));
-    TRY(store_read(s, "/form_factors/indices", STORE_U32, 1, entries, &columns, error));
+    TRY(store_read(s, STORE_FORM_FACTORS "/indptr", STORE_U64, 1, dims, &ends, error));
+    TRY(store_read(s, STORE_FORM_FACTORS "/indices", STORE_U32, 1, entries, &columns, error));
     counts = memory_allocate(n, sizeof *counts, "counts", error);
     if (counts == NULL) TRY(LAM_ERR_MEMORY);
     const uint64_t *row = ends;

@@ -4,6 +4,7 @@
 
 #include "solver/scene/coincident.h"
 #include "solver/scene/texture.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,24 +17,25 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     const size_t of_vertices[2] = {m->n_vertices, 3}, of_elements[2] = {m->n, 4}, of_normals[2] = {m->n, 3};
     const size_t of_channels[2] = {m->n_channels, m->n};
     mesh_geometry_hash(m, hash);
-    TRY(store_write(s, "/mesh/vertices", STORE_F64, 2, of_vertices, m->vertices, error));
-    TRY(store_write(s, "/mesh/elements", STORE_U32, 2, of_elements, m->elements, error));
-    TRY(store_write(s, "/mesh/area", STORE_F64, 1, &m->n, m->area, error));
-    TRY(store_write(s, "/mesh/normal", STORE_F32, 2, of_normals, m->normal, error));
-    TRY(store_write(s, "/mesh/reflectance", STORE_F32, 2, of_channels, m->reflectance, error));
-    TRY(store_write(s, "/mesh/emission", STORE_F32, 2, of_channels, m->emission, error));
-    TRY(store_write(s, "/mesh/group", STORE_U32, 1, &m->n, m->group, error));
-    TRY(store_write_texts(s, "/mesh/group_names", m->n_groups, (const char *const *)m->group_names, error));
+    TRY(store_write(s, STORE_MESH "/vertices", STORE_F64, 2, of_vertices, m->vertices, error));
+    TRY(store_write(s, STORE_MESH "/elements", STORE_U32, 2, of_elements, m->elements, error));
+    TRY(store_write(s, STORE_MESH "/area", STORE_F64, 1, &m->n, m->area, error));
+    TRY(store_write(s, STORE_MESH "/normal", STORE_F32, 2, of_normals, m->normal, error));
+    TRY(store_write(s, STORE_MESH "/reflectance", STORE_F32, 2, of_channels, m->reflectance, error));
+    TRY(store_write(s, STORE_MESH "/emission", STORE_F32, 2, of_channels, m->emission, error));
+    TRY(store_write(s, STORE_MESH "/group", STORE_U32, 1, &m->n, m->group, error));
+    TRY(store_write_texts(s, STORE_MESH "/group_names", m->n_groups, (const char *const *)m->group_names,
+                          error));
     if (m->overlap != NULL)
-        TRY(store_write(s, "/mesh/overlap", STORE_F64, 1, &m->n_groups, m->overlap, error));
-    if (m->overlap != NULL) TRY(store_set_number(s, "/mesh", "overlap_area", mesh_overlap_area(m), error));
-    if (row_sums != NULL) TRY(store_write(s, "/mesh/row_sums", STORE_F64, 1, &m->n, row_sums, error));
+        TRY(store_write(s, STORE_MESH "/overlap", STORE_F64, 1, &m->n_groups, m->overlap, error));
+    if (m->overlap != NULL) TRY(store_set_number(s, STORE_MESH, "overlap_area", mesh_overlap_area(m), error));
+    if (row_sums != NULL) TRY(store_write(s, STORE_MESH "/row_sums", STORE_F64, 1, &m->n, row_sums, error));
     TRY(scene_pictures_save(m->pictures, m->n, s, error));
-    TRY(store_set_text(s, "/mesh", "geometry_hash", hash, error));
-    TRY(store_set_text(s, "/mesh", "source_hash", m->source_hash, error));
-    TRY(store_set_text(s, "/mesh", "name", m->name, error));
-    TRY(store_set_text(s, "/mesh", "up", up, error));
-    TRY(store_set_number(s, "/mesh", "unit", m->unit, error));
+    TRY(store_set_text(s, STORE_MESH, "geometry_hash", hash, error));
+    TRY(store_set_text(s, STORE_MESH, "source_hash", m->source_hash, error));
+    TRY(store_set_text(s, STORE_MESH, "name", m->name, error));
+    TRY(store_set_text(s, STORE_MESH, "up", up, error));
+    TRY(store_set_number(s, STORE_MESH, "unit", m->unit, error));
     TRY(scene_backs_save(m->n_backs, m->two_sided, s, error));
     TRY(scene_cameras_save(m->n_cameras, m->cameras, s, error));
 done:
@@ -44,7 +46,7 @@ done:
 static lam_status load_text(store *s, const char *name, char *out, size_t size, lam_error *error) {
     lam_status status = LAM_OK;
     char *text = NULL;
-    TRY(store_get_text(s, "/mesh", name, &text, error));
+    TRY(store_get_text(s, STORE_MESH, name, &text, error));
     if (strlen(text) >= size)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute %s is longer than %zu bytes", store_path(s), name,
              size - 1);
@@ -60,7 +62,7 @@ static lam_status load_attributes(store *s, mesh *m, lam_error *error) {
     TRY(load_text(s, "source_hash", m->source_hash, sizeof m->source_hash, error));
     TRY(load_text(s, "name", m->name, sizeof m->name, error));
     TRY(load_text(s, "up", up, sizeof up, error));
-    TRY(store_get_number(s, "/mesh", "unit", &m->unit, error));
+    TRY(store_get_number(s, STORE_MESH, "unit", &m->unit, error));
     if (strlen(up) != 1 || strchr("xyz", up[0]) == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute up is '%s', must be x, y or z", store_path(s), up);
     if (!(m->unit > 0) || !isfinite(m->unit))
@@ -94,10 +96,10 @@ static lam_status load_geometry(store *s, mesh *m, lam_error *error) {
     void *data = NULL;
     size_t of_vertices[2] = {SIZE_MAX, 3}, of_elements[2] = {SIZE_MAX, 4};
     char stated[33], found[33];
-    TRY(store_read(s, "/mesh/vertices", STORE_F64, 2, of_vertices, &data, error));
+    TRY(store_read(s, STORE_MESH "/vertices", STORE_F64, 2, of_vertices, &data, error));
     m->vertices = data;
     m->n_vertices = of_vertices[0];
-    TRY(store_read(s, "/mesh/elements", STORE_U32, 2, of_elements, &data, error));
+    TRY(store_read(s, STORE_MESH "/elements", STORE_U32, 2, of_elements, &data, error));
     m->elements = data;
     m->n = of_elements[0];
     for (size_t v = 0; v < m->n_vertices; v++)
@@ -148,9 +150,9 @@ lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
     void *data = NULL;
     TRY(load_attributes(s, &loaded, error));
     TRY(load_geometry(s, &loaded, error));
-    TRY(load_f64(s, "/mesh/area", loaded.n, 0, true, &loaded.area, error));
+    TRY(load_f64(s, STORE_MESH "/area", loaded.n, 0, true, &loaded.area, error));
     size_t of_normals[2] = {loaded.n, 3};
-    TRY(store_read(s, "/mesh/normal", STORE_F32, 2, of_normals, &data, error));
+    TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, of_normals, &data, error));
     loaded.normal = data;
     for (size_t i = 0; i < loaded.n; i++)
         for (int k = 0; k < 3; k++)
@@ -158,27 +160,27 @@ lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
                 FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/normal[%zu][%d] = %g, must be finite", store_path(s),
                      i, k, (double)loaded.normal[i][k]);
     size_t of_channels[2] = {SIZE_MAX, loaded.n};
-    TRY(load_channels(s, "/mesh/reflectance", 1.f, of_channels, &loaded.reflectance, error));
+    TRY(load_channels(s, STORE_MESH "/reflectance", 1.f, of_channels, &loaded.reflectance, error));
     if (of_channels[0] == 0)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/reflectance has no channel", store_path(s));
     loaded.n_channels = of_channels[0];
-    TRY(load_channels(s, "/mesh/emission", INFINITY, of_channels, &loaded.emission, error));
-    TRY(store_read_texts(s, "/mesh/group_names", &loaded.n_groups, &loaded.group_names, error));
-    TRY(store_read(s, "/mesh/group", STORE_U32, 1, &loaded.n, &data, error));
+    TRY(load_channels(s, STORE_MESH "/emission", INFINITY, of_channels, &loaded.emission, error));
+    TRY(store_read_texts(s, STORE_MESH "/group_names", &loaded.n_groups, &loaded.group_names, error));
+    TRY(store_read(s, STORE_MESH "/group", STORE_U32, 1, &loaded.n, &data, error));
     loaded.group = data;
     for (size_t i = 0; i < loaded.n; i++)
         if (loaded.group[i] >= loaded.n_groups)
             FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group[%zu] = %u, there are %zu group names", store_path(s),
                  i, loaded.group[i], loaded.n_groups);
-    if (store_has(s, "/mesh/overlap")) {
-        TRY(load_f64(s, "/mesh/overlap", loaded.n_groups, 0, false, &loaded.overlap, error));
+    if (store_has(s, STORE_MESH "/overlap")) {
+        TRY(load_f64(s, STORE_MESH "/overlap", loaded.n_groups, 0, false, &loaded.overlap, error));
         for (size_t g = 0; g < loaded.n_groups; g++)
             if (loaded.overlap[g] > 1)
                 FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/overlap[%zu] = %g, must be at most 1", store_path(s),
                      g, loaded.overlap[g]);
     }
-    if (store_has(s, "/mesh/row_sums") || store_has(s, "/form_factors") || store_has(s, "/sky"))
-        TRY(load_f64(s, "/mesh/row_sums", loaded.n, 0, false, &sums, error));
+    if (store_has(s, STORE_MESH "/row_sums") || store_has(s, STORE_FORM_FACTORS) || store_has(s, STORE_SKY))
+        TRY(load_f64(s, STORE_MESH "/row_sums", loaded.n, 0, false, &sums, error));
     TRY(scene_cameras_load(s, &loaded.n_cameras, &loaded.cameras, error));
     TRY(scene_pictures_load(s, loaded.n, &loaded.pictures, error));
     *m = loaded;

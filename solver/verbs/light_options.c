@@ -4,6 +4,7 @@
 #include "solver/operator/operator.h"
 #include "solver/operator/refine/form_factor_rows.h"
 #include "solver/operator/sky_light.h"
+#include "store/groups.h"
 
 #include <omp.h>
 #include <stdio.h>
@@ -57,9 +58,9 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
     TRY(sky_load(s, m->n, &out->sky, error));
     TRY(operator_load(s, &out->op, error));
     /* A store whose form factors cannot be read is refused whole, as lambertd does. */
-    if (store_has(s, FORM_FACTORS_GROUP)) TRY(form_factors_storage(s, &how, error));
+    if (store_has(s, STORE_FORM_FACTORS)) TRY(form_factors_storage(s, &how, error));
     TRY(emission_scene_sources(&out->scene, out->op, out->sky, error));
-    if (out->sky != NULL) TRY(store_get_text(s, "/sky", "tiling", &tiling, error));
+    if (out->sky != NULL) TRY(store_get_text(s, STORE_SKY, "tiling", &tiling, error));
     if (tiling != NULL) snprintf(out->scene.tiling, sizeof out->scene.tiling, "%s", tiling);
     TRY(emission_choose(&out->scene, &given, &out->light, &out->own, error));
     const emitters *few = operator_emitters_of(out->op);

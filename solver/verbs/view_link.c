@@ -1,6 +1,7 @@
 #include "solver/verbs/view_link.h"
 
 #include "solver/base/file_stem.h"
+#include "store/groups.h"
 #include "store/store.h"
 
 #include <jansson.h>
@@ -35,8 +36,8 @@ static lam_status read_scene(const char *argument, linked_scene *out, lam_error 
         given = colon + 1;
     }
     TRY(store_open(path, &s, error));
-    TRY(store_read_texts(s, "/mesh/group_names", &out->n_groups, &out->groups, error));
-    TRY(store_array_info(s, "/mesh/reflectance", &type, &rank, dims, error));
+    TRY(store_read_texts(s, STORE_MESH "/group_names", &out->n_groups, &out->groups, error));
+    TRY(store_array_info(s, STORE_MESH "/reflectance", &type, &rank, dims, error));
     out->n_channels = dims[0];
     out->name = given != NULL ? strdup(given) : file_stem(path);
     if (out->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);

@@ -2,6 +2,7 @@
 #include "solver/verify/verify.h"
 
 #include "solver/scene/import/import.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -76,12 +77,12 @@ lam_status verify_mesh(examination *e, check *c, lam_error *error) {
     e->has_mesh = true;
     const mesh *m = &e->m;
     check_say(c, VERDICT_OK, "%zu elements, %zu vertices, %zu groups", m->n, m->n_vertices, m->n_groups);
-    TRY(store_get_text(e->s, "/mesh", "geometry_hash", &recorded, error));
+    TRY(store_get_text(e->s, STORE_MESH, "geometry_hash", &recorded, error));
     mesh_geometry_hash(m, hash);
     if (strcmp(recorded, hash) != 0)
         check_say(c, VERDICT_BROKEN, "geometry_hash is %.32s, the mesh gives %s", recorded, hash);
-    if (e->row_sums == NULL && !store_has(e->s, "/operator/direct"))
-        check_say(c, VERDICT_BROKEN, "/mesh/row_sums is missing");
+    if (e->row_sums == NULL && !store_has(e->s, STORE_OPERATOR "/direct"))
+        check_say(c, VERDICT_BROKEN, STORE_MESH "/row_sums is missing");
     for (size_t i = 0; i < m->n && e->row_sums != NULL && c->verdict == VERDICT_OK; i++)
         if (!(e->row_sums[i] >= 0 && e->row_sums[i] <= 1 + 1e-6))
             check_say(c, VERDICT_BROKEN, "row_sums[%zu] = %.9g, must be from 0 to 1", i, e->row_sums[i]);
@@ -132,7 +133,7 @@ static lam_status verify_blocks(examination *e, check *c, lam_error *error) {
 
 lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
     form_factor_storage how = STORAGE_ROWS;
-    if (!e->has_mesh || !store_has(e->s, "/form_factors")) {
+    if (!e->has_mesh || !store_has(e->s, STORE_FORM_FACTORS)) {
         check_say(c, VERDICT_SKIPPED, e->has_mesh ? "none are kept" : "no mesh to compare with");
         return LAM_OK;
     }
@@ -234,8 +235,8 @@ lam_status verify_scene(examination *e, check *c, lam_error *error) {
         check_say(c, VERDICT_SKIPPED, e->scene == NULL ? "no scene given" : "no mesh to compare with");
         return LAM_OK;
     }
-    if (store_has_attribute(e->s, "/mesh", "reflectance_given"))
-        TRY(store_get_number(e->s, "/mesh", "reflectance_given", &reflectance, error));
+    if (store_has_attribute(e->s, STORE_MESH, "reflectance_given"))
+        TRY(store_get_number(e->s, STORE_MESH, "reflectance_given", &reflectance, error));
     const import_options how = {.unit = e->m.unit,
                                 .up = e->m.up,
                                 .reflectance = reflectance,

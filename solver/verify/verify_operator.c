@@ -6,6 +6,7 @@
 #include "solver/precompute/judging.h"
 #include "solver/precompute/precompute.h"
 #include "solver/verify/verify.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -122,9 +123,9 @@ bool examination_stated(store *s, const char *group, const char *name, double *v
  * reflectance. */
 static double allowed_imbalance(store *s, bool own, double emitted, double area, double received) {
     double value;
-    if (own && examination_stated(s, "/error/lights", "energy_balance", &value))
+    if (own && examination_stated(s, STORE_ERROR "/lights", "energy_balance", &value))
         return (1.1 * value + rounding) * emitted;
-    if (!own && examination_stated(s, "/error/random", "operator_indirect_max", &value))
+    if (!own && examination_stated(s, STORE_ERROR "/random", "operator_indirect_max", &value))
         return 2 * value * sqrt(area * received) + rounding * emitted;
     return -1;
 }
@@ -220,7 +221,7 @@ static void compare_figure(store *s, const char *group, const char *against, con
     char path[32];
     const char *const ends[] = {"mean", "std", "max"};
     double *const values[] = {&mean, &std, &max};
-    snprintf(path, sizeof path, "/error/%s", group);
+    snprintf(path, sizeof path, STORE_ERROR "/%s", group);
     for (int k = 0; k < 3; k++) {
         snprintf(key, sizeof key, "%s_indirect_%s", against, ends[k]);
         if (!store_has(s, path) || store_get_number(s, path, key, values[k], NULL) != LAM_OK) return;
@@ -237,7 +238,7 @@ static void compare_figure(store *s, const char *group, const char *against, con
 static void compare_receivers(store *s, const char *group, const receiver_figures *again, check *c) {
     char path[32];
     double stated, noise;
-    snprintf(path, sizeof path, "/error/%s", group);
+    snprintf(path, sizeof path, STORE_ERROR "/%s", group);
     if (!again->known || strcmp(group, "single") == 0 ||
         !examination_stated(s, path, "receivers_indirect", &stated) ||
         !examination_stated(s, path, "receivers_noise", &noise))
@@ -252,8 +253,8 @@ static void compare_receivers(store *s, const char *group, const receiver_figure
  * options it may have taken others, and compare_figure allows for the noise that goes with the number. */
 static size_t judge_rays(const examination *e) {
     double epsilon = .05;
-    if (store_has_attribute(e->s, "/operator", "epsilon") &&
-        store_get_number(e->s, "/operator", "epsilon", &epsilon, NULL) != LAM_OK)
+    if (store_has_attribute(e->s, STORE_OPERATOR, "epsilon") &&
+        store_get_number(e->s, STORE_OPERATOR, "epsilon", &epsilon, NULL) != LAM_OK)
         epsilon = .05;
     return recipe_auto_rays(epsilon, .25);
 }
@@ -328,7 +329,7 @@ lam_status verify_error(examination *e, check *c, lam_error *error) {
     error_report again = {.seconds = 0};
     recipe from = {.rays = 0};
     if (examination_skips(e, c)) return LAM_OK;
-    if (e->probes == 0 || !store_has(e->s, "/error/single")) {
+    if (e->probes == 0 || !store_has(e->s, STORE_ERROR "/single")) {
         check_say(c, VERDICT_SKIPPED, e->probes == 0 ? "not measured again (--probes 0)" : "none is stated");
         return LAM_OK;
     }

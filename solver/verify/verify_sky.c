@@ -1,5 +1,6 @@
 /* The check of a store's sky. */
 #include "solver/verify/verify.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,7 +12,7 @@ lam_status verify_sky(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     sky_bounce sky = {.n = 0};
     double *sums = NULL;
-    if (!e->has_mesh || !store_has(e->s, "/sky")) {
+    if (!e->has_mesh || !store_has(e->s, STORE_SKY)) {
         check_say(c, VERDICT_SKIPPED, e->has_mesh ? "there is none" : "no mesh to compare with");
         return LAM_OK;
     }

@@ -5,6 +5,7 @@
 #include "solver/precompute/precompute.h"
 #include "solver/verify/verify.h"
 #include "solver/walk/walk.h"
+#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -168,9 +169,9 @@ typedef struct judgement {
 /* The largest error that a store states for any emission, or for one light alone; negative: none. */
 static double stated_error(store *s, const char *name, bool alone) {
     double most, value;
-    if (!examination_stated(s, "/error/random", name, &most)) return -1;
-    if (alone && examination_stated(s, "/error/lights", name, &value)) most = fmax(most, value);
-    if (alone && examination_stated(s, "/error/single", name, &value)) most = fmax(most, value);
+    if (!examination_stated(s, STORE_ERROR "/random", name, &most)) return -1;
+    if (alone && examination_stated(s, STORE_ERROR "/lights", name, &value)) most = fmax(most, value);
+    if (alone && examination_stated(s, STORE_ERROR "/single", name, &value)) most = fmax(most, value);
     return most;
 }
 

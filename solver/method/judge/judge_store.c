@@ -1,5 +1,6 @@
 /* Measured errors in a store. */
 #include "solver/method/judge/judge.h"
+#include "store/groups.h"
 
 #include <stdio.h>
 
@@ -56,11 +57,11 @@ done:
 
 lam_status judge_save(const error_report *report, store *s, lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(save_group(s, "/error/single", &report->single, report->has_total, error));
-    TRY(save_group(s, "/error/lights", &report->lights, report->has_total, error));
-    TRY(save_group(s, "/error/random", &report->random, report->has_total, error));
-    TRY(save_group(s, "/error/whole", &report->whole, report->has_total, error));
-    TRY(save_group(s, "/error/sky", &report->sky, report->has_total, error));
+    TRY(save_group(s, STORE_ERROR "/single", &report->single, report->has_total, error));
+    TRY(save_group(s, STORE_ERROR "/lights", &report->lights, report->has_total, error));
+    TRY(save_group(s, STORE_ERROR "/random", &report->random, report->has_total, error));
+    TRY(save_group(s, STORE_ERROR "/whole", &report->whole, report->has_total, error));
+    TRY(save_group(s, STORE_ERROR STORE_SKY, &report->sky, report->has_total, error));
 done:
     return status;
 }
@@ -85,14 +86,15 @@ lam_status judge_save_groups(const group_errors *e, store *s, lam_error *error) 
     lam_status status = LAM_OK;
     char path[64];
     for (int k = 0; k < GROUP_FIGURES && e->n_rows > 0; k++) {
-        snprintf(path, sizeof path, "/error/by_group/%s", names[k]);
+        snprintf(path, sizeof path, STORE_ERROR "/by_group/%s", names[k]);
         TRY(store_write(s, path, STORE_F64, 2, (size_t[]){e->n_rows, e->n_groups}, e->of[k], error));
     }
     for (int k = 0; k < SKY_FIGURES && e->sky[k] != NULL; k++) {
-        snprintf(path, sizeof path, "/error/by_group/%s", of_sky[k]);
+        snprintf(path, sizeof path, STORE_ERROR "/by_group/%s", of_sky[k]);
         TRY(store_write(s, path, STORE_F64, 2, (size_t[]){e->n_rows, e->n_groups}, e->sky[k], error));
     }
-    if (e->sky[0] != NULL) TRY(store_set_number(s, "/error/by_group", "sky_direct", e->sky_direct, error));
+    if (e->sky[0] != NULL)
+        TRY(store_set_number(s, STORE_ERROR "/by_group", "sky_direct", e->sky_direct, error));
     const struct {
         const char *name;
         size_t rows;
@@ -104,7 +106,7 @@ lam_status judge_save_groups(const group_errors *e, store *s, lam_error *error) 
                     {"sky_means_off", e->n_groups, e->sky_means_off}};
     for (size_t k = 0; k < sizeof of_tiles / sizeof *of_tiles; k++) {
         if (of_tiles[k].numbers == NULL) continue;
-        snprintf(path, sizeof path, "/error/by_group/%s", of_tiles[k].name);
+        snprintf(path, sizeof path, STORE_ERROR "/by_group/%s", of_tiles[k].name);
         TRY(store_write(s, path, STORE_F64, 2, (size_t[]){of_tiles[k].rows, e->n_tiles}, of_tiles[k].numbers,
                         error));
     }

@@ -1,12 +1,13 @@
 #include "solver/operator/blocks/block_store.h"
 
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define GROUP "/form_factors"
+#define GROUP STORE_FORM_FACTORS
 
 /* In place of the left child of a leaf. */
 #define NO_CHILD UINT32_MAX

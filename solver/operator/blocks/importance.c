@@ -1,5 +1,6 @@
 #include "solver/operator/blocks/importance.h"
 
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -20,8 +21,8 @@ static const double share_of_mean = 1.5, bounds_least = .4, thresholds_least = .
  * sources. */
 static const double reference_least = .5, reference_times = 1.25;
 
-#define GROUP "/importance"
-#define SOURCES "/sources"
+#define GROUP STORE_IMPORTANCE
+#define SOURCES STORE_SOURCES
 
 /* Bounces, and the largest change of the last that counts, over 1. */
 enum { BOUNCES_MOST = 64 };

@@ -1,11 +1,12 @@
 #include "solver/operator/refine/form_factor_rows.h"
 
+#include "store/groups.h"
 #include "store/status.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#define GROUP FORM_FACTORS_GROUP
+#define GROUP STORE_FORM_FACTORS
 
 lam_status form_factors_storage(store *s, form_factor_storage *out, lam_error *error) {
     static const char *const names[STORAGES] = {"rows", "upper", "blocks"};
@@ -173,7 +174,7 @@ static lam_status read_area(store *s, size_t *n, double **area, lam_error *error
     lam_status status = LAM_OK;
     size_t dims[STORE_MAX_RANK] = {SIZE_MAX};
     void *data = NULL;
-    TRY(store_read(s, "/mesh/area", STORE_F64, 1, dims, &data, error));
+    TRY(store_read(s, STORE_MESH "/area", STORE_F64, 1, dims, &data, error));
     const double *values = data;
     for (size_t i = 0; i < dims[0]; i++)
         if (!(values[i] > 0 && isfinite(values[i])))

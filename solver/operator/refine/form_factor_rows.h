@@ -8,8 +8,6 @@
 
 #include <math.h>
 
-#define FORM_FACTORS_GROUP "/form_factors"
-
 /* F_ij from g_ij = A_i F_ij, so that F_ij and F_ji are rounded from one number. */
 static inline float upper_factor(float exchange, double area) {
     return (float)fmin((double)exchange / area, 1);

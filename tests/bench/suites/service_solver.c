@@ -5,6 +5,7 @@
 #include "solver/operator/operator.h"
 #include "solver/precompute/forecast.h"
 #include "solver/scene/mesh.h"
+#include "store/groups.h"
 #include "tests/bench/suites/bench.h"
 #include "tests/bench/suites/stats.h"
 
@@ -118,10 +119,10 @@ static lam_status save(const mesh *m, const double *row_sums, size_t k, const la
     TRY(store_set_number(s, "/", "unit", m->unit, error));
     TRY(mesh_save(m, row_sums, s, error));
     TRY(operator_save(op, s, error));
-    TRY(store_set_text(s, "/operator", "method", "low-rank", error));
-    TRY(store_set_text(s, "/operator", "factorizer", "none", error));
-    TRY(store_set_text(s, "/operator", "reason", "made of arbitrary numbers, to be timed", error));
-    TRY(store_set_integer(s, "/operator", "rank", (int64_t)k, error));
+    TRY(store_set_text(s, STORE_OPERATOR, "method", "low-rank", error));
+    TRY(store_set_text(s, STORE_OPERATOR, "factorizer", "none", error));
+    TRY(store_set_text(s, STORE_OPERATOR, "reason", "made of arbitrary numbers, to be timed", error));
+    TRY(store_set_integer(s, STORE_OPERATOR, "rank", (int64_t)k, error));
     store *sealing = s;
     s = NULL;
     TRY(store_seal(sealing, error));
