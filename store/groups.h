@@ -10,7 +10,7 @@
 #define STORE_SKY "/sky"                   /* solver/formfactor/sky_bounce.c */
 #define STORE_IMPORTANCE "/importance"     /* solver/operator/blocks/importance.c */
 #define STORE_SOURCES "/sources"           /* the same */
-#define STORE_ERROR "/error"               /* solver/method/judge/judge_store.c, solver/precompute */
+#define STORE_ERROR "/error"               /* solver/operator/stated/error_figures.c */
 #define STORE_POSITIONS "/positions"       /* solver/precompute/positions_error.c */
 #define STORE_CHECKSUM "/checksum"         /* store/store_checksum.c, when a store is sealed */
 

@@ -1,9 +1,8 @@
 /* A store file: named typed arrays and attributes in HDF5, sealed once, then read only.
- * The only user of <hdf5.h>; knows no operator kind. Names are HDF5 paths: a group of store/groups.h,
- * "/area". Each function that reads asks for a store that was opened, each that writes for one that was
- * created. One thread at a time may call into a store; several may open and read stores, as HDF5 only runs in
- * children then, but not while another thread writes one, as a child would begin in the middle of a call of
- * HDF5. */
+ * The only user of <hdf5.h>; knows no operator kind. Names are HDF5 paths (/mesh/area).
+ * Each function that reads asks for a store that was opened, each that writes for one that was created. One
+ * thread at a time may call into a store; several may open and read stores, as HDF5 only runs in children
+ * then, but not while another thread writes one, as a child would begin in the middle of a call of HDF5. */
 #ifndef LAMBERT_STORE_STORE_H
 #define LAMBERT_STORE_STORE_H
 

@@ -124,11 +124,7 @@ static lam_status find_groups(const scene *made,
 static lam_status read_errors(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     const error_scene about = scene_for_errors(made);
-    const emitters *few = operator_emitters_of(made->op);
-    emitters_light light = {.s = 0};
-    if (few != NULL)
-        light = (emitters_light){.s = few->a.s, .direct = few->a.direct, .exitance = few->a.exitance};
-    TRY(stated_errors_read(s, &about, &light, &made->errors, error));
+    TRY(stated_errors_read(s, &about, made->op, &made->errors, error));
     if (made->errors.read != NULL) TRY(find_groups(made, stated_errors_others, &made->group_read, error));
     if (made->errors.emits != NULL)
         TRY(find_groups(made, stated_errors_strangers, &made->group_emits, error));

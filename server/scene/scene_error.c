@@ -50,7 +50,9 @@ error_scene scene_for_errors(const scene *s) {
                          .n_channels = s->n_channels,
                          .area = s->area,
                          .reflectance = s->reflectance,
-                         .groups = &s->groups,
+                         .n_groups = s->groups.n_groups,
+                         .start = s->groups.start,
+                         .members = s->groups.elements,
                          .read = s->errors.read};
 }
 
@@ -62,10 +64,11 @@ static bool has_sky_weights(const scene *s, const radiosity_request *request) {
 /* True where the error of the answer's own emission can be told. */
 static bool has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes) {
     const error_by_group *e = &s->errors.by_group;
-    const bool whole = !request->reduce.linear || e->sky_first != NULL;
+    const bool whole = !request->reduce.linear || e->figures.sky_first != NULL;
     const bool sky = request->sky.values != NULL || has_sky_weights(s, request);
-    return e->n_bins > 0 && notes->has_error && s->errors.emitters.s == 0 && request->tolerance == 0 &&
-           (!sky || (whole && s->sky != NULL && e->n_tiles == lam_sky_tiles(s->sky)));
+    return e->n_bins > 0 && notes->has_error && s->errors.emitters.figures.s == 0 &&
+           request->tolerance == 0 &&
+           (!sky || (whole && s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
 }
 
 /* The radiances of the sky of vector v, [C][m]; NULL: it has none. */
@@ -77,9 +80,10 @@ static const float *sky_of(const scene *s, const radiosity_request *request, siz
 /* The size of the sky L [C][m]; NULL: there is none. */
 static emission_size size_of_sky(const scene *s, const float *L) {
     const error_by_group *e = &s->errors.by_group;
-    const size_t C = s->n_channels, m = e->n_tiles;
+    const size_t C = s->n_channels, m = e->figures.n_tiles;
     emission_size size = {.power2 = 0};
-    for (size_t c = 0; L != NULL && c < C; c++) emission_size_add(&size, m, e->sky_power + c * m, L + c * m);
+    for (size_t c = 0; L != NULL && c < C; c++)
+        emission_size_add(&size, m, e->figures.sky_power + c * m, L + c * m);
     return size;
 }
 
@@ -140,7 +144,7 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     *names = NULL;
     if (!has_own_error(s, request, notes)) return true;
     name_error *const kept = memory_allocate(reduce->n_names, 2 * sizeof *kept, "errors", NULL);
-    const size_t n_own = W != NULL ? 2 * vector + C * s->errors.by_group.n_tiles : 0;
+    const size_t n_own = W != NULL ? 2 * vector + C * s->errors.by_group.figures.n_tiles : 0;
     float *const own = memory_allocate(n_own, sizeof *own, "errors", NULL);
     bool good = kept != NULL && own != NULL;
     if (good) begin_own(reduce, kept, &made);
@@ -186,7 +190,7 @@ static void sum_by_group(const scene *s, const radiosity_request *request, const
                          double *sums) {
     const size_t C = s->n_channels, count = request->select ? request->n_selected : s->n;
     const emitters_error *e = &s->errors.emitters;
-    memset(sums, 0, e->n_groups * (1 + C) * sizeof *sums);
+    memset(sums, 0, e->figures.n_groups * (1 + C) * sizeof *sums);
     for (size_t k = 0; k < count; k++) {
         const size_t i = request->select ? request->selected[k] : k;
         double *const own = sums + e->group[i] * (1 + C);
@@ -223,11 +227,11 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
     const size_t C = s->n_channels, vector = C * s->n, count = request->select ? request->n_selected : s->n;
     answer_notes made = *notes;
     *names = NULL;
-    if (e->s == 0 || !notes->has_error ||
+    if (e->figures.s == 0 || !notes->has_error ||
         ((request->select || reduce->on) && !emitters_error_knows_groups(e)))
         return true;
     float *light = memory_allocate(2, vector * sizeof *light, "errors", NULL);
-    double *mean = memory_allocate(C + e->n_groups * (1 + C), sizeof *mean, "errors", NULL);
+    double *mean = memory_allocate(C + e->figures.n_groups * (1 + C), sizeof *mean, "errors", NULL);
     name_error *const kept = memory_allocate(reduce->n_names, sizeof *kept, "errors", NULL);
     emitters_mix mix = {.W = NULL};
     bool good = light != NULL && mean != NULL && kept != NULL;
@@ -280,7 +284,7 @@ static void add_weights(const scene *s, const radiosity_request *request, double
             to->sums[(v * C + k / s->n) * G + e->bin[k % s->n] % G] += flux;
         }
         if (to->L == NULL) continue;
-        const size_t m = e->n_tiles;
+        const size_t m = e->figures.n_tiles;
         const float *sky = sky_of(s, request, v);
         operator_emitters_radiances(s->op, 1, request->emitters.values + v * row, to->L + v * C * m);
         for (size_t k = 0; sky != NULL && k < C * m; k++) to->L[v * C * m + k] += sky[k];
@@ -298,7 +302,7 @@ static void size_of_spots(const scene *s, const radiosity_request *request, doub
         double area = a, squares = a * a;
         if (spot->whole_group) {
             squares = e->squares[spot->where];
-            for (size_t bin = spot->where; bin < e->n_bins; bin += e->n_groups) area += e->area[bin];
+            for (size_t bin = spot->where; bin < e->n_bins; bin += e->figures.n_groups) area += e->area[bin];
         }
         for (size_t c = 0; c < C; c++) {
             const double value = (double)request->colours[k * C + c];
@@ -329,7 +333,7 @@ static void emission_of_name(const scene *s, const radiosity_request *request, c
     memset(emission, 0, request->n_rhs * C * sizeof *emission);
     for (size_t g = 0; g < name->n_groups; g++) {
         const uint32_t group = name->groups[g];
-        for (size_t bin = group; bin < e->n_bins; bin += e->n_groups) all += e->area[bin];
+        for (size_t bin = group; bin < e->n_bins; bin += e->figures.n_groups) all += e->area[bin];
         for (size_t row = 0; row < request->n_dense * C; row++)
             for (uint32_t k = s->groups.start[group]; k < s->groups.start[group + 1]; k++) {
                 const size_t i = s->groups.elements[k];
@@ -340,10 +344,10 @@ static void emission_of_name(const scene *s, const radiosity_request *request, c
     }
     for (size_t k = 0; k < request->n_spots; k++) {
         const emission_spot *spot = &request->spots[k];
-        const size_t group = spot->whole_group ? spot->where : e->bin[spot->where] % e->n_groups;
+        const size_t group = spot->whole_group ? spot->where : e->bin[spot->where] % e->figures.n_groups;
         if (spot->vector < request->n_dense || !is_in_name(name, group)) continue;
         double area = spot->whole_group ? 0 : s->area[spot->where];
-        for (size_t bin = group; spot->whole_group && bin < e->n_bins; bin += e->n_groups)
+        for (size_t bin = group; spot->whole_group && bin < e->n_bins; bin += e->figures.n_groups)
             area += e->area[bin];
         for (size_t c = 0; c < C; c++)
             emission[spot->vector * C + c] += area * (double)request->colours[k * C + c];
@@ -362,12 +366,12 @@ static void direct_of_name(const scene *s, const radiosity_request *request, con
     memset(direct, 0, request->n_rhs * C * sizeof *direct);
     for (size_t g = 0; L != NULL && g < name->n_groups; g++) {
         double area = 0;
-        for (size_t bin = name->groups[g]; bin < e->n_bins; bin += e->n_groups) area += e->area[bin];
+        for (size_t bin = name->groups[g]; bin < e->n_bins; bin += e->figures.n_groups) area += e->area[bin];
         all += area;
         for (size_t row = 0; row < rows; row++)
-            for (size_t t = 0; t < e->n_tiles; t++)
-                direct[row] +=
-                    area * e->sky_first[name->groups[g] * e->n_tiles + t] * (double)L[row * e->n_tiles + t];
+            for (size_t t = 0; t < e->figures.n_tiles; t++)
+                direct[row] += area * e->figures.sky_first[name->groups[g] * e->figures.n_tiles + t] *
+                               (double)L[row * e->figures.n_tiles + t];
     }
     for (size_t k = 0; all > 0 && k < request->n_rhs * C; k++) direct[k] /= all;
 }
@@ -394,7 +398,9 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
         const bool sky = has_sky_weights(s, request);
         made.E = memory_allocate(s->n_channels, s->n * sizeof *made.E, "errors", NULL);
         made.sums = memory_allocate(rows, s->groups.n_groups * sizeof *made.sums, "errors", NULL);
-        if (sky) made.L = memory_allocate(rows, s->errors.by_group.n_tiles * sizeof *made.L, "errors", NULL);
+        if (sky)
+            made.L =
+                memory_allocate(rows, s->errors.by_group.figures.n_tiles * sizeof *made.L, "errors", NULL);
         good = good && made.E != NULL && made.sums != NULL && (!sky || made.L != NULL);
     }
     if (!good) {
@@ -428,7 +434,8 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
     emission_of_name(s, request, name, to, to->emission);
     direct_of_name(s, request, name, to, direct);
     for (size_t v = 0; v < request->n_rhs; v++) {
-        const float *L = to->L != NULL ? to->L + v * C * s->errors.by_group.n_tiles : sky_of(s, request, v);
+        const float *L =
+            to->L != NULL ? to->L + v * C * s->errors.by_group.figures.n_tiles : sky_of(s, request, v);
         const name_means of = {.quantity = request->quantity,
                                .size = to->sizes[v],
                                .sky = size_of_sky(s, L),

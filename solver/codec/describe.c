@@ -2,6 +2,7 @@
 
 #include "solver/base/scene_cameras.h"
 #include "solver/operator/operator.h"
+#include "solver/operator/stated/error_figures.h"
 #include "store/groups.h"
 #include "store/status.h"
 
@@ -106,74 +107,55 @@ static size_t worst_group(const double *figure, const bool *taken, size_t n) {
 
 /* The errors of the means of groups, those with the largest one by uniform light first. */
 static lam_status add_error_by_group(store *s, json_t *figures, const json_t *groups, lam_error *error) {
-    static const char *const names[] = {"uniform", "uniform_largest", "near", "near_largest",
-                                        "far",     "far_largest"};
-    enum { NAMES = sizeof names / sizeof *names };
     lam_status status = LAM_OK;
     const size_t n = json_array_size(groups);
-    void *data[NAMES] = {NULL};
+    group_errors of = {.n_groups = 0};
     bool *taken = NULL;
     json_t *list = NULL;
-    if (!store_has(s, STORE_ERROR "/by_group")) return LAM_OK;
-    for (size_t k = 0; k < NAMES; k++) {
-        char path[64];
-        size_t dims[2] = {SIZE_MAX, n};
-        snprintf(path, sizeof path, STORE_ERROR "/by_group/%s", names[k]);
-        TRY(store_read(s, path, STORE_F64, 2, dims, &data[k], error));
-        if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: %s is empty", store_path(s), path);
-    }
+    TRY(group_errors_load_shown(s, n, &of, error));
+    if (of.n_rows == 0) goto done;
     taken = memory_allocate(n, sizeof *taken, "errors of groups", error);
     if (taken == NULL) TRY(LAM_ERR_MEMORY);
     list = json_array();
     for (size_t count = 0; count < GROUPS_DESCRIBED; count++) {
-        const size_t g = worst_group(data[0], taken, n);
+        const size_t g = worst_group(of.of[GROUP_UNIFORM], taken, n);
         if (g == n) break;
         taken[g] = true;
         json_t *one = json_object();
         copy_member(one, "name", json_array_get(groups, g), "name");
-        for (size_t k = 0; k < NAMES; k++)
-            json_object_set_new(one, names[k], describe_number(((const double *)data[k])[g]));
+        for (int k = GROUP_UNIFORM; k < GROUP_FIGURES; k++)
+            json_object_set_new(one, group_figure_name(k), describe_number(of.of[k][g]));
         json_array_append_new(list, one);
     }
     json_object_set(figures, "by_group", list);
 done:
-    for (size_t k = 0; k < NAMES; k++) free(data[k]);
+    group_errors_free(&of);
     free(taken);
     json_decref(list);
     return status;
 }
 
+/* An error that is no number becomes null. */
+static json_t *list_numbers(size_t count, const double *numbers) {
+    json_t *list = json_array();
+    for (size_t i = 0; i < count; i++)
+        json_array_append_new(list, isfinite(numbers[i]) ? json_real(numbers[i]) : json_null());
+    return list;
+}
+
 /* The errors of every emitter, where they are stated. */
 static lam_status add_emitter_errors(store *s, json_t *figures, lam_error *error) {
-    static const char *const names[] = {"relative", "indirect"};
-    lam_status status = LAM_OK;
-    json_t *errors = NULL;
-    void *data = NULL;
-    if (!store_has(s, STORE_ERROR "/emitters")) return LAM_OK;
-    errors = json_object();
-    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
-        char path[64];
-        size_t count = SIZE_MAX;
-        snprintf(path, sizeof path, STORE_ERROR "/emitters/%s", names[k]);
-        TRY(store_read(s, path, STORE_F64, 1, &count, &data, error));
-        json_t *list = json_array();
-        for (size_t i = 0; i < count; i++) { /* an error that is no number becomes null */
-            const double x = ((const double *)data)[i];
-            json_array_append_new(list, isfinite(x) ? json_real(x) : json_null());
-        }
-        json_object_set_new(errors, names[k], list);
-        free(data);
-        data = NULL;
-    }
-    json_object_set(figures, "emitters", errors);
-done:
-    json_decref(errors);
-    free(data);
+    emitter_figures of = {.s = 0};
+    const lam_status status = emitter_figures_load_shown(s, &of, error);
+    if (of.relative != NULL)
+        json_object_set_new(figures, "emitters",
+                            json_pack("{s:o, s:o}", "relative", list_numbers(of.s, of.relative), "indirect",
+                                      list_numbers(of.s, of.indirect)));
+    emitter_figures_free(&of);
     return status;
 }
 
 static lam_status add_error(store *s, json_t *out, lam_error *error) {
-    static const char *const groups[] = {"single", "lights", "random", "whole", "sky", "mesh"};
     lam_status status = LAM_OK;
     json_t *figures = NULL;
     if (!store_has(s, STORE_ERROR)) {
@@ -181,13 +163,11 @@ static lam_status add_error(store *s, json_t *out, lam_error *error) {
         return LAM_OK;
     }
     TRY(attributes_of(s, STORE_ERROR, &figures, error));
-    for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
-        char path[32];
+    for (const figures_group *g = figures_groups; g->name != NULL; g++) {
         json_t *group = NULL;
-        snprintf(path, sizeof path, STORE_ERROR "/%s", groups[i]);
-        if (!store_has(s, path)) continue;
-        TRY(attributes_of(s, path, &group, error));
-        json_object_set_new(figures, groups[i], group);
+        if (!store_has(s, g->path)) continue;
+        TRY(attributes_of(s, g->path, &group, error));
+        json_object_set_new(figures, g->name, group);
     }
     TRY(add_emitter_errors(s, figures, error));
     TRY(add_error_by_group(s, figures, json_object_get(out, "groups"), error));

@@ -14,27 +14,20 @@ void stated_errors_free(stated_errors *e) {
     *e = (stated_errors){.n = 0};
 }
 
-static stated_error read_error(store *s, const char *relative, const char *indirect) {
-    static const char *const groups[] = {STORE_ERROR "/lights", STORE_ERROR "/single"};
+/* A stated error of the scene's own lights, or else of single elements. */
+static stated_error error_of(const error_report *report, bool of_receivers) {
+    const error_group *const groups[] = {&report->lights, &report->single};
+    static const char *const names[] = {"lights", "single"};
     stated_error found = {.known = false};
     for (size_t i = 0; i < sizeof groups / sizeof groups[0] && !found.known; i++) {
-        found.light = groups[i] + sizeof STORE_ERROR "/" - 1;
-        found.known = store_has(s, groups[i]) && store_has_attribute(s, groups[i], relative) &&
-                      store_has_attribute(s, groups[i], indirect) &&
-                      store_get_number(s, groups[i], relative, &found.relative, NULL) == LAM_OK &&
-                      store_get_number(s, groups[i], indirect, &found.indirect, NULL) == LAM_OK &&
-                      isfinite(found.relative) && isfinite(found.indirect);
+        const error_group *g = groups[i];
+        found.light = names[i];
+        found.relative = of_receivers ? g->receivers.total_relative : g->total_relative.mean;
+        found.indirect = of_receivers ? g->receivers.total_indirect : g->total_indirect.mean;
+        found.known = found.relative >= 0 && isfinite(found.relative) && found.indirect >= 0 &&
+                      isfinite(found.indirect);
     }
     return found;
-}
-
-/* A figure of /error/mesh; 0: there is none. */
-static double read_mesh_error(store *s, const char *light) {
-    double found = 0;
-    const bool good =
-        store_has(s, STORE_ERROR STORE_MESH) && store_has_attribute(s, STORE_ERROR STORE_MESH, light) &&
-        store_get_number(s, STORE_ERROR STORE_MESH, light, &found, NULL) == LAM_OK && isfinite(found);
-    return good ? found : 0;
 }
 
 /* *out [n]: true where a weight is above 0; NULL of NULL. */
@@ -46,29 +39,32 @@ static lam_status find_members(const float *weights, size_t n, bool **out, lam_e
     return LAM_OK;
 }
 
-lam_status stated_errors_read(store *s, const error_scene *scene, const emitters_light *light,
-                              stated_errors *out, lam_error *error) {
+lam_status stated_errors_read(store *s, const error_scene *scene, const lam_operator *op, stated_errors *out,
+                              lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = scene->n;
+    const figures_shape shape = {scene->n_groups, scene->n_channels, emitters_error_count(op)};
     error_scene about = *scene;
     importance weights = {.n = 0};
-    stated_errors made = {.n = n,
-                          .all = read_error(s, "total_relative_mean", "total_indirect_mean"),
-                          .mesh = read_mesh_error(s, "lights"),
-                          .mesh_of_skies =
-                              fmax(read_mesh_error(s, "sky_even"), read_mesh_error(s, "sky_cloudy"))};
-    if (!(made.mesh > 0)) made.mesh = read_mesh_error(s, "even");
+    stated_figures figures = {.repair = 0};
+    stated_errors made = {.n = n};
+    TRY(stated_figures_load(s, &shape, &figures, error));
+    const mesh_figures *mesh = &figures.mesh;
+    made.all = error_of(&figures.report, false);
+    made.mesh = mesh->lights > 0 ? mesh->lights : mesh->even;
+    made.mesh_of_skies = fmax(mesh->sky_even, mesh->sky_cloudy);
     TRY(importance_load(s, n, &weights, error));
     TRY(find_members(weights.read, n, &made.read, error));
     TRY(find_members(weights.emits, n, &made.emits, error));
-    if (made.read != NULL) made.receivers = read_error(s, "receivers_relative", "receivers_indirect");
+    if (made.read != NULL) made.receivers = error_of(&figures.report, true);
     about.read = made.read;
-    TRY(error_by_group_read(s, &about, &made.by_group, error));
-    TRY(emitters_error_read(s, &about, light, &made.emitters, error));
+    TRY(error_by_group_make(s, &about, &figures, &made.by_group, error));
+    TRY(emitters_error_make(&about, op, &figures, &made.emitters, error));
     *out = made;
     made = (stated_errors){.n = 0};
 done:
     importance_free(&weights);
+    stated_figures_free(&figures);
     stated_errors_free(&made);
     return status;
 }

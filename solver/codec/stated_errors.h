@@ -4,7 +4,6 @@
 
 #include "solver/codec/answer.h"
 #include "solver/codec/answer_error.h"
-#include "solver/codec/emitters_error.h"
 #include "store/store.h"
 
 /* Of the scene's own lights, else of single elements, against the independent sample. */
@@ -24,17 +23,17 @@ typedef struct stated_errors {
     bool *read;             /* [n], true of receivers; NULL: the store was built for all elements */
     bool *emits; /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */
     error_by_group by_group; /* n_bins is 0 where the store states none */
-    emitters_error emitters; /* s is 0 where the store states none */
+    emitters_error emitters; /* figures.s is 0 where the store states none */
     size_t n;
 } stated_errors;
 
 void stated_errors_free(stated_errors *e);
 
-/* Reads those of a store of this scene, `read` of which is not used, and of the light of its operator's
- * emitters. A figure that is missing or no finite number is not known. Errors: those of importance_load and
- * error_by_group_read; LAM_ERR_MEMORY. */
-lam_status stated_errors_read(store *s, const error_scene *scene, const emitters_light *light,
-                              stated_errors *out, lam_error *error);
+/* Reads those of a store of this scene, `read` of which is not used, with the operator of that store. A
+ * figure that is missing or no finite number is not known. Errors: those of importance_load and
+ * stated_figures_load; LAM_ERR_MEMORY. */
+lam_status stated_errors_read(store *s, const error_scene *scene, const lam_operator *op, stated_errors *out,
+                              lam_error *error);
 
 /* The number among count elements that are no receivers; selected NULL: the first count elements. 0 where
  * the store was built for all. O(count). */

@@ -15,7 +15,6 @@
  * squares with the other errors, which are independent of it. */
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/coincident.h"
-#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -137,10 +136,4 @@ done:
     free(area);
     free(mean);
     return status;
-}
-
-lam_status state_save_overlap(const precompute_state *state, store *s, lam_error *error) {
-    const bool stated = state->probes > 0 || state->position_errors != NULL;
-    if (!(state->repair > 0) || !stated) return LAM_OK;
-    return store_set_number(s, STORE_ERROR, "repair", state->repair, error);
 }

@@ -140,9 +140,12 @@ done:
     return status;
 }
 
-/* The light itself: its polygon, and turn and move of every position side by side. */
-static lam_status save_light(const moving_light *l, size_t n_channels, store *s, lam_error *error) {
+/* Its polygon, and turn and move of every position side by side. */
+lam_status state_save_positions(const precompute_state *state, store *s, lam_error *error) {
     lam_status status = LAM_OK;
+    const moving_light *l = &state->light;
+    const size_t n_channels = state->paths.n_channels;
+    if (l->n == 0) return LAM_OK;
     const size_t corners[2] = {l->n_corners, 3}, poses[3] = {l->n, 3, 4};
     double *pose = memory_allocate(l->n, 12 * sizeof *pose, "positions", error);
     if (pose == NULL) return LAM_ERR_MEMORY;
@@ -156,25 +159,5 @@ static lam_status save_light(const moving_light *l, size_t n_channels, store *s,
     TRY(store_write(s, STORE_POSITIONS "/pose", STORE_F64, 3, poses, pose, error));
 done:
     free(pose);
-    return status;
-}
-
-lam_status state_save_positions(const precompute_state *state, store *s, lam_error *error) {
-    lam_status status = LAM_OK;
-    const reuse_estimates *e = &state->paths;
-    const size_t positions = e->n_positions, dims[2] = {positions, positions};
-    if (state->position_errors == NULL) return LAM_OK;
-    TRY(save_light(&state->light, e->n_channels, s, error));
-    TRY(store_write(s, STORE_ERROR "/emitters/covariance", STORE_F64, 2, dims, e->covariance, error));
-    if (e->of_groups != NULL) {
-        const size_t by_group[3] = {state->m.n_groups, positions, positions};
-        TRY(store_write(s, STORE_ERROR "/emitters/groups", STORE_F64, 3, by_group, e->of_groups, error));
-        TRY(store_write(s, STORE_ERROR "/emitters/group_means", STORE_F64, 3, by_group, e->of_means, error));
-    }
-    TRY(store_write(s, STORE_ERROR "/emitters/relative", STORE_F64, 1, &positions, state->position_errors,
-                    error));
-    TRY(store_write(s, STORE_ERROR "/emitters/indirect", STORE_F64, 1, &positions,
-                    state->position_errors + positions, error));
-done:
     return status;
 }

@@ -48,13 +48,6 @@ typedef struct trial_course {
 /* Single elements by which an operator is judged at least, unless --probes gives their number. */
 enum { PROBES_LEAST = 32 };
 
-/* The share of light that constants on elements leave, |error| / |B - E|: of the scene's lamps or of all
- * emitters together, of 1 from every element, and of an even and a cloudy sky. */
-typedef struct mesh_figures {
-    bool has_lights, has_even, has_skies;
-    double lights, even, sky_even, sky_cloudy;
-} mesh_figures;
-
 typedef struct precompute_state {
     const precompute_options *options;
     precompute_options chosen;    /* with --time: the options, once it has chosen the recipe */
@@ -152,22 +145,19 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
 lam_status state_refine_mesh(precompute_state *state, lam_error *error);
 void state_log_mesh(const precompute_state *state);
 
-/* --positions and --path: all from the scene to the operator, without form factors; its errors, and their
- * place in the store: stage_positions.c, positions_error.c. */
+/* --positions and --path: all from the scene to the operator, without form factors; its errors; the light, in
+ * the store: stage_positions.c, positions_error.c. */
 lam_status stage_positions(precompute_state *state, lam_error *error);
 lam_status state_judge_positions(precompute_state *state, lam_error *error);
 lam_status state_save_positions(const precompute_state *state, store *s, lam_error *error);
 
-/* The error of the mesh by the operator's answers, and its place in the store: stage_mesh_error.c. */
+/* The error of the mesh by the operator's answers: stage_mesh_error.c. */
 lam_status stage_mesh_error(precompute_state *state, lam_error *error);
-lam_status state_save_mesh_error(const precompute_state *state, store *s, lam_error *error);
 
-/* Adds what overlapping faces and the repair of row sums are to all stated errors: overlap_error.c. Its place
- * in the store. */
+/* Adds what overlapping faces and the repair of row sums are to all stated errors: overlap_error.c. */
 void state_add_overlap(precompute_state *state);
 bool state_is_overlapping(const precompute_state *state); /* it is most of the error of random emission */
 lam_status state_add_overlap_of_positions(precompute_state *state, lam_error *error);
-lam_status state_save_overlap(const precompute_state *state, store *s, lam_error *error);
 
 /* Opens the folder for rows where one was given and is needed. */
 lam_status stage_open_scratch(precompute_state *state, lam_error *error);

@@ -2,7 +2,6 @@
 #include "solver/adapt/mesh_error.h"
 #include "solver/base/random.h"
 #include "solver/precompute/precompute_state.h"
-#include "store/groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -136,19 +135,5 @@ done:
     free(E);
     free(B);
     free(work);
-    return status;
-}
-
-lam_status state_save_mesh_error(const precompute_state *state, store *s, lam_error *error) {
-    lam_status status = LAM_OK;
-    const mesh_figures *figures = &state->errors_of_mesh;
-    if (figures->has_lights)
-        TRY(store_set_number(s, STORE_ERROR STORE_MESH, "lights", figures->lights, error));
-    if (figures->has_even) TRY(store_set_number(s, STORE_ERROR STORE_MESH, "even", figures->even, error));
-    if (figures->has_skies) {
-        TRY(store_set_number(s, STORE_ERROR STORE_MESH, "sky_even", figures->sky_even, error));
-        TRY(store_set_number(s, STORE_ERROR STORE_MESH, "sky_cloudy", figures->sky_cloudy, error));
-    }
-done:
     return status;
 }

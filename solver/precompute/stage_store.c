@@ -47,6 +47,26 @@ done:
     return status;
 }
 
+/* Without probes nothing was judged, but walks state their own errors. */
+static lam_status save_errors(const precompute_state *state, store *s, lam_error *error) {
+    const reuse_estimates *e = &state->paths;
+    stated_figures all = {.mesh = state->errors_of_mesh};
+    if (state->light.n > 0)
+        all.emitters = (emitter_figures){.s = e->n_positions,
+                                         .n_groups = state->m.n_groups,
+                                         .covariance = e->covariance,
+                                         .of_groups = e->of_groups,
+                                         .of_means = e->of_means,
+                                         .relative = state->position_errors,
+                                         .indirect = state->position_errors + e->n_positions};
+    if (state->probes > 0 || state->light.n > 0) {
+        all.report = state->errors;
+        all.repair = state->repair;
+    }
+    if (state->probes > 0) all.by_group = state->by_group;
+    return stated_figures_save(&all, s, error);
+}
+
 lam_status stage_store(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
@@ -71,11 +91,8 @@ lam_status stage_store(precompute_state *state, lam_error *error) {
     TRY(operator_save(state->op, s, error));
     if (state->importance.n > 0) TRY(save_importance(state, s, error));
     TRY(save_report(state, s, error));
-    if (state->probes > 0 || state->light.n > 0) TRY(judge_save(&state->errors, s, error));
     TRY(state_save_positions(state, s, error));
-    TRY(state_save_mesh_error(state, s, error));
-    TRY(state_save_overlap(state, s, error));
-    if (state->probes > 0) TRY(judge_save_groups(&state->by_group, s, error));
+    TRY(save_errors(state, s, error));
     TRY(terminal_check(error));
     store *sealing = s;
     s = NULL;

@@ -312,7 +312,6 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));
-    about = (error_scene){.n = m.n, .n_channels = m.n_channels, .area = m.area, .reflectance = m.reflectance};
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
     light_log(&lit, t);
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
@@ -321,11 +320,16 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
              lit.sky != NULL ? ", --sky FILE or --weather FILE" : "");
     if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
+    about = (error_scene){.n = m.n,
+                          .n_channels = m.n_channels,
+                          .n_groups = lit.scene.groups.n_groups,
+                          .area = m.area,
+                          .reflectance = m.reflectance,
+                          .start = lit.scene.groups.start,
+                          .members = lit.scene.groups.elements};
     /* With --reduce only figures are written, also with -o. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
-    about.groups = &lit.scene.groups;
-    const emitters_light outside = own_error_light(lit.op);
-    TRY(stated_errors_read(s, &about, &outside, &stated, error));
+    TRY(stated_errors_read(s, &about, lit.op, &stated, error));
     about.read = stated.read;
     if (f->weather != NULL) {
         /* The error of an answer is told by all that the sun shines on. */

@@ -42,7 +42,7 @@ static lam_status take_emission(const stated_errors *stated, const error_scene *
     name_error *made = NULL;
     if (by->n_bins == 0 || out->relative < 0) return LAM_OK;
     TRY(own_light_make(lit, scene, &light, error));
-    if (light.n_tiles > 0 && by->n_tiles != light.n_tiles) goto done;
+    if (light.n_tiles > 0 && by->figures.n_tiles != light.n_tiles) goto done;
     made = memory_allocate(out->n_reductions, sizeof *made, "errors", error);
     if (made == NULL) TRY(LAM_ERR_MEMORY);
     out->relative = out->indirect = 0;
@@ -67,21 +67,14 @@ done:
     return status;
 }
 
-emitters_light own_error_light(const lam_operator *op) {
-    const emitters *few = operator_emitters_of(op);
-    if (few == NULL) return (emitters_light){.s = 0};
-    return (emitters_light){.s = few->a.s, .direct = few->a.direct, .exitance = few->a.exitance};
-}
-
 /* Means [C] of the values of a vector over a name. */
 static void mean_of_name(const error_scene *scene, const reduce_name *name, const float *values,
                          double *mean) {
     double area = 0;
     for (size_t c = 0; c < scene->n_channels; c++) mean[c] = 0;
     for (size_t g = 0; g < name->n_groups; g++)
-        for (uint32_t at = scene->groups->start[name->groups[g]];
-             at < scene->groups->start[name->groups[g] + 1]; at++) {
-            const size_t i = scene->groups->elements[at];
+        for (uint32_t at = scene->start[name->groups[g]]; at < scene->start[name->groups[g] + 1]; at++) {
+            const size_t i = scene->members[at];
             area += scene->area[i];
             for (size_t c = 0; c < scene->n_channels; c++)
                 mean[c] += scene->area[i] * (double)values[c * scene->n + i];
@@ -97,7 +90,7 @@ static lam_status take_mixture(const stated_errors *stated, const error_scene *s
     const emitters_error *e = &stated->emitters;
     const emission *given = &lit->light;
     emitters_mix mix = {.W = NULL};
-    if (e->s == 0 || given->W == NULL || out->relative < 0 ||
+    if (e->figures.s == 0 || given->W == NULL || out->relative < 0 ||
         (out->n_reductions > 0 && !emitters_error_knows_groups(e)))
         return LAM_OK;
     name_error *made = memory_allocate(out->n_reductions, sizeof *made, "errors", error);
@@ -145,6 +138,6 @@ done:
 lam_status own_error_take(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
                           size_t n_selected, const uint32_t *selected, solution *out, name_error **names,
                           lam_error *error) {
-    if (stated->emitters.s > 0) return take_mixture(stated, scene, lit, out, names, error);
+    if (stated->emitters.figures.s > 0) return take_mixture(stated, scene, lit, out, names, error);
     return take_emission(stated, scene, lit, n_selected, selected, out, names, error);
 }

@@ -6,9 +6,6 @@
 #include "solver/output/output.h"
 #include "solver/verbs/light_options.h"
 
-/* The light of the emitters of an operator, for what is stated of them. */
-emitters_light own_error_light(const lam_operator *op);
-
 /* Replaces the error in out, of a batch by the largest over its vectors, where the store states what it
  * takes: errors by group, or the covariance of its emitters for whole answers. *names (freed with free()
  * after the answer is written) belongs to out. Errors: LAM_ERR_MEMORY. */

@@ -122,7 +122,8 @@ void own_light_put(const own_light *l, const error_by_group *by, error_answer *o
     of->lost2 = l->lost2;
     for (size_t c = 0; c < l->scene->n_channels; c++) {
         emission_size_add(&of->size, n, l->scene->area, sent + c * n);
-        if (l->L != NULL) emission_size_add(&of->sky, m, by->sky_power + c * m, l->L + c * m);
-        if (of->L_sent != NULL) emission_size_add(&of->sky, m, by->sky_power + c * m, l->L_sent + c * m);
+        if (l->L != NULL) emission_size_add(&of->sky, m, by->figures.sky_power + c * m, l->L + c * m);
+        if (of->L_sent != NULL)
+            emission_size_add(&of->sky, m, by->figures.sky_power + c * m, l->L_sent + c * m);
     }
 }

@@ -6,6 +6,7 @@
 #include "solver/formfactor/formfactor.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/refine/form_factor_rows.h"
+#include "solver/operator/stated/error_figures.h"
 #include "solver/scene/mesh.h"
 
 typedef enum verdict { VERDICT_OK, VERDICT_BROKEN, VERDICT_SKIPPED } verdict;
@@ -46,6 +47,7 @@ typedef struct examination {
     plane_tree tree;
     block_factors blocks;
     importance importance; /* n is 0 where all is read, and emits; loaded with the operator */
+    error_report stated;   /* by the store; a figure that it does not state is negative */
     lam_operator *op;
     bool has_mesh;
     walk_comparison *compared; /* [n_compared] by verify_walks; the channels of a mean stand together */
@@ -70,9 +72,6 @@ lam_status examination_apply(const examination *e, size_t m, lam_quantity quanti
 
 /* True where there is no operator to test, which the verdict then says. */
 bool examination_skips(const examination *e, check *c);
-
-/* Reads a number that the store states; false where it states none. */
-bool examination_stated(store *s, const char *group, const char *name, double *value);
 
 /* Sets a verdict with its detail. */
 void check_say(check *c, verdict v, const char *format, ...) __attribute__((format(printf, 3, 4)));

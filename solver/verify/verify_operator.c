@@ -56,6 +56,7 @@ lam_status verify_operator(examination *e, check *c, lam_error *error) {
         check_say(c, VERDICT_SKIPPED, "no mesh to light");
         return LAM_OK;
     }
+    error_report_load(e->s, &e->stated);
     TRY(importance_load(e->s, e->m.n, &e->importance, error));
     TRY(operator_load(e->s, &e->op, error));
     operator_describe(e->op, &about);
@@ -112,22 +113,15 @@ done:
     return check_failed(c, status, error);
 }
 
-bool examination_stated(store *s, const char *group, const char *name, double *value) {
-    return store_has(s, group) && store_has_attribute(s, group, name) &&
-           store_get_number(s, group, name, value, NULL) == LAM_OK;
-}
-
 /* Largest imbalance of the power; negative when the store states none. For the scene's own light the store
  * states it; for uniform emission it follows from the error of random emissions: an error h of H is an
  * imbalance of sum A (1 - rho s) h <= |A|^1/2 |h|, twice because the stated error weighs H by the
  * reflectance. */
-static double allowed_imbalance(store *s, bool own, double emitted, double area, double received) {
-    double value;
-    if (own && examination_stated(s, STORE_ERROR "/lights", "energy_balance", &value))
-        return (1.1 * value + rounding) * emitted;
-    if (!own && examination_stated(s, STORE_ERROR "/random", "operator_indirect_max", &value))
-        return 2 * value * sqrt(area * received) + rounding * emitted;
-    return -1;
+static double allowed_imbalance(const error_report *stated, bool own, double emitted, double area,
+                                double received) {
+    const double value = own ? stated->lights.energy_balance : stated->random.operator_indirect.max;
+    if (value < 0) return -1;
+    return own ? (1.1 * value + rounding) * emitted : 2 * value * sqrt(area * received) + rounding * emitted;
 }
 
 /* The light whose energy is tested: the scene's own, or uniform emission, both of sources alone where the
@@ -195,7 +189,7 @@ lam_status verify_energy(examination *e, check *c, lam_error *error) {
         received += a * h * h;
     }
     const double off = fabs(emitted - accounted);
-    const double allowed = allowed_imbalance(e->s, light.own, emitted, area, received);
+    const double allowed = allowed_imbalance(&e->stated, light.own, emitted, area, received);
     if (allowed < 0)
         check_say(c, VERDICT_SKIPPED, "off by %.2g of the power; the store states no error to compare with",
                   off / emitted);
@@ -214,39 +208,26 @@ done:
 
 /* One figure, stated and measured again over n probes of another draw: means differ by the standard error of
  * either, lights (one probe) by the noise of the samples they were measured against. */
-static void compare_figure(store *s, const char *group, const char *against, const error_figures *again,
-                           size_t probes, double noise, check *c) {
-    char key[64];
-    double mean, std, max;
-    char path[32];
-    const char *const ends[] = {"mean", "std", "max"};
-    double *const values[] = {&mean, &std, &max};
-    snprintf(path, sizeof path, STORE_ERROR "/%s", group);
-    for (int k = 0; k < 3; k++) {
-        snprintf(key, sizeof key, "%s_indirect_%s", against, ends[k]);
-        if (!store_has(s, path) || store_get_number(s, path, key, values[k], NULL) != LAM_OK) return;
-    }
-    const double spread = fmax(std, again->std) / sqrt(fmax(1, (double)probes));
-    const double allowed = 1.1 * mean + 6 * spread + 3 * noise + rounding;
+static void compare_figure(const char *group, const char *against, const error_figures *stated,
+                           const error_figures *again, size_t probes, double noise, check *c) {
+    if (stated->mean < 0 || stated->std < 0 || stated->max < 0) return;
+    const double spread = fmax(stated->std, again->std) / sqrt(fmax(1, (double)probes));
+    const double allowed = 1.1 * stated->mean + 6 * spread + 3 * noise + rounding;
     if (!(again->mean <= allowed))
         check_say(c, VERDICT_BROKEN, "%s: %s indirect error %.3g, stated %.3g (at most %.3g)", group, against,
-                  again->mean, mean, allowed);
+                  again->mean, stated->mean, allowed);
 }
 
 /* The same of receivers, by the noise of both references: not of single elements, of which few may make most
  * of the light that receivers see. */
-static void compare_receivers(store *s, const char *group, const receiver_figures *again, check *c) {
-    char path[32];
-    double stated, noise;
-    snprintf(path, sizeof path, STORE_ERROR "/%s", group);
-    if (!again->known || strcmp(group, "single") == 0 ||
-        !examination_stated(s, path, "receivers_indirect", &stated) ||
-        !examination_stated(s, path, "receivers_noise", &noise))
+static void compare_receivers(const char *group, const receiver_figures *stated,
+                              const receiver_figures *again, check *c) {
+    if (!again->known || strcmp(group, "single") == 0 || stated->total_indirect < 0 || stated->noise < 0)
         return;
-    const double allowed = 1.1 * stated + 3 * (noise + again->noise) + rounding;
+    const double allowed = 1.1 * stated->total_indirect + 3 * (stated->noise + again->noise) + rounding;
     if (!(again->total_indirect <= allowed))
         check_say(c, VERDICT_BROKEN, "%s: receivers' indirect error %.3g, stated %.3g (at most %.3g)", group,
-                  again->total_indirect, stated, allowed);
+                  again->total_indirect, stated->total_indirect, allowed);
 }
 
 /* A hemicube's judge takes as many rays as precompute does at defaults for the recorded epsilon: with other
@@ -329,7 +310,7 @@ lam_status verify_error(examination *e, check *c, lam_error *error) {
     error_report again = {.seconds = 0};
     recipe from = {.rays = 0};
     if (examination_skips(e, c)) return LAM_OK;
-    if (e->probes == 0 || !store_has(e->s, STORE_ERROR "/single")) {
+    if (e->probes == 0 || e->stated.single.probes == 0) {
         check_say(c, VERDICT_SKIPPED, e->probes == 0 ? "not measured again (--probes 0)" : "none is stated");
         return LAM_OK;
     }
@@ -351,14 +332,19 @@ lam_status verify_error(examination *e, check *c, lam_error *error) {
               again.single.total_indirect.mean, again.single.operator_indirect.mean);
     const struct {
         const char *name;
-        const error_group *group;
-    } groups[] = {{"single", &again.single}, {"lights", &again.lights}, {"random", &again.random}};
+        const error_group *again, *stated;
+    } groups[] = {{"single", &again.single, &e->stated.single},
+                  {"lights", &again.lights, &e->stated.lights},
+                  {"random", &again.random, &e->stated.random}};
     for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
-        const error_group *g = groups[i].group;
+        const char *name = groups[i].name;
+        const error_group *g = groups[i].again, *of = groups[i].stated;
         if (g->probes == 0) continue;
-        compare_figure(e->s, groups[i].name, "total", &g->total_indirect, g->probes, g->reference_noise, c);
-        compare_figure(e->s, groups[i].name, "operator", &g->operator_indirect, g->operator_probes, 0, c);
-        compare_receivers(e->s, groups[i].name, &g->receivers, c);
+        compare_figure(name, "total", &of->total_indirect, &g->total_indirect, g->probes, g->reference_noise,
+                       c);
+        compare_figure(name, "operator", &of->operator_indirect, &g->operator_indirect, g->operator_probes, 0,
+                       c);
+        compare_receivers(name, &of->receivers, &g->receivers, c);
     }
 done:
     return check_failed(c, status, error);

@@ -166,12 +166,16 @@ typedef struct judgement {
     bool known;    /* the store states all of them */
 } judgement;
 
-/* The largest error that a store states for any emission, or for one light alone; negative: none. */
-static double stated_error(store *s, const char *name, bool alone) {
-    double most, value;
-    if (!examination_stated(s, STORE_ERROR "/random", name, &most)) return -1;
-    if (alone && examination_stated(s, STORE_ERROR "/lights", name, &value)) most = fmax(most, value);
-    if (alone && examination_stated(s, STORE_ERROR "/single", name, &value)) most = fmax(most, value);
+/* The largest error that a store states for any emission, or for one light alone; negative: none. Of dark
+ * emissions the relative one, else the indirect one. */
+static double stated_error(const error_report *stated, bool dark, bool alone) {
+    const error_group *const groups[] = {&stated->random, &stated->lights, &stated->single};
+    double most = -1;
+    for (size_t k = 0; k < (alone ? 3 : 1); k++) {
+        const double x = dark ? groups[k]->total_relative.max : groups[k]->total_indirect.max;
+        if (k == 0 && x < 0) return -1;
+        most = fmax(most, x);
+    }
     return most;
 }
 
@@ -193,8 +197,7 @@ static void allow(const examination *e, const walk_estimates *shot, judgement *j
         uint64_t visits = 0;
         for (size_t t = 0; t < shot->n_targets; t++) visits += shot->visits[light * shot->n_targets + t];
         j->dark[light] = visits == 0;
-        const double stated =
-            stated_error(e->s, visits == 0 ? "total_relative_max" : "total_indirect_max", alone);
+        const double stated = stated_error(&e->stated, visits == 0, alone);
         j->known = j->known && stated >= 0;
         j->error[light] = stated * area_norm(&e->m, (visits == 0 ? j->l->E : j->H) + light * count);
     }

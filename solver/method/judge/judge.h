@@ -4,6 +4,7 @@
 
 #include "solver/linalg/factor_product.h"
 #include "solver/method/method.h"
+#include "solver/operator/stated/error_figures.h"
 
 /* Probes of random emission, and of whole groups, at most. */
 enum { JUDGE_RANDOM_PROBES = 8, JUDGE_WHOLE_PROBES = 3 };
@@ -11,108 +12,10 @@ enum { JUDGE_RANDOM_PROBES = 8, JUDGE_WHOLE_PROBES = 3 };
 /* Single emissions of a round. */
 size_t judge_at_once(size_t n);
 
-/* Mean, standard deviation and largest value over the probes of a group. */
-typedef struct error_figures {
-    double mean, std, max;
-} error_figures;
-
-/* Errors of the light of receivers, |B~ - B|_w / |B|_w with |x|_w^2 = sum over probes, channels and elements
- * of A w x^2, w the weights of what is read: the errors of all probes together, as receivers see next to
- * nothing of many a single element. */
-typedef struct receiver_figures {
-    bool known; /* false: all is read, or there is no such light */
-    double total_relative, total_indirect, operator_indirect;
-    double noise; /* error of the reference, likewise; above a third of total_indirect it is in the figures of
-                     total, which is_bound then calls upper bounds */
-    bool is_bound;
-} receiver_figures;
-
-typedef struct error_group {
-    size_t probes;                                      /* 0: nothing measured, nothing stored */
-    size_t operator_probes;                             /* of them, for the operator's own error */
-    error_figures total_relative, total_indirect;       /* against an independent sample of F */
-    error_figures operator_relative, operator_indirect; /* against the very F that was factorized */
-    double reference_noise; /* standard error of the mean of total_indirect by the noise of the reference */
-    double probes_noise;    /* the same by the choice of probes; negative: of one probe nobody knows */
-    /* The noise of the reference is more than a third of the mean: it is not taken out, and the figures of
-     * total are upper bounds, with twice their standard error added. */
-    bool is_bound;
-    double negative_share; /* power of negative radiosity over all, mean */
-    double energy_balance; /* |emitted - absorbed - left| / emitted, mean */
-    receiver_figures receivers;
-} error_group;
-
 /* The indirect errors that were asked for: those of receivers where these are known, else the means over all
  * elements. */
 double judge_total(const error_group *g);
 double judge_of_operator(const error_group *g);
-
-/* The errors in each group of the scene, for answers to any emission E of power P = sum A E (per channel,
- * squares added up) and effective number of emitters N = P^2 / sum A^2 E^2. In double; [n_rows][n_groups]:
- * row 0 is of the elements of a group, or of those that are read, row 1 then of its others. Zeroed: nothing
- * is known.
- *
- * The error of an answer, of the mean of a group or the root of the mean square of its elements, is about
- *     P sqrt(one^2 / N^2 + many^2 (1 - 1/N) / N + even^2),
- * in which errors of the light of single elements are independent: they add up in squares, to many^2 / N,
- * where those of one element of any size are one^2, and even is what whole groups and the scene's own lights
- * are off beyond that. */
-enum {
-    GROUP_MEAN_ONE,
-    GROUP_MEAN_MANY,
-    GROUP_MEAN_EVEN,
-    GROUP_RMS_ONE,
-    GROUP_RMS_MANY,
-    GROUP_RMS_EVEN,
-    /* For people: errors of the mean of a group over the reflected light in it, over all probes together and
-     * the largest, by random emission, by elements that light it at least as much as the whole scene, and by
-     * those that light it less. */
-    GROUP_UNIFORM,
-    GROUP_UNIFORM_LARGEST,
-    GROUP_NEAR,
-    GROUP_NEAR_LARGEST,
-    GROUP_FAR,
-    GROUP_FAR_LARGEST,
-    GROUP_FIGURES
-};
-
-/* The same of skies. With Q_t the power that radiance 1 of tile t sends into the scene after the first
- * bounce, M the mean of radiances L weighted by Q, and f_t the mean first bounce of a group, let P = sum_t
- * L_t Q_t,  S = sum_t Q_t (L_t - M)^2,  D = rho^2 sum_t f_t (L_t - M)^2, their squares and S, D added up over
- * channels, rho the mean reflectance of the group. The error is about sqrt(direct^2 D + tiles^2 S + even^2
- * P^2). Rays that meet a tile, and with them the noise of the direct light, are as many as it is bright, so
- * that squared errors of direct light grow as D; where all of a window is seen, what one tile has too much
- * another has not, and an even sky is off by far less.
- *
- * That is the law of all tiles alike. The errors of single ones are known better (judge_sky_tiles.h): with
- * d_t, or of the mean of a group d'_t, the squared error of the first bounce of a tile there, and w_t that of
- * the power that it sends into the scene, which bounces into the group as the light of single tiles does,
- *     D = rho^2 sum_t d_t (L_t - M)^2,    W = sum_t w_t (L_t - M)^2
- * are the square of the error D + bounced^2 W + tiles^2 S + even^2 P^2. */
-enum {
-    SKY_MEAN_TILES,
-    SKY_MEAN_EVEN,
-    SKY_MEAN_BOUNCED,
-    SKY_RMS_TILES,
-    SKY_RMS_EVEN,
-    SKY_RMS_BOUNCED,
-    SKY_FIGURES
-};
-typedef struct group_errors {
-    size_t n_groups, n_rows;
-    double *of[GROUP_FIGURES];
-    /* The part of them that is against the very F of the operator, by its share of the error of those probes
-     * that are compared with it. Not stored. */
-    double *of_operator[GROUP_FIGURES];
-    double *sky[SKY_FIGURES]; /* [n_rows][n_groups]; NULL: no sky was judged */
-    double sky_direct;        /* of all groups alike; 0 where sky_first is NULL: tiles have it all */
-    size_t n_channels, n_tiles;
-    double *sky_power; /* [C][n_tiles], Q_t = sum A rho first_bounce_t, m^2 sr */
-    double *sky_first; /* [n_groups][n_tiles], mean first_bounce_t over a group, sr; NULL: too many numbers */
-    double *sky_elements_off, *sky_means_off; /* [n_groups][n_tiles], d_t and d'_t, sr^2; NULL: likewise */
-    double *sky_power_off;                    /* [C][n_tiles], w_t, m^4 sr^2 */
-} group_errors;
-void group_errors_free(group_errors *e);
 
 /* The largest of uniform, near and far over the groups, of their elements that are read. */
 typedef struct worst_group {
@@ -144,14 +47,6 @@ typedef struct judged_sky {
 
 /* Skies by which it is judged: two that shine from everywhere, and single tiles. */
 enum { JUDGE_EVEN_SKIES = 2, JUDGE_SUNS = 6 };
-
-typedef struct error_report {
-    error_group single, lights, random;
-    error_group whole; /* one whole group of the scene emits evenly */
-    error_group sky;   /* only a sky shines; against the independent sample alone */
-    bool has_total;
-    double seconds;
-} error_report;
 
 /* The other reference beside the independent one: a sample of the same quality, that shares nothing with it;
  * the same disturbed by a sample of its own noise; a coarser one, of which other_share of the distance is the
@@ -200,11 +95,5 @@ typedef struct judge_input {
  * solve per probe and reference, started from the operator's own answer. */
 lam_status judge_operator(const lam_operator *op, const judge_input *given, error_report *report,
                           lam_error *error);
-
-/* /error/by_group of a store. */
-lam_status judge_save_groups(const group_errors *e, store *s, lam_error *error);
-
-/* /error of a store, without by_group. */
-lam_status judge_save(const error_report *report, store *s, lam_error *error);
 
 #endif

@@ -251,15 +251,3 @@ worst_group judge_worst_group(const group_errors *e) {
     }
     return worst;
 }
-
-void group_errors_free(group_errors *e) {
-    for (int f = 0; f < GROUP_FIGURES; f++) free(e->of[f]);
-    for (int f = 0; f < GROUP_FIGURES; f++) free(e->of_operator[f]);
-    for (int f = 0; f < SKY_FIGURES; f++) free(e->sky[f]);
-    free(e->sky_power);
-    free(e->sky_first);
-    free(e->sky_elements_off);
-    free(e->sky_means_off);
-    free(e->sky_power_off);
-    *e = (group_errors){.n_groups = 0};
-}

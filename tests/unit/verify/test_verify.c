@@ -108,7 +108,7 @@ static void save(const sample *s, const char *path) {
         MUST(operator_save(s->op, out, error));
     else
         save_not_finite(s->m.n, out);
-    MUST(judge_save(&s->errors, out, error));
+    MUST(stated_figures_save(&(stated_figures){.report = s->errors}, out, error));
     MUST(store_seal(out, error));
 }
 

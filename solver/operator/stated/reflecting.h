@@ -3,8 +3,8 @@
  * as much of H in each, so that with means over elements and channels
  *     mean e_B^2 = mean rho^2 mean e_H^2,    and of the means of a group    e_B^2 = (mean rho)^2 e_H^2.
  * A group that reflects nothing has no error of B, and what stores state of it is that of H. */
-#ifndef LAMBERT_CODEC_REFLECTING_H
-#define LAMBERT_CODEC_REFLECTING_H
+#ifndef LAMBERT_OPERATOR_STATED_REFLECTING_H
+#define LAMBERT_OPERATOR_STATED_REFLECTING_H
 
 #include "lambert/lambert.h"
 #include "store/status.h"

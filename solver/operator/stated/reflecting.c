@@ -1,4 +1,4 @@
-#include "solver/codec/reflecting.h"
+#include "solver/operator/stated/reflecting.h"
 
 #include <stdlib.h>
 

@@ -1,0 +1,93 @@
+/* The stated errors of groups of a scene, as laws of the size of an emission and of a sky: what the figures
+ * of a store (error_figures.h) say of the light of one group. */
+#ifndef LAMBERT_OPERATOR_STATED_ERROR_LAW_H
+#define LAMBERT_OPERATOR_STATED_ERROR_LAW_H
+
+#include "solver/operator/stated/error_figures.h"
+#include "solver/operator/stated/reflecting.h"
+
+/* The scene of an answer; views of the caller's. */
+typedef struct error_scene {
+    size_t n, n_channels, n_groups;
+    const double *area;              /* [n] */
+    const float *reflectance;        /* [C][n] */
+    const uint32_t *start, *members; /* [n_groups + 1], [n]: those of group g from members[start[g]] on */
+    const bool *read;                /* [n], true of receivers; NULL: all are */
+} error_scene;
+
+/* Figures with what their formulas need of the mesh. A bin is the elements of a group, or of those that are
+ * read, and in a second row the others. Zeroed: a store that states nothing by group.
+ *
+ * Faces that count twice make another error, which is as large as the light: of squares of the light B - E,
+ * s^2 + o / 2 of the elements of a group and s^2 + o^2 / 2 of its mean, with s the share of light that
+ * repaired row sums are off by, and o the share of the group's area that overlaps others
+ * (precompute/overlap_error.c). */
+typedef struct error_by_group {
+    group_errors figures;
+    size_t n_bins;
+    double *area;         /* [n_bins] */
+    double *squares;      /* [n_groups], sum A^2 */
+    double *reflectance;  /* [C][n_groups], mean */
+    reflecting *of_group; /* [n_groups] */
+    uint32_t *bin;        /* [n] */
+    double repair;        /* s; 0: none */
+    double *overlap;      /* [n_groups], o; NULL: none */
+} error_by_group;
+
+void error_by_group_free(error_by_group *e);
+
+/* Takes over by_group of figures that were loaded from the store s. *out is zeroed where that has none.
+ * Errors: LAM_ERR_FORMAT, LAM_ERR_MEMORY. */
+lam_status error_by_group_make(store *s, const error_scene *scene, stated_figures *from, error_by_group *out,
+                               lam_error *error);
+
+/* The size of an emission, channels stacked: P^2 = sum (sum A E)^2 and sum A^2 E^2. */
+typedef struct emission_size {
+    double power2, squares;
+} emission_size;
+
+/* (sum A E)^2 / sum A^2 E^2; 0 of no emission. */
+double emission_size_number(const emission_size *e);
+
+/* Adds a channel, [n]; with the powers of tiles as weights that of a sky, [n_tiles]. */
+void emission_size_add(emission_size *e, size_t n, const double *weights, const float *E);
+
+/* The size of both: their powers added up. */
+emission_size emission_size_sum(const emission_size *a, const emission_size *b);
+
+/* P^2, S and W of a sky (error_figures.h). */
+typedef struct sky_sizes {
+    const float *L; /* [C][n_tiles]; NULL: no sky, or nothing is stated of skies */
+    double power2, spread, power_off;
+} sky_sizes;
+sky_sizes sky_sizes_of(const error_by_group *e, const float *L);
+
+/* The quantity of an answer, its emission and its sky, and a sky whose bounced light alone is in it. */
+typedef struct light_sizes {
+    lam_quantity quantity;
+    emission_size size;
+    sky_sizes sky, sent;
+    double lost2; /* (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
+} light_sizes;
+
+/* Of the light that is reflected the direct light of a sky is no part, nor are errors of it. */
+light_sizes light_sizes_of(const error_by_group *e, lam_quantity quantity, const emission_size *size,
+                           const float *L);
+
+/* Squares of the errors of a bin: of its elements, and of its mean. O(C n_tiles) under a sky. */
+typedef struct bin_error {
+    double elements2, mean2;
+} bin_error;
+bin_error error_law(const error_by_group *e, const light_sizes *of, size_t bin);
+
+/* The share o of a bin; the square, over that of the light, that faces which count twice are off by: of the
+ * elements of a bin; and that of a mean, by the sums of its light and of the light that may be covered. */
+double overlap_of_bin(const error_by_group *e, size_t bin);
+double overlap_elements2(const error_by_group *e, size_t bin);
+double overlap_mean2(const error_by_group *e, double light, double covered);
+
+/* The error over the light that there is without it: the light of the answer has the error in it, and its
+ * square is larger by that of the error on average. Not finite where nothing is left. */
+double error_ratio(double error2, double light2);
+
+#endif
