@@ -205,7 +205,7 @@ static lam_status pass_of_selected(const scene *s, const radiosity_solve *solve,
 /* Finds the error of the answer's own emission, which JSON states. */
 static bool judge(const call *in, radiosity_solve *s) {
     s->judged = true;
-    return (in->scene->errors.emitters.s > 0
+    return (in->scene->errors.emitters.figures.s > 0
                 ? scene_note_emitters_error(in->scene, &s->request, s->W, s->out, &s->notes, &s->errors)
                 : scene_note_own_error(in->scene, &s->request, s->H0, s->W, s->out, &s->notes, &s->errors)) ||
            problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
