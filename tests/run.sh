@@ -100,7 +100,7 @@ CK_FORK=no run_ctest asan -j $((jobs + 1))
 
 step "the daemon under ThreadSanitizer, which mostly waits; beside it clang: a warning-free build, clang-tidy, tests that compute"
 configure tsan -DLAMBERT_TEST_PROGRAM="$LAMBERT_REFERENCE"
-build tsan lambertd unit_batch unit_batch_blocked unit_batch_company unit_batch_order unit_kept_forms unit_turns unit_request_memory unit_thread_budget unit_adjoint_rows unit_guard_parts
+build tsan lambertd tests_server
 configure users
 build users ready_server faults
 mkdir -p build/release/tests

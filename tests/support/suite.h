@@ -1,4 +1,4 @@
-/* The main() of every libcheck program: runs a suite, fails when it holds no test; and its checks. */
+/* How the main() of a test file runs its suite, which fails when it holds no test; and checks of libcheck. */
 #ifndef LAMBERT_TESTS_SUITE_H
 #define LAMBERT_TESTS_SUITE_H
 
@@ -15,6 +15,9 @@
 
 /* Of a call that sets the test's own `error`. */
 #define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
+
+/* The files of a room are one program (program.h), for which the build names the main() of each test_NAME. */
+int main(void);
 
 /* Runs a suite; the exit status. */
 int suite_run(Suite *suite);
