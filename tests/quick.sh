@@ -17,7 +17,7 @@ for room in "${rooms[@]}"; do
 done
 mapfile -t tested < <(for room in "${rooms[@]}"; do [ ! -d "tests/unit/$room" ] || echo "$room"; done)
 
-./tests/layers.sh
+./tests/layers.py
 git ls-files '*.[ch]' '*.inc' | xargs -P "$(nproc)" -n 40 clang-format-19 --dry-run --Werror
 ./tests/comments.py
 

@@ -74,7 +74,7 @@ clang_build() {
 }
 
 step "layers, layout and comments"
-./tests/layers.sh
+./tests/layers.py
 git ls-files '*.[ch]' '*.inc' | xargs -P "$jobs" -n 40 clang-format-19 --dry-run --Werror
 ./tests/comments.py
 
