@@ -103,7 +103,7 @@ GROUP = re.compile(r'^#define STORE_[A-Z_]* "(/[a-z_]*)"', re.M)
 
 
 def wrong_includes(name, allowed):
-    """What is to be said of each include of a file that its folder may not have."""
+    """The message for each include of a file that its folder may not have."""
     with open(os.path.join(HERE, name), encoding="utf-8") as file:
         source = file.read()
     folder = os.path.dirname(name)

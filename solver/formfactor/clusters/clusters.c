@@ -85,10 +85,11 @@ static int longest_extent(const builder *b, const cluster *c, double *middle) {
     }
     for (uint32_t p = c->first; p < c->last; p++) {
         const feature *f = &b->features[b->tree.element[p]];
+        const double x[6] = {f->centre[0], f->centre[1], f->centre[2],
+                             f->normal[0], f->normal[1], f->normal[2]};
         for (int d = 0; d < 6; d++) {
-            const double x = d < 3 ? f->centre[d] : f->normal[d - 3];
-            low[d] = fmin(low[d], x);
-            high[d] = fmax(high[d], x);
+            low[d] = fmin(low[d], x[d]);
+            high[d] = fmax(high[d], x[d]);
         }
     }
     const double size =

@@ -7,7 +7,7 @@
 
 /* Every piece is in 4^LEVELS elements; where something is hidden, one level more, so that blocks and not
  * elements resolve the shadow. Sanitizers watch the same code at the bounds of the defaults. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { LEVELS = 4, FINENESS = 1 };
 #else
 enum { LEVELS = 4, FINENESS = 2 };

@@ -144,7 +144,7 @@ START_TEST(all_elements_count_by_their_group) {
 END_TEST
 
 START_TEST(selected_elements_are_those_of_the_answer) {
-    float values[C * N], some[C];
+    float values[C * N], some[C] = {0};
     const uint32_t selected[] = {2};
     answer_error found;
     fill(LAM_RADIOSITY, false, values);

@@ -10,7 +10,7 @@
 #include <string.h>
 
 /* A sanitizer looks at how a number is read, not at which: some of them are enough for it. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { SHARE = 8 };
 #else
 enum { SHARE = 1 };

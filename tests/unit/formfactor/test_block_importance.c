@@ -12,7 +12,7 @@
 static lam_error error;
 
 enum { VECTORS = 4 };
-#ifdef LAMBERT_SANITIZED /* watches the same code of fewer elements */
+#ifdef LAMBERT_FEW_CASES /* watches the same code of fewer elements */
 enum { ELEMENTS = 1800 };
 #else
 enum { ELEMENTS = 3000 };

@@ -10,7 +10,7 @@
 
 enum { SCENES = 3 };
 /* A sanitizer watches the same code with each seed. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { SEEDS = 2 };
 #else
 enum { SEEDS = 16 };

@@ -13,7 +13,7 @@
 #include <omp.h>
 
 /* A sanitizer watches fewer elements. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { ELEMENTS = 500, SEEDS = 4, FINE = 40 };
 #else
 enum { ELEMENTS = 2000, SEEDS = 16, FINE = 60 };

@@ -13,7 +13,7 @@ static const struct {
 } scenes[] = {{"cornell", 6000}, {"rooms", 3000}, {"atrium", 2000}, {"maze", 2000}, {"city", 1500}};
 enum { SCENES = sizeof scenes / sizeof *scenes };
 /* A sanitizer watches the same code in each scene: a closed and an open one are enough. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { FIRST_SCENE = SCENES - 2 };
 #else
 enum { FIRST_SCENE = 0 };

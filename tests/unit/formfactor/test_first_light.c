@@ -12,7 +12,7 @@
 #include <math.h>
 
 /* A sanitizer watches fewer elements, whose form factors are larger by as much as their accuracy is. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { ELEMENTS = 500, BRIGHT = 105, SEEDS = 4 };
 #else
 enum { ELEMENTS = 2000, BRIGHT = 300, SEEDS = 8 };

@@ -6,7 +6,7 @@
 #include <math.h>
 
 /* Gaps by chance; a sanitizer watches the same code in fewer. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { GAPS = 1000, MANY = 0 };
 #else
 enum { GAPS = 5000, MANY = 1 };

@@ -13,7 +13,7 @@
 /* Scenes of occluders by chance, and of rooms with a hole by its size and the thickness of the wall. A
  * sanitizer watches the same code in each, so that a hole in walls with and without a reveal is enough, and
  * over seeds one without. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { CUT_SCENES = 1, HOLES_FIRST = 6, HOLES_LAST = 9, SEEN_FIRST = 6, SEEN_LAST = 7 };
 #else
 enum { CUT_SCENES = 4, HOLES_FIRST = 0, HOLES_LAST = 15, SEEN_FIRST = 3, SEEN_LAST = 9 };

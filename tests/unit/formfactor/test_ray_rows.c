@@ -21,7 +21,7 @@ static lam_error error;
 
 enum { CLOSED, CLOSED_NEAR, OPEN, OPEN_NEAR, CASES };
 /* Operators are built in each; a sanitizer watches the same code in a closed and in an open one. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { BUILT_FIRST = CLOSED_NEAR, BUILT_LAST = OPEN_NEAR };
 #else
 enum { BUILT_FIRST = CLOSED, BUILT_LAST = CASES };

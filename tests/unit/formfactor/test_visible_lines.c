@@ -138,7 +138,7 @@ static bool lines_of(const setting *s, int way, line_pair *out) {
 }
 
 /* Pairs of shapes, all of them; a sanitizer watches the same code with each shape once. */
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
 enum { PAIRS = 5 };
 static int pair_of_shapes(int k) {
     return 3 * k + k % 3;

@@ -327,7 +327,7 @@ END_TEST
  * degrees of freedom, their squares the variance 3 * 31^2 / (29 * 27) - v^2 = 2.54: means of many of them are
  * within four standard errors. A sanitizer watches the same code with each seed. */
 START_TEST(standard_errors_are_right) {
-#ifdef LAMBERT_SANITIZED
+#ifdef LAMBERT_FEW_CASES
     enum { SEEDS = 60 };
 #else
     enum { SEEDS = 400 };
