@@ -3,17 +3,23 @@
 # daemon's tests under ThreadSanitizer and beside them a warning-free build by the other compiler and clang-tidy, with the
 # tests that try fewer cases under sanitizers, and those few (AS_USERS in tests/CMakeLists.txt) with programs as users build
 # them. The builds are the presets of CMakePresets.json, in build/.
-# usage: tests/run.sh [--all]     --all: all unit and contract tests by the other compiler too, two minutes more
+# usage: tests/run.sh [--all]          --all: all unit and contract tests by the other compiler too, two minutes more
+#        tests/run.sh --since REVISION  all that is built, and of the tests those that the files that differ from a revision can
+#                                       reach by the graph of each build (tests/reach.py); a change of fixtures, of CMake or of a
+#                                       file that nothing is known of reaches all. Before a merge and a tag all are run.
 set -euo pipefail
-case "$*" in
-"") by_clang=optimised ;;
---all) by_clang='unit|contract|optimised' ;;
+cd "$(dirname "$0")/.."
+by_clang=optimised
+since=
+case "$#:$*" in
+0:) ;;
+1:--all) by_clang='unit|contract|optimised' ;;
+2:"--since "*) since=$(git rev-parse --verify "$2^{commit}") ;;
 *)
-    echo "tests/run.sh: '$*': nothing or --all must be given" >&2
+    echo "tests/run.sh: '$*': nothing, --all or --since REVISION must be given" >&2
     exit 2
     ;;
 esac
-cd "$(dirname "$0")/.."
 jobs=$(nproc)
 logs=build/logs
 mkdir -p "$logs"
@@ -42,24 +48,26 @@ build() {
 
 total_passed=0
 total_failed=0
-# tally PRESET: adds what its log of ctest says to the totals; finding no test is a failure.
+# tally PRESET: adds what its log of ctest says to the totals; finding no test is a failure, but where a change reaches none.
 tally() {
     local preset=$1 passed failed
     passed=$(grep -cE '^ *[0-9]+/[0-9]+ Test .* Passed ' "$logs/$preset.ctest" || true)
     failed=$(grep -cE '^ *[0-9]+/[0-9]+ Test .*(Failed|Timeout|Not Run|Exception|\*\*\*)' "$logs/$preset.ctest" || true)
-    [ $((passed + failed)) -gt 0 ] || failed=1
+    [ $((passed + failed)) -gt 0 ] || [ -n "$since" ] || failed=1
     total_passed=$((total_passed + passed))
     total_failed=$((total_failed + failed))
 }
 
-# tests_of PRESET CTEST-ARGUMENTS...: runs them and prints what failed, into the log that tally reads.
+# tests_of PRESET REGEX CTEST-ARGUMENTS...: runs the tests of that name, or those of them that the change reaches, and prints what
+# failed, into the log that tally reads.
 tests_of() {
-    local preset=$1
-    shift
-    ctest --test-dir "build/$preset" --output-on-failure --no-tests=error "$@" | tee "$logs/$preset.ctest" || true
+    local preset=$1 names=$2 none=error
+    shift 2
+    [ -z "$since" ] || { names=$(./tests/reach.py "build/$preset" "$since" "$names"); none=ignore; }
+    ctest --test-dir "build/$preset" --output-on-failure --no-tests=$none -R "$names" "$@" | tee "$logs/$preset.ctest" || true
 }
 
-# run_ctest PRESET CTEST-ARGUMENTS...: both, one after the other.
+# run_ctest PRESET REGEX CTEST-ARGUMENTS...: both, one after the other.
 run_ctest() {
     tests_of "$@"
     tally "$1"
@@ -69,8 +77,8 @@ run_ctest() {
 clang_build() {
     configure clang
     build clang
-    git ls-files 'solver/*.c' 'server/*.c' 'store/*.c' 'tests/bench/suites/*.c' | xargs -P "$jobs" -n 8 clang-tidy --quiet -p build/clang \
-        >"$logs/tidy" 2>/dev/null || { cat "$logs/tidy"; return 1; }
+    { if [ -n "$since" ]; then ./tests/reach.py --sources "$since"; else git ls-files 'solver/*.c' 'server/*.c' 'store/*.c' 'tests/bench/suites/*.c'; fi; } |
+        xargs -r -P "$jobs" -n 8 clang-tidy --quiet -p build/clang >"$logs/tidy" 2>/dev/null || { cat "$logs/tidy"; return 1; }
 }
 
 step "layers, layout and comments"
@@ -96,7 +104,7 @@ export ASAN_OPTIONS=detect_leaks=1:quarantine_size_mb=16 LSAN_OPTIONS=suppressio
 export UBSAN_OPTIONS=print_stacktrace=1
 # A process for each check would have its leaks looked for each time: half of the time of the contract. One test more than
 # cores: those of slow clients and of time limits mostly wait.
-CK_FORK=no run_ctest asan -j $((jobs + 1))
+CK_FORK=no run_ctest asan . -j $((jobs + 1))
 
 step "the daemon under ThreadSanitizer, which mostly waits; beside it clang: a warning-free build, clang-tidy, tests that compute"
 configure tsan -DLAMBERT_TEST_PROGRAM="$LAMBERT_REFERENCE"
@@ -114,7 +122,7 @@ rm -f "$logs/clang.ctest"
     renice -n 19 "$BASHPID"
     failed=0
     clang_build || failed=1
-    CK_FORK=no tests_of clang -L "$by_clang" -LE "$waiting" -j "$jobs"
+    CK_FORK=no tests_of clang . -L "$by_clang" -LE "$waiting" -j "$jobs"
     exit "$failed"
 ) >"$logs/clang" 2>&1 &
 clang=$!
@@ -122,7 +130,8 @@ export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:ex
 # The daemon shares its passes among threads of its own; OpenMP's runtime, which the unit tests' operators use, is not
 # instrumented: its barriers would look like races.
 export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers|io_thread|fair|leaving|request_memory)|unit\.(batch|kept_forms|turns|request_memory|thread_budget|adjoint_rows|guard_parts)'
+run_ctest tsan 'service\.(daemon|reduce|guard|headers|io_thread|fair|leaving|request_memory)|unit\.(batch|kept_forms|turns|request_memory|thread_budget|adjoint_rows|guard_parts)' \
+    -j $((jobs + 1))
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS
 
 wait "$clang" || total_failed=$((total_failed + 1))
@@ -131,11 +140,11 @@ cat "$logs/clang"
 step "tests by clang of rooms whose children and threads have limits of time"
 if [ -e "$logs/clang.ctest" ]; then # it is built
     tally clang
-    CK_FORK=no run_ctest clang -L "$by_clang" -L "$waiting" -j "$jobs"
+    CK_FORK=no run_ctest clang . -L "$by_clang" -L "$waiting" -j "$jobs"
 fi
 
 step "programs as users have them: faults, kills, an installation, the commands of all documents, the bench"
-run_ctest users -j $((jobs + 1)) -L as_users
+run_ctest users . -j $((jobs + 1)) -L as_users
 
 step "totals"
 echo "$total_passed passed, $total_failed failed"

@@ -1,4 +1,4 @@
-/* For the main() of a test file: it runs a suite, and fails when that holds no test; and checks of libcheck. */
+/* For the main() of a test file: it runs a suite, and fails when it holds no test; and checks of libcheck. */
 #ifndef LAMBERT_TESTS_SUITE_H
 #define LAMBERT_TESTS_SUITE_H
 
