@@ -69,21 +69,38 @@ static void option_limits(const option_row *row, char out[TEXT_MOST]) {
     snprintf(out, TEXT_MOST, "%s %.12g%s", row->above ? "above" : "at least", row->least, most);
 }
 
-/* Puts into out the help of a row and, in brackets, its preset with its unit and, where wanted, its limits.
- */
+/* "not with --rays, --sky", or nothing. */
+static void option_exclusions(const option_row *row, char out[TEXT_MOST]) {
+    size_t used = 0;
+    out[0] = '\0';
+    for (const char *word = row->not_with; word != NULL && *word != '\0';) {
+        const size_t length = strcspn(word, "|");
+        used += (size_t)snprintf(out + used, TEXT_MOST - used, "%s--%.*s", used == 0 ? "not with " : ", ",
+                                 (int)length, word);
+        word += length + (word[length] == '|');
+    }
+}
+
+/* Puts into out the help of a row and, in brackets, its preset with its unit, where wanted its limits, and
+ * the options that it excludes. */
 static void option_explanation(const option_row *row, bool with_limits, char out[TEXT_MOST]) {
-    char preset[TEXT_MOST] = "", limits[TEXT_MOST] = "";
+    char preset[TEXT_MOST] = "", limits[TEXT_MOST] = "", others[TEXT_MOST];
     if (row->preset != NULL)
         snprintf(preset, sizeof preset, "preset %s%s%s", row->preset, row->unit != NULL ? " " : "",
                  row->unit != NULL ? row->unit : "");
     else if (row->otherwise != NULL)
         snprintf(preset, sizeof preset, "preset: %s", row->otherwise);
     if (with_limits) option_limits(row, limits);
-    const char *between = *preset != '\0' && *limits != '\0' ? "; " : "";
-    if (*preset != '\0' || *limits != '\0')
-        snprintf(out, TEXT_MOST, "%s (%.256s%s%.256s)", row->help, preset, between, limits);
-    else
-        snprintf(out, TEXT_MOST, "%s", row->help);
+    option_exclusions(row, others);
+    const char *const parts[] = {preset, limits, others};
+    size_t used = (size_t)snprintf(out, TEXT_MOST, "%s", row->help);
+    bool open = false;
+    for (size_t k = 0; k < sizeof parts / sizeof *parts && used < TEXT_MOST; k++) {
+        if (*parts[k] == '\0') continue;
+        used += (size_t)snprintf(out + used, TEXT_MOST - used, "%s%.256s", open ? "; " : " (", parts[k]);
+        open = true;
+    }
+    if (open && used < TEXT_MOST) snprintf(out + used, TEXT_MOST - used, ")");
 }
 
 /* A signature that is too long for its column has a line of its own. */

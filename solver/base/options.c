@@ -183,6 +183,45 @@ done:
     return status;
 }
 
+/* Calls for each row of an option that was given; stops at the first result that is not OPTIONS_GO. */
+static int for_given(const option_table *tables, const option_result *result,
+                     int (*call)(const void *context, const option_row *row), const void *context) {
+    for (const option_table *t = tables; t->rows != NULL; t++)
+        for (const option_row *row = t->rows; row->name != NULL; row++) {
+            const int code = options_given(result, row->name) ? call(context, row) : OPTIONS_GO;
+            if (code != OPTIONS_GO) return code;
+        }
+    return OPTIONS_GO;
+}
+
+/* A command line that was read, and what is said of it. */
+typedef struct read_line {
+    const option_command *command;
+    const option_result *result;
+    const char *instead;
+} read_line;
+
+static int refuse_pair(const void *context, const option_row *row) {
+    const read_line *line = context;
+    for (size_t i = 0; row->not_with != NULL && i < line->result->n_given; i++)
+        if (option_among(line->result->given[i], row->not_with))
+            return options_usage(line->command->name, "--%s and --%s exclude each other: give one of the two",
+                                 row->name, line->result->given[i]);
+    return OPTIONS_GO;
+}
+
+static int refuse_settled(const void *context, const option_row *row) {
+    const read_line *line = context;
+    if (row->settled == NULL) return OPTIONS_GO;
+    return options_usage(line->command->name, "--%s: %s; %s", row->name, row->settled, line->instead);
+}
+
+int options_refuse_settled(const option_command *command, const option_table *tables,
+                           const option_result *result, const char *instead) {
+    const read_line line = {command, result, instead};
+    return for_given(tables, result, refuse_settled, &line);
+}
+
 int options_parse(const option_command *command, const option_table *tables, int argc, char **argv,
                   option_result *result) {
     common_fields common = {0};
@@ -200,8 +239,10 @@ int options_parse(const option_command *command, const option_table *tables, int
     if (parsed.n_arguments < command->least_arguments)
         return options_usage(command->name, "too few arguments; usage: %s %s", command->name,
                              command->arguments);
-    *result = parsed;
-    return OPTIONS_GO;
+    const read_line line = {command, &parsed, NULL};
+    const int code = for_given(tables, &parsed, refuse_pair, &line);
+    if (code == OPTIONS_GO) *result = parsed;
+    return code;
 }
 
 static const option_verb *find_verb(const option_verb *verbs, const char *name) {

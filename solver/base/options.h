@@ -51,7 +51,11 @@ typedef struct option_row {
     bool above, below;   /* the value must lie above least, below most */
     const char *choices; /* "rays|hemicube" */
     lam_status (*parse)(const char *text, void *field, lam_error *error);
-    const char *help; /* NULL: stands in another table with this name */
+    const char *not_with; /* "rays|sky": options that it cannot be given together with; NULL: any. A pair
+                             stands in the row of one of the two */
+    const char *settled;  /* why an input that settles it already does not go together with it; NULL: it does
+                             (options_refuse_settled) */
+    const char *help;     /* NULL: stands in another table with this name */
 } option_row;
 
 /* Rows that several commands have. place is the offset of the field; further members, such as the help,
@@ -116,6 +120,11 @@ int options_parse(const option_command *command, const option_table *tables, int
 /* Runs the verb argv[1] of a program, from a list that ends with a row without name. `help VERB` prints the
  * verb's --help; --help, --version, --print-manual and --print-completion are those of the whole program. */
 int options_run_verb(const option_command *program, const option_verb *verbs, int argc, char **argv);
+
+/* Wrong usage, 2, where an option was given whose row says that the input settles it; else OPTIONS_GO.
+ * instead: the end of the message, "precompute from its scene instead". */
+int options_refuse_settled(const option_command *command, const option_table *tables,
+                           const option_result *result, const char *instead);
 
 /* True if the option was on the command line. */
 bool options_given(const option_result *result, const char *name);

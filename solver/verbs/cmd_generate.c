@@ -44,6 +44,7 @@ static const option_row box_rows[] = {
      .argument = "M",
      .least = 1,
      .most = 10000,
+     .not_with = "elements",
      .help = "Exactly 6 M^2 faces"},
     {.name = "size",
      .kind = OPTION_CUSTOM,
@@ -108,8 +109,6 @@ int cmd_generate(int argc, char **argv) {
     if (code != OPTIONS_GO) return code;
     const char *kind = given.arguments[0];
     if (f.output == NULL) return options_usage(verb.name, "no -o SCENE.obj given");
-    if (f.divisions != 0 && f.elements != 0)
-        return options_usage(verb.name, "--divisions and --elements exclude each other");
     if (options_given(&given, "closed") && strcmp(kind, "cornell") != 0)
         return options_usage(verb.name, "--closed: only for cornell");
     if (strcmp(kind, "box") != 0 && (options_given(&given, "size") || options_given(&given, "divisions")))

@@ -42,6 +42,7 @@ static const option_row rows[] = {
     {.name = "full",
      .kind = OPTION_FLAG,
      .offset = FIELD(full),
+     .not_with = "quick",
      .help = "More settings, larger scenes and more seeds: half an hour instead of minutes"},
     {.name = "quick",
      .kind = OPTION_FLAG,
@@ -361,7 +362,6 @@ static int measure(int argc, char **argv) {
     const option_table tables[] = {{NULL, rows, &f}, {0}};
     int code = options_parse(&command, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
-    if (f.full && f.quick) return options_usage(command.name, "--full and --quick exclude each other");
     code = find_suites(&given, suites);
     if (code != OPTIONS_GO) return code;
 

@@ -163,7 +163,12 @@ static const option_row rows[] = {
 };
 static const option_row more_rows[] = {
     {.name = "flag", .kind = OPTION_FLAG, .offset = FIELD(flag), .help = "?"},
-    {.name = "list", .kind = OPTION_LIST, .offset = FIELD(list), .argument = "X", .help = "?"},
+    {.name = "list",
+     .kind = OPTION_LIST,
+     .offset = FIELD(list),
+     .argument = "X",
+     .settled = "the list is fixed",
+     .help = "?"},
     {.name = "number",
      .kind = OPTION_NUMBER,
      .offset = FIELD(number),
@@ -172,6 +177,7 @@ static const option_row more_rows[] = {
      .least = 0,
      .most = 1,
      .above = true,
+     .not_with = "choice|size",
      .help = "?"},
     {.name = "count",
      .kind = OPTION_COUNT_AUTO,
@@ -344,6 +350,19 @@ START_TEST(test_a_name_in_two_tables) {
 }
 END_TEST
 
+/* The input settles what --list says. */
+START_TEST(settled_options_are_refused) {
+    fields f = {0};
+    option_result result = {0};
+    char said[512];
+    const option_table tables[] = {{"more", more_rows, &f}, {0}};
+    ck_assert_int_eq(parse(WORDS("a", "--list", "x", "--flag"), &f, &result, said), OPTIONS_GO);
+    ck_assert_int_eq(options_refuse_settled(&command, tables, &result, "give another"), 2);
+    ck_assert_int_eq(parse(WORDS("a", "--flag"), &f, &result, said), OPTIONS_GO);
+    ck_assert_int_eq(options_refuse_settled(&command, tables, &result, "give another"), OPTIONS_GO);
+}
+END_TEST
+
 START_TEST(test_table_refuses_in_one_line) {
     static const struct {
         const char *words[3];
@@ -369,6 +388,8 @@ START_TEST(test_table_refuses_in_one_line) {
         {{"a", "--custom", "x"}, "--custom x: not a number"},
         {{"a", "--output="}, "not empty"},
         {{"a", "b", "c"}, "one argument too many"},
+        {{"a", "--number=.5", "--size=2K"}, "--number and --size exclude each other: give one of the two"},
+        {{"a", "--size=2K", "--number=.5"}, "--number and --size exclude each other: give one of the two"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         fields f = {0};
@@ -398,6 +419,7 @@ int main(void) {
     tcase_add_test(c, test_table);
     tcase_add_test(c, test_words_of_the_command_line);
     tcase_add_test(c, test_a_name_in_two_tables);
+    tcase_add_test(c, settled_options_are_refused);
     tcase_add_test(c, test_table_refuses_in_one_line);
     suite_add_tcase(s, c);
     return suite_run(s);
