@@ -227,7 +227,7 @@ static lam_status open_sequence(const char *path, animation *a, terminal *t, lam
     light_options light = f->light;
     bool *lit = NULL;
     if (strcmp(light.frames, ANIMATE_SKY) == 0) light.frames = NULL;
-    codec_quantity_find(f->quantity, strlen(f->quantity), &a->quantity);
+    a->quantity = (lam_quantity)f->quantity; /* frames show light */
     TRY(render_view_open(path, f, &a->view, error));
     TRY(light_open(a->view.s, &a->view.m, &light, false, &a->lit, error));
     light_log(&a->lit, t);

@@ -50,7 +50,7 @@ static lam_status render(const char *path, const render_options *f, terminal *t,
     float *values = NULL;
     lam_quantity quantity = LAM_RADIOSITY;
 
-    codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
+    if (!render_needs_no_light(f)) quantity = (lam_quantity)f->quantity;
     TRY(render_view_open(path, f, &v, error));
     TRY(light_open(v.s, &v.m, &f->light, false, &lit, error));
     light_log(&lit, t);
@@ -163,10 +163,11 @@ static void log_unused(const render_options *f, const option_result *given, term
     static const char *const unused[] = {"emit",    "emission",  "sky",        "exposure",
                                          "smooth",  "iso-lines", "value-unit", "false-color",
                                          "palette", "range",     "log"};
+    char name[OPTION_WORD_BYTES];
     const size_t all = sizeof unused / sizeof *unused, count = f->false_color ? 7 : all;
     for (size_t i = 0; i < count; i++)
         if (options_given(given, unused[i]))
-            terminal_log(t, "--quantity %s does not use --%s", f->quantity, unused[i]);
+            terminal_log(t, "--quantity %s does not use --%s", render_quantity_name(f, name), unused[i]);
 }
 
 int cmd_render(int argc, char **argv) {

@@ -18,11 +18,15 @@
 
 #define A_LEAP_YEAR (24. * 366)
 
+/* --sun: the light of its tile, or the sun itself. */
+typedef enum sun_asked { SUN_TILES, SUN_EXACT } sun_asked;
+
 typedef struct fields {
     light_options light;
     option_list reduce, annual;
-    const char *weather, *sun, *quantity, *output, *occupied;
+    const char *weather, *quantity, *output, *occupied;
     double hours, tolerance;
+    sun_asked sun;
     uint64_t sun_points;
     bool photometric, json, smooth;
 } fields;
@@ -36,7 +40,7 @@ static const option_row weather_rows[] = {
      .help = "The hours of a weather file in place of --sky, as `lambert sky` converts them to the tiles of "
              "the store"},
     {.name = "sun",
-     .kind = OPTION_CHOICE,
+     .kind = OPTION_WORD,
      .offset = FIELD(sun),
      .choices = "tiles|exact",
      .preset = "tiles",
@@ -274,7 +278,7 @@ static lam_status add_weather(const fields *f, store *s, const mesh *m, size_t n
                               weather_span *span, lam_error *error) {
     const weather_options hours = {.path = f->weather,
                                    .photometric = f->photometric,
-                                   .exact = strcmp(f->sun, "exact") == 0,
+                                   .exact = f->sun == SUN_EXACT,
                                    .sun_points = (size_t)f->sun_points};
     return weather_light_add(&hours, s, m, lit->op, lit->sky, n_selected, selected, t, &lit->light, sun, span,
                              error);
@@ -285,6 +289,17 @@ static lam_status put_out(const solution *out, const fields *f, lam_error *error
     if (f->json) return output_print_json(out, error);
     output_print(out);
     return LAM_OK;
+}
+
+/* Views of both. */
+static error_scene error_scene_of(const mesh *m, const emission_scene *scene) {
+    return (error_scene){.n = m->n,
+                         .n_channels = m->n_channels,
+                         .n_groups = scene->groups.n_groups,
+                         .area = m->area,
+                         .reflectance = m->reflectance,
+                         .start = scene->groups.start,
+                         .members = scene->groups.elements};
 }
 
 static lam_status solve(const char *path, const fields *f, const annual_options *year, reduction *reductions,
@@ -320,13 +335,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
              lit.sky != NULL ? ", --sky FILE or --weather FILE" : "");
     if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
-    about = (error_scene){.n = m.n,
-                          .n_channels = m.n_channels,
-                          .n_groups = lit.scene.groups.n_groups,
-                          .area = m.area,
-                          .reflectance = m.reflectance,
-                          .start = lit.scene.groups.start,
-                          .members = lit.scene.groups.elements};
+    about = error_scene_of(&m, &lit.scene);
     /* With --reduce only figures are written, also with -o. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     TRY(stated_errors_read(s, &about, lit.op, &stated, error));
@@ -436,7 +445,7 @@ int cmd_solve(int argc, char **argv) {
         return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
     if (f.weather == NULL && (f.photometric || options_given(&given, "sun")))
         return options_usage(verb.name, "--sun and --photometric are for --weather");
-    if (strcmp(f.sun, "exact") != 0 && options_given(&given, "sun-points"))
+    if (f.sun != SUN_EXACT && options_given(&given, "sun-points"))
         return options_usage(verb.name, "--sun-points is for --sun exact");
     if (f.tolerance > 0 && f.annual.count > 0)
         return options_usage(verb.name, "--tolerance is not for --annual");

@@ -135,12 +135,14 @@ const option_row render_frame_rows[] = {
              "its numbered pictures stay beside it"},
     {0},
 };
+static const char quantity_words[] = "radiosity|irradiance|indirect|coherence|patch|visible";
+
 const option_row render_view_rows[] = {
     {.name = "quantity",
-     .kind = OPTION_CHOICE,
+     .kind = OPTION_WORD,
      .offset = FIELD(quantity),
      .argument = "NAME",
-     .choices = "radiosity|irradiance|indirect|coherence|patch|visible",
+     .choices = quantity_words,
      .preset = "radiosity",
      .help = "radiosity, irradiance or indirect light; or, without any light, of a store of --method 2msc: "
              "coherence, from black for the least coherent patch to white for 1, or patch, with a colour for "
@@ -194,16 +196,21 @@ const option_row render_view_rows[] = {
     {0},
 };
 
+const char *render_quantity_name(const render_options *f, char name[OPTION_WORD_BYTES]) {
+    option_word(f->quantity, quantity_words, name);
+    return name;
+}
+
 bool render_is_visible(const render_options *f) {
-    return strcmp(f->quantity, "visible") == 0;
+    return f->quantity == SHOW_VISIBLE;
 }
 
 bool render_is_patch(const render_options *f) {
-    return strcmp(f->quantity, "patch") == 0;
+    return f->quantity == SHOW_PATCH;
 }
 
 bool render_needs_no_light(const render_options *f) {
-    return strcmp(f->quantity, "coherence") == 0 || render_is_patch(f) || render_is_visible(f);
+    return f->quantity >= SHOW_COHERENCE;
 }
 
 bool render_is_exr(const render_options *f) {
@@ -234,9 +241,11 @@ done:
 static lam_status check_frames(const render_options *f, lam_error *error) {
     lam_status status = LAM_OK;
     const char *frames = f->light.frames;
+    char name[OPTION_WORD_BYTES];
     if (frames == NULL) goto done;
     if (render_needs_no_light(f))
-        FAIL(error, LAM_ERR_ARGUMENT, "--quantity %s shows no light: there is none to animate", f->quantity);
+        FAIL(error, LAM_ERR_ARGUMENT, "--quantity %s shows no light: there is none to animate",
+             render_quantity_name(f, name));
     if (strcmp(frames, ANIMATE_SKY) == 0) {
         if (f->light.sky == NULL)
             FAIL(error, LAM_ERR_ARGUMENT, "--animate sky is of the skies of --sky FILE");

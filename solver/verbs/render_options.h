@@ -22,9 +22,19 @@ typedef struct render_range {
     double low, high; /* both 0: not given */
 } render_range;
 
+/* --quantity: those of light first (lam_quantity), then pictures of the store. */
+typedef enum shown_quantity {
+    SHOW_RADIOSITY = LAM_RADIOSITY,
+    SHOW_IRRADIANCE = LAM_IRRADIANCE,
+    SHOW_INDIRECT = LAM_INDIRECT,
+    SHOW_COHERENCE,
+    SHOW_PATCH,
+    SHOW_VISIBLE
+} shown_quantity;
+
 typedef struct render_options {
     light_options light;
-    const char *quantity;
+    shown_quantity quantity;
     render_camera camera;
     render_size size;
     const char *samples; /* rays of a pixel */
@@ -50,6 +60,9 @@ lam_status render_options_check(render_options *f, const option_result *given, l
 
 /* True of coherence, patch and visible: a picture of the store, without light. */
 bool render_needs_no_light(const render_options *f);
+/* Returns name, the word of its quantity. */
+const char *render_quantity_name(const render_options *f, char name[OPTION_WORD_BYTES]);
+
 bool render_is_visible(const render_options *f);
 bool render_is_patch(const render_options *f);
 

@@ -158,7 +158,8 @@ void render_sheet_free(render_sheet *sheet) {
 lam_status render_sheet_write(const render_options *f, const picture_options *style, render_sheet *sheet,
                               const char *path, size_t *clamped, lam_error *error) {
     const char *unit = render_needs_no_light(f) ? "" : f->unit;
-    const exr_notes notes = {.quantity = f->quantity, .unit = unit};
+    char name[OPTION_WORD_BYTES];
+    const exr_notes notes = {.quantity = render_quantity_name(f, name), .unit = unit};
     *clamped = 0;
     if (render_is_exr(f)) return exr_write(&sheet->values, f->single, &notes, path, clamped, error);
     if (style->scale.palette != NULL) picture_legend(&style->scale, unit, &sheet->picture);

@@ -31,7 +31,7 @@ static const option_row rows[] = {
      .below = true,
      .help = "Entries below X are discarded"},
     {.name = "correction",
-     .kind = OPTION_CHOICE,
+     .kind = OPTION_WORD,
      .offset = offsetof(sparse_options, correction),
      .preset = "delta",
      .choices = "none|delta|discarded",
@@ -40,16 +40,10 @@ static const option_row rows[] = {
     {0},
 };
 
+static const char *const correction_names[] = {"none", "delta", "discarded"};
+
 /* The threshold where none is given. */
 static const double usual_threshold = 1e-4;
-
-typedef enum sparse_correction { SPARSE_NONE, SPARSE_DELTA, SPARSE_DISCARDED } sparse_correction;
-
-static sparse_correction correction_of(const sparse_options *o) {
-    return strcmp(o->correction, "none") == 0    ? SPARSE_NONE
-           : strcmp(o->correction, "delta") == 0 ? SPARSE_DELTA
-                                                 : SPARSE_DISCARDED;
-}
 
 /* The smallest threshold from that asked for on whose entries memory is forecast to hold, of all channels;
  * where it does not hold them at that one, rows of black elements are as the others. */
@@ -144,7 +138,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     sparse_arrays arrays = {.M = memory_allocate(C, sizeof *arrays.M, "operator", error)};
     lam_operator *made = NULL;
     const sparse_options *o = own;
-    const sparse_correction correction = correction_of(o);
+    const sparse_correction correction = o->correction;
+
     const double asked = o->threshold > 0 ? o->threshold : usual_threshold;
     sparse_limits limits = {.threshold = asked, .whole_black = true};
     double entries = 0;
@@ -175,7 +170,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     TRY(operator_sparse_create(n, C, problem->reflectance, &arrays, &made, error));
     TRY(operator_set_order(made, problem->order, error));
     report_number(report, "threshold", limits.threshold);
-    report_text(report, "correction", o->correction);
+    report_text(report, "correction", correction_names[correction]);
     report_step_add(report, "invert", clock_seconds() - started);
     snprintf(report->detail, sizeof report->detail, "threshold %.3g, %.3g %% of all entries, %zu bounces%s",
              limits.threshold, 100 * entries / ((double)n * (double)n * (double)C), bounces,

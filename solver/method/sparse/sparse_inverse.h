@@ -5,10 +5,13 @@
 
 #include "solver/method/method.h"
 
+/* --correction. */
+typedef enum sparse_correction { SPARSE_NONE, SPARSE_DELTA, SPARSE_DISCARDED } sparse_correction;
+
 /* The options of --method sparse. */
 typedef struct sparse_options {
-    double threshold;       /* entries below it are left out; 0: not given */
-    const char *correction; /* "none", "delta", "discarded" */
+    double threshold; /* entries below it are left out; 0: not given */
+    sparse_correction correction;
 } sparse_options;
 
 /* The limits of what is kept. Rows of black elements are as if rho were 1 there, and their irradiance is all

@@ -43,7 +43,7 @@ static const option_row rows[] = {
      .above = true,
      .help = "Split no patch of this area or less; without --coherence, split all others"},
     {.name = "assign",
-     .kind = OPTION_CHOICE,
+     .kind = OPTION_WORD,
      .offset = offsetof(two_mesh_options, assign),
      .preset = "inclusion",
      .choices = "inclusion|proximity",
@@ -56,7 +56,7 @@ static const option_row rows[] = {
 enum { ELEMENTS_OF_PATCH = 16 };
 
 static bool by_proximity(const two_mesh_options *o) {
-    return strcmp(o->assign, "proximity") == 0;
+    return o->assign == ASSIGN_PROXIMITY;
 }
 
 /* Patches where their number is known before; 0: it is not. */

@@ -5,11 +5,15 @@
 #include "solver/linalg/scaled.h"
 #include "solver/method/two_mesh/coarse_mesh.h"
 
+/* --assign: an element belongs to the patch that it was split into, or to the nearest one. */
+typedef enum patch_assignment { ASSIGN_INCLUSION, ASSIGN_PROXIMITY } patch_assignment;
+
 /* The options of --method 2msc. */
 typedef struct two_mesh_options {
-    const char *factorizer, *assign; /* "auto" or "qr"; "inclusion" or "proximity" */
-    uint64_t rank;                   /* 0: by coherence and min_area */
-    double coherence, min_area;      /* smallest coherence; smallest area of a patch, m^2; 0: not given */
+    const char *factorizer; /* "auto" or "qr" */
+    patch_assignment assign;
+    uint64_t rank;              /* 0: by coherence and min_area */
+    double coherence, min_area; /* smallest coherence; smallest area of a patch, m^2; 0: not given */
     bool keep_factors;
 } two_mesh_options;
 
