@@ -99,9 +99,8 @@ lam_status coarse_light_make(const mesh *faces, uint64_t seed, const progress *p
     order = memory_allocate(c.m.n, sizeof *order, "a coarse mesh", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&c.m, order, error));
-    const form_factor_options how = {.recipe = {.source = &source_rays, .rays = RAYS, .seed = seed},
-                                     .progress = p,
-                                     .stage = "form factors of a coarse mesh"};
+    const form_factor_options how = {
+        .recipe = {.rays = RAYS, .seed = seed}, .progress = p, .stage = "form factors of a coarse mesh"};
     TRY(form_factors_make(&c.m, order, &how, &f, error));
     if (f.F.indptr == NULL) TRY(form_factors_expand(&f, c.m.area, error));
     TRY(solve(&f, p, &c, error));

@@ -22,10 +22,10 @@ const char *recipe_name(const recipe *r) {
 
 lam_status recipe_check(const recipe *r, lam_error *error) {
     if (recipe_can(r, SOURCE_RESOLUTION)) {
-        if (r->resolution < RECIPE_RESOLUTION_LEAST || r->resolution > RECIPE_RESOLUTION_MOST ||
+        if (r->resolution < HEMICUBE_RESOLUTION_LEAST || r->resolution > HEMICUBE_RESOLUTION_MOST ||
             r->resolution % 2 != 0)
             return status_fail(error, LAM_ERR_ARGUMENT, "--resolution %zu: must be even, from %d to %d",
-                               r->resolution, RECIPE_RESOLUTION_LEAST, RECIPE_RESOLUTION_MOST);
+                               r->resolution, HEMICUBE_RESOLUTION_LEAST, HEMICUBE_RESOLUTION_MOST);
         return LAM_OK;
     }
     if (r->rays < 1 || r->rays > RECIPE_RAYS_MOST)

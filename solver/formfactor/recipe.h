@@ -20,10 +20,10 @@ typedef struct recipe {
     scene_closure closure;
 } recipe;
 
-enum { RECIPE_RAYS_MOST = 1 << 24, RECIPE_RESOLUTION_LEAST = 4, RECIPE_RESOLUTION_MOST = 4096 };
+enum { RECIPE_RAYS_MOST = 1 << 24, HEMICUBE_RESOLUTION_LEAST = 4, HEMICUBE_RESOLUTION_MOST = 4096 };
 
 /* Rays beside pairs without a sky: they only find whether the scene is closed and has turned faces. */
-enum { RECIPE_RAYS_FEW = 256 };
+enum { RAYS_BESIDE_PAIRS = 256 };
 
 /* "rays", "hemicube", "pairs", "near-pairs", "blocks" */
 const char *recipe_name(const recipe *r);

@@ -10,17 +10,19 @@
 #include "solver/formfactor/visibility/visibility.h"
 
 enum {
-    SOURCE_ROWS = 1 << 0,       /* finds rows of F (form_factors_make) */
-    SOURCE_STREAM = 1 << 1,     /* finds them one after the other, too (ray_rows.h) */
-    SOURCE_BLOCKS = 1 << 2,     /* finds blocks of clusters (form_factors_make_blocks) */
-    SOURCE_TWICE = 1 << 3,      /* finds both samples of a judge together (form_factors_make_twice) */
-    SOURCE_LARGE = 1 << 4,      /* its rows may lie in files */
-    SOURCE_NOISE = 1 << 5,      /* the noise of its rays is in all of F (recipe_noise) */
-    SOURCE_RAYS = 1 << 6,       /* recipe.rays are cast from every element and fill F */
-    SOURCE_RESOLUTION = 1 << 7, /* recipe.resolution is its own, and rays are none of its own */
-    SOURCE_ACCURACY = 1 << 8,   /* recipe.accuracy is its own */
-    SOURCE_TIMED = 1 << 9,      /* the measured rate of rays says more of its time than a sample's counts */
-    SOURCE_BY_EPSILON = 1 << 10 /* --epsilon decides its accuracy, whatever else is asked for */
+    SOURCE_ROWS = 1 << 0,        /* finds rows of F (form_factors_make) */
+    SOURCE_STREAM = 1 << 1,      /* finds them one after the other, too (ray_rows.h) */
+    SOURCE_BLOCKS = 1 << 2,      /* finds blocks of clusters (form_factors_make_blocks) */
+    SOURCE_TWICE = 1 << 3,       /* finds both samples of a judge together (form_factors_make_twice) */
+    SOURCE_LARGE = 1 << 4,       /* its rows may lie in files */
+    SOURCE_NOISE = 1 << 5,       /* the noise of its rays is in all of F (recipe_noise) */
+    SOURCE_RAYS = 1 << 6,        /* recipe.rays are cast from every element and fill F */
+    SOURCE_RESOLUTION = 1 << 7,  /* recipe.resolution is its own, and rays are none of its own */
+    SOURCE_ACCURACY = 1 << 8,    /* recipe.accuracy is its own */
+    SOURCE_TIMED = 1 << 9,       /* the measured rate of rays says more of its time than a sample's counts */
+    SOURCE_BY_EPSILON = 1 << 10, /* --epsilon decides its accuracy, whatever else is asked for */
+    SOURCE_COARSER = 1 << 11,    /* an operator's --epsilon may make it coarser (recipe_coarser) */
+    SOURCE_ASKED = 1 << 12       /* --form-factors asks for it by its name */
 };
 
 /* Where the rows of a sample lie while they are found and merged. */
@@ -51,6 +53,9 @@ typedef struct factor_source {
     double (*accuracy)(const recipe *r); /* recipe_accuracy, where it is not recipe.accuracy; or NULL */
     double (*repair)(const recipe *r);   /* the mean repair of row sums that its samples make by themselves */
     recipe (*judge)(const recipe *r, size_t rays); /* recipe_of_judge, but for seed and closure */
+    /* Its recipe where --form-factors asks for it, of rays, resolution, seed and closure that options ask
+     * for; NULL: the plan weighs it against others. */
+    recipe (*asked)(const recipe *r);
 
     double (*rays)(double n, const recipe *r);         /* that are cast from an element */
     double (*blocks)(double n, const recipe *r);       /* their number; NULL: rows */
@@ -82,6 +87,13 @@ extern const factor_source source_rays, source_hemicube, source_pairs, source_ne
 /* The list; NULL behind the last. A new source is the last. */
 const factor_source *source_at(size_t k);
 const factor_source *source_find(const char *name); /* NULL: none */
+
+/* The words of --form-factors: "auto", and the names of the sources that it asks for. The source at a place
+ * among them, NULL: auto; and the place of a source. */
+enum { SOURCE_WORDS_BYTES = 128 };
+void source_words(char words[SOURCE_WORDS_BYTES]);
+const factor_source *source_asked(unsigned place);
+unsigned source_place(const factor_source *asked);
 
 /* The place of a recipe's source in the list, by which scratch files know it. */
 size_t source_number(const recipe *r);

@@ -1,7 +1,9 @@
 /* The list of the sources of form factors, and what a recipe knows by its own. */
 #include "solver/formfactor/source.h"
 
+#include <assert.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 static const factor_source *const SOURCE_LIST[] = {
@@ -16,6 +18,27 @@ const factor_source *source_find(const char *name) {
     size_t k = 0;
     while (SOURCE_LIST[k] != NULL && strcmp(SOURCE_LIST[k]->name, name) != 0) k++;
     return SOURCE_LIST[k];
+}
+
+void source_words(char words[SOURCE_WORDS_BYTES]) {
+    size_t length = (size_t)sprintf(words, "auto");
+    const factor_source *s;
+    for (unsigned place = 1; (s = source_asked(place)) != NULL; place++) {
+        length += (size_t)snprintf(words + length, SOURCE_WORDS_BYTES - length, "|%s", s->name);
+        assert(length < SOURCE_WORDS_BYTES);
+    }
+}
+
+const factor_source *source_asked(unsigned place) {
+    for (size_t k = 0; SOURCE_LIST[k] != NULL; k++)
+        if ((SOURCE_LIST[k]->flags & SOURCE_ASKED) && --place == 0) return SOURCE_LIST[k];
+    return NULL;
+}
+
+unsigned source_place(const factor_source *asked) {
+    unsigned place = 1;
+    while (source_asked(place) != NULL && source_asked(place) != asked) place++;
+    return source_asked(place) != NULL ? place : 0;
 }
 
 size_t source_number(const recipe *r) {

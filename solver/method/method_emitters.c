@@ -14,6 +14,9 @@
 
 enum { FRAMES_MOST = 65536 };
 
+/* Options of precompute that are about form factors, which walks find none of. */
+#define NO_FORM_FACTORS "sky|portal|keep-form-factors|receivers|importance|sources|group-error|time"
+
 static const option_row rows[] = {
     {.name = "emitters",
      .kind = OPTION_TEXT,
@@ -25,12 +28,14 @@ static const option_row rows[] = {
      .kind = OPTION_TEXT,
      .offset = offsetof(emitters_options, positions),
      .argument = "FILE.json",
+     .not_with = "emitters|path|" NO_FORM_FACTORS,
      .help = "The positions of a light that is no part of the scene, an emitter each: found by random walks, "
              "without form factors"},
     {.name = "path",
      .kind = OPTION_TEXT,
      .offset = offsetof(emitters_options, path),
      .argument = "FILE.json",
+     .not_with = "emitters|" NO_FORM_FACTORS,
      .help = "The same of a light that moves along a curve, in --frames positions"},
     {.name = "frames",
      .kind = OPTION_COUNT,
@@ -165,14 +170,12 @@ done:
 static lam_status check(const void *own, lam_error *error) {
     lam_status status = LAM_OK;
     const emitters_options *o = own;
-    const int ways = (o->emitters != NULL) + (o->positions != NULL) + (o->path != NULL);
-    if (ways > 1)
-        FAIL(error, LAM_ERR_ARGUMENT, "--emitters, --positions and --path exclude each other: give one");
     if (o->path != NULL && o->frames == 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--path: give --frames N too, the number of positions along it");
     if (o->path == NULL && o->frames > 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--frames: is for --path FILE.json, which is not given");
-    if (ways == 0) FAIL(error, LAM_ERR_ARGUMENT, "%s", missing);
+    if (o->emitters == NULL && o->positions == NULL && o->path == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "%s", missing);
 done:
     return status;
 }

@@ -13,17 +13,17 @@
  * overlaps, the squared error over the squared light L = B - E in it is s^2 + o_g / 2 of its elements and
  * s^2 + o_g^2 / 2 of its mean, and over the whole scene, o the share of its area, s^2 + o / 2. It adds up in
  * squares with the other errors, which are independent of it. */
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 #include "solver/scene/coincident.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 /* s by the overlap and by the repair of rows; there are no rows beside positions. */
-static double repair_of(const precompute_state *state) {
-    const mesh *m = &state->m;
+static double repair_of(const precompute_scene *scene, const form_factors *f) {
+    const mesh *m = &scene->m;
     const double overlap = mesh_overlap_share(m) / 2,
-                 r = fmax(overlap, state->f.row_sums != NULL ? form_factors_repair_error(&state->f) : 0);
+                 r = fmax(overlap, f != NULL && f->row_sums != NULL ? form_factors_repair_error(f) : 0);
     double most = 0, area = 0;
     if (!(r > 0)) return 0;
     for (size_t i = 0; i < m->n; i++) area += m->area[i];
@@ -35,18 +35,18 @@ static double repair_of(const precompute_state *state) {
     return r * fmin(2, 1 / sqrt(1 - most));
 }
 
-static double elements2(const precompute_state *state, size_t group) {
-    const double share = state->m.overlap != NULL ? state->m.overlap[group] : 0;
-    return state->repair * state->repair + share / 2;
+static double elements2(const precompute_scene *scene, const made_operator *made, size_t group) {
+    const double share = scene->m.overlap != NULL ? scene->m.overlap[group] : 0;
+    return made->repair * made->repair + share / 2;
 }
 
-static double mean2(const precompute_state *state, size_t group) {
-    const double share = state->m.overlap != NULL ? state->m.overlap[group] : 0;
-    return state->repair * state->repair + share * share / 2;
+static double mean2(const precompute_scene *scene, const made_operator *made, size_t group) {
+    const double share = scene->m.overlap != NULL ? scene->m.overlap[group] : 0;
+    return made->repair * made->repair + share * share / 2;
 }
 
-static double whole2(const precompute_state *state) {
-    return state->repair * state->repair + mesh_overlap_share(&state->m) / 2;
+static double whole2(const precompute_scene *scene, const made_operator *made) {
+    return made->repair * made->repair + mesh_overlap_share(&scene->m) / 2;
 }
 
 /* relative = indirect |B - E| / |B|: what is added to the indirect error is less of B. */
@@ -67,45 +67,48 @@ static void add_to_figures(error_group *g, double added2) {
     r->total_relative = sqrt(r->total_relative * r->total_relative + of_read * of_read * added2);
 }
 
-static void add_to_groups(const precompute_state *state, group_errors *e) {
+static void add_to_groups(const precompute_scene *scene, const made_operator *made, group_errors *e) {
     static const int figures[] = {GROUP_UNIFORM, GROUP_UNIFORM_LARGEST, GROUP_NEAR, GROUP_NEAR_LARGEST,
                                   GROUP_FAR,     GROUP_FAR_LARGEST};
     for (size_t k = 0; k < sizeof figures / sizeof *figures && e->of[figures[k]] != NULL; k++)
         for (size_t b = 0; b < e->n_rows * e->n_groups; b++) {
             double *x = &e->of[figures[k]][b]; /* not a number where nothing is known */
-            *x = sqrt(*x * *x + mean2(state, b % e->n_groups));
+            *x = sqrt(*x * *x + mean2(scene, made, b % e->n_groups));
         }
 }
 
-bool state_is_overlapping(const precompute_state *state) {
-    const double error = judge_total(&state->errors.random);
-    return state->repair > 0 && whole2(state) > .5 * error * error;
+bool made_is_overlapping(const precompute_scene *scene, const made_operator *made) {
+    const double error = judge_total(&made->errors.random);
+    return made->repair > 0 && whole2(scene, made) > .5 * error * error;
 }
 
-void state_add_overlap(precompute_state *state) {
-    error_report *e = &state->errors;
+void made_add_overlap(const precompute_job *job, const precompute_scene *scene, const precompute_plan *plan,
+                      const precompute_factors *factors, made_operator *made) {
+    error_report *e = &made->errors;
     error_group *const groups[] = {&e->single, &e->lights, &e->random, &e->whole, &e->sky};
-    state->repair = repair_of(state);
-    if (!(state->repair > 0) || state->probes == 0 || !e->has_total) return;
-    for (size_t k = 0; k < sizeof groups / sizeof *groups; k++) add_to_figures(groups[k], whole2(state));
-    add_to_groups(state, &state->by_group);
+    made->repair = repair_of(scene, &factors->f);
+    if (!(made->repair > 0) || plan->probes == 0 || !e->has_total) return;
+    for (size_t k = 0; k < sizeof groups / sizeof *groups; k++)
+        add_to_figures(groups[k], whole2(scene, made));
+    add_to_groups(scene, made, &made->by_group);
     terminal_log(
-        state->t,
+        job->t,
         "faces that overlap, and the repair of row sums, are %.2g of the reflected light: stated errors "
         "contain it",
-        sqrt(whole2(state)));
+        sqrt(whole2(scene, made)));
 }
 
 /* Covariances of light that is off by the same share for all positions: share^2 times the products of their
  * light, of the elements of a group and of its mean. */
-lam_status state_add_overlap_of_positions(precompute_state *state, lam_error *error) {
+lam_status walked_add_overlap(const precompute_scene *scene, made_operator *made, const walked_light *walked,
+                              lam_error *error) {
     lam_status status = LAM_OK;
-    const mesh *m = &state->m;
-    const reuse_estimates *e = &state->paths;
+    const mesh *m = &scene->m;
+    const reuse_estimates *e = &walked->paths;
     const size_t n = m->n, C = m->n_channels, s = e->n_positions, G = m->n_groups;
     double *area = NULL, *mean = NULL;
-    state->repair = repair_of(state);
-    if (!(state->repair > 0)) return LAM_OK;
+    made->repair = repair_of(scene, NULL);
+    if (!(made->repair > 0)) return LAM_OK;
     area = memory_allocate(G, sizeof *area, "errors of positions", error);
     mean = memory_allocate(G, s * sizeof *mean, "errors of positions", error);
     if (area == NULL || mean == NULL) TRY(LAM_ERR_MEMORY);
@@ -121,16 +124,17 @@ lam_status state_add_overlap_of_positions(precompute_state *state, lam_error *er
                 mean[g * s + j] += m->area[i] * (double)rho[i] * here / area[g];
                 for (size_t l = 0; l < s; l++) {
                     const double product = weight * here * (double)H[l * n + i];
-                    e->covariance[j * s + l] += elements2(state, g) * product;
+                    e->covariance[j * s + l] += elements2(scene, made, g) * product;
                     if (e->of_groups != NULL)
-                        e->of_groups[(g * s + j) * s + l] += elements2(state, g) * product;
+                        e->of_groups[(g * s + j) * s + l] += elements2(scene, made, g) * product;
                 }
             }
         }
         for (size_t g = 0; e->of_means != NULL && g < G; g++)
             for (size_t j = 0; j < s; j++)
                 for (size_t l = 0; l < s; l++)
-                    e->of_means[(g * s + j) * s + l] += mean2(state, g) * mean[g * s + j] * mean[g * s + l];
+                    e->of_means[(g * s + j) * s + l] +=
+                        mean2(scene, made, g) * mean[g * s + j] * mean[g * s + l];
     }
 done:
     free(area);

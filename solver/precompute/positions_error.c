@@ -1,6 +1,6 @@
 /* The errors of the positions of a light and of mixtures of them, from the covariance of the walks. */
 #include "solver/base/random.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 #include "store/groups.h"
 
 #include <math.h>
@@ -103,10 +103,11 @@ static void add_products(size_t s, size_t n, const double *area, const float *x,
         }
 }
 
-lam_status state_judge_positions(precompute_state *state, lam_error *error) {
+lam_status walked_judge(const precompute_job *job, const precompute_scene *scene, made_operator *made,
+                        walked_light *walked, lam_error *error) {
     lam_status status = LAM_OK;
-    const mesh *m = &state->m;
-    const reuse_estimates *e = &state->paths;
+    const mesh *m = &scene->m;
+    const reuse_estimates *e = &walked->paths;
     const size_t n = m->n, C = m->n_channels, s = e->n_positions;
     const bool black = is_black(m);
     norms of = {.s = s, .covariance = e->covariance};
@@ -114,24 +115,23 @@ lam_status state_judge_positions(precompute_state *state, lam_error *error) {
     double *w = memory_allocate(s, sizeof *w, "errors of positions", error);
     of.radiosity = memory_allocate(s, s * sizeof *of.radiosity, "errors of positions", error);
     of.reflected = memory_allocate(s, s * sizeof *of.reflected, "errors of positions", error);
-    state->position_errors = memory_allocate(s, 2 * sizeof *state->position_errors, "errors", error);
+    walked->position_errors = memory_allocate(s, 2 * sizeof *walked->position_errors, "errors", error);
     if (x == NULL || w == NULL || of.radiosity == NULL || of.reflected == NULL ||
-        state->position_errors == NULL)
+        walked->position_errors == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < C; c++) {
         const float *rho = m->reflectance + c * n, *H = e->H + c * s * n,
-                    power = (float)state->light.emission[c];
+                    power = (float)walked->light.emission[c];
         for (size_t k = 0; k < s * n; k++) x[k] = (black ? 1 : rho[k % n]) * H[k];
         add_products(s, n, m->area, x, of.radiosity);
         for (size_t k = 0; k < s * n; k++) x[k] = (black ? 1 : rho[k % n]) * (H[k] - power * e->direct[k]);
         add_products(s, n, m->area, x, of.reflected);
     }
-    measure_all(&of, precompute_seed(state->options->seed, SEED_PROBES), w, state->position_errors,
-                state->position_errors + s, &state->errors);
-    const error_group *g = &state->errors.single;
-    terminal_log(state->t, "positions relative %.3g, indirect %.3g; at most %.3g, %.3g",
-                 g->total_relative.mean, g->total_indirect.mean, g->total_relative.max,
-                 g->total_indirect.max);
+    measure_all(&of, precompute_seed(job->options->seed, SEED_PROBES), w, walked->position_errors,
+                walked->position_errors + s, &made->errors);
+    const error_group *g = &made->errors.single;
+    terminal_log(job->t, "positions relative %.3g, indirect %.3g; at most %.3g, %.3g", g->total_relative.mean,
+                 g->total_indirect.mean, g->total_relative.max, g->total_indirect.max);
 done:
     free(x);
     free(w);
@@ -141,10 +141,10 @@ done:
 }
 
 /* Its polygon, and turn and move of every position side by side. */
-lam_status state_save_positions(const precompute_state *state, store *s, lam_error *error) {
+lam_status walked_save(const walked_light *walked, store *s, lam_error *error) {
     lam_status status = LAM_OK;
-    const moving_light *l = &state->light;
-    const size_t n_channels = state->paths.n_channels;
+    const moving_light *l = &walked->light;
+    const size_t n_channels = walked->paths.n_channels;
     if (l->n == 0) return LAM_OK;
     const size_t corners[2] = {l->n_corners, 3}, poses[3] = {l->n, 3, 4};
     double *pose = memory_allocate(l->n, 12 * sizeof *pose, "positions", error);

@@ -4,7 +4,7 @@
 
 #include "solver/base/options.h"
 #include "solver/base/terminal.h"
-#include "solver/formfactor/recipe.h"
+#include "solver/formfactor/source.h"
 #include "solver/method/choice.h"
 #include "solver/precompute/error_advice.h"
 #include "solver/precompute/forecast.h"
@@ -13,10 +13,9 @@
 /* --two-sided: materials say which faces have a back; every face has one; none has. */
 typedef enum sides_asked { SIDES_OF_MATERIALS, SIDES_BOTH, SIDES_FRONTS } sides_asked;
 
-/* --form-factors and --quality: places among the words of their rows (option_word). */
-typedef enum factors_asked { FACTORS_AUTO, FACTORS_RAYS, FACTORS_BLOCKS, FACTORS_HEMICUBE } factors_asked;
+/* --quality: the place among the words of its row (option_word). */
 typedef enum factor_quality { QUALITY_DRAFT, QUALITY_NORMAL, QUALITY_HIGH } factor_quality;
-extern const char precompute_factor_words[], precompute_quality_words[];
+extern const char precompute_quality_words[];
 
 /* The options, as the rows of precompute_tables_make fill them; texts point into argv. The members after
  * progress belong to the verb. */
@@ -30,7 +29,7 @@ typedef struct precompute_options {
     bool orient;
     sides_asked two_sided;
     scene_closure closed;
-    factors_asked form_factors;
+    unsigned form_factors; /* --form-factors: source_asked */
     factor_quality quality;
     uint64_t rays, resolution; /* rays: OPTION_AUTO */
     const char *sky;           /* a tiling, or NULL; from a store: that of the store */
@@ -54,13 +53,14 @@ typedef struct precompute_options {
     const char *continues; /* the message of a cancelled run whose finished rows the folder holds */
 } precompute_options;
 
-/* The tables of options, and the row of --method, whose words are those of the list of methods. The tables
- * refer to that row and its words: the struct must stay where it is. */
-enum { PRECOMPUTE_TABLES = 9, PRECOMPUTE_TABLES_MOST = PRECOMPUTE_TABLES + METHODS_MOST + 2 };
+/* The tables of options, and the rows of --form-factors and --method, whose words are those of the lists of
+ * sources and methods. The tables refer to these rows and words: the struct must stay where it is. */
+enum { PRECOMPUTE_TABLES = 10, PRECOMPUTE_TABLES_MOST = PRECOMPUTE_TABLES + METHODS_MOST + 2 };
 typedef struct precompute_tables {
     size_t n_tables;                             /* without the last, which has no rows */
     option_table tables[PRECOMPUTE_TABLES_MOST]; /* the methods have one each, and the verb has one */
-    option_row method_rows[2];
+    option_row source_rows[2], method_rows[2];
+    char sources[SOURCE_WORDS_BYTES];
     char methods[METHOD_CHOICES_BYTES];
 } precompute_tables;
 
@@ -73,6 +73,9 @@ void precompute_tables_make(precompute_options *o, bool to_classify, precompute_
 
 /* Adds a table of the verb's own, once. */
 void precompute_tables_add(precompute_tables *t, const option_row *rows, void *fields);
+
+/* True for an option that --positions and --path, which need no form factors, have no use for. */
+bool precompute_walks_ignore(const char *name);
 
 /* True for an HDF5 file, or one that is named so: it is taken for a store. */
 bool precompute_takes_as_store(const char *path);

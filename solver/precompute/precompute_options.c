@@ -25,7 +25,6 @@ done:
     return status;
 }
 
-const char precompute_factor_words[] = "auto|rays|blocks|hemicube";
 const char precompute_quality_words[] = "draft|normal|high";
 
 const option_gone precompute_gone[] = {
@@ -34,6 +33,10 @@ const option_gone precompute_gone[] = {
     {"subdivide", "give --elements N or --max-edge METRES"},
     {0},
 };
+
+/* Why a store as the input settles some of them. */
+static const char fixed_mesh[] = "the mesh of a store is fixed", kept_sky[] = "a store keeps the sky it has",
+                  found_factors[] = "a store has its form factors already";
 
 #define FIELD(member) offsetof(precompute_options, member)
 static const option_row output_rows[] = {
@@ -47,8 +50,10 @@ static const option_row mesh_rows[] = {
      .offset = FIELD(max_edge),
      .argument = "METRES",
      .above = true,
+     .not_with = "elements",
+     .settled = fixed_mesh,
      .help = "Divide until no edge is longer than this"},
-    OPTION_ROW_ELEMENTS(FIELD(elements), 4e9, .help = "Divide into about N elements"),
+    OPTION_ROW_ELEMENTS(FIELD(elements), 4e9, .settled = fixed_mesh, .help = "Divide into about N elements"),
     {.name = "mesh-error",
      .kind = OPTION_NUMBER,
      .offset = FIELD(mesh_error),
@@ -56,6 +61,7 @@ static const option_row mesh_rows[] = {
      .least = 0,
      .most = 1,
      .above = true,
+     .settled = fixed_mesh,
      .help = "Join faces of one material that lie in one plane and divide them where light changes, until "
              "constants on elements leave at most this share of the reflected light of the scene's lamps and "
              "of light that all elements emit; at most --elements, else 40,000"},
@@ -65,33 +71,38 @@ static const option_row mesh_rows[] = {
      .argument = "METRES",
      .preset = "1",
      .above = true,
+     .settled = fixed_mesh,
      .help = "Length of the unit of the file"},
     {.name = "up",
      .kind = OPTION_CHOICE,
      .offset = FIELD(up),
      .otherwise = "y for glTF, z for other formats",
      .choices = "x|y|z",
+     .settled = fixed_mesh,
      .help = "Axis that points up"},
     {.name = "two-sided",
      .kind = OPTION_SWITCH,
      .offset = FIELD(two_sided),
      .choices = "no",
+     .settled = fixed_mesh,
      .help = "Make two elements of every face: first all fronts, then all backs, whose groups are called "
              "GROUP.back. no: of none. Without it, of those whose glTF material is double-sided"},
     {.name = "orient",
      .kind = OPTION_FLAG,
      .offset = FIELD(orient),
+     .settled = fixed_mesh,
      .help = "Turn faces to the side that the light is on, where rays decide which that is"},
     {.name = "closed",
      .kind = OPTION_SWITCH,
      .offset = FIELD(closed),
      .choices = "no",
+     .settled = fixed_mesh,
      .help = "No light leaves the scene, whatever rays find: what they lose goes back to the row. no: light "
              "leaves through every gap. Without it, light leaves through gaps wider than the diagonal of the "
              "scene over 800, and narrower ones are cracks"},
     OPTION_ROW_REFLECTANCE(FIELD(reflectance),
                            .help = "Grey reflectance of every face, in place of that in the file"),
-    OPTION_ROW_ASSETS(FIELD(assets)),
+    OPTION_ROW_ASSETS(FIELD(assets), .settled = fixed_mesh),
     {0},
 };
 
@@ -110,36 +121,27 @@ static const option_row sample_rows[] = {
      .argument = "none|tregenza|reinhart:MF|grid:AxB",
      .preset = "none",
      .parse = parse_sky,
+     .settled = kept_sky,
      .help = "Tiles of the sky that may light the store: 145, 144 MF^2 + 1, or A sectors by B bands"},
     {.name = "portal",
      .kind = OPTION_LIST,
      .offset = FIELD(portals),
      .argument = "GROUP",
      .otherwise = "the holes of the mesh, where little light leaves it",
+     .settled = kept_sky,
      .help = "A group of faces in the plane of a window, at which rays for the sky are aimed; the faces "
              "neither block nor reflect light, and the store does not have them. May be repeated"},
     {0},
 };
 
 static const option_row form_factor_rows[] = {
-    {.name = "form-factors",
-     .kind = OPTION_WORD,
-     .offset = FIELD(form_factors),
-     .preset = "auto",
-     .choices = precompute_factor_words,
-     .help =
-         "Method that finds them. rays: pairs of elements, near ones or all, and rays, as --quality "
-         "says. blocks: "
-         "clusters of elements at a time, for scenes of large planes, or in which nothing hides anything. "
-         "auto: blocks where the operator "
-         "can be built from them and they cost less, by a sample of them, else rays"},
     {.name = "resolution",
      .kind = OPTION_COUNT,
      .offset = FIELD(resolution),
      .argument = "PIXELS",
      .preset = "512",
-     .least = RECIPE_RESOLUTION_LEAST,
-     .most = RECIPE_RESOLUTION_MOST,
+     .least = HEMICUBE_RESOLUTION_LEAST,
+     .most = HEMICUBE_RESOLUTION_MOST,
      .help = "Pixels along the top of a hemicube, an even number"},
     {.name = "quality",
      .kind = OPTION_WORD,
@@ -157,6 +159,7 @@ static const option_row form_factor_rows[] = {
      .preset = "0",
      .least = 0,
      .most = 1,
+     .settled = kept_sky,
      .help = "Share of the light of the sky that the ground below the horizon reflects"},
     {.name = "keep-form-factors",
      .kind = OPTION_FLAG,
@@ -245,10 +248,24 @@ static const option_row resource_rows[] = {
      .argument = "SECONDS",
      .otherwise = "as long as it takes",
      .above = true,
+     .not_with = "epsilon|rays|quality|resolution|trials|emitters|scratch|group-error",
+     .settled = found_factors,
      .help = "Take the form factors, rays and epsilon of the smallest error that is forecast to be ready "
              "within this time on this machine, the judge included, and log the options that stand for them"},
     {0},
 };
+
+static bool has_row(const option_row *rows, const char *name) {
+    while (rows->name != NULL && strcmp(rows->name, name) != 0) rows++;
+    return rows->name != NULL;
+}
+
+bool precompute_walks_ignore(const char *name) {
+    const build_method *const made = method_find("emitters");
+    return strcmp(name, "form-factors") == 0 || has_row(sample_rows, name) ||
+           has_row(form_factor_rows, name) || has_row(resource_rows, name) || has_row(build_rows, name) ||
+           (method_has_option(NULL, name) && !method_has_option(made, name));
+}
 
 static void add(precompute_tables *t, const char *heading, const option_row *rows, void *fields) {
     assert(t->n_tables + 1 < sizeof t->tables / sizeof *t->tables);
@@ -260,6 +277,18 @@ void precompute_tables_make(precompute_options *o, bool to_classify, precompute_
     *o = (precompute_options){.reflectance = -1, .build = {.method = "auto"}};
     out->n_tables = 0;
     method_choices(out->methods);
+    source_words(out->sources);
+    out->source_rows[0] = (option_row){
+        .name = "form-factors",
+        .kind = OPTION_WORD,
+        .offset = FIELD(form_factors),
+        .preset = "auto",
+        .choices = out->sources,
+        .help = "Method that finds them. rays: pairs of elements, near ones or all, and rays, as "
+                "--quality says. blocks: clusters of elements at a time, for scenes of large "
+                "planes, or in which nothing hides anything. auto: blocks where the operator can "
+                "be built from them and they cost less, by a sample of them, else rays"};
+    out->source_rows[1] = (option_row){.name = NULL};
     out->method_rows[0] = (option_row){.name = "method",
                                        .kind = OPTION_CHOICE,
                                        .offset = FIELD(build.method),
@@ -271,6 +300,7 @@ void precompute_tables_make(precompute_options *o, bool to_classify, precompute_
     add(out, "mesh (preset: every face of the file is one element)", mesh_rows, o);
     add(out, "form factors", sample_rows, o);
     if (!to_classify) {
+        add(out, "", out->source_rows, o);
         add(out, "", form_factor_rows, o);
         add(out, "operator", out->method_rows, o);
     }

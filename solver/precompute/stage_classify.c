@@ -1,5 +1,5 @@
 /* lambert classify: few rays per element, and all methods weighed by them. */
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 
 #include <math.h>
 
@@ -16,33 +16,37 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, d
                                size_t *rays_used, lam_error *error) {
     lam_status status = LAM_OK;
     precompute_options o = *options;
-    precompute_state state = state_begin(&o, t);
+    precompute_parts p = parts_begin(&o, t);
+    precompute_job *const job = &p.job;
+    const mesh *const m = &p.scene.m;
+    const form_factors *const f = &p.factors.f;
     build_problem problem;
-    state.holds = true;
-    o.form_factors = FACTORS_RAYS;
+    job->holds = true;
+    o.form_factors = source_place(&source_rays);
     o.quality = QUALITY_DRAFT;
-    TRY(o.from_store ? stage_load_store(&state, error) : stage_load_scene(&state, error));
+    TRY(o.from_store ? stage_load_store(job, &p.scene, &p.plan, &p.factors, error)
+                     : stage_load_scene(job, &p.scene, error));
     TRY(terminal_check(error));
-    TRY(stage_prepare_mesh(&state, error));
+    TRY(stage_prepare_mesh(job, &p.scene, &p.plan, error));
+    TRY(stage_choose_plan(job, &p.scene, &p.plan, error));
     TRY(terminal_check(error));
     *rays_used = 0;
     if (!o.from_store) {
-        if (o.rays == OPTION_AUTO)
-            state.recipe = (recipe){.source = &source_rays, .rays = rays_for(state.m.n), .seed = o.seed};
-        TRY(stage_form_factors(&state, error));
-        *rays_used = state.recipe.rays;
+        if (o.rays == OPTION_AUTO) p.plan.recipe.rays = rays_for(m->n);
+        TRY(stage_factors(job, &p.scene, &p.plan, &p.factors, error));
+        *rays_used = f->recipe.rays;
     }
-    const build_options how = state_build_options(&state);
-    TRY(state_problem(&state, METHOD_GEOMETRY | METHOD_SURFACES, &problem, error));
+    const build_options how = build_options_of(job, &p.scene, &p.factors, &p.course);
+    TRY(problem_of(&p.scene, &p.factors, METHOD_GEOMETRY | METHOD_SURFACES, &problem, error));
     TRY(choose_method(&problem, &how, true, out, error));
-    *n = state.m.n;
+    *n = m->n;
     out->problem = NULL;
     out->options = NULL;
-    const double noise = recipe_noise(&state.f.recipe);
+    const double noise = recipe_noise(&f->recipe);
     if (noise > o.build.epsilon)
         terminal_warn(t, "the rank at --epsilon %g counts the noise %.2g of %zu rays: give more --rays",
-                      o.build.epsilon, noise, state.f.recipe.rays);
+                      o.build.epsilon, noise, f->recipe.rays);
 done:
-    state_free(&state);
+    parts_free(&p);
     return status;
 }

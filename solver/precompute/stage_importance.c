@@ -2,7 +2,7 @@
  * importance of all. */
 #include "solver/base/atomic_file.h"
 #include "solver/light/emission.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -70,49 +70,51 @@ done:
     return status;
 }
 
-lam_status state_read_importance(precompute_state *state, lam_error *error) {
+lam_status scene_read_importance(const precompute_job *job, const precompute_plan *plan,
+                                 precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
-    const mesh *m = &state->m;
-    emission_scene scene = {.m = NULL};
+    const precompute_options *o = job->options;
+    const mesh *m = &scene->m;
+    emission_scene named = {.m = NULL};
     importance made = {.n = m->n};
     if (o->receivers == NULL && o->importance == NULL && o->sources == NULL) return LAM_OK;
-    TRY(emission_scene_create(m, &scene, error));
+    TRY(emission_scene_create(m, &named, error));
     if (o->receivers != NULL || o->importance != NULL)
-        TRY(read_weights("--receivers", o->receivers, o->importance, &scene, &made.read, error));
-    if (o->sources != NULL) TRY(read_weights("--sources", o->sources, NULL, &scene, &made.emits, error));
-    if (!(state->expected->flags & METHOD_READS)) goto done;
-    state->importance = made;
+        TRY(read_weights("--receivers", o->receivers, o->importance, &named, &made.read, error));
+    if (o->sources != NULL) TRY(read_weights("--sources", o->sources, NULL, &named, &made.emits, error));
+    if (!(plan->method->flags & METHOD_READS)) goto done;
+    scene->importance = made;
     made = (importance){.n = 0};
 done:
-    emission_scene_free(&scene);
+    emission_scene_free(&named);
     importance_free(&made);
     return status;
 }
 
 /* Rows of a stream are found as the operator asks for them: a few rays of each element tell enough. */
-static lam_status find_by_rays(precompute_state *state, lam_error *error) {
+static lam_status find_by_rays(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     enum { RAYS = 64 };
     lam_status status = LAM_OK;
-    const form_factor_options how = {
-        .recipe = {.source = &source_rays, .rays = RAYS, .seed = state->options->seed},
-        .progress = &state->progress,
-        .stage = "importance"};
+    const form_factor_options how = {.recipe = {.rays = RAYS, .seed = job->options->seed},
+                                     .progress = &job->progress,
+                                     .stage = "importance"};
     form_factors f = {.row_sums = NULL};
-    TRY(form_factors_make(&state->m, state->order, &how, &f, error));
+    TRY(form_factors_make(&scene->m, scene->order, &how, &f, error));
     const factor_product F = factor_product_of_rows(&f.F);
-    TRY(importance_find(&F, state->m.n_channels, state->m.reflectance, state->m.area, &state->importance,
+    TRY(importance_find(&F, scene->m.n_channels, scene->m.reflectance, scene->m.area, &scene->importance,
                         error));
 done:
     form_factors_free(&f);
     return status;
 }
 
-lam_status state_find_importance(precompute_state *state, lam_error *error) {
-    if (state->importance.n == 0 || importance_is_found(&state->importance)) return LAM_OK;
-    if (state->streamed) return find_by_rays(state, error);
-    const factor_product F =
-        state->blocks.n > 0 ? block_factors_product(&state->blocks) : factor_product_of_rows(&state->f.F);
-    return importance_find(&F, state->m.n_channels, state->m.reflectance, state->m.area, &state->importance,
+lam_status scene_find_importance(const precompute_job *job, precompute_scene *scene,
+                                 const precompute_plan *plan, const precompute_factors *factors,
+                                 lam_error *error) {
+    if (scene->importance.n == 0 || importance_is_found(&scene->importance)) return LAM_OK;
+    if (plan->streamed) return find_by_rays(job, scene, error);
+    const factor_product F = factors->blocks.n > 0 ? block_factors_product(&factors->blocks)
+                                                   : factor_product_of_rows(&factors->f.F);
+    return importance_find(&F, scene->m.n_channels, scene->m.reflectance, scene->m.area, &scene->importance,
                            error);
 }

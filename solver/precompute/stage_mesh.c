@@ -1,7 +1,8 @@
 /* From faces to elements, as the options of the mesh say. */
 #include "solver/adapt/adaptive.h"
 #include "solver/base/scene_backs.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/plan.h"
+#include "solver/precompute/stages.h"
 #include "solver/scene/facet/face_join.h"
 #include "solver/scene/import/picture_files.h"
 
@@ -12,12 +13,12 @@
 /* Elements that --mesh-error makes at most, unless --elements gives their number. */
 enum { ADAPTIVE_ELEMENTS = 40000 };
 
-static lam_status join_faces(precompute_state *state, lam_error *error) {
-    const size_t faces = state->m.n;
-    const lam_status status = faces_join(&state->m, error);
-    if (status == LAM_OK && state->m.n < faces)
-        terminal_log(state->t, "%zu faces are left of %zu, as those of one material in one plane are joined",
-                     state->m.n, faces);
+static lam_status join_faces(const precompute_job *job, precompute_scene *scene, lam_error *error) {
+    const size_t faces = scene->m.n;
+    const lam_status status = faces_join(&scene->m, error);
+    if (status == LAM_OK && scene->m.n < faces)
+        terminal_log(job->t, "%zu faces are left of %zu, as those of one material in one plane are joined",
+                     scene->m.n, faces);
     return status;
 }
 
@@ -30,24 +31,24 @@ static size_t elements_to_be(const mesh *m) {
 
 /* Divides the mesh where light changes, says what that leaves, and warns where it is more than was asked for.
  */
-static lam_status refine_by_error(precompute_state *state, lam_error *error) {
+static lam_status refine_by_error(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
+    const precompute_options *o = job->options;
     const adaptive_options how = {.error = o->mesh_error,
                                   .elements = o->elements > 0 ? o->elements : ADAPTIVE_ELEMENTS,
                                   .seed = precompute_seed(o->seed, SEED_MESH),
-                                  .progress = &state->progress};
+                                  .progress = &job->progress};
     adaptive_report made;
     char lamps[64] = "";
-    TRY(adaptive_refine(&state->m, &how, &made, error));
+    TRY(adaptive_refine(&scene->m, &how, &made, error));
     if (made.has_lamps) snprintf(lamps, sizeof lamps, "%.3g of the light of lamps and ", made.lamps);
-    terminal_log(state->t, "constants on elements leave %s%.3g of light that all elements emit", lamps,
+    terminal_log(job->t, "constants on elements leave %s%.3g of light that all elements emit", lamps,
                  made.even);
     if (!made.reached)
-        terminal_warn(state->t,
+        terminal_warn(job->t,
                       "--mesh-error %g is not kept with %zu elements: they leave %.3g; --elements takes more "
                       "than %zu",
-                      o->mesh_error, elements_to_be(&state->m),
+                      o->mesh_error, elements_to_be(&scene->m),
                       made.lamps > made.even ? made.lamps : made.even, how.elements);
 done:
     return status;
@@ -65,8 +66,8 @@ static size_t fronts_of(const mesh *m, size_t elements) {
 }
 
 /* Names a group of backs that could not be called after its fronts. */
-static void log_renamed(precompute_state *state) {
-    const mesh *m = &state->m;
+static void log_renamed(const precompute_job *job, const precompute_scene *scene) {
+    const mesh *m = &scene->m;
     size_t n_renamed = 0, first = 0, n_own = 0; /* groups of fronts */
     for (size_t i = 0; i < m->n - m->n_backs; i++)
         if (m->group[i] >= n_own) n_own = m->group[i] + (size_t)1;
@@ -76,25 +77,25 @@ static void log_renamed(precompute_state *state) {
         if (n_renamed++ == 0) first = g;
     }
     if (n_renamed > 0)
-        terminal_warn(state->t,
+        terminal_warn(job->t,
                       "%zu group%s of backs cannot have the name of %s fronts with " SCENE_BACK
                       ", which another group has; the first is called '%.60s'",
                       n_renamed, n_renamed == 1 ? "" : "s", n_renamed == 1 ? "its" : "their",
                       m->group_names[first]);
 }
 
-lam_status state_refine_mesh(precompute_state *state, lam_error *error) {
+lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
+    const precompute_options *o = job->options;
     /* --elements counts both sides. */
     const mesh_refinement refinement = {
-        .max_edge = o->max_edge, .elements = o->mesh_error > 0 ? 0 : fronts_of(&state->m, o->elements)};
-    if (o->mesh_error > 0) TRY(join_faces(state, error));
-    if (refinement.max_edge > 0 || refinement.elements > 0) TRY(mesh_refine(&state->m, &refinement, error));
-    if (o->mesh_error > 0) TRY(refine_by_error(state, error));
-    TRY(mesh_make_backs(&state->m, error));
-    log_renamed(state);
-    TRY(mesh_keep_pictures(&state->m, error)); /* every element has its means */
+        .max_edge = o->max_edge, .elements = o->mesh_error > 0 ? 0 : fronts_of(&scene->m, o->elements)};
+    if (o->mesh_error > 0) TRY(join_faces(job, scene, error));
+    if (refinement.max_edge > 0 || refinement.elements > 0) TRY(mesh_refine(&scene->m, &refinement, error));
+    if (o->mesh_error > 0) TRY(refine_by_error(job, scene, error));
+    TRY(mesh_make_backs(&scene->m, error));
+    log_renamed(job, scene);
+    TRY(mesh_keep_pictures(&scene->m, error)); /* every element has its means */
 done:
     return status;
 }
@@ -104,9 +105,9 @@ static const double coarse_share = .02;
 enum { COARSE_ADVICE = 5000 };
 
 /* Logs what shows a wrong axis or unit, or a mesh too coarse to show light. */
-void state_log_mesh(const precompute_state *state) {
-    const mesh *m = &state->m;
-    const precompute_options *o = state->options;
+void scene_log_mesh(const precompute_job *job, const precompute_scene *scene) {
+    const mesh *m = &scene->m;
+    const precompute_options *o = job->options;
     const char axes[] = {'x', 'y', 'z'};
     double low[3], high[3], size[3] = {0, 0, 0}, height = 0, area = 0, largest = 0;
     size_t n_wide = 0;
@@ -120,13 +121,40 @@ void state_log_mesh(const precompute_state *state) {
         area += m->area[i];
         largest = fmax(largest, m->area[i]);
     }
-    terminal_log(state->t, "%zu elements in %zu groups, %zu channel%s%s", m->n, m->n_groups, m->n_channels,
+    terminal_log(job->t, "%zu elements in %zu groups, %zu channel%s%s", m->n, m->n_groups, m->n_channels,
                  m->n_channels == 1 ? "" : "s", m->two_sided ? ", two-sided" : "");
-    terminal_log(state->t, "%.4g m x %.4g m, %.4g m high, %c up; --up and --unit set axis and unit", size[0],
+    terminal_log(job->t, "%.4g m x %.4g m, %.4g m high, %c up; --up and --unit set axis and unit", size[0],
                  size[1], height, m->up);
     if (o->max_edge == 0 && o->elements == 0 && o->mesh_error == 0 && largest > coarse_share * area)
-        terminal_log(state->t,
+        terminal_log(job->t,
                      "one element has %.0f %% of the area, and light does not vary across an element: "
                      "--elements %d divides the faces",
                      100 * largest / area, COARSE_ADVICE);
+}
+
+/* About how many elements there will be; never fewer than now. */
+static double elements_after(const mesh *m, const precompute_options *o) {
+    double n = (double)m->n, area = 0;
+    if (o->max_edge > 0) {
+        for (size_t i = 0; i < m->n; i++) area += m->area[i];
+        n = fmax(n, area / (o->max_edge * o->max_edge));
+    }
+    size_t backs = 0;
+    for (size_t i = 0; m->has_back != NULL && i < m->n; i++) backs += m->has_back[i];
+    n *= 1 + (double)backs / (double)m->n;
+    /* With --mesh-error they are the most, and nobody knows yet how many it takes. */
+    return o->mesh_error > 0 ? n : fmax(n, (double)o->elements);
+}
+
+lam_status stage_prepare_mesh(const precompute_job *job, precompute_scene *scene, precompute_plan *plan,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(plan_check_mesh(job, scene, elements_after(&scene->m, job->options), plan, error));
+    TRY(scene_refine(job, scene, error));
+    scene->order = memory_allocate(scene->m.n, sizeof *scene->order, "the order of the elements", error);
+    if (scene->order == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_z_order(&scene->m, scene->order, error));
+    TRY(scene_read_importance(job, plan, scene, error));
+done:
+    return status;
 }

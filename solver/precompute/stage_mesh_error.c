@@ -1,7 +1,7 @@
 /* The error that constants on elements leave, as the store states it. */
 #include "solver/adapt/mesh_error.h"
 #include "solver/base/random.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,20 +9,21 @@
 
 /* The lights that errors are stated for: E [n_lights][C][n], freed with free(). An operator of few emitters
  * knows no other light than theirs. */
-static lam_status choose_lights(precompute_state *state, float **out, lam_error *error) {
-    const mesh *m = &state->m;
+static lam_status choose_lights(const precompute_scene *scene, made_operator *made, float **out,
+                                lam_error *error) {
+    const mesh *m = &scene->m;
     const size_t vector = m->n * m->n_channels;
-    mesh_figures *figures = &state->errors_of_mesh;
+    mesh_figures *figures = &made->errors_of_mesh;
     float *E = memory_allocate(2 * vector, sizeof *E, "the error of the mesh", error);
     if (E == NULL) return LAM_ERR_MEMORY;
-    if (state->emitters.s > 0) {
-        for (size_t k = 0; state->emitters.light.E != NULL && k < state->emitters.s * vector; k++)
-            E[k % vector] += state->emitters.light.E[k];
+    if (scene->emitters.s > 0) {
+        for (size_t k = 0; scene->emitters.light.E != NULL && k < scene->emitters.s * vector; k++)
+            E[k % vector] += scene->emitters.light.E[k];
     } else {
         memcpy(E, m->emission, vector * sizeof *E);
     }
     for (size_t i = 0; i < vector; i++) figures->has_lights = figures->has_lights || E[i] > 0;
-    figures->has_even = state->emitters.s == 0;
+    figures->has_even = scene->emitters.s == 0;
     float *even = figures->has_lights ? E + vector : E;
     for (size_t i = 0; figures->has_even && i < vector; i++) even[i] = 1;
     *out = E;
@@ -48,9 +49,10 @@ static void set_skies(const sky_bounce *sky, uint64_t seed, double *L) {
 }
 
 /* E = rho H0 [SKIES][C][n]; true where any of it is light. */
-static bool light_by_skies(const precompute_state *state, const double *L, float *E) {
-    const mesh *m = &state->m;
-    const sky_bounce *sky = &state->f.sky;
+static bool light_by_skies(const precompute_scene *scene, const precompute_factors *factors, const double *L,
+                           float *E) {
+    const mesh *m = &scene->m;
+    const sky_bounce *sky = &factors->f.sky;
     const size_t n = m->n, tiles = sky->tiling.n_tiles;
     bool lit = false;
     for (size_t s = 0; s < SKIES; s++)
@@ -66,33 +68,34 @@ static bool light_by_skies(const precompute_state *state, const double *L, float
 }
 
 /* The error under skies, for any emission: 0 is the emission of a scene that a sky lights. */
-static lam_status add_skies(precompute_state *state, lam_error *error) {
+static lam_status add_skies(const precompute_job *job, const precompute_scene *scene,
+                            const precompute_factors *factors, made_operator *made, lam_error *error) {
     lam_status status = LAM_OK;
-    const sky_bounce *sky = &state->f.sky;
-    const size_t all = SKIES * state->m.n_channels * state->m.n;
-    const uint64_t seed = precompute_seed(state->options->seed, SEED_MESH_ERROR);
-    mesh_figures *figures = &state->errors_of_mesh;
+    const sky_bounce *sky = &factors->f.sky;
+    const size_t all = SKIES * scene->m.n_channels * scene->m.n;
+    const uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
+    mesh_figures *figures = &made->errors_of_mesh;
     double found[SKIES];
     float *E = NULL, *B = NULL;
     void *work = NULL;
     double *L = NULL;
-    if (sky->first_bounce == NULL || state->f.closed || state->emitters.s > 0) goto done;
-    const size_t bytes = lam_operator_work_bytes(state->op, SKIES);
+    if (sky->first_bounce == NULL || factors->f.closed || scene->emitters.s > 0) goto done;
+    const size_t bytes = lam_operator_work_bytes(made->op, SKIES);
     L = memory_allocate(SKIES, (sky->tiling.n_tiles + 1) * sizeof *L, "the error of the mesh", error);
     E = memory_allocate(all, sizeof *E, "the error of the mesh", error);
     B = memory_allocate(all, sizeof *B, "the error of the mesh", error);
     work = memory_allocate(bytes, 1, "the error of the mesh", error);
     if (L == NULL || E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
     set_skies(sky, seed, L);
-    if (!light_by_skies(state, L, E)) goto done;
-    TRY(lam_operator_apply(state->op, SKIES, LAM_RADIOSITY, E, B, work, bytes, error));
+    if (!light_by_skies(scene, factors, L, E)) goto done;
+    TRY(lam_operator_apply(made->op, SKIES, LAM_RADIOSITY, E, B, work, bytes, error));
     for (size_t i = 0; i < all; i++) E[i] = 0;
     const gather_sky skies = {.tiling = &sky->tiling, .L = L};
-    TRY(mesh_error(&state->m, SKIES, E, B, false, &skies, seed, &state->progress, found, error));
+    TRY(mesh_error(&scene->m, SKIES, E, B, false, &skies, seed, &job->progress, found, error));
     figures->has_skies = true;
     figures->sky_even = found[0];
     figures->sky_cloudy = found[1];
-    terminal_log(state->t, "mesh     skies, even %.3g, cloudy %.3g", found[0], found[1]);
+    terminal_log(job->t, "mesh     skies, even %.3g, cloudy %.3g", found[0], found[1]);
 done:
     free(L);
     free(E);
@@ -101,36 +104,37 @@ done:
     return status;
 }
 
-lam_status stage_mesh_error(precompute_state *state, lam_error *error) {
+lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *scene,
+                            const precompute_factors *factors, made_operator *made, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t vector = state->m.n * state->m.n_channels;
-    mesh_figures *figures = &state->errors_of_mesh;
+    const size_t vector = scene->m.n * scene->m.n_channels;
+    mesh_figures *figures = &made->errors_of_mesh;
     double found[2] = {0};
     float *E = NULL, *B = NULL;
     void *work = NULL;
     *figures = (mesh_figures){.has_lights = false};
-    TRY(choose_lights(state, &E, error));
+    TRY(choose_lights(scene, made, &E, error));
     const size_t n_lights = (size_t)figures->has_lights + figures->has_even;
     if (n_lights == 0) goto done;
-    const size_t bytes = lam_operator_work_bytes(state->op, n_lights);
+    const size_t bytes = lam_operator_work_bytes(made->op, n_lights);
     B = memory_allocate(n_lights * vector, sizeof *B, "the error of the mesh", error);
     work = memory_allocate(bytes, 1, "the error of the mesh", error);
     if (B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    status = lam_operator_apply(state->op, n_lights, LAM_RADIOSITY, E, B, work, bytes, error);
+    status = lam_operator_apply(made->op, n_lights, LAM_RADIOSITY, E, B, work, bytes, error);
     if (status == LAM_ERR_ARGUMENT &&
-        state->emitters.s > 0) { /* a sum that no weights give: nothing is stated */
+        scene->emitters.s > 0) { /* a sum that no weights give: nothing is stated */
         *figures = (mesh_figures){.has_lights = false};
         status = LAM_OK;
         goto done;
     }
     TRY(status);
-    TRY(mesh_error(&state->m, n_lights, E, B, figures->has_lights, NULL,
-                   precompute_seed(state->options->seed, SEED_MESH_ERROR), &state->progress, found, error));
+    TRY(mesh_error(&scene->m, n_lights, E, B, figures->has_lights, NULL,
+                   precompute_seed(job->options->seed, SEED_MESH_ERROR), &job->progress, found, error));
     figures->lights = found[0];
     figures->even = found[n_lights - 1];
-    if (figures->has_lights) terminal_log(state->t, "mesh     lights indirect %.3g", figures->lights);
-    if (figures->has_even) terminal_log(state->t, "mesh     even indirect %.3g", figures->even);
-    TRY(add_skies(state, error));
+    if (figures->has_lights) terminal_log(job->t, "mesh     lights indirect %.3g", figures->lights);
+    if (figures->has_even) terminal_log(job->t, "mesh     even indirect %.3g", figures->even);
+    TRY(add_skies(job, scene, factors, made, error));
 done:
     free(E);
     free(B);

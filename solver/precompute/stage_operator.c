@@ -1,7 +1,8 @@
 /* The operator of a precompute and its measured errors. */
 #include "solver/base/random.h"
 #include "solver/precompute/judging.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/plan.h"
+#include "solver/precompute/stages.h"
 #include "solver/scene/surfaces.h"
 
 #include <math.h>
@@ -10,61 +11,63 @@
 #include <stdlib.h>
 #include <string.h>
 
-static lam_status find_geometry(precompute_state *state, unsigned needs, lam_error *error) {
-    const mesh *m = &state->m;
+static lam_status find_geometry(precompute_scene *scene, unsigned needs, lam_error *error) {
+    const mesh *m = &scene->m;
     size_t n_surfaces;
-    if (state->centre == NULL) {
-        state->centre = memory_allocate(m->n, sizeof *state->centre, "centroids", error);
-        if (state->centre == NULL) return LAM_ERR_MEMORY;
-        for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, state->centre[i]);
+    if (scene->centre == NULL) {
+        scene->centre = memory_allocate(m->n, sizeof *scene->centre, "centroids", error);
+        if (scene->centre == NULL) return LAM_ERR_MEMORY;
+        for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, scene->centre[i]);
     }
-    if (!(needs & METHOD_SURFACES) || state->surface != NULL) return LAM_OK;
-    state->surface = memory_allocate(m->n, sizeof *state->surface, "surfaces", error);
-    return state->surface == NULL ? LAM_ERR_MEMORY : mesh_surfaces(m, state->surface, &n_surfaces, error);
+    if (!(needs & METHOD_SURFACES) || scene->surface != NULL) return LAM_OK;
+    scene->surface = memory_allocate(m->n, sizeof *scene->surface, "surfaces", error);
+    return scene->surface == NULL ? LAM_ERR_MEMORY : mesh_surfaces(m, scene->surface, &n_surfaces, error);
 }
 
-lam_status state_problem(precompute_state *state, unsigned needs, build_problem *problem, lam_error *error) {
+lam_status problem_of(precompute_scene *scene, precompute_factors *factors, unsigned needs,
+                      build_problem *problem, lam_error *error) {
     lam_status status = LAM_OK;
-    const form_factors *f = &state->f;
-    state->emitting = (emitter_source){.s = state->emitters.s,
-                                       .names = (const char *const *)state->emitters.names,
-                                       .E = state->emitters.light.E,
+    const form_factors *f = &factors->f;
+    scene->emitting = (emitter_source){.s = scene->emitters.s,
+                                       .names = (const char *const *)scene->emitters.names,
+                                       .E = scene->emitters.light.E,
                                        .n_tiles = f->sky.tiling.n_tiles,
-                                       .L = state->emitters.light.L,
+                                       .L = scene->emitters.light.L,
                                        .first_bounce = f->sky.first_bounce};
-    *problem = (build_problem){.emitters = state->emitters.s > 0 ? &state->emitting : NULL,
-                               .n = state->m.n,
-                               .n_channels = state->m.n_channels,
-                               .area = state->m.area,
-                               .reflectance = state->m.reflectance,
-                               .F = state->rays != NULL || state->blocks.n > 0 ? NULL : &f->F,
-                               .blocks = state->blocks.n > 0 ? &state->blocks : NULL,
-                               .stream = state->rays != NULL ? &state->stream : NULL,
-                               .order = state->order,
-                               .importance = state->importance.n > 0 ? &state->importance : NULL,
+    *problem = (build_problem){.emitters = scene->emitters.s > 0 ? &scene->emitting : NULL,
+                               .n = scene->m.n,
+                               .n_channels = scene->m.n_channels,
+                               .area = scene->m.area,
+                               .reflectance = scene->m.reflectance,
+                               .F = factors->rays != NULL || factors->blocks.n > 0 ? NULL : &f->F,
+                               .blocks = factors->blocks.n > 0 ? &factors->blocks : NULL,
+                               .stream = factors->rays != NULL ? &factors->stream : NULL,
+                               .order = scene->order,
+                               .importance = scene->importance.n > 0 ? &scene->importance : NULL,
                                .noise = recipe_noise(&f->recipe)};
     if (!(needs & METHOD_GEOMETRY)) goto done;
-    TRY(find_geometry(state, needs, error));
-    problem->centre = (const double(*)[3])state->centre;
-    problem->normal = (const float(*)[3])state->m.normal;
-    problem->surface = state->surface;
-    state->corners =
-        (element_corners){(const double(*)[3])state->m.vertices, (const uint32_t(*)[4])state->m.elements};
-    problem->corners = &state->corners;
+    TRY(find_geometry(scene, needs, error));
+    problem->centre = (const double(*)[3])scene->centre;
+    problem->normal = (const float(*)[3])scene->m.normal;
+    problem->surface = scene->surface;
+    scene->corners =
+        (element_corners){(const double(*)[3])scene->m.vertices, (const uint32_t(*)[4])scene->m.elements};
+    problem->corners = &scene->corners;
 done:
     return status;
 }
 
-build_options state_build_options(const precompute_state *state) {
-    const csr *F = &state->f.F;
-    const double rows = F->place != NULL || F->indptr == NULL ? 0 : (double)F->indptr[state->m.n] * 8;
-    build_options how = state->options->build;
+build_options build_options_of(const precompute_job *job, const precompute_scene *scene,
+                               const precompute_factors *factors, const trial_course *course) {
+    const csr *F = &factors->f.F;
+    const double rows = F->place != NULL || F->indptr == NULL ? 0 : (double)F->indptr[scene->m.n] * 8;
+    build_options how = job->options->build;
     lam_error none;
-    how.memory = (size_t)fmax(1, state->memory - rows - 400 * (double)state->m.n);
-    how.seed = state->options->seed;
-    how.progress = &state->progress;
-    if (state->trial.epsilon != how.epsilon) /* of a trial: below one that is in its limits */
-        (void)build_set_number(&how, "epsilon", state->trial.epsilon, &none);
+    how.memory = (size_t)fmax(1, job->memory - rows - 400 * (double)scene->m.n);
+    how.seed = job->options->seed;
+    how.progress = &job->progress;
+    if (course->epsilon != how.epsilon) /* of a trial: below one that is in its limits */
+        (void)build_set_number(&how, "epsilon", course->epsilon, &none);
     return how;
 }
 
@@ -160,52 +163,54 @@ static unsigned needs_of(const char *method) {
     return m == NULL ? METHOD_GEOMETRY | METHOD_SURFACES : m->flags;
 }
 
-static void log_report(const precompute_state *state) {
-    const build_report *r = &state->built;
-    const precompute_options *o = state->options;
+static void log_report(const precompute_job *job, const precompute_factors *factors,
+                       const made_operator *made) {
+    const build_report *r = &made->built;
+    const precompute_options *o = job->options;
     char line[512];
-    for (size_t k = 0; k < r->n_steps; k++)
-        terminal_log_stage(state->t, r->steps[k].name, r->steps[k].seconds);
+    for (size_t k = 0; k < r->n_steps; k++) terminal_log_stage(job->t, r->steps[k].name, r->steps[k].seconds);
     report_line(r, line, sizeof line);
-    terminal_log(state->t, "%s", line);
+    terminal_log(job->t, "%s", line);
     if (r->below_noise)
         terminal_warn(
-            state->t,
+            job->t,
             "--epsilon %g is below the sampling noise %.2g of %zu rays: the part of the operator below it is "
             "noise; --rays %zu would fit",
-            o->build.epsilon, recipe_noise(&state->f.recipe), state->f.recipe.rays,
+            o->build.epsilon, recipe_noise(&factors->f.recipe), factors->f.recipe.rays,
             recipe_auto_rays(o->build.epsilon, 1. / 4));
     if (r->doubtful > 0)
         terminal_warn(
-            state->t,
+            job->t,
             "the operator leaves %.2g of smooth light unexplained, above the %.2g that --epsilon %g "
             "allows: its answers to light of large areas are off by about as much; take another "
             "--method or --form-factors",
             report_get(r, "smooth_residual", 0), r->doubtful, o->build.epsilon);
-    terminal_log(state->t, "%s", r->reason);
+    terminal_log(job->t, "%s", r->reason);
 }
 
-lam_status stage_operator(precompute_state *state, lam_error *error) {
+lam_status stage_operator(const precompute_job *job, precompute_scene *scene, const precompute_plan *plan,
+                          precompute_factors *factors, made_operator *made, const trial_course *course,
+                          lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
-    const build_options how = state_build_options(state);
+    const precompute_options *o = job->options;
+    const build_options how = build_options_of(job, scene, factors, course);
     panel_precision precision = PANEL_F32;
     build_problem problem;
-    TRY(state_find_importance(state, error));
-    TRY(state_problem(state, needs_of(how.method), &problem, error));
-    TRY(build_operator(&problem, &how, &state->op, &state->built, error));
-    if (!(method_find(state->built.method)->flags & METHOD_READS)) importance_free(&state->importance);
-    if (state->streamed) {
-        form_factors_free(&state->f);
-        state->f = ray_rows_take(state->rays);
-        ray_rows_destroy(state->rays);
-        state->rays = NULL;
+    TRY(scene_find_importance(job, scene, plan, factors, error));
+    TRY(problem_of(scene, factors, needs_of(how.method), &problem, error));
+    TRY(build_operator(&problem, &how, &made->op, &made->built, error));
+    if (!(method_find(made->built.method)->flags & METHOD_READS)) importance_free(&scene->importance);
+    if (plan->streamed) {
+        form_factors_free(&factors->f);
+        factors->f = ray_rows_take(factors->rays);
+        ray_rows_destroy(factors->rays);
+        factors->rays = NULL;
     }
-    log_report(state);
-    lam_operator_set_threads(state->op, (size_t)omp_get_max_threads());
+    log_report(job, factors, made);
+    lam_operator_set_threads(made->op, (size_t)omp_get_max_threads());
     (void)panel_precision_find(how.precision, &precision); /* one of the choices of the row */
-    TRY(precision_replace(&state->op, precision, state->m.area, precompute_seed(o->seed, SEED_PRECISION),
-                          state->t, error));
+    TRY(precision_replace(&made->op, precision, scene->m.area, precompute_seed(o->seed, SEED_PRECISION),
+                          job->t, error));
 done:
     return status;
 }
@@ -232,13 +237,13 @@ static void log_figures(terminal *t, const char *name, const error_group *g, boo
 }
 
 /* Rows that were not held are found again: the error of the operator itself is measured against them. */
-static lam_status trace_again(precompute_state *state, lam_error *error) {
-    const form_factor_options how = {.recipe = state->recipe,
-                                     .progress = &state->progress,
-                                     .stage = "form factors once more for the judge"};
+static lam_status trace_again(const precompute_job *job, const precompute_scene *scene,
+                              const precompute_plan *plan, precompute_factors *factors, lam_error *error) {
+    const form_factor_options how = {
+        .recipe = plan->recipe, .progress = &job->progress, .stage = "form factors once more for the judge"};
     form_factors again = {.row_sums = NULL};
-    const lam_status status = form_factors_make(&state->m, state->order, &how, &again, error);
-    state->f.F = again.F;
+    const lam_status status = form_factors_make(&scene->m, scene->order, &how, &again, error);
+    factors->f.F = again.F;
     again.F = (csr){.n = 0};
     form_factors_free(&again);
     return status;
@@ -251,78 +256,90 @@ static const char *keeper(void) {
     return NULL;
 }
 
-void state_advise(precompute_state *state) {
-    const precompute_options *o = state->options;
-    const bool all_tried = state->trial.count == o->trials && o->trials < TRIALS_MOST;
-    const worst_group worst = judge_worst_group(&state->by_group);
-    const bool known = worst.group < state->by_group.n_groups;
-    const error_advice_input input = {.errors = &state->errors,
-                                      .recipe = state->f.recipe,
-                                      .asked = state_keeps_epsilon(state) ? state->trial.asked : 0,
-                                      .group_asked = state->trial.group,
+void stage_advise(const finished_trial *t, char advice[ERROR_ADVICE_BYTES]) {
+    const precompute_options *o = t->job->options;
+    const trial_course *course = t->course;
+    const form_factors *f = &t->factors->f;
+    const bool all_tried = course->count == o->trials && o->trials < TRIALS_MOST;
+    const worst_group worst = judge_worst_group(&t->made->by_group);
+    const bool known = worst.group < t->made->by_group.n_groups;
+    const error_advice_input input = {.errors = &t->made->errors,
+                                      .recipe = f->recipe,
+                                      .asked = trial_keeps_epsilon(t) ? t->job->kept_epsilon : 0,
+                                      .group_asked = o->group_error,
                                       .worst = &worst,
-                                      .worst_name = known ? state->m.group_names[worst.group] : "",
+                                      .worst_name = known ? t->scene->m.group_names[worst.group] : "",
                                       .trials_left = all_tried ? TRIALS_MOST : 0,
-                                      .other_method = state_follows_epsilon(state) ? NULL : keeper(),
-                                      .epsilon = state->trial.epsilon,
-                                      .lacking = state->trial.lacking,
-                                      .spent = state->trial.spent,
-                                      .by_noise = state->built.by_noise,
+                                      .other_method = trial_follows_epsilon(t) ? NULL : keeper(),
+                                      .epsilon = course->epsilon,
+                                      .lacking = course->lacking,
+                                      .spent = course->spent,
+                                      .by_noise = t->made->built.by_noise,
                                       .finest = o->quality == QUALITY_HIGH ||
-                                                state->f.recipe.accuracy <= state_finest_accuracy(),
-                                      .overlapping = state_is_overlapping(state),
+                                                f->recipe.accuracy <= plan_finest_accuracy(),
+                                      .overlapping = made_is_overlapping(t->scene, t->made),
                                       .from_store = o->from_store};
-    if (state->probes == 0) return;
-    error_advice(&input, state->advice);
-    if (state->advice[0] != '\0') terminal_warn(state->t, "%s", state->advice);
+    if (t->plan->probes == 0) return;
+    error_advice(&input, advice);
+    if (advice[0] != '\0') terminal_warn(t->job->t, "%s", advice);
     char of_sky[ERROR_ADVICE_BYTES];
-    error_advice_sky(&input, state->f.leaving_share, state->f.n_aimed, of_sky);
-    if (of_sky[0] != '\0') terminal_warn(state->t, "%s", of_sky);
+    error_advice_sky(&input, f->leaving_share, f->n_aimed, of_sky);
+    if (of_sky[0] != '\0') terminal_warn(t->job->t, "%s", of_sky);
 }
+
+/* Context of log_half. */
+typedef struct half_log {
+    const precompute_job *job;
+    size_t n;
+} half_log;
 
 static void log_half(void *context, const form_factors *half) {
-    state_log_kept(context, half);
+    const half_log *to = context;
+    factors_log_kept(to->job, to->n, half);
 }
 
-lam_status stage_judge(precompute_state *state, lam_error *error) {
+lam_status stage_judge(const precompute_job *job, precompute_scene *scene, const precompute_plan *plan,
+                       precompute_factors *factors, made_operator *made, judge_references **kept,
+                       lam_error *error) {
     lam_status status = LAM_OK;
-    const uint64_t seed = state->options->seed;
+    half_log to = {job, scene->m.n};
+    const uint64_t seed = job->options->seed;
     build_problem problem;
-    if (state->streamed) TRY(trace_again(state, error));
-    TRY(state_problem(state, 0, &problem, error));
-    judging j = {.m = &state->m,
-                 .order = state->order,
+    if (plan->streamed) TRY(trace_again(job, scene, plan, factors, error));
+    TRY(problem_of(scene, factors, 0, &problem, error));
+    judging j = {.m = &scene->m,
+                 .order = scene->order,
                  .problem = &problem,
-                 .f = &state->f,
-                 .openings = state->openings,
-                 .importance = state->importance.n > 0 ? &state->importance : NULL,
+                 .f = &factors->f,
+                 .openings = scene->openings,
+                 .importance = scene->importance.n > 0 ? &scene->importance : NULL,
                  .scratch_names = {"judge-1.rows", "judge-2.rows"},
                  .stages = {"form factors for the judge, 1 of 2", "form factors for the judge, 2 of 2"},
-                 .scratch = state->scratch,
-                 .large = state_large_place(state),
+                 .scratch = factors->scratch,
+                 .large = factors_place(plan, factors),
                  .probes_seed = precompute_seed(seed, SEED_PROBES),
                  .first_light_seed = precompute_seed(seed, SEED_FIRST_LIGHT),
-                 .probes = state->probes,
-                 .probes_least = state->options->probes == OPTION_AUTO ? PROBES_LEAST : 0,
-                 .by_group = &state->by_group,
-                 .progress = &state->progress,
+                 .probes = plan->probes,
+                 .probes_least = job->options->probes == OPTION_AUTO ? PROBES_LEAST : 0,
+                 .by_group = &made->by_group,
+                 .progress = &job->progress,
                  .sampled = log_half,
-                 .context = state,
-                 .kept = state_may_try_again(state) ? &state->trial.references : NULL};
+                 .context = &to,
+                 .kept = kept};
     uint64_t purpose = SEED_JUDGE_FIRST, own;
     for (int h = 0; h < 2; h++) {
         /* Independent of the F that was factorized: kept form factors may have any seed. */
         do own = precompute_seed(seed, purpose++);
-        while (own == state->f.recipe.seed);
-        j.halves[h] = state_judge_recipe(state, own);
+        while (own == factors->f.recipe.seed);
+        j.halves[h] = plan_judge_recipe(job, plan, own);
     }
-    TRY(judging_run(&j, state->op, &state->errors, error));
-    if (state->importance.emits != NULL) terminal_log(state->t, "errors of emissions of the sources alone:");
-    log_figures(state->t, "single", &state->errors.single, state->errors.has_total);
-    log_figures(state->t, "lights", &state->errors.lights, state->errors.has_total);
-    log_figures(state->t, "random", &state->errors.random, state->errors.has_total);
-    log_figures(state->t, "whole", &state->errors.whole, state->errors.has_total);
-    log_figures(state->t, "sky", &state->errors.sky, state->errors.has_total);
+    TRY(judging_run(&j, made->op, &made->errors, error));
+    if (scene->importance.emits != NULL) terminal_log(job->t, "errors of emissions of the sources alone:");
+    log_figures(job->t, "single", &made->errors.single, made->errors.has_total);
+    log_figures(job->t, "lights", &made->errors.lights, made->errors.has_total);
+    log_figures(job->t, "random", &made->errors.random, made->errors.has_total);
+    log_figures(job->t, "whole", &made->errors.whole, made->errors.has_total);
+    log_figures(job->t, "sky", &made->errors.sky, made->errors.has_total);
 done:
     return status;
 }

@@ -1,7 +1,7 @@
 /* Openings through which the sky is seen: groups of --portal, or those that the faces leave. */
 #include "solver/formfactor/visibility/openings.h"
 #include "solver/light/emission.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -46,46 +46,46 @@ done:
     return status;
 }
 
-lam_status state_take_portals(precompute_state *state, lam_error *error) {
+lam_status scene_take_portals(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
-    const option_list *names = &state->options->portals;
-    mesh *const m = &state->m;
-    emission_scene scene = {.m = NULL};
+    const option_list *names = &job->options->portals;
+    mesh *const m = &scene->m;
+    emission_scene named = {.m = NULL};
     size_t n_dropped = 0;
     bool *dropped = NULL;
     if (names->count == 0) return LAM_OK;
     dropped = memory_allocate(m->n, sizeof *dropped, "--portal", error);
     if (dropped == NULL) return LAM_ERR_MEMORY;
-    TRY(emission_scene_create(m, &scene, error));
+    TRY(emission_scene_create(m, &named, error));
     for (size_t k = 0; k < names->count; k++) {
         plane_rectangle around;
-        TRY(read_portal(m, &scene.groups, names->items[k], dropped, &around, error));
-        TRY(face_openings_give(&state->of_faces, &around, error));
+        TRY(read_portal(m, &named.groups, names->items[k], dropped, &around, error));
+        TRY(face_openings_give(&scene->of_faces, &around, error));
     }
-    state->openings = &state->of_faces;
+    scene->openings = &scene->of_faces;
     for (size_t i = 0; i < m->n; i++) n_dropped += dropped[i];
     if (n_dropped == m->n)
         FAIL(error, LAM_ERR_ARGUMENT, "--portal %.200s: every face of the scene is of a portal",
              names->items[0]);
     TRY(mesh_drop(m, dropped, error));
-    terminal_log(state->t, "%zu face%s of portals, which are no elements", n_dropped,
+    terminal_log(job->t, "%zu face%s of portals, which are no elements", n_dropped,
                  n_dropped == 1 ? "" : "s");
 done:
-    emission_scene_free(&scene);
+    emission_scene_free(&named);
     free(dropped);
     return status;
 }
 
-lam_status state_find_openings(precompute_state *state, lam_error *error) {
+lam_status scene_find_openings(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
-    if (state->options->sky == NULL || state->openings != NULL) return LAM_OK;
-    TRY(face_openings_find(&state->m, openings_crack_width(&state->m), &state->of_faces, error));
-    state->openings = &state->of_faces;
-    if (state->of_faces.n_left > 0)
-        terminal_log(state->t,
+    if (job->options->sky == NULL || scene->openings != NULL) return LAM_OK;
+    TRY(face_openings_find(&scene->m, openings_crack_width(&scene->m), &scene->of_faces, error));
+    scene->openings = &scene->of_faces;
+    if (scene->of_faces.n_left > 0)
+        terminal_log(job->t,
                      "the faces leave %zu openings; rays are aimed at none but the %zu largest, or give "
                      "--portal GROUP",
-                     state->of_faces.n + state->of_faces.n_left, state->of_faces.n);
+                     scene->of_faces.n + scene->of_faces.n_left, scene->of_faces.n);
 done:
     return status;
 }

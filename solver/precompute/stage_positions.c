@@ -4,7 +4,7 @@
 #include "solver/light/light_path.h"
 #include "solver/method/emitters_options.h"
 #include "solver/operator/emitters.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 
 #include <math.h>
 #include <omp.h>
@@ -32,70 +32,73 @@ static lam_status take_colours(mesh *m, lam_error *error) {
 }
 
 /* The mesh of a store, whatever its operator is. */
-static lam_status load_mesh(precompute_state *state, lam_error *error) {
+static lam_status load_mesh(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
-    TRY(store_open(state->options->input, &s, error));
-    TRY(mesh_load(s, &state->m, NULL, error));
-    if (state->m.n_channels != 1 && state->m.n_channels != MOVING_LIGHT_CHANNELS)
+    TRY(store_open(job->options->input, &s, error));
+    TRY(mesh_load(s, &scene->m, NULL, error));
+    if (scene->m.n_channels != 1 && scene->m.n_channels != MOVING_LIGHT_CHANNELS)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: has %zu channels, a moving light needs 1 or %d",
-             state->options->input, state->m.n_channels, MOVING_LIGHT_CHANNELS);
-    if (state->options->reflectance >= 0)
-        for (size_t i = 0; i < state->m.n * state->m.n_channels; i++)
-            state->m.reflectance[i] = (float)state->options->reflectance;
+             job->options->input, scene->m.n_channels, MOVING_LIGHT_CHANNELS);
+    if (job->options->reflectance >= 0)
+        for (size_t i = 0; i < scene->m.n * scene->m.n_channels; i++)
+            scene->m.reflectance[i] = (float)job->options->reflectance;
 done:
     store_close(s);
     return status;
 }
 
-static lam_status read_light(precompute_state *state, const emitters_options *how, lam_error *error) {
+static lam_status read_light(const precompute_job *job, precompute_scene *scene, walked_light *walked,
+                             const emitters_options *how, lam_error *error) {
     lam_status status = LAM_OK;
     const bool listed = how->positions != NULL;
     const light_path_request request = {.path = listed ? how->positions : how->path,
                                         .frames = listed ? 0 : (size_t)how->frames,
-                                        .unit = state->options->from_store ? 1 : state->m.unit};
+                                        .unit = job->options->from_store ? 1 : scene->m.unit};
     bool coloured = false;
-    TRY(light_path_read(&request, &state->light, &coloured, error));
-    if (coloured) TRY(take_colours(&state->m, error));
-    terminal_log(state->t, "%zu positions of a light of %.3g m2", state->light.n, state->light.area);
+    TRY(light_path_read(&request, &walked->light, &coloured, error));
+    if (coloured) TRY(take_colours(&scene->m, error));
+    terminal_log(job->t, "%zu positions of a light of %.3g m2", walked->light.n, walked->light.area);
 done:
     return status;
 }
 
 /* Fails before any walk where the sums of all threads, the estimates and the operator have no room. */
-static lam_status check_memory(const precompute_state *state, lam_error *error) {
+static lam_status check_memory(const precompute_job *job, const precompute_scene *scene,
+                               const walked_light *walked, lam_error *error) {
     lam_status status = LAM_OK;
-    const double n = (double)state->m.n, C = (double)state->m.n_channels, s = (double)state->light.n;
+    const double n = (double)scene->m.n, C = (double)scene->m.n_channels, s = (double)walked->light.n;
     const double threads = (double)omp_get_max_threads();
     const double bytes = 8 * n * s * ((threads + 2) * C + threads + 1) + 4 * n * s * (4 * C + 1);
-    if (bytes > state->memory)
+    if (bytes > job->memory)
         FAIL(
             error, LAM_ERR_MEMORY,
             "%zu positions of %zu elements take about %.2g GB with %d threads, --memory allows %.2g GB: give "
             "fewer positions, elements or --threads",
-            state->light.n, state->m.n, 1e-9 * bytes, (int)threads, 1e-9 * state->memory);
+            walked->light.n, scene->m.n, 1e-9 * bytes, (int)threads, 1e-9 * job->memory);
 done:
     return status;
 }
 
-static lam_status walk(precompute_state *state, const emitters_options *how, lam_error *error) {
+static lam_status walk(const precompute_job *job, const precompute_scene *scene, walked_light *walked,
+                       const emitters_options *how, lam_error *error) {
     lam_status status = LAM_OK;
     const reuse_way way = (reuse_way)(how->reuse[0] - 'A');
-    const reuse_problem problem = {.light = &state->light,
+    const reuse_problem problem = {.light = &walked->light,
                                    .way = way,
                                    .paths = (size_t)how->paths,
                                    .even = true,
                                    .resolution = way == REUSE_CUBES ? CUBE_PIXELS : MAP_CELLS,
-                                   .seed = precompute_seed(state->options->seed, SEED_POSITIONS),
-                                   .progress = &state->progress,
+                                   .seed = precompute_seed(job->options->seed, SEED_POSITIONS),
+                                   .progress = &job->progress,
                                    .stage = "paths"};
-    walk_scene *scene = NULL;
-    TRY(walk_scene_create(&state->m, state->options->closed, &scene, error));
-    TRY(walk_reuse(scene, &problem, &state->paths, error));
-    terminal_log(state->t, "%zu paths of each position, %.3g rays each", state->paths.paths,
-                 state->paths.rays);
+    walk_scene *walks = NULL;
+    TRY(walk_scene_create(&scene->m, job->options->closed, &walks, error));
+    TRY(walk_reuse(walks, &problem, &walked->paths, error));
+    terminal_log(job->t, "%zu paths of each position, %.3g rays each", walked->paths.paths,
+                 walked->paths.rays);
 done:
-    walk_scene_free(scene);
+    walk_scene_free(walks);
     return status;
 }
 
@@ -109,12 +112,13 @@ static lam_status copy_names(const moving_light *l, char ***names, lam_error *er
 }
 
 /* No element emits: the light is no part of the mesh. */
-static lam_status make_operator(precompute_state *state, lam_error *error) {
+static lam_status make_operator(const precompute_scene *scene, made_operator *made, walked_light *walked,
+                                lam_error *error) {
     lam_status status = LAM_OK;
-    const mesh *m = &state->m;
-    const size_t n = m->n, C = m->n_channels, s = state->light.n;
+    const mesh *m = &scene->m;
+    const size_t n = m->n, C = m->n_channels, s = walked->light.n;
     emitter_arrays a = {.s = s};
-    TRY(copy_names(&state->light, &a.names, error));
+    TRY(copy_names(&walked->light, &a.names, error));
     a.T = memory_allocate(C * s, n * sizeof *a.T, "light of positions", error);
     a.ends = memory_allocate(C * s + 1, sizeof *a.ends, "light of positions", error);
     a.elements = memory_allocate(1, sizeof *a.elements, "light of positions", error);
@@ -123,61 +127,63 @@ static lam_status make_operator(precompute_state *state, lam_error *error) {
     if (a.T == NULL || a.ends == NULL || a.elements == NULL || a.values == NULL || a.exitance == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < C; c++) {
-        a.exitance[c] = (float)state->light.emission[c];
+        a.exitance[c] = (float)walked->light.emission[c];
         for (size_t k = 0; k < s; k++)
             for (size_t i = 0; i < n; i++) {
                 const float rho = m->reflectance[c * n + i];
-                a.T[(c * s + k) * n + i] = (rho > 0 ? rho : 1) * state->paths.H[(c * s + k) * n + i];
+                a.T[(c * s + k) * n + i] = (rho > 0 ? rho : 1) * walked->paths.H[(c * s + k) * n + i];
             }
     }
-    a.direct = state->paths.direct;
-    state->paths.direct = NULL;
-    TRY(operator_emitters_create(n, C, m->reflectance, &a, &state->op, error));
+    a.direct = walked->paths.direct;
+    walked->paths.direct = NULL;
+    TRY(operator_emitters_create(n, C, m->reflectance, &a, &made->op, error));
 done:
     emitter_arrays_free(&a);
     return status;
 }
 
-static void report(precompute_state *state, const emitters_options *how) {
+static void report(const precompute_job *job, made_operator *made, const walked_light *walked,
+                   const emitters_options *how) {
     static const char *const ways[] = {
         "A: every position by its own paths", "B: paths serve all positions, by a ray to each",
         "C: paths serve all positions, by maps", "D: paths serve all positions, by hemicubes",
         "E: walks from the elements that are lit serve all positions"};
-    build_report *r = &state->built;
+    build_report *r = &made->built;
     r->method = method_find("emitters")->name;
-    snprintf(r->detail, sizeof r->detail, "%zu paths of each; %s", state->paths.paths,
+    snprintf(r->detail, sizeof r->detail, "%zu paths of each; %s", walked->paths.paths,
              ways[how->reuse[0] - 'A']);
     snprintf(r->reason, sizeof r->reason, "emitters: %zu positions of a light asked for by --%s; %s",
-             state->light.n, how->positions != NULL ? "positions" : "path", r->detail);
-    report_count(r, "paths", (double)state->paths.paths);
+             walked->light.n, how->positions != NULL ? "positions" : "path", r->detail);
+    report_count(r, "paths", (double)walked->paths.paths);
     report_text(r, "reuse", how->reuse);
-    report_number(r, "rays_of_path", state->paths.rays);
-    terminal_log(state->t, "%s", r->reason);
+    report_number(r, "rays_of_path", walked->paths.rays);
+    terminal_log(job->t, "%s", r->reason);
 }
 
-lam_status stage_positions(precompute_state *state, lam_error *error) {
+lam_status stage_positions(const precompute_job *job, precompute_scene *scene, made_operator *made,
+                           walked_light *walked, lam_error *error) {
     lam_status status = LAM_OK;
-    const emitters_options *how = emitters_options_of(&state->options->build);
+    const emitters_options *how = emitters_options_of(&job->options->build);
     double started = clock_seconds();
-    TRY(state->options->from_store ? load_mesh(state, error) : stage_load_scene(state, error));
-    terminal_log_stage(state->t, "import", clock_seconds() - started);
+    TRY(job->options->from_store ? load_mesh(job, scene, error) : stage_load_scene(job, scene, error));
+    terminal_log_stage(job->t, "import", clock_seconds() - started);
     TRY(terminal_check(error));
     started = clock_seconds();
-    if (!state->options->from_store) TRY(state_refine_mesh(state, error));
-    state_log_mesh(state);
-    TRY(read_light(state, how, error));
-    TRY(check_memory(state, error));
-    terminal_log_stage(state->t, "mesh", clock_seconds() - started);
+    if (!job->options->from_store) TRY(scene_refine(job, scene, error));
+    scene_log_mesh(job, scene);
+    TRY(read_light(job, scene, walked, how, error));
+    TRY(check_memory(job, scene, walked, error));
+    terminal_log_stage(job->t, "mesh", clock_seconds() - started);
     started = clock_seconds();
-    TRY(walk(state, how, error));
-    terminal_log_stage(state->t, "paths", clock_seconds() - started);
+    TRY(walk(job, scene, walked, how, error));
+    terminal_log_stage(job->t, "paths", clock_seconds() - started);
     started = clock_seconds();
-    report(state, how);
-    TRY(state_add_overlap_of_positions(state, error));
-    TRY(state_judge_positions(state, error));
-    TRY(make_operator(state, error)); /* it takes the direct light over */
-    lam_operator_set_threads(state->op, (size_t)omp_get_max_threads());
-    terminal_log_stage(state->t, "judge", clock_seconds() - started);
+    report(job, made, walked, how);
+    TRY(walked_add_overlap(scene, made, walked, error));
+    TRY(walked_judge(job, scene, made, walked, error));
+    TRY(make_operator(scene, made, walked, error)); /* it takes the direct light over */
+    lam_operator_set_threads(made->op, (size_t)omp_get_max_threads());
+    terminal_log_stage(job->t, "judge", clock_seconds() - started);
     TRY(terminal_check(error));
 done:
     return status;

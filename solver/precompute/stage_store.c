@@ -1,25 +1,27 @@
 /* The store that a precompute writes, and its seal. */
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 #include "store/groups.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static lam_status save_report(const precompute_state *state, store *s, lam_error *error) {
+static lam_status save_report(const precompute_job *job, const precompute_factors *factors,
+                              const made_operator *made, const walked_light *walked, store *s,
+                              lam_error *error) {
     lam_status status = LAM_OK;
     operator_description about;
-    operator_describe(state->op, &about);
-    TRY(store_set_text(s, STORE_OPERATOR, "method", state->built.method, error));
-    TRY(store_set_text(s, STORE_OPERATOR, "reason", state->built.reason, error));
-    TRY(report_save(&state->built, s, error));
+    operator_describe(made->op, &about);
+    TRY(store_set_text(s, STORE_OPERATOR, "method", made->built.method, error));
+    TRY(store_set_text(s, STORE_OPERATOR, "reason", made->built.reason, error));
+    TRY(report_save(&made->built, s, error));
     if (about.density >= 0) TRY(store_set_number(s, STORE_OPERATOR, "density", about.density, error));
-    if (state->light.n > 0) { /* there are no form factors */
-        TRY(recipe_save_closure(state->options->closed, recipe_of_operator.group, s, error));
+    if (walked->light.n > 0) { /* there are no form factors */
+        TRY(recipe_save_closure(job->options->closed, recipe_of_operator.group, s, error));
         goto done;
     }
     /* The recipe of the form factors, so that they can be made again where they are not kept. */
-    TRY(recipe_save(&state->f.recipe, &recipe_of_operator, s, error));
+    TRY(recipe_save(&factors->f.recipe, &recipe_of_operator, s, error));
 done:
     return status;
 }
@@ -33,14 +35,15 @@ static lam_status name_option(const char *name, const char *value, char **out, l
     return LAM_OK;
 }
 
-static lam_status save_importance(const precompute_state *state, store *s, lam_error *error) {
+static lam_status save_importance(const precompute_job *job, const precompute_scene *scene, store *s,
+                                  lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
+    const precompute_options *o = job->options;
     char *option = NULL, *sources = NULL;
     if (o->receivers != NULL) TRY(name_option("--receivers", o->receivers, &option, error));
     if (o->importance != NULL) TRY(name_option("--importance", o->importance, &option, error));
     if (o->sources != NULL) TRY(name_option("--sources", o->sources, &sources, error));
-    TRY(importance_save(&state->importance, option, sources, s, error));
+    TRY(importance_save(&scene->importance, option, sources, s, error));
 done:
     free(option);
     free(sources);
@@ -48,51 +51,55 @@ done:
 }
 
 /* Without probes nothing was judged, but walks state their own errors. */
-static lam_status save_errors(const precompute_state *state, store *s, lam_error *error) {
-    const reuse_estimates *e = &state->paths;
-    stated_figures all = {.mesh = state->errors_of_mesh};
-    if (state->light.n > 0)
+static lam_status save_errors(const precompute_scene *scene, const precompute_plan *plan,
+                              const made_operator *made, const walked_light *walked, store *s,
+                              lam_error *error) {
+    const reuse_estimates *e = &walked->paths;
+    stated_figures all = {.mesh = made->errors_of_mesh};
+    if (walked->light.n > 0)
         all.emitters = (emitter_figures){.s = e->n_positions,
-                                         .n_groups = state->m.n_groups,
+                                         .n_groups = scene->m.n_groups,
                                          .covariance = e->covariance,
                                          .of_groups = e->of_groups,
                                          .of_means = e->of_means,
-                                         .relative = state->position_errors,
-                                         .indirect = state->position_errors + e->n_positions};
-    if (state->probes > 0 || state->light.n > 0) {
-        all.report = state->errors;
-        all.repair = state->repair;
+                                         .relative = walked->position_errors,
+                                         .indirect = walked->position_errors + e->n_positions};
+    if (plan->probes > 0 || walked->light.n > 0) {
+        all.report = made->errors;
+        all.repair = made->repair;
     }
-    if (state->probes > 0) all.by_group = state->by_group;
+    if (plan->probes > 0) all.by_group = made->by_group;
     return stated_figures_save(&all, s, error);
 }
 
-lam_status stage_store(precompute_state *state, lam_error *error) {
+lam_status stage_store(const precompute_job *job, const precompute_scene *scene, const precompute_plan *plan,
+                       precompute_factors *factors, const made_operator *made, const walked_light *walked,
+                       lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
+    const precompute_options *o = job->options;
     store *s = NULL;
     TRY(store_create(o->output, &s, error));
-    TRY(store_set_text(s, "/", "name", state->m.name, error));
+    TRY(store_set_text(s, "/", "name", scene->m.name, error));
     TRY(store_set_text(s, "/", "tool", "lambert " LAMBERT_VERSION, error));
     TRY(store_set_text(s, "/", "command", o->command, error));
     TRY(store_set_integer(s, "/", "seed", (int64_t)o->seed, error));
-    TRY(store_set_number(s, "/", "unit", state->m.unit, error));
-    TRY(mesh_save(&state->m, state->f.row_sums, s, error));
+    TRY(store_set_number(s, "/", "unit", scene->m.unit, error));
+    TRY(mesh_save(&scene->m, factors->f.row_sums, s, error));
     if (o->reflectance >= 0) TRY(store_set_number(s, STORE_MESH, "reflectance_given", o->reflectance, error));
     TRY(terminal_check(error));
-    if (state_keeps(o) && state->blocks.n > 0) {
-        TRY(form_factors_save_blocks(&state->f, &state->blocks, s, error));
-    } else if (state_keeps(o)) {
-        if (state->m.n > FORM_FACTORS_ROWS_MOST) TRY(form_factors_gather(&state->f, state->m.area, error));
-        TRY(form_factors_save(&state->f, s, error));
+    if (o->keep_form_factors && factors->blocks.n > 0) {
+        TRY(form_factors_save_blocks(&factors->f, &factors->blocks, s, error));
+    } else if (o->keep_form_factors) {
+        if (scene->m.n > FORM_FACTORS_ROWS_MOST) TRY(form_factors_gather(&factors->f, scene->m.area, error));
+        TRY(form_factors_save(&factors->f, s, error));
     }
-    if (state->f.sky.first_bounce != NULL) TRY(sky_bounce_save(&state->f.sky, s, error));
+    if (factors->f.sky.first_bounce != NULL) TRY(sky_bounce_save(&factors->f.sky, s, error));
     TRY(terminal_check(error));
-    TRY(operator_save(state->op, s, error));
-    if (state->importance.n > 0) TRY(save_importance(state, s, error));
-    TRY(save_report(state, s, error));
-    TRY(state_save_positions(state, s, error));
-    TRY(save_errors(state, s, error));
+    TRY(operator_save(made->op, s, error));
+    if (scene->importance.n > 0) TRY(save_importance(job, scene, s, error));
+    TRY(save_report(job, factors, made, walked, s, error));
+    TRY(walked_save(walked, s, error));
+    TRY(save_errors(scene, plan, made, walked, s, error));
     TRY(terminal_check(error));
     store *sealing = s;
     s = NULL;

@@ -26,11 +26,12 @@
      __VA_ARGS__}
 
 /* --assets DIR, a text or NULL. */
-#define OPTION_ROW_ASSETS(place)                                                                             \
+#define OPTION_ROW_ASSETS(place, ...)                                                                        \
     {.name = "assets",                                                                                       \
      .kind = OPTION_TEXT,                                                                                    \
      .offset = (place),                                                                                      \
      .argument = "DIR",                                                                                      \
-     .help = "Folder of files that the scene names and that do not lie in its own; others are not read"}
+     .help = "Folder of files that the scene names and that do not lie in its own; others are not read",     \
+     __VA_ARGS__}
 
 #endif

@@ -96,8 +96,6 @@ int cmd_classify(int argc, char **argv) {
     precompute_tables_add(&tables, own_rows, &f);
     const int code = options_parse(&verb, tables.tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
-    if (o.max_edge > 0 && o.elements > 0)
-        return options_usage(verb.name, "--max-edge and --elements exclude each other");
     terminal_open(&term, verb.name, o.quiet || f.json, o.progress);
     term.nothing = "nothing was found out";
     if (o.threads > 0) omp_set_num_threads((int)o.threads);

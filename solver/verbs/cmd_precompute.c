@@ -101,78 +101,45 @@ static char *command_line(int argc, char **argv) {
     return text;
 }
 
-/* --time chooses these itself, or they need time that it does not forecast. */
-static int check_time(const precompute_options *o, const option_result *given) {
-    static const char *const chosen[] = {"epsilon", "rays", "quality", "resolution", "trials"};
-    static const char *const not_forecast[] = {"emitters", "scratch", "group-error"};
+/* Of options that go together by name: values that --time does not forecast. */
+static int check_time(const precompute_options *o) {
     const build_method *method = method_find(o->build.method);
-    if (!(o->time > 0)) return 0;
-    for (size_t i = 0; i < sizeof chosen / sizeof *chosen; i++)
-        if (options_given(given, chosen[i]))
-            return options_usage(command.name, "--time chooses --%s: give one of the two", chosen[i]);
-    for (size_t i = 0; i < sizeof not_forecast / sizeof *not_forecast; i++)
-        if (options_given(given, not_forecast[i]))
-            return options_usage(command.name, "--time: is not supported together with --%s",
-                                 not_forecast[i]);
-    if (o->from_store)
-        return options_usage(command.name, "--time: a store has its form factors already; precompute from "
-                                           "its scene instead");
-    if (o->form_factors == FACTORS_HEMICUBE)
-        return options_usage(command.name, "--time: is not supported together with --form-factors hemicube");
+    const factor_source *const asked = source_asked(o->form_factors);
+    if (!(o->time > 0)) return OPTIONS_GO;
+    if (asked != NULL && asked->asked != NULL)
+        return options_usage(command.name, "--time: is not supported together with --form-factors %s",
+                             asked->name);
     if (method != NULL && !(method->flags & METHOD_BLOCKS))
         return options_usage(command.name, "--time: is not supported together with --method %s",
                              method->name);
-    return 0;
+    return OPTIONS_GO;
 }
 
-/* Positions of a light need no form factors, and have no use for what is about these. */
-static int check_positions(const precompute_options *o, const option_result *given) {
-    static const char *const others[] = {"sky",        "portal",  "keep-form-factors", "receivers",
-                                         "importance", "sources", "group-error",       "time"};
-    const emitters_options *positions = emitters_options_of(&o->build);
-    if (!emitters_are_positions(positions)) return 0;
-    const char *const name = positions->positions != NULL ? "positions" : "path";
-    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
-        if (options_given(given, others[i]))
-            return options_usage(command.name,
-                                 "--%s: is not supported together with --%s, whose light is found "
-                                 "without form factors",
-                                 others[i], name);
-    if (strcmp(o->build.method, "auto") != 0 && strcmp(o->build.method, "emitters") != 0)
-        return options_usage(command.name, "--%s: gives a store of emitters: leave out --method %s", name,
-                             o->build.method);
-    return 0;
-}
-
-/* 0, or the status of wrong usage where arguments do not go together. */
-static int check_together(const precompute_options *o, const option_result *given) {
-    static const char *const of_mesh[] = {"max-edge",  "elements", "mesh-error", "unit",  "up",
-                                          "two-sided", "orient",   "closed",     "assets"};
-    static const char *const of_sky[] = {"sky", "ground-albedo", "portal"};
+/* The same of options of methods: those of the method that is going to be built. */
+static int check_method(const precompute_options *o) {
     const build_method *method = method_find(o->build.method);
-    lam_error error = {.message = ""};
-    if (o->output == NULL) return options_usage(command.name, "no -o STORE.h5 given");
-    if (o->max_edge > 0 && o->elements > 0)
-        return options_usage(command.name, "--max-edge and --elements exclude each other");
-    for (size_t i = 0; o->from_store && i < sizeof of_sky / sizeof of_sky[0]; i++)
-        if (options_given(given, of_sky[i]))
-            return options_usage(command.name,
-                                 "--%s: a store keeps the sky it has; precompute from its scene instead",
-                                 of_sky[i]);
-    for (size_t i = 0; o->from_store && i < sizeof of_mesh / sizeof of_mesh[0]; i++)
-        if (options_given(given, of_mesh[i]))
-            return options_usage(command.name,
-                                 "--%s: the mesh of a store is fixed; precompute from its scene instead",
-                                 of_mesh[i]);
-    if (check_positions(o, given) != 0) return 2;
     const emitters_options *of_light = emitters_options_of(&o->build);
-    if (method == NULL && (emitters_are_positions(of_light) || of_light->frames > 0))
-        method = method_find("emitters");
+    const bool walked = emitters_are_positions(of_light);
+    lam_error error = {.message = ""};
+    if (walked && method != NULL && method != method_find("emitters"))
+        return options_usage(command.name, "--%s: gives a store of emitters: leave out --method %s",
+                             of_light->positions != NULL ? "positions" : "path", o->build.method);
+    if (method == NULL && (walked || of_light->frames > 0)) method = method_find("emitters");
     if (method == NULL) method = method_fallback(); /* auto may come to it */
     if (method->check != NULL && method->check(method_own_const(&o->build, method), &error) != LAM_OK)
         return options_usage(command.name, "%s", error.message);
-    if (o->receivers != NULL && o->importance != NULL)
-        return options_usage(command.name, "--receivers and --importance exclude each other");
+    return OPTIONS_GO;
+}
+
+/* OPTIONS_GO, or the status of wrong usage where values do not go together. */
+static int check_together(const precompute_options *o, const option_table *tables,
+                          const option_result *given) {
+    int code = OPTIONS_GO;
+    if (o->output == NULL) return options_usage(command.name, "no -o STORE.h5 given");
+    if (o->from_store)
+        code = options_refuse_settled(&command, tables, given, "precompute from its scene instead");
+    if (code == OPTIONS_GO) code = check_method(o);
+    if (code != OPTIONS_GO) return code;
     if (o->resolution % 2 != 0)
         return options_usage(command.name, "--resolution %" PRIu64 ": must be even", o->resolution);
     if (!o->from_store && same_file(o->input, o->output))
@@ -182,18 +149,20 @@ static int check_together(const precompute_options *o, const option_result *give
                              "--group-error %g: needs errors that are measured: give --probes "
                              "above 0, or leave it out",
                              o->group_error);
-    if (check_time(o, given) != 0) return 2;
+    code = check_time(o);
+    if (code != OPTIONS_GO) return code;
     if (is_other_file(o->output))
         return options_usage(command.name,
                              "-o %s: there is a file that is not a store; give another name or remove it",
                              o->output);
-    return 0;
+    return OPTIONS_GO;
 }
 
 /* True if an option about form factors had no effect. With form factors from a store only the judge casts
  * rays; with a hemicube it chooses their number itself. */
 static bool unused_by_form_factors(const char *name, const precompute_options *o) {
-    const bool hemicube = o->form_factors == FACTORS_HEMICUBE;
+    const factor_source *const asked = source_asked(o->form_factors);
+    const bool hemicube = asked != NULL && (asked->flags & SOURCE_RESOLUTION);
     if (strcmp(name, "form-factors") == 0) return o->from_store;
     if (strcmp(name, "resolution") == 0) return o->from_store || !hemicube;
     if (strcmp(name, "quality") == 0) return o->from_store || hemicube || o->rays != OPTION_AUTO;
@@ -202,37 +171,29 @@ static bool unused_by_form_factors(const char *name, const precompute_options *o
     return false;
 }
 
-/* The same of positions of a light. */
-static bool unused_by_positions(const char *name) {
-    static const char *const names[] = {"form-factors", "resolution", "quality",         "ground-albedo",
-                                        "rays",         "epsilon",    "store-precision", "scratch",
-                                        "probes",       "trials"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (strcmp(name, names[i]) == 0) return true;
-    return false;
-}
-
 /* Names the options that had no effect. */
 static void log_unused(terminal *t, const option_result *given, const precompute_options *o,
                        const precompute_result *result) {
     char list[256] = "";
     const bool walked = emitters_are_positions(emitters_options_of(&o->build));
-    char asked[OPTION_WORD_BYTES];
+    const factor_source *const asked = source_asked(o->form_factors);
     size_t length = 0;
     for (size_t i = 0; i < given->n_given; i++) {
         const char *name = given->given[i];
-        if (!(walked ? unused_by_positions(name) : unused_by_form_factors(name, o)) ||
+        if (!(walked ? precompute_walks_ignore(name) : unused_by_form_factors(name, o)) ||
             length + strlen(name) + 5 > sizeof list)
             continue;
         length += (size_t)sprintf(list + length, "%s--%s", length > 0 ? ", " : "", name);
     }
-    option_word(o->form_factors, precompute_factor_words, asked);
     if (length > 0)
         terminal_log(t, "%s%s does not use %s",
                      walked          ? "a light that moves"
                      : o->from_store ? "a store with form factors"
                                      : "--form-factors ",
-                     walked || o->from_store ? "" : asked, list);
+                     walked || o->from_store ? ""
+                     : asked != NULL         ? asked->name
+                                             : "auto",
+                     list);
     if (result->unused[0] != '\0' && !walked)
         terminal_log(t, "%s does not use %s", result->report.method, result->unused);
 }
@@ -252,7 +213,7 @@ int cmd_precompute(int argc, char **argv) {
     if (code == OPTIONS_GO) {
         o.input = given.arguments[0];
         o.from_store = precompute_takes_as_store(o.input);
-        if (check_together(&o, &given) != 0) code = 2;
+        code = check_together(&o, tables.tables, &given);
     }
     if (code != OPTIONS_GO) {
         free(line);

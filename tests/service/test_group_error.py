@@ -152,7 +152,7 @@ class GroupError(Case):
         for value in 0, -1, 1, 2, "nan", "much":
             self.refused(2, "--group-error", "precompute", self.rooms, "-o", store, "--group-error", value)
         self.refused(2, "--probes", "precompute", self.rooms, "-o", store, "--group-error", X, "--probes", 0)
-        self.refused(2, "--time: is not supported together with --group-error", "precompute", self.rooms, "-o", store,
+        self.refused(2, "--time and --group-error exclude each other", "precompute", self.rooms, "-o", store,
                      "--group-error", X, "--time", 10)
         self.assertFalse(os.path.exists(store))
 

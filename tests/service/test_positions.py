@@ -305,7 +305,7 @@ class Positions(Case):
         usage("give --frames N", "--path", self.file)
         usage("--frames", "--frames", 3)
         usage("leave out --method exact", "--positions", self.file, "--method", "exact")
-        usage("--sky: is not supported together", "--positions", self.file, "--sky", "tregenza")
+        usage("--positions and --sky exclude each other", "--positions", self.file, "--sky", "tregenza")
         usage("--reuse", "--positions", self.file, "--reuse", "F")
 
 

@@ -92,10 +92,10 @@ class Time(Case):
             self.refused(2, "--time", "precompute", self.small, "-o", self.path("a.h5"), "--time", value)
 
     def test_what_it_chooses_is_not_given_beside_it(self):
-        for option, value in (("--epsilon", .1), ("--rays", 64), ("--quality", "high"), ("--trials", 2), ("--resolution", 64)):
-            self.refused(2, f"--time chooses {option}", "precompute", self.small, "-o", self.path("a.h5"), "--time", 1, option, value)
-        for option, value in (("--emitters", "sky"), ("--scratch", self.folder), ("--form-factors", "hemicube"),
-                              ("--method", "exact")):
+        for option, value in (("--epsilon", .1), ("--rays", 64), ("--quality", "high"), ("--trials", 2), ("--resolution", 64),
+                              ("--emitters", "sky"), ("--scratch", self.folder)):
+            self.refused(2, f"--time and {option} exclude each other", "precompute", self.small, "-o", self.path("a.h5"), "--time", 1, option, value)
+        for option, value in (("--form-factors", "hemicube"), ("--method", "exact")):
             self.refused(2, "not supported together with " + option, "precompute", self.small, "-o", self.path("a.h5"),
                          "--time", 1, option, value)
         self.refused(2, "a store has its form factors", "precompute", self.store, "-o", self.path("a.h5"), "--time", 1)

@@ -28,7 +28,7 @@ static recipe judge(const recipe *r, size_t rays) {
     static const double judge_share = .5;
     recipe finer = *r;
     (void)rays;
-    if (finer.rays > RECIPE_RAYS_FEW) finer.rays = RECIPE_RAYS_FEW;
+    if (finer.rays > RAYS_BESIDE_PAIRS) finer.rays = RAYS_BESIDE_PAIRS;
     finer.accuracy *= judge_share;
     return finer;
 }
@@ -102,7 +102,7 @@ static void advise(const recipe *r, double error, double most, bool finest, char
 
 const factor_source source_blocks = {
     .name = "blocks",
-    .flags = SOURCE_BLOCKS | SOURCE_ACCURACY | SOURCE_BY_EPSILON,
+    .flags = SOURCE_BLOCKS | SOURCE_ACCURACY | SOURCE_BY_EPSILON | SOURCE_ASKED,
     .describe = describe,
     .option = option,
     .repair = repair,

@@ -149,7 +149,7 @@ static double repair(const recipe *r) {
 static recipe judge(const recipe *r, size_t rays) {
     recipe few = *r;
     (void)rays;
-    if (few.rays > RECIPE_RAYS_FEW) few.rays = RECIPE_RAYS_FEW;
+    if (few.rays > RAYS_BESIDE_PAIRS) few.rays = RAYS_BESIDE_PAIRS;
     return few;
 }
 
@@ -206,7 +206,7 @@ static void advise(const recipe *r, double error, double most, bool finest, char
 
 const factor_source source_pairs = {
     .name = "pairs",
-    .flags = SOURCE_ROWS | SOURCE_TWICE | SOURCE_ACCURACY,
+    .flags = SOURCE_ROWS | SOURCE_TWICE | SOURCE_ACCURACY | SOURCE_COARSER,
     .describe = describe,
     .option = option,
     .repair = repair,

@@ -36,9 +36,10 @@ lam_status hemicube_create(size_t resolution, hemicube *out, lam_error *error) {
     lam_status status = LAM_OK;
     hemicube h = {.resolution = resolution};
     const size_t half = resolution / 2;
-    if (resolution < RECIPE_RESOLUTION_LEAST || resolution > RECIPE_RESOLUTION_MOST || resolution % 2 != 0)
+    if (resolution < HEMICUBE_RESOLUTION_LEAST || resolution > HEMICUBE_RESOLUTION_MOST ||
+        resolution % 2 != 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--resolution %zu: must be even and from %d to %d", resolution,
-             RECIPE_RESOLUTION_LEAST, RECIPE_RESOLUTION_MOST);
+             HEMICUBE_RESOLUTION_LEAST, HEMICUBE_RESOLUTION_MOST);
     h.top = memory_allocate(half * half, sizeof *h.top, "the hemicube's pixels", error);
     h.side = memory_allocate(half * half, sizeof *h.side, "the hemicube's pixels", error);
     if (h.top == NULL || h.side == NULL) TRY(LAM_ERR_MEMORY);

@@ -70,6 +70,11 @@ done:
     return status;
 }
 
+static recipe asked(const recipe *r) {
+    return (recipe){
+        .source = &source_hemicube, .resolution = r->resolution, .seed = r->seed, .closure = r->closure};
+}
+
 static bool less(recipe *r) {
     if (r->resolution / 2 < LOWEST_RESOLUTION) return false;
     r->resolution = r->resolution / 4 * 2; /* even */
@@ -87,11 +92,12 @@ static void advise(const recipe *r, double error, double most, bool finest, char
 
 const factor_source source_hemicube = {
     .name = "hemicube",
-    .flags = SOURCE_ROWS | SOURCE_LARGE | SOURCE_RESOLUTION,
+    .flags = SOURCE_ROWS | SOURCE_LARGE | SOURCE_RESOLUTION | SOURCE_ASKED,
     .describe = describe,
     .option = option,
     .repair = repair,
     .judge = judge,
+    .asked = asked,
     .rays = rays_of,
     .bytes = bytes,
     .packed_bytes = packed_bytes,

@@ -74,7 +74,8 @@ static bool less(recipe *r) {
 
 const factor_source source_rays = {
     .name = "rays",
-    .flags = SOURCE_ROWS | SOURCE_STREAM | SOURCE_LARGE | SOURCE_NOISE | SOURCE_RAYS | SOURCE_TIMED,
+    .flags =
+        SOURCE_ROWS | SOURCE_STREAM | SOURCE_LARGE | SOURCE_NOISE | SOURCE_RAYS | SOURCE_TIMED | SOURCE_ASKED,
     .describe = describe,
     .option = option,
     .repair = rays_repair,

@@ -39,6 +39,7 @@ static const option_row rows[] = {
      .kind = OPTION_TEXT,
      .offset = offsetof(hierarchical_options, receivers),
      .argument = "GROUP,...",
+     .not_with = "importance",
      .help = "The groups whose light is going to be read: errors are kept small there, and stated for it; "
              "light elsewhere is only roughly right; --method auto then takes hierarchical"},
     {.name = "importance",

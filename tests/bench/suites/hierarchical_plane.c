@@ -208,7 +208,7 @@ static recipe recipe_of(const bench_run *run, const lowrank_scene *s, int way, c
     if (way == WAY_RAYS) return r;
     r.accuracy = pair_accuracy;
     r.source = way == WAY_NEAR_PAIRS ? &source_near_pairs : &source_pairs;
-    if (way == WAY_PAIRS) r.rays = RECIPE_RAYS_FEW;
+    if (way == WAY_PAIRS) r.rays = RAYS_BESIDE_PAIRS;
     if (way == WAY_BLOCKS) {
         r.source = &source_blocks;
         r.rays = recipe_rays_beside_blocks(s->m.n);

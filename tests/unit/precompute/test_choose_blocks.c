@@ -2,7 +2,7 @@
 #include "solver/base/terminal.h"
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/source.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/plan.h"
 #include "support/building.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -25,30 +25,26 @@ static outcome choose(const char *scene, size_t n, recipe other, int n_threads) 
                                   .closed = true,
                                   .variant = 1,
                                   .terrain = "flat"};
-    const precompute_options options = {.form_factors = FACTORS_AUTO,
-                                        .quality = QUALITY_NORMAL,
-                                        .rays = OPTION_AUTO,
-                                        .build = build_presets("auto")};
-    precompute_state state = {.options = &options,
-                              .t = &t,
-                              .expected = method_find("hierarchical"),
-                              .recipe = other,
-                              .memory = 8e9};
+    const precompute_options options = {
+        .form_factors = 0, .quality = QUALITY_NORMAL, .rays = OPTION_AUTO, .build = build_presets("auto")};
+    precompute_job job = {.options = &options, .t = &t, .memory = 8e9};
+    precompute_scene of = {.order = NULL};
+    precompute_plan plan = {.method = method_find("hierarchical"), .recipe = other};
     terminal_open(&t, "test", true, false);
-    state.progress = terminal_progress(&t);
-    state.m = generate_good(&how);
+    job.progress = terminal_progress(&t);
+    of.m = generate_good(&how);
     const int before = omp_get_max_threads();
     omp_set_num_threads(n_threads);
-    ck_ok(state_choose_blocks(&state, method_find("hierarchical"), true, &error));
+    ck_ok(plan_weigh_blocks(&job, &of, method_find("hierarchical"), true, &plan, &error));
     omp_set_num_threads(before);
-    const outcome found = {state.recipe.source, state.cost.seconds};
-    block_scene_destroy(state.ready);
-    mesh_free(&state.m);
-    plane_tree_free(&state.tree);
+    const outcome found = {plan.recipe.source, plan.cost.seconds};
+    block_scene_destroy(of.ready);
+    mesh_free(&of.m);
+    plane_tree_free(&of.tree);
     return found;
 }
 
-static const recipe all_pairs = {.source = &source_pairs, .rays = RECIPE_RAYS_FEW, .accuracy = 7e-5},
+static const recipe all_pairs = {.source = &source_pairs, .rays = RAYS_BESIDE_PAIRS, .accuracy = 7e-5},
                     few_rays = {.source = &source_rays, .rays = 256};
 
 START_TEST(a_room_of_large_planes_gets_blocks) {

@@ -153,7 +153,7 @@ END_TEST
 
 /* Both samples share the pairs that are projected. */
 START_TEST(noise_by_pairs_is_the_spread_of_seeds) {
-    const recipe r = {.source = &source_pairs, .rays = RECIPE_RAYS_FEW, .accuracy = 2e-3, .seed = 1};
+    const recipe r = {.source = &source_pairs, .rays = RAYS_BESIDE_PAIRS, .accuracy = 2e-3, .seed = 1};
     recipe of_truth = r;
     of_truth.accuracy = 2e-5;
     check_scene("cornell", &r, &of_truth);

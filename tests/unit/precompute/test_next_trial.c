@@ -2,7 +2,7 @@
  * Operators and form factors are real, errors are made up. */
 #include "solver/base/terminal.h"
 #include "solver/formfactor/source.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/stages.h"
 #include "support/scene.h"
 #include "support/suite.h"
 
@@ -11,54 +11,70 @@
 
 static const double asked = .01;
 
-static void begin(precompute_options *options, terminal *t, precompute_state *state) {
+static void begin(precompute_options *options, terminal *t, precompute_parts *parts) {
     const generate_options how = {.kind = "box", .size = {1, 1, 1}, .divisions = 2, .reflectance = .5};
     lam_error error = {.message = ""};
-    *options = (precompute_options){.form_factors = FACTORS_RAYS,
+    *options = (precompute_options){.form_factors = source_place(&source_rays),
                                     .quality = QUALITY_DRAFT,
                                     .rays = OPTION_AUTO,
                                     .probes = 1,
                                     .trials = TRIALS_MOST,
                                     .build = build_presets("hierarchical")};
     terminal_open(t, "test", true, false);
-    *state = state_begin(options, t);
-    state->memory = 1e12;
-    state->probes = 1;
-    state->expected = method_find("hierarchical");
-    state->recipe = (recipe){.source = &source_rays, .rays = 256, .seed = 1};
-    state->trial.asked = asked;
-    state->m = generate_good(&how);
-    state->order = memory_allocate(state->m.n, sizeof *state->order, "order", &error);
-    ck_assert_ptr_nonnull(state->order);
-    ck_ok(mesh_z_order(&state->m, state->order, &error));
+    *parts = parts_begin(options, t);
+    parts->job.memory = 1e12;
+    parts->plan.probes = 1;
+    parts->plan.method = method_find("hierarchical");
+    parts->plan.recipe = (recipe){.source = &source_rays, .rays = 256, .seed = 1};
+    parts->job.kept_epsilon = asked;
+    parts->scene.m = generate_good(&how);
+    parts->scene.order = memory_allocate(parts->scene.m.n, sizeof *parts->scene.order, "order", &error);
+    ck_assert_ptr_nonnull(parts->scene.order);
+    ck_ok(mesh_z_order(&parts->scene.m, parts->scene.order, &error));
+}
+
+static bool next_trial(precompute_parts *p) {
+    return stage_next_trial(&p->job, &p->scene, &p->plan, &p->factors, &p->made, &p->course);
+}
+
+static bool may_be_repeated(const precompute_parts *p) {
+    const finished_trial now = parts_view(p);
+    return trial_may_be_repeated(&now);
+}
+
+static void report(precompute_parts *p) {
+    const finished_trial now = parts_view(p);
+    trial_report(&now, &p->made.built);
 }
 
 /* Form factors, unless they are there, and operator, whose stated errors are these. */
-static void make(precompute_state *state, double total, double compression) {
+static void make(precompute_parts *parts, double total, double compression) {
     lam_error error = {.message = ""};
-    if (state->f.row_sums == NULL) ck_ok(stage_form_factors(state, &error));
-    ck_assert_ptr_null(state->op);
-    ck_ok(stage_operator(state, &error));
-    state->built.by_noise = false;
-    state->errors = (error_report){.random = {.probes = 8,
-                                              .total_indirect = {total, 0, total},
-                                              .operator_indirect = {compression, 0, compression}},
-                                   .has_total = true};
+    if (parts->factors.f.row_sums == NULL)
+        ck_ok(stage_factors(&parts->job, &parts->scene, &parts->plan, &parts->factors, &error));
+    ck_assert_ptr_null(parts->made.op);
+    ck_ok(stage_operator(&parts->job, &parts->scene, &parts->plan, &parts->factors, &parts->made,
+                         &parts->course, &error));
+    parts->made.built.by_noise = false;
+    parts->made.errors = (error_report){.random = {.probes = 8,
+                                                   .total_indirect = {total, 0, total},
+                                                   .operator_indirect = {compression, 0, compression}},
+                                        .has_total = true};
 }
 
 START_TEST(an_error_that_is_kept_ends_it) {
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
-    make(&state, .01, .001);
-    ck_assert(!state_next_trial(&state));
-    ck_assert_uint_eq(state.trial.count, 1);
-    state_report_trials(&state);
-    ck_assert_double_eq(report_get(&state.built, "epsilon", 0), .01);
-    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", 0), .01);
-    ck_assert_double_eq(report_get(&state.built, "trials", 0), 1);
-    state_free(&state);
+    precompute_parts parts;
+    begin(&options, &t, &parts);
+    make(&parts, .01, .001);
+    ck_assert(!next_trial(&parts));
+    ck_assert_uint_eq(parts.course.count, 1);
+    report(&parts);
+    ck_assert_double_eq(report_get(&parts.made.built, "epsilon", 0), .01);
+    ck_assert_double_eq(report_get(&parts.made.built, "epsilon_stated", 0), .01);
+    ck_assert_double_eq(report_get(&parts.made.built, "trials", 0), 1);
+    parts_free(&parts);
 }
 END_TEST
 
@@ -67,33 +83,33 @@ END_TEST
 START_TEST(the_best_comes_back) {
     precompute_options options;
     terminal t;
-    precompute_state state;
+    precompute_parts parts;
     const bool keeps = _i == 1;
-    begin(&options, &t, &state);
+    begin(&options, &t, &parts);
     if (keeps) options.keep_form_factors = "";
-    make(&state, .02, .001);
-    const lam_operator *best = state.op;
-    const double *sums = state.f.row_sums, epsilon = state.trial.epsilon;
-    ck_assert(state_next_trial(&state));
-    ck_assert_uint_gt(state.recipe.rays, 256);
-    ck_assert_ptr_null(state.f.row_sums);
-    make(&state, .05, .04); /* the threshold is turned next, of the same form factors */
-    ck_assert(state_next_trial(&state));
-    ck_assert_double_lt(state.trial.epsilon, epsilon);
-    ck_assert_ptr_nonnull(state.f.row_sums);
-    ck_assert_uint_gt(state.f.recipe.rays, 256);
-    make(&state, .03, .029);
-    ck_assert(!state_next_trial(&state)); /* three trials at most */
-    ck_assert_ptr_eq(state.op, best);
-    ck_assert_ptr_eq(state.f.row_sums, sums);
-    ck_assert_uint_eq(state.f.recipe.rays, 256);
-    ck_assert_double_eq(state.errors.random.total_indirect.mean, .02);
-    ck_assert_double_eq(state.trial.epsilon, epsilon);
-    ck_assert_int_eq(state.f.F.indptr != NULL, keeps);
-    state_report_trials(&state);
-    ck_assert_double_eq(report_get(&state.built, "trials", 0), 3);
-    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", 0), .02);
-    state_free(&state);
+    make(&parts, .02, .001);
+    const lam_operator *best = parts.made.op;
+    const double *sums = parts.factors.f.row_sums, epsilon = parts.course.epsilon;
+    ck_assert(next_trial(&parts));
+    ck_assert_uint_gt(parts.plan.recipe.rays, 256);
+    ck_assert_ptr_null(parts.factors.f.row_sums);
+    make(&parts, .05, .04); /* the threshold is turned next, of the same form factors */
+    ck_assert(next_trial(&parts));
+    ck_assert_double_lt(parts.course.epsilon, epsilon);
+    ck_assert_ptr_nonnull(parts.factors.f.row_sums);
+    ck_assert_uint_gt(parts.factors.f.recipe.rays, 256);
+    make(&parts, .03, .029);
+    ck_assert(!next_trial(&parts)); /* three trials at most */
+    ck_assert_ptr_eq(parts.made.op, best);
+    ck_assert_ptr_eq(parts.factors.f.row_sums, sums);
+    ck_assert_uint_eq(parts.factors.f.recipe.rays, 256);
+    ck_assert_double_eq(parts.made.errors.random.total_indirect.mean, .02);
+    ck_assert_double_eq(parts.course.epsilon, epsilon);
+    ck_assert_int_eq(parts.factors.f.F.indptr != NULL, keeps);
+    report(&parts);
+    ck_assert_double_eq(report_get(&parts.made.built, "trials", 0), 3);
+    ck_assert_double_eq(report_get(&parts.made.built, "epsilon_stated", 0), .02);
+    parts_free(&parts);
 }
 END_TEST
 
@@ -101,21 +117,21 @@ END_TEST
 START_TEST(form_factors_are_used_again) {
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
-    make(&state, .02, .0199);
-    const double *sums = state.f.row_sums;
-    ck_assert(state_next_trial(&state));
-    ck_assert_ptr_eq(state.f.row_sums, sums);
-    make(&state, .015, .0149);
-    const lam_operator *last = state.op;
+    precompute_parts parts;
+    begin(&options, &t, &parts);
+    make(&parts, .02, .0199);
+    const double *sums = parts.factors.f.row_sums;
+    ck_assert(next_trial(&parts));
+    ck_assert_ptr_eq(parts.factors.f.row_sums, sums);
+    make(&parts, .015, .0149);
+    const lam_operator *last = parts.made.op;
     options.from_store = true;
-    state.errors.random.operator_indirect.mean =
+    parts.made.errors.random.operator_indirect.mean =
         0; /* now all is left to form factors, which are those of a store */
-    ck_assert(!state_next_trial(&state));
-    ck_assert_ptr_eq(state.op, last);
-    ck_assert_double_eq(state.errors.random.total_indirect.mean, .015);
-    state_free(&state);
+    ck_assert(!next_trial(&parts));
+    ck_assert_ptr_eq(parts.made.op, last);
+    ck_assert_double_eq(parts.made.errors.random.total_indirect.mean, .015);
+    parts_free(&parts);
 }
 END_TEST
 
@@ -123,16 +139,16 @@ END_TEST
 START_TEST(a_knob_without_effect_is_left) {
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
-    make(&state, .02, .001);
-    ck_assert(state_next_trial(&state));
-    make(&state, .0195, .001);
-    const size_t rays = state.recipe.rays;
-    ck_assert(!state_next_trial(&state));
-    ck_assert(state.trial.spent);
-    ck_assert_uint_eq(state.recipe.rays, rays);
-    state_free(&state);
+    precompute_parts parts;
+    begin(&options, &t, &parts);
+    make(&parts, .02, .001);
+    ck_assert(next_trial(&parts));
+    make(&parts, .0195, .001);
+    const size_t rays = parts.plan.recipe.rays;
+    ck_assert(!next_trial(&parts));
+    ck_assert(parts.course.spent);
+    ck_assert_uint_eq(parts.plan.recipe.rays, rays);
+    parts_free(&parts);
 }
 END_TEST
 
@@ -140,14 +156,14 @@ END_TEST
 START_TEST(memory_is_a_limit) {
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
-    make(&state, .02, .001);
-    state.memory = 1;
-    ck_assert(!state_next_trial(&state));
-    ck_assert_uint_eq(state.recipe.rays, 256);
-    ck_assert_double_gt(state.trial.lacking, 1);
-    state_free(&state);
+    precompute_parts parts;
+    begin(&options, &t, &parts);
+    make(&parts, .02, .001);
+    parts.job.memory = 1;
+    ck_assert(!next_trial(&parts));
+    ck_assert_uint_eq(parts.plan.recipe.rays, 256);
+    ck_assert_double_gt(parts.course.lacking, 1);
+    parts_free(&parts);
 }
 END_TEST
 
@@ -156,26 +172,26 @@ END_TEST
 START_TEST(the_preset_is_kept_by_the_threshold) {
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
-    state.trial.asked = 0;
-    state.recipe = (recipe){.source = &source_pairs, .rays = 256, .accuracy = 1e-4, .seed = 1};
-    const recipe pairs = state.recipe;
-    make(&state, .04, .039);
-    const double epsilon = state.trial.epsilon, *sums = state.f.row_sums;
-    ck_assert(state_may_try_again(&state));
-    ck_assert(state_next_trial(&state));
-    ck_assert_double_eq_tol(state.trial.epsilon,
+    precompute_parts parts;
+    begin(&options, &t, &parts);
+    parts.job.kept_epsilon = 0;
+    parts.plan.recipe = (recipe){.source = &source_pairs, .rays = 256, .accuracy = 1e-4, .seed = 1};
+    const recipe pairs = parts.plan.recipe;
+    make(&parts, .04, .039);
+    const double epsilon = parts.course.epsilon, *sums = parts.factors.f.row_sums;
+    ck_assert(may_be_repeated(&parts));
+    ck_assert(next_trial(&parts));
+    ck_assert_double_eq_tol(parts.course.epsilon,
                             epsilon * pow(sqrt(.027 * .027 - (.04 * .04 - .039 * .039)) / .039, 1 / .6),
                             1e-9);
-    ck_assert(!recipes_differ(&state.recipe, &pairs));
-    ck_assert_ptr_eq(state.f.row_sums, sums);
-    make(&state, .02, .01);
-    ck_assert(!state_next_trial(&state));
-    state_report_trials(&state);
-    ck_assert_double_eq(report_get(&state.built, "trials", 0), 2);
-    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", -1), -1);
-    state_free(&state);
+    ck_assert(!recipes_differ(&parts.plan.recipe, &pairs));
+    ck_assert_ptr_eq(parts.factors.f.row_sums, sums);
+    make(&parts, .02, .01);
+    ck_assert(!next_trial(&parts));
+    report(&parts);
+    ck_assert_double_eq(report_get(&parts.made.built, "trials", 0), 2);
+    ck_assert_double_eq(report_get(&parts.made.built, "epsilon_stated", -1), -1);
+    parts_free(&parts);
 }
 END_TEST
 
@@ -185,23 +201,24 @@ START_TEST(the_preset_has_no_other_trials) {
     static const double errors[][2] = {{.03, .029}, {.04, .001}, {.04, .039}};
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
-    state.trial.asked = 0;
-    if (_i < 2) state.recipe = (recipe){.source = &source_pairs, .rays = 256, .accuracy = 1e-4, .seed = 1};
-    make(&state, errors[_i][0], errors[_i][1]);
-    ck_assert_int_eq(state_may_try_again(&state), _i < 2);
-    ck_assert(!state_next_trial(&state));
-    ck_assert_uint_eq(state.trial.count, 0);
-    state_report_trials(&state);
-    ck_assert_double_eq(report_get(&state.built, "trials", 0), 0);
-    state_free(&state);
+    precompute_parts parts;
+    begin(&options, &t, &parts);
+    parts.job.kept_epsilon = 0;
+    if (_i < 2)
+        parts.plan.recipe = (recipe){.source = &source_pairs, .rays = 256, .accuracy = 1e-4, .seed = 1};
+    make(&parts, errors[_i][0], errors[_i][1]);
+    ck_assert_int_eq(may_be_repeated(&parts), _i < 2);
+    ck_assert(!next_trial(&parts));
+    ck_assert_uint_eq(parts.course.count, 0);
+    report(&parts);
+    ck_assert_double_eq(report_get(&parts.made.built, "trials", 0), 0);
+    parts_free(&parts);
 }
 END_TEST
 
 /* Errors of the only group, by light from far away. */
-static void set_group_error(precompute_state *state, double total, double of_operator) {
-    group_errors *e = &state->by_group;
+static void set_group_error(precompute_parts *parts, double total, double of_operator) {
+    group_errors *e = &parts->made.by_group;
     group_errors_free(e);
     *e = (group_errors){.n_groups = 1, .n_rows = 1};
     for (int f = 0; f < GROUP_FIGURES; f++) {
@@ -219,34 +236,34 @@ static void set_group_error(precompute_state *state, double total, double of_ope
 START_TEST(the_worst_group_is_kept) {
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
-    state.trial.group = .1;
-    make(&state, .015, .001);
-    set_group_error(&state, .4, .4);
-    const double first = state.trial.epsilon;
-    const size_t rays = state.recipe.rays;
-    ck_assert(state_next_trial(&state));
-    ck_assert_uint_eq(state.recipe.rays, rays);
-    const double second = state.trial.epsilon;
+    precompute_parts parts;
+    begin(&options, &t, &parts);
+    options.group_error = .1;
+    make(&parts, .015, .001);
+    set_group_error(&parts, .4, .4);
+    const double first = parts.course.epsilon;
+    const size_t rays = parts.plan.recipe.rays;
+    ck_assert(next_trial(&parts));
+    ck_assert_uint_eq(parts.plan.recipe.rays, rays);
+    const double second = parts.course.epsilon;
     ck_assert_double_eq_tol(second, first * pow(.09 / .4, 1 / .6), 1e-12);
-    make(&state, .009, .001);
-    set_group_error(&state, .3, .3);
-    ck_assert(state_next_trial(&state));
+    make(&parts, .009, .001);
+    set_group_error(&parts, .3, .3);
+    ck_assert(next_trial(&parts));
     const double power = log(.3 / .4) / log(second / first);
     const double factor = fmax(pow(.09 / .3, 1 / power), 1. / 64);
-    ck_assert_double_eq_tol(state.trial.epsilon, second * factor, 1e-9 * second);
-    make(&state, .02, .001); /* --epsilon by 2, as much as the best of before lacked */
-    set_group_error(&state, .05, .05);
-    const lam_operator *last = state.op;
-    ck_assert(!state_next_trial(&state));
-    ck_assert_ptr_eq(state.op, last);
-    state_report_trials(&state);
-    ck_assert_double_eq(report_get(&state.built, "group_error", 0), .1);
-    ck_assert_double_eq(report_get(&state.built, "group_error_stated", 0), .05);
-    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", 0), .02);
-    ck_assert_double_eq(report_get(&state.built, "trials", 0), 3);
-    state_free(&state);
+    ck_assert_double_eq_tol(parts.course.epsilon, second * factor, 1e-9 * second);
+    make(&parts, .02, .001); /* --epsilon by 2, as much as the best of before lacked */
+    set_group_error(&parts, .05, .05);
+    const lam_operator *last = parts.made.op;
+    ck_assert(!next_trial(&parts));
+    ck_assert_ptr_eq(parts.made.op, last);
+    report(&parts);
+    ck_assert_double_eq(report_get(&parts.made.built, "group_error", 0), .1);
+    ck_assert_double_eq(report_get(&parts.made.built, "group_error_stated", 0), .05);
+    ck_assert_double_eq(report_get(&parts.made.built, "epsilon_stated", 0), .02);
+    ck_assert_double_eq(report_get(&parts.made.built, "trials", 0), 3);
+    parts_free(&parts);
 }
 END_TEST
 
@@ -254,38 +271,38 @@ END_TEST
 START_TEST(other_kinds_keep_groups_by_form_factors) {
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
+    precompute_parts parts;
+    begin(&options, &t, &parts);
     options.build = build_presets("exact");
-    state.trial.asked = 0;
-    state.trial.group = .1;
-    make(&state, .02, .001);
-    set_group_error(&state, .2, .01);
-    ck_assert(state_next_trial(&state));
-    ck_assert_uint_gt(state.recipe.rays, 256);
-    make(&state, .02, .001);
-    set_group_error(&state, .2, .2);
-    state.trial.spent = false;
-    const double epsilon = state.trial.epsilon;
-    ck_assert(!state_next_trial(&state));
-    ck_assert_double_eq(state.trial.epsilon, epsilon);
-    state_report_trials(&state);
-    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", -1), -1);
-    state_free(&state);
+    parts.job.kept_epsilon = 0;
+    options.group_error = .1;
+    make(&parts, .02, .001);
+    set_group_error(&parts, .2, .01);
+    ck_assert(next_trial(&parts));
+    ck_assert_uint_gt(parts.plan.recipe.rays, 256);
+    make(&parts, .02, .001);
+    set_group_error(&parts, .2, .2);
+    parts.course.spent = false;
+    const double epsilon = parts.course.epsilon;
+    ck_assert(!next_trial(&parts));
+    ck_assert_double_eq(parts.course.epsilon, epsilon);
+    report(&parts);
+    ck_assert_double_eq(report_get(&parts.made.built, "epsilon_stated", -1), -1);
+    parts_free(&parts);
 }
 END_TEST
 
 START_TEST(a_group_that_is_not_measured_ends_it) {
     precompute_options options;
     terminal t;
-    precompute_state state;
-    begin(&options, &t, &state);
-    state.trial.asked = 0;
-    state.trial.group = .1;
-    make(&state, .02, .001);
-    ck_assert(!state_next_trial(&state));
-    ck_assert_uint_eq(state.trial.count, 1);
-    state_free(&state);
+    precompute_parts parts;
+    begin(&options, &t, &parts);
+    parts.job.kept_epsilon = 0;
+    options.group_error = .1;
+    make(&parts, .02, .001);
+    ck_assert(!next_trial(&parts));
+    ck_assert_uint_eq(parts.course.count, 1);
+    parts_free(&parts);
 }
 END_TEST
 
@@ -293,15 +310,15 @@ START_TEST(nothing_is_tried_where_nothing_was_asked_or_measured) {
     for (int k = 0; k < 3; k++) {
         precompute_options options;
         terminal t;
-        precompute_state state;
-        begin(&options, &t, &state);
-        make(&state, .02, .001);
-        if (k == 0) state.trial.asked = 0;
-        if (k == 1) state.probes = 0;
-        if (k == 2) state.built.method = "exact";
-        ck_assert(!state_next_trial(&state));
-        ck_assert_uint_eq(state.trial.count, 0);
-        state_free(&state);
+        precompute_parts parts;
+        begin(&options, &t, &parts);
+        make(&parts, .02, .001);
+        if (k == 0) parts.job.kept_epsilon = 0;
+        if (k == 1) parts.plan.probes = 0;
+        if (k == 2) parts.made.built.method = "exact";
+        ck_assert(!next_trial(&parts));
+        ck_assert_uint_eq(parts.course.count, 0);
+        parts_free(&parts);
     }
 }
 END_TEST

@@ -1,7 +1,8 @@
 /* All pairs, near pairs or rays: the choice by the cost of a sample. */
 #include "solver/base/terminal.h"
 #include "solver/formfactor/source.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/plan.h"
+#include "solver/precompute/stages.h"
 #include "support/building.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -20,24 +21,26 @@ static outcome weigh_kept(const char *scene, size_t n, factor_quality quality, i
     lam_error error = {0};
     terminal t;
     const generate_options how = {.kind = scene, .elements = n, .seed = 1, .reflectance = -1};
-    const precompute_options options = {.form_factors = FACTORS_AUTO,
+    const precompute_options options = {.form_factors = 0,
                                         .quality = quality,
                                         .rays = OPTION_AUTO,
                                         .build = build_presets("auto"),
                                         .keep_form_factors = keep};
-    precompute_state state = {
-        .options = &options, .t = &t, .expected = method_find("hierarchical"), .memory = memory};
-    state.recipe =
-        (recipe){.source = source, .rays = source == &source_pairs ? RECIPE_RAYS_FEW : 512, .accuracy = 7e-5};
+    precompute_job job = {.options = &options, .t = &t, .memory = memory};
+    precompute_scene of = {.order = NULL};
+    precompute_plan plan = {.method = method_find("hierarchical")};
+    plan.recipe = (recipe){
+        .source = source, .rays = source == &source_pairs ? RAYS_BESIDE_PAIRS : 512, .accuracy = 7e-5};
     terminal_open(&t, "test", true, false);
-    state.progress = terminal_progress(&t);
-    state.m = generate_good(&how);
+    job.progress = terminal_progress(&t);
+    of.m = generate_good(&how);
     const int before = omp_get_max_threads();
     omp_set_num_threads(n_threads);
-    ck_ok(state_weigh_pairs(&state, &error));
+    ck_ok(plan_weigh_pairs(&job, &of, &plan, &error));
     omp_set_num_threads(before);
-    const outcome found = {state.dear, state.plain, state.least_rays, state.cost.seconds, state.cost.entries};
-    mesh_free(&state.m);
+    const outcome found = {plan.weighed.dear, plan.weighed.plain, plan.weighed.least_rays, plan.cost.seconds,
+                           plan.cost.entries};
+    mesh_free(&of.m);
     return found;
 }
 
@@ -147,28 +150,31 @@ START_TEST(entries_of_rays_are_counted) {
                                   .seed = 1,
                                   .reflectance = -1};
     const recipe rays = {.source = &source_rays, .rays = 1024, .seed = 3};
-    const precompute_options options = {.form_factors = FACTORS_AUTO}, of_store = {.from_store = true};
-    precompute_state state = {.options = &options, .m = generate_good(&how), .recipe = rays};
+    const precompute_options options = {.form_factors = 0}, of_store = {.from_store = true};
+    precompute_job job = {.options = &options};
+    precompute_scene scene = {.m = generate_good(&how)};
+    precompute_plan plan = {.recipe = rays};
+    precompute_factors factors = {.scratch = NULL};
     const form_factor_options make = {.recipe = rays};
-    uint32_t *order = calloc(state.m.n, sizeof *order);
+    uint32_t *order = calloc(scene.m.n, sizeof *order);
     ck_assert_ptr_nonnull(order);
-    for (size_t i = 0; i < state.m.n; i++) order[i] = (uint32_t)i;
-    ck_ok(form_factors_make(&state.m, order, &make, &state.f, &error));
-    const double truth = (double)state.f.F.indptr[state.m.n];
-    ck_ok(state_count_entries(&state, &error));
-    ck_assert_double_eq_tol(state.cost.entries, truth, .6 * truth);
+    for (size_t i = 0; i < scene.m.n; i++) order[i] = (uint32_t)i;
+    ck_ok(form_factors_make(&scene.m, order, &make, &factors.f, &error));
+    const double truth = (double)factors.f.F.indptr[scene.m.n];
+    ck_ok(plan_count_entries(&job, &scene, &plan, &factors, &error));
+    ck_assert_double_eq_tol(plan.cost.entries, truth, .6 * truth);
     /* A law of .3 entries a ray that hits would be far off in the city. */
-    if (_i == 0) ck_assert_double_lt(truth, .1 * .3 * (double)(rays.rays * state.m.n));
-    state.options = &of_store;
-    ck_ok(state_count_entries(&state, &error));
-    ck_assert_double_eq(state.cost.entries, truth);
-    state.recipe.source = &source_pairs;
-    state.cost.entries = 7;
-    ck_ok(state_count_entries(&state, &error));
-    ck_assert_double_eq(state.cost.entries, 7);
-    form_factors_free(&state.f);
+    if (_i == 0) ck_assert_double_lt(truth, .1 * .3 * (double)(rays.rays * scene.m.n));
+    job.options = &of_store;
+    ck_ok(plan_count_entries(&job, &scene, &plan, &factors, &error));
+    ck_assert_double_eq(plan.cost.entries, truth);
+    plan.recipe.source = &source_pairs;
+    plan.cost.entries = 7;
+    ck_ok(plan_count_entries(&job, &scene, &plan, &factors, &error));
+    ck_assert_double_eq(plan.cost.entries, 7);
+    form_factors_free(&factors.f);
     free(order);
-    mesh_free(&state.m);
+    mesh_free(&scene.m);
 }
 END_TEST
 

@@ -2,7 +2,8 @@
  * there on the run is that of these options, and no clock has a part in it. */
 #include "solver/base/clock.h"
 #include "solver/precompute/budget.h"
-#include "solver/precompute/precompute_state.h"
+#include "solver/precompute/plan.h"
+#include "solver/precompute/stages.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -48,16 +49,19 @@ typedef struct quality_costs {
 
 /* The part that all candidates share. */
 typedef struct budget_run {
-    precompute_state *state;
+    const precompute_job *job;
+    precompute_scene *scene;
+    const precompute_plan *plan; /* so far: where rows lie */
+    const forecast_rates *rates;
     const build_method *method;
     block_costs blocks;
     quality_costs pairs;
-    factor_cost rays; /* of RAYS_SAMPLED from each element */
+    factor_cost rays_cost; /* of RAYS_SAMPLED from each element */
 } budget_run;
 enum { RAYS_SAMPLED = 1024 };
 
 static double accuracy_of(const budget_run *run, double epsilon) {
-    build_options build = run->state->options->build;
+    build_options build = run->job->options->build;
     lam_error none;
     (void)build_set_number(&build, "epsilon", epsilon, &none);
     return run->method->block_accuracy(method_own_const(&build, run->method));
@@ -87,17 +91,16 @@ static double finer_of(const factor_cost *c) {
 
 static lam_status sample_blocks(budget_run *run, double seconds, lam_error *error) {
     lam_status status = LAM_OK;
-    precompute_state *state = run->state;
     block_costs *c = &run->blocks;
     for (size_t k = 0; k < SAMPLES_MOST; k++) {
         const recipe r = {.source = &source_blocks,
-                          .rays = recipe_rays_beside_blocks(state->m.n),
+                          .rays = recipe_rays_beside_blocks(run->scene->m.n),
                           .accuracy = accuracy_of(run, sampled_epsilons[k]),
-                          .seed = state->options->seed};
-        TRY(state_sample(state, &r, &c->cost[k], error));
+                          .seed = run->job->options->seed};
+        TRY(plan_sample(run->job, run->scene, &r, &c->cost[k], error));
         c->accuracy[k] = r.accuracy;
         c->count = k + 1;
-        if (forecast_wall_seconds(c->cost[k].measured, &state->rates) > finer_share * seconds) break;
+        if (forecast_wall_seconds(c->cost[k].measured, run->rates) > finer_share * seconds) break;
     }
 done:
     return status;
@@ -106,7 +109,7 @@ done:
 /* The options of a candidate. */
 static lam_status set_options(const budget_recipe *r, const build_method *method, precompute_options *o,
                               lam_error *error) {
-    o->form_factors = r->kind == BUDGET_BLOCKS ? FACTORS_BLOCKS : FACTORS_RAYS;
+    o->form_factors = source_place(r->kind == BUDGET_BLOCKS ? &source_blocks : &source_rays);
     if (r->rays > 0) o->rays = r->rays;
     if (r->kind == BUDGET_PAIRS) o->quality = r->quality;
     o->build.method = method->name;
@@ -115,38 +118,48 @@ static lam_status set_options(const budget_recipe *r, const build_method *method
     return build_set(&o->build, "epsilon", r->epsilon, error);
 }
 
+/* The plan of a candidate beside its options. */
+static precompute_plan plan_of(const budget_run *run, const budget_recipe *r, const precompute_job *job) {
+    const double n = (double)run->scene->m.n;
+    precompute_plan plan = *run->plan;
+    factor_cost *const cost = &plan.cost;
+    plan.method = run->method;
+    plan.recipe = (recipe){.source = &source_rays, .rays = r->rays, .seed = job->options->seed};
+    if (r->kind == BUDGET_BLOCKS) {
+        const double accuracy =
+            run->method->block_accuracy(method_own_const(&job->options->build, run->method));
+        plan.recipe.source = &source_blocks;
+        plan.recipe.rays = recipe_rays_beside_blocks(run->scene->m.n);
+        plan.recipe.accuracy = accuracy;
+        *cost = (factor_cost){.measured = along(&run->blocks, accuracy, measured_of),
+                              .finer = along(&run->blocks, accuracy, finer_of),
+                              .entries = along(&run->blocks, accuracy, entries_of)};
+    } else if (r->kind == BUDGET_PAIRS) {
+        plan.recipe = plan_pairs_recipe(job, &plan);
+        size_t k = 0;
+        while (k + 1 < run->pairs.count && run->pairs.quality[k] != r->quality) k++;
+        *cost = run->pairs.cost[k];
+        cost->measured = pairs_cost_at(cost, run->pairs.accuracy[k], plan.recipe.accuracy);
+    } else {
+        *cost = run->rays_cost;
+        cost->entries = fmin(run->rays_cost.entries * (double)r->rays / RAYS_SAMPLED, n * n);
+    }
+    cost->seconds = cost->measured;
+    return plan;
+}
+
 /* Seconds of a candidate on the wall, or less than 0. */
 static lam_status find_seconds(const budget_run *run, budget_recipe *r, lam_error *error) {
     lam_status status = LAM_OK;
-    precompute_options options = *run->state->options;
-    precompute_state probe = *run->state; /* a view, never freed */
-    const double n = (double)probe.m.n;
+    precompute_options options = *run->job->options;
+    precompute_job job = *run->job;
     TRY(set_options(r, run->method, &options, error));
-    probe.options = &options;
-    probe.expected = run->method;
-    probe.recipe = (recipe){.source = &source_rays, .rays = r->rays, .seed = options.seed};
-    if (r->kind == BUDGET_BLOCKS) {
-        probe.recipe.source = &source_blocks;
-        probe.recipe.rays = recipe_rays_beside_blocks(probe.m.n);
-        probe.recipe.accuracy = run->method->block_accuracy(method_own_const(&options.build, run->method));
-        probe.cost = (factor_cost){.measured = along(&run->blocks, probe.recipe.accuracy, measured_of),
-                                   .finer = along(&run->blocks, probe.recipe.accuracy, finer_of),
-                                   .entries = along(&run->blocks, probe.recipe.accuracy, entries_of)};
-    } else if (r->kind == BUDGET_PAIRS) {
-        probe.recipe = state_pairs_recipe(&probe);
-        size_t k = 0;
-        while (k + 1 < run->pairs.count && run->pairs.quality[k] != r->quality) k++;
-        probe.cost = run->pairs.cost[k];
-        probe.cost.measured = pairs_cost_at(&probe.cost, run->pairs.accuracy[k], probe.recipe.accuracy);
-    } else {
-        probe.cost = run->rays;
-        probe.cost.entries = fmin(run->rays.entries * (double)r->rays / RAYS_SAMPLED, n * n);
-    }
-    probe.cost.seconds = probe.cost.measured;
-    const forecast f = state_forecast(&probe, n);
-    if (forecast_bytes(&f) > probe.memory) goto done;
-    const forecast_times t = forecast_seconds(&f, &probe.rates);
-    r->seconds = forecast_wall_seconds(t.form_factors + t.operate + t.judge + t.solves, &probe.rates);
+    job.options = &options;
+    const precompute_plan plan = plan_of(run, r, &job);
+    const forecast f = plan_forecast(&job, run->scene, &plan, (double)run->scene->m.n);
+    if (forecast_bytes(&f) > job.memory) goto done;
+    const forecast_times t = forecast_seconds(&f, run->rates);
+    r->seconds = forecast_wall_seconds(t.form_factors + t.operate + t.judge + t.solves, run->rates);
 done:
     return status;
 }
@@ -155,24 +168,21 @@ done:
 static lam_status weigh_pairs(budget_run *run, factor_quality quality, bool *taken, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t k = run->pairs.count;
-    precompute_options options = *run->state->options;
-    precompute_state probe = *run->state;
-    terminal silent = *probe.t;
-    silent.quiet = true;
-    silent.live = false;
-    options.form_factors = FACTORS_RAYS;
+    precompute_options options = *run->job->options;
+    precompute_job job = *run->job;
+    precompute_plan plan = *run->plan;
+    options.form_factors = source_place(&source_rays);
     options.quality = quality;
     options.build.method = run->method->name;
     TRY(build_set(&options.build, "epsilon", epsilon_of_pairs, error));
-    probe.options = &options;
-    probe.expected = run->method;
-    probe.t = &silent;
-    probe.recipe = state_pairs_recipe(&probe);
-    TRY(state_weigh_pairs(&probe, error));
-    *taken = !probe.dear;
+    job.options = &options;
+    plan.method = run->method;
+    plan.recipe = plan_pairs_recipe(&job, &plan);
+    TRY(plan_weigh_pairs(&job, run->scene, &plan, error));
+    *taken = !plan.weighed.dear;
     run->pairs.quality[k] = quality;
-    run->pairs.accuracy[k] = probe.recipe.accuracy;
-    run->pairs.cost[k] = probe.cost;
+    run->pairs.accuracy[k] = plan.recipe.accuracy;
+    run->pairs.cost[k] = plan.cost;
     run->pairs.count++;
 done:
     return status;
@@ -186,7 +196,7 @@ static lam_status find_all_seconds(budget_run *run, double seconds, budget_recip
     bool pairs = false;
     double took = 0;
     const recipe rays = {.source = &source_rays, .rays = RAYS_SAMPLED};
-    TRY(state_sample(run->state, &rays, &run->rays, error));
+    TRY(plan_sample(run->job, run->scene, &rays, &run->rays_cost, error));
     for (size_t k = 0; k < count; k++) {
         if (list[k].kind == BUDGET_PAIRS &&
             (weighed->count == 0 || list[k].quality != weighed->quality[weighed->count - 1])) {
@@ -196,8 +206,7 @@ static lam_status find_all_seconds(budget_run *run, double seconds, budget_recip
             TRY(weigh_pairs(run, list[k].quality, &pairs, error));
             took = clock_seconds() - before;
             const factor_cost *cost = &weighed->cost[weighed->count - 1];
-            if (forecast_wall_seconds(cost->measured - cost->segments, &run->state->rates) > seconds)
-                pairs = false;
+            if (forecast_wall_seconds(cost->measured - cost->segments, run->rates) > seconds) pairs = false;
             if (!pairs) break; /* a higher quality costs more */
         }
         TRY(find_seconds(run, &list[k], error));
@@ -206,42 +215,50 @@ done:
     return status;
 }
 
-static void log_choice(precompute_state *state, const budget_run *run, const budget_recipe *r, bool probes) {
+static void log_choice(const budget_run *run, const budget_recipe *r, bool probes) {
     char options[BUDGET_TEXT], seconds[32];
     budget_options(r, run->method->name, probes, options);
     clock_format_seconds(r->seconds, seconds);
-    terminal_log(state->t,
+    terminal_log(run->job->t,
                  "--time %g: forecast %s, indirect error of single elements about %.2g; the same store "
                  "without --time: %s",
-                 state->options->time, seconds, r->error, options);
+                 run->job->options->time, seconds, r->error, options);
 }
 
-lam_status stage_budget(precompute_state *state, lam_error *error) {
+/* Seconds that are left of those that the forecast may fill. */
+static double seconds_left(const precompute_job *job) {
+    return share_filled * job->options->time - (clock_seconds() - job->started);
+}
+
+lam_status plan_within_time(const precompute_job *job, precompute_scene *scene, const precompute_plan *plan,
+                            stage_times *times, precompute_options *chosen, lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
-    const double n = (double)state->m.n;
+    const precompute_options *o = job->options;
+    const double n = (double)scene->m.n;
+    const factor_source *const asked = source_asked(o->form_factors);
     const bool given = o->probes != OPTION_AUTO;
     bool blocks = false;
-    budget_run run = {.state = state, .method = state_method_of_blocks()};
+    budget_run run = {
+        .job = job, .scene = scene, .plan = plan, .rates = &times->rates, .method = plan_method_of_blocks()};
     budget_recipe list[BUDGET_RECIPES_MOST + 1];
-    TRY(state_measure_rates(state, true, error));
-    state_update_processors(state);
-    double seconds = share_filled * o->time - (clock_seconds() - state->started);
-    if (o->form_factors != FACTORS_RAYS) TRY(state_blocks_possible(state, run.method, &blocks, error));
+    TRY(times_measure_rates(scene, times, true, error));
+    times_update_processors(job, times);
+    double seconds = seconds_left(job);
+    if (asked != &source_rays) TRY(plan_blocks_possible(job, scene, run.method, &blocks, error));
     if (blocks) TRY(sample_blocks(&run, seconds, error));
-    state_update_processors(state);
+    times_update_processors(job, times);
     const double all = n * n / 2, sampling = fmin(all, sampled_pairs) * sampled_pair_seconds;
     const bool pairs = n <= PAIRS_ELEMENTS_MOST &&
-                       forecast_wall_seconds(all * pair_least_seconds, &state->rates) < seconds &&
-                       forecast_wall_seconds(sampling, &state->rates) < share_sampled * seconds;
-    const bool rays = o->form_factors != FACTORS_BLOCKS;
+                       forecast_wall_seconds(all * pair_least_seconds, run.rates) < seconds &&
+                       forecast_wall_seconds(sampling, run.rates) < share_sampled * seconds;
+    const bool rays = asked != &source_blocks;
     size_t count = budget_list(blocks, rays, rays && pairs, given ? o->probes : PROBES_OF_BUDGET, list);
     TRY(find_all_seconds(&run, seconds, list, count, error));
-    seconds = share_filled * o->time - (clock_seconds() - state->started);
+    seconds = seconds_left(job);
     const size_t cheapest = budget_cheapest(list, count);
     if (cheapest == count)
         FAIL(error, LAM_ERR_MEMORY, "--time: %zu elements do not fit into --memory by any recipe",
-             state->m.n);
+             scene->m.n);
     if (!given) {
         list[count] = list[cheapest];
         list[count].probes = PROBES_OF_CHEAPEST;
@@ -252,15 +269,13 @@ lam_status stage_budget(precompute_state *state, lam_error *error) {
     if (taken == count) {
         char needs[32];
         taken = budget_cheapest(list, count);
-        clock_format_seconds(list[taken].seconds + clock_seconds() - state->started, needs);
-        terminal_warn(state->t, "--time %g: the cheapest recipe is forecast to take %s, and is taken",
-                      o->time, needs);
+        clock_format_seconds(list[taken].seconds + clock_seconds() - job->started, needs);
+        terminal_warn(job->t, "--time %g: the cheapest recipe is forecast to take %s, and is taken", o->time,
+                      needs);
     }
-    state->chosen = *o;
-    TRY(set_options(&list[taken], run.method, &state->chosen, error));
-    state->options = &state->chosen;
-    state->trial.asked = state->trial.epsilon = state->chosen.build.epsilon;
-    log_choice(state, &run, &list[taken], !given);
+    *chosen = *o;
+    TRY(set_options(&list[taken], run.method, chosen, error));
+    log_choice(&run, &list[taken], !given);
 done:
     return status;
 }
