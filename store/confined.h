@@ -49,7 +49,7 @@ bool confined_receive(confined *c, void *out, size_t bytes);
  * Errors: LAM_ERR_IO if the system does not tell the end, as while SIGCHLD is ignored. */
 lam_status confined_end(confined *c, bool answered, const char *path, int *how, lam_error *error);
 
-/* In the child: writes all bytes to a descriptor. */
+/* Writes all bytes to a descriptor; the child calls it. */
 bool confined_send(int fd, const void *data, size_t bytes);
 
 #endif

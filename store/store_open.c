@@ -37,7 +37,7 @@ static lam_status open_file(store *s, lam_error *error) {
     return LAM_OK;
 }
 
-/* In the child, whose copy of the store has a descriptor of another number. */
+/* This runs in the child, whose copy of the store has a descriptor of another number. */
 static void send_headers(void *context) {
     store *s = context;
     s->file.fd = CONFINED_INPUT;

@@ -111,7 +111,8 @@ lam_status store_hdf5_failure(store *s, const char *name, const char *what, lam_
 /* Memory for a store of this path, with no file yet. */
 lam_status store_new(const char *path, store **out, lam_error *error);
 
-/* In a child process: reads the headers of the file at s->file.fd by HDF5 and sends them (store_reply.h). */
+/* Reads the headers of the file at s->file.fd by HDF5 and sends them (store_reply.h); a child process calls
+ * it. */
 void store_headers_send(store *s, int to);
 
 /* store_open by a child that runs `run` on the store, with these limits: tests send what they like. */

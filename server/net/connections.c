@@ -198,8 +198,8 @@ static void uncount(connections *all, const client *c) {
     if (c->counts) all->kept.of[shares_place(c->key)]--;
 }
 
-/* With the lock, so that the descriptor still belongs to this client. The thread that serves it finds the
- * socket shut down and closes it. */
+/* The caller holds the lock, so that the descriptor still belongs to this client. The thread that serves it
+ * finds the socket shut down and closes it. */
 static void cut(connections *all, client *c, cut_reason why) {
     uncount(all, c);
     /* Discards unread bytes of the answer, which would otherwise stay in the socket. */
@@ -220,8 +220,8 @@ static client *find_idle(const connections *all, double now) {
     return oldest;
 }
 
-/* With the lock. Closes what is past its deadline and, if all connections or descriptors are in use, at most
- * a quarter of them that are idle. O(open) for each one closed. */
+/* The caller holds the lock. Closes what is past its deadline and, if all connections or descriptors are in
+ * use, at most a quarter of them that are idle. O(open) for each one closed. */
 static void sweep(connections *all) {
     const double now = clock_seconds();
     cut_reason why = CUT_HEAD;

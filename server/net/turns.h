@@ -31,7 +31,7 @@
 
 typedef struct turns turns;
 
-/* Of one request or one long answer. Zero at the start but for the first two. */
+/* A turn belongs to one request or one long answer. It is zero at the start but for the first two members. */
 typedef struct turn turn;
 struct turn {
     uint64_t client;

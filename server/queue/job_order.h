@@ -89,9 +89,8 @@ void order_count_done(job_order *order);
 void order_look(job_order *order);
 
 /* Moves to `unwanted` the job that came last of the client with most jobs that wait, if these are more than
- * the jobs of `client` and one. Of the jobs of one key that have begun, or (NULL) of all. False if there is
- * none. O(jobs).
- */
+ * the jobs of `client` and one. Only the jobs of the key that have begun count; with NULL all jobs do. False
+ * if there is none. O(jobs). */
 bool order_evict(job_order *order, uint64_t client, const void *key);
 
 /* Looks at one job that was not looked at for BATCH_LOOK seconds. */

@@ -27,8 +27,8 @@ void thread_budget_init(thread_budget *budget, size_t n_threads, pthread_mutex_t
  * thread that only asks for help and gives none (the one that loads stores) may have that of another. */
 void thread_budget_join(thread_budget *budget, size_t member);
 
-/* With the lock, which is released meanwhile: helps a loop until nothing is left of it or a job calls. False,
- * at once, when no loop wants help. */
+/* Helps a loop until nothing is left of it or a job calls. The caller holds the lock, which is released
+ * meanwhile. False, at once, when no loop wants help. */
 bool thread_budget_help(thread_budget *budget, size_t member);
 
 /* Has helpers return after the piece at hand, since a job waits and no thread is idle. */

@@ -13,7 +13,7 @@ static bool write_metrics(void *context, buffer *b) {
     size_t work_bytes = 0;
     for (size_t i = 0; i < snapshot->n_scenes; i++) {
         const scene *one = snapshot->scenes[i];
-        /* Of a variant only the memory that is not its base's. */
+        /* A variant counts only with the memory that is not its base's. */
         gauges.operator_bytes += one->base != NULL ? one->bytes : lam_operator_bytes(one->op);
         stores.memory += one->memory + scene_grown(one);
         if (one->work_bytes > work_bytes) work_bytes = one->work_bytes;

@@ -7,7 +7,7 @@ _Static_assert(CODING_ZSTD + 1 == KEPT_FORMS, "a form for each coding");
 /* Seconds to compress a byte, roughly. */
 #define PER_BYTE 10e-9
 
-/* Of one request, until its answer is made. */
+/* A call belongs to one request until its answer is made. */
 typedef struct kept_call {
     kept_source from;
     content_coding form; /* that is sent */

@@ -185,7 +185,7 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
                               .batch = request->batch,
                               .n_values = request->select ? request->n_selected : s->n};
     *out = r;
-    /* With the memory of the pass: what waits for memory must not have begun. */
+    /* The memory of the pass is included, as what waits for memory must not have begun. */
     const size_t of_pass = pass_memory_bytes(s, request, vectors_of_pass(request) * s->n_channels);
     if (!request_memory_take(in->memory, bytes_plus(of_pass, bytes_needed(in, request, &r->shape, &r->as)),
                              why))

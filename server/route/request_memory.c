@@ -130,7 +130,7 @@ static void settle(request_ledger *ledger) {
     }
 }
 
-/* With the lock. */
+/* The caller holds the lock. */
 static bool take(request_memory *m, size_t bytes) {
     request_ledger *ledger = m->ledger;
     const size_t more = bytes > m->granted ? bytes - m->granted : 0;
@@ -143,7 +143,7 @@ static bool take(request_memory *m, size_t bytes) {
     return true;
 }
 
-/* With the lock. */
+/* The caller holds the lock. */
 static bool refuse(request_memory *m, size_t bytes, problem *why) {
     request_ledger *ledger = m->ledger;
     const size_t most = request_ledger_most(ledger), wanted = bytes_plus(m->held, bytes);
@@ -175,7 +175,7 @@ bool request_memory_take(request_memory *m, size_t bytes, problem *why) {
     return taken;
 }
 
-/* With the lock. */
+/* The caller holds the lock. */
 static bool allows_body(const request_memory *m, size_t bytes) {
     const shares *bodies = &m->ledger->bodies;
     if (shares_of(bodies, m->client) > m->body) return shares_allow(bodies, m->client, bytes);

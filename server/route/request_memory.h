@@ -25,7 +25,7 @@
 
 typedef struct request_memory request_memory;
 
-/* Of all requests. Any thread, by the functions below. */
+/* The memory of all requests. Any thread may use it, by the functions below. */
 typedef struct request_ledger {
     pthread_mutex_t lock;
     shares all, bodies;    /* bytes; bodies are part of all, with a limit of their own (--max-buffered) */
@@ -41,7 +41,8 @@ void request_ledger_destroy(request_ledger *ledger);
 /* The most bytes that one request, or one client, may have (server/net/shares.h). */
 size_t request_ledger_most(const request_ledger *ledger);
 
-/* Of one request; belongs to the thread that has the request. Zero at the start but for ledger. */
+/* The memory of one request belongs to the thread that has the request. It is zero at the start but for
+ * ledger. */
 struct request_memory {
     request_ledger *ledger;
     uint64_t client; /* whose it is */

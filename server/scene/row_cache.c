@@ -65,7 +65,7 @@ size_t row_cache_held(row_cache *rows) {
     return held;
 }
 
-/* With the lock. Names of the same groups share a row. */
+/* The caller holds the lock. Names of the same groups share a row. */
 static adjoint_row *find_locked(row_cache *rows, const reduce_name *name, lam_quantity quantity) {
     for (adjoint_row *row = rows->first; row != NULL; row = row->next)
         if (row->groups == name->groups && row->n_groups == name->n_groups && row->quantity == quantity) {
@@ -76,12 +76,13 @@ static adjoint_row *find_locked(row_cache *rows, const reduce_name *name, lam_qu
     return NULL;
 }
 
-/* With the lock. */
+/* The caller holds the lock. */
 static void release_locked(adjoint_row *row) {
     if (row != NULL && --row->references == 0) adjoint_row_free(row);
 }
 
-/* With the lock, of a list that is not empty: drops the least recently used row. Its last user frees it. */
+/* Drops the least recently used row of a list that is not empty; its last user frees it. The caller holds
+ * the lock. */
 static void evict_locked(row_cache *rows) {
     adjoint_row **oldest = &rows->first;
     for (adjoint_row **at = oldest; *at != NULL; at = &(*at)->next)
@@ -99,8 +100,8 @@ void row_cache_clear(row_cache *rows) {
     pthread_mutex_unlock(&rows->lock);
 }
 
-/* With the lock: makes room for a row by dropping others; false if the ledger has none. A single row may
- * exceed max_bytes. */
+/* Makes room for a row by dropping others; false if the ledger has none. The caller holds the lock. A single
+ * row may exceed max_bytes. */
 static bool make_room_locked(row_cache *rows, size_t bytes) {
     while (rows->first != NULL && rows->bytes + bytes > rows->max_bytes) evict_locked(rows);
     while (!memory_ledger_take(rows->ledger, bytes)) {

@@ -118,7 +118,7 @@ typedef struct mean_errors {
     name_error *names;    /* [n_names]; NULL: that of the store stays */
     emission_size *sizes; /* [n_rhs] */
     double *emission;     /* [2][n_rhs][C], work */
-    /* Of weights of emitters, which request has; NULL: none. */
+    /* These are needed where the request has weights of emitters; NULL: it has none. */
     float *E;     /* [C][n], work */
     double *sums; /* [n_rhs][C][n_groups], of A E of groups */
     float *L;     /* [n_rhs][C][m], radiances with those of the request's sky; NULL: no emitter is of a sky */

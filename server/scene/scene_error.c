@@ -124,7 +124,8 @@ typedef struct vector_light {
     const float *E, *H0, *L; /* [C][n], [C][m]; NULL: none */
 } vector_light;
 
-/* Of few emitters that of weights [C][s], into own [2][C][n] and then [C][m]. False when memory is short. */
+/* Writes the light of few emitters, by weights [C][s], into own, which is [2][C][n] and then [C][m]. False
+ * when memory is short. */
 static bool light_of_weights(const scene *s, const float *weights, float *own, vector_light *out) {
     const size_t vector = s->n_channels * s->n;
     const bool sky = operator_emitters_of(s->op)->a.L != NULL;

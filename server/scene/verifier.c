@@ -47,7 +47,7 @@ static void verify(verifier *v, scene *s) {
     }
 }
 
-/* With the lock. Waits for a scene to verify or the end; lists scenes again when it is time. */
+/* The caller holds the lock. Waits for a scene to verify or the end; lists scenes again when it is time. */
 static void wait_for_scene(verifier *v) {
     struct timespec due = clock_now();
     const double seconds = v->scrub.hours * 3600;
