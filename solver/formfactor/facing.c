@@ -139,8 +139,8 @@ static void look(const mesh *m, const visibility *v, const mesh_sides *s, const 
     }
 }
 
-/* Of the rays from a side, those that meet fronts of other patches, less the weight of those that meet
- * backs, as a share. */
+/* The share of the rays from a side that meet fronts of other patches, less the weight of those that meet
+ * backs. */
 static double brightness(const side_views *w, size_t side) {
     double fronts = 0, backs = 0;
     for (size_t r = 0; r < w->rays; r++) {

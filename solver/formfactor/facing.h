@@ -11,7 +11,8 @@ typedef struct facing_survey {
     double *group_shares; /* [n_groups], their sum is share */
 } facing_survey;
 
-/* By 65,536 rays. The caller frees out with facing_survey_free. Errors: LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
+/* Casts 65,536 rays. The caller frees out with facing_survey_free. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_INTERNAL. */
 lam_status facing_survey_make(const mesh *m, facing_survey *out, lam_error *error);
 void facing_survey_free(facing_survey *s);
 

@@ -126,9 +126,9 @@ typedef struct form_factor_options {
 lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *options,
                              form_factors *out, lam_error *error);
 
-/* By pairs (source_pairs) a reference, and the same disturbed by a sample of its own noise, at about the cost
- * of one sample (pairs_twice.h): out[0] is the mean of two samples, by the recipe's seed and another one,
- * which share the pairs that are projected. stages: names for progress. No sky and no scratch folder. */
+/* Finds a reference by pairs (source_pairs), and the same disturbed by a sample of its own noise, at about
+ * the cost of one sample (pairs_twice.h): out[0] is the mean of two samples, by the recipe's seed and another
+ * one, which share the pairs that are projected. stages: names for progress. No sky and no scratch folder. */
 lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const form_factor_options *options,
                                    uint64_t other_seed, const char *const stages[2], form_factors out[2],
                                    lam_error *error);

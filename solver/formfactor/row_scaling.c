@@ -10,8 +10,8 @@
  * last: the remaining difference goes outside. */
 static const double sweep_tolerance = 2e-8;
 
-/* Of Anderson's extrapolation: previous steps that are kept, sweeps that are tried, and the factor by which
- * the worst row may exceed the best one so far. */
+/* Anderson's extrapolation keeps so many previous steps and tries so many sweeps; GROWTH_MOST is the factor
+ * by which the worst row may exceed the best one so far. */
 enum { STEPS = 5, MAX_STEPS = 60, GROWTH_MOST = 4 };
 /* Added to the unit diagonal of the normal equations, which nearly parallel steps make singular. */
 static const double alike = 1e-11;

@@ -14,7 +14,7 @@ static const double ridge = .02;
 /* Below this many radii between centre and cluster nothing is smooth. */
 static const double nearest = 1.05;
 
-/* Of the points that lie in front of both planes: cos cos' / (pi r^2), r from x to y. */
+/* The kernel is cos cos' / (pi r^2), r from x to y, for points that lie in front of both planes, else 0. */
 static double kernel(const double *normal_x, const double *normal_y, const double *x, const double *y) {
     const double r[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]}, r2 = dot3(r, r);
     const double leaving = dot3(normal_x, r), arriving = -dot3(normal_y, r);

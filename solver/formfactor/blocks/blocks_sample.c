@@ -57,14 +57,15 @@ static const double joined_pair_seconds = 3e-6;
  * 10,249 to 163,687 elements, rooms and patios of 10,000 and 40,000; form factors are forecast at .75 to 1.33
  * times what they take in 18 scenes of 1,500 to 163,687. */
 static const double finish_seconds = 1.7e-7, element_seconds = 2.5e-6;
-/* Of half the bound, as a judge takes them: single pairs are as many, of other blocks there are so many times
- * as many; their segments are cast against the whole scene, and they are balanced to a coarser tolerance. Of
- * two Cornell boxes, rooms, a maze and a patio, whose blocks became 1.11 to 1.9 times as many. */
+/* A judge takes blocks of half the bound: single pairs are as many, of other blocks there are so many times
+ * as many; their segments are cast against the whole scene, and they are balanced to a coarser tolerance. The
+ * numbers come from two Cornell boxes, rooms, a maze and a patio, whose blocks became 1.11 to 1.9 times as
+ * many. */
 static const double finer_times = 1.9, scene_seconds = 6.5e-8, finer_finish = .7;
 /* Pairs beyond the bound get 2^(1/.7) times as many segments then, those within it as many. */
 static const double finer_segments = 1.4;
 
-/* Of the walk alone. */
+/* The seconds of the walk alone. */
 static double walk_seconds(const block_report *w) {
     return w->visits * visit_seconds + w->sifted * sifted_seconds + w->sampled * even_seconds +
            w->pairs * (w->joined ? joined_pair_seconds : pair_seconds) + w->shaded * shaded_seconds +
@@ -80,7 +81,7 @@ static double finish_of(const block_scene *scene, const block_report *w) {
     return count_of(w) * finish_seconds + (double)scene->nodes.n * element_seconds;
 }
 
-/* Of the blocks w, which a judge finds against the whole scene. */
+/* The seconds of the blocks w, which a judge finds against the whole scene. */
 static double judge_seconds(const block_scene *scene, const block_report *w, double pace) {
     return (walk_seconds(w) + w->segments * scene_seconds) * pace + finish_of(scene, w) * finer_finish;
 }

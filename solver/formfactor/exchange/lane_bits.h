@@ -7,8 +7,8 @@
 
 typedef signed char lane_bytes __attribute__((vector_size(8)));
 
-/* Bit k is that of lane k, which is -1 or 0: byte k keeps its bit k, and the product adds all bytes. By a
- * pointer, as vectors are passed in other registers by each instruction set. */
+/* Bit k is that of lane k, which is -1 or 0: byte k keeps its bit k, and the product adds all bytes. The
+ * lanes come by a pointer, as vectors are passed in other registers by each instruction set. */
 static inline __attribute__((always_inline)) unsigned lane_bits(const lane_bytes *lanes) {
     uint64_t bytes;
     memcpy(&bytes, lanes, sizeof bytes);

@@ -58,8 +58,8 @@ static double factor_bound(double area, double distance2) {
 
 typedef enum cluster_state { CLUSTERS_OPEN, CLUSTERS_HIDDEN, CLUSTERS_MIXED } cluster_state;
 
-/* Of two clusters with elements in their shaft: open where no occluder is between them, hidden where one
- * covers them, or, where there are too many to know, where all segments are blocked. */
+/* Two clusters with elements in their shaft are open where no occluder is between them, and hidden where one
+ * covers them or, where there are too many to know, where all segments are blocked. */
 static cluster_state look_between(walk *w, const cluster *a, const cluster *b, const shaft *s,
                                   double distance2) {
     const bool near = w->options->threshold > 0;

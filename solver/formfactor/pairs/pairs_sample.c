@@ -9,8 +9,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Of the pairs whose segments agree, those that a neighbour's verdict makes mixed all the same: measured .26
- * (a Cornell box of 5,005 elements) to .47 (a furnished room of 516 triangles), but they ask for fewer
+/* The share of the pairs whose segments agree that a neighbour's verdict makes mixed all the same: measured
+ * .26 (a Cornell box of 5,005 elements) to .47 (a furnished room of 516 triangles), but they ask for fewer
  * segments than the mean. */
 static const double at_border = .2;
 
@@ -221,7 +221,8 @@ static const double times_apart = 1.35;
 /* Few rays beside all pairs: not worth a sample. */
 static const double few_ray_seconds = 1e-7;
 
-/* Of segments, which the sample does not cast; `all` are cast in place of those that were counted. */
+/* The time of segments, which the sample does not cast; `all` are cast in place of those that were
+ * counted. */
 static double segments_seconds(const pairs_work *w, double all) {
     const double times = w->segments > 0 ? all / w->segments : 0;
     const double cast = fmax(w->segments - w->proven - w->listed, 0);
@@ -229,7 +230,7 @@ static double segments_seconds(const pairs_work *w, double all) {
            times * (w->listed * listed_seconds + w->list_tests * list_test_seconds + cast * cast_seconds);
 }
 
-/* Of rows of pairs, without their segments. */
+/* The time of rows of pairs, without their segments. */
 static double rows_seconds_of(const pairs_work *w) {
     return w->tried * tried_seconds + w->close * close_seconds + w->tests * test_seconds +
            w->sifted * sift_seconds + w->projection * projection_seconds;

@@ -194,7 +194,7 @@ static double size_of(const portals *p, const aiming *from, const choice *c, dou
     return sqrt(half);
 }
 
-/* Of several portals an upper bound of about the same kind. */
+/* The weight of several portals is an upper bound of about the same kind. */
 static double weight_of(const portals *p, const aiming *from, const choice *c) {
     const portal_node *n = c->node;
     double distance, farthest = -INFINITY;

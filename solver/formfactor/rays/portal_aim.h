@@ -20,7 +20,7 @@ typedef struct portal {
     uint32_t opening;
 } portal;
 
-/* Of neighbouring portals first ... first + count - 1. */
+/* A node holds the neighbouring portals first ... first + count - 1. */
 typedef struct portal_node {
     double low[3], high[3];
     double power; /* sum of A_k times the greater strength */

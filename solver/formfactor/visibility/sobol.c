@@ -1,7 +1,8 @@
 #include "solver/formfactor/visibility/sobol.h"
 
-/* Of the primitive polynomials x + 1, x^2 + x + 1 and x^3 + x + 1 with the initial numbers 1; 1, 3 and 1, 3,
- * 1 by Joe and Kuo (2008): m_k = 2 a_1 m_(k-1) ^ ... ^ 2^s m_(k-s) ^ m_(k-s), v_k = m_k 2^-k. */
+/* The directions are those of the primitive polynomials x + 1, x^2 + x + 1 and x^3 + x + 1 with the initial
+ * numbers 1; 1, 3 and 1, 3, 1 by Joe and Kuo (2008): m_k = 2 a_1 m_(k-1) ^ ... ^ 2^s m_(k-s) ^ m_(k-s), v_k =
+ * m_k 2^-k. */
 const uint32_t sobol_direction[SOBOL_DIMENSIONS][SOBOL_BITS] = {
     {0x80000000u, 0x40000000u, 0x20000000u, 0x10000000u, 0x08000000u, 0x04000000u, 0x02000000u, 0x01000000u,
      0x00800000u, 0x00400000u, 0x00200000u, 0x00100000u, 0x00080000u, 0x00040000u, 0x00020000u, 0x00010000u,
