@@ -57,8 +57,8 @@ typedef struct decision {
     bool final;       /* F cannot change it */
 } decision;
 
-/* Weighs the methods in the order of the list where options->method is auto, else takes that one. With
- * neither F nor stream nor blocks in the problem, decides as far as is possible without them.
+/* Weighs the methods in the order of the list where options->method is auto, else takes that one. Where the
+ * problem has neither F nor stream nor blocks, it decides as far as is possible without them.
  *
  * The cost of the hierarchical operator is known only after its build. Then the decision holds the operator
  * (taken->op), and a caller that takes it over sets op to NULL. Free with decision_free, which closes all

@@ -108,7 +108,8 @@ typedef struct build_method {
     const option_row *rows;    /* its options, with presets and limits; NULL: none */
     unsigned flags;            /* METHOD_... */
     const char *smaller;       /* an option that asks for a smaller operator; NULL: none is known */
-    /* Of a command line: LAM_ERR_ARGUMENT where options that are each in their limits do not go together. */
+    /* Checks a command line: LAM_ERR_ARGUMENT where options that are each in their limits do not go
+     * together. */
     lam_status (*check)(const void *own, lam_error *error);
     /* True if an option that was given, a row of this table, had no effect beside the others. */
     bool (*ignores)(const void *own, const build_report *report, const char *option);

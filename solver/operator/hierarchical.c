@@ -67,7 +67,7 @@ done:
     return status;
 }
 
-/* With the correction of its mean error. */
+/* Makes the lift of the correction of the mean error. */
 static lam_status lift_even_light(hierarchical *self, lam_error *error) {
     const size_t n = self->base.n, C = self->base.n_channels;
     float *by = NULL;

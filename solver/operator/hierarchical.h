@@ -69,9 +69,9 @@ lam_status hierarchical_steps(const wavelets *basis, double threshold, float **o
 lam_status hierarchical_groups(const wavelet_plan *plan, const float *step, float least, size_t *n_groups,
                                tile_group **groups, float **group_step, lam_error *error);
 
-/* Of a K: GROUP/count [planes][n_groups] u16 (u32 where a row has more than 65,535 tiles), tile [tiles] u16,
- * far u32, digit i8, as store/FORMAT.md says. Errors: as store_read; LAM_ERR_FORMAT where they do not fit
- * together, LAM_ERR_NUMERIC for a tile that cannot be. */
+/* The tiles of a K are GROUP/count [planes][n_groups] u16 (u32 where a row has more than 65,535 tiles), tile
+ * [tiles] u16, far u32, digit i8, as store/FORMAT.md says. Errors: as store_read; LAM_ERR_FORMAT where they
+ * do not fit together, LAM_ERR_NUMERIC for a tile that cannot be. */
 lam_status hierarchical_save_tiles(const tile_matrix *m, size_t n_groups, const char *group, store *s,
                                    lam_error *error);
 lam_status hierarchical_load_tiles(store *s, const char *group, size_t n_groups, const tile_group *groups,

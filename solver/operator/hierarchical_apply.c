@@ -122,7 +122,7 @@ typedef struct ending {
     size_t v;
 } ending;
 
-/* In mesh order, as scattered reads cost less than scattered writes. */
+/* This goes in mesh order, as scattered reads cost less than scattered writes. */
 static void finish_elements(const void *job, size_t thread, size_t first, size_t last) {
     const channel *h = ((const ending *)job)->h;
     const hierarchical *self = h->self;

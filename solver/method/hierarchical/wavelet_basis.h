@@ -22,7 +22,7 @@ lam_status wavelet_tree_make(size_t n, const csr *F, const uint32_t *part, const
 lam_status wavelet_basis_make(const plane_tree *tree, const double *area, const double (*centre)[3],
                               wavelets *out, lam_error *error);
 
-/* Of each part of the scene, the coefficient of the constant over all of it: its root, which is the last of
+/* The root of each part of the scene is the coefficient of the constant over all of it, which is the last of
  * the coefficients of its part. One part of a single plane has none: WAVELET_NONE throughout. */
 typedef struct wavelet_roots {
     uint32_t *of_node; /* [n_nodes], of its part; of a node whose children are apart: of the left one */

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Of the product of the weights of two nodes of importance x and y: (x y)^-1/4. With all of (x y)^-1/2 the
+/* The product of the weights of two nodes of importance x and y is (x y)^-1/4. With all of (x y)^-1/2 the
  * coefficients of S are a third fewer, and what is read errs by a quarter more. */
 static const double power = .25;
 

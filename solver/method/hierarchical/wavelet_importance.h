@@ -4,7 +4,7 @@
 
 #include "solver/operator/blocks/importance.h"
 
-/* Of the nodes of a basis; all NULL: all is read, and may emit. */
+/* The importance of the nodes of a basis; all NULL: all is read, and may emit. */
 typedef struct wavelet_importance {
     float *times, *read, *emits; /* of wavelet_inverse_input */
 } wavelet_importance;

@@ -6,11 +6,11 @@
 #include "solver/linalg/csr.h"
 #include "solver/operator/blocks/block_factors.h"
 
-/* Of rows of F; area [n] by element. Cost: one pass over F. */
+/* The norm of rows of F; area [n] by element. Cost: one pass over F. */
 double wavelet_norm_of_rows(const csr *F, const double *area);
 
-/* Of blocks, each taken for its mean: slopes have less than a hundredth of the norm. Cost: one pass over the
- * blocks. Errors: LAM_ERR_MEMORY. */
+/* The norm of blocks, each taken for its mean: slopes have less than a hundredth of the norm. Cost: one pass
+ * over the blocks. Errors: LAM_ERR_MEMORY. */
 lam_status wavelet_norm_of_blocks(const block_factors *f, double *out, lam_error *error);
 
 #endif

@@ -8,10 +8,11 @@
 /* Sums over probes in one bin, a row of one group: of squares of errors and of the noise in them. */
 typedef struct bin_sums {
     double area, squares; /* sum A, sum A^2 */
-    /* By single elements: e^2 N / P^2, and e^2; of the mean of the bin, and of the mean square in it. */
+    /* Single elements give e^2 N / P^2, and e^2; these are of the mean of the bin, and of the mean square in
+     * it. */
     double mean_one, mean_one_noise, mean_all, mean_all_noise;
     double rms_one, rms_one_noise, rms_all, rms_all_noise;
-    /* Of means: errors, their noise, reflected light, and the largest ratio. */
+    /* Means have errors, the noise of these, reflected light, and the largest ratio. */
     double off[3], noise[3], light[3], largest[3];
 } bin_sums;
 

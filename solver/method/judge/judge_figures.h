@@ -22,9 +22,9 @@ typedef struct figure_probe {
     double other_share;
 } figure_probe;
 
-/* Of element k % n in channel k / n: B, B - E, the error x, the noise t in it, that of the first light, and
- * the error of x by the coarser reference. Of a black element H stands for B, and H less what is direct for
- * B - E. */
+/* Element k % n has these numbers in channel k / n: B, B - E, the error x, the noise t in it, that of the
+ * first light, and the error of x by the coarser reference. For a black element H stands for B, and H less
+ * what is direct for B - E. */
 typedef struct figure_number {
     double b, bounced, off, noise, light, apart;
 } figure_number;

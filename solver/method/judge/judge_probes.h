@@ -4,7 +4,7 @@
 
 #include "solver/method/method.h"
 
-/* In the order of a round. */
+/* A round has this order. */
 enum { JUDGE_RANDOM, JUDGE_WHOLE, JUDGE_LIGHTS, JUDGE_SINGLE, JUDGE_GROUPS };
 
 /* A source of emissions: single elements (or emitters), drawn without repetition, the scene's own light,

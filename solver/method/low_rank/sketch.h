@@ -21,8 +21,8 @@ void sketch_sparse_column(uint64_t seed, size_t k, size_t i, sketch_entry column
 
 /* Replaces the columns of Y, [n][m], by an orthonormal basis of their span, to the rounding of single
  * precision; *rank, at most m, is how many it takes: directions below 1e-6 of the largest are left out, and Y
- * becomes [n][*rank]. By Cholesky or, where that fails, eigenvectors of the Gram matrix in double, twice.
- * Cost: O(n m^2). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
+ * becomes [n][*rank]. It takes the Cholesky factor or, where that fails, eigenvectors of the Gram matrix in
+ * double, twice. Cost: O(n m^2). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
 lam_status sketch_orthonormalize(size_t n, size_t m, float *Y, size_t *rank, lam_error *error);
 
 /* |S - B X^T|_2, X and B [n][m], to about a tenth from below: power iteration on the square of the difference

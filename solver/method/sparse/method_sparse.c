@@ -17,7 +17,7 @@ static const double delta_tolerance = 1e-7;
 /* Factor by which a threshold rises at a time where memory is too small; error of its forecast. */
 static const double rise = 1.25, doubt = 1.15;
 
-/* Of an entry: its column and its value, in rows and, transposed, in columns. */
+/* An entry has a column and a value, in rows and, transposed, in columns. */
 enum { ENTRY_BYTES = 2 * (sizeof(uint32_t) + sizeof(float)) };
 
 static const option_row rows[] = {

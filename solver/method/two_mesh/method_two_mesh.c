@@ -214,7 +214,7 @@ done:
     return status;
 }
 
-/* With --rank the options that split patches have no effect; qr is the only factorizer of this method. */
+/* The options that split patches have no effect with --rank; qr is the only factorizer of this method. */
 static bool ignores(const void *own, const build_report *report, const char *option) {
     const two_mesh_options *o = own;
     (void)report;

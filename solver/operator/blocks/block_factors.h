@@ -77,7 +77,7 @@ typedef struct block_factors {
     size_t n_blocks;
     cluster_block
         *blocks; /* [n_blocks], malloc; after block_factors_end a stands before b, by a, then by b */
-    /* Of block_factors_end: the blocks of a node as a are from[t] ... from[t + 1] - 1, those as b are
+    /* After block_factors_end the blocks of a node as a are from[t] ... from[t + 1] - 1, those as b are
      * into[into_from[t]] ... into[into_from[t + 1] - 1], by a. */
     size_t *from, *into_from; /* [n_clusters + n + 1] */
     uint32_t *into;           /* [n_blocks] */

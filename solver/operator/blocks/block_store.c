@@ -9,9 +9,9 @@
 
 #define GROUP STORE_FORM_FACTORS
 
-/* In place of the left child of a leaf. */
+/* This stands in place of the left child of a leaf. */
 #define NO_CHILD UINT32_MAX
-/* In place of PLANE_ABOVE: of several parts of the scene. */
+/* This stands in place of PLANE_ABOVE where a cluster holds several parts of the scene. */
 #define PARTS_APART (UINT32_MAX - 1)
 
 enum { CLUSTER_NUMBERS = 4, FRAME_NUMBERS = 9 };

@@ -8,8 +8,8 @@
 /* Nodes reach beyond their parents by no more than this share of them. */
 #define BLOCK_OVERHANG 1e-6
 
-/* Of f the nodes, blocks, their order and the balance are written; of nodes without a function along an axis
- * not the numbers that it would have. f has a balance. Errors: as store_write. */
+/* Writes the nodes and blocks of f, their order and the balance, but not the numbers of a function along an
+ * axis for nodes that have none. f has a balance. Errors: as store_write. */
 lam_status block_factors_save(const block_factors *f, store *s, lam_error *error);
 
 /* Reads the blocks of n elements with areas by element. Everything is checked: the tree, that nodes lie

@@ -9,16 +9,16 @@
 
 const double importance_least = 1. / 16;
 
-/* Of the root mean square r of y by area: the shares are its multiple, no less than these and at most 1.
- * Where y is 1 everywhere, all is read. The less is important, the more the errors of the rest add up in what
- * is read, and the more there is to gain. Chosen by receivers and lamps in an office, three rooms and a
- * Cornell box with blocks (r from .08 to .57): what is read errs .36 to 1.08 times as much as without, but up
- * to 1.28 times at a lamp of .2 % of the area, and 1.45 times once (performance-hierarchical.md). The same of
- * z. With receivers and sources both shares are products, as the importance is. */
+/* The shares are a multiple of the root mean square r of y by area, no less than these and at most 1. Where y
+ * is 1 everywhere, all is read. The less is important, the more the errors of the rest add up in what is
+ * read, and the more there is to gain. Chosen by receivers and lamps in an office, three rooms and a Cornell
+ * box with blocks (r from .08 to .57): what is read errs .36 to 1.08 times as much as without, but up to 1.28
+ * times at a lamp of .2 % of the area, and 1.45 times once (performance-hierarchical.md). The same of z. With
+ * receivers and sources both shares are products, as the importance is. */
 static const double share_of_mean = 1.5, bounds_least = .4, thresholds_least = .25;
-/* Of bounds of a reference: with bounds_least its blocks take as long as if all were read. It is no more than
- * so many times the share of what it judges, which is less than bounds_least where there are receivers and
- * sources. */
+/* The share of bounds of a reference: with bounds_least its blocks take as long as if all were read. It is no
+ * more than so many times the share of what it judges, which is less than bounds_least where there are
+ * receivers and sources. */
 static const double reference_least = .5, reference_times = 1.25;
 
 #define GROUP STORE_IMPORTANCE

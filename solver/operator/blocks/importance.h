@@ -64,7 +64,7 @@ lam_status importance_nodes_make(const importance *i, const double *area, const 
                                  importance_nodes *out, lam_error *error);
 void importance_nodes_free(importance_nodes *nodes);
 
-/* Of the light between two nodes, which goes both ways: max(y_a z_b, y_b z_a). */
+/* The importance of the light between two nodes, which goes both ways, is max(y_a z_b, y_b z_a). */
 double importance_between(const importance_nodes *nodes, size_t a, size_t b);
 
 /* y_a z_a of one node: the root of its product with that of another node is the geometric mean of y_a z_b and

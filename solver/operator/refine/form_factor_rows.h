@@ -28,8 +28,8 @@ typedef enum form_factor_storage {
     STORAGES
 } form_factor_storage;
 
-/* Of a store that has form factors. Errors: those of store_get_text; LAM_ERR_UNSUPPORTED for another storage,
- * such as compressed coefficients. */
+/* Finds how a store that has form factors holds them. Errors: those of store_get_text; LAM_ERR_UNSUPPORTED
+ * for another storage, such as compressed coefficients. */
 lam_status form_factors_storage(store *s, form_factor_storage *out, lam_error *error);
 
 /* F of an open store, as rows or as blocks; the certificate of a refined answer refers to it. */

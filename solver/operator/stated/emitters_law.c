@@ -93,7 +93,7 @@ bool emitters_error_knows_groups(const emitters_error *e) {
     return e->figures.of_groups != NULL;
 }
 
-/* Of each emitter the largest weight over channels, [s]. */
+/* Finds the largest weight of each emitter over channels, [s]. */
 static void largest_weights(const emitters_error *e, size_t n_channels, const float *W, double *w) {
     for (size_t k = 0; k < e->figures.s; k++) {
         w[k] = 0;

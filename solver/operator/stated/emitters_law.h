@@ -7,8 +7,8 @@
 /* Covariances with what mixtures need of the mesh and of the operator. Zeroed: a store that states none. */
 typedef struct emitters_error {
     emitter_figures figures;
-    /* Of groups, with figures.of_groups: areas, mean reflectances [C][n_groups], and the mean irradiance that
-     * emitters outside the mesh give directly, [n_groups][s] of 1 W/m^2. */
+    /* Groups have these with figures.of_groups: areas, mean reflectances [C][n_groups], and the mean
+     * irradiance that emitters outside the mesh give directly, [n_groups][s] of 1 W/m^2. */
     double *area, *reflectance, *direct;
     double *exitance;  /* [C], W/m^2 of weight 1 */
     reflecting *black; /* [n_groups], with figures.of_groups: how errors of B and H go together */

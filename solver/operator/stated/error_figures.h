@@ -38,9 +38,9 @@ typedef struct error_group {
 } error_group;
 
 /* The errors in each group of the scene, for answers to any emission E of power P = sum A E (per channel,
- * squares added up) and effective number of emitters N = P^2 / sum A^2 E^2. In double; [n_rows][n_groups]:
- * row 0 is of the elements of a group, or of those that are read, row 1 then of its others. Zeroed: nothing
- * is known.
+ * squares added up) and effective number of emitters N = P^2 / sum A^2 E^2. The arrays are in double,
+ * [n_rows][n_groups]: row 0 is of the elements of a group, or of those that are read, row 1 then of its
+ * others. Zeroed: nothing is known.
  *
  * The error of an answer, of the mean of a group or the root of the mean square of its elements, is about
  *     P sqrt(one^2 / N^2 + many^2 (1 - 1/N) / N + even^2),

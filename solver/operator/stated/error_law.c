@@ -38,7 +38,7 @@ static void find_sums(const error_scene *scene, error_by_group *e) {
     }
 }
 
-/* Of groups, whose bins of row 0 have their numbers. */
+/* Makes of_group for groups, whose bins of row 0 have their numbers. */
 static lam_status find_reflecting(const error_scene *scene, error_by_group *e, lam_error *error) {
     uint32_t *group = memory_allocate(scene->n, sizeof *group, "errors of groups", error);
     if (group == NULL) return LAM_ERR_MEMORY;
