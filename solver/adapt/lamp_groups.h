@@ -51,7 +51,7 @@ void lamp_groups_share(const lamp_groups *l, uint32_t element, uint64_t key, siz
 /* The lamp at a place of [0, 1) among all: a group has its share, and a lamp of it that of its power. */
 uint32_t lamp_groups_at(const lamp_groups *l, const lamp_shares *shares, double place);
 
-/* Of a sample: the density per area at an element that emits. */
+/* The density of a sample per area, at an element that emits. */
 double lamp_groups_density(const lamp_groups *l, const lamp_shares *shares, uint32_t element);
 
 #endif

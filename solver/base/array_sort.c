@@ -9,7 +9,7 @@ enum { COUNT_LEAST = 8192, PARTS_MOST = 16 };
 
 typedef int comparison(const void *, const void *);
 
-/* Of two sorted ranges, one behind the other, into as much room elsewhere. */
+/* Merges two sorted ranges, one of which lies behind the other, into as much room elsewhere. */
 static void merge(const char *from, size_t first, size_t second, size_t size, comparison *compare, char *to) {
     const char *a = from, *b = from + first * size;
     const char *const a_end = b, *const b_end = b + second * size;

@@ -1,4 +1,4 @@
-/* Loops over independent pieces of work. In a program on its own OpenMP shares them; in a server, whose
+/* Loops over independent pieces of work. OpenMP shares them in a program on its own; in a server, whose
  * threads belong to a pool, the pool does, so that no thread is ever made for a loop. */
 #ifndef LAMBERT_BASE_PARALLEL_H
 #define LAMBERT_BASE_PARALLEL_H

@@ -9,8 +9,8 @@
 /* The end of the name of a group of backs: `floor.back` beside `floor`. */
 #define SCENE_BACK ".back"
 
-/* Of n elements; two_sided: every element has its back or is one. Attributes of /mesh that are not there mean
- * that there are none. Errors: LAM_ERR_FORMAT. */
+/* Reads the attributes for a mesh of n elements; two_sided: every element has its back or is one. Attributes
+ * of /mesh that are not there mean that there are none. Errors: LAM_ERR_FORMAT. */
 lam_status scene_backs_load(store *s, size_t n, size_t *n_backs, bool *two_sided, lam_error *error);
 
 /* Writes the attributes. */

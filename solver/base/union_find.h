@@ -31,7 +31,7 @@ static inline size_t union_find_number(uint32_t *parent, size_t n) {
 
 #define UNION_FIND_ALONE UINT32_MAX
 
-/* Of numbers [n] as above: those of sets of one member become UNION_FIND_ALONE. sizes: room for as many
+/* The numbers [n] are as above: those of sets of one member become UNION_FIND_ALONE. sizes: room for as many
  * numbers as there are sets. */
 static inline void union_find_mark_alone(uint32_t *number, size_t n, size_t n_sets, uint32_t *sizes) {
     for (size_t k = 0; k < n_sets; k++) sizes[k] = 0;

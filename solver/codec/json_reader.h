@@ -62,9 +62,9 @@ bool json_read_float(json_reader *r, float *value);
 bool json_read_double(json_reader *r, double *value);
 bool json_skip_number(json_reader *r);
 
-/* In an array: as many numbers as follow each other that are written plainly (not negative, 18 digits and an
- * exponent of two at most), up to `most`: the same floats, several times as fast. Returns how many; the next
- * json_next_element goes on behind them. */
+/* Reads numbers of an array as long as they follow each other and are written plainly (not negative, 18
+ * digits and an exponent of two at most), up to `most`. The floats are the same, several times as fast.
+ * Returns how many; the next json_next_element goes on behind them. */
 size_t json_read_plain_floats(json_reader *r, float *values, size_t most);
 
 bool json_read_boolean(json_reader *r, bool *value);

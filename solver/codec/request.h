@@ -77,7 +77,7 @@ void radiosity_request_free(radiosity_request *request);
 /* All three return false with *why filled; request must be freed either way.
  * text[length] must be NUL. 400: not JSON, or not NPY; 422: what the contract lists.
  * E then holds every vector, but for a linear reduction of sparse vectors, which stay spots, so that reading
- * it costs no more than the text is long. With any other reduction, select names the elements of its groups.
+ * it costs no more than the text is long. For any other reduction, select names the elements of its groups.
  */
 bool codec_read_json(const codec_scene *scene, const char *text, size_t length, radiosity_request *request,
                      problem *why);

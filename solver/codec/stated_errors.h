@@ -6,7 +6,7 @@
 #include "solver/codec/answer_error.h"
 #include "store/store.h"
 
-/* Of the scene's own lights, else of single elements, against the independent sample. */
+/* The error for the scene's own lights, else for single elements, against the independent sample. */
 typedef struct stated_error {
     bool known;
     double relative, indirect;

@@ -37,7 +37,7 @@ typedef struct sky_tiling {
     float sign[3]; /* likewise */
 } sky_tiling;
 
-/* By name; the first tile of every band is centred on north.
+/* Finds the tiles by name; the first tile of every band is centred on north.
  *   tregenza      145 tiles: bands of 12 degrees with 30, 30, 24, 24, 18, 12, 6 tiles, and a cap of radius 6
  *                 (Tregenza 1987)
  *   reinhart:MF   144 MF^2 + 1: each of those bands becomes MF bands of MF times as many tiles; all bands are

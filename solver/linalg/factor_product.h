@@ -12,7 +12,7 @@ typedef struct factor_product {
     const void *context;
 } factor_product;
 
-/* Of rows, which must outlive it. */
+/* Makes a product with rows, which must outlive it. */
 factor_product factor_product_of_rows(const csr *rows);
 
 #endif

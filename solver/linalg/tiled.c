@@ -339,8 +339,8 @@ CPU_AVX512_TARGET static void group_avx512(const tiled_rows *t, size_t g, const 
 }
 #endif
 
-/* Of a group of rows and the columns times their steps: one vector x; WIDTH vectors, side is
- * [n + COLUMNS_PAST][WIDTH], of which m are written to Y; the transposed rows times x added to y. */
+/* Each multiplies a group of rows with the columns times their steps: one vector x; WIDTH vectors, where side
+ * is [n + COLUMNS_PAST][WIDTH], of which m are written to Y; or the transposed rows with x, added to y. */
 typedef struct kernels {
     void (*one)(const tiled_rows *t, size_t g, const float *x, float *y);
     void (*wide)(const tiled_rows *t, size_t g, size_t m, const float *side, float *Y);

@@ -203,7 +203,7 @@ void texture_affine(size_t corners, const double (*p)[3], const double *value, s
     double e[3][3], slope[3];
     for (int k = 0; k < 3; k++)
         for (size_t i = 1; i < corners; i++) e[i - 1][k] = p[i][k] - p[0][k];
-    /* Of a quad, the triangle of the first, second and last corner. */
+    /* A quad counts as the triangle of its first, second and last corner. */
     gradient(e[0], e[corners - 2], value[stride] - value[0], value[(corners - 1) * stride] - value[0], slope);
     for (int k = 0; k < 4; k++) {
         out[k] = (float)(k < 3 ? slope[k] : value[0]);

@@ -166,8 +166,8 @@ typedef struct judgement {
     bool known;    /* the store states all of them */
 } judgement;
 
-/* The largest error that a store states for any emission, or for one light alone; negative: none. Of dark
- * emissions the relative one, else the indirect one. */
+/* The largest error that a store states for any emission, or for one light alone; negative: none. It is the
+ * relative error for dark emissions, else the indirect one. */
 static double stated_error(const error_report *stated, bool dark, bool alone) {
     const error_group *const groups[] = {&stated->random, &stated->lights, &stated->single};
     double most = -1;

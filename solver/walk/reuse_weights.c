@@ -10,7 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of maps; PART_LEAST: cells along the side of the map of a part, below which fewer parts are better. */
+/* These bound maps; PART_LEAST: cells along the side of the map of a part, below which fewer parts are
+ * better. */
 enum { SIDE_MOST = 1 << 14, SPLIT_MOST = 4, PART_LEAST = 32 };
 
 /* The largest diagonal of a part of a light, times the radius of the scene. */

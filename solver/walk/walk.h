@@ -80,9 +80,9 @@ lam_status walk_gather(const walk_scene *s, const walk_problem *problem, walk_es
 lam_status walk_shoot(const walk_scene *s, const walk_problem *problem, walk_estimates *out,
                       lam_error *error);
 
-/* By how many standard errors a value is above estimate k of mean. The standard error is never less than one
- * visit. An estimate of few visits does not know its own error: there it is at least that of visits whose
- * mean is the value. value_error, the error of the value itself, counts too. */
+/* The number of standard errors by which a value is above estimate k of mean. The standard error is never
+ * less than one visit. An estimate of few visits does not know its own error: there it is at least that of
+ * visits whose mean is the value. value_error, the error of the value itself, counts too. */
 double walk_score(const walk_estimates *e, size_t k, double value, double value_error);
 
 /* The chance that the largest |score| of so many comparisons, each with Student's distribution of

@@ -15,7 +15,7 @@
 #define CHUNK_HEAD 8u
 static const uint32_t magic = 0x46546C67, version = 2, chunk_json = 0x4E4F534A, chunk_binary = 0x004E4942;
 
-/* Of the specification: component types, and targets of views. */
+/* The component types and the targets of views are those of the specification. */
 enum { TYPE_FLOAT = 5126, TYPE_U32 = 5125, TARGET_VERTICES = 34962, TARGET_INDICES = 34963 };
 
 /* The views of the binary chunk, in this order; each group has one accessor in each. With light there is a

@@ -27,7 +27,7 @@ size_t gltf_bytes_most(const gltf_sizes *sizes) {
 }
 
 size_t gltf_work_bytes(const gltf_sizes *sizes) {
-    /* Of a vertex: its position, three numbers, and up to four places of a hash table. */
+    /* A vertex takes its position, three numbers, and up to four places of a hash table. */
     const size_t vertex = 3 * sizeof(float) + 7 * sizeof(uint32_t),
                  element = 4 * (3 * sizeof(float) + sizeof(uint32_t));
     return sum_of_products(6, (const size_t[][2]){{sizes->n, element},

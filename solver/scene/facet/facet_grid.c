@@ -11,8 +11,8 @@
 #define CELL_FILLED 0x80000000u
 #define CELL_EMPTY 0xFFFFFFFFu
 
-/* In cells: a smaller overlap counts as none, a smaller gap as filled. Larger than the rounding of
- * coordinates. */
+/* The margin, in cells: a smaller overlap counts as none, a smaller gap as filled. It is larger than the
+ * rounding of coordinates. */
 static const double margin = 1e-5;
 
 /* The most cells per element, and the most cells of a facet beside these. */
@@ -192,7 +192,8 @@ typedef struct overlap {
     float depth; /* of the cell in the element, at its best corner */
 } overlap;
 
-/* By cells; in a cell the element that has most of it comes first, where nearly all searches end. */
+/* Orders overlaps by cells; in a cell the element that has most of it comes first, where nearly all searches
+ * end. */
 static int overlap_order(const void *a, const void *b) {
     const overlap *p = a, *q = b;
     if (p->cell != q->cell) return p->cell < q->cell ? -1 : 1;

@@ -34,7 +34,7 @@ typedef struct joining {
     size_t n_edges, n_parts;
 } joining;
 
-/* Of edges with one low place. */
+/* Orders edges that have one low place. */
 static int edge_order(const void *a, const void *b) {
     const edge *p = a, *q = b;
     if (p->high != q->high) return p->high < q->high ? -1 : 1;

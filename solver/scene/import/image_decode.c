@@ -39,7 +39,7 @@ static bool decode_png(const unsigned char *bytes, size_t length, texture_image 
     bool done = false;
     if (png_image_begin_read_from_memory(&png, bytes, length) == 0) return say(why, "libpng", png.message);
     png.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;
-    /* With alpha: without it the library would lay the image on a background. */
+    /* The format has alpha: without it the library would lay the image on a background. */
     png.format = PNG_FORMAT_RGBA;
     if (!reserve(png.width, png.height, out, why)) goto done;
     rgba = memory_allocate(out->width * out->height, sizeof *rgba, "image", &error);
