@@ -50,7 +50,7 @@ static float *copy(const float *x, size_t count) {
     return y;
 }
 
-/* By a builder's functions alone, under rho. U and V are rows by position. */
+/* Makes an operator by a builder's functions alone, under rho. U and V are rows by position. */
 static lam_operator *build(const factors_of_test *f, bool two_mesh, const float *U, const float *V,
                            const float *rho) {
     lam_operator *op = NULL;

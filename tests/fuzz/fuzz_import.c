@@ -13,7 +13,7 @@ typedef struct sent {
 } sent;
 static sent to_send;
 
-/* In the child, whose only descriptor besides the standard ones is the pipe, at 3. */
+/* This runs in the child, whose only descriptor besides the standard ones is the pipe, at 3. */
 static lam_status send_it(const char *path, imported_faces *s, lam_error *error) {
     (void)path;
     (void)s;

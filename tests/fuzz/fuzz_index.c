@@ -3,7 +3,7 @@
 #include "fuzz/fuzz.h"
 #include "store/store_private.h"
 
-/* Of the file that the seeds are about. */
+/* The name and the size of the file that the seeds are about. */
 #define NAME "store.h5"
 static const uint64_t file_size = (uint64_t)1 << 20;
 

@@ -30,7 +30,7 @@ static size_t replay(const char *path) {
     uint8_t *data = malloc(size + 1);
     FUZZ_CHECK(file != NULL && data != NULL && fread(data, 1, size, file) == size);
     fclose(file);
-    /* Of a size of its own, so that reading past its end is seen. */
+    /* The copy has a size of its own, so that reading past its end is seen. */
     uint8_t *exact = malloc(size > 0 ? size : 1);
     FUZZ_CHECK(exact != NULL);
     memcpy(exact, data, size);

@@ -38,7 +38,7 @@ typedef struct gltf_primitive {
     const json_t *material, *extras, *attributes;
 } gltf_primitive;
 
-/* With its bounds checked. */
+/* Reads a primitive and checks its bounds. */
 gltf_primitive gltf_primitive_of(const gltf_file *l, size_t node);
 
 #endif

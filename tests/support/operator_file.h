@@ -7,7 +7,7 @@
 #include "support/suite.h"
 #include "support/transport.h"
 
-/* Of the test that runs: its folder, the file in it. */
+/* The folder of the test that runs, and the path of the file in it. */
 extern char operator_file_folder[64], operator_file_path[256];
 
 void operator_file_setup(void);

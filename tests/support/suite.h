@@ -13,7 +13,7 @@
     ((condition) ? (void)0                                                                                   \
                  : _ck_assert_failed(__FILE__, __LINE__, "Assertion '" #condition "' failed", __VA_ARGS__))
 
-/* Of a call that sets the test's own `error`. */
+/* Asserts success of a call that sets the test's own `error`. */
 #define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
 
 /* The files of a room are one program (program.h), for which the build names the main() of each test_NAME. */

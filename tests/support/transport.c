@@ -197,7 +197,7 @@ static void round_to(panel_precision precision, size_t n, size_t k, float *x) {
     panel_free(&narrow);
 }
 
-/* In place of P = rho' F M, which Y and V no longer are once they are rounded: P = -Y V^T. */
+/* P = -Y V^T takes the place of P = rho' F M, which Y and V no longer are once they are rounded. */
 static void product_of_factors(transport *t, const float *Y, const float *V) {
     const size_t n = t->n, k = t->k;
     for (size_t i = 0; i < n; i++)
@@ -211,8 +211,8 @@ static void product_of_factors(transport *t, const float *Y, const float *V) {
         }
 }
 
-/* Of two meshes: U with row sums up to .95, V with one weight a row, of a patch that is one run of positions;
- * patches of 1 element and of many, weights that sum to 1 or (unweighted) are 1. I is [k+1]. */
+/* Makes factors of two meshes: U has row sums up to .95, V has one weight a row, of a patch that is one run
+ * of positions; patches have 1 element or many, and weights sum to 1 or (unweighted) are 1. I is [k+1]. */
 static void random_two_mesh(size_t n, size_t k, const uint32_t *order, bool weighted, float *U, float *V,
                             uint64_t *begin, uint64_t *state) {
     for (size_t p = 1; p <= k; p++) begin[p] = p + (n - k) * p * p * p / (k * k * k);

@@ -85,8 +85,8 @@ typedef struct transport_parts {
 /* Area of an element: that of the store's mesh where a kind asks for it. Roots are exact. */
 double transport_area(size_t element);
 
-/* In place of an operator made for its reflectances, one that was made for others and relit. The cores of
- * both are in double until they are rounded once: nothing is added to the roundings. */
+/* Puts an operator that was made for other reflectances and relit in place of one made for its own. The cores
+ * of both are in double until they are rounded once: nothing is added to the roundings. */
 void relight(transport *t, const transport_parts *parts);
 
 /* An operator of a kind with its truth; ordered: its rows are in a random order inside. */

@@ -30,7 +30,7 @@ enum { SINGLES = 24, SINGLES_QUICK = 4, RANDOMS = 4 };
  */
 enum { PAIRS_MOST = 24000, PLANES_MOST = 4096 };
 
-/* Of reference solutions, which are far more exact than form factors. */
+/* The tolerance of reference solutions, which are far more exact than form factors. */
 static const double tolerance = 1e-7;
 
 static const table_column plane_columns[] = {

@@ -145,7 +145,7 @@ done:
     return status;
 }
 
-/* By the finer mesh: sums over its elements j of each element i, of A (x - truth)^2. */
+/* Compares by the finer mesh: it sums A (x - truth)^2 over its elements j of each element i. */
 static void compare_finer(const mesh *m, const double *x, const mesh *finer, const double *fine,
                           mesh_errors *out) {
     double means = 0, constant = 0, all = 0;

@@ -13,7 +13,8 @@ typedef struct stability_problem {
     float *reflectance;
     csr F;
     uint32_t *order;
-    /* Of a mesh; NULL where the problem is a matrix alone, which methods on clusters are not tried on. */
+    /* These are of a mesh; NULL where the problem is a matrix alone, which methods on clusters are not tried
+     * on. */
     double (*centre)[3];
     float (*normal)[3];
     uint32_t *surface;

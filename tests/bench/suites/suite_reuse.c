@@ -43,8 +43,8 @@ static double largest_of(const double x[REUSE_POSITIONS]) {
 static void add_row(int experiment, const mesh *m, size_t paths, int way, const reuse_verdict v[WAYS],
                     table *out) {
     const reuse_verdict *own = &v[0], *of = &v[way];
-    /* By the paper's count of rays: l of a path, and 29 for visibility, of which those that find nothing in
-     * the way are 1/1.3 of the others. */
+    /* The paper counts l rays of a path, and 29 for visibility, of which those that find nothing in the way
+     * are 1/1.3 of the others. */
     const double law = ways[way] == REUSE_EXACT ? 1 / (1 + (REUSE_POSITIONS - 1) / (1.3 * of->rays)) : NAN;
     table_number(out, experiment + 1);
     table_number(out, (double)m->n);

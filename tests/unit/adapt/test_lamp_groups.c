@@ -47,7 +47,8 @@ START_TEST(what_lights_a_place_has_the_samples) {
                  below = share_of(&l, &shares, BELOW);
     printf("seen %.3f, hidden %.3f, below %.3f\n", seen, hidden, below);
     ck_assert_double_eq_tol(seen + hidden + below, 1, 1e-12);
-    /* by power alone .04, .77 and .19; of the hidden one's at most a tenth stays, and a ninth of the rest */
+    /* Power alone gives .04, .77 and .19; of the hidden one's at most a tenth stays, and a ninth of the
+     * rest. */
     ck_assert_double_gt(seen, .5);
     ck_assert_double_lt(hidden, .4);
     ck_assert_double_lt(below, .1 * 5 / 26 + 1e-9);

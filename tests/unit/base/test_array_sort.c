@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of an odd size, with few different keys; the number tells equal keys apart. */
+/* Items have an odd size and few different keys; the number tells equal keys apart. */
 typedef struct item {
     uint16_t key, number[2];
 } item;

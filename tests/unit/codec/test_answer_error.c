@@ -79,8 +79,8 @@ static double law_over(double D, double tiles, double evenly, double rho2) {
     return .25 * D + (tiles * tiles * sky_S + evenly * evenly * sky_P2) / rho2;
 }
 
-/* Of light that is reflected alone, whose bounced light is not off: that without D, or the law of an emission
- * of all elements, whose number is (sum A)^2 / sum A^2 = 49 / 21, where that is less. */
+/* The law of light that is reflected alone, whose bounced light is not off, is that without D, or that of an
+ * emission of all elements, whose number is (sum A)^2 / sum A^2 = 49 / 21, where that is less. */
 static double law_of_sent(double tiles, double evenly, double a, double b, double c) {
     return fmin(law_over(0, tiles, evenly, 1), law(sky_P2, 49. / 21, a, b, c));
 }
@@ -187,7 +187,7 @@ START_TEST(names_have_errors_of_their_means) {
     const double all = (3 * mean0 + 4 * law(P2, number, .01, .005, .002) / lamp_rho2) / 7;
     const double a0 = (3 * r0 + 4 * .125 / rho0) / 7, a1 = (3 * r1 + 4 * .25 / rho1) / 7;
     ck_assert_double_eq_tol(found[1].mean, sqrt(all / (a0 * a0 + a1 * a1 - all)), 1e-5);
-    /* By means alone; in a group that has one reflectance. */
+    /* The means alone give the same, in a group that has one reflectance. */
     double value[C] = {0}, emission[C] = {0};
     const double direct[C] = {0};
     for (size_t k = 0; k < C * 2; k++) {
@@ -340,7 +340,7 @@ START_TEST(faces_that_count_twice_are_off_by_their_light) {
         ck_assert_double_eq_tol(means_found[name].mean, sqrt(e2 / (mean2 - e2)), 1e-5);
         ck_assert_double_gt(means_found[name].elements, means_before[name].elements);
     }
-    /* By means alone. */
+    /* The means alone give the same. */
     const double none[C] = {0};
     const name_means means = {
         .quantity = LAM_INDIRECT, .size = of.size, .value = r0, .emission = none, .direct = none};

@@ -47,7 +47,8 @@ START_TEST(parameters) {
     ck_assert_double_eq(p.clearness, 1);
     ck_assert_int_eq(p.bin, 0);
     ck_assert_double_eq_tol(p.brightness, 200 * 1.9928 / 1367, 1e-5);
-    /* By hand from table 1, with z = pi/3 and Delta = .29156: eq. 6, and 7 and 8 for c and d. */
+    /* These are found by hand from table 1, with z = pi/3 and Delta = .29156: eq. 6, and 7 and 8 for c and
+     * d. */
     const double z = M_PI / 3, D = p.brightness;
     ck_assert_double_eq_tol(p.a, .5657, 1e-4);
     ck_assert_double_eq_tol(p.b, -.4326, 1e-4);
@@ -314,7 +315,8 @@ START_TEST(year) {
         for (size_t t = 0; t < 145; t++) ck_assert(fabs(whole[t] - (double)L[i][t]) <= 1e-6 * whole[t]);
         ck_assert(i != 3 || (flat[i][0] == 0 && suns[i].direction[1] < 0 && suns[i].direction[2] > .9));
     }
-    /* In light: every hour by between 60 and 150 lm/W, and the tile of the sun alone where there is but sun.
+    /* The skies in light: every hour has between 60 and 150 lm/W, and the tile of the sun alone has light
+     * where there is but sun.
      */
     ck_assert_int_eq(year_skies(&w, &s, &bright, NULL, light[0], NULL, &lit, &error), LAM_OK);
     for (size_t i = 0; i < N; i++)

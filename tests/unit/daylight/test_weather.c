@@ -94,7 +94,8 @@ START_TEST(epw) {
     ck_assert_double_eq(w.hours[1].diffuse, 210);
     ck_assert(isnan(w.hours[1].dew_point));
     weather_free(&w);
-    /* With a mark of UTF-8 and the ends of lines of another system; a row need not go on after the two. */
+    /* This file has a mark of UTF-8 and the ends of lines of another system; a row need not go on after the
+     * two. */
     w = must_read(".Epw", "\xEF\xBB\xBF" EPW_NO_PERIOD EPW_ROW("2000,2,29,24", "1") "1,2\r\n");
     ck_assert_uint_eq(w.n, 1);
     ck_assert_double_eq(w.hours[0].hour, 23.5);

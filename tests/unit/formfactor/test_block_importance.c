@@ -17,7 +17,7 @@ enum { ELEMENTS = 1800 };
 #else
 enum { ELEMENTS = 3000 };
 #endif
-/* Of the corner of the floor that is read, of a box of 1 m. */
+/* The side of the corner of the floor that is read, of a box of 1 m. */
 static const double side = .3;
 
 /* A box with two blocks, of which a corner of the floor is read: the blocks hide a part of all else from it.

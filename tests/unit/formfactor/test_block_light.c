@@ -57,7 +57,7 @@ static void find_truth(lit *s) {
     }
 }
 
-/* Of blocks beside which 16 segments are taken. */
+/* The bound of blocks beside which 16 segments are taken. */
 static const double bound_of_16 = 1.2e-4;
 
 static void find_light(lit *s, double beside, uint64_t seed) {

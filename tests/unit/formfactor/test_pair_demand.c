@@ -80,8 +80,8 @@ END_TEST
 
 /* Plates far apart, between which a screen leaves a fiftieth of the light: their factor is so small that
  * eight segments suffice, most of which see nothing. The screen is of too many strips to be projected, each
- * behind the edge of the next. Of points x, y of both plates the middle of the segment passes beside the last
- * strip where (x + y) / 2 > 1 - h: a share 2 h^2 of all. */
+ * behind the edge of the next. The middle of the segment between points x, y of both plates passes beside the
+ * last strip where (x + y) / 2 > 1 - h, for a share 2 h^2 of all. */
 START_TEST(light_past_a_screen_is_found) {
     enum { SEEDS = 64, STRIPS = UNCUT_OCCLUDERS_MOST + 2 };
     static const double h = .1, apart = 30;

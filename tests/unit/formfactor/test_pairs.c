@@ -104,8 +104,8 @@ START_TEST(touching_elements_are_right) {
 }
 END_TEST
 
-/* Two plates of many elements and an occluder between. With shared, cells of a plate share their corners,
- * which is what makes them neighbours. */
+/* Two plates of many elements and an occluder between. If shared is set, cells of a plate share their
+ * corners, which is what makes them neighbours. */
 static mesh divided_plates(bool shared) {
     enum { DIVISIONS = 6 };
     const double w = 1. / DIVISIONS;

@@ -14,7 +14,7 @@ static mesh scene_of(const char *kind, size_t n) {
 
 static const recipe all_pairs = {.source = &source_pairs, .rays = 16, .accuracy = 7e-5, .seed = 1};
 
-/* Of all pairs at normal quality; occluders: 0 where neither projection nor lists are allowed. */
+/* Samples all pairs at normal quality; occluders: 0 where neither projection nor lists are allowed. */
 static pairs_work sample(const mesh *m, bool occluders, int n_threads, pairs_trial *trial) {
     lam_error error = {.message = ""};
     pairs_options options = pairs_options_of(&all_pairs, m->n, 0);

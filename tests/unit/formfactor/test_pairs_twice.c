@@ -40,8 +40,8 @@ static double *dense_of(const csr *G) {
     return out;
 }
 
-/* Of some seeds: squares of the error of the first reference, of the noise beside it, of the mean of both
- * over the seeds, and the pairs that noise was found for. */
+/* Sums over some seeds: squares of the error of the first reference, of the noise beside it, of the mean of
+ * both over the seeds, and the pairs that noise was found for. */
 typedef struct squares {
     double error, noise, bias, alone; /* alone: of errors of one sample */
     size_t disturbed, pairs;

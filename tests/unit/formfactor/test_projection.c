@@ -46,7 +46,8 @@ static void add_random_occluder(mesh *m, uint64_t *state) {
     if (unit(state) < .4) m->elements[m->n - 1][3] = MESH_NO_VERTEX;
 }
 
-/* Brute force: does the segment cross the occluder? By the signs of volumes of tetrahedra, not by planes. */
+/* Brute force: does the segment cross the occluder? The signs of volumes of tetrahedra tell it, not
+ * planes. */
 static double volume(const double a[3], const double b[3], const double c[3], const double d[3]) {
     double u[3], v[3], w[3];
     for (int k = 0; k < 3; k++) u[k] = b[k] - a[k], v[k] = c[k] - a[k], w[k] = d[k] - a[k];

@@ -36,7 +36,7 @@ typedef struct subject {
     row_stream stream;
 } subject;
 
-/* In place: the rows know where the mesh is. */
+/* Makes the subject in place, as the rows know where the mesh is. */
 static void subject_make(int which, size_t elements, const char *sky, subject *to) {
     const bool open = which == OPEN || which == OPEN_NEAR, near = which == CLOSED_NEAR || which == OPEN_NEAR;
     const generate_options how = {.kind = open ? "city" : "cornell",

@@ -91,9 +91,9 @@ static bool grazes(const occluders *all, const polygon *a, const double x[3], co
     return false;
 }
 
-/* Of pairs of leaves, each with its own list, the verdicts of eight segments. The search of the whole scene
- * lifts both ends by two roundings, and each of it, the lists and their margin is off by another: segments
- * that nothing grazes within eight are blocked by both or by neither. */
+/* Compares the verdicts of eight segments, for pairs of leaves, each with its own list. The search of the
+ * whole scene lifts both ends by two roundings, and each of it, the lists and their margin is off by another:
+ * segments that nothing grazes within eight are blocked by both or by neither. */
 START_TEST(lists_block_what_the_scene_blocks) {
     enum { PAIRS = 20000 };
     setting s;

@@ -42,7 +42,7 @@ static sun_rays *make(const mesh *m, size_t n_points, size_t n_wanted, const uin
     return s;
 }
 
-/* Of unit square i the part that lies from low to high along one axis. */
+/* The part of unit square i that lies from low to high along one axis. */
 static double overlap(double low, double high, double i) {
     return fmax(0, fmin(high, i + 1) - fmax(low, i));
 }

@@ -190,8 +190,8 @@ static double integral_of(const polygon *a, const polygon *b, const line_pair *p
     return sum;
 }
 
-/* Of squares that touch, of those a hundredth or a room apart, and of those seen from far away, where the
- * kernel is that of the middle; near the change from the one form to the other, too. */
+/* The squares touch, are a hundredth or a room apart, or are seen from far away, where the kernel is that of
+ * the middle; some are near the change from the one form to the other. */
 START_TEST(integrals_of_lines_are_exact) {
     static const double distance[] = {0, .01, 1, 30, 900, 1100, 1e5};
     uint64_t seed = 11;

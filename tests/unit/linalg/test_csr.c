@@ -36,7 +36,7 @@ static csr random_rows(size_t n) {
     return a;
 }
 
-/* In every instruction set and width: right, and a vector's bits its own. */
+/* The products are right in every instruction set and width, and a vector's bits are its own. */
 START_TEST(products_of_floats_side_by_side) {
     enum { N = 83 };
     static const size_t widths[] = {1, 8, 16, 32};

@@ -12,7 +12,7 @@
 
 static uint64_t random_state;
 
-/* In (-1, 1), never 0. */
+/* A number in (-1, 1), never 0. */
 static float random_float(void) {
     return (float)((double)(random_lcg(&random_state) >> 40) + 0.5) / 8388608.0f - 1.0f;
 }

@@ -155,7 +155,7 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     for (size_t i = 0; i < N; i++) Y[i] = NAN;
     tiled_multiply_rows(&t, 40, rows, X, Y, work);
     for (size_t k = 0; k < 40; k++) ck_assert_float_eq(Y[rows[k]], one[rows[k]]);
-    /* By columns: of all vectors, one has many and the others few. */
+    /* The products by columns: one of the vectors has many of them and the others few. */
     for (size_t k = 0; k < VECTORS * N; k++)
         if (k >= N && k % N % 97 != k / N) X[k] = 0;
     ck_assert(!tiled_few_columns(&t, X) && tiled_few_columns(&t, X + N));

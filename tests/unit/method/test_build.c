@@ -408,7 +408,7 @@ START_TEST(bad_options_are_refused) {
 END_TEST
 
 /* Black elements, among them a whole wall, and nearly black and bright ones: all columns of the operator
- * against sums of bounces in double. With form factors that lack reciprocity, too. */
+ * against sums of bounces in double. The second case has form factors that lack reciprocity. */
 START_TEST(exact_with_black_elements) {
     enum { DIVISIONS = 4, N = 6 * DIVISIONS * DIVISIONS, BOUNCES = 400 };
     fixture f = fixture_box(room, DIVISIONS, .5f);

@@ -53,9 +53,10 @@ START_TEST(coherence_is_one_where_all_see_the_same) {
 }
 END_TEST
 
-/* By hand: one half of the area sees only group 0, the other only group 1: the mean (.5, .5) keeps half of
- * the squares. Of two that see the same way but twice as much, (1, 2): mean 1.5, 2.25 of 2.5. By area 3 : 1:
- * mean 1.25, 1.5625 of 1.75. All in double from short binary fractions: some roundings of 1e-16. */
+/* The figures are found by hand. One half of the area sees only group 0, the other only group 1: the mean
+ * (.5, .5) keeps half of the squares. Two that see the same way but one twice as much, (1, 2), have the mean
+ * 1.5, which keeps 2.25 of 2.5; areas 3 : 1 have the mean 1.25, which keeps 1.5625 of 1.75. All is in double
+ * from short binary fractions: some roundings of 1e-16. */
 START_TEST(coherence_of_unlike_views) {
     const double apart[2][2] = {{1, 0}, {0, 1}}, twice[2][2] = {{1, 0}, {2, 0}};
     const double even[2] = {1, 1}, uneven[2] = {3, 1};
@@ -93,9 +94,9 @@ START_TEST(a_sphere_is_one_patch) {
 END_TEST
 
 /* With no more elements than groups, each is its own: coherence is then the share of the squares of S's
- * columns, S = A^1/2 F A^-1/2, that their projection on a patch keeps: S W W^T, W_jp = (A_j / A_p)^1/2. In
- * double from the same F, but for views in single precision: 1e-6 of the squares. Patches of one face and
- * patches of several, whose areas differ. */
+ * columns, S = A^1/2 F A^-1/2, that their projection on a patch keeps: S W W^T, W_jp = (A_j / A_p)^1/2. All
+ * is in double from the same F, but for views in single precision: 1e-6 of the squares. Patches of one face
+ * and patches of several, whose areas differ. */
 START_TEST(coherence_is_what_a_patch_keeps_of_S) {
     room r = room_create(hall, 3, .5f, 1);
     const size_t n = r.m.n;
@@ -139,7 +140,8 @@ START_TEST(patches_are_as_many_as_asked_for) {
 }
 END_TEST
 
-/* Of everything: sees both ways along each axis. Of the six directions, where surfaces are too many. */
+/* A patch of everything sees both ways along each axis. Patches begin as the six directions where surfaces
+ * are too many. */
 START_TEST(too_many_surfaces_begin_as_directions) {
     room r = room_create(hall, 4, .5f, 1);
     for (size_t i = 0; i < r.m.n; i++) r.surface[i] = (uint32_t)i;

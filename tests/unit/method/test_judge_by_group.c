@@ -64,7 +64,7 @@ START_TEST(a_single_element_counts_by_its_power) {
 }
 END_TEST
 
-/* Of two groups: figures that are not known do not count, nor do the largest of single probes. */
+/* There are two groups: figures that are not known do not count, nor do the largest of single probes. */
 START_TEST(the_worst_group) {
     double uniform[] = {.1, NAN}, near[] = {NAN, .3}, far[] = {.2, NAN}, one[] = {9, 9}, own[] = {NAN, .1};
     group_errors e = {.n_groups = GROUPS, .n_rows = 1};

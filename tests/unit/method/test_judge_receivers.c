@@ -37,7 +37,7 @@ static figure_probe probe_of(const build_problem *problem, const probe_numbers *
                           .other_share = .5};
 }
 
-/* Of all probes, with the noise taken out where it is small, else within a bound. */
+/* Checks the sums of all probes, with the noise taken out where it is small, else within a bound. */
 static void check(reference_relation relation, double off, double noise, bool bound) {
     const build_problem problem = {.n = N, .n_channels = C, .area = area, .reflectance = rho};
     receiver_sums total = {.b = 0}, own = {.b = 0};

@@ -272,8 +272,8 @@ END_TEST
 
 /* Element 1 is the larger one, and none of its own rays met tile 2, or none but those of the ground, or five
  * more than these. Rays that are aimed there find .02 and .04 sr: the distance from .03 sr is the error of
- * its group, and that of the power A rho times as much. Of the other tiles direct^2 times what is seen
- * counts. */
+ * its group, and that of the power A rho times as much. The other tiles count by direct^2 times what is
+ * seen. */
 static lam_status missed_light(void *context, int sample, size_t count, const size_t *elements,
                                const size_t *tiles, float *first, lam_error *error) {
     size_t *asked = context;

@@ -35,7 +35,7 @@ static csr with_wrong_block(const csr *F, size_t n, double share) {
     return out;
 }
 
-/* Of a wall that is a sixth of the area, a block of a fifth of its light that is off by half. */
+/* A wall that is a sixth of the area has a block of a fifth of its light that is off by half. */
 START_TEST(wrong_block_is_noticed) {
     closed_box s = closed_box_make(unit_cube, DIVISIONS, .7f);
     build_problem problem = *closed_box_problem(&s);

@@ -194,7 +194,7 @@ static furnace furnace_make(const double size[3], unsigned divisions) {
     return f;
 }
 
-/* With these reflectances, and rows of the sum s, as exact as floats are. */
+/* The problem has these reflectances, and rows of the sum s, as exact as floats are. */
 static build_problem furnace_problem(furnace *f, const float rho[CHANNELS], double s) {
     build_problem problem = *closed_box_problem(&f->box);
     const size_t n = problem.n;
@@ -218,8 +218,9 @@ static void furnace_free(furnace *f) {
 
 static const double epsilons[] = {.05, .1, .2, .4, .8};
 
-/* By pairs and by blocks, at every epsilon. Row sums are rounded by 3e-8, of which 1 / (1 - rho) makes 3e-7,
- * and K_rr, E and the numbers of two transforms by 6e-8 each, up or down: less than 1e-6 together. */
+/* Checks furnaces by pairs and by blocks, at every epsilon. Row sums are rounded by 3e-8, of which 1 / (1 -
+ * rho) makes 3e-7, and K_rr, E and the numbers of two transforms by 6e-8 each, up or down: less than 1e-6
+ * together. */
 static void check_furnace(const build_problem *rows, double s) {
     build_problem others = *rows;
     plane_tree tree;

@@ -60,7 +60,8 @@ START_TEST(far_clusters_at_once) {
 }
 END_TEST
 
-/* Of some positions, from few to all but a few, the cells that hold them, in order and no others. */
+/* Checks for some positions, from few to all but a few, that the cells that hold them are found, in order and
+ * no others. */
 static void cells_of_some(const wavelet_reach *r, size_t leaf, const uint32_t *cells, size_t count) {
     const wavelets *w = r->basis;
     uint32_t *lit = test_allocate(w->n, sizeof *lit), *found = test_allocate(r->n_leaves, sizeof *found);

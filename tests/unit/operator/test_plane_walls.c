@@ -200,7 +200,7 @@ START_TEST(what_does_not_stand_on_the_floor_parts_nothing) {
         free(y);
     }
     yard *y = yard_make();
-    /* Of one plane, behind the floor here and in front of it elsewhere. */
+    /* The walls have one plane, and lie behind the floor here and in front of it elsewhere. */
     add_wall(y, (double[2]){3, 0}, (double[2]){3, 8}, 1, -2, 0);
     add_wall(y, (double[2]){3, 20}, (double[2]){3, 22}, 1, 0, 2);
     ck_assert_uint_eq(count_parts(y), 1);

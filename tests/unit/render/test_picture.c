@@ -15,8 +15,8 @@ static void add_tile(mesh *m, double x, double y, double width, double height) {
 }
 
 START_TEST(test_weights) {
-    /* In a convex quad: sum to 1 and reproduce the point itself; on an edge and at a corner linear. Rounding
-     * of a few operations on numbers of size 3: 1e-12. */
+    /* The weights in a convex quad sum to 1 and reproduce the point itself; they are linear on an edge and at
+     * a corner. Rounding of a few operations on numbers of size 3: 1e-12. */
     const double quad[4][3] = {{0, 0, 1}, {3, 0, 1}, {2, 2, 1}, {0, 1, 1}}, up[3] = {0, 0, 1};
     const double points[][3] = {{.5, .5, 1},   {1, .9, 1},    {0, 0, 1},    {3, 0, 1},
                                 {1.5, 0, 1},   {0, .3, 1},    {2.5, 1, 1},  {1, 1.5, 1},

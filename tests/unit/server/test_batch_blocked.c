@@ -75,7 +75,7 @@ static void stop(record *r) {
     batch_destroy(r->queue);
 }
 
-/* Of long jobs, which the thread for short ones leaves, in one line of a client. */
+/* The jobs are long, so that the thread for short ones leaves them, and stand in one line of a client. */
 static void submit(record *r, job *j, size_t id, uint64_t client) {
     j->record = r;
     j->id = id;

@@ -98,7 +98,7 @@ START_TEST(gradients_are_differences) {
                 ck_assert_double_eq_tol((double)by_rho[i], difference(&p, quantity, &p.rho[i]), 1e-5);
                 ck_assert_double_eq_tol((double)by_H0[i], difference(&p, quantity, &p.H0[i]), 1e-5);
             }
-            /* In place. */
+            /* The result may take the place of an argument. */
             gradient_of_reflectance(quantity, N, g_f, w_f, H_f, sky ? H0_f : NULL, H_f);
             ck_assert_mem_eq(H_f, by_rho, sizeof by_rho);
             gradient_of_sky_irradiance(quantity, N, rho_f, g_f, w_f, g_f);

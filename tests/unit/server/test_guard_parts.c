@@ -65,7 +65,8 @@ static void expect_count(connections *all, const char *line) {
     buffer_free(&b);
 }
 
-/* In the order in which the last is cut; those that are never cut are looked at when all others are. */
+/* The test waits for connections in the order in which they are cut; those that are never cut are looked at
+ * when all others are. */
 START_TEST(each_stage_has_its_time) {
     connections *all = start(100, 1, 1 << 10);
     pair head = open_pair(all, 0), body = open_pair(all, 0), solve = open_pair(all, 0),

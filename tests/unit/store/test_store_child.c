@@ -254,7 +254,7 @@ START_TEST(closed_streams_do_no_harm) {
 }
 END_TEST
 
-/* In the child: another file takes the place of this one, in the middle of opening. */
+/* The child lets another file take the place of this one, in the middle of opening. */
 static void replace_then_send(void *context) {
     char other[160];
     snprintf(other, sizeof other, "%s/other.h5", folder);

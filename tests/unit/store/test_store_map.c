@@ -177,8 +177,8 @@ START_TEST(a_flipped_bit_is_named) {
 }
 END_TEST
 
-/* With right checksums, in any piece: of the type of the array, since the bits of another may mean anything.
- */
+/* The number may be in any piece, with right checksums. It is read as the type of the array, since the bits
+ * of another may mean anything. */
 START_TEST(a_number_that_is_not_finite_is_named) {
     static const size_t places[] = {0, ((size_t)1 << 18) + 5, LARGE - 1};
     static const float values[] = {INFINITY, -INFINITY, NAN};

@@ -267,7 +267,7 @@ START_TEST(test_patches_that_weigh_wrong) {
     examine(&s, done);
     ck_assert_int_eq(done[OPERATOR].verdict, VERDICT_OK);
     free_sample(&s);
-    /* Of unlike area: they need weights. */
+    /* Elements of unlike area need weights. */
     sample room = make_sample();
     for (size_t i = 0; i < room.m.n_vertices; i++) room.m.vertices[i][2] *= 3;
     MUST(mesh_measure(&room.m, error));

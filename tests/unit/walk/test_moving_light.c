@@ -21,7 +21,7 @@ START_TEST(points_are_uniform) {
             sum[2] += x[0] * x[1] / (SIDE * SIDE);
             ck_assert_double_eq_tol(x[2], 1, 1e-12);
         }
-    /* By Green's theorem. */
+    /* Green's theorem gives the moments. */
     double area = 0, mx = 0, my = 0, mxy = 0;
     for (int k = 0; k < 5; k++) {
         const double *p = corners[k], *q = corners[(k + 1) % 5], c = p[0] * q[1] - q[0] * p[1];
