@@ -1,3 +1,6 @@
+/* The callbacks of libmicrohttpd are here: on_accept admits a connection, on_head checks a head (fields,
+ * route, host, token, scene, type, length), on_body holds a body in counted memory, and handle answers on the
+ * I/O thread or hands the request to the queue of solves. */
 #include "server/http/http.h"
 
 #include "server/http/browser.h"

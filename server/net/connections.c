@@ -1,3 +1,6 @@
+/* This list of connections is swept by one thread every second, and at ends that come before. Bytes that move
+ * set the deadline of a body or an answer to min(deadline + bytes / least_rate, now + timeout_s); a
+ * connection past it is shut down here, and the thread that serves it closes it. */
 #include "server/net/connections.h"
 
 #include "server/net/shares.h"

@@ -1,3 +1,6 @@
+/* The fields Forwarded (RFC 7239) and X-Forwarded-For are read as lists of hops; the last hop that is no
+ * trusted proxy is the client. Its key is SipHash-2-4 (Aumasson and Bernstein 2012), under a random seed, of
+ * the IPv4 address, of the first 64 bits of an IPv6 address, or of the name that a proxy gave. */
 #include "server/net/peer.h"
 
 #include <arpa/inet.h>

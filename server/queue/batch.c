@@ -1,3 +1,6 @@
+/* The threads of the queue are here: each asks job_order.c for a job and runs one of its functions, begin,
+ * pass, end, drop or finish, without the lock. A spare thread serves short jobs while all others are in long
+ * functions. batch_delay() forecasts pace times n_jobs seconds. */
 #include "server/queue/batch.h"
 
 #include "server/queue/job_order.h"

@@ -1,3 +1,6 @@
+/* The order of jobs is start-time fair queuing (Goyal, Vin and Cheng 1996): the first job of the least
+ * charged line goes on. A line is charged for the seconds of its jobs, for a pass by took count / (sum of
+ * counts), and an empty one begins again at max(charge, now_served). batch.h has the rules. */
 #include "server/queue/job_order.h"
 
 #include "solver/base/clock.h"

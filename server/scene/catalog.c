@@ -1,3 +1,6 @@
+/* A reload builds a new snapshot and replaces the present one under the lock; readers hold references. A
+ * scene is served if memory + computed + work areas <= --max-memory, summed over all scenes, with work areas
+ * = threads times the largest one; where it does not fit, what was computed is dropped first. */
 #include "server/scene/catalog.h"
 
 #include "server/scene/log_line.h"

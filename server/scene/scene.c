@@ -1,3 +1,6 @@
+/* A scene is opened from a store, or as a variant of another one, and is freed with its last reference.
+ * read_store() forecasts the bytes of operator, sky, mesh and errors before it reads them, and refuses more
+ * than options->memory; scene_verify() and scene_damaged() keep the health of mapped arrays. */
 #include "server/scene/scene.h"
 
 #include "server/queue/batch.h"

@@ -1,3 +1,6 @@
+/* The description of a store is one JSON object, put together from the attributes of /, /mesh, /operator,
+ * /error, /sky and /form_factors, and from groups, emitters and cameras (store/FORMAT.md;
+ * deploy/docs/api.md). A whole number is written as an integer, and one that is not finite as null. */
 #include "solver/codec/describe.h"
 
 #include "solver/base/scene_cameras.h"

@@ -1,3 +1,6 @@
+/* EPW and WEA files are read line by line, and each field is checked against its range (EnergyPlus,
+ * "EnergyPlus Weather File (EPW) Data Dictionary"; Radiance, gendaymtx(1)). The header of a WEA gives
+ * longitude = -value and time zone = -value / 15. The step and the gaps are those of weather_times.h. */
 #include "solver/daylight/weather_times.h"
 
 #include <ctype.h>

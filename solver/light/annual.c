@@ -1,3 +1,6 @@
+/* A sum over the year is n hours / 1000 times the answer to the mean vector, as answers are linear. A share
+ * is (hours with low <= x <= high) / (hours that count), the daylight autonomy or useful daylight of
+ * annual.h; with fewer tiles than hours, x_h = x_E + sum_t L_ht x_t from one answer x_t for each tile. */
 #include "solver/light/annual.h"
 
 #include "solver/light/sunlight.h"

@@ -1,3 +1,6 @@
+/* The JSON of a moving light is read, and every member is checked. Frames stand at equal lengths of the cubic
+ * of Catmull and Rom with points a, b, e, f, b + t/2 (e - a + t (2 a - 5 b + 4 e - f + t (3 (b - e) + f -
+ * a))) from b to e; quaternions between two points follow slerp (Shoemake 1985). */
 #include "solver/light/light_path.h"
 
 #include "solver/base/file_text.h"

@@ -1,3 +1,6 @@
+/* Y = D (sum_d 256^d Q_d) D X, with the steps D and the digits Q_d of tiles.h, is computed on rows of four
+ * tiles: X is scaled by D, the planes d follow from the highest by Horner's rule, and the lanes are added in
+ * one order (sum_of_lanes). tiled_kernels.inc has the loops for several vectors and for columns. */
 #include "solver/linalg/tiled.h"
 
 #include "solver/base/cpu.h"

@@ -1,3 +1,6 @@
+/* Up to 32 emissions at a time are solved by conjugate gradients, (I - R^1/2 S R^1/2) u = R^1/2 (h0 + S e)
+ * with S = A^1/2 F A^-1/2, e = A^1/2 E, h0 = A^1/2 H0; T = rho' A^-1/2 (h0 + S (e + R^1/2 u)).
+ * many_lights_jacobi() sweeps B := E' + R F B instead (Aguerre 2016, eqs. 2.5 and 4.8). */
 #include "solver/method/many_lights.h"
 
 #include "solver/linalg/csr_rows.h"

@@ -1,3 +1,6 @@
+/* Vertices at most 1e-6 (radius of the scene) apart are welded by a grid of points. Corners at one place
+ * share a node where their elements have one group and n_i . n_j > cos 20 degrees. A node inside an edge from
+ * a to b that belongs to one element alone is tied to it: its value is (1 - t) v_a + t v_b. */
 #include "solver/render/smooth_nodes.h"
 
 #include "solver/base/union_find.h"

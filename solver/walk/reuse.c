@@ -1,3 +1,6 @@
+/* Approaches B to D of Castro et al. are run here: first hits y of all positions are cast, each is weighted
+ * for every position j by Phi F(x_j, y) / sum_l N_l F(x_l, y) (eq. 2.8), and its walk deposits that light
+ * wherever it arrives. walk_reuse() gives approaches A and E to reuse_alone.c and reuse_elements.c. */
 #include "solver/walk/reuse.h"
 
 #include "solver/base/clock.h"

@@ -1,3 +1,6 @@
+/* A scene is written as binary glTF 2.0 (ISO/IEC 12113:2022): plan() lays out groups and views, the say_
+ * functions write the JSON chunk, and the put_ functions write the binary one. The emission is emissiveFactor
+ * times emissiveStrength, and COLOR_0 is light / white cut to [0, 1]. */
 #include "solver/codec/gltf/gltf.h"
 
 #include "solver/codec/gltf/corner_normals.h"

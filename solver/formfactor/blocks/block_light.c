@@ -1,3 +1,6 @@
+/* H = F E of few elements is found by a descent from each source: a smooth block adds L^T sum A E m to its
+ * cluster, near elements exchange as exact pairs, and where something stands between, the open light is
+ * multiplied by sum K E V / sum K E over segments, K = cos cos' / r^2. H is the mean of two such halves. */
 #include "solver/formfactor/blocks/block_light.h"
 
 #include "solver/base/random.h"

@@ -1,3 +1,6 @@
+/* One of two nodes is split until their light is one block (Hanrahan, Salzman and Aupperle 1991): the bound
+ * of its 2-norm, max K (A_a A_b)^1/2, times its roughness is at most `open`, and where something stands
+ * between, that bound is at most `shadow` as well. Importance scales both; two elements are not split. */
 #include "solver/formfactor/blocks/block_walk.h"
 
 #include "solver/base/array_grow.h"

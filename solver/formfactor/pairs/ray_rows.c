@@ -1,3 +1,6 @@
+/* A row of F1 is cast when it is asked for: a hit of j adds A_j / (rays (A_i + A_j)) to F1_ij, and A_i /
+ * (rays (A_i + A_j)) to the row sum of j, so that A F = A F1 + (A F1)^T. Near pairs are found once, and half
+ * of their F enters. close_rows() returns the row sums sum / (sum + outside). */
 #include "solver/formfactor/pairs/ray_rows.h"
 
 #include "solver/formfactor/leaving.h"

@@ -1,3 +1,6 @@
+/* An element chooses up to PORTAL_GROUPS groups of portals by halving, and shares 3/4 of its rays by their
+ * weights, about strength A cos cos' / (pi r^2 + A), and 1/4 evenly. portals_point() draws points by these
+ * shares, and portals_density() returns their density q(w) = sum_k share_g r^2 / (A_g cos_k). */
 #include "solver/formfactor/rays/portal_aim.h"
 
 #include "solver/base/vector3.h"

@@ -1,3 +1,6 @@
+/* Finished blocks of packed rows are appended to a scratch file, each behind a head with checksums. The next
+ * run finds them again: it cuts off a block that is not whole, and takes one whose checksum differs as
+ * missing. The head of the file names scene, version and recipe, and another run's file is refused. */
 #include "solver/formfactor/rows/row_file.h"
 #include "solver/formfactor/source.h"
 

@@ -1,3 +1,6 @@
+/* The exchange areas g_ij = (c_ij + c_ji) / rays A_i A_j / (A_i + A_j), j > i, are merged panel by panel from
+ * one-sided rows, whose entries below the diagonal are transposed first. upper_expand() replaces them by F_ij
+ * = min(g_ij / A_i, 1), and upper_gather() is its exact inverse. */
 #include "solver/formfactor/rows/upper.h"
 
 #include "solver/base/array_grow.h"

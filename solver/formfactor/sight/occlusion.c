@@ -1,3 +1,6 @@
+/* The visible share of a pair is sum K V / sum K over segments, K = cos cos' / r^2 times the areas that both
+ * ends stand for, or over lines where few occluders stand between. segments_of_pair() chooses N by the error
+ * SEGMENTS_ERROR N^-SEGMENTS_POWER, and visible_exchange() halves pieces over which K varies much. */
 #include "solver/formfactor/sight/occlusion.h"
 
 #include "solver/base/random.h"

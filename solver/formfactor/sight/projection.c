@@ -1,3 +1,6 @@
+/* The visible share V is the integral of F to what is visible over that of F, both over one element, F being
+ * Lambert's sum over edges (Lambert 1760; shadow_cut.h). They are sums over cells of 4 x 4 Gauss points, and
+ * the cell of the largest error, by its coefficients of P_2 and P_3, is split until the tolerance is kept. */
 #include "solver/formfactor/sight/projection.h"
 
 #include "solver/base/random.h"

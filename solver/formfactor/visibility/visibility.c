@@ -1,3 +1,6 @@
+/* Embree's scene is made of facets, and rays are cast in packets: origins are lifted by 2 rounding + rise
+ * along the normal, rounding = 4 2^-24 (radius of the scene), so that rays pass their own facet; the few that
+ * hit it are cast again with a filter. facet_grid.h then finds the element that was hit. */
 #include "solver/formfactor/visibility/visibility_private.h"
 
 #include <math.h>

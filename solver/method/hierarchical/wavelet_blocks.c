@@ -1,3 +1,6 @@
+/* W S W^T is made from cluster blocks, S = S1 + S1^T (Gortler et al. 1993): a block is M_a L M_b^T at the
+ * scaling functions of its nodes, columns and then rows climb the tree by (Phi_t; Psi_t) = Q_t (Phi_left;
+ * Phi_right), and a coefficient is kept above threshold weight_i weight_j. */
 #include "solver/method/hierarchical/wavelet_blocks.h"
 
 #include "solver/base/array_grow.h"

@@ -1,3 +1,6 @@
+/* K = S (I - R S)^-1 is the limit of doublings, Z_2m = Z_m R Z_m and K_2m = K_m + Z_2m + Z_m R (K_m - Z_m),
+ * on sparse rows over the weights, K_ij / (w_i w_j), so that one number is the threshold of all entries.
+ * final_upper() then keeps the entries and the tiles of K that are above theirs. */
 #include "solver/method/hierarchical/wavelet_inverse.h"
 
 #include "solver/method/hierarchical/wavelet_terms.h"

@@ -1,3 +1,6 @@
+/* W S W^T is made from rows of F in one pass up the tree (Beylkin, Coifman and Rokhlin 1991): node a forms
+ * (Phi_a S; Psi_a S) = Q_a (Phi_left S; Phi_right S), coarsens the columns by Q_b, and keeps Psi_a S Psi_b^T
+ * above threshold weight_a weight_b. wavelet_pass_kernels.inc has the inner loops. */
 #include "solver/method/hierarchical/wavelet_pass.h"
 
 #include "solver/base/bitset.h"

@@ -1,3 +1,6 @@
+/* The solution of (I - R F) x = r is found by X := X + M r, r := r - (I - R F) M r with the judged operator
+ * M, until the steps that are left, step (q + q^2 + ...), q = step / step before, sum to at most tolerance
+ * |X|. Where q > 1/2 reference_solve() takes over; where an LU is quicker, it is used from the start. */
 #include "solver/method/judge/guided_reference.h"
 
 #include "solver/operator/emitters.h"

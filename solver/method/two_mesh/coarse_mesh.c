@@ -1,3 +1,6 @@
+/* The coarse mesh of 2MSC (Fernández et al. 2011, algorithm 1) is split from a heap: the patch of the largest
+ * loss = sum_e A_e |v_e - v|^2 is halved by area, up to a number of patches, or while its coherence is below
+ * a bound: coherence = 1 - loss / sum_e A_e |v_e|^2, and v_eg = F_eg / A_g^1/2 is the view of group g. */
 #include "solver/method/two_mesh/coarse_mesh.h"
 
 #include <math.h>

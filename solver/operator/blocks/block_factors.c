@@ -1,3 +1,6 @@
+/* Blocks A_i F_ij = A_i A_j m_a(i)^T L m_b(j) are made usable (Hanrahan, Salzman and Aupperle 1991): nodes
+ * get their rectangles, m_t(i) = (1, (x - centre) over), blocks are sorted by a, then by b, and listed by b
+ * as well, and the tree is cut into the pieces that threads share. block_product.c has the products. */
 #include "solver/operator/blocks/block_factors.h"
 
 #include "solver/base/array_grow.h"

@@ -1,3 +1,6 @@
+/* The blocks A_i F_ij = A_i A_j d_i d_j m_a(i)^T L m_b(j), d the balance, and their tree are written to
+ * /form_factors and read back (store/FORMAT.md, storage = blocks); of L the numbers are stored that have a
+ * function on both sides. Each array is checked, and a block that is negative anywhere is refused. */
 #include "solver/operator/blocks/block_store.h"
 
 #include "store/groups.h"

@@ -1,3 +1,6 @@
+/* The cluster tree is built in four steps: elements are sorted into planes by normal and offset; a plane is
+ * parted at the wall of the largest (covered share of its line) sqrt(elements of the smaller side / all); the
+ * parts are halved along their longer side to leaves; planes are joined in the order of plane_order.h. */
 #include "solver/operator/blocks/plane_tree.h"
 
 #include "solver/base/array_sort.h"

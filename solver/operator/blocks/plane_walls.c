@@ -1,3 +1,6 @@
+/* A wall is the segment in which an element that rises above the plane meets normal . x = level. Segments
+ * whose angles differ by at most same_direction get their mean angle, weighted by length, and those whose
+ * offsets differ by at most 4 same are one line, across . x = offset, whose overlapping parts are joined. */
 #include "solver/operator/blocks/plane_walls.h"
 
 #include "solver/base/array_grow.h"

@@ -1,3 +1,6 @@
+/* Form factors are read and checked, 0 <= F_ij <= 1 and sum_j F_ij <= 1 + 1e-5, or 0 <= g_ij <= min(A_i, A_j)
+ * of a triangle, which gives F_ij = min(g_ij / A_i, 1). The row norms (sum_j F_ij^2 / A_j)^1/2 are those of
+ * the certificate in refinement.h. Blocks are left to kept_blocks.h. */
 #include "solver/operator/refine/form_factor_rows.h"
 
 #include "store/groups.h"

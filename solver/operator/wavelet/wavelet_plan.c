@@ -1,3 +1,6 @@
+/* A plan computes c = W x and x = W^T c for the coefficients that are used (Gortler et al. 1993): a subtree
+ * of at most WHOLE_ELEMENTS elements with none in use is one matrix, shared by subtrees of equal shapes, and
+ * threads take pieces of the tree. wavelet_kernels.inc has the loops. */
 #include "solver/operator/wavelet/wavelet_plan.h"
 
 #include "solver/base/array_grow.h"

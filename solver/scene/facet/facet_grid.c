@@ -1,3 +1,6 @@
+/* A grid along two sides of a typical element finds the element at a point. A cell names the element that
+ * fills it, or it lists candidates, of which the first is taken whose min over sides of (a x + b y + c), the
+ * distance of the point inside it, is at least 0, or else the one of the largest. */
 #include "solver/scene/facet/facet_grid.h"
 
 #include "solver/base/array_grow.h"

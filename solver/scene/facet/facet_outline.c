@@ -1,3 +1,6 @@
+/* An outline of joined elements is followed side by side, vertices on a straight line are dropped (Douglas
+ * and Peucker 1973), bridges join its holes to it, and it is cut into triangles and parallelograms. A part is
+ * left alone if its pieces leave out a corner, differ in area, or have few elements each. */
 #include "solver/scene/facet/facet_outline.h"
 
 #include "solver/base/array_grow.h"

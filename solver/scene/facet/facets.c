@@ -1,3 +1,6 @@
+/* Elements a and b are joined at a side that they alone share in their plane, n_a . n_b >= 1 -
+ * plane_same_direction and each within `flat` of the plane of the other. A part with a corner farther than
+ * `flat` from its mean plane stays single elements; facet_outline.c cuts the others into pieces. */
 #include "solver/scene/facet/facets.h"
 
 #include "solver/base/array_sort.h"

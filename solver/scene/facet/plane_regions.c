@@ -1,3 +1,6 @@
+/* The edges in a plane are gathered, each side of them is marked as covered, empty or unknown, and loops are
+ * traced around empty sides: one of positive area, sum of (p x q) / 2, is an open region, and one of negative
+ * area outlines what is covered, whose pockets within the convex hull are open as well. */
 #include "solver/scene/facet/plane_regions.h"
 
 #include "solver/base/array_grow.h"
