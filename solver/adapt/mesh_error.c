@@ -11,7 +11,9 @@ enum { QUARTERS = 4 };
  * function that is linear over a square is a 16th of the whole. */
 static const double lacking = 16. / 15;
 
-/* A (rho H)'s variance over element i, by light. */
+/* out [n_lights] = the variance of rho H over element i, summed over channels: from one point in each quarter
+ * q and two independent halves 0 and 1 of each estimate,
+ *     var(rho H) = 16/15 rho^2 (1/4) sum_q (H_q0 - mean of H_0) (H_q1 - mean of H_1). */
 static void look(const gather *g, const mesh *m, uint32_t i, uint64_t key, double *out) {
     const size_t values = gather_values(g);
     float uw[QUARTERS][2];
@@ -50,6 +52,9 @@ static void choose(const mesh *m, size_t n, uint32_t *chosen) {
     }
 }
 
+/* Each of the m elements k that are looked at stands for the area sum_i A_i / m, so that the error e is
+ *     e^2 = (sum_i A_i / m) sum_k var_k(rho H) / sum_i A_i (B_i - E_i)^2
+ * for each light, where i runs over all elements, and variances and squares are summed over channels. */
 lam_status mesh_error(const mesh *m, size_t n_lights, const float *E, const float *B, bool lamps,
                       const gather_sky *sky, uint64_t seed, const progress *p, double *error_of_light,
                       lam_error *error) {

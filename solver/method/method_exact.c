@@ -52,7 +52,8 @@ done:
     return status;
 }
 
-/* P = M - I; where rho_i = 0 the row is F_i M instead (contract, /operator). */
+/* M = (I - R F)^-1 is read, and P is written: P = M - I, so that B - E = P E; where rho_i = 0 the row is
+ * F_i M instead, the irradiance of E (contract, /operator). */
 static void bounced(size_t n, const csr *F, const float *rho, const double *M, float *P) {
 #pragma omp parallel for schedule(dynamic, 16)
     for (size_t i = 0; i < n; i++) {
@@ -169,7 +170,11 @@ static void scale_symmetric(size_t n, const csr *F, const float *rho, const doub
         }
 }
 
-/* P of one channel, through the matrix M [n][n]. */
+/* P of one channel, B - E = P E, by way of the matrix M [n][n]. Let T_i = (rho_i / A_i)^1/2, S = I - T K T
+ * and K_ij = A_i F_ij. Then
+ *     I - R F = T S T^-1,   P = (I - R F)^-1 - I = T (S^-1 - I) T^-1.
+ * First M is S, after invert_symmetric() it is S^-1, and after scale_symmetric() it is P in double. Where
+ * K is not symmetric, M is I - R F, invert() makes it (I - R F)^-1, and bounced() makes P of that. */
 static lam_status make_channel(const build_problem *problem, const float *rho, double *M, float *P,
                                double *rcond, lam_error *error) {
     lam_status status = LAM_OK;

@@ -36,7 +36,10 @@ static size_t vector_of(const judge_input *input) {
     return input->problem->n * input->problem->n_channels;
 }
 
-/* Computes the first light H of the probes in which few elements emit. */
+/* Fills m->first, m->spread and m->known with H, D and *known of input->first_light (judge.h), for probes of
+ * the scene's light and of single elements: H = F E is the first light of a probe, and D is half the
+ * difference of two independent estimates whose mean is H. known[v] is false where so many elements of probe
+ * v emit that neither is found. A channel with the emission of the first one gets its H and D. */
 static lam_status find_first_light(measured *m, lam_error *error) {
     lam_status status = LAM_OK;
     const judge_input *input = m->input;

@@ -17,7 +17,8 @@ static const double delta_tolerance = 1e-7;
 /* Factor by which a threshold rises at a time where memory is too small; error of its forecast. */
 static const double rise = 1.25, doubt = 1.15;
 
-/* An entry has a column and a value, in rows and, transposed, in columns. */
+/* An entry is held twice, in the rows and, transposed, in the columns; each time it is an index and a
+ * value. */
 enum { ENTRY_BYTES = 2 * (sizeof(uint32_t) + sizeof(float)) };
 
 static const option_row rows[] = {
@@ -195,8 +196,8 @@ static void forecast(const method_scale *scale, const void *own, method_forecast
 static const double threshold_first = 1e-2, threshold_last = 1e-6, threshold_step = .3162277660168379;
 
 /* The error of a sample over the error allowed: of uniform emission epsilon, which operators of low rank and
- * hierarchical ones keep to; of single elements epsilon too, or as much as the rival leaves out, if that is
- * more. */
+ * hierarchical ones keep to; of single elements `single`, epsilon or, if that is more, as much as another
+ * method leaves out (weigh). */
 static double excess(const sparse_sample *sample, double epsilon, double single) {
     return fmax(sample->single / single, sample->everywhere / epsilon);
 }
@@ -251,9 +252,23 @@ done:
     return status;
 }
 
-/* Estimates the threshold that keeps the error to epsilon, and the entries that are left, from some rows of
- * sparse inverses. A dense F has no useful sparse inverse; where the noise of F is above epsilon, an inverse
- * of it is noise, and a method that filters the noise is better. */
+/* Estimates the threshold that keeps the error to epsilon, and the entries that are left, from some rows
+ * of sparse inverses. A dense F has no useful sparse inverse; where the noise of F is above epsilon, an
+ * inverse of it is noise, and a method that filters the noise is better.
+ *
+ * The methods c before this one are read as choice.h says. c->outdone is set where another method keeps
+ * the bound for single elements too, so that the cost of c does not count. c->left is the share of S that
+ * c leaves out beyond epsilon: `single`, the error that is allowed to single elements, is the largest of
+ * epsilon and of `left` of all c that count. out->open says that F is not known yet, and could show that
+ * this method suits it best. decision_claimed() is true where a method is taken for another reason than
+ * its cost; nothing is estimated then, unless so_far->thorough asks for figures of methods that are not
+ * taken.
+ *
+ * An entry costs as much time as CHOICE_SCATTERED coefficients, and as much memory as two. `most` is the
+ * number of entries of a channel up to which this method is the fastest and fits into memory,
+ *     most = min(decision_rival / CHOICE_SCATTERED, so_far->most / (2 C)),
+ * where decision_rival is the lowest cost of the methods that count, and so_far->most is the number of
+ * coefficients that memory holds. */
 static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_error *error) {
     lam_status status = LAM_OK;
     sparse_options *o = own;

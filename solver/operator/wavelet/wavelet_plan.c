@@ -59,7 +59,13 @@ static uint64_t hash_subtree(const whole_table *t, size_t a) {
     return h;
 }
 
-/* out [scaling][padded(count)]: the scaling functions of node t, from those of its children. */
+/* out [scaling][padded(n_elements)] = the scaling functions of node t on its elements. They are the first
+ * rows of its matrix, C^T, with C_mk = columns[m WAVELET_INPUTS + k] for input m and function k. A node
+ * with from_left == 0 is a leaf, and its inputs are its elements:
+ *     out = C^T.
+ * The inputs of another node are the functions of its left child, the first from_left of them, and of its
+ * right child, each of which is 0 on the elements of the other:
+ *     out = C^T [below_left; below_right]. */
 static void write_rows(const wavelets *w, size_t t, float *out) {
     const wavelet_node *a = &w->nodes[t];
     const float *columns = wavelet_columns(w, a);
