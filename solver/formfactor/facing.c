@@ -190,7 +190,8 @@ static lam_status settle(const double *areas, side_views *w, lam_error *error) {
     return LAM_OK;
 }
 
-/* Fills the views and decides. list has the elements patch by patch, from begin[p] to begin[p + 1]. */
+/* Casts the rays from both sides of every patch into w->met, and has settle() choose the front of each patch,
+ * w->turned. list has the elements patch by patch: those of patch p stand from begin[p] to begin[p + 1]. */
 static lam_status look_around(const mesh *m, const mesh_sides *s, const uint32_t *list, const size_t *begin,
                               double *before, side_views *w, const progress *how, lam_error *error) {
     lam_status status = LAM_OK;

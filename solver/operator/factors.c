@@ -19,7 +19,7 @@ void factors_free(factors *f) {
     *f = (factors){0};
 }
 
-/* One panel a channel of core [C][k][k]; nowhere: none. */
+/* f->core gets one panel for each channel of core [C][k][k]; it stays NULL where core has no data. */
 static lam_status add_cores(size_t k, const store_view *core, factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     char name[48];

@@ -55,9 +55,11 @@ static size_t start(void *context, size_t n, walker *w) {
     return started;
 }
 
-/* Light that comes straight from the light goes into the first of the numbers of an element, which stand
- * together, the rest of it into those of channels, and what meets nothing into numbers that nobody reads.
- * Without branches: which of them it is cannot be predicted. */
+/* Adds n arrivals to the 1 + C numbers that an element has for a position. A path that comes straight from
+ * the light adds its power to the first number, and a path that was reflected adds its weights to the C
+ * numbers of channels. A path that meets no element adds to numbers behind those of all elements, which
+ * nobody reads. The loop has no branches, because a processor cannot predict which of these cases comes
+ * next. */
 static inline void deposit(const alone_batch *b, size_t n, const walk_stream *w, const uint32_t *element,
                            size_t C) {
     const alone *r = b->r;

@@ -210,8 +210,10 @@ done:
     return status;
 }
 
-/* A part of the descent. A sample has so many and small ones that each begins with the occluders near its
- * shaft, as the descent would have them there: finding them from the root on is no work of all of it. */
+/* Runs one task, a part of the descent, and measures its time. The tasks of a sample are many and small. The
+ * whole descent comes to such a task with the occluders near its shaft, which it has found above; here they
+ * are found from the root on. The clock starts after that, as the whole descent does not do this work for
+ * every task. */
 static void run_task(walk *w, const task *of, size_t n_candidates) {
     static const uint32_t root = 0;
     uint32_t within[SHAFT_CANDIDATES];

@@ -274,7 +274,6 @@ static lam_status fill_cells(const facet_grid *grid, const gathering *g, facet_g
     return LAM_OK;
 }
 
-/* Sets the map of a piece from its corner and the two sides from there. */
 /* The largest number whose cell is one of n. */
 static float last_place(uint32_t n) {
     float most = nextafterf((float)n, 0);
@@ -282,6 +281,7 @@ static float last_place(uint32_t n) {
     return most;
 }
 
+/* Sets the map of a piece from its corner and the two sides from there. */
 static void place_piece(const mesh *m, const frame *f, const uint32_t piece[4], const facet_grid *grid,
                         piece_place *out) {
     double o[2], u[2], w[2];
