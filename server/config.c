@@ -1,7 +1,7 @@
 #include "server/config.h"
 
 #include "solver/base/machine.h"
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 
 #include <stdio.h>
 #include <unistd.h>

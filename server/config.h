@@ -2,7 +2,7 @@
 #ifndef LAMBERT_SERVER_CONFIG_H
 #define LAMBERT_SERVER_CONFIG_H
 
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "store/status.h"
 
 #include <stdio.h>

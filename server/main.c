@@ -4,7 +4,7 @@
 #include "server/route/routes.h"
 #include "server/scene/map_guard.h"
 #include "solver/base/clock.h"
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/codec/reflectance.h"
 #include "solver/linalg/core.h"
 #include "solver/waits.h"

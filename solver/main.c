@@ -1,5 +1,5 @@
 /* `lambert`: the list of its verbs; each is in its own cmd_*.c. */
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/linalg/core.h"
 #include "solver/verbs/verbs.h"

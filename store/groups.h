@@ -3,8 +3,8 @@
 #ifndef LAMBERT_STORE_GROUPS_H
 #define LAMBERT_STORE_GROUPS_H
 
-#define STORE_MESH "/mesh"         /* solver/scene/mesh_store.c; solver/base/scene_{backs,pictures}.c */
-#define STORE_CAMERAS "/cameras"   /* solver/base/scene_cameras.c */
+#define STORE_MESH "/mesh"         /* solver/scene/mesh_store.c; solver/base/scene/scene_{backs,pictures}.c */
+#define STORE_CAMERAS "/cameras"   /* solver/base/scene/scene_cameras.c */
 #define STORE_OPERATOR "/operator" /* solver/operator, each kind its own; solver/method/report.c */
 #define STORE_FORM_FACTORS "/form_factors" /* solver/formfactor, solver/operator/{blocks,refine} */
 #define STORE_SKY "/sky"                   /* solver/formfactor/sky_bounce.c */

@@ -4,7 +4,7 @@
 #ifndef LAMBERT_SERVER_NET_ORIGIN_H
 #define LAMBERT_SERVER_NET_ORIGIN_H
 
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 
 typedef struct origin_rules {
     const option_list *hosts, *origins; /* --allow-host, --allow-origin */

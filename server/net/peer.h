@@ -4,7 +4,7 @@
 #ifndef LAMBERT_SERVER_NET_PEER_H
 #define LAMBERT_SERVER_NET_PEER_H
 
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 
 #include <sys/socket.h>
 

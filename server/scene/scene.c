@@ -7,7 +7,7 @@
 #include "server/scene/map_guard.h"
 #include "server/scene/tile_places.h"
 #include "solver/base/clock.h"
-#include "solver/base/scene_backs.h"
+#include "solver/base/scene/scene_backs.h"
 #include "solver/codec/describe.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"

@@ -3,7 +3,7 @@
  * deploy/docs/api.md). A whole number is written as an integer, and one that is not finite as null. */
 #include "solver/codec/describe.h"
 
-#include "solver/base/scene_cameras.h"
+#include "solver/base/scene/scene_cameras.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/stated/error_figures.h"
 #include "store/groups.h"

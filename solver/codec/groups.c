@@ -1,7 +1,7 @@
 #include "solver/codec/groups.h"
 
 #include "solver/base/nearest.h"
-#include "solver/base/scene_backs.h"
+#include "solver/base/scene/scene_backs.h"
 #include "store/groups.h"
 
 #include <stdio.h>

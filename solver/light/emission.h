@@ -4,7 +4,7 @@
 #define LAMBERT_LIGHT_EMISSION_H
 
 #include "lambert/lambert.h"
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/codec/groups.h"
 #include "solver/scene/mesh.h"
 

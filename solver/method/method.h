@@ -4,7 +4,7 @@
 #ifndef LAMBERT_METHOD_METHOD_H
 #define LAMBERT_METHOD_METHOD_H
 
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/base/progress.h"
 #include "solver/linalg/csr.h"
 #include "solver/linalg/row_source.h"

@@ -1,7 +1,7 @@
 #include "solver/precompute/error_advice.h"
 
 #include "solver/formfactor/source.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 #include "solver/precompute/trial.h"
 
 #include <math.h>

@@ -10,7 +10,7 @@
 #include "solver/method/judge/judge.h"
 #include "solver/precompute/emitter_list.h"
 #include "solver/precompute/error_advice.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 #include "solver/precompute/judging.h"
 #include "solver/precompute/precompute.h"
 #include "solver/precompute/trial.h"

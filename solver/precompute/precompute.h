@@ -2,12 +2,12 @@
 #ifndef LAMBERT_PRECOMPUTE_PRECOMPUTE_H
 #define LAMBERT_PRECOMPUTE_PRECOMPUTE_H
 
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/formfactor/source.h"
 #include "solver/method/choice.h"
 #include "solver/precompute/error_advice.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 #include "solver/scene/mesh.h"
 
 /* --two-sided: materials say which faces have a back; every face has one; none has. */

@@ -1,6 +1,6 @@
 /* The forecast of a precompute, and how it came true. */
 #include "solver/base/clock.h"
-#include "solver/precompute/machine_pace.h"
+#include "solver/precompute/forecast/machine_pace.h"
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
 

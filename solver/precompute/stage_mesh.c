@@ -1,6 +1,6 @@
 /* From faces to elements, as the options of the mesh say. */
 #include "solver/adapt/adaptive.h"
-#include "solver/base/scene_backs.h"
+#include "solver/base/scene/scene_backs.h"
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
 #include "solver/scene/facet/face_join.h"

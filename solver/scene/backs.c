@@ -1,6 +1,6 @@
 /* Elements for the backs of faces, behind all fronts, with groups of their own. */
 #include "solver/base/array_grow.h"
-#include "solver/base/scene_backs.h"
+#include "solver/base/scene/scene_backs.h"
 #include "solver/scene/mesh.h"
 #include "solver/scene/tables.h"
 

@@ -3,7 +3,7 @@
 #define LAMBERT_SCENE_MESH_H
 
 #include "solver/base/progress.h"
-#include "solver/base/scene_cameras.h"
+#include "solver/base/scene/scene_cameras.h"
 #include "store/store.h"
 
 #include <stdint.h>

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_SCENE_MESH_OPTIONS_H
 #define LAMBERT_SCENE_MESH_OPTIONS_H
 
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 
 /* --elements N, a uint64_t, at most the largest. */
 #define OPTION_ROW_ELEMENTS(place, largest, ...)                                                             \

@@ -1,5 +1,5 @@
 /* /mesh and /cameras of a store: written as it is, read back with every index and value checked. */
-#include "solver/base/scene_backs.h"
+#include "solver/base/scene/scene_backs.h"
 #include "solver/scene/mesh.h"
 
 #include "solver/scene/coincident.h"

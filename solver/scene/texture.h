@@ -3,7 +3,7 @@
 #ifndef LAMBERT_SCENE_TEXTURE_H
 #define LAMBERT_SCENE_TEXTURE_H
 
-#include "solver/base/scene_pictures.h"
+#include "solver/base/scene/scene_pictures.h"
 #include "solver/scene/mesh.h"
 
 /* No image, or an element without a textured face. */

@@ -1,6 +1,6 @@
 /* lambert generate: writes one of the known scenes. */
 #include "solver/base/atomic_file.h"
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/scene/generate/generate.h"
 #include "solver/scene/mesh_options.h"

@@ -1,5 +1,5 @@
 /* lambert info: prints the contents of a store, its size and its errors. */
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/codec/describe.h"
 #include "solver/method/report.h"

@@ -1,7 +1,7 @@
 /* lambert sky: turns a weather file or a sky matrix of Radiance into the radiance of the tiles of a sky, hour
  * by hour. */
 #include "solver/base/atomic_file.h"
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/daylight/sky_matrix.h"
 #include "solver/light/weather_light.h"

@@ -1,6 +1,6 @@
 /* lambert view: runs a daemon of its own for some stores and opens the viewer in the browser. Knows of the
  * daemon its name, its options and the line that says where it listens. */
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/light/emission.h"
 #include "solver/verbs/sibling.h"

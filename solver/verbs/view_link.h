@@ -2,7 +2,7 @@
 #ifndef LAMBERT_VERBS_VIEW_LINK_H
 #define LAMBERT_VERBS_VIEW_LINK_H
 
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 
 /* The fragment "#1." and base64url of the JSON that server/viewer/src/state/link.ts reads: the scene of
  * argument (STORE.h5 or STORE.h5:NAME, as the daemon takes it) with the groups of the items GROUP=V or

@@ -2,7 +2,7 @@
 #include "solver/base/random.h"
 #include "solver/formfactor/source.h"
 #include "solver/operator/emitters.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 #include "solver/precompute/judging.h"
 #include "solver/precompute/precompute.h"
 #include "solver/verify/verify.h"

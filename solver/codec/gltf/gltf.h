@@ -3,7 +3,7 @@
 #ifndef LAMBERT_CODEC_GLTF_GLTF_H
 #define LAMBERT_CODEC_GLTF_GLTF_H
 
-#include "solver/base/scene_pictures.h"
+#include "solver/base/scene/scene_pictures.h"
 #include "solver/codec/buffer.h"
 #include "solver/codec/groups.h"
 

@@ -3,7 +3,7 @@
 #ifndef LAMBERT_SCENE_IMPORT_IMPORTED_FACES_H
 #define LAMBERT_SCENE_IMPORT_IMPORTED_FACES_H
 
-#include "solver/base/scene_cameras.h"
+#include "solver/base/scene/scene_cameras.h"
 #include "solver/scene/polygon_split.h"
 #include "solver/scene/tables.h"
 #include "solver/scene/texture.h"

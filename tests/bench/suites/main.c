@@ -3,10 +3,10 @@
  * log, progress or an error. */
 #include "solver/base/array_grow.h"
 #include "solver/base/atomic_file.h"
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/linalg/core.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 #include "solver/waits.h"
 #include "tests/bench/suites/bench.h"
 

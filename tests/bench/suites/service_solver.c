@@ -3,7 +3,7 @@
  * numbers. */
 #include "solver/base/clock.h"
 #include "solver/operator/operator.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 #include "solver/scene/mesh.h"
 #include "store/groups.h"
 #include "tests/bench/suites/bench.h"

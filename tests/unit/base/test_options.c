@@ -1,5 +1,5 @@
 /* The readers of numbers and the tables of options. */
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 #include "support/suite.h"
 
 #include <math.h>

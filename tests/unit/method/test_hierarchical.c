@@ -4,7 +4,7 @@
 #include "solver/formfactor/source.h"
 #include "solver/method/reference.h"
 #include "solver/operator/hierarchical.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 #include "support/building.h"
 #include "support/closed_box.h"
 #include "support/dense.h"

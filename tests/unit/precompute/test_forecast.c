@@ -2,7 +2,7 @@
 #include "solver/formfactor/rays/hemicube.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/source.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 #include "support/box.h"
 #include "support/building.h"
 #include "support/scene.h"

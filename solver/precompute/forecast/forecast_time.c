@@ -2,7 +2,7 @@
 #include "solver/formfactor/source.h"
 #include "solver/method/judge/judge.h"
 #include "solver/method/reference.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 
 #include <math.h>
 #include <stdio.h>

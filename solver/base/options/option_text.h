@@ -3,7 +3,7 @@
 #ifndef LAMBERT_BASE_OPTION_TEXT_H
 #define LAMBERT_BASE_OPTION_TEXT_H
 
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 
 /* The row of --help, which every command has. */
 extern const option_row option_help_row;

@@ -1,5 +1,5 @@
 /* Shell completion from the tables of options: a function (bash, zsh) or lines (fish) for each command. */
-#include "solver/base/option_text.h"
+#include "solver/base/options/option_text.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -3,7 +3,7 @@
 #include "solver/formfactor/source.h"
 #include "solver/method/judge/guided_reference.h"
 #include "solver/method/judge/judge.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-#include "solver/base/scene_cameras.h"
+#include "solver/base/scene/scene_cameras.h"
 
 #include "solver/base/utf8.h"
 #include "solver/base/vector3.h"

@@ -1,5 +1,5 @@
 /* Reads values of options: a whole text, a finite number, nothing else. */
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 
 #include <ctype.h>
 #include <errno.h>

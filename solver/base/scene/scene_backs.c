@@ -1,4 +1,4 @@
-#include "solver/base/scene_backs.h"
+#include "solver/base/scene/scene_backs.h"
 
 #include "store/groups.h"
 #include "store/status.h"

@@ -1,4 +1,4 @@
-#include "solver/base/scene_pictures.h"
+#include "solver/base/scene/scene_pictures.h"
 
 #include "store/groups.h"
 #include "store/status.h"

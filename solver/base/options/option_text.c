@@ -1,4 +1,4 @@
-#include "solver/base/option_text.h"
+#include "solver/base/options/option_text.h"
 
 #include <ctype.h>
 #include <stdio.h>

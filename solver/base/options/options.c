@@ -1,7 +1,7 @@
-#include "solver/base/options.h"
+#include "solver/base/options/options.h"
 
 #include "solver/base/nearest.h"
-#include "solver/base/option_text.h"
+#include "solver/base/options/option_text.h"
 
 #include <assert.h>
 #include <stdarg.h>

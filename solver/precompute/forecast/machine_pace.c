@@ -1,4 +1,4 @@
-#include "solver/precompute/machine_pace.h"
+#include "solver/precompute/forecast/machine_pace.h"
 
 #include "solver/base/clock.h"
 #include "solver/base/random.h"

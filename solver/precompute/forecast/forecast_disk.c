@@ -1,6 +1,6 @@
 /* Bytes of the store and of the scratch folder, and a check that the disks have room for them. */
 #include "solver/formfactor/source.h"
-#include "solver/precompute/forecast.h"
+#include "solver/precompute/forecast/forecast.h"
 
 #include <math.h>
 #include <stdio.h>
