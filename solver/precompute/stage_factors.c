@@ -104,14 +104,19 @@ static void log_closure(const precompute_job *job, const precompute_factors *fac
 static const double repair_warned = .01;
 
 static void warn_of_repair(const precompute_job *job, const precompute_factors *factors) {
-    const double off = form_factors_repair_error(&factors->f);
+    const form_factors *f = &factors->f;
+    const double off = form_factors_repair_error(f);
+    const char *const why =
+        f->recipe.closure == CLOSURE_CLOSED && f->leaving_share > repair_warned
+            ? "--closed gives back light that leaves through gaps, or some faces may coincide and "
+              "count twice"
+            : "some faces may coincide and count twice, or cut through each other";
     if (off > repair_warned)
         terminal_warn(
             job->t,
             "the form factors of an element add up to %.2g %% too much or too little on average, before "
-            "the repair: some faces may coincide and count twice, or cut through each other; stated "
-            "errors contain it",
-            100 * off);
+            "the repair: %s; stated errors contain it",
+            100 * off, why);
 }
 
 static void log_blocks(const precompute_job *job, const precompute_scene *scene,
