@@ -301,7 +301,7 @@ lam_status many_lights_solve(const many_lights_input *c, double tolerance, float
     return in_blocks(c, solve_one, &s, T, error);
 }
 
-/* u = rho A^-1/2 (h0 + S x), the light that leaves again, in A^1/2 of it */
+/* u = rho (h0 + S x) is the light that leaves again, times A^1/2. */
 static void finish_sweep(block *b, size_t i, const float *S_x, double *sums) {
     (void)sums;
     for (size_t v = 0; v < b->width; v++)

@@ -59,10 +59,10 @@ typedef struct precompute_scene {
     importance importance;   /* n is 0 where all is read, and may emit */
 } precompute_scene;
 
-/* The outcome of the samples of pairs. dear: all pairs cost more than they are worth, so that at least
- * least_rays are cast; plain: near pairs do, too, and rays alone are taken. */
+/* The outcome of the samples of pairs. too_slow: all pairs cost more than they are worth, so that at least
+ * least_rays are cast; rays_alone: near pairs do, too. */
 typedef struct pairs_weighed {
-    bool dear, plain;
+    bool too_slow, rays_alone;
     size_t least_rays;
 } pairs_weighed;
 

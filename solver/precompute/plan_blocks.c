@@ -7,9 +7,9 @@
 /* Blocks may take this many times as long as rays: in rooms they leave a third of the error of rays, or less.
  * All pairs have as small an error. */
 static const double times_rays = 1.5;
-/* Seconds of one thread that blocks take without asking what all pairs do, which is dear to tell: in eight
- * scenes of 1,498 to 2,030 elements programs took .3 to .8 of their time by pairs, for .3 to 1.2 times the
- * error of single elements. */
+/* Seconds of one thread that blocks take without asking what all pairs do, as a sample of these costs much:
+ * in eight scenes of 1,498 to 2,030 elements programs took .3 to .8 of their time by pairs, for .3 to 1.2
+ * times the error of single elements. */
 static const double seconds_enough = 2;
 /* With fewer elements all methods are weighed by rows that cost little. */
 enum { ELEMENTS_LEAST = 1025 };

@@ -31,15 +31,15 @@ enum { MORE_RAYS_OF_MANY = 2 };
 static lam_status find_cheaper(const precompute_job *job, precompute_scene *scene, recipe *other,
                                factor_cost *cost, lam_error *error) {
     lam_status status = LAM_OK;
-    recipe plain = *other;
+    recipe many = *other;
     factor_cost more;
-    plain.source = &source_rays;
-    plain.rays *= MORE_RAYS;
-    plain.accuracy = 0;
+    many.source = &source_rays;
+    many.rays *= MORE_RAYS;
+    many.accuracy = 0;
     TRY(plan_sample(job, scene, other, cost, error));
-    TRY(plan_sample(job, scene, &plain, &more, error));
+    TRY(plan_sample(job, scene, &many, &more, error));
     if (more.seconds >= cost->seconds) goto done;
-    *other = plain;
+    *other = many;
     *cost = more;
 done:
     return status;
@@ -74,24 +74,24 @@ static lam_status weigh_near_pairs(const precompute_job *job, precompute_scene *
                                    lam_error *error) {
     lam_status status = LAM_OK;
     const recipe near = plan->recipe;
-    recipe plain = near;
-    factor_cost of_plain;
-    char near_time[32], plain_time[32], what[64];
-    plain.source = &source_rays;
-    plain.rays *= MORE_RAYS_OF_MANY;
-    plain.accuracy = 0;
+    recipe many = near;
+    factor_cost of_many;
+    char near_time[32], many_time[32], what[64];
+    many.source = &source_rays;
+    many.rays *= MORE_RAYS_OF_MANY;
+    many.accuracy = 0;
     TRY(plan_sample(job, scene, &near, &plan->cost, error));
-    TRY(plan_sample(job, scene, &plain, &of_plain, error));
-    if (of_plain.seconds >= plan->cost.seconds || !fits(job, scene, plan, &plain)) goto done;
+    TRY(plan_sample(job, scene, &many, &of_many, error));
+    if (of_many.seconds >= plan->cost.seconds || !fits(job, scene, plan, &many)) goto done;
     clock_format_seconds(plan->cost.seconds, near_time);
-    clock_format_seconds(of_plain.seconds, plain_time);
-    recipe_describe(&plain, what);
+    clock_format_seconds(of_many.seconds, many_time);
+    recipe_describe(&many, what);
     plan_explain(plan,
                  "near pairs are not taken: they and %zu rays need about %s of one thread, by a sample of "
                  "them, and %s %s",
-                 near.rays, near_time, what, plain_time);
-    plan->cost = of_plain;
-    plan->weighed = (pairs_weighed){.dear = true, .plain = true, .least_rays = plain.rays};
+                 near.rays, near_time, what, many_time);
+    plan->cost = of_many;
+    plan->weighed = (pairs_weighed){.too_slow = true, .rays_alone = true, .least_rays = many.rays};
 done:
     return status;
 }
@@ -115,15 +115,15 @@ static lam_status weigh_all_pairs(const precompute_job *job, precompute_scene *s
     }
     TRY(find_cheaper(job, scene, &other, &some, error));
     TRY(spend_more(job, scene, plan, &other, &some, error));
-    const bool dear = all.seconds > (coarse ? times_most_coarse : times_most) * some.seconds;
+    const bool too_slow = all.seconds > (coarse ? times_most_coarse : times_most) * some.seconds;
     clock_format_seconds(some.seconds, other_time);
     recipe_describe(&other, what);
     plan_explain(plan, "%s taken: all pairs need about %s of one thread, by a sample of them, and %s %s",
-                 dear ? "not all pairs are" : "all pairs are", all_time, what, other_time);
-    if (!dear) goto done;
+                 too_slow ? "not all pairs are" : "all pairs are", all_time, what, other_time);
+    if (!too_slow) goto done;
     plan->cost = some;
     plan->weighed = (pairs_weighed){
-        .dear = true, .plain = recipe_source(&other) == &source_rays, .least_rays = other.rays};
+        .too_slow = true, .rays_alone = recipe_source(&other) == &source_rays, .least_rays = other.rays};
 done:
     return status;
 }
@@ -142,7 +142,7 @@ lam_status plan_weigh_rows(const precompute_job *job, precompute_scene *scene, p
     lam_status status = LAM_OK;
     if (plan->cost.seconds > 0) return LAM_OK;
     TRY(plan_weigh_pairs(job, scene, plan, error));
-    if (plan->weighed.dear) TRY(plan_rows(job, scene, (double)scene->m.n, plan, error));
+    if (plan->weighed.too_slow) TRY(plan_rows(job, scene, (double)scene->m.n, plan, error));
 done:
     return status;
 }

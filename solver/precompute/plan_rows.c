@@ -13,7 +13,7 @@ typedef struct rows_request {
     uint64_t seed;
     scene_closure closure;
     size_t least_rays; /* of rays that are not given */
-    bool plain;        /* no pairs */
+    bool rays_alone;   /* no pairs */
     bool sky;          /* light that leaves the scene matters too */
     bool filtered;     /* the method takes out most of the noise of rays: few are enough */
     bool rounded;      /* all pairs follow epsilon */
@@ -61,7 +61,7 @@ static rows_request request_of(const precompute_job *job, const precompute_plan 
                           .seed = o->seed,
                           .closure = o->closed,
                           .least_rays = plan->weighed.least_rays,
-                          .plain = plan->weighed.plain,
+                          .rays_alone = plan->weighed.rays_alone,
                           .sky = o->sky != NULL,
                           .filtered = (plan->method->flags & METHOD_FILTERS_NOISE) != 0,
                           .rounded = plan_pairs_follow_epsilon(job, plan->method)};
@@ -87,7 +87,7 @@ static recipe recipe_asked(const rows_request *asked, bool all_pairs) {
                 .closure = asked->closure};
     if (asked->source != NULL && asked->source->asked != NULL) return asked->source->asked(&r);
     r.resolution = 0;
-    if (asked->rays != OPTION_AUTO || level->accuracy == 0 || asked->plain) return r;
+    if (asked->rays != OPTION_AUTO || level->accuracy == 0 || asked->rays_alone) return r;
     r.source = all_pairs ? &source_pairs : &source_near_pairs;
     r.accuracy = level->accuracy;
     if (all_pairs && asked->rounded) r.accuracy *= recipe_coarser(asked->epsilon);
@@ -158,7 +158,8 @@ lam_status plan_rows(const precompute_job *job, const precompute_scene *scene, d
     TRY(plan_expect_method(job, scene, n, 0, &plan->method, &final, error));
     const rows_request asked = request_of(job, plan);
     const int disk_too = o->scratch != NULL;
-    const bool pairs_too = !plan->weighed.dear && (n <= PAIRS_ELEMENTS_MOST || n <= (double)rays_of(&asked));
+    const bool pairs_too =
+        !plan->weighed.too_slow && (n <= PAIRS_ELEMENTS_MOST || n <= (double)rays_of(&asked));
     for (int way = 0; way <= 2 * disk_too + 1; way++) {
         const bool all_pairs = way % 2 == 0;
         if (all_pairs && !pairs_too) continue;

@@ -179,7 +179,7 @@ static lam_status weigh_pairs(budget_run *run, factor_quality quality, bool *tak
     plan.method = run->method;
     plan.recipe = plan_pairs_recipe(&job, &plan);
     TRY(plan_weigh_pairs(&job, run->scene, &plan, error));
-    *taken = !plan.weighed.dear;
+    *taken = !plan.weighed.too_slow;
     run->pairs.quality[k] = quality;
     run->pairs.accuracy[k] = plan.recipe.accuracy;
     run->pairs.cost[k] = plan.cost;
