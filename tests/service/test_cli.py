@@ -69,7 +69,7 @@ class Usage(Case):
                 ("--resolution 4098: must be at least 4", "precompute a.obj -o b.h5 --resolution 4098"),
                 ("--resolution 33: must be even",
                  "precompute a.obj -o b.h5 --form-factors hemicube --resolution 33"),
-                ("--form-factors spheres: must be one of: auto rays blocks hemicube",
+                ("--form-factors spheres: must be one of: auto rays hemicube blocks",
                  "precompute a.obj -o b.h5 --form-factors spheres"),
                 ("--rank 0: must be at least 1", "precompute a.obj -o b.h5 --rank 0"),
                 ("--memory 5X: not a size", "precompute a.obj -o b.h5 --memory 5X"),
