@@ -183,12 +183,15 @@ class Mapped(unittest.TestCase):
         path = self.store("box")
         with serve_first(path) as daemon:
             daemon.wait_for("verified box: ")
+            # After this doubt there is none for a minute, whose comparison could overtake the answers.
+            self.assertEqual(daemon.radiosity("box", {"emission": [3e38] * N}).status, 422)
+            daemon.wait_for("verified box: ", 2)
             self.rot(path)
             answer = daemon.radiosity("box", self.MEAN)
             self.assertEqual(answer.status, 422, answer)
             self.assertIn("the mean of floor is not finite", answer.json()["detail"])
             answer = daemon.radiosity("box", {"emission": [1] * N})
-            self.assertIn(answer.status, (422, 503), answer)
+            self.assertEqual(answer.status, 422, answer)
 
     def test_an_answer_that_is_not_finite_has_its_scene_compared_again(self):
         path = self.store("box")
