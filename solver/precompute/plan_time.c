@@ -145,6 +145,7 @@ static precompute_plan plan_of(const budget_run *run, const budget_recipe *r, co
         cost->entries = fmin(run->rays_cost.entries * (double)r->rays / RAYS_SAMPLED, n * n);
     }
     cost->seconds = cost->measured;
+    if (!ray_rows_can(&plan.recipe)) plan.streamed = false; /* as the rows so far may be */
     return plan;
 }
 
