@@ -109,6 +109,9 @@ bool recipes_differ(const recipe *a, const recipe *b);
  * 1/64 to 64. */
 double source_turn(double from, double to, double power);
 
+/* The column `rays` of a source that casts recipe.rays from every element. */
+double source_rays_given(double n, const recipe *r);
+
 /* Laws that sources of rows share. Bytes of the rows of one merged sample: a pair is seen from either end, so
  * rows have on average at most twice as many entries as an element has rays, an index and a value each. Bytes
  * of packed rows: a gap in groups of seven bits, of which one bit marks a count above 1, or a weight; the

@@ -60,6 +60,11 @@ bool recipes_differ(const recipe *a, const recipe *b) {
            a->accuracy != b->accuracy || a->seed != b->seed;
 }
 
+double source_rays_given(double n, const recipe *r) {
+    (void)n;
+    return (double)r->rays;
+}
+
 double source_turn(double from, double to, double power) {
     static const double most = 64;
     return fmin(fmax(pow(to / from, 1 / power), 1 / most), most);

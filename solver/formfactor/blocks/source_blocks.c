@@ -33,11 +33,6 @@ static recipe judge(const recipe *r, size_t rays) {
     return finer;
 }
 
-static double rays_of(double n, const recipe *r) {
-    (void)n;
-    return (double)r->rays;
-}
-
 /* Blocks in rooms of large planes: measured 7.6e5 (a Cornell box of 10,249 elements) and 2.0e6 (of 163,687)
  * at an accuracy of 3e-4, 3.3e5 and 9.3e5 at 1e-3; 6.1e6 (of 2,620,549) at 4e-4. */
 static double blocks_of(double n, const recipe *r) {
@@ -107,7 +102,7 @@ const factor_source source_blocks = {
     .option = option,
     .repair = repair,
     .judge = judge,
-    .rays = rays_of,
+    .rays = source_rays_given,
     .blocks = blocks_of,
     .bytes = bytes,
     .packed_bytes = packed_bytes,

@@ -22,30 +22,9 @@ static void option(const recipe *r, char text[40]) {
     snprintf(text, 40, "near-pairs");
 }
 
-/* The judge's samples are two, of half the rays each. */
-static recipe judge(const recipe *r, size_t rays) {
-    recipe half = *r;
-    (void)rays;
-    if (half.rays > 1) half.rays /= 2;
-    return half;
-}
-
-static double rays_of(double n, const recipe *r) {
-    (void)n;
-    return (double)r->rays;
-}
-
-static double bytes(double n, const recipe *r) {
-    return rows_bytes(n, (double)r->rays);
-}
-
-static double packed_bytes(double n, const recipe *r) {
-    return rows_packed_bytes(n, (double)r->rays, false);
-}
-
 /* Near pairs are as many as rays at most, and stand in a triangle of their own. */
 static double making_bytes(double n, const recipe *r, factor_place place) {
-    const double near = bytes(n, r), packed = packed_bytes(n, r);
+    const double near = rays_bytes(n, r), packed = rays_packed_bytes(n, r);
     if (place == FACTORS_ON_DISK) return near + rows_making_bytes(near, packed, place);
     return rows_making_bytes(near, (place == FACTORS_IN_MEMORY ? packed : 0) + 1.5 * near, FACTORS_IN_MEMORY);
 }
@@ -55,10 +34,6 @@ static double making_bytes(double n, const recipe *r, factor_place place) {
 static double stream_bytes(double n, const recipe *r) {
     static const double near_share = .25, near_bytes = 17;
     return n * fmin(n, near_share * (double)r->rays) * near_bytes;
-}
-
-static double stored_bytes(double n, const recipe *r) {
-    return rows_stored_bytes(n, bytes(n, r));
 }
 
 static double seconds(double n, const recipe *r, double entries, double ray_seconds, double slowness) {
@@ -102,13 +77,13 @@ const factor_source source_near_pairs = {
     .option = option,
     .accuracy = accuracy,
     .repair = rays_repair,
-    .judge = judge,
-    .rays = rays_of,
-    .bytes = bytes,
-    .packed_bytes = packed_bytes,
+    .judge = rays_halved,
+    .rays = source_rays_given,
+    .bytes = rays_bytes,
+    .packed_bytes = rays_packed_bytes,
     .making_bytes = making_bytes,
     .stream_bytes = stream_bytes,
-    .stored_bytes = stored_bytes,
+    .stored_bytes = rays_stored_bytes,
     .seconds = seconds,
     .sample = sample,
     .make = make,

@@ -61,3 +61,22 @@ void rays_advise(const recipe *r, double error, double most, bool finest, char o
     (void)finest;
     snprintf(option, 64, "--rays %zu", rays_for(r->rays, error, most));
 }
+
+recipe rays_halved(const recipe *r, size_t rays) {
+    recipe half = *r;
+    (void)rays;
+    if (half.rays > 1) half.rays /= 2;
+    return half;
+}
+
+double rays_bytes(double n, const recipe *r) {
+    return rows_bytes(n, (double)r->rays);
+}
+
+double rays_packed_bytes(double n, const recipe *r) {
+    return rows_packed_bytes(n, (double)r->rays, false);
+}
+
+double rays_stored_bytes(double n, const recipe *r) {
+    return rows_stored_bytes(n, rays_bytes(n, r));
+}

@@ -17,6 +17,13 @@ lam_status rays_cost(const mesh *m, size_t rays, factor_cost *out, lam_error *er
  * sum_j F_ij A_j / (A_i + A_j) / N < 1 / N. 0 of no rays. */
 double rays_repair(const recipe *r);
 
+/* Columns of a source whose rows are those of its rays. The judge's samples are two, of half the rays each.
+ */
+recipe rays_halved(const recipe *r, size_t rays);
+double rays_bytes(double n, const recipe *r);
+double rays_packed_bytes(double n, const recipe *r);
+double rays_stored_bytes(double n, const recipe *r);
+
 /* Columns of a source whose noise falls as the root of its rays. */
 void rays_finer(recipe *r, double error, double wanted, const factor_knobs *knobs);
 void rays_advise(const recipe *r, double error, double most, bool finest, char option[64]);

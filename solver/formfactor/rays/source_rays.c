@@ -18,33 +18,8 @@ static void option(const recipe *r, char text[40]) {
     snprintf(text, 40, "--rays %zu", r->rays);
 }
 
-/* The judge's samples are two, of half the rays each. */
-static recipe judge(const recipe *r, size_t rays) {
-    recipe half = *r;
-    (void)rays;
-    if (half.rays > 1) half.rays /= 2;
-    return half;
-}
-
-static double rays_of(double n, const recipe *r) {
-    (void)n;
-    return (double)r->rays;
-}
-
-static double bytes(double n, const recipe *r) {
-    return rows_bytes(n, (double)r->rays);
-}
-
-static double packed_bytes(double n, const recipe *r) {
-    return rows_packed_bytes(n, (double)r->rays, false);
-}
-
 static double making_bytes(double n, const recipe *r, factor_place place) {
-    return rows_making_bytes(bytes(n, r), packed_bytes(n, r), place);
-}
-
-static double stored_bytes(double n, const recipe *r) {
-    return rows_stored_bytes(n, bytes(n, r));
+    return rows_making_bytes(rays_bytes(n, r), rays_packed_bytes(n, r), place);
 }
 
 static double seconds(double n, const recipe *r, double entries, double ray_seconds, double slowness) {
@@ -79,12 +54,12 @@ const factor_source source_rays = {
     .describe = describe,
     .option = option,
     .repair = rays_repair,
-    .judge = judge,
-    .rays = rays_of,
-    .bytes = bytes,
-    .packed_bytes = packed_bytes,
+    .judge = rays_halved,
+    .rays = source_rays_given,
+    .bytes = rays_bytes,
+    .packed_bytes = rays_packed_bytes,
     .making_bytes = making_bytes,
-    .stored_bytes = stored_bytes,
+    .stored_bytes = rays_stored_bytes,
     .seconds = seconds,
     .sample = sample,
     .make = make,
