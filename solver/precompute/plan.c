@@ -1,8 +1,6 @@
 /* The choice of form factors for a scene, of rows first and then by samples, and what it takes. */
 #include "solver/precompute/plan.h"
 
-#include "solver/operator/refine/form_factor_rows.h"
-
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -94,29 +92,16 @@ done:
     return status;
 }
 
-/* Blocks in place of the rows so far, unless memory has room for rows alone. */
-static lam_status try_blocks(const precompute_job *job, precompute_scene *scene, precompute_plan *plan,
-                             lam_error *error) {
-    lam_status status = LAM_OK;
-    const double n = (double)scene->m.n;
-    const bool rows_fit = plan_fits(job, scene, plan, n),
-               asked = source_asked(job->options->form_factors) == &source_blocks;
-    const build_method *method;
-    bool final;
-    TRY(plan_expect_method(job, scene, n, 0, &method, &final, error));
-    TRY(plan_weigh_blocks(job, scene, method, final, plan, error));
-    if (rows_fit && !asked && !plan_fits(job, scene, plan, n)) TRY(plan_rows(job, scene, n, plan, error));
-done:
-    return status;
-}
-
 /* Blocks come first: to weigh all pairs or near ones costs more than blocks do in most rooms. */
 lam_status plan_choose(const precompute_job *job, precompute_scene *scene, precompute_plan *plan,
                        lam_error *error) {
     lam_status status = LAM_OK;
     const double n = (double)scene->m.n;
+    const build_method *method;
+    bool final;
     TRY(plan_rows(job, scene, n, plan, error));
-    TRY(try_blocks(job, scene, plan, error));
+    TRY(plan_expect_method(job, scene, n, 0, &method, &final, error));
+    TRY(plan_weigh_blocks(job, scene, method, final, plan, error));
     TRY(plan_weigh_rows(job, scene, plan, error));
     forecast f = plan_forecast(job, scene, plan, n);
     TRY(forecast_check(&f, job->memory, error));

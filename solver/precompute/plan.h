@@ -8,6 +8,9 @@
 
 #include "solver/precompute/parts.h"
 
+/* Above this number of elements all pairs take too long by preset. */
+enum { PLAN_PAIRS_ELEMENTS = 32768 };
+
 /* plan.c. The plan of a mesh that is ready; the same, where rows take other memory than was thought, since
  * emitters are known; before the mesh is refined to about n elements, that of the rows so far; of a store,
  * whose recipe is in plan. All fail, LAM_ERR_MEMORY with advice, where nothing fits into memory. */

@@ -145,9 +145,10 @@ lam_status plan_weigh_blocks(const precompute_job *job, precompute_scene *scene,
     const bool asked = source_asked(o->form_factors) == &source_blocks,
                able = (method->flags & METHOD_BLOCKS) != 0;
     const build_method *built = able ? method : plan_method_of_blocks();
+    const double n = (double)scene->m.n;
+    precompute_plan of_blocks;
     factor_cost cost = plan->cost;
-    bool taken = asked;
-    if (!plan_may_have_blocks(job, (double)scene->m.n) || built == NULL) return LAM_OK;
+    if (!plan_may_have_blocks(job, n) || built == NULL) return LAM_OK;
     if (final && !able && !asked) return LAM_OK;
     TRY(scene_make_tree(scene, error));
     if (asked) TRY(check_asked(o, method, final, &scene->tree, error));
@@ -159,13 +160,21 @@ lam_status plan_weigh_blocks(const precompute_job *job, precompute_scene *scene,
                      .seed = o->seed,
                      .closure = o->closed};
     if (o->quality == QUALITY_HIGH) blocks.accuracy /= 4;
-    taken = taken || !plan_fits(job, scene, plan, (double)scene->m.n);
+    const bool wanted = asked || !plan_fits(job, scene, plan, n);
+    bool taken = wanted;
     if (!taken) TRY(weigh(job, scene, &blocks, plan, &cost, &taken, error));
     if (!taken) goto done;
-    plan->recipe = blocks;
-    plan->cost = cost;
-    plan->method = built;
-    plan->streamed = plan->large = false;
+    of_blocks = *plan;
+    of_blocks.recipe = blocks;
+    of_blocks.cost = cost;
+    of_blocks.method = built;
+    of_blocks.streamed = of_blocks.large = false;
+    if (!wanted && !plan_fits(job, scene, &of_blocks, n)) {
+        plan_explain(plan, "blocks of clusters are not taken: memory has room for rows alone");
+        scene_forget_ready(scene);
+    } else {
+        *plan = of_blocks;
+    }
 done:
     return status;
 }

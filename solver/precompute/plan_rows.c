@@ -19,9 +19,6 @@ typedef struct rows_request {
     bool rounded;      /* all pairs follow epsilon */
 } rows_request;
 
-/* Above this number of elements all pairs take too long. */
-enum { PAIRS_ELEMENTS_MOST = 32768 };
-
 /* The accuracy that a quality stands for. */
 typedef struct quality_level {
     double noise_share; /* of rays: part of epsilon that their noise may be */
@@ -159,7 +156,7 @@ lam_status plan_rows(const precompute_job *job, const precompute_scene *scene, d
     const rows_request asked = request_of(job, plan);
     const int disk_too = o->scratch != NULL;
     const bool pairs_too =
-        !plan->weighed.too_slow && (n <= PAIRS_ELEMENTS_MOST || n <= (double)rays_of(&asked));
+        !plan->weighed.too_slow && (n <= PLAN_PAIRS_ELEMENTS || n <= (double)rays_of(&asked));
     for (int way = 0; way <= 2 * disk_too + 1; way++) {
         const bool all_pairs = way % 2 == 0;
         if (all_pairs && !pairs_too) continue;

@@ -14,9 +14,8 @@ enum { PROBES_OF_BUDGET = 32, PROBES_OF_CHEAPEST = 8 };
 /* Of the budget, the share that the forecast may fill: importing, samples and the store take some, too, and
  * forecasts are right within half as much again. */
 static const double share_filled = .8;
-/* Pairs cost more than these seconds each; above this many elements defaults do not take all of them. */
+/* Pairs cost more than these seconds each. */
 static const double pair_least_seconds = 1.5e-7;
-enum { PAIRS_ELEMENTS_MOST = 32768 };
 /* A sample of pairs takes at most so many of them, each of these seconds where it is projected, and at high
  * quality this many times as long; it may take a quarter of the budget. */
 static const double sampled_pairs = 40000, sampled_pair_seconds = 2e-5, high_times = 8, share_sampled = .25;
@@ -249,7 +248,7 @@ lam_status plan_within_time(const precompute_job *job, precompute_scene *scene, 
     if (blocks) TRY(sample_blocks(&run, seconds, error));
     times_update_processors(job, times);
     const double all = n * n / 2, sampling = fmin(all, sampled_pairs) * sampled_pair_seconds;
-    const bool pairs = n <= PAIRS_ELEMENTS_MOST &&
+    const bool pairs = n <= PLAN_PAIRS_ELEMENTS &&
                        forecast_wall_seconds(all * pair_least_seconds, run.rates) < seconds &&
                        forecast_wall_seconds(sampling, run.rates) < share_sampled * seconds;
     const bool rays = asked != &source_blocks;

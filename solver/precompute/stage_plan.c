@@ -5,9 +5,10 @@
 #include <string.h>
 
 static void log_reason(terminal *t, const char *reason) {
-    for (size_t length; *reason != '\0'; reason += length + 1) {
-        length = strcspn(reason, "\n");
+    while (*reason != '\0') {
+        const size_t length = strcspn(reason, "\n");
         terminal_log(t, "%.*s", (int)length, reason);
+        reason += length + (reason[length] == '\n');
     }
 }
 

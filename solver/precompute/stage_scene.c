@@ -1,13 +1,9 @@
-/* The first stages of a precompute: input, mesh, and a recipe for which memory suffices. */
+/* The first stage of a precompute: a scene becomes a mesh, with its openings, backs and tiles of the sky. */
 #include "solver/base/atomic_file.h"
 #include "solver/formfactor/facing.h"
-#include "solver/operator/refine/form_factor_rows.h"
 #include "solver/precompute/stages.h"
 #include "solver/scene/import/import.h"
-#include "solver/scene/import/picture_files.h"
-#include "store/groups.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
