@@ -15,7 +15,7 @@ typedef struct outcome {
     double seconds;
 } outcome;
 
-static outcome choose(const char *scene, size_t n, recipe other, int n_threads) {
+static outcome choose_within(const char *scene, size_t n, recipe other, int n_threads, double memory) {
     lam_error error = {.message = ""};
     terminal t;
     const generate_options how = {.kind = scene,
@@ -27,7 +27,7 @@ static outcome choose(const char *scene, size_t n, recipe other, int n_threads) 
                                   .terrain = "flat"};
     const precompute_options options = {
         .form_factors = 0, .quality = QUALITY_NORMAL, .rays = OPTION_AUTO, .build = build_presets("auto")};
-    precompute_job job = {.options = &options, .t = &t, .memory = 8e9};
+    precompute_job job = {.options = &options, .t = &t, .memory = memory};
     precompute_scene of = {.order = NULL};
     precompute_plan plan = {.method = method_find("hierarchical"), .recipe = other};
     terminal_open(&t, "test", true, false);
@@ -42,6 +42,10 @@ static outcome choose(const char *scene, size_t n, recipe other, int n_threads) 
     mesh_free(&of.m);
     plane_tree_free(&of.tree);
     return found;
+}
+
+static outcome choose(const char *scene, size_t n, recipe other, int n_threads) {
+    return choose_within(scene, n, other, n_threads, 8e9);
 }
 
 static const recipe all_pairs = {.source = &source_pairs, .rays = RAYS_BESIDE_PAIRS, .accuracy = 7e-5},
@@ -77,6 +81,17 @@ START_TEST(a_smaller_scene_is_not_weighed) {
 }
 END_TEST
 
+/* 1,024 rays of 1,500 elements take less memory than blocks, which cost less time; no cost of blocks is left
+ * behind. */
+START_TEST(rows_are_taken_where_blocks_do_not_fit) {
+    const recipe rays = {.source = &source_rays, .rays = 1024};
+    ck_assert_ptr_eq(choose_within("cornell", 1500, rays, 2, 2e8).source, &source_blocks);
+    const outcome tight = choose_within("cornell", 1500, rays, 2, 7e7);
+    ck_assert_ptr_eq(tight.source, &source_rays);
+    ck_assert_double_eq(tight.seconds, 0);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("choose blocks");
     TCase *cases = tcase_create("choose blocks");
@@ -85,6 +100,7 @@ int main(void) {
     tcase_add_test(cases, a_city_does_not);
     tcase_add_test(cases, small_scenes_get_blocks);
     tcase_add_test(cases, a_smaller_scene_is_not_weighed);
+    tcase_add_test(cases, rows_are_taken_where_blocks_do_not_fit);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
