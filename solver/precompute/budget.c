@@ -1,3 +1,5 @@
+/* The laws of error that --time chooses by: e = e_0 (epsilon / .05)^.6 of blocks and of pairs, to which pairs
+ * add their own error in squares, and e = 9 rays^-1/2 of rays. Among recipes in time the least error wins. */
 #include "solver/precompute/budget.h"
 
 #include "solver/formfactor/recipe.h"

@@ -1,3 +1,5 @@
+/* Emitters are read from a file of emissions, made of groups that shine evenly, or are the tiles of the sky.
+ */
 #include "solver/precompute/emitter_list.h"
 
 #include <stdio.h>

@@ -1,3 +1,5 @@
+/* One line names the stated error that is too large and the option that lowers it: --epsilon where
+ * compression is more than half of the squared error, else what the source of the form factors advises. */
 #include "solver/precompute/error_advice.h"
 
 #include "solver/formfactor/source.h"

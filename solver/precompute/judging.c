@@ -1,3 +1,6 @@
+/* Two samples of form factors, or finer blocks, become the references of the judge; they are kept where a
+ * next trial has the same form factors. First light is found by rays or by blocks where rows say it too
+ * coarsely. */
 #include "solver/precompute/judging.h"
 
 #include "solver/base/random.h"

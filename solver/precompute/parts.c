@@ -1,3 +1,5 @@
+/* The parts of a run at its beginning and at its end, and the tree of elements that samples and blocks share.
+ */
 #include "solver/precompute/parts.h"
 
 #include "solver/base/clock.h"

@@ -1,3 +1,5 @@
+/* A run from the input to a sealed store: the stages in their order, each handed the parts that it may touch
+ * (parts.h), and the trials of form factors, operator and judge until an error that was asked for is kept. */
 #include "solver/precompute/precompute.h"
 
 #include "solver/base/clock.h"

@@ -1,3 +1,5 @@
+/* The laws by which a trial turns its knobs: the squares of compression C and form factors F add up to that
+ * of the whole error; C falls as epsilon^.6, or as measured, and F as the source of the form factors says. */
 #include "solver/precompute/trial.h"
 
 #include "solver/formfactor/source.h"
