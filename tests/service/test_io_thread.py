@@ -68,7 +68,17 @@ class IoThread(unittest.TestCase):
         self.assertGreater(len(paths), 12)
         times, tagged = 200, 0
         with Daemon(self.store, "--threads", 2) as daemon:
-            pace = min(self.ask_often(daemon, request("/healthz", method="HEAD"), times, 200) for _ in range(3))
+            def pace():
+                return self.ask_often(daemon, request("/healthz", method="HEAD"), times, 200)
+
+            def often(line, status):
+                """Of both the least of some rounds in turns: another load on the machine makes one of them slow, but not all."""
+                took, beside = [], []
+                while len(took) < 3 or (len(took) < 10 and not min(took) < 4 * min(beside)):
+                    beside.append(pace())
+                    took.append(self.ask_often(daemon, line, times, status))
+                return min(took) / min(beside)
+
             for path in paths:
                 for accept in "identity", "gzip", "zstd":
                     own = path.replace("{name}", "box")
@@ -78,9 +88,9 @@ class IoThread(unittest.TestCase):
                         asked += [(request(own, f"Accept-Encoding: {accept}", f"If-None-Match: {tag}"), 304)]
                         tagged += 1
                     for line, status in asked:
-                        took = min(self.ask_often(daemon, line, times, status) for _ in range(3))
-                        with self.subTest(path=path, accept=accept, status=status, took=f"{took / pace:.1f} times"):
-                            self.assertLess(took, 4 * pace)
+                        took = often(line, status)
+                        with self.subTest(path=path, accept=accept, status=status, took=f"{took:.1f} times"):
+                            self.assertLess(took, 4)
             self.assertGreaterEqual(tagged, 12)
 
     def test_bytes_are_those_of_the_file(self):
