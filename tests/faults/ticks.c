@@ -18,7 +18,9 @@ enum { LEAPS = 2 };
 static const long thread_step = 4096 * 32 * 8 / 5, wall_step = 100000, wall_leap = 20100000;
 
 static atomic_long wall;
-static atomic_int leaps; /* that are left */
+/* The leaps that are left to the thread that read the process's clock: other threads, as those of Embree 4,
+ * read the clock on the wall whenever they wait. */
+static _Thread_local int leaps;
 static _Thread_local long thread;
 
 static struct timespec time_of(long nanoseconds) {
@@ -28,12 +30,12 @@ static struct timespec time_of(long nanoseconds) {
 int clock_gettime(clockid_t id, struct timespec *out) {
     switch (id) {
     case CLOCK_MONOTONIC: {
-        const long step = atomic_fetch_sub(&leaps, 1) > 0 ? wall_leap : wall_step;
+        const long step = leaps-- > 0 ? wall_leap : wall_step;
         *out = time_of(atomic_fetch_add(&wall, step) + step);
         return 0;
     }
     case CLOCK_PROCESS_CPUTIME_ID:
-        atomic_store(&leaps, LEAPS);
+        leaps = LEAPS;
         *out = time_of(2 * atomic_load(&wall));
         return 0;
     case CLOCK_THREAD_CPUTIME_ID:
