@@ -13,6 +13,9 @@
 /* Elements that --mesh-error makes at most, unless --elements gives their number. */
 enum { ADAPTIVE_ELEMENTS = 40000 };
 
+/* The elements that a mesh that was not divided is advised to have. */
+enum { COARSE_ADVICE = 5000 };
+
 static lam_status join_faces(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     const size_t faces = scene->m.n;
     const lam_status status = faces_join(&scene->m, error);
@@ -84,15 +87,29 @@ static void log_renamed(const precompute_job *job, const precompute_scene *scene
                       m->group_names[first]);
 }
 
+/* About the edge of the elements that the options ask for, metres; 0: faces stay as they are. With
+ * --mesh-error nobody knows yet how many it takes. */
+static double edge_to_be(const mesh *m, const precompute_options *o) {
+    const size_t elements = o->elements > 0 || o->mesh_error == 0 ? fronts_of(m, o->elements) : COARSE_ADVICE;
+    double area = 0;
+    for (size_t i = 0; i < m->n; i++) area += m->area[i];
+    if (o->max_edge > 0) return o->max_edge;
+    return elements > m->n || o->mesh_error > 0 ? sqrt(area / (double)elements) : 0;
+}
+
 lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
+    const double edge = edge_to_be(&scene->m, o);
+    const size_t most = o->elements > 0 ? fronts_of(&scene->m, o->elements) : SIZE_MAX;
     /* --elements counts both sides. */
     const mesh_refinement refinement = {
         .max_edge = o->max_edge, .elements = o->mesh_error > 0 ? 0 : fronts_of(&scene->m, o->elements)};
     if (o->mesh_error > 0) TRY(join_faces(job, scene, error));
+    if (edge > 0) TRY(scene_cut_at_walls(job, scene, edge, most, error));
     if (refinement.max_edge > 0 || refinement.elements > 0) TRY(mesh_refine(&scene->m, &refinement, error));
     if (o->mesh_error > 0) TRY(refine_by_error(job, scene, error));
+    if (edge > 0) TRY(scene_log_under_walls(job, scene, edge, error));
     TRY(mesh_make_backs(&scene->m, error));
     log_renamed(job, scene);
     TRY(mesh_keep_pictures(&scene->m, error)); /* every element has its means */
@@ -102,7 +119,6 @@ done:
 
 /* Above this share of the area in one element, a mesh that was not divided is called coarse. */
 static const double coarse_share = .02;
-enum { COARSE_ADVICE = 5000 };
 
 /* Logs what shows a wrong axis or unit, or a mesh too coarse to show light. */
 void scene_log_mesh(const precompute_job *job, const precompute_scene *scene) {

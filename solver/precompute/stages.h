@@ -34,6 +34,15 @@ lam_status stage_prepare_mesh(const precompute_job *job, precompute_scene *scene
                               lam_error *error);
 void scene_log_mesh(const precompute_job *job, const precompute_scene *scene);
 
+/* Cuts faces along the walls that stand on them, where these extend over at least half of the edge of the
+ * elements to be, metres, as long as it makes no more than max(1,000, the faces so far) in addition, nor more
+ * than `most` faces; logs the number of faces. Logs how many elements still lie under walls, once the mesh is
+ * divided: stage_walls.c. */
+lam_status scene_cut_at_walls(const precompute_job *job, precompute_scene *scene, double edge, size_t most,
+                              lam_error *error);
+lam_status scene_log_under_walls(const precompute_job *job, const precompute_scene *scene, double edge,
+                                 lam_error *error);
+
 /* Chooses the form factors, in plan and in the log, and reads emitters then: stage_plan.c. */
 lam_status stage_choose_plan(const precompute_job *job, precompute_scene *scene, precompute_plan *plan,
                              lam_error *error);
