@@ -6,12 +6,27 @@
 
 #include "solver/adapt/gather.h"
 
-/* Elements that are looked at, by area: as many as there are, within these. */
-enum { MESH_ERROR_LOOKS_LEAST = 64, MESH_ERROR_LOOKS_MOST = 1024 };
+/* Elements that are looked at: as many as there are, within the first two, shared among groups by their
+ * areas, but MESH_ERROR_LOOKS_OF_GROUP in each group at least; of many groups fewer, so that these are no
+ * more than MESH_ERROR_LOOKS_OF_GROUPS together. */
+enum {
+    MESH_ERROR_LOOKS_LEAST = 64,
+    MESH_ERROR_LOOKS_MOST = 1024,
+    MESH_ERROR_LOOKS_OF_GROUP = 16,
+    MESH_ERROR_LOOKS_OF_GROUPS = 4096
+};
+
+/* By light and group, [n_lights][n_groups], means by area, channels summed: the variance of rho H inside
+ * elements, which its noise may make negative, the standard error of that, and (B - E)^2. All are 0 of groups
+ * that were not looked at. */
+typedef struct mesh_error_groups {
+    double *variance, *noise, *light2;
+    size_t fewer; /* looks are the whole numbers of these shares of them; 0: all */
+} mesh_error_groups;
 
 /* error[n_lights] of the answers B [n_lights][C][n] to the emissions E, the first of which comes from lamps
  * where `lamps` says so, or to skies (NULL: none), whose emission is 0; 0 for a light of which nothing
- * bounces. The variance over an element of
+ * bounces. groups: NULL, or what is filled by group. The variance over an element of
  *     B(x) - E = rho H(x)
  * comes from gathering at one random point in each quarter; the product of two independent halves of each
  * estimate has no noise on average. The same for any number of threads. Cost: 768 rays and
@@ -19,6 +34,6 @@ enum { MESH_ERROR_LOOKS_LEAST = 64, MESH_ERROR_LOOKS_MOST = 1024 };
  * Errors: LAM_ERR_MEMORY, LAM_ERR_INTERNAL, LAM_ERR_CANCELLED. */
 lam_status mesh_error(const mesh *m, size_t n_lights, const float *E, const float *B, bool lamps,
                       const gather_sky *sky, uint64_t seed, const progress *p, double *error_of_light,
-                      lam_error *error);
+                      const mesh_error_groups *groups, lam_error *error);
 
 #endif

@@ -42,6 +42,7 @@ void parts_free(precompute_parts *p) {
     scratch_close(p->factors.scratch, false);
     lam_operator_close(p->made.op);
     group_errors_free(&p->made.by_group);
+    mesh_figures_free(&p->made.errors_of_mesh);
     trial_made_free(&p->course.best);
     judge_references_free(p->course.references);
     moving_light_free(&p->walked.light);

@@ -1,6 +1,7 @@
 /* The error that constants on elements leave, as the store states it. */
 #include "solver/adapt/mesh_error.h"
 #include "solver/base/random.h"
+#include "solver/precompute/mesh_error_lights.h"
 #include "solver/precompute/stages.h"
 
 #include <math.h>
@@ -27,6 +28,16 @@ static lam_status choose_lights(const precompute_scene *scene, made_operator *ma
     float *even = figures->has_lights ? E + vector : E;
     for (size_t i = 0; figures->has_even && i < vector; i++) even[i] = 1;
     *out = E;
+    return LAM_OK;
+}
+
+/* The power that each group emits, channels summed. */
+static lam_status take_power(const mesh *m, const float *E, mesh_figures *figures, lam_error *error) {
+    double *power = memory_allocate(m->n_groups, sizeof *power, "the error of the mesh", error);
+    figures->lights_power = power;
+    if (power == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < m->n * m->n_channels; k++)
+        power[m->group[k % m->n]] += m->area[k % m->n] * (double)E[k];
     return LAM_OK;
 }
 
@@ -79,6 +90,7 @@ static lam_status add_skies(const precompute_job *job, const precompute_scene *s
     float *E = NULL, *B = NULL;
     void *work = NULL;
     double *L = NULL;
+    mesh_error_groups groups = {.fewer = 0};
     if (sky->first_bounce == NULL || factors->f.closed || scene->emitters.s > 0) goto done;
     const size_t bytes = lam_operator_work_bytes(made->op, SKIES);
     L = memory_allocate(SKIES, (sky->tiling.n_tiles + 1) * sizeof *L, "the error of the mesh", error);
@@ -91,12 +103,16 @@ static lam_status add_skies(const precompute_job *job, const precompute_scene *s
     TRY(lam_operator_apply(made->op, SKIES, LAM_RADIOSITY, E, B, work, bytes, error));
     for (size_t i = 0; i < all; i++) E[i] = 0;
     const gather_sky skies = {.tiling = &sky->tiling, .L = L};
-    TRY(mesh_error(&scene->m, SKIES, E, B, false, &skies, seed, &job->progress, found, error));
+    TRY(mesh_error_groups_begin(&scene->m, SKIES, &groups, error));
+    TRY(mesh_error(&scene->m, SKIES, E, B, false, &skies, seed, &job->progress, found, &groups, error));
+    TRY(mesh_error_take(&groups, 0, MESH_OF_SKY_EVEN, scene->m.n_groups, figures, error));
+    TRY(mesh_error_take(&groups, 1, MESH_OF_SKY_CLOUDY, scene->m.n_groups, figures, error));
     figures->has_skies = true;
     figures->sky_even = found[0];
     figures->sky_cloudy = found[1];
     terminal_log(job->t, "mesh     skies, even %.3g, cloudy %.3g", found[0], found[1]);
 done:
+    mesh_error_groups_free(&groups);
     free(L);
     free(E);
     free(B);
@@ -112,6 +128,7 @@ lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *s
     double found[2] = {0};
     float *E = NULL, *B = NULL;
     void *work = NULL;
+    mesh_error_groups groups = {.fewer = 0};
     *figures = (mesh_figures){.has_lights = false};
     TRY(choose_lights(scene, made, &E, error));
     const size_t n_lights = (size_t)figures->has_lights + figures->has_even;
@@ -128,14 +145,25 @@ lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *s
         goto done;
     }
     TRY(status);
+    TRY(mesh_error_groups_begin(&scene->m, n_lights, &groups, error));
     TRY(mesh_error(&scene->m, n_lights, E, B, figures->has_lights, NULL,
-                   precompute_seed(job->options->seed, SEED_MESH_ERROR), &job->progress, found, error));
+                   precompute_seed(job->options->seed, SEED_MESH_ERROR), &job->progress, found, &groups,
+                   error));
+    if (figures->has_lights)
+        TRY(mesh_error_take(&groups, 0, MESH_OF_LAMPS, scene->m.n_groups, figures, error));
+    if (figures->has_even)
+        TRY(mesh_error_take(&groups, n_lights - 1, MESH_OF_EVEN, scene->m.n_groups, figures, error));
+    if (figures->has_lights) TRY(take_power(&scene->m, E, figures, error));
+    if (figures->has_even)
+        figures->even_emitters = mesh_error_emitters(&scene->m, E + (n_lights - 1) * vector);
     figures->lights = found[0];
     figures->even = found[n_lights - 1];
     if (figures->has_lights) terminal_log(job->t, "mesh     lights indirect %.3g", figures->lights);
     if (figures->has_even) terminal_log(job->t, "mesh     even indirect %.3g", figures->even);
+    TRY(mesh_error_add_others(job, scene, made, error));
     TRY(add_skies(job, scene, factors, made, error));
 done:
+    mesh_error_groups_free(&groups);
     free(E);
     free(B);
     free(work);

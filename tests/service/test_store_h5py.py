@@ -265,6 +265,12 @@ class StoreTest(unittest.TestCase):
                 for name in "sky_first", "sky_elements_off", "sky_means_off":
                     expected[f"/error/by_group/{name}"] = ((g, 12), "<f8")
             expected.update({f"/error/by_group/{figure}": ((1, g), "<f8") for figure in by_group})
+            of_mesh = [light for light in ("lights", "even", "single", "groups", "sky_even", "sky_cloudy")
+                       if light in f["error/mesh"].attrs]
+            expected.update({f"/error/mesh/{light}_{what}": ((g,), "<f8")
+                             for light in of_mesh for what in ("variation", "reflected")})
+            if "lights" in of_mesh:
+                expected["/error/mesh/lights_power"] = ((g,), "<f8")
             names = found.pop("/mesh/group_names")
             self.assertEqual(names[0], (g,))
             self.assertRegex(names[1], r"^\|S\d+$")
@@ -410,8 +416,9 @@ class StoreTest(unittest.TestCase):
             # of what constants leave: every light is there that the operator answers
             of_mesh = dict(f["error/mesh"].attrs)
             self.assertEqual("even" in of_mesh, name != "emitters")
-            for share in of_mesh.values():
-                self.assertTrue(0 <= share < 10, share)
+            for light, share in of_mesh.items():
+                if not light.endswith("_emitters"):
+                    self.assertTrue(0 <= share < 10, (light, share))
             for name, figures in f.get("error/by_group", {}).items():
                 if "sky" not in name:
                     self.assertEqual(figures.shape, (1, len(f["mesh/group_names"])), name)

@@ -121,26 +121,41 @@ void error_report_load(store *s, error_report *out) {
 }
 
 /* Writes figures of the mesh, or reads them: one that is no finite number is not known. */
-static lam_status pass_mesh(store *s, bool saves, mesh_figures *m, lam_error *error) {
+static lam_status pass_mesh_numbers(store *s, bool saves, mesh_figures *m, lam_error *error) {
     lam_status status = LAM_OK;
     const char *const path = figures_groups[MESH_GROUP].path;
     const struct {
         const char *name;
         double *number;
         bool *has;
-    } all[] = {{"lights", &m->lights, &m->has_lights},
-               {"even", &m->even, &m->has_even},
-               {"sky_even", &m->sky_even, &m->has_skies},
-               {"sky_cloudy", &m->sky_cloudy, &m->has_skies}};
+    } all[] = {{"lights", &m->lights, &m->has_lights},     {"even", &m->even, &m->has_even},
+               {"sky_even", &m->sky_even, &m->has_skies},  {"sky_cloudy", &m->sky_cloudy, &m->has_skies},
+               {"single", &m->single, &m->has_single},     {"groups", &m->groups, &m->has_groups},
+               {"even_emitters", &m->even_emitters, NULL}, {"groups_emitters", &m->groups_emitters, NULL}};
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
         const double x = saves ? -1 : number_of(s, path, all[k].name);
-        if (saves && *all[k].has) TRY(store_set_number(s, path, all[k].name, *all[k].number, error));
+        const bool has = all[k].has != NULL ? *all[k].has : *all[k].number > 0;
+        if (saves && has) TRY(store_set_number(s, path, all[k].name, *all[k].number, error));
         if (!(x >= 0 && isfinite(x))) continue;
         *all[k].number = x;
-        *all[k].has = true;
+        if (all[k].has != NULL) *all[k].has = true;
     }
 done:
     return status;
+}
+
+void mesh_figures_load_shown(store *s, mesh_figures *out) {
+    *out = (mesh_figures){.has_lights = false};
+    pass_mesh_numbers(s, false, out, NULL);
+}
+
+void mesh_figures_free(mesh_figures *m) {
+    for (int k = 0; k < MESH_FIGURES; k++) {
+        free(m->variation[k]);
+        free(m->reflected[k]);
+    }
+    free(m->lights_power);
+    *m = (mesh_figures){.has_lights = false};
 }
 
 /* Writes an array of `group`, or reads it: numbers that are finite and at least `least`. */
@@ -159,6 +174,32 @@ static lam_status pass_array(store *s, bool saves, const char *group, const char
         if (!((*numbers)[k] >= least && isfinite((*numbers)[k])))
             FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu] = %g, must be %s", store_path(s), path, k, (*numbers)[k],
                  least < 0 ? "finite" : "at least 0");
+done:
+    return status;
+}
+
+/* The same with the arrays by group, of which older stores have none. */
+static lam_status pass_mesh(store *s, bool saves, mesh_figures *m, lam_error *error) {
+    static const char *const names[MESH_FIGURES][2] = {
+        [MESH_OF_LAMPS] = {"lights_variation", "lights_reflected"},
+        [MESH_OF_EVEN] = {"even_variation", "even_reflected"},
+        [MESH_OF_SKY_EVEN] = {"sky_even_variation", "sky_even_reflected"},
+        [MESH_OF_SKY_CLOUDY] = {"sky_cloudy_variation", "sky_cloudy_reflected"},
+        [MESH_OF_SINGLE] = {"single_variation", "single_reflected"},
+        [MESH_OF_GROUPS] = {"groups_variation", "groups_reflected"}};
+    lam_status status = LAM_OK;
+    const char *const group = figures_groups[MESH_GROUP].path;
+    TRY(pass_mesh_numbers(s, saves, m, error));
+    for (int k = 0; k < 2 * MESH_FIGURES; k++) {
+        const char *const name = names[k / 2][k % 2];
+        double **numbers = &(k % 2 == 0 ? m->variation : m->reflected)[k / 2];
+        char path[PATH_BYTES];
+        snprintf(path, sizeof path, "%s/%s", group, name);
+        if (saves ? *numbers == NULL : !store_has(s, path)) continue;
+        TRY(pass_array(s, saves, group, name, 1, &m->n_groups, 0, numbers, error));
+    }
+    if (saves ? m->lights_power != NULL : store_has(s, STORE_ERROR "/mesh/lights_power"))
+        TRY(pass_array(s, saves, group, "lights_power", 1, &m->n_groups, 0, &m->lights_power, error));
 done:
     return status;
 }
@@ -309,6 +350,7 @@ done:
 void stated_figures_free(stated_figures *f) {
     group_errors_free(&f->by_group);
     emitter_figures_free(&f->emitters);
+    mesh_figures_free(&f->mesh);
     *f = (stated_figures){.repair = 0};
 }
 
@@ -331,6 +373,7 @@ lam_status stated_figures_load(store *s, const figures_shape *shape, stated_figu
     lam_status status = LAM_OK;
     stated_figures f = {.by_group = {.n_groups = shape->n_groups, .n_channels = shape->n_channels}};
     error_report_load(s, &f.report);
+    f.mesh.n_groups = shape->n_groups;
     TRY(pass_mesh(s, false, &f.mesh, error));
     if (store_has_attribute(s, STORE_ERROR, "repair"))
         TRY(store_get_number(s, STORE_ERROR, "repair", &f.repair, error));

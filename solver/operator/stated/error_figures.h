@@ -113,12 +113,32 @@ typedef struct error_report {
     double seconds;
 } error_report;
 
-/* The share of light that constants on elements leave, |error| / |B - E|: of the scene's lamps or of all
- * emitters together, of 1 from every element, and of an even and a cloudy sky. */
+/* The lights that the error of the mesh is measured for: the scene's lamps or all emitters together, 1 from
+ * every element, an even and a cloudy sky, and several lights of one element and of one group each. */
+enum {
+    MESH_OF_LAMPS,
+    MESH_OF_EVEN,
+    MESH_OF_SKY_EVEN,
+    MESH_OF_SKY_CLOUDY,
+    MESH_OF_SINGLE,
+    MESH_OF_GROUPS,
+    MESH_FIGURES
+};
+
+/* The share of light that constants on elements leave, |error| / |B - E|, of each of these; and by group the
+ * root of the mean square, by area, of what B varies by inside elements and of B - E, which mesh_law.h
+ * divides by each other: 0 of both where a group was not looked at. Of several lights, each of them scaled to
+ * sum A (B - E)^2 = 1, all together. */
 typedef struct mesh_figures {
-    bool has_lights, has_even, has_skies;
-    double lights, even, sky_even, sky_cloudy;
+    bool has_lights, has_even, has_skies, has_single, has_groups;
+    double lights, even, sky_even, sky_cloudy, single, groups;
+    double even_emitters,
+        groups_emitters; /* effective numbers, of several lights in the middle; 0: not stated */
+    size_t n_groups;
+    double *variation[MESH_FIGURES], *reflected[MESH_FIGURES]; /* [n_groups]; NULL: not stated */
+    double *lights_power; /* [n_groups], that the scene's lamps emit; NULL: not stated */
 } mesh_figures;
+void mesh_figures_free(mesh_figures *m);
 
 /* Weights w of emitters have the mean squared error w' K w of B, channels stacked, of all elements (K, with
  * areas), of those of a group (K_g), and of the mean of a group (M_g); of a group that reflects nothing,
@@ -155,6 +175,9 @@ lam_status stated_figures_load(store *s, const figures_shape *shape, stated_figu
 
 /* The part of it that is attributes: a figure that is missing, or no number, is negative. */
 void error_report_load(store *s, error_report *out);
+
+/* The attributes of the mesh alone, without arrays. */
+void mesh_figures_load_shown(store *s, mesh_figures *out);
 
 /* For descriptions. The groups of /error whose attributes are figures; a name of NULL ends the list. */
 typedef struct figures_group {

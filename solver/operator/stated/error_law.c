@@ -15,6 +15,7 @@ void error_by_group_free(error_by_group *e) {
     free(e->of_group);
     free(e->bin);
     free(e->overlap);
+    mesh_shares_free(&e->mesh);
     *e = (error_by_group){.n_bins = 0};
 }
 
@@ -82,6 +83,7 @@ lam_status error_by_group_make(store *s, const error_scene *scene, stated_figure
     if (e.area == NULL || e.squares == NULL || e.reflectance == NULL || e.bin == NULL) TRY(LAM_ERR_MEMORY);
     find_sums(scene, &e);
     TRY(find_reflecting(scene, &e, error));
+    TRY(mesh_shares_make(&from->mesh, G, &e.mesh, error));
     *out = e;
     e = (error_by_group){.n_bins = 0};
 done:
@@ -106,7 +108,7 @@ void emission_size_add(emission_size *e, size_t n, const double *weights, const 
 
 emission_size emission_size_sum(const emission_size *a, const emission_size *b) {
     const double power = sqrt(a->power2) + sqrt(b->power2);
-    return (emission_size){power * power, a->squares + b->squares};
+    return (emission_size){power * power, a->squares + b->squares, a->lamps2 + b->lamps2};
 }
 
 /* P^2 (one^2 / N^2 + many^2 (1 - 1/N) / N + even^2): the square of an error. */
@@ -194,7 +196,7 @@ static void add_sent(const error_by_group *e, const light_sizes *of, size_t bin,
         area += e->area[b];
     }
     for (size_t g = 0; g < G; g++) squares += e->squares[g];
-    const emission_size size = {of->sent.power2, area > 0 ? of->sent.power2 * squares / (area * area) : 0};
+    const emission_size size = {of->sent.power2, area > 0 ? of->sent.power2 * squares / (area * area) : 0, 0};
     const double rms = sky[SKY_RMS_BOUNCED][bin], mean = sky[SKY_MEAN_BOUNCED][bin];
     sum->elements2 += fmin(sky2(e, &of->sent, bin, SKY_RMS_TILES),
                            rms * rms * off2 + emission2(e, &size, bin, GROUP_RMS_ONE));
@@ -217,6 +219,23 @@ bin_error error_law(const error_by_group *e, const light_sizes *of, size_t bin) 
 
 double error_ratio(double error2, double light2) {
     return error2 > 0 ? sqrt(error2 / fmax(light2 - error2, 0)) : 0;
+}
+
+bool mesh_is_stated(const error_by_group *e) {
+    return mesh_shares_known(&e->mesh);
+}
+
+bool mesh_lamps_in(const error_by_group *e, size_t bin) {
+    return e->mesh.lamps != NULL && e->mesh.lamps[bin % e->figures.n_groups];
+}
+
+mesh_lack mesh_lack_of_bin(const error_by_group *e, const light_sizes *of, size_t bin) {
+    const mesh_light light = {.power = sqrt(of->size.power2),
+                              .of_lamps = sqrt(of->size.lamps2),
+                              .emitters = emission_size_number(&of->size),
+                              .sky_power = sqrt(of->sky.power2) + sqrt(of->sent.power2),
+                              .bounced = of->quantity == LAM_INDIRECT};
+    return mesh_lack_of(&e->mesh, &light, bin % e->figures.n_groups);
 }
 
 double overlap_of_bin(const error_by_group *e, size_t bin) {

@@ -4,6 +4,7 @@
 #define LAMBERT_OPERATOR_STATED_ERROR_LAW_H
 
 #include "solver/operator/stated/error_figures.h"
+#include "solver/operator/stated/mesh_law.h"
 #include "solver/operator/stated/reflecting.h"
 
 /* The scene of an answer; views of the caller's. */
@@ -32,6 +33,7 @@ typedef struct error_by_group {
     uint32_t *bin;        /* [n] */
     double repair;        /* s; 0: none */
     double *overlap;      /* [n_groups], o; NULL: none */
+    mesh_shares mesh;
 } error_by_group;
 
 void error_by_group_free(error_by_group *e);
@@ -41,9 +43,10 @@ void error_by_group_free(error_by_group *e);
 lam_status error_by_group_make(store *s, const error_scene *scene, stated_figures *from, error_by_group *out,
                                lam_error *error);
 
-/* The size of an emission, channels stacked: P^2 = sum (sum A E)^2 and sum A^2 E^2. */
+/* The size of an emission, channels stacked: P^2 = sum (sum A E)^2 and sum A^2 E^2; and P^2 of that part
+ * which groups with lamps of the scene emit (mesh_law.h), which emission_size_add leaves. */
 typedef struct emission_size {
-    double power2, squares;
+    double power2, squares, lamps2;
 } emission_size;
 
 /* (sum A E)^2 / sum A^2 E^2; 0 of no emission. */
@@ -79,6 +82,12 @@ typedef struct bin_error {
     double elements2, mean2;
 } bin_error;
 bin_error error_law(const error_by_group *e, const light_sizes *of, size_t bin);
+
+/* The shares of a bin's light that constants on elements lack; true where any are stated; and true where
+ * lamps of the scene are in the group of a bin. */
+mesh_lack mesh_lack_of_bin(const error_by_group *e, const light_sizes *of, size_t bin);
+bool mesh_is_stated(const error_by_group *e);
+bool mesh_lamps_in(const error_by_group *e, size_t bin);
 
 /* The share o of a bin; the square, over that of the light, that faces which count twice are off by: of the
  * elements of a bin; and that of a mean, by the sums of its light and of the light that may be covered. */

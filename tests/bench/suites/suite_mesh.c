@@ -77,7 +77,7 @@ static lam_status state_errors(const bench_run *run, const measured_mesh *m, con
     if (B == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < MESH_LIGHTS * vector; i++) B[i] = m->E[i] + (float)x[i];
     TRY(mesh_error(of, MESH_LIGHTS - first, m->E + first * vector, B + first * vector, first == 0, NULL,
-                   run->seed, run->progress, stated + first, error));
+                   run->seed, run->progress, stated + first, NULL, error));
 done:
     free(B);
     return status;

@@ -29,6 +29,7 @@ static mesh floor_and_lamp(size_t cells) {
         }
     mesh_add_cell(&m, &(box_cell){.axis = 2, .level = 1, .from = {.7, 1, 1}, .to = {1.7, 2, 1}}, false);
     mesh_finish(&m, rho);
+    m.n_groups = 1;
     m.reflectance[m.n - 1] = 0;
     m.emission[m.n - 1] = 1;
     return m;
@@ -212,7 +213,20 @@ START_TEST(error_of_a_uniform_mesh) {
     double stated = 0;
     lam_error error = {0};
     const double off = true_error(&m, B);
-    ck_ok(mesh_error(&m, 1, m.emission, B, true, NULL, 3, NULL, &stated, &error));
+    double *numbers = calloc(3 * m.n_groups, sizeof *numbers), *area = calloc(m.n_groups, sizeof *area);
+    const mesh_error_groups groups = {numbers, numbers + m.n_groups, numbers + 2 * m.n_groups, 0};
+    ck_ok(mesh_error(&m, 1, m.emission, B, true, NULL, 3, NULL, &stated, &groups, &error));
+    /* The lacks of groups add up to that of the scene. */
+    double lacks = 0, light2 = 0;
+    for (size_t i = 0; i < m.n; i++) area[m.group[i]] += m.area[i];
+    for (size_t g = 0; g < m.n_groups; g++) {
+        lacks += area[g] * groups.variance[g];
+        light2 += area[g] * groups.light2[g];
+        ck_assert_double_lt(groups.noise[g], groups.variance[g] + 1e-12);
+    }
+    ck_assert_double_eq_tol(sqrt(lacks / light2), stated, 1e-6 * stated);
+    free(numbers);
+    free(area);
     printf("%zu elements: stated %g, true %g\n", m.n, stated, off);
     ck_assert_double_eq_tol(stated, off, .1 * off);
     free(B);
@@ -224,6 +238,7 @@ END_TEST
 START_TEST(no_error) {
     static const double size[3] = {1, 1, 1};
     mesh m = box_mesh(size, 3, .5f);
+    m.n_groups = 1;
     float *E = malloc(2 * m.n * sizeof *E), *B = malloc(2 * m.n * sizeof *B);
     double stated[2] = {-1, -1};
     lam_error error = {0};
@@ -231,7 +246,7 @@ START_TEST(no_error) {
         E[i] = 1, B[i] = 2;
         E[m.n + i] = B[m.n + i] = 0;
     }
-    ck_ok(mesh_error(&m, 2, E, B, false, NULL, 3, NULL, stated, &error));
+    ck_ok(mesh_error(&m, 2, E, B, false, NULL, 3, NULL, stated, NULL, &error));
     ck_assert_double_le(stated[0], 1e-6);
     ck_assert(stated[1] == 0);
     free(E);

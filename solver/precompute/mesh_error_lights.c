@@ -1,0 +1,200 @@
+#include "solver/precompute/mesh_error_lights.h"
+
+#include "solver/base/random.h"
+#include "solver/operator/stated/error_law.h"
+#include "solver/precompute/precompute.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+double mesh_error_emitters(const mesh *m, const float *E) {
+    emission_size size = {.power2 = 0};
+    for (size_t c = 0; c < m->n_channels; c++) emission_size_add(&size, m->n, m->area, E + c * m->n);
+    return emission_size_number(&size);
+}
+
+lam_status mesh_error_groups_begin(const mesh *m, size_t n_lights, mesh_error_groups *out, lam_error *error) {
+    double **const arrays[] = {&out->variance, &out->noise, &out->light2};
+    for (int k = 0; k < 3; k++) {
+        *arrays[k] =
+            memory_allocate(n_lights, m->n_groups * sizeof **arrays[k], "the error of the mesh", error);
+        if (*arrays[k] == NULL) return LAM_ERR_MEMORY;
+    }
+    return LAM_OK;
+}
+
+void mesh_error_groups_free(mesh_error_groups *g) {
+    free(g->variance);
+    free(g->noise);
+    free(g->light2);
+}
+
+lam_status mesh_error_take(const mesh_error_groups *from, size_t light, int which, size_t n_groups,
+                           mesh_figures *to, lam_error *error) {
+    double *variation = memory_allocate(n_groups, sizeof *variation, "the error of the mesh", error);
+    double *reflected = memory_allocate(n_groups, sizeof *reflected, "the error of the mesh", error);
+    to->n_groups = n_groups;
+    to->variation[which] = variation;
+    to->reflected[which] = reflected;
+    if (variation == NULL || reflected == NULL) return LAM_ERR_MEMORY;
+    for (size_t g = 0; g < n_groups; g++) {
+        const size_t k = light * n_groups + g;
+        variation[g] = sqrt(fmax(from->variance[k], from->noise[k]));
+        reflected[g] = sqrt(from->light2[k]);
+    }
+    return LAM_OK;
+}
+
+/* Rounds of lights: the first of each is a single element, whose direct light is sampled as that of a lamp;
+ * the others are groups. */
+enum { ROUNDS = 4, LARGEST_GROUPS = 4, OTHER_GROUPS = 4, GROUPS = LARGEST_GROUPS + OTHER_GROUPS };
+
+/* Sums over lights, each scaled to sum A (B - E)^2 = 1, by group. */
+typedef struct light_sums {
+    double *variance, *noise2, *light2; /* [n_groups] */
+} light_sums;
+
+static bool light_sums_begin(const mesh *m, light_sums *s, lam_error *error) {
+    s->variance = memory_allocate(3, m->n_groups * sizeof *s->variance, "the error of the mesh", error);
+    if (s->variance == NULL) return false;
+    s->noise2 = s->variance + m->n_groups;
+    s->light2 = s->noise2 + m->n_groups;
+    return true;
+}
+
+/* area [n_groups]. */
+static void add_light(const mesh_error_groups *of, size_t light, size_t n_groups, const double *area,
+                      light_sums *to) {
+    const size_t first = light * n_groups;
+    double all = 0;
+    for (size_t g = 0; g < n_groups; g++) all += area[g] * of->light2[first + g];
+    for (size_t g = 0; all > 0 && g < n_groups; g++) {
+        to->variance[g] += of->variance[first + g] / all;
+        to->noise2[g] += of->noise[first + g] * of->noise[first + g] / (all * all);
+        to->light2[g] += of->light2[first + g] / all;
+    }
+}
+
+/* States them for a light; *whole is the share of all groups together. */
+static lam_status state(const light_sums *s, size_t n_groups, const double *area, int which, double *whole,
+                        bool *has, mesh_figures *to, lam_error *error) {
+    double off = 0, all = 0;
+    for (size_t g = 0; g < n_groups; g++) {
+        off += area[g] * s->variance[g];
+        all += area[g] * s->light2[g];
+        s->noise2[g] = sqrt(s->noise2[g]);
+    }
+    if (!(all > 0)) return LAM_OK;
+    *whole = sqrt(fmax(off, 0) / all);
+    *has = true;
+    const mesh_error_groups groups = {s->variance, s->noise2, s->light2, 0};
+    return mesh_error_take(&groups, 0, which, n_groups, to, error);
+}
+
+/* Groups to be lit: the largest that are no lamps, and some at equal steps of the others in that order.
+ * Returns how many. */
+static size_t choose_groups(const mesh *m, const double *area, const double *lamps, size_t chosen[GROUPS],
+                            size_t *order) {
+    size_t n = 0, count = 0;
+    for (size_t g = 0; g < m->n_groups; g++)
+        if (area[g] > 0 && (lamps == NULL || !(lamps[g] > 0))) order[n++] = g;
+    for (size_t k = 0; k < n && count < LARGEST_GROUPS; k++) {
+        size_t largest = k;
+        for (size_t j = k + 1; j < n; j++)
+            if (area[order[j]] > area[order[largest]]) largest = j;
+        const size_t g = order[largest];
+        order[largest] = order[k];
+        order[k] = g;
+        chosen[count++] = g;
+    }
+    const size_t left = n - count, first = count, others = left < OTHER_GROUPS ? left : OTHER_GROUPS;
+    for (size_t k = 0; k < others; k++) chosen[count++] = order[first + k * left / others];
+    return count;
+}
+
+/* An element by its area. */
+static size_t choose_element(const mesh *m, double all, uint64_t *seed) {
+    double before = 0;
+    const double at = random_unit(seed) * all;
+    size_t i = 0;
+    while (i + 1 < m->n && (before += m->area[i]) < at) i++;
+    return i;
+}
+
+/* Puts 1 where `group` is, or at one element where that is SIZE_MAX, into all channels of E [C][n]. */
+static void light_up(const mesh *m, size_t group, size_t element, float *E) {
+    for (size_t k = 0; k < m->n_channels * m->n; k++)
+        E[k] = (group == SIZE_MAX ? k % m->n == element : m->group[k % m->n] == group) ? 1 : 0;
+}
+
+/* Of lights [n_lights][C][n]. */
+static lam_status judge_lights(const precompute_job *job, const precompute_scene *scene, made_operator *made,
+                               size_t n_lights, const float *E, float *B, uint64_t seed,
+                               mesh_error_groups *groups, lam_error *error) {
+    lam_status status = LAM_OK;
+    double found[GATHER_VALUES_MOST];
+    const size_t bytes = lam_operator_work_bytes(made->op, n_lights);
+    void *work = memory_allocate(bytes, 1, "the error of the mesh", error);
+    if (work == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(lam_operator_apply(made->op, n_lights, LAM_RADIOSITY, E, B, work, bytes, error));
+    TRY(mesh_error(&scene->m, n_lights, E, B, true, NULL, seed, &job->progress, found, groups, error));
+done:
+    free(work);
+    return status;
+}
+
+lam_status mesh_error_add_others(const precompute_job *job, const precompute_scene *scene,
+                                 made_operator *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &scene->m;
+    const size_t vector = m->n * m->n_channels, G = m->n_groups, most = GATHER_VALUES_MOST / m->n_channels;
+    mesh_figures *figures = &made->errors_of_mesh;
+    uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
+    mesh_error_groups groups = {.fewer = ROUNDS};
+    light_sums single = {NULL}, of_groups = {NULL};
+    double *area = NULL, all = 0, logs = 0;
+    float *E = NULL, *B = NULL;
+    size_t chosen[GROUPS], *order = NULL, next = 0;
+    if (scene->emitters.s > 0 || scene->importance.emits != NULL) return LAM_OK;
+    area = memory_allocate(G, sizeof *area, "the error of the mesh", error);
+    order = memory_allocate(G, sizeof *order, "the error of the mesh", error);
+    E = memory_allocate(most, vector * sizeof *E, "the error of the mesh", error);
+    B = memory_allocate(most, vector * sizeof *B, "the error of the mesh", error);
+    if (area == NULL || order == NULL || E == NULL || B == NULL || !light_sums_begin(m, &single, error) ||
+        !light_sums_begin(m, &of_groups, error))
+        TRY(LAM_ERR_MEMORY);
+    TRY(mesh_error_groups_begin(m, most, &groups, error));
+    for (size_t i = 0; i < m->n; i++) {
+        area[m->group[i]] += m->area[i];
+        all += m->area[i];
+    }
+    const size_t n_chosen = choose_groups(m, area, figures->lights_power, chosen, order);
+    for (size_t round = 0; round < ROUNDS; round++) {
+        const size_t left = n_chosen - next, n_lit = left < most - 1 ? left : most - 1;
+        light_up(m, SIZE_MAX, choose_element(m, all, &seed), E);
+        for (size_t k = 0; k < n_lit; k++) {
+            light_up(m, chosen[next + k], 0, E + (k + 1) * vector);
+            logs += log(mesh_error_emitters(m, E + (k + 1) * vector));
+        }
+        TRY(judge_lights(job, scene, made, n_lit + 1, E, B, random_mix(seed), &groups, error));
+        add_light(&groups, 0, G, area, &single);
+        for (size_t k = 0; k < n_lit; k++) add_light(&groups, k + 1, G, area, &of_groups);
+        next += n_lit;
+    }
+    TRY(state(&single, G, area, MESH_OF_SINGLE, &figures->single, &figures->has_single, figures, error));
+    if (next > 0) {
+        TRY(state(&of_groups, G, area, MESH_OF_GROUPS, &figures->groups, &figures->has_groups, figures,
+                  error));
+        figures->groups_emitters = exp(logs / (double)next);
+    }
+    terminal_log(job->t, "mesh     single elements %.3g, groups %.3g", figures->single, figures->groups);
+done:
+    mesh_error_groups_free(&groups);
+    free(single.variance);
+    free(of_groups.variance);
+    free(area);
+    free(order);
+    free(E);
+    free(B);
+    return status;
+}

@@ -1,0 +1,27 @@
+/* Lights of one element and of one group by which the error of the mesh is stated for other emissions than
+ * the scene's own, and the steps that all such lights share. */
+#ifndef LAMBERT_PRECOMPUTE_MESH_ERROR_LIGHTS_H
+#define LAMBERT_PRECOMPUTE_MESH_ERROR_LIGHTS_H
+
+#include "solver/adapt/mesh_error.h"
+#include "solver/precompute/parts.h"
+
+/* The effective number of emitters of an emission E [C][n]. */
+double mesh_error_emitters(const mesh *m, const float *E);
+
+/* Room for figures by group of n_lights lights; out->fewer stays. Freed by mesh_error_groups_free, also after
+ * LAM_ERR_MEMORY. */
+lam_status mesh_error_groups_begin(const mesh *m, size_t n_lights, mesh_error_groups *out, lam_error *error);
+void mesh_error_groups_free(mesh_error_groups *g);
+
+/* Puts the figures of a light into those that the store states for the light `which` (MESH_OF_...). A
+ * variance below its standard error is stated as that. Errors: LAM_ERR_MEMORY. */
+lam_status mesh_error_take(const mesh_error_groups *from, size_t light, int which, size_t n_groups,
+                           mesh_figures *to, lam_error *error);
+
+/* States the error for light of single elements and of single groups, by some of each, where the operator
+ * takes any emission. Cost: about that of mesh_error once more. Errors: those of mesh_error. */
+lam_status mesh_error_add_others(const precompute_job *job, const precompute_scene *scene,
+                                 made_operator *made, lam_error *error);
+
+#endif

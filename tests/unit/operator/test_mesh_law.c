@@ -1,0 +1,106 @@
+/* The law of the share that the mesh leaves of a light, between the lights that a store states it for. */
+#include "solver/operator/stated/mesh_law.h"
+#include "support/suite.h"
+
+#include <math.h>
+
+enum { G = 3 };
+/* The third group was not looked at. */
+static double lamps[] = {.1, .2, 0}, even[] = {.02, .04, 0}, single[] = {.4, .8, 0}, groups[] = {.1, .2, 0},
+              sky[] = {.3, .1, 0}, cloudy[] = {.2, .2, 0}, ones[] = {1, 1, 0}, power[] = {0, 5, 0};
+static const mesh_figures figures = {.has_lights = true,
+                                     .has_even = true,
+                                     .has_skies = true,
+                                     .has_single = true,
+                                     .has_groups = true,
+                                     .lights = .15,
+                                     .even = .03,
+                                     .sky_even = .25,
+                                     .sky_cloudy = .2,
+                                     .single = .6,
+                                     .groups = .15,
+                                     .even_emitters = 256,
+                                     .groups_emitters = 16,
+                                     .n_groups = G,
+                                     .variation = {lamps, even, sky, cloudy, single, groups},
+                                     .reflected = {ones, ones, ones, ones, ones, ones},
+                                     .lights_power = power};
+
+/* m^2 without the part of second order. */
+static double share2(const mesh_shares *m, const mesh_light *light, size_t group) {
+    const mesh_lack lack = mesh_lack_of(m, light, group);
+    return lack.elements2 - lack.mean2;
+}
+
+static mesh_shares made(const mesh_figures *from) {
+    mesh_shares m;
+    lam_error error = {0};
+    ck_ok(mesh_shares_make(from, G, &m, &error));
+    return m;
+}
+
+START_TEST(light_of_lamps_has_their_share) {
+    mesh_shares m = made(&figures);
+    const mesh_light own = {.power = 7, .of_lamps = 7, .emitters = 3};
+    ck_assert_double_eq_tol(share2(&m, &own, 0), .01, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &own, 1), .04, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &own, 2), .15 * .15, 1e-12); /* as the scene */
+    /* The mean of the group lacks a part of second order, by its own share and that of the scene. */
+    const double c = (.01 + .15 * .15) / 2;
+    ck_assert_double_eq_tol(mesh_lack_of(&m, &own, 0).mean2, c * c, 1e-12);
+    mesh_shares_free(&m);
+}
+END_TEST
+
+START_TEST(other_light_follows_its_number) {
+    static const struct {
+        double emitters, share2;
+    } all[] = {{.5, .16}, {1, .16}, {4, .04}, {16, .01}, {64, (.01 + .0004) / 2}, {256, .0004}, {1e4, .0004}};
+    mesh_shares m = made(&figures);
+    for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
+        const mesh_light light = {.power = 1, .emitters = all[k].emitters};
+        ck_assert_double_eq_tol(share2(&m, &light, 0), all[k].share2, 1e-12);
+    }
+    mesh_shares_free(&m);
+}
+END_TEST
+
+START_TEST(skies_and_emissions_weigh_by_power) {
+    mesh_shares m = made(&figures);
+    const mesh_light alone = {.sky_power = 2}, bounced = {.sky_power = 2, .bounced = true},
+                     both = {.power = 1, .of_lamps = 1, .emitters = 3, .sky_power = 3};
+    ck_assert_double_eq_tol(share2(&m, &alone, 0), .09, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &alone, 1), .04, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &bounced, 0), .0004, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &both, 0), .25 * .01 + .75 * .09, 1e-12);
+    ck_assert(mesh_lack_of(&m, &(mesh_light){.power = 0}, 0).elements2 == 0);
+    mesh_shares_free(&m);
+}
+END_TEST
+
+/* Older stores have the lamps' share for any emission, else that of an even light; or nothing. */
+START_TEST(older_stores) {
+    const mesh_light light = {.power = 1, .emitters = 3};
+    mesh_shares m = made(&(mesh_figures){.has_lights = true, .has_even = true, .lights = .15, .even = .03});
+    ck_assert_double_eq_tol(share2(&m, &light, 0), .15 * .15, 1e-12);
+    mesh_shares_free(&m);
+    m = made(&(mesh_figures){.has_even = true, .even = .03});
+    ck_assert_double_eq_tol(share2(&m, &light, 1), .03 * .03, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &(mesh_light){.sky_power = 1}, 1), .03 * .03, 1e-12);
+    mesh_shares_free(&m);
+    m = made(&(mesh_figures){.has_lights = false});
+    ck_assert(!mesh_shares_known(&m));
+    mesh_shares_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *s = suite_create("mesh_law");
+    TCase *c = tcase_create("mesh_law");
+    tcase_add_test(c, light_of_lamps_has_their_share);
+    tcase_add_test(c, other_light_follows_its_number);
+    tcase_add_test(c, skies_and_emissions_weigh_by_power);
+    tcase_add_test(c, older_stores);
+    suite_add_tcase(s, c);
+    return suite_run(s);
+}
