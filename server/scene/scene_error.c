@@ -43,6 +43,8 @@ void scene_note_error(const scene *s, const radiosity_request *request, answer_n
                                 .sky = request->sky.values != NULL && request->E == NULL &&
                                        request->n_spots == 0};
     stated_errors_note(&s->errors, scope, notes);
+    if (s->base != NULL)
+        notes->head.advice = "errors were measured for the reflectances of the store: precompute with these";
 }
 
 error_scene scene_for_errors(const scene *s) {
@@ -98,25 +100,29 @@ static void take_error(const answer_error *one, answer_notes *notes) {
         notes->emitters = one->emitters;
     }
     if (is_larger(one->relative, notes->relative_mean)) notes->relative_mean = one->relative;
+    headline_raise(&notes->head, &one->parts);
 }
 
-static void take_names(const reduce_request *reduce, const name_error *one, double number,
-                       answer_notes *notes, name_error *names) {
-    for (size_t k = 0; k < reduce->n_names; k++) {
-        const answer_error mean = {one[k].relative, one[k].mean, number};
-        take_error(&mean, notes);
-        if (is_larger(one[k].mean, names[k].mean)) names[k].mean = one[k].mean;
-        if (is_larger(one[k].elements, names[k].elements)) names[k].elements = one[k].elements;
-    }
+/* Takes a name of one vector: its mean as the error of the answer, and the larger figures for the name. */
+static void take_name(const name_error *one, double number, name_error *kept, answer_notes *notes) {
+    const answer_error mean = {one->relative, one->mean, number, one->parts};
+    headline of_name = {.known = true, .parts = kept->parts};
+    take_error(&mean, notes);
+    headline_raise(&of_name, &one->parts);
+    kept->parts = of_name.parts;
+    if (is_larger(one->mean, kept->mean)) kept->mean = one->mean;
+    if (is_larger(one->elements, kept->elements)) kept->elements = one->elements;
 }
 
 /* The notes of an error of the answer's own emission, before any vector is taken. */
 static void begin_own(const reduce_request *reduce, name_error *names, answer_notes *notes) {
     notes->error_light = "own";
     notes->relative_mean = notes->indirect_mean = -1;
+    notes->head.parts = (stated_parts){.mesh = -1};
     notes->n_name_errors = reduce->on ? reduce->n_names : 0;
     notes->name_errors = names;
-    for (size_t k = 0; k < notes->n_name_errors; k++) names[k].name = reduce_text(reduce, k);
+    for (size_t k = 0; k < notes->n_name_errors; k++)
+        names[k] = (name_error){.name = reduce_text(reduce, k), .parts = {.mesh = -1}};
 }
 
 /* The light of one vector of an answer. */
@@ -167,7 +173,8 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
         if (reduce->on) {
             good = name_errors_of(&s->errors.by_group, &about, &of, reduce, kept + reduce->n_names);
             const emission_size both = emission_size_sum(&of.size, &of.sky);
-            if (good) take_names(reduce, kept + reduce->n_names, emission_size_number(&both), &made, kept);
+            for (size_t k = 0; good && k < reduce->n_names; k++)
+                take_name(&kept[reduce->n_names + k], emission_size_number(&both), &kept[k], &made);
         } else {
             good = answer_error_of(&s->errors.by_group, &about, &of, &one);
             if (good) take_error(&one, &made);
@@ -212,14 +219,6 @@ static void mean_of_name(size_t n_channels, const reduce_name *name, const doubl
     for (size_t c = 0; area > 0 && c < n_channels; c++) mean[c] /= area;
 }
 
-static void take_name(const emitters_mix *mix, const name_error *one, size_t k, name_error *names,
-                      answer_notes *notes) {
-    const answer_error mean = {one->relative, one->mean, mix->emitters};
-    take_error(&mean, notes);
-    if (is_larger(one->mean, names[k].mean)) names[k].mean = one->mean;
-    if (is_larger(one->elements, names[k].elements)) names[k].elements = one->elements;
-}
-
 bool scene_note_emitters_error(const scene *s, const radiosity_request *request, const float *W,
                                const float *values, answer_notes *notes, name_error **names) {
     const error_scene about = scene_for_errors(s);
@@ -247,7 +246,7 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
             mean_of_name(C, &reduce->names[k], mean + C, mean);
             const name_error one =
                 emitters_error_of_name(e, C, request->quantity, &reduce->names[k], &mix, mean);
-            take_name(&mix, &one, k, kept, &made);
+            take_name(&one, mix.emitters, &kept[k], &made);
         }
         if (reduce->on) continue;
         const error_answer of = {.quantity = request->quantity,
@@ -272,8 +271,8 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
 
 /* The light of the weights of emitters that a request has: adds the power and squares of what elements emit,
  * their sums over groups and the radiances of the sky. */
-static void add_weights(const scene *s, const radiosity_request *request, double *power, emission_size *size,
-                        mean_errors *to) {
+static void add_weights(const scene *s, const radiosity_request *request, double *power, double *lamps,
+                        emission_size *size, mean_errors *to) {
     const size_t C = s->n_channels, row = C * s->n_emitters, G = s->groups.n_groups;
     const error_by_group *e = &s->errors.by_group;
     for (size_t v = 0; v < request->emitters.n; v++) {
@@ -281,6 +280,7 @@ static void add_weights(const scene *s, const radiosity_request *request, double
         for (size_t k = 0; k < C * s->n; k++) {
             const double flux = s->area[k % s->n] * (double)to->E[k];
             power[v * C + k / s->n] += flux;
+            if (mesh_lamps_in(e, e->bin[k % s->n])) lamps[v * C + k / s->n] += flux;
             size[v].squares += flux * flux;
             to->sums[(v * C + k / s->n) * G + e->bin[k % s->n] % G] += flux;
         }
@@ -292,8 +292,8 @@ static void add_weights(const scene *s, const radiosity_request *request, double
     }
 }
 
-/* Emissions of a request: their sizes. */
-static void size_of_spots(const scene *s, const radiosity_request *request, double *power,
+/* Emissions of a request: their sizes. power, lamps [n_rhs][C], zeroed: of all, and of groups with lamps. */
+static void size_of_spots(const scene *s, const radiosity_request *request, double *power, double *lamps,
                           emission_size *size, mean_errors *to) {
     const size_t C = s->n_channels;
     const error_by_group *e = &s->errors.by_group;
@@ -301,6 +301,7 @@ static void size_of_spots(const scene *s, const radiosity_request *request, doub
         const emission_spot *spot = &request->spots[k];
         const double a = spot->whole_group ? 0 : s->area[spot->where];
         double area = a, squares = a * a;
+        const size_t home = spot->whole_group ? spot->where : e->bin[spot->where];
         if (spot->whole_group) {
             squares = e->squares[spot->where];
             for (size_t bin = spot->where; bin < e->n_bins; bin += e->figures.n_groups) area += e->area[bin];
@@ -308,21 +309,27 @@ static void size_of_spots(const scene *s, const radiosity_request *request, doub
         for (size_t c = 0; c < C; c++) {
             const double value = (double)request->colours[k * C + c];
             power[spot->vector * C + c] += area * value;
+            if (mesh_lamps_in(e, home)) lamps[spot->vector * C + c] += area * value;
             size[spot->vector].squares += squares * value * value;
         }
     }
     for (size_t v = 0; v < request->n_dense; v++) {
         size[v] = (emission_size){.power2 = 0};
-        for (size_t c = 0; c < C; c++) power[v * C + c] = 0;
+        for (size_t c = 0; c < C; c++) power[v * C + c] = lamps[v * C + c] = 0;
         for (size_t k = v * C * s->n; k < (v + 1) * C * s->n; k++) {
             const double flux = s->area[k % s->n] * (double)request->E[k];
             power[k / s->n] += flux;
+            if (mesh_lamps_in(e, e->bin[k % s->n])) lamps[k / s->n] += flux;
             size[v].squares += flux * flux;
         }
     }
-    if (request->emitters.values != NULL && s->n_emitters > 0) add_weights(s, request, power, size, to);
+    if (request->emitters.values != NULL && s->n_emitters > 0)
+        add_weights(s, request, power, lamps, size, to);
     for (size_t v = 0; v < request->n_rhs; v++)
-        for (size_t c = 0; c < C; c++) size[v].power2 += power[v * C + c] * power[v * C + c];
+        for (size_t c = 0; c < C; c++) {
+            size[v].power2 += power[v * C + c] * power[v * C + c];
+            size[v].lamps2 += lamps[v * C + c] * lamps[v * C + c];
+        }
 }
 
 /* emission [n_rhs][C]: means over the name. */
@@ -408,7 +415,7 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
         mean_errors_free(&made);
         return false;
     }
-    size_of_spots(s, request, made.emission, made.sizes, &made);
+    size_of_spots(s, request, made.emission, made.emission + rows, made.sizes, &made);
     begin_own(reduce, made.names, notes);
     *out = made;
     return true;
@@ -426,7 +433,7 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
             if (!emitters_mix_create(e, C, request->emitters.values + v * C * s->n_emitters, &mix))
                 return false;
             const name_error one = emitters_error_of_name(e, C, request->quantity, name, &mix, means + v * C);
-            take_name(&mix, &one, k, to->names, notes);
+            take_name(&one, mix.emitters, &to->names[k], notes);
             emitters_mix_free(&mix);
         }
         return true;
@@ -446,10 +453,7 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
                                .direct = direct + v * C};
         const name_error one = name_error_of_means(&s->errors.by_group, name, &of);
         const emission_size both = emission_size_sum(&of.size, &of.sky);
-        const answer_error mean = {one.relative, one.mean, emission_size_number(&both)};
-        take_error(&mean, notes);
-        if (is_larger(one.mean, to->names[k].mean)) to->names[k].mean = one.mean;
-        if (is_larger(one.elements, to->names[k].elements)) to->names[k].elements = one.elements;
+        take_name(&one, emission_size_number(&both), &to->names[k], notes);
     }
     return true;
 }

@@ -31,9 +31,11 @@ static bool write_light(buffer *b, const answer_notes *notes) {
     written = written && buffer_append_text(b, ",\"groups\":{");
     for (size_t k = 0; written && k < notes->n_name_errors; k++) {
         const name_error *one = &notes->name_errors[k];
+        const headline head = {.known = true, .parts = one->parts};
         written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, one->name) &&
                   buffer_append_text(b, ":{\"mean\":") && json_write_double(b, one->mean) &&
                   buffer_append_text(b, ",\"elements\":") && json_write_double(b, one->elements) &&
+                  buffer_append_text(b, ",\"stated\":") && json_write_double(b, headline_stated(&head)) &&
                   buffer_append(b, "}", 1);
     }
     return written && buffer_append(b, "}", 1);
@@ -42,14 +44,16 @@ static bool write_light(buffer *b, const answer_notes *notes) {
 /* The figures, and the elements that they are of; without figures a word on why there are none. */
 static bool write_error(buffer *b, const answer_notes *notes) {
     const char *of = notes->error_of, *from = notes->error_from;
+    const headline *head = &notes->head;
     if (!notes->has_error)
-        return from == NULL || strcmp(from, "others") != 0 ||
-               buffer_append_text(b, ",\"error\":{\"from\":\"others\"}");
-    return buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
-           json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
-           json_write_double(b, notes->indirect_mean) &&
-           (!(notes->mesh > 0) ||
-            (buffer_append_text(b, ",\"mesh\":") && json_write_double(b, notes->mesh))) &&
+        return head->advice == NULL ||
+               (buffer_append_text(b, ",\"error\":{") && headline_write(b, head) &&
+                (from == NULL || buffer_printf(b, ",\"from\":\"%s\"", from)) && buffer_append(b, "}", 1));
+    return buffer_append_text(b, ",\"error\":{") && headline_write(b, head) &&
+           buffer_append_text(b, ",\"relative_mean\":") && json_write_double(b, notes->relative_mean) &&
+           buffer_append_text(b, ",\"indirect_mean\":") && json_write_double(b, notes->indirect_mean) &&
+           (!(head->parts.mesh > 0) ||
+            (buffer_append_text(b, ",\"mesh\":") && json_write_double(b, head->parts.mesh))) &&
            write_light(b, notes) && (of == NULL || buffer_printf(b, ",\"of\":\"%s\"", of)) &&
            (from == NULL || buffer_printf(b, ",\"from\":\"%s\"", from)) && buffer_append(b, "}", 1);
 }

@@ -4,6 +4,7 @@
 
 #include "lambert/lambert.h"
 #include "solver/codec/answer_error.h"
+#include "solver/codec/headline.h"
 #include "solver/codec/media.h"
 #include "solver/codec/problem.h"
 
@@ -21,7 +22,7 @@ typedef struct answer_notes {
     lam_quantity quantity;
     bool has_error;
     double relative_mean, indirect_mean; /* not finite: there is nothing that they could be relative to */
-    double mesh; /* the share of reflected light that constants on elements leave; 0: not stated */
+    headline head;                       /* known only with has_error */
     const char *error_light; /* the light that the error is of: "own", the answer's; "lights" of the scene or
                                 "single" elements, whatever the answer's is */
     double emitters;         /* effective number, of "own" */

@@ -3,8 +3,22 @@
 #include <math.h>
 #include <stdlib.h>
 
-static light_sizes sizes_of_answer(const error_by_group *e, const error_answer *of) {
+/* P^2 of the part of an emission that groups with lamps emit. */
+static double lamps2_of(const error_by_group *e, const error_scene *scene, const float *E) {
+    double sum = 0;
+    for (size_t c = 0; E != NULL && e->mesh.lamps != NULL && c < scene->n_channels; c++) {
+        double power = 0;
+        for (size_t i = 0; i < scene->n; i++)
+            if (mesh_lamps_in(e, e->bin[i])) power += scene->area[i] * (double)E[c * scene->n + i];
+        sum += power * power;
+    }
+    return sum;
+}
+
+static light_sizes sizes_of_answer(const error_by_group *e, const error_scene *scene,
+                                   const error_answer *of) {
     light_sizes sizes = light_sizes_of(e, of->quantity, &of->size, of->L);
+    sizes.size.lamps2 = lamps2_of(e, scene, of->E);
     const sky_sizes sent = sky_sizes_of(e, of->L_sent);
     if (sent.L == NULL) return sizes;
     if (sizes.sent.L == NULL) sizes.sent.L = sent.L;
@@ -80,18 +94,35 @@ static value_sums *sum_values(const error_by_group *e, const error_scene *scene,
     return sums;
 }
 
+/* The root of error2 / light2, of errors that are no small part of the light with them taken out of it
+ * (error_ratio), which is 1 where they are half of it, and beyond that with twice the error, so that it stays
+ * finite and rises. */
+static double part_ratio(double error2, double light2) {
+    return 2 * error2 < light2 ? error_ratio(error2, light2) : sqrt(2 * error2 / light2);
+}
+
+/* Finds parts from squares of the light that is reflected, and of all; mesh2 negative: not stated. */
+static stated_parts parts_of(double off2, double mesh2, double light2, double radiosity2) {
+    const double all2 = light2 > 0 ? light2 : radiosity2;
+    return (stated_parts){.rest = off2 > 0 ? part_ratio(off2, all2) : 0,
+                          .mesh = mesh2 < 0    ? -1
+                                  : light2 > 0 ? sqrt(mesh2 / light2)
+                                               : 0};
+}
+
 /* The error of all values where its square is known, sum A |B~ - B|^2 over channels and the values. */
 static answer_error error_of_square(const error_scene *scene, const error_answer *of, double off2) {
     value_sums sums = {.area = 0};
     add_run(scene, of, 0, of->count, &sums);
     return (answer_error){.relative = error_ratio(off2, sums.radiosity2),
-                          .indirect = error_ratio(off2, sums.reflected2)};
+                          .indirect = error_ratio(off2, sums.reflected2),
+                          .parts = parts_of(off2, -1, sums.reflected2, sums.radiosity2)};
 }
 
 bool answer_error_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                      answer_error *out) {
-    double off = 0, reflected = 0, radiosity = 0;
-    const light_sizes sizes = sizes_of_answer(e, of);
+    double off = 0, reflected = 0, radiosity = 0, light = 0, mesh = 0;
+    const light_sizes sizes = sizes_of_answer(e, scene, of);
     const emission_size both = emission_size_sum(&of->size, &of->sky);
     value_sums *sums = sum_values(e, scene, of);
     if (sums == NULL) return false;
@@ -100,17 +131,23 @@ bool answer_error_of(const error_by_group *e, const error_scene *scene, const er
         off += sums[b].area * error_law(e, &sizes, b).elements2 + overlap_elements2(e, b) * sums[b].light2;
         reflected += sums[b].reflected2;
         radiosity += sums[b].radiosity2;
+        const double l = of->quantity == LAM_INDIRECT ? sums[b].reflected2 : sums[b].light2;
+        light += l;
+        mesh += mesh_lack_of_bin(e, &sizes, b).elements2 * l;
     }
     free(sums);
+    if (!mesh_is_stated(e)) mesh = -1;
     *out = (answer_error){.relative = error_ratio(off, radiosity),
                           .indirect = error_ratio(off, reflected),
-                          .emitters = emission_size_number(&both)};
+                          .emitters = emission_size_number(&both),
+                          .parts = parts_of(off, mesh, light, radiosity)};
     return true;
 }
 
-/* Mean squared errors of a name's bins, by area. */
+/* Sums over a name's bins: A, and, by area, mean squared errors of means and of elements, and the share of
+ * the mean that the mesh leaves, which has one sign in all groups at worst. */
 typedef struct name_sums {
-    double area, mean2, elements2;
+    double area, mean2, elements2, mesh;
 } name_sums;
 
 static void add_bin(const error_by_group *e, const light_sizes *size, size_t bin, double area,
@@ -120,6 +157,7 @@ static void add_bin(const error_by_group *e, const light_sizes *size, size_t bin
     to->area += area;
     to->mean2 += area * error.mean2;
     to->elements2 += area * error.elements2;
+    to->mesh += area * sqrt(mesh_lack_of_bin(e, size, bin).mean2);
 }
 
 /* reflected2, radiosity2: squares of the means over the name. */
@@ -129,21 +167,26 @@ static name_error error_of_squares(double mean2, double elements2, double reflec
                         .relative = error_ratio(mean2, radiosity2)};
 }
 
-static name_error finish_name(const name_sums *s, double reflected2, double radiosity2) {
+/* light2: the square of the mean of the light that the parts of the headline are over. */
+static name_error finish_name(const error_by_group *e, const name_sums *s, double reflected2,
+                              double radiosity2, double light2) {
     if (!(s->area > 0)) return (name_error){.mean = 0};
-    return error_of_squares(s->mean2 / s->area, s->elements2 / s->area, reflected2, radiosity2);
+    name_error made = error_of_squares(s->mean2 / s->area, s->elements2 / s->area, reflected2, radiosity2);
+    const double mesh2 = mesh_is_stated(e) ? s->mesh * s->mesh / (s->area * s->area) * light2 : -1;
+    made.parts = parts_of(s->mean2 / s->area, mesh2, light2, radiosity2);
+    return made;
 }
 
 bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                     const reduce_request *names, name_error *errors) {
     const size_t n_rows = e->n_bins / e->figures.n_groups;
-    const light_sizes sizes = sizes_of_answer(e, of);
+    const light_sizes sizes = sizes_of_answer(e, scene, of);
     value_sums *sums = sum_values(e, scene, of);
     if (sums == NULL) return false;
     for (size_t k = 0; k < names->n_names; k++) {
         const reduce_name *name = &names->names[k];
         name_sums s = {.area = 0};
-        double reflected2 = 0, radiosity2 = 0;
+        double reflected2 = 0, radiosity2 = 0, light2 = 0;
         for (size_t g = 0; g < name->n_groups; g++)
             for (size_t row = 0; row < n_rows; row++) {
                 const size_t bin = row * e->figures.n_groups + name->groups[g];
@@ -164,11 +207,12 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
                 overlap_mean2(e, light, covered) / s.area; /* of sums by area, over it once more below */
             reflected2 += reflected * reflected / (s.area * s.area);
             radiosity2 += radiosity * radiosity / (s.area * s.area);
+            light2 += light * light / (s.area * s.area);
         }
-        const name_error found = finish_name(&s, reflected2, radiosity2);
-        errors[k].mean = found.mean;
-        errors[k].elements = found.elements;
-        errors[k].relative = found.relative;
+        const char *const called = errors[k].name;
+        errors[k] =
+            finish_name(e, &s, reflected2, radiosity2, of->quantity == LAM_INDIRECT ? reflected2 : light2);
+        errors[k].name = called;
     }
     free(sums);
     return true;
@@ -178,7 +222,7 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
     const size_t n_rows = e->n_bins / e->figures.n_groups;
     const light_sizes sizes = light_sizes_of(e, means->quantity, &means->size, means->L);
     name_sums s = {.area = 0};
-    double reflected2 = 0, radiosity2 = 0, covered = 0;
+    double reflected2 = 0, radiosity2 = 0, light2 = 0, covered = 0;
     for (size_t g = 0; g < name->n_groups; g++)
         for (size_t row = 0; row < n_rows; row++) {
             const size_t bin = row * e->figures.n_groups + name->groups[g];
@@ -201,10 +245,11 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
         radiosity2 += irradiance ? value * value : (r + direct) * (r + direct);
         /* As if it were even over the name. */
         const double light = r + (irradiance ? 1 : rho) * means->direct[c];
+        light2 += light * light;
         s.mean2 += s.area * overlap_mean2(e, light, covered / s.area * light);
         s.elements2 += s.area * (e->repair * e->repair + covered / s.area / 2) * light * light;
     }
-    return finish_name(&s, reflected2, radiosity2);
+    return finish_name(e, &s, reflected2, radiosity2, means->quantity == LAM_INDIRECT ? reflected2 : light2);
 }
 
 answer_error emitters_error_of(const emitters_error *e, const error_scene *scene, const error_answer *of,
@@ -247,5 +292,8 @@ name_error emitters_error_of_name(const emitters_error *e, size_t n_channels, la
         reflected2 += r * r;
         radiosity2 += irradiance ? mean[c] * mean[c] : (r + rho * direct) * (r + rho * direct);
     }
-    return error_of_squares(off * off / (area * area), elements2 / area, reflected2, radiosity2);
+    const double mean2 = off * off / (area * area);
+    name_error made = error_of_squares(mean2, elements2 / area, reflected2, radiosity2);
+    made.parts = parts_of(mean2, -1, reflected2, radiosity2);
+    return made;
 }

@@ -21,12 +21,22 @@ typedef struct error_answer {
     double lost2; /* with L_sent: (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
 } error_answer;
 
+/* The two parts of the headline (headline.h), over all light that surfaces reflect, |B - E|, the direct light
+ * of a sky with it, of irradiance over |H|, of the indirect light over itself. The direct light of positions
+ * is known and left out. */
+typedef struct stated_parts {
+    double rest; /* of operator and form factors; where nothing is reflected over |B|; not finite where that
+                    is 0, too */
+    double mesh; /* of constants on elements; negative: not stated */
+} stated_parts;
+
 /* The root of the mean squared error over the light that is left where that error is taken out of the light
  * of the answer, in squares; not finite where none is. */
 typedef struct answer_error {
     double relative; /* |B~ - B| / |B|, of irradiance |H~ - H| / |H| */
     double indirect; /* |B~ - B| / |B - E - rho H0|, of irradiance |H~ - H| / |H - H0| */
     double emitters; /* effective number */
+    stated_parts parts;
 } answer_error;
 
 /* The error of all values. Cost: O(C count), and under a sky C n_tiles for each group of them. False when
@@ -40,6 +50,7 @@ bool answer_error_of(const error_by_group *e, const error_scene *scene, const er
 typedef struct name_error {
     const char *name; /* of the request; set by the caller */
     double mean, elements, relative;
+    stated_parts parts; /* of its mean */
 } name_error;
 
 /* errors [n_names], the names of which are left. Cost: O(C count). False when memory is short. */

@@ -4,6 +4,8 @@
 #include "solver/codec/describe.h"
 
 #include "solver/base/scene/scene_cameras.h"
+#include "solver/codec/headline.h"
+#include "solver/codec/stated_errors.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/stated/error_figures.h"
 #include "store/groups.h"
@@ -158,6 +160,29 @@ static lam_status add_emitter_errors(store *s, json_t *figures, lam_error *error
     return status;
 }
 
+/* The error of the store in one number, with its parts: members as in answers (headline.h). */
+static void add_headline(store *s, json_t *figures) {
+    error_report report;
+    mesh_figures mesh;
+    headline_part parts[HEADLINE_PARTS];
+    const char *light;
+    size_t largest;
+    error_report_load(s, &report);
+    mesh_figures_load_shown(s, &mesh);
+    const headline head = stated_headline(&report, &mesh, &light);
+    if (!head.known) return;
+    json_object_set_new(figures, "stated", describe_number(headline_stated(&head)));
+    json_object_set_new(figures, "light", json_string(light));
+    const size_t n = headline_parts(&head, parts, &largest);
+    if (headline_is_coarse(&head)) {
+        json_object_set_new(figures, "coarse", json_true());
+        json_object_set_new(figures, "advice", json_sprintf("precompute with %s", parts[largest].option));
+    }
+    json_t *list = json_object();
+    for (size_t k = 0; k < n; k++) json_object_set_new(list, parts[k].name, describe_number(parts[k].error));
+    json_object_set_new(figures, "parts", list);
+}
+
 static lam_status add_error(store *s, json_t *out, lam_error *error) {
     lam_status status = LAM_OK;
     json_t *figures = NULL;
@@ -166,6 +191,7 @@ static lam_status add_error(store *s, json_t *out, lam_error *error) {
         return LAM_OK;
     }
     TRY(attributes_of(s, STORE_ERROR, &figures, error));
+    add_headline(s, figures);
     for (const figures_group *g = figures_groups; g->name != NULL; g++) {
         json_t *group = NULL;
         if (!store_has(s, g->path)) continue;

@@ -14,20 +14,64 @@ void stated_errors_free(stated_errors *e) {
     *e = (stated_errors){.n = 0};
 }
 
+static bool is_figure(double x) {
+    return x >= 0 && isfinite(x);
+}
+
+/* The operator's own part of a squared error; negative: it was not measured. */
+static double share_of(double of_operator, double all) {
+    if (!is_figure(of_operator)) return -1;
+    return all > 0 ? fmin(of_operator * of_operator / (all * all), 1) : 0;
+}
+
+/* The errors of a group of probes. */
+static stated_error error_of_group(const error_group *g, bool of_receivers, const char *light) {
+    stated_error e = {.light = light};
+    e.relative = of_receivers ? g->receivers.total_relative : g->total_relative.mean;
+    e.indirect = of_receivers ? g->receivers.total_indirect : g->total_indirect.mean;
+    e.share = share_of(of_receivers ? g->receivers.operator_indirect : g->operator_indirect.mean, e.indirect);
+    e.known = is_figure(e.relative) && is_figure(e.indirect);
+    return e;
+}
+
 /* A stated error of the scene's own lights, or else of single elements. */
 static stated_error error_of(const error_report *report, bool of_receivers) {
-    const error_group *const groups[] = {&report->lights, &report->single};
-    static const char *const names[] = {"lights", "single"};
-    stated_error found = {.known = false};
-    for (size_t i = 0; i < sizeof groups / sizeof groups[0] && !found.known; i++) {
-        const error_group *g = groups[i];
-        found.light = names[i];
-        found.relative = of_receivers ? g->receivers.total_relative : g->total_relative.mean;
-        found.indirect = of_receivers ? g->receivers.total_indirect : g->total_indirect.mean;
-        found.known = found.relative >= 0 && isfinite(found.relative) && found.indirect >= 0 &&
-                      isfinite(found.indirect);
-    }
-    return found;
+    const stated_error lights = error_of_group(&report->lights, of_receivers, "lights");
+    return lights.known ? lights : error_of_group(&report->single, of_receivers, "single");
+}
+
+/* Of skies no probe is compared with the operator's own form factors: the error of the operator is that of
+ * random emission, over all light. */
+static stated_error error_of_sky(const error_report *report) {
+    stated_error e = error_of_group(&report->sky, false, "sky");
+    if (e.known) e.share = fmax(share_of(report->random.operator_relative.mean, e.relative), 0);
+    return e;
+}
+
+static double mesh_of_lights(const mesh_figures *m) {
+    return m->has_lights ? m->lights : m->has_even ? m->even : -1;
+}
+
+static double mesh_of_skies(const mesh_figures *m) {
+    return m->has_skies ? fmax(m->sky_even, m->sky_cloudy) : -1;
+}
+
+static const char *const probes_advice = "precompute without --probes 0 measures it";
+
+headline stated_headline(const error_report *report, const mesh_figures *mesh, const char **light) {
+    const stated_error lights = error_of_group(&report->lights, false, "lights"), sky = error_of_sky(report),
+                       random = error_of_group(&report->random, false, "random");
+    const stated_error *e = lights.known ? &lights : sky.known ? &sky : &random;
+    headline h = {.known = e->known, .share = e->share, .advice = e->known ? NULL : probes_advice};
+    *light = e->light;
+    if (!h.known) return h;
+    /* Of a sky the light is B, as nothing is emitted. */
+    h.parts.rest = e == &sky ? e->relative : e->indirect;
+    h.parts.mesh = e == &sky        ? mesh_of_skies(mesh)
+                   : e == &lights   ? mesh_of_lights(mesh)
+                   : mesh->has_even ? mesh->even
+                                    : -1;
+    return h;
 }
 
 /* *out [n]: true where a weight is above 0; NULL of NULL. */
@@ -51,8 +95,9 @@ lam_status stated_errors_read(store *s, const error_scene *scene, const lam_oper
     TRY(stated_figures_load(s, &shape, &figures, error));
     const mesh_figures *mesh = &figures.mesh;
     made.all = error_of(&figures.report, false);
-    made.mesh = mesh->lights > 0 ? mesh->lights : mesh->even;
-    made.mesh_of_skies = fmax(mesh->sky_even, mesh->sky_cloudy);
+    made.sky = error_of_sky(&figures.report);
+    made.mesh = mesh_of_lights(mesh);
+    made.mesh_of_skies = mesh_of_skies(mesh);
     TRY(importance_load(s, n, &weights, error));
     TRY(find_members(weights.read, n, &made.read, error));
     TRY(find_members(weights.emits, n, &made.emits, error));
@@ -99,15 +144,14 @@ void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes
     notes->has_error = of->known && !strange;
     notes->relative_mean = of->relative;
     notes->indirect_mean = of->indirect;
-    notes->mesh = scope.sky && e->mesh_of_skies > 0 ? e->mesh_of_skies : e->mesh;
+    const bool sky = scope.sky && e->sky.known && !receivers;
+    notes->head = (headline){
+        .known = notes->has_error,
+        .parts = {.rest = sky ? e->sky.relative : of->indirect,
+                  .mesh = scope.sky && e->mesh_of_skies >= 0 ? e->mesh_of_skies : e->mesh},
+        .share = sky ? e->sky.share : of->share,
+        .advice = strange ? "precompute with --sources that name all that emits, or without" : probes_advice};
     notes->error_light = of->light;
     notes->error_of = e->read == NULL || strange ? NULL : receivers ? "receivers" : "all";
     notes->error_from = e->emits == NULL ? NULL : strange ? "others" : "sources";
-}
-
-void stated_error_add_mesh(double mesh, double *relative, double *indirect) {
-    if (!isfinite(*indirect)) return; /* it is divided by reflected light that is 0 */
-    const double both = hypot(*indirect, mesh);
-    *relative = *indirect > 0 ? *relative * (both / *indirect) : hypot(*relative, mesh);
-    *indirect = both;
 }

@@ -4,21 +4,24 @@
 
 #include "solver/codec/answer.h"
 #include "solver/codec/answer_error.h"
+#include "solver/codec/headline.h"
 #include "store/store.h"
 
 /* The error for the scene's own lights, else for single elements, against the independent sample. */
 typedef struct stated_error {
     bool known;
     double relative, indirect;
+    double share;      /* of the square, the operator's own part; negative: not told apart */
     const char *light; /* "lights" or "single" */
 } stated_error;
 
 /* Zeroed: nothing is stated. */
 typedef struct stated_errors {
     stated_error all; /* means over probes, of the light of all elements */
+    stated_error sky; /* the same of skies: relative is over the light that they and surfaces give */
     double mesh; /* share of reflected light that constants on elements leave, of the scene's lamps, else of
-                    light that all elements emit; 0: not stated */
-    double mesh_of_skies;   /* the same of skies, the larger of an even and a cloudy one; 0: not stated */
+                    light that all elements emit; negative: not stated */
+    double mesh_of_skies;   /* the same of skies, the larger of an even and a cloudy one; likewise */
     stated_error receivers; /* of the light of receivers; known only where the store was built for them */
     bool *read;             /* [n], true of receivers; NULL: the store was built for all elements */
     bool *emits; /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */
@@ -58,9 +61,8 @@ typedef struct answer_scope {
  * receivers stands in no other answer, and no error in a strange one. */
 void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes *notes);
 
-/* Adds the part of the mesh to an error that is stated without it: indirect' = sqrt(indirect^2 + mesh^2), as
- * the parts are independent. Both figures are of the reflected light, over another size, so that relative
- * grows alike; where indirect is 0 it is taken for a share of the same light. */
-void stated_error_add_mesh(double mesh, double *relative, double *indirect);
+/* The headline of a store, of the scene's own lights, else of a sky, else of light that all elements emit:
+ * *light is "lights", "sky" or "random". Not known where nothing was measured. */
+headline stated_headline(const error_report *report, const mesh_figures *mesh, const char **light);
 
 #endif

@@ -6,6 +6,7 @@
 #include "lambert/lambert.h"
 #include "solver/codec/answer_error.h"
 #include "solver/codec/group_figures.h"
+#include "solver/codec/headline.h"
 #include "solver/scene/mesh.h"
 
 #include <stdio.h>
@@ -42,7 +43,8 @@ typedef struct solution {
     reduction *reductions;
     size_t n_reductions;               /* 0: the values themselves are written */
     double relative, indirect;         /* mean error that is stated; negative: none is */
-    double mesh;                       /* of answer_notes */
+    headline head;                     /* of answer_notes */
+    bool tells_parts;                  /* of head, in the table for people */
     const char *error_of, *error_from; /* of answer_notes */
     const char *error_light;           /* likewise */
     double emitters;                   /* likewise */

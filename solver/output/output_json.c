@@ -144,7 +144,7 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .has_error = s->relative >= 0,
                                 .relative_mean = s->relative,
                                 .indirect_mean = s->indirect,
-                                .mesh = s->mesh,
+                                .head = s->head,
                                 .error_of = s->error_of,
                                 .error_from = s->error_from,
                                 .error_light = s->error_light,

@@ -1,5 +1,4 @@
 /* A solution as a table on standard output: one line a group, or one a figure. */
-#include "solver/codec/stated_errors.h"
 #include "solver/output/output.h"
 
 #include <math.h>
@@ -56,25 +55,29 @@ static void print_reductions(const solution *s) {
     }
 }
 
-/* The stated error with the part of the mesh, and the parts where the mesh is stated. */
+/* "stated error of this answer, of the light of receivers, emitted by sources, 4 emitters: 0.012, most of it
+ * by the mesh", and its parts where these are wanted. */
 static void print_error(const solution *s) {
     const bool own = s->error_light != NULL && strcmp(s->error_light, "own") == 0;
-    double relative = s->relative, indirect = s->indirect;
-    if (s->relative < 0) return;
-    stated_error_add_mesh(s->mesh, &relative, &indirect);
+    char text[HEADLINE_BYTES];
+    if (!s->head.known && s->head.advice == NULL) return;
+    if (!s->head.known) {
+        printf("no error is stated: %s\n", s->head.advice);
+        return;
+    }
+    headline_text(&s->head, text);
     printf("stated error of %s%s%s%s%s", own ? "this answer" : "the store",
            s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
            s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "");
     if (own) printf(", %.3g emitters", s->emitters);
-    if (!isfinite(s->indirect)) { /* the error would be divided by light that is 0 */
-        printf(": relative %.3g, no light is reflected there\n", relative);
-        return;
-    }
-    printf(": relative %.3g, indirect %.3g", relative, indirect);
-    if (s->mesh > 0)
-        printf(" (operator and form factors: relative %.3g, indirect %.3g; mesh: indirect %.3g)", s->relative,
-               s->indirect, s->mesh);
-    putchar('\n');
+    printf(": %s\n", text);
+    if (!s->tells_parts) return;
+    headline_text_parts(&s->head, text);
+    printf("parts: %s; operator and form factors: relative %.3g", text, s->relative);
+    if (isfinite(s->indirect)) /* or it would be divided by light that is 0 */
+        printf(", indirect %.3g\n", s->indirect);
+    else
+        puts(", no light is reflected there");
 }
 
 void output_print(const solution *s) {

@@ -28,7 +28,7 @@ typedef struct fields {
     double hours, tolerance;
     sun_asked sun;
     uint64_t sun_points;
-    bool photometric, json, smooth;
+    bool photometric, json, verbose, smooth;
 } fields;
 
 #define FIELD(member) offsetof(fields, member)
@@ -83,6 +83,10 @@ static const option_row answer_options[] = {
      .kind = OPTION_FLAG,
      .offset = FIELD(json),
      .help = "Print JSON in place of a table, without -o"},
+    {.name = "verbose",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(verbose),
+     .help = "Print the parts of the stated error, too"},
     {.name = "tolerance",
      .kind = OPTION_NUMBER,
      .offset = FIELD(tolerance),
@@ -154,7 +158,7 @@ static void take_error(const stated_errors *stated, const emission *light, size_
     stated_errors_note(stated, scope, &notes);
     if (notes.has_error) out->relative = notes.relative_mean;
     if (notes.has_error) out->indirect = notes.indirect_mean;
-    out->mesh = notes.mesh;
+    out->head = notes.head;
     if (notes.has_error) out->error_light = notes.error_light;
     out->error_of = notes.error_of;
     out->error_from = notes.error_from;
@@ -362,6 +366,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                     .batch = lit.light.batch,
                     .relative = -1,
                     .indirect = -1,
+                    .tells_parts = f->verbose,
                     .reductions = reductions,
                     .n_reductions = n_reductions};
     if (f->tolerance == 0) take_error(&stated, &lit.light, n_selected, selected, t, &out);

@@ -6,6 +6,16 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* Takes the parts of the headline of a name of one vector, as the vector's own where they are the larger. */
+static void raise_name(name_error *kept, const name_error *own, answer_error *vector) {
+    headline of_name = {.known = true, .parts = kept->parts},
+             of_vector = {.known = true, .parts = vector->parts};
+    headline_raise(&of_name, &own->parts);
+    headline_raise(&of_vector, &own->parts);
+    kept->parts = of_name.parts;
+    vector->parts = of_vector.parts;
+}
+
 /* The error of one vector, or of the names that are reduced: the larger figures stay. */
 static lam_status add_own_error(const stated_errors *stated, const error_scene *scene, const error_answer *of,
                                 solution *out, name_error *names, lam_error *error) {
@@ -22,11 +32,13 @@ static lam_status add_own_error(const stated_errors *stated, const error_scene *
         names[r].elements = fmax(names[r].elements, name.elements);
         one.indirect = fmax(one.indirect, name.mean);
         one.relative = fmax(one.relative, name.relative);
+        raise_name(&names[r], &name, &one);
     }
     if (!good) return status_fail(error, LAM_ERR_MEMORY, "not enough memory for the error of the answer");
     if (one.indirect >= out->indirect) out->emitters = number;
     out->indirect = fmax(out->indirect, one.indirect);
     out->relative = fmax(out->relative, one.relative);
+    headline_raise(&out->head, &one.parts);
     return LAM_OK;
 }
 
@@ -46,6 +58,7 @@ static lam_status take_emission(const stated_errors *stated, const error_scene *
     made = memory_allocate(out->n_reductions, sizeof *made, "errors", error);
     if (made == NULL) TRY(LAM_ERR_MEMORY);
     out->relative = out->indirect = 0;
+    out->head.parts = (stated_parts){.mesh = -1};
     for (size_t r = 0; r < out->n_reductions; r++) made[r].name = out->reductions[r].group;
     for (size_t v = 0; v < out->n_vectors; v++) {
         error_answer of = {.quantity = out->quantity,
@@ -98,6 +111,7 @@ static lam_status take_mixture(const stated_errors *stated, const error_scene *s
     float *light = memory_allocate(2 * C, n * sizeof *light, "errors", error);
     if (made == NULL || mean == NULL || light == NULL) TRY(LAM_ERR_MEMORY);
     out->relative = out->indirect = 0;
+    out->head.parts = (stated_parts){.mesh = -1};
     for (size_t r = 0; r < out->n_reductions; r++) made[r].name = out->reductions[r].group;
     for (size_t v = 0; v < out->n_vectors; v++) {
         const float *weights = given->W + (given->steady ? 0 : v * C * s), *values = out->values + v * C * n;
@@ -117,11 +131,13 @@ static lam_status take_mixture(const stated_errors *stated, const error_scene *s
             made[r].elements = fmax(made[r].elements, own.elements);
             one.indirect = fmax(one.indirect, own.mean);
             one.relative = fmax(one.relative, own.relative);
+            raise_name(&made[r], &own, &one);
         }
         emitters_mix_free(&mix);
         if (one.indirect >= out->indirect) out->emitters = one.emitters;
         out->indirect = fmax(out->indirect, one.indirect);
         out->relative = fmax(out->relative, one.relative);
+        headline_raise(&out->head, &one.parts);
     }
     out->error_light = "own";
     if (out->n_reductions > 0) out->name_errors = made;

@@ -378,6 +378,62 @@ START_TEST(unknown_skies_are_left) {
 }
 END_TEST
 
+/* The mesh lacks .1 of the light in desk and .3 in lamp, of any emission: errors of elements add up in
+ * squares by the light of each group, and what a mean lacks, of second order, is less. */
+START_TEST(the_mesh_is_a_part) {
+    double of_lamps[] = {.01, .09, .04};
+    const uint32_t selected[] = {2}, desk[] = {0}, both[] = {0, 1};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}, {.groups = both, .n_groups = 2}};
+    const reduce_request request = {.on = true, .names = list, .n_names = 2};
+    error_by_group with = stated;
+    with.mesh = (mesh_shares){.n_groups = G, .of = {[MESH_OF_LAMPS] = of_lamps}};
+    float values[C * N];
+    answer_error found, before;
+    name_error names[2];
+    fill(LAM_RADIOSITY, false, values);
+    error_answer of = answer_of(LAM_RADIOSITY, values);
+    ck_assert(answer_error_of(&with, &scene, &of, &found));
+    double light2[G] = {0};
+    for (size_t k = 0; k < C * N; k++) light2[bin[k % N]] += area[k % N] * r[k] * r[k];
+    const double c[] = {(.01 + .04) / 2, (.09 + .04) / 2};
+    const double lacks2 = light2[0] * (.01 + c[0] * c[0]) + light2[1] * (.09 + c[1] * c[1]);
+    ck_assert_double_eq_tol(found.parts.mesh, sqrt(lacks2 / (light2[0] + light2[1])), 1e-6);
+    /* Without a sky the rest is the indirect error, where that is small. */
+    ck_assert(answer_error_of(&stated, &scene, &of, &before));
+    ck_assert(before.parts.mesh == -1 && before.parts.rest == found.parts.rest);
+    ck_assert(found.indirect == before.indirect && found.relative == before.relative);
+    of.count = 1;
+    of.selected = selected;
+    of.whole = true;
+    ck_assert(answer_error_of(&with, &scene, &of, &found));
+    ck_assert_double_eq_tol(found.parts.mesh, sqrt(.09 + c[1] * c[1]), 1e-6);
+    of = answer_of(LAM_RADIOSITY, values);
+    ck_assert(name_errors_of(&with, &scene, &of, &request, names));
+    ck_assert_double_eq_tol(names[0].parts.mesh, c[0], 1e-6);
+    ck_assert_double_eq_tol(names[1].parts.mesh, (3 * c[0] + 4 * c[1]) / 7, 1e-6);
+}
+END_TEST
+
+/* An error as large as the light is stated as a number that rises with it. */
+START_TEST(large_errors_are_numbers) {
+    float values[C * N];
+    double larger[G], last = 0;
+    fill(LAM_RADIOSITY, false, values);
+    error_by_group off = stated;
+    off.figures.of[GROUP_RMS_EVEN] = larger;
+    for (double scale = .01; scale < 1e4; scale *= 2) {
+        answer_error found;
+        for (size_t g = 0; g < G; g++) larger[g] = scale * even[g];
+        const error_answer of = answer_of(LAM_RADIOSITY, values);
+        ck_assert(answer_error_of(&off, &scene, &of, &found));
+        ck_assert(isfinite(found.parts.rest) && found.parts.rest > last);
+        if (found.parts.rest < 1) ck_assert_double_eq_tol(found.parts.rest, found.indirect, 1e-12);
+        last = found.parts.rest;
+    }
+    ck_assert_double_gt(last, 1);
+}
+END_TEST
+
 START_TEST(darkness_has_no_error_and_no_light_no_ratio) {
     const float dark[C * N] = {0};
     answer_error found;
@@ -402,6 +458,8 @@ int main(void) {
     tcase_add_test(cases, black_groups_have_errors_of_their_irradiance);
     tcase_add_test(cases, reflectances_of_groups);
     tcase_add_test(cases, unknown_skies_are_left);
+    tcase_add_test(cases, the_mesh_is_a_part);
+    tcase_add_test(cases, large_errors_are_numbers);
     tcase_add_test(cases, darkness_has_no_error_and_no_light_no_ratio);
     suite_add_tcase(suite, cases);
     return suite_run(suite);

@@ -38,7 +38,7 @@ export interface Description {
     /** In the axes of the store, metres; the field of view is that of the height, in degrees. */
     cameras?: { name: string; eye: Vector; direction: Vector; up: Vector; fov: number }[];
     sky: { tiling: string; tiles: number; ground_albedo: number } | null;
-    error: { [light: string]: ErrorFigures | GroupErrors[] } & {
+    error: { [light: string]: ErrorFigures | GroupErrors[] | number | string | boolean } & {
         [light in "single" | "lights" | "random" | "sky"]?: ErrorFigures;
     } | null;
     provenance?: { [name: string]: unknown };

@@ -148,12 +148,16 @@ export function makeStatus({ store, scene, ask }: Page): HTMLElement {
         const headline = headlineOf(description.error, ask.wanted()?.emission ?? null);
         error.textContent = headline === null
             ? "error not measured"
-            : `error ${percent(headline.indirect)} of the indirect light, ${percent(headline.relative)} of all`;
+            : `error ${percent(headline.stated)}${headline.coarse ? ", coarse" : ""}`;
         error.title = headline === null
             ? description.reason
-            : `${percent(headline.rest)} by operator and form factors, ${
+            : `Of the light that surfaces reflect: ${percent(headline.rest)} by operator and form factors, ${
                 headline.mesh > 0 ? `${percent(headline.mesh)} by the mesh` : "that of the mesh is not known"
-            }. ${description.reason}`;
+            }. ${
+                headline.coarse
+                    ? `precompute with ${headline.mesh > headline.rest ? "--mesh-error .05" : "--quality high"} lowers it. `
+                    : ""
+            }${description.reason}`;
     };
     scene.on("field", drawError);
     scene.on("scene", () => {

@@ -26,6 +26,9 @@ const LIGHTS: { [name: string]: string } = {
 };
 
 interface OwnError {
+    stated?: number | null;
+    coarse?: boolean;
+    advice?: string;
     relative_mean?: number | null;
     indirect_mean?: number | null;
     light?: string;
@@ -112,6 +115,8 @@ function ownError(error: OwnError | null): Node[] {
             make("p", { class: "hint" },
                 "This store was built for light from some groups alone; others shine, too, and no error is known for these."),
         ];
+    if (error.relative_mean === undefined)
+        return [make("p", { class: "hint" }, `This store states no error for this lighting: ${error.advice ?? ""}.`)];
     const of = error.light === "own"
         ? ""
         : error.light === "lights"
