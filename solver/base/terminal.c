@@ -36,6 +36,10 @@ void terminal_open(terminal *t, const char *program, bool quiet, bool force_prog
     sigaction(SIGXFSZ, &ignore, NULL);
 }
 
+void terminal_be_brief(terminal *t) {
+    t->brief = isatty(STDERR_FILENO) == 1;
+}
+
 void terminal_clear(terminal *t) {
     if (t->line_shown) fputs("\r\033[K", stderr);
     t->line_shown = false;
@@ -72,8 +76,14 @@ progress terminal_progress(terminal *t) {
     return (progress){.report = t->live ? show : NULL, .cancelled = asked_to_stop, .context = t};
 }
 
-void terminal_log(terminal *t, const char *format, ...) {
+void terminal_say(terminal *t, const char *line) {
     if (t->quiet) return;
+    terminal_clear(t);
+    fprintf(stderr, "%s\n", line);
+}
+
+void terminal_log(terminal *t, const char *format, ...) {
+    if (t->quiet || t->brief) return;
     va_list arguments;
     terminal_clear(t);
     va_start(arguments, format);

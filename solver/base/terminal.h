@@ -18,6 +18,7 @@ typedef struct terminal {
     const char *program; /* "lambert solve", with which messages begin */
     const char *nothing; /* the end of the message of a cancelled verb: "nothing was written" */
     bool quiet;
+    bool brief;           /* leaves out the log */
     bool live;            /* shows a progress line */
     char stage[64];       /* the stage the line shows */
     double stage_started; /* seconds */
@@ -31,11 +32,18 @@ typedef struct terminal {
  * quiet. Catches SIGINT and SIGTERM (a second one ends at once) and turns "file too large" into an error. */
 void terminal_open(terminal *t, const char *program, bool quiet, bool force_progress);
 
+/* Leaves out the log, for a person who waits, where standard error is a terminal: of long work that says at
+ * its end what came of it. */
+void terminal_be_brief(terminal *t);
+
 /* The callbacks to hand to long work; they live as long as t. */
 progress terminal_progress(terminal *t);
 
 /* One line of the log; nothing with quiet. Erases the progress line first. */
 void terminal_log(terminal *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* One line of the outcome, which brevity does not leave out; nothing with quiet. */
+void terminal_say(terminal *t, const char *line);
 
 /* Logs "NAME   1.23 s" and keeps it in done, where equal names add up, and of which later stages than the
  * TERMINAL_STAGES-th are left out. */

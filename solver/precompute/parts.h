@@ -45,6 +45,7 @@ typedef struct precompute_job {
 /* The scene as it is computed with. */
 typedef struct precompute_scene {
     mesh m;
+    size_t n_faces; /* of the file, backs left out; 0: a store was read */
     uint32_t *order;
     double (*centre)[3]; /* [n], with surface where a method needs them */
     uint32_t *surface;

@@ -158,6 +158,7 @@ lam_status precompute_run(const precompute_options *options, const option_result
     scratch_close(p.factors.scratch, true);
     p.factors.scratch = NULL;
     result->report = p.made.built;
+    result->n_faces = p.scene.n_faces;
     result->forecast = p.times.expected;
     result->spent = p.times.spent;
     memcpy(result->advice, p.made.advice, sizeof result->advice);

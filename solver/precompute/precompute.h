@@ -94,6 +94,7 @@ typedef struct precompute_result {
     build_report report;
     char unused[256];
     char advice[ERROR_ADVICE_BYTES];
+    size_t n_faces;                 /* of the file; 0: a store was read */
     forecast_times forecast, spent; /* processor seconds of the stages: the forecast, and the truth */
 } precompute_result;
 lam_status precompute_run(const precompute_options *options, const option_result *given, terminal *t,

@@ -93,6 +93,7 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
                                 .assets = o->assets};
     import_report report = {0};
     TRY(scene_import(o->input, &how, &scene->m, &report, error));
+    scene->n_faces = scene->m.n;
     log_warnings(job->t, report.warnings);
     if (report.dropped_faces > 0)
         terminal_log(job->t, "%zu face%s of zero area dropped", report.dropped_faces,

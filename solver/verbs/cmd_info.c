@@ -3,6 +3,7 @@
 #include "solver/base/terminal.h"
 #include "solver/codec/describe.h"
 #include "solver/method/report.h"
+#include "solver/verbs/store_lines.h"
 #include "solver/verbs/verbs.h"
 
 #include <stdio.h>
@@ -276,7 +277,7 @@ static lam_status info(const char *path, bool as_json, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     json_t *about = NULL;
-    char *text = NULL;
+    char *text = NULL, lines[STORE_LINES][STORE_LINE_BYTES];
     TRY(store_open(path, &s, error));
     TRY(describe_store(s, &about, error));
     if (as_json) {
@@ -284,6 +285,9 @@ static lam_status info(const char *path, bool as_json, lam_error *error) {
         if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
         puts(text);
     } else {
+        store_lines_make(about, path, 0, lines);
+        for (size_t k = 0; k < STORE_LINES; k++) puts(lines[k]);
+        puts("");
         print_text(about);
     }
 done:

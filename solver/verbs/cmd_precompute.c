@@ -3,6 +3,7 @@
 #include "solver/codec/describe.h"
 #include "solver/method/emitters_options.h"
 #include "solver/precompute/precompute.h"
+#include "solver/verbs/store_lines.h"
 #include "solver/verbs/verbs.h"
 
 #include <inttypes.h>
@@ -22,9 +23,18 @@ static const option_command command = {
     .gone = precompute_gone,
 };
 
-static const option_row json_rows[] = {
+typedef struct own_fields {
+    bool verbose, json;
+} own_fields;
+
+static const option_row own_rows[] = {
+    {.name = "verbose",
+     .kind = OPTION_FLAG,
+     .offset = offsetof(own_fields, verbose),
+     .help = "Print the log on a terminal, too, where three lines at the end stand for it"},
     {.name = "json",
      .kind = OPTION_FLAG,
+     .offset = offsetof(own_fields, json),
      .help = "Print the description of the store and the seconds of each stage as JSON"},
     {0},
 };
@@ -37,13 +47,10 @@ static json_t *times_json(const forecast_times *t) {
 /* The answer of `lambert info --json`, with the path of the store, the seconds of each stage, the processor
  * seconds of the main ones as forecast and as taken, and the advice on its errors where there is one. */
 static lam_status print_json(const char *path, const terminal *t, const precompute_result *result,
-                             lam_error *error) {
+                             json_t *about, lam_error *error) {
     lam_status status = LAM_OK;
-    store *s = NULL;
-    json_t *about = NULL, *seconds = json_object();
+    json_t *seconds = json_object();
     char *text = NULL;
-    TRY(store_open(path, &s, error));
-    TRY(describe_store(s, &about, error));
     for (size_t k = 0; k < t->n_done; k++)
         json_object_set_new(seconds, t->done[k].name, json_real(t->done[k].seconds));
     json_object_set_new(about, "output", json_string(path));
@@ -58,8 +65,30 @@ static lam_status print_json(const char *path, const terminal *t, const precompu
 done:
     free(text);
     json_decref(seconds);
+    return status;
+}
+
+/* The outcome: three lines of the log, and with --json the description of the store. */
+static lam_status print_outcome(const precompute_options *o, bool as_json, terminal *t,
+                                const precompute_result *result, lam_error *error) {
+    lam_status status = LAM_OK;
+    char lines[STORE_LINES][STORE_LINE_BYTES];
+    store *s = NULL;
+    json_t *about = NULL;
+    if (o->quiet && !as_json) return LAM_OK;
+    TRY(store_open(o->output, &s, error));
+    TRY(describe_store(s, &about, error));
+    store_lines_make(about, o->output, result->n_faces, lines);
+    for (size_t k = 0; k < STORE_LINES; k++) terminal_say(t, lines[k]);
+    if (as_json) TRY(print_json(o->output, t, result, about, error));
+done:
     json_decref(about);
     store_close(s);
+    /* The store is whole: a person can still ask info. */
+    if (status != LAM_OK && !as_json) {
+        terminal_warn(t, "%s", error->message);
+        status = LAM_OK;
+    }
     return status;
 }
 
@@ -201,14 +230,14 @@ static void log_unused(terminal *t, const option_result *given, const precompute
 int cmd_precompute(int argc, char **argv) {
     precompute_options o;
     precompute_tables tables;
-    bool json = false;
+    own_fields own = {.json = false};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     precompute_result result = {.unused = "", .advice = ""};
     char *line = command_line(argc, argv), *continues = NULL;
     precompute_tables_make(&o, false, &tables);
-    precompute_tables_add(&tables, json_rows, &json);
+    precompute_tables_add(&tables, own_rows, &own);
     int code = options_parse(&command, tables.tables, argc, argv, &given);
     if (code == OPTIONS_GO) {
         o.input = given.arguments[0];
@@ -223,6 +252,7 @@ int cmd_precompute(int argc, char **argv) {
         asprintf(&continues, "what was finished stays in %s; to go on: %s", o.scratch, line) < 0)
         continues = NULL;
     terminal_open(&term, command.name, o.quiet, o.progress);
+    if (!own.verbose) terminal_be_brief(&term);
     if (o.threads > 0) omp_set_num_threads((int)o.threads); /* OpenBLAS asks OpenMP too */
     o.command = line != NULL ? line : "";
     o.continues = continues != NULL ? continues : "what was finished stays in the scratch folder";
@@ -234,6 +264,6 @@ int cmd_precompute(int argc, char **argv) {
     if (code != 0) return code;
     log_unused(&term, &given, &o, &result);
     terminal_log(&term, "%s", o.output);
-    if (json && print_json(o.output, &term, &result, &error) != LAM_OK) return terminal_fail(&term, &error);
+    if (print_outcome(&o, own.json, &term, &result, &error) != LAM_OK) return terminal_fail(&term, &error);
     return 0;
 }
