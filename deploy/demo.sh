@@ -51,7 +51,7 @@ lambertd=$PWD/build/release/lambertd
 if [ -z "$scene" ]; then
     echo "== scene"
     scene=$out/cornell.obj
-    "$lambert" generate cornell --elements 2560 -o "$scene"
+    "$lambert" generate cornell --elements 40 -o "$scene"
 fi
 store=$out/$(basename "${scene%.*}").h5
 

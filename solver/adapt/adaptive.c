@@ -15,9 +15,14 @@ static const double largest_share = 1. / 128;
 enum { ROUND_SHARE = 8 };
 static const double round_least = 1. / 8;
 
-/* A cell is cut by what POINTS_ENOUGH points show, its own and those that it inherited. Where the points of
- * all cells would take more than some bytes, none are kept, and a cell is cut by what one look shows. */
-enum { CELL_STEPS = 6, POINTS_ENOUGH = 192 };
+/* A cell is cut by what enough points show, its own and those that it inherited; steps are of its first look.
+ * Of many cells fewer points say what all leave. Where the points of all cells would take more than some
+ * bytes, none are kept, and a cell is cut by what one look shows. */
+typedef struct look_plan {
+    size_t steps, enough;
+} look_plan;
+static const look_plan thorough = {6, 192}, rough = {4, 96};
+enum { MANY = 4096, MANY_STEPS = 4 };
 static const size_t points_bytes_most = (size_t)256 << 20;
 
 typedef struct adaptive_cell {
@@ -30,30 +35,31 @@ typedef struct adaptive_cell {
 } adaptive_cell;
 
 typedef struct adaptive_run {
-    const mesh *m; /* faces */
+    look_plan looks;
     const adaptive_options *how;
-    const coarse_light *coarse;
-    cell_light light;
+    const cell_light *light;
     adaptive_cell *cells;
     size_t n;
-    bool keep; /* the points of cells */
+    size_t points; /* that were looked at */
+    bool keep;     /* the points of cells */
 } adaptive_run;
 
 /* Looks at those of the cells first ... end - 1 that wait for it. */
 static lam_status look_at_some(adaptive_run *r, size_t first, size_t end, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t values = cell_light_values(&r->light);
+    const size_t values = cell_light_values(r->light);
     for (size_t i = first; i < end; i++) {
         adaptive_cell *c = &r->cells[i];
         const size_t more = c->steps * c->steps;
+        r->points += more;
         if (more > 0) TRY(cell_points_reserve(&c->points, values, CELL_POINTS_MOST - more, more, error));
     }
 #pragma omp parallel for schedule(dynamic, 4)
     for (size_t i = first; i < end; i++) {
         adaptive_cell *c = &r->cells[i];
         if (c->steps == 0 || progress_cancelled(r->how->progress)) continue;
-        cell_look_at(&r->light, &c->cell, c->key, c->steps, &c->points, c->error);
-        cell_cut_find(&r->light, &c->cell, &c->points, c->best);
+        cell_look_at(r->light, &c->cell, c->key, c->steps, &c->points, c->error);
+        cell_cut_find(r->light, &c->cell, &c->points, c->best);
         c->key = random_hash(c->key);
         c->steps = 0;
     }
@@ -67,11 +73,11 @@ done:
 static lam_status look_at_waiting(adaptive_run *r, double *sum, lam_error *error) {
     enum { BATCH = 4096 };
     lam_status status = LAM_OK;
-    const size_t bytes = POINTS_ENOUGH * cell_points_bytes(cell_light_values(&r->light));
+    const size_t bytes = r->looks.enough * cell_points_bytes(cell_light_values(r->light));
     r->keep = r->keep && r->n * bytes <= points_bytes_most;
     for (size_t i = 0; i < r->n; i += BATCH)
         TRY(look_at_some(r, i, i + BATCH < r->n ? i + BATCH : r->n, error));
-    for (size_t l = 0; l < r->coarse->n_lights; l++) {
+    for (size_t l = 0; l < r->light->coarse->n_lights; l++) {
         sum[l] = 0;
         for (size_t i = 0; i < r->n; i++) sum[l] += (double)r->cells[i].error[l];
     }
@@ -82,7 +88,7 @@ done:
 /* The largest error of all lights. */
 static double largest_error(const adaptive_run *r, const double *sum) {
     double most = 0;
-    for (size_t l = 0; l < r->coarse->n_lights; l++) most = fmax(most, sum[l]);
+    for (size_t l = 0; l < r->light->coarse->n_lights; l++) most = fmax(most, sum[l]);
     return sqrt(most);
 }
 
@@ -90,7 +96,7 @@ static double largest_error(const adaptive_run *r, const double *sum) {
  * that one decides. */
 static void weigh_lights(const adaptive_run *r, const double *sum, double *weight) {
     const double most = largest_error(r, sum);
-    for (size_t l = 0; l < r->coarse->n_lights; l++)
+    for (size_t l = 0; l < r->light->coarse->n_lights; l++)
         weight[l] = sum[l] > r->how->error * r->how->error ? pow(sum[l] / (most * most), 4) : 0;
 }
 
@@ -98,17 +104,18 @@ static void weigh_lights(const adaptive_run *r, const double *sum, double *weigh
  * can be made. */
 static double best_gain(const adaptive_run *r, const adaptive_cell *c, const double *weight, size_t *best) {
     double most = 0;
-    for (size_t k = 0; k < r->coarse->n_lights; k++) {
+    for (size_t k = 0; k < r->light->coarse->n_lights; k++) {
         double gain = 0;
-        for (size_t l = 0; l < r->coarse->n_lights; l++) gain += weight[l] * (double)c->best[k].gain[l];
+        for (size_t l = 0; l < r->light->coarse->n_lights; l++)
+            gain += weight[l] * (double)c->best[k].gain[l];
         if (c->best[k].gain[k] > 0 && gain > most) most = gain, *best = k;
     }
     return most;
 }
 
 /* Steps of a look of at least some points. */
-static size_t steps_of(size_t points) {
-    size_t steps = CELL_STEPS;
+static size_t steps_of(const adaptive_run *r, size_t points) {
+    size_t steps = r->looks.steps;
     while (steps * steps < points) steps++;
     return steps;
 }
@@ -133,8 +140,8 @@ static lam_status cut_cell(const adaptive_run *r, const adaptive_cell *c, mesh_c
     if (!mesh_cell_cut(&c->cell, cut, cells)) return status_fail(error, LAM_ERR_INTERNAL, "a cut of nothing");
     for (int k = 0; k < 2; k++)
         parts[k] = (adaptive_cell){
-            .cell = cells[k], .key = random_hash(2 * c->key + (uint64_t)k), .steps = CELL_STEPS};
-    cell_cut_way(&r->light, &c->cell, cut, from, to);
+            .cell = cells[k], .key = random_hash(2 * c->key + (uint64_t)k), .steps = r->looks.steps};
+    cell_cut_way(r->light, &c->cell, cut, from, to);
     return cell_points_part(&c->points, from, to, &parts[1].points, &parts[0].points, error);
 }
 
@@ -165,7 +172,7 @@ static lam_status cut_cells(adaptive_run *r, const uint8_t *light, lam_error *er
 
 /* The elements that a cell becomes. */
 static size_t sides_of(const adaptive_run *r, const adaptive_cell *c) {
-    return r->m->has_back != NULL && r->m->has_back[c->cell.face] ? 2 : 1;
+    return r->light->m->has_back != NULL && r->light->m->has_back[c->cell.face] ? 2 : 1;
 }
 
 /* Cuts the cells of the largest gains, or has those looked at again that show too few points for it; *n_more
@@ -191,8 +198,8 @@ static lam_status cut_best(adaptive_run *r, const double *sum, size_t *n_more, l
         adaptive_cell *c = &r->cells[order[k].cell];
         made += sides_of(r, c);
         if (made > r->how->elements) break;
-        if (r->keep && c->points.n < POINTS_ENOUGH)
-            c->steps = steps_of(POINTS_ENOUGH - c->points.n);
+        if (r->keep && c->points.n < r->looks.enough)
+            c->steps = steps_of(r, r->looks.enough - c->points.n);
         else
             light[order[k].cell] = (uint8_t)order[k].light;
     }
@@ -205,8 +212,11 @@ done:
 
 /* Steps of a look at all cells: of many of them fewer points say what all leave. */
 static size_t steps_of_all(const adaptive_run *r) {
-    enum { MANY = 4096, MANY_STEPS = 4 };
-    return r->n < MANY ? CELL_STEPS : MANY_STEPS;
+    return r->n < MANY ? r->looks.steps : MANY_STEPS;
+}
+
+static bool points_are_left(const adaptive_run *r) {
+    return r->how->points == 0 || r->points < r->how->points;
 }
 
 /* The cells to begin with. */
@@ -214,9 +224,9 @@ static lam_status begin(adaptive_run *r, lam_error *error) {
     lam_status status = LAM_OK;
     mesh_cell *cells = NULL;
     double area = 0;
-    for (size_t i = 0; i < r->m->n; i++) area += r->m->area[i];
-    TRY(mesh_cells_even(r->m, largest_share * area, r->how->elements / (r->m->has_back != NULL ? 2 : 1),
-                        &cells, &r->n, error));
+    for (size_t i = 0; i < r->light->m->n; i++) area += r->light->m->area[i];
+    TRY(mesh_cells_even(r->light->m, largest_share * area,
+                        r->how->elements / (r->light->m->has_back != NULL ? 2 : 1), &cells, &r->n, error));
     r->cells = memory_allocate(r->n, sizeof *r->cells, "cells of a mesh", error);
     if (r->cells == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < r->n; i++)
@@ -244,54 +254,42 @@ static lam_status refine_cells(adaptive_run *r, adaptive_report *report, lam_err
         progress_report(r->how->progress, "mesh", fmin(1, (double)r->n / (double)r->how->elements));
         report->reached = largest_error(r, sum) <= r->how->error;
         n_more = 0;
-        if (!report->reached) TRY(cut_best(r, sum, &n_more, error));
+        if (!report->reached && points_are_left(r)) TRY(cut_best(r, sum, &n_more, error));
         chosen = chosen || n_more > 0;
     }
-    report->has_lamps = r->coarse->lamps;
-    report->lamps = r->coarse->lamps ? sqrt(fmax(0, sum[0])) : 0;
-    report->even = sqrt(fmax(0, sum[r->coarse->n_lights - 1]));
+    report->left = mesh_estimate_of(r->light->coarse, sum);
 done:
     return status;
 }
 
-/* sum A |B - E|^2 of each light; at least a number above 0. */
-static void weigh(const coarse_light *c, double *all) {
-    const size_t n = c->m.n, vector = n * c->m.n_channels;
-    for (size_t l = 0; l < c->n_lights; l++) {
-        all[l] = 1e-300;
-        for (size_t k = 0; k < vector; k++) {
-            const double x = (double)c->B[l * vector + k] - (double)c->E[l * vector + k];
-            all[l] += c->m.area[k % n] * x * x;
-        }
-    }
-}
-
-lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report *report, lam_error *error) {
+lam_status adaptive_refine_by(const cell_light *light, const adaptive_options *how, mesh *out,
+                              adaptive_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    coarse_light coarse = {.n_lights = 0};
-    gather *g = NULL;
     mesh_cell *cells = NULL;
-    mesh fine = {0};
-    adaptive_run r = {.m = m, .how = how, .coarse = &coarse, .keep = true};
-    adaptive_report made = {.reached = false};
-    TRY(coarse_light_make(m, how->seed, how->progress, &coarse, error));
-    TRY(gather_create(&coarse.m, coarse.n_lights, coarse.B, coarse.lamps ? coarse.E : NULL, NULL, &g, error));
-    r.light = (cell_light){.m = m, .coarse = &coarse, .g = g};
-    weigh(&coarse, r.light.all);
-    TRY(refine_cells(&r, &made, error));
-    if (r.n > m->n) {
-        cells = memory_allocate(r.n, sizeof *cells, "cells of a mesh", error);
-        if (cells == NULL) TRY(LAM_ERR_MEMORY);
-        for (size_t i = 0; i < r.n; i++) cells[i] = r.cells[i].cell;
-        TRY(mesh_of_cells(m, r.n, cells, &fine, error));
-        mesh_replace(m, &fine);
-    }
-    *report = made;
+    adaptive_run r = {.looks = how->rough ? rough : thorough, .light = light, .how = how, .keep = true};
+    TRY(refine_cells(&r, report, error));
+    cells = memory_allocate(r.n, sizeof *cells, "cells of a mesh", error);
+    if (cells == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < r.n; i++) cells[i] = r.cells[i].cell;
+    TRY(mesh_of_cells(light->m, r.n, cells, out, error));
 done:
     free(cells);
     for (size_t i = 0; r.cells != NULL && i < r.n; i++) cell_points_free(&r.cells[i].points);
     free(r.cells);
-    gather_free(g);
-    coarse_light_free(&coarse);
+    return status;
+}
+
+lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    light_scene by = {.g = NULL};
+    mesh fine = {0};
+    adaptive_report made = {.reached = false};
+    TRY(light_scene_make(m, NULL, how->seed, how->progress, &by, error));
+    TRY(adaptive_refine_by(&by.light, how, &fine, &made, error));
+    if (fine.n > m->n) mesh_replace(m, &fine);
+    *report = made;
+done:
+    mesh_free(&fine);
+    light_scene_free(&by);
     return status;
 }

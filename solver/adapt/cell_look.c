@@ -15,6 +15,52 @@ typedef struct look_points {
     double share[POINTS];
 } look_points;
 
+/* sum A |B - E|^2 of each light; at least a number above 0. */
+static void weigh(const coarse_light *c, double all[COARSE_LIGHTS]) {
+    const size_t n = c->m.n, vector = n * c->m.n_channels;
+    for (size_t l = 0; l < c->n_lights; l++) {
+        all[l] = 1e-300;
+        for (size_t k = 0; k < vector; k++) {
+            const double x = (double)c->B[l * vector + k] - (double)c->E[l * vector + k];
+            all[l] += c->m.area[k % n] * x * x;
+        }
+    }
+}
+
+lam_status light_scene_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
+                            light_scene *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    *out = (light_scene){.g = NULL};
+    coarse_light *const c = &out->coarse;
+    TRY(coarse_light_make(faces, sky, seed, p, c, error));
+    out->sky = (gather_sky){.tiling = &c->bounce.tiling, .L = c->L};
+    TRY(gather_create(&c->m, c->n_lights, c->B, c->lamps ? c->E : NULL, c->sky ? &out->sky : NULL, &out->g,
+                      error));
+    out->light = (cell_light){.m = faces, .coarse = c, .g = out->g};
+    weigh(c, out->light.all);
+done:
+    if (status != LAM_OK) light_scene_free(out);
+    return status;
+}
+
+void light_scene_free(light_scene *s) {
+    gather_free(s->g);
+    coarse_light_free(&s->coarse);
+    *s = (light_scene){.g = NULL};
+}
+
+mesh_estimate mesh_estimate_of(const coarse_light *c, const double sum[COARSE_LIGHTS]) {
+    mesh_estimate e = {.has_lamps = c->lamps, .has_sky = c->sky};
+    if (c->lamps) e.lamps = sqrt(fmax(0, sum[0]));
+    e.even = sqrt(fmax(0, sum[coarse_light_even(c)]));
+    if (c->sky) e.sky = sqrt(fmax(0, sum[c->n_lights - 1]));
+    return e;
+}
+
+double mesh_estimate_most(const mesh_estimate *e) {
+    return fmax(fmax(e->lamps, e->even), e->sky);
+}
+
 size_t cell_light_values(const cell_light *light) {
     return gather_values(light->g) * (light->m->has_back != NULL ? 2 : 1);
 }

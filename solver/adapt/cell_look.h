@@ -14,6 +14,28 @@ typedef struct cell_light {
     double all[COARSE_LIGHTS]; /* sum A |B - E|^2, above 0 */
 } cell_light;
 
+/* Estimated errors of constants on elements, of the lights that there are. */
+typedef struct mesh_estimate {
+    bool has_lamps, has_sky;
+    double lamps, even, sky; /* of the light of lamps, of 1 from every element, and of an even sky */
+} mesh_estimate;
+
+/* The estimate by sums of squares of each light; mesh_estimate_most is the largest error. */
+mesh_estimate mesh_estimate_of(const coarse_light *c, const double sum[COARSE_LIGHTS]);
+double mesh_estimate_most(const mesh_estimate *e);
+
+/* A cell_light with what it views, where it is made: it must not be moved. Faces outlive it. Errors: those of
+ * coarse_light_make. */
+typedef struct light_scene {
+    coarse_light coarse;
+    gather_sky sky;
+    gather *g;
+    cell_light light;
+} light_scene;
+lam_status light_scene_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
+                            light_scene *out, lam_error *error);
+void light_scene_free(light_scene *s);
+
 /* Values of a point: lights and channels, of the front and then, where the mesh has faces with two sides, of
  * the back, 0 on faces without one. */
 size_t cell_light_values(const cell_light *light);

@@ -9,7 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { RAYS = 256 };
+/* Rays of each element, 256 of COARSE_ELEMENTS of them and fewer, down to 64, of more: it is the sum of the
+ * rays that meet a face from which its light at points has little noise. */
+enum { RAYS_MOST = 256, RAYS_LEAST = 64 };
 static const double tolerance = 1e-4;
 
 void coarse_light_free(coarse_light *c) {
@@ -18,6 +20,7 @@ void coarse_light_free(coarse_light *c) {
     free(c->back);
     free(c->E);
     free(c->B);
+    sky_bounce_free(&c->bounce);
     *c = (coarse_light){.n_lights = 0};
 }
 
@@ -51,6 +54,20 @@ static lam_status make_backs(const mesh *faces, coarse_light *c, lam_error *erro
     return mesh_make_backs(&c->m, error);
 }
 
+static size_t rays_of(size_t elements) {
+    size_t rays = RAYS_MOST;
+    while (rays > RAYS_LEAST && rays * elements > 2 * (size_t)RAYS_MOST * COARSE_ELEMENTS) rays /= 2;
+    return rays;
+}
+
+/* The light that is there without a bounce: an emission, or of the sky rho H0. */
+static double first_of(const coarse_light *c, size_t light, size_t channel, size_t i) {
+    const size_t n = c->m.n, at = channel * n + i;
+    if (c->sky && light == c->n_lights - 1)
+        return (double)c->m.reflectance[at] * (double)c->bounce.first_bounce[i];
+    return (double)c->E[light * c->m.n_channels * n + at];
+}
+
 static lam_status solve(const form_factors *f, const progress *p, coarse_light *c, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->m.n, channels = c->m.n_channels;
@@ -60,8 +77,7 @@ static lam_status solve(const form_factors *f, const progress *p, coarse_light *
     double *B = E + c->n_lights * n;
     for (size_t k = 0; k < channels; k++) {
         for (size_t l = 0; l < c->n_lights; l++)
-            for (size_t i = 0; i < n; i++)
-                E[l * n + i] = B[l * n + i] = (double)c->E[(l * channels + k) * n + i];
+            for (size_t i = 0; i < n; i++) E[l * n + i] = B[l * n + i] = first_of(c, l, k, i);
         TRY(reference_create(&f->F, c->m.area, c->m.reflectance + k * n, REFERENCE_ITERATED, &of, error));
         TRY(reference_solve(of, c->n_lights, E, B, tolerance, p, error));
         reference_destroy(of);
@@ -75,34 +91,50 @@ done:
     return status;
 }
 
-static lam_status set_lights(coarse_light *c, lam_error *error) {
+static lam_status set_lights(const coarse_sky *sky, coarse_light *c, lam_error *error) {
     const size_t vector = c->m.n * c->m.n_channels;
     for (size_t i = 0; i < vector; i++) c->lamps = c->lamps || c->m.emission[i] > 0;
-    c->n_lights = c->lamps ? COARSE_LIGHTS : 1;
+    c->sky = sky != NULL;
+    c->n_lights = 1 + (size_t)c->lamps + c->sky;
     c->E = memory_allocate(c->n_lights * vector, sizeof *c->E, "a coarse solution", error);
     c->B = memory_allocate(c->n_lights * vector, sizeof *c->B, "a coarse solution", error);
     if (c->E == NULL || c->B == NULL) return LAM_ERR_MEMORY;
     if (c->lamps) memcpy(c->E, c->m.emission, vector * sizeof *c->E);
-    for (size_t i = 0; i < vector; i++) c->E[(c->n_lights - 1) * vector + i] = 1;
+    for (size_t i = 0; i < vector; i++) c->E[coarse_light_even(c) * vector + i] = 1;
     return LAM_OK;
 }
 
-lam_status coarse_light_make(const mesh *faces, uint64_t seed, const progress *p, coarse_light *out,
-                             lam_error *error) {
+/* The ground below a sky of radiance 1 receives pi, and reflects its albedo of it. */
+static void set_radiances(const coarse_sky *sky, coarse_light *c) {
+    double *const L = c->L + 2 * (c->n_lights - 1);
+    if (sky == NULL) return;
+    L[0] = 1;
+    L[1] = sky->ground_albedo;
+}
+
+lam_status coarse_light_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
+                             coarse_light *out, lam_error *error) {
     lam_status status = LAM_OK;
     coarse_light c = {.n_lights = 0};
     form_factors f = {.row_sums = NULL};
     uint32_t *order = NULL;
     TRY(divide(faces, &c, error));
     TRY(make_backs(faces, &c, error));
-    TRY(set_lights(&c, error));
+    TRY(set_lights(sky, &c, error));
     order = memory_allocate(c.m.n, sizeof *order, "a coarse mesh", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&c.m, order, error));
-    const form_factor_options how = {
-        .recipe = {.rays = RAYS, .seed = seed}, .progress = p, .stage = "form factors of a coarse mesh"};
+    const form_factor_options how = {.recipe = {.rays = rays_of(c.m.n), .seed = seed},
+                                     .progress = p,
+                                     .stage = "form factors of a coarse mesh",
+                                     .sky = sky != NULL ? "grid:1x1" : NULL,
+                                     .ground_albedo = sky != NULL ? sky->ground_albedo : 0,
+                                     .openings = sky != NULL ? sky->openings : NULL};
     TRY(form_factors_make(&c.m, order, &how, &f, error));
     if (f.F.indptr == NULL) TRY(form_factors_expand(&f, c.m.area, error));
+    c.bounce = f.sky;
+    f.sky = (sky_bounce){.n = 0};
+    set_radiances(sky, &c);
     TRY(solve(&f, p, &c, error));
     *out = c;
     c = (coarse_light){.n_lights = 0};

@@ -1,29 +1,46 @@
-/* A rough solution to refine a mesh by: the light of the scene's lamps, and of 1 from every element, on a
- * mesh of a few thousand elements. */
+/* A rough solution to refine a mesh by: the light of the scene's lamps, of 1 from every element, and of an
+ * even sky, on a mesh of a few thousand elements. */
 #ifndef LAMBERT_ADAPT_COARSE_LIGHT_H
 #define LAMBERT_ADAPT_COARSE_LIGHT_H
 
+#include "solver/formfactor/sky_bounce.h"
+#include "solver/scene/facet/face_openings.h"
 #include "solver/scene/mesh.h"
 
-enum { COARSE_LIGHTS = 2 };
+/* Lights at most: of lamps, of all elements, and of the sky, in this order; only the second is always there.
+ */
+enum { COARSE_LIGHTS = 3 };
+
+/* The sky that lights the store; openings, or NULL, as form_factor_options has them. */
+typedef struct coarse_sky {
+    double ground_albedo;
+    const face_openings *openings;
+} coarse_sky;
 
 typedef struct coarse_light {
     mesh m;          /* with the backs of faces that have one */
     uint32_t *first; /* [faces + 1]: the elements, or fronts, of face f are first[f] ... first[f + 1] - 1 */
     uint32_t *back;  /* [faces]: the first of its backs, in the order of the fronts; NULL: no face has any */
-    size_t n_lights; /* 2, the lamps first; 1, the second alone, where there are no lamps */
-    float *E, *B;    /* [n_lights][C][n] */
-    bool lamps;
+    size_t n_lights; /* of those that there are */
+    float *E, *B;    /* [n_lights][C][n]; of the sky E is 0 */
+    bool lamps, sky;
+    sky_bounce bounce;           /* of a sky of one tile */
+    double L[2 * COARSE_LIGHTS]; /* [n_lights][2]: radiances of that tile and of the ground, by light */
 } coarse_light;
+
+/* The place of the light of all elements. */
+static inline size_t coarse_light_even(const coarse_light *c) {
+    return c->lamps ? 1 : 0;
+}
 
 void coarse_light_free(coarse_light *c);
 
 /* Divides a copy of the faces into at least COARSE_ELEMENTS elements, as few show too little of the light
- * that near ones send each other, of which it finds form factors with 256 rays each, and the converged
- * solution. Cost: about a second, or 256 rays from each face. Errors: those of form_factors_make and
- * reference_solve. */
+ * that near ones send each other, of which it finds form factors with 64 to 256 rays each, and the converged
+ * solution. sky: NULL: none. Cost: about a second, or 64 rays from each face. Errors: those of
+ * form_factors_make and reference_solve. */
 enum { COARSE_ELEMENTS = 8000 };
-lam_status coarse_light_make(const mesh *faces, uint64_t seed, const progress *p, coarse_light *out,
-                             lam_error *error);
+lam_status coarse_light_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
+                             coarse_light *out, lam_error *error);
 
 #endif

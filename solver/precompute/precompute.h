@@ -13,6 +13,9 @@
 /* --two-sided: materials say which faces have a back; every face has one; none has. */
 typedef enum sides_asked { SIDES_OF_MATERIALS, SIDES_BOTH, SIDES_FRONTS } sides_asked;
 
+/* --mesh: faces are divided until they fit the light, or not at all. */
+typedef enum mesh_asked { MESH_OF_LIGHT, MESH_OF_FACES } mesh_asked;
+
 /* --quality: the place among the words of its row (option_word). */
 typedef enum factor_quality { QUALITY_DRAFT, QUALITY_NORMAL, QUALITY_HIGH } factor_quality;
 extern const char precompute_quality_words[];
@@ -23,7 +26,8 @@ typedef struct precompute_options {
     const char *output;
     uint64_t elements;
     double max_edge, unit, reflectance; /* reflectance: negative, the file's own */
-    double mesh_error;                  /* 0: faces are divided by their size alone */
+    double mesh_error;                  /* 0: as mesh says, or by size */
+    mesh_asked mesh;                    /* where no other option of the mesh is given */
     const char *up;                     /* NULL: by the file */
     const char *assets;                 /* a folder, or NULL */
     bool orient;

@@ -45,6 +45,18 @@ static const option_row output_rows[] = {
 };
 
 static const option_row mesh_rows[] = {
+    {.name = "mesh",
+     .kind = OPTION_WORD,
+     .offset = FIELD(mesh),
+     .preset = "light",
+     .choices = "light|faces",
+     .not_with = "max-edge|elements|mesh-error",
+     .settled = fixed_mesh,
+     .help =
+         "light: divide the faces until constants on elements leave at most .05 of the reflected light of "
+         "the scene's lamps, of light that all elements emit, and with --sky of an even sky: evenly, or "
+         "where light changes, into at most 40,000 elements, or a quarter more than there are faces; faces "
+         "that are fine enough stay. faces: every face is one element"},
     {.name = "max-edge",
      .kind = OPTION_NUMBER,
      .offset = FIELD(max_edge),
@@ -297,7 +309,7 @@ void precompute_tables_make(precompute_options *o, bool to_classify, precompute_
                                        .help = "Kind of operator"};
     out->method_rows[1] = (option_row){.name = NULL};
     if (!to_classify) add(out, NULL, output_rows, o);
-    add(out, "mesh (preset: every face of the file is one element)", mesh_rows, o);
+    add(out, "mesh (preset: faces are divided until they fit the light)", mesh_rows, o);
     add(out, "form factors", sample_rows, o);
     if (!to_classify) {
         add(out, "", out->source_rows, o);

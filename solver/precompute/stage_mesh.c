@@ -1,5 +1,5 @@
 /* From faces to elements, as the options of the mesh say. */
-#include "solver/adapt/adaptive.h"
+#include "solver/adapt/mesh_fit.h"
 #include "solver/base/scene/scene_backs.h"
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
@@ -13,7 +13,7 @@
 /* Elements that --mesh-error makes at most, unless --elements gives their number. */
 enum { ADAPTIVE_ELEMENTS = 40000 };
 
-/* The elements that a mesh that was not divided is advised to have. */
+/* The elements that a mesh of an error is thought to have before it is divided. */
 enum { COARSE_ADVICE = 5000 };
 
 static lam_status join_faces(const precompute_job *job, precompute_scene *scene, lam_error *error) {
@@ -44,15 +44,85 @@ static lam_status refine_by_error(const precompute_job *job, precompute_scene *s
     adaptive_report made;
     char lamps[64] = "";
     TRY(adaptive_refine(&scene->m, &how, &made, error));
-    if (made.has_lamps) snprintf(lamps, sizeof lamps, "%.3g of the light of lamps and ", made.lamps);
+    if (made.left.has_lamps)
+        snprintf(lamps, sizeof lamps, "%.3g of the light of lamps and ", made.left.lamps);
     terminal_log(job->t, "constants on elements leave %s%.3g of light that all elements emit", lamps,
-                 made.even);
+                 made.left.even);
     if (!made.reached)
         terminal_warn(job->t,
                       "--mesh-error %g is not kept with %zu elements: they leave %.3g; --elements takes more "
                       "than %zu",
-                      o->mesh_error, elements_to_be(&scene->m),
-                      made.lamps > made.even ? made.lamps : made.even, how.elements);
+                      o->mesh_error, elements_to_be(&scene->m), mesh_estimate_most(&made.left), how.elements);
+done:
+    return status;
+}
+
+/* By preset constants leave this error, and there are at most ADAPTIVE_ELEMENTS elements, or a quarter more
+ * than faces; fewer where --time is less than these seconds. */
+static const double fit_error = .05, fit_seconds = 30, fit_of_face = 1.25;
+
+static bool is_fitted(const precompute_options *o) {
+    return o->mesh == MESH_OF_LIGHT && o->max_edge == 0 && o->elements == 0 && o->mesh_error == 0;
+}
+
+/* "0.021 of the light of lamps, 0.04 of light that all elements emit" */
+enum { LEFT_BYTES = 160 };
+static void describe_left(const mesh_estimate *e, char text[LEFT_BYTES]) {
+    size_t length = 0;
+    if (e->has_lamps) length += (size_t)snprintf(text, LEFT_BYTES, "%.3g of the light of lamps, ", e->lamps);
+    if (e->has_sky)
+        length +=
+            (size_t)snprintf(text + length, LEFT_BYTES - length, "%.3g of that of an even sky, ", e->sky);
+    snprintf(text + length, LEFT_BYTES - length, "%.3g of light that all elements emit", e->even);
+}
+
+/* The cuts along walls that come before a mesh by preset is divided. */
+typedef struct walls_to_cut {
+    const precompute_job *job;
+    precompute_scene *scene;
+    double edge;
+    size_t most;
+} walls_to_cut;
+
+static lam_status cut_at_walls(void *of, lam_error *error) {
+    const walls_to_cut *w = of;
+    return scene_cut_at_walls(w->job, w->scene, w->edge, w->most, error);
+}
+
+/* The mesh by preset, with a line on what was divided and why. */
+static lam_status fit_to_light(const precompute_job *job, precompute_scene *scene, double edge, bool *divided,
+                               lam_error *error) {
+    static const char *const ways[] = {"stay as they are", "are divided evenly",
+                                       "are divided where light changes"};
+    lam_status status = LAM_OK;
+    const precompute_options *o = job->options;
+    const size_t faces = elements_to_be(&scene->m);
+    const coarse_sky sky = {.ground_albedo = o->ground_albedo, .openings = scene->openings};
+    const double share = o->time > 0 ? fmin(1, o->time / fit_seconds) : 1;
+    walls_to_cut walls = {.job = job, .scene = scene, .edge = edge, .most = SIZE_MAX};
+    const mesh_fit_options how = {.error = fit_error,
+                                  .elements =
+                                      (size_t)(share * fmax(ADAPTIVE_ELEMENTS, fit_of_face * (double)faces)),
+                                  .effort = share,
+                                  .sky = o->sky != NULL ? &sky : NULL,
+                                  .cut = cut_at_walls,
+                                  .cut_of = &walls,
+                                  .seed = precompute_seed(o->seed, SEED_MESH),
+                                  .progress = &job->progress};
+    mesh_fit_report made;
+    char before[LEFT_BYTES], left[LEFT_BYTES];
+    TRY(mesh_fit(&scene->m, &how, &made, error));
+    *divided = made.way != MESH_FIT_FACES;
+    describe_left(&made.faces, before);
+    describe_left(&made.left, left);
+    if (made.way == MESH_FIT_FACES)
+        terminal_log(job->t, "%zu faces %s: constants on them leave %s", faces, ways[made.way], before);
+    else
+        terminal_log(job->t, "%zu faces %s, as constants on them leave %s; %zu elements leave %s", faces,
+                     ways[made.way], before, elements_to_be(&scene->m), left);
+    if (!made.reached)
+        terminal_log(job->t, "%.2g is not reached with %zu elements; --elements or --mesh-error takes more",
+                     fit_error, elements_to_be(&scene->m));
 done:
     return status;
 }
@@ -87,29 +157,32 @@ static void log_renamed(const precompute_job *job, const precompute_scene *scene
                       m->group_names[first]);
 }
 
-/* About the edge of the elements that the options ask for, metres; 0: faces stay as they are. With
- * --mesh-error nobody knows yet how many it takes. */
+/* About the edge of the elements that the options ask for, metres; 0: faces stay as they are. Nobody knows
+ * yet how many elements it takes to keep an error. */
 static double edge_to_be(const mesh *m, const precompute_options *o) {
-    const size_t elements = o->elements > 0 || o->mesh_error == 0 ? fronts_of(m, o->elements) : COARSE_ADVICE;
+    const bool by_error = (o->mesh_error > 0 || is_fitted(o)) && o->elements == 0;
+    const size_t elements = by_error ? COARSE_ADVICE : fronts_of(m, o->elements);
     double area = 0;
     for (size_t i = 0; i < m->n; i++) area += m->area[i];
     if (o->max_edge > 0) return o->max_edge;
-    return elements > m->n || o->mesh_error > 0 ? sqrt(area / (double)elements) : 0;
+    return by_error || elements > m->n ? sqrt(area / (double)elements) : 0;
 }
 
 lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
     const double edge = edge_to_be(&scene->m, o);
+    bool divided = true;
     const size_t most = o->elements > 0 ? fronts_of(&scene->m, o->elements) : SIZE_MAX;
     /* --elements counts both sides. */
     const mesh_refinement refinement = {
         .max_edge = o->max_edge, .elements = o->mesh_error > 0 ? 0 : fronts_of(&scene->m, o->elements)};
     if (o->mesh_error > 0) TRY(join_faces(job, scene, error));
-    if (edge > 0) TRY(scene_cut_at_walls(job, scene, edge, most, error));
+    if (edge > 0 && !is_fitted(o)) TRY(scene_cut_at_walls(job, scene, edge, most, error));
     if (refinement.max_edge > 0 || refinement.elements > 0) TRY(mesh_refine(&scene->m, &refinement, error));
     if (o->mesh_error > 0) TRY(refine_by_error(job, scene, error));
-    if (edge > 0) TRY(scene_log_under_walls(job, scene, edge, error));
+    if (is_fitted(o)) TRY(fit_to_light(job, scene, edge, &divided, error));
+    if (edge > 0 && divided) TRY(scene_log_under_walls(job, scene, edge, error));
     TRY(mesh_make_backs(&scene->m, error));
     log_renamed(job, scene);
     TRY(mesh_keep_pictures(&scene->m, error)); /* every element has its means */
@@ -141,11 +214,11 @@ void scene_log_mesh(const precompute_job *job, const precompute_scene *scene) {
                  m->n_channels == 1 ? "" : "s", m->two_sided ? ", two-sided" : "");
     terminal_log(job->t, "%.4g m x %.4g m, %.4g m high, %c up; --up and --unit set axis and unit", size[0],
                  size[1], height, m->up);
-    if (o->max_edge == 0 && o->elements == 0 && o->mesh_error == 0 && largest > coarse_share * area)
+    if (o->mesh == MESH_OF_FACES && largest > coarse_share * area)
         terminal_log(job->t,
                      "one element has %.0f %% of the area, and light does not vary across an element: "
-                     "--elements %d divides the faces",
-                     100 * largest / area, COARSE_ADVICE);
+                     "without --mesh faces they are divided",
+                     100 * largest / area);
 }
 
 /* About how many elements there will be; never fewer than now. */

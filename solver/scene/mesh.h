@@ -70,6 +70,11 @@ typedef struct mesh_refinement {
  * the means over their own areas. */
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
 
+/* The same in another mesh, which has neither cameras nor names of groups until mesh_replace; parent [n of
+ * out], or NULL: the face that each element is a part of. The caller frees both. */
+lam_status mesh_refine_into(const mesh *m, const mesh_refinement *how, mesh *out, uint32_t **parent,
+                            lam_error *error);
+
 /* Gives the elements that are marked in has_back their backs, which lie behind all elements, in mesh order,
  * and have the materials of their fronts. Backs get groups of their own, behind the others: that of `floor`
  * is called `floor.back`, or `floor.back-2` and so on where the scene has a group of that name. has_back is

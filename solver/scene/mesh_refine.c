@@ -263,23 +263,39 @@ done:
     return status;
 }
 
-lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error) {
+lam_status mesh_refine_into(const mesh *m, const mesh_refinement *how, mesh *out, uint32_t **parent,
+                            lam_error *error) {
     lam_status status = LAM_OK;
     refined_mesh fine = {.n = 0};
-    mesh made = {0};
+    uint32_t *of = NULL;
     size_t n = 0;
     face_cut *cuts = memory_allocate(m->n, sizeof *cuts, "refined mesh", error);
     if (cuts == NULL) return LAM_ERR_MEMORY;
-    if (m->n_backs > 0) FAIL(error, LAM_ERR_ARGUMENT, "mesh: refine before making it two-sided");
     TRY(plan_cuts(m, how, cuts, error));
     for (size_t i = 0; i < m->n && n < MESH_NO_VERTEX; i++) n += cut_pieces(m, i, cuts[i]);
-    if (n == m->n) goto done; /* nothing to cut */
     TRY(refined_mesh_begin(m, n, &fine, error));
+    if (parent != NULL) {
+        of = memory_allocate(n, sizeof *of, "refined mesh", error);
+        if (of == NULL) TRY(LAM_ERR_MEMORY);
+    }
     TRY(cut_faces(m, cuts, &fine, error));
-    TRY(refined_mesh_end(&fine, m, &made, error));
-    mesh_replace(m, &made);
+    if (parent != NULL) memcpy(of, fine.face, n * sizeof *of);
+    TRY(refined_mesh_end(&fine, m, out, error));
+    if (parent != NULL) *parent = of;
+    of = NULL;
 done:
+    free(of);
     free(cuts);
     refined_mesh_free(&fine);
+    return status;
+}
+
+lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh made = {0};
+    TRY(mesh_refine_into(m, how, &made, NULL, error));
+    if (made.n > m->n) mesh_replace(m, &made);
+done:
+    mesh_free(&made);
     return status;
 }

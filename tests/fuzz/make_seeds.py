@@ -51,10 +51,10 @@ with tempfile.TemporaryDirectory() as scratch:
                              ["low-rank", "--rank", 2, "--store-precision", "i8"],
                              ["exact", "--keep-form-factors", "--sky", "grid:2x2"],
                              ["hierarchical", "--keep-form-factors"])):
-        run("precompute", "box.obj", "--rays", 64, "--probes", 0, "--quiet", "-o", folder / "store" / f"{k}.h5",
+        run("precompute", "box.obj", "--mesh", "faces", "--rays", 64, "--probes", 0, "--quiet", "-o", folder / "store" / f"{k}.h5",
             "--method", *how)
     run("generate", "box", "--divisions", 3, "-o", "box.obj")
-    run("precompute", "box.obj", "--probes", 0, "--quiet", "-o", folder / "store" / "blocks.h5", "--form-factors", "blocks",
+    run("precompute", "box.obj", "--mesh", "faces", "--probes", 0, "--quiet", "-o", folder / "store" / "blocks.h5", "--form-factors", "blocks",
         "--epsilon", .99, "--keep-form-factors")
 
 # The reply of the importing process: a header, then points, elements, names, materials, textured faces, images.

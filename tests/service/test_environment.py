@@ -18,7 +18,7 @@ class Surroundings(unittest.TestCase):
             must("generate", "box", "--divisions", 6, "-o", folder / "box.obj")
             for limit in "1", "2":
                 done = subprocess.run([LAMBERT, "precompute", folder / "box.obj", "-o", folder / "box.h5", "--quiet",
-                                       "--rays", "64", "--probes", "0"], capture_output=True, text=True, timeout=PATIENCE,
+                                       "--rays", "64", "--probes", "0", "--mesh", "faces"], capture_output=True, text=True, timeout=PATIENCE,
                                       env=dict(os.environ, OMP_NUM_THREADS="2", OMP_THREAD_LIMIT=limit))
                 self.assertEqual(done.returncode, 0, done.stderr)
 

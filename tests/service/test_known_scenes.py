@@ -10,6 +10,7 @@ import unittest
 import h5py
 import numpy as np
 
+from command import of_faces
 from daemon import Daemon
 from patience import PATIENCE
 
@@ -18,7 +19,7 @@ FIXTURES = pathlib.Path(os.environ["FIXTURES"])
 
 
 def precompute(scene, store, *options):
-    done = subprocess.run([LAMBERT, "precompute", scene, "-o", store, "--probes", "4", "--quiet", *map(str, options)],
+    done = subprocess.run([LAMBERT, *of_faces(("precompute", scene, "-o", store, "--probes", 4, "--quiet", *options))],
                           capture_output=True, text=True, timeout=PATIENCE)
     if done.returncode != 0:
         raise RuntimeError(done.stderr)

@@ -24,7 +24,7 @@ import sys
 import tempfile
 import unittest
 
-from command import ENVIRONMENT, LAMBERT, SMALL, must
+from command import ENVIRONMENT, LAMBERT, SMALL, must, of_faces
 from patience import PATIENCE
 
 TESTS = pathlib.Path(__file__).resolve().parents[1]
@@ -120,7 +120,7 @@ class Runs:
         """The lines of the log up to the forecast; of small scenes and trials also those of their outcome."""
         memory = () if "--memory" in options else ("--memory", "16G")
         to_end, follows, lines, found = "--trials" in options, False, [], set()
-        with subprocess.Popen([LAMBERT, "precompute", scene, "-o", os.path.join(self.folder, "s.h5"), *memory, *options],
+        with subprocess.Popen([LAMBERT, *of_faces(("precompute", scene, "-o", os.path.join(self.folder, "s.h5"), *memory, *options))],
                               stderr=subprocess.PIPE, text=True, env=self.environment) as run:
             for line in run.stderr:
                 line = line.rstrip()

@@ -13,7 +13,7 @@ import unittest
 
 import h5py
 
-from command import ENVIRONMENT, LAMBERT, must
+from command import ENVIRONMENT, LAMBERT, must, of_faces
 from patience import PATIENCE
 
 SEED = 20260301
@@ -45,7 +45,7 @@ class Scratch(unittest.TestCase):
         self.store = os.path.join(self.folder, "room.h5")
         self.scratch = os.path.join(self.folder, "scratch")
         self.rows = os.path.join(self.scratch, "form-factors.rows")
-        self.command = [LAMBERT, "precompute", self.scene, "-o", self.store, *self.options, "--scratch", self.scratch]
+        self.command = [LAMBERT, *of_faces(("precompute", self.scene, "-o", self.store, *self.options, "--scratch", self.scratch))]
 
     def size(self):
         return os.stat(self.rows).st_size if os.path.exists(self.rows) else 0

@@ -120,7 +120,7 @@ class Streamed(unittest.TestCase):
     def test_it_ends_when_asked_to(self):
         path = self.path("never.h5")
         run = subprocess.Popen([LAMBERT, "precompute", self.scene, "-o", path, "--method", "hierarchical", "--rays",
-                                "400000", "--probes", "0"], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+                                "400000", "--probes", "0", "--mesh", "faces"], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
         said = ""
         while "forecast:" not in said:  # it is the last line before the rays start
             line = run.stderr.readline()

@@ -6,96 +6,25 @@
 #include "solver/adapt/mesh_error.h"
 #include "solver/base/random.h"
 #include "support/box.h"
+#include "support/floor_lamp.h"
 #include "support/scene.h"
 #include "support/suite.h"
 
 #include <omp.h>
-
-static const float rho = .5f;
-
-/* A floor of 3 x 3 m, cells x cells elements, 1 m below a lamp of 1 x 1 m that emits 1. The lamp is the last
- * element and reflects nothing, so that B = rho F on the floor. */
-static mesh floor_and_lamp(size_t cells) {
-    mesh m = {0};
-    for (size_t j = 0; j < cells; j++)
-        for (size_t i = 0; i < cells; i++) {
-            const double step = 3. / (double)cells;
-            mesh_add_cell(&m,
-                          &(box_cell){.axis = 2,
-                                      .level = 0,
-                                      .from = {step * (double)i, step * (double)j, 0},
-                                      .to = {step * (double)(i + 1), step * (double)(j + 1), 0}},
-                          true);
-        }
-    mesh_add_cell(&m, &(box_cell){.axis = 2, .level = 1, .from = {.7, 1, 1}, .to = {1.7, 2, 1}}, false);
-    mesh_finish(&m, rho);
-    m.n_groups = 1;
-    m.reflectance[m.n - 1] = 0;
-    m.emission[m.n - 1] = 1;
-    return m;
-}
-
-/* The share of light from a point that meets a rectangle [0, a] x [0, b] at height 1 above a corner of it
- * (Howell, configuration C-11), odd in a and in b. */
-static double corner(double a, double b) {
-    const double s = sqrt(1 + a * a), t = sqrt(1 + b * b);
-    return (a / s * atan(b / s) + b / t * atan(a / t)) / (2 * M_PI);
-}
-
-/* F from the point (x, y) of the floor to the lamp. */
-static double truth(double x, double y) {
-    return corner(1.7 - x, 2 - y) - corner(.7 - x, 2 - y) - corner(1.7 - x, 1 - y) + corner(.7 - x, 1 - y);
-}
-
-/* Mean and variance of the truth over an element of the floor, by 16 x 16 points of each half of a quad. */
-static void over(const mesh *m, size_t i, double *mean, double *variance) {
-    enum { POINTS = 16 };
-    double sum = 0, squares = 0, area = 0;
-    for (size_t half = 0; half + 2 < mesh_corners(m, i); half++) {
-        const double *a = m->vertices[m->elements[i][0]], *b = m->vertices[m->elements[i][half + 1]],
-                     *c = m->vertices[m->elements[i][half + 2]];
-        const double A = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        for (int k = 0; k < POINTS * POINTS; k++) {
-            const double u = sqrt((k % POINTS + .5) / POINTS), v = (k / POINTS + .5) / POINTS * u;
-            const double F = truth(a[0] + (u - v) * (b[0] - a[0]) + v * (c[0] - a[0]),
-                                   a[1] + (u - v) * (b[1] - a[1]) + v * (c[1] - a[1]));
-            sum += A * F;
-            squares += A * F * F;
-        }
-        area += POINTS * POINTS * A;
-    }
-    *mean = sum / area;
-    *variance = squares / area - *mean * *mean;
-}
-
-/* The true error of constants, and B [n] with them; the elements that are not the lamp lie in the floor. */
-static double true_error(const mesh *m, float *B) {
-    double off = 0, all = 0;
-    for (size_t i = 0; i < m->n; i++) {
-        double mean, variance;
-        if (B != NULL) B[i] = m->emission[i];
-        if (m->emission[i] > 0) continue;
-        over(m, i, &mean, &variance);
-        if (B != NULL) B[i] = rho * (float)mean;
-        off += m->area[i] * variance;
-        all += m->area[i] * mean * mean;
-    }
-    return sqrt(off / all);
-}
 
 /* The light of the lamp at points of the floor, near and far from it: the mean over keys is the closed form,
  * the halves are independent, and rays alone, which know of no lamp, say the same. */
 START_TEST(light_at_points) {
     enum { KEYS = 400 };
     static const double points[3][3] = {{1.2, 1.5, 0}, {.1, .2, 0}, {2.9, 2.9, 0}};
-    mesh m = floor_and_lamp(1);
+    mesh m = floor_lamp_mesh(1);
     const float B[2] = {0, 1};
     gather *g = NULL;
     lam_error error = {0};
     ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, NULL, &g, &error));
     ck_assert_uint_eq(gather_values(g), 1);
     for (int p = 0; p < 3; p++) {
-        const double F = truth(points[p][0], points[p][1]);
+        const double F = floor_lamp_truth(points[p][0], points[p][1]);
         double sum = 0, squares = 0, product = 0;
         for (uint64_t key = 0; key < KEYS; key++) {
             double H[GATHER_HALVES];
@@ -120,7 +49,7 @@ END_TEST
 /* A bright plate that turns its back to a point leaves it dark, and another point as bright as it was. */
 START_TEST(shadow) {
     static const double points[2][3] = {{1.2, 1.5, 0}, {.1, .2, 0}};
-    mesh m = floor_and_lamp(1);
+    mesh m = floor_lamp_mesh(1);
     const box_cell plate = {.axis = 2, .level = .1, .from = {.6, .9, .1}, .to = {1.8, 2.1, .1}};
     const float B[3] = {0, 1, 5}, lamps[3] = {0, 1, 0};
     double H[2 * GATHER_HALVES], light = 0;
@@ -130,14 +59,14 @@ START_TEST(shadow) {
     free(m.emission);
     free(m.group);
     mesh_add_cell(&m, &plate, true);
-    mesh_finish(&m, rho);
+    mesh_finish(&m, floor_lamp_rho);
     ck_ok(gather_create(&m, 1, B, lamps, NULL, &g, &error));
     for (uint64_t key = 0; key < 100; key++) {
         gather_at(g, 0, key, 2, points, H);
         ck_assert(H[0] == 0 && H[1] == 0);
         light += (H[2] + H[3]) / 200;
     }
-    ck_assert_double_eq_tol(light, truth(.1, .2), .02 * truth(.1, .2));
+    ck_assert_double_eq_tol(light, floor_lamp_truth(.1, .2), .02 * floor_lamp_truth(.1, .2));
     gather_free(g);
     mesh_free(&m);
 }
@@ -148,7 +77,7 @@ END_TEST
 START_TEST(light_of_skies) {
     enum { KEYS = 400 };
     static const double points[2][3] = {{1.2, 1.5, 0}, {.1, .2, 0}};
-    mesh m = floor_and_lamp(1);
+    mesh m = floor_lamp_mesh(1);
     const float B[4] = {0};
     sky_tiling tiling = {.n_tiles = 0};
     lam_error error = {0};
@@ -161,7 +90,7 @@ START_TEST(light_of_skies) {
     const gather_sky sky = {.tiling = &tiling, .L = L};
     ck_ok(gather_create(&m, 2, B, NULL, &sky, &g, &error));
     for (int p = 0; p < 2; p++) {
-        const double seen = M_PI * (1 - truth(points[p][0], points[p][1]));
+        const double seen = M_PI * (1 - floor_lamp_truth(points[p][0], points[p][1]));
         double sum = 0, squares = 0;
         for (uint64_t key = 0; key < KEYS; key++) {
             double H[2 * GATHER_HALVES];
@@ -208,11 +137,11 @@ END_TEST
  * to 3 have a standard error of the square below .1, of the error half of that. */
 START_TEST(error_of_a_uniform_mesh) {
     static const size_t cells[] = {4, 12, 32};
-    mesh m = floor_and_lamp(cells[_i]);
+    mesh m = floor_lamp_mesh(cells[_i]);
     float *B = malloc(m.n * sizeof *B);
     double stated = 0;
     lam_error error = {0};
-    const double off = true_error(&m, B);
+    const double off = floor_lamp_error(&m, B);
     double *numbers = calloc(3 * m.n_groups, sizeof *numbers), *area = calloc(m.n_groups, sizeof *area);
     const mesh_error_groups groups = {numbers, numbers + m.n_groups, numbers + 2 * m.n_groups, 0};
     ck_ok(mesh_error(&m, 1, m.emission, B, true, NULL, 3, NULL, &stated, &groups, &error));
@@ -242,7 +171,7 @@ START_TEST(no_error) {
     float *E = malloc(2 * m.n * sizeof *E), *B = malloc(2 * m.n * sizeof *B);
     double stated[2] = {-1, -1};
     lam_error error = {0};
-    for (size_t i = 0; i < m.n; i++) { /* B = E / (1 - rho) in a furnace; a light that is off */
+    for (size_t i = 0; i < m.n; i++) { /* B = E / (1 - floor_lamp_rho) in a furnace; a light that is off */
         E[i] = 1, B[i] = 2;
         E[m.n + i] = B[m.n + i] = 0;
     }
@@ -259,7 +188,7 @@ END_TEST
  * which the light is that of the closed form; errors are on average those of constants there. */
 START_TEST(looks_at_a_cell) {
     enum { KEYS = 300, FINE = 64 };
-    mesh m = floor_and_lamp(1);
+    mesh m = floor_lamp_mesh(1);
     float E[2] = {0, 1}, B[2] = {0, 1};
     uint32_t first[3] = {0, 1, 2};
     const coarse_light coarse = {.m = m, .first = first, .n_lights = 1, .E = E, .B = B, .lamps = true};
@@ -286,11 +215,12 @@ START_TEST(looks_at_a_cell) {
         area++;
         x += at[0];
         y += at[1];
-        F += truth(at[0], at[1]);
-        squares += truth(at[0], at[1]) * truth(at[0], at[1]);
+        F += floor_lamp_truth(at[0], at[1]);
+        squares += floor_lamp_truth(at[0], at[1]) * floor_lamp_truth(at[0], at[1]);
     }
     const double variance = squares / area - F / area * F / area;
-    const double all = mesh_cell_area(c) * (double)rho * (double)rho / light.all[0] * variance;
+    const double all =
+        mesh_cell_area(c) * (double)floor_lamp_rho * (double)floor_lamp_rho / light.all[0] * variance;
     double sum[3] = {0}, weight = 0, off = 0;
     for (uint64_t key = 0; key < KEYS; key++) {
         float its[COARSE_LIGHTS];
@@ -307,7 +237,7 @@ START_TEST(looks_at_a_cell) {
             weight += W;
             sum[0] += W * (double)p.x[k];
             sum[1] += W * (double)p.y[k];
-            sum[2] += W * (double)p.H[k] / (double)rho;
+            sum[2] += W * (double)p.H[k] / (double)floor_lamp_rho;
         }
         ck_assert_double_eq_tol(first_look, (double)(steps * steps), 1e-4);
     }
@@ -330,22 +260,22 @@ END_TEST
 /* The adaptive floor keeps the error that was asked for, to a fifth, with less than half of the elements of a
  * uniform one of the same error; it covers the floor and keeps group and materials. */
 START_TEST(adaptive_floor) {
-    mesh m = floor_and_lamp(1);
+    mesh m = floor_lamp_mesh(1);
     const adaptive_options how = {.error = .04, .elements = 10000, .seed = 1};
     adaptive_report report;
     lam_error error = {0};
     const double area = total_area(&m);
     ck_ok(adaptive_refine(&m, &how, &report, &error));
-    const double off = true_error(&m, NULL);
-    ck_assert(report.reached && report.has_lamps);
-    ck_assert_double_le(report.lamps, .04);
+    const double off = floor_lamp_error(&m, NULL);
+    ck_assert(report.reached && report.left.has_lamps);
+    ck_assert_double_le(report.left.lamps, .04);
     ck_assert_double_le(off, 1.2 * .04);
-    ck_assert_double_eq_tol(report.lamps, off, .2 * off);
+    ck_assert_double_eq_tol(report.left.lamps, off, .2 * off);
     ck_assert_double_eq_tol(total_area(&m), area, 1e-12 * area);
     size_t cells = 1;
     for (double uniform = 1; uniform > off; cells++) {
-        mesh even = floor_and_lamp(cells);
-        uniform = true_error(&even, NULL);
+        mesh even = floor_lamp_mesh(cells);
+        uniform = floor_lamp_error(&even, NULL);
         mesh_free(&even);
     }
     printf("%zu elements adaptive of error %g, %zu uniform\n", m.n, off, cells * cells + 1);
@@ -364,7 +294,7 @@ START_TEST(limit_and_threads) {
     for (int k = 0; k < 2; k++) {
         const adaptive_options how = {.error = 1e-4, .elements = 500, .seed = 1};
         omp_set_num_threads(k == 0 ? 1 : 5);
-        m[k] = floor_and_lamp(1);
+        m[k] = floor_lamp_mesh(1);
         ck_ok(adaptive_refine(&m[k], &how, &report[k], &error));
         ck_assert(!report[k].reached);
         ck_assert_uint_eq(m[k].n, 500);
@@ -372,10 +302,10 @@ START_TEST(limit_and_threads) {
     ck_assert_uint_eq(m[0].n_vertices, m[1].n_vertices);
     ck_assert_mem_eq(m[0].vertices, m[1].vertices, m[0].n_vertices * sizeof *m[0].vertices);
     ck_assert_mem_eq(m[0].elements, m[1].elements, m[0].n * sizeof *m[0].elements);
-    ck_assert(report[0].lamps == report[1].lamps);
-    printf("500 elements leave %g, %g\n", report[0].lamps, report[0].even);
-    ck_assert_double_lt(report[0].lamps, .033);
-    ck_assert_double_lt(report[0].even, .034);
+    ck_assert(report[0].left.lamps == report[1].left.lamps);
+    printf("500 elements leave %g, %g\n", report[0].left.lamps, report[0].left.even);
+    ck_assert_double_lt(report[0].left.lamps, .033);
+    ck_assert_double_lt(report[0].left.even, .034);
     for (int k = 0; k < 2; k++) mesh_free(&m[k]);
 }
 END_TEST
@@ -388,7 +318,7 @@ START_TEST(two_sided) {
     lam_error error = {0};
     for (int k = 0; k < 3; k++) {
         const adaptive_options how = {.error = .05, .elements = 4000, .seed = 1};
-        m[k] = floor_and_lamp(1);
+        m[k] = floor_lamp_mesh(1);
         if (k != 2) ck_ok(mesh_mark_two_sided(&m[k], &error));
         if (k > 0) { /* turned */
             const uint32_t swap = m[k].elements[0][1];

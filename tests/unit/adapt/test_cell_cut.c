@@ -108,7 +108,7 @@ START_TEST(edges_of_shadows_are_found) {
     const cell_light light = {.m = &m, .coarse = &coarse, .all = {1, 2}};
     const mesh_cell c = mesh_cell_of(&m, 0);
     cell_points p = points_of(&m, edges, 0, 3 + (uint64_t)_i);
-    cell_cut best[LIGHTS];
+    cell_cut best[COARSE_LIGHTS];
     cell_cut_find(&light, &c, &p, best);
     for (size_t l = 0; l < LIGHTS; l++) {
         float from[2], to[2];
@@ -146,7 +146,7 @@ START_TEST(no_cut_gains_more) {
     const cell_light light = {.m = &m, .coarse = &coarse, .all = {1, 2}};
     const mesh_cell c = mesh_cell_of(&m, 0);
     cell_points p = points_of(&m, slope, .5, 9 + (uint64_t)_i);
-    cell_cut best[LIGHTS];
+    cell_cut best[COARSE_LIGHTS];
     mesh_cut cuts[MESH_CUTS_MOST];
     cell_cut_find(&light, &c, &p, best);
     for (size_t l = 0; l < LIGHTS; l++) {
@@ -176,7 +176,7 @@ START_TEST(even_light_gains_nothing) {
     const cell_light light = {.m = &m, .coarse = &coarse, .all = {1, 1}};
     const mesh_cell c = mesh_cell_of(&m, 0);
     cell_points p = points_of(&m, one, 0, 1);
-    cell_cut best[LIGHTS];
+    cell_cut best[COARSE_LIGHTS];
     cell_cut_find(&light, &c, &p, best);
     ck_assert(best[0].gain[0] <= 1e-9f && best[1].gain[1] <= 1e-9f);
     p.n = 1;

@@ -1,0 +1,81 @@
+"""The mesh by preset: faces are divided until they fit the light, those that are fine enough stay, and --mesh faces leaves all
+as they are. The error that it states is that of the operator's own light."""
+
+import os
+import pathlib
+import re
+import unittest
+
+import h5py
+import numpy as np
+
+from case import Case
+from command import SMALL, lambert, must
+
+FIXTURES = pathlib.Path(os.environ["FIXTURES"])
+LEFT = re.compile(r"([\d.e-]+) of the light of lamps")
+
+
+def faces_of(path):
+    return sum(line.startswith("f ") for line in pathlib.Path(path).read_text(encoding="utf-8").splitlines())
+
+
+class MeshOfLight(Case):
+    def precompute(self, scene, *options):
+        store = self.path("s.h5")
+        said = must("precompute", scene, "-o", store, *options).stderr
+        with h5py.File(store) as file:
+            mesh = {name: file["mesh/" + name][()] for name in ("elements", "vertices", "area", "group")}
+            error = dict(file["error/mesh"].attrs) if "error/mesh" in file else {}
+        return said, mesh, error
+
+    def test_a_room_is_divided_until_it_fits_its_light(self):
+        scene = FIXTURES / "room-front" / "room-front.obj"
+        options = ("--probes", 0, "--rays", 64) if SMALL else ("--probes", 4)
+        said, mesh, error = self.precompute(scene, "--mesh", "light", *options)
+        line = next(line for line in said.splitlines() if " faces are divided " in line)
+        before, after = map(float, LEFT.findall(line))
+        self.assertGreater(before, .2, line)
+        self.assertLessEqual(after, .05, line)
+        self.assertIn(f"{len(mesh['area'])} elements leave", line)
+        self.assertNotIn("one element has", said)
+        if not SMALL:  # the estimate of a coarse solution is that of the operator's own light, whose noise is a tenth or two
+            self.assertLess(error["lights"], .07)
+
+    def test_fine_faces_stay(self):
+        scene = self.path("fine.obj")
+        must("generate", "furnace", "--elements", 300, "-o", scene)
+        common = ("--probes", 0, "--rays", 64)
+        said, mesh, _ = self.precompute(scene, "--mesh", "light", *common)
+        self.assertRegex(said, r"\d+ faces stay as they are: constants on them leave ")
+        _, plain, _ = self.precompute(scene, "--mesh", "faces", *common)
+        self.assertEqual(len(plain["area"]), faces_of(scene))
+        for name, values in plain.items():
+            np.testing.assert_array_equal(mesh[name], values, name)
+
+    def test_faces_are_elements_on_request(self):
+        said, mesh, _ = self.precompute(self.box, "--mesh", "faces", "--probes", 0, "--rays", 64)
+        self.assertEqual(len(mesh["area"]), faces_of(self.box))
+        self.assertNotIn("divided", said)
+
+    def test_a_sky_has_its_part(self):
+        said, _, _ = self.precompute(FIXTURES / "l-room" / "l-room.obj", "--mesh", "light", "--sky", "grid:4x2", "--probes", 0,
+                                     "--rays", 64)
+        self.assertRegex(said, r"[\d.e-]+ of that of an even sky, ")
+
+    def test_few_seconds_make_few_elements(self):
+        scene = FIXTURES / "l-room" / "l-room.obj"
+        said, mesh, _ = self.precompute(scene, "--mesh", "light", "--time", .1)
+        self.assertLess(len(mesh["area"]), 200, said)
+
+    def test_wrong_combinations(self):
+        out = self.path("no.h5")
+        for option, value in (("--elements", 100), ("--max-edge", 1), ("--mesh-error", .1)):
+            self.refused(2, "--mesh", "precompute", self.box, "-o", out, "--mesh", "faces", option, value)
+        self.refused(2, "--mesh", "precompute", self.box, "-o", out, "--mesh", "coarse")
+        self.refused(2, "--mesh", "precompute", self.store, "-o", out, "--mesh", "faces")
+        self.assertEqual(lambert("precompute", "--help").stdout.count("--mesh=light|faces"), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
