@@ -11,6 +11,7 @@ condition number: T, 2 unless it is given, is the same for both.
 """
 
 import argparse
+import functools
 import os
 import pathlib
 import re
@@ -59,6 +60,17 @@ PROBES = "--probes", "4"
 VARIES = re.compile(r"^/(@created|@tool|@command)$|^/checksum|seconds$|^/operator@time_")
 
 
+@functools.cache
+def knows_mesh(program):
+    return "--mesh=" in subprocess.run([program, "precompute", "--help"], capture_output=True, text=True, check=True).stdout
+
+
+def of_faces(program, source, options):
+    """Bits are those of the faces of a scene: the mesh by preset rests on rays, whose bits differ between programs."""
+    own = source in STORES or any(o.startswith(("--mesh", "--elements", "--max-edge")) for o in options)
+    return () if own or not knows_mesh(program) else ("--mesh", "faces")
+
+
 def make(program, name, folder, common, threads):
     """A store in its folder; scenes are common to both programs."""
     source, *options = STORES[name].split()
@@ -67,7 +79,7 @@ def make(program, name, folder, common, threads):
         make(program, source, folder, common, threads)
     walks = "--positions" in options or "--path" in options
     command = [program, "precompute", scene, "-o", folder / f"{name}.h5", "--quiet", "--memory", "8G",
-               *(() if walks else PROBES), *options]
+               *(() if walks else PROBES), *of_faces(program, source, options), *options]
     done = subprocess.run(list(map(str, command)), cwd=common, stderr=subprocess.PIPE, text=True, check=False,
                           env=dict(os.environ, OMP_NUM_THREADS=str(threads), LC_ALL="C"))
     if done.returncode != 0:

@@ -61,7 +61,7 @@ class Scene:
         self.folder, self.path = folder, path
         stores = [os.path.join(folder, f"reference{k}.h5") for k in range(len(REFERENCES))]
         for store, recipe in zip(stores, REFERENCES):
-            subprocess.run([program, "precompute", path, "-o", store, "--probes", "0", "--quiet", *recipe.split(), quality],
+            subprocess.run([program, "precompute", path, "-o", store, "--mesh", "faces", "--probes", "0", "--quiet", *recipe.split(), quality],
                            check=True)
         with h5py.File(stores[0]) as file:
             self.area, own = file["mesh/area"][:], file["mesh/emission"][:]
@@ -165,7 +165,7 @@ def main():
             for name in recipes:
                 for which, program in (("old", asked.old), ("new", asked.new)):
                     store = os.path.join(folder, f"{which}.h5")
-                    command = [program, "precompute", path, "-o", store, "--probes", "0", "--quiet", *RECIPES[name].split()]
+                    command = [program, "precompute", path, "-o", store, "--mesh", "faces", "--probes", "0", "--quiet", *RECIPES[name].split()]
                     times = [processor_seconds(command, asked.limit) for _ in range(asked.repeats)]
                     if None in times:
                         continue

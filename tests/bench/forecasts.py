@@ -34,7 +34,7 @@ def main():
                 path = os.path.join(folder, f"{scene}.obj")
                 subprocess.run([program, "generate", *KINDS[scene], "--elements", str(asked.elements), "-o", path], check=True,
                                stdout=subprocess.DEVNULL)
-            command = [program, "precompute", path, "-o", os.path.join(folder, "s.h5"), "--json", "--probes", "32"]
+            command = [program, "precompute", path, "-o", os.path.join(folder, "s.h5"), "--json", "--mesh", "faces", "--probes", "32"]
             done = subprocess.run(command + asked.add.split(), check=True, capture_output=True, text=True)
             about = json.loads(done.stdout)
             forecast, taken = about.get("forecast_processor_seconds", {}), about["processor_seconds"]

@@ -4,7 +4,7 @@
     honesty.py PROGRAMS SCALE SEED [SCENE]
 
 PROGRAMS is the folder of lambert, lambertd and lambert-bench; SCALE is quick, default or full; SCENE is a scene file, or
-a folder of some, in place of the scenes of the suite. Each scene is precomputed at defaults, and as exact inverses
+a folder of some, in place of the scenes of the suite. Each scene is precomputed at defaults but for its faces, which are the elements, and as exact inverses
 of form factors pair by pair at high quality, with other seeds, whose mean is the reference. All stores get the same random requests:
 groups, elements, random emission, the scene's own light and skies, of which all elements, groups or single elements are
 selected, or groups reduced. lambert-bench reads standard output: one JSON object a line, as of service.py.
@@ -164,7 +164,7 @@ class Scene:
         if "--seed" not in options:
             options = *options, "--seed", str(self.bench.seed)
         Program("lambert", self.bench.folder, self.bench.programs / "lambert", "precompute", self.path, "-o", store,
-                "--quiet", "--sky", "tregenza", *options).finish(SECONDS)
+                "--quiet", "--mesh", "faces", "--sky", "tregenza", *options).finish(SECONDS)
 
     def measure(self):
         folder = self.bench.folder

@@ -36,9 +36,10 @@ class Install(unittest.TestCase):
         cls.minor_version = run(lambert, "--version").split()[1].rpartition(".")[0]
         cls.closed, cls.open = cls.root / "closed.h5", cls.root / "open.h5"
         run(lambert, "generate", "box", "--divisions", 5, "-o", cls.root / "closed.obj")
-        run(lambert, "precompute", cls.root / "closed.obj", "-o", cls.closed, "--reflectance", 0.5, "--keep-form-factors")
+        run(lambert, "precompute", cls.root / "closed.obj", "-o", cls.closed, "--mesh", "faces", "--reflectance", 0.5, "--keep-form-factors")
         run(lambert, "generate", "city", "--elements", 500, "-o", cls.root / "open.obj")
-        run(lambert, "precompute", cls.root / "open.obj", "-o", cls.open, "--sky", "tregenza", "--rays", 256)
+        run(lambert, "precompute", cls.root / "open.obj", "-o", cls.open, "--mesh", "faces", "--sky", "tregenza",
+            "--rays", 256)
         np.save(cls.root / "ones.npy", np.ones(150, "f4"))
         run(lambert, "solve", cls.closed, "--emission", cls.root / "ones.npy", "-o", cls.root / "closed.npy")
         skies = np.repeat(np.arange(1, 5, dtype="f4")[:, None], 145, axis=1)

@@ -178,7 +178,7 @@ def main():
         folder = pathlib.Path(name)
         scene, store = folder / "room.obj", folder / "room.h5"
         for command in (["generate", "cornell", "--elements", str(elements), "--reflectance", ".5", "-o", scene],
-                        ["precompute", scene, "-o", store, "--quiet", "--probes", "0", "--keep-form-factors"]):
+                        ["precompute", scene, "-o", store, "--mesh", "faces", "--quiet", "--probes", "0", "--keep-form-factors"]):
             subprocess.run([LAMBERT, *map(str, command)], check=True, stdout=subprocess.DEVNULL)
         # The largest weather file that is served; its sky is that of no scene here.
         (folder / "room.epw").write_bytes(b"LOCATION,Here\n" + b"1999,1,1,1,60,0,4.4\n" * 400000)

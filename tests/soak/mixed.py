@@ -109,7 +109,7 @@ class Scenes:
                    "rotten": ["--probes", "0", "--method", "low-rank", "--rank", "256"]}
         for name, options in methods.items():  # a scene is served by the name of its file
             self.run("generate", "cornell", "--elements", "2560", "-o", folder / f"{name}.obj")
-            self.run("precompute", folder / f"{name}.obj", "-o", folder / f"{name}.h5", *options)
+            self.run("precompute", folder / f"{name}.obj", "-o", folder / f"{name}.h5", "--mesh", "faces", *options)
         facts = json.loads(self.run("info", folder / "kept.h5", "--json"))
         self.n, self.channels = facts["elements"], facts["channels"]
         self.group = facts["groups"][0]["name"]
