@@ -27,7 +27,7 @@ export function inFolder(name) {
 /** Runs lambert; where no option of the mesh says otherwise the faces of a scene are its elements, which tests know. */
 export function lambert(...args) {
     const own = args.map(String), makes = own[0] === "precompute" && !own[1].endsWith(".h5");
-    if (makes && !own.some((a) => /^--(mesh|mesh-error|elements|max-edge)$/.test(a))) own.push("--mesh", "faces");
+    if (makes && !own.some((a) => /^--(mesh|mesh-error|elements|max-edge)$/.test(a))) own.splice(2, 0, "--mesh", "faces");
     return execFileSync(LAMBERT, own, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
 }
 

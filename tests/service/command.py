@@ -30,7 +30,7 @@ def of_faces(arguments):
     makes = len(arguments) > 2 and arguments[0] in ("precompute", "classify") and not arguments[1].startswith("-")
     if not makes or arguments[1].endswith(".h5") or any(a.split("=")[0] in MESH_OPTIONS for a in arguments):
         return arguments
-    return [*arguments, "--mesh", "faces"]
+    return [*arguments[:2], "--mesh", "faces", *arguments[2:]]
 
 
 def lambert(*arguments, threads=2, program=LAMBERT, **more):

@@ -61,7 +61,7 @@ class Stores(Case):
             file.write("v 0 0 0\nv 4 0 0\nv 4 3 0\nv 0 3 0\nv 0 0 2.5\nv 4 0 2.5\nv 4 3 2.5\nv 0 3 2.5\n"
                        "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n")
         quick = ("-o", self.path("a.h5"), "--rays", 64, "--probes", 0)
-        coarse = "--elements 5000 divides the faces"
+        coarse = "without --mesh faces they are divided"
         said = must("precompute", room, *quick).stderr
         self.assertIn("\n4 m x 3 m, 2.5 m high, z up; --up and --unit", said)
         # The floor has 12 of 59 square metres.

@@ -8,7 +8,7 @@ import subprocess
 import unittest
 
 from case import Case
-from command import ENVIRONMENT, LAMBERT, lambert, must
+from command import ENVIRONMENT, LAMBERT, lambert, must, of_faces
 from daemon import Daemon
 from patience import PATIENCE
 
@@ -16,7 +16,7 @@ from patience import PATIENCE
 def on_terminal(*arguments):
     """Runs lambert with a terminal as its standard error; the lines that this shows."""
     mine, its = pty.openpty()
-    with subprocess.Popen([LAMBERT, *map(str, arguments)], stdout=subprocess.PIPE, stderr=its, env=ENVIRONMENT) as run:
+    with subprocess.Popen([LAMBERT, *of_faces(arguments)], stdout=subprocess.PIPE, stderr=its, env=ENVIRONMENT) as run:
         os.close(its)
         shown = b""
         try:
