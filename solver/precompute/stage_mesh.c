@@ -62,7 +62,8 @@ done:
 static const double fit_error = .05, fit_seconds = 30, fit_of_face = 1.25;
 
 static bool is_fitted(const precompute_options *o) {
-    return o->mesh == MESH_OF_LIGHT && o->max_edge == 0 && o->elements == 0 && o->mesh_error == 0;
+    return !o->from_store && o->mesh == MESH_OF_LIGHT && o->max_edge == 0 && o->elements == 0 &&
+           o->mesh_error == 0;
 }
 
 /* "0.021 of the light of lamps, 0.04 of light that all elements emit" */
@@ -214,7 +215,7 @@ void scene_log_mesh(const precompute_job *job, const precompute_scene *scene) {
                  m->n_channels == 1 ? "" : "s", m->two_sided ? ", two-sided" : "");
     terminal_log(job->t, "%.4g m x %.4g m, %.4g m high, %c up; --up and --unit set axis and unit", size[0],
                  size[1], height, m->up);
-    if (o->mesh == MESH_OF_FACES && largest > coarse_share * area)
+    if (o->mesh == MESH_OF_FACES && !o->from_store && largest > coarse_share * area)
         terminal_log(job->t,
                      "one element has %.0f %% of the area, and light does not vary across an element: "
                      "without --mesh faces they are divided",

@@ -58,6 +58,16 @@ class MeshOfLight(Case):
         self.assertEqual(len(mesh["area"]), faces_of(self.box))
         self.assertNotIn("divided", said)
 
+    def test_a_store_has_its_mesh(self):
+        """It is not divided again, however much of the light it leaves."""
+        kept, scene = self.path("kept.h5"), self.path("coarse.obj")
+        must("generate", "cornell", "--elements", 40, "-o", scene)
+        must("precompute", scene, "-o", kept, "--mesh", "faces", "--keep-form-factors", "--rays", 256, "--probes", 0)
+        said, mesh, _ = self.precompute(kept, "--method", "low-rank", "--probes", 0)
+        self.assertEqual(len(mesh["area"]), faces_of(scene))
+        self.assertNotIn("divided where", said)
+        self.assertNotIn("divided evenly", said)
+
     def test_a_sky_has_its_part(self):
         said, _, _ = self.precompute(FIXTURES / "l-room" / "l-room.obj", "--mesh", "light", "--sky", "grid:4x2", "--probes", 0,
                                      "--rays", 64)
