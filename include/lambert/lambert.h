@@ -140,6 +140,33 @@ lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_
                                       const float *g, float *w, void *work, size_t work_bytes,
                                       lam_error *error);
 
+/* The limiter keeps light of answers from falling below zero, by the areas and groups of a store's elements;
+ * immutable once open. An operator is linear, and its errors put some of its values below zero where little
+ * light is. */
+typedef struct lam_limiter lam_limiter;
+
+/* Opens the store at path and loads its groups; the caller closes it with lam_limiter_close. Errors and
+ * threads as lam_operator_open. */
+lam_status lam_limiter_open(const char *path, lam_limiter **limiter, lam_error *error);
+
+/* Frees it; NULL is allowed. */
+void lam_limiter_close(lam_limiter *limiter);
+
+/* Bytes of work area that lam_limiter_apply needs, however many vectors there are. */
+size_t lam_limiter_work_bytes(const lam_limiter *limiter);
+
+/* Limits answers of an operator of the same store: what out has beside E + rho H0 (of irradiance, beside H0)
+ * is nowhere negative after it, and its area-weighted mean over each group is what it was, to rounding, or 0
+ * where it was negative. Nothing changes where nothing is negative, nor in a vector's channel whose emission
+ * or sky is negative somewhere, as its light may be so too. out is [n_rhs][C][n] from lam_operator_apply_lit
+ * with these E and H0 (NULL: none), or from lam_operator_apply_emitters with these weights W [n_rhs][C][s] (E
+ * and H0 NULL). limited [n_rhs], unless NULL, gets the number of elements that were below zero, in all
+ * channels. Allocates nothing; any thread. A vector's bits do not depend on the batch it is in. Cost: O(n)
+ * per vector. Errors: LAM_ERR_ARGUMENT. */
+lam_status lam_limiter_apply(const lam_limiter *limiter, const lam_operator *op, size_t n_rhs,
+                             lam_quantity quantity, const float *E, const float *H0, const float *W,
+                             float *out, size_t *limited, void *work, size_t work_bytes, lam_error *error);
+
 /* The form factors F that a store keeps (lambert precompute --keep-form-factors), as rows of single
  * precision, 8 bytes per entry, or as blocks of clusters; immutable once open. */
 typedef struct lam_form_factors lam_form_factors;

@@ -1,0 +1,354 @@
+#include "solver/operator/limiter.h"
+
+#include "solver/base/parallel.h"
+#include "solver/base/work_area.h"
+#include "solver/operator/emitters.h"
+#include "store/groups.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+lam_limiter limiter_of(size_t n, size_t n_groups, const uint32_t *start, const uint32_t *elements,
+                       const double *area) {
+    lam_limiter l = {.n = n, .n_groups = n_groups, .start = start, .elements = elements, .area = area};
+    for (size_t g = 0; g < n_groups; g++)
+        if (start[g + 1] - start[g] > l.most) l.most = start[g + 1] - start[g];
+    return l;
+}
+
+/* A block of a group: S = sum A x, and P the part of it that is positive; then what its x are scaled by. */
+typedef struct block {
+    double sum, positive, factor;
+    double node; /* the sum of the node that is cut before this block */
+    uint32_t negative;
+} block;
+
+static size_t blocks_of(size_t n_elements) {
+    return (n_elements + LIMITER_BLOCK - 1) / LIMITER_BLOCK;
+}
+
+size_t lam_limiter_work_bytes(const lam_limiter *l) {
+    size_t total = WORK_AREA_ALIGN;
+    if (!work_area_add(&total, blocks_of(l->most) * sizeof(block)) ||
+        !work_area_add(&total, l->n * sizeof(uint32_t)) || !work_area_add(&total, l->n_groups))
+        return 0;
+    return total;
+}
+
+/* One row: of a vector and a channel. */
+typedef struct row {
+    const lam_limiter *l;
+    lam_quantity quantity;
+    const float *rho, *E, *H0; /* [n]; E and H0 NULL: 0 */
+    const uint32_t *where;     /* [n], element -> place in out; NULL: mesh order */
+    float *out;
+} row;
+
+/* The part of the answer that is not reflected. */
+static inline float direct_at(const row *r, size_t i) {
+    if (r->quantity == LAM_RADIOSITY && r->E != NULL) return operator_light(r->rho, r->E, r->H0, i);
+    return r->quantity == LAM_IRRADIANCE && r->H0 != NULL ? r->H0[i] : 0.0f;
+}
+
+static inline size_t place_of(const row *r, size_t i) {
+    return r->where != NULL ? r->where[i] : i;
+}
+
+/* True where a value of a whole row is below its direct light. Each case is a loop that becomes vectors. */
+static bool any_below(const row *r, size_t first, size_t last) {
+    const float *rho = r->rho, *E = r->E, *H0 = r->H0, *out = r->out;
+    int found = 0;
+    if (r->quantity == LAM_RADIOSITY && E != NULL && H0 == NULL)
+        for (size_t i = first; i < last; i++) found |= out[i] < E[i];
+    else if (r->quantity == LAM_RADIOSITY && E != NULL)
+        for (size_t i = first; i < last; i++) found |= out[i] < E[i] + rho[i] * H0[i];
+    else if (r->quantity == LAM_IRRADIANCE && H0 != NULL)
+        for (size_t i = first; i < last; i++) found |= out[i] < H0[i];
+    else
+        for (size_t i = first; i < last; i++) found |= out[i] < 0.0f;
+    return found != 0;
+}
+
+static bool any_negative(const float *x, size_t count) {
+    int found = 0;
+    for (size_t i = 0; x != NULL && i < count; i++) found |= x[i] < 0.0f;
+    return found != 0;
+}
+
+/* A group under way. */
+typedef struct group_work {
+    const row *r;
+    const uint32_t *elements;
+    size_t count;
+    block *blocks;
+} group_work;
+
+/* The elements of block k. */
+static const uint32_t *block_elements(const group_work *w, size_t k, size_t *count) {
+    const size_t first = k * LIMITER_BLOCK, left = w->count - first;
+    *count = left < LIMITER_BLOCK ? left : LIMITER_BLOCK;
+    return w->elements + first;
+}
+
+static void sum_blocks(const void *job, size_t thread, size_t first, size_t last) {
+    const group_work *w = job;
+    const row *r = w->r;
+    (void)thread;
+    for (size_t k = first; k < last; k++) {
+        size_t count;
+        const uint32_t *elements = block_elements(w, k, &count);
+        block b = {.sum = 0};
+        for (size_t e = 0; e < count; e++) {
+            const size_t i = elements[e];
+            const double x = (double)r->out[place_of(r, i)] - (double)direct_at(r, i), Ax = r->l->area[i] * x;
+            b.sum += Ax;
+            b.positive += x > 0 ? Ax : 0;
+            b.negative += x < 0;
+        }
+        w->blocks[k] = b;
+    }
+}
+
+static double node_sum(const block *blocks, size_t first, size_t last) {
+    return last - first == 1 ? blocks[first].sum : blocks[first + (last - first) / 2].node;
+}
+
+/* Adds up the sums of the nodes of blocks first ... last - 1. */
+static void add_up(block *blocks, size_t first, size_t last) {
+    if (last - first <= 1) return;
+    const size_t middle = first + (last - first) / 2;
+    add_up(blocks, first, middle);
+    add_up(blocks, middle, last);
+    blocks[middle].node = node_sum(blocks, first, middle) + node_sum(blocks, middle, last);
+}
+
+/* Hands `factor` times the sum of a node on to its blocks. */
+static void hand_down(block *blocks, size_t first, size_t last, double factor) {
+    if (last - first == 1 || !(factor > 0)) {
+        for (size_t k = first; k < last; k++) blocks[k].factor = factor;
+        return;
+    }
+    const size_t middle = first + (last - first) / 2;
+    const double left = node_sum(blocks, first, middle), right = node_sum(blocks, middle, last),
+                 sum = blocks[middle].node; /* above 0, so that one of both is */
+    const double of_left = right > 0 ? factor : factor * (sum / left),
+                 of_right = left > 0 ? factor : factor * (sum / right);
+    hand_down(blocks, first, middle, left > 0 ? of_left : 0);
+    hand_down(blocks, middle, last, right > 0 ? of_right : 0);
+}
+
+static void scale_blocks(const void *job, size_t thread, size_t first, size_t last) {
+    const group_work *w = job;
+    const row *r = w->r;
+    (void)thread;
+    for (size_t k = first; k < last; k++) {
+        const block *b = &w->blocks[k];
+        if (b->negative == 0 && b->factor == 1) continue;
+        size_t count;
+        const uint32_t *elements = block_elements(w, k, &count);
+        const double scale = b->negative == 0 ? b->factor
+                             : b->factor > 0  ? b->factor * (b->sum / b->positive)
+                                              : 0;
+        for (size_t e = 0; e < count; e++) {
+            const size_t i = elements[e];
+            float *out = &r->out[place_of(r, i)];
+            const float direct = direct_at(r, i);
+            const double x = (double)*out - (double)direct;
+            *out = x > 0 ? (float)((double)direct + scale * x) : direct;
+        }
+    }
+}
+
+/* Groups shorter than this are limited by one thread; blocks that a thread takes at a time. */
+enum { THREADS_WORTH = 65536, AT_ONCE = 128 };
+
+/* Limits one group; returns the elements that were below zero. */
+static size_t limit_group(const row *r, size_t n_threads, size_t g, block *blocks) {
+    const lam_limiter *l = r->l;
+    const group_work w = {r, l->elements + l->start[g], l->start[g + 1] - l->start[g], blocks};
+    const size_t n_blocks = blocks_of(w.count), threads = w.count >= THREADS_WORTH ? n_threads : 1;
+    size_t negative = 0;
+    bool finite = true;
+    parallel_share(threads, n_blocks, AT_ONCE, sum_blocks, &w);
+    for (size_t k = 0; k < n_blocks; k++) {
+        negative += blocks[k].negative;
+        finite = finite && isfinite(blocks[k].sum) && isfinite(blocks[k].positive);
+    }
+    if (negative == 0 || !finite) return 0;
+    add_up(blocks, 0, n_blocks);
+    hand_down(blocks, 0, n_blocks, node_sum(blocks, 0, n_blocks) > 0 ? 1 : 0);
+    parallel_share(threads, n_blocks, AT_ONCE, scale_blocks, &w);
+    return negative;
+}
+
+/* Limits a row of all elements, or of the groups that are touched. */
+static size_t limit_row(const row *r, size_t n_threads, const uint8_t *touched, block *blocks) {
+    size_t negative = 0;
+    for (size_t g = 0; g < r->l->n_groups; g++)
+        if ((touched == NULL || touched[g]) && r->l->start[g] < r->l->start[g + 1])
+            negative += limit_group(r, n_threads, g, blocks);
+    return negative;
+}
+
+void limiter_limit(const lam_limiter *l, const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                   const limiter_light *light, size_t n_selected, const uint32_t *selected, float *out,
+                   size_t *limited, void *work) {
+    const size_t n = op->n, C = op->n_channels, width = selected != NULL ? n_selected : n;
+    const size_t s = light->W != NULL ? lam_operator_emitters(op) : 0;
+    void *rest = work_area_begin(work);
+    block *blocks = work_area_take(&rest, blocks_of(l->most) * sizeof *blocks);
+    uint32_t *where = selected != NULL ? work_area_take(&rest, n * sizeof *where) : NULL;
+    uint8_t *touched = selected != NULL ? work_area_take(&rest, l->n_groups) : NULL;
+    if (selected != NULL) {
+        memset(where, 0xff, n * sizeof *where);
+        for (size_t k = 0; k < n_selected; k++) where[selected[k]] = (uint32_t)k;
+        for (size_t g = 0; g < l->n_groups; g++)
+            touched[g] = l->start[g] < l->start[g + 1] && where[l->elements[l->start[g]]] != UINT32_MAX;
+    }
+    for (size_t v = 0; v < n_rhs; v++) {
+        size_t negative = 0;
+        for (size_t at = v * C; at < (v + 1) * C; at++) {
+            const row r = {.l = l,
+                           .quantity = quantity,
+                           .rho = op->reflectance + at % C * n,
+                           .E = light->E != NULL ? light->E + at * n : NULL,
+                           .H0 = light->H0 != NULL ? light->H0 + at * n : NULL,
+                           .where = where,
+                           .out = out + at * width};
+            if (selected == NULL && !any_below(&r, 0, n)) continue;
+            if (any_negative(r.E, n) || any_negative(r.H0, n) ||
+                any_negative(light->W != NULL ? light->W + at * s : NULL, s))
+                continue;
+            negative += limit_row(&r, op->n_threads, touched, blocks);
+        }
+        if (limited != NULL) limited[v] = negative;
+    }
+}
+
+lam_status limiter_whole_groups(const lam_limiter *l, size_t n_selected, const uint32_t *selected,
+                                uint32_t **elements, size_t *count, lam_error *error) {
+    lam_status status = LAM_OK;
+    bool *asked = memory_allocate(l->n, sizeof *asked, "selected elements", error);
+    uint32_t *made = NULL;
+    size_t n_made = 0;
+    if (asked == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < n_selected; k++) asked[selected[k]] = true;
+    for (int writes = 0; writes < 2; writes++) {
+        if (writes) made = memory_allocate(n_made, sizeof *made, "selected elements", error);
+        if (writes && made == NULL) TRY(LAM_ERR_MEMORY);
+        n_made = 0;
+        for (size_t g = 0; g < l->n_groups; g++) {
+            const size_t first = l->start[g], size = l->start[g + 1] - first;
+            bool touched = false;
+            for (size_t e = 0; e < size && !touched; e++) touched = asked[l->elements[first + e]];
+            if (!touched) continue;
+            if (writes) memcpy(made + n_made, l->elements + first, size * sizeof *made);
+            n_made += size;
+        }
+    }
+    *elements = made;
+    *count = n_made;
+    made = NULL;
+done:
+    free(asked);
+    free(made);
+    return status;
+}
+
+lam_status lam_limiter_apply(const lam_limiter *l, const lam_operator *op, size_t n_rhs,
+                             lam_quantity quantity, const float *E, const float *H0, const float *W,
+                             float *out, size_t *limited, void *work, size_t work_bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (l == NULL || op == NULL || out == NULL || work == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "a limiter, an operator, its answer and a work area are needed, one is NULL");
+    if (op->n != l->n)
+        FAIL(error, LAM_ERR_ARGUMENT, "an operator of %zu elements and a limiter of %zu are not of one store",
+             op->n, l->n);
+    if (quantity != LAM_RADIOSITY && quantity != LAM_IRRADIANCE && quantity != LAM_INDIRECT)
+        FAIL(error, LAM_ERR_ARGUMENT, "there is no quantity %d", (int)quantity);
+    if (op->kind->apply == NULL ? W == NULL || E != NULL || H0 != NULL : W != NULL || E == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             op->kind->apply == NULL ? "the weights of emitters alone are the light of an operator of kind %s"
+                                     : "an emission is the light of an operator of kind %s",
+             op->kind->name);
+    const size_t needed = lam_limiter_work_bytes(l);
+    if (needed == 0 || work_bytes < needed)
+        FAIL(error, LAM_ERR_ARGUMENT, "work area of %zu bytes, %zu are needed", work_bytes, needed);
+    limiter_limit(l, op, n_rhs, quantity, &(limiter_light){E, H0, W}, 0, NULL, out, limited, work);
+done:
+    return status;
+}
+
+/* Sorts elements by their groups, in mesh order within one: *start [n_groups + 1], *elements [n]. */
+static lam_status sort_groups(const char *path, size_t n, const uint32_t *group, size_t n_groups,
+                              uint32_t **start, uint32_t **elements, lam_error *error) {
+    lam_status status = LAM_OK;
+    uint32_t *begin = memory_allocate(n_groups + 1, sizeof *begin, "groups", error);
+    uint32_t *list = memory_allocate(n, sizeof *list, "groups", error);
+    if (begin == NULL || list == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) {
+        if (group[i] >= n_groups)
+            FAIL(error, LAM_ERR_FORMAT, "%s: " STORE_MESH "/group[%zu] = %u, must be below the %zu names",
+                 path, i, (unsigned)group[i], n_groups);
+        begin[group[i] + 1]++;
+    }
+    for (size_t g = 0; g < n_groups; g++) begin[g + 1] += begin[g];
+    /* begin[g] serves as the place of the next element of g, which leaves it one group ahead. */
+    for (size_t i = 0; i < n; i++) list[begin[group[i]]++] = (uint32_t)i;
+    memmove(begin + 1, begin, n_groups * sizeof *begin);
+    begin[0] = 0;
+    *start = begin;
+    *elements = list;
+    begin = list = NULL;
+done:
+    free(begin);
+    free(list);
+    return status;
+}
+
+lam_status lam_limiter_open(const char *path, lam_limiter **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    lam_limiter *made = NULL;
+    void *group = NULL, *area = NULL;
+    char **names = NULL;
+    uint32_t *start = NULL, *elements = NULL;
+    size_t dims[STORE_MAX_RANK] = {SIZE_MAX}, n_groups = 0;
+    if (path == NULL || out == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "a path and a place for the limiter are needed");
+    TRY(store_open(path, &s, error));
+    TRY(store_read(s, STORE_MESH "/group", STORE_U32, 1, dims, &group, error));
+    TRY(store_read(s, STORE_MESH "/area", STORE_F64, 1, dims, &area, error));
+    TRY(store_read_texts(s, STORE_MESH "/group_names", &n_groups, &names, error));
+    const double *areas = area;
+    for (size_t i = 0; i < dims[0]; i++)
+        if (!(areas[i] >= 0 && isfinite(areas[i])))
+            FAIL(error, LAM_ERR_FORMAT, "%s: " STORE_MESH "/area[%zu] = %g, must be at least 0", path, i,
+                 areas[i]);
+    TRY(sort_groups(path, dims[0], group, n_groups, &start, &elements, error));
+    made = memory_allocate(1, sizeof *made, "the limiter", error);
+    if (made == NULL) TRY(LAM_ERR_MEMORY);
+    *made = limiter_of(dims[0], n_groups, start, elements, areas);
+    made->owned[0] = start;
+    made->owned[1] = elements;
+    made->owned[2] = area;
+    start = elements = NULL;
+    area = NULL;
+    *out = made;
+done:
+    free(group);
+    free(area);
+    free(names);
+    free(start);
+    free(elements);
+    store_close(s);
+    return status;
+}
+
+void lam_limiter_close(lam_limiter *limiter) {
+    if (limiter == NULL) return;
+    for (size_t k = 0; k < sizeof limiter->owned / sizeof *limiter->owned; k++) free(limiter->owned[k]);
+    free(limiter);
+}
