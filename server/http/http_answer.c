@@ -89,6 +89,13 @@ static bool add_refined(struct MHD_Response *response, const answer *a) {
            http_add_header(response, "Lambert-Iterations", iterations);
 }
 
+/* The elements that were below zero, for which NPY has no place either. */
+static bool add_limited(struct MHD_Response *response, const answer *a) {
+    char limited[24];
+    snprintf(limited, sizeof limited, "%zu", a->limited);
+    return http_add_header(response, "Lambert-Limited", limited);
+}
+
 /* The times of parsing, solving and encoding, which pages read as performance entries. */
 static bool add_times(struct MHD_Response *response, const answer *a) {
     char times[120];
@@ -106,6 +113,7 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
     if (a->policy != NULL) good = good && http_add_header(response, "Content-Security-Policy", a->policy);
     if (a->timed) good = good && add_times(response, a);
     if (a->refined) good = good && add_refined(response, a);
+    if (a->counts_limited) good = good && add_limited(response, a);
     if (a->retry_after > 0) {
         char seconds[16];
         snprintf(seconds, sizeof seconds, "%u", a->retry_after);

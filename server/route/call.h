@@ -75,6 +75,8 @@ struct answer {
     bool refined;             /* certificate and iterations are set: the largest of its vectors */
     double certificate;
     size_t iterations;
+    bool counts_limited; /* `limited` is set: elements that were limited, of all its vectors */
+    size_t limited;
     bool timed; /* the times below are set, in ms */
     double parse_ms, solve_ms, encode_ms;
     char *location; /* of a 202, owned; or NULL */

@@ -82,6 +82,9 @@ static bool evaluate(const scene *s, const radiosity_request *request, size_t fi
         const adjoint_row *row = rows[k];
         adjoint_row_evaluate(s, row, request, f->weights, f->means);
         if (row->area > 0 && !check_means(s, request, first + k, f->means, why)) return false;
+        /* The limiter keeps means but for those below zero. */
+        for (size_t v = 0; !request->linear_map && v < request->n_rhs * s->n_channels; v++)
+            if (f->means[v] < 0) f->means[v] = 0;
         if (!scene_mean_errors_add(s, request, first + k, f->means, &f->errors, notes))
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
         reduce_means(r, first + k, s->n_channels, request->n_rhs, row->area, f->means, f->figures);

@@ -1,6 +1,7 @@
 /* POST /v1/scenes/NAME/radiosity: emission in, radiosity out. begin reads the body, pass computes vectors
  * together with those of other clients, or goes on with figures, end writes the answer; each on any thread.
  */
+#include "server/route/limited_answer.h"
 #include "server/route/linear_figures.h"
 #include "server/route/radiosity_figures.h"
 #include "server/route/refined_answer.h"
@@ -26,6 +27,7 @@ typedef struct radiosity_solve {
     double *figures;        /* of reduce, in place of values; else NULL */
     float *W;               /* [n_rhs][C][s], weights of a store of emitters; else NULL */
     refined_solve *refined; /* for a request with a tolerance; else NULL */
+    limited_solve limit;    /* of light below zero */
     linear_figures *linear; /* for a linear reduction, which computes no vectors; else NULL */
     figures_text text;      /* of figures */
     bool judged;            /* the error of figures was found */
@@ -40,6 +42,7 @@ static void solve_free(radiosity_solve *s) {
     answer_stream_free(s->stream);
     refined_free(s->refined, &s->notes);
     linear_figures_free(s->linear);
+    limited_free(&s->limit);
     free(s->own);
     free(s->figures);
     free(s->H0);
@@ -158,7 +161,8 @@ static bool begin(call *in, answer *out) {
     const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;
     good = linear   ? linear_figures_begin(in, &s->request, &s->notes, &s->linear, &why)
            : refine ? refined_begin(in, request, &s->notes, &s->refined, &why)
-                    : good && find_light(in, s, &why) && find_room(in, s, &why);
+                    : good && find_light(in, s, &why) &&
+                          limited_begin(in, request, &s->limit, &s->notes, &why) && find_room(in, s, &why);
     if (!good) {
         answer_problem(out, &why);
         solve_free(s);
@@ -177,29 +181,31 @@ static bool begin(call *in, answer *out) {
     return true;
 }
 
-/* The work area of a pass; NULL and *why if memory is short. */
+/* The work area of a pass and of limiting it; NULL and *why if memory is short. */
 static void *get_work(const scene *s, size_t n_rhs, batch_workspace *workspace, size_t *bytes, problem *why) {
-    *bytes = lam_operator_work_bytes(s->op, n_rhs);
-    void *work = *bytes > 0 ? batch_workspace_get(workspace, *bytes) : NULL;
+    const size_t solving = lam_operator_work_bytes(s->op, n_rhs),
+                 limiting = lam_limiter_work_bytes(&s->limiter);
+    *bytes = solving > limiting ? solving : limiting;
+    void *work = solving > 0 ? batch_workspace_get(workspace, *bytes) : NULL;
     if (work == NULL) problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve %zu vectors", n_rhs);
     return work;
 }
 
-static lam_status pass_of_emitters(const scene *s, const radiosity_solve *solve, const batch_part *part,
-                                   float *out, void *work, size_t bytes, lam_error *error) {
+/* A pass of its own: for selected elements, or of emitters. */
+static lam_status pass_alone(const scene *s, const radiosity_solve *solve, const batch_part *part, float *out,
+                             void *work, size_t bytes, lam_error *error) {
     const radiosity_request *request = &solve->request;
-    return lam_operator_apply_emitters(
-        s->op, part->count, request->quantity, solve->W + part->first * s->n_channels * s->n_emitters,
-        request->n_selected, request->select ? request->selected : NULL, out, work, bytes, error);
-}
-
-static lam_status pass_of_selected(const scene *s, const radiosity_solve *solve, const batch_part *part,
-                                   float *out, void *work, size_t bytes, lam_error *error) {
-    const radiosity_request *request = &solve->request;
-    const size_t before = part->first * s->n_channels * s->n;
-    return lam_operator_apply_selected(s->op, part->count, request->quantity, request->E + before,
-                                       solve->H0 != NULL ? solve->H0 + before : NULL, request->n_selected,
-                                       request->selected, out, work, bytes, error);
+    const size_t before = part->first * s->n_channels;
+    size_t n_selected;
+    const uint32_t *selected;
+    float *to = limited_place(&solve->limit, request, out, &n_selected, &selected);
+    if (s->n_emitters > 0)
+        return lam_operator_apply_emitters(s->op, part->count, request->quantity,
+                                           solve->W + before * s->n_emitters, n_selected, selected, to, work,
+                                           bytes, error);
+    return lam_operator_apply_selected(s->op, part->count, request->quantity, request->E + before * s->n,
+                                       solve->H0 != NULL ? solve->H0 + before * s->n : NULL, n_selected,
+                                       selected, to, work, bytes, error);
 }
 
 /* Finds the error of the answer's own emission, which JSON states. */
@@ -272,11 +278,15 @@ static void pass_vectors(const batch_part *parts, size_t n_parts, batch_workspac
     }
     void *work = get_work(s, count, workspace, &bytes, &why);
     if (work != NULL) {
-        const lam_status status =
-            s->n_emitters > 0     ? pass_of_emitters(s, one, parts, shared[0].out, work, bytes, &error)
-            : one->request.select ? pass_of_selected(s, one, parts, shared[0].out, work, bytes, &error)
-                                  : lam_operator_apply_parts(s->op, n_parts, shared, work, bytes, &error);
+        const lam_status status = s->n_emitters > 0 || one->request.select
+                                      ? pass_alone(s, one, parts, shared[0].out, work, bytes, &error)
+                                      : lam_operator_apply_parts(s->op, n_parts, shared, work, bytes, &error);
         if (status != LAM_OK) problem_set(&why, PROBLEM_INTERNAL, "%s", error.message);
+        for (size_t p = 0; p < n_parts && status == LAM_OK; p++) {
+            const radiosity_solve *solve = call_of(parts[p].job)->state;
+            limited_finish(s, &solve->limit, &solve->request, parts[p].first, parts[p].count, solve->H0,
+                           solve->W, shared[p].out, work);
+        }
     }
     metrics_pass(first->service->metrics, count);
     const double took = clock_ms() - start;
@@ -350,6 +360,7 @@ static void end(call *in, answer *out) {
         out->stream = s->stream;
         s->stream = NULL;
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
+        limited_set_header(&s->limit, s->request.n_rhs, out);
         if (s->refined != NULL) refined_set_headers(&s->notes, s->request.n_rhs, out);
     } else {
         answer_problem(out, &s->why);

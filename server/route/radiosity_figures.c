@@ -80,7 +80,7 @@ bool figures_write(const scene *s, const radiosity_request *request, const doubl
     }
     notes->encode_ms += clock_ms() - start;
     if (written && at->next == all) {
-        written = buffer_append(b, "}", 1) && answer_certificates(b, request->n_rhs, request->batch, notes) &&
+        written = buffer_append(b, "}", 1) && answer_of_vectors(b, request->n_rhs, request->batch, notes) &&
                   answer_tail(b, notes);
         *done = written;
     }

@@ -167,7 +167,9 @@ done:
 
 /* The work area of a thread for its passes; vectors and answers belong to requests. */
 static size_t pass_work_bytes(const scene *s) {
-    return lam_operator_work_bytes(s->op, BATCH_PASS);
+    const size_t solving = lam_operator_work_bytes(s->op, BATCH_PASS),
+                 limiting = lam_limiter_work_bytes(&s->limiter);
+    return solving > limiting ? solving : limiting;
 }
 
 uint64_t scene_work_memory(size_t n_threads, size_t work_bytes) {
@@ -264,9 +266,11 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(sky_load(s, made->n, &made->sky, error));
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
-    made->work_bytes = pass_work_bytes(made);
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
+    made->limiter =
+        limiter_of(made->n, made->groups.n_groups, made->groups.start, made->groups.elements, made->area);
+    made->work_bytes = pass_work_bytes(made);
     made->ledger = options->ledger;
     TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
     TRY(refined_create(s, made->op, made->ledger, &made->refined, error));
@@ -338,6 +342,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->reflectance = op->reflectance;
     made->groups = base->groups;
     made->area = base->area;
+    made->limiter = base->limiter;
     made->sky = base->sky;
     made->map = base->map;
     made->health = base->health;

@@ -11,6 +11,7 @@
 #include "solver/codec/groups.h"
 #include "solver/codec/request.h"
 #include "solver/codec/stated_errors.h"
+#include "solver/operator/limiter.h"
 #include "store/store_map.h"
 
 #include <stdatomic.h>
@@ -36,6 +37,7 @@ struct scene {
     group_index groups;
     group_index emitters;  /* by name */
     double *area;          /* [n], m^2 */
+    lam_limiter limiter;   /* of answers below zero; it borrows groups and areas */
     lam_sky *sky;          /* NULL: none */
     weather_file weather;  /* beside the file; its text is in texts. A variant has none of its own */
     size_t n_emitters;     /* 0: the store answers any emission */

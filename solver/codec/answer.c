@@ -182,21 +182,26 @@ bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept
     return true;
 }
 
-bool answer_certificates(buffer *b, size_t n_rhs, bool batch, const answer_notes *notes) {
-    if (notes->certificates == NULL) return true;
-    bool written = buffer_append_text(b, ",\"certificate\":") &&
-                   (batch ? json_write_doubles(b, notes->certificates, n_rhs)
-                          : json_write_double(b, notes->certificates[0])) &&
-                   buffer_append_text(b, batch ? ",\"iterations\":[" : ",\"iterations\":");
+/* ,"iterations":12 or ,"iterations":[12,9,...]. */
+static bool write_counts(buffer *b, const char *name, size_t n_rhs, bool batch, const size_t *counts) {
+    bool written = buffer_printf(b, ",\"%s\":%s", name, batch ? "[" : "");
     for (size_t v = 0; written && v < n_rhs; v++)
-        written = buffer_printf(b, v > 0 ? ",%zu" : "%zu", notes->iterations[v]);
+        written = buffer_printf(b, v > 0 ? ",%zu" : "%zu", counts[v]);
     return written && (!batch || buffer_append(b, "]", 1));
+}
+
+bool answer_of_vectors(buffer *b, size_t n_rhs, bool batch, const answer_notes *notes) {
+    if (notes->limited != NULL && !write_counts(b, "limited", n_rhs, batch, notes->limited)) return false;
+    return notes->certificates == NULL || (buffer_append_text(b, ",\"certificate\":") &&
+                                           (batch ? json_write_doubles(b, notes->certificates, n_rhs)
+                                                  : json_write_double(b, notes->certificates[0])) &&
+                                           write_counts(b, "iterations", n_rhs, batch, notes->iterations));
 }
 
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                 problem *why) {
     if (as->type == MEDIA_NPY) return true;
     return ((!shape->batch || buffer_append(b, "]", 1)) &&
-            answer_certificates(b, shape->n_rhs, shape->batch, notes) && answer_tail(b, notes)) ||
+            answer_of_vectors(b, shape->n_rhs, shape->batch, notes) && answer_tail(b, notes)) ||
            no_memory(why);
 }

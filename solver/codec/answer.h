@@ -39,11 +39,12 @@ typedef struct answer_notes {
      * number of a vector, and the multiplications by the form factors that it took. */
     const double *certificates;
     const size_t *iterations;
+    const size_t *limited; /* [n_rhs]: elements that were below zero, in all channels; NULL: not stated */
 } answer_notes;
 
-/* The certificates and iterations of a refined answer: a number each, or one for each vector of a batch;
- * nothing for others. False when memory is short. */
-bool answer_certificates(buffer *b, size_t n_rhs, bool batch, const answer_notes *notes);
+/* The numbers that are of vectors: certificates and iterations of a refined answer, the elements that were
+ * limited; one each, or one for each vector of a batch. False when memory is short. */
+bool answer_of_vectors(buffer *b, size_t n_rhs, bool batch, const answer_notes *notes);
 
 /* The beginning of any JSON answer, up to and with its quantity, and its end: error, time and the closing
  * brace. False when memory is short. */

@@ -45,8 +45,9 @@ size_t answer_bytes_most(const answer_shape *shape, const media_accept *as) {
      */
     const size_t pieces =
         as->type == MEDIA_JSON && shape->n_values >= 4096 ? (72u << 10) + shape->n_values / 64 : 0;
-    if (!size_multiply(count_of(shape), each, &bytes) ||
-        !size_multiply(shape->n_rhs, 4 * shape->n_channels, &rows) ||
+    /* Brackets and commas of rows, and the number of limited elements of a vector. */
+    const size_t of_vector = 4 * shape->n_channels + (as->type == MEDIA_JSON ? 21 : 0);
+    if (!size_multiply(count_of(shape), each, &bytes) || !size_multiply(shape->n_rhs, of_vector, &rows) ||
         __builtin_add_overflow(bytes, rows, &all) || __builtin_add_overflow(all, AROUND + pieces, &all))
         return SIZE_MAX;
     return all;

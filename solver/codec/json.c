@@ -130,6 +130,14 @@ static bool read_tolerance(parser *p) {
                          *value);
 }
 
+static bool read_limit(parser *p) {
+    bool limits;
+    if (!parser_expect(p, JSON_BOOLEAN, "true or false")) return false;
+    if (!json_read_boolean(&p->r, &limits)) return parser_fault(p);
+    p->request->linear_map = !limits;
+    return true;
+}
+
 /* The members that hold emissions, in a request and in a file. */
 enum { EMISSION, EMISSIONS, EITHER = 1u << EMISSION | 1u << EMISSIONS };
 
@@ -146,8 +154,9 @@ static bool read_lights(parser *p, size_t which, unsigned seen) {
 }
 
 static bool read_body(parser *p) {
-    static const char *const names[] = {"emission", "emissions", "select", "quantity", "tolerance", "reduce"};
-    enum { SELECT = EMISSIONS + 1, QUANTITY, TOLERANCE, REDUCE, N_NAMES };
+    static const char *const names[] = {"emission",  "emissions", "select", "quantity",
+                                        "tolerance", "reduce",    "limit"};
+    enum { SELECT = EMISSIONS + 1, QUANTITY, TOLERANCE, REDUCE, LIMIT, N_NAMES };
     unsigned seen = 0;
     size_t which;
     json_slice key;
@@ -169,6 +178,9 @@ static bool read_body(parser *p) {
             break;
         case TOLERANCE:
             good = read_tolerance(p);
+            break;
+        case LIMIT:
+            good = read_limit(p);
             break;
         default:
             good = read_lights(p, which, seen);

@@ -61,6 +61,7 @@ typedef struct radiosity_request {
     uint32_t *selected;
     size_t n_selected;
     lam_quantity quantity;
+    bool linear_map;  /* "limit": false: light below zero stays */
     double tolerance; /* of a refined answer, above 0 and below 1; 0: none is asked for */
 
     reduce_request reduce; /* figures of groups in place of vectors */

@@ -176,6 +176,7 @@ static lam_status make_sums(const work *w, const emission *light, lam_error *err
         if (!w->options->figures[k].is_sum) continue;
         float *to = w->made + k * w->row;
         TRY(mean_of(light, &width, &mean, error));
+        mean.limiter = light->limiter;
         if (light->sun != NULL) {
             TRY(sunlight_mean(light->sun, w->steps, &sun, error));
             mean.sun = &sun;
@@ -263,8 +264,13 @@ static lam_status tile_answers_make(const work *w, const emission *light, tile_a
         TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < m; t++)
         for (size_t c = 0; c < C; c++) units[(t * C + c) * m + t] = 1;
-    const emission tiles = {.n_vectors = m, .steady = true, .E = dark, .L = units},
-                   lamps = {.n_vectors = 1, .steady = true, .E = light->E, .L = units + m * C * m};
+    const lam_limiter *limiter = light->limiter;
+    const emission tiles = {.n_vectors = m, .steady = true, .E = dark, .L = units, .limiter = limiter},
+                   lamps = {.n_vectors = 1,
+                            .steady = true,
+                            .E = light->E,
+                            .L = units + m * C * m,
+                            .limiter = limiter};
     TRY(add_answers(w, &tiles, m, &a, error));
     TRY(add_answers(w, &lamps, 1, &a, error));
     *out = a;

@@ -2,16 +2,18 @@
 
 #include "solver/light/sunlight.h"
 #include "solver/operator/emitters.h"
+#include "solver/operator/limiter.h"
 #include "solver/operator/sky_light.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { AT_ONCE = 64 }; /* vectors in one go of a whole answer */
+enum { AT_ONCE = EMISSION_PASS_MOST }; /* vectors in one go of a whole answer */
 
 void emission_pass_free(emission_pass *p) {
     free(p->work);
+    free(p->limiter_work);
     free(p->E);
     free(p->L);
     free(p->H0);
@@ -41,6 +43,10 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
                        .work_bytes = lam_operator_work_bytes(op, most)};
     p.work = memory_allocate(p.work_bytes, 1, "the work area of a solve", error);
     if (p.work == NULL) TRY(LAM_ERR_MEMORY);
+    if (light->limiter != NULL) {
+        p.limiter_work = memory_allocate(lam_limiter_work_bytes(light->limiter), 1, "the limiter", error);
+        if (p.limiter_work == NULL) TRY(LAM_ERR_MEMORY);
+    }
     if (light->E != NULL) TRY(reserve(most * C, n, "emissions", &p.E, error));
     for (size_t k = 0; light->steady && p.E != NULL && k < most; k++)
         memcpy(p.E + k * C * n, light->E, C * n * sizeof *p.E);
@@ -77,7 +83,7 @@ done:
     return status;
 }
 
-/* H0 [n][C][elements] under the skies and the sun. */
+/* H0 [n][C][elements] under the skies and the sun. Rounding must not make a value negative. */
 static void light_directly(emission_pass *p, size_t n, const size_t *vectors) {
     const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
     if (p->L != NULL)
@@ -88,7 +94,17 @@ static void light_directly(emission_pass *p, size_t n, const size_t *vectors) {
     sunlight_irradiance(p->light->sun, n, vectors, p->sun, p->sun_work);
     for (size_t row = 0; row < n * C; row++)
         for (size_t i = 0; i < n_elements; i++)
-            p->H0[row * n_elements + i] += p->sun[row / C * n_elements + i];
+            p->H0[row * n_elements + i] =
+                fmaxf(p->H0[row * n_elements + i] + p->sun[row / C * n_elements + i], 0);
+}
+
+/* Limits the answers of n vectors where the emission asks for it. */
+static void limit(emission_pass *p, size_t n, float *out) {
+    const limiter_light light = {.E = p->W == NULL ? p->E : NULL, .H0 = p->H0, .W = p->W};
+    memset(p->limited, 0, sizeof p->limited);
+    if (p->light->limiter != NULL)
+        limiter_limit(p->light->limiter, p->op, n, p->quantity, &light, p->n_selected, p->selected, out,
+                      p->limited, p->limiter_work);
 }
 
 /* Adds the sun to the answers of an operator of few emitters. Their direct light becomes exact; the bounced
@@ -119,6 +135,7 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
         TRY(find_weights(p, n, vectors, error));
         TRY(lam_operator_apply_emitters(p->op, n, p->quantity, p->W, p->n_selected, p->selected, out, p->work,
                                         p->work_bytes, error));
+        limit(p, n, out);
         light_answers(p, n, vectors, out);
         goto done;
     }
@@ -128,6 +145,7 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
                                         p->work, p->work_bytes, error));
     else
         TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, out, p->work, p->work_bytes, error));
+    limit(p, n, out);
 done:
     return status;
 }
@@ -181,7 +199,8 @@ void emission_scatter(size_t n_rows, size_t n, size_t n_selected, const uint32_t
 
 lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
                           lam_quantity quantity, size_t n_selected, const uint32_t *selected,
-                          lam_status (*stop)(lam_error *error), float **values, lam_error *error) {
+                          lam_status (*stop)(lam_error *error), float **values, size_t *limited,
+                          lam_error *error) {
     lam_status status = LAM_OK;
     emission_pass p = {0};
     const size_t C = lam_operator_channels(op), n = lam_operator_elements(op);
@@ -200,6 +219,7 @@ lam_status emission_apply(const emission *e, const lam_operator *op, const lam_s
         for (size_t k = 0; k < now; k++) vectors[k] = first + k;
         TRY(emission_pass_solve(&p, now, vectors, selected != NULL ? some : to, error));
         if (selected != NULL) emission_scatter(now * C, n, n_selected, selected, some, to);
+        if (limited != NULL) memcpy(limited + first, p.limited, now * sizeof *limited);
         if (stop != NULL) TRY(stop(error));
     }
     *values = made;

@@ -5,6 +5,8 @@
 
 #include "solver/light/emission.h"
 
+#define EMISSION_PASS_MOST 64
+
 /* An operator and its sky (NULL: none) with room to answer some vectors of an emission. All are borrowed. */
 typedef struct emission_pass {
     const emission *light;
@@ -13,15 +15,18 @@ typedef struct emission_pass {
     lam_quantity quantity;
     size_t n_selected;
     const uint32_t *selected; /* NULL: every element */
-    size_t most;              /* vectors in one go, at most 64 */
+    size_t most;              /* vectors in one go, at most EMISSION_PASS_MOST */
     size_t work_bytes;
-    void *work;
-    float *E, *L, *H0, *W; /* of one go; NULL where the operator takes none */
-    float *sun, *sun_work; /* [most][elements]; NULL without one */
+    void *work, *limiter_work;
+    size_t limited[EMISSION_PASS_MOST]; /* of the vectors of the last go: elements that were below zero, in
+                                         * all channels */
+    float *E, *L, *H0, *W;              /* of one go; NULL where the operator takes none */
+    float *sun, *sun_work;              /* [most][elements]; NULL without one */
 } emission_pass;
 
 /* Allocates for passes of at most `most` vectors. With selected only these elements are answered, which is
- * less work. Freed by emission_pass_free. Errors: LAM_ERR_MEMORY. */
+ * less work; they must be all elements of some groups where the emission has a limiter. Freed by
+ * emission_pass_free. Errors: LAM_ERR_MEMORY. */
 lam_status emission_pass_create(const emission *light, const lam_operator *op, const lam_sky *sky,
                                 lam_quantity quantity, size_t n_selected, const uint32_t *selected,
                                 size_t most, emission_pass *out, lam_error *error);
@@ -33,11 +38,13 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
                                lam_error *error);
 
 /* *values is [n_vectors][C][n], freed with free(): the answer to each vector under its sky; with selected
- * (not NULL) of these elements only, and 0 elsewhere. stop, which may be NULL, is asked between passes and
- * ends the work with its status. */
+ * (not NULL) of these elements only, and 0 elsewhere. limited [n_vectors], unless NULL, gets the elements of
+ * each that were below zero. stop, which may be NULL, is asked between passes and ends the work with its
+ * status. */
 lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
                           lam_quantity quantity, size_t n_selected, const uint32_t *selected,
-                          lam_status (*stop)(lam_error *error), float **values, lam_error *error);
+                          lam_status (*stop)(lam_error *error), float **values, size_t *limited,
+                          lam_error *error);
 
 /* The input of refining the n vectors of these numbers: E and H0 [n][C][elements] in double. *H0_there is
  * false where there is no H0. An operator of few emitters also gives its indirect light, start

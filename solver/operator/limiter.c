@@ -55,6 +55,34 @@ static inline size_t place_of(const row *r, size_t i) {
     return r->where != NULL ? r->where[i] : i;
 }
 
+/* LIMITER_BLOCK elements of a row, padded with zeros: what stands side by side in the mesh, as most does, is
+ * read where it is, by loops that become vectors. */
+typedef struct portion {
+    const double *A;
+    const float *out, *direct;
+    double own_A[LIMITER_BLOCK];
+    float own_out[LIMITER_BLOCK], own_direct[LIMITER_BLOCK];
+} portion;
+
+static void read_portion(const row *r, const uint32_t *elements, size_t count, portion *p) {
+    const size_t first = elements[0];
+    const bool together = count == LIMITER_BLOCK && elements[count - 1] - first == count - 1;
+    p->A = together ? r->l->area + first : p->own_A;
+    p->out = together && r->where == NULL ? r->out + first : p->own_out;
+    p->direct = p->own_direct;
+    for (size_t e = 0; e < count && p->A == p->own_A; e++) p->own_A[e] = r->l->area[elements[e]];
+    for (size_t e = 0; e < count && p->out == p->own_out; e++)
+        p->own_out[e] = r->out[place_of(r, elements[e])];
+    if (together && r->quantity == LAM_RADIOSITY && r->E != NULL && r->H0 == NULL)
+        p->direct = r->E + first;
+    else
+        for (size_t e = 0; e < count; e++) p->own_direct[e] = direct_at(r, elements[e]);
+    for (size_t e = count; e < LIMITER_BLOCK; e++) {
+        p->own_A[e] = 0;
+        p->own_out[e] = p->own_direct[e] = 0;
+    }
+}
+
 /* True where a value of a whole row is below its direct light. Each case is a loop that becomes vectors. */
 static bool any_below(const row *r, size_t first, size_t last) {
     const float *rho = r->rho, *E = r->E, *H0 = r->H0, *out = r->out;
@@ -91,22 +119,34 @@ static const uint32_t *block_elements(const group_work *w, size_t k, size_t *cou
     return w->elements + first;
 }
 
+/* Sums stand in lanes, so that their order is that of the loop whatever the compiler makes of it. */
+enum { LANES = 4 };
+
+/* P = (sum A |x| + sum A x) / 2. It is used where the second sum is above 0, so that nothing cancels. */
+static void sum_portion(const portion *p, block *b) {
+    double sum[LANES] = {0}, size[LANES] = {0};
+    int negative = 0;
+    for (size_t e = 0; e < LIMITER_BLOCK; e += LANES)
+        for (size_t lane = 0; lane < LANES; lane++) {
+            const double x = (double)p->out[e + lane] - (double)p->direct[e + lane];
+            sum[lane] += p->A[e + lane] * x;
+            size[lane] += p->A[e + lane] * fabs(x);
+        }
+    for (size_t e = 0; e < LIMITER_BLOCK; e++) negative += p->out[e] < p->direct[e];
+    b->sum = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+    b->positive = (b->sum + ((size[0] + size[1]) + (size[2] + size[3]))) / 2;
+    b->negative = (uint32_t)negative;
+}
+
 static void sum_blocks(const void *job, size_t thread, size_t first, size_t last) {
     const group_work *w = job;
-    const row *r = w->r;
     (void)thread;
     for (size_t k = first; k < last; k++) {
         size_t count;
         const uint32_t *elements = block_elements(w, k, &count);
-        block b = {.sum = 0};
-        for (size_t e = 0; e < count; e++) {
-            const size_t i = elements[e];
-            const double x = (double)r->out[place_of(r, i)] - (double)direct_at(r, i), Ax = r->l->area[i] * x;
-            b.sum += Ax;
-            b.positive += x > 0 ? Ax : 0;
-            b.negative += x < 0;
-        }
-        w->blocks[k] = b;
+        portion p;
+        read_portion(w->r, elements, count, &p);
+        sum_portion(&p, &w->blocks[k]);
     }
 }
 
@@ -150,13 +190,18 @@ static void scale_blocks(const void *job, size_t thread, size_t first, size_t la
         const double scale = b->negative == 0 ? b->factor
                              : b->factor > 0  ? b->factor * (b->sum / b->positive)
                                               : 0;
-        for (size_t e = 0; e < count; e++) {
-            const size_t i = elements[e];
-            float *out = &r->out[place_of(r, i)];
-            const float direct = direct_at(r, i);
-            const double x = (double)*out - (double)direct;
-            *out = x > 0 ? (float)((double)direct + scale * x) : direct;
+        portion p;
+        float made[LIMITER_BLOCK];
+        read_portion(r, elements, count, &p);
+        /* Without a branch: which elements are negative nobody foresees. */
+        for (size_t e = 0; e < LIMITER_BLOCK; e++) {
+            const double x = (double)p.out[e] - (double)p.direct[e];
+            made[e] = (float)((double)p.direct[e] + scale * (x > 0 ? x : 0));
         }
+        if (p.out != p.own_out)
+            memcpy(r->out + elements[0], made, sizeof made);
+        else
+            for (size_t e = 0; e < count; e++) r->out[place_of(r, elements[e])] = made[e];
     }
 }
 

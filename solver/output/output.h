@@ -40,6 +40,7 @@ typedef struct solution {
     const double *refined;    /* [n_vectors][C][n], and, of each vector, [n_vectors]: */
     const double *certificates;
     const size_t *iterations;
+    const size_t *limited; /* of answer_notes; or NULL */
     reduction *reductions;
     size_t n_reductions;               /* 0: the values themselves are written */
     double relative, indirect;         /* mean error that is stated; negative: none is */

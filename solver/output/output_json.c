@@ -125,7 +125,7 @@ static bool write_object(const solution *s, bool means, const answer_notes *note
     } else {
         written = written && (year ? write_reduced_year(s, b) : write_reductions(s, b));
     }
-    written = written && buffer_append(b, "}", 1) && answer_certificates(b, s->n_vectors, s->batch, notes) &&
+    written = written && buffer_append(b, "}", 1) && answer_of_vectors(b, s->n_vectors, s->batch, notes) &&
               answer_tail(b, notes);
     return written || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
 }
@@ -152,6 +152,7 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .emitters = s->emitters,
                                 .n_name_errors = s->name_errors != NULL ? s->n_reductions : 0,
                                 .name_errors = s->name_errors,
+                                .limited = s->limited,
                                 .certificates = s->certificates,
                                 .iterations = s->iterations};
     const bool vectors = !means && s->names == NULL && s->n_reductions == 0;

@@ -63,7 +63,7 @@ static lam_status render(const char *path, const render_options *f, terminal *t,
     lit_elements = memory_allocate(v.m.n, sizeof *lit_elements, "lit elements", error);
     glows = memory_allocate(v.m.n, sizeof *glows, "glowing elements", error);
     if (sum == NULL || lit_elements == NULL || glows == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(emission_apply(&lit.light, lit.op, lit.sky, quantity, 0, NULL, NULL, &values, error));
+    TRY(emission_apply(&lit.light, lit.op, lit.sky, quantity, 0, NULL, NULL, &values, NULL, error));
     const float *E = quantity == LAM_RADIOSITY ? lit.light.E : NULL;
     render_mark_lit(&v.m, values, lit_elements);
     render_mark_glowing(&v.m, values, E, glows);

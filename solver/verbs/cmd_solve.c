@@ -28,7 +28,7 @@ typedef struct fields {
     double hours, tolerance;
     sun_asked sun;
     uint64_t sun_points;
-    bool photometric, json, verbose, smooth;
+    bool photometric, json, verbose, smooth, linear;
 } fields;
 
 #define FIELD(member) offsetof(fields, member)
@@ -79,6 +79,10 @@ static const option_row answer_options[] = {
      .offset = FIELD(smooth),
      .help = "Write the light at the corners of elements, which neighbours give it, beside the mean (.ply, "
              ".vtu) or in its place (.glb; .npy: one more dimension, 4, NaN where a triangle has no corner)"},
+    {.name = "linear",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(linear),
+     .help = "Leave light below zero, which else is raised to zero with the means of groups kept"},
     {.name = "json",
      .kind = OPTION_FLAG,
      .offset = FIELD(json),
@@ -253,6 +257,16 @@ static void take_refined(const refined_light *refined, solution *out, double tol
                  iterations == 1 ? "" : "s", out->n_vectors > 1 ? " at most" : "");
 }
 
+/* Puts the numbers of limited elements into the solution, and all of them into the log. */
+static void take_limited(const size_t *limited, terminal *t, solution *out) {
+    size_t all = 0;
+    out->limited = limited;
+    for (size_t v = 0; v < out->n_vectors; v++) all += limited[v];
+    if (all > 0)
+        terminal_log(t, "%zu value%s below zero raised to zero, means of groups kept; --linear leaves them",
+                     all, all == 1 ? " was" : "s were");
+}
+
 /* The answers at the corners of elements, *corners freed with free(). Emission varies from element to element
  * where it is given so, and not inside of one. */
 static lam_status find_corners(const solution *s, const emission *light, float **corners, lam_error *error) {
@@ -315,6 +329,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     lam_quantity quantity = LAM_RADIOSITY;
     double *row_sums = NULL;
     float *values = NULL, *corners = NULL;
+    size_t *limited = NULL;
     refined_light refined = {0};
     char *scene = NULL;
     uint32_t *selected = NULL;
@@ -333,6 +348,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     TRY(mesh_load(s, &m, &row_sums, error));
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
     light_log(&lit, t);
+    if (f->linear) lit.light.limiter = NULL;
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
     if (lit.own && is_dark(&lit.light, m.n * m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
@@ -378,8 +394,11 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                             &refined, error));
         take_refined(&refined, &out, f->tolerance, t);
     } else {
+        limited = memory_allocate(lit.light.n_vectors, sizeof *limited, "the solution", error);
+        if (limited == NULL) TRY(LAM_ERR_MEMORY);
         TRY(emission_apply(&lit.light, lit.op, lit.sky, quantity, n_selected, selected, terminal_check,
-                           &values, error));
+                           &values, limited, error));
+        if (!f->linear) take_limited(limited, t, &out);
     }
     out.values = values;
     if (values != NULL && year->n_figures == 0)
@@ -394,6 +413,7 @@ done:
     free(selected);
     stated_errors_free(&stated);
     free(values);
+    free(limited);
     free(corners);
     refined_light_free(&refined);
     free(row_sums);
@@ -454,6 +474,8 @@ int cmd_solve(int argc, char **argv) {
         return options_usage(verb.name, "--sun-points is for --sun exact");
     if (f.tolerance > 0 && f.annual.count > 0)
         return options_usage(verb.name, "--tolerance is not for --annual");
+    if (f.tolerance > 0 && f.linear)
+        return options_usage(verb.name, "--linear is not for --tolerance, whose answers are not below zero");
     if (f.json && f.output != NULL) return options_usage(verb.name, "give --json or -o, not both");
     if (f.smooth && (f.output == NULL || f.reduce.count > 0 || f.tolerance > 0))
         return options_usage(verb.name, "--smooth is for -o, without --reduce and --tolerance");

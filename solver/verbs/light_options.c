@@ -70,6 +70,9 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
              "several",
              store_path(s), few->a.names[0]);
     lam_operator_set_threads(out->op, (size_t)omp_get_max_threads());
+    const group_index *groups = &out->scene.groups;
+    out->limiter = limiter_of(m->n, groups->n_groups, groups->start, groups->elements, m->area);
+    out->light.limiter = &out->limiter;
 done:
     free(tiling);
     return status;

@@ -4,6 +4,7 @@
 
 #include "solver/base/terminal.h"
 #include "solver/light/emission.h"
+#include "solver/operator/limiter.h"
 #include "store/store.h"
 
 #define LIGHT_HEADING "light (preset: the emission in the scene)"
@@ -26,7 +27,8 @@ typedef struct lit_store {
     lam_sky *sky; /* NULL: the store has none */
     emission_scene scene;
     emission light;
-    bool own; /* the light is the scene's own */
+    lam_limiter limiter; /* of its answers, which borrows from mesh and scene; light has it */
+    bool own;            /* the light is the scene's own */
 } lit_store;
 
 /* Loads from an open store with all threads for the operator. `other` is light that the caller adds later, so
