@@ -60,6 +60,7 @@ codec_scene call_codec_scene(const call *in) {
                          .groups = &s->groups,
                          .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
                          .n_emitters = s->n_emitters,
+                         .signs = s->n_emitters == 0,
                          .emitters = &s->emitters,
                          .max_batch = in->service->config->max_batch,
                          .max_bytes = SIZE_MAX, /* the memory of the request is the limit */

@@ -74,6 +74,17 @@ static void figures_clear(linear_figures *f) {
     free(f->weights);
 }
 
+/* The limiter keeps means but for those below zero. */
+static void limit_means(const scene *s, const radiosity_request *request, double *means) {
+    const size_t C = s->n_channels;
+    const codec_scene about = {.n = s->n,
+                               .n_channels = C,
+                               .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
+                               .n_emitters = s->n_emitters};
+    for (size_t k = 0; !request->linear_map && k < request->n_rhs * C; k++)
+        if (means[k] < 0 && !radiosity_request_has_signs(request, &about, k / C, k % C)) means[k] = 0;
+}
+
 /* Computes the figures of names first ... first + count from their rows. */
 static bool evaluate(const scene *s, const radiosity_request *request, size_t first, size_t count,
                      adjoint_row *const *rows, linear_figures *f, answer_notes *notes, problem *why) {
@@ -82,9 +93,7 @@ static bool evaluate(const scene *s, const radiosity_request *request, size_t fi
         const adjoint_row *row = rows[k];
         adjoint_row_evaluate(s, row, request, f->weights, f->means);
         if (row->area > 0 && !check_means(s, request, first + k, f->means, why)) return false;
-        /* The limiter keeps means but for those below zero. */
-        for (size_t v = 0; !request->linear_map && v < request->n_rhs * s->n_channels; v++)
-            if (f->means[v] < 0) f->means[v] = 0;
+        limit_means(s, request, f->means);
         if (!scene_mean_errors_add(s, request, first + k, f->means, &f->errors, notes))
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
         reduce_means(r, first + k, s->n_channels, request->n_rhs, row->area, f->means, f->figures);

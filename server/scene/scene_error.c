@@ -307,7 +307,7 @@ static void size_of_spots(const scene *s, const radiosity_request *request, doub
             for (size_t bin = spot->where; bin < e->n_bins; bin += e->figures.n_groups) area += e->area[bin];
         }
         for (size_t c = 0; c < C; c++) {
-            const double value = (double)request->colours[k * C + c];
+            const double value = fabs((double)request->colours[k * C + c]);
             power[spot->vector * C + c] += area * value;
             if (mesh_lamps_in(e, home)) lamps[spot->vector * C + c] += area * value;
             size[spot->vector].squares += squares * value * value;
@@ -317,7 +317,7 @@ static void size_of_spots(const scene *s, const radiosity_request *request, doub
         size[v] = (emission_size){.power2 = 0};
         for (size_t c = 0; c < C; c++) power[v * C + c] = lamps[v * C + c] = 0;
         for (size_t k = v * C * s->n; k < (v + 1) * C * s->n; k++) {
-            const double flux = s->area[k % s->n] * (double)request->E[k];
+            const double flux = s->area[k % s->n] * fabs((double)request->E[k]);
             power[k / s->n] += flux;
             if (mesh_lamps_in(e, e->bin[k % s->n])) lamps[k / s->n] += flux;
             size[v].squares += flux * flux;

@@ -8,7 +8,7 @@
 #include <string.h>
 
 static inline float least_value(const parser *p) {
-    return p->request->any_sign ? -FLT_MAX : 0.0f;
+    return p->request->any_sign || (p->scene->signs && !p->in_side) ? -FLT_MAX : 0.0f;
 }
 
 static bool bad_value(parser *p, float value) {
@@ -316,11 +316,10 @@ static bool read_emission_object(parser *p) {
         case GROUPS:
             good = read_groups(p);
             break;
-        case SKY:
-            good = read_sky(p);
-            break;
         default:
-            good = read_emitters(p);
+            p->in_side = true;
+            good = which == SKY ? read_sky(p) : read_emitters(p);
+            p->in_side = false;
         }
         if (!good) return false;
         p->pointer_length = mark;

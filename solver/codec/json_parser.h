@@ -38,6 +38,7 @@ typedef struct parser {
     char pointer[sizeof((problem *)0)->pointer]; /* of the value being read */
     size_t pointer_length;
     /* Scratch of sparse vectors, kept from one to the next; never larger than the text read so far. */
+    bool in_side; /* in radiances or weights, which have no sign */
     index_list elements;
     float *values; /* [values_capacity][C] */
     size_t values_capacity;

@@ -249,7 +249,8 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
     const size_t count = found.rows * row;
     for (size_t r = 0; r < found.n_rhs; r++) {
         float *E = request->E + r * scene->n_channels * row;
-        if (!read_values(bytes + h.data, wide, r * count, count, request->any_sign, E, why)) return false;
+        if (!read_values(bytes + h.data, wide, r * count, count, request->any_sign || scene->signs, E, why))
+            return false;
         for (size_t c = found.rows; c < scene->n_channels; c++) memcpy(E + c * row, E, row * sizeof *E);
     }
     return true;

@@ -122,6 +122,28 @@ bool radiosity_request_expand(radiosity_request *request, const codec_scene *sce
     return true;
 }
 
+static bool is_negative(const float *x, size_t count) {
+    for (size_t i = 0; i < count; i++)
+        if (x[i] < 0) return true;
+    return false;
+}
+
+/* The same of the row of a vector and channel. */
+static bool side_is_negative(const side_rows *side, size_t n_channels, size_t width, size_t vector,
+                             size_t c) {
+    return vector < side->n && is_negative(side->values + (vector * n_channels + c) * width, width);
+}
+
+bool radiosity_request_has_signs(const radiosity_request *request, const codec_scene *scene, size_t vector,
+                                 size_t c) {
+    const size_t C = scene->n_channels;
+    for (size_t k = 0; k < request->n_spots; k++)
+        if (request->spots[k].vector == vector && request->colours[k * C + c] < 0) return true;
+    return (vector < request->n_dense && is_negative(request->E + (vector * C + c) * scene->n, scene->n)) ||
+           side_is_negative(&request->sky, C, scene->n_tiles, vector, c) ||
+           side_is_negative(&request->emitters, C, scene->n_emitters, vector, c);
+}
+
 static bool add_side(const radiosity_request *request, const codec_scene *scene, side_rows *side,
                      size_t width, const char *what, float **row, problem *why) {
     size_t values, bytes, size;

@@ -21,10 +21,11 @@ typedef struct codec_scene {
     /* Asked before memory for emission vectors is allocated, of bytes more than before; false with *why.
      * NULL: max_bytes is the only limit. */
     bool (*take)(void *owner, size_t bytes, problem *why);
-    void *owner;        /* of take */
-    bool only_linear;   /* anything but a linear reduction of sparse vectors is refused (503) before it costs
-                           more than its text */
-    size_t max_rows;    /* adjoint rows that the scene keeps: at most so many groups are reduced by them */
+    void *owner;      /* of take */
+    bool only_linear; /* anything but a linear reduction of sparse vectors is refused (503) before it costs
+                         more than its text */
+    size_t max_rows;  /* adjoint rows that the scene keeps: at most so many groups are reduced by them */
+    bool signs;       /* emissions may be negative: radiosity is linear in them. Skies and weights may not */
     const char *source; /* the word for the bytes in messages; NULL: "the body" */
     const char *item;   /* the word for one of the n values of an NPY row; NULL: "element" */
     bool frames;        /* an array of two axes is always a batch, of vectors that all channels share */
@@ -92,6 +93,11 @@ bool codec_read_emissions(const codec_scene *scene, const char *text, size_t len
  * [m][1][n]; for more channels [n] (all alike), [C][n], or a batch [m][C][n]. */
 bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, radiosity_request *request,
                     problem *why);
+
+/* True where a channel of a vector has an emission, a radiance or a weight below 0. n and C are of the scene.
+ */
+bool radiosity_request_has_signs(const radiosity_request *request, const codec_scene *scene, size_t vector,
+                                 size_t c);
 
 /* Adds a vector without any emission. */
 bool radiosity_request_add(radiosity_request *request, const codec_scene *scene, problem *why);

@@ -96,7 +96,7 @@ done:
 
 static bool any(const float *x, size_t count) {
     for (size_t i = 0; i < count; i++)
-        if (x[i] > 0) return true;
+        if (x[i] != 0) return true;
     return false;
 }
 

@@ -209,7 +209,7 @@ lam_status emission_choose(const emission_scene *scene, const emission_options *
     else if (options->items->count > 0)
         TRY(emission_from_groups(scene, options->items, &e, error));
     else if (options->path != NULL)
-        TRY(emission_read(options->path, scene, &e, error));
+        TRY(emission_read(options->path, scene, options->signs, &e, error));
     else
         TRY(one_vector(scene->m, &e.E, error));
     if (options->sky != NULL) TRY(emission_add_sky(&e, options->sky, scene, error));

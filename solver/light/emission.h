@@ -8,7 +8,7 @@
 #include "solver/codec/groups.h"
 #include "solver/scene/mesh.h"
 
-/* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2, never negative; NULL: W is all there is.
+/* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2; NULL: W is all there is.
  */
 typedef struct emission {
     size_t n_vectors;
@@ -58,8 +58,10 @@ lam_status emission_check_items(const option_list *items, lam_error *error);
 
 /* Reads a file. NPY: <f4 or <f8 of shape (n), (C, n) or a batch (b, C, n), and (b, n) for one channel. JSON:
  * the contract's EMISSION, or an object with one as `emission` or with a batch of them as `emissions`.
- * Errors name the file, the place, the value and the limit. */
-lam_status emission_read(const char *path, const emission_scene *scene, emission *out, lam_error *error);
+ * Values are negative only with signs, and where the store answers any emission. Errors name the file, the
+ * place, the value and the limit. */
+lam_status emission_read(const char *path, const emission_scene *scene, bool signs, emission *out,
+                         lam_error *error);
 
 /* Reads the frames of an animation, always a batch: JSON as above; NPY of shape (f, n) or (f, C, n), and of a
  * scene with s emitters also their weights, (f, s) or (f, C, s); or, for the word EMISSION_EMITTERS, every
@@ -93,6 +95,7 @@ typedef struct emission_options {
     const char *path;         /* --emission, or NULL */
     const char *frames;       /* for emission_read_frames in place of both, or NULL */
     const char *sky;          /* --sky, or NULL */
+    bool signs;               /* the emission of path may be negative, where the store answers any emission */
     bool other;               /* light is added later: the scene's own is not the preset */
 } emission_options;
 

@@ -51,7 +51,8 @@ static lam_status read_with(codec_reader *reader, const char *path, codec_scene 
     return read_kind(reader, path, about, out, &ignored, error);
 }
 
-lam_status emission_read(const char *path, const emission_scene *scene, emission *out, lam_error *error) {
+lam_status emission_read(const char *path, const emission_scene *scene, bool signs, emission *out,
+                         lam_error *error) {
     lam_status status = LAM_OK;
     char extension[16];
     radiosity_request read = {0};
@@ -60,7 +61,8 @@ lam_status emission_read(const char *path, const emission_scene *scene, emission
                                .groups = &scene->groups,
                                .n_tiles = scene->n_tiles,
                                .n_emitters = scene->n_emitters,
-                               .emitters = &scene->emitters};
+                               .emitters = &scene->emitters,
+                               .signs = signs && scene->n_emitters == 0};
     atomic_file_extension(path, extension);
     const bool npy = strcmp(extension, "npy") == 0;
     if (!npy && strcmp(extension, "json") != 0)
@@ -132,7 +134,7 @@ lam_status emission_read_frames(const char *path, const emission_scene *scene, e
     if (strcmp(extension, "npy") == 0)
         TRY(read_arrays(path, scene, out, error));
     else if (strcmp(extension, "json") == 0)
-        TRY(emission_read(path, scene, out, error));
+        TRY(emission_read(path, scene, false, out, error));
     else
         FAIL(error, LAM_ERR_ARGUMENT, "%s: must end in .npy or .json", path);
     out->batch = true;

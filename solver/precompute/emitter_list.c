@@ -87,7 +87,7 @@ lam_status emitter_list_read(const char *text, const mesh *m, size_t n_tiles, em
     } else if (strncmp(text, "group=", 6) == 0) {
         TRY(read_groups(text + 6, &scene, &made, error));
     } else {
-        TRY(emission_read(text, &scene, &made.light, error));
+        TRY(emission_read(text, &scene, false, &made.light, error));
         TRY(number_names("emitter", made.light.n_vectors, &made, error));
     }
     for (size_t k = 0; k < made.s; k++)

@@ -36,7 +36,7 @@ static lam_status read_file(const char *path, const emission_scene *scene, emiss
     atomic_file_extension(path, extension);
     if (strcmp(extension, "npy") != 0 && strcmp(extension, "json") != 0)
         return status_fail(error, LAM_ERR_ARGUMENT, "--importance %.200s: must end in .npy or .json", path);
-    return emission_read(path, scene, out, error);
+    return emission_read(path, scene, false, out, error);
 }
 
 /* out [n]: the largest of all channels over the largest of all elements, of groups NAME,NAME or, where groups

@@ -143,7 +143,7 @@ static const option_command verb = {
 
 static bool is_dark(const emission *light, size_t count) {
     for (size_t i = 0; i < count; i++)
-        if (light->E[i] > 0) return false;
+        if (light->E[i] != 0) return false;
     return true;
 }
 
@@ -440,7 +440,7 @@ done:
 }
 
 int cmd_solve(int argc, char **argv) {
-    fields f = {0};
+    fields f = {.light.signs = true};
     option_result given = {0};
     lam_error error = {0};
     terminal term;

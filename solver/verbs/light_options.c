@@ -53,6 +53,7 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
                                     .path = options->emission,
                                     .frames = options->frames,
                                     .sky = options->sky,
+                                    .signs = options->signs,
                                     .other = other};
     TRY(emission_scene_create(m, &out->scene, error));
     TRY(sky_load(s, m->n, &out->sky, error));

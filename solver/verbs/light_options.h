@@ -12,6 +12,7 @@
 typedef struct light_options {
     option_list emit;
     const char *emission, *sky;
+    bool signs;         /* --emission may be negative; no row of the table */
     const char *frames; /* of an animation, in place of --emit and --emission; no row of the table */
 } light_options;
 

@@ -319,7 +319,7 @@ class Gradients(Both):
         self.refuse({"cotangent": g, "gradient": ["emitters"]}, 422, "no precomputed emitters", pointer="/gradient/0")
         self.refuse({"cotangent": [1] * 40, "gradient": ["sky"]}, 422, "no sky", pointer="/gradient/0", name="exact")
         self.refuse({"cotangent": g, "gradient": ["reflectance"]}, 422, "needs an emission")
-        self.refuse({"cotangent": g, "gradient": ["reflectance"], "emission": [-1] * 60}, 422, "negative",
+        self.refuse({"cotangent": g, "gradient": ["reflectance"], "emission": ["-1"] * 60}, 422, "a number",
                     pointer="/emission/0")
         self.refuse({"cotangent": g, "emission": [1] * 3}, 422, "60", pointer="/emission")
         self.refuse({"cotangent": g, "emission": {"emitters": [1]}}, 422, "emitters", pointer="/emission/emitters")

@@ -65,7 +65,7 @@ class Errors(unittest.TestCase):
         for body, name in (
                 ("{", "not-json"), ({"emission": dense, "x": 1}, "wrong-members"), ({}, "wrong-members"), ([], "wrong-kind"),
                 ({"emission": 7}, "wrong-kind"), ({"emission": dense[1:]}, "wrong-length"),
-                ({"emissions": []}, "wrong-length"), ({"emission": [-1] * N}, "bad-value"),
+                ({"emissions": []}, "wrong-length"), ({"emission": [1e39] * N}, "bad-value"),
                 ({"emission": {"elements": [N], "values": [1]}}, "bad-index"),
                 ({"emission": {"elements": [1, 1], "values": [1, 1]}}, "given-twice"),
                 ({"emission": {"groups": {"lava": 1}}}, "unknown-group"),
@@ -223,16 +223,13 @@ class Errors(unittest.TestCase):
 
         for text in "1e999", "-1e999", "1" + "0" * 400, "1e39", "3.5e38":
             self.refuse(dense(text), 422, "emission/7", text[:40], pointer="/emission/7")
-        for text in "-1", "-0.5", "-1e-30":
-            self.refuse(dense(text), 422, "emission/7", text, "negative", pointer="/emission/7")
         for body, pointer in (
-            ('{"emission":{"elements":[3],"values":[-2]}}', "/emission/values/0"),
             ('{"emission":{"elements":[3,4],"values":[1,1e999]}}', "/emission/values/1"),
-            ('{"emission":{"groups":{"lamp":-2}}}', "/emission/groups/lamp"),
+            ('{"emission":{"groups":{"lamp":-1e999}}}', "/emission/groups/lamp"),
             ('{"emissions":[{"groups":{"lamp":1}},{"groups":{"lamp":1e999}}]}', "/emissions/1/groups/lamp"),
         ):
             self.refuse(body, 422, pointer=pointer)
-        self.refuse('{"emission":{"groups":{"lamp":[1,2,-3]}}}', 422, "-3", name="colour",
+        self.refuse('{"emission":{"groups":{"lamp":[1,2,-3e99]}}}', 422, "-3e99", name="colour",
                     pointer="/emission/groups/lamp/2")
         # These are no errors: zero below zero, and numbers too small for single precision.
         for text in "-0", "-0.0", "-0e5", "1e-999", "1e-60":
@@ -391,7 +388,7 @@ class Errors(unittest.TestCase):
             self.refuse_npy(body, 422, "bytes")
 
     def test_npy_values(self):
-        for value, words in (np.nan, "NaN"), (np.inf, "inf"), (-np.inf, "negative"), (-1.5, "-1.5"), (1e39, "1e+39"):
+        for value, words in (np.nan, "NaN"), (np.inf, "inf"), (-np.inf, "-inf"), (1e39, "1e+39"):
             for dtype in "<f4", "<f8":
                 if value == 1e39 and dtype == "<f4":
                     continue

@@ -187,6 +187,49 @@ class Limited(unittest.TestCase):
         plain = self.daemon.radiosity("lowrank", {"emissions": E.tolist(), "limit": False})
         self.assertNotIn("Lambert-Limited", plain.headers)
 
+    def test_signed_emissions(self):
+        """The answer to a difference is the difference of linear answers, whichever program and form."""
+        for name in "lowrank", "hierarchical", "sparse", "colour":
+            store = self.stores[name]
+            E = store.emissions(11, 8)
+            D = E[:4] - E[4:]
+            for quantity in QUANTITIES:
+                linear, _ = self.solve(store, E, quantity, "--linear")
+                signed, said = self.solve(store, D, quantity)
+                self.assertNotIn("below zero", said)
+                # Each is as far from the exact product as single precision and sums of it are: of the largest values.
+                slack = 1e-5 * max(np.abs(linear).max(), 1)
+                self.assertLessEqual(np.abs(signed - (linear[:4] - linear[4:])).max(), slack, (name, quantity))
+                emissions = D.tolist() if store.channels > 1 else D[:, 0].tolist()
+                answer = self.ask(name, {"emissions": emissions, "quantity": quantity})
+                self.assertTrue((np.array(answer[quantity], np.float32).reshape(D.shape) == signed.astype(np.float32)).all())
+                g = store.names[store.group[3]]
+                i, A = store.members(store.group[3]), store.area[store.members(store.group[3])]
+                means = self.ask(name, {"emissions": emissions, "quantity": quantity,
+                                        "reduce": {"groups": [g], "with": ["mean"]}})["groups"][g]["mean"]
+                self.assertLessEqual(np.abs(np.array(means).reshape(D.shape[:2]) - signed[..., i] @ A / A.sum()).max(), slack)
+            i = int(np.nonzero(D[0, 0])[0][0])
+            body = {"emission": {"elements": [i], "values": [-2]}}
+            plus = self.ask(name, {"emission": {"elements": [i], "values": [2]}, "limit": False})
+            minus = self.ask(name, body)
+            self.assertEqual((-np.array(minus["radiosity"])).tolist(), plus["radiosity"])
+            self.assertEqual(np.max(minus["limited"]), 0)
+            if "error" in plus:
+                self.assertEqual(minus["error"], plus["error"])
+
+    def test_signs_are_refused_where_they_mean_nothing(self):
+        problem = self.ask("patio", {"emission": {"sky": [-1.0] + [0.0] * 144}}, 422)
+        self.assertEqual(problem["pointer"], "/emission/sky/0")
+        problem = self.ask("tiles", {"emission": {"emitters": [-1.0] + [0.0] * 144}}, 422)
+        self.assertEqual(problem["pointer"], "/emission/emitters/0")
+        problem = self.ask("refined", {"emission": {"elements": [3], "values": [-1]}, "tolerance": .1}, 422)
+        self.assertIn("-1", problem["detail"])
+        np.save(self.folder / "minus.npy", -np.ones(self.stores["refined"].n, np.float32))
+        done = lambert("render", self.stores["refined"].path, "--emission", self.folder / "minus.npy",
+                       "-o", self.folder / "a.png")
+        self.assertEqual((done.returncode, len(done.stderr.splitlines())), (1, 1), done.stderr)
+        self.assertIn("must not be negative", done.stderr)
+
     def test_refusals(self):
         for value in 0, "no", None, [], {}:
             problem = self.ask("lowrank", {"emission": {"elements": [0], "values": [1]}, "limit": value}, 422)

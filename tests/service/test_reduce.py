@@ -312,7 +312,7 @@ class Reduce(unittest.TestCase):
             self.refuse(good, 422, "both select and reduce", select=select)
         for figures in ["mean"], ["max"]:
             self.refuse(dict(good, **{"with": figures}), 422, "JSON", accept="application/x-npy")
-            self.refuse(dict(good, **{"with": figures}), 422, "negative", emission={"elements": [1], "values": [-1]},
+            self.refuse(dict(good, **{"with": figures}), 422, "a number", emission={"elements": [1], "values": ["-1"]},
                         pointer="/emission/values/0")
             self.refuse(dict(good, **{"with": figures}), 422, "moon", emission={"groups": {"moon": 1}})
         self.refuse({"groups": ["lamp"], "with": ["max"]}, 422, "single precision", emission=[3e38] * 60)

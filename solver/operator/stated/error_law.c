@@ -98,7 +98,7 @@ double emission_size_number(const emission_size *e) {
 void emission_size_add(emission_size *e, size_t n, const double *weights, const float *E) {
     double power = 0, squares = 0;
     for (size_t i = 0; i < n; i++) {
-        const double flux = weights[i] * (double)E[i];
+        const double flux = fabs(weights[i] * (double)E[i]);
         power += flux;
         squares += flux * flux;
     }

@@ -92,7 +92,7 @@ static lam_status by_json(const mesh *m, const char *text, emission *e, lam_erro
     ck_assert_int_eq(write(descriptor, text, strlen(text)), (ssize_t)strlen(text));
     close(descriptor);
     emission_scene scene = scene_of(m);
-    lam_status status = emission_read(path, &scene, e, error);
+    lam_status status = emission_read(path, &scene, false, e, error);
     emission_scene_free(&scene);
     unlink(path);
     return status;
@@ -212,7 +212,7 @@ START_TEST(test_npy) {
         emission_scene scene = scene_of(of);
         emission e = {0};
         write_counting(mkstemps(path, 4), cases[k].rank, cases[k].shape);
-        const lam_status status = emission_read(path, &scene, &e, &error);
+        const lam_status status = emission_read(path, &scene, false, &e, &error);
         ck_assert_int_eq(status, cases[k].n_vectors > 0 ? LAM_OK : LAM_ERR_ARGUMENT);
         ck_assert(e.n_vectors == cases[k].n_vectors && e.batch == cases[k].batch);
         for (size_t i = 0; i < e.n_vectors * of->n_channels * N; i++)
@@ -224,9 +224,9 @@ START_TEST(test_npy) {
     }
     emission_scene scene = scene_of(&m);
     emission e = {0};
-    ck_assert_int_eq(emission_read("/nonexistent/a.npy", &scene, &e, &error), LAM_ERR_IO);
-    ck_assert_int_eq(emission_read("/nonexistent/a.json", &scene, &e, &error), LAM_ERR_IO);
-    ck_assert_int_eq(emission_read("/tmp", &scene, &e, &error), LAM_ERR_ARGUMENT);
+    ck_assert_int_eq(emission_read("/nonexistent/a.npy", &scene, false, &e, &error), LAM_ERR_IO);
+    ck_assert_int_eq(emission_read("/nonexistent/a.json", &scene, false, &e, &error), LAM_ERR_IO);
+    ck_assert_int_eq(emission_read("/tmp", &scene, false, &e, &error), LAM_ERR_ARGUMENT);
     emission_scene_free(&scene);
 }
 END_TEST
