@@ -477,13 +477,13 @@ class StoreTest(unittest.TestCase):
         np.testing.assert_allclose(names["B"], store.answer(E)[0][0], rtol=1e-12)
 
     def test_python_of_a_hierarchical_store(self):
-        """The reader in deploy/examples says what `lambert solve` does."""
+        """The reader in deploy/examples says what `lambert solve --linear` does."""
         scene, path, answer = (self.root / name for name in ("made.obj", "made.h5", "made.npy"))
         for kind, group, rays, made_up in (("cornell", "lamp", "auto", False), ("city", "street", 64, True)):
             for line in (("generate", kind, "--elements", 1000, "-o", scene),
                          ("precompute", scene, "-o", path, "--method", "hierarchical", "--probes", 0, "--reflectance", 0.5,
                           "--rays", rays),
-                         ("solve", path, "--emit", f"{group}=2", "-o", answer)):
+                         ("solve", path, "--emit", f"{group}=2", "--linear", "-o", answer)):
                 done = run(*line)
                 self.assertEqual(done.returncode, 0, done.stderr)
             with h5py.File(path, "r+") as f:
