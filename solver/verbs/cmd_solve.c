@@ -257,16 +257,6 @@ static void take_refined(const refined_light *refined, solution *out, double tol
                  iterations == 1 ? "" : "s", out->n_vectors > 1 ? " at most" : "");
 }
 
-/* Puts the numbers of limited elements into the solution, and all of them into the log. */
-static void take_limited(const size_t *limited, terminal *t, solution *out) {
-    size_t all = 0;
-    out->limited = limited;
-    for (size_t v = 0; v < out->n_vectors; v++) all += limited[v];
-    if (all > 0)
-        terminal_log(t, "%zu value%s below zero raised to zero, means of groups kept; --linear leaves them",
-                     all, all == 1 ? " was" : "s were");
-}
-
 /* The answers at the corners of elements, *corners freed with free(). Emission varies from element to element
  * where it is given so, and not inside of one. */
 static lam_status find_corners(const solution *s, const emission *light, float **corners, lam_error *error) {
@@ -398,7 +388,8 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
         if (limited == NULL) TRY(LAM_ERR_MEMORY);
         TRY(emission_apply(&lit.light, lit.op, lit.sky, quantity, n_selected, selected, terminal_check,
                            &values, limited, error));
-        if (!f->linear) take_limited(limited, t, &out);
+        if (!f->linear) out.limited = limited;
+        light_log_limited(lit.light.n_vectors, limited, t);
     }
     out.values = values;
     if (values != NULL && year->n_figures == 0)

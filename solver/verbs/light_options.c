@@ -91,3 +91,11 @@ void light_log(const lit_store *lit, terminal *t) {
         terminal_log(t, "the store is grey: the coloured sky lights it by its luminance, .265 R + .670 G + "
                         ".065 B");
 }
+
+void light_log_limited(size_t n_vectors, const size_t *limited, terminal *t) {
+    size_t all = 0;
+    for (size_t v = 0; v < n_vectors; v++) all += limited[v];
+    if (all > 0)
+        terminal_log(t, "%zu value%s below zero raised to zero, means of groups kept; --linear leaves them",
+                     all, all == 1 ? " was" : "s were");
+}

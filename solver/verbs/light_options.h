@@ -41,4 +41,7 @@ void light_close(lit_store *lit);
 /* Says where a coloured sky lights a grey store. */
 void light_log(const lit_store *lit, terminal *t);
 
+/* Says how many values of answers were below zero, of which each vector had so many. */
+void light_log_limited(size_t n_vectors, const size_t *limited, terminal *t);
+
 #endif
