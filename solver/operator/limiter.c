@@ -5,6 +5,7 @@
 #include "solver/operator/emitters.h"
 #include "store/groups.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,9 +18,9 @@ lam_limiter limiter_of(size_t n, size_t n_groups, const uint32_t *start, const u
     return l;
 }
 
-/* A block of a group: S = sum A x, and P the part of it that is positive; then what its x are scaled by. */
+/* A block of a group: S = sum A x; then the share of it that the block is to have. */
 typedef struct block {
-    double sum, positive, factor;
+    double sum, factor;
     double node; /* the sum of the node that is cut before this block */
     uint32_t negative;
 } block;
@@ -122,19 +123,16 @@ static const uint32_t *block_elements(const group_work *w, size_t k, size_t *cou
 /* Sums stand in lanes, so that their order is that of the loop whatever the compiler makes of it. */
 enum { LANES = 4 };
 
-/* P = (sum A |x| + sum A x) / 2. It is used where the second sum is above 0, so that nothing cancels. */
 static void sum_portion(const portion *p, block *b) {
-    double sum[LANES] = {0}, size[LANES] = {0};
+    double sum[LANES] = {0};
     int negative = 0;
     for (size_t e = 0; e < LIMITER_BLOCK; e += LANES)
         for (size_t lane = 0; lane < LANES; lane++) {
             const double x = (double)p->out[e + lane] - (double)p->direct[e + lane];
             sum[lane] += p->A[e + lane] * x;
-            size[lane] += p->A[e + lane] * fabs(x);
         }
     for (size_t e = 0; e < LIMITER_BLOCK; e++) negative += p->out[e] < p->direct[e];
     b->sum = (sum[0] + sum[1]) + (sum[2] + sum[3]);
-    b->positive = (b->sum + ((size[0] + size[1]) + (size[2] + size[3]))) / 2;
     b->negative = (uint32_t)negative;
 }
 
@@ -178,7 +176,28 @@ static void hand_down(block *blocks, size_t first, size_t last, double factor) {
     hand_down(blocks, middle, last, right > 0 ? of_right : 0);
 }
 
-static void scale_blocks(const void *job, size_t thread, size_t first, size_t last) {
+/* The level l with sum A max(x - l, 0) = target, which is above 0 and at most that sum at 0. The sum is
+ * convex and falls with l, so that Newton's steps from 0 never pass the level, and end once no further x
+ * falls below. */
+static double level_of(const double *A, const double *x, double target) {
+    double level = 0;
+    for (int step = 0; step <= LIMITER_BLOCK; step++) {
+        double sum[LANES] = {0}, area[LANES] = {0};
+        for (size_t e = 0; e < LIMITER_BLOCK; e += LANES)
+            for (size_t lane = 0; lane < LANES; lane++) {
+                const double over = x[e + lane] - level;
+                sum[lane] += over > 0 ? A[e + lane] * over : 0;
+                area[lane] += over > 0 ? A[e + lane] : 0;
+            }
+        const double excess = (sum[0] + sum[1]) + (sum[2] + sum[3]) - target,
+                     falls = (area[0] + area[1]) + (area[2] + area[3]);
+        if (!(excess > DBL_EPSILON * target) || !(falls > 0)) break;
+        level += excess / falls;
+    }
+    return level;
+}
+
+static void lower_blocks(const void *job, size_t thread, size_t first, size_t last) {
     const group_work *w = job;
     const row *r = w->r;
     (void)thread;
@@ -187,17 +206,15 @@ static void scale_blocks(const void *job, size_t thread, size_t first, size_t la
         if (b->negative == 0 && b->factor == 1) continue;
         size_t count;
         const uint32_t *elements = block_elements(w, k, &count);
-        const double scale = b->negative == 0 ? b->factor
-                             : b->factor > 0  ? b->factor * (b->sum / b->positive)
-                                              : 0;
         portion p;
+        double x[LIMITER_BLOCK];
         float made[LIMITER_BLOCK];
         read_portion(r, elements, count, &p);
-        /* Without a branch: which elements are negative nobody foresees. */
-        for (size_t e = 0; e < LIMITER_BLOCK; e++) {
-            const double x = (double)p.out[e] - (double)p.direct[e];
-            made[e] = (float)((double)p.direct[e] + scale * (x > 0 ? x : 0));
-        }
+        for (size_t e = 0; e < LIMITER_BLOCK; e++) x[e] = (double)p.out[e] - (double)p.direct[e];
+        const double target = b->sum > 0 ? b->factor * b->sum : 0;
+        const double level = target > 0 ? level_of(p.A, x, target) : HUGE_VAL;
+        for (size_t e = 0; e < LIMITER_BLOCK; e++)
+            made[e] = (float)((double)p.direct[e] + (x[e] > level ? x[e] - level : 0));
         if (p.out != p.own_out)
             memcpy(r->out + elements[0], made, sizeof made);
         else
@@ -218,12 +235,12 @@ static size_t limit_group(const row *r, size_t n_threads, size_t g, block *block
     parallel_share(threads, n_blocks, AT_ONCE, sum_blocks, &w);
     for (size_t k = 0; k < n_blocks; k++) {
         negative += blocks[k].negative;
-        finite = finite && isfinite(blocks[k].sum) && isfinite(blocks[k].positive);
+        finite = finite && isfinite(blocks[k].sum);
     }
     if (negative == 0 || !finite) return 0;
     add_up(blocks, 0, n_blocks);
     hand_down(blocks, 0, n_blocks, node_sum(blocks, 0, n_blocks) > 0 ? 1 : 0);
-    parallel_share(threads, n_blocks, AT_ONCE, scale_blocks, &w);
+    parallel_share(threads, n_blocks, AT_ONCE, lower_blocks, &w);
     return negative;
 }
 

@@ -5,8 +5,9 @@
  * of irradiance and 0 of indirect light; in a store of few emitters 0 of all. The elements of each group of
  * the scene stand in mesh order, cut into blocks of LIMITER_BLOCK, over which a binary tree adds up the sums
  * S = sum A x. From the root down a node hands its sum on to its children; where the sum of one is not above
- * 0 that child gets 0, and the sum of the other is scaled down to that of the node. In a block negative x
- * become 0, and positive ones are scaled to what is left. Thus a group whose sum is not negative keeps it,
+ * 0 that child gets 0, and the sum of the other is scaled down to that of the node. In a block x becomes
+ * max(x - l, 0), of the level l that leaves its sum: of all that are nowhere negative and have that sum it is
+ * the one nearest to x, by area. Thus a group whose sum is not negative keeps it,
  * and so does each cluster beside which no cluster is negative; a group whose sum is negative gets 0. The
  * limiter is that of positivity-preserving finite volumes: Zhang, Shu 2010, J. Comput. Phys.
  * 229(9):3091-3120. */

@@ -112,9 +112,17 @@ static void limit_slowly(size_t count, const double *area, double *x, double lef
         return;
     }
     if (n_blocks <= 1) {
-        for (size_t e = 0; e < count; e++) x[e] = fmax(x[e], 0);
-        const double positive = sum_of(count, area, x);
-        for (size_t e = 0; e < count; e++) x[e] *= left / positive;
+        bool below = left != sum;
+        for (size_t e = 0; e < count; e++) below = below || x[e] < 0;
+        double low = 0, high = 0; /* of the level, by bisection */
+        for (size_t e = 0; e < count; e++) high = fmax(high, x[e]);
+        for (int step = 0; step < 200 && below; step++) {
+            const double level = (low + high) / 2;
+            double above = 0;
+            for (size_t e = 0; e < count; e++) above += area[e] * fmax(x[e] - level, 0);
+            *(above > left ? &low : &high) = level;
+        }
+        for (size_t e = 0; e < count && below; e++) x[e] = fmax(x[e] - low, 0);
         return;
     }
     const double first = sum_of(cut, area, x), second = sum_of(count - cut, area + cut, x + cut);
@@ -143,8 +151,9 @@ static void limit(const subject *s, size_t n_rhs, lam_quantity quantity, float *
 }
 
 /* Values are single precision: each is rounded once, by half an ulp of itself. The slow one subtracts sums
- * where the fast one scales, so that both differ by a few roundings in double of the sum of magnitudes, which
- * reach an element in full where its block has a small area: 1e-9 is far above and below what matters. */
+ * where the fast one scales these, so that both differ by a few roundings in double of the sum of magnitudes,
+ * which reach an element in full where its block has a small area: 1e-9 is far above and below what matters.
+ */
 START_TEST(agrees_with_the_slow_one) {
     const lam_quantity quantity = quantities[_i];
     subject *s = make_subject(quantity);
