@@ -124,7 +124,7 @@ class Scratch(unittest.TestCase):
     def test_other_options_are_refused(self):
         self.stop_after(signal.SIGKILL, 1, 0)
         before = self.size()
-        for options, words in ((["--rays", "1024"], "other options"), (["--max-edge", ".06"], "another scene")):
+        for options, words in ((["--rays", "1024"], "other options"), (["--unit", "2"], "another scene")):
             done = subprocess.run([*self.command, *options], capture_output=True, text=True, timeout=PATIENCE, check=False,
                                   env=ENVIRONMENT)
             self.assertEqual(done.returncode, 1, done.stderr)
