@@ -155,7 +155,9 @@ export function makeStatus({ store, scene, ask }: Page): HTMLElement {
                 headline.mesh > 0 ? `${percent(headline.mesh)} by the mesh` : "that of the mesh is not known"
             }. ${
                 headline.coarse
-                    ? `precompute with ${headline.mesh > headline.rest ? "--mesh-error .05" : "--quality high"} lowers it. `
+                    ? `precompute with ${
+                        headline.mesh > headline.rest ? "--mesh-error .05" : "--quality high"
+                    } lowers it. `
                     : ""
             }${description.reason}`;
     };
