@@ -151,7 +151,7 @@ lam_status mesh_error_add_others(const precompute_job *job, const precompute_sce
     mesh_figures *figures = &made->errors_of_mesh;
     uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
     mesh_error_groups groups = {.fewer = ROUNDS};
-    light_sums single = {NULL}, of_groups = {NULL};
+    light_sums single = {.noise2 = NULL}, of_groups = {.noise2 = NULL};
     double *area = NULL, all = 0, logs = 0;
     float *E = NULL, *B = NULL;
     size_t chosen[GROUPS], *order = NULL, next = 0;
