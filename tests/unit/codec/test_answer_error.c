@@ -274,7 +274,7 @@ START_TEST(black_groups_have_errors_of_their_irradiance) {
     for (int k = 0; k < 3; k++) {
         const lam_quantity quantity = (lam_quantity[]){LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT}[k];
         const name_means means = {
-            .quantity = quantity, .size = {P2, A2E2}, .value = value, .emission = none, .direct = none};
+            .quantity = quantity, .size = {P2, A2E2, 0}, .value = value, .emission = none, .direct = none};
         const name_error found = name_error_of_means(&black, &list[0], &means);
         const double off = quantity == LAM_IRRADIANCE ? law(P2, P2 / A2E2, .03, .02, .001) : 0;
         ck_assert_double_eq_tol(found.mean, sqrt(off / (25 - off)), 1e-6);
