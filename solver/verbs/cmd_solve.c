@@ -292,6 +292,20 @@ static lam_status add_weather(const fields *f, store *s, const mesh *m, size_t n
                              error);
 }
 
+/* The answers, *values, and how many elements of each were limited, *limited; both freed with free(). */
+static lam_status answer(const fields *f, const lit_store *lit, size_t n_selected, const uint32_t *selected,
+                         terminal *t, solution *out, float **values, size_t **limited, lam_error *error) {
+    lam_status status = LAM_OK;
+    *limited = memory_allocate(lit->light.n_vectors, sizeof **limited, "the solution", error);
+    if (*limited == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(emission_apply(&lit->light, lit->op, lit->sky, out->quantity, n_selected, selected, terminal_check,
+                       values, *limited, error));
+    if (!f->linear) out->limited = *limited;
+    light_log_limited(lit->light.n_vectors, *limited, t);
+done:
+    return status;
+}
+
 static lam_status put_out(const solution *out, const fields *f, lam_error *error) {
     if (f->output != NULL) return output_write(out, f->output, error);
     if (f->json) return output_print_json(out, error);
@@ -384,12 +398,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                             &refined, error));
         take_refined(&refined, &out, f->tolerance, t);
     } else {
-        limited = memory_allocate(lit.light.n_vectors, sizeof *limited, "the solution", error);
-        if (limited == NULL) TRY(LAM_ERR_MEMORY);
-        TRY(emission_apply(&lit.light, lit.op, lit.sky, quantity, n_selected, selected, terminal_check,
-                           &values, limited, error));
-        if (!f->linear) out.limited = limited;
-        light_log_limited(lit.light.n_vectors, limited, t);
+        TRY(answer(f, &lit, n_selected, selected, t, &out, &values, &limited, error));
     }
     out.values = values;
     if (values != NULL && year->n_figures == 0)
