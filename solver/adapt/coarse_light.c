@@ -60,6 +60,12 @@ static size_t rays_of(size_t elements) {
     return rays;
 }
 
+/* Both directions of an exchange are entries of 8 bytes, beside half as much while rows are merged. */
+double coarse_light_bytes(size_t faces) {
+    const size_t n = faces > 2 * COARSE_ELEMENTS ? faces : 2 * COARSE_ELEMENTS;
+    return 24. * (double)rays_of(n) * (double)n;
+}
+
 /* The light that is there without a bounce: an emission, or of the sky rho H0. */
 static double first_of(const coarse_light *c, size_t light, size_t channel, size_t i) {
     const size_t n = c->m.n, at = channel * n + i;

@@ -40,6 +40,8 @@ void coarse_light_free(coarse_light *c);
  * solution. sky: NULL: none. Cost: about a second, or 64 rays from each face. Errors: those of
  * form_factors_make and reference_solve. */
 enum { COARSE_ELEMENTS = 8000 };
+/* The memory that it takes for a number of faces, about, at most. */
+double coarse_light_bytes(size_t faces);
 lam_status coarse_light_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
                              coarse_light *out, lam_error *error);
 

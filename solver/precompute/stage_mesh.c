@@ -112,6 +112,16 @@ static lam_status fit_to_light(const precompute_job *job, precompute_scene *scen
                                   .progress = &job->progress};
     mesh_fit_report made;
     char before[LEFT_BYTES], left[LEFT_BYTES];
+    const double bytes = coarse_light_bytes(faces);
+    *divided = false;
+    if (bytes > job->memory) {
+        terminal_warn(
+            job->t,
+            "%zu faces stay as they are: the solution by which they are divided takes about %.0f MB, "
+            "and --memory allows %.0f MB; give --elements, or more of it",
+            faces, 1e-6 * bytes, 1e-6 * job->memory);
+        return LAM_OK;
+    }
     TRY(mesh_fit(&scene->m, &how, &made, error));
     *divided = made.way != MESH_FIT_FACES;
     describe_left(&made.faces, before);

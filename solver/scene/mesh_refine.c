@@ -263,16 +263,23 @@ done:
     return status;
 }
 
-lam_status mesh_refine_into(const mesh *m, const mesh_refinement *how, mesh *out, uint32_t **parent,
-                            lam_error *error) {
+static lam_status plan_division(const mesh *m, const mesh_refinement *how, face_cut **cuts, size_t *n,
+                                lam_error *error) {
+    lam_status status = LAM_OK;
+    *n = 0;
+    *cuts = memory_allocate(m->n, sizeof **cuts, "refined mesh", error);
+    if (*cuts == NULL) return LAM_ERR_MEMORY;
+    TRY(plan_cuts(m, how, *cuts, error));
+    for (size_t i = 0; i < m->n && *n < MESH_NO_VERTEX; i++) *n += cut_pieces(m, i, (*cuts)[i]);
+done:
+    return status;
+}
+
+static lam_status divide(const mesh *m, const face_cut *cuts, size_t n, mesh *out, uint32_t **parent,
+                         lam_error *error) {
     lam_status status = LAM_OK;
     refined_mesh fine = {.n = 0};
     uint32_t *of = NULL;
-    size_t n = 0;
-    face_cut *cuts = memory_allocate(m->n, sizeof *cuts, "refined mesh", error);
-    if (cuts == NULL) return LAM_ERR_MEMORY;
-    TRY(plan_cuts(m, how, cuts, error));
-    for (size_t i = 0; i < m->n && n < MESH_NO_VERTEX; i++) n += cut_pieces(m, i, cuts[i]);
     TRY(refined_mesh_begin(m, n, &fine, error));
     if (parent != NULL) {
         of = memory_allocate(n, sizeof *of, "refined mesh", error);
@@ -285,17 +292,34 @@ lam_status mesh_refine_into(const mesh *m, const mesh_refinement *how, mesh *out
     of = NULL;
 done:
     free(of);
-    free(cuts);
     refined_mesh_free(&fine);
+    return status;
+}
+
+lam_status mesh_refine_into(const mesh *m, const mesh_refinement *how, mesh *out, uint32_t **parent,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    face_cut *cuts = NULL;
+    size_t n;
+    TRY(plan_division(m, how, &cuts, &n, error));
+    TRY(divide(m, cuts, n, out, parent, error));
+done:
+    free(cuts);
     return status;
 }
 
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error) {
     lam_status status = LAM_OK;
     mesh made = {0};
-    TRY(mesh_refine_into(m, how, &made, NULL, error));
-    if (made.n > m->n) mesh_replace(m, &made);
+    face_cut *cuts = NULL;
+    size_t n;
+    if (m->n_backs > 0) FAIL(error, LAM_ERR_ARGUMENT, "mesh: refine before making it two-sided");
+    TRY(plan_division(m, how, &cuts, &n, error));
+    if (n == m->n) goto done; /* nothing to cut */
+    TRY(divide(m, cuts, n, &made, NULL, error));
+    mesh_replace(m, &made);
 done:
+    free(cuts);
     mesh_free(&made);
     return status;
 }

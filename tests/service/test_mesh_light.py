@@ -73,6 +73,13 @@ class MeshOfLight(Case):
                                      "--rays", 64)
         self.assertRegex(said, r"[\d.e-]+ of that of an even sky, ")
 
+    def test_memory_is_kept(self):
+        """The solution that a division rests on is not begun where memory has no room for it."""
+        scene = FIXTURES / "l-room" / "l-room.obj"
+        said, mesh, _ = self.precompute(scene, "--mesh", "light", "--memory", "30M", "--probes", 0, "--rays", 64)
+        self.assertRegex(said, r"warning: \d+ faces stay as they are: .* --memory allows 31 MB")
+        self.assertEqual(len(mesh["area"]), faces_of(scene))
+
     def test_few_seconds_make_few_elements(self):
         scene = FIXTURES / "l-room" / "l-room.obj"
         said, mesh, _ = self.precompute(scene, "--mesh", "light", "--time", .1)
