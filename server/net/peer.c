@@ -219,7 +219,8 @@ static const char *read_value(const char *at, const char *end, char copy[80], si
     *length = 0;
     if (at < end && *at == '"') {
         for (at++; at < end && *at != '"'; at++) {
-            if (*at == '\\' && ++at == end) return NULL;
+            if (*at == '\\') at++;
+            if (at == end) return NULL;
             if (*length < 79) copy[(*length)++] = *at;
         }
         if (at == end) return NULL;

@@ -49,7 +49,7 @@ static lam_status reader_open(reader *r, lam_error *error) {
     if (fread(start, 1, sizeof MAGIC - 1, r->stream) != sizeof MAGIC - 1 || strcmp(start, MAGIC) != 0)
         FAIL(error, LAM_ERR_FORMAT, "%s: does not begin with " MAGIC "; make it without gendaymtx -h",
              r->path);
-    rewind(r->stream);
+    if (fseek(r->stream, 0, SEEK_SET) != 0) FAIL(error, LAM_ERR_IO, "%s: %s", r->path, strerror(errno));
 done:
     return status;
 }

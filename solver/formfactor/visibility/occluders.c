@@ -92,8 +92,8 @@ static void drop_twins(occluders *o) {
     if (o->n > 0) qsort(o->of, o->n, sizeof *o->of, by_low);
     for (size_t k = 0; k < o->n; k++) {
         bool twin = false;
-        for (size_t p = kept; p-- > 0 && !twin && kept - p <= NEAREST;)
-            twin = coincide(&o->of[k], &o->of[p], o->slack);
+        for (size_t p = kept; p > 0 && !twin && kept - p < NEAREST; p--)
+            twin = coincide(&o->of[k], &o->of[p - 1], o->slack);
         if (!twin) o->of[kept++] = o->of[k];
     }
     o->n = kept;

@@ -40,8 +40,8 @@ static lam_status spread_weights(const wavelets *w, const float *weight, float *
 
 /* The entry of row i in column j; NULL: there is none. */
 static const float *entry_of(const csr *A, size_t i, uint32_t j) {
-    for (uint64_t e = A->indptr[i + 1]; e-- > A->indptr[i] && A->indices[e] >= j;)
-        if (A->indices[e] == j) return &A->data[e];
+    for (uint64_t e = A->indptr[i + 1]; e > A->indptr[i] && A->indices[e - 1] >= j; e--)
+        if (A->indices[e - 1] == j) return &A->data[e - 1];
     return NULL;
 }
 
