@@ -63,6 +63,14 @@ class View(unittest.TestCase):
         os.chmod(path, 0o755)
         return path
 
+    @staticmethod
+    def name_of(pid):
+        """None of a browser that has ended meanwhile."""
+        try:
+            return pathlib.Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip()
+        except (FileNotFoundError, ProcessLookupError):
+            return None
+
     def start(self, *options, **environment):
         process = subprocess.Popen([LAMBERT, "view", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                    env=dict(ENVIRONMENT, **environment))
@@ -75,8 +83,7 @@ class View(unittest.TestCase):
         address = process.stdout.readline().strip()
         self.assertRegex(address, r"^http://127\.0\.0\.1:\d+/(#1\.[-_A-Za-z0-9]+)?$")
         children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text(encoding="utf-8").split()
-        daemons = [int(pid) for pid in children
-                   if pathlib.Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip() == "lambertd"]
+        daemons = [int(pid) for pid in children if self.name_of(pid) == "lambertd"]
         self.assertEqual(len(daemons), 1, children)
         return process, address, daemons[0]
 
