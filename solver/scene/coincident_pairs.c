@@ -3,6 +3,7 @@
 #include "solver/base/array_grow.h"
 #include "solver/scene/box_pairs.h"
 #include "solver/scene/element_face.h"
+#include "solver/scene/flat_polygon.h"
 #include "solver/scene/plane.h"
 
 #include <math.h>
@@ -16,9 +17,6 @@ static const double shared_least = 1e-3;
  * of a face as small as the rounding of its corners says little. */
 static const double alike = .9;
 
-/* Corners that two convex quads have in common at most. */
-enum { CORNERS_MOST = 8 };
-
 typedef struct search {
     const mesh *m;
     bool both_sides;
@@ -30,33 +28,6 @@ double coincident_distance(const mesh *m) {
     double centre[3], radius;
     mesh_bounds(m, centre, &radius);
     return plane_same_place * radius;
-}
-
-/* A convex polygon in a plane. */
-typedef struct flat_polygon {
-    size_t n;
-    double corner[CORNERS_MOST][2];
-} flat_polygon;
-
-static double flat_area(const flat_polygon *p) {
-    double twice = 0;
-    for (size_t k = 1; k + 1 < p->n; k++) twice += plane_turn(p->corner[0], p->corner[k], p->corner[k + 1]);
-    return .5 * fabs(twice);
-}
-
-/* The part of p to the left of the line from a to b (Sutherland and Hodgman 1974). */
-static flat_polygon clip(const flat_polygon *p, const double a[2], const double b[2]) {
-    flat_polygon out = {.n = 0};
-    for (size_t k = 0; k < p->n; k++) {
-        const double *from = p->corner[k], *to = p->corner[(k + 1) % p->n];
-        const double here = plane_turn(a, b, from), there = plane_turn(a, b, to);
-        if (here >= 0 && out.n < CORNERS_MOST) memcpy(out.corner[out.n++], from, sizeof out.corner[0]);
-        if ((here >= 0) == (there >= 0) || out.n == CORNERS_MOST) continue;
-        for (int d = 0; d < 2; d++)
-            out.corner[out.n][d] = from[d] + here / (here - there) * (to[d] - from[d]);
-        out.n++;
-    }
-    return out;
 }
 
 /* The corners of a face in a plane through a point, counter-clockwise as seen from where its normal points;
@@ -116,10 +87,7 @@ static lam_status look(void *context, uint32_t i, uint32_t j, lam_error *error) 
     (void)flatten(m, a, plane.centre, plane.normal, HUGE_VAL, false, &large);
     /* Rounding moves the edge that neighbours share by `distance`, and makes them share a strip beside it. */
     const double least = shared_least * m->area[b] + s->distance * perimeter(&small);
-    flat_polygon both = small;
-    for (size_t k = 0; k < large.n && both.n >= 3; k++)
-        both = clip(&both, large.corner[k], large.corner[(k + 1) % large.n]);
-    const double area = both.n >= 3 ? fmin(flat_area(&both), m->area[b]) : 0;
+    const double area = fmin(flat_polygons_overlap(&small, &large), m->area[b]);
     if (!(area > least)) return LAM_OK;
     coincident_pairs *out = s->out;
     const double near = fmin(s->distance, 1e-2 * sqrt(m->area[b]));
