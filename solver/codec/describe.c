@@ -4,6 +4,7 @@
 #include "solver/codec/describe.h"
 
 #include "solver/base/scene/scene_cameras.h"
+#include "solver/base/scene/scene_faces.h"
 #include "solver/codec/headline.h"
 #include "solver/codec/stated_errors.h"
 #include "solver/operator/operator.h"
@@ -323,6 +324,15 @@ done:
     return status;
 }
 
+/* The faces of the scene file; null where the store does not know them. */
+static lam_status add_faces(store *s, json_t *out, lam_error *error) {
+    size_t n = 0;
+    const lam_status status = scene_faces_count(s, &n, error);
+    if (status == LAM_OK)
+        json_object_set_new(out, "faces", n > 0 ? json_integer((json_int_t)n) : json_null());
+    return status;
+}
+
 lam_status describe_store(store *s, json_t **out, lam_error *error) {
     lam_status status = LAM_OK;
     json_t *root = NULL, *operator_attributes = NULL, *mesh = NULL, *made = json_object();
@@ -340,6 +350,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     TRY(store_group_bytes(s, STORE_OPERATOR, &bytes, error));
     copy_member(made, "name", root, "name");
     json_object_set_new(made, "elements", json_integer((json_int_t)dims[1]));
+    TRY(add_faces(s, made, error));
     json_object_set_new(made, "channels", json_integer((json_int_t)dims[0]));
     const json_t *kind = json_object_get(operator_attributes, "kind");
     if (!json_is_string(kind))

@@ -120,6 +120,10 @@ lam_status mesh_make_backs(mesh *m, lam_error *error) {
         wide.textured_face = with_backs(m, &backs, m->textured_face, 1, sizeof *m->textured_face, error);
         if (wide.textured_face == NULL) TRY(LAM_ERR_MEMORY);
     }
+    if (m->faces.of != NULL) {
+        wide.faces.of = with_backs(m, &backs, m->faces.of, 1, sizeof *m->faces.of, error);
+        if (wide.faces.of == NULL) TRY(LAM_ERR_MEMORY);
+    }
     if (wide.elements == NULL || wide.area == NULL || wide.normal == NULL || wide.group == NULL ||
         wide.reflectance == NULL || wide.emission == NULL)
         TRY(LAM_ERR_MEMORY);
@@ -141,6 +145,7 @@ lam_status mesh_make_backs(mesh *m, lam_error *error) {
     MESH_EXCHANGE(reflectance);
     MESH_EXCHANGE(emission);
     MESH_EXCHANGE(textured_face);
+    MESH_EXCHANGE(faces.of);
     MESH_EXCHANGE(has_back);
 #undef MESH_EXCHANGE
     m->two_sided = backs.n == m->n;

@@ -18,6 +18,7 @@ void mesh_free(mesh *m) {
     free(m->group);
     free(m->group_names);
     free(m->overlap);
+    scene_faces_free(&m->faces);
     free(m->reflectance);
     free(m->emission);
     free(m->has_back);
@@ -149,7 +150,7 @@ lam_status mesh_drop(mesh *m, const bool *dropped, lam_error *error) {
     uint32_t *number = memory_allocate(m->n_groups, sizeof *number, "groups", error);
     if (number == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < before; i++) n += !dropped[i];
-    assert(n > 0);
+    assert(n > 0 && m->faces.n_parts == 0);
     for (size_t c = 0, to = 0; c < m->n_channels; c++)
         for (size_t i = 0; i < before; i++) {
             if (dropped[i]) continue;
@@ -163,6 +164,7 @@ lam_status mesh_drop(mesh *m, const bool *dropped, lam_error *error) {
         m->area[to] = m->area[i];
         if (m->textured_face != NULL) m->textured_face[to] = m->textured_face[i];
         if (m->has_back != NULL) m->has_back[to] = m->has_back[i];
+        if (m->faces.of != NULL) m->faces.of[to] = m->faces.of[i];
         m->group[to++] = m->group[i];
     }
     m->n = n;

@@ -4,6 +4,7 @@
 
 #include "solver/base/progress.h"
 #include "solver/base/scene/scene_cameras.h"
+#include "solver/base/scene/scene_faces.h"
 #include "store/store.h"
 
 #include <stdint.h>
@@ -22,6 +23,8 @@ typedef struct mesh {
     double *area;       /* [n], m^2 */
     float (*normal)[3]; /* [n][3], unit, towards the front */
     uint32_t *group;    /* [n] */
+    scene_faces faces;  /* of the scene file, of which elements are parts; they have parts of their own only
+                           after the last change of elements but for backs */
     size_t n_groups;
     char **group_names;              /* [n_groups], one block freed by one free() */
     double *overlap;                 /* [n_groups], share of a group's area that other faces cover in the same
@@ -66,8 +69,8 @@ typedef struct mesh_refinement {
     size_t elements;           /* the number of elements, as closely as near-equal areas allow */
 } mesh_refinement;
 
-/* Refines in place; children of an element are consecutive and inherit its group and materials, of textures
- * the means over their own areas. */
+/* Refines in place; children of an element are consecutive and inherit its group, face and materials, of
+ * textures the means over their own areas. */
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
 
 /* The same in another mesh, which has neither cameras nor names of groups until mesh_replace; parent [n of
@@ -76,10 +79,10 @@ lam_status mesh_refine_into(const mesh *m, const mesh_refinement *how, mesh *out
                             lam_error *error);
 
 /* Gives the elements that are marked in has_back their backs, which lie behind all elements, in mesh order,
- * and have the materials of their fronts. Backs get groups of their own, behind the others: that of `floor`
- * is called `floor.back`, or `floor.back-2` and so on where the scene has a group of that name. has_back is
- * NULL then. Once for a mesh, after its last refinement. Errors: LAM_ERR_ARGUMENT (too many elements),
- * LAM_ERR_MEMORY. */
+ * and have the faces and the materials of their fronts. Backs get groups of their own, behind the others:
+ * that of `floor` is called `floor.back`, or `floor.back-2` and so on where the scene has a group of that
+ * name. has_back is NULL then. Once for a mesh, after its last refinement. Errors: LAM_ERR_ARGUMENT (too many
+ * elements), LAM_ERR_MEMORY. */
 lam_status mesh_make_backs(mesh *m, lam_error *error);
 
 /* Marks every element in has_back, and makes the backs, too (`--two-sided`). */

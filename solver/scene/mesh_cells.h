@@ -55,8 +55,8 @@ void mesh_cell_edges(const mesh_cell *c, double length[4]);
 lam_status mesh_cells_even(const mesh *m, double area, size_t most, mesh_cell **out, size_t *n,
                            lam_error *error);
 
-/* A mesh of n cells in that order, which cover all faces; they inherit group and materials, and mesh_replace
- * the names of groups. Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT. */
+/* A mesh of n cells in that order, which cover all faces; they inherit group, face of the file and materials,
+ * and mesh_replace the names of groups. Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT. */
 lam_status mesh_of_cells(const mesh *m, size_t n, const mesh_cell *cells, mesh *out, lam_error *error);
 
 /* Replaces a mesh by one that was made of it; *by is empty then. */

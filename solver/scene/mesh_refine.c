@@ -4,6 +4,7 @@
 #include "solver/scene/mesh_refined.h"
 #include "solver/scene/texture.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -184,6 +185,13 @@ lam_status refined_mesh_end(refined_mesh *r, const mesh *m, mesh *out, lam_error
         if (fine.textured_face == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t i = 0; i < n; i++) fine.textured_face[i] = m->textured_face[r->face[i]];
         mesh_textures_hold(&fine, m->textures);
+    }
+    if (m->faces.of != NULL) {
+        assert(m->faces.n_parts == 0);
+        fine.faces = (scene_faces){.n_faces = m->faces.n_faces};
+        fine.faces.of = memory_allocate(n, sizeof *fine.faces.of, "refined mesh", error);
+        if (fine.faces.of == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t i = 0; i < n; i++) fine.faces.of[i] = m->faces.of[r->face[i]];
     }
     if (m->has_back != NULL) {
         fine.has_back = memory_allocate(n, sizeof *fine.has_back, "refined mesh", error);

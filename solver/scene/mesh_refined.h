@@ -20,7 +20,8 @@ void refined_mesh_free(refined_mesh *r);
 lam_status refined_mesh_add(refined_mesh *r, size_t i, size_t corners, const double (*p)[3],
                             lam_error *error);
 
-/* The mesh, without the names of groups; groups and materials come from the faces. */
+/* The mesh, without the names of groups; groups, faces of the file and materials come from the
+ * faces. */
 lam_status refined_mesh_end(refined_mesh *r, const mesh *m, mesh *out, lam_error *error);
 
 #endif

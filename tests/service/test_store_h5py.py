@@ -233,6 +233,7 @@ class StoreTest(unittest.TestCase):
                 "/mesh/area": ((n,), "<f8"), "/mesh/normal": ((n, 3), "<f4"),
                 "/mesh/reflectance": ((C, n), "<f4"), "/mesh/emission": ((C, n), "<f4"),
                 "/mesh/group": ((n,), "<u4"), "/mesh/row_sums": ((n,), "<f8"),
+                "/mesh/face": ((n,), "<u4"), "/mesh/face_area": ((6,), "<f8"),
                 "/form_factors/indptr": ((n + 1,), "<u8"), "/form_factors/indices": ((nnz,), "<u4"),
                 "/form_factors/data": ((nnz,), "<f4"), "/form_factors/leaving": ((n,), "<f8"),
                 "/form_factors/absorbed": ((n,), "<f8"), "/form_factors/repair": ((n,), "<f8"), "/sky/tiles": ((12, 9), "<f8"),

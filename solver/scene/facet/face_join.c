@@ -92,6 +92,7 @@ lam_status faces_join(mesh *m, lam_error *error) {
     if (n_faces == m->n) goto done;
     TRY(cells_of(m, n_faces, faces, &cells, error));
     TRY(mesh_of_cells(m, n_faces, cells, &joined, error));
+    scene_faces_free(&joined.faces); /* what is joined is several faces of the file */
     mesh_replace(m, &joined);
 done:
     free(label);

@@ -292,7 +292,13 @@ static lam_status copy_geometry(imported_faces *s, const char *path, double unit
     m->n = s->n_elements;
     m->elements = memory_allocate(m->n, sizeof *m->elements, "elements", error);
     if (m->elements == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < m->n; i++) memcpy(m->elements[i], s->elements[i].corners, sizeof *m->elements);
+    m->faces.n_faces = s->n_polygons;
+    m->faces.of = memory_allocate(m->n, sizeof *m->faces.of, "elements", error);
+    if (m->faces.of == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m->n; i++) {
+        memcpy(m->elements[i], s->elements[i].corners, sizeof *m->elements);
+        m->faces.of[i] = s->elements[i].polygon;
+    }
     m->n_vertices = s->points.n;
     m->vertices = s->points.points; /* taken over */
     s->points.points = NULL;

@@ -18,8 +18,8 @@ typedef struct reply_header {
     uint64_t status;
     char message[sizeof((lam_error *)0)->message];
     import_warnings warnings;
-    uint64_t n_points, n_elements, n_objects, object_bytes, n_materials, material_bytes, n_cameras, dropped,
-        latin1, n_faces, n_images;
+    uint64_t n_points, n_polygons, n_elements, n_objects, object_bytes, n_materials, material_bytes,
+        n_cameras, dropped, latin1, n_faces, n_images;
 } reply_header;
 
 static const char reply_magic[8] = "lamsoup";
@@ -48,6 +48,7 @@ static void send_reply(lam_status result, const lam_error *error, const imported
     }
     header.warnings = s->warnings;
     header.n_points = s->points.n;
+    header.n_polygons = s->n_polygons;
     header.n_elements = s->n_elements;
     header.n_objects = s->objects.n;
     header.object_bytes = s->objects.text_bytes;
@@ -128,6 +129,7 @@ static bool elements_are_sound(const imported_faces *s) {
             if (e->corners[k] >= s->points.n && !(k == 3 && e->corners[k] == TABLE_NONE)) return false;
         if (e->object >= s->objects.n && e->object != TABLE_NONE) return false;
         if (e->material >= s->materials.n && e->material != TABLE_NONE) return false;
+        if (e->polygon >= s->n_polygons) return false;
     }
     return true;
 }
@@ -209,11 +211,13 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
         FAIL(error, (lam_status)header.status, "%s", header.message);
     const uint64_t most = most_bytes / 8; /* except for names, no entry is smaller in the pipe */
     sound = sound && header.status == LAM_OK && header.n_points < most && header.n_elements < most &&
-            header.n_points < TABLE_NONE && header.n_elements < TABLE_NONE && header.n_elements > 0 &&
-            header.object_bytes < most && header.material_bytes < most && header.n_materials < most &&
+            header.n_points < TABLE_NONE && header.n_polygons < most && header.n_polygons < TABLE_NONE &&
+            header.n_elements < TABLE_NONE && header.n_elements > 0 && header.object_bytes < most &&
+            header.material_bytes < most && header.n_materials < most &&
             header.n_cameras <= SCENE_CAMERAS_MOST && header.n_faces <= header.n_elements &&
             header.n_images < most;
     if (!sound) FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
+    s->n_polygons = header.n_polygons;
     s->points.points = receive_array(child, header.n_points, sizeof *s->points.points, whole, error);
     if (s->points.points == NULL) TRY(LAM_ERR_MEMORY);
     s->points.n = s->points.capacity = header.n_points;

@@ -215,7 +215,8 @@ static lam_status add_element(imported_faces *s, const uint32_t piece[4],
                               const struct imported_polygon *polygon, const struct imported_skin *skin,
                               lam_error *error) {
     lam_status status = LAM_OK;
-    struct imported_element element = {{0, 0, 0, TABLE_NONE}, polygon->object, polygon->material};
+    struct imported_element element = {
+        {0, 0, 0, TABLE_NONE}, polygon->object, polygon->material, (uint32_t)(polygon - s->polygons)};
     skinned_piece skinned = {.n = 0};
     if (skin != NULL) skinned = skin_piece(s, polygon, skin, piece);
     if (skinned.n == 4 && !is_affine(&skinned)) {

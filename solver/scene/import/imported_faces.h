@@ -50,7 +50,7 @@ typedef struct imported_faces {
         size_t first;
         uint32_t n_corners, object, material, line; /* line 0: the format has none */
     } *polygons;
-    size_t n_polygons, polygon_capacity;
+    size_t n_polygons, polygon_capacity; /* the parent knows their number alone: the faces of the file */
 
     /* Skins of some of the polygons, in their order: the same number of corners, from first on. */
     struct imported_skin {
@@ -63,6 +63,7 @@ typedef struct imported_faces {
     point_table points;
     struct imported_element {
         uint32_t corners[4], object, material;
+        uint32_t polygon; /* that it is, or is a part of */
     } *elements;
     size_t n_elements, element_capacity;
     uint64_t dropped; /* faces without an area */
