@@ -16,9 +16,10 @@ enum { ADAPTIVE_ELEMENTS = 40000 };
 /* The elements that a mesh of an error is thought to have before it is divided. */
 enum { COARSE_ADVICE = 5000 };
 
-static lam_status join_faces(const precompute_job *job, precompute_scene *scene, lam_error *error) {
+static lam_status join_faces(const precompute_job *job, precompute_scene *scene, faces_before *before,
+                             lam_error *error) {
     const size_t faces = scene->m.n;
-    const lam_status status = faces_join(&scene->m, error);
+    const lam_status status = faces_join(&scene->m, before, error);
     if (status == LAM_OK && scene->m.n < faces)
         terminal_log(job->t, "%zu faces are left of %zu, as those of one material in one plane are joined",
                      scene->m.n, faces);
@@ -184,20 +185,23 @@ lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_
     const precompute_options *o = job->options;
     const double edge = edge_to_be(&scene->m, o);
     bool divided = true;
+    faces_before before = {.n = 0};
     const size_t most = o->elements > 0 ? fronts_of(&scene->m, o->elements) : SIZE_MAX;
     /* --elements counts both sides. */
     const mesh_refinement refinement = {
         .max_edge = o->max_edge, .elements = o->mesh_error > 0 ? 0 : fronts_of(&scene->m, o->elements)};
-    if (o->mesh_error > 0) TRY(join_faces(job, scene, error));
+    if (o->mesh_error > 0) TRY(join_faces(job, scene, &before, error));
     if (edge > 0 && !is_fitted(o)) TRY(scene_cut_at_walls(job, scene, edge, most, error));
     if (refinement.max_edge > 0 || refinement.elements > 0) TRY(mesh_refine(&scene->m, &refinement, error));
     if (o->mesh_error > 0) TRY(refine_by_error(job, scene, error));
     if (is_fitted(o)) TRY(fit_to_light(job, scene, edge, &divided, error));
     if (edge > 0 && divided) TRY(scene_log_under_walls(job, scene, edge, error));
+    TRY(faces_part(&scene->m, &before, error));
     TRY(mesh_make_backs(&scene->m, error));
     log_renamed(job, scene);
     TRY(mesh_keep_pictures(&scene->m, error)); /* every element has its means */
 done:
+    faces_before_free(&before);
     return status;
 }
 

@@ -71,15 +71,49 @@ static lam_status cells_of(const mesh *m, size_t n, const joined_polygon *faces,
     return LAM_OK;
 }
 
-lam_status faces_join(mesh *m, lam_error *error) {
+void faces_before_free(faces_before *b) {
+    free(b->vertices);
+    free(b->elements);
+    free(b->face);
+    free(b->start);
+    free(b->order);
+    *b = (faces_before){.n = 0};
+}
+
+/* Takes the faces of m over, of which each became a part of the face joined[k] of by, and numbers those. */
+static lam_status keep_before(mesh *m, const uint32_t *joined, mesh *by, faces_before *out,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    faces_before b = {.n_joined = by->n};
+    b.start = memory_allocate(by->n + 1, sizeof *b.start, "joined faces", error);
+    b.order = memory_allocate(m->n, sizeof *b.order, "joined faces", error);
+    if (b.start == NULL || b.order == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < m->n; k++)
+        if (joined[k] != MESH_NO_VERTEX) b.start[joined[k]]++;
+    for (size_t j = 0; j < by->n; j++) b.start[j + 1] += b.start[j];
+    for (size_t k = m->n; k-- > 0;) /* the ends become the beginnings */
+        if (joined[k] != MESH_NO_VERTEX) b.order[--b.start[joined[k]]] = (uint32_t)k;
+    b.n = m->n;
+    b.vertices = m->vertices, b.elements = m->elements, b.face = m->faces.of;
+    m->vertices = NULL, m->elements = NULL, m->faces.of = NULL;
+    for (uint32_t j = 0; j < by->n; j++) by->faces.of[j] = j;
+    *out = b;
+    b = (faces_before){.n = 0};
+done:
+    faces_before_free(&b);
+    return status;
+}
+
+lam_status faces_join(mesh *m, faces_before *before, lam_error *error) {
     lam_status status = LAM_OK;
     uint32_t *label = memory_allocate(m->n, sizeof *label, "joined faces", error);
     joined_polygon *faces = NULL;
     mesh_cell *cells = NULL;
+    uint32_t *unions = memory_allocate(m->n, sizeof *unions, "joined faces", error);
     size_t n_faces = 0;
     double centre[3], radius;
     mesh joined = {0};
-    if (label == NULL) TRY(LAM_ERR_MEMORY);
+    if (label == NULL || unions == NULL) TRY(LAM_ERR_MEMORY);
     TRY(label_faces(m, label, error));
     mesh_bounds(m, centre, &radius);
     const polygon_join_options how = {.n = m->n,
@@ -87,14 +121,18 @@ lam_status faces_join(mesh *m, lam_error *error) {
                                       .label = label,
                                       .within_labels = true,
                                       .corners = 4,
-                                      .slack = flat * radius};
+                                      .slack = flat * radius,
+                                      .joined = unions};
     TRY(polygons_join(m, &how, &faces, &n_faces, error));
     if (n_faces == m->n) goto done;
     TRY(cells_of(m, n_faces, faces, &cells, error));
     TRY(mesh_of_cells(m, n_faces, cells, &joined, error));
-    scene_faces_free(&joined.faces); /* what is joined is several faces of the file */
+    if (before == NULL) scene_faces_free(&joined.faces);
+    if (before != NULL && m->faces.of != NULL) TRY(keep_before(m, unions, &joined, before, error));
     mesh_replace(m, &joined);
 done:
+    mesh_free(&joined);
+    free(unions);
     free(label);
     free(faces);
     free(cells);

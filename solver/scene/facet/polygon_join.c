@@ -1,8 +1,10 @@
 #include "solver/scene/facet/polygon_join.h"
 
+#include "solver/base/union_find.h"
 #include "solver/base/vector3.h"
 #include "solver/scene/tables.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,7 +30,8 @@ typedef struct joining {
     size_t n;
     join_edge *edges; /* in order of (from, to) */
     size_t n_edges;
-    bool *used; /* [n], in this round */
+    bool *used;    /* [n], in this round */
+    uint32_t *set; /* [options->n], of polygons that are joined; NULL: not wanted */
 } joining;
 
 static void cross_of(const mesh *m, uint32_t from, uint32_t at, uint32_t to, double out[3]) {
@@ -201,6 +204,8 @@ static bool join_one(joining *j, size_t p, join_step step) {
             if (other->piece == p || j->used[other->piece]) continue;
             if (!is_open_to(j, &j->of[other->piece], other->at, step)) continue;
             if (!unite(j, &j->of[p], c, &j->of[other->piece], other->at, most, &joined)) continue;
+            if (j->set != NULL)
+                union_find_join(j->set, j->of[p].shape.first, j->of[other->piece].shape.first);
             j->used[p] = j->used[other->piece] = true;
             j->of[p] = joined;
             j->of[other->piece].shape.n = 0;
@@ -249,6 +254,18 @@ static void add_polygon(joining *j, size_t k) {
         add_piece(j, 3, (uint32_t[]){corner[0], corner[c], corner[c + 1]}, k);
 }
 
+/* Fills the union of each polygon, by its set. */
+static lam_status tell_unions(joining *j, lam_error *error) {
+    uint32_t *const out = j->options->joined;
+    uint32_t *of_root = memory_allocate(j->options->n, sizeof *of_root, "joined polygons", error);
+    if (of_root == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < j->options->n; k++) of_root[k] = MESH_NO_VERTEX;
+    for (size_t p = 0; p < j->n; p++) of_root[union_find_root(j->set, j->of[p].shape.first)] = (uint32_t)p;
+    for (size_t k = 0; k < j->options->n; k++) out[k] = of_root[union_find_root(j->set, (uint32_t)k)];
+    free(of_root);
+    return LAM_OK;
+}
+
 lam_status polygons_join(const mesh *m, const polygon_join_options *options, joined_polygon **out,
                          size_t *count, lam_error *error) {
     enum { OF_POLYGON = 2 }; /* triangles */
@@ -259,6 +276,12 @@ lam_status polygons_join(const mesh *m, const polygon_join_options *options, joi
     j.place = memory_allocate(m->n_vertices, sizeof *j.place, "joined polygons", error);
     j.of = memory_allocate(options->n, OF_POLYGON * sizeof *j.of, "joined polygons", error);
     if (j.place == NULL || j.of == NULL) TRY(LAM_ERR_MEMORY);
+    assert(options->joined == NULL || !options->split);
+    if (options->joined != NULL) {
+        j.set = memory_allocate(options->n, sizeof *j.set, "joined polygons", error);
+        if (j.set == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t k = 0; k < options->n; k++) j.set[k] = (uint32_t)k;
+    }
     TRY(points_weld(m->n_vertices, (const double(*)[3])m->vertices, j.place, error));
     for (size_t k = 0; k < options->n; k++) add_polygon(&j, k);
     /* A union has no more corners than its two pieces less the two that both have. */
@@ -270,9 +293,13 @@ lam_status polygons_join(const mesh *m, const polygon_join_options *options, joi
     joined = memory_allocate(j.n, sizeof *joined, "joined polygons", error);
     if (joined == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t p = 0; p < j.n; p++) joined[p] = j.of[p].shape;
+    if (j.set != NULL) TRY(tell_unions(&j, error));
     *out = joined;
+    joined = NULL;
     *count = j.n;
 done:
+    free(joined);
+    free(j.set);
     free(j.place);
     free(j.of);
     free(j.edges);

@@ -179,7 +179,7 @@ static lam_status make_mesh(const bench_run *run, const mesh_scene *scene, size_
     lam_status status = LAM_OK;
     adaptive_report report;
     TRY(open_mesh(scene, adaptive ? 0 : elements, out, error));
-    if (adaptive) TRY(faces_join(out, error));
+    if (adaptive) TRY(faces_join(out, NULL, error));
     if (adaptive) TRY(adaptive_refine(out, &how, &report, error));
 done:
     return status;

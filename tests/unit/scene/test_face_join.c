@@ -46,7 +46,7 @@ START_TEST(only_faces_of_one_material_are_joined) {
     const double area = total_area(&m), light = light_of(&m), floor = group_area(&m, "floor", NULL);
     ck_assert_uint_eq(m.n, SIDE * SIDE + 2);
     m.reflectance[20] = .3f;
-    ck_ok(faces_join(&m, &error));
+    ck_ok(faces_join(&m, NULL, &error));
     ck_assert_uint_eq(m.n, 1 + 1 + 4 + 1 + 1);
     ck_assert_double_eq_tol(total_area(&m), area, 1e-12 * area);
     ck_assert_double_eq_tol(light_of(&m), light, 1e-12 * light);
@@ -62,8 +62,97 @@ START_TEST(only_faces_of_one_material_are_joined) {
     }
     ck_assert_uint_eq(n_dark, 1);
     const mesh first = m;
-    ck_ok(faces_join(&m, &error)); /* nothing is left to join */
+    ck_ok(faces_join(&m, NULL, &error)); /* nothing is left to join */
     ck_assert_ptr_eq(m.elements, first.elements);
+    mesh_free(&m);
+    folder_remove(folder);
+}
+END_TEST
+
+/* Corners of an element of the plane z = 0 that is a rectangle along the axes. */
+static void box_of(const mesh *m, size_t i, double low[2], double high[2]) {
+    for (int d = 0; d < 2; d++) {
+        low[d] = HUGE_VAL, high[d] = -HUGE_VAL;
+        for (size_t c = 0; c < mesh_corners(m, i); c++) {
+            low[d] = fmin(low[d], m->vertices[m->elements[i][c]][d]);
+            high[d] = fmax(high[d], m->vertices[m->elements[i][c]][d]);
+        }
+    }
+}
+
+/* The area that an element of the floor has in common with square k of the file. */
+static double common_area(const mesh *m, size_t i, uint32_t k) {
+    const double from[2] = {k % SIDE, .5 * (k / SIDE)}, size[2] = {1, .5};
+    double low[2], high[2], area = 1;
+    box_of(m, i, low, high);
+    for (int d = 0; d < 2; d++) area *= fmax(0, fmin(high[d], from[d] + size[d]) - fmax(low[d], from[d]));
+    return area;
+}
+
+static double part_area(const mesh *m, size_t i, uint32_t face) {
+    double sum = m->faces.of[i] == face ? m->area[i] : 0;
+    for (size_t p = 0; p < m->faces.n_parts; p++)
+        if (m->faces.parts[p].element == i && m->faces.parts[p].face == face) sum += m->faces.parts[p].area;
+    return sum;
+}
+
+/* Elements of joined faces know what they have in common with the faces of the file: by exact rectangles on
+ * the floor; all of the wall is of its two triangles. */
+START_TEST(parts_of_joined_faces_know_these) {
+    static const double edges[] = {0, .9, .35};
+    char folder[64];
+    double sums[SIDE * SIDE + 2];
+    folder_make(folder);
+    for (size_t e = 0; e < sizeof edges / sizeof *edges; e++) {
+        mesh m = make_room(folder);
+        faces_before before = {.n = 0};
+        ck_ok(faces_join(&m, &before, &error));
+        ck_assert_uint_eq(m.n, 4);
+        if (edges[e] > 0) ck_ok(mesh_refine(&m, &(mesh_refinement){.max_edge = edges[e]}, &error));
+        ck_ok(faces_part(&m, &before, &error));
+        ck_ok(mesh_make_two_sided(&m, &error));
+        const size_t n = m.n - m.n_backs;
+        ck_assert_uint_eq(m.faces.n_faces, SIDE * SIDE + 2);
+        size_t whole = 0;
+        for (size_t i = 0; i < n; i++) {
+            const bool of_wall = m.group[i] == group_find(&m, "wall");
+            whole += m.faces.of[i] != SCENE_FACE_NONE;
+            ck_assert_uint_eq(m.faces.of[i], m.faces.of[n + i]);
+            double sum = 0;
+            for (uint32_t k = 0; k < m.faces.n_faces; k++) {
+                const double area = part_area(&m, i, k);
+                sum += area;
+                if (of_wall) ck_assert(k >= SIDE * SIDE || area == 0);
+                if (!of_wall && k < SIDE * SIDE) ck_assert_double_eq_tol(area, common_area(&m, i, k), 1e-12);
+            }
+            ck_assert_double_eq_tol(sum, m.area[i], 1e-12);
+        }
+        ck_assert(edges[e] == 0 || whole > 0);
+        scene_faces_sum(&m.faces, n, m.area, sums);
+        for (size_t k = 0; k < SIDE * SIDE; k++) ck_assert_double_eq_tol(sums[k], .5, 1e-12);
+        for (size_t k = SIDE * SIDE; k < SIDE * SIDE + 2; k++) ck_assert_double_eq_tol(sums[k], 9, 1e-12);
+        faces_before_free(&before);
+        mesh_free(&m);
+    }
+    folder_remove(folder);
+}
+END_TEST
+
+/* Where nothing is joined faces stay what they are, and without a place for those before they are lost. */
+START_TEST(faces_that_are_not_joined_stay) {
+    char folder[64];
+    folder_make(folder);
+    mesh m = obj_good(folder, "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 1 1\nf 1 2 3\nf 1 2\nf 1 3 5\n", NULL);
+    faces_before before = {.n = 0};
+    ck_ok(faces_join(&m, &before, &error));
+    ck_assert_uint_eq(before.n, 0);
+    ck_ok(faces_part(&m, &before, &error));
+    ck_assert_uint_eq(m.faces.of[0], 0);
+    ck_assert_uint_eq(m.faces.of[1], 2);
+    mesh_free(&m);
+    m = make_room(folder);
+    ck_ok(faces_join(&m, NULL, &error));
+    ck_assert_ptr_null(m.faces.of);
     mesh_free(&m);
     folder_remove(folder);
 }
@@ -73,6 +162,8 @@ int main(void) {
     Suite *suite = suite_create("face join");
     TCase *tests = tcase_create("face join");
     tcase_add_test(tests, only_faces_of_one_material_are_joined);
+    tcase_add_test(tests, parts_of_joined_faces_know_these);
+    tcase_add_test(tests, faces_that_are_not_joined_stay);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
