@@ -58,6 +58,7 @@ codec_scene call_codec_scene(const call *in) {
     return (codec_scene){.n = s->n,
                          .n_channels = s->n_channels,
                          .groups = &s->groups,
+                         .faces = &s->faces,
                          .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
                          .n_emitters = s->n_emitters,
                          .signs = s->n_emitters == 0,
@@ -72,9 +73,10 @@ codec_scene call_codec_scene(const call *in) {
 size_t call_parse_bytes(const call *in) {
     const scene *s = in->scene;
     if (in->body_type != MEDIA_JSON) return 0;
-    /* Indices and values of one sparse vector, the set of those seen, and a list of selected elements; each
-     * takes a letter of the text at least, and there are n of them at most. */
-    const size_t numbers = in->length < s->n ? in->length : s->n;
+    /* Indices and values of one sparse vector, the set of those seen, and a list of selected elements or
+     * faces; each takes a letter of the text at least, and there are as many as elements or faces at most. */
+    const size_t most = s->faces.n_faces > s->n ? s->faces.n_faces : s->n;
+    const size_t numbers = in->length < most ? in->length : most;
     return bytes_times(numbers, 32 + 6 * s->n_channels);
 }
 

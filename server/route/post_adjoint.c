@@ -135,7 +135,7 @@ static bool write_npy(const call *in, const adjoint_request *request, const adjo
     const size_t dims[2] = {C, width};
     const double start = clock_ms();
     const bool good = npy_write_header(b, in->accept.npy, C > 1 ? 2 : 1, C > 1 ? dims : &dims[1])
-                          ? answer_rows(b, &in->accept, C, width, values, why)
+                          ? answer_rows(b, &in->accept, C, width, false, values, why)
                           : problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
     notes->encode_ms = clock_ms() - start;
     return good;
@@ -151,7 +151,7 @@ static bool write_json(const call *in, const adjoint_request *request, const adj
         if (!adjoint_wants(request, (gradient_kind)kind)) continue;
         written = buffer_printf(b, "%s\"%s\":", count++ > 0 ? "," : "", gradient_name((gradient_kind)kind));
         const float *values = gradient_values(s, memory, (gradient_kind)kind, &width);
-        if (written && !answer_rows(b, &in->accept, s->n_channels, width, values, why)) return false;
+        if (written && !answer_rows(b, &in->accept, s->n_channels, width, false, values, why)) return false;
     }
     written = written && buffer_append(b, "}", 1);
     notes->encode_ms = clock_ms() - start;

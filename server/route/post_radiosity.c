@@ -18,9 +18,12 @@ typedef struct radiosity_solve {
     radiosity_request request;
     answer_notes notes;
     answer_shape shape;
+    size_t n_computed; /* elements that passes compute: all, those selected, or those of faces */
     buffer answer;
-    float *out;             /* [n_rhs][C][n_values]: inside `answer` if its encoding allows, else own */
+    float *out;             /* [n_rhs][C][n_computed]: inside `answer` if its encoding allows, else own */
     float *own;             /* or NULL */
+    float *means;           /* [n_rhs][C][n_values] of faces, a part of `answer` or allocated; else NULL */
+    bool means_placed;      /* they are inside `answer` */
     answer_stream *stream;  /* of these, until the answer has it */
     bool streams;           /* the values are encoded while the answer is sent */
     float *H0;              /* [n_rhs][C][n], direct irradiance of the sky; NULL if no vector has a sky */
@@ -44,6 +47,7 @@ static void solve_free(radiosity_solve *s) {
     linear_figures_free(s->linear);
     limited_free(&s->limit);
     free(s->own);
+    if (!s->means_placed) free(s->means);
     free(s->figures);
     free(s->H0);
     free(s->W);
@@ -93,7 +97,7 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
         if (!request_memory_take(in->memory, figures_bytes(&s->request, s->shape.n_channels), why))
             return false;
         s->figures = reduce_figures(reduce, s->shape.n_rhs, s->shape.n_channels);
-        s->out = s->own = allocate_rows(in, s, s->shape.n_values, "values to reduce", why);
+        s->out = s->own = allocate_rows(in, s, s->n_computed, "values to reduce", why);
         return s->own != NULL &&
                (s->figures != NULL || problem_set(why, PROBLEM_NO_MEMORY,
                                                   "not enough memory to reduce %zu vectors", s->shape.n_rhs));
@@ -105,9 +109,30 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
                           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer"))))
         return false;
     if (!answer_begin(&s->answer, &s->shape, &in->accept, &s->notes, why)) return false;
-    s->out = placed ? answer_place(&s->answer, &s->shape, &in->accept) : NULL;
-    if (s->out == NULL) s->out = s->own = allocate_rows(in, s, s->shape.n_values, "values", why);
-    return s->out != NULL;
+    float *values = placed ? answer_place(&s->answer, &s->shape, &in->accept) : NULL;
+    const bool inside = values != NULL;
+    if (!inside) values = allocate_rows(in, s, s->shape.n_values, "values", why);
+    if (values == NULL) return false;
+    if (!s->request.at_faces) {
+        s->out = values;
+        s->own = inside ? NULL : values;
+        return true;
+    }
+    s->means = values;
+    s->means_placed = inside;
+    s->out = s->own = allocate_rows(in, s, s->n_computed, "the elements of faces", why);
+    return s->own != NULL;
+}
+
+/* Puts the means of faces in the place of the values of elements. */
+static void take_means(const call *in, radiosity_solve *s) {
+    const face_index *faces = &in->scene->faces;
+    const face_choice chosen = radiosity_request_faces(&s->request, faces);
+    if (s->means == NULL) return;
+    face_means_floats(faces, &chosen, s->shape.n_rhs * s->shape.n_channels, s->out, s->means);
+    free(s->own);
+    s->own = s->means_placed ? NULL : s->means;
+    s->means = NULL;
 }
 
 /* Takes room for the lists of a text, which are freed before it returns, and reads it. */
@@ -119,8 +144,10 @@ static bool read_body(const call *in, radiosity_request *request, problem *why) 
                           ? codec_read_npy(&about, in->body, in->length, request, why)
                           : codec_read_json(&about, in->body, in->length, request, why);
     request_memory_give_back(in->memory, lists);
-    return good && (!request->select ||
-                    request_memory_take(in->memory, request->n_selected * sizeof *request->selected, why));
+    return good && (!request->select || request_memory_take(in->memory,
+                                                            request->n_selected * sizeof *request->selected +
+                                                                request->n_faces * sizeof *request->faces,
+                                                            why));
 }
 
 /* The vectors that passes compute. Figures take one pass more, or several: each a step of their text. */
@@ -149,12 +176,15 @@ static bool begin(call *in, answer *out) {
     s->notes = call_notes(in);
     s->notes.quantity = request->quantity;
     s->notes.by_luminance = request->by_luminance;
+    s->notes.at_faces = request->at_faces;
     s->notes.parse_ms = clock_ms() - start;
     s->shape = (answer_shape){.n = of->n,
                               .n_channels = of->n_channels,
                               .n_rhs = request->n_rhs,
                               .batch = request->batch,
-                              .n_values = request->select ? request->n_selected : of->n};
+                              .n_values = radiosity_request_values(request, of->n, &of->faces),
+                              .at_faces = request->at_faces};
+    s->n_computed = request->select ? request->n_selected : of->n;
     in->n_rhs = request->n_rhs;
     if (good) scene_note_error(of, request, &s->notes);
     good = good && figures_acceptable(in, request, &why);
@@ -235,7 +265,7 @@ static void pass_figures(call *in, radiosity_solve *s, size_t computed, batch_wo
 }
 
 static bool add_figures(const scene *of, radiosity_solve *s, const batch_part *part) {
-    const float *x = s->own + part->first * of->n_channels * s->shape.n_values;
+    const float *x = s->own + part->first * of->n_channels * s->n_computed;
     return s->figures == NULL ||
            figures_add(of, &s->request, part->first, part->count, x, s->figures, &s->why);
 }
@@ -273,7 +303,7 @@ static void pass_vectors(const batch_part *parts, size_t n_parts, batch_workspac
                                .quantity = solve->request.quantity,
                                .E = solve->request.E + before,
                                .H0 = solve->H0 != NULL ? solve->H0 + before : NULL,
-                               .out = solve->out + parts[p].first * s->n_channels * solve->shape.n_values};
+                               .out = solve->out + parts[p].first * s->n_channels * solve->n_computed};
         count += parts[p].count;
     }
     void *work = get_work(s, count, workspace, &bytes, &why);
@@ -344,6 +374,7 @@ static bool write_answer(call *in, radiosity_solve *s) {
     if (s->request.reduce.on) return good;
     if (s->refined != NULL) return good && refined_end(s->refined, &s->notes, &s->answer, &s->why);
     if (good && in->accept.type == MEDIA_JSON) good = judge(in, s);
+    if (good) take_means(in, s);
     if (s->streams) return good && make_stream(in, s);
     good = good && (s->own == NULL
                         ? answer_placed(&s->answer, &s->shape, &s->why)

@@ -22,6 +22,7 @@ typedef struct pass_memory {
     double *E, *H0, *out; /* [BATCH_PASS][C][n] */
     double *L;            /* [BATCH_PASS][C][m] */
     double *some;         /* [BATCH_PASS][C][selected] */
+    double *means;        /* [C][n_values], of faces, of one vector */
     float *start; /* [BATCH_PASS][C][n], of a store of emitters: its own answer, the start of the iteration */
     float *W;     /* [BATCH_PASS][C][s], weights of emitters */
     void *work;
@@ -44,6 +45,7 @@ static void pass_memory_free(pass_memory *p) {
     free(p->out);
     free(p->L);
     free(p->some);
+    free(p->means);
     free(p->start);
     free(p->W);
     free(p->work);
@@ -58,9 +60,11 @@ static size_t pass_memory_bytes(const scene *s, const radiosity_request *request
     const bool few = s->n_emitters > 0, sky = request->sky.values != NULL;
     const size_t doubles = (size_t)(REFINING_VECTORS + 2 + (few || sky)) * s->n +
                            (sky ? lam_sky_tiles(s->sky) : 0) + (request->select ? request->n_selected : 0);
+    const size_t means = request->at_faces ? radiosity_request_values(request, s->n, &s->faces) : 0;
     const size_t floats = few ? s->n + s->n_emitters : 0;
     return bytes_plus(bytes_times(rows, doubles * sizeof(double) + floats * sizeof(float)),
-                      few ? lam_operator_work_bytes(s->op, rows / s->n_channels) : 0);
+                      bytes_plus(bytes_times(s->n_channels, means * sizeof(double)),
+                                 few ? lam_operator_work_bytes(s->op, rows / s->n_channels) : 0));
 }
 
 static bool pass_memory_allocate(const scene *s, const radiosity_request *request, pass_memory *p,
@@ -82,6 +86,11 @@ static bool pass_memory_allocate(const scene *s, const radiosity_request *reques
     if (request->select) {
         p->some = memory_allocate(rows, request->n_selected * sizeof *p->some, "B", NULL);
         good = good && p->some != NULL;
+    }
+    if (request->at_faces) {
+        const size_t n_values = radiosity_request_values(request, s->n, &s->faces);
+        p->means = memory_allocate(s->n_channels, n_values * sizeof *p->means, "B", NULL);
+        good = good && p->means != NULL;
     }
     if (few) {
         p->work_bytes = lam_operator_work_bytes(s->op, vectors);
@@ -183,7 +192,8 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
                               .n_channels = s->n_channels,
                               .n_rhs = request->n_rhs,
                               .batch = request->batch,
-                              .n_values = request->select ? request->n_selected : s->n};
+                              .n_values = radiosity_request_values(request, s->n, &s->faces),
+                              .at_faces = request->at_faces};
     *out = r;
     /* The memory of the pass is included, as what waits for memory must not have begun. */
     const size_t of_pass = pass_memory_bytes(s, request, vectors_of_pass(request) * s->n_channels);
@@ -214,11 +224,20 @@ static bool find_refiner(const scene *s, const lam_refiner **refiner, problem *w
     return false;
 }
 
+/* The means of faces of the values of a vector. */
+static const double *means_of(const scene *s, const radiosity_request *request, const double *values,
+                              pass_memory *p, double *rounding) {
+    const face_choice chosen = radiosity_request_faces(request, &s->faces);
+    face_means_doubles(&s->faces, &chosen, s->n_channels, values, p->means, rounding);
+    return p->means;
+}
+
 bool refined_pass(call *in, const radiosity_request *request, size_t first, size_t count, refined_solve *r,
                   answer_notes *notes, buffer *b, problem *why) {
     const scene *s = in->scene;
     const lam_refiner *refiner = NULL;
     const double begin = clock_ms();
+    const size_t width = request->select ? request->n_selected : s->n;
     bool good = find_refiner(s, &refiner, why);
     if (good && !r->made) {
         r->made = true;
@@ -236,11 +255,12 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
                               count, (reduce_values){.doubles = x}, r->figures) ||
                problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
     for (size_t v = 0; good && r->figures == NULL && v < count; v++) {
-        /* One by one: each vector has its own rounding error, which counts in its certificate. */
-        double rounding = 0;
-        good = answer_add_doubles(b, &r->shape, &r->as, first + v, 1,
-                                  x + v * s->n_channels * r->shape.n_values, &rounding, why);
-        r->certificates[first + v] += rounding;
+        /* One by one: each vector has its own rounding errors, which count in its certificate. */
+        double rounding = 0, of_means = 0;
+        const double *values = x + v * s->n_channels * width;
+        if (request->at_faces) values = means_of(s, request, values, &r->p, &of_means);
+        good = answer_add_doubles(b, &r->shape, &r->as, first + v, 1, values, &rounding, why);
+        r->certificates[first + v] += rounding + of_means;
     }
     notes->encode_ms += clock_ms() - solved;
     if (good) metrics_pass(in->service->metrics, count);

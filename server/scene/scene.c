@@ -152,6 +152,19 @@ done:
     return status;
 }
 
+/* Once areas are read. */
+static lam_status read_faces(store *s, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    scene_faces faces = {.n_faces = 0};
+    size_t n_backs = 0;
+    bool two_sided;
+    TRY(scene_backs_load(s, made->n, &n_backs, &two_sided, error));
+    TRY(scene_faces_load(s, made->n, made->n - n_backs, &faces, error));
+    TRY(face_index_make(made->n, made->n - n_backs, made->area, &faces, &made->faces, error));
+done:
+    return status;
+}
+
 static lam_status read_area(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     void *area = NULL;
@@ -182,23 +195,31 @@ static lam_status bytes_below(store *s, const char *group, uint64_t *bytes, lam_
     return store_has(s, group) ? store_group_bytes(s, group, bytes, error) : LAM_OK;
 }
 
-/* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, an index of these. */
+/* Parts of faces in elements of several. */
+static uint64_t face_parts(const store *s) {
+    return store_array_bytes(s, STORE_MESH "/face_part_area") / sizeof(double);
+}
+
+/* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, an index of these, and
+ * one of faces. */
 static uint64_t mesh_memory(const store *s) {
+    const uint64_t n = store_array_bytes(s, STORE_MESH "/face") / sizeof(uint32_t),
+                   n_faces = store_array_bytes(s, STORE_MESH "/face_area") / sizeof(double);
     const uint64_t names = store_texts_memory(s, STORE_MESH "/group_names");
     return store_array_bytes(s, STORE_MESH "/area") + store_array_bytes(s, STORE_MESH "/reflectance") +
-           store_array_bytes(s, STORE_MESH "/group") + names +
+           store_array_bytes(s, STORE_MESH "/group") + face_index_bytes(n, n_faces, face_parts(s)) + names +
            names / (sizeof(char *) + 1) * 2 * sizeof(uint32_t);
 }
 
 /* The bytes that are read beside that and freed again before the scene is open: of groups by element, the
- * names as they are stored, receivers and sources. */
+ * names as they are stored, parts of faces, receivers and sources. */
 static lam_status passing_memory(store *s, uint64_t *memory, lam_error *error) {
     lam_status status = LAM_OK;
     uint64_t receivers, sources;
     TRY(bytes_below(s, STORE_IMPORTANCE, &receivers, error));
     TRY(bytes_below(s, STORE_SOURCES, &sources, error));
     *memory = store_array_bytes(s, STORE_MESH "/group") + store_texts_memory(s, STORE_MESH "/group_names") +
-              receivers + sources;
+              16 * face_parts(s) + receivers + sources;
 done:
     return status;
 }
@@ -268,6 +289,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
+    TRY(read_faces(s, made, error));
     made->limiter =
         limiter_of(made->n, made->groups.n_groups, made->groups.start, made->groups.elements, made->area);
     made->work_bytes = pass_work_bytes(made);
@@ -341,6 +363,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->op = op;
     made->reflectance = op->reflectance;
     made->groups = base->groups;
+    made->faces = base->faces;
     made->area = base->area;
     made->limiter = base->limiter;
     made->sky = base->sky;
@@ -392,6 +415,7 @@ void scene_release(scene *s) {
         weather_file_free(&s->weather);
         group_index_free(&s->groups);
         group_index_free(&s->emitters);
+        face_index_free(&s->faces);
         free(s->area);
         stated_errors_free(&s->errors);
         free(s->group_read);

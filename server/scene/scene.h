@@ -36,6 +36,7 @@ struct scene {
     const float *reflectance; /* [C][n], of op */
     group_index groups;
     group_index emitters;  /* by name */
+    face_index faces;      /* of the scene file; empty: the store does not know them */
     double *area;          /* [n], m^2 */
     lam_limiter limiter;   /* of answers below zero; it borrows groups and areas */
     lam_sky *sky;          /* NULL: none */

@@ -16,8 +16,8 @@ static bool no_memory(problem *why) {
 
 bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes) {
     return buffer_append_text(b, "{\"scene\":") && json_write_text(b, notes->scene) &&
-           buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\"", n, n_channels,
-                         codec_quantity_name(notes->quantity));
+           buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\"%s", n, n_channels,
+                         codec_quantity_name(notes->quantity), notes->at_faces ? ",\"at\":\"faces\"" : "");
 }
 
 /* The light that the figures are of, and those of each name that is reduced. */
@@ -90,18 +90,21 @@ static bool refuse_range(double limit, problem *why) {
                        "the answer passes the range of single precision (3.4e38); scale the emission");
 }
 
-static bool check_range(const float *x, size_t count, float limit, problem *why) {
-    int bad = 0;
-    for (size_t i = 0; i < count; i++) bad |= !(fabsf(x[i]) <= limit);
-    return !bad || refuse_range((double)limit, why);
+static bool check_range(const float *x, size_t count, bool gaps, float limit, problem *why) {
+    int bad = 0, missing = 0;
+    for (size_t i = 0; i < count; i++) {
+        bad |= fabsf(x[i]) > limit;
+        missing |= isnan(x[i]);
+    }
+    return (!bad && (gaps || !missing)) || refuse_range((double)limit, why);
 }
 
-bool answer_check_as(const float *x, size_t count, const media_accept *as, problem *why) {
-    return check_range(x, count, as->type == MEDIA_NPY && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why);
+bool answer_check_as(const float *x, size_t count, bool gaps, const media_accept *as, problem *why) {
+    return check_range(x, count, gaps, as->type == MEDIA_NPY && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why);
 }
 
 bool answer_check(const float *x, size_t count, problem *why) {
-    return check_range(x, count, FLT_MAX, why);
+    return check_range(x, count, false, FLT_MAX, why);
 }
 
 static bool add_row(buffer *b, const media_accept *as, const float *row, size_t n) {
@@ -109,10 +112,10 @@ static bool add_row(buffer *b, const media_accept *as, const float *row, size_t 
     return json_write_floats(b, row, n);
 }
 
-bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,
+bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, bool gaps, const float *x,
                  problem *why) {
     const bool json = as->type == MEDIA_JSON, deep = json && n_channels > 1;
-    if (!answer_check_as(x, n_channels * n, as, why)) return false;
+    if (!answer_check_as(x, n_channels * n, gaps, as, why)) return false;
     bool written = !deep || buffer_append(b, "[", 1);
     for (size_t c = 0; written && c < n_channels; c++)
         written = (!json || c == 0 || buffer_append(b, ",", 1)) && add_row(b, as, x + c * n, n);
@@ -124,7 +127,7 @@ bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, si
     const size_t C = shape->n_channels, n = shape->n_values;
     for (size_t r = 0; r < count; r++) {
         if (as->type == MEDIA_JSON && first + r > 0 && !buffer_append(b, ",", 1)) return no_memory(why);
-        if (!answer_rows(b, as, C, n, x + r * C * n, why)) return false;
+        if (!answer_rows(b, as, C, n, shape->at_faces, x + r * C * n, why)) return false;
     }
     return true;
 }
@@ -147,7 +150,8 @@ float *answer_place(buffer *b, const answer_shape *shape, const media_accept *as
 
 bool answer_placed(buffer *b, const answer_shape *shape, problem *why) {
     const size_t count = count_values(shape);
-    if (!check_range((const float *)(const void *)(b->bytes + b->length), count, FLT_MAX, why)) return false;
+    const float *x = (const float *)(const void *)(b->bytes + b->length);
+    if (!check_range(x, count, shape->at_faces, FLT_MAX, why)) return false;
     b->length += count * sizeof(float);
     b->bytes[b->length] = '\0';
     return true;
@@ -171,7 +175,7 @@ bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept
                          : as->npy == NPY_F4       ? (double)FLT_MAX
                                                    : (double)HALF_MAX;
     for (size_t i = 0; i < count * C * n; i++)
-        if (!(fabs(x[i]) <= limit)) return refuse_range(limit, why);
+        if (!(fabs(x[i]) <= limit) && !(shape->at_faces && isnan(x[i]))) return refuse_range(limit, why);
     for (size_t row = 0; row < count * C; row++) {
         const double *values = x + row * n;
         const bool written = json ? before_row(b, shape, first + row / C, row % C) &&

@@ -13,7 +13,8 @@ typedef struct answer_shape {
     size_t n_channels;
     size_t n_rhs;
     bool batch;
-    size_t n_values; /* elements that the answer is about: n, or those selected */
+    size_t n_values; /* numbers of a vector in a channel: of all elements or faces, or of those selected */
+    bool at_faces;   /* NaN stands for a face without an element: null in JSON */
 } answer_shape;
 
 /* The members of a JSON answer beside its vectors. */
@@ -32,6 +33,7 @@ typedef struct answer_notes {
                              for receivers; NULL: it was built for all */
     const char *error_from; /* "sources" where a store was built for these and they alone emit; "others": not
                                they alone, and no error is stated; NULL: it was built for any emission */
+    bool at_faces;          /* numbers are of faces of the scene file */
     bool by_luminance;      /* a coloured sky lights a store of one channel by its luminance */
     bool has_time;
     double parse_ms, solve_ms, encode_ms;
@@ -53,11 +55,11 @@ bool answer_tail(buffer *b, const answer_notes *notes);
 
 /* Checks that an answer is within single precision; 422. */
 bool answer_check(const float *x, size_t count, problem *why);
-/* The same within the range of an encoding. */
-bool answer_check_as(const float *x, size_t count, const media_accept *as, problem *why);
+/* The same within the range of an encoding; with gaps NaN may stand for a number. */
+bool answer_check_as(const float *x, size_t count, bool gaps, const media_accept *as, problem *why);
 
 /* Appends x [C][n], or [n] for one channel. False with *why as the next. */
-bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,
+bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, bool gaps, const float *x,
                  problem *why);
 
 /* Appends the beginning of an answer, then vectors first ... first + count of x [count][C][n_values], then

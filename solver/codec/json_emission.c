@@ -67,43 +67,51 @@ static bool read_colour(parser *p, float *colour) {
     return true;
 }
 
-/* Checks an index that was just read: an element of the scene, and with once none that was listed before. */
-static bool check_element(parser *p, double index, size_t count, bool once) {
-    const size_t n = p->scene->n;
+/* The words of messages. */
+static const struct index_words {
+    const char *one, *many, *index, *list;
+} index_words[] = {
+    [INDEX_ELEMENTS] = {"an element", "elements", "an element index", "an array of element indices"},
+    [INDEX_FACES] = {"a face", "faces", "the number of a face", "an array of numbers of faces"},
+};
+
+/* Checks an index that was just read, and with once that it was not listed before. */
+static bool check_index(parser *p, index_kind kind, double index, size_t count, bool once) {
+    const size_t n = kind == INDEX_FACES ? p->scene->faces->n_faces : p->scene->n;
     if (!(index >= 0.0 && index < (double)n && index == floor(index))) {
         int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
         return parser_refuse(p, PROBLEM_BAD_INDEX, "%s = %.*s, must be an integer from 0 to %zu",
                              parser_here(p), length, p->r.number.bytes, n - 1);
     }
     if (count == n)
-        return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s: more than the %zu elements of the scene",
-                             parser_here(p), n);
+        return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s: more than the %zu %ss of the scene",
+                             parser_here(p), n, index_words[kind].many);
     if (!once) return true;
     switch (index_set_add(&p->seen, (uint32_t)index)) {
     case INDEX_SET_ADDED:
         return true;
     case INDEX_SET_KNOWN:
-        return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s = %.0f, an element that was listed before",
-                             parser_here(p), index);
+        return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s = %.0f, %s that was listed before", parser_here(p),
+                             index, index_words[kind].one);
     case INDEX_SET_NO_MEMORY:
         break;
     }
     return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a list of indices");
 }
 
-bool parser_read_elements(parser *p, index_list *elements, bool once) {
+bool parser_read_indices(parser *p, index_kind kind, bool once, index_list *indices) {
     const size_t mark = p->pointer_length;
-    elements->count = 0;
+    indices->count = 0;
     if (once) index_set_clear(&p->seen);
-    if (!parser_expect(p, JSON_ARRAY, "an array of element indices")) return false;
+    if (!parser_expect(p, JSON_ARRAY, index_words[kind].list)) return false;
     if (!json_enter_array(&p->r)) return parser_fault(p);
     while (json_next_element(&p->r)) {
         double index;
-        parser_point_index(p, elements->count);
-        if (!parser_expect(p, JSON_NUMBER, "an element index")) return false;
+        parser_point_index(p, indices->count);
+        if (!parser_expect(p, JSON_NUMBER, index_words[kind].index)) return false;
         if (!json_read_double(&p->r, &index)) return parser_fault(p);
-        if (!check_element(p, index, elements->count, once)) return false;
-        if (!parser_append(p, elements, &(uint32_t){(uint32_t)index}, 1)) return false;
+        if (!check_index(p, kind, index, indices->count, once)) return false;
+        if (!parser_append(p, indices, &(uint32_t){(uint32_t)index}, 1)) return false;
         p->pointer_length = mark;
     }
     return parser_closed(p);
@@ -308,7 +316,7 @@ static bool read_emission_object(parser *p) {
                                  parser_here(p));
         switch (which) {
         case ELEMENTS:
-            good = parser_read_elements(p, &p->elements, true);
+            good = parser_read_indices(p, INDEX_ELEMENTS, true, &p->elements);
             break;
         case VALUES:
             good = read_values(p, &n_values);

@@ -224,6 +224,8 @@ bool parser_end(parser *p, bool good) {
         json_end(&p->r);
     }
     free(p->elements.values);
+    free(p->groups.values);
+    free(p->faces.values);
     free(p->values);
     free(p->colour);
     index_set_free(&p->seen);

@@ -30,6 +30,10 @@ typedef struct index_list {
     size_t count, capacity;
 } index_list;
 
+/* The word of `at`, and the member of `select`. */
+typedef enum place_word { AT_UNSAID, AT_ELEMENTS, AT_FACES } place_word;
+typedef enum select_word { SELECT_ELEMENTS, SELECT_GROUPS, SELECT_FACES, SELECT_WORDS } select_word;
+
 typedef struct parser {
     json_reader r;
     const codec_scene *scene;
@@ -43,7 +47,10 @@ typedef struct parser {
     float *values; /* [values_capacity][C] */
     size_t values_capacity;
     float *colour;  /* [C] */
-    index_set seen; /* elements, or groups */
+    index_set seen; /* elements, groups or faces */
+    place_word at;
+    select_word selects;      /* with select */
+    index_list groups, faces; /* that are selected */
 } parser;
 
 /* Begins to read a text into request. parser_end frees the parser and returns good; when a text is refused,
@@ -94,8 +101,9 @@ bool parser_find_in(parser *p, const group_index *index, const json_slice *name,
 bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups);
 bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups);
 
-/* [...] of element indices, each below n, at most n of them; those of an emission only once each. */
-bool parser_read_elements(parser *p, index_list *elements, bool once);
+/* [...] of indices of the scene, no more than it has elements, or faces; with once each only once. */
+typedef enum index_kind { INDEX_ELEMENTS, INDEX_FACES } index_kind;
+bool parser_read_indices(parser *p, index_kind kind, bool once, index_list *indices);
 
 /* The value of `quantity`. */
 bool parser_read_quantity(parser *p, lam_quantity *quantity);

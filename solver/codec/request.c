@@ -16,8 +16,19 @@ void radiosity_request_free(radiosity_request *request) {
     free(request->sky.values);
     free(request->emitters.values);
     free(request->selected);
+    free(request->faces);
     reduce_request_free(&request->reduce);
     *request = (radiosity_request){0};
+}
+
+face_choice radiosity_request_faces(const radiosity_request *request, const face_index *faces) {
+    return (face_choice){request->select ? request->n_faces : faces->n_faces,
+                         request->select ? request->faces : NULL};
+}
+
+size_t radiosity_request_values(const radiosity_request *request, size_t n, const face_index *faces) {
+    if (request->at_faces) return radiosity_request_faces(request, faces).n;
+    return request->select ? request->n_selected : n;
 }
 
 bool radiosity_request_add(radiosity_request *request, const codec_scene *scene, problem *why) {

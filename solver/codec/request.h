@@ -4,6 +4,7 @@
 #define LAMBERT_CODEC_REQUEST_H
 
 #include "lambert/lambert.h"
+#include "solver/codec/face_means.h"
 #include "solver/codec/group_figures.h"
 #include "solver/codec/groups.h"
 #include "solver/codec/problem.h"
@@ -13,6 +14,7 @@ typedef struct codec_scene {
     size_t n;
     size_t n_channels;
     const group_index *groups;
+    const face_index *faces;     /* of the scene file; NULL or empty: they are not known */
     size_t n_tiles;              /* of the sky; 0: none */
     size_t n_emitters;           /* 0: none */
     const group_index *emitters; /* these by name; NULL: they have none */
@@ -61,6 +63,9 @@ typedef struct radiosity_request {
     bool select; /* only these elements, in this order */
     uint32_t *selected;
     size_t n_selected;
+    bool at_faces;   /* the answer is of faces, with select of some, of which `selected` has the elements */
+    uint32_t *faces; /* [n_faces], these; NULL: all */
+    size_t n_faces;
     lam_quantity quantity;
     bool linear_map;  /* "limit": false: light below zero stays */
     double tolerance; /* of a refined answer, above 0 and below 1; 0: none is asked for */
@@ -121,6 +126,10 @@ bool radiosity_request_emitters(radiosity_request *request, const codec_scene *s
 /* The luminance of a colour by which a store of one channel takes coloured skies, Radiance's: .265 R + .670 G
  * + .065 B. */
 float codec_luminance(const float rgb[3]);
+
+/* The faces of an answer of faces, and the numbers of an answer to one vector in one channel. */
+face_choice radiosity_request_faces(const radiosity_request *request, const face_index *faces);
+size_t radiosity_request_values(const radiosity_request *request, size_t n, const face_index *faces);
 
 /* The contract's word for a quantity, and the quantity of a word: false for any other word. */
 const char *codec_quantity_name(lam_quantity quantity);

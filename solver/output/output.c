@@ -64,6 +64,31 @@ done:
     return status;
 }
 
+lam_status reductions_elements(const mesh *m, const reduction *reductions, size_t n_reductions,
+                               size_t *n_selected, uint32_t **selected, lam_error *error) {
+    lam_status status = LAM_OK;
+    bool *inside = NULL;
+    uint32_t *made = NULL;
+    *selected = NULL;
+    *n_selected = 0;
+    if (n_reductions == 0) return LAM_OK;
+    inside = memory_allocate(m->n_groups, sizeof *inside, "the elements wanted", error);
+    made = memory_allocate(m->n, sizeof *made, "the elements wanted", error);
+    if (inside == NULL || made == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t r = 0; r < n_reductions; r++) {
+        const reduce_name *name = &reductions[r].request.names[0];
+        for (size_t g = 0; g < name->n_groups; g++) inside[name->groups[g]] = true;
+    }
+    for (size_t i = 0; i < m->n; i++)
+        if (inside[m->group[i]]) made[(*n_selected)++] = (uint32_t)i;
+    *selected = made;
+    made = NULL;
+done:
+    free(inside);
+    free(made);
+    return status;
+}
+
 lam_status reductions_fill(solution *s, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t C = s->m->n_channels;
@@ -92,6 +117,14 @@ void output_column(const solution *s, size_t vector, size_t channel, char name[O
         snprintf(name + length, OUTPUT_COLUMN - (size_t)length, "_c%zu", channel);
 }
 
+const char *output_face_group(const solution *s, size_t face, double *area) {
+    const face_index *f = s->faces;
+    *area = 0;
+    for (uint32_t e = f->start[face]; e < f->start[face + 1]; e++) *area += f->area[e];
+    if (f->start[face] == f->start[face + 1]) return NULL;
+    return s->m->group_names[s->m->group[f->element[f->start[face]]]];
+}
+
 lam_status output_array(FILE *stream, size_t rank, const size_t *shape, const float *floats,
                         const double *doubles, lam_error *error) {
     enum { BLOCK = 1 << 16 };
@@ -115,7 +148,7 @@ static lam_status output_npy(const solution *s, FILE *stream, lam_error *error) 
     size_t shape[4], rank = 0;
     if (s->batch) shape[rank++] = s->n_vectors;
     if (s->m->n_channels > 1) shape[rank++] = s->m->n_channels;
-    shape[rank++] = s->m->n;
+    shape[rank++] = output_width(s);
     if (s->corners != NULL) shape[rank++] = 4;
     return output_array(stream, rank, shape, s->corners != NULL ? s->corners : s->values, s->refined, error);
 }
@@ -124,11 +157,11 @@ static lam_status output_npy(const solution *s, FILE *stream, lam_error *error) 
 static const struct {
     const char *extension;
     lam_status (*write)(const solution *s, FILE *stream, lam_error *error);
-    bool takes[OUTPUT_CONTENTS]; /* elements, groups, corners */
+    bool takes[OUTPUT_CONTENTS]; /* elements, groups, corners, faces */
 } formats[] = {
-    {"npy", output_npy, {true, false, true}}, {"json", output_json, {true, true, false}},
-    {"csv", output_csv, {true, true, false}}, {"ply", output_ply, {true, false, true}},
-    {"vtu", output_vtu, {true, false, true}}, {"glb", output_glb, {true, false, true}},
+    {"npy", output_npy, {true, false, true, true}},  {"json", output_json, {true, true, false, true}},
+    {"csv", output_csv, {true, true, false, true}},  {"ply", output_ply, {true, false, true, false}},
+    {"vtu", output_vtu, {true, false, true, false}}, {"glb", output_glb, {true, false, true, false}},
 };
 #define N_FORMATS (sizeof formats / sizeof *formats)
 
@@ -155,7 +188,8 @@ static size_t find_format(const char *path) {
 }
 
 lam_status output_check(const char *path, output_content content, lam_error *error) {
-    static const char *const options[OUTPUT_CONTENTS] = {"values of elements", "--reduce", "--smooth"};
+    static const char *const options[OUTPUT_CONTENTS] = {"values of elements", "--reduce", "--smooth",
+                                                         "--at faces"};
     lam_status status = LAM_OK;
     const size_t format = find_format(path);
     char text[OUTPUT_FORMATS];
@@ -171,7 +205,9 @@ lam_status output_write(const solution *s, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
     atomic_file file = {0};
     problem why;
-    if (s->values != NULL && !answer_check(s->values, s->n_vectors * s->m->n_channels * s->m->n, &why))
+    const media_accept as = {.type = MEDIA_JSON};
+    const size_t count = s->n_vectors * s->m->n_channels * output_width(s);
+    if (s->values != NULL && !answer_check_as(s->values, count, s->faces != NULL, &as, &why))
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: %s", path, why.detail);
     TRY(atomic_file_open(path, &file, error));
     TRY(formats[find_format(path)].write(s, file.stream, error));

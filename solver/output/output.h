@@ -5,6 +5,7 @@
 
 #include "lambert/lambert.h"
 #include "solver/codec/answer_error.h"
+#include "solver/codec/face_means.h"
 #include "solver/codec/group_figures.h"
 #include "solver/codec/headline.h"
 #include "solver/scene/mesh.h"
@@ -24,6 +25,11 @@ lam_status reductions_add(reduction *reductions, size_t *n, const char *item, la
 /* Finds the groups of each. LAM_ERR_ARGUMENT for a name that the scene does not have. */
 lam_status reductions_bind(reduction *reductions, size_t n, const group_index *groups, lam_error *error);
 
+/* The elements of the groups that are reduced, *selected freed with free(); NULL where there is no reduction.
+ * LAM_ERR_MEMORY. */
+lam_status reductions_elements(const mesh *m, const reduction *reductions, size_t n, size_t *n_selected,
+                               uint32_t **selected, lam_error *error);
+
 void reductions_free(reduction *reductions, size_t n);
 
 /* An answer of the solver and its question. */
@@ -40,7 +46,9 @@ typedef struct solution {
     const double *refined;    /* [n_vectors][C][n], and, of each vector, [n_vectors]: */
     const double *certificates;
     const size_t *iterations;
-    const size_t *limited; /* of answer_notes; or NULL */
+    const face_index *faces; /* where values are of faces: [n_vectors][C][n_faces], NaN of a face without an
+                                element; NULL: of elements */
+    const size_t *limited;   /* of answer_notes; or NULL */
     reduction *reductions;
     size_t n_reductions;               /* 0: the values themselves are written */
     double relative, indirect;         /* mean error that is stated; negative: none is */
@@ -56,11 +64,12 @@ typedef struct solution {
 /* Computes the figures of every reduction. LAM_ERR_MEMORY. */
 lam_status reductions_fill(solution *s, lam_error *error);
 
-/* A file holds values of elements, figures of groups in place of them, or values of corners. */
+/* A file holds values of elements, figures of groups in place of them, values of corners, or of faces. */
 typedef enum output_content {
     OUTPUT_ELEMENTS,
     OUTPUT_GROUPS,
     OUTPUT_CORNERS,
+    OUTPUT_FACES,
     OUTPUT_CONTENTS
 } output_content;
 
@@ -83,6 +92,11 @@ lam_status output_array(FILE *stream, size_t rank, const size_t *shape, const fl
 #define OUTPUT_COLUMN 64
 void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]);
 
+/* Numbers of a vector in a channel. */
+static inline size_t output_width(const solution *s) {
+    return s->faces != NULL ? s->faces->n_faces : s->m->n;
+}
+
 /* A value in double, and the digits that distinguish it from all others of its precision. */
 static inline double output_value(const solution *s, size_t index) {
     return s->values != NULL ? (double)s->values[index] : s->refined[index];
@@ -97,11 +111,15 @@ static inline double output_figure(const solution *s, const reduction *r, size_t
     return *reduce_figure(&r->request, 0, k, s->n_vectors, column / C, C, column % C, r->figures);
 }
 
-/* Writes on standard output: the reductions, or the mean of every group. */
+/* The group of a face of the scene file, or NULL where it has no element; and the area of its elements, m^2.
+ */
+const char *output_face_group(const solution *s, size_t face, double *area);
+
+/* Writes on standard output: the reductions, the values of faces, or the mean of every group. */
 void output_print(const solution *s);
 
-/* Writes the same as JSON on standard output. Errors: LAM_ERR_MEMORY; LAM_ERR_ARGUMENT for a value that is
- * too large for a float. */
+/* Writes the same as JSON on standard output, those of faces as output_json. Errors: LAM_ERR_MEMORY;
+ * LAM_ERR_ARGUMENT for a value that is too large for a float. */
 lam_status output_print_json(const solution *s, lam_error *error);
 
 /* The formats; a failed write is seen by ferror(stream). */

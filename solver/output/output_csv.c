@@ -29,6 +29,27 @@ static void elements(const solution *s, FILE *stream) {
     }
 }
 
+/* A value that is missing, of a face without an element, is empty. */
+static void faces(const solution *s, FILE *stream) {
+    const size_t n = output_width(s);
+    header(s, "face,group,area", stream);
+    for (size_t f = 0; f < n; f++) {
+        double area;
+        const char *group = output_face_group(s, f, &area);
+        fprintf(stream, "%zu,", f);
+        if (group != NULL) csv_text(group, stream);
+        fprintf(stream, ",%.9g", area);
+        for (size_t k = 0; k < s->n_vectors * s->m->n_channels; k++) {
+            const double value = output_value(s, k * n + f);
+            if (isnan(value))
+                fputc(',', stream);
+            else
+                fprintf(stream, ",%.*g", output_digits(s), value);
+        }
+        fputs("\n", stream);
+    }
+}
+
 static void figures(const solution *s, FILE *stream) {
     const mesh *m = s->m;
     header(s, "group,statistic", stream);
@@ -53,6 +74,8 @@ lam_status output_csv(const solution *s, FILE *stream, lam_error *error) {
     (void)error;
     if (s->n_reductions > 0)
         figures(s, stream);
+    else if (s->faces != NULL)
+        faces(s, stream);
     else
         elements(s, stream);
     return LAM_OK;

@@ -11,13 +11,13 @@ static void flush(buffer *b, FILE *stream) {
 
 /* "sum":ROWS of every figure of a year. */
 static bool write_year(const solution *s, buffer *b, FILE *stream, problem *why) {
-    const size_t C = s->m->n_channels, n = s->m->n;
+    const size_t C = s->m->n_channels, n = output_width(s);
     const media_accept as = {.type = MEDIA_JSON};
     for (size_t v = 0; v < s->n_vectors; v++) {
         const bool written = (v == 0 || buffer_append(b, ",", 1)) && json_write_text(b, s->names[v]) &&
                              buffer_append(b, ":", 1);
         if (!written) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
-        if (!answer_rows(b, &as, C, n, s->values + v * C * n, why)) return false;
+        if (!answer_rows(b, &as, C, n, s->faces != NULL, s->values + v * C * n, why)) return false;
         flush(b, stream);
     }
     return true;
@@ -98,7 +98,7 @@ static bool write_year_means(const solution *s, buffer *b) {
 
 static bool write_vectors(const solution *s, const answer_shape *shape, const answer_notes *notes, buffer *b,
                           FILE *stream, problem *why) {
-    const size_t row = s->m->n_channels * s->m->n;
+    const size_t row = s->m->n_channels * output_width(s);
     const media_accept as = {.type = MEDIA_JSON};
     double rounding = 0;
     if (!answer_begin(b, shape, &as, notes, why)) return false;
@@ -138,7 +138,8 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .n_channels = s->m->n_channels,
                                 .n_rhs = s->n_vectors,
                                 .batch = s->batch,
-                                .n_values = s->m->n};
+                                .n_values = output_width(s),
+                                .at_faces = s->faces != NULL};
     const answer_notes notes = {.scene = s->scene,
                                 .quantity = s->quantity,
                                 .has_error = s->relative >= 0,
@@ -148,6 +149,7 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .error_of = s->error_of,
                                 .error_from = s->error_from,
                                 .error_light = s->error_light,
+                                .at_faces = s->faces != NULL,
                                 .by_luminance = s->by_luminance,
                                 .emitters = s->emitters,
                                 .n_name_errors = s->name_errors != NULL ? s->n_reductions : 0,
@@ -170,5 +172,5 @@ lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
 }
 
 lam_status output_print_json(const solution *s, lam_error *error) {
-    return write_all(s, s->n_reductions == 0, stdout, error);
+    return write_all(s, s->n_reductions == 0 && s->faces == NULL, stdout, error);
 }

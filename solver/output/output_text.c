@@ -42,6 +42,25 @@ static void print_means(const solution *s) {
     }
 }
 
+/* A face without an element has no value. */
+static void print_faces(const solution *s) {
+    const size_t n = output_width(s);
+    print_columns(s, "face       group                      area, m2");
+    for (size_t f = 0; f < n; f++) {
+        double area;
+        const char *group = output_face_group(s, f, &area);
+        printf("%-10zu %-24s %10.4g", f, group != NULL ? group : "-", area);
+        for (size_t k = 0; k < s->n_vectors * s->m->n_channels; k++) {
+            const double value = output_value(s, k * n + f);
+            if (isnan(value))
+                printf(" %*s", column_width(s, k), "-");
+            else
+                printf(" %*.6g", column_width(s, k), value);
+        }
+        putchar('\n');
+    }
+}
+
 static void print_reductions(const solution *s) {
     print_columns(s, "group                    figure    ");
     for (size_t r = 0; r < s->n_reductions; r++) {
@@ -83,6 +102,8 @@ static void print_error(const solution *s) {
 void output_print(const solution *s) {
     if (s->n_reductions > 0)
         print_reductions(s);
+    else if (s->faces != NULL)
+        print_faces(s);
     else
         print_means(s);
     print_error(s);

@@ -10,6 +10,7 @@
 #include "solver/render/smooth.h"
 #include "solver/verbs/light_options.h"
 #include "solver/verbs/own_error.h"
+#include "solver/verbs/solve_faces.h"
 #include "solver/verbs/verbs.h"
 
 #include <math.h>
@@ -21,12 +22,16 @@
 /* --sun: the light of its tile, or the sun itself. */
 typedef enum sun_asked { SUN_TILES, SUN_EXACT } sun_asked;
 
+/* --at: the places of the values. */
+typedef enum place_asked { AT_ELEMENTS, AT_FACES } place_asked;
+
 typedef struct fields {
     light_options light;
     option_list reduce, annual;
     const char *weather, *quantity, *output, *occupied;
     double hours, tolerance;
     sun_asked sun;
+    place_asked at;
     uint64_t sun_points;
     bool photometric, json, verbose, smooth, linear;
 } fields;
@@ -74,6 +79,14 @@ static const option_row answer_options[] = {
      .offset = FIELD(reduce),
      .argument = "GROUP=FIGURE",
      .help = "mean, sum, min, max, uniformity or variance of a group; may be repeated"},
+    {.name = "at",
+     .kind = OPTION_WORD,
+     .offset = FIELD(at),
+     .choices = "elements|faces",
+     .preset = "elements",
+     .help = "The places of values. faces: means by area over the fronts of each face of the scene file, in "
+             "its order (.npy: NaN, .json: null, .csv: nothing for a face without an element), into "
+             ".npy, .json, .csv, or as a table"},
     {.name = "smooth",
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),
@@ -177,32 +190,6 @@ static void take_error(const stated_errors *stated, const emission *light, size_
                          "answer is only roughly right, and no error is stated for it");
 }
 
-/* The elements of the groups that are reduced, *selected freed with free(); NULL where all are wanted. */
-static lam_status wanted_elements(const mesh *m, const reduction *reductions, size_t n_reductions,
-                                  size_t *n_selected, uint32_t **selected, lam_error *error) {
-    lam_status status = LAM_OK;
-    bool *inside = NULL;
-    uint32_t *made = NULL;
-    *selected = NULL;
-    *n_selected = 0;
-    if (n_reductions == 0) return LAM_OK;
-    inside = memory_allocate(m->n_groups, sizeof *inside, "the elements wanted", error);
-    made = memory_allocate(m->n, sizeof *made, "the elements wanted", error);
-    if (inside == NULL || made == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t r = 0; r < n_reductions; r++) {
-        const reduce_name *name = &reductions[r].request.names[0];
-        for (size_t g = 0; g < name->n_groups; g++) inside[name->groups[g]] = true;
-    }
-    for (size_t i = 0; i < m->n; i++)
-        if (inside[m->group[i]]) made[(*n_selected)++] = (uint32_t)i;
-    *selected = made;
-    made = NULL;
-done:
-    free(inside);
-    free(made);
-    return status;
-}
-
 /* Replaces the batch by figures of the year; *values is freed with free(). */
 static lam_status solve_year(const annual_options *annual, const emission *light, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
@@ -292,16 +279,52 @@ static lam_status add_weather(const fields *f, store *s, const mesh *m, size_t n
                              error);
 }
 
-/* The answers, *values, and how many elements of each were limited, *limited; both freed with free(). */
+/* The arrays of an answer. */
+typedef struct answers {
+    float *values, *corners;
+    size_t *limited;
+    refined_light refined;
+    name_error *name_errors;
+} answers;
+
+static void answers_free(answers *a) {
+    free(a->values);
+    free(a->corners);
+    free(a->limited);
+    refined_light_free(&a->refined);
+    free(a->name_errors);
+}
+
+/* The answers, and how many elements of each were limited. */
 static lam_status answer(const fields *f, const lit_store *lit, size_t n_selected, const uint32_t *selected,
-                         terminal *t, solution *out, float **values, size_t **limited, lam_error *error) {
+                         terminal *t, solution *out, answers *made, lam_error *error) {
     lam_status status = LAM_OK;
-    *limited = memory_allocate(lit->light.n_vectors, sizeof **limited, "the solution", error);
-    if (*limited == NULL) TRY(LAM_ERR_MEMORY);
+    made->limited = memory_allocate(lit->light.n_vectors, sizeof *made->limited, "the solution", error);
+    if (made->limited == NULL) TRY(LAM_ERR_MEMORY);
     TRY(emission_apply(&lit->light, lit->op, lit->sky, out->quantity, n_selected, selected, terminal_check,
-                       values, *limited, error));
-    if (!f->linear) out->limited = *limited;
-    light_log_limited(lit->light.n_vectors, *limited, t);
+                       &made->values, made->limited, error));
+    if (!f->linear) out->limited = made->limited;
+    light_log_limited(lit->light.n_vectors, made->limited, t);
+done:
+    return status;
+}
+
+/* The answers to each light, refined, or figures of a year, as the options ask for. */
+static lam_status find_answers(const char *path, const fields *f, const annual_options *year,
+                               const lit_store *lit, size_t n_selected, const uint32_t *selected, terminal *t,
+                               solution *out, answers *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (year->n_figures > 0) {
+        TRY(solve_year(year, &lit->light, lit->op, lit->sky, n_selected, selected, t, out, &made->values,
+                       error));
+    } else if (f->tolerance > 0) {
+        TRY(emission_refine(&lit->light, path, lit->op, lit->sky, out->quantity, f->tolerance, terminal_check,
+                            &made->refined, error));
+        take_refined(&made->refined, out, f->tolerance, t);
+    } else {
+        TRY(answer(f, lit, n_selected, selected, t, out, made, error));
+    }
+    out->values = made->values;
 done:
     return status;
 }
@@ -332,15 +355,13 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     lit_store lit = {0};
     lam_quantity quantity = LAM_RADIOSITY;
     double *row_sums = NULL;
-    float *values = NULL, *corners = NULL;
-    size_t *limited = NULL;
-    refined_light refined = {0};
+    answers made = {.values = NULL};
+    face_index faces = {.n_faces = 0};
     char *scene = NULL;
     uint32_t *selected = NULL;
     size_t n_selected = 0;
     stated_errors stated = {.n = 0};
     error_scene about = {.n = 0};
-    name_error *name_errors = NULL;
     sunlight sun = {0};
     weather_span span = {0};
     annual_options figures = *year;
@@ -350,6 +371,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));
+    if (f->at == AT_FACES) TRY(solve_faces_find(path, &m, &faces, error));
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
     light_log(&lit, t);
     if (f->linear) lit.light.limiter = NULL;
@@ -361,7 +383,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
     about = error_scene_of(&m, &lit.scene);
     /* With --reduce only figures are written, also with -o. */
-    TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
+    TRY(reductions_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     TRY(stated_errors_read(s, &about, lit.op, &stated, error));
     about.read = stated.read;
     if (f->weather != NULL) {
@@ -390,32 +412,21 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                     .reductions = reductions,
                     .n_reductions = n_reductions};
     if (f->tolerance == 0) take_error(&stated, &lit.light, n_selected, selected, t, &out);
-    if (year->n_figures > 0) {
-        out.names = names;
-        TRY(solve_year(&figures, &lit.light, lit.op, lit.sky, n_selected, selected, t, &out, &values, error));
-    } else if (f->tolerance > 0) {
-        TRY(emission_refine(&lit.light, path, lit.op, lit.sky, quantity, f->tolerance, terminal_check,
-                            &refined, error));
-        take_refined(&refined, &out, f->tolerance, t);
-    } else {
-        TRY(answer(f, &lit, n_selected, selected, t, &out, &values, &limited, error));
-    }
-    out.values = values;
-    if (values != NULL && year->n_figures == 0)
-        TRY(own_error_take(&stated, &about, &lit, n_selected, selected, &out, &name_errors, error));
-    if (f->smooth) TRY(find_corners(&out, &lit.light, &corners, error));
-    out.corners = corners;
+    if (year->n_figures > 0) out.names = names;
+    TRY(find_answers(path, f, &figures, &lit, n_selected, selected, t, &out, &made, error));
+    if (made.values != NULL && year->n_figures == 0)
+        TRY(own_error_take(&stated, &about, &lit, n_selected, selected, &out, &made.name_errors, error));
+    if (f->smooth) TRY(find_corners(&out, &lit.light, &made.corners, error));
+    out.corners = made.corners;
+    if (f->at == AT_FACES) TRY(solve_faces_take(&faces, &made.values, &made.refined, &out, error));
     TRY(reductions_fill(&out, error));
     TRY(put_out(&out, f, error));
 done:
     free(scene);
-    free(name_errors);
     free(selected);
     stated_errors_free(&stated);
-    free(values);
-    free(limited);
-    free(corners);
-    refined_light_free(&refined);
+    answers_free(&made);
+    face_index_free(&faces);
     free(row_sums);
     sunlight_free(&sun);
     weather_span_free(&span);
@@ -479,7 +490,11 @@ int cmd_solve(int argc, char **argv) {
     if (f.json && f.output != NULL) return options_usage(verb.name, "give --json or -o, not both");
     if (f.smooth && (f.output == NULL || f.reduce.count > 0 || f.tolerance > 0))
         return options_usage(verb.name, "--smooth is for -o, without --reduce and --tolerance");
+    if (f.at == AT_FACES && (f.reduce.count > 0 || f.smooth))
+        return options_usage(verb.name, "--at faces is of single faces: leave out --%s",
+                             f.smooth ? "smooth" : "reduce");
     const output_content content = f.smooth             ? OUTPUT_CORNERS
+                                   : f.at == AT_FACES   ? OUTPUT_FACES
                                    : f.reduce.count > 0 ? OUTPUT_GROUPS
                                                         : OUTPUT_ELEMENTS;
     if (f.output != NULL && output_check(f.output, content, &error) != LAM_OK)

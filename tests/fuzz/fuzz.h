@@ -37,6 +37,24 @@ static inline void fuzz_check_problem(const problem *why) {
     FUZZ_CHECK(why->detail[0] != '\0' && why->status == problem_status(why->kind));
 }
 
+/* Faces of the elements of the scene below: face 1 has none, element 5 is a part of two, and 6 is its back.
+ */
+static inline const face_index *fuzz_faces(void) {
+    static uint32_t of[] = {3, 3, 0, 2, 2, SCENE_FACE_NONE, SCENE_FACE_NONE}, start[] = {0, 2, 2, 5, 7},
+                    element[] = {2, 5, 3, 4, 5, 0, 1};
+    static double area[] = {1, .5, 1, 1, .5, 1, 1};
+    static scene_face_part parts[] = {{5, 0, .5}, {5, 2, .5}};
+    static const face_index faces = {.n_faces = 4,
+                                     .n = 7,
+                                     .n_fronts = 6,
+                                     .n_entries = 7,
+                                     .start = start,
+                                     .element = element,
+                                     .area = area,
+                                     .of = {4, of, 2, parts}};
+    return &faces;
+}
+
 /* A small scene; shape says of which kind. The caller frees groups. */
 static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
     static const char *names[] = {"lamp", "wall", "wall.red", "\xc3\xa9t\xc3\xa9"};
@@ -50,6 +68,7 @@ static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
     return (codec_scene){.n = N,
                          .n_channels = shape & 1 ? 3 : 1,
                          .groups = groups,
+                         .faces = shape & 64 ? NULL : fuzz_faces(),
                          .n_tiles = shape & 2 ? 5 : 0,
                          .n_emitters = shape & 4 ? GROUPS : 0,
                          .emitters = groups,

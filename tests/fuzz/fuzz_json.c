@@ -58,6 +58,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
             FUZZ_CHECK(request.spots[k].vector < request.n_rhs &&
                        request.spots[k].where < (request.spots[k].whole_group ? groups.n_groups : scene.n));
         for (size_t k = 0; k < request.n_selected; k++) FUZZ_CHECK(request.selected[k] < scene.n);
+        FUZZ_CHECK(!request.at_faces || (scene.faces != NULL && !request.reduce.on));
+        for (size_t k = 0; k < request.n_faces; k++) FUZZ_CHECK(request.faces[k] < scene.faces->n_faces);
         if (request.E != NULL) write_back(&scene, &request, text);
     } else {
         fuzz_check_problem(&why);

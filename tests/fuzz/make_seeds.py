@@ -24,6 +24,8 @@ for e in emissions:
     for body in ({"emission": e}, {"emissions": [e, e], "quantity": "irradiance"},
                  {"emission": e, "select": {"elements": [1, 1, 6]}, "quantity": "indirect"},
                  {"emission": e, "select": {"groups": ["wall"]}, "tolerance": 1e-4},
+                 {"emission": e, "at": "faces", "select": {"groups": ["wall"]}},
+                 {"emission": e, "select": {"faces": [3, 0]}},
                  {"emission": e, "reduce": {"groups": ["wall"], "with": ["mean", "sum", "min", "max", "uniformity",
                                                                         "variance"]}},
                  {"cotangent": e, "quantity": "radiosity", "gradient": ["emission", "reflectance"], "emission": e}):

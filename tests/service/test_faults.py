@@ -89,8 +89,11 @@ def each_request(n):
                  {"cotangent": {"groups": {"lamp": 1}}, "gradient": ["emission"]}):
         yield "POST", adjoint, {"Content-Type": JSON}, json.dumps(body)
     yield "POST", adjoint, {"Content-Type": NPY, "Accept": NPY}, array(dense)
-    yield "POST", "/v1/scenes/box/radiosity", {"Content-Type": JSON}, json.dumps(
-        {"emission": {"elements": [3], "values": [1]}, "tolerance": 1e-4})
+    light = {"emission": {"elements": [3], "values": [1]}}
+    for more in ({"tolerance": 1e-4}, {"at": "faces"}, {"at": "faces", "select": {"groups": ["floor"]}},
+                 {"select": {"faces": [7, 3]}, "tolerance": 1e-4}):
+        yield "POST", "/v1/scenes/box/radiosity", {"Content-Type": JSON}, json.dumps({**light, **more})
+    yield "POST", "/v1/scenes/box/radiosity", {"Content-Type": JSON, "Accept": NPY}, json.dumps({**light, "at": "faces"})
     reflectance = "/v1/scenes/grey/reflectance"
     yield "PUT", reflectance, {"Content-Type": JSON}, json.dumps({"variant": "x", "groups": {"moon": .5}})
     yield "PUT", reflectance, {"Content-Type": JSON}, json.dumps({"variant": "x", "groups": {"floor": .5}})
