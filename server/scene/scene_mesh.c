@@ -218,6 +218,7 @@ lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *erro
                          .area = root->area,
                          .reflectance = of->reflectance,
                          .emission = a.emission,
+                         .face = root->faces.of.of,
                          .groups = &root->groups,
                          .pictures = a.pictures,
                          .up = mesh->up};

@@ -68,6 +68,7 @@ lam_status output_glb(const solution *s, FILE *stream, lam_error *error) {
                           .area = m->area,
                           .reflectance = m->reflectance,
                           .emission = m->emission,
+                          .face = m->faces.of,
                           .groups = s->groups,
                           .light = &light,
                           .up = m->up};

@@ -44,7 +44,8 @@ class Group:
         self.index = node["extras"]["group"]
         self.count = node["extras"]["elements"]
         self.attributes = primitive["attributes"]
-        self.position, self.normal, self.element = (file.array(self.attributes[k]) for k in ("POSITION", "NORMAL", "_ELEMENT"))
+        self.position, self.normal, self.element, self.face = (file.array(self.attributes[k])
+                                                               for k in ("POSITION", "NORMAL", "_ELEMENT", "_FACE"))
         self.triangles = file.array(primitive["indices"]).reshape(-1, 3)
         self.material = file.json["materials"][primitive["material"]]
 
@@ -75,6 +76,7 @@ def check(test, raw, store, kind=None, reflectance=None):
     glb = Glb(raw)
     with h5py.File(store, "r") as f:
         m = {name: f["mesh"][name][()] for name in "vertices elements area normal reflectance emission group".split()}
+        face = f["mesh/face"][()].astype(float) if "mesh/face" in f else np.full(len(m["elements"]), -1.)
         names = [name.decode() for name in f["mesh/group_names"][()]]
         up = f["mesh"].attrs["up"].decode()
     if reflectance is not None:
@@ -89,6 +91,7 @@ def check(test, raw, store, kind=None, reflectance=None):
         corners = m["elements"][members]
         used = corners != NO_VERTEX
         np.testing.assert_array_equal(group.element, np.repeat(members, used.sum(axis=1)))
+        np.testing.assert_array_equal(group.face, np.repeat(np.where(face < NO_VERTEX, face, -1)[members], used.sum(axis=1)))
         np.testing.assert_array_equal(group.position, vertices[corners[used]])
         # Elements follow each other with one or two triangles, each of its own corners.
         of_triangle = group.element[group.triangles]

@@ -97,6 +97,8 @@ gltf_primitive gltf_primitive_of(const gltf_file *l, size_t node) {
     ck_assert_uint_eq(count, out.n_vertices);
     out.element = gltf_accessor(l, gltf_number(of, "_ELEMENT"), "SCALAR", 5126, 4, &count);
     ck_assert_uint_eq(count, out.n_vertices);
+    out.face = gltf_accessor(l, gltf_number(of, "_FACE"), "SCALAR", 5126, 4, &count);
+    ck_assert_uint_eq(count, out.n_vertices);
     out.index = gltf_accessor(l, gltf_number(p, "indices"), "SCALAR", 5125, 4, &out.n_indices);
     out.material = gltf_item(l->root, "materials", gltf_number(p, "material"));
     const json_t *a = gltf_item(l->root, "accessors", gltf_number(of, "POSITION"));

@@ -33,7 +33,7 @@ const char *gltf_accessor(const gltf_file *l, size_t k, const char *type, size_t
 /* The primitive of a node. */
 typedef struct gltf_primitive {
     const char *name;
-    const char *position, *normal, *element, *index;
+    const char *position, *normal, *element, *face, *index;
     size_t n_vertices, n_indices;
     const json_t *material, *extras, *attributes;
 } gltf_primitive;

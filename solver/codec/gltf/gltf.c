@@ -24,7 +24,7 @@ enum { TYPE_FLOAT = 5126, TYPE_U32 = 5125, TARGET_VERTICES = 34962, TARGET_INDIC
 /* The views of the binary chunk, in this order; each group has one accessor in each. With light there is a
  * colour, and a view for each column. With pictures there are places in the image and reflectances, which
  * only the vertices of groups with an image have, and then a view for each image. */
-enum { VIEW_POSITION, VIEW_NORMAL, VIEW_ELEMENT, VIEW_INDEX, VIEW_COLOUR, VIEW_COLUMN };
+enum { VIEW_POSITION, VIEW_NORMAL, VIEW_ELEMENT, VIEW_FACE, VIEW_INDEX, VIEW_COLOUR, VIEW_COLUMN };
 enum { VIEW_TEXCOORD = VIEW_COLOUR, VIEW_REFLECTANCE, VIEW_IMAGE };
 
 /* A group's part of the file. */
@@ -232,8 +232,9 @@ static size_t textured_accessor(const writer *w, const part *p) {
 
 static bool say_attributes(const writer *w, const part *p, size_t first, buffer *b) {
     const gltf_light *light = w->m->light;
-    bool good = buffer_printf(b, "\"POSITION\":%zu,\"NORMAL\":%zu,\"_ELEMENT\":%zu", first + VIEW_POSITION,
-                              first + VIEW_NORMAL, first + VIEW_ELEMENT);
+    bool good =
+        buffer_printf(b, "\"POSITION\":%zu,\"NORMAL\":%zu,\"_ELEMENT\":%zu,\"_FACE\":%zu",
+                      first + VIEW_POSITION, first + VIEW_NORMAL, first + VIEW_ELEMENT, first + VIEW_FACE);
     if (p->surface != PICTURE_NONE)
         good = good && buffer_printf(b, ",\"TEXCOORD_0\":%zu,\"_REFLECTANCE\":%zu", textured_accessor(w, p),
                                      textured_accessor(w, p) + 1);
@@ -444,6 +445,12 @@ static void put_images(const writer *w, char *to) {
     }
 }
 
+/* The number of an element's face as glTF has it: -1 of none, of several, or where it is no float. */
+static float face_number(const gltf_mesh *m, size_t element) {
+    if (m->face == NULL || m->face[element] > GLTF_FACES_MOST) return -1;
+    return (float)m->face[element];
+}
+
 /* Writes the part's vertices and triangles; to is the binary chunk. */
 static lam_status put_part(writer *w, const part *p, char *to, lam_error *error) {
     lam_status status = LAM_OK;
@@ -452,7 +459,7 @@ static lam_status put_part(writer *w, const part *p, char *to, lam_error *error)
     char *position = to + w->view[VIEW_POSITION] + 12 * p->vertex,
          *normal = to + w->view[VIEW_NORMAL] + 12 * p->vertex,
          *element = to + w->view[VIEW_ELEMENT] + 4 * p->vertex,
-         *index = to + w->view[VIEW_INDEX] + 4 * p->index;
+         *face = to + w->view[VIEW_FACE] + 4 * p->vertex, *index = to + w->view[VIEW_INDEX] + 4 * p->index;
     uint32_t vertex = 0;
     TRY(corner_normals_of_group(&w->s, p->group, w->normals, error));
     for (size_t j = 0; j < p->n_elements; j++) {
@@ -461,6 +468,7 @@ static lam_status put_part(writer *w, const part *p, char *to, lam_error *error)
             position = put_vector(position, w->s.position[m->elements[elements[j]][k]]);
             normal = put_vector(normal, w->normals[4 * j + k]);
             element = put_float(element, (float)elements[j]);
+            face = put_float(face, face_number(m, elements[j]));
         }
         for (uint32_t k = 2; k < corners; k++)
             index = put(put(put(index, vertex), vertex + k - 1), vertex + k);

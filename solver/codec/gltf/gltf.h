@@ -10,6 +10,9 @@
 /* More elements have numbers that a float does not hold. */
 #define GLTF_ELEMENTS_MOST ((size_t)1 << 24)
 
+/* The largest number of a face that a float holds with all before it. */
+#define GLTF_FACES_MOST ((uint32_t)1 << 24)
+
 /* The 4th vertex of an element that is a triangle. */
 #define GLTF_NO_VERTEX 0xFFFFFFFFu
 
@@ -34,6 +37,7 @@ typedef struct gltf_mesh {
     const double *area;            /* [n], m^2 */
     const float *reflectance;      /* [C][n] */
     const float *emission;         /* [C][n], W/m^2 */
+    const uint32_t *face;          /* [n], of the scene file (scene_faces); NULL: not known */
     const group_index *groups;
     const gltf_light *light;        /* or NULL */
     const scene_pictures *pictures; /* or NULL; not beside light, of 1 channel (grey images) or 3 */
@@ -43,8 +47,9 @@ typedef struct gltf_mesh {
 /* Appends the mesh to out, which is empty: metres, y up, north -z (as of a scene that has y up), every
  * element with 3 or 4 vertices of its own.
  *   - A scene of one root node, which has a child for each group that has elements, of the group's name. Its
- *     mesh is one primitive of triangles with POSITION, NORMAL, _ELEMENT (the number of the element, a float)
- *     and indices of 32 bits; elements ascend, and the triangles of one follow each other.
+ *     mesh is one primitive of triangles with POSITION, NORMAL, _ELEMENT and _FACE (the numbers of the
+ *     element and of its face, floats; -1: of none, of several, not known or beyond GLTF_FACES_MOST) and
+ *     indices of 32 bits; elements ascend, and the triangles of one follow each other.
  *   - Corners of a group at one position share a normal, bit for bit, if they belong to one surface: elements
  *     that meet there at less than 30 degrees, directly or by others between them. It is the mean of their
  *     elements' normals by area. All other corners have those of their elements.

@@ -16,7 +16,7 @@ static size_t sum_of_products(size_t n, const size_t (*terms)[2]) {
 #define JSON_OF_FILE 4096
 
 size_t gltf_bytes_most(const gltf_sizes *sizes) {
-    const size_t element = 4 * 7 * sizeof(float) + 6 * sizeof(uint32_t);
+    const size_t element = 4 * 8 * sizeof(float) + 6 * sizeof(uint32_t);
     return sum_of_products(7, (const size_t[][2]){{sizes->n, element},
                                                   {sizes->n_textured, 4 * 5 * sizeof(float)},
                                                   {sizes->n_textures, JSON_OF_GROUP},

@@ -139,6 +139,24 @@ START_TEST(a_file_has_what_the_mesh_has) {
 }
 END_TEST
 
+/* A face is a number that a float holds, or -1. */
+START_TEST(elements_have_the_numbers_of_their_faces) {
+    static const char *const names[2] = {"floor", "lamp"};
+    static const uint32_t face[3] = {GLTF_FACES_MOST, UINT32_MAX, GLTF_FACES_MOST + 1};
+    for (int known = 0; known < 2; known++) {
+        small s = {.m = {.name = "faces", .kind = "low_rank", .face = known ? face : NULL}};
+        fill_mixed(&s);
+        gltf_file l = gltf_load(finish(&s, 2, names));
+        const gltf_primitive floor = gltf_primitive_of(&l, 1), lamp = gltf_primitive_of(&l, 2);
+        for (size_t k = 0; k < 4; k++) ck_assert_float_eq(gltf_float(floor.face + 4 * k), -1);
+        for (size_t k = 0; k < 6; k++)
+            ck_assert_float_eq(gltf_float(lamp.face + 4 * k), known && k < 3 ? (float)GLTF_FACES_MOST : -1.f);
+        gltf_unload(&l);
+        group_index_free(&s.groups);
+    }
+}
+END_TEST
+
 START_TEST(groups_without_elements_are_left_out) {
     static const char *const names[] = {"nothing", "floor", "none", "lamp", "empty"};
     small s = {.m = {.n = 0}};
@@ -496,6 +514,7 @@ int main(void) {
     Suite *suite = suite_create("gltf");
     TCase *tests = tcase_create("gltf");
     tcase_add_test(tests, a_file_has_what_the_mesh_has);
+    tcase_add_test(tests, elements_have_the_numbers_of_their_faces);
     tcase_add_test(tests, groups_without_elements_are_left_out);
     tcase_add_test(tests, normals_keep_creases);
     tcase_add_test(tests, a_surface_goes_around_its_corner);
