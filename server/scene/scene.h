@@ -120,7 +120,9 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
 typedef struct mean_errors {
     name_error *names;    /* [n_names]; NULL: that of the store stays */
     emission_size *sizes; /* [n_rhs] */
-    double *emission;     /* [2][n_rhs][C], work */
+    whole_light *whole;   /* [n_vectors], of n_rhs; NULL: nothing of it is known */
+    size_t n_vectors;
+    double *emission; /* [2][n_rhs][C], work */
     /* These are needed where the request has weights of emitters; NULL: it has none. */
     float *E;     /* [C][n], work */
     double *sums; /* [n_rhs][C][n_groups], of A E of groups */

@@ -1,8 +1,9 @@
 /* The errors of answers (scene.h): of their own emission where the store states errors by group. */
-#include "server/scene/scene.h"
+#include "server/scene/request_light.h"
 
 #include "solver/operator/emitters.h"
 #include "solver/operator/sky_light.h"
+#include "solver/operator/stated/whole_law.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -55,7 +56,8 @@ error_scene scene_for_errors(const scene *s) {
                          .n_groups = s->groups.n_groups,
                          .start = s->groups.start,
                          .members = s->groups.elements,
-                         .read = s->errors.read};
+                         .read = s->errors.read,
+                         .emits = s->errors.emits};
 }
 
 /* True where weights of emitters are given, some of which may be of the sky. */
@@ -71,12 +73,6 @@ static bool has_own_error(const scene *s, const radiosity_request *request, cons
     return e->n_bins > 0 && notes->has_error && s->errors.emitters.figures.s == 0 &&
            request->tolerance == 0 &&
            (!sky || (whole && s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
-}
-
-/* The radiances of the sky of vector v, [C][m]; NULL: it has none. */
-static const float *sky_of(const scene *s, const radiosity_request *request, size_t v) {
-    const side_rows *sky = &request->sky;
-    return sky->values != NULL && v < sky->n ? sky->values + v * s->n_channels * lam_sky_tiles(s->sky) : NULL;
 }
 
 /* The size of the sky L [C][m]; NULL: there is none. */
@@ -157,7 +153,7 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     if (good) begin_own(reduce, kept, &made);
     for (size_t v = 0; good && v < request->n_rhs; v++) {
         vector_light light = {request->E + v * vector, H0 != NULL ? H0 + v * vector : NULL,
-                              sky_of(s, request, v)};
+                              request_sky(s, request, v)};
         answer_error one;
         good = W == NULL || light_of_weights(s, W + v * C * s->n_emitters, own, &light);
         if (!good) break;
@@ -269,69 +265,6 @@ bool scene_note_emitters_error(const scene *s, const radiosity_request *request,
     return good;
 }
 
-/* The light of the weights of emitters that a request has: adds the power and squares of what elements emit,
- * their sums over groups and the radiances of the sky. */
-static void add_weights(const scene *s, const radiosity_request *request, double *power, double *lamps,
-                        emission_size *size, mean_errors *to) {
-    const size_t C = s->n_channels, row = C * s->n_emitters, G = s->groups.n_groups;
-    const error_by_group *e = &s->errors.by_group;
-    for (size_t v = 0; v < request->emitters.n; v++) {
-        operator_emitters_emission(s->op, 1, request->emitters.values + v * row, to->E);
-        for (size_t k = 0; k < C * s->n; k++) {
-            const double flux = s->area[k % s->n] * (double)to->E[k];
-            power[v * C + k / s->n] += flux;
-            if (mesh_lamps_in(e, e->bin[k % s->n])) lamps[v * C + k / s->n] += flux;
-            size[v].squares += flux * flux;
-            to->sums[(v * C + k / s->n) * G + e->bin[k % s->n] % G] += flux;
-        }
-        if (to->L == NULL) continue;
-        const size_t m = e->figures.n_tiles;
-        const float *sky = sky_of(s, request, v);
-        operator_emitters_radiances(s->op, 1, request->emitters.values + v * row, to->L + v * C * m);
-        for (size_t k = 0; sky != NULL && k < C * m; k++) to->L[v * C * m + k] += sky[k];
-    }
-}
-
-/* Emissions of a request: their sizes. power, lamps [n_rhs][C], zeroed: of all, and of groups with lamps. */
-static void size_of_spots(const scene *s, const radiosity_request *request, double *power, double *lamps,
-                          emission_size *size, mean_errors *to) {
-    const size_t C = s->n_channels;
-    const error_by_group *e = &s->errors.by_group;
-    for (size_t k = 0; k < request->n_spots; k++) {
-        const emission_spot *spot = &request->spots[k];
-        const double a = spot->whole_group ? 0 : s->area[spot->where];
-        double area = a, squares = a * a;
-        const size_t home = spot->whole_group ? spot->where : e->bin[spot->where];
-        if (spot->whole_group) {
-            squares = e->squares[spot->where];
-            for (size_t bin = spot->where; bin < e->n_bins; bin += e->figures.n_groups) area += e->area[bin];
-        }
-        for (size_t c = 0; c < C; c++) {
-            const double value = fabs((double)request->colours[k * C + c]);
-            power[spot->vector * C + c] += area * value;
-            if (mesh_lamps_in(e, home)) lamps[spot->vector * C + c] += area * value;
-            size[spot->vector].squares += squares * value * value;
-        }
-    }
-    for (size_t v = 0; v < request->n_dense; v++) {
-        size[v] = (emission_size){.power2 = 0};
-        for (size_t c = 0; c < C; c++) power[v * C + c] = lamps[v * C + c] = 0;
-        for (size_t k = v * C * s->n; k < (v + 1) * C * s->n; k++) {
-            const double flux = s->area[k % s->n] * fabs((double)request->E[k]);
-            power[k / s->n] += flux;
-            if (mesh_lamps_in(e, e->bin[k % s->n])) lamps[k / s->n] += flux;
-            size[v].squares += flux * flux;
-        }
-    }
-    if (request->emitters.values != NULL && s->n_emitters > 0)
-        add_weights(s, request, power, lamps, size, to);
-    for (size_t v = 0; v < request->n_rhs; v++)
-        for (size_t c = 0; c < C; c++) {
-            size[v].power2 += power[v * C + c] * power[v * C + c];
-            size[v].lamps2 += lamps[v * C + c] * lamps[v * C + c];
-        }
-}
-
 /* emission [n_rhs][C]: means over the name. */
 static void emission_of_name(const scene *s, const radiosity_request *request, const reduce_name *name,
                              const mean_errors *to, double *emission) {
@@ -401,7 +334,9 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
     made.names = memory_allocate(reduce->n_names, sizeof *made.names, "errors", NULL);
     made.sizes = memory_allocate(request->n_rhs, sizeof *made.sizes, "errors", NULL);
     made.emission = memory_allocate(rows, 2 * sizeof *made.emission, "errors", NULL);
-    bool good = made.names != NULL && made.sizes != NULL && made.emission != NULL;
+    made.whole = memory_allocate(request->n_rhs, sizeof *made.whole, "errors", NULL);
+    made.n_vectors = request->n_rhs;
+    bool good = made.names != NULL && made.sizes != NULL && made.emission != NULL && made.whole != NULL;
     if (request->emitters.values != NULL && s->n_emitters > 0) {
         const bool sky = has_sky_weights(s, request);
         made.E = memory_allocate(s->n_channels, s->n * sizeof *made.E, "errors", NULL);
@@ -415,7 +350,10 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
         mean_errors_free(&made);
         return false;
     }
-    size_of_spots(s, request, made.emission, made.emission + rows, made.sizes, &made);
+    if (!request_sizes(s, request, &made)) {
+        mean_errors_free(&made);
+        return false;
+    }
     begin_own(reduce, made.names, notes);
     *out = made;
     return true;
@@ -443,9 +381,10 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
     direct_of_name(s, request, name, to, direct);
     for (size_t v = 0; v < request->n_rhs; v++) {
         const float *L =
-            to->L != NULL ? to->L + v * C * s->errors.by_group.figures.n_tiles : sky_of(s, request, v);
+            to->L != NULL ? to->L + v * C * s->errors.by_group.figures.n_tiles : request_sky(s, request, v);
         const name_means of = {.quantity = request->quantity,
                                .size = to->sizes[v],
+                               .whole = to->whole[v],
                                .sky = size_of_sky(s, L),
                                .L = L,
                                .value = means + v * C,
@@ -459,6 +398,8 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
 }
 
 void mean_errors_free(mean_errors *e) {
+    for (size_t v = 0; e->whole != NULL && v < e->n_vectors; v++) whole_light_free(&e->whole[v]);
+    free(e->whole);
     free(e->names);
     free(e->sizes);
     free(e->emission);

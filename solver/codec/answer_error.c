@@ -1,5 +1,7 @@
 #include "solver/codec/answer_error.h"
 
+#include "solver/operator/stated/whole_law.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -15,18 +17,20 @@ static double lamps2_of(const error_by_group *e, const error_scene *scene, const
     return sum;
 }
 
-static light_sizes sizes_of_answer(const error_by_group *e, const error_scene *scene,
-                                   const error_answer *of) {
-    light_sizes sizes = light_sizes_of(e, of->quantity, &of->size, of->L);
-    sizes.size.lamps2 = lamps2_of(e, scene, of->E);
+/* The first light of a sun, of which E tells nothing, has the law of its size alone. *sizes owns
+ * its whole groups. False when memory is short. */
+static bool sizes_of_answer(const error_by_group *e, const error_scene *scene, const error_answer *of,
+                            light_sizes *sizes) {
+    *sizes = light_sizes_of(e, of->quantity, &of->size, of->L);
+    sizes->size.lamps2 = lamps2_of(e, scene, of->E);
     const sky_sizes sent = sky_sizes_of(e, of->L_sent);
-    if (sent.L == NULL) return sizes;
-    if (sizes.sent.L == NULL) sizes.sent.L = sent.L;
-    sizes.sent.power2 += sent.power2;
-    sizes.sent.spread += sent.spread;
-    sizes.sent.power_off += sent.power_off;
-    sizes.lost2 = of->lost2;
-    return sizes;
+    if (sent.L == NULL) return whole_light_find(e, scene, of->E, &sizes->whole);
+    if (sizes->sent.L == NULL) sizes->sent.L = sent.L;
+    sizes->sent.power2 += sent.power2;
+    sizes->sent.spread += sent.spread;
+    sizes->sent.power_off += sent.power_off;
+    sizes->lost2 = of->lost2;
+    return true;
 }
 
 /* Sums over the values of a bin: A, and of r = B - E - rho H0, B and L = B - E, of irradiance H - H0, H and
@@ -94,17 +98,10 @@ static value_sums *sum_values(const error_by_group *e, const error_scene *scene,
     return sums;
 }
 
-/* The root of error2 / light2, of errors that are no small part of the light with them taken out of it
- * (error_ratio), which is 1 where they are half of it, and beyond that with twice the error, so that it stays
- * finite and rises. */
-static double part_ratio(double error2, double light2) {
-    return 2 * error2 < light2 ? error_ratio(error2, light2) : sqrt(2 * error2 / light2);
-}
-
 /* Finds parts from squares of the light that is reflected, and of all; mesh2 negative: not stated. */
 static stated_parts parts_of(double off2, double mesh2, double light2, double radiosity2) {
     const double all2 = light2 > 0 ? light2 : radiosity2;
-    return (stated_parts){.rest = off2 > 0 ? part_ratio(off2, all2) : 0,
+    return (stated_parts){.rest = off2 > 0 ? error_ratio(off2, all2) : 0,
                           .mesh = mesh2 < 0    ? -1
                                   : light2 > 0 ? sqrt(mesh2 / light2)
                                                : 0};
@@ -122,10 +119,13 @@ static answer_error error_of_square(const error_scene *scene, const error_answer
 bool answer_error_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                      answer_error *out) {
     double off = 0, reflected = 0, radiosity = 0, light = 0, mesh = 0;
-    const light_sizes sizes = sizes_of_answer(e, scene, of);
     const emission_size both = emission_size_sum(&of->size, &of->sky);
-    value_sums *sums = sum_values(e, scene, of);
-    if (sums == NULL) return false;
+    light_sizes sizes;
+    value_sums *sums = sizes_of_answer(e, scene, of, &sizes) ? sum_values(e, scene, of) : NULL;
+    if (sums == NULL) {
+        whole_light_free(&sizes.whole);
+        return false;
+    }
     for (size_t b = 0; b < e->n_bins; b++) {
         if (!(sums[b].area > 0)) continue;
         off += sums[b].area * error_law(e, &sizes, b).elements2 + overlap_elements2(e, b) * sums[b].light2;
@@ -136,6 +136,7 @@ bool answer_error_of(const error_by_group *e, const error_scene *scene, const er
         mesh += mesh_lack_of_bin(e, &sizes, b).elements2 * l;
     }
     free(sums);
+    whole_light_free(&sizes.whole);
     if (!mesh_is_stated(e)) mesh = -1;
     *out = (answer_error){.relative = error_ratio(off, radiosity),
                           .indirect = error_ratio(off, reflected),
@@ -180,9 +181,12 @@ static name_error finish_name(const error_by_group *e, const name_sums *s, doubl
 bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
                     const reduce_request *names, name_error *errors) {
     const size_t n_rows = e->n_bins / e->figures.n_groups;
-    const light_sizes sizes = sizes_of_answer(e, scene, of);
-    value_sums *sums = sum_values(e, scene, of);
-    if (sums == NULL) return false;
+    light_sizes sizes;
+    value_sums *sums = sizes_of_answer(e, scene, of, &sizes) ? sum_values(e, scene, of) : NULL;
+    if (sums == NULL) {
+        whole_light_free(&sizes.whole);
+        return false;
+    }
     for (size_t k = 0; k < names->n_names; k++) {
         const reduce_name *name = &names->names[k];
         name_sums s = {.area = 0};
@@ -215,12 +219,14 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
         errors[k].name = called;
     }
     free(sums);
+    whole_light_free(&sizes.whole);
     return true;
 }
 
 name_error name_error_of_means(const error_by_group *e, const reduce_name *name, const name_means *means) {
     const size_t n_rows = e->n_bins / e->figures.n_groups;
-    const light_sizes sizes = light_sizes_of(e, means->quantity, &means->size, means->L);
+    light_sizes sizes = light_sizes_of(e, means->quantity, &means->size, means->L);
+    sizes.whole = means->whole;
     name_sums s = {.area = 0};
     double reflected2 = 0, radiosity2 = 0, light2 = 0, covered = 0;
     for (size_t g = 0; g < name->n_groups; g++)

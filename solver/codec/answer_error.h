@@ -62,7 +62,8 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
 typedef struct name_means {
     lam_quantity quantity;
     emission_size size, sky;
-    const float *L; /* [C][n_tiles]; NULL: no sky */
+    whole_light whole; /* of size; a view */
+    const float *L;    /* [C][n_tiles]; NULL: no sky */
     const double *value, *emission, *direct;
 } name_means;
 name_error name_error_of_means(const error_by_group *e, const reduce_name *name, const name_means *means);

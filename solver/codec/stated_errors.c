@@ -103,6 +103,7 @@ lam_status stated_errors_read(store *s, const error_scene *scene, const lam_oper
     TRY(find_members(weights.emits, n, &made.emits, error));
     if (made.read != NULL) made.receivers = error_of(&figures.report, true);
     about.read = made.read;
+    about.emits = made.emits;
     TRY(error_by_group_make(s, &about, &figures, &made.by_group, error));
     TRY(emitters_error_make(&about, op, &figures, &made.emitters, error));
     *out = made;

@@ -386,6 +386,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     TRY(reductions_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     TRY(stated_errors_read(s, &about, lit.op, &stated, error));
     about.read = stated.read;
+    about.emits = stated.emits;
     if (f->weather != NULL) {
         /* The error of an answer is told by all that the sun shines on. */
         const bool some = year->n_figures > 0;

@@ -4,6 +4,7 @@
 #include "solver/method/judge/judge_black.h"
 #include "solver/method/judge/judge_round.h"
 #include "solver/method/judge/judge_sky.h"
+#include "solver/method/judge/judge_whole.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -20,15 +21,18 @@ static void group_sums_free(group_sums *s) {
     by_group_free(&s->own);
 }
 
-static lam_status group_sums_begin(const judge_input *input, group_sums *out, lam_error *error) {
+/* Room for so many probes of whole groups. */
+static lam_status group_sums_begin(const judge_input *input, size_t whole, group_sums *out,
+                                   lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(by_group_begin(input, &out->total, error));
-    TRY(by_group_begin(input, &out->same, error));
-    TRY(by_group_begin(input, &out->own, error));
+    TRY(by_group_begin(input, whole, &out->total, error));
+    TRY(by_group_begin(input, whole, &out->same, error));
+    TRY(by_group_begin(input, whole, &out->own, error));
 done:
     return status;
 }
 
+/* Fills figures of `out`, which has those of whole groups. */
 static lam_status group_sums_finish(const group_sums *s, group_errors *out, lam_error *error) {
     lam_status status = LAM_OK;
     double *same[GROUP_FIGURES] = {NULL};
@@ -88,7 +92,7 @@ size_t judge_at_once(size_t n) {
 /* The probes of the next round; false where there are none. An LU takes all of them at once. */
 static bool next_counts(const judge_rounds *r, const probe_source *source, size_t counts[JUDGE_GROUPS]) {
     const judge_input *input = r->input;
-    const size_t least[JUDGE_GROUPS] = {RANDOM_LEAST, 0, 1,
+    const size_t least[JUDGE_GROUPS] = {RANDOM_LEAST, source->most[JUDGE_WHOLE], 1,
                                         input->probes_least > 0 ? input->probes_least : input->probes};
     size_t all = 0;
     for (int g = 0; g < JUDGE_GROUPS; g++) {
@@ -98,7 +102,8 @@ static bool next_counts(const judge_rounds *r, const probe_source *source, size_
         const figure_group *of = input->independent.n > 0 ? &t->total : &t->own;
         const bool enough =
             t->done >= least[g] && judge_is_certain(&of->indirect, probe_source_all(source, g));
-        counts[g] = enough ? 0 : r->at_once || left < step ? left : step;
+        const bool once = r->at_once || g == JUDGE_WHOLE || left < step;
+        counts[g] = enough ? 0 : once ? left : step;
         all += counts[g];
     }
     return all > 0;
@@ -189,9 +194,14 @@ lam_status judge_operator(const lam_operator *op, const judge_input *given, erro
                           JUDGE_RANDOM_PROBES, input->seed, &source, error));
     source.black = input->black;
     if (input->group != NULL)
-        TRY(probe_source_add_groups(&source, input->group, input->n_groups, JUDGE_WHOLE_PROBES, error));
-    if (input->by_group != NULL && input->group != NULL && input->independent.n > 0)
-        TRY(group_sums_begin(input, &rounds.by_group, error));
+        TRY(probe_source_add_groups(&source, input->group, input->n_groups, WHOLE_LARGE,
+                                    judge_whole_most(input->problem->n, input->problem->n_channels,
+                                                     input->n_groups * (input->read != NULL ? 2 : 1)),
+                                    error));
+    if (input->by_group != NULL && input->group != NULL && input->independent.n > 0) {
+        TRY(group_sums_begin(input, source.most[JUDGE_WHOLE], &rounds.by_group, error));
+        rounds.whole = &made;
+    }
     for (int g = 0; g < JUDGE_GROUPS; g++) most += source.most[g];
     rounds.at_once = is_dense(op, input, most);
     progress_report(input->progress, "judge", 0);

@@ -6,8 +6,12 @@
 #include "solver/method/method.h"
 #include "solver/operator/stated/error_figures.h"
 
-/* Probes of random emission, and of whole groups, at most. */
-enum { JUDGE_RANDOM_PROBES = 8, JUDGE_WHOLE_PROBES = 3 };
+/* Probes of random emission at most. */
+enum { JUDGE_RANDOM_PROBES = 8 };
+
+/* Probes of whole groups at most: held for the whole of a round, every two of them with a figure in each
+ * group. */
+size_t judge_whole_most(size_t n, size_t n_channels, size_t n_bins);
 
 /* Single emissions of a round. */
 size_t judge_at_once(size_t n);

@@ -12,31 +12,27 @@ static const double dark = 1e-6;
 
 enum { SORT_UNIFORM, SORT_NEAR, SORT_FAR };
 
-static size_t bins_of(const by_group_sums *s) {
-    return s->n_rows * s->n_groups;
-}
-
-static size_t bin_of(const by_group_sums *s, size_t i) {
-    return s->group[i] + (s->read != NULL && !(s->read[i] > 0) ? s->n_groups : 0);
-}
-
-lam_status by_group_begin(const judge_input *input, by_group_sums *out, lam_error *error) {
+lam_status by_group_begin(const judge_input *input, size_t whole, by_group_sums *out, lam_error *error) {
     lam_status status = LAM_OK;
     by_group_sums s = {.n = input->problem->n,
                        .n_groups = input->n_groups,
                        .n_rows = input->read != NULL ? 2 : 1,
                        .group = input->group,
                        .read = input->read};
-    s.bins = memory_allocate(bins_of(&s), sizeof *s.bins, "errors of groups", error);
-    s.work = memory_allocate(bins_of(&s), 2 * BIN_NUMBERS * sizeof *s.work, "errors of groups", error);
+    s.bins = memory_allocate(by_group_bins(&s), sizeof *s.bins, "errors of groups", error);
+    s.work = memory_allocate(by_group_bins(&s), 2 * BIN_NUMBERS * sizeof *s.work, "errors of groups", error);
     if (s.bins == NULL || s.work == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < sizeof s.even / sizeof *s.even; k++) {
-        s.even[k].mean = memory_allocate(bins_of(&s), 2 * sizeof *s.even[k].mean, "errors of groups", error);
+    s.even = memory_allocate(whole + 1, sizeof *s.even, "errors of groups", error);
+    if (s.even == NULL) TRY(LAM_ERR_MEMORY);
+    s.even_most = whole + 1;
+    for (size_t k = 0; k < s.even_most; k++) {
+        s.even[k].mean =
+            memory_allocate(by_group_bins(&s), 2 * sizeof *s.even[k].mean, "errors of groups", error);
         if (s.even[k].mean == NULL) TRY(LAM_ERR_MEMORY);
-        s.even[k].rms = s.even[k].mean + bins_of(&s);
+        s.even[k].rms = s.even[k].mean + by_group_bins(&s);
     }
     for (size_t i = 0; i < s.n; i++) {
-        bin_sums *b = &s.bins[bin_of(&s, i)];
+        bin_sums *b = &s.bins[by_group_bin(&s, i)];
         b->area += input->problem->area[i];
         b->squares += input->problem->area[i] * input->problem->area[i];
     }
@@ -50,7 +46,8 @@ done:
 void by_group_free(by_group_sums *sums) {
     free(sums->bins);
     free(sums->work);
-    for (size_t k = 0; k < sizeof sums->even / sizeof *sums->even; k++) free(sums->even[k].mean);
+    for (size_t k = 0; k < sums->even_most; k++) free(sums->even[k].mean);
+    free(sums->even);
     *sums = (by_group_sums){.n = 0};
 }
 
@@ -66,7 +63,7 @@ static channel_sums add_channel(const figure_probe *p, size_t c, const by_group_
     for (size_t i = 0; i < n; i++) {
         const figure_number one = figure_number_at(p, c * n + i);
         const double a = p->problem->area[i], E = a * (double)p->E[c * n + i];
-        double *to = s->work + BIN_NUMBERS * bin_of(s, i);
+        double *to = s->work + BIN_NUMBERS * by_group_bin(s, i);
         to[BIN_MEAN] += a * one.off;
         const double off2 = one.off * one.off, noise = one.noise * one.noise + one.light * one.light;
         to[BIN_MEAN_NOISE] += a * (one.noise + one.light);
@@ -91,7 +88,7 @@ static void add_ratio(double e2, double noise, double light2, int sort, bin_sums
     if (light2 > 0) to->largest[sort] = fmax(to->largest[sort], sqrt(e2 / light2));
 }
 
-static double without_noise(double e2, double noise) {
+double square_without_noise(double e2, double noise) {
     const double less = e2 - noise;
     return noise <= noise_most * less ? less : e2;
 }
@@ -107,8 +104,8 @@ static void add_bin(const double at[BIN_NUMBERS], const probe_power *power, int 
     const double one = power->N / power->P2;
     if (kind == JUDGE_RANDOM) add_ratio(at[BIN_MEAN], at[BIN_MEAN_NOISE], at[BIN_LIGHT], SORT_UNIFORM, b);
     if (kind == JUDGE_WHOLE || kind == JUDGE_LIGHTS) {
-        to->even[to->n_even].mean[bin] = without_noise(at[BIN_MEAN], at[BIN_MEAN_NOISE]) / power->P2;
-        to->even[to->n_even].rms[bin] = without_noise(at[BIN_RMS], at[BIN_RMS_NOISE]) / power->P2;
+        to->even[to->n_even].mean[bin] = square_without_noise(at[BIN_MEAN], at[BIN_MEAN_NOISE]) / power->P2;
+        to->even[to->n_even].rms[bin] = square_without_noise(at[BIN_RMS], at[BIN_RMS_NOISE]) / power->P2;
     }
     if (kind != JUDGE_SINGLE) return;
     b->mean_one += one * at[BIN_MEAN];
@@ -126,7 +123,7 @@ static void add_bin(const double at[BIN_NUMBERS], const probe_power *power, int 
 
 /* Adds the numbers of a channel, means squared, to those of the probe. */
 static void stack(const by_group_sums *s, const double *channel, double *stacked) {
-    for (size_t k = 0; k < bins_of(s); k++) {
+    for (size_t k = 0; k < by_group_bins(s); k++) {
         const double area = s->bins[k].area, *from = channel + BIN_NUMBERS * k;
         double *to = stacked + BIN_NUMBERS * k;
         if (!(area > 0)) continue;
@@ -143,7 +140,7 @@ static void stack(const by_group_sums *s, const double *channel, double *stacked
 
 /* The numbers of all bins, [n_bins][BIN_NUMBERS], in to->work, and the power of the probe. */
 static const double *find_numbers(const figure_probe *p, by_group_sums *to, probe_power *power) {
-    const size_t n_bins = bins_of(to), bytes = n_bins * BIN_NUMBERS * sizeof *to->work;
+    const size_t n_bins = by_group_bins(to), bytes = n_bins * BIN_NUMBERS * sizeof *to->work;
     double *const stacked = to->work + n_bins * BIN_NUMBERS;
     double area = 0, squares = 0;
     *power = (probe_power){.P2 = 0};
@@ -170,7 +167,7 @@ void by_group_add(const figure_probe *p, int kind, by_group_sums *to) {
     probe_power power;
     const double *stacked = find_numbers(p, to, &power);
     if (!(power.P2 > 0)) return;
-    for (size_t k = 0; k < bins_of(to); k++) add_bin(stacked + BIN_NUMBERS * k, &power, kind, k, to);
+    for (size_t k = 0; k < by_group_bins(to); k++) add_bin(stacked + BIN_NUMBERS * k, &power, kind, k, to);
     if (kind == JUDGE_SINGLE) {
         to->n_single++;
         to->power += power.P2 / power.N;
@@ -188,7 +185,8 @@ static double even_of(const by_group_sums *s, size_t bin, bool rms, double many2
 }
 
 static double ratio_of(const bin_sums *b, int sort) {
-    return b->light[sort] > 0 ? sqrt(without_noise(b->off[sort], b->noise[sort]) / b->light[sort]) : NAN;
+    return b->light[sort] > 0 ? sqrt(square_without_noise(b->off[sort], b->noise[sort]) / b->light[sort])
+                              : NAN;
 }
 
 static void finish_bin(const by_group_sums *s, size_t k, double **of) {
@@ -198,12 +196,12 @@ static void finish_bin(const by_group_sums *s, size_t k, double **of) {
     if (s->n_single > 0) {
         /* The errors of elements alike count alike in one^2, and by their power in what many add up to. The
          * geometric mean of both is taken for many: the few probes are not enough to know the second. */
-        const double mean = without_noise(b->mean_one, b->mean_one_noise) / m;
-        const double rms = without_noise(b->rms_one, b->rms_one_noise) / m;
+        const double mean = square_without_noise(b->mean_one, b->mean_one_noise) / m;
+        const double rms = square_without_noise(b->rms_one, b->rms_one_noise) / m;
         mean_one = sqrt(mean);
         rms_one = sqrt(rms);
-        mean_many = pow(mean * without_noise(b->mean_all, b->mean_all_noise) / s->power, .25);
-        rms_many = pow(rms * without_noise(b->rms_all, b->rms_all_noise) / s->power, .25);
+        mean_many = pow(mean * square_without_noise(b->mean_all, b->mean_all_noise) / s->power, .25);
+        rms_many = pow(rms * square_without_noise(b->rms_all, b->rms_all_noise) / s->power, .25);
     }
     /* The few probes may all be right on average where the elements are off: no mean is known better than
      * independent errors of these leave it. */
@@ -225,12 +223,12 @@ static void finish_bin(const by_group_sums *s, size_t k, double **of) {
 lam_status by_group_finish(const by_group_sums *sums, double **of, lam_error *error) {
     double *made[GROUP_FIGURES] = {NULL};
     for (int f = 0; f < GROUP_FIGURES; f++) {
-        made[f] = memory_allocate(bins_of(sums), sizeof *made[f], "errors of groups", error);
+        made[f] = memory_allocate(by_group_bins(sums), sizeof *made[f], "errors of groups", error);
         if (made[f] != NULL) continue;
         while (f-- > 0) free(made[f]);
         return LAM_ERR_MEMORY;
     }
-    for (size_t k = 0; k < bins_of(sums); k++) finish_bin(sums, k, made);
+    for (size_t k = 0; k < by_group_bins(sums); k++) finish_bin(sums, k, made);
     memcpy(of, made, sizeof made);
     return LAM_OK;
 }

@@ -28,11 +28,11 @@ typedef struct by_group_sums {
     const uint32_t *group;
     const float *read;
     size_t n_single;
-    double power;   /* sum of P^2 / N of single elements */
-    bin_sums *bins; /* [n_rows][n_groups] */
-    double *work;   /* two numbers of all bins, of a channel and of a probe */
-    even_probe even[JUDGE_WHOLE_PROBES + 1];
-    size_t n_even;
+    double power;     /* sum of P^2 / N of single elements */
+    bin_sums *bins;   /* [n_rows][n_groups] */
+    double *work;     /* two numbers of all bins, of a channel and of a probe */
+    even_probe *even; /* [even_most] */
+    size_t n_even, even_most;
 } by_group_sums;
 
 /* Numbers of a bin for one probe, channels stacked: the squared error of its mean, the noise in it, and the
@@ -51,8 +51,20 @@ enum {
     BIN_NUMBERS
 };
 
-/* Errors: LAM_ERR_MEMORY. */
-lam_status by_group_begin(const judge_input *input, by_group_sums *out, lam_error *error);
+/* Room for so many probes of whole groups, and for one of the scene's own light. Errors: LAM_ERR_MEMORY. */
+lam_status by_group_begin(const judge_input *input, size_t whole, by_group_sums *out, lam_error *error);
+
+/* The number of bins, and that of an element. */
+static inline size_t by_group_bins(const by_group_sums *s) {
+    return s->n_rows * s->n_groups;
+}
+
+static inline size_t by_group_bin(const by_group_sums *s, size_t i) {
+    return s->group[i] + (s->read != NULL && !(s->read[i] > 0) ? s->n_groups : 0);
+}
+
+/* The square of an error without the noise in it, where that is at most a ninth of the rest. */
+double square_without_noise(double e2, double noise);
 
 /* Adds a probe of a group of probes, JUDGE_... Cost: O(C n). */
 void by_group_add(const figure_probe *p, int kind, by_group_sums *to);

@@ -34,8 +34,7 @@ lam_status probe_source_make(const build_problem *problem, const lam_operator *o
         .emits = emits,
         .most = {[JUDGE_RANDOM] = randoms, [JUDGE_LIGHTS] = any_light(op, problem, emission, emits)},
         .draw = seed,
-        .random = seed + 1,
-        .draw_whole = seed + 2};
+        .random = seed + 1};
     out->deck = memory_allocate(all, sizeof *out->deck, "probes", error);
     if (out->deck == NULL) return LAM_ERR_MEMORY;
     for (size_t k = 0; k < all; k++)
@@ -44,22 +43,51 @@ lam_status probe_source_make(const build_problem *problem, const lam_operator *o
     return LAM_OK;
 }
 
-lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups, size_t most,
-                                   lam_error *error) {
+/* A group that may emit: the power of the scene's own light there, and its area. */
+typedef struct ranked_group {
+    uint32_t group;
+    bool may;
+    double power, area;
+} ranked_group;
+
+/* Groups that may emit first, of them the brightest, then the largest, then by their numbers. */
+static int compare_groups(const void *a, const void *b) {
+    const ranked_group *x = a, *y = b;
+    if (x->may != y->may) return x->may ? -1 : 1;
+    if (x->power != y->power) return x->power > y->power ? -1 : 1;
+    if (x->area != y->area) return x->area > y->area ? -1 : 1;
+    return x->group < y->group ? -1 : 1;
+}
+
+lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups, size_t large,
+                                   size_t most, lam_error *error) {
     lam_status status = LAM_OK;
-    bool *may = NULL;
+    const build_problem *p = s->problem;
+    ranked_group *ranked = NULL;
+    size_t lit = 0;
     if (lam_operator_emitters(s->op) > 0) return LAM_OK;
-    may = memory_allocate(n_groups, sizeof *may, "probes", error);
+    ranked = memory_allocate(n_groups, sizeof *ranked, "probes", error);
     s->whole = memory_allocate(n_groups, sizeof *s->whole, "probes", error);
-    if (may == NULL || s->whole == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < s->problem->n; i++)
-        if (s->emits == NULL || s->emits[i] > 0) may[group[i]] = true;
-    for (size_t g = 0; g < n_groups; g++)
-        if (may[g]) s->whole[s->n_whole++] = (uint32_t)g;
+    if (ranked == NULL || s->whole == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0; g < n_groups; g++) ranked[g].group = (uint32_t)g;
+    for (size_t i = 0; i < p->n; i++) {
+        ranked_group *of = &ranked[group[i]];
+        if (s->emits != NULL && !(s->emits[i] > 0)) continue;
+        of->may = true;
+        of->area += p->area[i];
+        for (size_t c = 0; c < p->n_channels; c++)
+            of->power += p->area[i] * (double)s->emission[c * p->n + i];
+    }
+    qsort(ranked, n_groups, sizeof *ranked, compare_groups);
+    for (size_t g = 0; g < n_groups && ranked[g].may; g++) {
+        s->whole[s->n_whole++] = ranked[g].group;
+        lit += s->emits != NULL || ranked[g].power > 0;
+    }
     s->group = group;
-    s->most[JUDGE_WHOLE] = most < s->n_whole ? most : s->n_whole;
+    s->most[JUDGE_WHOLE] = lit + large < most ? lit + large : most;
+    if (s->n_whole < s->most[JUDGE_WHOLE]) s->most[JUDGE_WHOLE] = s->n_whole;
 done:
-    free(may);
+    free(ranked);
     return status;
 }
 
@@ -103,8 +131,7 @@ static lam_status set_numbers(probe_source *s, int group, size_t count, float *n
     }
     const size_t v = s->made[group]++;
     if (group == JUDGE_WHOLE) {
-        const size_t drawn = draw(s->whole, s->n_whole, v, &s->draw_whole);
-        for (size_t k = 0; k < C * count; k++) numbers[k] = s->group[k % count] == drawn;
+        for (size_t k = 0; k < C * count; k++) numbers[k] = s->group[k % count] == s->whole[v];
     } else if (group == JUDGE_RANDOM)
         for (size_t k = 0; k < C * count; k++) numbers[k] = (float)random_unit(&s->random);
     else if (lam_operator_emitters(s->op) > 0)

@@ -8,8 +8,8 @@
 enum { JUDGE_RANDOM, JUDGE_WHOLE, JUDGE_LIGHTS, JUDGE_SINGLE, JUDGE_GROUPS };
 
 /* A source of emissions: single elements (or emitters), drawn without repetition, the scene's own light,
- * random light of all elements (emitters), and whole groups of the scene, drawn without repetition, each of
- * which emits evenly; with sources, of these elements alone. */
+ * random light of all elements (emitters), and whole groups of the scene, each of which emits evenly; with
+ * sources, of these elements alone. */
 typedef struct probe_source {
     const build_problem *problem;
     const lam_operator *op;
@@ -18,11 +18,11 @@ typedef struct probe_source {
     const bool *black;     /* [n], true where B of probes is the irradiance; NULL: nowhere. Set by the user */
     const uint32_t *group; /* [n], of each element; NULL: no whole groups are drawn */
     size_t n_singles;      /* in the deck */
-    size_t n_whole;        /* groups in their deck, of which some element may emit */
-    uint32_t *whole;       /* [n_whole] drawn so far, then the others */
+    size_t n_whole;        /* groups of which some element may emit */
+    uint32_t *whole;       /* [n_whole], in the order in which they are taken */
     size_t most[JUDGE_GROUPS], made[JUDGE_GROUPS];
-    uint32_t *deck;                    /* [n or emitters, or those that emit] drawn so far, then the others */
-    uint64_t draw, random, draw_whole; /* states */
+    uint32_t *deck;        /* [n or emitters, or those that emit] drawn so far, then the others */
+    uint64_t draw, random; /* states */
 } probe_source;
 
 /* singles: at most; emits may be NULL, as it is of an operator of emitters. Errors: LAM_ERR_MEMORY. */
@@ -30,10 +30,12 @@ lam_status probe_source_make(const build_problem *problem, const lam_operator *o
                              const float *emits, size_t singles, size_t randoms, uint64_t seed,
                              probe_source *out, lam_error *error);
 
-/* Adds at most `most` of the groups 0 ... n_groups - 1, group [n] being those of the elements; an operator of
- * emitters cannot answer them, and gets none. Errors: LAM_ERR_MEMORY. */
-lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups, size_t most,
-                                   lam_error *error);
+/* Adds groups 0 ... n_groups - 1, group [n] being those of the elements: those that people light, which are
+ * groups with emission of the scene, by their power, and with `emits` all of which some element emits, and so
+ * many others, `large`, by their area; at most `most`. An operator of emitters cannot answer them, and gets
+ * none. Errors: LAM_ERR_MEMORY. */
+lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups, size_t large,
+                                   size_t most, lam_error *error);
 void probe_source_free(probe_source *s);
 
 /* The number of emissions of a group, JUDGE_..., 0 where they are endless. */

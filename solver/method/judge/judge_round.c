@@ -1,6 +1,7 @@
 #include "solver/method/judge/judge_round.h"
 
 #include "solver/method/judge/judge_emitters.h"
+#include "solver/method/judge/judge_whole.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,10 @@ static const double certain = .1;
 /* Random emissions are all alike. Where the references are no twins the noise is measured by some of the
  * first round: random emission, whole groups, the lights, and some single elements. */
 enum { NOISE_PROBES = 12 };
+/* The first light of a group takes as long as that of all of its elements one by one: it is found for groups
+ * of so few of them, as of single elements the samples have little of it, and for no more than these in all.
+ */
+enum { FIRST_OF_GROUP = 32, FIRST_OF_ALL = 128 };
 
 /* The emissions of a round, their first light H and its spread D, [m][C][n], and corrections by each
  * reference, in single precision, as the answers are that they correct. */
@@ -36,10 +41,18 @@ static size_t vector_of(const judge_input *input) {
     return input->problem->n * input->problem->n_channels;
 }
 
+/* The elements that emit in a probe. */
+static size_t count_emitters(const measured *m, size_t v) {
+    const size_t n = m->input->problem->n;
+    size_t count = 0;
+    for (size_t i = 0; i < n; i++) count += m->p->E[v * vector_of(m->input) + i] > 0;
+    return count;
+}
+
 /* Fills m->first, m->spread and m->known with H, D and *known of input->first_light (judge.h), for probes of
- * the scene's light and of single elements: H = F E is the first light of a probe, and D is half the
- * difference of two independent estimates whose mean is H. known[v] is false where so many elements of probe
- * v emit that neither is found. A channel with the emission of the first one gets its H and D. */
+ * small groups, the scene's light and of single elements: H = F E is the first light of a probe, and D is
+ * half the difference of two independent estimates whose mean is H. known[v] is false where so many elements
+ * of probe v emit that neither is found. A channel with the emission of the first one gets its H and D. */
 static lam_status find_first_light(measured *m, lam_error *error) {
     lam_status status = LAM_OK;
     const judge_input *input = m->input;
@@ -49,7 +62,11 @@ static lam_status find_first_light(measured *m, lam_error *error) {
     m->spread = memory_allocate(m->p->m, C * n * sizeof *m->spread, "probes", error);
     m->known = memory_allocate(m->p->m, sizeof *m->known, "probes", error);
     if (m->first == NULL || m->spread == NULL || m->known == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t v = m->p->begin[JUDGE_LIGHTS]; v < m->p->m; v++) {
+    size_t left = FIRST_OF_ALL;
+    for (size_t v = m->p->begin[JUDGE_WHOLE]; v < m->p->m; v++) {
+        const size_t emitters = v < m->p->begin[JUDGE_LIGHTS] ? count_emitters(m, v) : 0;
+        if (emitters > FIRST_OF_GROUP || emitters > left) continue;
+        left -= emitters;
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         for (size_t c = 0; c < C; c++) {
             const float *E = m->p->E + v * C * n;
@@ -216,6 +233,34 @@ static void add_total(const measured *m, size_t n_noisy, bool same, bool lit, ju
         }
 }
 
+/* The figures of whole groups. Corrections are copied as numbers in double, [count][C][n] by each reference.
+ */
+static lam_status add_whole(const measured *m, size_t n_noisy, const probe_source *source, judge_rounds *r,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t first = m->p->begin[JUDGE_WHOLE], count = m->p->begin[JUDGE_WHOLE + 1] - first;
+    const size_t vector = vector_of(m->input);
+    figure_probe *each = NULL;
+    double *numbers = NULL;
+    if (r->whole == NULL || count == 0) return LAM_OK;
+    each = memory_allocate(count, sizeof *each, "errors of groups", error);
+    numbers = memory_allocate(2 * count, vector * sizeof *numbers, "errors of groups", error);
+    if (each == NULL || numbers == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < count; k++) {
+        double *const x = numbers + 2 * k * vector, *const y = x + vector;
+        const size_t v = first + k;
+        each[k] = probe_of(m, v, m->x, v < n_noisy ? m->y : NULL, true);
+        each[k].x = numbers_of(m, v, m->x, x);
+        if (each[k].y != NULL) each[k].y = numbers_of(m, v, m->y, y);
+    }
+    TRY(whole_errors(count, each, source->whole + source->made[JUDGE_WHOLE] - count, &r->by_group.total,
+                     r->whole, error));
+done:
+    free(each);
+    free(numbers);
+    return status;
+}
+
 lam_status judge_rounds_add(const lam_operator *op, const probe_source *source, const probes *p,
                             judge_rounds *r, lam_error *error) {
     lam_status status = LAM_OK;
@@ -251,6 +296,7 @@ lam_status judge_rounds_add(const lam_operator *op, const probe_source *source, 
         const bool lit = judge_emitters_are_lit(op, input);
         if (lit) TRY(judge_emitters_add(op, p, r, error));
         add_total(&m, n_noisy, own, lit, r);
+        TRY(add_whole(&m, n_noisy, source, r, error));
     }
     for (int g = 0; g < JUDGE_GROUPS; g++) r->of[g].done += p->begin[g + 1] - p->begin[g];
     report(r, 1);

@@ -34,6 +34,8 @@ typedef struct judge_rounds {
     step_rates rates;
     group_tally of[JUDGE_GROUPS];
     group_sums by_group;
+    group_errors *whole; /* gets the figures of whole groups, all of which are in the first round; NULL: none
+                            are wanted */
 } judge_rounds;
 
 /* Adds the emissions p, one after the other in memory of two corrections of each, [m][C][n] floats, the first

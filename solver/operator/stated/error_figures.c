@@ -250,7 +250,34 @@ void group_errors_free(group_errors *e) {
     for (int f = 0; f < GROUP_FIGURES; f++) free(e->of_operator[f]);
     for (int f = 0; f < SKY_FIGURES; f++) free(e->sky[f]);
     for (int k = 0; k < TILE_ARRAYS; k++) free(*tiles[k].numbers);
+    free(e->whole_groups);
+    free(e->whole_rms);
+    free(e->whole_mean);
     *e = (group_errors){.n_groups = 0};
+}
+
+/* Writes the errors of whole groups, or reads them: older stores have none. */
+static lam_status pass_whole(store *s, bool saves, group_errors *e, lam_error *error) {
+    static const char path[] = BY_GROUP "/whole_groups";
+    lam_status status = LAM_OK;
+    void *groups = NULL;
+    if (saves ? e->n_whole == 0 : !store_has(s, path)) return LAM_OK;
+    if (saves) {
+        TRY(store_write(s, path, STORE_U32, 1, &e->n_whole, e->whole_groups, error));
+    } else {
+        e->n_whole = SIZE_MAX;
+        TRY(store_read(s, path, STORE_U32, 1, &e->n_whole, &groups, error));
+        e->whole_groups = groups;
+        for (size_t k = 0; k < e->n_whole; k++)
+            if (e->whole_groups[k] >= e->n_groups)
+                FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu] = %u, must be below %zu, the number of groups",
+                     store_path(s), path, k, (unsigned)e->whole_groups[k], e->n_groups);
+    }
+    size_t dims[4] = {e->n_rows, e->n_groups, e->n_whole, e->n_whole};
+    TRY(pass_array(s, saves, BY_GROUP, "whole_rms", 4, dims, -INFINITY, &e->whole_rms, error));
+    TRY(pass_array(s, saves, BY_GROUP, "whole_mean", 4, dims, -INFINITY, &e->whole_mean, error));
+done:
+    return status;
 }
 
 /* Writes what stands under by_group, or reads those of its figures that laws need. */
@@ -265,6 +292,7 @@ static lam_status pass_by_group(store *s, bool saves, group_errors *e, lam_error
         FAIL(error, LAM_ERR_FORMAT, "%s: " BY_GROUP " has figures of %zu rows, must have 1 or 2",
              store_path(s), bins[0]);
     e->n_rows = bins[0];
+    TRY(pass_whole(s, saves, e, error));
     if (saves ? e->sky[0] == NULL : !store_has(s, BY_GROUP "/sky_power")) goto done;
     for (int k = 0; k < SKY_FIGURES; k++)
         TRY(pass_array(s, saves, BY_GROUP, sky_names[k], 2, bins, 0, &e->sky[k], error));

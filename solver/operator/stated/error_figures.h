@@ -92,6 +92,13 @@ enum {
 typedef struct group_errors {
     size_t n_groups, n_rows;
     double *of[GROUP_FIGURES];
+    /* Of groups that emit evenly the errors are known themselves, and together: K [n_rows][n_groups][n_whole]
+     * [n_whole] has for whole_groups k and l, 1 W/m^2 in every channel from each, the mean product of the
+     * errors that both make, over the elements of a bin (rms) or of its mean (mean), channels added up, so
+     * that weights w of them have the squared error w' K w. */
+    size_t n_whole;
+    uint32_t *whole_groups;         /* [n_whole] */
+    double *whole_rms, *whole_mean; /* W^2/m^4 at 1 W/m^2; NULL: n_whole is 0 */
     /* The part of them that is against the very F of the operator, by its share of the error of those probes
      * that are compared with it. Not stored. */
     double *of_operator[GROUP_FIGURES];

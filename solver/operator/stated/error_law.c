@@ -1,6 +1,7 @@
 #include "solver/operator/stated/error_law.h"
 
 #include "solver/base/weighted.h"
+#include "solver/operator/stated/whole_law.h"
 #include "store/groups.h"
 #include "store/status.h"
 
@@ -15,6 +16,7 @@ void error_by_group_free(error_by_group *e) {
     free(e->of_group);
     free(e->bin);
     free(e->overlap);
+    free(e->whole_of);
     mesh_shares_free(&e->mesh);
     *e = (error_by_group){.n_bins = 0};
 }
@@ -50,6 +52,17 @@ static lam_status find_reflecting(const error_scene *scene, error_by_group *e, l
     return status;
 }
 
+/* The places of groups among those whose errors are stated together. */
+static lam_status find_whole(error_by_group *e, lam_error *error) {
+    const group_errors *f = &e->figures;
+    if (f->n_whole == 0) return LAM_OK;
+    e->whole_of = memory_allocate(f->n_groups, sizeof *e->whole_of, "errors of groups", error);
+    if (e->whole_of == NULL) return LAM_ERR_MEMORY;
+    for (size_t g = 0; g < f->n_groups; g++) e->whole_of[g] = WHOLE_NONE;
+    for (size_t k = 0; k < f->n_whole; k++) e->whole_of[f->whole_groups[k]] = (uint32_t)k;
+    return LAM_OK;
+}
+
 /* The share of each group that overlaps others. */
 static lam_status read_overlap(store *s, error_by_group *e, lam_error *error) {
     lam_status status = LAM_OK;
@@ -83,6 +96,7 @@ lam_status error_by_group_make(store *s, const error_scene *scene, stated_figure
     if (e.area == NULL || e.squares == NULL || e.reflectance == NULL || e.bin == NULL) TRY(LAM_ERR_MEMORY);
     find_sums(scene, &e);
     TRY(find_reflecting(scene, &e, error));
+    TRY(find_whole(&e, error));
     TRY(mesh_shares_make(&from->mesh, G, &e.mesh, error));
     *out = e;
     e = (error_by_group){.n_bins = 0};
@@ -208,8 +222,11 @@ bin_error error_law(const error_by_group *e, const light_sizes *of, size_t bin) 
     const reflecting *group = &e->of_group[bin % e->figures.n_groups];
     if (group->black && of->quantity != LAM_IRRADIANCE) return (bin_error){0, 0};
     const bin_error direct = error_of_direct(e, of, bin);
-    bin_error sum = {emission2(e, &of->size, bin, GROUP_RMS_ONE),
-                     emission2(e, &of->size, bin, GROUP_MEAN_ONE)};
+    const bool whole = of->whole.weights != NULL;
+    const emission_size *rest = whole ? &of->whole.rest : &of->size;
+    bin_error sum = whole ? whole_law(e, of->whole.weights, bin) : (bin_error){0, 0};
+    sum.elements2 += emission2(e, rest, bin, GROUP_RMS_ONE);
+    sum.mean2 += emission2(e, rest, bin, GROUP_MEAN_ONE);
     sum.elements2 += sky2(e, &of->sky, bin, SKY_RMS_TILES);
     sum.mean2 += sky2(e, &of->sky, bin, SKY_MEAN_TILES);
     add_sent(e, of, bin, &sum);
@@ -218,7 +235,8 @@ bin_error error_law(const error_by_group *e, const light_sizes *of, size_t bin) 
 }
 
 double error_ratio(double error2, double light2) {
-    return error2 > 0 ? sqrt(error2 / fmax(light2 - error2, 0)) : 0;
+    if (!(error2 > 0)) return 0;
+    return sqrt(2 * error2 < light2 ? error2 / (light2 - error2) : 2 * error2 / light2);
 }
 
 bool mesh_is_stated(const error_by_group *e) {

@@ -14,6 +14,7 @@ typedef struct error_scene {
     const float *reflectance;        /* [C][n] */
     const uint32_t *start, *members; /* [n_groups + 1], [n]: those of group g from members[start[g]] on */
     const bool *read;                /* [n], true of receivers; NULL: all are */
+    const bool *emits;               /* [n], true of sources; NULL: all are */
 } error_scene;
 
 /* Figures with what their formulas need of the mesh. A bin is the elements of a group, or of those that are
@@ -31,6 +32,7 @@ typedef struct error_by_group {
     double *reflectance;  /* [C][n_groups], mean */
     reflecting *of_group; /* [n_groups] */
     uint32_t *bin;        /* [n] */
+    uint32_t *whole_of;   /* [n_groups], places among figures.whole_groups (whole_law.h); NULL: none */
     double repair;        /* s; 0: none */
     double *overlap;      /* [n_groups], o; NULL: none */
     mesh_shares mesh;
@@ -58,6 +60,13 @@ void emission_size_add(emission_size *e, size_t n, const double *weights, const 
 /* The size of both: their powers added up. */
 emission_size emission_size_sum(const emission_size *a, const emission_size *b);
 
+/* The light that whole groups emit evenly, [C][n_whole], W/m^2 (whole_law.h), and the size of all else that
+ * is emitted. weights NULL: nothing is known of whole groups. */
+typedef struct whole_light {
+    double *weights;
+    emission_size rest;
+} whole_light;
+
 /* P^2, S and W of a sky (error_figures.h). */
 typedef struct sky_sizes {
     const float *L; /* [C][n_tiles]; NULL: no sky, or nothing is stated of skies */
@@ -69,6 +78,7 @@ sky_sizes sky_sizes_of(const error_by_group *e, const float *L);
 typedef struct light_sizes {
     lam_quantity quantity;
     emission_size size;
+    whole_light whole; /* of size; a view */
     sky_sizes sky, sent;
     double lost2; /* (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
 } light_sizes;
@@ -95,8 +105,10 @@ double overlap_of_bin(const error_by_group *e, size_t bin);
 double overlap_elements2(const error_by_group *e, size_t bin);
 double overlap_mean2(const error_by_group *e, double light, double covered);
 
-/* The error over the light that there is without it: the light of the answer has the error in it, and its
- * square is larger by that of the error on average. Not finite where nothing is left. */
+/* The root of error2 / light2. The light of the answer has the error in it, and its square is larger by that
+ * of the error on average, which is taken out of it where it is no more than half: the figure is 1 there.
+ * Beyond that it is over half of the light, so that it rises and stays finite; of no light at all it is not.
+ */
 double error_ratio(double error2, double light2);
 
 #endif

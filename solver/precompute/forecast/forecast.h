@@ -12,6 +12,7 @@
 
 typedef struct forecast {
     size_t n, n_channels;
+    size_t n_groups;             /* of the scene; 0: none is judged as a whole */
     size_t n_own_channels;       /* whose reflectances no earlier one has; 0: all */
     size_t n_planes;             /* of the tree of clusters; 0: not known */
     size_t sky_tiles;            /* 0: no sky */

@@ -50,17 +50,19 @@ double forecast_operator_bytes(const forecast *f) {
     return method_bytes(f).stored;
 }
 
-/* Of each probe of a round its emission, an answer, its first light with its spread, and corrections by two
- * references; the vectors of the solutions that are found at once; an LU, which takes all probes in one
- * round; and the walk of first light, whose nodes are those of blocks. */
+/* Memory holds of each probe of a round its emission, an answer, its first light with its spread, and
+ * corrections by two references; the vectors of the solutions that are found at once; an LU, which takes all
+ * probes in one round; and the walk of first light, whose nodes are those of blocks. */
 static const double walk_bytes = 460;
 
 static double judge_bytes(const forecast *f) {
     const double n = (double)f->n, n_channels = (double)f->n_channels, others = JUDGE_RANDOM_PROBES + 1;
+    const double whole =
+        fmin((double)f->n_groups, (double)judge_whole_most(f->n, f->n_channels, f->n_groups));
     const bool blocks = recipe_can(&f->judge_recipe, SOURCE_BLOCKS),
                dense = f->n <= REFERENCE_DENSE_ELEMENTS && !blocks;
-    const double all = (double)f->probes + others,
-                 round = dense ? all : fmin(all, (double)judge_at_once(f->n) + 5);
+    const double all = (double)f->probes + others + whole,
+                 round = dense ? all : fmin(all, (double)judge_at_once(f->n) + 5 + whole);
     const double columns = (double)guided_reference_columns(f->n, f->n_channels);
     const double walk = blocks ? walk_bytes : 0;
     return n * (32 * round * n_channels + 72 * fmin(round * n_channels, columns) + walk) +

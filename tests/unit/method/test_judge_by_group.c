@@ -32,7 +32,7 @@ static void judge_single(const float *E, const float *B, const double *x, const 
     const judge_input input = input_of();
     by_group_sums sums = {.n = 0};
     lam_error error = {.message = ""};
-    ck_ok(by_group_begin(&input, &sums, &error));
+    ck_ok(by_group_begin(&input, 1, &sums, &error));
     by_group_add(&one, JUDGE_SINGLE, &sums);
     ck_ok(by_group_finish(&sums, of, &error));
     by_group_free(&sums);
@@ -121,7 +121,7 @@ START_TEST(whole_groups_show_what_does_not_average_out) {
     by_group_sums sums = {.n = 0};
     double *of[GROUP_FIGURES] = {NULL};
     lam_error error = {.message = ""};
-    ck_ok(by_group_begin(&input, &sums, &error));
+    ck_ok(by_group_begin(&input, 1, &sums, &error));
     for (size_t j = 0; j < MANY; j++) {
         memset(E, 0, sizeof E);
         E[j] = 1;
@@ -160,7 +160,7 @@ START_TEST(receivers_have_a_row_of_their_own) {
     double *of[GROUP_FIGURES] = {NULL};
     lam_error error = {.message = ""};
     input.read = read;
-    ck_ok(by_group_begin(&input, &sums, &error));
+    ck_ok(by_group_begin(&input, 1, &sums, &error));
     ck_assert_uint_eq(sums.n_rows, 2);
     by_group_add(&one, JUDGE_SINGLE, &sums);
     ck_ok(by_group_finish(&sums, of, &error));

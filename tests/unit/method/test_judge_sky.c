@@ -81,7 +81,7 @@ static size_t judge(const two_elements *s, reference_relation relation, figure_g
     size_t done = 0;
     lam_operator *op = make_operator(s->F[0]);
     *figures = (figure_group){.relative = {.tried = 0}};
-    ck_ok(by_group_begin(&input, &bins, &error));
+    ck_ok(by_group_begin(&input, 0, &bins, &error));
     ck_ok(judge_sky_powers(&input, &made, &error));
     ck_ok(sky_law_begin(&input, &made, &sums, &error));
     ck_ok(judge_sky_add(op, &input, figures, &bins, &sums, &done, &error));

@@ -1,0 +1,119 @@
+/* The errors of answers to light that whole groups emit, against sums by hand: five elements of three groups,
+ * two of which are stated, and two channels. */
+#include "solver/operator/stated/whole_law.h"
+#include "support/suite.h"
+
+#include <math.h>
+
+enum { N = 5, C = 2, G = 3, WHOLE = 2, DESK = 0, LAMP = 1, WALL = 2 };
+static const double area[N] = {1, 2, 4, 3, 5};
+static const float rho[C * N] = {.5f, .5f, .5f, .5f, .5f, .5f, .5f, .5f, .5f, .5f};
+static const uint32_t start[] = {0, 1, 3, 5}, members[] = {0, 1, 2, 3, 4};
+static const error_scene scene = {.n = N,
+                                  .n_channels = C,
+                                  .n_groups = G,
+                                  .area = area,
+                                  .reflectance = rho,
+                                  .start = start,
+                                  .members = members};
+
+/* Lamp and wall are stated; their errors are alike in the desk, cancel in the lamp, and go apart in the wall.
+ */
+static uint32_t whole_groups[WHOLE] = {WALL, LAMP}, whole_of[G] = {WHOLE_NONE, 1, 0},
+                bin[N] = {0, 1, 1, 2, 2};
+static double rms[G * WHOLE * WHOLE] = {4, 6, 6, 9, 1, -1, -1, 1, 2, 0, 0, 3};
+static double means[G * WHOLE * WHOLE] = {2, 3, 3, 4.5, 1e-9, 0, 0, 1e-9, 1, 0, 0, 1};
+static double bin_area[G] = {1, 6, 8}, squares[G] = {1, 20, 34};
+static const error_by_group stated = {.figures = {.n_groups = G,
+                                                  .n_rows = 1,
+                                                  .n_channels = C,
+                                                  .n_whole = WHOLE,
+                                                  .whole_groups = whole_groups,
+                                                  .whole_rms = rms,
+                                                  .whole_mean = means},
+                                      .n_bins = G,
+                                      .area = bin_area,
+                                      .squares = squares,
+                                      .bin = bin,
+                                      .whole_of = whole_of};
+
+START_TEST(even_groups_are_told_from_the_rest) {
+    /* The lamp shines evenly in both channels, the wall in the second alone; the desk is none of them. */
+    const float E[C * N] = {1, 2, 2, 1, 3, 0, 4, 4, 5, 5};
+    whole_light found;
+    ck_assert(whole_light_find(&stated, &scene, E, &found));
+    const double expected[C * WHOLE] = {0, 2, 5, 4};
+    for (size_t k = 0; k < C * WHOLE; k++) ck_assert_double_eq(found.weights[k], expected[k]);
+    /* In the first channel 1, 3 and 15 W are left, in the second nothing. */
+    ck_assert_double_eq(found.rest.power2, 19 * 19);
+    ck_assert_double_eq(found.rest.squares, 1 + 9 + 225);
+    whole_light_free(&found);
+}
+END_TEST
+
+START_TEST(sources_count_alone) {
+    const float E[C * N] = {0, 2, 0, 0, 0, 0, 0, 0, 0, 0};
+    const bool emits[N] = {false, true, false, false, false};
+    error_scene of_sources = scene;
+    whole_light found;
+    ck_assert(whole_light_find(&stated, &scene, E, &found));
+    ck_assert_double_eq(found.weights[1], 0);
+    ck_assert_double_eq(found.rest.power2, 16);
+    whole_light_free(&found);
+    of_sources.emits = emits;
+    ck_assert(whole_light_find(&stated, &of_sources, E, &found));
+    ck_assert_double_eq(found.weights[1], 2);
+    ck_assert_double_eq(found.rest.power2, 0);
+    whole_light_free(&found);
+}
+END_TEST
+
+START_TEST(light_that_has_signs_counts_by_its_size) {
+    const float E[C * N] = {0, -2, -2, 0, 0, 0, 0, 0, 1, -1};
+    whole_light found;
+    ck_assert(whole_light_find(&stated, &scene, E, &found));
+    ck_assert_double_eq(found.weights[1], 2);
+    ck_assert_double_eq(found.weights[C * WHOLE - 2], 0);
+    ck_assert_double_eq(found.rest.power2, 64);
+    whole_light_free(&found);
+}
+END_TEST
+
+START_TEST(errors_together_are_those_of_sums) {
+    const double w[C * WHOLE] = {1, 2, 0, 1};
+    /* 4 + 2 * 2 * 6 + 4 * 9 and 9, over two channels; the mean of the desk, one element, is no better. */
+    const bin_error desk = whole_law(&stated, w, DESK), lamp = whole_law(&stated, w, LAMP),
+                    wall = whole_law(&stated, w, WALL);
+    ck_assert_double_eq_tol(desk.elements2, (64 + 9) / 2., 1e-12);
+    ck_assert_double_eq_tol(desk.mean2, (64 + 9) / 2., 1e-12);
+    /* 1 - 4 + 4 is less than a quarter of 1 + 4, which stays; the mean has the errors of two elements. */
+    ck_assert_double_eq_tol(lamp.elements2, (1.25 + 1) / 2, 1e-12);
+    ck_assert_double_eq_tol(lamp.mean2, (1.25 + 1) / 2 * 20 / 36, 1e-12);
+    ck_assert_double_eq_tol(wall.elements2, (2 + 12 + 3) / 2., 1e-12);
+    ck_assert_double_eq_tol(wall.mean2, fmax((1 + 4 + 1) / 2., 8.5 * 34 / 64), 1e-12);
+}
+END_TEST
+
+START_TEST(older_stores_state_none) {
+    error_by_group older = stated;
+    whole_light found;
+    const float E[C * N] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+    older.whole_of = NULL;
+    ck_assert(whole_light_find(&older, &scene, E, &found));
+    ck_assert_ptr_null(found.weights);
+    ck_assert_uint_eq(whole_place(&older, LAMP), WHOLE_NONE);
+    ck_assert_uint_eq(whole_place(&stated, LAMP), 1);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("whole_law");
+    TCase *cases = tcase_create("whole_law");
+    tcase_add_test(cases, even_groups_are_told_from_the_rest);
+    tcase_add_test(cases, sources_count_alone);
+    tcase_add_test(cases, light_that_has_signs_counts_by_its_size);
+    tcase_add_test(cases, errors_together_are_those_of_sums);
+    tcase_add_test(cases, older_stores_state_none);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
