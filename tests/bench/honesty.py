@@ -7,7 +7,8 @@ PROGRAMS is the folder of lambert, lambertd and lambert-bench; SCALE is quick, d
 a folder of some, in place of the scenes of the suite. Each scene is precomputed at defaults but for its faces, which are the elements, and as exact inverses
 of form factors pair by pair at high quality, with other seeds, whose mean is the reference. All stores get the same random requests:
 groups, elements, random emission, the scene's own light and skies, of which all elements, groups or single elements are
-selected, or groups reduced. lambert-bench reads standard output: one JSON object a line, as of service.py.
+selected, or groups reduced. The same requests then go to a store of elements 16 times smaller, which has the error of the mesh in it: the
+headline of each answer stands beside the distance of the light of the smaller elements to that of those that they are parts of. lambert-bench reads standard output: one JSON object a line, as of service.py.
 """
 
 import csv
@@ -19,6 +20,7 @@ import random
 import sys
 import tempfile
 
+import h5py
 import numpy as np
 
 from service_programs import Client, Failure, Program, post, run_suite, tell
@@ -29,6 +31,8 @@ SIZES = {"quick": (.25, 30), "default": (1, 200), "full": (2, 400)}
 # Small factors are no more certain at high quality than at defaults, and a few of them may be all the light of a
 # group: one reference would err as much as the store that is asked. The mean of several errs less.
 REFERENCES = {"quick": 2, "default": 4, "full": 8}
+# Elements of the reference of the mesh for each of the store that is asked; its operator is off by this share of its light.
+FINER, FINE_EPSILON = 16, ".01"
 # Below 1,025 elements the preset is an exact inverse, which has the error of the form factors alone.
 SCENES = {"cornell": (1300, ["cornell"]), "closed cornell": (640, ["cornell", "--closed"]), "rooms": (1300, ["rooms"]),
           "patio": (1300, ["patio"]), "atrium": (1300, ["atrium"]), "maze": (1300, ["maze"]),
@@ -106,6 +110,49 @@ class Reference:
                 for key in ("radiosity", "indirect", "groups") if key in answers[0]}
 
 
+class Finer:
+    """A store of smaller elements, which is asked what another one is asked, and tells the light inside the elements of that."""
+
+    def __init__(self, store, path, asked):
+        self.store = store
+        with h5py.File(asked) as coarse, h5py.File(path) as fine:
+            places = {key: k for k, key in enumerate(self.keys(coarse))}
+            self.parent = np.array([places[key] for key in self.keys(fine)])
+            self.area, self.group = fine["mesh/area"][:], fine["mesh/group"][:]
+            self.names = [name.decode() for name in fine["mesh/group_names"]]
+        self.n = len(places)
+
+    @staticmethod
+    def keys(store):
+        """The face of each element, and whether it is the back of it."""
+        face, attributes = store["mesh/face"][:], store["mesh"].attrs
+        backs = len(face) // 2 if attributes["two_sided"] else int(attributes.get("backs", 0))
+        return [(int(f), k >= len(face) - backs) for k, f in enumerate(face)]
+
+    def emission(self, given):
+        """Every part of an element emits what the element does."""
+        if isinstance(given, list):
+            return np.array(given)[self.parent].tolist()
+        if "elements" not in given:
+            return given
+        values = np.zeros(self.n)
+        values[given["elements"]] = given["values"]
+        return values[self.parent].tolist()
+
+    def emitted(self, given):
+        if isinstance(given, dict):
+            values = given.get("groups", {})
+            return np.array([values.get(self.names[g], 0) for g in self.group], dtype=float)
+        return np.array(given, dtype=float)
+
+    def light(self, request):
+        """The radiosity of all parts, [C][n], and the light that they reflect, which is that of a sky as well."""
+        emission = self.emission(request["emission"])
+        answer = self.store.ask({"emission": emission})
+        radiosity = np.atleast_2d(np.array(answer["radiosity"], dtype=float))
+        return radiosity, radiosity - (0 if isinstance(emission, dict) and "sky" in emission else self.emitted(emission))
+
+
 class Requests:
     """Random requests to a scene."""
 
@@ -160,11 +207,63 @@ class Scene:
         self.bench, self.name, self.path = bench, name, path
         self.n_requests = bench.n_requests
 
-    def precompute(self, store, *options):
+    def precompute(self, store, *options, mesh=("--mesh", "faces")):
         if "--seed" not in options:
             options = *options, "--seed", str(self.bench.seed)
         Program("lambert", self.bench.folder, self.bench.programs / "lambert", "precompute", self.path, "-o", store,
-                "--quiet", "--mesh", "faces", "--sky", "tregenza", *options).finish(SECONDS)
+                "--quiet", *mesh, "--sky", "tregenza", *options).finish(SECONDS)
+
+    def measure_mesh(self):
+        """Pairs of the true error and the headline of answers, with the mesh in them."""
+        stores = [self.bench.folder / name for name in ("asked.h5", "finer.h5")]
+        served = []
+        try:
+            self.precompute(stores[0])
+            self.read_elements(stores[0])
+            words = ("--quality", "high", "--epsilon", FINE_EPSILON, "--method", "hierarchical", "--probes", "0")
+            self.precompute(stores[1], "--seed", str(self.bench.seed + 2000), *words,
+                            mesh=("--elements", str(FINER * len(self.groups))))
+            for store in stores:
+                served.append(Store(self.bench.folder, self.bench.programs, store, "lambertd"))
+            asked, finer = served[0], Finer(served[1], stores[1], stores[0])
+            tiles = self.lit_tiles(asked)
+            requests, found = Requests(asked.about(), self.groups, self.own_emission(), tiles, self.bench.seed + 1), []
+            for _ in range(self.n_requests):
+                kind, target, request = requests.draw()
+                found += [(kind, target, true, stated) for true, stated in self.mesh_error(target, request, asked, finer)]
+            return found
+        finally:
+            for store in served:
+                store.stop()
+            for store in stores:
+                store.unlink(missing_ok=True)
+
+    def mesh_error(self, target, request, asked, finer):
+        """Pairs as of error, of the headline of what is asked."""
+        answer = asked.ask(request)
+        radiosity, reflected = finer.light(request)
+        stated = self.infinite(answer.get("error", {}))
+        names = np.array(self.groups)[finer.parent]
+        if target == "reduce":
+            pairs = []
+            for name in request["reduce"]["groups"]:
+                weight = finer.area * (names == name) / finer.area[names == name].sum()
+                right, there = radiosity @ weight, np.linalg.norm(reflected @ weight)
+                off = np.atleast_1d(np.array(answer["groups"][name]["mean"], dtype=float)) - right
+                if there > 0:
+                    pairs.append((float(np.linalg.norm(off) / there), stated.get("groups", {}).get(name, {}).get("stated")))
+            return pairs
+        values = np.atleast_2d(np.array(answer["radiosity"], dtype=float))
+        chosen = np.arange(self.area.size)
+        if "select" in request:
+            chosen = (np.array(request["select"]["elements"]) if "elements" in request["select"] else
+                      np.flatnonzero(np.array(self.groups) == request["select"]["groups"][0]))
+        place = np.full(self.area.size, -1)
+        place[chosen] = np.arange(chosen.size)
+        part = np.flatnonzero(place[finer.parent] >= 0)
+        off = values[:, place[finer.parent[part]]] - radiosity[:, part]
+        light = self.norm(reflected[:, part], finer.area[part])
+        return [(self.norm(off, finer.area[part]) / light, stated.get("stated"))] if light > 0 else []
 
     def measure(self):
         folder = self.bench.folder
@@ -203,10 +302,7 @@ class Scene:
         return path
 
     def compare(self, asked, reference):
-        about = asked.about()
-        tiles = about["sky"]["tiles"] if about["sky"] else 0
-        if tiles and not self.is_lit(asked, tiles):
-            tiles = 0
+        about, tiles = asked.about(), self.lit_tiles(asked)
         requests = Requests(about, self.groups, self.own_emission(), tiles, self.bench.seed)
         found = []
         for _ in range(self.n_requests):
@@ -216,9 +312,14 @@ class Scene:
         return about, found
 
     @staticmethod
-    def is_lit(store, tiles):
+    def lit_tiles(store):
+        """The tiles of its sky; 0: it has none, or the scene is closed."""
+        about = store.about()
+        tiles = about["sky"]["tiles"] if about["sky"] else 0
+        if not tiles:
+            return 0
         answer = store.ask({"emission": {"sky": [1] * tiles}, "quantity": "irradiance"})
-        return np.max(answer["irradiance"]) > 0
+        return tiles if np.max(answer["irradiance"]) > 0 else 0
 
     def own_emission(self):
         """Groups whose names say that they are lamps shine in scenes of `lambert generate`."""
@@ -289,12 +390,17 @@ class Bench:
     def run(self):
         with tempfile.TemporaryDirectory(prefix="lambert-bench-", dir=os.environ.get("TMPDIR") or "/tmp") as path:
             self.folder = pathlib.Path(path).resolve()
-            rows, all_pairs, measured = [], [], 0
+            rows, meshes, all_pairs, all_mesh, measured = [], [], [], [], 0
             for name, file in self.scenes():
-                about, pairs = Scene(self, name, file).measure()
+                scene = Scene(self, name, file)
+                about, pairs = scene.measure()
+                of_mesh = scene.measure_mesh()
+                meshes.append([name, float(about["elements"]), *self.summary(of_mesh)])
+                all_mesh += of_mesh
                 rows.append([name, float(about["elements"]), *self.summary(pairs)])
                 tell(log=f"{name}, {about['elements']} elements, {about['kind']}: of {rows[-1][2]:.0f} errors "
-                         f"{rows[-1][3]:.3f} are below twice the stated one, {rows[-1][4]:.3f} above a fifth")
+                         f"{rows[-1][3]:.3f} are below twice the stated one, {rows[-1][4]:.3f} above a fifth; with the mesh "
+                         f"{meshes[-1][3]:.3f} and {meshes[-1][4]:.3f} of {meshes[-1][2]:.0f}")
                 all_pairs += pairs
                 measured += 1
             if measured == 0:
@@ -302,10 +408,17 @@ class Bench:
             rows.append(["all", None, *self.summary(all_pairs)])
             table("scenes", "Stated errors of answers to random requests beside the true ones",
                   (("scene", None, "name, or all"), ("elements", "", "n"), *COUNTS), rows)
+            meshes.append(["all", None, *self.summary(all_mesh)])
+            table("mesh", f"Headlines of such answers beside the true errors with the mesh in them, by elements {FINER} times smaller",
+                  (("scene", None, "name, or all"), ("elements", "", "n"), *COUNTS), meshes)
             kinds = [("emission", kind, 0) for kind in EMISSIONS + SKIES] + [("target", kind, 1) for kind in TARGETS]
             table("kinds", "The same by emission and by what was asked for",
                   (("by", None, "emission or target"), ("kind", None, "of it"), *COUNTS),
                   [[by, kind, *self.summary([pair for pair in all_pairs if pair[place] == kind])]
+                   for by, kind, place in kinds])
+            table("mesh-kinds", "Headlines by emission and by what was asked for",
+                  (("by", None, "emission or target"), ("kind", None, "of it"), *COUNTS),
+                  [[by, kind, *self.summary([pair for pair in all_mesh if pair[place] == kind])]
                    for by, kind, place in kinds])
 
     @staticmethod
