@@ -13,6 +13,16 @@ double mesh_error_emitters(const mesh *m, const float *E) {
     return emission_size_number(&size);
 }
 
+lam_status mesh_error_answers(const precompute_scene *scene, const made_operator *made, size_t n_lights,
+                              const float *E, float *B, void *work, size_t bytes, lam_error *error) {
+    const size_t vector = scene->m.n * scene->m.n_channels;
+    const lam_quantity quantity = scene->lightened ? LAM_IRRADIANCE : LAM_RADIOSITY;
+    const lam_status status = lam_operator_apply(made->op, n_lights, quantity, E, B, work, bytes, error);
+    for (size_t k = 0; status == LAM_OK && scene->lightened && k < n_lights * vector; k++)
+        B[k] = E[k] + scene->m.reflectance[k % vector] * B[k];
+    return status;
+}
+
 lam_status mesh_error_groups_begin(const mesh *m, size_t n_lights, mesh_error_groups *out, lam_error *error) {
     double **const arrays[] = {&out->variance, &out->noise, &out->light2};
     for (int k = 0; k < 3; k++) {
@@ -136,7 +146,7 @@ static lam_status judge_lights(const precompute_job *job, const precompute_scene
     const size_t bytes = lam_operator_work_bytes(made->op, n_lights);
     void *work = memory_allocate(bytes, 1, "the error of the mesh", error);
     if (work == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(lam_operator_apply(made->op, n_lights, LAM_RADIOSITY, E, B, work, bytes, error));
+    TRY(mesh_error_answers(scene, made, n_lights, E, B, work, bytes, error));
     TRY(mesh_error(&scene->m, n_lights, E, B, true, NULL, seed, &job->progress, found, groups, error));
 done:
     free(work);

@@ -9,6 +9,11 @@
 /* The effective number of emitters of an emission E [C][n]. */
 double mesh_error_emitters(const mesh *m, const float *E);
 
+/* The radiosity B [n_lights][C][n] of emissions E; of a lightened scene (black_scene.h) by the irradiance, as
+ * the operator is of one that reflects nothing: B = E + rho H. work is for lam_operator_apply. */
+lam_status mesh_error_answers(const precompute_scene *scene, const made_operator *made, size_t n_lights,
+                              const float *E, float *B, void *work, size_t bytes, lam_error *error);
+
 /* Room for figures by group of n_lights lights; out->fewer stays. Freed by mesh_error_groups_free, also after
  * LAM_ERR_MEMORY. */
 lam_status mesh_error_groups_begin(const mesh *m, size_t n_lights, mesh_error_groups *out, lam_error *error);

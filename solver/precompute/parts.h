@@ -58,6 +58,7 @@ typedef struct precompute_scene {
     emitter_list emitters;
     emitter_source emitting; /* a view of emitters, for methods */
     importance importance;   /* n is 0 where all is read, and may emit */
+    bool lightened; /* a view for the error of the mesh, of a scene that reflects nothing (black_scene.h) */
 } precompute_scene;
 
 /* The outcome of the samples of pairs. too_slow: all pairs cost more than they are worth, so that at least

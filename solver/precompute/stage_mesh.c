@@ -1,6 +1,7 @@
 /* From faces to elements, as the options of the mesh say. */
 #include "solver/adapt/mesh_fit.h"
 #include "solver/base/scene/scene_backs.h"
+#include "solver/precompute/black_scene.h"
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
 #include "solver/scene/facet/face_join.h"
@@ -184,6 +185,7 @@ lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
     const double edge = edge_to_be(&scene->m, o);
+    const bool black = black_scene_lighten(&scene->m);
     bool divided = true;
     faces_before before = {.n = 0};
     const size_t most = o->elements > 0 ? fronts_of(&scene->m, o->elements) : SIZE_MAX;
@@ -202,6 +204,7 @@ lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_
     TRY(mesh_keep_pictures(&scene->m, error)); /* every element has its means */
 done:
     faces_before_free(&before);
+    if (black) black_scene_darken(&scene->m);
     return status;
 }
 

@@ -1,6 +1,7 @@
 /* The error that constants on elements leave, as the store states it. */
 #include "solver/adapt/mesh_error.h"
 #include "solver/base/random.h"
+#include "solver/precompute/black_scene.h"
 #include "solver/precompute/mesh_error_lights.h"
 #include "solver/precompute/stages.h"
 
@@ -100,7 +101,7 @@ static lam_status add_skies(const precompute_job *job, const precompute_scene *s
     if (L == NULL || E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
     set_skies(sky, seed, L);
     if (!light_by_skies(scene, factors, L, E)) goto done;
-    TRY(lam_operator_apply(made->op, SKIES, LAM_RADIOSITY, E, B, work, bytes, error));
+    TRY(mesh_error_answers(scene, made, SKIES, E, B, work, bytes, error));
     for (size_t i = 0; i < all; i++) E[i] = 0;
     const gather_sky skies = {.tiling = &sky->tiling, .L = L};
     TRY(mesh_error_groups_begin(&scene->m, SKIES, &groups, error));
@@ -120,8 +121,8 @@ done:
     return status;
 }
 
-lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *scene,
-                            const precompute_factors *factors, made_operator *made, lam_error *error) {
+static lam_status find_errors(const precompute_job *job, const precompute_scene *scene,
+                              const precompute_factors *factors, made_operator *made, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t vector = scene->m.n * scene->m.n_channels;
     mesh_figures *figures = &made->errors_of_mesh;
@@ -137,7 +138,7 @@ lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *s
     B = memory_allocate(n_lights * vector, sizeof *B, "the error of the mesh", error);
     work = memory_allocate(bytes, 1, "the error of the mesh", error);
     if (B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    status = lam_operator_apply(made->op, n_lights, LAM_RADIOSITY, E, B, work, bytes, error);
+    status = mesh_error_answers(scene, made, n_lights, E, B, work, bytes, error);
     if (status == LAM_ERR_ARGUMENT &&
         scene->emitters.s > 0) { /* a sum that no weights give: nothing is stated */
         *figures = (mesh_figures){.has_lights = false};
@@ -167,5 +168,22 @@ done:
     free(E);
     free(B);
     free(work);
+    return status;
+}
+
+lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *scene,
+                            const precompute_factors *factors, made_operator *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &scene->m;
+    precompute_scene lighter = *scene;
+    float *reflectance =
+        memory_allocate(m->n, m->n_channels * sizeof *reflectance, "the error of the mesh", error);
+    if (reflectance == NULL) return LAM_ERR_MEMORY;
+    memcpy(reflectance, m->reflectance, m->n * m->n_channels * sizeof *reflectance);
+    lighter.m.reflectance = reflectance;
+    lighter.lightened = black_scene_lighten(&lighter.m);
+    TRY(find_errors(job, &lighter, factors, made, error));
+done:
+    free(reflectance);
     return status;
 }

@@ -1,6 +1,7 @@
 """The mesh by preset: faces are divided until they fit the light, those that are fine enough stay, and --mesh faces leaves all
 as they are. The error that it states is that of the operator's own light."""
 
+import json
 import os
 import pathlib
 import re
@@ -52,6 +53,20 @@ class MeshOfLight(Case):
         self.assertEqual(len(plain["area"]), faces_of(scene))
         for name, values in plain.items():
             np.testing.assert_array_equal(mesh[name], values, name)
+
+    def test_a_black_scene_is_divided_by_its_irradiance(self):
+        """Where nothing is reflected faces are divided as where next to nothing is, and the same is stated."""
+        scene, common = self.path("cornell.obj"), ("--mesh", "light", "--probes", 4, "--rays", 256)
+        must("generate", "cornell", "--elements", 39, "-o", scene)
+        said, mesh, black = self.precompute(scene, *common, "--reflectance", 0)
+        self.assertRegex(said, r"39 faces are divided evenly, as constants on them leave 0\.[1-9]")
+        _, grey, small = self.precompute(scene, *common, "--reflectance", .0009765625)
+        np.testing.assert_array_equal(mesh["elements"], grey["elements"])
+        for light in "lights", "even", "groups", "single":
+            self.assertAlmostEqual(black[light], small[light], delta=.05 * small[light], msg=light)
+        self.precompute(scene, *common, "--reflectance", 0)
+        answer = json.loads(must("solve", self.path("s.h5"), "--quantity", "irradiance", "--json").stdout)
+        self.assertAlmostEqual(answer["error"]["parts"]["mesh"], black["lights"], delta=.2 * black["lights"])
 
     def test_faces_are_elements_on_request(self):
         said, mesh, _ = self.precompute(self.box, "--mesh", "faces", "--probes", 0, "--rays", 64)
