@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* Numbers of corrections that are held at once, and figures of a store, at most. */
-static const size_t most_numbers = (size_t)1 << 22, most_figures = (size_t)1 << 18;
+static const size_t most_numbers = (size_t)1 << 22, most_figures = (size_t)1 << 16;
 
 enum { WHOLE_LEAST = 3 };
 

@@ -133,11 +133,12 @@ START_TEST(bright_groups_come_first_and_then_large_ones) {
 }
 END_TEST
 
-/* 16 M of figures at once at most, and no more figures than stores take; never fewer than three groups. */
+/* Four million numbers at once at most, and no more figures than stores take; never fewer than three groups.
+ */
 START_TEST(fewer_groups_where_they_are_many_or_large) {
     ck_assert_uint_eq(judge_whole_most(1000, 1, 10), 64);
     ck_assert_uint_eq(judge_whole_most(163687, 1, 10), 25);
-    ck_assert_uint_eq(judge_whole_most(1000, 1, 1000), 16);
+    ck_assert_uint_eq(judge_whole_most(1000, 1, 1000), 8);
     ck_assert_uint_eq(judge_whole_most(10000000, 3, 10), 3);
 }
 END_TEST
