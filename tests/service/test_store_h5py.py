@@ -266,6 +266,14 @@ class StoreTest(unittest.TestCase):
                 for name in "sky_first", "sky_elements_off", "sky_means_off":
                     expected[f"/error/by_group/{name}"] = ((g, 12), "<f8")
             expected.update({f"/error/by_group/{figure}": ((1, g), "<f8") for figure in by_group})
+            # All groups of the box are few enough to be judged as themselves.
+            expected["/error/by_group/whole_groups"] = ((g,), "<u4")
+            expected.update({f"/error/by_group/whole_{what}": ((1, g, g, g), "<f8") for what in ("rms", "mean")})
+            self.assertEqual(sorted(f["error/by_group/whole_groups"][:]), list(range(g)))
+            for what in "rms", "mean":
+                of_pairs = f[f"error/by_group/whole_{what}"][0]
+                np.testing.assert_array_equal(of_pairs, of_pairs.transpose(0, 2, 1))
+                self.assertTrue((np.diagonal(of_pairs, axis1=1, axis2=2) >= 0).all())
             of_mesh = [light for light in ("lights", "even", "single", "groups", "sky_even", "sky_cloudy")
                        if light in f["error/mesh"].attrs]
             expected.update({f"/error/mesh/{light}_{what}": ((g,), "<f8")
@@ -421,7 +429,7 @@ class StoreTest(unittest.TestCase):
                 if not light.endswith("_emitters"):
                     self.assertTrue(0 <= share < 10, (light, share))
             for name, figures in f.get("error/by_group", {}).items():
-                if "sky" not in name:
+                if "sky" not in name and "whole" not in name:
                     self.assertEqual(figures.shape, (1, len(f["mesh/group_names"])), name)
             for group in (f["error"][name] for name in f["error"] if name not in ("by_group", "mesh")):
                 attributes = group.attrs
