@@ -1,6 +1,7 @@
 /* Faces that lie in a plane become one: how many are left, whose they are, and that they cover what they did.
  */
 #include "solver/scene/facet/face_join.h"
+#include "support/failing_memory.h"
 #include "support/scene.h"
 #include "support/suite.h"
 
@@ -158,12 +159,36 @@ START_TEST(faces_that_are_not_joined_stay) {
 }
 END_TEST
 
+/* Whichever allocation fails, nothing is lost or freed twice. */
+START_TEST(memory_may_be_short) {
+    char folder[64];
+    long k = 0;
+    lam_status status = LAM_ERR_MEMORY;
+    folder_make(folder);
+    for (; status == LAM_ERR_MEMORY && k < 1000; k++) {
+        mesh m = make_room(folder);
+        faces_before before = {.n = 0};
+        allocations_left = k;
+        status = faces_join(&m, &before, &error);
+        if (status == LAM_OK) status = mesh_refine(&m, &(mesh_refinement){.max_edge = .9}, &error);
+        if (status == LAM_OK) status = faces_part(&m, &before, &error);
+        allocations_left = -1;
+        faces_before_free(&before);
+        mesh_free(&m);
+    }
+    ck_assert_int_eq(status, LAM_OK);
+    ck_assert_int_gt(k, 20);
+    folder_remove(folder);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("face join");
     TCase *tests = tcase_create("face join");
     tcase_add_test(tests, only_faces_of_one_material_are_joined);
     tcase_add_test(tests, parts_of_joined_faces_know_these);
     tcase_add_test(tests, faces_that_are_not_joined_stay);
+    tcase_add_test(tests, memory_may_be_short);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
