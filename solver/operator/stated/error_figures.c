@@ -243,6 +243,15 @@ static void tile_arrays_of(group_errors *e, tile_array out[TILE_ARRAYS]) {
     for (int k = 0; k < TILE_ARRAYS; k++) out[k] = all[k];
 }
 
+void group_errors_drop_whole(group_errors *e) {
+    free(e->whole_groups);
+    free(e->whole_rms);
+    free(e->whole_mean);
+    e->whole_groups = NULL;
+    e->whole_rms = e->whole_mean = NULL;
+    e->n_whole = 0;
+}
+
 void group_errors_free(group_errors *e) {
     tile_array tiles[TILE_ARRAYS];
     tile_arrays_of(e, tiles);
@@ -250,9 +259,7 @@ void group_errors_free(group_errors *e) {
     for (int f = 0; f < GROUP_FIGURES; f++) free(e->of_operator[f]);
     for (int f = 0; f < SKY_FIGURES; f++) free(e->sky[f]);
     for (int k = 0; k < TILE_ARRAYS; k++) free(*tiles[k].numbers);
-    free(e->whole_groups);
-    free(e->whole_rms);
-    free(e->whole_mean);
+    group_errors_drop_whole(e);
     *e = (group_errors){.n_groups = 0};
 }
 

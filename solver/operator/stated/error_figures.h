@@ -112,6 +112,9 @@ typedef struct group_errors {
 } group_errors;
 void group_errors_free(group_errors *e);
 
+/* Leaves out the errors of whole groups. */
+void group_errors_drop_whole(group_errors *e);
+
 typedef struct error_report {
     error_group single, lights, random;
     error_group whole; /* one whole group of the scene emits evenly */
