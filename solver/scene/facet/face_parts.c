@@ -1,4 +1,6 @@
-/* The faces of the scene file that elements of joined faces are parts of: faces_part of face_join.h. */
+/* The faces of the scene file that elements of joined faces are parts of: faces_part of face_join.h. The
+ * faces and the elements of one joined face are laid into its plane, with axes u and w. The faces are sorted
+ * along u, so that an element meets few of them, and what it has in common with each is found by clipping. */
 #include "solver/base/array_grow.h"
 #include "solver/base/array_sort.h"
 #include "solver/base/vector3.h"
