@@ -220,7 +220,7 @@ class Scene:
         try:
             self.precompute(stores[0])
             self.read_elements(stores[0])
-            words = ("--quality", "high", "--epsilon", FINE_EPSILON, "--method", "hierarchical", "--probes", "0")
+            words = ("--epsilon", FINE_EPSILON, "--method", "hierarchical", "--probes", "0")
             self.precompute(stores[1], "--seed", str(self.bench.seed + 2000), *words,
                             mesh=("--elements", str(FINER * len(self.groups))))
             for store in stores:
