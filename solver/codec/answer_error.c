@@ -28,6 +28,7 @@ static bool sizes_of_answer(const error_by_group *e, const error_scene *scene, c
     if (sizes->sent.L == NULL) sizes->sent.L = sent.L;
     sizes->sent.power2 += sent.power2;
     sizes->sent.spread += sent.spread;
+    sizes->sent.squares += sent.squares;
     sizes->sent.power_off += sent.power_off;
     sizes->lost2 = of->lost2;
     return true;

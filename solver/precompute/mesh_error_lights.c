@@ -7,10 +7,25 @@
 #include <math.h>
 #include <stdlib.h>
 
-double mesh_error_emitters(const mesh *m, const float *E) {
+static emission_size size_of(const mesh *m, const float *E) {
     emission_size size = {.power2 = 0};
     for (size_t c = 0; c < m->n_channels; c++) emission_size_add(&size, m->n, m->area, E + c * m->n);
+    return size;
+}
+
+double mesh_error_emitters(const mesh *m, const float *E) {
+    const emission_size size = size_of(m, E);
     return emission_size_number(&size);
+}
+
+double mesh_error_light(const mesh *m, const float *E, const float *B, bool first_bounce) {
+    const double power2 = size_of(m, E).power2;
+    double sum = 0;
+    for (size_t k = 0; k < m->n_channels * m->n; k++) {
+        const double x = (double)B[k] - (first_bounce ? 0 : (double)E[k]);
+        sum += m->area[k % m->n] * x * x;
+    }
+    return power2 > 0 ? sum / power2 : 0;
 }
 
 lam_status mesh_error_answers(const precompute_scene *scene, const made_operator *made, size_t n_lights,
@@ -59,46 +74,50 @@ lam_status mesh_error_take(const mesh_error_groups *from, size_t light, int whic
  * the others are groups. */
 enum { ROUNDS = 4, LARGEST_GROUPS = 4, OTHER_GROUPS = 4, GROUPS = LARGEST_GROUPS + OTHER_GROUPS };
 
-/* Sums over lights, each scaled to sum A (B - E)^2 = 1, by group. */
-typedef struct light_sums {
-    double *variance, *noise2, *light2; /* [n_groups] */
-} light_sums;
-
-static bool light_sums_begin(const mesh *m, light_sums *s, lam_error *error) {
-    s->variance = memory_allocate(3, m->n_groups * sizeof *s->variance, "the error of the mesh", error);
-    if (s->variance == NULL) return false;
-    s->noise2 = s->variance + m->n_groups;
-    s->light2 = s->noise2 + m->n_groups;
-    return true;
+void mesh_light_sums_free(mesh_light_sums *s) {
+    free(s->area);
+    free(s->variance);
 }
 
-/* area [n_groups]. */
-static void add_light(const mesh_error_groups *of, size_t light, size_t n_groups, const double *area,
-                      light_sums *to) {
-    const size_t first = light * n_groups;
+lam_status mesh_light_sums_begin(const mesh *m, mesh_light_sums *s, lam_error *error) {
+    s->area = memory_allocate(m->n_groups, sizeof *s->area, "the error of the mesh", error);
+    s->variance = memory_allocate(3, m->n_groups * sizeof *s->variance, "the error of the mesh", error);
+    if (s->area == NULL || s->variance == NULL) return LAM_ERR_MEMORY;
+    s->noise2 = s->variance + m->n_groups;
+    s->light2 = s->noise2 + m->n_groups;
+    for (size_t i = 0; i < m->n; i++) s->area[m->group[i]] += m->area[i];
+    return LAM_OK;
+}
+
+void mesh_light_sums_add(const mesh_error_groups *of, size_t k, const mesh *m, double light,
+                         mesh_light_sums *to) {
+    const size_t first = k * m->n_groups;
     double all = 0;
-    for (size_t g = 0; g < n_groups; g++) all += area[g] * of->light2[first + g];
-    for (size_t g = 0; all > 0 && g < n_groups; g++) {
+    for (size_t g = 0; g < m->n_groups; g++) all += to->area[g] * of->light2[first + g];
+    if (!(all > 0)) return;
+    for (size_t g = 0; g < m->n_groups; g++) {
         to->variance[g] += of->variance[first + g] / all;
         to->noise2[g] += of->noise[first + g] * of->noise[first + g] / (all * all);
         to->light2[g] += of->light2[first + g] / all;
     }
+    to->light += light;
+    to->n++;
 }
 
-/* States them for a light; *whole is the share of all groups together. */
-static lam_status state(const light_sums *s, size_t n_groups, const double *area, int which, double *whole,
-                        bool *has, mesh_figures *to, lam_error *error) {
+lam_status mesh_light_sums_state(const mesh_light_sums *s, const mesh *m, int which, double *whole, bool *has,
+                                 mesh_figures *to, lam_error *error) {
     double off = 0, all = 0;
-    for (size_t g = 0; g < n_groups; g++) {
-        off += area[g] * s->variance[g];
-        all += area[g] * s->light2[g];
+    for (size_t g = 0; g < m->n_groups; g++) {
+        off += s->area[g] * s->variance[g];
+        all += s->area[g] * s->light2[g];
         s->noise2[g] = sqrt(s->noise2[g]);
     }
     if (!(all > 0)) return LAM_OK;
     *whole = sqrt(fmax(off, 0) / all);
     *has = true;
+    to->light_of[which] = s->light / (double)s->n;
     const mesh_error_groups groups = {s->variance, s->noise2, s->light2, 0};
-    return mesh_error_take(&groups, 0, which, n_groups, to, error);
+    return mesh_error_take(&groups, 0, which, m->n_groups, to, error);
 }
 
 /* Groups to be lit: the largest that are no lamps, and some at equal steps of the others in that order.
@@ -161,24 +180,20 @@ lam_status mesh_error_add_others(const precompute_job *job, const precompute_sce
     mesh_figures *figures = &made->errors_of_mesh;
     uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
     mesh_error_groups groups = {.fewer = ROUNDS};
-    light_sums single = {.noise2 = NULL}, of_groups = {.noise2 = NULL};
-    double *area = NULL, all = 0, logs = 0;
+    mesh_light_sums single = {.noise2 = NULL}, of_groups = {.noise2 = NULL};
+    double all = 0, logs = 0;
     float *E = NULL, *B = NULL;
     size_t chosen[GROUPS], *order = NULL, next = 0;
     if (scene->emitters.s > 0 || scene->importance.emits != NULL) return LAM_OK;
-    area = memory_allocate(G, sizeof *area, "the error of the mesh", error);
     order = memory_allocate(G, sizeof *order, "the error of the mesh", error);
     E = memory_allocate(most, vector * sizeof *E, "the error of the mesh", error);
     B = memory_allocate(most, vector * sizeof *B, "the error of the mesh", error);
-    if (area == NULL || order == NULL || E == NULL || B == NULL || !light_sums_begin(m, &single, error) ||
-        !light_sums_begin(m, &of_groups, error))
-        TRY(LAM_ERR_MEMORY);
+    if (order == NULL || E == NULL || B == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_light_sums_begin(m, &single, error));
+    TRY(mesh_light_sums_begin(m, &of_groups, error));
     TRY(mesh_error_groups_begin(m, most, &groups, error));
-    for (size_t i = 0; i < m->n; i++) {
-        area[m->group[i]] += m->area[i];
-        all += m->area[i];
-    }
-    const size_t n_chosen = choose_groups(m, area, figures->lights_power, chosen, order);
+    for (size_t i = 0; i < m->n; i++) all += m->area[i];
+    const size_t n_chosen = choose_groups(m, single.area, figures->lights_power, chosen, order);
     for (size_t round = 0; round < ROUNDS; round++) {
         const size_t left = n_chosen - next, n_lit = left < most - 1 ? left : most - 1;
         light_up(m, SIZE_MAX, choose_element(m, all, &seed), E);
@@ -187,22 +202,24 @@ lam_status mesh_error_add_others(const precompute_job *job, const precompute_sce
             logs += log(mesh_error_emitters(m, E + (k + 1) * vector));
         }
         TRY(judge_lights(job, scene, made, n_lit + 1, E, B, random_mix(seed), &groups, error));
-        add_light(&groups, 0, G, area, &single);
-        for (size_t k = 0; k < n_lit; k++) add_light(&groups, k + 1, G, area, &of_groups);
+        mesh_light_sums_add(&groups, 0, m, mesh_error_light(m, E, B, false), &single);
+        for (size_t k = 1; k <= n_lit; k++)
+            mesh_light_sums_add(&groups, k, m, mesh_error_light(m, E + k * vector, B + k * vector, false),
+                                &of_groups);
         next += n_lit;
     }
-    TRY(state(&single, G, area, MESH_OF_SINGLE, &figures->single, &figures->has_single, figures, error));
+    TRY(mesh_light_sums_state(&single, m, MESH_OF_SINGLE, &figures->single, &figures->has_single, figures,
+                              error));
     if (next > 0) {
-        TRY(state(&of_groups, G, area, MESH_OF_GROUPS, &figures->groups, &figures->has_groups, figures,
-                  error));
+        TRY(mesh_light_sums_state(&of_groups, m, MESH_OF_GROUPS, &figures->groups, &figures->has_groups,
+                                  figures, error));
         figures->groups_emitters = exp(logs / (double)next);
     }
     terminal_log(job->t, "mesh     single elements %.3g, groups %.3g", figures->single, figures->groups);
 done:
     mesh_error_groups_free(&groups);
-    free(single.variance);
-    free(of_groups.variance);
-    free(area);
+    mesh_light_sums_free(&single);
+    mesh_light_sums_free(&of_groups);
     free(order);
     free(E);
     free(B);

@@ -1,11 +1,10 @@
 /* The error that constants on elements leave, as the store states it. */
 #include "solver/adapt/mesh_error.h"
-#include "solver/base/random.h"
 #include "solver/precompute/black_scene.h"
 #include "solver/precompute/mesh_error_lights.h"
+#include "solver/precompute/mesh_error_skies.h"
 #include "solver/precompute/stages.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -42,85 +41,6 @@ static lam_status take_power(const mesh *m, const float *E, mesh_figures *figure
     return LAM_OK;
 }
 
-enum { SKIES = 2 };
-
-/* Clouds are this bright at least, relative to the brightest, as those by which skies are judged. */
-static const double darkest_cloud = .2;
-
-/* Radiances [SKIES][n_tiles + 1] of an even sky and a cloudy one, and of the ground that they light. */
-static void set_skies(const sky_bounce *sky, uint64_t seed, double *L) {
-    const size_t row = sky->tiling.n_tiles + 1;
-    for (size_t s = 0; s < SKIES; s++) {
-        double light = 0;
-        for (size_t t = 0; t + 1 < row; t++) {
-            L[s * row + t] = s == 0 ? 1 : darkest_cloud + (1 - darkest_cloud) * random_unit(&seed);
-            light += L[s * row + t] * sky->tiling.tiles[t].cosine;
-        }
-        L[s * row + row - 1] = sky->ground_albedo * light / M_PI;
-    }
-}
-
-/* E = rho H0 [SKIES][C][n]; true where any of it is light. */
-static bool light_by_skies(const precompute_scene *scene, const precompute_factors *factors, const double *L,
-                           float *E) {
-    const mesh *m = &scene->m;
-    const sky_bounce *sky = &factors->f.sky;
-    const size_t n = m->n, tiles = sky->tiling.n_tiles;
-    bool lit = false;
-    for (size_t s = 0; s < SKIES; s++)
-        for (size_t i = 0; i < n; i++) {
-            double H = 0;
-            for (size_t t = 0; t < tiles; t++)
-                H += L[s * (tiles + 1) + t] * (double)sky->first_bounce[t * n + i];
-            lit = lit || H > 0;
-            for (size_t c = 0; c < m->n_channels; c++)
-                E[(s * m->n_channels + c) * n + i] = (float)(H * (double)m->reflectance[c * n + i]);
-        }
-    return lit;
-}
-
-/* The error under skies, for any emission: 0 is the emission of a scene that a sky lights. */
-static lam_status add_skies(const precompute_job *job, const precompute_scene *scene,
-                            const precompute_factors *factors, made_operator *made, lam_error *error) {
-    lam_status status = LAM_OK;
-    const sky_bounce *sky = &factors->f.sky;
-    const size_t all = SKIES * scene->m.n_channels * scene->m.n;
-    const uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
-    mesh_figures *figures = &made->errors_of_mesh;
-    double found[SKIES];
-    float *E = NULL, *B = NULL;
-    void *work = NULL;
-    double *L = NULL;
-    mesh_error_groups groups = {.fewer = 0};
-    if (sky->first_bounce == NULL || factors->f.closed || scene->emitters.s > 0) goto done;
-    const size_t bytes = lam_operator_work_bytes(made->op, SKIES);
-    L = memory_allocate(SKIES, (sky->tiling.n_tiles + 1) * sizeof *L, "the error of the mesh", error);
-    E = memory_allocate(all, sizeof *E, "the error of the mesh", error);
-    B = memory_allocate(all, sizeof *B, "the error of the mesh", error);
-    work = memory_allocate(bytes, 1, "the error of the mesh", error);
-    if (L == NULL || E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    set_skies(sky, seed, L);
-    if (!light_by_skies(scene, factors, L, E)) goto done;
-    TRY(mesh_error_answers(scene, made, SKIES, E, B, work, bytes, error));
-    for (size_t i = 0; i < all; i++) E[i] = 0;
-    const gather_sky skies = {.tiling = &sky->tiling, .L = L};
-    TRY(mesh_error_groups_begin(&scene->m, SKIES, &groups, error));
-    TRY(mesh_error(&scene->m, SKIES, E, B, false, &skies, seed, &job->progress, found, &groups, error));
-    TRY(mesh_error_take(&groups, 0, MESH_OF_SKY_EVEN, scene->m.n_groups, figures, error));
-    TRY(mesh_error_take(&groups, 1, MESH_OF_SKY_CLOUDY, scene->m.n_groups, figures, error));
-    figures->has_skies = true;
-    figures->sky_even = found[0];
-    figures->sky_cloudy = found[1];
-    terminal_log(job->t, "mesh     skies, even %.3g, cloudy %.3g", found[0], found[1]);
-done:
-    mesh_error_groups_free(&groups);
-    free(L);
-    free(E);
-    free(B);
-    free(work);
-    return status;
-}
-
 static lam_status find_errors(const precompute_job *job, const precompute_scene *scene,
                               const precompute_factors *factors, made_operator *made, lam_error *error) {
     lam_status status = LAM_OK;
@@ -155,14 +75,17 @@ static lam_status find_errors(const precompute_job *job, const precompute_scene 
     if (figures->has_even)
         TRY(mesh_error_take(&groups, n_lights - 1, MESH_OF_EVEN, scene->m.n_groups, figures, error));
     if (figures->has_lights) TRY(take_power(&scene->m, E, figures, error));
-    if (figures->has_even)
-        figures->even_emitters = mesh_error_emitters(&scene->m, E + (n_lights - 1) * vector);
+    if (figures->has_even) {
+        const float *even = E + (n_lights - 1) * vector, *answer = B + (n_lights - 1) * vector;
+        figures->even_emitters = mesh_error_emitters(&scene->m, even);
+        figures->light_of[MESH_OF_EVEN] = mesh_error_light(&scene->m, even, answer, false);
+    }
     figures->lights = found[0];
     figures->even = found[n_lights - 1];
     if (figures->has_lights) terminal_log(job->t, "mesh     lights indirect %.3g", figures->lights);
     if (figures->has_even) terminal_log(job->t, "mesh     even indirect %.3g", figures->even);
     TRY(mesh_error_add_others(job, scene, made, error));
-    TRY(add_skies(job, scene, factors, made, error));
+    TRY(mesh_error_add_skies(job, scene, factors, made, error));
 done:
     mesh_error_groups_free(&groups);
     free(E);

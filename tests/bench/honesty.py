@@ -43,6 +43,7 @@ SUFFIXES = ".obj", ".gltf", ".glb", ".ply", ".stl", ".off"
 EMISSIONS = "group", "groups", "element", "elements", "random", "own"
 SKIES = "even sky", "cloudy sky", "sun"
 TARGETS = "all", "group", "elements", "reduce"
+DARK = 1e-6  # of all light: reflected light below this share is rounding of both stores
 LIMITS = 2, .2  # of the true error over the stated one: hardly ever above, mostly above
 WANTED = .95, .5
 
@@ -250,7 +251,7 @@ class Scene:
                 weight = finer.area * (names == name) / finer.area[names == name].sum()
                 right, there = radiosity @ weight, np.linalg.norm(reflected @ weight)
                 off = np.atleast_1d(np.array(answer["groups"][name]["mean"], dtype=float)) - right
-                if there > 0:
+                if there > DARK * np.linalg.norm(right):
                     pairs.append((float(np.linalg.norm(off) / there), stated.get("groups", {}).get(name, {}).get("stated")))
             return pairs
         values = np.atleast_2d(np.array(answer["radiosity"], dtype=float))
@@ -263,7 +264,8 @@ class Scene:
         part = np.flatnonzero(place[finer.parent] >= 0)
         off = values[:, place[finer.parent[part]]] - radiosity[:, part]
         light = self.norm(reflected[:, part], finer.area[part])
-        return [(self.norm(off, finer.area[part]) / light, stated.get("stated"))] if light > 0 else []
+        dark = DARK * self.norm(radiosity[:, part], finer.area[part])
+        return [(self.norm(off, finer.area[part]) / light, stated.get("stated"))] if light > dark else []
 
     def measure(self):
         folder = self.bench.folder

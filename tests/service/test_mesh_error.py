@@ -129,6 +129,22 @@ class MeshError(Case):
             off = (area * (there[:, whole] - true) ** 2).sum() / (area * true ** 2).sum()
             self.assertLess(abs(math.log(stated[name] / math.sqrt(off))), math.log(1.2))
         self.assertIn(f"even sky {stated['sky_even']:.3g}", must("info", coarse).stdout)
+        # single tiles, by the power that each sends into the scene
+        numpy.save(self.path("tiles.npy"), numpy.repeat(numpy.eye(145)[:, None], about["channels"], axis=1))
+        light = []
+        for store in coarse, fine:
+            must("solve", store, "--sky", self.path("tiles.npy"), "-o", self.path("light.npy"))
+            light.append(numpy.load(self.path("light.npy")).astype(float).reshape(145, about["channels"], -1))
+        off, all_of = ((area * x ** 2).sum(axis=(1, 2)) for x in (light[0][..., whole] - light[1], light[1]))
+        power = values_of(coarse, "error/by_group/sky_power").sum(axis=0)
+        true = math.sqrt((power * off / numpy.maximum(all_of, 1e-300)).sum() / power.sum())
+        self.assertLess(abs(math.log(stated["sky_tile"] / true)), math.log(1.6))  # of 12 tiles
+        self.assertGreater(stated["sky_tile"], 1.5 * stated["sky_even"])
+        sun = numpy.full(145, .05)
+        sun[power.argmax()] = 50
+        numpy.save(self.path("sky.npy"), sun)
+        of_sun = json.loads(must("solve", coarse, "--sky", self.path("sky.npy"), "--json").stdout)["error"]["mesh"]
+        self.assertLess(abs(math.log(of_sun / stated["sky_tile"])), math.log(1.3))
         numpy.save(self.path("sky.npy"), skies[0])
         error = [json.loads(must("solve", coarse, *light, "--sky", self.path("sky.npy"), "--json").stdout)["error"]["mesh"]
                  for light in ((), ("--emit", "floor=1e-6"), ("--emit", "floor=1e6"))]
@@ -136,6 +152,24 @@ class MeshError(Case):
         self.assertLess(abs(math.log(error[0] / whole)), math.log(1.3))
         self.assertAlmostEqual(error[1], error[0], delta=1e-3 * error[0])  # the power of each weighs its part
         self.assertNotAlmostEqual(error[2], error[0], delta=1e-2 * error[0])
+
+    def test_single_elements_without_lamps(self):
+        """A scene without lamps has the figure of single elements, too, and several light corners of their own in a maze."""
+        must("generate", "maze", "--elements", 150, "-o", self.scene)
+        about, _, store = self.made("maze.h5", "--mesh", "faces")
+        stated, n = about["error"]["mesh"], about["elements"]
+        self.assertNotIn("lights", stated)
+        self.assertGreater(stated["single"], 3 * stated["even"])
+        names, group = (values_of(store, f"mesh/{name}") for name in ("group_names", "group"))
+        floor = numpy.flatnonzero(names[group] == b"floor")
+        parts = []
+        for chosen in floor[:1], floor[:: len(floor) // 10]:
+            emission = numpy.zeros(n)
+            emission[chosen] = 1
+            numpy.save(self.path("emission.npy"), emission)
+            error = json.loads(must("solve", store, "--emission", self.path("emission.npy"), "--json").stdout)["error"]
+            parts.append(error["mesh"])
+        self.assertTrue(all(.5 * stated["single"] < part < 1.5 * stated["single"] for part in parts), (parts, stated))
 
     def test_no_measurement(self):
         store = self.path("none.h5")

@@ -274,7 +274,7 @@ class StoreTest(unittest.TestCase):
                 of_pairs = f[f"error/by_group/whole_{what}"][0]
                 np.testing.assert_array_equal(of_pairs, of_pairs.transpose(0, 2, 1))
                 self.assertTrue((np.diagonal(of_pairs, axis1=1, axis2=2) >= 0).all())
-            of_mesh = [light for light in ("lights", "even", "single", "groups", "sky_even", "sky_cloudy")
+            of_mesh = [light for light in ("lights", "even", "single", "groups", "sky_even", "sky_cloudy", "sky_tile")
                        if light in f["error/mesh"].attrs]
             expected.update({f"/error/mesh/{light}_{what}": ((g,), "<f8")
                              for light in of_mesh for what in ("variation", "reflected")})

@@ -128,10 +128,19 @@ static lam_status pass_mesh_numbers(store *s, bool saves, mesh_figures *m, lam_e
         const char *name;
         double *number;
         bool *has;
-    } all[] = {{"lights", &m->lights, &m->has_lights},     {"even", &m->even, &m->has_even},
-               {"sky_even", &m->sky_even, &m->has_skies},  {"sky_cloudy", &m->sky_cloudy, &m->has_skies},
-               {"single", &m->single, &m->has_single},     {"groups", &m->groups, &m->has_groups},
-               {"even_emitters", &m->even_emitters, NULL}, {"groups_emitters", &m->groups_emitters, NULL}};
+    } all[] = {{"lights", &m->lights, &m->has_lights},
+               {"even", &m->even, &m->has_even},
+               {"sky_even", &m->sky_even, &m->has_skies},
+               {"sky_cloudy", &m->sky_cloudy, &m->has_skies},
+               {"single", &m->single, &m->has_single},
+               {"groups", &m->groups, &m->has_groups},
+               {"sky_tile", &m->sky_tile, &m->has_tiles},
+               {"even_emitters", &m->even_emitters, NULL},
+               {"groups_emitters", &m->groups_emitters, NULL},
+               {"even_light", m->light_of + MESH_OF_EVEN, NULL},
+               {"single_light", m->light_of + MESH_OF_SINGLE, NULL},
+               {"sky_even_light", m->light_of + MESH_OF_SKY_EVEN, NULL},
+               {"sky_tile_light", m->light_of + MESH_OF_SKY_TILE, NULL}};
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
         const double x = saves ? -1 : number_of(s, path, all[k].name);
         const bool has = all[k].has != NULL ? *all[k].has : *all[k].number > 0;
@@ -186,7 +195,8 @@ static lam_status pass_mesh(store *s, bool saves, mesh_figures *m, lam_error *er
         [MESH_OF_SKY_EVEN] = {"sky_even_variation", "sky_even_reflected"},
         [MESH_OF_SKY_CLOUDY] = {"sky_cloudy_variation", "sky_cloudy_reflected"},
         [MESH_OF_SINGLE] = {"single_variation", "single_reflected"},
-        [MESH_OF_GROUPS] = {"groups_variation", "groups_reflected"}};
+        [MESH_OF_GROUPS] = {"groups_variation", "groups_reflected"},
+        [MESH_OF_SKY_TILE] = {"sky_tile_variation", "sky_tile_reflected"}};
     lam_status status = LAM_OK;
     const char *const group = figures_groups[MESH_GROUP].path;
     TRY(pass_mesh_numbers(s, saves, m, error));

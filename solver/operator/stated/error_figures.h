@@ -124,7 +124,8 @@ typedef struct error_report {
 } error_report;
 
 /* The lights that the error of the mesh is measured for: the scene's lamps or all emitters together, 1 from
- * every element, an even and a cloudy sky, and several lights of one element and of one group each. */
+ * every element, an even and a cloudy sky, and several lights of one element, of one group and of one tile
+ * of the sky each. */
 enum {
     MESH_OF_LAMPS,
     MESH_OF_EVEN,
@@ -132,6 +133,7 @@ enum {
     MESH_OF_SKY_CLOUDY,
     MESH_OF_SINGLE,
     MESH_OF_GROUPS,
+    MESH_OF_SKY_TILE,
     MESH_FIGURES
 };
 
@@ -140,10 +142,12 @@ enum {
  * divides by each other: 0 of both where a group was not looked at. Of several lights, each of them scaled to
  * sum A (B - E)^2 = 1, all together. */
 typedef struct mesh_figures {
-    bool has_lights, has_even, has_skies, has_single, has_groups;
-    double lights, even, sky_even, sky_cloudy, single, groups;
+    bool has_lights, has_even, has_skies, has_single, has_groups, has_tiles;
+    double lights, even, sky_even, sky_cloudy, single, groups, sky_tile;
     double even_emitters,
-        groups_emitters; /* effective numbers, of several lights in the middle; 0: not stated */
+        groups_emitters;           /* effective numbers, of several lights in the middle; 0: not stated */
+    double light_of[MESH_FIGURES]; /* of EVEN, SINGLE, SKY_EVEN and SKY_TILE: sum A (B - E)^2 over the square
+                                      of the power, on average, 1/m^2; 0: not stated */
     size_t n_groups;
     double *variation[MESH_FIGURES], *reflected[MESH_FIGURES]; /* [n_groups]; NULL: not stated */
     double *lights_power; /* [n_groups], that the scene's lamps emit; NULL: not stated */

@@ -79,6 +79,21 @@ done:
     return status;
 }
 
+/* The effective number of tiles of an even sky; 0: nothing is stated of skies. */
+static double even_tiles(const group_errors *e) {
+    double power2 = 0, squares = 0;
+    for (size_t c = 0; e->sky_power != NULL && c < e->n_channels; c++) {
+        double power = 0;
+        for (size_t t = 0; t < e->n_tiles; t++) {
+            const double Q = e->sky_power[c * e->n_tiles + t];
+            power += Q;
+            squares += Q * Q;
+        }
+        power2 += power * power;
+    }
+    return squares > 0 ? power2 / squares : 0;
+}
+
 lam_status error_by_group_make(store *s, const error_scene *scene, stated_figures *from, error_by_group *out,
                                lam_error *error) {
     lam_status status = LAM_OK;
@@ -97,7 +112,7 @@ lam_status error_by_group_make(store *s, const error_scene *scene, stated_figure
     find_sums(scene, &e);
     TRY(find_reflecting(scene, &e, error));
     TRY(find_whole(&e, error));
-    TRY(mesh_shares_make(&from->mesh, G, &e.mesh, error));
+    TRY(mesh_shares_make(&from->mesh, G, even_tiles(&e.figures), &e.mesh, error));
     *out = e;
     e = (error_by_group){.n_bins = 0};
 done:
@@ -149,6 +164,7 @@ sky_sizes sky_sizes_of(const error_by_group *by, const float *L) {
         const weighted_sums sums = sky_channel(e, L, c);
         of.power2 += sums.sum * sums.sum;
         of.spread += sums.spread;
+        of.squares += sums.squares;
         of.power_off +=
             weighted_spread(e->n_tiles, e->sky_power_off + c * e->n_tiles, L + c * e->n_tiles, sums.mean);
     }
@@ -248,10 +264,17 @@ bool mesh_lamps_in(const error_by_group *e, size_t bin) {
 }
 
 mesh_lack mesh_lack_of_bin(const error_by_group *e, const light_sizes *of, size_t bin) {
-    const mesh_light light = {.power = sqrt(of->size.power2),
-                              .of_lamps = sqrt(of->size.lamps2),
+    const double squares = of->sky.squares + of->sent.squares, power = sqrt(of->size.power2);
+    const bool knows_whole = of->whole.weights != NULL;
+    const emission_size *others = knows_whole ? &of->whole.rest : &of->size;
+    const double of_lamps = sqrt(of->size.lamps2);
+    const mesh_light light = {.power = power,
+                              .of_lamps = of_lamps,
+                              .of_whole = knows_whole ? fmax(power - of_lamps - sqrt(others->power2), 0) : 0,
                               .emitters = emission_size_number(&of->size),
+                              .others = emission_size_number(others),
                               .sky_power = sqrt(of->sky.power2) + sqrt(of->sent.power2),
+                              .sky_tiles = squares > 0 ? (of->sky.power2 + of->sent.power2) / squares : 0,
                               .bounced = of->quantity == LAM_INDIRECT};
     return mesh_lack_of(&e->mesh, &light, bin % e->figures.n_groups);
 }

@@ -67,10 +67,10 @@ typedef struct whole_light {
     emission_size rest;
 } whole_light;
 
-/* P^2, S and W of a sky (error_figures.h). */
+/* P^2, S and W of a sky (error_figures.h), and the squares of the powers of its tiles. */
 typedef struct sky_sizes {
     const float *L; /* [C][n_tiles]; NULL: no sky, or nothing is stated of skies */
-    double power2, spread, power_off;
+    double power2, spread, power_off, squares;
 } sky_sizes;
 sky_sizes sky_sizes_of(const error_by_group *e, const float *L);
 

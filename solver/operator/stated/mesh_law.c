@@ -11,7 +11,13 @@ void mesh_shares_free(mesh_shares *m) {
     *m = (mesh_shares){.n_groups = 0};
 }
 
-lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, mesh_shares *out, lam_error *error) {
+/* The light of many over that of one, for the same power; 0: not stated. */
+static double common(const mesh_figures *from, int one, int many) {
+    return from->light_of[one] > 0 ? from->light_of[many] / from->light_of[one] : 0;
+}
+
+lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, double even_tiles, mesh_shares *out,
+                            lam_error *error) {
     lam_status status = LAM_OK;
     const struct {
         bool has;
@@ -21,9 +27,14 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, mesh_shar
                            [MESH_OF_SKY_EVEN] = {from->has_skies, from->sky_even},
                            [MESH_OF_SKY_CLOUDY] = {from->has_skies, from->sky_cloudy},
                            [MESH_OF_SINGLE] = {from->has_single, from->single},
-                           [MESH_OF_GROUPS] = {from->has_groups, from->groups}};
-    mesh_shares m = {n_groups, .even_emitters = from->even_emitters,
-                     .groups_emitters = from->groups_emitters};
+                           [MESH_OF_GROUPS] = {from->has_groups, from->groups},
+                           [MESH_OF_SKY_TILE] = {from->has_tiles, from->sky_tile}};
+    mesh_shares m = {n_groups,
+                     .even_emitters = from->even_emitters,
+                     .groups_emitters = from->groups_emitters,
+                     .even_tiles = even_tiles,
+                     .common_light = common(from, MESH_OF_SINGLE, MESH_OF_EVEN),
+                     .common_sky = common(from, MESH_OF_SKY_TILE, MESH_OF_SKY_EVEN)};
     *out = (mesh_shares){.n_groups = 0};
     for (int k = 0; k < MESH_FIGURES; k++) {
         const double *variation = from->variation[k], *reflected = from->reflected[k];
@@ -60,39 +71,61 @@ static double way(double emitters, double n, double N) {
     return fmin(fmax(log(fmax(emitters, 1) / n) / log(N / n), 0), 1);
 }
 
-/* An emission of so many emitters: a power of N from single elements to groups, as single elements add up;
- * beyond, squares follow log N, as an even light may have no error at all. */
-static double by_emitters(const mesh_shares *m, double emitters, size_t group) {
+/* Whole groups: squares follow log N from those of groups to those of an even light, which may have no error
+ * at all. */
+static double of_groups(const mesh_shares *m, double emitters, size_t group) {
+    const double *groups = m->of[MESH_OF_GROUPS], *even = m->of[MESH_OF_EVEN];
+    const double N = m->groups_emitters, all = m->even_emitters;
+    if (groups == NULL || !(N > 0)) return even != NULL ? even[group] : 0;
+    if (even == NULL || !(all > N)) return groups[group];
+    const double t = way(emitters, N, all);
+    return (1 - t) * groups[group] + t * even[group];
+}
+
+/* (s m_1^2 + (1 - s) q m_e^2) / (s + (1 - s) q). */
+static double of_many(double one2, double even2, double q, double N, double N_e) {
+    const double s = N_e > 1 && N > 0 ? fmin(fmax((1 / fmax(N, 1) - 1 / N_e) / (1 - 1 / N_e), 0), 1) : 0;
+    const double both = s + (1 - s) * q;
+    return both > 0 ? (s * one2 + (1 - s) * q * even2) / both : even2;
+}
+
+/* Emitters here and there. Older stores do not know q: a power of N from single elements to groups. */
+static double of_elements(const mesh_shares *m, double emitters, size_t group) {
     const double *single = m->of[MESH_OF_SINGLE], *groups = m->of[MESH_OF_GROUPS],
                  *even = m->of[MESH_OF_EVEN];
-    const double N = m->groups_emitters, all = m->even_emitters;
-    double found = even != NULL ? even[group] : 0;
-    if (groups == NULL || !(N > 0)) return found;
-    if (even == NULL || !(all > N)) found = groups[group];
-    if (even != NULL && all > N) {
-        const double t = way(emitters, N, all);
-        found = (1 - t) * groups[group] + t * even[group];
-    }
-    if (single == NULL || !(N > 1) || !(emitters < N) || !(groups[group] > 0) || !(single[group] > 0))
-        return found;
+    const double N = m->groups_emitters;
+    if (single != NULL && even != NULL && m->common_light > 0)
+        return of_many(single[group], even[group], m->common_light, emitters, m->even_emitters);
+    if (single == NULL || groups == NULL || !(N > 1) || !(emitters < N) || !(groups[group] > 0) ||
+        !(single[group] > 0))
+        return of_groups(m, emitters, group);
     return single[group] * pow(groups[group] / single[group], way(emitters, 1, N));
 }
 
 static double of_emission(const mesh_shares *m, const mesh_light *light, size_t group) {
     const double *lamps = m->of[MESH_OF_LAMPS];
     /* Older stores have no more than two figures. */
-    if (m->lamps == NULL)
+    if (m->of[MESH_OF_SINGLE] == NULL && m->of[MESH_OF_GROUPS] == NULL)
         return lamps != NULL ? lamps[group] : m->of[MESH_OF_EVEN] != NULL ? m->of[MESH_OF_EVEN][group] : 0;
-    const double other = by_emitters(m, light->emitters, group);
-    if (lamps == NULL || !(light->power > 0)) return other;
-    const double part = fmin(light->of_lamps / light->power, 1);
-    return part * lamps[group] + (1 - part) * other;
+    const double part = lamps != NULL ? fmin(light->of_lamps / light->power, 1) : 0;
+    const double whole = fmin(light->of_whole / light->power, 1 - part), rest = 1 - part - whole;
+    double sum = part > 0 ? part * lamps[group] : 0;
+    if (whole > 0) sum += whole * of_groups(m, light->emitters, group);
+    return rest > 0 ? sum + rest * of_elements(m, light->others, group) : sum;
 }
 
 static double of_sky(const mesh_shares *m, const mesh_light *light, size_t group) {
-    const double *even = m->of[MESH_OF_SKY_EVEN], *cloudy = m->of[MESH_OF_SKY_CLOUDY];
-    if (light->bounced && m->of[MESH_OF_EVEN] != NULL) return m->of[MESH_OF_EVEN][group];
-    return even != NULL && cloudy != NULL ? fmax(even[group], cloudy[group]) : of_emission(m, light, group);
+    const double *wide = m->of[MESH_OF_SKY_EVEN], *cloudy = m->of[MESH_OF_SKY_CLOUDY];
+    const double *even = m->of[MESH_OF_EVEN], *tile = m->of[MESH_OF_SKY_TILE];
+    const double *groups = m->of[MESH_OF_GROUPS];
+    const bool knows_tiles = tile != NULL && m->common_sky > 0;
+    if (light->bounced && even != NULL)
+        return knows_tiles && groups != NULL
+                   ? of_many(groups[group], even[group], m->common_sky, light->sky_tiles, m->even_tiles)
+                   : even[group];
+    if (wide == NULL || cloudy == NULL) return of_emission(m, light, group);
+    const double all = fmax(wide[group], cloudy[group]);
+    return knows_tiles ? of_many(tile[group], all, m->common_sky, light->sky_tiles, m->even_tiles) : all;
 }
 
 static double share2(const mesh_shares *m, const mesh_light *light, size_t group) {
@@ -105,6 +138,6 @@ static double share2(const mesh_shares *m, const mesh_light *light, size_t group
 }
 
 mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t group) {
-    const double own2 = share2(m, light, group), mean = (own2 + share2(m, light, m->n_groups)) / 2;
+    const double own2 = share2(m, light, group), mean = fmax(own2, share2(m, light, m->n_groups));
     return (mesh_lack){own2 + mean * mean, mean * mean};
 }

@@ -10,35 +10,45 @@ typedef struct mesh_shares {
     size_t n_groups;
     double *of[MESH_FIGURES];              /* [n_groups + 1], the last of the scene; NULL: not stated */
     double even_emitters, groups_emitters; /* effective numbers; 0: not stated */
+    double even_tiles;                     /* of an even sky */
+    double common_light, common_sky; /* q below, of elements and of tiles; 0: not stated, of an older store */
     bool *lamps; /* [n_groups], true where lamps of the scene are; NULL: not stated, any light is taken for
                     theirs */
 } mesh_shares;
 void mesh_shares_free(mesh_shares *m);
 
-/* A group that was not looked at, or that the light did not reach, has the share of the scene, and so have
- * all groups of an older store. Errors: LAM_ERR_MEMORY. */
-lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, mesh_shares *out, lam_error *error);
+/* even_tiles: the effective number of tiles of an even sky, 0 without one. A group that was not looked at, or
+ * that the light did not reach, has the share of the scene, and so have all groups of an older store. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, double even_tiles, mesh_shares *out,
+                            lam_error *error);
 
 bool mesh_shares_known(const mesh_shares *m);
 
-/* The light of an answer: the power that elements emit, the part of it that comes from groups with lamps, the
- * effective number of emitters, and the power that a sky sends on; bounced: the direct light of the sky is no
- * part of it. */
+/* The light of an answer: the power that elements emit, the parts of it that come from groups with lamps and
+ * from other groups that shine evenly as wholes, the effective number of emitters, that of all but such
+ * groups, the power that a sky sends on, and the effective number of its tiles; bounced: the direct light of
+ * the sky is no part of it. */
 typedef struct mesh_light {
-    double power, of_lamps, emitters, sky_power;
+    double power, of_lamps, of_whole, emitters, others, sky_power, sky_tiles;
     bool bounced;
 } mesh_light;
 
 /* Squares of the shares that a group lacks. m^2, what its light varies by inside elements: squares of parts
- * of a light are weighted by their powers. Light from groups with lamps has that of the lamps; of other
- * emissions the squares follow log N, the effective number of emitters, from single elements through groups
- * to an even light. Of two skies the larger counts, and of their bounced light, which comes from everywhere,
- * that of an even light.
+ * of a light are weighted by their powers. Light from groups with lamps has that of the lamps, and that of
+ * other whole groups the share of groups, which goes over to that of an even light by log N, the effective
+ * number of emitters. N emitters here and there lie between a single one, m_1^2, and an even light of N_e,
+ * m_e^2: what they light in common, q of the square of the light of one, varies as the even light, and the
+ * rest as the single one, m^2 = (s m_1^2 + (1 - s) q m_e^2) / (s + (1 - s) q),    s = (1/N - 1/N_e) / (1 -
+ * 1/N_e). In a maze q is a hundredth, and twenty emitters vary as one does. The same holds of the tiles of a
+ * sky, single ones and all, of whose two kinds of skies the larger counts; of their bounced light one tile
+ * counts as a group, from where it falls, and all as an even light.
  *
  * The mean of a group is off by less: light is sent by elements as if it were even over them, and where it is
  * not, the part of it that arrives varies with it, so that the error is of second order, about
- *     c = (m_g^2 + m^2) / 2,
- * m being the share of the scene. Elements have m_g^2 + c^2. 0 where nothing is stated. */
+ *     c = max(m_g^2, m^2),
+ * m being the share of the scene, where the light comes from. Elements have m_g^2 + c^2. 0 where nothing is
+ * stated. */
 typedef struct mesh_lack {
     double elements2, mean2;
 } mesh_lack;

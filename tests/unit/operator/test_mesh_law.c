@@ -35,7 +35,7 @@ static double share2(const mesh_shares *m, const mesh_light *light, size_t group
 static mesh_shares made(const mesh_figures *from) {
     mesh_shares m;
     lam_error error = {0};
-    ck_ok(mesh_shares_make(from, G, &m, &error));
+    ck_ok(mesh_shares_make(from, G, 100, &m, &error));
     return m;
 }
 
@@ -46,21 +46,72 @@ START_TEST(light_of_lamps_has_their_share) {
     ck_assert_double_eq_tol(share2(&m, &own, 1), .04, 1e-12);
     ck_assert_double_eq_tol(share2(&m, &own, 2), .15 * .15, 1e-12); /* as the scene */
     /* The mean of the group lacks a part of second order, by its own share and that of the scene. */
-    const double c = (.01 + .15 * .15) / 2;
+    const double c = .15 * .15;
     ck_assert_double_eq_tol(mesh_lack_of(&m, &own, 0).mean2, c * c, 1e-12);
     mesh_shares_free(&m);
 }
 END_TEST
 
+/* Older stores do not tell what single elements light in common. */
 START_TEST(other_light_follows_its_number) {
     static const struct {
         double emitters, share2;
     } all[] = {{.5, .16}, {1, .16}, {4, .04}, {16, .01}, {64, (.01 + .0004) / 2}, {256, .0004}, {1e4, .0004}};
     mesh_shares m = made(&figures);
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
-        const mesh_light light = {.power = 1, .emitters = all[k].emitters};
+        const mesh_light light = {.power = 1, .emitters = all[k].emitters, .others = all[k].emitters};
         ck_assert_double_eq_tol(share2(&m, &light, 0), all[k].share2, 1e-12);
     }
+    mesh_shares_free(&m);
+}
+END_TEST
+
+/* The light of several in common, q, varies as that of all, and the rest as that of one. */
+START_TEST(emitters_share_what_they_light_in_common) {
+    enum { SINGLE_LIGHT = 50, EVEN_LIGHT = 10 };
+    static const double numbers[] = {.5, 1, 4, 20, 256, 1e5};
+    mesh_figures from = figures;
+    from.light_of[MESH_OF_SINGLE] = SINGLE_LIGHT;
+    from.light_of[MESH_OF_EVEN] = EVEN_LIGHT;
+    mesh_shares m = made(&from);
+    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) {
+        /* N lights of power P / N: N squares of each alone, and what all have in common. */
+        const double N = fmin(fmax(numbers[k], 1), 256), s = (1 / N - 1. / 256) / (1 - 1. / 256);
+        const double light = s * SINGLE_LIGHT + (1 - s) * EVEN_LIGHT;
+        const double off = s * SINGLE_LIGHT * .16 + (1 - s) * EVEN_LIGHT * .0004;
+        const mesh_light given = {.power = 1, .emitters = 7, .others = numbers[k]};
+        ck_assert_double_eq_tol(share2(&m, &given, 0), off / light, 1e-12);
+    }
+    /* Whole groups are no others, whatever they are. */
+    const mesh_light whole = {.power = 2, .of_whole = 1, .emitters = 16, .others = 1};
+    ck_assert_double_eq_tol(share2(&m, &whole, 0), (.01 + .16) / 2, 1e-12);
+    const mesh_light mixed = {.power = 4, .of_lamps = 2, .of_whole = 1, .emitters = 16, .others = 1};
+    ck_assert_double_eq_tol(share2(&m, &mixed, 1), (2 * .04 + .04 + .64) / 4, 1e-12);
+    mesh_shares_free(&m);
+}
+END_TEST
+
+START_TEST(tiles_share_what_they_light_in_common) {
+    static double tile[] = {.6, .9, 0};
+    mesh_figures from = figures;
+    from.has_tiles = true;
+    from.sky_tile = .7;
+    from.variation[MESH_OF_SKY_TILE] = tile;
+    from.reflected[MESH_OF_SKY_TILE] = ones;
+    from.light_of[MESH_OF_SKY_TILE] = 4;
+    from.light_of[MESH_OF_SKY_EVEN] = 1;
+    mesh_shares m = made(&from);
+    const double s = (1. / 4 - 1. / 100) / (1 - 1. / 100), q = .25;
+    const mesh_light one = {.sky_power = 1, .sky_tiles = 1}, four = {.sky_power = 1, .sky_tiles = 4},
+                     all = {.sky_power = 1, .sky_tiles = 100}, unknown = {.sky_power = 1};
+    ck_assert_double_eq_tol(share2(&m, &one, 0), .36, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &one, 2), .49, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &four, 0), (s * .36 + (1 - s) * q * .09) / (s + (1 - s) * q), 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &all, 0), .09, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &unknown, 0), .09, 1e-12);
+    /* Bounced light comes from where a tile shines, as from a group. */
+    const mesh_light bounced = {.sky_power = 1, .sky_tiles = 1, .bounced = true};
+    ck_assert_double_eq_tol(share2(&m, &bounced, 0), .01, 1e-12);
     mesh_shares_free(&m);
 }
 END_TEST
@@ -99,6 +150,8 @@ int main(void) {
     TCase *c = tcase_create("mesh_law");
     tcase_add_test(c, light_of_lamps_has_their_share);
     tcase_add_test(c, other_light_follows_its_number);
+    tcase_add_test(c, emitters_share_what_they_light_in_common);
+    tcase_add_test(c, tiles_share_what_they_light_in_common);
     tcase_add_test(c, skies_and_emissions_weigh_by_power);
     tcase_add_test(c, older_stores);
     suite_add_tcase(s, c);
