@@ -127,25 +127,30 @@ static void add_sky(const gather *g, const ray_packet *rays, const hit_packet *h
             H[row] += M_PI * g->sky->L[row / channels * (tiles + 1) + tile[i]] / GATHER_RAYS;
 }
 
+/* Casts the packet of rays of a half that begins with the first. */
+static void cast(const gather *g, const gather_samples *s, size_t half, size_t first, uint32_t element,
+                 const float origin[3], ray_packet *rays, hit_packet *hits) {
+    uint32_t self[VISIBILITY_PACKET];
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        self[i] = element;
+        for (int d = 0; d < 3; d++) {
+            rays->origin[d][i] = origin[d];
+            rays->direction[d][i] = s->direction[half][first + i][d];
+        }
+    }
+    visibility_cast(g->v, rays, VISIBILITY_PACKET, self, 0, hits);
+}
+
 static void add_rays(const gather *g, const gather_samples *s, size_t half, uint32_t element,
                      const float origin[3], double *H) {
-    const float(*direction)[3] = s->direction[half];
     const float *normal = g->m->normal[element];
     for (size_t first = 0; first < GATHER_RAYS; first += VISIBILITY_PACKET) {
         ray_packet rays;
         hit_packet hits;
-        uint32_t self[VISIBILITY_PACKET];
-        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-            self[i] = element;
-            for (int d = 0; d < 3; d++) {
-                rays.origin[d][i] = origin[d];
-                rays.direction[d][i] = direction[first + i][d];
-            }
-        }
-        visibility_cast(g->v, &rays, VISIBILITY_PACKET, self, 0, &hits);
+        cast(g, s, half, first, element, origin, &rays, &hits);
         if (g->sky != NULL) add_sky(g, &rays, &hits, H);
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-            const float *to = direction[first + i];
+            const float *to = s->direction[half][first + i];
             if (hits.element[i] == VISIBILITY_NOTHING || hits.back[i]) continue;
             add_hit(g, s, to, hits.element[i], (double)hits.distance[i],
                     (double)(to[0] * normal[0] + to[1] * normal[1] + to[2] * normal[2]), H);
@@ -210,6 +215,24 @@ void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points,
     }
 }
 
+void gather_hits(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
+                 uint32_t *hit) {
+    gather_samples s;
+    draw(g, element, key, n_points, points, &s);
+    for (size_t p = 0; p < n_points; p++) {
+        float origin[3];
+        visibility_recentre(g->v, points[p], origin);
+        for (size_t h = 0; h < GATHER_HALVES; h++)
+            for (size_t first = 0; first < GATHER_RAYS; first += VISIBILITY_PACKET) {
+                ray_packet rays;
+                hit_packet hits;
+                cast(g, &s, h, first, element, origin, &rays, &hits);
+                for (size_t i = 0; i < VISIBILITY_PACKET; i++)
+                    *hit++ = hits.back[i] ? VISIBILITY_NOTHING : hits.element[i];
+            }
+    }
+}
+
 void gather_place(const gather *g, uint32_t element, size_t n, const float (*uw)[2], double (*points)[3]) {
     const double *centre = visibility_centre(g->v);
     element_sampler sampler;
@@ -219,4 +242,15 @@ void gather_place(const gather *g, uint32_t element, size_t n, const float (*uw)
         element_sampler_point(&sampler, uw[k][0], uw[k][1], point);
         for (int d = 0; d < 3; d++) points[k][d] = (double)point[d] + centre[d];
     }
+}
+
+void gather_quarters(const gather *g, uint32_t element, uint64_t key, double points[GATHER_QUARTERS][3]) {
+    float uw[GATHER_QUARTERS][2];
+    uint64_t random = key;
+    for (size_t k = 0; k < GATHER_QUARTERS; k++) {
+        uw[k][0] = (float)((double)(k % 2) + random_unit(&random)) / 2;
+        uw[k][1] = (float)((double)(k / 2) + random_unit(&random)) / 2;
+        for (int d = 0; d < 2; d++) uw[k][d] = fminf(uw[k][d], 1 - 0x1p-24f);
+    }
+    gather_place(g, element, GATHER_QUARTERS, (const float(*)[2])uw, points);
 }

@@ -41,7 +41,19 @@ size_t gather_values(const gather *g); /* n_lights C */
 void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
                double *H);
 
+/* hit [n_points][GATHER_HALVES][GATHER_RAYS]: the elements whose fronts the same rays meet,
+ * VISIBILITY_NOTHING where there is none. */
+void gather_hits(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
+                 uint32_t *hit);
+
 /* Points of an element at (u, w) of the unit square; the map preserves area. */
 void gather_place(const gather *g, uint32_t element, size_t n, const float (*uw)[2], double (*points)[3]);
+
+/* One random point in each quarter of an element. The mean square of what a function is there, about the mean
+ * of the four, lacks the variance of that mean, which for a function that is linear over a square is a 16th
+ * of the whole: its variance is GATHER_QUARTERS_LACK times as much. */
+enum { GATHER_QUARTERS = 4 };
+#define GATHER_QUARTERS_LACK (16. / 15)
+void gather_quarters(const gather *g, uint32_t element, uint64_t key, double points[GATHER_QUARTERS][3]);
 
 #endif

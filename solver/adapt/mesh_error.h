@@ -5,16 +5,7 @@
 #define LAMBERT_ADAPT_MESH_ERROR_H
 
 #include "solver/adapt/gather.h"
-
-/* Elements that are looked at: as many as there are, within the first two, shared among groups by their
- * areas, but MESH_ERROR_LOOKS_OF_GROUP in each group at least; of many groups fewer, so that these are no
- * more than MESH_ERROR_LOOKS_OF_GROUPS together. */
-enum {
-    MESH_ERROR_LOOKS_LEAST = 64,
-    MESH_ERROR_LOOKS_MOST = 1024,
-    MESH_ERROR_LOOKS_OF_GROUP = 16,
-    MESH_ERROR_LOOKS_OF_GROUPS = 4096
-};
+#include "solver/adapt/look_plan.h"
 
 /* By light and group, [n_lights][n_groups], means by area, channels summed: the variance of rho H inside
  * elements, which its noise may make negative, the standard error of that, and (B - E)^2. All are 0 of groups

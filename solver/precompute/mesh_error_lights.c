@@ -1,5 +1,6 @@
 #include "solver/precompute/mesh_error_lights.h"
 
+#include "solver/adapt/mesh_single.h"
 #include "solver/base/random.h"
 #include "solver/operator/stated/error_law.h"
 #include "solver/precompute/precompute.h"
@@ -70,9 +71,8 @@ lam_status mesh_error_take(const mesh_error_groups *from, size_t light, int whic
     return LAM_OK;
 }
 
-/* Rounds of lights: the first of each is a single element, whose direct light is sampled as that of a lamp;
- * the others are groups. */
-enum { ROUNDS = 4, LARGEST_GROUPS = 4, OTHER_GROUPS = 4, GROUPS = LARGEST_GROUPS + OTHER_GROUPS };
+/* Groups that are lit alone, and the share of the looks that each of them is worth. */
+enum { FEWER = 2, LARGEST_GROUPS = 4, OTHER_GROUPS = 4, GROUPS = LARGEST_GROUPS + OTHER_GROUPS };
 
 void mesh_light_sums_free(mesh_light_sums *s) {
     free(s->area);
@@ -141,19 +141,39 @@ static size_t choose_groups(const mesh *m, const double *area, const double *lam
     return count;
 }
 
-/* An element by its area. */
-static size_t choose_element(const mesh *m, double all, uint64_t *seed) {
-    double before = 0;
-    const double at = random_unit(seed) * all;
-    size_t i = 0;
-    while (i + 1 < m->n && (before += m->area[i]) < at) i++;
-    return i;
+/* Puts 1 where a group is into all channels of E [C][n]. */
+static void light_up(const mesh *m, size_t group, float *E) {
+    for (size_t k = 0; k < m->n_channels * m->n; k++) E[k] = m->group[k % m->n] == group ? 1 : 0;
 }
 
-/* Puts 1 where `group` is, or at one element where that is SIZE_MAX, into all channels of E [C][n]. */
-static void light_up(const mesh *m, size_t group, size_t element, float *E) {
-    for (size_t k = 0; k < m->n_channels * m->n; k++)
-        E[k] = (group == SIZE_MAX ? k % m->n == element : m->group[k % m->n] == group) ? 1 : 0;
+/* The light of single elements, each of power 1 W times its area. Of what bounces on, which spreads as that
+ * of an even light does, nothing is found: it has the square of that light, W^2 l^2 over the power, and no
+ * variance.
+ */
+static lam_status add_single(const precompute_job *job, const precompute_scene *scene, mesh_figures *figures,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &scene->m;
+    const double *even = figures->reflected[MESH_OF_EVEN];
+    const uint64_t seed = random_mix(precompute_seed(job->options->seed, SEED_MESH_ERROR));
+    mesh_error_groups groups = {.fewer = 0};
+    mesh_light_sums sums = {.noise2 = NULL};
+    double all = 0, light = 0;
+    TRY(mesh_light_sums_begin(m, &sums, error));
+    TRY(mesh_error_groups_begin(m, 1, &groups, error));
+    TRY(mesh_single(m, seed, &job->progress, &groups, error));
+    for (size_t g = 0; g < m->n_groups; g++) all += sums.area[g];
+    for (size_t g = 0; g < m->n_groups; g++) {
+        if (even != NULL && all > 0) groups.light2[g] += even[g] * even[g] / all;
+        light += sums.area[g] * groups.light2[g];
+    }
+    if (all > 0) mesh_light_sums_add(&groups, 0, m, light / all / (double)m->n_channels, &sums);
+    TRY(mesh_light_sums_state(&sums, m, MESH_OF_SINGLE, &figures->single, &figures->has_single, figures,
+                              error));
+done:
+    mesh_error_groups_free(&groups);
+    mesh_light_sums_free(&sums);
+    return status;
 }
 
 /* Of lights [n_lights][C][n]. */
@@ -166,62 +186,64 @@ static lam_status judge_lights(const precompute_job *job, const precompute_scene
     void *work = memory_allocate(bytes, 1, "the error of the mesh", error);
     if (work == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_error_answers(scene, made, n_lights, E, B, work, bytes, error));
-    TRY(mesh_error(&scene->m, n_lights, E, B, true, NULL, seed, &job->progress, found, groups, error));
+    TRY(mesh_error(&scene->m, n_lights, E, B, false, NULL, seed, &job->progress, found, groups, error));
 done:
     free(work);
+    return status;
+}
+
+/* Single groups, as many of them at once as can be gathered. */
+static lam_status add_groups(const precompute_job *job, const precompute_scene *scene, made_operator *made,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &scene->m;
+    const size_t vector = m->n * m->n_channels, most = GATHER_VALUES_MOST / m->n_channels;
+    mesh_figures *figures = &made->errors_of_mesh;
+    uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
+    mesh_error_groups groups = {.fewer = FEWER};
+    mesh_light_sums sums = {.noise2 = NULL};
+    double logs = 0;
+    float *E = NULL, *B = NULL;
+    size_t chosen[GROUPS], *order = NULL;
+    order = memory_allocate(m->n_groups, sizeof *order, "the error of the mesh", error);
+    E = memory_allocate(most, vector * sizeof *E, "the error of the mesh", error);
+    B = memory_allocate(most, vector * sizeof *B, "the error of the mesh", error);
+    if (order == NULL || E == NULL || B == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_light_sums_begin(m, &sums, error));
+    TRY(mesh_error_groups_begin(m, most, &groups, error));
+    const size_t n_chosen = choose_groups(m, sums.area, figures->lights_power, chosen, order);
+    for (size_t first = 0; first < n_chosen; first += most) {
+        const size_t left = n_chosen - first, n_lit = left < most ? left : most;
+        for (size_t k = 0; k < n_lit; k++) {
+            light_up(m, chosen[first + k], E + k * vector);
+            logs += log(mesh_error_emitters(m, E + k * vector));
+        }
+        TRY(judge_lights(job, scene, made, n_lit, E, B, random_next(&seed), &groups, error));
+        for (size_t k = 0; k < n_lit; k++)
+            mesh_light_sums_add(&groups, k, m, mesh_error_light(m, E + k * vector, B + k * vector, false),
+                                &sums);
+    }
+    if (n_chosen == 0) goto done;
+    TRY(mesh_light_sums_state(&sums, m, MESH_OF_GROUPS, &figures->groups, &figures->has_groups, figures,
+                              error));
+    figures->groups_emitters = exp(logs / (double)n_chosen);
+done:
+    mesh_error_groups_free(&groups);
+    mesh_light_sums_free(&sums);
+    free(order);
+    free(E);
+    free(B);
     return status;
 }
 
 lam_status mesh_error_add_others(const precompute_job *job, const precompute_scene *scene,
                                  made_operator *made, lam_error *error) {
     lam_status status = LAM_OK;
-    const mesh *m = &scene->m;
-    const size_t vector = m->n * m->n_channels, G = m->n_groups, most = GATHER_VALUES_MOST / m->n_channels;
     mesh_figures *figures = &made->errors_of_mesh;
-    uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
-    mesh_error_groups groups = {.fewer = ROUNDS};
-    mesh_light_sums single = {.noise2 = NULL}, of_groups = {.noise2 = NULL};
-    double all = 0, logs = 0;
-    float *E = NULL, *B = NULL;
-    size_t chosen[GROUPS], *order = NULL, next = 0;
     if (scene->emitters.s > 0 || scene->importance.emits != NULL) return LAM_OK;
-    order = memory_allocate(G, sizeof *order, "the error of the mesh", error);
-    E = memory_allocate(most, vector * sizeof *E, "the error of the mesh", error);
-    B = memory_allocate(most, vector * sizeof *B, "the error of the mesh", error);
-    if (order == NULL || E == NULL || B == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(mesh_light_sums_begin(m, &single, error));
-    TRY(mesh_light_sums_begin(m, &of_groups, error));
-    TRY(mesh_error_groups_begin(m, most, &groups, error));
-    for (size_t i = 0; i < m->n; i++) all += m->area[i];
-    const size_t n_chosen = choose_groups(m, single.area, figures->lights_power, chosen, order);
-    for (size_t round = 0; round < ROUNDS; round++) {
-        const size_t left = n_chosen - next, n_lit = left < most - 1 ? left : most - 1;
-        light_up(m, SIZE_MAX, choose_element(m, all, &seed), E);
-        for (size_t k = 0; k < n_lit; k++) {
-            light_up(m, chosen[next + k], 0, E + (k + 1) * vector);
-            logs += log(mesh_error_emitters(m, E + (k + 1) * vector));
-        }
-        TRY(judge_lights(job, scene, made, n_lit + 1, E, B, random_mix(seed), &groups, error));
-        mesh_light_sums_add(&groups, 0, m, mesh_error_light(m, E, B, false), &single);
-        for (size_t k = 1; k <= n_lit; k++)
-            mesh_light_sums_add(&groups, k, m, mesh_error_light(m, E + k * vector, B + k * vector, false),
-                                &of_groups);
-        next += n_lit;
-    }
-    TRY(mesh_light_sums_state(&single, m, MESH_OF_SINGLE, &figures->single, &figures->has_single, figures,
-                              error));
-    if (next > 0) {
-        TRY(mesh_light_sums_state(&of_groups, m, MESH_OF_GROUPS, &figures->groups, &figures->has_groups,
-                                  figures, error));
-        figures->groups_emitters = exp(logs / (double)next);
-    }
+    TRY(add_single(job, scene, figures, error));
+    TRY(add_groups(job, scene, made, error));
     terminal_log(job->t, "mesh     single elements %.3g, groups %.3g", figures->single, figures->groups);
 done:
-    mesh_error_groups_free(&groups);
-    mesh_light_sums_free(&single);
-    mesh_light_sums_free(&of_groups);
-    free(order);
-    free(E);
-    free(B);
     return status;
 }

@@ -48,8 +48,8 @@ void mesh_light_sums_add(const mesh_error_groups *of, size_t k, const mesh *m, d
 lam_status mesh_light_sums_state(const mesh_light_sums *s, const mesh *m, int which, double *whole, bool *has,
                                  mesh_figures *to, lam_error *error);
 
-/* States the error for light of single elements and of single groups, by some of each, where the operator
- * takes any emission. Cost: about that of mesh_error once more. Errors: those of mesh_error. */
+/* States the error for light of single elements, of all of them, and of some single groups, where the
+ * operator takes any emission. Cost: about that of mesh_error twice more. Errors: those of mesh_error. */
 lam_status mesh_error_add_others(const precompute_job *job, const precompute_scene *scene,
                                  made_operator *made, lam_error *error);
 
