@@ -168,7 +168,7 @@ class Honesty(unittest.TestCase):
         done = lambert("bench", "honesty", "--quick", "-o", folder.name)
         assert done.returncode == 0, done.stderr
         cls.tables = {}
-        for name in "scenes", "kinds":
+        for name in "scenes", "kinds", "mesh":
             with open(os.path.join(folder.name, f"honesty-{name}.csv"), encoding="utf-8", newline="") as stream:
                 cls.tables[name] = list(csv.DictReader(stream))
 
@@ -189,6 +189,18 @@ class Honesty(unittest.TestCase):
             self.assertEqual(float(row["unstated"]), 0, row)
             self.assertTrue(.2 < float(row["median"]) < 2 and float(row["median"]) <= float(row["largest"]), row)
         self.assertEqual(float(rows[2]["requests"]), sum(float(row["requests"]) for row in rows[:2]))
+
+    def test_mesh(self):
+        """Headlines, which have the mesh in them, beside elements 16 times smaller."""
+        rows = self.tables["mesh"]
+        self.assertEqual([row["scene"] for row in rows], ["cornell", "closed cornell", "all"])
+        for row in rows:
+            below, above = self.shares(row)
+            self.assertGreaterEqual(float(row["requests"]), 30, row)
+            self.assertGreaterEqual(below, .95, row)
+            self.assertGreaterEqual(above, .5, row)
+            self.assertEqual(float(row["unstated"]), 0, row)
+            self.assertTrue(.2 < float(row["median"]) < 2, row)
 
     def test_kinds(self):
         rows = self.tables["kinds"]
