@@ -10,8 +10,10 @@
 /* The longest time that Retry-After asks for. */
 #define RETRY_MOST 600
 
-/* Seconds in which an answer is sent that is made at the deadline. */
+/* Seconds in which an answer is sent that is made at the deadline, and those that a request may take to
+ * arrive, so that one whose time is over before is told so. */
 #define REFUSAL_S 1.0
+#define ARRIVAL_S .25
 
 bool http_check_health(request *r) {
     lam_error why;
@@ -49,7 +51,7 @@ bool http_read_timeout(request *r) {
         return false;
     }
     r->deadline = fmin(r->deadline, r->start + seconds);
-    client_end_by(r->service->connections, r->client, r->deadline);
+    client_end_by(r->service->connections, r->client, fmax(r->deadline, r->start + ARRIVAL_S));
     return true;
 }
 

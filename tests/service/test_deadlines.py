@@ -53,6 +53,17 @@ class Deadlines(Case):
                 until(lambda: metrics(daemon)[("lambertd_queued",)] == 0)
                 self.serves(daemon)
 
+    def test_times_that_are_over_at_once(self):
+        """They are told so, whenever the thread that watches connections looks: of 1,000, 1 to 3 were cut without a word."""
+        request = b"GET /v1/scenes/box/mesh HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nLambert-Timeout: 1e-9\r\n\r\n"
+        with self.daemon() as daemon:
+            for _ in range(2000):
+                with daemon.raw() as s:
+                    s.sendall(request)
+                    self.check_problem(read_all(s), b"not ready in time")
+            self.assertEqual(cuts(daemon, "deadline"), 0)
+            self.serves(daemon)
+
     def test_a_solve_that_waits_is_answered_in_time(self):
         """Behind refinements, which go on: one pass of these runs at a time."""
         with self.daemon() as daemon, contextlib.closing(self.ask(daemon, LONG)), contextlib.closing(self.ask(daemon, LONG)):
