@@ -3,12 +3,14 @@
 
     honesty.py PROGRAMS SCALE SEED [SCENE]
 
-PROGRAMS is the folder of lambert, lambertd and lambert-bench; SCALE is quick, default or full; SCENE is a scene file, or
-a folder of some, in place of the scenes of the suite. Each scene is precomputed at defaults but for its faces, which are the elements, and as exact inverses
-of form factors pair by pair at high quality, with other seeds, whose mean is the reference. All stores get the same random requests:
-groups, elements, random emission, the scene's own light and skies, of which all elements, groups or single elements are
-selected, or groups reduced. The same requests then go to a store of elements 16 times smaller, which has the error of the mesh in it: the
-headline of each answer stands beside the distance of the light of the smaller elements to that of those that they are parts of. lambert-bench reads standard output: one JSON object a line, as of service.py.
+PROGRAMS is the folder of lambert, lambertd and lambert-bench; SCALE is quick, default, full, or mesh, which tells the
+tables of the mesh alone, by 100 requests; SCENE is a scene file, or a folder of some, in place of the scenes of the
+suite. Each scene is precomputed at defaults but for its faces, which are the elements, and as exact inverses of form
+factors pair by pair at high quality, with other seeds, whose mean is the reference. All stores get the same random
+requests: groups, elements, random emission, the scene's own light and skies, of which all elements, groups or single
+elements are selected, or groups reduced. The same requests then go to a store of elements 16 times smaller, which has
+the error of the mesh in it: the headline of each answer stands beside the distance of the light of the smaller elements
+to that of those that they are parts of. lambert-bench reads standard output: one JSON object a line, as of service.py.
 """
 
 import csv
@@ -27,10 +29,10 @@ from service_programs import Client, Failure, Program, post, run_suite, tell
 
 SECONDS = 3600
 # share of the elements of each scene, requests of a scene
-SIZES = {"quick": (.25, 30), "default": (1, 200), "full": (2, 400)}
+SIZES = {"quick": (.25, 30), "default": (1, 200), "full": (2, 400), "mesh": (1, 100)}
 # Small factors are no more certain at high quality than at defaults, and a few of them may be all the light of a
 # group: one reference would err as much as the store that is asked. The mean of several errs less.
-REFERENCES = {"quick": 2, "default": 4, "full": 8}
+REFERENCES = {"quick": 2, "default": 4, "full": 8, "mesh": 0}
 # Elements of the reference of the mesh for each of the store that is asked; its operator is off by this share of its light.
 FINER, FINE_EPSILON = 16, ".01"
 # Below 1,025 elements the preset is an exact inverse, which has the error of the form factors alone.
@@ -369,7 +371,7 @@ class Scene:
 
 class Bench:
     def __init__(self, programs, scale, seed, given=None):
-        self.programs, self.quick, self.seed = pathlib.Path(programs), scale == "quick", int(seed)
+        self.programs, self.quick, self.seed = pathlib.Path(programs).resolve(), scale == "quick", int(seed)
         self.share, self.n_requests = SIZES[scale]
         self.references = REFERENCES[scale]
         self.given = pathlib.Path(given).resolve() if given else None
@@ -392,36 +394,39 @@ class Bench:
     def run(self):
         with tempfile.TemporaryDirectory(prefix="lambert-bench-", dir=os.environ.get("TMPDIR") or "/tmp") as path:
             self.folder = pathlib.Path(path).resolve()
-            rows, meshes, all_pairs, all_mesh, measured = [], [], [], [], 0
+            pairs, meshes = {}, {}
             for name, file in self.scenes():
                 scene = Scene(self, name, file)
-                about, pairs = scene.measure()
-                of_mesh = scene.measure_mesh()
-                meshes.append([name, float(about["elements"]), *self.summary(of_mesh)])
-                all_mesh += of_mesh
-                rows.append([name, float(about["elements"]), *self.summary(pairs)])
-                tell(log=f"{name}, {about['elements']} elements, {about['kind']}: of {rows[-1][2]:.0f} errors "
-                         f"{rows[-1][3]:.3f} are below twice the stated one, {rows[-1][4]:.3f} above a fifth; with the mesh "
-                         f"{meshes[-1][3]:.3f} and {meshes[-1][4]:.3f} of {meshes[-1][2]:.0f}")
-                all_pairs += pairs
-                measured += 1
-            if measured == 0:
+                text = ""
+                if self.references:
+                    about, found = scene.measure()
+                    pairs[name] = about["elements"], found
+                    text = f", {about['kind']}: {self.told(found)}"
+                found = scene.measure_mesh()
+                meshes[name] = len(scene.groups), found
+                tell(log=f"{name}, {len(scene.groups)} elements{text}; with the mesh: {self.told(found)}")
+            if not meshes:
                 raise Failure(f"{self.given}: no scene file ({', '.join(SUFFIXES)})")
-            rows.append(["all", None, *self.summary(all_pairs)])
-            table("scenes", "Stated errors of answers to random requests beside the true ones",
-                  (("scene", None, "name, or all"), ("elements", "", "n"), *COUNTS), rows)
-            meshes.append(["all", None, *self.summary(all_mesh)])
-            table("mesh", f"Headlines of such answers beside the true errors with the mesh in them, by elements {FINER} times smaller",
-                  (("scene", None, "name, or all"), ("elements", "", "n"), *COUNTS), meshes)
-            kinds = [("emission", kind, 0) for kind in EMISSIONS + SKIES] + [("target", kind, 1) for kind in TARGETS]
-            table("kinds", "The same by emission and by what was asked for",
-                  (("by", None, "emission or target"), ("kind", None, "of it"), *COUNTS),
-                  [[by, kind, *self.summary([pair for pair in all_pairs if pair[place] == kind])]
-                   for by, kind, place in kinds])
-            table("mesh-kinds", "Headlines by emission and by what was asked for",
-                  (("by", None, "emission or target"), ("kind", None, "of it"), *COUNTS),
-                  [[by, kind, *self.summary([pair for pair in all_mesh if pair[place] == kind])]
-                   for by, kind, place in kinds])
+            if pairs:
+                self.tell_tables(pairs, ("scenes", "Stated errors of answers to random requests beside the true ones"),
+                                 ("kinds", "The same by emission and by what was asked for"))
+            self.tell_tables(meshes, ("mesh", "Headlines of such answers beside the true errors with the mesh in them, "
+                                      f"by elements {FINER} times smaller"),
+                             ("mesh-kinds", "Headlines by emission and by what was asked for"))
+
+    def told(self, found):
+        requests, below, above = self.summary(found)[:3]
+        return f"of {requests:.0f} errors {below:.3f} are below twice the stated one, {above:.3f} above a fifth"
+
+    def tell_tables(self, of_scenes, by_scene, by_kind):
+        """of_scenes: elements and pairs by name."""
+        everything = [pair for _, found in of_scenes.values() for pair in found]
+        rows = [[name, float(n), *self.summary(found)] for name, (n, found) in of_scenes.items()]
+        table(*by_scene, (("scene", None, "name, or all"), ("elements", "", "n"), *COUNTS),
+              [*rows, ["all", None, *self.summary(everything)]])
+        kinds = [("emission", kind, 0) for kind in EMISSIONS + SKIES] + [("target", kind, 1) for kind in TARGETS]
+        table(*by_kind, (("by", None, "emission or target"), ("kind", None, "of it"), *COUNTS),
+              [[by, kind, *self.summary([pair for pair in everything if pair[place] == kind])] for by, kind, place in kinds])
 
     @staticmethod
     def summary(pairs):
