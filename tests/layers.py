@@ -75,7 +75,7 @@ ALLOWED = {
     "server/route": f"{OPERATOR} solver/codec/ server/net/ server/queue/ server/scene/ server/config.h",
     "server/http": f"{OPERATOR} solver/codec/ server/net/ server/queue/ server/scene/ server/route/ server/config.h",
     "server": f"{OPERATOR} solver/codec/ solver/waits.h server/",
-    "tests/bench": "lambert/ store/ solver/ server/ support/ tests/bench/suites/stats.h",
+    "tests/bench": "lambert/ store/ solver/ server/ support/ tests/bench/suites/stats.h tests/bench/suites/mesh_truths.h",
     "tests/bench/suites": (f"{METHOD} {SCENE} solver/formfactor/ solver/precompute/ solver/render/shade.h solver/walk/walk.h "
         "solver/walk/reuse.h solver/walk/moving_light.h solver/adapt/ solver/waits.h"),
 }
