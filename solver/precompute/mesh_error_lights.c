@@ -146,10 +146,10 @@ static void light_up(const mesh *m, size_t group, float *E) {
     for (size_t k = 0; k < m->n_channels * m->n; k++) E[k] = m->group[k % m->n] == group ? 1 : 0;
 }
 
-/* The light of single elements, each of power 1 W times its area. Of what bounces on, which spreads as that
- * of an even light does, nothing is found: it has the square of that light, W^2 l^2 over the power, and no
- * variance.
- */
+/* The lights of all single elements j, of 1 W in each channel, weighted by A_j. mesh_single finds their first
+ * bounce. Light that bounces again spreads as that of all elements together: the light of 1 W from everywhere
+ * is added to the square, sum_j A_j (l / sum A)^2 = l^2 / sum A with l^2 the mean square of the even light,
+ * and nothing to the variance. */
 static lam_status add_single(const precompute_job *job, const precompute_scene *scene, mesh_figures *figures,
                              lam_error *error) {
     lam_status status = LAM_OK;

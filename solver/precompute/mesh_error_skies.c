@@ -26,6 +26,7 @@ typedef struct sky_work {
     size_t row;   /* n_tiles + 1 */
     double *L;    /* [n_skies][row], radiances of tiles, and of the ground that they light */
     float *E, *B; /* [n_skies][C][n] */
+    double *H0;   /* [n] */
     void *work;   /* of the operator, bytes */
     size_t bytes;
 } sky_work;
@@ -34,6 +35,7 @@ static void sky_work_free(sky_work *w) {
     free(w->L);
     free(w->E);
     free(w->B);
+    free(w->H0);
     free(w->work);
 }
 
@@ -43,8 +45,10 @@ static lam_status sky_work_begin(size_t n_skies, sky_work *w, lam_error *error) 
     w->L = memory_allocate(n_skies, w->row * sizeof *w->L, "the error of the mesh", error);
     w->E = memory_allocate(n_skies, vector * sizeof *w->E, "the error of the mesh", error);
     w->B = memory_allocate(n_skies, vector * sizeof *w->B, "the error of the mesh", error);
+    w->H0 = memory_allocate(w->scene->m.n, sizeof *w->H0, "the error of the mesh", error);
     w->work = memory_allocate(w->bytes, 1, "the error of the mesh", error);
-    return w->L == NULL || w->E == NULL || w->B == NULL || w->work == NULL ? LAM_ERR_MEMORY : LAM_OK;
+    return w->L == NULL || w->E == NULL || w->B == NULL || w->H0 == NULL || w->work == NULL ? LAM_ERR_MEMORY
+                                                                                            : LAM_OK;
 }
 
 /* The ground below the horizon sends back what the tiles of a sky send to it. */
@@ -64,20 +68,27 @@ static void set_skies(const sky_work *w, uint64_t seed) {
     }
 }
 
+/* H0 = sum_t L_t first_bounce_t of one sky, tile by tile that shines. */
+static void add_up_tiles(const sky_work *w, const double *L) {
+    const size_t n = w->scene->m.n;
+    memset(w->H0, 0, n * sizeof *w->H0);
+    for (size_t t = 0; t + 1 < w->row; t++) {
+        const float *first = w->sky->first_bounce + t * n;
+        for (size_t i = 0; L[t] > 0 && i < n; i++) w->H0[i] += L[t] * (double)first[i];
+    }
+}
+
 /* E = rho H0 [n_skies][C][n]; true where any of it is light. */
 static bool light_by_skies(const sky_work *w, size_t n_skies) {
     const mesh *m = &w->scene->m;
-    const size_t n = m->n, tiles = w->row - 1;
+    const size_t n = m->n, vector = m->n_channels * n;
     bool lit = false;
-    for (size_t s = 0; s < n_skies; s++)
-        for (size_t i = 0; i < n; i++) {
-            double H = 0;
-            for (size_t t = 0; t < tiles; t++)
-                H += w->L[s * w->row + t] * (double)w->sky->first_bounce[t * n + i];
-            lit = lit || H > 0;
-            for (size_t c = 0; c < m->n_channels; c++)
-                w->E[(s * m->n_channels + c) * n + i] = (float)(H * (double)m->reflectance[c * n + i]);
-        }
+    for (size_t s = 0; s < n_skies; s++) {
+        add_up_tiles(w, w->L + s * w->row);
+        for (size_t i = 0; i < n; i++) lit = lit || w->H0[i] > 0;
+        for (size_t k = 0; k < vector; k++)
+            w->E[s * vector + k] = (float)(w->H0[k % n] * (double)m->reflectance[k]);
+    }
     return lit;
 }
 

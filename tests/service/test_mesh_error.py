@@ -160,7 +160,16 @@ class MeshError(Case):
         stated, n = about["error"]["mesh"], about["elements"]
         self.assertNotIn("lights", stated)
         self.assertGreater(stated["single"], 3 * stated["even"])
-        names, group = (values_of(store, f"mesh/{name}") for name in ("group_names", "group"))
+        names, group, area = (values_of(store, f"mesh/{name}") for name in ("group_names", "group", "area"))
+        # squares of the reflected light of 1 W from everywhere, and from single elements by area
+        of_groups = numpy.bincount(group, area, len(names))
+        light2 = (of_groups * values_of(store, "error/mesh/even_reflected") ** 2).sum()
+        self.assertAlmostEqual(stated["even_light"] * area.sum() ** 2 / light2, 1, delta=1e-5)
+        numpy.save(self.path("each.npy"), numpy.eye(n))
+        must("solve", store, "--emission", self.path("each.npy"), "--quantity", "indirect", "-o", self.path("light.npy"))
+        each = (area * numpy.load(self.path("light.npy")).astype(float).reshape(n, n) ** 2).sum(axis=1) / area ** 2
+        true = (area * each).sum() / area.sum()
+        self.assertLess(abs(math.log(stated["single_light"] / true)), math.log(1.2))
         floor = numpy.flatnonzero(names[group] == b"floor")
         parts = []
         for chosen in floor[:1], floor[:: len(floor) // 10]:

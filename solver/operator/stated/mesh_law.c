@@ -107,8 +107,9 @@ static double of_emission(const mesh_shares *m, const mesh_light *light, size_t 
     /* Older stores have no more than two figures. */
     if (m->of[MESH_OF_SINGLE] == NULL && m->of[MESH_OF_GROUPS] == NULL)
         return lamps != NULL ? lamps[group] : m->of[MESH_OF_EVEN] != NULL ? m->of[MESH_OF_EVEN][group] : 0;
-    const double part = lamps != NULL ? fmin(light->of_lamps / light->power, 1) : 0;
-    const double whole = fmin(light->of_whole / light->power, 1 - part), rest = 1 - part - whole;
+    const double unit = light->power > 0 ? 1 / light->power : 0; /* of a sky that no figure is stated of */
+    const double part = lamps != NULL ? fmin(light->of_lamps * unit, 1) : 0;
+    const double whole = fmin(light->of_whole * unit, 1 - part), rest = 1 - part - whole;
     double sum = part > 0 ? part * lamps[group] : 0;
     if (whole > 0) sum += whole * of_groups(m, light->emitters, group);
     return rest > 0 ? sum + rest * of_elements(m, light->others, group) : sum;

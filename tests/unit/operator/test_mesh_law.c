@@ -129,6 +129,17 @@ START_TEST(skies_and_emissions_weigh_by_power) {
 }
 END_TEST
 
+/* A sky that no figure is stated of counts as an even light, whatever lamps there are. */
+START_TEST(sky_without_figures) {
+    mesh_figures from = figures;
+    from.has_skies = false;
+    from.light_of[MESH_OF_SINGLE] = from.light_of[MESH_OF_EVEN] = 1;
+    mesh_shares m = made(&from);
+    ck_assert_double_eq_tol(share2(&m, &(mesh_light){.sky_power = 1, .sky_tiles = 1}, 1), .0016, 1e-12);
+    mesh_shares_free(&m);
+}
+END_TEST
+
 /* Older stores have the lamps' share for any emission, else that of an even light; or nothing. */
 START_TEST(older_stores) {
     const mesh_light light = {.power = 1, .emitters = 3};
@@ -153,6 +164,7 @@ int main(void) {
     tcase_add_test(c, emitters_share_what_they_light_in_common);
     tcase_add_test(c, tiles_share_what_they_light_in_common);
     tcase_add_test(c, skies_and_emissions_weigh_by_power);
+    tcase_add_test(c, sky_without_figures);
     tcase_add_test(c, older_stores);
     suite_add_tcase(s, c);
     return suite_run(s);
