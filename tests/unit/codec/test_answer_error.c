@@ -383,6 +383,41 @@ START_TEST(unknown_skies_are_left) {
 }
 END_TEST
 
+/* The mesh lacks more of the light of few tiles than of all, whether the sky is in the light or its first
+ * bounce is sent alone. */
+START_TEST(the_mesh_has_its_part_of_skies) {
+    double all[] = {.01, .04, .02}, tile[] = {.25, .36, .3};
+    error_by_group with = stated;
+    with.mesh =
+        (mesh_shares){.n_groups = G,
+                      .of = {[MESH_OF_SKY_EVEN] = all, [MESH_OF_SKY_CLOUDY] = all, [MESH_OF_SKY_TILE] = tile},
+                      .even_tiles = 2,
+                      .common_sky = .5};
+    /* N = 89 / 53 tiles of 2. */
+    const double s = (sky_squares / sky_P2 - .5) / .5, q = (1 - s) * .5;
+    double m2[G + 1], lacks2 = 0, light2 = 0;
+    for (int g = 0; g <= G; g++) m2[g] = (s * tile[g] + q * all[g]) / (s + q);
+    for (size_t k = 0; k < C * N; k++) {
+        const double light = r[k] + (double)rho[k] * (double)H0[k], A = area[k % N];
+        const double c = fmax(m2[bin[k % N]], m2[G]);
+        light2 += A * light * light;
+        lacks2 += A * light * light * (m2[bin[k % N]] + c * c);
+    }
+    for (int sent = 0; sent < 2; sent++) {
+        float values[C * N];
+        answer_error found;
+        const float dark[C * N] = {0};
+        for (size_t k = 0; k < C * N; k++) values[k] = (float)(r[k] + (double)rho[k] * (double)H0[k]);
+        error_answer of = {.quantity = LAM_RADIOSITY, .E = dark, .count = N, .values = values, .H0 = H0};
+        *(sent ? &of.L_sent : &of.L) = L;
+        for (size_t c = 0; c < C; c++)
+            emission_size_add(&of.sky, TILES, sky_power + c * TILES, L + c * TILES);
+        ck_assert(answer_error_of(&with, &scene, &of, &found));
+        ck_assert_double_eq_tol(found.parts.mesh, sqrt(lacks2 / light2), 1e-6);
+    }
+}
+END_TEST
+
 /* The mesh lacks .1 of the light in desk and .3 in lamp, of any emission: errors of elements add up in
  * squares by the light of each group, and what a mean lacks, of second order, is less. */
 START_TEST(the_mesh_is_a_part) {
@@ -464,6 +499,7 @@ int main(void) {
     tcase_add_test(cases, reflectances_of_groups);
     tcase_add_test(cases, unknown_skies_are_left);
     tcase_add_test(cases, the_mesh_is_a_part);
+    tcase_add_test(cases, the_mesh_has_its_part_of_skies);
     tcase_add_test(cases, large_errors_are_numbers);
     tcase_add_test(cases, darkness_has_no_error_and_no_light_no_ratio);
     suite_add_tcase(suite, cases);

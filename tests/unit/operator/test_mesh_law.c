@@ -129,6 +129,20 @@ START_TEST(skies_and_emissions_weigh_by_power) {
 }
 END_TEST
 
+START_TEST(scene_without_lamps) {
+    mesh_figures from = figures;
+    from.has_lights = false;
+    from.lights_power = NULL;
+    from.variation[MESH_OF_LAMPS] = from.reflected[MESH_OF_LAMPS] = NULL;
+    mesh_shares m = made(&from);
+    const mesh_light one = {.power = 1, .emitters = 1, .others = 1},
+                     whole = {.power = 1, .of_whole = 1, .emitters = 16, .others = 0};
+    ck_assert_double_eq_tol(share2(&m, &one, 0), .16, 1e-12);
+    ck_assert_double_eq_tol(share2(&m, &whole, 0), .01, 1e-12);
+    mesh_shares_free(&m);
+}
+END_TEST
+
 /* A sky that no figure is stated of counts as an even light, whatever lamps there are. */
 START_TEST(sky_without_figures) {
     mesh_figures from = figures;
@@ -164,6 +178,7 @@ int main(void) {
     tcase_add_test(c, emitters_share_what_they_light_in_common);
     tcase_add_test(c, tiles_share_what_they_light_in_common);
     tcase_add_test(c, skies_and_emissions_weigh_by_power);
+    tcase_add_test(c, scene_without_lamps);
     tcase_add_test(c, sky_without_figures);
     tcase_add_test(c, older_stores);
     suite_add_tcase(s, c);

@@ -94,6 +94,23 @@ START_TEST(errors_together_are_those_of_sums) {
 }
 END_TEST
 
+/* A group that shines evenly has the mesh's figure of groups, what else shines that of elements. */
+START_TEST(the_mesh_tells_whole_groups_from_elements) {
+    double single[] = {.16, .16, .16, .16}, groups[] = {.01, .01, .01, .01};
+    error_by_group with = stated;
+    with.mesh = (mesh_shares){
+        .n_groups = G, .of = {[MESH_OF_SINGLE] = single, [MESH_OF_GROUPS] = groups}, .groups_emitters = 16};
+    /* 6 W of the lamp, in one channel 3 W of an element of the wall, alone as no other shines there. */
+    const float E[C * N] = {0, 1, 1, 1, 0, 0, 0, 0, 0, 0};
+    light_sizes of = {.quantity = LAM_RADIOSITY};
+    for (size_t c = 0; c < C; c++) emission_size_add(&of.size, N, area, E + c * N);
+    ck_assert(whole_light_find(&with, &scene, E, &of.whole));
+    const mesh_lack lack = mesh_lack_of_bin(&with, &of, DESK);
+    ck_assert_double_eq_tol(lack.elements2 - lack.mean2, (6 * .01 + 3 * .16) / 9, 1e-12);
+    whole_light_free(&of.whole);
+}
+END_TEST
+
 START_TEST(older_stores_state_none) {
     error_by_group older = stated;
     whole_light found;
@@ -113,6 +130,7 @@ int main(void) {
     tcase_add_test(cases, sources_count_alone);
     tcase_add_test(cases, light_that_has_signs_counts_by_its_size);
     tcase_add_test(cases, errors_together_are_those_of_sums);
+    tcase_add_test(cases, the_mesh_tells_whole_groups_from_elements);
     tcase_add_test(cases, older_stores_state_none);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
