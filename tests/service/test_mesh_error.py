@@ -140,6 +140,13 @@ class MeshError(Case):
         true = math.sqrt((power * off / numpy.maximum(all_of, 1e-300)).sum() / power.sum())
         self.assertLess(abs(math.log(stated["sky_tile"] / true)), math.log(1.6))  # of 12 tiles
         self.assertGreater(stated["sky_tile"], 1.5 * stated["sky_even"])
+        # squares of the reflected light of 1 W from all of the sky, and from single tiles by their power
+        of_groups = numpy.bincount(values_of(coarse, "mesh/group"), values_of(coarse, "mesh/area"))
+        Q = values_of(coarse, "error/by_group/sky_power")
+        even = (of_groups * values_of(coarse, "error/mesh/sky_even_reflected") ** 2).sum() / (Q.sum(axis=1) ** 2).sum()
+        self.assertAlmostEqual(stated["sky_even_light"] / even, 1, delta=1e-5)
+        reflected = (values_of(coarse, "mesh/area") * light[0] ** 2).sum(axis=(1, 2)) / (Q ** 2).sum(axis=0)
+        self.assertLess(abs(math.log(stated["sky_tile_light"] * power.sum() / (power * reflected).sum())), math.log(1.3))
         sun = numpy.full(145, .05)
         sun[power.argmax()] = 50
         numpy.save(self.path("sky.npy"), sun)
