@@ -14,6 +14,7 @@ typedef struct adaptive_options {
     size_t elements; /* at most, both sides counted; where there are more faces, as many as these */
     size_t points;   /* that are looked at, about, at most; 0: as many as it takes */
     bool rough; /* a cell is cut by half as many points: a third of the time, for a tenth more elements */
+    const coarse_sky *sky; /* of adaptive_refine; NULL: none */
     uint64_t seed;
     const progress *progress;
 } adaptive_options;
@@ -24,11 +25,10 @@ typedef struct adaptive_report {
 } adaptive_report;
 
 /* Divides the faces of a mesh in place, which faces_join has made as large as can be, or not. Both sides are
- * looked at of those that are to have a back. The scene's lamps and 1 from every element are its lights; a
- * coarse solution is found for them first.
- * Deterministic, for any number of threads. Cost: the coarse solution, and gather_at for about 150 points of
- * each element that is made; memory: at most 256 MiB of points beside the cells. Errors: those of
- * coarse_light_make and mesh_of_cells. */
+ * looked at of those that are to have a back. Its lights are those of a coarse solution (coarse_light.h),
+ * which is found first. Deterministic, for any number of threads. Cost: the coarse solution, and gather_at
+ * for about 150 points of each element that is made; memory: at most 256 MiB of points beside the cells.
+ * Errors: those of coarse_light_make and mesh_of_cells. */
 lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report *report, lam_error *error);
 
 /* The same by a solution that is there, and its lights; the mesh goes to another one, as mesh_of_cells makes

@@ -50,15 +50,16 @@ void light_scene_free(light_scene *s) {
 }
 
 mesh_estimate mesh_estimate_of(const coarse_light *c, const double sum[COARSE_LIGHTS]) {
-    mesh_estimate e = {.has_lamps = c->lamps, .has_sky = c->sky};
+    mesh_estimate e = {.has_lamps = c->lamps, .has_groups = c->n_lit > 0, .has_sky = c->sky};
     if (c->lamps) e.lamps = sqrt(fmax(0, sum[0]));
+    for (size_t l = 0; l < c->n_lit; l++) e.groups = fmax(e.groups, sqrt(fmax(0, sum[l])));
     e.even = sqrt(fmax(0, sum[coarse_light_even(c)]));
     if (c->sky) e.sky = sqrt(fmax(0, sum[c->n_lights - 1]));
     return e;
 }
 
 double mesh_estimate_most(const mesh_estimate *e) {
-    return fmax(fmax(e->lamps, e->even), e->sky);
+    return fmax(fmax(e->lamps, e->groups), fmax(e->even, e->sky));
 }
 
 size_t cell_light_values(const cell_light *light) {

@@ -16,8 +16,10 @@ typedef struct cell_light {
 
 /* Estimated errors of constants on elements, of the lights that there are. */
 typedef struct mesh_estimate {
-    bool has_lamps, has_sky;
-    double lamps, even, sky; /* of the light of lamps, of 1 from every element, and of an even sky */
+    bool has_lamps, has_groups, has_sky;
+    /* They are of the light of lamps, the largest of those of single groups, of 1 from every element, and of
+     * an even sky. */
+    double lamps, groups, even, sky;
 } mesh_estimate;
 
 /* The estimate by sums of squares of each light; mesh_estimate_most is the largest error. */

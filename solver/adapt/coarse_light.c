@@ -3,6 +3,7 @@
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/source.h"
 #include "solver/method/reference.h"
+#include "solver/scene/lit_groups.h"
 #include "solver/scene/mesh_cells.h"
 
 #include <math.h>
@@ -97,17 +98,27 @@ done:
     return status;
 }
 
-static lam_status set_lights(const coarse_sky *sky, coarse_light *c, lam_error *error) {
-    const size_t vector = c->m.n * c->m.n_channels;
+static lam_status set_lights(const mesh *faces, const coarse_sky *sky, coarse_light *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = c->m.n, vector = n * c->m.n_channels;
+    uint8_t *light_of = memory_allocate(faces->n_groups, sizeof *light_of, "a coarse solution", error);
+    if (light_of == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < vector; i++) c->lamps = c->lamps || c->m.emission[i] > 0;
     c->sky = sky != NULL;
-    c->n_lights = 1 + (size_t)c->lamps + c->sky;
+    if (!c->lamps && !c->sky) TRY(lit_groups_find(faces, COARSE_LIT, light_of, &c->n_lit, error));
+    c->n_lights = 1 + coarse_light_even(c) + c->sky;
     c->E = memory_allocate(c->n_lights * vector, sizeof *c->E, "a coarse solution", error);
     c->B = memory_allocate(c->n_lights * vector, sizeof *c->B, "a coarse solution", error);
-    if (c->E == NULL || c->B == NULL) return LAM_ERR_MEMORY;
+    if (c->E == NULL || c->B == NULL) TRY(LAM_ERR_MEMORY);
     if (c->lamps) memcpy(c->E, c->m.emission, vector * sizeof *c->E);
+    for (size_t k = 0; k < c->n_lit * vector; k++) {
+        const uint32_t group = c->m.group[k % n]; /* backs have their own, behind the others */
+        c->E[k] = group < faces->n_groups && light_of[group] == k / vector ? 1 : 0;
+    }
     for (size_t i = 0; i < vector; i++) c->E[coarse_light_even(c) * vector + i] = 1;
-    return LAM_OK;
+done:
+    free(light_of);
+    return status;
 }
 
 /* The ground below a sky of radiance 1 receives pi, and reflects its albedo of it. */
@@ -126,7 +137,7 @@ lam_status coarse_light_make(const mesh *faces, const coarse_sky *sky, uint64_t 
     uint32_t *order = NULL;
     TRY(divide(faces, &c, error));
     TRY(make_backs(faces, &c, error));
-    TRY(set_lights(sky, &c, error));
+    TRY(set_lights(faces, sky, &c, error));
     order = memory_allocate(c.m.n, sizeof *order, "a coarse mesh", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&c.m, order, error));

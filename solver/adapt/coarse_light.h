@@ -1,5 +1,6 @@
-/* A rough solution to refine a mesh by: the light of the scene's lamps, of 1 from every element, and of an
- * even sky, on a mesh of a few thousand elements. */
+/* A rough solution to refine a mesh by: the light of the scene's lamps, or of groups that people light where
+ * it has neither lamps nor a sky, of 1 from every element, and of an even sky, on a mesh of a few thousand
+ * elements. */
 #ifndef LAMBERT_ADAPT_COARSE_LIGHT_H
 #define LAMBERT_ADAPT_COARSE_LIGHT_H
 
@@ -7,9 +8,9 @@
 #include "solver/scene/facet/face_openings.h"
 #include "solver/scene/mesh.h"
 
-/* Lights at most: of lamps, of all elements, and of the sky, in this order; only the second is always there.
- */
-enum { COARSE_LIGHTS = 3 };
+/* Lights at most: of lamps or COARSE_LIT of groups, of all elements, and of the sky, in this order; only that
+ * of all elements is always there. */
+enum { COARSE_LIGHTS = 3, COARSE_LIT = 2 };
 
 /* The sky that lights the store; openings, or NULL, as form_factor_options has them. */
 typedef struct coarse_sky {
@@ -24,13 +25,14 @@ typedef struct coarse_light {
     size_t n_lights; /* of those that there are */
     float *E, *B;    /* [n_lights][C][n]; of the sky E is 0 */
     bool lamps, sky;
-    sky_bounce bounce;           /* of a sky of one tile */
+    size_t n_lit;      /* lights of groups (lit_groups.h), which come first; 0 beside lamps or a sky */
+    sky_bounce bounce; /* of a sky of one tile */
     double L[2 * COARSE_LIGHTS]; /* [n_lights][2]: radiances of that tile and of the ground, by light */
 } coarse_light;
 
 /* The place of the light of all elements. */
 static inline size_t coarse_light_even(const coarse_light *c) {
-    return c->lamps ? 1 : 0;
+    return c->lamps ? 1 : c->n_lit;
 }
 
 void coarse_light_free(coarse_light *c);

@@ -60,8 +60,12 @@ static const char *const probes_advice = "precompute without --probes 0 measures
 
 headline stated_headline(const error_report *report, const mesh_figures *mesh, const char **light) {
     const stated_error lights = error_of_group(&report->lights, false, "lights"), sky = error_of_sky(report),
+                       groups = error_of_group(&report->whole, false, "groups"),
                        random = error_of_group(&report->random, false, "random");
-    const stated_error *e = lights.known ? &lights : sky.known ? &sky : &random;
+    /* A group that is the whole scene is the light of all elements. */
+    const bool by_groups =
+        groups.known && mesh->has_groups && mesh->groups_emitters < .999 * mesh->even_emitters;
+    const stated_error *e = lights.known ? &lights : sky.known ? &sky : by_groups ? &groups : &random;
     headline h = {.known = e->known, .share = e->share, .advice = e->known ? NULL : probes_advice};
     *light = e->light;
     if (!h.known) return h;
@@ -69,6 +73,7 @@ headline stated_headline(const error_report *report, const mesh_figures *mesh, c
     h.parts.rest = e == &sky ? e->relative : e->indirect;
     h.parts.mesh = e == &sky        ? mesh_of_skies(mesh)
                    : e == &lights   ? mesh_of_lights(mesh)
+                   : e == &groups   ? (mesh->groups_together > 0 ? mesh->groups_together : mesh->groups)
                    : mesh->has_even ? mesh->even
                                     : -1;
     return h;

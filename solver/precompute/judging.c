@@ -10,6 +10,7 @@
 #include "solver/formfactor/source.h"
 #include "solver/operator/blocks/block_store.h"
 #include "solver/precompute/trial.h"
+#include "solver/scene/lit_groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -272,7 +273,7 @@ done:
 }
 
 /* The blocks that are judged tell the noise of finer ones; one of two samples that of the other. */
-static judge_input input_of(const judging *j, judge_references *r) {
+static judge_input input_of(const judging *j, judge_references *r, const bool *people) {
     const bool blocks = r->finer.n > 0;
     const factor_product own =
         blocks ? block_factors_product(j->problem->blocks) : factor_product_of_rows(j->problem->F);
@@ -283,6 +284,7 @@ static judge_input input_of(const judging *j, judge_references *r) {
                          .emits = j->importance != NULL ? j->importance->emits : NULL,
                          .group = j->by_group != NULL ? j->m->group : NULL,
                          .n_groups = j->m->n_groups,
+                         .people = people,
                          .by_group = j->by_group,
                          .sky = has_sky(j) ? &r->light : NULL,
                          .own = own,
@@ -304,6 +306,7 @@ static judge_input input_of(const judging *j, judge_references *r) {
 lam_status judging_run(const judging *j, const lam_operator *op, error_report *out, lam_error *error) {
     lam_status status = LAM_OK;
     judge_references *r = NULL;
+    bool *people = NULL;
     if (j->kept != NULL) {
         r = *j->kept;
         *j->kept = NULL;
@@ -315,7 +318,10 @@ lam_status judging_run(const judging *j, const lam_operator *op, error_report *o
         r->keeps = j->kept != NULL;
     }
     TRY(make_references(j, r, error));
-    const judge_input input = input_of(j, r);
+    people = memory_allocate(j->m->n_groups, sizeof *people, "references", error);
+    if (people == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0; g < j->m->n_groups; g++) people[g] = group_name_is_window(j->m->group_names[g]);
+    const judge_input input = input_of(j, r, people);
     TRY(judge_operator(op, &input, out, error));
     if (j->kept != NULL) {
         *j->kept = r;
@@ -323,5 +329,6 @@ lam_status judging_run(const judging *j, const lam_operator *op, error_report *o
     }
 done:
     judge_references_free(r);
+    free(people);
     return status;
 }

@@ -4,6 +4,7 @@
 #include "solver/base/random.h"
 #include "solver/operator/stated/error_law.h"
 #include "solver/precompute/precompute.h"
+#include "solver/scene/lit_groups.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -120,8 +121,14 @@ lam_status mesh_light_sums_state(const mesh_light_sums *s, const mesh *m, int wh
     return mesh_error_take(&groups, 0, which, m->n_groups, to, error);
 }
 
-/* Groups to be lit: the largest that are no lamps, and some at equal steps of the others in that order.
- * Returns how many. */
+/* Windows come before other groups, and the larger before the smaller. */
+static bool is_lit_more(const mesh *m, const double *area, size_t g, size_t than) {
+    const bool window = group_name_is_window(m->group_names[g]);
+    return window != group_name_is_window(m->group_names[than]) ? window : area[g] > area[than];
+}
+
+/* Groups to be lit: windows and the largest that are no lamps, and some at equal steps of the others in that
+ * order. Returns how many. */
 static size_t choose_groups(const mesh *m, const double *area, const double *lamps, size_t chosen[GROUPS],
                             size_t *order) {
     size_t n = 0, count = 0;
@@ -130,7 +137,7 @@ static size_t choose_groups(const mesh *m, const double *area, const double *lam
     for (size_t k = 0; k < n && count < LARGEST_GROUPS; k++) {
         size_t largest = k;
         for (size_t j = k + 1; j < n; j++)
-            if (area[order[j]] > area[order[largest]]) largest = j;
+            if (is_lit_more(m, area, order[j], order[largest])) largest = j;
         const size_t g = order[largest];
         order[largest] = order[k];
         order[k] = g;
@@ -192,6 +199,21 @@ done:
     return status;
 }
 
+/* The share that light k leaves, no less than its noise, and both squares for all lights together. */
+static void take_group(const mesh_error_groups *of, size_t k, const mesh *m, const double *area,
+                       double together[2], double *share) {
+    const size_t first = k * m->n_groups;
+    double off = 0, noise2 = 0, all = 0;
+    for (size_t g = 0; g < m->n_groups; g++) {
+        off += area[g] * of->variance[first + g];
+        noise2 += pow(area[g] * of->noise[first + g], 2);
+        all += area[g] * of->light2[first + g];
+    }
+    together[0] += off;
+    together[1] += all;
+    *share = all > 0 ? sqrt(fmax(off, sqrt(noise2)) / all) : 0;
+}
+
 /* Single groups, as many of them at once as can be gathered. */
 static lam_status add_groups(const precompute_job *job, const precompute_scene *scene, made_operator *made,
                              lam_error *error) {
@@ -202,13 +224,18 @@ static lam_status add_groups(const precompute_job *job, const precompute_scene *
     uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
     mesh_error_groups groups = {.fewer = FEWER};
     mesh_light_sums sums = {.noise2 = NULL};
-    double logs = 0;
+    double logs = 0, together[2] = {0};
     float *E = NULL, *B = NULL;
     size_t chosen[GROUPS], *order = NULL;
     order = memory_allocate(m->n_groups, sizeof *order, "the error of the mesh", error);
     E = memory_allocate(most, vector * sizeof *E, "the error of the mesh", error);
     B = memory_allocate(most, vector * sizeof *B, "the error of the mesh", error);
     if (order == NULL || E == NULL || B == NULL) TRY(LAM_ERR_MEMORY);
+    figures->group_share =
+        memory_allocate(m->n_groups, sizeof *figures->group_share, "the error of the mesh", error);
+    figures->group_light =
+        memory_allocate(m->n_groups, sizeof *figures->group_light, "the error of the mesh", error);
+    if (figures->group_share == NULL || figures->group_light == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_light_sums_begin(m, &sums, error));
     TRY(mesh_error_groups_begin(m, most, &groups, error));
     const size_t n_chosen = choose_groups(m, sums.area, figures->lights_power, chosen, order);
@@ -219,11 +246,15 @@ static lam_status add_groups(const precompute_job *job, const precompute_scene *
             logs += log(mesh_error_emitters(m, E + k * vector));
         }
         TRY(judge_lights(job, scene, made, n_lit, E, B, random_next(&seed), &groups, error));
-        for (size_t k = 0; k < n_lit; k++)
-            mesh_light_sums_add(&groups, k, m, mesh_error_light(m, E + k * vector, B + k * vector, false),
-                                &sums);
+        for (size_t k = 0; k < n_lit; k++) {
+            const double light = mesh_error_light(m, E + k * vector, B + k * vector, false);
+            mesh_light_sums_add(&groups, k, m, light, &sums);
+            take_group(&groups, k, m, sums.area, together, &figures->group_share[chosen[first + k]]);
+            figures->group_light[chosen[first + k]] = light;
+        }
     }
     if (n_chosen == 0) goto done;
+    figures->groups_together = together[1] > 0 ? sqrt(fmax(together[0], 0) / together[1]) : 0;
     TRY(mesh_light_sums_state(&sums, m, MESH_OF_GROUPS, &figures->groups, &figures->has_groups, figures,
                               error));
     figures->groups_emitters = exp(logs / (double)n_chosen);

@@ -34,22 +34,36 @@ static size_t elements_to_be(const mesh *m) {
     return n;
 }
 
+/* "0.021 of the light of lamps, 0.04 of light that all elements emit" */
+enum { LEFT_BYTES = 160 };
+static void describe_left(const mesh_estimate *e, char text[LEFT_BYTES]) {
+    size_t length = 0;
+    if (e->has_lamps) length += (size_t)snprintf(text, LEFT_BYTES, "%.3g of the light of lamps, ", e->lamps);
+    if (e->has_groups)
+        length +=
+            (size_t)snprintf(text + length, LEFT_BYTES - length, "%.3g of the light of groups, ", e->groups);
+    if (e->has_sky)
+        length +=
+            (size_t)snprintf(text + length, LEFT_BYTES - length, "%.3g of that of an even sky, ", e->sky);
+    snprintf(text + length, LEFT_BYTES - length, "%.3g of light that all elements emit", e->even);
+}
+
 /* Divides the mesh where light changes, says what that leaves, and warns where it is more than was asked for.
  */
 static lam_status refine_by_error(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
+    const coarse_sky sky = {.ground_albedo = o->ground_albedo, .openings = scene->openings};
     const adaptive_options how = {.error = o->mesh_error,
                                   .elements = o->elements > 0 ? o->elements : ADAPTIVE_ELEMENTS,
+                                  .sky = o->sky != NULL ? &sky : NULL,
                                   .seed = precompute_seed(o->seed, SEED_MESH),
                                   .progress = &job->progress};
     adaptive_report made;
-    char lamps[64] = "";
+    char left[LEFT_BYTES];
     TRY(adaptive_refine(&scene->m, &how, &made, error));
-    if (made.left.has_lamps)
-        snprintf(lamps, sizeof lamps, "%.3g of the light of lamps and ", made.left.lamps);
-    terminal_log(job->t, "constants on elements leave %s%.3g of light that all elements emit", lamps,
-                 made.left.even);
+    describe_left(&made.left, left);
+    terminal_log(job->t, "constants on elements leave %s", left);
     if (!made.reached)
         terminal_warn(job->t,
                       "--mesh-error %g is not kept with %zu elements: they leave %.3g; --elements takes more "
@@ -66,17 +80,6 @@ static const double fit_error = .05, fit_seconds = 30, fit_of_face = 1.25;
 static bool is_fitted(const precompute_options *o) {
     return !o->from_store && o->mesh == MESH_OF_LIGHT && o->max_edge == 0 && o->elements == 0 &&
            o->mesh_error == 0;
-}
-
-/* "0.021 of the light of lamps, 0.04 of light that all elements emit" */
-enum { LEFT_BYTES = 160 };
-static void describe_left(const mesh_estimate *e, char text[LEFT_BYTES]) {
-    size_t length = 0;
-    if (e->has_lamps) length += (size_t)snprintf(text, LEFT_BYTES, "%.3g of the light of lamps, ", e->lamps);
-    if (e->has_sky)
-        length +=
-            (size_t)snprintf(text + length, LEFT_BYTES - length, "%.3g of that of an even sky, ", e->sky);
-    snprintf(text + length, LEFT_BYTES - length, "%.3g of light that all elements emit", e->even);
 }
 
 /* The cuts along walls that come before a mesh by preset is divided. */

@@ -27,6 +27,7 @@ static void say_scene(const json_t *about, size_t faces, char *line) {
 static const char *words_of(const char *light) {
     if (light != NULL && strcmp(light, "lights") == 0) return "the scene's own lights";
     if (light != NULL && strcmp(light, "sky") == 0) return "skies";
+    if (light != NULL && strcmp(light, "groups") == 0) return "one group that is lit alone";
     return "light that all elements emit";
 }
 

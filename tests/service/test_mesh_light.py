@@ -43,9 +43,31 @@ class MeshOfLight(Case):
         if not SMALL:  # the estimate of a coarse solution is that of the operator's own light, whose noise is a tenth or two
             self.assertLess(error["lights"], .07)
 
+    def test_a_room_without_lamps_is_divided_by_the_light_of_its_groups(self):
+        """Light that all faces emit is even in a closed room of one reflectance; that of one of them is not, and is what people ask for."""
+        scene = next((FIXTURES / "l-room").glob("*.obj"))
+        said, mesh, error = self.precompute(scene, "--mesh", "light", "--probes", 8)
+        line = next(line for line in said.splitlines() if " faces are divided " in line)
+        before, after = map(float, re.findall(r"([\d.e-]+) of the light of groups", line))
+        self.assertGreater(before, .2, line)
+        self.assertLessEqual(after, .05, line)
+        self.assertGreater(len(mesh["area"]), 400)
+        self.assertLess(error["groups_together"], .1)
+        store = self.path("s.h5")
+        head = json.loads(must("info", store, "--json").stdout)["error"]
+        self.assertEqual(head["light"], "groups")
+        self.assertGreater(head["stated"], error["groups_together"] * .99)
+        with h5py.File(store) as file:
+            share, light = file["error/mesh/group_share"][:], file["error/mesh/group_light"][:]
+            name = file["mesh/group_names"][:][share.argmax()].decode()
+        self.assertTrue((light > 0).all() and (share > 0).all(), (share, light))
+        # An answer to one group states the figure of that group, and parts of second order.
+        parts = json.loads(must("solve", store, "--emit", f"{name}=1", "--json").stdout)["error"]["parts"]
+        self.assertAlmostEqual(parts["mesh"], share.max(), delta=.15 * share.max())
+
     def test_fine_faces_stay(self):
         scene = self.path("fine.obj")
-        must("generate", "furnace", "--elements", 300, "-o", scene)
+        must("generate", "furnace", "--elements", 1500, "-o", scene)
         common = ("--probes", 0, "--rays", 64)
         said, mesh, _ = self.precompute(scene, "--mesh", "light", *common)
         self.assertRegex(said, r"\d+ faces stay as they are: constants on them leave ")

@@ -194,7 +194,7 @@ lam_status judge_operator(const lam_operator *op, const judge_input *given, erro
                           JUDGE_RANDOM_PROBES, input->seed, &source, error));
     source.black = input->black;
     if (input->group != NULL)
-        TRY(probe_source_add_groups(&source, input->group, input->n_groups, WHOLE_LARGE,
+        TRY(probe_source_add_groups(&source, input->group, input->n_groups, input->people, WHOLE_LARGE,
                                     judge_whole_most(input->problem->n, input->problem->n_channels,
                                                      input->n_groups * (input->read != NULL ? 2 : 1)),
                                     error));

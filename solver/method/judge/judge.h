@@ -65,6 +65,7 @@ typedef struct judge_input {
     const float *emits;     /* [n], above 0 of the elements that alone emit in probes; NULL: all */
     const uint32_t *group;  /* [n], below n_groups: groups of the scene; NULL: none emits as a whole */
     size_t n_groups;
+    const bool *people;         /* [n_groups], groups that people light; NULL: those with emission alone */
     const judged_sky *sky;      /* NULL: none, or the scene is closed */
     group_errors *by_group;     /* filled with the errors in each group, if there is an independent F and
                                    `group`; NULL: not asked for */

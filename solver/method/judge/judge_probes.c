@@ -43,24 +43,26 @@ lam_status probe_source_make(const build_problem *problem, const lam_operator *o
     return LAM_OK;
 }
 
-/* A group that may emit: the power of the scene's own light there, and its area. */
+/* A group that may emit: whether people light it, the power of the scene's own light there, and its area. */
 typedef struct ranked_group {
     uint32_t group;
-    bool may;
+    bool may, people;
     double power, area;
 } ranked_group;
 
-/* Groups that may emit first, of them the brightest, then the largest, then by their numbers. */
+/* Groups that may emit first, of them the brightest, then those that people light, then the largest, then by
+ * their numbers. */
 static int compare_groups(const void *a, const void *b) {
     const ranked_group *x = a, *y = b;
     if (x->may != y->may) return x->may ? -1 : 1;
     if (x->power != y->power) return x->power > y->power ? -1 : 1;
+    if (x->people != y->people) return x->people ? -1 : 1;
     if (x->area != y->area) return x->area > y->area ? -1 : 1;
     return x->group < y->group ? -1 : 1;
 }
 
-lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups, size_t large,
-                                   size_t most, lam_error *error) {
+lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups,
+                                   const bool *people, size_t large, size_t most, lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem *p = s->problem;
     ranked_group *ranked = NULL;
@@ -69,7 +71,8 @@ lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_
     ranked = memory_allocate(n_groups, sizeof *ranked, "probes", error);
     s->whole = memory_allocate(n_groups, sizeof *s->whole, "probes", error);
     if (ranked == NULL || s->whole == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t g = 0; g < n_groups; g++) ranked[g].group = (uint32_t)g;
+    for (size_t g = 0; g < n_groups; g++)
+        ranked[g] = (ranked_group){.group = (uint32_t)g, .people = people != NULL && people[g]};
     for (size_t i = 0; i < p->n; i++) {
         ranked_group *of = &ranked[group[i]];
         if (s->emits != NULL && !(s->emits[i] > 0)) continue;
@@ -81,7 +84,7 @@ lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_
     qsort(ranked, n_groups, sizeof *ranked, compare_groups);
     for (size_t g = 0; g < n_groups && ranked[g].may; g++) {
         s->whole[s->n_whole++] = ranked[g].group;
-        lit += s->emits != NULL || ranked[g].power > 0;
+        lit += s->emits != NULL || ranked[g].power > 0 || ranked[g].people;
     }
     s->group = group;
     s->most[JUDGE_WHOLE] = lit + large < most ? lit + large : most;

@@ -31,11 +31,11 @@ lam_status probe_source_make(const build_problem *problem, const lam_operator *o
                              probe_source *out, lam_error *error);
 
 /* Adds groups 0 ... n_groups - 1, group [n] being those of the elements: those that people light, which are
- * groups with emission of the scene, by their power, and with `emits` all of which some element emits, and so
- * many others, `large`, by their area; at most `most`. An operator of emitters cannot answer them, and gets
- * none. Errors: LAM_ERR_MEMORY. */
-lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups, size_t large,
-                                   size_t most, lam_error *error);
+ * groups with emission of the scene, by their power, those that `people` [n_groups] marks (NULL: none), and
+ * with `emits` all of which some element emits, and so many others, `large`, by their area; at most `most`.
+ * An operator of emitters cannot answer them, and gets none. Errors: LAM_ERR_MEMORY. */
+lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups,
+                                   const bool *people, size_t large, size_t most, lam_error *error);
 void probe_source_free(probe_source *s);
 
 /* The number of emissions of a group, JUDGE_..., 0 where they are endless. */

@@ -137,6 +137,7 @@ static lam_status pass_mesh_numbers(store *s, bool saves, mesh_figures *m, lam_e
                {"sky_tile", &m->sky_tile, &m->has_tiles},
                {"even_emitters", &m->even_emitters, NULL},
                {"groups_emitters", &m->groups_emitters, NULL},
+               {"groups_together", &m->groups_together, NULL},
                {"even_light", m->light_of + MESH_OF_EVEN, NULL},
                {"single_light", m->light_of + MESH_OF_SINGLE, NULL},
                {"sky_even_light", m->light_of + MESH_OF_SKY_EVEN, NULL},
@@ -164,6 +165,8 @@ void mesh_figures_free(mesh_figures *m) {
         free(m->reflected[k]);
     }
     free(m->lights_power);
+    free(m->group_share);
+    free(m->group_light);
     *m = (mesh_figures){.has_lights = false};
 }
 
@@ -210,6 +213,9 @@ static lam_status pass_mesh(store *s, bool saves, mesh_figures *m, lam_error *er
     }
     if (saves ? m->lights_power != NULL : store_has(s, STORE_ERROR "/mesh/lights_power"))
         TRY(pass_array(s, saves, group, "lights_power", 1, &m->n_groups, 0, &m->lights_power, error));
+    if (saves ? m->group_light == NULL : !store_has(s, STORE_ERROR "/mesh/group_light")) goto done;
+    TRY(pass_array(s, saves, group, "group_share", 1, &m->n_groups, 0, &m->group_share, error));
+    TRY(pass_array(s, saves, group, "group_light", 1, &m->n_groups, 0, &m->group_light, error));
 done:
     return status;
 }

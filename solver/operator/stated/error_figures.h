@@ -151,6 +151,10 @@ typedef struct mesh_figures {
     size_t n_groups;
     double *variation[MESH_FIGURES], *reflected[MESH_FIGURES]; /* [n_groups]; NULL: not stated */
     double *lights_power; /* [n_groups], that the scene's lamps emit; NULL: not stated */
+    /* Of each group that was lit alone, [n_groups]: its own share, and its light as light_of has it; light 0
+     * of the others. Both NULL: not stated. Together: the share of these lights, 1 W/m^2 from each group, in
+     * which a group that lights little counts little. */
+    double *group_share, *group_light, groups_together;
 } mesh_figures;
 void mesh_figures_free(mesh_figures *m);
 

@@ -8,6 +8,8 @@
 void mesh_shares_free(mesh_shares *m) {
     for (int k = 0; k < MESH_FIGURES; k++) free(m->of[k]);
     free(m->lamps);
+    free(m->group_share2);
+    free(m->group_light);
     *m = (mesh_shares){.n_groups = 0};
 }
 
@@ -53,6 +55,15 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, double ev
         if (m.lamps == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t g = 0; g < n_groups; g++) m.lamps[g] = from->lights_power[g] > 0;
     }
+    if (from->group_light != NULL && from->group_share != NULL) {
+        m.group_share2 = memory_allocate(n_groups, sizeof *m.group_share2, "errors of the mesh", error);
+        m.group_light = memory_allocate(n_groups, sizeof *m.group_light, "errors of the mesh", error);
+        if (m.group_share2 == NULL || m.group_light == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t g = 0; g < n_groups; g++) {
+            m.group_share2[g] = from->group_share[g] * from->group_share[g];
+            m.group_light[g] = from->group_light[g];
+        }
+    }
     *out = m;
     m = (mesh_shares){.n_groups = 0};
 done:
@@ -71,15 +82,33 @@ static double way(double emitters, double n, double N) {
     return fmin(fmax(log(fmax(emitters, 1) / n) / log(N / n), 0), 1);
 }
 
+double mesh_groups_scale(const mesh_shares *m, const double *power2) {
+    double mean = 0, sum = 0, light = 0;
+    size_t known = 0;
+    if (m->of[MESH_OF_GROUPS] == NULL || m->group_light == NULL) return 1;
+    const double groups2 = m->of[MESH_OF_GROUPS][m->n_groups];
+    for (size_t g = 0; g < m->n_groups; g++) {
+        mean += m->group_light[g];
+        known += m->group_light[g] > 0;
+    }
+    for (size_t g = 0; g < m->n_groups && known > 0; g++) {
+        const bool lit = m->group_light[g] > 0;
+        const double of = power2[g] * (lit ? m->group_light[g] : mean / (double)known);
+        light += of;
+        sum += of * (lit ? m->group_share2[g] : groups2);
+    }
+    return light > 0 && groups2 > 0 ? sum / light / groups2 : 1;
+}
+
 /* Whole groups: squares follow log N from those of groups to those of an even light, which may have no error
  * at all. */
-static double of_groups(const mesh_shares *m, double emitters, size_t group) {
+static double of_groups(const mesh_shares *m, double emitters, double scale, size_t group) {
     const double *groups = m->of[MESH_OF_GROUPS], *even = m->of[MESH_OF_EVEN];
     const double N = m->groups_emitters, all = m->even_emitters;
     if (groups == NULL || !(N > 0)) return even != NULL ? even[group] : 0;
-    if (even == NULL || !(all > N)) return groups[group];
+    if (even == NULL || !(all > N)) return scale * groups[group];
     const double t = way(emitters, N, all);
-    return (1 - t) * groups[group] + t * even[group];
+    return (1 - t) * scale * groups[group] + t * even[group];
 }
 
 /* (s m_1^2 + (1 - s) q m_e^2) / (s + (1 - s) q). */
@@ -98,7 +127,7 @@ static double of_elements(const mesh_shares *m, double emitters, size_t group) {
         return of_many(single[group], even[group], m->common_light, emitters, m->even_emitters);
     if (single == NULL || groups == NULL || !(N > 1) || !(emitters < N) || !(groups[group] > 0) ||
         !(single[group] > 0))
-        return of_groups(m, emitters, group);
+        return of_groups(m, emitters, 1, group);
     return single[group] * pow(groups[group] / single[group], way(emitters, 1, N));
 }
 
@@ -111,7 +140,7 @@ static double of_emission(const mesh_shares *m, const mesh_light *light, size_t 
     const double part = lamps != NULL ? fmin(light->of_lamps * unit, 1) : 0;
     const double whole = fmin(light->of_whole * unit, 1 - part), rest = 1 - part - whole;
     double sum = part > 0 ? part * lamps[group] : 0;
-    if (whole > 0) sum += whole * of_groups(m, light->emitters, group);
+    if (whole > 0) sum += whole * of_groups(m, light->emitters, light->scale > 0 ? light->scale : 1, group);
     return rest > 0 ? sum + rest * of_elements(m, light->others, group) : sum;
 }
 

@@ -44,6 +44,24 @@ static void add_rest(const error_by_group *e, const error_scene *scene, const do
     rest->squares += squares;
 }
 
+/* Finds the square of the share that the mesh leaves of these groups over that of groups on average. */
+static bool find_mesh_scale(const error_by_group *e, const error_scene *scene, whole_light *out) {
+    const size_t w = e->figures.n_whole;
+    double *power2 = memory_allocate(e->figures.n_groups, sizeof *power2, "errors", NULL);
+    if (power2 == NULL) return false;
+    for (size_t k = 0; k < w; k++) {
+        const uint32_t g = e->figures.whole_groups[k];
+        double area = 0;
+        if (mesh_lamps_in(e, g)) continue;
+        for (uint32_t j = scene->start[g]; j < scene->start[g + 1]; j++)
+            area += scene->area[scene->members[j]];
+        for (size_t c = 0; c < scene->n_channels; c++) power2[g] += pow(area * out->weights[c * w + k], 2);
+    }
+    out->mesh_scale = mesh_groups_scale(&e->mesh, power2);
+    free(power2);
+    return true;
+}
+
 bool whole_light_find(const error_by_group *e, const error_scene *scene, const float *E, whole_light *out) {
     const size_t w = e->figures.n_whole;
     *out = (whole_light){.weights = NULL};
@@ -56,7 +74,7 @@ bool whole_light_find(const error_by_group *e, const error_scene *scene, const f
             out->weights[c * w + k] = fabs(even_value(scene, e->figures.whole_groups[k], of_channel));
         add_rest(e, scene, out->weights + c * w, of_channel, &out->rest);
     }
-    return true;
+    return e->mesh.group_light == NULL || find_mesh_scale(e, scene, out);
 }
 
 /* Adds w' K w, no less than a share of its diagonal. */

@@ -125,7 +125,7 @@ START_TEST(bright_groups_come_first_and_then_large_ones) {
     for (int sources = 0; sources < 2; sources++) {
         probe_source s = {.deck = NULL};
         ck_ok(probe_source_make(&box, op, emission, sources ? emits : NULL, 1, 1, 1, &s, &error));
-        ck_ok(probe_source_add_groups(&s, side, SIDES, 1, 64, &error));
+        ck_ok(probe_source_add_groups(&s, side, SIDES, NULL, 1, 64, &error));
         if (sources) {
             ck_assert_uint_eq(s.most[JUDGE_WHOLE], 2);
             ck_assert_uint_eq(s.whole[0], 5);

@@ -108,6 +108,17 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     const mesh_lack lack = mesh_lack_of_bin(&with, &of, DESK);
     ck_assert_double_eq_tol(lack.elements2 - lack.mean2, (6 * .01 + 3 * .16) / 9, 1e-12);
     whole_light_free(&of.whole);
+    /* A lamp that was lit alone, and left a quarter of the square of what groups leave, has that. */
+    double own2[G] = {0}, light[G] = {0}, all[] = {.01, .01, .01, .01};
+    with.mesh.of[MESH_OF_GROUPS] = all;
+    with.mesh.group_share2 = own2;
+    with.mesh.group_light = light;
+    own2[LAMP] = .0025;
+    light[LAMP] = 3;
+    ck_assert(whole_light_find(&with, &scene, E, &of.whole));
+    const mesh_lack lit = mesh_lack_of_bin(&with, &of, DESK);
+    ck_assert_double_eq_tol(lit.elements2 - lit.mean2, (6 * .0025 + 3 * .16) / 9, 1e-12);
+    whole_light_free(&of.whole);
 }
 END_TEST
 
