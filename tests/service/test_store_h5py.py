@@ -280,6 +280,8 @@ class StoreTest(unittest.TestCase):
                              for light in of_mesh for what in ("variation", "reflected")})
             if "lights" in of_mesh:
                 expected["/error/mesh/lights_power"] = ((g,), "<f8")
+            if "groups" in of_mesh:
+                expected.update({f"/error/mesh/group_{what}": ((g,), "<f8") for what in ("share", "light")})
             names = found.pop("/mesh/group_names")
             self.assertEqual(names[0], (g,))
             self.assertRegex(names[1], r"^\|S\d+$")
