@@ -80,10 +80,10 @@ class WholeGroups(Case):
         for _ in range(6):
             yield {name: draw.uniform(.2, 1) for name in draw.choice(self.lit, draw.integers(2, len(self.lit)), replace=False)}
 
-    def test_large_groups_are_judged_without_lamps(self):
-        self.assertEqual(len(self.lit), 8)
-        self.assertEqual(set(self.lit[:2]), {"floor", "ceiling"})
-        self.assertNotIn("splinters", self.lit)
+    def test_panes_and_large_groups_are_judged_without_lamps(self):
+        self.assertEqual(set(self.lit[:4]), set(PANES))
+        self.assertEqual(set(self.lit[4:6]), {"floor", "ceiling"})
+        self.assertEqual(len(self.lit), min(4 + 8, len(self.names)))
         with h5py.File(self.sources) as store:
             lit = {self.names[k] for k in store["error/by_group/whole_groups"]}
         self.assertEqual(lit, set(PANES))
