@@ -54,8 +54,10 @@ static const option_row mesh_rows[] = {
      .settled = fixed_mesh,
      .help =
          "light: divide the faces until constants on elements leave at most .05 of the reflected light of "
-         "the scene's lamps, of light that all elements emit, and with --sky of an even sky: evenly, or "
-         "where light changes, into at most 40,000 elements, or a quarter more than there are faces; faces "
+         "the scene's lamps, of light that all elements emit, with --sky of an even sky, and without lamps "
+         "and "
+         "sky of its windows and largest groups, lit alone: evenly, or where light changes, into at most "
+         "40,000 elements, or a quarter more than there are faces; faces "
          "that are fine enough stay. faces: every face is one element"},
     {.name = "max-edge",
      .kind = OPTION_NUMBER,
@@ -76,7 +78,8 @@ static const option_row mesh_rows[] = {
      .settled = fixed_mesh,
      .help = "Join faces of one material that lie in one plane and divide them where light changes, until "
              "constants on elements leave at most this share of the reflected light of the scene's lamps and "
-             "of light that all elements emit; at most --elements, else 40,000"},
+             "of light that all elements emit, and of the other lights of --mesh; at most --elements, else "
+             "40,000"},
     {.name = "unit",
      .kind = OPTION_NUMBER,
      .offset = FIELD(unit),
