@@ -77,9 +77,8 @@ static const option_row mesh_rows[] = {
      .above = true,
      .settled = fixed_mesh,
      .help = "Join faces of one material that lie in one plane and divide them where light changes, until "
-             "constants on elements leave at most this share of the reflected light of the scene's lamps and "
-             "of light that all elements emit, and of the other lights of --mesh; at most --elements, else "
-             "40,000"},
+             "constants on elements leave at most this share of the reflected light, of each light that "
+             "--mesh names; at most --elements, else 40,000"},
     {.name = "unit",
      .kind = OPTION_NUMBER,
      .offset = FIELD(unit),
