@@ -55,10 +55,9 @@ static const option_row mesh_rows[] = {
      .help =
          "light: divide the faces until constants on elements leave at most .05 of the reflected light of "
          "the scene's lamps, of light that all elements emit, with --sky of an even sky, and without lamps "
-         "and "
-         "sky of its windows and largest groups, lit alone: evenly, or where light changes, into at most "
-         "40,000 elements, or a quarter more than there are faces; faces "
-         "that are fine enough stay. faces: every face is one element"},
+         "and sky of its windows and largest groups, lit alone: evenly, or where light changes, into at most "
+         "40,000 elements, or a quarter more than there are faces; faces that are fine enough stay. faces: "
+         "every face is one element"},
     {.name = "max-edge",
      .kind = OPTION_NUMBER,
      .offset = FIELD(max_edge),

@@ -276,7 +276,7 @@ mesh_lack mesh_lack_of_bin(const error_by_group *e, const light_sizes *of, size_
                               .sky_power = sqrt(of->sky.power2) + sqrt(of->sent.power2),
                               .sky_tiles = squares > 0 ? (of->sky.power2 + of->sent.power2) / squares : 0,
                               .bounced = of->quantity == LAM_INDIRECT,
-                              .scale = knows_whole ? of->whole.mesh_scale : 0};
+                              .whole_scale = of->whole.mesh_scale};
     return mesh_lack_of(&e->mesh, &light, bin % e->figures.n_groups);
 }
 

@@ -140,7 +140,7 @@ static double of_emission(const mesh_shares *m, const mesh_light *light, size_t 
     const double part = lamps != NULL ? fmin(light->of_lamps * unit, 1) : 0;
     const double whole = fmin(light->of_whole * unit, 1 - part), rest = 1 - part - whole;
     double sum = part > 0 ? part * lamps[group] : 0;
-    if (whole > 0) sum += whole * of_groups(m, light->emitters, light->scale > 0 ? light->scale : 1, group);
+    if (whole > 0) sum += whole * of_groups(m, light->emitters, light->whole_scale, group);
     return rest > 0 ? sum + rest * of_elements(m, light->others, group) : sum;
 }
 

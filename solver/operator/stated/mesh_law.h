@@ -34,7 +34,7 @@ bool mesh_shares_known(const mesh_shares *m);
 typedef struct mesh_light {
     double power, of_lamps, of_whole, emitters, others, sky_power, sky_tiles;
     bool bounced;
-    double scale; /* of the squares of the whole groups' share: mesh_groups_scale; 0: 1 */
+    double whole_scale; /* of the square of the share of whole groups: mesh_groups_scale */
 } mesh_light;
 
 /* Squares of the shares that a group lacks. m^2, what its light varies by inside elements: squares of parts

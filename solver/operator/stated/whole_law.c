@@ -45,7 +45,7 @@ static void add_rest(const error_by_group *e, const error_scene *scene, const do
 }
 
 /* Finds the square of the share that the mesh leaves of these groups over that of groups on average. */
-static bool find_mesh_scale(const error_by_group *e, const error_scene *scene, whole_light *out) {
+static bool find_mesh_scale(const error_by_group *e, whole_light *out) {
     const size_t w = e->figures.n_whole;
     double *power2 = memory_allocate(e->figures.n_groups, sizeof *power2, "errors", NULL);
     if (power2 == NULL) return false;
@@ -53,9 +53,9 @@ static bool find_mesh_scale(const error_by_group *e, const error_scene *scene, w
         const uint32_t g = e->figures.whole_groups[k];
         double area = 0;
         if (mesh_lamps_in(e, g)) continue;
-        for (uint32_t j = scene->start[g]; j < scene->start[g + 1]; j++)
-            area += scene->area[scene->members[j]];
-        for (size_t c = 0; c < scene->n_channels; c++) power2[g] += pow(area * out->weights[c * w + k], 2);
+        for (size_t b = g; b < e->n_bins; b += e->figures.n_groups) area += e->area[b];
+        for (size_t c = 0; c < e->figures.n_channels; c++)
+            power2[g] += pow(area * out->weights[c * w + k], 2);
     }
     out->mesh_scale = mesh_groups_scale(&e->mesh, power2);
     free(power2);
@@ -64,7 +64,7 @@ static bool find_mesh_scale(const error_by_group *e, const error_scene *scene, w
 
 bool whole_light_find(const error_by_group *e, const error_scene *scene, const float *E, whole_light *out) {
     const size_t w = e->figures.n_whole;
-    *out = (whole_light){.weights = NULL};
+    *out = (whole_light){.mesh_scale = 1};
     if (e->whole_of == NULL || E == NULL) return true;
     out->weights = memory_allocate(w, scene->n_channels * sizeof *out->weights, "errors", NULL);
     if (out->weights == NULL) return false;
@@ -74,7 +74,7 @@ bool whole_light_find(const error_by_group *e, const error_scene *scene, const f
             out->weights[c * w + k] = fabs(even_value(scene, e->figures.whole_groups[k], of_channel));
         add_rest(e, scene, out->weights + c * w, of_channel, &out->rest);
     }
-    return e->mesh.group_light == NULL || find_mesh_scale(e, scene, out);
+    return e->mesh.group_light == NULL || find_mesh_scale(e, out);
 }
 
 /* Adds w' K w, no less than a share of its diagonal. */
