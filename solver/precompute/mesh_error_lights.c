@@ -183,75 +183,68 @@ done:
     return status;
 }
 
-/* Of lights [n_lights][C][n]. */
-static lam_status judge_lights(const precompute_job *job, const precompute_scene *scene, made_operator *made,
-                               size_t n_lights, const float *E, float *B, uint64_t seed,
-                               mesh_error_groups *groups, lam_error *error) {
+/* One group alone: its E and B [C][n] are left, and `groups` filled. Its light is sampled as that of lamps
+ * is, as rays alone find a small group by luck. */
+static lam_status light_group(const precompute_job *job, const precompute_scene *scene, made_operator *made,
+                              size_t group, uint64_t seed, float *E, float *B, mesh_error_groups *groups,
+                              lam_error *error) {
     lam_status status = LAM_OK;
-    double found[GATHER_VALUES_MOST];
-    const size_t bytes = lam_operator_work_bytes(made->op, n_lights);
+    double found;
+    const size_t bytes = lam_operator_work_bytes(made->op, 1);
     void *work = memory_allocate(bytes, 1, "the error of the mesh", error);
     if (work == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(mesh_error_answers(scene, made, n_lights, E, B, work, bytes, error));
-    TRY(mesh_error(&scene->m, n_lights, E, B, false, NULL, seed, &job->progress, found, groups, error));
+    light_up(&scene->m, group, E);
+    TRY(mesh_error_answers(scene, made, 1, E, B, work, bytes, error));
+    TRY(mesh_error(&scene->m, 1, E, B, true, NULL, seed, &job->progress, &found, groups, error));
 done:
     free(work);
     return status;
 }
 
-/* The share that light k leaves, no less than its noise, and both squares for all lights together. */
-static void take_group(const mesh_error_groups *of, size_t k, const mesh *m, const double *area,
-                       double together[2], double *share) {
-    const size_t first = k * m->n_groups;
+/* The share that a light leaves, no less than its noise, and both squares for all lights together. */
+static void take_group(const mesh_error_groups *of, const mesh *m, const double *area, double together[2],
+                       double *share) {
     double off = 0, noise2 = 0, all = 0;
     for (size_t g = 0; g < m->n_groups; g++) {
-        off += area[g] * of->variance[first + g];
-        noise2 += pow(area[g] * of->noise[first + g], 2);
-        all += area[g] * of->light2[first + g];
+        off += area[g] * of->variance[g];
+        noise2 += pow(area[g] * of->noise[g], 2);
+        all += area[g] * of->light2[g];
     }
     together[0] += off;
     together[1] += all;
     *share = all > 0 ? sqrt(fmax(off, sqrt(noise2)) / all) : 0;
 }
 
-/* Single groups, as many of them at once as can be gathered. */
+/* Single groups, one after the other. */
 static lam_status add_groups(const precompute_job *job, const precompute_scene *scene, made_operator *made,
                              lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = &scene->m;
-    const size_t vector = m->n * m->n_channels, most = GATHER_VALUES_MOST / m->n_channels;
+    const size_t vector = m->n * m->n_channels;
     mesh_figures *figures = &made->errors_of_mesh;
     uint64_t seed = precompute_seed(job->options->seed, SEED_MESH_ERROR);
     mesh_error_groups groups = {.fewer = FEWER};
     mesh_light_sums sums = {.noise2 = NULL};
     double logs = 0, together[2] = {0};
-    float *E = NULL, *B = NULL;
-    size_t chosen[GROUPS], *order = NULL;
-    order = memory_allocate(m->n_groups, sizeof *order, "the error of the mesh", error);
-    E = memory_allocate(most, vector * sizeof *E, "the error of the mesh", error);
-    B = memory_allocate(most, vector * sizeof *B, "the error of the mesh", error);
-    if (order == NULL || E == NULL || B == NULL) TRY(LAM_ERR_MEMORY);
-    figures->group_share =
-        memory_allocate(m->n_groups, sizeof *figures->group_share, "the error of the mesh", error);
-    figures->group_light =
-        memory_allocate(m->n_groups, sizeof *figures->group_light, "the error of the mesh", error);
-    if (figures->group_share == NULL || figures->group_light == NULL) TRY(LAM_ERR_MEMORY);
+    size_t chosen[GROUPS];
+    float *E = memory_allocate(vector, sizeof *E, "the error of the mesh", error);
+    float *B = memory_allocate(vector, sizeof *B, "the error of the mesh", error);
+    size_t *order = memory_allocate(m->n_groups, sizeof *order, "the error of the mesh", error);
+    double *share = memory_allocate(m->n_groups, sizeof *share, "the error of the mesh", error);
+    double *light = memory_allocate(m->n_groups, sizeof *light, "the error of the mesh", error);
+    figures->group_share = share;
+    figures->group_light = light;
+    if (E == NULL || B == NULL || order == NULL || share == NULL || light == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_light_sums_begin(m, &sums, error));
-    TRY(mesh_error_groups_begin(m, most, &groups, error));
+    TRY(mesh_error_groups_begin(m, 1, &groups, error));
     const size_t n_chosen = choose_groups(m, sums.area, figures->lights_power, chosen, order);
-    for (size_t first = 0; first < n_chosen; first += most) {
-        const size_t left = n_chosen - first, n_lit = left < most ? left : most;
-        for (size_t k = 0; k < n_lit; k++) {
-            light_up(m, chosen[first + k], E + k * vector);
-            logs += log(mesh_error_emitters(m, E + k * vector));
-        }
-        TRY(judge_lights(job, scene, made, n_lit, E, B, random_next(&seed), &groups, error));
-        for (size_t k = 0; k < n_lit; k++) {
-            const double light = mesh_error_light(m, E + k * vector, B + k * vector, false);
-            mesh_light_sums_add(&groups, k, m, light, &sums);
-            take_group(&groups, k, m, sums.area, together, &figures->group_share[chosen[first + k]]);
-            figures->group_light[chosen[first + k]] = light;
-        }
+    for (size_t k = 0; k < n_chosen; k++) {
+        const size_t g = chosen[k];
+        TRY(light_group(job, scene, made, g, random_next(&seed), E, B, &groups, error));
+        logs += log(mesh_error_emitters(m, E));
+        light[g] = mesh_error_light(m, E, B, false);
+        mesh_light_sums_add(&groups, 0, m, light[g], &sums);
+        take_group(&groups, m, sums.area, together, &share[g]);
     }
     if (n_chosen == 0) goto done;
     figures->groups_together = together[1] > 0 ? sqrt(fmax(together[0], 0) / together[1]) : 0;

@@ -2,6 +2,7 @@
 
 import json
 import math
+import pathlib
 import re
 import unittest
 
@@ -186,6 +187,52 @@ class MeshError(Case):
             error = json.loads(must("solve", store, "--emission", self.path("emission.npy"), "--json").stdout)["error"]
             parts.append(error["mesh"])
         self.assertTrue(all(.5 * stated["single"] < part < 1.5 * stated["single"] for part in parts), (parts, stated))
+
+    def test_groups_are_stated_as_if_they_were_lamps(self):
+        """A group that is lit alone leaves what it does as the lamp of the scene; windows come first, however small."""
+        common = "--mesh", "faces", "--probes", 8
+        lit, dark = self.path("rooms.obj"), self.path("dark.obj")
+        must("generate", "rooms", "--elements", 300, "-o", lit)
+        materials = pathlib.Path(lit).with_suffix(".mtl").read_text(encoding="utf-8")
+        plain = re.sub(r"(?m)^Ke .*$", "Ke 0 0 0", materials)
+        self.assertNotEqual(plain, materials)
+        plan = pathlib.Path(lit).read_text(encoding="utf-8").replace("rooms.mtl", "dark.mtl")
+        pathlib.Path(dark).write_text(plan, encoding="utf-8")
+        parts, n_faces = [], 0
+        for line in plan.replace("o lamp-1\n", "o Window-1\n").splitlines(keepends=True):
+            n_faces += line.startswith("f ")
+            parts.append(f"o part-{n_faces // 15}\n{line}" if line.startswith("f ") and n_faces % 15 == 0 else line)
+        pathlib.Path(self.path("windows.obj")).write_text("".join(parts), encoding="utf-8")
+        pathlib.Path(dark).with_suffix(".mtl").write_text(plain, encoding="utf-8")
+        stores = {}
+        for name in "rooms", "dark", "windows":
+            stores[name] = self.path(name + ".h5")
+            must("precompute", self.path(name + ".obj"), "-o", stores[name], *common)
+        with h5py.File(stores["dark"]) as file:
+            mesh, figures = file["error/mesh"], dict(file["error/mesh"].attrs)
+            share, light = mesh["group_share"][:], mesh["group_light"][:]
+            names = [name.decode() for name in file["mesh/group_names"][:]]
+            area = numpy.bincount(file["mesh/group"][:], file["mesh/area"][:], len(names))
+        self.assertGreater((light > 0).sum(), 3)
+        weight = light * area**2
+        together = math.sqrt((share**2 * weight).sum() / weight.sum())
+        self.assertLess(abs(math.log(figures["groups_together"] / together)), math.log(1.05))
+        group = names[share.argmax()]
+        kinds = dict(re.findall(r"o (\S+)\nusemtl (\S+)", plan))
+        own = self.path("own.obj")
+        text = plan.replace("dark.mtl", "own.mtl").replace(f"o {group}\nusemtl {kinds[group]}", f"o {group}\nusemtl lit")
+        pathlib.Path(own).write_text(text, encoding="utf-8")
+        block = re.search(rf"(?m)^newmtl {kinds[group]}$(?s:.*?)(?=^newmtl|\Z)", plain).group()
+        glow = re.sub(r"(?m)^Ke .*$\n?", "", block).replace(kinds[group], "lit", 1) + "\nKe 1 1 1\n"
+        pathlib.Path(own).with_suffix(".mtl").write_text(plain + "\n" + glow, encoding="utf-8")
+        must("precompute", own, "-o", self.path("own.h5"), *common)
+        with h5py.File(self.path("own.h5")) as file:
+            lights = file["error/mesh"].attrs["lights"]
+        self.assertLess(abs(math.log(share.max() / lights)), math.log(1.25), (group, share.max(), lights))
+        with h5py.File(stores["windows"]) as file:
+            names = [name.decode() for name in file["mesh/group_names"][:]]
+            self.assertGreater(file["error/mesh/group_light"][names.index("Window-1")], 0)
+            self.assertEqual(file["error/by_group/whole_groups"][0], names.index("Window-1"))
 
     def test_no_measurement(self):
         store = self.path("none.h5")

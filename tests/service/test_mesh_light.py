@@ -110,6 +110,15 @@ class MeshOfLight(Case):
                                      "--rays", 64)
         self.assertRegex(said, r"[\d.e-]+ of that of an even sky, ")
 
+    def test_an_asked_error_is_of_the_sky_too(self):
+        scene = self.path("city.obj")
+        must("generate", "city", "--elements", 100, "-o", scene)
+        for options, there, not_there in (("--sky", "grid:4x4"), "of that of an even sky", "light of groups"), ((), "light of groups", "sky"):
+            said = must("precompute", scene, "-o", self.path("s.h5"), "--probes", 0, "--rays", 64, "--mesh-error", .3, *options).stderr
+            line = next(line for line in said.splitlines() if line.startswith("constants on elements leave"))
+            self.assertIn(there, line)
+            self.assertNotIn(not_there, line)
+
     def test_memory_is_kept(self):
         """The solution that a division rests on is not begun where memory has no room for it."""
         scene = FIXTURES / "l-room" / "l-room.obj"

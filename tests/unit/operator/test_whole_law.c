@@ -119,6 +119,19 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     const mesh_lack lit = mesh_lack_of_bin(&with, &of, DESK);
     ck_assert_double_eq_tol(lit.elements2 - lit.mean2, (6 * .0025 + 3 * .16) / 9, 1e-12);
     whole_light_free(&of.whole);
+    /* Lamp and wall together, 6 W and 8 W of one channel, by the squares of their powers; a lamp of the scene
+     * has no part in it. */
+    const float both[C * N] = {0, 1, 1, 1, 1, 0, 0, 0, 0, 0};
+    bool lamps[G] = {false, true, false};
+    own2[WALL] = .04;
+    light[WALL] = 1;
+    ck_assert(whole_light_find(&with, &scene, both, &of.whole));
+    ck_assert_double_eq_tol(of.whole.mesh_scale, (36 * 3 * .0025 + 64 * .04) / (36 * 3 + 64) / .01, 1e-12);
+    whole_light_free(&of.whole);
+    with.mesh.lamps = lamps;
+    ck_assert(whole_light_find(&with, &scene, both, &of.whole));
+    ck_assert_double_eq_tol(of.whole.mesh_scale, 4, 1e-12);
+    whole_light_free(&of.whole);
 }
 END_TEST
 
