@@ -109,6 +109,7 @@ static bool whole_of_spots(const scene *s, const radiosity_request *request, dou
         }
     }
     for (size_t k = 0; k < request->n_rhs * C; k++) to->whole[k / C].rest.power2 += power[k] * power[k];
+    for (size_t v = request->n_dense; v < request->n_rhs; v++) whole_light_set_mesh(e, &to->whole[v]);
     return true;
 }
 

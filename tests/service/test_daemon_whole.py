@@ -6,6 +6,7 @@ import pathlib
 import tempfile
 import unittest
 
+import h5py
 import numpy as np
 
 from command import must
@@ -73,6 +74,24 @@ class Whole(unittest.TestCase):
             B = np.load(io.BytesIO(answer.body))
             self.assertEqual(B.shape, (3, about["elements"]))
             np.testing.assert_array_equal(B, np.load(out).astype(np.float32))
+
+    def test_a_group_by_name_states_what_its_values_do(self):
+        about = self.daemon.get("/v1/scenes/cornell").json()
+        with h5py.File(self.folder / "cornell.h5") as file:
+            group = file["mesh/group"][:]
+        names = [g["name"] for g in about["groups"]]
+        asked = {"reduce": {"groups": names[:3], "with": ["mean"]}, "limit": False}
+        shares = []
+        for k, name in enumerate(names):
+            values = np.repeat((group == k)[None], 3, axis=0).astype(float).tolist()
+            told = [self.daemon.radiosity("cornell", {"emission": emission, **asked}).json()["error"]
+                    for emission in ({"groups": {name: 1}}, values)]
+            for of in names[:3]:
+                by_name, by_values = (error["groups"][of]["stated"] for error in told)
+                self.assertAlmostEqual(by_name, by_values, delta=1e-4 * by_values, msg=(name, of))
+            self.assertGreater(told[0]["parts"]["mesh"], 0)
+            shares.append(told[0]["parts"]["mesh"])
+        self.assertGreater(max(shares), 1.2 * min(shares), shares)  # groups have their own
 
 
 if __name__ == "__main__":

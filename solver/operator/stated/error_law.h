@@ -60,8 +60,9 @@ void emission_size_add(emission_size *e, size_t n, const double *weights, const 
 /* The size of both: their powers added up. */
 emission_size emission_size_sum(const emission_size *a, const emission_size *b);
 
-/* The light that whole groups emit evenly, [C][n_whole], W/m^2 (whole_law.h), mesh_groups_scale of those
- * without lamps, and the size of all else that is emitted. weights NULL: nothing is known of whole groups. */
+/* The light that whole groups emit evenly, [C][n_whole], W/m^2 (whole_law.h), whole_light_set_mesh of
+ * those without lamps, and the size of all else that is emitted. weights NULL: nothing is known of whole
+ * groups. */
 typedef struct whole_light {
     double *weights;
     double mesh_scale;

@@ -18,6 +18,26 @@ static double common(const mesh_figures *from, int one, int many) {
     return from->light_of[one] > 0 ? from->light_of[many] / from->light_of[one] : 0;
 }
 
+static lam_status take_groups(const mesh_figures *from, mesh_shares *m, lam_error *error) {
+    double light = 0;
+    size_t known = 0;
+    if (from->group_light == NULL || from->group_share == NULL) return LAM_OK;
+    m->group_share2 = memory_allocate(m->n_groups, sizeof *m->group_share2, "errors of the mesh", error);
+    m->group_light = memory_allocate(m->n_groups, sizeof *m->group_light, "errors of the mesh", error);
+    if (m->group_share2 == NULL || m->group_light == NULL) return LAM_ERR_MEMORY;
+    for (size_t g = 0; g < m->n_groups; g++) {
+        light += from->group_light[g];
+        known += from->group_light[g] > 0;
+    }
+    for (size_t g = 0; g < m->n_groups && known > 0; g++) {
+        const bool lit = from->group_light[g] > 0;
+        const double share = lit ? from->group_share[g] : from->groups;
+        m->group_share2[g] = share * share;
+        m->group_light[g] = lit ? from->group_light[g] : light / (double)known;
+    }
+    return LAM_OK;
+}
+
 lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, double even_tiles, mesh_shares *out,
                             lam_error *error) {
     lam_status status = LAM_OK;
@@ -55,15 +75,7 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, double ev
         if (m.lamps == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t g = 0; g < n_groups; g++) m.lamps[g] = from->lights_power[g] > 0;
     }
-    if (from->group_light != NULL && from->group_share != NULL) {
-        m.group_share2 = memory_allocate(n_groups, sizeof *m.group_share2, "errors of the mesh", error);
-        m.group_light = memory_allocate(n_groups, sizeof *m.group_light, "errors of the mesh", error);
-        if (m.group_share2 == NULL || m.group_light == NULL) TRY(LAM_ERR_MEMORY);
-        for (size_t g = 0; g < n_groups; g++) {
-            m.group_share2[g] = from->group_share[g] * from->group_share[g];
-            m.group_light[g] = from->group_light[g];
-        }
-    }
+    TRY(take_groups(from, &m, error));
     *out = m;
     m = (mesh_shares){.n_groups = 0};
 done:
@@ -80,24 +92,6 @@ bool mesh_shares_known(const mesh_shares *m) {
 /* A share between two lights of n and N > n emitters: the part of the way from n to N by their logarithms. */
 static double way(double emitters, double n, double N) {
     return fmin(fmax(log(fmax(emitters, 1) / n) / log(N / n), 0), 1);
-}
-
-double mesh_groups_scale(const mesh_shares *m, const double *power2) {
-    double mean = 0, sum = 0, light = 0;
-    size_t known = 0;
-    if (m->of[MESH_OF_GROUPS] == NULL || m->group_light == NULL) return 1;
-    const double groups2 = m->of[MESH_OF_GROUPS][m->n_groups];
-    for (size_t g = 0; g < m->n_groups; g++) {
-        mean += m->group_light[g];
-        known += m->group_light[g] > 0;
-    }
-    for (size_t g = 0; g < m->n_groups && known > 0; g++) {
-        const bool lit = m->group_light[g] > 0;
-        const double of = power2[g] * (lit ? m->group_light[g] : mean / (double)known);
-        light += of;
-        sum += of * (lit ? m->group_share2[g] : groups2);
-    }
-    return light > 0 && groups2 > 0 ? sum / light / groups2 : 1;
 }
 
 /* Whole groups: squares follow log N from those of groups to those of an even light, which may have no error

@@ -12,8 +12,9 @@ typedef struct mesh_shares {
     double even_emitters, groups_emitters; /* effective numbers; 0: not stated */
     double even_tiles;                     /* of an even sky */
     double common_light, common_sky; /* q below, of elements and of tiles; 0: not stated, of an older store */
-    double *group_share2, *group_light; /* [n_groups], of groups that were lit alone, light 0 of the others;
-                                           NULL: not stated */
+    /* [n_groups], of groups that are lit alone: m_g^2 and the light l_g of 1 W. One that was not measured has
+     * the share of groups and the mean light of the others. NULL: not stated. */
+    double *group_share2, *group_light;
     bool *lamps; /* [n_groups], true where lamps of the scene are; NULL: not stated, any light is taken for
                     theirs */
 } mesh_shares;
@@ -34,7 +35,7 @@ bool mesh_shares_known(const mesh_shares *m);
 typedef struct mesh_light {
     double power, of_lamps, of_whole, emitters, others, sky_power, sky_tiles;
     bool bounced;
-    double whole_scale; /* of the square of the share of whole groups: mesh_groups_scale */
+    double whole_scale; /* of the square of the share of whole groups: whole_light.mesh_scale */
 } mesh_light;
 
 /* Squares of the shares that a group lacks. m^2, what its light varies by inside elements: squares of parts
@@ -56,12 +57,5 @@ typedef struct mesh_lack {
     double elements2, mean2;
 } mesh_lack;
 mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t group);
-
-/* Returns the square of the share that whole groups leave together over that of groups on average,
- *     sum_g P_g^2 l_g m_g^2 / sum_g P_g^2 l_g / groups^2,
- * as if their lights had little in common: P_g is the power of a group, l_g the light of 1 W of it, m_g its
- * own share. A group that was not lit alone has the mean light of the others and `groups`. power2 [n_groups]
- * has P_g^2. 1 where nothing is known. */
-double mesh_groups_scale(const mesh_shares *m, const double *power2);
 
 #endif

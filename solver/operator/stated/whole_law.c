@@ -44,27 +44,25 @@ static void add_rest(const error_by_group *e, const error_scene *scene, const do
     rest->squares += squares;
 }
 
-/* Finds the square of the share that the mesh leaves of these groups over that of groups on average. */
-static bool find_mesh_scale(const error_by_group *e, whole_light *out) {
-    const size_t w = e->figures.n_whole;
-    double *power2 = memory_allocate(e->figures.n_groups, sizeof *power2, "errors", NULL);
-    if (power2 == NULL) return false;
-    for (size_t k = 0; k < w; k++) {
-        const uint32_t g = e->figures.whole_groups[k];
-        double area = 0;
+void whole_light_set_mesh(const error_by_group *e, whole_light *w) {
+    const group_errors *f = &e->figures;
+    double light = 0, left = 0;
+    for (size_t k = 0; e->mesh.group_light != NULL && k < f->n_whole; k++) {
+        const uint32_t g = f->whole_groups[k];
+        double area = 0, power2 = 0;
         if (mesh_lamps_in(e, g)) continue;
-        for (size_t b = g; b < e->n_bins; b += e->figures.n_groups) area += e->area[b];
-        for (size_t c = 0; c < e->figures.n_channels; c++)
-            power2[g] += pow(area * out->weights[c * w + k], 2);
+        for (size_t b = g; b < e->n_bins; b += f->n_groups) area += e->area[b];
+        for (size_t c = 0; c < f->n_channels; c++) power2 += pow(area * w->weights[c * f->n_whole + k], 2);
+        light += power2 * e->mesh.group_light[g];
+        left += power2 * e->mesh.group_light[g] * e->mesh.group_share2[g];
     }
-    out->mesh_scale = mesh_groups_scale(&e->mesh, power2);
-    free(power2);
-    return true;
+    const double groups2 = light > 0 ? e->mesh.of[MESH_OF_GROUPS][f->n_groups] : 0;
+    w->mesh_scale = groups2 > 0 ? left / light / groups2 : 1;
 }
 
 bool whole_light_find(const error_by_group *e, const error_scene *scene, const float *E, whole_light *out) {
     const size_t w = e->figures.n_whole;
-    *out = (whole_light){.mesh_scale = 1};
+    *out = (whole_light){.weights = NULL};
     if (e->whole_of == NULL || E == NULL) return true;
     out->weights = memory_allocate(w, scene->n_channels * sizeof *out->weights, "errors", NULL);
     if (out->weights == NULL) return false;
@@ -74,7 +72,8 @@ bool whole_light_find(const error_by_group *e, const error_scene *scene, const f
             out->weights[c * w + k] = fabs(even_value(scene, e->figures.whole_groups[k], of_channel));
         add_rest(e, scene, out->weights + c * w, of_channel, &out->rest);
     }
-    return e->mesh.group_light == NULL || find_mesh_scale(e, out);
+    whole_light_set_mesh(e, out);
+    return true;
 }
 
 /* Adds w' K w, no less than a share of its diagonal. */

@@ -10,6 +10,13 @@
 bool whole_light_find(const error_by_group *e, const error_scene *scene, const float *E, whole_light *out);
 void whole_light_free(whole_light *w);
 
+/* Sets mesh_scale by the weights: with P_g the power of a group, l_g and m_g its light and its share alone
+ * (mesh_law.h), the square of the share that they leave together over that of groups on average, as if their
+ * lights had little in common,
+ *     sum_g P_g^2 l_g m_g^2 / sum_g P_g^2 l_g / groups^2.
+ * 1 where nothing is stated. Cost: O(C n_whole). */
+void whole_light_set_mesh(const error_by_group *e, whole_light *w);
+
 /* The place of a group among those that are stated; WHOLE_NONE: it is none of them. */
 #define WHOLE_NONE UINT32_MAX
 uint32_t whole_place(const error_by_group *e, size_t group);

@@ -52,21 +52,19 @@ START_TEST(light_of_lamps_has_their_share) {
 }
 END_TEST
 
-/* Groups that were lit alone have their own shares, weighted by the light that they give; another one has the
- * mean light of those and the share of groups. */
+/* A group that was not lit alone has the mean light of the others and the share of groups. */
 START_TEST(whole_groups_have_their_own_shares) {
     double share[] = {.03, .3, 0}, light[] = {8, 2, 0};
     mesh_figures lit = figures;
     lit.group_share = share;
     lit.group_light = light;
     mesh_shares m = made(&lit), older = made(&figures);
-    const double one[] = {7, 0, 0}, both[] = {4, 1, 0}, other[] = {0, 0, 5}, none[] = {0, 0, 0};
-    const double groups2 = .15 * .15;
-    ck_assert_double_eq_tol(mesh_groups_scale(&m, one), .0009 / groups2, 1e-12);
-    ck_assert_double_eq_tol(mesh_groups_scale(&m, both), (32 * .0009 + 2 * .09) / 34 / groups2, 1e-12);
-    ck_assert_double_eq_tol(mesh_groups_scale(&m, other), 1, 1e-12);
-    ck_assert_double_eq_tol(mesh_groups_scale(&m, none), 1, 1e-12);
-    ck_assert_double_eq_tol(mesh_groups_scale(&older, one), 1, 1e-12);
+    const double shares2[] = {.0009, .09, .15 * .15}, lights[] = {8, 2, 5};
+    for (size_t g = 0; g < G; g++) {
+        ck_assert_double_eq_tol(m.group_share2[g], shares2[g], 1e-12);
+        ck_assert_double_eq_tol(m.group_light[g], lights[g], 1e-12);
+    }
+    ck_assert_ptr_null(older.group_light);
     const mesh_light whole = {.power = 7, .of_whole = 7, .emitters = 16, .whole_scale = .04};
     ck_assert_double_eq_tol(share2(&m, &whole, 0), .04 * .01, 1e-12);
     mesh_shares_free(&older);
