@@ -24,7 +24,7 @@ FORMFACTOR = (f"{OPERATOR} solver/daylight/ {SCENE} solver/formfactor/formfactor
 METHOD = f"{OPERATOR} solver/method/"
 # Headers that the methods share; folders of methods do not know each other.
 METHOD_SHARED = ("solver/method/method.h solver/method/choice.h solver/method/report.h solver/method/tall_factors.h "
-                 "solver/method/norm.h solver/method/many_lights.h solver/method/reference.h")
+                 "solver/method/inverse_rows.h solver/method/norm.h solver/method/many_lights.h solver/method/reference.h")
 
 # folder: the prefixes that its files may include beside their own folder; * stands for each folder within
 ALLOWED = {

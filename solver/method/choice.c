@@ -40,22 +40,59 @@ void candidate_figure(candidate *c, const char *name, double value) {
 }
 
 void decision_free(decision *d) {
-    for (size_t k = 0; k < d->n_candidates; k++) lam_operator_close(d->candidates[k].op);
+    for (size_t k = 0; k < d->n_candidates; k++) {
+        lam_operator_close(d->candidates[k].op);
+        inverse_rows_free(&d->candidates[k].truth);
+    }
     free(d->candidates);
     *d = (decision){.n_candidates = 0};
 }
 
-/* The candidate with the highest claim, and of those the one with the lowest cost; the first of equal ones.
+double candidate_error(const decision *d, const candidate *c) {
+    return fmax(CHOICE_WORSE * d->options->epsilon, c->errors.groups);
+}
+
+/* What a candidate is judged by: the lower, the better. */
+static double weight_of(const decision *d, const candidate *c) {
+    if (c->claim > CLAIM_COST) return c->cost;
+    return candidate_error(d, c) * pow(c->cost, log(CHOICE_WORSE) / log(CHOICE_FASTER));
+}
+
+/* The candidate with the highest claim, and of those the one with the lowest weight; the first of equal ones.
  */
 static const candidate *best(const decision *d) {
     const candidate *found = NULL;
     for (size_t k = 0; k < d->n_candidates; k++) {
         const candidate *c = &d->candidates[k];
         if (c->claim == CLAIM_COST && (c->outdone || !isfinite(c->cost))) continue;
-        if (found == NULL || c->claim > found->claim || (c->claim == found->claim && c->cost < found->cost))
+        if (found == NULL || c->claim > found->claim ||
+            (c->claim == found->claim && weight_of(d, c) < weight_of(d, found)))
             found = c;
     }
     return found != NULL ? found : decision_find(d, method_fallback()->name);
+}
+
+/* Measures the operators that are built, where another method has found the rows that tell their errors, and
+ * that method too, whose estimates are lower ones: it is built then, as it would be if it were taken. */
+static lam_status compare_errors(decision *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    candidate *rival = NULL;
+    size_t n_built = 0;
+    for (size_t k = 0; k < d->n_candidates; k++) {
+        candidate *c = &d->candidates[k];
+        if (c->truth.rows != NULL && isfinite(c->cost)) rival = c;
+        n_built += c->op != NULL;
+    }
+    if (rival == NULL || n_built == 0) goto done;
+    if (rival == best(d) && !d->thorough)
+        TRY(method_build(rival->method, d->problem, d->options, &rival->own, &rival->op, &rival->built,
+                         error));
+    for (size_t k = 0; k < d->n_candidates; k++) {
+        candidate *c = &d->candidates[k];
+        if (c->op != NULL) TRY(operator_sampled_errors(d->problem, c->op, &rival->truth, &c->errors, error));
+    }
+done:
+    return status;
 }
 
 /* Before F is known: true if all others are ruled out already. */
@@ -79,9 +116,13 @@ static void explain(decision *d) {
             (size_t)snprintf(d->reason + length, size - length, "%s%s", length > 0 ? ", " : "", own->found);
     for (size_t k = 0; k < d->n_candidates && isfinite(own->cost) && length < size; k++) {
         const candidate *c = &d->candidates[k];
-        if (c == own || !isfinite(c->cost) || c->cost < own->cost) continue;
+        const double of_c = candidate_error(d, c), of_own = candidate_error(d, own);
+        if (c == own || !isfinite(c->cost) || (c->cost < own->cost && !(of_c > of_own))) continue;
         length += (size_t)snprintf(d->reason + length, size - length, "; %s would take %.3g times as long",
                                    c->method->name, c->cost / own->cost);
+        if (of_c != of_own && length < size)
+            length += (size_t)snprintf(d->reason + length, size - length, " and err by %.2g in place of %.2g",
+                                       of_c, of_own);
     }
     if (length == 0) snprintf(d->reason, size, "chosen before the form factors are known");
 }
@@ -159,6 +200,7 @@ lam_status choose_method(const build_problem *problem, const build_options *opti
         TRY(m->weigh(&d, &c->own, c, error));
         d.n_candidates++;
     }
+    TRY(compare_errors(&d, error));
     d.taken = best(&d);
     d.final = problem->F != NULL || problem->stream != NULL || problem->blocks != NULL || is_final(&d);
     explain(&d);

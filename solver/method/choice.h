@@ -2,7 +2,7 @@
 #ifndef LAMBERT_METHOD_CHOICE_H
 #define LAMBERT_METHOD_CHOICE_H
 
-#include "solver/method/method.h"
+#include "solver/method/inverse_rows.h"
 
 /* The cost of an answer is counted in coefficients that it reads: 2 n k of low rank, n^2 of the whole
  * inverse. The column of an entry of a sparse matrix is one more number, and the value that it is multiplied
@@ -10,8 +10,14 @@
  * matrix. */
 #define CHOICE_SCATTERED 4.
 
-/* The grounds on which a method may be taken; the highest claim wins, and among equal ones the lowest cost.
- */
+/* Among methods that are weighed by their cost, that of the least error of groups times a power of the cost
+ * is taken: an answer that takes a quarter of the time is worth CHOICE_WORSE times the error. Errors up to
+ * CHOICE_WORSE times epsilon are equal. */
+#define CHOICE_FASTER 4.
+#define CHOICE_WORSE 1.2
+
+/* The grounds on which a method may be taken; the highest claim wins, and among those without a claim errors
+ * and costs decide. */
 typedef enum choice_claim {
     CLAIM_COST,    /* none: by the cost of an answer */
     CLAIM_USUAL,   /* before F is known: the method of most problems */
@@ -24,11 +30,13 @@ typedef enum choice_claim {
 typedef struct candidate {
     const build_method *method;
     choice_claim claim;
-    double cost;    /* INFINITY: it cannot be had, or is not known as nothing depends on it */
-    double left;    /* share of S in the Frobenius norm that it leaves out beyond epsilon, which the light of
-                       single elements lacks; 0: none */
-    bool certain;   /* cost is no estimate, and the operator has no error beside rounding */
-    bool open;      /* F is not known yet, and could show that this method suits it best */
+    double cost; /* INFINITY: it cannot be had, or is not known as nothing depends on it */
+    double left; /* share of S in the Frobenius norm that it leaves out beyond epsilon, which the light of
+                    single elements lacks; 0: none */
+    inverse_rows truth;    /* that errors were measured by; rows NULL: none */
+    sampled_errors errors; /* 0: not measured, as it is no estimate, or nothing else could be taken */
+    bool certain;          /* cost is no estimate, and the operator has no error beside rounding */
+    bool open;             /* F is not known yet, and could show that this method suits it best */
     bool outdone;   /* another candidate keeps the bound for single elements too: cost does not count */
     char found[96]; /* figures estimated from F: "rank estimate 40 at epsilon 0.05"; empty: nothing */
     /* The same as numbers, for `lambert classify --json`, as the member `object` of its document. */
@@ -53,7 +61,7 @@ typedef struct decision {
     size_t n_candidates;
     candidate *candidates;
     const candidate *taken;
-    char reason[256]; /* without the name of the method */
+    char reason[384]; /* without the name of the method */
     bool final;       /* F cannot change it */
 } decision;
 
@@ -71,6 +79,9 @@ void decision_free(decision *d);
 
 /* True once a method has a claim, so that costs decide nothing. */
 bool decision_claimed(const decision *so_far);
+
+/* The error of groups, at least CHOICE_WORSE times epsilon. */
+double candidate_error(const decision *d, const candidate *c);
 
 /* The lowest cost of those that count; INFINITY: none. */
 double decision_rival(const decision *so_far);

@@ -33,7 +33,9 @@ typedef struct build_problem {
     row_stream *stream;          /* of rows of F, in place of F; METHOD_STREAMS */
     const block_factors *blocks; /* in place of F, on a tree with leaves of PLANE_LEAF; METHOD_BLOCKS */
     const uint32_t *order;       /* [n] */
-    double noise;                /* sampling error of S in the 2-norm, about; 0: not known */
+    const uint32_t *group;       /* [n] below n_groups, whose light is asked for; NULL: not known */
+    size_t n_groups;
+    double noise; /* sampling error of S in the 2-norm, about; 0: not known */
     /* NULL where no method needs them: METHOD_GEOMETRY. */
     const double (*centre)[3];      /* [n] centroids, m */
     const float (*normal)[3];       /* [n] unit */

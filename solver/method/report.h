@@ -24,7 +24,7 @@ typedef struct report_step {
 typedef struct build_report {
     const char *method; /* as built; static text */
     char detail[288];   /* figures that the method adds to the reason */
-    char reason[736];   /* why this method, and detail */
+    char reason[864];   /* why this method, and detail */
     size_t n_figures;
     report_figure figures[REPORT_FIGURES];
     size_t n_steps;

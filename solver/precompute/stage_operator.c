@@ -43,6 +43,8 @@ lam_status problem_of(precompute_scene *scene, precompute_factors *factors, unsi
                                .blocks = factors->blocks.n > 0 ? &factors->blocks : NULL,
                                .stream = factors->rays != NULL ? &factors->stream : NULL,
                                .order = scene->order,
+                               .group = scene->m.group,
+                               .n_groups = scene->m.n_groups,
                                .importance = scene->importance.n > 0 ? &scene->importance : NULL,
                                .noise = recipe_noise(&f->recipe)};
     if (!(needs & METHOD_GEOMETRY)) goto done;

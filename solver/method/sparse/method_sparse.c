@@ -195,14 +195,15 @@ static void forecast(const method_scale *scale, const void *own, method_forecast
 /* Thresholds that are tried, and from one to the next. */
 static const double threshold_first = 1e-2, threshold_last = 1e-6, threshold_step = .3162277660168379;
 
-/* The error of a sample over the error allowed: of uniform emission epsilon, which operators of low rank and
- * hierarchical ones keep to; of single elements `single`, epsilon or, if that is more, as much as another
- * method leaves out (weigh). */
+/* The error of a sample over the error allowed: of uniform emission and of groups epsilon, which operators of
+ * low rank and hierarchical ones keep to; of single elements, as they receive and as they emit, `single`:
+ * epsilon or, if that is more, as much as another method leaves out (weigh). */
 static double excess(const sparse_sample *sample, double epsilon, double single) {
-    return fmax(sample->single / single, sample->everywhere / epsilon);
+    return fmax(fmax(sample->single, sample->errors.single) / single,
+                fmax(sample->everywhere, sample->errors.groups) / epsilon);
 }
 
-/* The largest threshold at which truncation alone leaves out no more than is allowed; 0: none. */
+/* The largest threshold at which truncation alone leaves out no more of rows than is allowed; 0: none. */
 static double optimistic_threshold(const inverse_rows *truth, double epsilon, double single,
                                    double entries_most) {
     for (double threshold = threshold_first; threshold > threshold_last; threshold *= threshold_step) {
@@ -215,26 +216,27 @@ static double optimistic_threshold(const inverse_rows *truth, double epsilon, do
 
 /* From the threshold that truncation alone would allow, down until a sparse inverse leaves out no more than
  * is allowed, or has too many entries; between two thresholds both are taken to be powers of it. *entries
- * stays negative where there is none. A threshold that was given is only sampled. */
+ * stays negative where there is none. A threshold that was given is only sampled. out gets the
+ * rows that it was measured by, and its errors. */
 static lam_status find_threshold(const decision *d, double single, double entries_most, double *threshold,
-                                 double *entries, lam_error *error) {
+                                 double *entries, candidate *out, lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem *p = d->problem;
     const bool given = *threshold > 0;
     const double epsilon = d->options->epsilon;
-    inverse_rows truth = {.rows = NULL};
     sparse_sample sample;
     double tried = *threshold, last_entries = 0, last_excess = 0;
-    TRY(inverse_rows_find(p, p->reflectance, d->options->progress, &truth, error));
-    if (!given) tried = optimistic_threshold(&truth, epsilon, single, entries_most);
+    TRY(inverse_rows_find(p, p->reflectance, d->options->progress, &out->truth, error));
+    if (!given) tried = optimistic_threshold(&out->truth, epsilon, single, entries_most);
     while (tried >= threshold_last) {
         if (progress_cancelled(d->options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         const sparse_limits limits = {.threshold = tried, .whole_black = true};
-        TRY(sparse_inverse_sample(p, p->reflectance, &limits, &truth, &sample, error));
+        TRY(sparse_inverse_sample(p, p->reflectance, &limits, &out->truth, &sample, error));
         const double now = excess(&sample, epsilon, single);
         if (given || now <= 1) {
             *threshold = tried;
             *entries = sample.entries;
+            out->errors = sample.errors;
             if (last_entries > 0 && now > 0) {
                 const double part = log(last_excess) / log(last_excess / now);
                 *threshold = tried / threshold_step * pow(threshold_step, part);
@@ -248,7 +250,6 @@ static lam_status find_threshold(const decision *d, double single, double entrie
         tried *= threshold_step;
     }
 done:
-    inverse_rows_free(&truth);
     return status;
 }
 
@@ -288,7 +289,7 @@ static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_e
         (decision_claimed(so_far) && !so_far->thorough))
         return LAM_OK;
     const double most = fmin(decision_rival(so_far) / CHOICE_SCATTERED, so_far->most / 2 / C);
-    TRY(find_threshold(so_far, single, most, &o->threshold, &entries, error));
+    TRY(find_threshold(so_far, single, most, &o->threshold, &entries, out, error));
     if (entries < 0) goto done;
     if (2 * C * entries <= so_far->most) out->cost = CHOICE_SCATTERED * entries;
     candidate_figure(out, "entries", entries);

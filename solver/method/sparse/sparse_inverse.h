@@ -3,7 +3,7 @@
 #ifndef LAMBERT_METHOD_SPARSE_SPARSE_INVERSE_H
 #define LAMBERT_METHOD_SPARSE_SPARSE_INVERSE_H
 
-#include "solver/method/method.h"
+#include "solver/method/inverse_rows.h"
 
 /* --correction. */
 typedef enum sparse_correction { SPARSE_NONE, SPARSE_DELTA, SPARSE_DISCARDED } sparse_correction;
@@ -43,32 +43,20 @@ lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, c
 lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho,
                                    const sparse_limits *limits, double *entries, lam_error *error);
 
-/* A sample of rows of M - I, exact to single precision, against which a sparse inverse is compared: those of
- * positions k n / count, rows [count][n] by position. */
-typedef struct inverse_rows {
-    size_t n, count;
-    float *rows;
-    double square, sum; /* over all entries of the sample */
-} inverse_rows;
-
-void inverse_rows_free(inverse_rows *r);
-
-/* Solves for columns, which are rows by reciprocity: A_i/rho_i (M - I)_ij is symmetric. Cost: a few dozen
- * products of F with a block of vectors. Errors: those of many_lights_solve. */
-lam_status inverse_rows_find(const build_problem *problem, const float *rho, const progress *p,
-                             inverse_rows *out, lam_error *error);
-
 /* Estimates of a sparse inverse from the sampled rows: entries of all rows; single = |M - M~|_F / |M - I|_F,
- * the indirect error of single emitters; everywhere = the same ratio of sums of rows, the error of uniform
- * emission. */
+ * the error of elements that receive; everywhere = the same ratio of sums of rows, the error of uniform
+ * emission; errors as those of any operator. A small element receives by large entries of M and emits by
+ * small ones, so that a threshold may keep its row and lose its column. */
 typedef struct sparse_sample {
     double entries, single, everywhere;
+    sampled_errors errors;
 } sparse_sample;
 
 /* For M~ = M without its entries below the threshold, a lower bound of the entries that algorithm 5 needs. */
 sparse_sample inverse_rows_truncated(const inverse_rows *r, double threshold);
 
-/* For M~ of algorithm 5. Errors: LAM_ERR_MEMORY. */
+/* For M~ of algorithm 5, corrected by the error of uniform emission; columns as those of M without its
+ * entries below the threshold, which algorithm 5 has no more of. Errors: LAM_ERR_MEMORY. */
 lam_status sparse_inverse_sample(const build_problem *problem, const float *rho, const sparse_limits *limits,
                                  const inverse_rows *truth, sparse_sample *out, lam_error *error);
 

@@ -1,12 +1,11 @@
 /* Estimates the size and the error of a sparse inverse from a sample of its rows. */
-#include "solver/method/many_lights.h"
 #include "solver/method/sparse/sparse_inverse.h"
 #include "solver/method/sparse/sparse_rows.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { SAMPLED = 256, COMPARED = 32 };
+enum { SAMPLED = 256 };
 
 lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho,
                                    const sparse_limits *limits, double *entries, lam_error *error) {
@@ -27,57 +26,6 @@ lam_status sparse_inverse_forecast(const build_problem *problem, const float *rh
 done:
     rows_job_end(&job);
     row_work_free(&d);
-    return status;
-}
-
-void inverse_rows_free(inverse_rows *r) {
-    free(r->rows);
-    *r = (inverse_rows){.rows = NULL};
-}
-
-/* Column i of M - I, T [n] = (M - I)_ji, to its row i: with H_ji = T_j / rho'_j, (M - I)_ij = rho'_i H_ji A_j
- * / A_i, where rho' is rho, or 1 in place of 0. */
-static void column_to_row(const build_problem *p, const float *rho, size_t i, const float *T, float *row) {
-    const double own = rho[i] > 0 ? (double)rho[i] : 1;
-    for (size_t position = 0; position < p->n; position++) {
-        const size_t j = p->order[position];
-        const double H = (double)T[j] / (rho[j] > 0 ? (double)rho[j] : 1);
-        row[position] = (float)(own * H * p->area[j] / p->area[i]);
-    }
-}
-
-lam_status inverse_rows_find(const build_problem *problem, const float *rho, const progress *p,
-                             inverse_rows *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = problem->n, count = n < COMPARED ? n : COMPARED;
-    many_lights_report report;
-    inverse_rows found = {.n = n, .count = count};
-    float *E = memory_allocate(count, n * sizeof *E, "rows of an inverse", error);
-    float *T = memory_allocate(count, n * sizeof *T, "rows of an inverse", error);
-    found.rows = memory_allocate(count, n * sizeof *found.rows, "rows of an inverse", error);
-    if (E == NULL || T == NULL || found.rows == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < count; k++) E[k * n + problem->order[k * n / count]] = 1;
-    const many_lights_input unit = {.n = n,
-                                    .F = problem->F,
-                                    .area = problem->area,
-                                    .rho = rho,
-                                    .m = count,
-                                    .E = E,
-                                    .progress = p,
-                                    .stage = "sample the inverse"};
-    TRY(many_lights_solve(&unit, 1e-5, T, &report, error));
-    for (size_t k = 0; k < count; k++)
-        column_to_row(problem, rho, problem->order[k * n / count], T + k * n, found.rows + k * n);
-    for (size_t k = 0; k < count * n; k++) {
-        found.square += (double)found.rows[k] * (double)found.rows[k];
-        found.sum += (double)found.rows[k];
-    }
-    *out = found;
-    found.rows = NULL;
-done:
-    free(E);
-    free(T);
-    inverse_rows_free(&found);
     return status;
 }
 
@@ -102,27 +50,75 @@ sparse_sample inverse_rows_truncated(const inverse_rows *r, double threshold) {
     return sample_of(r, entries, square, sum);
 }
 
+/* A row of M - M~ and the column of its element: figures that are summed in order, so that the bits do not
+ * depend on threads. */
+typedef struct row_lack {
+    double entries, square, sum;
+    double column; /* |column of M - M~| / |column of M - I|, area-weighted */
+    double missing[SAMPLED_GROUPS], light[SAMPLED_GROUPS];
+} row_lack;
+
+/* The column, without entries below the threshold: (M - I)_ji for all j, from row i. */
+static double column_lack(const build_problem *p, const float *rho, double threshold,
+                          const inverse_rows *truth, size_t k) {
+    double square = 0, whole = 0;
+    for (size_t position = 0; position < truth->n; position++) {
+        const size_t j = p->order[position];
+        const double x =
+            inverse_rows_factor(truth, p, rho, k, position) * (double)truth->rows[k * truth->n + position];
+        whole += p->area[j] * x * x;
+        if (x < threshold) square += p->area[j] * x * x;
+    }
+    return whole > 0 ? sqrt(square / whole) : 0;
+}
+
+/* The light of groups that row k lacks once the sum of all that it lacks, for uniform emission, is given back
+ * by the share that a group has of all area. absent [n] by position: the row of M - M~. */
+static void groups_lack(const build_problem *p, const sampled_groups *g, const double *share,
+                        const float *row, const float *absent, row_lack *out) {
+    sampled_groups_sum(g, p, row, out->light);
+    sampled_groups_sum(g, p, absent, out->missing);
+    for (size_t v = 0; v < g->count; v++) out->missing[v] -= out->sum * share[v];
+}
+
+/* Shares of the largest groups in all area. */
+static void find_shares(const build_problem *p, const sampled_groups *g, double share[SAMPLED_GROUPS]) {
+    double all = 0;
+    for (size_t v = 0; v < g->count; v++) share[v] = 0;
+    for (size_t i = 0; i < p->n; i++) {
+        all += p->area[i];
+        for (size_t v = 0; v < g->count; v++)
+            if (p->group[i] == g->group[v]) share[v] += p->area[i];
+    }
+    for (size_t v = 0; v < g->count; v++) share[v] /= all;
+}
+
 lam_status sparse_inverse_sample(const build_problem *problem, const float *rho, const sparse_limits *limits,
                                  const inverse_rows *truth, sparse_sample *out, lam_error *error) {
     lam_status status = LAM_OK;
-    rows_job job;
+    rows_job job = {.position = NULL};
+    sampled_groups groups;
     const size_t n = problem->n;
     bool failed = false;
-    double entries = 0, square = 0, sum = 0;
-    double *missing = memory_allocate(truth->count, 3 * sizeof *missing, "rows of a sparse inverse", error);
-    if (missing == NULL) return LAM_ERR_MEMORY;
+    double share[SAMPLED_GROUPS], entries = 0, square = 0, sum = 0, columns = 0;
+    row_lack *lacks = memory_allocate(truth->count, sizeof *lacks, "rows of a sparse inverse", error);
+    if (lacks == NULL) return LAM_ERR_MEMORY;
+    TRY(sampled_groups_find(problem, &groups, error));
+    find_shares(problem, &groups, share);
     TRY(rows_job_begin(problem, rho, limits, &job, error));
 #pragma omp parallel
     {
         row_work d;
         lam_error own = {.message = ""};
-        const bool ready = row_work_make(n, &d, &own) == LAM_OK;
+        float *absent = memory_allocate(n, sizeof *absent, "rows of a sparse inverse", &own);
+        const bool ready = row_work_make(n, &d, &own) == LAM_OK && absent != NULL;
 #pragma omp for schedule(dynamic, 1)
         for (size_t k = 0; k < truth->count; k++) {
             const float *row = truth->rows + k * n;
-            double discarded, *lack = missing + 3 * k;
+            double discarded;
             size_t bounces;
             uint64_t length = 0;
+            row_lack *lack = lacks + k;
             d.used = 0;
             if (ready) row_work_compute(&job, k * n / truth->count, &d, &discarded, &bounces);
             if (!ready || !row_work_store(&d, &length)) {
@@ -130,25 +126,34 @@ lam_status sparse_inverse_sample(const build_problem *problem, const float *rho,
                 failed = true;
                 continue;
             }
-            lack[0] = (double)length;
+            lack->entries = (double)length;
             for (size_t j = 0, e = 0; j < n; j++) {
                 const double there = e < length && d.indices[e] == j ? (double)d.data[e++] : 0;
                 const double x = (double)row[j] - there;
-                lack[1] += x * x;
-                lack[2] += x;
+                absent[j] = (float)x;
+                lack->square += x * x;
+                lack->sum += x;
             }
+            lack->column = column_lack(problem, rho, limits->threshold, truth, k);
+            groups_lack(problem, &groups, share, row, absent, lack);
         }
         row_work_free(&d);
+        free(absent);
     }
     if (failed) FAIL(error, LAM_ERR_MEMORY, "sparse inverse: out of memory");
-    for (size_t k = 0; k < truth->count; k++) { /* in order, so that the bits do not depend on threads */
-        entries += missing[3 * k];
-        square += missing[3 * k + 1];
-        sum += missing[3 * k + 2];
+    for (size_t k = 0; k < truth->count; k++) {
+        entries += lacks[k].entries;
+        square += lacks[k].square;
+        sum += lacks[k].sum;
+        columns += lacks[k].column;
+        sampled_groups_add(&groups, problem->area[problem->order[k * n / truth->count]], lacks[k].missing,
+                           lacks[k].light);
     }
     *out = sample_of(truth, entries, square, sum);
+    out->errors =
+        (sampled_errors){.single = columns / (double)truth->count, .groups = sampled_groups_mean(&groups)};
 done:
     rows_job_end(&job);
-    free(missing);
+    free(lacks);
     return status;
 }
