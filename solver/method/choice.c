@@ -52,7 +52,7 @@ double candidate_error(const decision *d, const candidate *c) {
     return fmax(CHOICE_WORSE * d->options->epsilon, c->errors.groups);
 }
 
-/* What a candidate is judged by: the lower, the better. */
+/* The weight of a candidate: the lower, the better. */
 static double weight_of(const decision *d, const candidate *c) {
     if (c->claim > CLAIM_COST) return c->cost;
     return candidate_error(d, c) * pow(c->cost, log(CHOICE_WORSE) / log(CHOICE_FASTER));
