@@ -276,7 +276,7 @@ mesh_lack mesh_lack_of_bin(const error_by_group *e, const light_sizes *of, size_
                               .sky_power = sqrt(of->sky.power2) + sqrt(of->sent.power2),
                               .sky_tiles = squares > 0 ? (of->sky.power2 + of->sent.power2) / squares : 0,
                               .bounced = of->quantity == LAM_INDIRECT,
-                              .whole_scale = of->whole.mesh_scale};
+                              .whole = of->whole.mesh};
     return mesh_lack_of(&e->mesh, &light, bin % e->figures.n_groups);
 }
 

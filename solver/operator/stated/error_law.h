@@ -65,7 +65,7 @@ emission_size emission_size_sum(const emission_size *a, const emission_size *b);
  * groups. */
 typedef struct whole_light {
     double *weights;
-    double mesh_scale;
+    mesh_whole mesh;
     emission_size rest;
 } whole_light;
 

@@ -56,6 +56,7 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, double ev
                      .groups_emitters = from->groups_emitters,
                      .even_tiles = even_tiles,
                      .common_light = common(from, MESH_OF_SINGLE, MESH_OF_EVEN),
+                     .even_light = from->light_of[MESH_OF_EVEN],
                      .common_sky = common(from, MESH_OF_SKY_TILE, MESH_OF_SKY_EVEN)};
     *out = (mesh_shares){.n_groups = 0};
     for (int k = 0; k < MESH_FIGURES; k++) {
@@ -94,15 +95,23 @@ static double way(double emitters, double n, double N) {
     return fmin(fmax(log(fmax(emitters, 1) / n) / log(N / n), 0), 1);
 }
 
-/* Whole groups: squares follow log N from those of groups to those of an even light, which may have no error
- * at all. */
-static double of_groups(const mesh_shares *m, double emitters, double scale, size_t group) {
+/* Squares follow log N from those of groups to those of an even light, which may have no error at all. */
+static double of_groups(const mesh_shares *m, double emitters, size_t group) {
     const double *groups = m->of[MESH_OF_GROUPS], *even = m->of[MESH_OF_EVEN];
     const double N = m->groups_emitters, all = m->even_emitters;
     if (groups == NULL || !(N > 0)) return even != NULL ? even[group] : 0;
-    if (even == NULL || !(all > N)) return scale * groups[group];
+    if (even == NULL || !(all > N)) return groups[group];
     const double t = way(emitters, N, all);
-    return (1 - t) * scale * groups[group] + t * even[group];
+    return (1 - t) * groups[group] + t * even[group];
+}
+
+/* Groups even out each other's light no further than all elements do. */
+static double of_whole(const mesh_shares *m, const mesh_light *light, size_t group) {
+    const double *groups = m->of[MESH_OF_GROUPS], *even = m->of[MESH_OF_EVEN];
+    const mesh_whole *w = &light->whole;
+    if (!w->known || groups == NULL || even == NULL) return of_groups(m, light->emitters, group);
+    const double alone2 = w->scale * groups[group];
+    return fmax(w->alone * alone2 + (1 - w->alone) * w->common * even[group], fmin(alone2, even[group]));
 }
 
 /* (s m_1^2 + (1 - s) q m_e^2) / (s + (1 - s) q). */
@@ -121,7 +130,7 @@ static double of_elements(const mesh_shares *m, double emitters, size_t group) {
         return of_many(single[group], even[group], m->common_light, emitters, m->even_emitters);
     if (single == NULL || groups == NULL || !(N > 1) || !(emitters < N) || !(groups[group] > 0) ||
         !(single[group] > 0))
-        return of_groups(m, emitters, 1, group);
+        return of_groups(m, emitters, group);
     return single[group] * pow(groups[group] / single[group], way(emitters, 1, N));
 }
 
@@ -134,7 +143,7 @@ static double of_emission(const mesh_shares *m, const mesh_light *light, size_t 
     const double part = lamps != NULL ? fmin(light->of_lamps * unit, 1) : 0;
     const double whole = fmin(light->of_whole * unit, 1 - part), rest = 1 - part - whole;
     double sum = part > 0 ? part * lamps[group] : 0;
-    if (whole > 0) sum += whole * of_groups(m, light->emitters, light->whole_scale, group);
+    if (whole > 0) sum += whole * of_whole(m, light, group);
     return rest > 0 ? sum + rest * of_elements(m, light->others, group) : sum;
 }
 

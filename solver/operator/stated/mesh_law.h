@@ -12,6 +12,7 @@ typedef struct mesh_shares {
     double even_emitters, groups_emitters; /* effective numbers; 0: not stated */
     double even_tiles;                     /* of an even sky */
     double common_light, common_sky; /* q below, of elements and of tiles; 0: not stated, of an older store */
+    double even_light;               /* of the light that all elements emit, as group_light; 0: not stated */
     /* [n_groups], of groups that are lit alone: m_g^2 and the light l_g of 1 W. One that was not measured has
      * the share of groups and the mean light of the others. NULL: not stated. */
     double *group_share2, *group_light;
@@ -28,6 +29,15 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, double ev
 
 bool mesh_shares_known(const mesh_shares *m);
 
+/* The variation of the light of whole groups, by what is known of each of them (whole_law.h): the share of it
+ * that each lights alone, the rest being what they light in common; the factor from the square of the share
+ * of groups to that of these; and from that of an even light to that of what they light in common. Zeroed:
+ * not known, it goes by the number of emitters. */
+typedef struct mesh_whole {
+    bool known;
+    double alone, scale, common;
+} mesh_whole;
+
 /* The light of an answer: the power that elements emit, the parts of it that come from groups with lamps and
  * from other groups that shine evenly as wholes, the effective number of emitters, that of all but such
  * groups, the power that a sky sends on, and the effective number of its tiles; bounced: the direct light of
@@ -35,18 +45,19 @@ bool mesh_shares_known(const mesh_shares *m);
 typedef struct mesh_light {
     double power, of_lamps, of_whole, emitters, others, sky_power, sky_tiles;
     bool bounced;
-    double whole_scale; /* of the square of the share of whole groups: whole_light.mesh_scale */
+    mesh_whole whole;
 } mesh_light;
 
 /* Squares of the shares that a group lacks. m^2, what its light varies by inside elements: squares of parts
  * of a light are weighted by their powers. Light from groups with lamps has that of the lamps, and that of
- * other whole groups the share of groups, which goes over to that of an even light by log N, the effective
- * number of emitters. N emitters here and there lie between a single one, m_1^2, and an even light of N_e,
- * m_e^2: what they light in common, q of the square of the light of one, varies as the even light, and the
- * rest as the single one, m^2 = (s m_1^2 + (1 - s) q m_e^2) / (s + (1 - s) q),    s = (1/N - 1/N_e) / (1 -
- * 1/N_e). In a maze q is a hundredth, and twenty emitters vary as one does. The same holds of the tiles of a
- * sky, single ones and all, of whose two kinds of skies the larger counts; of their bounced light one tile
- * counts as a group, from where it falls, and all as an even light.
+ * other whole groups what they light alone and in common (mesh_whole); of older stores the share of groups,
+ * which goes over to that of an even light by log N, the effective number of emitters. N emitters here and
+ * there lie between a single one, m_1^2, and an even light of N_e, m_e^2: what they light in common, q of the
+ * square of the light of one, varies as the even light, and the rest as the single one, m^2 = (s m_1^2 + (1 -
+ * s) q m_e^2) / (s + (1 - s) q),    s = (1/N - 1/N_e) / (1 - 1/N_e). In a maze q is a hundredth, and twenty
+ * emitters vary as one does. The same holds of the tiles of a sky, single ones and all, of whose two kinds of
+ * skies the larger counts; of their bounced light one tile counts as a group, from where it falls, and all as
+ * an even light.
  *
  * The mean of a group is off by less: light is sent by elements as if it were even over them, and where it is
  * not, the part of it that arrives varies with it, so that the error is of second order, about

@@ -65,8 +65,17 @@ START_TEST(whole_groups_have_their_own_shares) {
         ck_assert_double_eq_tol(m.group_light[g], lights[g], 1e-12);
     }
     ck_assert_ptr_null(older.group_light);
-    const mesh_light whole = {.power = 7, .of_whole = 7, .emitters = 16, .whole_scale = .04};
-    ck_assert_double_eq_tol(share2(&m, &whole, 0), .04 * .01, 1e-12);
+    const mesh_light whole = {.power = 7,
+                              .of_whole = 7,
+                              .emitters = 256,
+                              .whole = {.known = true, .alone = .75, .scale = .04, .common = 5}};
+    ck_assert_double_eq_tol(share2(&m, &whole, 0), .75 * .04 * .01 + .25 * 5 * .0004, 1e-12);
+    /* Groups that even out the light of each other leave no less than all elements do. */
+    const mesh_light smooth = {.power = 7,
+                               .of_whole = 7,
+                               .emitters = 256,
+                               .whole = {.known = true, .alone = .5, .scale = 1, .common = -30}};
+    ck_assert_double_eq_tol(share2(&m, &smooth, 0), .0004, 1e-12);
     mesh_shares_free(&older);
     mesh_shares_free(&m);
 }
@@ -103,10 +112,9 @@ START_TEST(emitters_share_what_they_light_in_common) {
         ck_assert_double_eq_tol(share2(&m, &given, 0), off / light, 1e-12);
     }
     /* Whole groups are no others, whatever they are. */
-    const mesh_light whole = {.power = 2, .of_whole = 1, .whole_scale = 1, .emitters = 16, .others = 1};
+    const mesh_light whole = {.power = 2, .of_whole = 1, .emitters = 16, .others = 1};
     ck_assert_double_eq_tol(share2(&m, &whole, 0), (.01 + .16) / 2, 1e-12);
-    const mesh_light mixed = {
-        .power = 4, .of_lamps = 2, .of_whole = 1, .whole_scale = 1, .emitters = 16, .others = 1};
+    const mesh_light mixed = {.power = 4, .of_lamps = 2, .of_whole = 1, .emitters = 16, .others = 1};
     ck_assert_double_eq_tol(share2(&m, &mixed, 1), (2 * .04 + .04 + .64) / 4, 1e-12);
     mesh_shares_free(&m);
 }
@@ -157,7 +165,7 @@ START_TEST(scene_without_lamps) {
     from.variation[MESH_OF_LAMPS] = from.reflected[MESH_OF_LAMPS] = NULL;
     mesh_shares m = made(&from);
     const mesh_light one = {.power = 1, .emitters = 1, .others = 1},
-                     whole = {.power = 1, .of_whole = 1, .whole_scale = 1, .emitters = 16, .others = 0};
+                     whole = {.power = 1, .of_whole = 1, .emitters = 16, .others = 0};
     ck_assert_double_eq_tol(share2(&m, &one, 0), .16, 1e-12);
     ck_assert_double_eq_tol(share2(&m, &whole, 0), .01, 1e-12);
     mesh_shares_free(&m);

@@ -108,9 +108,14 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     const mesh_lack lack = mesh_lack_of_bin(&with, &of, DESK);
     ck_assert_double_eq_tol(lack.elements2 - lack.mean2, (6 * .01 + 3 * .16) / 9, 1e-12);
     whole_light_free(&of.whole);
-    /* A lamp that was lit alone, and left a quarter of the square of what groups leave, has that. */
-    double own2[G] = {0}, light[G] = {0}, all[] = {.01, .01, .01, .01};
+    /* A lamp that was lit alone, and left a quarter of the square of what groups leave, has that, although an
+     * even light has fewer emitters than it. */
+    double own2[] = {.01, .01, .01, .01}, light[] = {2, 2, 2, 2}, all[] = {.01, .01, .01, .01, .01};
+    double even[] = {.001, .001, .001, .001, .001};
     with.mesh.of[MESH_OF_GROUPS] = all;
+    with.mesh.of[MESH_OF_EVEN] = even;
+    with.mesh.even_light = 2.5;
+    with.mesh.even_emitters = 1;
     with.mesh.group_share2 = own2;
     with.mesh.group_light = light;
     own2[LAMP] = .0025;
@@ -119,18 +124,35 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     const mesh_lack lit = mesh_lack_of_bin(&with, &of, DESK);
     ck_assert_double_eq_tol(lit.elements2 - lit.mean2, (6 * .0025 + 3 * .16) / 9, 1e-12);
     whole_light_free(&of.whole);
-    /* Lamp and wall together, 6 W and 8 W of one channel, by the squares of their powers; a lamp of the scene
-     * has no part in it. */
+    /* Lamp and wall together, 6 W and 8 W of one channel, by the squares of their powers and what all groups
+     * light in common; a lamp of the scene has no part in it. */
     const float both[C * N] = {0, 1, 1, 1, 1, 0, 0, 0, 0, 0};
     bool lamps[G] = {false, true, false};
     own2[WALL] = .04;
     light[WALL] = 1;
     ck_assert(whole_light_find(&with, &scene, both, &of.whole));
-    ck_assert_double_eq_tol(of.whole.mesh_scale, (36 * 3 * .0025 + 64 * .04) / (36 * 3 + 64) / .01, 1e-12);
+    double whole = 0, of_areas = 0, alone_light = 0, alone_varies = 0;
+    for (size_t b = 0; b < with.n_bins; b++) whole += with.area[b];
+    for (size_t g = 0; g < G; g++) {
+        double a = 0;
+        for (size_t b = g; b < with.n_bins; b += G) a += with.area[b] / whole;
+        of_areas += a * a;
+        alone_light += a * a * light[g];
+        alone_varies += a * a * light[g] * own2[g];
+    }
+    const double in_common = (2.5 - alone_light) / (1 - of_areas), one_light = 36 * 3 + 64,
+                 varies = (2.5 * .001 - alone_varies) / (1 - of_areas), pairs = 14 * 14 - 36 - 64;
+    ck_assert_double_gt(in_common, 0);
+    const mesh_light shines = {.power = 14, .of_whole = 14, .emitters = 2, .whole = of.whole.mesh};
+    const mesh_lack together = mesh_lack_of(&with.mesh, &shines, DESK);
+    ck_assert_double_eq_tol(together.elements2 - together.mean2,
+                            (36 * 3 * .0025 + 64 * .04 + pairs * varies) / (one_light + pairs * in_common),
+                            1e-12);
     whole_light_free(&of.whole);
     with.mesh.lamps = lamps;
     ck_assert(whole_light_find(&with, &scene, both, &of.whole));
-    ck_assert_double_eq_tol(of.whole.mesh_scale, 4, 1e-12);
+    ck_assert_double_eq_tol(of.whole.mesh.scale, 4, 1e-12);
+    ck_assert_double_eq_tol(of.whole.mesh.alone, 1, 1e-12);
     whole_light_free(&of.whole);
 }
 END_TEST
