@@ -112,7 +112,7 @@ lam_status error_by_group_make(store *s, const error_scene *scene, stated_figure
     find_sums(scene, &e);
     TRY(find_reflecting(scene, &e, error));
     TRY(find_whole(&e, error));
-    TRY(mesh_shares_make(&from->mesh, G, even_tiles(&e.figures), &e.mesh, error));
+    TRY(mesh_shares_make(&from->mesh, G, e.area, even_tiles(&e.figures), &e.mesh, error));
     *out = e;
     e = (error_by_group){.n_bins = 0};
 done:

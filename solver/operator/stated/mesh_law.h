@@ -8,7 +8,8 @@
 /* Squares of shares, mean square variation over mean square of B - E. Zeroed: nothing is stated. */
 typedef struct mesh_shares {
     size_t n_groups;
-    double *of[MESH_FIGURES];              /* [n_groups + 1], the last of the scene; NULL: not stated */
+    double *of[MESH_FIGURES];              /* [n_groups + 1], the last of all groups that exchange light with
+                                              others; NULL: not stated */
     double even_emitters, groups_emitters; /* effective numbers; 0: not stated */
     double even_tiles;                     /* of an even sky */
     double common_light, common_sky; /* q below, of elements and of tiles; 0: not stated, of an older store */
@@ -21,11 +22,11 @@ typedef struct mesh_shares {
 } mesh_shares;
 void mesh_shares_free(mesh_shares *m);
 
-/* even_tiles: the effective number of tiles of an even sky, 0 without one. A group that was not looked at, or
- * that the light did not reach, has the share of the scene, and so have all groups of an older store. Errors:
- * LAM_ERR_MEMORY. */
-lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, double even_tiles, mesh_shares *out,
-                            lam_error *error);
+/* area [n_groups] of groups; even_tiles: the effective number of tiles of an even sky, 0 without one. A group
+ * that was not looked at, or that the light did not reach, has the share of the scene, and so have all groups
+ * of an older store. Errors: LAM_ERR_MEMORY. */
+lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, const double *area, double even_tiles,
+                            mesh_shares *out, lam_error *error);
 
 bool mesh_shares_known(const mesh_shares *m);
 
@@ -59,11 +60,13 @@ typedef struct mesh_light {
  * skies the larger counts; of their bounced light one tile counts as a group, from where it falls, and all as
  * an even light.
  *
- * The mean of a group is off by less: light is sent by elements as if it were even over them, and where it is
- * not, the part of it that arrives varies with it, so that the error is of second order, about
- *     c = max(m_g^2, m^2),
- * m being the share of the scene, where the light comes from. Elements have m_g^2 + c^2. 0 where nothing is
- * stated. */
+ * The mean of a group is off by less: light is sent by elements as if it were even over them. By reciprocity
+ * the mean is the product of the light that is sent and of the light of the group where it alone shines, so
+ * that it is off by that of both variations inside elements, about
+ *     c_g = sqrt(2) m s_g,
+ * m being the share of the scene where light is sent from, m_g if that is more, and s_g that of the light of
+ * group g. Elements are off by m_g and by c = m s_1 / sqrt(2), s_1 that of single elements; squares add up. 0
+ * where nothing is stated; stores without s have m in its place. */
 typedef struct mesh_lack {
     double elements2, mean2;
 } mesh_lack;

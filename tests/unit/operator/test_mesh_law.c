@@ -7,7 +7,8 @@
 enum { G = 3 };
 /* The third group was not looked at. */
 static double lamps[] = {.1, .2, 0}, even[] = {.02, .04, 0}, single[] = {.4, .8, 0}, groups[] = {.1, .2, 0},
-              sky[] = {.3, .1, 0}, cloudy[] = {.2, .2, 0}, ones[] = {1, 1, 0}, power[] = {0, 5, 0};
+              sky[] = {.3, .1, 0}, cloudy[] = {.2, .2, 0}, ones[] = {1, 1, 0}, power[] = {0, 5, 0},
+              areas[] = {1, 3, 5};
 static const mesh_figures figures = {.has_lights = true,
                                      .has_even = true,
                                      .has_skies = true,
@@ -26,16 +27,23 @@ static const mesh_figures figures = {.has_lights = true,
                                      .reflected = {ones, ones, ones, ones, ones, ones},
                                      .lights_power = power};
 
-/* m^2 without the part of second order. */
+/* m_g^2 of the share that elements lack, m_g^2 + M^2 s_1^2 / 2, M = max(m_g, m); of older stores s_1 is M. */
+static double without_sent(double elements2, double scene2, const double *one2) {
+    const double alone = one2 != NULL ? elements2 / (1 + one2[G] / 2) : sqrt(1 + 2 * elements2) - 1;
+    if (alone >= scene2) return alone;
+    return elements2 - scene2 * (one2 != NULL ? one2[G] : scene2) / 2;
+}
+
 static double share2(const mesh_shares *m, const mesh_light *light, size_t group) {
-    const mesh_lack lack = mesh_lack_of(m, light, group);
-    return lack.elements2 - lack.mean2;
+    const double *one2 = m->of[MESH_OF_SINGLE];
+    const double scene2 = without_sent(mesh_lack_of(m, light, G).elements2, 0, one2);
+    return without_sent(mesh_lack_of(m, light, group).elements2, scene2, one2);
 }
 
 static mesh_shares made(const mesh_figures *from) {
     mesh_shares m;
     lam_error error = {0};
-    ck_ok(mesh_shares_make(from, G, 100, &m, &error));
+    ck_ok(mesh_shares_make(from, G, areas, 100, &m, &error));
     return m;
 }
 
@@ -45,9 +53,11 @@ START_TEST(light_of_lamps_has_their_share) {
     ck_assert_double_eq_tol(share2(&m, &own, 0), .01, 1e-12);
     ck_assert_double_eq_tol(share2(&m, &own, 1), .04, 1e-12);
     ck_assert_double_eq_tol(share2(&m, &own, 2), .15 * .15, 1e-12); /* as the scene */
-    /* The mean of the group lacks a part of second order, by its own share and that of the scene. */
-    const double c = .15 * .15;
-    ck_assert_double_eq_tol(mesh_lack_of(&m, &own, 0).mean2, c * c, 1e-12);
+    /* The mean of the group lacks a part of second order: by the light that is sent, of the scene or its own,
+     * and by that of the group. */
+    const double scene2 = (.01 + 3 * .04) / 4, groups2 = (.01 + 3 * .04) / 4;
+    ck_assert_double_eq_tol(mesh_lack_of(&m, &own, 0).mean2, 2 * scene2 * groups2, 1e-12);
+    ck_assert_double_eq_tol(mesh_lack_of(&m, &own, 1).mean2, 2 * .04 * groups2, 1e-12);
     mesh_shares_free(&m);
 }
 END_TEST

@@ -96,7 +96,8 @@ END_TEST
 
 /* A group that shines evenly has the mesh's figure of groups, what else shines that of elements. */
 START_TEST(the_mesh_tells_whole_groups_from_elements) {
-    double single[] = {.16, .16, .16, .16}, groups[] = {.01, .01, .01, .01};
+    double single[] = {.16, .16, .16, .16, .16}, groups[] = {.01, .01, .01, .01, .01};
+    const double sent = 1 + .16 / 2; /* as all groups are alike, elements lack m^2 (1 + s_1^2 / 2) */
     error_by_group with = stated;
     with.mesh = (mesh_shares){
         .n_groups = G, .of = {[MESH_OF_SINGLE] = single, [MESH_OF_GROUPS] = groups}, .groups_emitters = 16};
@@ -106,7 +107,7 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     for (size_t c = 0; c < C; c++) emission_size_add(&of.size, N, area, E + c * N);
     ck_assert(whole_light_find(&with, &scene, E, &of.whole));
     const mesh_lack lack = mesh_lack_of_bin(&with, &of, DESK);
-    ck_assert_double_eq_tol(lack.elements2 - lack.mean2, (6 * .01 + 3 * .16) / 9, 1e-12);
+    ck_assert_double_eq_tol(lack.elements2 / sent, (6 * .01 + 3 * .16) / 9, 1e-12);
     whole_light_free(&of.whole);
     /* A lamp that was lit alone, and left a quarter of the square of what groups leave, has that, although an
      * even light has fewer emitters than it. */
@@ -122,7 +123,8 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     light[LAMP] = 3;
     ck_assert(whole_light_find(&with, &scene, E, &of.whole));
     const mesh_lack lit = mesh_lack_of_bin(&with, &of, DESK);
-    ck_assert_double_eq_tol(lit.elements2 - lit.mean2, (6 * .0025 + 3 * .16) / 9, 1e-12);
+    ck_assert_double_eq_tol(lit.elements2 / sent, (6 * .0025 + 3 * .16) / 9, 1e-12);
+    ck_assert_double_eq_tol(lit.mean2, 2 * lit.elements2 / sent * .01, 1e-12); /* s_g of the desk */
     whole_light_free(&of.whole);
     /* Lamp and wall together, 6 W and 8 W of one channel, by the squares of their powers and what all groups
      * light in common; a lamp of the scene has no part in it. */
@@ -145,7 +147,7 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     ck_assert_double_gt(in_common, 0);
     const mesh_light shines = {.power = 14, .of_whole = 14, .emitters = 2, .whole = of.whole.mesh};
     const mesh_lack together = mesh_lack_of(&with.mesh, &shines, DESK);
-    ck_assert_double_eq_tol(together.elements2 - together.mean2,
+    ck_assert_double_eq_tol(together.elements2 / sent,
                             (36 * 3 * .0025 + 64 * .04 + pairs * varies) / (one_light + pairs * in_common),
                             1e-12);
     whole_light_free(&of.whole);
