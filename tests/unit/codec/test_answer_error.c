@@ -401,7 +401,7 @@ START_TEST(the_mesh_has_its_part_of_skies) {
         const double light = r[k] + (double)rho[k] * (double)H0[k], A = area[k % N];
         const double c = fmax(m2[bin[k % N]], m2[G]);
         light2 += A * light * light;
-        lacks2 += A * light * light * (m2[bin[k % N]] + c * c);
+        lacks2 += A * light * light * (m2[bin[k % N]] + c * c / 2);
     }
     for (int sent = 0; sent < 2; sent++) {
         float values[C * N];
@@ -436,7 +436,7 @@ START_TEST(the_mesh_is_a_part) {
     double light2[G] = {0};
     for (size_t k = 0; k < C * N; k++) light2[bin[k % N]] += area[k % N] * r[k] * r[k];
     const double c[] = {.04, .09}; /* that of the scene, and the own one */
-    const double lacks2 = light2[0] * (.01 + c[0] * c[0]) + light2[1] * (.09 + c[1] * c[1]);
+    const double lacks2 = light2[0] * (.01 + c[0] * c[0] / 2) + light2[1] * (.09 + c[1] * c[1] / 2);
     ck_assert_double_eq_tol(found.parts.mesh, sqrt(lacks2 / (light2[0] + light2[1])), 1e-6);
     /* Without a sky the rest is the indirect error, where that is small. */
     ck_assert(answer_error_of(&stated, &scene, &of, &before));
@@ -446,11 +446,11 @@ START_TEST(the_mesh_is_a_part) {
     of.selected = selected;
     of.whole = true;
     ck_assert(answer_error_of(&with, &scene, &of, &found));
-    ck_assert_double_eq_tol(found.parts.mesh, sqrt(.09 + c[1] * c[1]), 1e-6);
+    ck_assert_double_eq_tol(found.parts.mesh, sqrt(.09 + c[1] * c[1] / 2), 1e-6);
     of = answer_of(LAM_RADIOSITY, values);
     ck_assert(name_errors_of(&with, &scene, &of, &request, names));
-    ck_assert_double_eq_tol(names[0].parts.mesh, c[0], 1e-6);
-    ck_assert_double_eq_tol(names[1].parts.mesh, (3 * c[0] + 4 * c[1]) / 7, 1e-6);
+    ck_assert_double_eq_tol(names[0].parts.mesh, sqrt(2) * c[0], 1e-6);
+    ck_assert_double_eq_tol(names[1].parts.mesh, sqrt(2) * (3 * c[0] + 4 * c[1]) / 7, 1e-6);
 }
 END_TEST
 
