@@ -40,11 +40,11 @@ void plan_explain(precompute_plan *plan, const char *format, ...) __attribute__(
 bool plan_pairs_follow_epsilon(const precompute_job *job, const build_method *method);
 
 /* The recipes that options and quality ask for: all pairs, as presets take them where they can; near pairs
- * and rays; of the judge's samples, with --rays given of as many also where a store's form factors had
- * others. The accuracy of pairs at --quality high. */
+ * and rays; of the judge's samples of n elements, with --rays given of as many also where a store's form
+ * factors had others. The accuracy of pairs at --quality high. */
 recipe plan_pairs_recipe(const precompute_job *job, const precompute_plan *plan);
 recipe plan_near_recipe(const precompute_job *job, const precompute_plan *plan);
-recipe plan_judge_recipe(const precompute_job *job, const precompute_plan *plan, uint64_t seed);
+recipe plan_judge_recipe(const precompute_job *job, const precompute_plan *plan, double n, uint64_t seed);
 double plan_finest_accuracy(void);
 
 /* The method that n elements are going to get, as far as it is known before their form factors are; *final:

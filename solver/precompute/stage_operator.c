@@ -333,7 +333,7 @@ lam_status stage_judge(const precompute_job *job, precompute_scene *scene, const
         /* Independent of the F that was factorized: kept form factors may have any seed. */
         do own = precompute_seed(seed, purpose++);
         while (own == factors->f.recipe.seed);
-        j.halves[h] = plan_judge_recipe(job, plan, own);
+        j.halves[h] = plan_judge_recipe(job, plan, (double)scene->m.n, own);
     }
     TRY(judging_run(&j, made->op, &made->errors, error));
     if (scene->importance.emits != NULL) terminal_log(job->t, "errors of emissions of the sources alone:");
