@@ -113,7 +113,7 @@ recipe plan_judge_recipe(const precompute_job *job, const precompute_plan *plan,
     if (job->options->from_store && recipe_source(&of) == &source_rays && asked.rays != OPTION_AUTO)
         of.rays = (size_t)asked.rays;
     recipe judges = recipe_of_judge(&of, rays_of(&asked), seed);
-    if (recipe_can(&of, SOURCE_NOISE) && n * (double)of.rays > judge_rays_enough) judges.rays /= 2;
+    if (recipe_source(&of) == &source_rays && n * (double)of.rays > judge_rays_enough) judges.rays /= 2;
     return judges;
 }
 

@@ -19,7 +19,7 @@ block_factors blocks_of(const mesh *m, plane_tree *tree, double open, double sha
 
 block_factors blocks_of_seed(const mesh *m, plane_tree *tree, uint64_t seed) {
     const block_options options = {
-        .open = blocks_open, .shadow = blocks_shadow, .exact = 1e-6, .by_scene = seed % 2 == 1, .seed = seed};
+        .open = blocks_open, .shadow = blocks_shadow, .exact = 1e-6, .scene_every = seed % 2, .seed = seed};
     return blocks_with(m, tree, &options, NULL);
 }
 

@@ -123,10 +123,13 @@ static double bound_times(const block_finder *k, uint32_t a, uint32_t b) {
     return i == NULL ? 1 : i->share_of_bounds * pow(importance_between(&k->important, a, b), power);
 }
 
-/* The candidates that segments are tested against. */
-static const candidates *segments_among(const block_walk *w, const candidates *among) {
+/* The candidates that segments of a block are tested against. */
+static const candidates *segments_among(const block_walk *w, uint32_t a, uint32_t b,
+                                        const candidates *among) {
     static const candidates whole_scene = {.count = CANDIDATES_UNKNOWN};
-    return w->finder->options->by_scene ? &whole_scene : among;
+    const unsigned every = w->finder->options->scene_every;
+    if (every == 0 || random_hash((uint64_t)a << 32 | b) % every != 0) return among;
+    return &whole_scene;
 }
 
 static void count_segments(block_walk *w, const candidates *among, double segments) {
@@ -254,7 +257,7 @@ static bool ends_here(const block_walk *w, uint32_t a, uint32_t b, double most, 
 
 static lam_status end_shaded(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
                              const candidates *among) {
-    const candidates *tested = segments_among(w, among);
+    const candidates *tested = segments_among(w, a, b, among);
     if (are_elements(w->finder, a, b)) return add_shaded_pair(w, a, b, most, crosses, tested);
     return add_shaded(w, a, b, tested);
 }

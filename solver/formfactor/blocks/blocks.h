@@ -10,11 +10,11 @@
 typedef struct block_options {
     double
         open; /* of blocks that nothing crosses: bound of the 2-norm of their error in S = A^1/2 F A^-1/2 */
-    double shadow; /* of partly hidden blocks: bound of their own 2-norm */
-    double exact;  /* of single pairs, unoccluded: relative tolerance */
-    bool by_scene; /* segments are cast against the whole scene by Embree, also where few pieces stand between
-                    */
-    uint64_t seed; /* of visibility segments */
+    double shadow;        /* of partly hidden blocks: bound of their own 2-norm */
+    double exact;         /* of single pairs, unoccluded: relative tolerance */
+    unsigned scene_every; /* segments of one block in so many are cast against the whole scene by Embree, also
+                             where few pieces stand between; 0: none */
+    uint64_t seed;        /* of visibility segments */
     /* Found: an error of a block counts as often as the importance between its two sides (importance.h), so
      * that both bounds are over it, times the share of bounds. NULL: all are 1. */
     const importance *importance;

@@ -267,7 +267,7 @@ START_TEST(pairs_are_tested_by_their_light) {
                 const block_options options = {.open = 1e-5,
                                                .shadow = cases[_i].bound,
                                                .exact = 1e-6,
-                                               .by_scene = by_scene == 1,
+                                               .scene_every = by_scene == 1,
                                                .seed = seed};
                 plane_tree tree;
                 block_report report;
@@ -316,7 +316,7 @@ START_TEST(candidates_of_a_pair_miss_none) {
     for (int k = 0; k < 2; k++) {
         mesh m = slatted_plates();
         const block_options options = {
-            .open = 1e-6, .shadow = 1e-5, .exact = 1e-6, .by_scene = k == 1, .seed = 5};
+            .open = 1e-6, .shadow = 1e-5, .exact = 1e-6, .scene_every = k == 1, .seed = 5};
         plane_tree tree;
         block_report report;
         block_factors f = blocks_with(&m, &tree, &options, &report);
