@@ -40,6 +40,18 @@ lam_status mesh_error_answers(const precompute_scene *scene, const made_operator
     return status;
 }
 
+lam_status mesh_error_answers_of_emitters(const precompute_scene *scene, const made_operator *made,
+                                          size_t n_lights, const float *W, const float *E, float *B,
+                                          void *work, size_t bytes, lam_error *error) {
+    const size_t vector = scene->m.n * scene->m.n_channels;
+    const lam_quantity quantity = scene->lightened ? LAM_IRRADIANCE : LAM_RADIOSITY;
+    const lam_status status =
+        lam_operator_apply_emitters(made->op, n_lights, quantity, W, 0, NULL, B, work, bytes, error);
+    for (size_t k = 0; status == LAM_OK && scene->lightened && k < n_lights * vector; k++)
+        B[k] = (E != NULL ? E[k] : 0) + scene->m.reflectance[k % vector] * B[k];
+    return status;
+}
+
 lam_status mesh_error_groups_begin(const mesh *m, size_t n_lights, mesh_error_groups *out, lam_error *error) {
     double **const arrays[] = {&out->variance, &out->noise, &out->light2};
     for (int k = 0; k < 3; k++) {

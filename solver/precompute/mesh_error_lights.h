@@ -18,6 +18,12 @@ double mesh_error_light(const mesh *m, const float *E, const float *B, bool firs
 lam_status mesh_error_answers(const precompute_scene *scene, const made_operator *made, size_t n_lights,
                               const float *E, float *B, void *work, size_t bytes, lam_error *error);
 
+/* The same of mixtures of the emitters that alone the operator knows, by their weights W [n_lights][C][s]; E
+ * is what of them elements emit, NULL: nothing. */
+lam_status mesh_error_answers_of_emitters(const precompute_scene *scene, const made_operator *made,
+                                          size_t n_lights, const float *W, const float *E, float *B,
+                                          void *work, size_t bytes, lam_error *error);
+
 /* Room for figures by group of n_lights lights; out->fewer stays. Freed by mesh_error_groups_free, also after
  * LAM_ERR_MEMORY. */
 lam_status mesh_error_groups_begin(const mesh *m, size_t n_lights, mesh_error_groups *out, lam_error *error);

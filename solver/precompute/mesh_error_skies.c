@@ -26,6 +26,7 @@ typedef struct sky_work {
     size_t row;   /* n_tiles + 1 */
     double *L;    /* [n_skies][row], radiances of tiles, and of the ground that they light */
     float *E, *B; /* [n_skies][C][n] */
+    float *W;     /* [n_skies][C][n_tiles], of emitters that are the tiles; NULL: the operator answers E */
     double *H0;   /* [n] */
     void *work;   /* of the operator, bytes */
     size_t bytes;
@@ -35,6 +36,7 @@ static void sky_work_free(sky_work *w) {
     free(w->L);
     free(w->E);
     free(w->B);
+    free(w->W);
     free(w->H0);
     free(w->work);
 }
@@ -47,8 +49,35 @@ static lam_status sky_work_begin(size_t n_skies, sky_work *w, lam_error *error) 
     w->B = memory_allocate(n_skies, vector * sizeof *w->B, "the error of the mesh", error);
     w->H0 = memory_allocate(w->scene->m.n, sizeof *w->H0, "the error of the mesh", error);
     w->work = memory_allocate(w->bytes, 1, "the error of the mesh", error);
-    return w->L == NULL || w->E == NULL || w->B == NULL || w->H0 == NULL || w->work == NULL ? LAM_ERR_MEMORY
-                                                                                            : LAM_OK;
+    if (w->L == NULL || w->E == NULL || w->B == NULL || w->H0 == NULL || w->work == NULL)
+        return LAM_ERR_MEMORY;
+    if (w->scene->emitters.s == 0) return LAM_OK;
+    w->W = memory_allocate(n_skies, w->scene->m.n_channels * (w->row - 1) * sizeof *w->W,
+                           "the error of the mesh", error);
+    return w->W == NULL ? LAM_ERR_MEMORY : LAM_OK;
+}
+
+/* True where emitter t is tile t of the sky, of radiance 1, and nothing else. */
+static bool emitters_are_tiles(const precompute_scene *scene, size_t n_tiles) {
+    const emitter_list *list = &scene->emitters;
+    const size_t each = scene->m.n_channels * n_tiles, vector = scene->m.n_channels * scene->m.n;
+    if (list->s != n_tiles || list->light.L == NULL) return false;
+    for (size_t k = 0; k < n_tiles * each; k++)
+        if (list->light.L[k] != (k % n_tiles == k / each)) return false;
+    for (size_t k = 0; list->light.E != NULL && k < n_tiles * vector; k++)
+        if (list->light.E[k] != 0) return false;
+    return true;
+}
+
+/* B of the skies of radiances w->L. */
+static lam_status answer_skies(const sky_work *w, size_t n_skies, lam_error *error) {
+    const size_t tiles = w->row - 1, C = w->scene->m.n_channels;
+    if (w->W == NULL)
+        return mesh_error_answers(w->scene, w->made, n_skies, w->E, w->B, w->work, w->bytes, error);
+    for (size_t k = 0; k < n_skies * C * tiles; k++)
+        w->W[k] = (float)w->L[k / (C * tiles) * w->row + k % tiles];
+    return mesh_error_answers_of_emitters(w->scene, w->made, n_skies, w->W, NULL, w->B, w->work, w->bytes,
+                                          error);
 }
 
 /* The ground below the horizon sends back what the tiles of a sky send to it. */
@@ -102,7 +131,7 @@ static lam_status judge_skies(const sky_work *w, size_t n_skies, uint64_t seed, 
     const gather_sky skies = {.tiling = &w->sky->tiling, .L = w->L};
     *lit = light_by_skies(w, n_skies);
     if (!*lit) return LAM_OK;
-    TRY(mesh_error_answers(w->scene, w->made, n_skies, w->E, w->B, w->work, w->bytes, error));
+    TRY(answer_skies(w, n_skies, error));
     for (size_t s = 0; s < n_skies; s++)
         light[s] = mesh_error_light(m, w->E + s * vector, w->B + s * vector, true);
     memset(w->E, 0, n_skies * vector * sizeof *w->E);
@@ -187,7 +216,8 @@ lam_status mesh_error_add_skies(const precompute_job *job, const precompute_scen
     const size_t most = GATHER_VALUES_MOST / scene->m.n_channels;
     const size_t at_once = most < TILES_AT_ONCE ? most : TILES_AT_ONCE;
     sky_work w = {.job = job, .scene = scene, .sky = sky, .made = made, .row = sky->tiling.n_tiles + 1};
-    if (sky->first_bounce == NULL || factors->f.closed || scene->emitters.s > 0) return LAM_OK;
+    if (sky->first_bounce == NULL || factors->f.closed) return LAM_OK;
+    if (scene->emitters.s > 0 && !emitters_are_tiles(scene, sky->tiling.n_tiles)) return LAM_OK;
     TRY(sky_work_begin(at_once > SKIES ? at_once : SKIES, &w, error));
     TRY(add_wide(&w, seed, figures, error));
     if (!figures->has_skies) goto done;

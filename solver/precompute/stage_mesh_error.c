@@ -8,27 +8,55 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The lights that errors are stated for: E [n_lights][C][n], freed with free(). An operator of few emitters
- * knows no other light than theirs. */
-static lam_status choose_lights(const precompute_scene *scene, made_operator *made, float **out,
+/* The lights that errors are stated for: E [n_lights][C][n], and of an operator of few emitters, which knows
+ * no other light than theirs, the weights W [C][s] of all together. Nothing is stated of emitters that have a
+ * sky in them, unless they are its tiles (mesh_error_add_skies). */
+typedef struct chosen_lights {
+    float *E, *W; /* freed with free(); W NULL: any emission is answered */
+} chosen_lights;
+
+static void add_emitters(const precompute_scene *scene, chosen_lights *to) {
+    const emission *light = &scene->emitters.light;
+    const size_t s = scene->emitters.s, C = scene->m.n_channels, vector = scene->m.n * C;
+    for (size_t t = 0; light->L != NULL && t < s * C * scene->sky_tiles; t++)
+        if (light->L[t] != 0) return;
+    for (size_t k = 0; light->E != NULL && k < s * vector; k++) to->E[k % vector] += light->E[k];
+    for (size_t k = 0; k < s * C; k++) to->W[k] = 1;
+}
+
+static lam_status choose_lights(const precompute_scene *scene, made_operator *made, chosen_lights *out,
                                 lam_error *error) {
     const mesh *m = &scene->m;
-    const size_t vector = m->n * m->n_channels;
+    const size_t vector = m->n * m->n_channels, s = scene->emitters.s;
     mesh_figures *figures = &made->errors_of_mesh;
-    float *E = memory_allocate(2 * vector, sizeof *E, "the error of the mesh", error);
-    if (E == NULL) return LAM_ERR_MEMORY;
-    if (scene->emitters.s > 0) {
-        for (size_t k = 0; scene->emitters.light.E != NULL && k < scene->emitters.s * vector; k++)
-            E[k % vector] += scene->emitters.light.E[k];
+    out->E = memory_allocate(2 * vector, sizeof *out->E, "the error of the mesh", error);
+    if (out->E == NULL) return LAM_ERR_MEMORY;
+    if (s > 0) {
+        out->W = memory_allocate(s, m->n_channels * sizeof *out->W, "the error of the mesh", error);
+        if (out->W == NULL) return LAM_ERR_MEMORY;
+        add_emitters(scene, out);
     } else {
-        memcpy(E, m->emission, vector * sizeof *E);
+        memcpy(out->E, m->emission, vector * sizeof *out->E);
     }
-    for (size_t i = 0; i < vector; i++) figures->has_lights = figures->has_lights || E[i] > 0;
-    figures->has_even = scene->emitters.s == 0;
-    float *even = figures->has_lights ? E + vector : E;
+    for (size_t i = 0; i < vector; i++) figures->has_lights = figures->has_lights || out->E[i] > 0;
+    figures->has_even = s == 0;
+    float *even = figures->has_lights ? out->E + vector : out->E;
     for (size_t i = 0; figures->has_even && i < vector; i++) even[i] = 1;
-    *out = E;
     return LAM_OK;
+}
+
+static lam_status answer(const precompute_scene *scene, const made_operator *made, size_t n_lights,
+                         const chosen_lights *lights, float *B, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t bytes = lam_operator_work_bytes(made->op, n_lights);
+    void *work = memory_allocate(bytes, 1, "the error of the mesh", error);
+    if (work == NULL) return LAM_ERR_MEMORY;
+    TRY(lights->W != NULL ? mesh_error_answers_of_emitters(scene, made, n_lights, lights->W, lights->E, B,
+                                                           work, bytes, error)
+                          : mesh_error_answers(scene, made, n_lights, lights->E, B, work, bytes, error));
+done:
+    free(work);
+    return status;
 }
 
 /* The power that each group emits, channels summed. */
@@ -47,25 +75,20 @@ static lam_status find_errors(const precompute_job *job, const precompute_scene 
     const size_t vector = scene->m.n * scene->m.n_channels;
     mesh_figures *figures = &made->errors_of_mesh;
     double found[2] = {0};
-    float *E = NULL, *B = NULL;
-    void *work = NULL;
+    float *B = NULL;
+    chosen_lights lights = {.E = NULL};
     mesh_error_groups groups = {.fewer = 0};
     *figures = (mesh_figures){.has_lights = false};
-    TRY(choose_lights(scene, made, &E, error));
+    TRY(choose_lights(scene, made, &lights, error));
+    const float *const E = lights.E;
     const size_t n_lights = (size_t)figures->has_lights + figures->has_even;
-    if (n_lights == 0) goto done;
-    const size_t bytes = lam_operator_work_bytes(made->op, n_lights);
-    B = memory_allocate(n_lights * vector, sizeof *B, "the error of the mesh", error);
-    work = memory_allocate(bytes, 1, "the error of the mesh", error);
-    if (B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    status = mesh_error_answers(scene, made, n_lights, E, B, work, bytes, error);
-    if (status == LAM_ERR_ARGUMENT &&
-        scene->emitters.s > 0) { /* a sum that no weights give: nothing is stated */
-        *figures = (mesh_figures){.has_lights = false};
-        status = LAM_OK;
+    if (n_lights == 0) { /* of few emitters, tiles of a sky */
+        TRY(mesh_error_add_skies(job, scene, factors, made, error));
         goto done;
     }
-    TRY(status);
+    B = memory_allocate(n_lights * vector, sizeof *B, "the error of the mesh", error);
+    if (B == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(answer(scene, made, n_lights, &lights, B, error));
     TRY(mesh_error_groups_begin(&scene->m, n_lights, &groups, error));
     TRY(mesh_error(&scene->m, n_lights, E, B, figures->has_lights, NULL,
                    precompute_seed(job->options->seed, SEED_MESH_ERROR), &job->progress, found, &groups,
@@ -88,9 +111,9 @@ static lam_status find_errors(const precompute_job *job, const precompute_scene 
     TRY(mesh_error_add_skies(job, scene, factors, made, error));
 done:
     mesh_error_groups_free(&groups);
-    free(E);
+    free(lights.E);
+    free(lights.W);
     free(B);
-    free(work);
     return status;
 }
 

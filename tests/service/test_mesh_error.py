@@ -243,6 +243,23 @@ class MeshError(Case):
         self.assertEqual(json.loads(must("solve", store, "--json").stdout)["error"], {"stated": None, "advice": advice})
         self.assertEqual(must("solve", store).stdout.splitlines()[-1], f"no error is stated: {advice}")
 
+    def test_few_emitters_have_the_part_of_the_mesh(self):
+        """As a store for any light has it, but for the luck of its looks; of emitters that are lamps and skies at once nothing is known."""
+        numpy.save(self.path("sky.npy"), numpy.ones((3, 16)))
+        mixed = {"emissions": [{"groups": {"lamp": 1}}, {"sky": [1] * 16}]}
+        pathlib.Path(self.path("mixed.json")).write_text(json.dumps(mixed), encoding="utf-8")
+        mesh = "--mesh", "faces", "--sky", "grid:4x4"
+        any_light = self.made("any.h5", *mesh)[0]["error"]["mesh"]
+        for emitters, name, light in (("group=lamp", "lights", ("--emit", "lamp=1")), ("sky", "sky_even", ("--sky", self.path("sky.npy")))):
+            about, _, store = self.made("few.h5", *mesh, "--emitters", emitters)
+            figures = about["error"]["mesh"]
+            self.assertLess(abs(math.log(figures[name] / any_light[name])), math.log(1.2), emitters)
+            error = json.loads(must("solve", store, *light, "--json").stdout)["error"]
+            self.assertGreater(error["parts"]["mesh"], .8 * figures[name], emitters)
+            self.assertAlmostEqual(error["stated"], math.hypot(*error["parts"].values()), delta=1e-6)
+        about, _, store = self.made("mixed.h5", *mesh, "--emitters", self.path("mixed.json"))
+        self.assertNotIn("mesh", about["error"])
+
     def test_older_stores(self):
         """Without figures by group every group has the share of the scene, of the lamps for any emission."""
         _, _, store = self.made("older.h5")
