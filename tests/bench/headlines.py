@@ -14,9 +14,9 @@ import csv
 import io
 import json
 import math
+import os
 import pathlib
 import re
-import resource
 import subprocess
 import sys
 import tempfile
@@ -37,11 +37,14 @@ def run(*words):
 
 
 def seconds_of(*words):
-    """Processor seconds and peak megabytes of a program."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    run(*words)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, after.ru_maxrss / 1024
+    """Processor seconds of a program, and its peak megabytes, no less than those of this script, which it begins as."""
+    with tempfile.TemporaryFile() as said, subprocess.Popen([str(word) for word in words], stdout=said, stderr=said) as program:
+        _, status, used = os.wait4(program.pid, 0)
+        program.returncode = os.waitstatus_to_exitcode(status)
+        if program.returncode != 0:
+            said.seek(0)
+            sys.exit(f"headlines: {' '.join(map(str, words))}: {said.read().decode().strip()}")
+    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
 
 
 def lit_groups(store):
