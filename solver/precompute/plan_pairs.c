@@ -6,10 +6,12 @@
  * worth more, as rays are far less accurate. Beyond, they may take this many times as long as the
  * alternative. A canopy of 4,000 elements, forecast at 18 s, is off by .063 and .0054 by all pairs in 81
  * processor s, judge included, and by .058 and .0071 by rays in 19, as the operator errs more than either.
- * Pairs that are no finer than the operator needs are worth less: a city of 7,999 elements, forecast at 15 s,
- * is off by .0254 and .0025 by them in 51 s and by .0286 and .0023 by rays in 14. */
+ * Pairs that are no finer than the operator needs are worth less, as rays then leave no more error, and as
+ * the judge takes twice as long again for pairs but half for rays: a canopy of 2,500 elements is off by .0574
+ * of single elements, .0063 of random emission and .0112 of groups by 8,192 rays in 14 s of a processor,
+ * judge included, and by .0708, .0066 and .0126 by pairs in 53, forecast at 7.6. */
 static const double seconds_enough = 16, seconds_enough_high = 600, times_most = 2;
-static const double seconds_enough_coarse = 8, times_most_coarse = 1.25;
+static const double seconds_enough_coarse = 2, times_most_coarse = 1.25, times_most_rays = .5;
 
 /* In a soup of triangles even near pairs stand in a crowd. Then rays alone are taken, MORE_RAYS times as
  * many, where these take less time: in a part of a town (12,541 triangles) 512 rays and near pairs left
@@ -115,7 +117,9 @@ static lam_status weigh_all_pairs(const precompute_job *job, precompute_scene *s
     }
     TRY(find_cheaper(job, scene, &other, &some, error));
     TRY(spend_more(job, scene, plan, &other, &some, error));
-    const bool too_slow = all.seconds > (coarse ? times_most_coarse : times_most) * some.seconds;
+    const bool rays = recipe_source(&other) == &source_rays;
+    const double most = !coarse ? times_most : rays ? times_most_rays : times_most_coarse;
+    const bool too_slow = all.seconds > most * some.seconds;
     clock_format_seconds(some.seconds, other_time);
     recipe_describe(&other, what);
     plan_explain(plan, "%s taken: all pairs need about %s of one thread, by a sample of them, and %s %s",

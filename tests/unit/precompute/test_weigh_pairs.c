@@ -72,7 +72,7 @@ END_TEST
 
 START_TEST(a_plain_room_keeps_its_pairs) {
     for (int k = 0; k < 2; k++) {
-        const outcome found = weigh("cornell", k == 0 ? 600 : 3000, QUALITY_NORMAL, 2);
+        const outcome found = weigh("cornell", k == 0 ? 600 : 2000, QUALITY_NORMAL, 2);
         ck_assert(!found.too_slow);
         ck_assert_uint_eq(found.rays, 0);
         ck_assert_double_gt(found.seconds, 0);
