@@ -190,9 +190,9 @@ static const double factor2_of_means = 2, factor2_of_elements = .5;
 mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t group) {
     const double *groups = m->of[MESH_OF_GROUPS], *single = m->of[MESH_OF_SINGLE];
     const double own2 = share2(m, light, group), sent2 = fmax(own2, share2(m, light, m->n_groups));
-    const double whole2 = m->group_share2 != NULL ? m->group_share2[group]
-                          : groups != NULL        ? groups[m->n_groups]
-                                                  : sent2;
+    const double whole2 = m->group_share2 != NULL && group < m->n_groups ? m->group_share2[group]
+                          : groups != NULL                               ? groups[m->n_groups]
+                                                                         : sent2;
     const double one2 = single != NULL ? single[m->n_groups] : sent2;
     return (mesh_lack){own2 + factor2_of_elements * sent2 * one2, factor2_of_means * sent2 * whole2};
 }

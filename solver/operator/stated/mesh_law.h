@@ -66,7 +66,7 @@ typedef struct mesh_light {
  *     c_g = sqrt(2) m s_g,
  * m being the share of the scene where light is sent from, m_g if that is more, and s_g that of the light of
  * group g. Elements are off by m_g and by c = m s_1 / sqrt(2), s_1 that of single elements; squares add up. 0
- * where nothing is stated; stores without s have m in its place. */
+ * where nothing is stated; stores without s have m in its place. group n_groups is all of them together. */
 typedef struct mesh_lack {
     double elements2, mean2;
 } mesh_lack;
