@@ -63,8 +63,8 @@ done:
 }
 
 /* Of a judge's blocks one in so many is cast against the whole scene: an occluder that the lists lack shows
- * in them, and all of them took the judge 1.5 to 1.8 times as long for the same figures (a Cornell box of
- * 3,550 elements, a room of 1,612). */
+ * in them, and all of them took the judge 1.4 to 1.8 times as long as none for the same figures (a Cornell
+ * box of 3,550 elements, a room of 1,612). */
 enum { JUDGE_SCENE_EVERY = 4 };
 
 /* Row sums of a judge's blocks in closed scenes may be off by this: a thirtieth of the least errors of random
