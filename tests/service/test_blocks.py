@@ -60,7 +60,7 @@ class Blocks(Case):
             most[way] = int(re.search(r"memory up to (\d+)M", log)[1])
             return store
 
-        made("rays", "--form-factors", "rays", "--method", "hierarchical")
+        made("rays", "--form-factors", "rays", "--method", "exact")
         store = made("auto", "--memory", f"{most['rays'] - 1}M")
         self.assertEqual(self.attributes(store)["form_factors"], b"blocks")
         self.assertLess(2 * most["auto"], most["rays"])
