@@ -260,6 +260,14 @@ class MeshError(Case):
         about, _, store = self.made("mixed.h5", *mesh, "--emitters", self.path("mixed.json"))
         self.assertNotIn("mesh", about["error"])
 
+    def test_receivers_leave_areas_of_groups(self):
+        """The mesh's part for a group that shines evenly goes by its whole area, whether its light is read or not."""
+        part = []
+        for options in (), ("--receivers", "floor"):
+            _, _, store = self.made("read.h5", "--mesh", "faces", "--method", "hierarchical", *options)
+            part.append(json.loads(must("solve", store, "--emit", "tall-block=1", "--json").stdout)["error"]["parts"]["mesh"])
+        self.assertLess(abs(math.log(part[1] / part[0])), .03)
+
     def test_older_stores(self):
         """Without figures by group every group has the share of the scene, of the lamps for any emission."""
         _, _, store = self.made("older.h5")

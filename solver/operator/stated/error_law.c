@@ -98,6 +98,7 @@ lam_status error_by_group_make(store *s, const error_scene *scene, stated_figure
                                lam_error *error) {
     lam_status status = LAM_OK;
     const size_t G = scene->n_groups;
+    double *group_area = NULL;
     error_by_group e = {
         .figures = from->by_group, .n_bins = from->by_group.n_rows * G, .repair = from->repair};
     *out = (error_by_group){.n_bins = 0};
@@ -112,11 +113,15 @@ lam_status error_by_group_make(store *s, const error_scene *scene, stated_figure
     find_sums(scene, &e);
     TRY(find_reflecting(scene, &e, error));
     TRY(find_whole(&e, error));
-    TRY(mesh_shares_make(&from->mesh, G, e.area, even_tiles(&e.figures), &e.mesh, error));
+    group_area = memory_allocate(G, sizeof *group_area, "errors of groups", error);
+    if (group_area == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t b = 0; b < e.n_bins; b++) group_area[b % G] += e.area[b];
+    TRY(mesh_shares_make(&from->mesh, G, group_area, even_tiles(&e.figures), &e.mesh, error));
     *out = e;
     e = (error_by_group){.n_bins = 0};
 done:
     error_by_group_free(&e);
+    free(group_area);
     return status;
 }
 

@@ -4,12 +4,14 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 void mesh_shares_free(mesh_shares *m) {
     for (int k = 0; k < MESH_FIGURES; k++) free(m->of[k]);
     free(m->lamps);
     free(m->group_share2);
     free(m->group_light);
+    free(m->area);
     *m = (mesh_shares){.n_groups = 0};
 }
 
@@ -36,6 +38,31 @@ static lam_status take_groups(const mesh_figures *from, mesh_shares *m, lam_erro
         m->group_light[g] = lit ? from->group_light[g] : light / (double)known;
     }
     return LAM_OK;
+}
+
+/* The light of whole groups: sums over channels and groups of P^2, P^2 l and P^2 l m^2. */
+typedef struct whole_sums {
+    double squares, light, varies;
+} whole_sums;
+
+static void add_group(const mesh_shares *m, size_t g, double P, whole_sums *to) {
+    to->squares += P * P;
+    to->light += P * P * m->group_light[g];
+    to->varies += P * P * m->group_light[g] * m->group_share2[g];
+}
+
+/* The light that groups have in common: the light of all elements tells it. */
+static void find_shared(double even_light, mesh_shares *m) {
+    double all = 0;
+    whole_sums alone = {0};
+    if (m->group_light == NULL || m->of[MESH_OF_EVEN] == NULL || !(even_light > 0)) return;
+    for (size_t g = 0; g < m->n_groups; g++) all += m->area[g];
+    for (size_t g = 0; g < m->n_groups; g++) add_group(m, g, m->area[g] / all, &alone);
+    const double rest = 1 - alone.squares;
+    if (!(rest > 0)) return;
+    m->shared_light = fmax(even_light - alone.light, 0) / rest;
+    if (!(m->shared_light > 0)) return;
+    m->shared_variation = (even_light * m->of[MESH_OF_EVEN][m->n_groups] - alone.varies) / rest;
 }
 
 /* The square of the share of light k where it is sent from: in all groups that exchange light with others. */
@@ -69,7 +96,6 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, const dou
                      .groups_emitters = from->groups_emitters,
                      .even_tiles = even_tiles,
                      .common_light = common(from, MESH_OF_SINGLE, MESH_OF_EVEN),
-                     .even_light = from->light_of[MESH_OF_EVEN],
                      .common_sky = common(from, MESH_OF_SKY_TILE, MESH_OF_SKY_EVEN)};
     *out = (mesh_shares){.n_groups = 0};
     for (int k = 0; k < MESH_FIGURES; k++) {
@@ -89,7 +115,11 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, const dou
         if (m.lamps == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t g = 0; g < n_groups; g++) m.lamps[g] = from->lights_power[g] > 0;
     }
+    m.area = memory_allocate(n_groups, sizeof *m.area, "errors of the mesh", error);
+    if (m.area == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(m.area, area, n_groups * sizeof *m.area);
     TRY(take_groups(from, &m, error));
+    find_shared(from->light_of[MESH_OF_EVEN], &m);
     *out = m;
     m = (mesh_shares){.n_groups = 0};
 done:
@@ -101,6 +131,33 @@ bool mesh_shares_known(const mesh_shares *m) {
     for (int k = 0; k < MESH_FIGURES; k++)
         if (m->of[k] != NULL) return true;
     return false;
+}
+
+mesh_whole mesh_whole_of(const mesh_shares *m, size_t n_channels, size_t n_whole, const uint32_t *groups,
+                         const double *weights) {
+    whole_sums alone = {0};
+    double power2 = 0;
+    if (m->group_light == NULL || m->of[MESH_OF_GROUPS] == NULL || m->of[MESH_OF_EVEN] == NULL)
+        return (mesh_whole){.known = false};
+    for (size_t c = 0; c < n_channels; c++) {
+        double power = 0;
+        for (size_t k = 0; k < n_whole; k++) {
+            const uint32_t g = groups[k];
+            if (m->lamps != NULL && m->lamps[g]) continue;
+            const double P = m->area[g] * weights[c * n_whole + k];
+            power += P;
+            add_group(m, g, P, &alone);
+        }
+        power2 += power * power;
+    }
+    const double pairs = fmax(power2 - alone.squares, 0), light = alone.light + pairs * m->shared_light;
+    const double groups2 = m->of[MESH_OF_GROUPS][m->n_groups], even2 = m->of[MESH_OF_EVEN][m->n_groups];
+    if (!(alone.light > 0) || !(groups2 > 0)) return (mesh_whole){.known = false};
+    const bool shares = m->shared_light > 0 && even2 > 0;
+    return (mesh_whole){.known = true,
+                        .alone = alone.light / light,
+                        .scale = alone.varies / alone.light / groups2,
+                        .common = shares ? m->shared_variation / m->shared_light / even2 : 0};
 }
 
 /* A share between two lights of n and N > n emitters: the part of the way from n to N by their logarithms. */

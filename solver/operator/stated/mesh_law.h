@@ -13,10 +13,11 @@ typedef struct mesh_shares {
     double even_emitters, groups_emitters; /* effective numbers; 0: not stated */
     double even_tiles;                     /* of an even sky */
     double common_light, common_sky; /* q below, of elements and of tiles; 0: not stated, of an older store */
-    double even_light;               /* of the light that all elements emit, as group_light; 0: not stated */
     /* [n_groups], of groups that are lit alone: m_g^2 and the light l_g of 1 W. One that was not measured has
      * the share of groups and the mean light of the others. NULL: not stated. */
     double *group_share2, *group_light;
+    double *area;                          /* [n_groups] */
+    double shared_light, shared_variation; /* l and v of mesh_whole_of; 0: not stated */
     bool *lamps; /* [n_groups], true where lamps of the scene are; NULL: not stated, any light is taken for
                     theirs */
 } mesh_shares;
@@ -30,14 +31,24 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, const dou
 
 bool mesh_shares_known(const mesh_shares *m);
 
-/* The variation of the light of whole groups, by what is known of each of them (whole_law.h): the share of it
- * that each lights alone, the rest being what they light in common; the factor from the square of the share
- * of groups to that of these; and from that of an even light to that of what they light in common. Zeroed:
- * not known, it goes by the number of emitters. */
+/* The variation of the light of whole groups, by what is known of each of them: the share of it that each
+ * lights alone, the rest being what they light in common; the factor from the square of the share of groups
+ * to that of these; and from that of an even light to that of what they light in common. Zeroed: not known,
+ * it goes by the number of emitters. */
 typedef struct mesh_whole {
     bool known;
     double alone, scale, common;
 } mesh_whole;
+
+/* Of groups [n_whole] that shine evenly by weights [C][n_whole], W/m^2: with P_g the power of a group, l_g
+ * and m_g its light and its share alone, p = (sum_g P_g)^2 - sum_g P_g^2, the square of the share that they
+ * leave together is m^2 = (sum_g P_g^2 l_g m_g^2 + p v) / (sum_g P_g^2 l_g + p l). The light l that two
+ * groups have in common, and its variation v, are those of the light of all elements, l_e and l_e m_e^2,
+ * without what groups light alone, a_g being their shares of the area: l = (l_e - sum_g a_g^2 l_g) / (1 -
+ * sum_g a_g^2), at least 0; v = (l_e m_e^2 - sum_g a_g^2 l_g m_g^2) / (1 - sum_g a_g^2), which is negative
+ * where groups even out the light of each other. Lamps of the scene are left out. Cost: O(C n_whole). */
+mesh_whole mesh_whole_of(const mesh_shares *m, size_t n_channels, size_t n_whole, const uint32_t *groups,
+                         const double *weights);
 
 /* The light of an answer: the power that elements emit, the parts of it that come from groups with lamps and
  * from other groups that shine evenly as wholes, the effective number of emitters, that of all but such

@@ -44,65 +44,9 @@ static void add_rest(const error_by_group *e, const error_scene *scene, const do
     rest->squares += squares;
 }
 
-/* The sums of the light of whole groups: over channels and groups of P^2 l, P^2 l m^2, P^2, and over channels
- * of (sum P)^2. */
-typedef struct whole_sums {
-    double light, varies, squares, power2;
-} whole_sums;
-
-/* The light that groups have in common, of 1 W each, and its mean square variation: the light of all elements
- * without what each group lights alone. */
-static whole_sums in_common(const error_by_group *e) {
-    const mesh_shares *m = &e->mesh;
-    const size_t n_groups = e->figures.n_groups;
-    double all = 0;
-    whole_sums alone = {0};
-    for (size_t b = 0; b < e->n_bins; b++) all += e->area[b];
-    for (size_t g = 0; g < n_groups; g++) {
-        double area = 0;
-        for (size_t b = g; b < e->n_bins; b += n_groups) area += e->area[b];
-        const double square = area * area / (all * all);
-        alone.squares += square;
-        alone.light += square * m->group_light[g];
-        alone.varies += square * m->group_light[g] * m->group_share2[g];
-    }
-    const double rest = 1 - alone.squares;
-    if (!(rest > 0)) return (whole_sums){0};
-    return (whole_sums){.light = fmax(m->even_light - alone.light, 0) / rest,
-                        .varies = (m->even_light * m->of[MESH_OF_EVEN][n_groups] - alone.varies) / rest};
-}
-
 void whole_light_set_mesh(const error_by_group *e, whole_light *w) {
     const group_errors *f = &e->figures;
-    const mesh_shares *m = &e->mesh;
-    whole_sums alone = {0};
-    w->mesh = (mesh_whole){.known = false};
-    if (m->group_light == NULL || !(m->even_light > 0) || m->of[MESH_OF_EVEN] == NULL ||
-        m->of[MESH_OF_GROUPS] == NULL)
-        return;
-    for (size_t c = 0; c < f->n_channels; c++) {
-        double power = 0;
-        for (size_t k = 0; k < f->n_whole; k++) {
-            const uint32_t g = f->whole_groups[k];
-            double area = 0;
-            if (mesh_lamps_in(e, g)) continue;
-            for (size_t b = g; b < e->n_bins; b += f->n_groups) area += e->area[b];
-            const double P = area * w->weights[c * f->n_whole + k];
-            power += P;
-            alone.squares += P * P;
-            alone.light += P * P * m->group_light[g];
-            alone.varies += P * P * m->group_light[g] * m->group_share2[g];
-        }
-        alone.power2 += power * power;
-    }
-    const whole_sums one = in_common(e);
-    const double pairs = fmax(alone.power2 - alone.squares, 0), light = alone.light + pairs * one.light;
-    const double groups2 = m->of[MESH_OF_GROUPS][f->n_groups], even2 = m->of[MESH_OF_EVEN][f->n_groups];
-    if (!(alone.light > 0) || !(groups2 > 0)) return;
-    w->mesh = (mesh_whole){.known = true,
-                           .alone = alone.light / light,
-                           .scale = alone.varies / alone.light / groups2,
-                           .common = one.light > 0 && even2 > 0 ? one.varies / one.light / even2 : 0};
+    w->mesh = mesh_whole_of(&e->mesh, f->n_channels, f->n_whole, f->whole_groups, w->weights);
 }
 
 bool whole_light_find(const error_by_group *e, const error_scene *scene, const float *E, whole_light *out) {

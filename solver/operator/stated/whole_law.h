@@ -10,14 +10,7 @@
 bool whole_light_find(const error_by_group *e, const error_scene *scene, const float *E, whole_light *out);
 void whole_light_free(whole_light *w);
 
-/* Sets the mesh's part by the weights: with P_g the power of a group, l_g and m_g its light and its share
- * alone (mesh_law.h), p = (sum_g P_g)^2 - sum_g P_g^2, the square of the share that they leave together is
- *     m^2 = (sum_g P_g^2 l_g m_g^2 + p v) / (sum_g P_g^2 l_g + p l).
- * The light l that two groups have in common, and its variation v, are those of the light of all elements,
- * l_e and l_e m_e^2, without what groups light alone, a_g being their shares of the area: l = (l_e - sum_g
- * a_g^2 l_g) / (1 - sum_g a_g^2), at least 0; v = (l_e m_e^2 - sum_g a_g^2 l_g m_g^2) / (1 - sum_g a_g^2),
- * which is negative where groups even out the light of each other. Lamps of the scene are left out of P.
- * Cost: O(C n_groups). */
+/* Sets the mesh's part by the weights (mesh_whole_of). */
 void whole_light_set_mesh(const error_by_group *e, whole_light *w);
 
 /* The place of a group among those that are stated; WHOLE_NONE: it is none of them. */

@@ -193,6 +193,28 @@ START_TEST(sky_without_figures) {
 }
 END_TEST
 
+/* A group that reflects nothing of an even light sends nothing on: it has no part in the share of what is
+ * sent. */
+START_TEST(roofs_send_nothing) {
+    double reached[] = {1, 1, 0};
+    mesh_figures from = figures;
+    from.reflected[MESH_OF_EVEN] = reached;
+    from.reflected[MESH_OF_LAMPS] = from.reflected[MESH_OF_SINGLE] = (double[]){1, 1, 8};
+    from.variation[MESH_OF_LAMPS] = (double[]){.1, .2, 8};
+    mesh_shares all = made(&figures), roofs = made(&from);
+    const mesh_light own = {.power = 1, .of_lamps = 1, .emitters = 3};
+    const double groups2 = (.01 + 3 * .04) / 4;
+    ck_assert_double_eq_tol(mesh_lack_of(&all, &own, 1).mean2, 2 * .04 * groups2, 1e-12);
+    ck_assert_double_eq_tol(mesh_lack_of(&roofs, &own, 1).mean2, 2 * .04 * groups2, 1e-12);
+    reached[2] = 1;
+    mesh_shares streets = made(&from);
+    ck_assert_double_gt(mesh_lack_of(&streets, &own, 0).mean2, 2 * mesh_lack_of(&all, &own, 0).mean2);
+    mesh_shares_free(&streets);
+    mesh_shares_free(&roofs);
+    mesh_shares_free(&all);
+}
+END_TEST
+
 /* Older stores have the lamps' share for any emission, else that of an even light; or nothing. */
 START_TEST(older_stores) {
     const mesh_light light = {.power = 1, .emitters = 3};
@@ -220,6 +242,7 @@ int main(void) {
     tcase_add_test(c, skies_and_emissions_weigh_by_power);
     tcase_add_test(c, scene_without_lamps);
     tcase_add_test(c, sky_without_figures);
+    tcase_add_test(c, roofs_send_nothing);
     tcase_add_test(c, older_stores);
     suite_add_tcase(s, c);
     return suite_run(s);

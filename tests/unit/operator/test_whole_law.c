@@ -94,13 +94,25 @@ START_TEST(errors_together_are_those_of_sums) {
 }
 END_TEST
 
-/* A group that shines evenly has the mesh's figure of groups, what else shines that of elements. */
+static mesh_shares shares_of(const mesh_figures *from) {
+    mesh_shares m;
+    lam_error error = {0};
+    ck_ok(mesh_shares_make(from, G, bin_area, 0, &m, &error));
+    return m;
+}
+
+/* A group that shines evenly has the mesh's figure of groups, what else shines that of elements. All groups
+ * are alike, so that elements lack m^2 (1 + s_1^2 / 2). */
 START_TEST(the_mesh_tells_whole_groups_from_elements) {
-    double single[] = {.16, .16, .16, .16, .16}, groups[] = {.01, .01, .01, .01, .01};
-    const double sent = 1 + .16 / 2; /* as all groups are alike, elements lack m^2 (1 + s_1^2 / 2) */
+    const double sent = 1 + .16 / 2;
+    mesh_figures figures = {.n_groups = G,
+                            .has_single = true,
+                            .has_groups = true,
+                            .single = .4,
+                            .groups = .1,
+                            .groups_emitters = 16};
     error_by_group with = stated;
-    with.mesh = (mesh_shares){
-        .n_groups = G, .of = {[MESH_OF_SINGLE] = single, [MESH_OF_GROUPS] = groups}, .groups_emitters = 16};
+    with.mesh = shares_of(&figures);
     /* 6 W of the lamp, in one channel 3 W of an element of the wall, alone as no other shines there. */
     const float E[C * N] = {0, 1, 1, 1, 0, 0, 0, 0, 0, 0};
     light_sizes of = {.quantity = LAM_RADIOSITY};
@@ -109,18 +121,17 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     const mesh_lack lack = mesh_lack_of_bin(&with, &of, DESK);
     ck_assert_double_eq_tol(lack.elements2 / sent, (6 * .01 + 3 * .16) / 9, 1e-12);
     whole_light_free(&of.whole);
+    mesh_shares_free(&with.mesh);
     /* A lamp that was lit alone, and left a quarter of the square of what groups leave, has that, although an
      * even light has fewer emitters than it. */
-    double own2[] = {.01, .01, .01, .01}, light[] = {2, 2, 2, 2}, all[] = {.01, .01, .01, .01, .01};
-    double even[] = {.001, .001, .001, .001, .001};
-    with.mesh.of[MESH_OF_GROUPS] = all;
-    with.mesh.of[MESH_OF_EVEN] = even;
-    with.mesh.even_light = 2.5;
-    with.mesh.even_emitters = 1;
-    with.mesh.group_share2 = own2;
-    with.mesh.group_light = light;
-    own2[LAMP] = .0025;
-    light[LAMP] = 3;
+    double share[G] = {.1, .05, .2}, light[G] = {2, 3, 1}, lamps[G] = {0, 5, 0};
+    figures.group_share = share;
+    figures.group_light = light;
+    figures.has_even = true;
+    figures.even = sqrt(.001);
+    figures.even_emitters = 1;
+    figures.light_of[MESH_OF_EVEN] = 2.5;
+    with.mesh = shares_of(&figures);
     ck_assert(whole_light_find(&with, &scene, E, &of.whole));
     const mesh_lack lit = mesh_lack_of_bin(&with, &of, DESK);
     ck_assert_double_eq_tol(lit.elements2 / sent, (6 * .0025 + 3 * .16) / 9, 1e-12);
@@ -129,33 +140,31 @@ START_TEST(the_mesh_tells_whole_groups_from_elements) {
     /* Lamp and wall together, 6 W and 8 W of one channel, by the squares of their powers and what all groups
      * light in common; a lamp of the scene has no part in it. */
     const float both[C * N] = {0, 1, 1, 1, 1, 0, 0, 0, 0, 0};
-    bool lamps[G] = {false, true, false};
-    own2[WALL] = .04;
-    light[WALL] = 1;
-    ck_assert(whole_light_find(&with, &scene, both, &of.whole));
-    double whole = 0, of_areas = 0, alone_light = 0, alone_varies = 0;
-    for (size_t b = 0; b < with.n_bins; b++) whole += with.area[b];
+    double of_areas = 0, alone_light = 0, alone_varies = 0;
     for (size_t g = 0; g < G; g++) {
-        double a = 0;
-        for (size_t b = g; b < with.n_bins; b += G) a += with.area[b] / whole;
+        const double a = bin_area[g] / 15;
         of_areas += a * a;
         alone_light += a * a * light[g];
-        alone_varies += a * a * light[g] * own2[g];
+        alone_varies += a * a * light[g] * share[g] * share[g];
     }
     const double in_common = (2.5 - alone_light) / (1 - of_areas), one_light = 36 * 3 + 64,
                  varies = (2.5 * .001 - alone_varies) / (1 - of_areas), pairs = 14 * 14 - 36 - 64;
     ck_assert_double_gt(in_common, 0);
+    ck_assert(whole_light_find(&with, &scene, both, &of.whole));
     const mesh_light shines = {.power = 14, .of_whole = 14, .emitters = 2, .whole = of.whole.mesh};
     const mesh_lack together = mesh_lack_of(&with.mesh, &shines, DESK);
     ck_assert_double_eq_tol(together.elements2 / sent,
                             (36 * 3 * .0025 + 64 * .04 + pairs * varies) / (one_light + pairs * in_common),
                             1e-12);
     whole_light_free(&of.whole);
-    with.mesh.lamps = lamps;
+    mesh_shares_free(&with.mesh);
+    figures.lights_power = lamps;
+    with.mesh = shares_of(&figures);
     ck_assert(whole_light_find(&with, &scene, both, &of.whole));
     ck_assert_double_eq_tol(of.whole.mesh.scale, 4, 1e-12);
     ck_assert_double_eq_tol(of.whole.mesh.alone, 1, 1e-12);
     whole_light_free(&of.whole);
+    mesh_shares_free(&with.mesh);
 }
 END_TEST
 
