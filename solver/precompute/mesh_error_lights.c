@@ -31,24 +31,18 @@ double mesh_error_light(const mesh *m, const float *E, const float *B, bool firs
 }
 
 lam_status mesh_error_answers(const precompute_scene *scene, const made_operator *made, size_t n_lights,
-                              const float *E, float *B, void *work, size_t bytes, lam_error *error) {
+                              const float *W, const float *E, float *B, void *work, size_t bytes,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
     const size_t vector = scene->m.n * scene->m.n_channels;
     const lam_quantity quantity = scene->lightened ? LAM_IRRADIANCE : LAM_RADIOSITY;
-    const lam_status status = lam_operator_apply(made->op, n_lights, quantity, E, B, work, bytes, error);
-    for (size_t k = 0; status == LAM_OK && scene->lightened && k < n_lights * vector; k++)
-        B[k] = E[k] + scene->m.reflectance[k % vector] * B[k];
-    return status;
-}
-
-lam_status mesh_error_answers_of_emitters(const precompute_scene *scene, const made_operator *made,
-                                          size_t n_lights, const float *W, const float *E, float *B,
-                                          void *work, size_t bytes, lam_error *error) {
-    const size_t vector = scene->m.n * scene->m.n_channels;
-    const lam_quantity quantity = scene->lightened ? LAM_IRRADIANCE : LAM_RADIOSITY;
-    const lam_status status =
-        lam_operator_apply_emitters(made->op, n_lights, quantity, W, 0, NULL, B, work, bytes, error);
-    for (size_t k = 0; status == LAM_OK && scene->lightened && k < n_lights * vector; k++)
+    if (W != NULL)
+        TRY(lam_operator_apply_emitters(made->op, n_lights, quantity, W, 0, NULL, B, work, bytes, error));
+    else
+        TRY(lam_operator_apply(made->op, n_lights, quantity, E, B, work, bytes, error));
+    for (size_t k = 0; scene->lightened && k < n_lights * vector; k++)
         B[k] = (E != NULL ? E[k] : 0) + scene->m.reflectance[k % vector] * B[k];
+done:
     return status;
 }
 
@@ -206,7 +200,7 @@ static lam_status light_group(const precompute_job *job, const precompute_scene 
     void *work = memory_allocate(bytes, 1, "the error of the mesh", error);
     if (work == NULL) TRY(LAM_ERR_MEMORY);
     light_up(&scene->m, group, E);
-    TRY(mesh_error_answers(scene, made, 1, E, B, work, bytes, error));
+    TRY(mesh_error_answers(scene, made, 1, NULL, E, B, work, bytes, error));
     TRY(mesh_error(&scene->m, 1, E, B, true, NULL, seed, &job->progress, &found, groups, error));
 done:
     free(work);

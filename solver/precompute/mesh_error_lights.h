@@ -14,15 +14,12 @@ double mesh_error_emitters(const mesh *m, const float *E);
 double mesh_error_light(const mesh *m, const float *E, const float *B, bool first_bounce);
 
 /* The radiosity B [n_lights][C][n] of emissions E; of a lightened scene (black_scene.h) by the irradiance, as
- * the operator is of one that reflects nothing: B = E + rho H. work is for lam_operator_apply. */
+ * the operator is of one that reflects nothing: B = E + rho H. An operator that knows few emitters alone is
+ * asked by their weights W [n_lights][C][s], of which elements emit E (NULL: nothing); else W is NULL. work
+ * is for lam_operator_apply. */
 lam_status mesh_error_answers(const precompute_scene *scene, const made_operator *made, size_t n_lights,
-                              const float *E, float *B, void *work, size_t bytes, lam_error *error);
-
-/* The same of mixtures of the emitters that alone the operator knows, by their weights W [n_lights][C][s]; E
- * is what of them elements emit, NULL: nothing. */
-lam_status mesh_error_answers_of_emitters(const precompute_scene *scene, const made_operator *made,
-                                          size_t n_lights, const float *W, const float *E, float *B,
-                                          void *work, size_t bytes, lam_error *error);
+                              const float *W, const float *E, float *B, void *work, size_t bytes,
+                              lam_error *error);
 
 /* Room for figures by group of n_lights lights; out->fewer stays. Freed by mesh_error_groups_free, also after
  * LAM_ERR_MEMORY. */

@@ -72,12 +72,10 @@ static bool emitters_are_tiles(const precompute_scene *scene, size_t n_tiles) {
 /* B of the skies of radiances w->L. */
 static lam_status answer_skies(const sky_work *w, size_t n_skies, lam_error *error) {
     const size_t tiles = w->row - 1, C = w->scene->m.n_channels;
-    if (w->W == NULL)
-        return mesh_error_answers(w->scene, w->made, n_skies, w->E, w->B, w->work, w->bytes, error);
-    for (size_t k = 0; k < n_skies * C * tiles; k++)
+    for (size_t k = 0; w->W != NULL && k < n_skies * C * tiles; k++)
         w->W[k] = (float)w->L[k / (C * tiles) * w->row + k % tiles];
-    return mesh_error_answers_of_emitters(w->scene, w->made, n_skies, w->W, NULL, w->B, w->work, w->bytes,
-                                          error);
+    const float *E = w->W != NULL ? NULL : w->E;
+    return mesh_error_answers(w->scene, w->made, n_skies, w->W, E, w->B, w->work, w->bytes, error);
 }
 
 /* The ground below the horizon sends back what the tiles of a sky send to it. */

@@ -51,9 +51,7 @@ static lam_status answer(const precompute_scene *scene, const made_operator *mad
     const size_t bytes = lam_operator_work_bytes(made->op, n_lights);
     void *work = memory_allocate(bytes, 1, "the error of the mesh", error);
     if (work == NULL) return LAM_ERR_MEMORY;
-    TRY(lights->W != NULL ? mesh_error_answers_of_emitters(scene, made, n_lights, lights->W, lights->E, B,
-                                                           work, bytes, error)
-                          : mesh_error_answers(scene, made, n_lights, lights->E, B, work, bytes, error));
+    TRY(mesh_error_answers(scene, made, n_lights, lights->W, lights->E, B, work, bytes, error));
 done:
     free(work);
     return status;

@@ -37,6 +37,17 @@ class Emitters(unittest.TestCase):
                  "--keep-form-factors", "--sky", "grid:4x3", "--emitters", emitters)
             cls.truth[name] = Truth(cls.stores[name])
 
+    def test_a_sky_alone_has_its_rays_alone(self):
+        """Rays miss more of a tile than pairs would mend: these come where an error, or rows to keep, are asked for."""
+        for options, pairs in ((), False), (("--epsilon", .05), True), (("--quality", "high"), True), (("--keep-form-factors",), True):
+            said = must("precompute", self.scene, "-o", self.folder / "alone.h5", "--elements", 150, "--probes", 0, "--sky",
+                        "grid:4x3", "--emitters", "sky", *options).stderr
+            self.assertEqual("pair by pair" in said, pairs, (options, said))
+            self.assertEqual("4096 rays per element:" in said, not pairs, (options, said))
+        said = must("precompute", self.scene, "-o", self.folder / "alone.h5", "--elements", 150, "--probes", 0, "--sky",
+                    "grid:4x3", "--emitters", "group=lamp").stderr
+        self.assertIn("pair by pair", said)
+
     def close(self, got, wanted, what):
         np.testing.assert_allclose(got, wanted, atol=5e-6 * np.abs(wanted).max(), err_msg=str(what))
 

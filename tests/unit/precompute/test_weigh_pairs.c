@@ -8,6 +8,7 @@
 #include "support/suite.h"
 
 #include <omp.h>
+#include <string.h>
 
 /* The outcome of the choice for a generated scene of about n elements. */
 typedef struct outcome {
@@ -20,7 +21,12 @@ static outcome weigh_kept(const char *scene, size_t n, factor_quality quality, i
                           const factor_source *source, double memory, const char *keep) {
     lam_error error = {0};
     terminal t;
-    const generate_options how = {.kind = scene, .elements = n, .seed = 1, .reflectance = -1};
+    const generate_options how = {.kind = scene,
+                                  .elements = n,
+                                  .seed = 1,
+                                  .reflectance = -1,
+                                  .variant = strcmp(scene, "city") == 0 ? 3 : 0,
+                                  .terrain = strcmp(scene, "city") == 0 ? "flat" : NULL};
     const precompute_options options = {.form_factors = 0,
                                         .quality = quality,
                                         .rays = OPTION_AUTO,
@@ -87,6 +93,17 @@ START_TEST(kept_pairs_may_take_longer) {
     ck_assert_double_gt(kept.seconds, 8);
     ck_assert_double_lt(kept.seconds, 16);
     ck_assert(coarse.too_slow);
+    ck_assert(!kept.too_slow);
+}
+END_TEST
+
+/* Coarse pairs that take about as long as rays, whose judge costs less. */
+START_TEST(coarse_pairs_give_way_to_rays) {
+    const outcome coarse = weigh("city", 2500, QUALITY_NORMAL, 2),
+                  kept = weigh_kept("city", 2500, QUALITY_NORMAL, 2, &source_pairs, 1e15, "");
+    ck_assert(coarse.too_slow);
+    ck_assert(coarse.rays_alone);
+    ck_assert_double_gt(coarse.seconds, 2);
     ck_assert(!kept.too_slow);
 }
 END_TEST
@@ -185,6 +202,7 @@ int main(void) {
     tcase_add_test(cases, a_soup_gets_rays);
     tcase_add_test(cases, a_plain_room_keeps_its_pairs);
     tcase_add_test(cases, kept_pairs_may_take_longer);
+    tcase_add_test(cases, coarse_pairs_give_way_to_rays);
     tcase_add_test(cases, high_quality_keeps_pairs_for_longer);
     tcase_add_test(cases, more_elements_cost_more);
     tcase_add_test(cases, near_pairs_are_weighed_too);
