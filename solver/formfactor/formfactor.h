@@ -142,12 +142,12 @@ lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error);
  * must outlive blocks: these hold the form factors, freed by block_factors_free, and out all but rows. In a
  * closed scene their balance gives rows the sum 1, in others it keeps sums at most 1. With a sky,
  * recipe.rays of an element find its share of each tile, and what the blocks leave of its row is distributed
- * so. judged: those that the blocks are to judge, or NULL. Visible shares then come from the whole scene by
- * Embree, so that a judge shares nothing with those of single occluders but the proofs that nothing, or one
- * piece, stands between; that the scene is closed is taken from judged, and no ray is cast for it; out has
- * neither leaving nor absorbed, nor a sky. No scratch folder. Cost: about a microsecond for each of some
- * n^1/2 blocks, and without judged n recipe.rays rays. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY,
- * LAM_ERR_CANCELLED. */
+ * so. judged: those that the blocks are to judge, or NULL. Visible shares of a quarter of them then come from
+ * the whole scene by Embree, so that a judge sees what lists of single occluders lack, but for the proofs
+ * that nothing, or one piece, stands between; that the scene is closed is taken from judged, and no ray is
+ * cast for it; out has neither leaving nor absorbed, nor a sky. No scratch folder. Cost: about a microsecond
+ * for each of some n^1/2 blocks, and without judged n recipe.rays rays. Errors: LAM_ERR_ARGUMENT,
+ * LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const plane_tree *tree,
                                     const form_factors *judged, const form_factor_options *options,
                                     form_factors *out, block_factors *blocks, lam_error *error);

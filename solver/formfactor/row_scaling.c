@@ -165,7 +165,7 @@ static lam_status extrapolate(row_scaling *c, double *before, bool *diverges, la
         }
         TRY(measure(c, error));
     }
-    if (c->worst <= least) goto done;
+    if (*diverges || c->worst <= least) goto done;
     memcpy(c->d, h.best, n * sizeof *h.best);
     TRY(measure(c, error));
 done:
