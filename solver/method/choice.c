@@ -72,24 +72,16 @@ static const candidate *best(const decision *d) {
     return found != NULL ? found : decision_find(d, method_fallback()->name);
 }
 
-/* Measures the operators that are built, where another method has found the rows that tell their errors, and
- * that method too, whose estimates are lower ones: it is built then, as it would be if it were taken. */
+/* Measures the operators that are built, where another method has found the rows that tell their errors. */
 static lam_status compare_errors(decision *d, lam_error *error) {
     lam_status status = LAM_OK;
-    candidate *rival = NULL;
-    size_t n_built = 0;
-    for (size_t k = 0; k < d->n_candidates; k++) {
+    const inverse_rows *truth = NULL;
+    for (size_t k = 0; k < d->n_candidates; k++)
+        if (d->candidates[k].truth.rows != NULL && isfinite(d->candidates[k].cost))
+            truth = &d->candidates[k].truth;
+    for (size_t k = 0; truth != NULL && k < d->n_candidates; k++) {
         candidate *c = &d->candidates[k];
-        if (c->truth.rows != NULL && isfinite(c->cost)) rival = c;
-        n_built += c->op != NULL;
-    }
-    if (rival == NULL || n_built == 0) goto done;
-    if (rival == best(d) && !d->thorough)
-        TRY(method_build(rival->method, d->problem, d->options, &rival->own, &rival->op, &rival->built,
-                         error));
-    for (size_t k = 0; k < d->n_candidates; k++) {
-        candidate *c = &d->candidates[k];
-        if (c->op != NULL) TRY(operator_sampled_errors(d->problem, c->op, &rival->truth, &c->errors, error));
+        if (c->op != NULL) TRY(operator_sampled_errors(d->problem, c->op, truth, &c->errors, error));
     }
 done:
     return status;

@@ -177,12 +177,34 @@ START_TEST(errors_come_before_time) {
 }
 END_TEST
 
+/* Where groups are not known, what splinters emit is kept all the same. */
+START_TEST(emitters_are_kept_without_groups) {
+    uint32_t group[N];
+    static double centre[N][3];
+    static float normal[N][3];
+    fixture f = splinters(group);
+    build_problem p = *problem_of(&f);
+    lam_error error = {0};
+    decision d;
+    const build_options how = build_presets("auto");
+    place_anywhere(&p, centre, normal);
+    ck_assert_int_eq(choose_method(&p, &how, true, &d, &error), LAM_OK);
+    const candidate *sparse = decision_find(&d, "sparse");
+    ck_assert_double_lt(decision_figure(&d, "sparse", "threshold", 1), .5 * splinter);
+    ck_assert_double_le(sparse->errors.single, how.epsilon);
+    ck_assert_double_eq(sparse->errors.groups, 0);
+    decision_free(&d);
+    fixture_free(&f);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("sampled_errors");
     TCase *cases = tcase_create("sampled_errors");
     tcase_set_timeout(cases, 240);
     tcase_add_test(cases, errors_are_those_of_the_reference);
     tcase_add_test(cases, errors_come_before_time);
+    tcase_add_test(cases, emitters_are_kept_without_groups);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
