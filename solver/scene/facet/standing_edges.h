@@ -3,34 +3,15 @@
 #ifndef LAMBERT_SCENE_FACET_STANDING_EDGES_H
 #define LAMBERT_SCENE_FACET_STANDING_EDGES_H
 
-#include "solver/scene/mesh.h"
+#include "solver/scene/face_frame.h"
 
 /* The largest distance between corners. Area over diameter is seven to ten tenths of the shorter side of a
  * rectangle. */
 double face_diameter(const mesh *m, size_t face);
 
-/* The axes of a face's plane, about its first corner. */
-typedef struct face_frame {
-    double origin[3], normal[3], u[3], w[3];
-} face_frame;
-
-face_frame face_frame_of(const mesh *m, size_t face);
-void face_frame_flatten(const face_frame *f, const double point[3], double out[2]);
-
 /* The part of a segment within a convex polygon, whose corners run counter-clockwise. False where there is
  * none; from and to are unchanged then. */
 bool segment_clip(size_t n, const double (*corner)[2], double from[2], double to[2]);
-
-/* A line in a plane: direction . x = level; the distance of a point is positive on the left of it. */
-typedef struct flat_line {
-    double across[2], level; /* across: unit */
-} flat_line;
-
-flat_line flat_line_through(const double from[2], const double to[2]);
-
-static inline double flat_line_distance(const flat_line *l, const double x[2]) {
-    return l->across[0] * x[0] + l->across[1] * x[1] - l->level;
-}
 
 /* A segment of a face where another face leaves its front, or either side where it is to have a back: an edge
  * of that in the plane, or where it passes through the plane. */
