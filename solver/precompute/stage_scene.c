@@ -34,6 +34,7 @@ static void log_warnings(terminal *t, const char *warnings) {
 
 static void warn_of_coincident(terminal *t, const coincident_report *found) {
     if (found->dropped > 0) terminal_warn(t, "%s", found->dropped_line);
+    if (found->cut_line[0] != '\0') terminal_warn(t, "%s", found->cut_line);
     if (found->overlapping > 0) terminal_warn(t, "%s", found->overlap_line);
 }
 
@@ -59,7 +60,7 @@ static lam_status choose_backs(const precompute_job *job, precompute_scene *scen
     size_t n = 0;
     if (asked == SIDES_BOTH) return mesh_mark_two_sided(m, error);
     for (size_t i = 0; m->has_back != NULL && i < m->n; i++) n += m->has_back[i];
-    if (asked == SIDES_FRONTS || n == 0) {
+    if (n == 0) {
         free(m->has_back);
         m->has_back = NULL;
         return LAM_OK;
@@ -90,6 +91,7 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
                                 .up = o->up != NULL ? o->up[0] : 0,
                                 .reflectance = o->reflectance,
                                 .two_sided = o->two_sided == SIDES_BOTH,
+                                .fronts_only = o->two_sided == SIDES_FRONTS,
                                 .assets = o->assets};
     import_report report = {0};
     TRY(scene_import(o->input, &how, &scene->m, &report, error));

@@ -46,12 +46,12 @@ static box box_of(const mesh *m, size_t face, const double centre[3]) {
     return b;
 }
 
-static inline bool boxes_meet(const box *a, const box *b, float distance, int least_axes) {
+static inline bool boxes_meet(const box *a, const box *b, float distance, float least, int least_axes) {
     int long_axes = 0;
     for (int d = 0; d < 3; d++) {
         const float length = lower(a->high[d], b->high[d]) - higher(a->low[d], b->low[d]);
         if (length < -distance) return false;
-        long_axes += length > distance;
+        long_axes += length > least;
     }
     return long_axes >= least_axes;
 }
@@ -128,7 +128,7 @@ static void make_boxes(search *s, range r) {
 }
 
 static inline bool meet(const search *s, const box *a, const box *b) {
-    return boxes_meet(a, b, (float)s->how->distance, s->how->long_axes);
+    return boxes_meet(a, b, (float)s->how->distance, (float)s->how->least, s->how->long_axes);
 }
 
 static bool may_look(search *s) {

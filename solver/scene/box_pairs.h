@@ -9,7 +9,8 @@ typedef lam_status box_pair_visit(void *context, uint32_t i, uint32_t j, lam_err
 
 typedef struct box_pairs {
     double distance; /* m: boxes no further apart meet; single precision should be off by less */
-    int long_axes;   /* they have more than that distance in common along as many axes at least */
+    double least;    /* m, at most that distance: they have more than this in common */
+    int long_axes;   /* along as many axes at least */
     box_pair_visit *visit;
     void *context;
 } box_pairs;

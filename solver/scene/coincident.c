@@ -1,8 +1,8 @@
 #include "solver/scene/coincident.h"
 
 #include "solver/base/union_find.h"
-#include "solver/scene/coincident_pairs.h"
-#include "solver/scene/texture.h"
+#include "solver/scene/coincident_cut.h"
+#include "solver/scene/coincident_order.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -11,22 +11,6 @@
 
 /* Groups that a line names. */
 enum { NAMED = 3 };
-
-static bool emits(const mesh *m, size_t face) {
-    bool any = false;
-    for (size_t c = 0; c < m->n_channels; c++) any |= m->emission[c * m->n + face] > 0;
-    return any;
-}
-
-static bool differ(const mesh *m, size_t a, size_t b) {
-    bool any = m->group[a] != m->group[b];
-    if (m->textured_face != NULL)
-        any |= (m->textured_face[a] == TEXTURE_NONE) != (m->textured_face[b] == TEXTURE_NONE);
-    for (size_t c = 0; c < m->n_channels; c++)
-        any |= m->reflectance[c * m->n + a] != m->reflectance[c * m->n + b] ||
-               m->emission[c * m->n + a] != m->emission[c * m->n + b];
-    return any;
-}
 
 /* "floor 12, roof 3, 5 more": the groups of the largest numbers. numbers [n_groups] is spent. */
 static void name_groups(const mesh *m, double *numbers, const char *unit, char *text, size_t size) {
@@ -45,29 +29,30 @@ static void name_groups(const mesh *m, double *numbers, const char *unit, char *
 }
 
 /* Drops all but one face of each set of the same corners. */
-static lam_status drop_repeated(mesh *m, const coincident_pairs *pairs, bool *dropped, coincident_report *out,
+static lam_status drop_repeated(mesh *m, const coincident_pairs *pairs, coincident_report *out,
                                 lam_error *error) {
     lam_status status = LAM_OK;
     char groups[256], lost[96] = "";
     size_t first = m->n;
+    bool *dropped = memory_allocate(m->n, sizeof *dropped, "repeated faces", error);
     uint32_t *set = memory_allocate(m->n, sizeof *set, "repeated faces", error);
     uint32_t *kept =
         memory_allocate(m->n, sizeof *kept, "repeated faces", error); /* of a set, by its first */
     double *numbers = memory_allocate(m->n_groups, sizeof *numbers, "repeated faces", error);
-    if (set == NULL || kept == NULL || numbers == NULL) TRY(LAM_ERR_MEMORY);
+    if (dropped == NULL || set == NULL || kept == NULL || numbers == NULL) TRY(LAM_ERR_MEMORY);
     for (uint32_t i = 0; i < m->n; i++) set[i] = kept[i] = i;
     for (size_t k = 0; k < pairs->n; k++)
         if (pairs->pairs[k].same) union_find_join(set, pairs->pairs[k].first, pairs->pairs[k].second);
     for (uint32_t i = 0; i < m->n; i++) {
         const uint32_t root = union_find_root(set, i);
-        if (root != i && !emits(m, kept[root]) && emits(m, i)) kept[root] = i;
+        if (root != i && !coincident_face_emits(m, kept[root]) && coincident_face_emits(m, i)) kept[root] = i;
     }
     for (uint32_t i = 0; i < m->n; i++) {
         const uint32_t keeps = kept[union_find_root(set, i)];
         dropped[i] = keeps != i;
         if (!dropped[i]) continue;
         out->dropped++;
-        out->differing += differ(m, i, keeps);
+        out->differing += coincident_faces_differ(m, i, keeps);
         numbers[m->group[i]]++;
         if (first == m->n) first = i;
     }
@@ -86,25 +71,63 @@ static lam_status drop_repeated(mesh *m, const coincident_pairs *pairs, bool *dr
         at[0], at[1], at[2], lost);
     TRY(mesh_drop(m, dropped, error));
 done:
+    free(dropped);
     free(set);
     free(kept);
     free(numbers);
     return status;
 }
 
-/* The overlap of faces that are kept; shared [n], by the faces before some were dropped, is their area that
- * others cover too. */
-static lam_status share_overlap(const mesh *m, const double *shared, const double first[3], bool cut,
-                                coincident_report *out, double **overlap, lam_error *error) {
+static lam_status find_again(const mesh *m, bool both_sides, coincident_pairs *pairs, lam_error *error) {
+    free(pairs->pairs);
+    *pairs = (coincident_pairs){.n = 0};
+    return coincident_pairs_find(m, both_sides, pairs, error);
+}
+
+/* Cuts faces so that each place belongs to one; *whole: some are as they were. */
+static lam_status cut_overlapping(mesh *m, const coincident_pairs *pairs, coincident_report *out, bool *whole,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    char groups[256], gone[64] = "";
+    coincident_cuts cuts = {.n = 0};
+    TRY(coincident_cuts_find(m, pairs, &cuts, error));
+    out->cut = cuts.cut;
+    out->covered = cuts.covered;
+    out->cut_area = cuts.area;
+    *whole = cuts.whole > 0;
+    if (cuts.cut + cuts.covered == 0) goto done;
+    name_groups(m, cuts.lost, " m2", groups, sizeof groups);
+    if (cuts.covered > 0) snprintf(gone, sizeof gone, "; nothing is left of %zu", cuts.covered);
+    snprintf(
+        out->cut_line, sizeof out->cut_line,
+        "%zu face%s cut where others cover the same place, by %.4g m2 in all (%s; the first at %.6g %.6g "
+        "%.6g m): the smaller surface keeps a place, of equal ones the first that emits, or the first%s",
+        cuts.cut + cuts.covered, cuts.cut + cuts.covered == 1 ? " is" : "s are", cuts.area, groups,
+        cuts.first[0], cuts.first[1], cuts.first[2], gone);
+    TRY(coincident_cuts_make(m, &cuts, error));
+done:
+    coincident_cuts_free(&cuts);
+    return status;
+}
+
+/* Names what overlaps nevertheless; *overlap [n_groups] are the shares of groups. */
+static lam_status name_overlap(const mesh *m, const coincident_pairs *pairs, coincident_report *out,
+                               double **overlap, lam_error *error) {
     lam_status status = LAM_OK;
     char groups[256];
+    double first[3];
+    double *shared = memory_allocate(m->n, sizeof *shared, "overlapping faces", error);
     double *area = memory_allocate(m->n_groups, sizeof *area, "overlapping faces", error);
     double *sums = memory_allocate(m->n_groups, sizeof *sums, "overlapping faces", error);
-    if (area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
+    if (shared == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < pairs->n; k++) {
+        shared[pairs->pairs[k].first] += pairs->pairs[k].area;
+        shared[pairs->pairs[k].second] += pairs->pairs[k].area;
+    }
     for (size_t i = 0; i < m->n; i++) {
         area[m->group[i]] += m->area[i];
         if (!(shared[i] > 0)) continue;
-        out->overlapping++;
+        if (out->overlapping++ == 0) mesh_centroid(m, i, first);
         sums[m->group[i]] += fmin(shared[i], m->area[i]);
     }
     if (out->overlapping == 0) goto done;
@@ -117,11 +140,12 @@ static lam_status share_overlap(const mesh *m, const double *shared, const doubl
         out->overlap_line, sizeof out->overlap_line,
         "%zu faces overlap others in one plane, %s%.4g m2 in all (%s; the first at %.6g %.6g %.6g m): light "
         "counts twice there, and stated errors contain it; delete what is covered, or move it by %.2g m",
-        out->overlapping, cut ? "at least " : "", out->area, groups, first[0], first[1], first[2],
-        10 * coincident_distance(m));
+        out->overlapping, pairs->cut ? "at least " : "", out->area, groups, first[0], first[1], first[2],
+        10 * coincident_planes_of(m).distance);
     *overlap = area;
     area = NULL;
 done:
+    free(shared);
     free(area);
     free(sums);
     return status;
@@ -131,37 +155,21 @@ lam_status mesh_settle_coincident(mesh *m, bool both_sides, coincident_report *o
     lam_status status = LAM_OK;
     coincident_pairs pairs = {.n = 0};
     coincident_report found = {.dropped = 0};
-    bool *dropped = NULL;
-    double *shared = NULL, *overlap = NULL, first[3] = {0, 0, 0};
-    const size_t before = m->n;
+    double *overlap = NULL;
+    bool whole = false;
     TRY(coincident_pairs_find(m, both_sides, &pairs, error));
-    if (pairs.n > 0) {
-        size_t least = before, kept = 0;
-        dropped = memory_allocate(before, sizeof *dropped, "repeated faces", error);
-        shared = memory_allocate(before, sizeof *shared, "overlapping faces", error);
-        if (dropped == NULL || shared == NULL) TRY(LAM_ERR_MEMORY);
-        TRY(drop_repeated(m, &pairs, dropped, &found, error));
-        for (size_t k = 0; k < pairs.n; k++) {
-            const coincident_pair *p = &pairs.pairs[k];
-            if (dropped[p->first] || dropped[p->second]) continue;
-            shared[p->first] += p->area;
-            shared[p->second] += p->area;
-            least = p->first < least ? p->first : least;
-        }
-        for (size_t i = 0; i < before; i++) {
-            if (dropped[i]) continue;
-            if (i == least) mesh_centroid(m, kept, first);
-            shared[kept++] = shared[i];
-        }
-        TRY(share_overlap(m, shared, first, pairs.cut, &found, &overlap, error));
+    TRY(drop_repeated(m, &pairs, &found, error));
+    if (found.dropped > 0) TRY(find_again(m, both_sides, &pairs, error));
+    if (pairs.n > 0) TRY(cut_overlapping(m, &pairs, &found, &whole, error));
+    if (whole || pairs.cut) {
+        TRY(find_again(m, both_sides, &pairs, error));
+        TRY(name_overlap(m, &pairs, &found, &overlap, error));
     }
     free(m->overlap);
     m->overlap = overlap;
     *out = found;
 done:
     free(pairs.pairs);
-    free(dropped);
-    free(shared);
     return status;
 }
 

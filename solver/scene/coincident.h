@@ -7,18 +7,22 @@
 enum { COINCIDENT_TEXT = 640 };
 
 typedef struct coincident_report {
-    size_t dropped;     /* faces that repeated another one */
-    size_t differing;   /* of them in another group, or of another material, than the one that is kept */
-    size_t overlapping; /* faces that overlap others in one plane, with the same side */
-    double area;        /* m^2 that they cover more than once */
+    size_t dropped;      /* faces that repeated another one */
+    size_t differing;    /* of them in another group, or of another material, than the one that is kept */
+    size_t cut, covered; /* faces that lost a part to others of their plane, or all */
+    double cut_area;     /* m^2 that they lost */
+    size_t overlapping;  /* faces that overlap others in one plane nevertheless, with the same side */
+    double area;         /* m^2 that they cover more than once */
     /* A line each for people, "" where there is nothing to say. */
-    char dropped_line[COINCIDENT_TEXT], overlap_line[COINCIDENT_TEXT];
+    char dropped_line[COINCIDENT_TEXT], cut_line[COINCIDENT_TEXT], overlap_line[COINCIDENT_TEXT];
 } coincident_report;
 
 /* Drops faces whose corners are those of another one, in the same sequence from any of them on: of these the
- * first that emits is kept, or, where none does, the first. Then sets m->overlap, or NULL where no face
- * overlaps others. The opposite sides of a sheet, or of a box and the floor that it stands on, do not
- * overlap; with both_sides (`--two-sided`) they do. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
+ * first that emits is kept, or, where none does, the first. Then cuts faces that cover the same part of a
+ * plane, so that each place belongs to one (coincident_cut.h). Sets m->overlap, or NULL where no face
+ * overlaps others after that. The opposite sides of a sheet, or of a box and the floor that it stands on, do
+ * not overlap, unless both have a back; with both_sides (`--two-sided`) they do. Cost: O(n log n). Errors:
+ * LAM_ERR_MEMORY. */
 lam_status mesh_settle_coincident(mesh *m, bool both_sides, coincident_report *out, lam_error *error);
 
 /* The m^2 that the overlapping faces of a mesh cover more than once: half the sum of what each of them

@@ -17,40 +17,95 @@ static const double shared_least = 1e-3;
  * of a face as small as the rounding of its corners says little. */
 static const double alike = .9;
 
-typedef struct search {
-    const mesh *m;
-    bool both_sides;
-    double distance;
-    coincident_pairs *out;
-} search;
+/* Decimals that are looked for: single precision has fewer, and more are no rounding that matters. */
+enum { DECIMALS_MOST = 8 };
 
-double coincident_distance(const mesh *m) {
-    double centre[3], radius;
-    mesh_bounds(m, centre, &radius);
-    return plane_same_place * radius;
+/* The step of the decimals of all coordinates, in units of the file, where each is off by no more than a
+ * share of itself; 0: they have more decimals. */
+static double step_of_decimals(const mesh *m, double share) {
+    static const double near = 1e-9;
+    double steps = 1; /* in a unit */
+    int decimals = 0;
+    for (size_t v = 0; v < m->n_vertices; v++)
+        for (int d = 0; d < 3; d++) {
+            const double x = m->vertices[v][d] / m->unit;
+            while (!(fabs(x * steps - round(x * steps)) <= near + fabs(x) * steps * share)) {
+                if (decimals++ == DECIMALS_MOST) return 0;
+                steps *= 10;
+            }
+        }
+    return 1 / steps;
 }
 
-/* The corners of a face in a plane through a point, counter-clockwise as seen from where its normal points;
- * false where one of them is off the plane. */
-static bool flatten(const mesh *m, size_t face, const double at[3], const double normal[3], double distance,
-                    bool turned, flat_polygon *out) {
-    double u[3], w[3];
-    plane_axes(normal, u, w);
-    out->n = mesh_corners(m, face);
-    for (size_t c = 0; c < out->n; c++) {
-        const double *v = m->vertices[m->elements[face][turned ? out->n - 1 - c : c]];
-        double off = 0, x = 0, y = 0;
-        for (int d = 0; d < 3; d++) {
-            off += (v[d] - at[d]) * normal[d];
-            x += (v[d] - at[d]) * u[d];
-            y += (v[d] - at[d]) * w[d];
-        }
-        if (!(fabs(off) <= distance)) return false;
-        out->corner[c][0] = x;
-        out->corner[c][1] = y;
+coincident_planes coincident_planes_of(const mesh *m) {
+    double centre[3], radius;
+    double step = step_of_decimals(m, 0x1p-50);
+    if (!(step > 0)) step = step_of_decimals(m, 0x1p-24); /* a file that was read in single precision */
+    mesh_bounds(m, centre, &radius);
+    return (coincident_planes){.m = m, .distance = plane_same_place * radius, .rounding = m->unit * step};
+}
+
+static double cosine_between(const mesh *m, uint32_t i, uint32_t j) {
+    const float *p = m->normal[i], *q = m->normal[j];
+    return (double)p[0] * (double)q[0] + (double)p[1] * (double)q[1] + (double)p[2] * (double)q[2];
+}
+
+/* A length that rounding makes between two faces. */
+static double rounded(const coincident_planes *p, uint32_t i, uint32_t j, double steps) {
+    const double slack = plane_slack(2 * sqrt(p->m->area[i]), 2 * sqrt(p->m->area[j]));
+    return fmax(p->distance, fmin(steps * p->rounding, slack));
+}
+
+double coincident_width(const coincident_planes *p, uint32_t i, uint32_t j) {
+    return rounded(p, i, j, 2);
+}
+
+/* Half a step along each axis moves a corner by (|n_x| + |n_y| + |n_z|) / 2 steps along a normal n, and the
+ * plane as much. Along an axis that is one step: a rug that lies so far above a floor is meant to. */
+static bool in_plane(const coincident_planes *p, const element_face *plane, uint32_t large, uint32_t small) {
+    static const double below = .99;
+    const mesh *m = p->m;
+    const double sum = fabs(plane->normal[0]) + fabs(plane->normal[1]) + fabs(plane->normal[2]);
+    const double most = rounded(p, large, small, below * sum);
+    for (size_t c = 0; c < mesh_corners(m, small); c++) {
+        const double *v = m->vertices[m->elements[small][c]];
+        double height = 0;
+        for (int d = 0; d < 3; d++) height += (v[d] - plane->centre[d]) * plane->normal[d];
+        if (!(fabs(height) <= most)) return false;
     }
     return true;
 }
+
+bool coincident_share_plane(const coincident_planes *p, uint32_t i, uint32_t j) {
+    const bool swapped = p->m->area[j] > p->m->area[i];
+    const uint32_t large = swapped ? j : i, small = swapped ? i : j;
+    element_face plane;
+    return fabs(cosine_between(p->m, i, j)) >= alike &&
+           element_face_set(p->m, p->m->elements[large], &plane) && in_plane(p, &plane, large, small);
+}
+
+/* The corners of a face in a plane, counter-clockwise as seen from where its normal points. */
+static void flatten(const mesh *m, uint32_t face, const element_face *plane, bool turned, flat_polygon *out) {
+    double u[3], w[3];
+    plane_axes(plane->normal, u, w);
+    out->n = mesh_corners(m, face);
+    for (size_t c = 0; c < out->n; c++) {
+        const double *v = m->vertices[m->elements[face][turned ? out->n - 1 - c : c]];
+        double x = 0, y = 0;
+        for (int d = 0; d < 3; d++) {
+            x += (v[d] - plane->centre[d]) * u[d];
+            y += (v[d] - plane->centre[d]) * w[d];
+        }
+        out->corner[c][0] = x;
+        out->corner[c][1] = y;
+    }
+}
+
+typedef struct search {
+    coincident_planes planes;
+    bool both_sides;
+    coincident_pairs *out;
+} search;
 
 /* True if the second polygon has the corners of the first, from any of them on. */
 static bool same_corners(const flat_polygon *a, const flat_polygon *b, double distance) {
@@ -69,43 +124,52 @@ static double perimeter(const flat_polygon *p) {
     return sum;
 }
 
+/* Faces of opposite sides cover a place twice where both have a back. */
+static bool looks_matter(const search *s, uint32_t i, uint32_t j, double cosine) {
+    const bool *has_back = s->planes.m->has_back;
+    return cosine >= alike ||
+           (cosine <= -alike && (s->both_sides || (has_back != NULL && has_back[i] && has_back[j])));
+}
+
 /* Notes two faces where they overlap. */
 static lam_status look(void *context, uint32_t i, uint32_t j, lam_error *error) {
     const search *s = context;
-    const mesh *m = s->m;
-    const float *p = m->normal[i], *q = m->normal[j];
-    const double cosine =
-        (double)p[0] * (double)q[0] + (double)p[1] * (double)q[1] + (double)p[2] * (double)q[2];
+    const mesh *m = s->planes.m;
+    const double cosine = cosine_between(m, i, j);
     element_face plane;
     flat_polygon large, small;
-    if (cosine < alike && !(s->both_sides && cosine < -alike)) return LAM_OK;
+    if (!looks_matter(s, i, j, cosine)) return LAM_OK;
     const bool swapped = m->area[j] > m->area[i];
     const uint32_t a = swapped ? j : i, b = swapped ? i : j;
-    if (!element_face_set(m, m->elements[a], &plane)) return LAM_OK;
-    /* The larger face gives the plane. A quad may deviate from its own by a hundred-thousandth. */
-    if (!flatten(m, b, plane.centre, plane.normal, s->distance, cosine < 0, &small)) return LAM_OK;
-    (void)flatten(m, a, plane.centre, plane.normal, HUGE_VAL, false, &large);
-    /* Rounding moves the edge that neighbours share by `distance`, and makes them share a strip beside it. */
-    const double least = shared_least * m->area[b] + s->distance * perimeter(&small);
+    if (!element_face_set(m, m->elements[a], &plane) || !in_plane(&s->planes, &plane, a, b)) return LAM_OK;
+    flatten(m, b, &plane, cosine < 0, &small);
+    flatten(m, a, &plane, false, &large);
+    /* Rounding moves the edge that neighbours share, and makes them share a strip beside it. */
+    const double width = coincident_width(&s->planes, i, j);
+    const double least = shared_least * m->area[b] + width * perimeter(&small);
     const double area = fmin(flat_polygons_overlap(&small, &large), m->area[b]);
     if (!(area > least)) return LAM_OK;
     coincident_pairs *out = s->out;
-    const double near = fmin(s->distance, 1e-2 * sqrt(m->area[b]));
+    const double near = fmin(width, 1e-2 * sqrt(m->area[b]));
     if (array_grow(&out->pairs, &out->capacity, out->n + 1, sizeof *out->pairs, "overlapping faces", error) !=
         LAM_OK)
         return LAM_ERR_MEMORY;
     out->pairs[out->n++] =
-        (coincident_pair){i < j ? i : j, i < j ? j : i, same_corners(&large, &small, near), area};
+        (coincident_pair){i < j ? i : j, i < j ? j : i, same_corners(&large, &small, near), cosine < 0, area};
     return LAM_OK;
 }
 
 lam_status coincident_pairs_find(const mesh *m, bool both_sides, coincident_pairs *out, lam_error *error) {
     lam_status status = LAM_OK;
     coincident_pairs found = {.n = 0};
-    search s = {.m = m, .both_sides = both_sides, .distance = coincident_distance(m), .out = &found};
+    search s = {.planes = coincident_planes_of(m), .both_sides = both_sides, .out = &found};
     /* A part of a plane that is in both is long along two axes. Faces that share an edge along an axis are
      * no further apart, but their boxes have only that axis in common. */
-    const box_pairs how = {.distance = s.distance, .long_axes = 2, .visit = look, .context = &s};
+    const box_pairs how = {.distance = fmax(s.planes.distance, 2 * s.planes.rounding),
+                           .least = s.planes.distance,
+                           .long_axes = 2,
+                           .visit = look,
+                           .context = &s};
     TRY(box_pairs_visit(m, &how, &found.cut, error));
     *out = found;
     found = (coincident_pairs){.n = 0};

@@ -8,6 +8,7 @@
 typedef struct coincident_pair {
     uint32_t first, second; /* faces, first < second */
     bool same;              /* the second has the corners of the first, in the same sequence */
+    bool opposite;          /* they look to opposite sides */
     double area;            /* m^2 that both cover */
 } coincident_pair;
 
@@ -17,12 +18,27 @@ typedef struct coincident_pairs {
     bool cut; /* the search was ended: there may be more */
 } coincident_pairs;
 
-/* The distance in metres below which two planes, or two corners, are one (coincident_pairs.c). */
-double coincident_distance(const mesh *m);
+/* When two faces of a mesh lie in one plane. */
+typedef struct coincident_planes {
+    const mesh *m;
+    double distance; /* m: planes, and corners, that are no further apart are one */
+    double rounding; /* m: the step of the decimals of the file, or 0 where it has more than eight of them */
+} coincident_planes;
 
-/* Finds the pairs of faces of one side, or, with both_sides, of either side, that cover more than a
- * thousandth of the smaller one together. The sequence of pairs depends on the mesh alone. Freed by
- * free(out->pairs). Cost: O(n log n + pairs); ended where it exceeds that by far. Errors: LAM_ERR_MEMORY. */
+/* Cost: O(n). */
+coincident_planes coincident_planes_of(const mesh *m);
+
+/* True where the smaller of two faces lies in the plane of the larger one, on either side: as far as rounding
+ * to the step of the decimals moves both, if plane_slack lets that count. */
+bool coincident_share_plane(const coincident_planes *p, uint32_t i, uint32_t j);
+
+/* m: corners of two faces, and their edges, are one where they are no further apart. */
+double coincident_width(const coincident_planes *p, uint32_t i, uint32_t j);
+
+/* Finds the pairs of faces that cover more than a thousandth of the smaller one together: of one side, and of
+ * opposite sides where both have, or are to have, a back; with both_sides all are. The sequence of pairs
+ * depends on the mesh alone. Freed by free(out->pairs). Cost: O(n log n + pairs); ended where it exceeds that
+ * by far. Errors: LAM_ERR_MEMORY. */
 lam_status coincident_pairs_find(const mesh *m, bool both_sides, coincident_pairs *out, lam_error *error);
 
 #endif

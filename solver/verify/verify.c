@@ -241,6 +241,7 @@ lam_status verify_scene(examination *e, check *c, lam_error *error) {
                                 .up = e->m.up,
                                 .reflectance = reflectance,
                                 .two_sided = e->m.two_sided,
+                                .fronts_only = e->m.n_backs == 0,
                                 .assets = e->assets};
     TRY(scene_import(e->scene, &how, &now, &report, error));
     check_say(c, VERDICT_OK, "%s has the same geometry and materials", e->scene);

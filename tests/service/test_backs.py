@@ -285,6 +285,22 @@ class DoubleSided(BacksCase):
                 np.testing.assert_array_equal(f["mesh/normal"][:, 2], [1, -1], str(options))
                 self.assertNotIn("overlap", f["mesh"])
 
+    def test_a_sheet_of_double_sided_faces_has_two_sides(self):
+        """Its faces are back to back: one of them is enough, but without backs; a box of such faces keeps its place in a
+        floor that is larger."""
+        scene = Gltf([("top", square(0), 0), ("under", square(0)[::-1], 0)], [material(.5, doubleSided=True)])
+        twin = self.write("twins.gltf", scene.text())
+        for options, groups in ((), ["top", "top.back"]), (("--two-sided=no",), ["top", "under"]):
+            store, _ = self.store(twin, *options)
+            self.assertEqual(list(self.groups(store)), groups)
+            self.assertIn("has the same geometry and materials", must("verify", store, twin, "--probes", 0).stdout)
+        scene = Gltf([("floor", square(0, 4), 0), ("bottom", square(0, at=(1, 1))[::-1], 0)], [material(.5, doubleSided=True)])
+        store, errors = self.store(self.write("box.gltf", scene.text()))
+        self.assertIn(" where others cover the same place, by 1 m2 in all (floor 1 m2; ", errors)
+        with h5py.File(store) as f:
+            areas = np.bincount(f["mesh/group"][()], f["mesh/area"][()])
+        np.testing.assert_allclose(areas, [15, 1, 15, 1], rtol=1e-9)
+
     def test_all_double_sided_is_two_sided(self):
         """The same bits but for what says how a store was made."""
         scene = Gltf([("floor", square(0), 0), ("panel", square(1), 1)], [material(.5, doubleSided=True), material(0, 1, doubleSided=True)])

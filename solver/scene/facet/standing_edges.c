@@ -227,7 +227,8 @@ lam_status standing_edges_find(const mesh *m, standing_edges *out, lam_error *er
                 .rounding = plane_same_place * radius,
                 .width = memory_allocate(m->n, sizeof *s.width, "edges of walls", error),
                 .out = &found};
-    const box_pairs how = {.distance = s.slack, .long_axes = 1, .visit = look, .context = &s};
+    const box_pairs how = {
+        .distance = s.slack, .least = s.slack, .long_axes = 1, .visit = look, .context = &s};
     if (s.width == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++) s.width[i] = m->area[i] / face_diameter(m, i);
     TRY(box_pairs_visit(m, &how, &found.cut, error));

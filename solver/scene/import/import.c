@@ -378,7 +378,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     TRY(name_groups(&s, &made, error));
     TRY(apply_materials(&s, path, options, &made, &found, error));
     TRY(lay_textures(&s, path, options->unit, &made, &found, error));
-    TRY(mark_backs(&s, &made, error));
+    if (!options->fronts_only) TRY(mark_backs(&s, &made, error));
     if (!is_obj) warn_of_lost_precision(&s, path, &made);
     TRY(mesh_settle_coincident(&made, options->two_sided, &found.coincident, error));
     mesh_geometry_hash(&made, made.source_hash);

@@ -10,6 +10,7 @@ typedef struct import_options {
     char up;              /* 'x', 'y', 'z', or 0: y for glTF, z otherwise */
     double reflectance;   /* for every face, grey; negative: the file's own */
     bool two_sided;       /* both sides of each face will be elements: `--two-sided` */
+    bool fronts_only;     /* no face gets a back by its material: `--two-sided=no` */
     const char *assets;   /* folder that files which the scene names may lie in, beside its own; NULL: none */
     unsigned cpu_seconds; /* limit for the child; 0 gives 120 */
     size_t memory_bytes;  /* limit for the child; 0 gives 8 GiB */
