@@ -1,4 +1,4 @@
-/* Which of several faces that cover the same part of a plane keeps it. Private to solver/scene. */
+/* The order of faces that cover the same part of a plane: the first keeps it. Private to solver/scene. */
 #ifndef LAMBERT_SCENE_COINCIDENT_ORDER_H
 #define LAMBERT_SCENE_COINCIDENT_ORDER_H
 

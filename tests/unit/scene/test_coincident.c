@@ -96,7 +96,7 @@ START_TEST(opposite_faces_are_a_sheet) {
 }
 END_TEST
 
-/* What is covered more than once stays with the smaller surface, or with the first; 1e-5 of the scene's size
+/* A place that two faces cover stays with the smaller surface, or with the first; 1e-5 of the scene's size
  * above the plane it is a rug. */
 START_TEST(each_place_is_of_the_smaller_surface) {
     static const struct {

@@ -137,7 +137,8 @@ START_TEST(each_place_is_of_one_face) {
 }
 END_TEST
 
-/* A floor with so many squares on it that what they leave is more than a thousand parts stays whole, and is named. */
+/* A floor with so many squares on it that what they leave is more than a thousand parts stays whole, and is
+ * named. */
 START_TEST(a_thousand_parts_are_named) {
     enum { ALONG = 26 };
     static char text[100000];
