@@ -9,7 +9,7 @@ lam_status closing_repair(form_factors *f, const mesh *m, const visibility *v, l
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
     leaving_measure(f, m, v);
-    for (size_t i = 0; i < m->n; i++) outside[i] = leaving_outside(f, i);
+    for (size_t i = 0; i < m->n; i++) outside[i] = leaving_outside(f, m, i);
     const lam_status status = repair_close(&f->upper, m->area, outside, f, error);
     free(outside);
     return status;

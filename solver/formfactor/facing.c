@@ -22,10 +22,13 @@ static const double decided_gain = .2;
 static const double back_weight = .75;
 enum { SWEEPS = 16 };
 
-/* before[k + 1] = area of the first k + 1 elements of list; returns their sum. */
+/* before[k + 1] = area of the first k + 1 elements of list, less buried ones; returns their sum. */
 static double accumulate(const mesh *m, const uint32_t *list, size_t count, double *before) {
     before[0] = 0;
-    for (size_t k = 0; k < count; k++) before[k + 1] = before[k] + m->area[list == NULL ? k : list[k]];
+    for (size_t k = 0; k < count; k++) {
+        const size_t i = list == NULL ? k : list[k];
+        before[k + 1] = before[k] + (mesh_is_buried(m, i) ? 0 : m->area[i]);
+    }
     return before[count];
 }
 
@@ -37,13 +40,8 @@ static void cast_from(const mesh *m, const visibility *v, size_t element, bool b
     uint32_t self[VISIBILITY_PACKET];
     element_sampler_init(&sampler, m, v, element, seed);
     element_sampler_packet(&sampler, 0, &rays);
-    for (int i = 0; i < VISIBILITY_PACKET; i++) {
-        const float *normal = sampler.frame.normal;
-        float along = 0;
-        self[i] = (uint32_t)element;
-        for (int d = 0; d < 3; d++) along += rays.direction[d][i] * normal[d];
-        for (int d = 0; d < 3 && back; d++) rays.direction[d][i] -= 2 * along * normal[d];
-    }
+    if (back) element_sampler_turn(&sampler, &rays);
+    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
     visibility_cast(v, &rays, VISIBILITY_PACKET, self, 0, hits);
 }
 

@@ -9,7 +9,7 @@
 static double area_mean(const mesh *m, const double *x) {
     double sum = 0, total = 0;
     for (size_t i = 0; i < m->n; i++) {
-        sum += m->area[i] * x[i];
+        if (!mesh_is_buried(m, i)) sum += m->area[i] * x[i];
         total += m->area[i];
     }
     return total > 0 ? sum / total : 0;
@@ -34,7 +34,7 @@ static void elements_of_lost(const lost_rays *l, double light, uint32_t *element
     double passed = 0;
     size_t k = 0, last = 0;
     for (size_t i = 0; i < l->m->n && k < FOLLOWED; i++) {
-        if (!(l->share[i] > 0)) continue;
+        if (!(l->share[i] > 0) || mesh_is_buried(l->m, i)) continue;
         passed += l->m->area[i] * l->share[i];
         last = i;
         for (; k < FOLLOWED && (k + .5) / FOLLOWED * light < passed; k++) element[k] = (uint32_t)i;
@@ -114,16 +114,19 @@ bool leaving_nothing(const form_factors *f) {
     return f->closed && f->outlet.fronts_only;
 }
 
-double leaving_outside(const form_factors *f, size_t element) {
+double leaving_outside(const form_factors *f, const mesh *m, size_t element) {
+    if (mesh_is_buried(m, element)) return f->leaving[element] + f->absorbed[element];
     return (f->closed ? 0 : f->leaving[element]) + absorbed(f, element);
 }
 
-lam_status leaving_to_sky(form_factors *f, size_t n, lam_error *error) {
+lam_status leaving_to_sky(form_factors *f, const mesh *m, lam_error *error) {
+    const size_t n = m->n;
     double *scale = memory_allocate(n, sizeof *scale, "first bounce of the sky", error);
     if (scale == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) {
         const double outside = f->leaving[i] + absorbed(f, i);
-        scale[i] = f->closed || outside <= 0 ? 0 : fmax(0, 1 - f->row_sums[i]) / outside;
+        scale[i] =
+            f->closed || outside <= 0 || mesh_is_buried(m, i) ? 0 : fmax(0, 1 - f->row_sums[i]) / outside;
     }
     sky_bounce_close(&f->sky, scale);
     free(scale);

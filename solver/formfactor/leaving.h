@@ -15,21 +15,21 @@
 
 /* Sets f->leaving_share and absorbed_share, area-weighted means of f->leaving and absorbed, f->closed and
  * f->outlet. Light that leaves through cracks, or meets backs through cracks, counts as noise: the repair
- * distributes it over the row. f->recipe.closure overrules what rays find. Of each kind of lost light 64
- * rays are followed, which are found by the recipe's seed. Cost: for each of them 400 rays, and those that
- * are cast until one is lost. */
+ * distributes it over the row. Buried elements (buried.h) have no part in it. f->recipe.closure overrules
+ * what rays find. Of each kind of lost light 64 rays are followed, which are found by the recipe's seed.
+ * Cost: for each of them 400 rays, and those that are cast until one is lost. */
 void leaving_measure(form_factors *f, const mesh *m, const visibility *v);
 
 /* True where rows must sum to 1: no ray leaves or hits a back face but through cracks. Needs leaving_measure.
  */
 bool leaving_nothing(const form_factors *f);
 
-/* leaving_i + absorbed_i as the repair takes it: 0 where only cracks let rays through. Needs leaving_measure.
- */
-double leaving_outside(const form_factors *f, size_t element);
+/* leaving_i + absorbed_i as the repair takes it: 0 where only cracks let rays through, but as the rays found
+ * it for a buried element, whose row is nearly empty. Needs leaving_measure. */
+double leaving_outside(const form_factors *f, const mesh *m, size_t element);
 
 /* Turns f->sky from shares of rays into first_bounce: the part 1 - row_sums_i that the repaired row leaves is
  * distributed over the tiles, the ground and back faces as the rays were. Errors: LAM_ERR_MEMORY. */
-lam_status leaving_to_sky(form_factors *f, size_t n, lam_error *error);
+lam_status leaving_to_sky(form_factors *f, const mesh *m, lam_error *error);
 
 #endif

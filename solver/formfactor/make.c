@@ -33,7 +33,7 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     own.n_aimed = &f.n_aimed;
     TRY(visibility_create(m, &v, error));
     TRY(source->make(m, v, order, options, &f, error));
-    if (asked->sky != NULL) TRY(leaving_to_sky(&f, m->n, error));
+    if (asked->sky != NULL) TRY(leaving_to_sky(&f, m, error));
     if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
     *out = f;
     f = (form_factors){0};

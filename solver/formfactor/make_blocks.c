@@ -77,8 +77,9 @@ static const double least_target = 1e-9;
 /* F' = D F D with the given row sums [n], by element, to a tolerance (0: the least); targets NULL: rows that
  * sum to 1 in a closed scene, and to at most 1 in others. Beside a sky, whose many rays tell each element's
  * share outside better than a block tells its own, rows without targets sum to 1 with that share, which is
- * scaled with them. Sets the row sums of f, and how much they were repaired. */
-static lam_status balance_blocks(form_factors *f, block_factors *blocks, const double *targets,
+ * scaled with them. Rows of buried elements are empty. Sets the row sums of f, and how much they were
+ * repaired. */
+static lam_status balance_blocks(form_factors *f, const mesh *m, block_factors *blocks, const double *targets,
                                  double tolerance, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = blocks->n;
@@ -98,8 +99,10 @@ static lam_status balance_blocks(form_factors *f, block_factors *blocks, const d
         TRY(LAM_ERR_MEMORY);
     for (size_t p = 0; p < n; p++) {
         ones[p] = 1;
-        outside[p] = sky ? leaving_outside(f, blocks->order[p]) : 0;
-        wanted[p] = blocks->area[p] * (targets != NULL ? fmax(targets[blocks->order[p]], least_target) : 1);
+        const uint32_t i = blocks->order[p];
+        const double target = targets != NULL ? targets[i] : mesh_is_buried(m, i) && !sky ? 0 : 1;
+        outside[p] = sky ? leaving_outside(f, m, i) : 0;
+        wanted[p] = blocks->area[p] * fmax(target, least_target);
     }
     balanced_blocks of = {blocks, ones, work, sky ? outside : NULL};
     row_scaling c = {.n = n,
@@ -117,9 +120,10 @@ static lam_status balance_blocks(form_factors *f, block_factors *blocks, const d
     for (size_t p = 0; p < n; p++) {
         const double sum = r[p] / blocks->area[p], off = fabs(before[p] / wanted[p] - 1);
         area += blocks->area[p];
+        f->row_sums[blocks->order[p]] = fmin(sum - d[p] * outside[p], 1);
+        if (mesh_is_buried(m, blocks->order[p])) continue;
         f->repair_mean += blocks->area[p] * off;
         f->repair_max = fmax(f->repair_max, off);
-        f->row_sums[blocks->order[p]] = fmin(sum - d[p] * outside[p], 1);
         if (closed) f->closure_error = fmax(f->closure_error, fabs(sum - 1));
     }
     f->repair_mean /= area;
@@ -239,8 +243,8 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
         if (targets == NULL) TRY(LAM_ERR_MEMORY);
         TRY(unhidden_row_sums(m, &known, targets, error));
     }
-    TRY(balance_blocks(&f, &made, known ? targets : NULL, judged != NULL ? judge_balance : 0, error));
-    if (f.sky.first_bounce != NULL) TRY(leaving_to_sky(&f, m->n, error));
+    TRY(balance_blocks(&f, m, &made, known ? targets : NULL, judged != NULL ? judge_balance : 0, error));
+    if (f.sky.first_bounce != NULL) TRY(leaving_to_sky(&f, m, error));
     *out = f;
     *blocks = made;
     f = (form_factors){0};

@@ -52,6 +52,7 @@ lam_status stage_load_store(const precompute_job *job, precompute_scene *scene, 
     form_factor_storage how = STORAGE_ROWS;
     TRY(store_open(job->options->input, &s, error));
     TRY(mesh_load(s, &scene->m, &row_sums, error));
+    TRY(scene_find_buried(job, scene, error));
     if (store_has(s, STORE_FORM_FACTORS)) {
         TRY(form_factors_storage(s, &how, error));
         TRY(recipe_load(s, &recipe_of_form_factors, &plan->recipe, error));

@@ -1,6 +1,7 @@
 /* From faces to elements, as the options of the mesh say. */
 #include "solver/adapt/mesh_fit.h"
 #include "solver/base/scene/scene_backs.h"
+#include "solver/formfactor/buried.h"
 #include "solver/precompute/black_scene.h"
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
@@ -184,6 +185,17 @@ static double edge_to_be(const mesh *m, const precompute_options *o) {
     return by_error || elements > m->n ? sqrt(area / (double)elements) : 0;
 }
 
+lam_status scene_find_buried(const precompute_job *job, precompute_scene *scene, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t n;
+    TRY(buried_find(&scene->m, &n, error));
+    if (n > 0)
+        terminal_log(job->t, "%zu element%s between a body and the face that it stands on, without light", n,
+                     n == 1 ? " lies" : "s lie");
+done:
+    return status;
+}
+
 lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
@@ -205,6 +217,7 @@ lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_
     TRY(mesh_make_backs(&scene->m, error));
     log_renamed(job, scene);
     TRY(mesh_keep_pictures(&scene->m, error)); /* every element has its means */
+    TRY(scene_find_buried(job, scene, error));
 done:
     faces_before_free(&before);
     if (black) black_scene_darken(&scene->m);

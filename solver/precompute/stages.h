@@ -34,6 +34,10 @@ lam_status stage_prepare_mesh(const precompute_job *job, precompute_scene *scene
                               lam_error *error);
 void scene_log_mesh(const precompute_job *job, const precompute_scene *scene);
 
+/* Marks the elements of a mesh that is made which see nothing, as they lie between a body and the face that
+ * it stands on. */
+lam_status scene_find_buried(const precompute_job *job, precompute_scene *scene, lam_error *error);
+
 /* Cuts faces along the walls that stand on them, where these extend over at least half of the edge of the
  * elements to be, metres, as long as it makes no more than max(1,000, the faces so far) in addition, nor more
  * than `most` faces; logs the number of faces. Logs how many elements still lie under walls, once the mesh is

@@ -78,10 +78,10 @@ done:
     return status;
 }
 
-static lam_status find_again(const mesh *m, bool both_sides, coincident_pairs *pairs, lam_error *error) {
+static lam_status find_again(const mesh *m, coincident_sort sort, coincident_pairs *pairs, lam_error *error) {
     free(pairs->pairs);
     *pairs = (coincident_pairs){.n = 0};
-    return coincident_pairs_find(m, both_sides, pairs, error);
+    return coincident_pairs_find(m, sort, pairs, error);
 }
 
 /* Cuts faces so that each place belongs to one; *whole: some are as they were. */
@@ -157,17 +157,35 @@ lam_status mesh_settle_coincident(mesh *m, bool both_sides, coincident_report *o
     coincident_report found = {.dropped = 0};
     double *overlap = NULL;
     bool whole = false;
-    TRY(coincident_pairs_find(m, both_sides, &pairs, error));
+    const coincident_sort sort = both_sides ? COINCIDENT_BOTH_SIDES : COINCIDENT_ONE_SIDE;
+    TRY(coincident_pairs_find(m, sort, &pairs, error));
     TRY(drop_repeated(m, &pairs, &found, error));
-    if (found.dropped > 0) TRY(find_again(m, both_sides, &pairs, error));
+    if (found.dropped > 0) TRY(find_again(m, sort, &pairs, error));
     if (pairs.n > 0) TRY(cut_overlapping(m, &pairs, &found, &whole, error));
     if (whole || pairs.cut) {
-        TRY(find_again(m, both_sides, &pairs, error));
+        TRY(find_again(m, sort, &pairs, error));
         TRY(name_overlap(m, &pairs, &found, &overlap, error));
     }
     free(m->overlap);
     m->overlap = overlap;
     *out = found;
+done:
+    free(pairs.pairs);
+    return status;
+}
+
+lam_status mesh_find_sheets(const mesh *m, double *shared, lam_error *error) {
+    lam_status status = LAM_OK;
+    coincident_pairs pairs = {.n = 0};
+    const size_t n_fronts = m->n - m->n_backs;
+    memset(shared, 0, m->n * sizeof *shared);
+    TRY(coincident_pairs_find(m, COINCIDENT_SHEETS, &pairs, error));
+    for (size_t k = 0; k < pairs.n; k++) {
+        const coincident_pair *p = &pairs.pairs[k];
+        if (p->second >= n_fronts) continue;
+        shared[p->first] += p->area;
+        shared[p->second] += p->area;
+    }
 done:
     free(pairs.pairs);
     return status;

@@ -25,6 +25,10 @@ typedef struct coincident_report {
  * LAM_ERR_MEMORY. */
 lam_status mesh_settle_coincident(mesh *m, bool both_sides, coincident_report *out, lam_error *error);
 
+/* shared [n]: the m^2 of each element that others of its plane cover which look to the opposite side, backs
+ * of fronts aside. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
+lam_status mesh_find_sheets(const mesh *m, double *shared, lam_error *error);
+
 /* The m^2 that the overlapping faces of a mesh cover more than once: half the sum of what each of them
  * shares; and the share of the mesh's area that they have together. 0 where none overlaps. */
 double mesh_overlap_area(const mesh *m);

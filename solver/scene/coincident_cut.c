@@ -163,7 +163,7 @@ done:
     return status;
 }
 
-/* What is left of a face that was cut. */
+/* Keeps the parts of a face that was cut. */
 static lam_status keep_parts(cutter *c, uint32_t face, lam_error *error) {
     lam_status status = LAM_OK;
     coincident_cuts *to = &c->made;
@@ -188,7 +188,7 @@ done:
     return status;
 }
 
-/* What is lost, by face; an opposite pair loses both sides of one face. */
+/* Losses, by face; an opposite pair loses both sides of one face. */
 static lam_status find_losses(const mesh *m, const coincident_pairs *pairs, loss **out, lam_error *error) {
     lam_status status = LAM_OK;
     coincident_order order = {0};

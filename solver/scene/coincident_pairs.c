@@ -103,7 +103,7 @@ static void flatten(const mesh *m, uint32_t face, const element_face *plane, boo
 
 typedef struct search {
     coincident_planes planes;
-    bool both_sides;
+    coincident_sort sort;
     coincident_pairs *out;
 } search;
 
@@ -127,8 +127,9 @@ static double perimeter(const flat_polygon *p) {
 /* Faces of opposite sides cover a place twice where both have a back. */
 static bool looks_matter(const search *s, uint32_t i, uint32_t j, double cosine) {
     const bool *has_back = s->planes.m->has_back;
-    return cosine >= alike ||
-           (cosine <= -alike && (s->both_sides || (has_back != NULL && has_back[i] && has_back[j])));
+    if (cosine >= alike) return s->sort != COINCIDENT_SHEETS;
+    if (cosine > -alike) return false;
+    return s->sort != COINCIDENT_ONE_SIDE || (has_back != NULL && has_back[i] && has_back[j]);
 }
 
 /* Notes two faces where they overlap. */
@@ -159,10 +160,11 @@ static lam_status look(void *context, uint32_t i, uint32_t j, lam_error *error) 
     return LAM_OK;
 }
 
-lam_status coincident_pairs_find(const mesh *m, bool both_sides, coincident_pairs *out, lam_error *error) {
+lam_status coincident_pairs_find(const mesh *m, coincident_sort sort, coincident_pairs *out,
+                                 lam_error *error) {
     lam_status status = LAM_OK;
     coincident_pairs found = {.n = 0};
-    search s = {.planes = coincident_planes_of(m), .both_sides = both_sides, .out = &found};
+    search s = {.planes = coincident_planes_of(m), .sort = sort, .out = &found};
     /* A part of a plane that is in both is long along two axes. Faces that share an edge along an axis are
      * no further apart, but their boxes have only that axis in common. */
     const box_pairs how = {.distance = fmax(s.planes.distance, 2 * s.planes.rounding),

@@ -35,10 +35,18 @@ bool coincident_share_plane(const coincident_planes *p, uint32_t i, uint32_t j);
 /* m: corners of two faces, and their edges, are one where they are no further apart. */
 double coincident_width(const coincident_planes *p, uint32_t i, uint32_t j);
 
-/* Finds the pairs of faces that cover more than a thousandth of the smaller one together: of one side, and of
- * opposite sides where both have, or are to have, a back; with both_sides all are. The sequence of pairs
- * depends on the mesh alone. Freed by free(out->pairs). Cost: O(n log n + pairs); ended where it exceeds that
- * by far. Errors: LAM_ERR_MEMORY. */
-lam_status coincident_pairs_find(const mesh *m, bool both_sides, coincident_pairs *out, lam_error *error);
+/* Pairs of one side, and of opposite sides where both are to have a back; pairs of either side; or of
+ * opposite sides alone. */
+typedef enum coincident_sort {
+    COINCIDENT_ONE_SIDE,
+    COINCIDENT_BOTH_SIDES,
+    COINCIDENT_SHEETS
+} coincident_sort;
+
+/* Finds the pairs of faces that cover more than a thousandth of the smaller one together. The sequence of
+ * pairs depends on the mesh alone. Freed by free(out->pairs). Cost: O(n log n + pairs); ended where it
+ * exceeds that by far. Errors: LAM_ERR_MEMORY. */
+lam_status coincident_pairs_find(const mesh *m, coincident_sort sort, coincident_pairs *out,
+                                 lam_error *error);
 
 #endif

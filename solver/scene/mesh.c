@@ -22,6 +22,7 @@ void mesh_free(mesh *m) {
     free(m->reflectance);
     free(m->emission);
     free(m->has_back);
+    free(m->buried);
     mesh_textures_release(m);
     free(m->cameras);
     mesh_pictures_drop(m);
@@ -150,7 +151,7 @@ lam_status mesh_drop(mesh *m, const bool *dropped, lam_error *error) {
     uint32_t *number = memory_allocate(m->n_groups, sizeof *number, "groups", error);
     if (number == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < before; i++) n += !dropped[i];
-    assert(n > 0 && m->faces.n_parts == 0);
+    assert(n > 0 && m->faces.n_parts == 0 && m->buried == NULL);
     for (size_t c = 0, to = 0; c < m->n_channels; c++)
         for (size_t i = 0; i < before; i++) {
             if (dropped[i]) continue;

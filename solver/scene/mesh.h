@@ -39,10 +39,13 @@ typedef struct mesh {
     scene_camera *cameras; /* [n_cameras], of the scene file */
     bool *has_back; /* [n]: faces that mesh_make_backs gives a second element; NULL: none, or all are made */
     size_t n_backs;
-    bool two_sided;       /* every element has its back, or is one */
-    double unit;          /* metres per unit of the scene file, for the record */
-    char up;              /* 'x', 'y' or 'z' */
-    char name[128];       /* the scene file's stem */
+    bool *buried;   /* [n]: elements between a body and the face that it stands on, which see nothing and are
+                       not seen (buried.h); NULL: none, or not looked for. Only after the last change of
+                       elements */
+    bool two_sided; /* every element has its back, or is one */
+    double unit;    /* metres per unit of the scene file, for the record */
+    char up;        /* 'x', 'y' or 'z' */
+    char name[128]; /* the scene file's stem */
     char source_hash[33]; /* of the faces as imported, before any subdivision: hex */
 } mesh;
 
@@ -53,6 +56,10 @@ static inline size_t corner_count(const uint32_t vertices[4]) {
 
 static inline size_t mesh_corners(const mesh *m, size_t element) {
     return corner_count(m->elements[element]);
+}
+
+static inline bool mesh_is_buried(const mesh *m, size_t element) {
+    return m->buried != NULL && m->buried[element];
 }
 
 /* Frees what a mesh owns and zeroes it. */

@@ -1,6 +1,7 @@
 /* The check of an operator by random walks, which share nothing with the form factors that it was built from.
  */
 #include "solver/base/random.h"
+#include "solver/formfactor/buried.h"
 #include "solver/operator/emitters.h"
 #include "solver/precompute/precompute.h"
 #include "solver/verify/verify.h"
@@ -239,12 +240,14 @@ static lam_status walk_all(examination *e, judgement *j, lam_error *error) {
     const mesh *m = &e->m;
     walk_scene *scene = NULL;
     scene_closure closure;
+    size_t buried;
     walk_estimates found = {.n_rhs = 0};
     targets t = {.of = memory_allocate(m->n, sizeof *t.of, "targets of walks", error)};
     e->compared = memory_allocate(j->l->n * m->n_channels, (GROUPS_MOST + ELEMENTS) * sizeof *e->compared,
                                   "comparisons", error);
     if (t.of == NULL || e->compared == NULL) TRY(LAM_ERR_MEMORY);
     TRY(recipe_load_closure(e->s, recipe_of_operator.group, &closure, error));
+    TRY(buried_find(&e->m, &buried, error));
     TRY(walk_scene_create(m, closure, &scene, error));
     walk_problem problem = {.n_rhs = j->l->n,
                             .E = j->l->E,

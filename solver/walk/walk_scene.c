@@ -51,8 +51,14 @@ static lam_status look_around(walk_scene *s, scene_closure closure, lam_error *e
     const double width = openings_crack_width(s->m);
     followed of[PARTS][2] = {{{0, 0}, {0, 0}}}, sums[2] = {{0, 0}, {0, 0}};
     double *before = memory_allocate(n + 1, sizeof *before, "walks", error);
-    if (before == NULL) return LAM_ERR_MEMORY;
-    walk_accumulate(n, s->m->area, before);
+    double *area = memory_allocate(n, sizeof *area, "walks", error);
+    if (before == NULL || area == NULL) {
+        free(before);
+        free(area);
+        return LAM_ERR_MEMORY;
+    }
+    for (size_t i = 0; i < n; i++) area[i] = mesh_is_buried(s->m, i) ? 0 : s->m->area[i];
+    walk_accumulate(n, area, before);
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t part = 0; part < PARTS; part++)
         follow_lost(s, before, width, part, &of[part][0], &of[part][1]);
@@ -65,6 +71,7 @@ static lam_status look_around(walk_scene *s, scene_closure closure, lam_error *e
     s->fronts = (double)sums[1].openings <= LEAVING_OPEN * (double)sums[1].all;
     if (closure != CLOSURE_MEASURED) s->closed = closure == CLOSURE_CLOSED;
     free(before);
+    free(area);
     return LAM_OK;
 }
 

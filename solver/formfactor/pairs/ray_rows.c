@@ -352,7 +352,7 @@ static lam_status close_rows(void *context, const double **row_sums, lam_error *
     leaving_measure(f, r->m, r->v);
     for (size_t i = 0; i < n; i++) {
         const double sum = r->near_sums[i] + r->own[i] + (double)r->received[i] * unit;
-        const double all = sum + leaving_outside(f, i);
+        const double all = sum + leaving_outside(f, r->m, i);
         /* A row that sees nothing has nothing to close. */
         f->row_sums[i] = sum > 0 ? sum / all : 0;
         f->repair[i] = all - 1;
@@ -361,7 +361,7 @@ static lam_status close_rows(void *context, const double **row_sums, lam_error *
         total_area += r->m->area[i];
     }
     f->repair_mean = changed / total_area;
-    if (f->sky.n > 0) TRY(leaving_to_sky(f, n, error));
+    if (f->sky.n > 0) TRY(leaving_to_sky(f, r->m, error));
     *row_sums = f->row_sums;
 done:
     return status;

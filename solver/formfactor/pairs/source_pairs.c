@@ -68,6 +68,7 @@ static lam_status close_pairs(form_factors *f, const mesh *m, const visibility *
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
     leaving_measure(f, m, v);
+    for (size_t i = 0; i < m->n && leaving_nothing(f); i++) outside[i] = leaving_outside(f, m, i);
     if (!leaving_nothing(f)) find_rests(f, m->area, variance, outside);
     TRY(repair_close(&f->upper, m->area, outside, f, error));
 done:

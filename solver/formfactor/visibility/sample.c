@@ -246,3 +246,11 @@ void element_sampler_packet_of(const element_sampler *s, const uint32_t index[VI
         for (int i = 0; i < VISIBILITY_PACKET; i++)
             rays->direction[d][i] = dx[i] * f->tangent[d] + dy[i] * f->bitangent[d] + dz[i] * f->normal[d];
 }
+
+void element_sampler_turn(const element_sampler *s, ray_packet *rays) {
+    for (int i = 0; i < VISIBILITY_PACKET; i++) {
+        float along = 0;
+        for (int d = 0; d < 3; d++) along += rays->direction[d][i] * s->frame.normal[d];
+        for (int d = 0; d < 3; d++) rays->direction[d][i] -= 2 * along * s->frame.normal[d];
+    }
+}

@@ -37,6 +37,9 @@ void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet
 void element_sampler_packet_of(const element_sampler *s, const uint32_t index[VISIBILITY_PACKET],
                                ray_packet *rays);
 
+/* Turns rays of the element about its plane, so that they go from its back. */
+void element_sampler_turn(const element_sampler *s, ray_packet *rays);
+
 /* Rays that element_sampler_order sorts at most. */
 enum { SAMPLE_ORDERED = 1024 };
 
