@@ -341,7 +341,7 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
     const bool crosses = behind[0] || behind[1];
     /* Candidates cost more to sift than to test: those of the parent do where the outcome is the same. */
     if (among != NULL && among->count > 0 && is_level(f, a) && is_level(f, b) &&
-        ends_here(w, a, b, most, crosses))
+        ends_here(w, a, b, most, crosses) && candidates_are_others(&k->pieces, f, a, b, among))
         return end_shaded(w, a, b, most, crosses, among);
     if (among == NULL || among->count != 0) {
         candidates_between(&k->pieces, f, a, b, &at, among, &mine);
@@ -422,6 +422,7 @@ lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tre
     TRY(block_factors_begin(tree, m->area, (const double(*)[3])centre, nodes, error));
     TRY(flat_clusters_make(m, v, tree, nodes, &out->flat, error));
     TRY(occluders_make(m, visibility_facets(v), out->flat.slack, &out->pieces, error));
+    TRY(flat_clusters_find_sets(v, tree, &out->pieces, &out->flat, error));
     out->joined = tree->view == PLANE_VIEW_UNHIDDEN;
     if (tree->view == PLANE_VIEW_UNKNOWN && !blocks_are_planar(tree))
         TRY(mesh_is_unhidden(m, &out->joined, NULL, error));

@@ -28,6 +28,10 @@ enum { CANDIDATES_UNKNOWN = -1 };
 void candidates_between(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
                         const flat_pair *at, const candidates *among, candidates *out);
 
+/* True where no candidate is of the plane of either node. */
+bool candidates_are_others(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
+                           const candidates *among);
+
 /* The share of the way from a to b at which the first candidate stands, between .05 and .95. */
 double candidates_place(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
                         const candidates *among);

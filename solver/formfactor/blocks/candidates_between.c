@@ -12,9 +12,23 @@ typedef struct between {
     const flat_pair *at;
     const flat_plane *plane[2];
     const flat_cluster *of[2];
+    const uint32_t (*set_range)[2];
     double low[3], high[3], slack, flush;
     double rise; /* the elements are off their rectangles by this at most */
 } between;
+
+/* True for a piece of the plane in which all elements of a node lie: it hides nothing of them. Its corners
+ * may be higher than they are over the plane of the node, in which faces are a little turned against each
+ * other: the halves of a quad that is not quite plane. */
+static inline bool is_own(const flat_cluster *node, const occluder *o) {
+    return o->set == node->set;
+}
+
+/* True where some elements of a node may lie in the plane of a piece. */
+static inline bool may_hold(const between *w, const flat_cluster *node, const occluder *o) {
+    return w->set_range != NULL && node->set == FLAT_MIXED && w->set_range[o->set][0] < node->end &&
+           w->set_range[o->set][1] >= node->begin;
+}
 
 typedef enum blocking { BLOCKS_NOTHING, BLOCKS_SOME, BLOCKS_ALL } blocking;
 
@@ -48,6 +62,13 @@ static void take_shaft(const between *w, shaft *s) {
         shaft_cut(s, w->plane[side]->normal, w->of[side]->lowest_top + w->flush);
 }
 
+bool candidates_are_others(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
+                           const candidates *among) {
+    for (int k = 0; k < among->count; k++)
+        if (is_own(&f->of[a], &o->of[among->of[k]]) || is_own(&f->of[b], &o->of[among->of[k]])) return false;
+    return true;
+}
+
 static void try_all(const occluders *o, const between *w, candidates *out) {
     shaft s;
     const uint32_t *found;
@@ -63,6 +84,7 @@ void candidates_between(const occluders *o, const flat_clusters *f, uint32_t a, 
     between w = {.at = at,
                  .plane = {&f->planes[f->of[a].plane], &f->planes[f->of[b].plane]},
                  .of = {&f->of[a], &f->of[b]},
+                 .set_range = (const uint32_t(*)[2])f->set_range,
                  .slack = f->slack,
                  .flush = f->flush,
                  .rise = fmax(f->of[a].rise, f->of[b].rise)};

@@ -17,6 +17,7 @@ void flat_clusters_free(flat_clusters *f) {
     free(f->of);
     free(f->planes);
     free(f->before);
+    free(f->set_range);
     *f = (flat_clusters){.m = NULL};
 }
 
@@ -69,6 +70,7 @@ static void set_cluster(const flat_plane *p, const rectangle *r, double area, ui
                         flat_cluster *out) {
     *out = (flat_cluster){.area = area,
                           .plane = plane,
+                          .set = FLAT_MIXED,
                           .level = .5 * (r->low[2] + r->high[2]),
                           .rise = .5 * (r->high[2] - r->low[2]),
                           .lowest_top = r->lowest_top,
@@ -117,12 +119,47 @@ static corner_box box_of(const mesh *m, const plane_tree *tree, const corner_box
 /* A cluster of several planes. */
 static void set_above(const corner_box *box, double area, flat_cluster *out) {
     double square = 0;
-    *out = (flat_cluster){.area = area, .plane = PLANE_ABOVE};
+    *out = (flat_cluster){.area = area, .plane = PLANE_ABOVE, .set = FLAT_MIXED};
     for (int d = 0; d < 3; d++) {
         out->centre[d] = .5 * (box->low[d] + box->high[d]);
         square += pow(.5 * (box->high[d] - box->low[d]), 2);
     }
     out->radius = sqrt(square);
+}
+
+/* Both sides of a two-sided element lie in one facet. */
+static uint32_t facet_of(const mesh *m, const visibility *v, uint32_t element) {
+    const size_t n_fronts = m->two_sided ? m->n / 2 : m->n;
+    return visibility_facets(v)->of_element[element < n_fronts ? element : element - n_fronts];
+}
+
+lam_status flat_clusters_find_sets(const visibility *v, const plane_tree *tree, const occluders *o,
+                                   flat_clusters *f, lam_error *error) {
+    const size_t n_clusters = tree->n_clusters;
+    f->set_range = memory_allocate(o->n_facets, sizeof *f->set_range, "clusters", error);
+    if (f->set_range == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < o->n_facets; k++) f->set_range[k][0] = UINT32_MAX;
+    for (uint32_t p = 0; p < f->m->n; p++) {
+        const uint32_t set = o->set_of_facet[facet_of(f->m, v, tree->order[p])];
+        flat_cluster *own = &f->of[n_clusters + p];
+        own->set = set;
+        own->begin = p;
+        own->end = p + 1;
+        if (p < f->set_range[set][0]) f->set_range[set][0] = p;
+        f->set_range[set][1] = p;
+    }
+    for (size_t t = 0; t < n_clusters; t++) {
+        const plane_cluster *c = &tree->clusters[t];
+        flat_cluster *to = &f->of[t];
+        to->begin = c->begin;
+        to->end = c->end;
+        to->set = f->of[n_clusters + c->begin].set;
+        for (uint32_t p = c->begin; p < c->end && c->leaf; p++)
+            if (f->of[n_clusters + p].set != to->set) to->set = FLAT_MIXED;
+        if (!c->leaf && f->of[c->left].set != f->of[t - 1].set) to->set = FLAT_MIXED;
+        if (!c->leaf && f->of[c->left].set == FLAT_MIXED) to->set = FLAT_MIXED;
+    }
+    return LAM_OK;
 }
 
 static double extent_of(const mesh *m) {

@@ -5,6 +5,7 @@
 #define LAMBERT_FORMFACTOR_BLOCKS_FLAT_CLUSTERS_H
 
 #include "solver/formfactor/exchange/polygon.h"
+#include "solver/formfactor/visibility/occluders.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/operator/blocks/block_factors.h"
 
@@ -20,10 +21,14 @@ typedef struct flat_cluster {
     /* Heights: that of the rectangle, how far the corners of its elements are from it at most, and the lowest
      * one of the highest corners of each element. 0 above planes. */
     double level, rise, lowest_top;
-    double contact; /* of an element or any of them, visibility_rise; lowest_top has it in it */
-    uint32_t plane; /* PLANE_ABOVE: several planes. Centre and radius are those of a box then */
-    bool full;      /* the elements fill the rectangle at its height; false above planes */
+    double contact;      /* of an element or any of them, visibility_rise; lowest_top has it in it */
+    uint32_t plane;      /* PLANE_ABOVE: several planes. Centre and radius are those of a box then */
+    uint32_t set;        /* of facets (occluders.h) that all of its elements lie in, or FLAT_MIXED */
+    uint32_t begin, end; /* positions */
+    bool full;           /* the elements fill the rectangle at its height; false above planes */
 } flat_cluster;
+
+#define FLAT_MIXED MESH_NO_VERTEX
 
 typedef struct flat_clusters {
     const mesh *m;
@@ -31,9 +36,10 @@ typedef struct flat_clusters {
     flat_cluster *of; /* [n_clusters + n] */
     flat_plane *planes;
     size_t n_planes;
-    double *before; /* [n + 1], the area of all elements before a position */
-    double slack;   /* metres: less than this is no distance */
-    double flush;   /* metres: elements of a plane that differ in height by less hide nothing of each other */
+    double *before;           /* [n + 1], the area of all elements before a position */
+    uint32_t (*set_range)[2]; /* [facets]: the first and the last position of elements of a set, or NULL */
+    double slack;             /* metres: less than this is no distance */
+    double flush; /* metres: elements of a plane that differ in height by less hide nothing of each other */
 } flat_clusters;
 
 /* Measures all nodes, and widens nodes of blocks from the rectangles of centroids to those of the elements.
@@ -41,6 +47,10 @@ typedef struct flat_clusters {
 lam_status flat_clusters_make(const mesh *m, const visibility *v, const plane_tree *tree,
                               block_factors *blocks, flat_clusters *out, lam_error *error);
 void flat_clusters_free(flat_clusters *f);
+
+/* Finds the sets of facets of all nodes; without it nodes are of no one. Errors: LAM_ERR_MEMORY. */
+lam_status flat_clusters_find_sets(const visibility *v, const plane_tree *tree, const occluders *o,
+                                   flat_clusters *f, lam_error *error);
 
 /* The corners of two rectangles side by side, the first's before the second's. */
 enum { FLAT_CORNERS = 8 };

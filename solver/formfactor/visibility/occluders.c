@@ -1,5 +1,6 @@
 #include "solver/formfactor/visibility/occluders.h"
 
+#include "solver/base/union_find.h"
 #include "solver/base/vector3.h"
 
 #include <math.h>
@@ -13,6 +14,7 @@ void occluders_free(occluders *o) {
     free(o->of);
     free(o->list);
     free(o->nodes);
+    free(o->set_of_facet);
     *o = (occluders){.n = 0};
 }
 
@@ -162,18 +164,25 @@ lam_status occluders_make(const mesh *m, const facets *f, double slack, occluder
     lam_status status = LAM_OK;
     joined_polygon *pieces = NULL;
     size_t n_pieces = 0;
-    occluders o = {.slack = slack};
+    occluders o = {.slack = slack, .n_facets = f->n};
+    o.set_of_facet = memory_allocate(f->n, sizeof *o.set_of_facet, "occluders", error);
+    if (o.set_of_facet == NULL) return LAM_ERR_MEMORY;
+    for (uint32_t k = 0; k < f->n; k++) o.set_of_facet[k] = k;
     const polygon_join_options how = {.n = f->n_pieces,
                                       .polygons = (const uint32_t(*)[4])f->pieces,
                                       .label = f->piece_facet,
                                       .split = true,
+                                      .label_sets = o.set_of_facet,
                                       .corners = OCCLUDER_CORNERS,
                                       .slack = slack};
     TRY(polygons_join(m, &how, &pieces, &n_pieces, error));
     o.of = memory_allocate(n_pieces, sizeof *o.of, "occluders", error);
     if (o.of == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < n_pieces; k++)
-        if (set_occluder(m, &pieces[k], slack, &o.of[o.n])) o.n++;
+    for (uint32_t k = 0; k < f->n; k++) o.set_of_facet[k] = union_find_root(o.set_of_facet, k);
+    for (size_t k = 0; k < n_pieces; k++) {
+        if (!set_occluder(m, &pieces[k], slack, &o.of[o.n])) continue;
+        o.of[o.n++].set = o.set_of_facet[f->piece_facet[pieces[k].first]];
+    }
     drop_twins(&o);
     TRY(make_tree(&o, error));
     *out = o;

@@ -17,6 +17,7 @@ typedef struct occluder {
     double middle[3], radius;                 /* of a sphere about all corners */
     int n;
     uint32_t facet;                     /* MESH_NO_VERTEX: of several, in one plane */
+    uint32_t set;                       /* of facets that lie in one plane (occluders.set_of_facet) */
     double edge[OCCLUDER_CORNERS][4];   /* the distance of x from the edge, inwards, metres */
     double across[4][OCCLUDER_CORNERS]; /* the edges by component, repeated to fill */
     double corner[OCCLUDER_CORNERS][3]; /* counter-clockwise about the normal */
@@ -33,6 +34,8 @@ typedef struct occluders {
     occluder *of;   /* [n] */
     uint32_t *list; /* [n], in the order of the nodes */
     occluder_node *nodes;
+    uint32_t *set_of_facet; /* [n_facets], below n_facets: facets that were joined have one */
+    size_t n_facets;
     double slack; /* metres: rounding may move a point by that much */
 } occluders;
 

@@ -117,6 +117,9 @@ static bool unite(const joining *j, const piece *p, uint32_t i, const piece *q, 
     out->shape.n = n;
     memcpy(out->shape.corner, corner, n * sizeof *corner);
     if (q->shape.label != p->shape.label) out->shape.label = MESH_NO_VERTEX;
+    if (j->options->label_sets != NULL)
+        union_find_join(j->options->label_sets, j->options->label[p->shape.first],
+                        j->options->label[q->shape.first]);
     return true;
 }
 
