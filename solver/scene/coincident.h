@@ -17,6 +17,9 @@ typedef struct coincident_report {
     char dropped_line[COINCIDENT_TEXT], cut_line[COINCIDENT_TEXT], overlap_line[COINCIDENT_TEXT];
 } coincident_report;
 
+/* Sets m->rounding of a mesh whose vertices are those of the file. Cost: O(n). */
+void coincident_find_rounding(mesh *m);
+
 /* Drops faces whose corners are those of another one, in the same sequence from any of them on: of these the
  * first that emits is kept, or, where none does, the first. Then cuts faces that cover the same part of a
  * plane, so that each place belongs to one (coincident_cut.h). Sets m->overlap, or NULL where no face

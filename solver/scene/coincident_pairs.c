@@ -2,6 +2,7 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/scene/box_pairs.h"
+#include "solver/scene/coincident.h"
 #include "solver/scene/element_face.h"
 #include "solver/scene/flat_polygon.h"
 #include "solver/scene/plane.h"
@@ -37,12 +38,16 @@ static double step_of_decimals(const mesh *m, double share) {
     return 1 / steps;
 }
 
-coincident_planes coincident_planes_of(const mesh *m) {
-    double centre[3], radius;
+void coincident_find_rounding(mesh *m) {
     double step = step_of_decimals(m, 0x1p-50);
     if (!(step > 0)) step = step_of_decimals(m, 0x1p-24); /* a file that was read in single precision */
+    m->rounding = m->unit * step;
+}
+
+coincident_planes coincident_planes_of(const mesh *m) {
+    double centre[3], radius;
     mesh_bounds(m, centre, &radius);
-    return (coincident_planes){.m = m, .distance = plane_same_place * radius, .rounding = m->unit * step};
+    return (coincident_planes){.m = m, .distance = plane_same_place * radius};
 }
 
 static double cosine_between(const mesh *m, uint32_t i, uint32_t j) {
@@ -52,8 +57,8 @@ static double cosine_between(const mesh *m, uint32_t i, uint32_t j) {
 
 /* A length that rounding makes between two faces. */
 static double rounded(const coincident_planes *p, uint32_t i, uint32_t j, double steps) {
-    const double slack = plane_slack(2 * sqrt(p->m->area[i]), 2 * sqrt(p->m->area[j]));
-    return fmax(p->distance, fmin(steps * p->rounding, slack));
+    const double gap = plane_gap(2 * sqrt(p->m->area[i]), 2 * sqrt(p->m->area[j]));
+    return fmax(p->distance, fmin(steps * p->m->rounding, gap));
 }
 
 double coincident_width(const coincident_planes *p, uint32_t i, uint32_t j) {
@@ -145,9 +150,11 @@ static lam_status look(void *context, uint32_t i, uint32_t j, lam_error *error) 
     if (!element_face_set(m, m->elements[a], &plane) || !in_plane(&s->planes, &plane, a, b)) return LAM_OK;
     flatten(m, b, &plane, cosine < 0, &small);
     flatten(m, a, &plane, false, &large);
-    /* Rounding moves the edge that neighbours share, and makes them share a strip beside it. */
+    /* Rounding moves the edge that neighbours share, and makes them share a strip beside it. Many parts cover
+     * an element together. */
     const double width = coincident_width(&s->planes, i, j);
-    const double least = shared_least * m->area[b] + width * perimeter(&small);
+    const double strip = s->sort == COINCIDENT_SHEETS ? 0 : width * perimeter(&small);
+    const double least = shared_least * m->area[b] + strip;
     const double area = fmin(flat_polygons_overlap(&small, &large), m->area[b]);
     if (!(area > least)) return LAM_OK;
     coincident_pairs *out = s->out;
@@ -167,7 +174,7 @@ lam_status coincident_pairs_find(const mesh *m, coincident_sort sort, coincident
     search s = {.planes = coincident_planes_of(m), .sort = sort, .out = &found};
     /* A part of a plane that is in both is long along two axes. Faces that share an edge along an axis are
      * no further apart, but their boxes have only that axis in common. */
-    const box_pairs how = {.distance = fmax(s.planes.distance, 2 * s.planes.rounding),
+    const box_pairs how = {.distance = fmax(s.planes.distance, 2 * m->rounding),
                            .least = s.planes.distance,
                            .long_axes = 2,
                            .visit = look,

@@ -22,14 +22,12 @@ typedef struct coincident_pairs {
 typedef struct coincident_planes {
     const mesh *m;
     double distance; /* m: planes, and corners, that are no further apart are one */
-    double rounding; /* m: the step of the decimals of the file, or 0 where it has more than eight of them */
 } coincident_planes;
 
-/* Cost: O(n). */
 coincident_planes coincident_planes_of(const mesh *m);
 
 /* True where the smaller of two faces lies in the plane of the larger one, on either side: as far as rounding
- * to the step of the decimals moves both, if plane_slack lets that count. */
+ * to the step of the decimals moves both, if that is less than plane_gap. */
 bool coincident_share_plane(const coincident_planes *p, uint32_t i, uint32_t j);
 
 /* m: corners of two faces, and their edges, are one where they are no further apart. */

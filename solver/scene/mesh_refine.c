@@ -168,7 +168,7 @@ done:
 lam_status refined_mesh_end(refined_mesh *r, const mesh *m, mesh *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = r->n, channels = m->n_channels;
-    mesh fine = {.n = n, .n_channels = channels, .unit = m->unit, .up = m->up};
+    mesh fine = {.n = n, .n_channels = channels, .unit = m->unit, .rounding = m->rounding, .up = m->up};
     fine.group = memory_allocate(n, sizeof *fine.group, "refined mesh", error);
     fine.reflectance = memory_allocate(n * channels, sizeof *fine.reflectance, "refined mesh", error);
     fine.emission = memory_allocate(n * channels, sizeof *fine.emission, "refined mesh", error);

@@ -37,6 +37,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_set_text(s, STORE_MESH, "name", m->name, error));
     TRY(store_set_text(s, STORE_MESH, "up", up, error));
     TRY(store_set_number(s, STORE_MESH, "unit", m->unit, error));
+    if (m->rounding > 0) TRY(store_set_number(s, STORE_MESH, "rounding", m->rounding, error));
     TRY(scene_backs_save(m->n_backs, m->two_sided, s, error));
     TRY(scene_cameras_save(m->n_cameras, m->cameras, s, error));
 done:
@@ -64,8 +65,13 @@ static lam_status load_attributes(store *s, mesh *m, lam_error *error) {
     TRY(load_text(s, "name", m->name, sizeof m->name, error));
     TRY(load_text(s, "up", up, sizeof up, error));
     TRY(store_get_number(s, STORE_MESH, "unit", &m->unit, error));
+    if (store_has_attribute(s, STORE_MESH, "rounding"))
+        TRY(store_get_number(s, STORE_MESH, "rounding", &m->rounding, error));
     if (strlen(up) != 1 || strchr("xyz", up[0]) == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute up is '%s', must be x, y or z", store_path(s), up);
+    if (!(m->rounding >= 0) || !isfinite(m->rounding))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute rounding is %g, must be 0 or more", store_path(s),
+             m->rounding);
     if (!(m->unit > 0) || !isfinite(m->unit))
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute unit is %g, must be positive", store_path(s),
              m->unit);

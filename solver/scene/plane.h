@@ -19,13 +19,18 @@ static const double plane_least_length = 1e-7;
  * too, meet either of two faces up to 1e-7 to 3e-7 apart, and the nearer one from there on. */
 static const double plane_same_place = 1e-6;
 
+/* The distance from which on two faces of these diameters are apart, whatever their corners say. */
+static inline double plane_gap(double one, double other) {
+    return .01 * fmin(one, other);
+}
+
 /* The distance that a corner of one face may have from the plane of another one of the same place, such as
  * the back of a sheet, given both diameters. A quad that counts as plane has corners up to f d off its plane,
  * by turns above and below it, so that each of them is up to 4 f d off the plane of the three others: the
  * back may be made of two triangles. A distance of a hundredth of the smaller face is a gap nevertheless: a
  * diode of a millimetre that hangs .1 mm above a large floor shines on it. */
 static inline double plane_slack(double one, double other) {
-    return fmin(4 * plane_flatness * fmax(one, other), .01 * fmin(one, other));
+    return fmin(4 * plane_flatness * fmax(one, other), plane_gap(one, other));
 }
 
 /* A flat face: its corners, their mean and the farthest one's distance from that, and the unit normal. */

@@ -380,6 +380,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     TRY(lay_textures(&s, path, options->unit, &made, &found, error));
     if (!options->fronts_only) TRY(mark_backs(&s, &made, error));
     if (!is_obj) warn_of_lost_precision(&s, path, &made);
+    coincident_find_rounding(&made);
     TRY(mesh_settle_coincident(&made, options->two_sided, &found.coincident, error));
     mesh_geometry_hash(&made, made.source_hash);
     found.dropped_faces = s.dropped;
