@@ -55,14 +55,10 @@ static double cosine_between(const mesh *m, uint32_t i, uint32_t j) {
     return (double)p[0] * (double)q[0] + (double)p[1] * (double)q[1] + (double)p[2] * (double)q[2];
 }
 
-/* A length that rounding makes between two faces. */
-static double rounded(const coincident_planes *p, uint32_t i, uint32_t j, double steps) {
-    const double gap = plane_gap(2 * sqrt(p->m->area[i]), 2 * sqrt(p->m->area[j]));
-    return fmax(p->distance, fmin(steps * p->m->rounding, gap));
-}
-
+/* Few decimals may be all that there are: edges are one only where plane_slack lets them. */
 double coincident_width(const coincident_planes *p, uint32_t i, uint32_t j) {
-    return rounded(p, i, j, 2);
+    const double slack = plane_slack(2 * sqrt(p->m->area[i]), 2 * sqrt(p->m->area[j]));
+    return fmax(p->distance, fmin(2 * p->m->rounding, slack));
 }
 
 /* Half a step along each axis moves a corner by (|n_x| + |n_y| + |n_z|) / 2 steps along a normal n, and the
@@ -71,7 +67,8 @@ static bool in_plane(const coincident_planes *p, const element_face *plane, uint
     static const double below = .99;
     const mesh *m = p->m;
     const double sum = fabs(plane->normal[0]) + fabs(plane->normal[1]) + fabs(plane->normal[2]);
-    const double most = rounded(p, large, small, below * sum);
+    const double gap = plane_gap(2 * sqrt(m->area[large]), 2 * sqrt(m->area[small]));
+    const double most = fmax(p->distance, fmin(below * sum * m->rounding, gap));
     for (size_t c = 0; c < mesh_corners(m, small); c++) {
         const double *v = m->vertices[m->elements[small][c]];
         double height = 0;
