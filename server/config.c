@@ -236,8 +236,8 @@ static const option_command daemon_command = {
 };
 
 /* Threads and processes beside those that compute: the one for short solves, main, input and output,
- * connections, verification, variants, a child that opens a store. */
-enum { BESIDE = 7 };
+ * connections, those that are closed, verification, variants, a child that opens a store. */
+enum { BESIDE = 8 };
 
 /* A machine that does not tell is taken to have this much. */
 #define UNKNOWN_MEMORY ((uint64_t)2 << 30)

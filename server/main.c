@@ -140,6 +140,14 @@ static bool idle_within(service *s, double seconds, const sigset_t *signals) {
     return true;
 }
 
+/* Waits as long for clients that still send what was refused, and then read why. */
+static void wait_for_lingering(service *s, double seconds, const sigset_t *signals) {
+    const double end = clock_seconds() + seconds;
+    while (connections_lingering(s->connections) > 0 && clock_seconds() < end &&
+           !hurried_within(5e-3, signals)) {
+    }
+}
+
 /* Leaves as --drain-delay and --shutdown-timeout say; a second signal hurries. True if no thread is in a
  * function that could take long. */
 static bool leave(service *s, http *h, unix_socket *own, const sigset_t *signals) {
@@ -148,8 +156,10 @@ static bool leave(service *s, http *h, unix_socket *own, const sigset_t *signals
     http_quiesce(h);
     listener_unlink(own);
     variants_close(s->variants);
-    if (!hurried && idle_within(s, (double)s->config->shutdown_timeout_s - LAST_ANSWERS_S, signals))
+    if (!hurried && idle_within(s, (double)s->config->shutdown_timeout_s - LAST_ANSWERS_S, signals)) {
+        wait_for_lingering(s, LAST_ANSWERS_S, signals);
         return true;
+    }
     atomic_store(&s->state, SERVICE_ENDING);
     batch_abandon(s->queue);
     (void)idle_within(s, LAST_ANSWERS_S, signals);

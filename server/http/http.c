@@ -7,6 +7,7 @@
 #include "server/http/framing.h"
 #include "server/http/head_fields.h"
 #include "server/http/request_log.h"
+#include "server/net/descriptors.h"
 #include "solver/base/clock.h"
 
 #include <stdarg.h>
@@ -31,6 +32,9 @@ struct http {
 /* The rest of a refused body is read and dropped up to this length, so that its connection can be used again.
  */
 #define DROP_MAX ((uint64_t)1 << 20)
+
+/* The part of a body without a length beyond --max-body that is read before its answer. */
+#define EXCESS_MAX ((uint64_t)64 << 20)
 
 /* True if the client may have the route, by its token where one is needed. */
 static bool check_token(request *r) {
@@ -249,6 +253,12 @@ static uint64_t announced_length(const request *r) {
     return *end == '\0' ? length : UINT64_MAX;
 }
 
+/* Answers before the body has come: the connection ends with the answer. */
+static enum MHD_Result send_early(request *r) {
+    client_linger(r->service->connections, r->client);
+    return http_send_answer(r);
+}
+
 static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const char *path,
                                const char *method, const char *version, void **context) {
     request *r = begin_request(h, connection, path, method);
@@ -257,15 +267,16 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
     if (!head_check_fields(r, version)) {
         /* Nothing that follows may be read as a request, nor waited for as a body. */
         r->answered = r->last = true;
-        return http_send_answer(r);
+        return send_early(r);
     }
     const uint64_t length = announced_length(r);
     r->announced = length;
     r->answered = !http_read_timeout(r) || !check_head(r, method, path, length);
     /* An answer sent before the end of the body closes the connection. So the body of a refused request is
-     * read and dropped, unless it is long or its client waits for 100 Continue. */
-    if (r->answered && (length > DROP_MAX || http_header(r, MHD_HTTP_HEADER_EXPECT) != NULL))
-        return http_send_answer(r);
+     * read and dropped, unless it is long, of unknown length, or its client waits for 100 Continue. */
+    if (r->answered && (length > DROP_MAX || http_header(r, MHD_HTTP_HEADER_EXPECT) != NULL ||
+                        http_header(r, MHD_HTTP_HEADER_TRANSFER_ENCODING) != NULL))
+        return send_early(r);
     return MHD_YES;
 }
 
@@ -289,7 +300,7 @@ static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
     r->received += *size;
     client_received(r->service->connections, r->client, *size);
     /* libmicrohttpd sends no answer in the middle of a body: the connection of one without end is closed. */
-    if (r->received > c->max_body + DROP_MAX) return MHD_NO;
+    if (r->received > c->max_body + EXCESS_MAX) return MHD_NO;
     *size = 0;
     return MHD_YES;
 }
@@ -359,6 +370,7 @@ static enum MHD_Result on_accept(void *context, const struct sockaddr *from, soc
  */
 static void log_unread(http *h, struct MHD_Connection *connection) {
     if (h->unread_status == 0) return;
+    if (connection != NULL) client_linger(h->service->connections, client_of(connection));
     peer who = {.text = ""};
     size_t received = 0;
     if (connection != NULL) {
@@ -384,7 +396,7 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
     } else {
         /* The descriptor is still open. */
         if (!client_has_request(*socket_context)) log_unread(context, connection);
-        connections_remove(all, *socket_context);
+        connections_close(all, *socket_context);
         *socket_context = NULL;
     }
 }
@@ -428,7 +440,7 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
                                 .timeout_s = s->config->timeout_s,
                                 .keep_alive_s = s->config->keep_alive_s,
                                 .least_rate = s->config->min_rate};
-    TRY(connections_affordable(&limits, catalog_stores(s->catalog), error));
+    TRY(descriptors_afford(&limits, catalog_stores(s->catalog), error));
     TRY(connections_start(&limits, &s->connections, error));
     TRY(turns_create(go, &s->turns, error));
     /* No time-out of libmicrohttpd: it would close a client whose answer waits in a slow socket. At its limit

@@ -3,43 +3,34 @@
  * connection past it is shut down here, and the thread that serves it closes it. */
 #include "server/net/connections.h"
 
+#include "server/net/descriptors.h"
+#include "server/net/lingering.h"
 #include "server/net/shares.h"
+#include "server/net/socket_state.h"
 #include "solver/base/clock.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <linux/sockios.h>
-#include <linux/tcp.h>
 #include <math.h>
-#include <netinet/in.h>
-#include <poll.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/ioctl.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-/* Descriptors for other than connections: standard streams, the listening socket, epoll, stores being read,
- * the log, libraries. */
-#define OTHER_DESCRIPTORS 64
-
-/* Connections that are always allowed; files that are more than all tables of the program can hold, to which
- * the limit is raised at most. */
-#define LEAST_CONNECTIONS 8
-#define MOST_DESCRIPTORS ((rlim_t)1 << 17)
+/* A connection lingers for so many seconds without a byte, or timeout_s if that is less, and for so many
+ * times as long in all; a part of all connections does at once, at most. */
+#define LINGERING_QUIET_S 5.0
+#define LINGERING_TIMES 6.0
+#define LINGERING_PART 4
 
 /* When all connections are in use, an idle one is kept for this time. */
 #define IDLE_GRACE_S 1.0
 
 /* Seconds after its end when a connection is closed. */
 #define END_SLACK 1e-3
-
-/* Connections that are accepted beyond the limit, of which the client that has most may take half. */
-#define BEYOND_MOST ((size_t)32)
-#define BEYOND_LEAST ((size_t)8)
 
 /* Idle connections closed in a second, at most. */
 #define PLACES 64
@@ -59,16 +50,18 @@ typedef enum cut_reason {
     CUT_PLACE,
     CUT_DEADLINE,
     CUT_SHARE,
+    CUT_LINGERING,
     N_CUT_REASONS
 } cut_reason;
-static const char *const reasons[N_CUT_REASONS] = {"idle",  "head",     "body", "answer",
-                                                   "place", "deadline", "share"};
+static const char *const reasons[N_CUT_REASONS] = {"idle",  "head",     "body",  "answer",
+                                                   "place", "deadline", "share", "lingering"};
 
 struct client {
     client *before, *after;
     int fd;
     connection_stage stage;
     bool cut;
+    bool lingers;    /* once it is closed */
     bool counts;     /* counts for its client */
     uint64_t key;    /* of its client */
     bool checked;    /* seen was set in this stage */
@@ -88,54 +81,13 @@ struct connections {
     double next_end; /* the earliest of all, or earlier */
     bool hurried;    /* an end comes before the next check */
     double looked;   /* for those that are gone, while all were in use */
-    size_t n_open;
+    size_t n_open, n_lingering;
+    lingering *lingering;
     shares kept;        /* connections but those that are being closed */
     uint64_t n_refused; /* not accepted, as their client has most of all */
     uint64_t n_cut[N_CUT_REASONS];
     bool ended;
 };
-
-lam_status connections_affordable(connection_limits *limits, size_t n_stores, lam_error *error) {
-    lam_status status = LAM_OK;
-    struct rlimit limit;
-    if (getrlimit(RLIMIT_NOFILE, &limit) != 0) FAIL(error, LAM_ERR_IO, "the limit on open files is unknown");
-    const rlim_t highest = limit.rlim_max < MOST_DESCRIPTORS ? limit.rlim_max : MOST_DESCRIPTORS;
-    if (limit.rlim_cur < highest) {
-        struct rlimit raised = limit;
-        raised.rlim_cur = highest;
-        if (setrlimit(RLIMIT_NOFILE, &raised) == 0) limit = raised;
-    }
-    if (limit.rlim_cur <= OTHER_DESCRIPTORS)
-        FAIL(error, LAM_ERR_IO, "only %llu files may be open (ulimit -n), must be more than %d",
-             (unsigned long long)limit.rlim_cur, OTHER_DESCRIPTORS);
-    const size_t others = OTHER_DESCRIPTORS + n_stores,
-                 left = limit.rlim_cur > others ? (size_t)(limit.rlim_cur - others) : 0;
-    const size_t allowed = left < LEAST_CONNECTIONS ? LEAST_CONNECTIONS : left;
-    limits->most = limits->wanted < allowed ? limits->wanted : allowed;
-    const size_t spare = allowed - limits->most;
-    limits->beyond = spare < BEYOND_LEAST ? BEYOND_LEAST : spare < BEYOND_MOST ? spare : BEYOND_MOST;
-done:
-    return status;
-}
-
-/* True if the process may open no file any more; nobody is accepted then, however few are connected. */
-static bool is_out_of_descriptors(void) {
-    const int fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    if (fd < 0) return errno == EMFILE || errno == ENFILE;
-    close(fd);
-    return false;
-}
-
-/* *bytes: bytes that the client's machine has acknowledged; false if the socket does not count them. */
-static bool read_acknowledged(int fd, uint64_t *bytes) {
-    struct tcp_info info;
-    socklen_t size = sizeof info;
-    if (getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 ||
-        size < offsetof(struct tcp_info, tcpi_bytes_acked) + sizeof info.tcpi_bytes_acked)
-        return false;
-    *bytes = info.tcpi_bytes_acked;
-    return true;
-}
 
 /* Bytes of an answer that were read since the last check. A Unix socket reports only the bytes waiting in it:
  * any change then counts as enough, and the time for the whole answer is limited. */
@@ -143,7 +95,7 @@ static double measure_read(const connection_limits *limits, client *c, double no
     uint64_t seen;
     int waiting = 0;
     const double enough = (double)limits->timeout_s * (double)limits->least_rate;
-    const bool counted = read_acknowledged(c->fd, &seen);
+    const bool counted = socket_acknowledged(c->fd, &seen);
     if (!counted) seen = ioctl(c->fd, SIOCOUTQ, &waiting) == 0 ? (uint64_t)waiting : 0;
     const bool changed = c->checked && seen != c->seen;
     const double read = !changed ? 0.0 : counted ? (double)(seen - c->seen) : enough;
@@ -154,40 +106,41 @@ static double measure_read(const connection_limits *limits, client *c, double no
     return read;
 }
 
-/* True if the client has ended its sending and all it sent was received. libmicrohttpd does not check this in
- * the middle of a head or a body. */
-static bool has_hung_up(const client *c) {
-    int unread = 0;
-    struct pollfd one = {.fd = c->fd, .events = POLLRDHUP};
-    return poll(&one, 1, 0) > 0 && (one.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0 &&
-           ioctl(c->fd, FIONREAD, &unread) == 0 && unread == 0;
+/* Seconds for which a connection lingers without a byte. */
+static double quiet_of(const connection_limits *limits) {
+    return fmin(LINGERING_QUIET_S, (double)limits->timeout_s);
 }
 
 /* True if c is past its deadline. Every byte that moves extends the deadline by 1/rate, to at most one
  * time-out from now, so that a client cannot save up time. */
 static bool is_over_time(const connection_limits *limits, client *c, double now, cut_reason *why) {
-    const double timeout = (double)limits->timeout_s;
+    const double timeout = c->stage == STAGE_LINGERING ? quiet_of(limits) : (double)limits->timeout_s;
     double moved = 0.0;
     switch (c->stage) {
     case STAGE_SOLVE:
         return false;
     case STAGE_IDLE:
         *why = CUT_IDLE;
-        return now > c->deadline || (now - c->since > GONE_AFTER_S && has_hung_up(c));
+        return now > c->deadline || (now - c->since > GONE_AFTER_S && socket_has_hung_up(c->fd));
     case STAGE_HEAD:
     case STAGE_BODY:
         *why = c->stage == STAGE_HEAD ? CUT_HEAD : CUT_BODY;
         moved = (double)(c->bytes - c->seen);
         c->seen = c->bytes;
-        if (moved <= 0 && now - c->since > GONE_AFTER_S && has_hung_up(c)) return true;
+        if (moved <= 0 && now - c->since > GONE_AFTER_S && socket_has_hung_up(c->fd)) return true;
         break;
     case STAGE_ANSWER:
         *why = CUT_ANSWER;
         moved = measure_read(limits, c, now);
         break;
+    case STAGE_LINGERING:
+        *why = CUT_LINGERING;
+        moved = (double)(c->bytes - c->seen);
+        c->seen = c->bytes;
+        break;
     }
     if (now > c->end && c->stage != STAGE_HEAD) {
-        *why = CUT_DEADLINE;
+        if (c->stage != STAGE_LINGERING) *why = CUT_DEADLINE;
         return true;
     }
     c->deadline += moved / (double)limits->least_rate;
@@ -213,11 +166,16 @@ static void cut(connections *all, client *c, cut_reason why) {
     shutdown(c->fd, SHUT_RDWR);
 }
 
-/* The client that has been idle between requests for longest, and longer than IDLE_GRACE_S; NULL if none. */
+/* True between requests, where nobody loses an answer. */
+static bool is_between(const client *c) {
+    return c->stage == STAGE_IDLE || c->stage == STAGE_HEAD || c->stage == STAGE_LINGERING;
+}
+
+/* The client that has been between requests for longest, and longer than IDLE_GRACE_S; NULL if none. */
 static client *find_idle(const connections *all, double now) {
     client *oldest = NULL;
     for (client *c = all->first; c != NULL; c = c->after)
-        if (!c->cut && (c->stage == STAGE_IDLE || c->stage == STAGE_HEAD) && now - c->since > IDLE_GRACE_S &&
+        if (!c->cut && is_between(c) && now - c->since > IDLE_GRACE_S &&
             (oldest == NULL || c->since < oldest->since))
             oldest = c;
     return oldest;
@@ -236,7 +194,7 @@ static void sweep(connections *all) {
         else if (c->stage != STAGE_SOLVE)
             all->next_end = fmin(all->next_end, c->end);
     }
-    if (all->n_open < all->limits.most && !is_out_of_descriptors()) return;
+    if (all->n_open < all->limits.most && !descriptors_are_out()) return;
     for (size_t place = 0; place <= all->limits.most / 4 && place < PLACES; place++) {
         client *idle = find_idle(all, now);
         if (idle == NULL) return;
@@ -263,6 +221,21 @@ static void *watch(void *argument) {
     return NULL;
 }
 
+/* Of lingering_calls. */
+static bool take_lingering(void *context, void *who, size_t bytes) {
+    connections *all = context;
+    client *c = who;
+    pthread_mutex_lock(&all->lock);
+    c->bytes += bytes;
+    const bool goes_on = !c->cut;
+    pthread_mutex_unlock(&all->lock);
+    return goes_on;
+}
+
+static void end_lingering(void *context, void *who) {
+    connections_remove(context, who);
+}
+
 lam_status connections_start(const connection_limits *limits, connections **out, lam_error *error) {
     lam_status status = LAM_OK;
     pthread_condattr_t monotonic;
@@ -271,11 +244,13 @@ lam_status connections_start(const connection_limits *limits, connections **out,
     if (all == NULL) return LAM_ERR_MEMORY;
     all->limits = *limits;
     all->next_end = INFINITY;
+    const lingering_calls calls = {take_lingering, end_lingering, all};
     pthread_mutex_init(&all->lock, NULL);
     pthread_condattr_init(&monotonic);
     pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_cond_init(&all->ending, &monotonic);
     pthread_condattr_destroy(&monotonic);
+    TRY(lingering_start(&calls, &all->lingering, error));
     sigfillset(&every);
     pthread_sigmask(SIG_SETMASK, &every, &before);
     const int failed = pthread_create(&all->thread, NULL, watch, all);
@@ -285,6 +260,7 @@ lam_status connections_start(const connection_limits *limits, connections **out,
     all = NULL;
 done:
     if (all != NULL) {
+        lingering_stop(all->lingering);
         pthread_cond_destroy(&all->ending);
         pthread_mutex_destroy(&all->lock);
         free(all);
@@ -294,7 +270,7 @@ done:
 
 void connections_reserve(connections *all, size_t n_stores) {
     connection_limits limits = {.wanted = all->limits.wanted};
-    if (connections_affordable(&limits, n_stores, NULL) != LAM_OK) return;
+    if (descriptors_afford(&limits, n_stores, NULL) != LAM_OK) return;
     pthread_mutex_lock(&all->lock);
     all->limits.most = limits.most;
     pthread_mutex_unlock(&all->lock);
@@ -307,6 +283,11 @@ void connections_stop(connections *all) {
     pthread_cond_signal(&all->ending);
     pthread_mutex_unlock(&all->lock);
     pthread_join(all->thread, NULL);
+    pthread_mutex_lock(&all->lock);
+    for (client *c = all->first; c != NULL; c = c->after)
+        if (!c->cut) cut(all, c, CUT_LINGERING);
+    pthread_mutex_unlock(&all->lock);
+    lingering_stop(all->lingering);
     pthread_cond_destroy(&all->ending);
     pthread_mutex_destroy(&all->lock);
     free(all);
@@ -315,7 +296,9 @@ void connections_stop(connections *all) {
 static void begin_stage(const connections *all, client *c, connection_stage stage, size_t bytes, double now) {
     c->stage = stage;
     c->since = now;
-    c->deadline = now + (double)(stage == STAGE_IDLE ? all->limits.keep_alive_s : all->limits.timeout_s);
+    c->deadline = now + (stage == STAGE_LINGERING ? quiet_of(&all->limits)
+                         : stage == STAGE_IDLE    ? (double)all->limits.keep_alive_s
+                                                  : (double)all->limits.timeout_s);
     c->bytes = bytes;
     c->seen = 0;
     c->checked = false;
@@ -332,8 +315,8 @@ static void hurry(connections *all, const client *c) {
 
 /* The loss of what a connection is in, least first. */
 static unsigned loss_of(const client *c) {
-    static const unsigned losses[] = {
-        [STAGE_IDLE] = 0, [STAGE_HEAD] = 1, [STAGE_BODY] = 2, [STAGE_ANSWER] = 3, [STAGE_SOLVE] = 4};
+    static const unsigned losses[] = {[STAGE_LINGERING] = 0, [STAGE_IDLE] = 1,   [STAGE_HEAD] = 2,
+                                      [STAGE_BODY] = 3,      [STAGE_ANSWER] = 4, [STAGE_SOLVE] = 5};
     return losses[c->stage];
 }
 
@@ -352,7 +335,7 @@ static client *find_gift(const connections *all, size_t place) {
 /* Closes one of the client's connections that has sent no head; false if there is none. */
 static bool replace_idle(connections *all, uint64_t key) {
     client *gift = find_gift(all, shares_place(key));
-    if (gift == NULL || (gift->stage != STAGE_IDLE && gift->stage != STAGE_HEAD)) return false;
+    if (gift == NULL || !is_between(gift)) return false;
     cut(all, gift, CUT_SHARE);
     return true;
 }
@@ -366,7 +349,7 @@ static void cut_gone(connections *all) {
     for (client *c = all->first; c != NULL; c = c->after) {
         const bool in_request = c->stage == STAGE_HEAD || c->stage == STAGE_BODY;
         if (!c->cut && (in_request || c->stage == STAGE_IDLE) && now - c->since > GONE_AFTER_FULL_S &&
-            has_hung_up(c))
+            socket_has_hung_up(c->fd))
             cut(all, c, c->stage == STAGE_BODY ? CUT_BODY : c->stage == STAGE_HEAD ? CUT_HEAD : CUT_IDLE);
     }
 }
@@ -420,8 +403,46 @@ void connections_remove(connections *all, client *c) {
     if (c->after != NULL) c->after->before = c->before;
     if (!c->cut) uncount(all, c);
     all->n_open--;
+    all->n_lingering -= c->stage == STAGE_LINGERING;
     pthread_mutex_unlock(&all->lock);
     free(c);
+}
+
+/* The connection that has lingered for longest. The caller holds the lock. */
+static client *find_lingering(const connections *all) {
+    client *oldest = NULL;
+    for (client *c = all->first; c != NULL; c = c->after)
+        if (!c->cut && c->stage == STAGE_LINGERING && (oldest == NULL || c->since < oldest->since))
+            oldest = c;
+    return oldest;
+}
+
+void connections_close(connections *all, client *c) {
+    if (c == NULL) return;
+    const double now = clock_seconds();
+    bool lingers = false;
+    pthread_mutex_lock(&all->lock);
+    const int fd = c->lingers && !c->cut ? fcntl(c->fd, F_DUPFD_CLOEXEC, 0) : -1;
+    if (fd >= 0) {
+        client *oldest = all->n_lingering < all->limits.most / LINGERING_PART ? NULL : find_lingering(all);
+        if (oldest != NULL) cut(all, oldest, CUT_LINGERING);
+        begin_stage(all, c, STAGE_LINGERING, 0, now);
+        c->end = now + LINGERING_TIMES * quiet_of(&all->limits);
+        c->fd = fd;
+        all->n_lingering++;
+        lingers = lingering_add(all->lingering, fd, c);
+    }
+    pthread_mutex_unlock(&all->lock);
+    if (lingers) return;
+    connections_remove(all, c);
+    if (fd >= 0) close(fd);
+}
+
+size_t connections_lingering(connections *all) {
+    pthread_mutex_lock(&all->lock);
+    const size_t count = all->n_lingering;
+    pthread_mutex_unlock(&all->lock);
+    return count;
 }
 
 void client_enter(connections *all, client *c, connection_stage stage, size_t bytes) {
@@ -448,29 +469,29 @@ void client_end_by(connections *all, client *c, double end) {
     pthread_mutex_unlock(&all->lock);
 }
 
+void client_linger(connections *all, client *c) {
+    if (c == NULL) return;
+    pthread_mutex_lock(&all->lock);
+    c->lingers = true;
+    pthread_mutex_unlock(&all->lock);
+}
+
 bool client_has_request(const client *c) {
     return c != NULL && c->stage != STAGE_IDLE && c->stage != STAGE_HEAD;
 }
 
 size_t client_bytes_received(const client *c) {
-    struct tcp_info info;
-    socklen_t size = sizeof info;
-    if (c == NULL || getsockopt(c->fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 ||
-        size < offsetof(struct tcp_info, tcpi_bytes_received) + sizeof info.tcpi_bytes_received)
-        return 0;
-    return info.tcpi_bytes_received;
+    return c != NULL ? socket_received(c->fd) : 0;
 }
 
 bool client_is_lost(const client *c) {
-    if (c == NULL) return false;
-    struct pollfd one = {.fd = c->fd, .events = POLLRDHUP};
-    return poll(&one, 1, 0) > 0 && (one.revents & (POLLRDHUP | POLLERR | POLLHUP)) != 0;
+    return c != NULL && socket_is_lost(c->fd);
 }
 
 bool connections_write(connections *all, buffer *b) {
     uint64_t n_cut[N_CUT_REASONS];
     pthread_mutex_lock(&all->lock);
-    const size_t n_open = all->n_open, most = all->limits.most;
+    const size_t n_open = all->n_open, n_lingering = all->n_lingering, most = all->limits.most;
     const uint64_t n_refused = all->n_refused;
     for (size_t r = 0; r < N_CUT_REASONS; r++) n_cut[r] = all->n_cut[r];
     pthread_mutex_unlock(&all->lock);
@@ -478,6 +499,10 @@ bool connections_write(connections *all, buffer *b) {
                                  "# HELP lambertd_connections Open connections.\n"
                                  "# TYPE lambertd_connections gauge\n"
                                  "lambertd_connections %zu\n"
+                                 "# HELP lambertd_connections_lingering Connections of these whose answer "
+                                 "was sent and whose rest is dropped.\n"
+                                 "# TYPE lambertd_connections_lingering gauge\n"
+                                 "lambertd_connections_lingering %zu\n"
                                  "# HELP lambertd_connections_most Limit of open connections.\n"
                                  "# TYPE lambertd_connections_most gauge\n"
                                  "lambertd_connections_most %zu\n"
@@ -488,7 +513,7 @@ bool connections_write(connections *all, buffer *b) {
                                  "# HELP lambertd_connections_cut_total Connections closed at a time limit, "
                                  "or to make room.\n"
                                  "# TYPE lambertd_connections_cut_total counter\n",
-                                 n_open, most, (unsigned long long)n_refused);
+                                 n_open, n_lingering, most, (unsigned long long)n_refused);
     for (size_t r = 0; r < N_CUT_REASONS; r++)
         written = written && buffer_printf(b, "lambertd_connections_cut_total{why=\"%s\"} %llu\n", reasons[r],
                                            (unsigned long long)n_cut[r]);

@@ -16,13 +16,16 @@ typedef struct client client;
  *   HEAD    its head must be complete timeout_s after it began, that of the first one after the connection
  *   BODY    timeout_s, extended by 1/least_rate seconds with every byte, to at most timeout_s from now
  *   SOLVE   none
- *   ANSWER  as BODY, for bytes that the client reads */
+ *   ANSWER  as BODY, for bytes that the client reads
+ *   LINGERING  as BODY, for bytes that are dropped, with 5 s (or timeout_s, if less) in place of timeout_s,
+ * and six times as long in all */
 typedef enum connection_stage {
     STAGE_IDLE,
     STAGE_HEAD,
     STAGE_BODY,
     STAGE_SOLVE,
-    STAGE_ANSWER
+    STAGE_ANSWER,
+    STAGE_LINGERING
 } connection_stage;
 
 typedef struct connection_limits {
@@ -33,11 +36,6 @@ typedef struct connection_limits {
     size_t timeout_s, keep_alive_s;
     size_t least_rate; /* bytes a second */
 } connection_limits;
-
-/* limits->most: the number of connections that the process has descriptors for, at most `wanted`, beside
- * those of n_stores mapped stores and of other files; some, even if these take all. Raises the soft limit to
- * the hard one. Errors: LAM_ERR_IO if there are none. */
-lam_status connections_affordable(connection_limits *limits, size_t n_stores, lam_error *error);
 
 /* Starts a thread that checks all connections once a second. */
 lam_status connections_start(const connection_limits *limits, connections **out, lam_error *error);
@@ -63,6 +61,15 @@ client *connections_add(connections *all, int fd, uint64_t key, bool counts);
  * instead. c may be NULL. */
 void connections_remove(connections *all, client *c);
 
+/* The same for a connection that is closed, in place of connections_remove: where client_linger was called,
+ * it goes on with a copy of the descriptor, whose sending is shut down, and counts until its client has
+ * closed it or its time is over. At most a quarter of all linger; the one that has for longest is closed for
+ * another. */
+void connections_close(connections *all, client *c);
+
+/* Connections that linger now. */
+size_t connections_lingering(connections *all);
+
 /* A stage begins now, in which `bytes` will be sent. c may be NULL. */
 void client_enter(connections *all, client *c, connection_stage stage, size_t bytes);
 
@@ -72,6 +79,9 @@ void client_received(connections *all, client *c, size_t bytes);
 /* The next body and answer must have moved by then (clock_seconds), whatever their rate; until the next head.
  * c may be NULL. */
 void client_end_by(connections *all, client *c, double end);
+
+/* The answer leaves before all of the request has come: connections_close reads the rest. c may be NULL. */
+void client_linger(connections *all, client *c);
 
 /* True from the head of a request to the last byte of its answer. c may be NULL. */
 bool client_has_request(const client *c);

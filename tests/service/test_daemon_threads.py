@@ -12,8 +12,8 @@ import numpy as np
 from daemon import Daemon
 from daemon_case import Case
 
-# Main thread, input and output, connections, verification, the one for short solves, the log, a sanitizer's own.
-BESIDE_MOST = 7
+# Main thread, input and output, connections, those that are closed, verification, the one for short solves, the log, a sanitizer's own.
+BESIDE_MOST = 8
 THREADS, CLIENTS, LIMIT = 24, 48, 64
 LARGE = 2600  # elements of an exact store of 27 MB: one answer is worth three threads
 

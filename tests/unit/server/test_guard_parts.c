@@ -1,7 +1,7 @@
 /* The rules by which the daemon tells connections, answers and requests apart: who is cut and who is not,
  * entity tags, request ids. */
 #include "server/http/http_fields.h"
-#include "server/net/connections.h"
+#include "server/net/descriptors.h"
 #include "solver/base/clock.h"
 #include "store/store.h"
 #include "support/suite.h"
@@ -276,7 +276,7 @@ END_TEST
 
 static lam_status afford(size_t wanted, size_t n_stores, size_t *most, lam_error *error) {
     connection_limits limits = {.wanted = wanted};
-    const lam_status status = connections_affordable(&limits, n_stores, error);
+    const lam_status status = descriptors_afford(&limits, n_stores, error);
     *most = limits.most;
     return status;
 }
