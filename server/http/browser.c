@@ -14,12 +14,15 @@
 #define PREFLIGHT_AGE "600"
 
 /* A page of another origin may neither read nor write, unless it is listed. A browser leaves Origin out where
- * the page does not ask for an answer it could read; then Sec-Fetch-Site tells. */
+ * the page does not ask for an answer it could read; then Sec-Fetch-Site tells. That field, which no page can
+ * write, also tells the daemon's own page behind a proxy that puts another Host in place of the one asked
+ * for. */
 static bool check_origin(request *r, const char *authority, size_t length) {
     const char *origin = http_header(r, MHD_HTTP_HEADER_ORIGIN), *site = http_header(r, "Sec-Fetch-Site");
     r->origin = origin != NULL ? origin_listed(&r->service->origins, origin) : NULL;
     if (r->origin != NULL) return true;
-    if (origin != NULL && !origin_is_own(origin, authority, length)) {
+    const bool is_own = site != NULL && strcasecmp(site, "same-origin") == 0;
+    if (origin != NULL && !is_own && !origin_is_own(origin, authority, length)) {
         answer_refuse(&r->answer, PROBLEM_WRONG_ORIGIN,
                       "pages of %.100s may not ask this daemon; --allow-origin %.100s would let them", origin,
                       origin);

@@ -151,6 +151,7 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
 /* The connection counts no more. */
 static void uncount(connections *all, const client *c) {
     all->kept.taken--;
+    all->n_lingering -= c->stage == STAGE_LINGERING;
     if (c->counts) all->kept.of[shares_place(c->key)]--;
 }
 
@@ -403,7 +404,6 @@ void connections_remove(connections *all, client *c) {
     if (c->after != NULL) c->after->before = c->before;
     if (!c->cut) uncount(all, c);
     all->n_open--;
-    all->n_lingering -= c->stage == STAGE_LINGERING;
     pthread_mutex_unlock(&all->lock);
     free(c);
 }

@@ -75,6 +75,8 @@ lam_status origin_rules_read(const option_list *hosts, const option_list *origin
                              const char *where, origin_rules *rules, lam_error *error) {
     lam_status status = LAM_OK;
     *rules = (origin_rules){.hosts = hosts, .origins = origins, .is_local = address == NULL};
+    /* No page of a browser reaches a Unix socket, and few clients of one have a name to write. */
+    rules->any_host = address == NULL && hosts->count == 0;
     for (size_t i = 0; i < hosts->count; i++)
         if (!is_name(hosts->items[i]))
             FAIL(error, LAM_ERR_ARGUMENT, "--allow-host %s: must be a name or an address, without a port",

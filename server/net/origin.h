@@ -9,7 +9,7 @@
 typedef struct origin_rules {
     const option_list *hosts, *origins; /* --allow-host, --allow-origin */
     char asked[256], bound[64];         /* the host of --listen as written and as bound; "" with --unix */
-    bool any_host;                      /* a wildcard address without --allow-host */
+    bool any_host;                      /* a wildcard address or a Unix socket without --allow-host */
     bool any_literal;                   /* a wildcard address: any address may be one of this machine */
     bool is_local;                      /* loopback or a Unix socket */
 } origin_rules;
@@ -23,7 +23,8 @@ lam_status origin_rules_read(const option_list *hosts, const option_list *origin
 
 /* True if an authority HOST[:PORT] of `length` bytes may be asked for: localhost, 127.0.0.1 and [::1] always,
  * the host of --listen, those of --allow-host; any address in digits on a wildcard address, as no name can be
- * made to resolve to anything else for its page. Ports are not compared. */
+ * made to resolve to anything else for its page. Ports are not compared. Any, also an empty one, where
+ * any_host says so. */
 bool origin_host_allowed(const origin_rules *rules, const char *authority, size_t length);
 
 /* The item of --allow-origin that equals an Origin field; NULL if none does. */

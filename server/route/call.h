@@ -70,7 +70,7 @@ struct answer {
     uint64_t tag;             /* of kept, where it is cacheable: what its ETag is made of */
     const fixed_bytes *fixed; /* in place of body; or NULL */
     const char *policy;       /* Content-Security-Policy, static; or NULL */
-    char allow[32];           /* of a 405 */
+    char allow[48];           /* of a 405, and of OPTIONS */
     unsigned retry_after;     /* of a 503: seconds; 0: no header */
     bool refined;             /* certificate and iterations are set: the largest of its vectors */
     double certificate;

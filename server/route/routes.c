@@ -1,5 +1,6 @@
 #include "server/route/routes.h"
 
+#include <stdio.h>
 #include <string.h>
 
 /* An answer that is kept. */
@@ -100,11 +101,23 @@ static bool match_path(const char *pattern, const char *path, route_match *match
     return *path == '\0';
 }
 
+/* Makes the answer that names the methods. */
+static void answer_options(const char *allow, answer *out) {
+    *out = (answer){.status = 204};
+    snprintf(out->allow, sizeof out->allow, "%s, OPTIONS", allow);
+}
+
 void route_find(const char *method, const char *path, route_match *match, answer *out) {
     /* HEAD is GET without the body, which the HTTP library leaves out. */
     const char *wanted = strcmp(method, "HEAD") == 0 ? "GET" : method;
     char allow[sizeof out->allow] = "";
+    const bool asks_methods = strcmp(method, "OPTIONS") == 0;
     *match = (route_match){.label = N_ROUTES};
+    if (asks_methods && strcmp(path, "*") == 0) {
+        match->any_host = true;
+        answer_options("GET, HEAD, POST, PUT, DELETE", out);
+        return;
+    }
     for (size_t i = 0; i < N_ROUTES; i++) {
         if (!match_path(routes[i].pattern, path, match)) continue;
         /* Routes of one pattern share the label of the first. */
@@ -121,6 +134,8 @@ void route_find(const char *method, const char *path, route_match *match, answer
     }
     if (match->label == N_ROUTES) {
         answer_refuse(out, PROBLEM_NOT_FOUND, "%.120s: there is no such route", path);
+    } else if (asks_methods) {
+        answer_options(allow, out);
     } else {
         answer_refuse(out, PROBLEM_WRONG_METHOD, "%.120s: the method is %.20s, must be %s", path, method,
                       allow);

@@ -52,7 +52,8 @@ typedef struct route_match {
     char name[ROUTE_NAME_MAX]; /* of {name}, escapes resolved; "" if no scene can have it */
 } route_match;
 
-/* Sets *match, and *out to 404 or 405 if there is no route. */
+/* Sets *match, and *out to 404 or 405 if there is no route, or to 204 for OPTIONS of a path that there is. A
+ * path of "*" is the daemon as a whole (RFC 9110, 9.3.7). */
 void route_find(const char *method, const char *path, route_match *match, answer *out);
 
 route_handler get_healthz, get_readyz, get_metrics, post_adjoint, put_reflectance, delete_reflectance,

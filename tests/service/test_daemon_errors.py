@@ -136,7 +136,7 @@ class Errors(unittest.TestCase):
             ("/v1/scenes/grey/adjoint", "GET", "POST"),
             ("/v1/scenes/grey/reflectance", "GET", "PUT, DELETE"),
             ("/healthz", "POST", "GET, HEAD"),
-            ("/metrics", "OPTIONS", "GET, HEAD"),
+            ("/metrics", "TRACE", "GET, HEAD"),
             ("/v1/openapi.json", "PATCH", "GET, HEAD"),
             ("/readyz", "BREW", "GET, HEAD"),
         ):
@@ -148,6 +148,22 @@ class Errors(unittest.TestCase):
                 else:
                     self.problem(answer, 405, method, allow)
                 self.still_works()
+
+    def test_options(self):
+        """The check of HAProxy, as it comes without arguments, and those of others."""
+        for target, allow in (("*", "GET, HEAD, POST, PUT, DELETE"), ("/", "GET, HEAD"), ("/healthz", "GET, HEAD"), ("/readyz", "GET, HEAD"),
+                              ("/metrics", "GET, HEAD"), ("/v1/scenes/grey/radiosity", "POST"), ("/v1/scenes/grey/reflectance", "PUT, DELETE")):
+            for version, host in (("1.0", ""), ("1.1", "Host: localhost\r\n")) + ((("1.1", "Host: any\r\n"),) if target == "*" else ()):
+                with self.subTest(target=target, host=host), self.daemon.raw() as s:
+                    s.sendall(f"OPTIONS {target} HTTP/{version}\r\n{host}Connection: close\r\n\r\n".encode())
+                    head, _, body = self.read_all(s).partition(b"\r\n\r\n")
+                    self.assertIn(b" 204 ", head.splitlines()[0])
+                    self.assertIn(f"\r\nAllow: {allow}, OPTIONS".encode(), head)
+                    self.assertEqual(body, b"")
+        self.problem(self.daemon.ask("OPTIONS", "/v1/none"), 404, "no such route")
+        with self.daemon.raw() as s:
+            s.sendall(b"GET * HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+            self.assertIn(b" 404 ", self.read_all(s).splitlines()[0])
 
     def test_type(self):
         for kind in "text/plain", "application/x-www-form-urlencoded", "application/jsonx", "application/octet-stream", "":

@@ -56,13 +56,17 @@ class Origin(Case):
     def test_hosts_of_a_unix_socket(self):
         where = self.folder / "socket"
         daemon = self.daemon("--unix", where, listen=None)
-        for host, status in ("localhost", b"200"), ("evil.example", b"403"):
-            with socket.socket(socket.AF_UNIX) as s:
-                s.settimeout(PATIENCE)
-                s.connect(str(where))
-                s.sendall(f"GET /v1/scenes HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
-                self.assertEqual(self.read_all(s).split()[1], status)
-        self.assertEqual(daemon.errors(), "")
+        named = self.folder / "named"
+        strict = self.daemon("--unix", named, "--allow-host", "app.example", listen=None)
+        for path, hosts, status in ((where, ("localhost", "unix", "app.example", "app.example:80", "", "unix:" + str(where)), b"200"),
+                                    (named, ("localhost", "app.example"), b"200"), (named, ("evil.example", ""), b"403")):
+            for host in hosts:
+                with socket.socket(socket.AF_UNIX) as s:
+                    s.settimeout(PATIENCE)
+                    s.connect(str(path))
+                    s.sendall(f"GET /v1/scenes HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
+                    self.assertEqual(self.read_all(s).split()[1], status, (path, host))
+        self.assertEqual(daemon.errors() + strict.errors(), "")
 
     def test_hosts_of_a_wildcard_address(self):
         token = self.folder / "token"
@@ -96,6 +100,12 @@ class Origin(Case):
             self.refused(daemon.get("/v1/scenes", headers={"Sec-Fetch-Site": site}), 403, "wrong-origin")
             self.refused(daemon.ask("POST", SOLVE, BODY, {**JSON, "Sec-Fetch-Site": site}), 403, "wrong-origin")
             self.assertEqual(daemon.get("/metrics", headers={"Sec-Fetch-Site": site}).status, 200)
+        # The page of the daemon behind a proxy that writes a Host of its own, as nginx does where nothing else is said.
+        behind = {**own, **JSON, "Origin": "https://public.example"}
+        self.assertEqual(daemon.ask("POST", SOLVE, BODY, {**behind, "Sec-Fetch-Site": "same-origin"}).status, 200)
+        for site in "none", "cross-site", "":
+            self.refused(daemon.ask("POST", SOLVE, BODY, {**behind, "Sec-Fetch-Site": site}), 403, "wrong-origin")
+        self.refused(daemon.ask("POST", SOLVE, BODY, {**behind, "Host": "evil.example", "Sec-Fetch-Site": "same-origin"}), 403, "wrong-host")
         for site in "none", "same-origin":
             self.assertEqual(daemon.get("/v1/scenes", headers={"Sec-Fetch-Site": site}).status, 200)
 
@@ -123,7 +133,7 @@ class Origin(Case):
         asks = {"Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "authorization,content-type"}
         answer = daemon.ask("OPTIONS", SOLVE, None, {**page, **asks})
         self.assertEqual((answer.status, answer.body), (204, b""))
-        self.assertEqual(answer.headers["Access-Control-Allow-Methods"], "POST")
+        self.assertEqual(answer.headers["Access-Control-Allow-Methods"], "POST, OPTIONS")
         for name in "authorization", "content-type":
             self.assertIn(name, answer.headers["Access-Control-Allow-Headers"].lower())
         self.assertEqual(answer.headers["Access-Control-Allow-Origin"], "http://localhost:3000")

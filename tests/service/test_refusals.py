@@ -160,7 +160,7 @@ class Refusals(Case):
             figures = {name: int(value) for name, value in re.findall(r"^(lambertd_connections\S*) (\d+)$", text, re.M)}
             self.assertLessEqual(figures["lambertd_connections_lingering"], 5)
             self.assertGreater(figures["lambertd_connections_lingering"], 0)
-            self.assertLessEqual(figures["lambertd_connections"], 20 + 8)
+            self.assertLessEqual(figures["lambertd_connections"], 20 + 32)
             self.assertGreaterEqual(figures['lambertd_connections_cut_total{why="lingering"}'], 150)
             with daemon.raw() as s:  # others are served beside them
                 s.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
