@@ -210,6 +210,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     TRY(metrics_create(route_label_count(), labels, &s.metrics, error));
     TRY(metrics_page_create(&s.metrics_page, error));
     TRY(openapi_keep(&s.openapi, error));
+    TRY(manual_keep(&s.manual, error));
     TRY(catalog_create(c, stdout, stderr, &s.catalog, error));
     TRY(variants_start(c, s.catalog, &s.variants, error));
     TRY(batch_start(c->threads, c->max_inflight, &s.queue, error));
@@ -243,6 +244,7 @@ done:
     metrics_destroy(s.metrics);
     metrics_page_destroy(s.metrics_page);
     kept_forms_release(s.openapi);
+    kept_forms_release(s.manual);
     if (s.audit_log != s.access_log) access_log_close(s.audit_log);
     access_log_close(s.access_log);
     request_ledger_destroy(&s.memory);

@@ -9,8 +9,8 @@
 
 static const char off_page[] =
     "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Lambert</title><h1>Lambert</h1>"
-    "<p>%s</p><p>The scenes stand at <a href=\"/v1/scenes\">/v1/scenes</a>, the routes at "
-    "<a href=\"/v1/openapi.json\">/v1/openapi.json</a>.</p></html>\n";
+    "<p>%s</p><p>The scenes stand at <a href=\"v1/scenes\">/v1/scenes</a>, the routes at "
+    "<a href=\"v1/openapi.json\">/v1/openapi.json</a>.</p></html>\n";
 
 static const char *why_off(const call *in) {
     if (in->service->config->no_viewer) return "The viewer is switched off (--no-viewer).";

@@ -44,9 +44,10 @@ static bool is_plain(char c) {
            (c != '\0' && strchr("-._~@", c) != NULL);
 }
 
-/* The path of a scene; NULL if memory is short. */
+/* The path of a scene as that of another's reflectance leads to it, so that it holds below any path of a
+ * proxy; NULL if memory is short. */
 static char *path_of(const char *name) {
-    static const char before[] = "/v1/scenes/";
+    static const char before[] = "../";
     char *path = malloc(sizeof before + 3 * strlen(name)), *to = path;
     if (path == NULL) return NULL;
     to += sprintf(to, "%s", before);

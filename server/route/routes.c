@@ -39,6 +39,8 @@ static const route routes[] = {
      .also_built = true,
      .right = TOKEN_VARY},
     {.method = "GET", .pattern = "/v1/openapi.json", KEPT(keeps_openapi)},
+    /* The type of a problem is a relative reference, which resolves beside the path that was asked for. */
+    {.method = "GET", .pattern = "/deploy/docs/api.md", KEPT(keeps_manual), .open = true, .below_any = true},
     {.method = "GET", .pattern = "/", .handle = get_viewer_page, .open = true},
     {.method = "GET", .pattern = "/viewer.js", .handle = get_viewer_script, .open = true},
     {.method = "GET", .pattern = "/viewer.css", .handle = get_viewer_style, .open = true},
@@ -107,6 +109,12 @@ static void answer_options(const char *allow, answer *out) {
     snprintf(out->allow, sizeof out->allow, "%s, OPTIONS", allow);
 }
 
+/* True if a path is that of a route, or ends with it where it may. */
+static bool match_route(const route *to, const char *path, route_match *match) {
+    const size_t length = strlen(path), end = strlen(to->pattern);
+    return match_path(to->pattern, to->below_any && length > end ? path + length - end : path, match);
+}
+
 void route_find(const char *method, const char *path, route_match *match, answer *out) {
     /* HEAD is GET without the body, which the HTTP library leaves out. */
     const char *wanted = strcmp(method, "HEAD") == 0 ? "GET" : method;
@@ -119,7 +127,7 @@ void route_find(const char *method, const char *path, route_match *match, answer
         return;
     }
     for (size_t i = 0; i < N_ROUTES; i++) {
-        if (!match_path(routes[i].pattern, path, match)) continue;
+        if (!match_route(&routes[i], path, match)) continue;
         /* Routes of one pattern share the label of the first. */
         if (match->label == N_ROUTES) match->label = i;
         match->with_token = !routes[i].open;

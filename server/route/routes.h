@@ -33,6 +33,7 @@ typedef struct route {
     bool open;      /* no token is needed, unless one has the right */
     token_right right; /* that a token must have; 0: TOKEN_READ */
     bool any_host;     /* asked for by those that know no name of the daemon */
+    bool below_any;    /* the pattern may follow any folder of a path */
     bool also_built;   /* {name} may also be a variant that is not served yet */
 } route;
 
@@ -59,10 +60,13 @@ void route_find(const char *method, const char *path, route_match *match, answer
 route_handler get_healthz, get_readyz, get_metrics, post_adjoint, put_reflectance, delete_reflectance,
     delete_scene, get_viewer_page, get_viewer_script, get_viewer_style, get_viewer_icon, get_viewer_licences;
 route_shortcut quick_radiosity, quick_kept;
-route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_sky, keeps_weather, keeps_openapi;
+route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_sky, keeps_weather, keeps_openapi, keeps_manual;
 extern const solve_steps post_radiosity, send_kept;
 
 /* The description of the routes, for service.openapi. Errors: LAM_ERR_MEMORY. */
 lam_status openapi_keep(kept_forms **out, lam_error *error);
+
+/* Their manual, for service.manual. Errors: LAM_ERR_MEMORY. */
+lam_status manual_keep(kept_forms **out, lam_error *error);
 
 #endif

@@ -34,6 +34,7 @@ typedef struct service {
         *audit_log; /* PUT and DELETE; the access log, or standard error; NULL: nothing can be changed */
     problem_counts problems;
     kept_forms *openapi; /* GET /v1/openapi.json */
+    kept_forms *manual;  /* GET /deploy/docs/api.md */
     metrics_page *metrics_page;
     atomic_int state;         /* a service_state */
     connections *connections; /* from http_start to http_stop, as turns */

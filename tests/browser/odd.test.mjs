@@ -1,6 +1,7 @@
 // Odd circumstances: narrow windows, links of strangers, slow networks, a daemon that is away, stores that are replaced.
 import assert from "node:assert/strict";
 import { copyFileSync, renameSync, writeFileSync } from "node:fs";
+import { createServer, request } from "node:http";
 import { before, test } from "node:test";
 import { PATIENCE, Daemon, inFolder, lambert, makeStore, openPage, settled, violations } from "./page.mjs";
 
@@ -213,4 +214,30 @@ test("many lamps with odd names are found, and fit", async () => {
     assert.deepEqual(page.faults, []);
     await page.context().close();
     await own.stop();
+});
+
+/** A proxy as nginx is by `location /light/ { proxy_pass http://127.0.0.1:PORT/; }`: it writes a Host of its own. */
+async function proxyBelow(path, port) {
+    const server = createServer((asked, answer) => {
+        if (!asked.url.startsWith(path)) return void answer.writeHead(404).end();
+        const options = { port, method: asked.method, path: asked.url.slice(path.length - 1),
+            headers: { ...asked.headers, host: `127.0.0.1:${port}` } };
+        asked.pipe(request(options, (got) => got.pipe(answer.writeHead(got.statusCode, got.headers))));
+    });
+    await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+    return server;
+}
+
+test("the page stands below a path of a proxy", async () => {
+    const server = await proxyBelow("/light/", daemon.port);
+    const page = await openPage(`http://127.0.0.1:${server.address().port}/light`);
+    assert.equal(await page.title(), "cornell · Lambert");
+    await page.getByRole("combobox", { name: "Scene" }).selectOption("patio");
+    await settled(page);
+    assert.equal((await sceneNow(page))[0], "patio");
+    // Faults are requests to other addresses, those outside the path among them.
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    server.closeAllConnections();
+    server.close();
 });

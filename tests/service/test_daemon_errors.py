@@ -5,6 +5,7 @@ import json
 import pathlib
 import tempfile
 import unittest
+import urllib.parse
 
 import numpy as np
 
@@ -124,6 +125,18 @@ class Errors(unittest.TestCase):
                                       connection=self.connection)
             self.problem(answer, 404, "no scene")
             self.still_works()
+
+    def test_types_lead_to_the_manual(self):
+        """From any path, without a token, and by the same text."""
+        for path in "/none", "/v1/none", "/v1/scenes/none", "/v1/scenes/grey/none", "/v1/scenes/none/radiosity", "/v1/a/b/c/d/":
+            kind = self.daemon.post(path, "{}").json()["type"]
+            manual, _, name = urllib.parse.urljoin(path, kind).partition("#")
+            answer = self.daemon.get(manual)
+            self.assertEqual((answer.status, answer.headers["Content-Type"]), (200, "text/plain; charset=utf-8"))
+            self.assertIn(f"\n### {name}\n", answer.body.decode())
+            self.assertEqual(self.daemon.get(manual, headers={"If-None-Match": answer.headers["ETag"]}).status, 304)
+            self.problem(self.daemon.ask("PUT", manual, "{}"), 405)
+        self.problem(self.daemon.get("/v1/scenes/xdeploy/docs/api.md"), 404)
 
     def test_method(self):
         for path, method, allow in (

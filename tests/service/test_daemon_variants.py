@@ -9,6 +9,7 @@ import tempfile
 import threading
 import time
 import unittest
+import urllib.parse
 
 import h5py
 import numpy as np
@@ -65,8 +66,12 @@ class Variants(unittest.TestCase):
     def made(self, daemon, groups, variant="red", scene="colour"):
         answer = self.put(daemon, groups, variant, scene)
         self.assertEqual((answer.status, answer.json()), (202, {"status": "building"}), answer)
-        self.assertEqual(answer.headers["Location"], f"/v1/scenes/{scene}@{variant}")
-        return self.until(daemon, answer.headers["Location"], 200).json()
+        self.assertEqual(answer.headers["Location"], f"../{scene}@{variant}")
+        return self.until(daemon, self.path_of(answer, scene), 200).json()
+
+    def path_of(self, answer, scene):
+        """The path that Location leads to, from that of the request."""
+        return urllib.parse.urljoin(f"/v1/scenes/{scene}/reflectance", answer.headers["Location"])
 
     def solve(self, daemon, name, E, quantity="radiosity", **more):
         body = {"emission": E.tolist() if isinstance(E, np.ndarray) else E, "quantity": quantity, **more}
@@ -167,8 +172,8 @@ class Variants(unittest.TestCase):
         self.store("a b.h5")
         with self.daemon("a b.h5") as daemon:
             answer = self.put(daemon, RED, "weiß~1", scene="a%20b")
-            self.assertEqual(answer.headers["Location"], "/v1/scenes/a%20b@wei%C3%9F~1")
-            self.assertEqual(self.until(daemon, answer.headers["Location"], 200).json()["name"], "a b@weiß~1")
+            self.assertEqual(self.path_of(answer, "a%20b"), "/v1/scenes/a%20b@wei%C3%9F~1")
+            self.assertEqual(self.until(daemon, self.path_of(answer, "a%20b"), 200).json()["name"], "a b@weiß~1")
 
     def test_it_is_what_precompute_makes(self):
         """Of a scene whose left wall has another colour: the same U and V, and the core that the variant gets."""

@@ -60,7 +60,14 @@ class Viewer(unittest.TestCase):
             self.assertEqual(policy[what], "'self'")
         text = page.body.decode()
         self.assertEqual(re.findall(r"<script(?![^>]*\bsrc=)|<style|\bstyle=|\bon\w+=", text), [])
-        self.assertEqual([link for link in re.findall(r'(?:src|href)="([^"]*)"', text) if not link.startswith("/")], [])
+        links = re.findall(r'(?:src|href)="([^"]*)"', text)
+        self.assertEqual(sorted(links), ["v1/openapi.json", "viewer.css", "viewer.js", "viewer.svg"])
+        # The script names no path from the root of the host either: the page may stand below any path of a proxy.
+        self.assertEqual(re.findall(rb"[\"'`]/(?:v1|readyz|viewer)\b", self.daemon().get("/viewer.js").body), [])
+
+    def test_links_of_the_page_that_says_why(self):
+        text = self.daemon("--no-viewer").get("/").body.decode()
+        self.assertEqual(re.findall(r'(?:src|href)="([^"]*)"', text), ["v1/scenes", "v1/openapi.json"])
 
     def test_without_it(self):
         daemon = self.daemon("--no-viewer")

@@ -109,20 +109,21 @@ export class Api {
         }, accept);
     }
 
+    /** Relative to the page, which may stand below any path of a proxy. */
     static path(scene: string, what = ""): string {
-        return `/v1/scenes/${encodeURIComponent(scene)}${what}`;
+        return `v1/scenes/${encodeURIComponent(scene)}${what}`;
     }
 
     async isReady(): Promise<boolean> {
         try {
-            return (await fetch("/readyz", { cache: "no-store" })).ok;
+            return (await fetch("readyz", { cache: "no-store" })).ok;
         } catch {
             return false;
         }
     }
 
     async scenes(): Promise<SceneLine[]> {
-        return ((await (await this.ask("/v1/scenes")).json()) as { scenes: SceneLine[] }).scenes;
+        return ((await (await this.ask("v1/scenes")).json()) as { scenes: SceneLine[] }).scenes;
     }
 
     async describe(scene: string): Promise<Description> {
@@ -194,6 +195,7 @@ export class Api {
             headers: { "Content-Type": "application/json" },
             body: JSON.stringify(groups === null ? { variant } : { variant, groups }),
         });
-        return response.headers.get("Location");
+        const location = response.headers.get("Location");
+        return location === null ? null : new URL(location, response.url).href;
     }
 }

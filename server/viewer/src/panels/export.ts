@@ -161,8 +161,8 @@ function requestPart(page: Page): HTMLElement {
             : withToken
             ? "Asks the daemon for what is shown. The token is read from LAMBERT_TOKEN."
             : "Asks the daemon for what is shown.";
-        curl.set(what === null ? "" : curlCommand(location.origin, what, withToken));
-        python.set(what === null ? "" : pythonProgram(location.origin, what, withToken));
+        curl.set(what === null ? "" : curlCommand(location.href, what, withToken));
+        python.set(what === null ? "" : pythonProgram(location.href, what, withToken));
     };
     new IntersectionObserver((entries) => {
         isSeen = entries.some((entry) => entry.isIntersecting);

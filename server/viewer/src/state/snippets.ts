@@ -49,12 +49,12 @@ function pythonValue(value: unknown): string {
     return String(value);
 }
 
-const urlOf = (origin: string, request: PlainRequest): string => origin + Api.path(request.scene, "/radiosity");
+const urlOf = (page: string, request: PlainRequest): string => new URL(Api.path(request.scene, "/radiosity"), page).href;
 
 /** The token itself stays out of what is copied: it is read from LAMBERT_TOKEN. */
-export function curlCommand(origin: string, request: PlainRequest, withToken: boolean): string {
+export function curlCommand(page: string, request: PlainRequest, withToken: boolean): string {
     const body = JSON.stringify(request.body), isLong = new TextEncoder().encode(body).length > ARGUMENT_MOST;
-    const parts = [`curl -sS --fail-with-body ${shellWord(urlOf(origin, request))}`,
+    const parts = [`curl -sS --fail-with-body ${shellWord(urlOf(page, request))}`,
         "-H 'Content-Type: application/json'"];
     if (withToken) parts.push('-H "Authorization: Bearer $LAMBERT_TOKEN"');
     // A body of JSON has no line breaks, so no line of it ends the text.
@@ -62,7 +62,7 @@ export function curlCommand(origin: string, request: PlainRequest, withToken: bo
     return `${parts.join(" \\\n  ")}\n`;
 }
 
-export function pythonProgram(origin: string, request: PlainRequest, withToken: boolean): string {
+export function pythonProgram(page: string, request: PlainRequest, withToken: boolean): string {
     return [
         "import json",
         ...(withToken ? ["import os"] : []),
@@ -70,7 +70,7 @@ export function pythonProgram(origin: string, request: PlainRequest, withToken: 
         "",
         `body = ${pythonValue(request.body)}`,
         "request = urllib.request.Request(",
-        `    ${pythonString(urlOf(origin, request))},`,
+        `    ${pythonString(urlOf(page, request))},`,
         "    json.dumps(body).encode(),",
         `    {"Content-Type": "application/json"${
             withToken ? ', "Authorization": "Bearer " + os.environ["LAMBERT_TOKEN"]' : ""
