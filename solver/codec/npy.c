@@ -221,6 +221,69 @@ static bool read_values(const char *data, bool wide, size_t first, size_t count,
     return true;
 }
 
+/* Elements that are read at a time of an array in Fortran order: their values stand together, those of all
+ * vectors of an element behind each other. */
+enum { ELEMENTS_AT_ONCE = 32 };
+
+/* The value of an array in Fortran order: v + n_rhs (c + rows i). */
+static double value_at(const char *data, bool wide, const layout *of, size_t v, size_t c, size_t i) {
+    const size_t at = v + of->n_rhs * (c + of->rows * i);
+    float narrow;
+    double value;
+    if (wide)
+        memcpy(&value, data + at * sizeof value, sizeof value);
+    else
+        memcpy(&narrow, data + at * sizeof narrow, sizeof narrow);
+    return wide ? value : (double)narrow;
+}
+
+/* All values of an array in Fortran order, to vectors of `stride` numbers. False with the first in C order
+ * that is none, by its number there. */
+static bool read_fortran(const char *data, bool wide, const layout *of, size_t n, size_t stride,
+                         bool any_sign, float *E, problem *why) {
+    const double least = any_sign ? -FLT_MAX : 0.0;
+    size_t bad = SIZE_MAX;
+    double culprit = 0;
+    for (size_t first = 0; first < n; first += ELEMENTS_AT_ONCE) {
+        const size_t end = n - first < ELEMENTS_AT_ONCE ? n : first + ELEMENTS_AT_ONCE;
+        for (size_t v = 0; v < of->n_rhs; v++)
+            for (size_t c = 0; c < of->rows; c++)
+                for (size_t i = first; i < end; i++) {
+                    const double value = value_at(data, wide, of, v, c, i);
+                    const size_t number = (v * of->rows + c) * n + i;
+                    if (value >= least && value <= FLT_MAX) {
+                        E[v * stride + c * n + i] = (float)value;
+                    } else if (number < bad) {
+                        bad = number;
+                        culprit = value;
+                    }
+                }
+    }
+    return bad == SIZE_MAX || bad_value(bad, culprit, any_sign, why);
+}
+
+/* The same in C order. */
+static bool read_c(const char *data, bool wide, const layout *of, size_t n, size_t stride, bool any_sign,
+                   float *E, problem *why) {
+    const size_t count = of->rows * n;
+    for (size_t v = 0; v < of->n_rhs; v++)
+        if (!read_values(data, wide, v * count, count, any_sign, E + v * stride, why)) return false;
+    return true;
+}
+
+/* 422 that says why the type of the values is not read. */
+static bool refuse_type(const char *descr, problem *why) {
+    const char first = descr[0];
+    const char *order = first == '>'   ? "big-endian"
+                        : first == '<' ? "little-endian"
+                        : first == '|' ? "without a byte order"
+                                       : "of a byte order that is not stated";
+    return problem_set(
+        why, PROBLEM_WRONG_KIND,
+        "the array's type is %s (%s), must be <f4 or <f8: little-endian numbers of 4 or 8 bytes", descr,
+        order);
+}
+
 bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, radiosity_request *request,
                     problem *why) {
     npy_header h;
@@ -228,10 +291,7 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
     *why = (problem){0};
     if (!read_header(codec_source(scene), bytes, length, &h, why)) return false;
     bool wide = strcmp(h.descr, "<f8") == 0;
-    if (!wide && strcmp(h.descr, "<f4") != 0)
-        return problem_set(why, PROBLEM_WRONG_KIND, "the array's type is %s, must be <f4 or <f8", h.descr);
-    if (h.fortran_order)
-        return problem_set(why, PROBLEM_WRONG_KIND, "the array is in Fortran order, must be in C order");
+    if (!wide && strcmp(h.descr, "<f4") != 0) return refuse_type(h.descr, why);
     if (!read_layout(&h, scene, &found, why)) return false;
 
     size_t row = scene->n, values, size;
@@ -246,11 +306,12 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
     request->n_rhs = found.n_rhs;
     float *last;
     if (!radiosity_request_dense(request, scene, &last, why)) return false;
-    const size_t count = found.rows * row;
+    const size_t stride = scene->n_channels * row;
+    if (!(h.fortran_order ? read_fortran : read_c)(bytes + h.data, wide, &found, row, stride,
+                                                   request->any_sign || scene->signs, request->E, why))
+        return false;
     for (size_t r = 0; r < found.n_rhs; r++) {
-        float *E = request->E + r * scene->n_channels * row;
-        if (!read_values(bytes + h.data, wide, r * count, count, request->any_sign || scene->signs, E, why))
-            return false;
+        float *E = request->E + r * stride;
         for (size_t c = found.rows; c < scene->n_channels; c++) memcpy(E + c * row, E, row * sizeof *E);
     }
     return true;

@@ -94,8 +94,8 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
 bool codec_read_emissions(const codec_scene *scene, const char *text, size_t length,
                           radiosity_request *request, problem *why);
 
-/* NPY format 1.0 to 3.0, little-endian <f4 or <f8, C order. For one channel [n], or a batch [m][n] or
- * [m][1][n]; for more channels [n] (all alike), [C][n], or a batch [m][C][n]. */
+/* NPY format 1.0 to 3.0, little-endian <f4 or <f8, C or Fortran order. For one channel [n], or a batch [m][n]
+ * or [m][1][n]; for more channels [n] (all alike), [C][n], or a batch [m][C][n]. */
 bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, radiosity_request *request,
                     problem *why);
 

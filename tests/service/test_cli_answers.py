@@ -194,8 +194,8 @@ class Answers(Case):
         for name, wanted in (
                 (npy("short.npy", good[:-1]), "must be (96)"), (npy("nan.npy", nan), "value 7 is NaN"),
                 (npy("int.npy", good.astype(int)), "<f4 or <f8"),
-                (npy("big-endian.npy", good.astype(">f8")), "<f4 or <f8"),
-                (npy("fortran.npy", numpy.asfortranarray(numpy.ones((96, 96)))), "C order"),
+                (npy("big-endian.npy", good.astype(">f8")), "(big-endian), must be <f4 or <f8"),
+                (npy("fortran.npy", numpy.asfortranarray(-numpy.ones((2, 97)))), "shape"),
                 (npy("deep.npy", numpy.ones((1, 1, 1, 96))), "3 axes"),
                 (npy("colour.npy", numpy.ones((2, 3, 96))), "shape"), (npy("none.npy", numpy.ones((0, 96))), "empty"),
                 (npy("huge.npy", numpy.array([1e300] * 96)), "single precision"),

@@ -191,7 +191,7 @@ class SameVerdicts(unittest.TestCase):
                                     (0, channels, N), (N - 1,), (), (N, 1), (1, 1, 1, N), (0,))]
             arrays += [npy_bytes(with_value(value)) for value in (np.nan, np.inf, -np.inf, -1, -0.0, 1e39, 3.5e38, 5e-324)]
             arrays += [npy_bytes(good, version) for version in ((1, 0), (2, 0), (3, 0))]
-            arrays += [npy_bytes(np.asfortranarray(np.ones((N, N))))]
+            arrays += [npy_bytes(np.asfortranarray(array)) for array in (np.ones((N, N)), np.outer([1, 2], good), -np.ones((2, N)))]
             arrays += [npy_by_hand(header % shape, good) for shape in ("(12,)", "(12)", "12", "[12]", "(12, )", "(012,)", "(+12,)",
                                                                       "(1e1,)", "(12,),", "(18446744073709551616,)",
                                                                       "(4294967296, 4294967296, 12)", "(-12,)", "(6, 2)")]

@@ -88,6 +88,84 @@ START_TEST(written_arrays_are_read) {
 }
 END_TEST
 
+/* An array of [m][2][N], or of fewer axes, in Fortran order, with the value at `bad` (its number in C order,
+ * or SIZE_MAX) replaced. */
+static buffer make_fortran(bool wide, size_t rank, const size_t *shape, size_t bad, double value) {
+    static const char *const texts[] = {"(%zu,)", "(%zu, %zu)", "(%zu, %zu, %zu)"};
+    char given[64], header[160];
+    snprintf(given, sizeof given, texts[rank - 1], shape[0], shape[1], shape[2]);
+    const size_t length =
+        (size_t)snprintf(header, sizeof header, "{'descr': '%s', 'fortran_order': True, 'shape': %s}\n",
+                         wide ? "<f8" : "<f4", given);
+    const unsigned char head[10] = {0x93, 'N', 'U', 'M', 'P', 'Y', 1, 0, (unsigned char)length, 0};
+    size_t dims[3] = {1, 1, 1};
+    for (size_t d = 0; d < rank; d++) dims[3 - rank + d] = shape[d];
+    buffer b = {0};
+    ck_assert(buffer_append(&b, head, sizeof head) && buffer_append(&b, header, length));
+    for (size_t i = 0; i < dims[2]; i++)
+        for (size_t c = 0; c < dims[1]; c++)
+            for (size_t v = 0; v < dims[0]; v++) {
+                const size_t number = (v * dims[1] + c) * dims[2] + i;
+                const double one = number == bad ? value : 1.0 / (double)(number + 1);
+                const float narrow = (float)one;
+                ck_assert(buffer_append(&b, wide ? (const void *)&one : &narrow,
+                                        wide ? sizeof one : sizeof narrow));
+            }
+    return b;
+}
+
+/* The vectors are those of the same array in C order, of any shape, and more elements than are read at a
+ * time. */
+START_TEST(fortran_order_is_read) {
+    enum { LONG = 100, M = 5 };
+    const codec_scene scenes[] = {{.n = LONG, .n_channels = 2, .max_batch = M, .max_bytes = 1 << 20},
+                                  {.n = LONG, .n_channels = 1, .max_batch = M, .max_bytes = 1 << 20}};
+    static const struct {
+        size_t scene, rank, shape[3], n_rhs, rows;
+    } cases[] = {{0, 1, {LONG, 0, 0}, 1, 1}, {0, 2, {2, LONG, 0}, 1, 2}, {0, 3, {M, 2, LONG}, M, 2},
+                 {0, 3, {1, 2, LONG}, 1, 2}, {1, 1, {LONG, 0, 0}, 1, 1}, {1, 2, {M, LONG, 0}, M, 1},
+                 {1, 3, {M, 1, LONG}, M, 1}};
+    for (int wide = 0; wide <= 1; wide++)
+        for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+            const codec_scene *scene = &scenes[cases[i].scene];
+            radiosity_request request = {0};
+            problem why;
+            buffer b = make_fortran(wide == 1, cases[i].rank, cases[i].shape, SIZE_MAX, 0);
+            ck_assert_msg(codec_read_npy(scene, b.bytes, b.length, &request, &why), "%s", why.detail);
+            ck_assert_uint_eq(request.n_rhs, cases[i].n_rhs);
+            for (size_t v = 0; v < request.n_rhs; v++)
+                for (size_t c = 0; c < scene->n_channels; c++)
+                    for (size_t e = 0; e < LONG; e++) {
+                        const size_t row = c < cases[i].rows ? c : 0,
+                                     number = (v * cases[i].rows + row) * LONG + e;
+                        ck_assert(request.E[(v * scene->n_channels + c) * LONG + e] ==
+                                  (float)(1.0 / (double)(number + 1)));
+                    }
+            ck_assert(!codec_read_npy(scene, b.bytes, b.length - 1, &request, &why) && why.status == 422);
+            radiosity_request_free(&request);
+            buffer_free(&b);
+        }
+}
+END_TEST
+
+/* A value that is none is named by its number in C order, which is that of NumPy's flat index. */
+START_TEST(fortran_order_names_values_as_c_order) {
+    const size_t shape[] = {4, 2, N};
+    for (size_t bad = 0; bad < 4 * 2 * N; bad++) {
+        radiosity_request request = {0};
+        problem why;
+        char wanted[32];
+        buffer b = make_fortran(true, 3, shape, bad, bad % 2 == 0 ? -1.0 : 1e39);
+        ck_assert(!codec_read_npy(&colour, b.bytes, b.length, &request, &why));
+        ck_assert_uint_eq(why.status, 422);
+        snprintf(wanted, sizeof wanted, "value %zu is ", bad);
+        ck_assert_msg(strstr(why.detail, wanted) != NULL, "%s", why.detail);
+        radiosity_request_free(&request);
+        buffer_free(&b);
+    }
+}
+END_TEST
+
 START_TEST(cut_arrays_are_refused) {
     buffer b = make(NPY_F4, 2, (size_t[]){2, N}, 2 * N);
     size_t data = b.length - 4 * 2 * N;
@@ -107,7 +185,9 @@ START_TEST(foreign_headers_are_refused) {
         {0, "{'shape': (1,), 'fortran_order': False, 'descr': '<f4'}\n"},
         {422, "{'descr': '>f4', 'fortran_order': False, 'shape': (1,), }\n"},
         {422, "{'descr': '<i4', 'fortran_order': False, 'shape': (1,), }\n"},
-        {422, "{'descr': '<f4', 'fortran_order': True, 'shape': (1,), }\n"},
+        {0, "{'descr': '<f4', 'fortran_order': True, 'shape': (1,), }\n"},
+        {422, "{'descr': '=f4', 'fortran_order': False, 'shape': (1,), }\n"},
+        {422, "{'descr': '<f4', 'fortran_order': True, 'shape': (2,), }\n"},
         {422, "{'descr': '<f4', 'fortran_order': False, 'shape': (2,), }\n"},
         {422, "{'descr': '<f4', 'fortran_order': False, 'shape': (), }\n"},
         {422, "{'descr': '<f4', 'fortran_order': False, 'shape': (1,1,1,1), }\n"},
@@ -245,6 +325,8 @@ int main(void) {
     tcase_add_test(tcase, doubles_tell_their_rounding);
     tcase_add_test(tcase, written_arrays_are_read);
     tcase_add_test(tcase, cut_arrays_are_refused);
+    tcase_add_test(tcase, fortran_order_is_read);
+    tcase_add_test(tcase, fortran_order_names_values_as_c_order);
     tcase_add_test(tcase, foreign_headers_are_refused);
     tcase_add_test(tcase, changed_arrays_never_do_harm);
     tcase_add_test(tcase, halves_are_rounded_to_nearest_even);
