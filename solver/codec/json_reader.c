@@ -1,6 +1,7 @@
 #include "solver/codec/json_reader.h"
 
 #include "solver/base/utf8.h"
+#include "solver/codec/json_mark.h"
 
 #include <stdint.h>
 #include <stdlib.h>
@@ -13,6 +14,7 @@ bool json_fail(json_reader *r, const char *fault) {
 
 void json_begin(json_reader *r, const char *text, size_t length) {
     *r = (json_reader){.start = text, .at = text, .end = text + length};
+    r->at += json_mark_length(text, length, &r->fault);
 }
 
 void json_end(json_reader *r) {

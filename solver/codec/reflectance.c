@@ -1,5 +1,7 @@
 #include "solver/codec/reflectance.h"
 
+#include "solver/codec/json_mark.h"
+
 #include <float.h>
 #include <jansson.h>
 #include <stdio.h>
@@ -117,7 +119,7 @@ static bool read_reflectance(const reflectance_scene *s, json_t *groups, float *
     return good;
 }
 
-static bool refuse_text(const json_error_t *error, problem *why) {
+static bool refuse_text(const json_error_t *error, size_t mark, problem *why) {
     const enum json_error_code code = json_error_code(error);
     const bool number = code == json_error_numeric_overflow, again = code == json_error_duplicate_key;
     const bool nul = code == json_error_null_byte_in_key || code == json_error_null_character;
@@ -125,21 +127,24 @@ static bool refuse_text(const json_error_t *error, problem *why) {
                               : again ? PROBLEM_GIVEN_TWICE
                               : nul   ? PROBLEM_WRONG_MEMBERS
                                       : PROBLEM_NOT_JSON;
-    return problem_set(why, kind, "%s: %.160s at byte %d",
+    return problem_set(why, kind, "%s: %.160s at byte %zu",
                        number  ? "a number beyond double"
                        : again ? "a name is given twice"
                        : nul   ? "a name with a NUL"
                                : "the body is not JSON",
-                       error->text, error->position);
+                       error->text, mark + (size_t)error->position);
 }
 
 static bool read_text(const char *text, size_t length, json_t **body, problem *why) {
     json_error_t error;
+    const char *fault = NULL;
+    const size_t mark = json_mark_length(text, length, &fault);
+    if (fault != NULL) return problem_set(why, PROBLEM_NOT_JSON, "the body is not JSON: %s", fault);
     memory_failed = false;
-    *body =
-        json_loadb(text, length, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY | JSON_DECODE_INT_AS_REAL, &error);
+    *body = json_loadb(text + mark, length - mark,
+                       JSON_REJECT_DUPLICATES | JSON_DECODE_ANY | JSON_DECODE_INT_AS_REAL, &error);
     if (memory_failed) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the request");
-    if (*body == NULL) return refuse_text(&error, why);
+    if (*body == NULL) return refuse_text(&error, mark, why);
     if (!json_is_object(*body)) return problem_set(why, PROBLEM_WRONG_KIND, "the body must be an object");
     return true;
 }

@@ -5,6 +5,7 @@
 
 #include "solver/base/file_text.h"
 #include "solver/base/vector3.h"
+#include "solver/codec/json_mark.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -360,7 +361,10 @@ lam_status light_path_read(const light_path_request *request, moving_light *out,
     char *bytes = NULL;
     size_t length = 0;
     TRY(file_text(request->path, &bytes, &length, error));
-    root = json_loadb(bytes, length, JSON_REJECT_DUPLICATES, &where);
+    const char *fault = NULL;
+    const size_t mark = json_mark_length(bytes, length, &fault);
+    if (fault != NULL) FAIL(error, LAM_ERR_FORMAT, "%.200s: %s", request->path, fault);
+    root = json_loadb(bytes + mark, length - mark, JSON_REJECT_DUPLICATES, &where);
     if (root == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%.200s: line %d, column %d: %.160s", request->path, where.line,
              where.column, where.text);

@@ -89,7 +89,7 @@ class Errors(unittest.TestCase):
     def test_not_json(self):
         whole = json.dumps({"emission": [1] * N})
         for body in (
-            "", " ", "{", "}", "null x", '{"emission":[1,2', whole + "x", whole + whole, "\ufeff" + whole,
+            "", " ", "{", "}", "null x", '{"emission":[1,2', whole + "x", whole + whole, "\ufeff\ufeff" + whole, "\ufeff",
             "{'emission':[1]}", '{"emission":[1,]}', '{"emission":[01]}', '{"emission":[+1]}', '{"emission":[.5]}',
             '{"emission":[1.]}', '{"emission":[1e]}', '{"emission":[0x10]}', '{"emission" [1]}', '{"emission":[1 2]}',
             '{"emission":[1],}', '{emission:[1]}', '// no\n{}', "[" * 100_000, '{"a":' * 10_000,
@@ -97,6 +97,20 @@ class Errors(unittest.TestCase):
             self.refuse(body.encode(), 400, "not JSON")
         for body in b'{"emission":[1]}\x00', b'{"\xff":1}', b'{"\xed\xa0\x80":1}', b'{"a\x01":1}', b"\x00", b"\xff\xfe{\x00":
             self.refuse(body, 400, "not JSON")
+        # The place counts the bytes of the mark.
+        self.refuse(b"\xef\xbb\xbf{x", 400, "at byte 4")
+
+    def test_byte_order_marks(self):
+        """PowerShell and editors put one before UTF-8, which changes nothing; other encodings are named."""
+        for path, whole in (("grey/radiosity", {"emission": [1] * N}), ("grey/adjoint", {"cotangent": [1] * N, "gradient": ["emission"]})):
+            text = json.dumps(whole)
+            plain, marked = (self.daemon.post(f"/v1/scenes/{path}", mark + text.encode()).json() | {"time_ms": None}
+                             for mark in (b"", b"\xef\xbb\xbf"))
+            self.assertEqual(plain, marked)
+            self.assertIn("scene", plain)
+            for coding in "utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-le", "utf-32-be":
+                answer = self.daemon.post(f"/v1/scenes/{path}", text.encode(coding), kind=f"application/json; charset={coding}")
+                self.problem(answer, 400, "UTF-16 or UTF-32")
 
     def test_nan_and_infinity(self):
         for value in "NaN", "Infinity", "-Infinity", "nan", "inf":

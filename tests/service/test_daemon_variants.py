@@ -168,6 +168,17 @@ class Variants(unittest.TestCase):
             # The walls of the first one are forgotten: a group that is not named has the scene's reflectance.
             self.check(daemon, "colour@red", scene.relit({"floor": .25}))
 
+    def test_byte_order_marks(self):
+        scene = self.store()
+        text = json.dumps({"variant": "red", "groups": {"floor": .25}})
+        with self.daemon() as daemon:
+            path = "/v1/scenes/colour/reflectance"
+            self.assertEqual(self.ask(daemon, "PUT", path, b"\xef\xbb\xbf" + text.encode()).status, 202)
+            self.until(daemon, "/v1/scenes/colour@red", 200)
+            self.check(daemon, "colour@red", scene.relit({"floor": .25}))
+            self.problem(self.ask(daemon, "PUT", path, text.encode("utf-16")), 400, "UTF-16")
+            self.problem(self.ask(daemon, "PUT", path, b"\xef\xbb\xbf{x"), 400, "at byte 5")
+
     def test_names(self):
         self.store("a b.h5")
         with self.daemon("a b.h5") as daemon:

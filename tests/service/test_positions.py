@@ -297,6 +297,12 @@ class Positions(Case):
         with open(broken, "w") as out:
             out.write('{"light": [1,\n 2}')
         given(broken, "broken.json: line 2, column")
+        with open(broken, "w", encoding="utf-16") as out:
+            json.dump(light(positions=POSITIONS), out)
+        given(broken, "UTF-16")
+        with open(broken, "w", encoding="utf-8-sig") as out:  # a mark is passed over: the fault is another one
+            json.dump(light(0, positions=POSITIONS), out)
+        given(broken, "dark")
         given(light(positions=POSITIONS), "--memory allows", more=("--memory", "20K"))
 
         def usage(words, *arguments):

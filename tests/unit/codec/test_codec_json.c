@@ -1,4 +1,5 @@
 /* The JSON reader against a published suite of cases, and requests that are cut, changed or hostile. */
+#include "solver/codec/json_mark.h"
 #include "solver/codec/json_reader.h"
 #include "support/request_text.h"
 #include "support/suite.h"
@@ -37,6 +38,35 @@ static bool is_json(const char *text, size_t length) {
     json_end(&r);
     return good;
 }
+
+/* A byte order mark is passed over, once and at the start; UTF-16 and UTF-32 are named. */
+START_TEST(byte_order_marks) {
+    static const char marked[] = "\xEF\xBB\xBF{\"emission\":[1,2,3,4,5]}", wide[] = "{\0\"\0e\0",
+                      big[] = "\0{\0\"\0e";
+    fixture f = make_scene(1);
+    radiosity_request request = {0};
+    ck_assert_uint_eq(status_of(&f, marked, sizeof marked - 1, &request), 0);
+    ck_assert(request.n_rhs == 1 && request.E[4] == 5);
+    radiosity_request_free(&request);
+    ck_assert(!is_json(marked + 1, sizeof marked - 2) && !is_json(marked, 3));
+    ck_assert(!is_json("\xEF\xBB\xBF\xEF\xBB\xBF{}", 8) && !is_json("[\xEF\xBB\xBF]", 5));
+    const struct {
+        const char *text;
+        size_t length;
+    } others[] = {{wide, 6},     {big, 6}, {"\xFF\xFE{\0", 4}, {"\xFE\xFF\0{", 4}, {"\xFF\xFE\0\0{\0\0\0", 8},
+                  {"{\0\0\0", 4}};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+        const char *fault = NULL;
+        ck_assert_uint_eq(json_mark_length(others[i].text, others[i].length, &fault), 0);
+        ck_assert(fault != NULL && strstr(fault, "UTF-16") != NULL);
+        ck_assert_uint_eq(status_of(&f, others[i].text, others[i].length, NULL), 400);
+    }
+    const char *fault = NULL;
+    ck_assert(json_mark_length("{}", 2, &fault) == 0 && json_mark_length("", 0, &fault) == 0 &&
+              fault == NULL);
+    group_index_free(&f.groups);
+}
+END_TEST
 
 START_TEST(tolerances) {
     static const struct {
@@ -288,6 +318,7 @@ int main(void) {
     TCase *tcase = tcase_create("codec_json");
     tcase_set_timeout(tcase, 300);
     tcase_add_test(tcase, published_cases);
+    tcase_add_test(tcase, byte_order_marks);
     tcase_add_test(tcase, tolerances);
     tcase_add_test(tcase, good_requests_are_read);
     tcase_add_test(tcase, skies_are_read);
