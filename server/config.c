@@ -17,6 +17,11 @@ static const option_row store_rows[] = {
      .offset = AT(stores_dir),
      .argument = "DIR",
      .help = "Serve every *.h5 file of a folder, each under its name without .h5"},
+    {.name = "strict",
+     .kind = OPTION_FLAG,
+     .offset = AT(strict),
+     .help = "Start only if every store can be served, and be ready (/readyz) only if every one could be "
+             "read last"},
     {.name = "verify",
      .kind = OPTION_FLAG,
      .offset = AT(verify),

@@ -29,6 +29,7 @@ typedef struct config {
     size_t drain_delay_s, shutdown_timeout_s;
     size_t min_rate; /* bytes a second that a client has to send and to read */
     size_t max_variants;
+    bool strict;
     bool verify;
     size_t verify_below; /* bytes of mapped arrays */
     bool no_viewer;

@@ -227,6 +227,8 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     warn_if_open(&s);
     TRY(http_start(&s, listen_fd, &h, error));
     if (catalog_reload(s.catalog, &stop) == 0 && !ended) FAIL(error, LAM_ERR_IO, "no store can be served");
+    if (c->strict && !catalog_read_all(s.catalog) && !ended)
+        FAIL(error, LAM_ERR_IO, "a store was refused, and --strict allows none");
     if (!ended) {
         connections_reserve(s.connections, catalog_stores(s.catalog));
         atomic_store(&s.state, SERVICE_READY);

@@ -253,6 +253,10 @@ bool metrics_write_stores(const metrics_stores *stores, buffer *b) {
     return write_gauge(b, "lambertd_stores_refused",
                        "Stores that were refused when stores were read last (/readyz names them).",
                        stores->n_refused) &&
+           write_gauge(b, "lambertd_reload_success",
+                       "1 if every store could be read when stores were read last, at the start or by "
+                       "SIGHUP; else 0.",
+                       stores->read_all) &&
            write_gauge(b, "lambertd_scenes_damaged", "Scenes out of service for damage.",
                        stores->n_damaged) &&
            write_gauge(b, "lambertd_scenes_unverified", "Scenes whose mapped blocks are still compared.",

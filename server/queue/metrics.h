@@ -55,6 +55,7 @@ bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b);
 
 /* Figures of the scenes' mapped stores. */
 typedef struct metrics_stores {
+    bool read_all;                  /* none was */
     size_t n_refused;               /* stores that could not be read when stores were read last */
     size_t n_damaged, n_unverified; /* scenes out of service; scenes still being compared */
     uint64_t mapped_bytes;

@@ -8,7 +8,7 @@ static bool write_metrics(void *context, buffer *b) {
     metrics_gauges gauges = {.queued = batch_jobs(s->queue),
                              .refining = atomic_load(&s->n_refining),
                              .body_bytes = request_ledger_bodies(in->memory->ledger)};
-    metrics_stores stores = {.n_refused = snapshot->refused->count};
+    metrics_stores stores = {.n_refused = snapshot->refused->count, .read_all = catalog_read_all(s->catalog)};
     size_t n_mapped = 0;
     size_t work_bytes = 0;
     for (size_t i = 0; i < snapshot->n_scenes; i++) {

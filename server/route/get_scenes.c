@@ -1,9 +1,10 @@
-/* GET /v1/scenes: the list of all scenes in service. GET /v1/scenes/NAME: the description of one. */
+/* GET /v1/scenes: the list of all scenes in service, and of stores that were refused. GET /v1/scenes/NAME:
+ * the description of one. */
 #include "server/route/kept_answer.h"
 
 bool keeps_scenes(const call *in, kept_source *from, answer *out) {
     const catalog_snapshot *all = in->snapshot;
-    kept_forms *text = scene_list_get(all->list, all->n_scenes, all->scenes);
+    kept_forms *text = scene_list_get(all->list, all->n_scenes, all->scenes, all->refused);
     if (text == NULL) {
         answer_refuse(out, PROBLEM_NO_MEMORY, "not enough memory for the answer");
         return false;

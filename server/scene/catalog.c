@@ -13,6 +13,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 struct catalog {
     const config *config;
@@ -22,6 +23,7 @@ struct catalog {
     pthread_mutex_t lock; /* of present */
     catalog_snapshot *present;
     uint64_t n_variants; /* made so far */
+    atomic_bool read_all;
 };
 
 /* The scenes in service are to be compared again. */
@@ -57,6 +59,7 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
     TRY(snapshot_create(0, &empty, error));
     all->config = c;
     atomic_init(&all->ledger.taken, 0);
+    atomic_init(&all->read_all, false);
     atomic_init(&all->ledger.room, 0); /* until the memory of the stores is known */
     all->out = out;
     all->problems = problems;
@@ -198,6 +201,23 @@ static lam_status check_kept(const catalog *all, const catalog_snapshot *next, c
     return check_work(all, next, s, error);
 }
 
+/* A message that says how a file that is no store, or a folder, was meant: a store is called NAME.h5 nearly
+ * always. */
+static lam_status explain_foreign(const source *from, lam_error *error) {
+    struct stat file;
+    const size_t length = strlen(from->path);
+    const bool known = stat(from->path, &file) == 0;
+    if (known && S_ISDIR(file.st_mode))
+        return status_fail(error, LAM_ERR_FORMAT, "%s: a folder; --stores %s serves the stores in it",
+                           from->path, from->path);
+    if (known && S_ISREG(file.st_mode) && (length < 3 || strcmp(from->path + length - 3, ".h5") != 0))
+        return status_fail(
+            error, LAM_ERR_FORMAT,
+            "%s: not a Lambert store; if it is a scene, precompute it first: lambert precompute %s -o %s.h5",
+            from->path, from->path, from->name);
+    return LAM_ERR_FORMAT;
+}
+
 /* Opens the store of a source and checks its memory. */
 static lam_status open_source(catalog *all, const catalog_snapshot *next, const source *from, scene *old,
                               const stop_check *stop, scene **out, lam_error *error) {
@@ -220,6 +240,7 @@ static lam_status open_source(catalog *all, const catalog_snapshot *next, const 
         options.memory = memory_left(all, next, memory_grown(next));
         status = scene_open(&options, &opened, error);
     }
+    if (status == LAM_ERR_FORMAT) status = explain_foreign(from, error);
     TRY(status);
     TRY(check_kept(all, next, opened, error));
     *out = opened;
@@ -229,14 +250,19 @@ done:
     return status;
 }
 
-/* A name that clients can put into a path, which they shorten by "." and "..". */
+/* A name that clients can put into a path, which they shorten by "." and "..", and in which proxies and
+ * clients take escaped slashes and control characters for others, or refuse them. */
 static lam_status check_name(const source *from, lam_error *error) {
     const size_t length = strlen(from->name);
-    if (strcmp(from->name, ".") == 0 || strcmp(from->name, "..") == 0)
+    bool plain = strcmp(from->name, ".") != 0 && strcmp(from->name, "..") != 0;
+    for (const char *c = from->name; *c != '\0'; c++)
+        plain = plain && (unsigned char)*c >= ' ' && *c != 0x7f && *c != '/';
+    if (!plain)
         return status_fail(
             error, LAM_ERR_ARGUMENT,
-            "%s: no client can ask for a scene called \"%s\"; give it another name: STORE:NAME", from->path,
-            from->name);
+            "%s: no client can ask for a scene called \"%s\" (a name is not . or .., and has no slash and "
+            "no control character); rename the file, or give it another name: STORE:NAME",
+            from->path, from->name);
     if (length >= CATALOG_NAME_MAX)
         return status_fail(
             error, LAM_ERR_ARGUMENT,
@@ -249,7 +275,9 @@ static lam_status check_name(const source *from, lam_error *error) {
 static void refuse(catalog *all, catalog_snapshot *next, const source *from, const lam_error *error,
                    const char *reason) {
     /* Most messages begin with the path, some (out of memory) do not. */
-    const bool named = strncmp(error->message, from->path, strlen(from->path)) == 0;
+    lam_error path;
+    (void)status_fail(&path, LAM_OK, "%s", from->path); /* as a message has it */
+    const bool named = strncmp(error->message, path.message, strlen(path.message)) == 0;
     log_line(all->problems, "refused %s%s%s", named ? "" : from->path, named ? "" : ": ", error->message);
     refusals_add(next->refused, from->path, from->name, reason != NULL ? reason : error->message, false);
 }
@@ -390,6 +418,10 @@ done:
     return status;
 }
 
+bool catalog_read_all(const catalog *all) {
+    return atomic_load(&all->read_all);
+}
+
 size_t catalog_stores(catalog *all) {
     source_list sources = {0};
     lam_error unused;
@@ -426,6 +458,7 @@ size_t catalog_reload(catalog *all, const stop_check *stop) {
     catalog_release(old);
 done:
     if (status != LAM_OK) log_line(all->problems, "%s", error.message);
+    atomic_store(&all->read_all, status == LAM_OK && next->refused->count == 0);
     catalog_release(next);
     catalog_release(before);
     sources_free(&sources);

@@ -33,6 +33,9 @@ void catalog_destroy(catalog *all);
  * snapshot stays as it was. One thread at a time. */
 size_t catalog_reload(catalog *all, const stop_check *stop);
 
+/* True if every store could be read when stores were read last, and none was refused. Any thread. */
+bool catalog_read_all(const catalog *all);
+
 /* Has the mapped arrays of a scene that is served compared again, as an answer makes one doubt them; at most
  * once in a minute. Any thread. */
 void catalog_doubt(catalog *all, const scene *s);

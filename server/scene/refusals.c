@@ -1,6 +1,7 @@
 #include "server/scene/refusals.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/codec/json_writer.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -38,6 +39,18 @@ void refusals_add(refusals *list, const char *path, const char *name, const char
         return;
     }
     list->items[list->count++] = made;
+}
+
+bool refusals_write(const refusals *list, buffer *b) {
+    bool written = true;
+    for (size_t i = 0; i < list->count && written; i++) {
+        const refused_store *one = &list->items[i];
+        written = buffer_append_text(b, i == 0 ? ",\"refused\":[{\"name\":" : ",{\"name\":") &&
+                  json_write_text(b, one->name) && buffer_append_text(b, ",\"reason\":") &&
+                  json_write_text(b, one->reason) &&
+                  buffer_printf(b, ",\"kept\":%s}", one->kept ? "true" : "false");
+    }
+    return written && (list->count == 0 || buffer_append(b, "]", 1));
 }
 
 refusals *refusals_hold(refusals *list) {

@@ -3,6 +3,8 @@
 #ifndef LAMBERT_SERVER_SCENE_REFUSALS_H
 #define LAMBERT_SERVER_SCENE_REFUSALS_H
 
+#include "solver/codec/buffer.h"
+
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -24,6 +26,9 @@ refusals *refusals_create(void);
 /* Adds the store at `path`: the reason is the message without this path and its folder. A store for which
  * memory is short is left out. */
 void refusals_add(refusals *list, const char *path, const char *name, const char *message, bool kept);
+
+/* Appends ,"refused":[{"name":…,"reason":…,"kept":…}…], or nothing where no store was refused. */
+bool refusals_write(const refusals *list, buffer *b);
 
 refusals *refusals_hold(refusals *list);
 void refusals_release(refusals *list); /* NULL is allowed */

@@ -40,7 +40,7 @@ static uint64_t mark_of(size_t n_scenes, scene *const *scenes) {
     return mark;
 }
 
-static kept_forms *make(size_t n_scenes, scene *const *scenes) {
+static kept_forms *make(size_t n_scenes, scene *const *scenes, const refusals *refused) {
     kept_forms *text = NULL;
     buffer b = {0};
     lam_error unused;
@@ -54,20 +54,20 @@ static kept_forms *make(size_t n_scenes, scene *const *scenes) {
                   buffer_printf(&b, ",\"elements\":%zu,\"channels\":%zu,\"kind\":\"%s\",\"bytes\":%llu}",
                                 s->n, s->n_channels, lam_operator_kind(s->op), (unsigned long long)s->bytes);
     }
-    if (written && buffer_append_text(&b, "]}\n"))
+    if (written && buffer_append(&b, "]", 1) && refusals_write(refused, &b) && buffer_append_text(&b, "}\n"))
         (void)kept_forms_of(&b, NULL, "the list of scenes", &text, &unused);
     buffer_free(&b);
     return text;
 }
 
-kept_forms *scene_list_get(scene_list *list, size_t n_scenes, scene *const *scenes) {
+kept_forms *scene_list_get(scene_list *list, size_t n_scenes, scene *const *scenes, const refusals *refused) {
     const double now = clock_seconds();
     pthread_mutex_lock(&list->lock);
     if (list->text == NULL || n_scenes <= FEW || now >= list->looked + LOOK_S) {
         const uint64_t mark = mark_of(n_scenes, scenes);
         if (list->text == NULL || mark != list->mark) {
             kept_forms_release(list->text);
-            list->text = make(n_scenes, scenes);
+            list->text = make(n_scenes, scenes, refused);
         }
         list->mark = mark;
         list->looked = now;

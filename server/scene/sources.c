@@ -32,9 +32,14 @@ static lam_status add_source(source_list *list, const char *folder, const char *
     const char *given = NULL;
     /* A file whose own name has a colon is taken as it is. */
     char *colon = may_name ? strrchr(path, ':') : NULL;
-    if (colon != NULL && colon[1] != '\0' && strchr(colon, '/') == NULL && access(path, F_OK) != 0) {
+    if (colon != NULL && colon[1] != '\0' && access(path, F_OK) != 0) {
         *colon = '\0';
         given = colon + 1;
+        /* A slash belongs to a name, which is refused later, where what stands before is a file. */
+        if (strchr(given, '/') != NULL && access(path, F_OK) != 0) {
+            *colon = ':';
+            given = NULL;
+        }
     }
     added->name = given != NULL ? strdup(given) : file_stem(path);
     if (added->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);

@@ -44,8 +44,12 @@ class Words(Case):
         path, _ = self.store(file=f"{name}.h5")
         odd, _ = self.store(file="y\nserving z.h5")
         other, _ = self.store(file="other.h5")
-        with Daemon(path, odd, f"{other}:{name}") as daemon:
-            self.assertIn(name, self.names(daemon))
+        with Daemon(path, odd, f"{other}:{name}", other) as daemon:
+            self.assertEqual(self.names(daemon), ["other"])
+            for line in daemon.errors().splitlines():
+                self.assertEqual(line.count(str(self.folder)), 1)  # the path stands there once, whatever is in it
+                self.assertIn("no control character", line)
+            self.assertEqual(len(daemon.errors().splitlines()), 3)
             daemon.signal(1)
             daemon.wait_for("reloaded")
             path.write_bytes(b"damaged")

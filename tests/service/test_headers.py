@@ -175,7 +175,8 @@ class Headers(unittest.TestCase):
                  "lambertd_connections_cut": "counter", "lambertd_access_log_lost": "counter",
                  "lambertd_queue_wait_seconds": "histogram", "lambertd_refining": "gauge", "lambertd_solves_refused": "counter"}
         kinds |= {"lambertd_problems": "counter", "lambertd_connections_refused": "counter", "lambertd_malformed_requests": "counter",
-                  "lambertd_verified_timestamp_seconds": "gauge"}
+                  "lambertd_verified_timestamp_seconds": "gauge", "lambertd_reload_success": "gauge",
+                  "lambertd_connections_lingering": "gauge"}
         kinds |= {"lambertd_request_memory_bytes": "gauge", "lambertd_request_memory_limit_bytes": "gauge",
                   "lambertd_request_memory_refused": "counter", "lambertd_request_memory_waiting": "gauge",
                   "lambertd_request_memory_waited": "counter", "lambertd_kept_memory_bytes": "gauge"}

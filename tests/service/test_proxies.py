@@ -108,8 +108,8 @@ class Proxies(Case):
         with Daemon(self.path, "--unix", where, listen=None):
             where.chmod(0o777)
             self.folder.chmod(0o755)
-            self.nginx(f"upstream light {{ server unix:{where}; }}\n"
-                       f"server {{ listen 127.0.0.1:{self.port}; client_max_body_size 0; location /a/b/ {{ proxy_pass http://light/; }} }}\n")
+            self.nginx(f"upstream light {{ server unix:{where}; }}\nserver {{ listen 127.0.0.1:{self.port}; client_max_body_size 0;\n"
+                       "location /a/b/ { proxy_pass http://light/; } }\n")
             self.check("/a/b/")
 
     @unittest.skipUnless(program("haproxy"), "no HAProxy")

@@ -3,11 +3,12 @@
 import pathlib
 import shutil
 import signal
+import subprocess
 import tempfile
 import unittest
 import urllib.parse
 
-from daemon import Daemon
+from daemon import LAMBERTD, PATIENCE, Daemon
 from guard_case import metrics
 from make_store import Scene
 
@@ -62,12 +63,79 @@ class SceneNames(unittest.TestCase):
 
     def test_names_that_nobody_can_ask_for(self):
         shutil.copy(self.one, self.folder / "..h5")
-        for name in ".", "..", "x" * 256:
+        for name in ".", "..", "x" * 256, "a/b", "a\nb", "\x7f", "/":
             with self.subTest(name=name), Daemon(self.one, f"{self.one}:{name}") as daemon:
                 self.assertEqual(self.names(daemon), ["one"])
                 self.assertEqual(len(daemon.errors().splitlines()), 1)
                 self.assertIn("give it another", daemon.errors())
-                self.assertEqual(list(self.refused(daemon)), [name])
+                self.assertEqual([r["name"] for r in daemon.get("/readyz").json()["refused"]], [name])
+        shutil.copy(self.one, self.stores / "a\tb.h5")
+        shutil.copy(self.one, self.stores / "ab.h5")
+        with Daemon("--stores", self.stores) as daemon:
+            self.assertEqual(self.names(daemon), ["ab"])
+            self.assertIn("control character); rename the file", daemon.errors())
+
+    def test_a_folder_with_a_colon(self):
+        odd = self.folder / "a:b"
+        odd.mkdir()
+        shutil.copy(self.one, odd / "one.h5")
+        with Daemon(odd / "one.h5", f"{odd / 'one.h5'}:two") as daemon:
+            self.assertEqual(self.names(daemon), ["one", "two"])
+
+    def test_what_is_no_store(self):
+        """Scenes and folders that were meant otherwise: the line says how."""
+        scene = self.folder / "room.obj"
+        scene.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        first = f"precompute it first: lambert precompute {scene} -o room.h5"
+        for file, words in ((scene, first), (self.stores, f"--stores {self.stores}"),
+                            (self.folder / "none.obj", "No such file")):
+            made = subprocess.run([LAMBERTD, file, "--listen", "127.0.0.1:0"], capture_output=True, text=True, timeout=PATIENCE)
+            self.assertEqual((made.returncode, made.stderr.count("\n")), (1, 2))
+            self.assertIn(f"refused {file}: ", made.stderr)
+            self.assertIn(words, made.stderr)
+
+    def success(self, daemon):
+        return metrics(daemon)[("lambertd_reload_success",)]
+
+    def test_strict(self):
+        """A refused store is an error of the start and of readiness; without the option of neither, but it is counted."""
+        for name in "good", "bad":
+            shutil.copy(self.one, self.stores / f"{name}.h5")
+        with Daemon("--stores", self.stores, "--strict") as strict, Daemon("--stores", self.stores) as easy:
+            for state, status, success in (("bad", 503, 0), ("mended", 200, 1), ("gone", 503, 0), ("back", 200, 1)):
+                away = self.folder / "away"
+                if state == "bad":
+                    (self.folder / "new").write_bytes(b"no store")
+                    (self.folder / "new").rename(self.stores / "worse.h5")
+                elif state == "mended":
+                    (self.stores / "worse.h5").unlink()
+                elif state == "gone":
+                    self.stores.rename(away)
+                else:
+                    away.rename(self.stores)
+                for daemon in strict, easy:
+                    before = daemon.output().count("reloaded")
+                    daemon.signal(signal.SIGHUP)
+                    daemon.wait_for("reloaded", before + 1)
+                    self.assertEqual(self.success(daemon), success, state)
+                    self.assertEqual(self.names(daemon), ["bad", "good"])
+                self.assertEqual(easy.get("/readyz").status, 200)
+                answer = strict.get("/readyz")
+                self.assertEqual(answer.status, status, answer)
+                if state == "bad":
+                    self.assertIn("--strict", answer.json()["detail"])
+                    self.assertIn("worse", answer.json()["detail"])
+                    listed = easy.get("/v1/scenes").json()["refused"]
+                    self.assertEqual([(r["name"], r["kept"]) for r in listed], [("worse", False)])
+                    self.assertEqual(listed, easy.get("/readyz").json()["refused"])
+                else:
+                    self.assertNotIn("refused", easy.get("/v1/scenes").json())
+        (self.stores / "worse.h5").write_bytes(b"no store")
+        made = subprocess.run([LAMBERTD, "--stores", self.stores, "--strict", "--listen", "127.0.0.1:0"], capture_output=True, text=True,
+                              timeout=PATIENCE)
+        self.assertEqual(made.returncode, 1)
+        self.assertIn("--strict", made.stderr.splitlines()[-1])
+        self.assertNotIn("listening", made.stdout)
 
     def test_a_name_is_taken(self):
         other = self.folder / "other"
