@@ -254,8 +254,8 @@ bool metrics_write_stores(const metrics_stores *stores, buffer *b) {
                        "Stores that were refused when stores were read last (/readyz names them).",
                        stores->n_refused) &&
            write_gauge(b, "lambertd_reload_success",
-                       "1 if every store could be read when stores were read last, at the start or by "
-                       "SIGHUP; else 0.",
+                       "Outcome of reading stores last, at the start or by SIGHUP: 1 if every one could be "
+                       "read, else 0.",
                        stores->read_all) &&
            write_gauge(b, "lambertd_scenes_damaged", "Scenes out of service for damage.",
                        stores->n_damaged) &&
