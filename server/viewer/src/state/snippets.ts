@@ -49,7 +49,8 @@ function pythonValue(value: unknown): string {
     return String(value);
 }
 
-const urlOf = (page: string, request: PlainRequest): string => new URL(Api.path(request.scene, "/radiosity"), page).href;
+const urlOf = (page: string, request: PlainRequest): string =>
+    new URL(Api.path(request.scene, "/radiosity"), page).href;
 
 /** The token itself stays out of what is copied: it is read from LAMBERT_TOKEN. */
 export function curlCommand(page: string, request: PlainRequest, withToken: boolean): string {
