@@ -26,6 +26,9 @@ PORT_IN_DOCUMENTS = "127.0.0.1:8317"
 # Options of other programs that the documents name.
 FOREIGN = {"--once", "--all", "--data-binary", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static", "--test-dir"}
 
+# Configurations of proxies, which test_proxies.py runs.
+CONFIGURATIONS = ("nginx", "haproxy")
+
 
 def blocks(document):
     """(language with its marks, text) of every fenced block."""
@@ -159,7 +162,7 @@ class Documents(unittest.TestCase):
         found = 0
         for document in DOCUMENTS:
             for mark, text in blocks(document):
-                self.assertIn(mark, ("", "sh", "sh slow", "sh elsewhere", "json", "c", "text"), document.name)
+                self.assertIn(mark, ("", "sh", "sh slow", "sh elsewhere", "json", "c", "text", *CONFIGURATIONS), document.name)
                 if mark != "sh elsewhere":
                     continue
                 for line in text.splitlines():
