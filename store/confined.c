@@ -52,12 +52,13 @@ static void check_call(call_filter *f, int number, unsigned argument, bool same,
     add(f, (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
 }
 
-/* Files are opened to be read, and looked at; a signal is sent to the process itself. */
+/* Files and folders are opened to be read, and looked at; a signal is sent to the process itself. */
 static void allow_files(call_filter *f) {
     static const int allowed[] = {
-        SYS_newfstatat, SYS_statx, SYS_readlinkat, SYS_faccessat, SYS_faccessat2, SYS_getcwd, SYS_sched_yield,
+        SYS_newfstatat, SYS_statx,       SYS_readlinkat, SYS_faccessat, SYS_faccessat2,
+        SYS_getcwd,     SYS_sched_yield, SYS_getdents64,
 #ifdef SYS_readlink /* older calls, which newer machines do not have */
-        SYS_readlink,   SYS_stat,  SYS_lstat,      SYS_access
+        SYS_readlink,   SYS_stat,        SYS_lstat,      SYS_access
 #endif
     };
     const unsigned harmless = O_CLOEXEC | O_NOCTTY | O_NONBLOCK | O_DIRECTORY | O_NOFOLLOW | O_LARGEFILE;

@@ -19,7 +19,7 @@ typedef struct confined_limits {
     unsigned all_seconds; /* of the clock, for the whole answer */
     size_t memory_bytes;  /* of address space, beyond that of the caller; a sanitizer needs more: no limit */
     bool filtered;        /* the system lets it read, write, allocate memory and end, nothing else */
-    bool reads_files;     /* if filtered: it may also open files to read them, and look at names */
+    bool reads_files;     /* if filtered: it may also open files and folders to read them */
     const stop_check *stop; /* asked while the answer is waited for; NULL: nobody is */
 } confined_limits;
 

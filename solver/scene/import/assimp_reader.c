@@ -356,10 +356,12 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     if (a.gltf)
         TRY(gltf_read_materials(path, bytes, length, s, &a.gltf_materials, &a.n_gltf_materials, error));
     TRY(ply_check_head(path, bytes, length, error));
+    if (!a.gltf && dot != NULL && strcasecmp(dot, ".stl") == 0)
+        TRY(stl_normalised(bytes, length, &padded, &padded_length, error));
     scene_files files = {.path = path,
                          .assets = s->assets,
                          .bytes = padded != NULL ? padded : bytes,
-                         .length = padded != NULL ? padded_length : length};
+                         .length = padded_length > 0 ? padded_length : length};
     if (a.gltf) TRY(gltf_rewrite(path, files.bytes, files.length, s, &rewritten, &rewritten_length, error));
     if (rewritten != NULL) files.bytes = rewritten, files.length = rewritten_length;
     a.scene = import_scene(&files);

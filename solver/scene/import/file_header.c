@@ -1,10 +1,12 @@
-/* Heads of files, before the importing library reads them: chunks of a GLB that are not padded, and a PLY's
- * numbers of vertices and faces. Runs in the child. */
+/* Heads of files, before the importing library reads them: chunks of a GLB that are not padded, a PLY's
+ * numbers of vertices and faces, and the letters of an STL's text. Runs in the child. */
 #include "solver/scene/import/imported_faces.h"
 
+#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 static uint32_t little_endian(const char *bytes) {
     const unsigned char *b = (const unsigned char *)bytes;
@@ -102,4 +104,61 @@ lam_status ply_check_head(const char *path, const char *bytes, size_t length, la
              path, most, largest, room > 0 ? room : 0);
 done:
     return status;
+}
+
+/* The head of a binary STL and its number of triangles, then bytes of each. */
+enum { STL_HEAD = 84, STL_TRIANGLE = 50 };
+
+/* True where a binary STL has all triangles that its head names; *used: bytes of these. */
+static bool is_binary_stl(const char *bytes, size_t length, size_t *used) {
+    if (length < STL_HEAD) return false;
+    const uint64_t need = STL_HEAD + (uint64_t)STL_TRIANGLE * little_endian(bytes + STL_HEAD - 4);
+    *used = (size_t)need;
+    return need <= length;
+}
+
+/* The first letter of a text behind a byte order mark, blanks and empty lines. */
+static size_t text_begins(const char *bytes, size_t length) {
+    size_t at = length >= 3 && memcmp(bytes, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
+    while (at < length && isspace((unsigned char)bytes[at])) at++;
+    return at;
+}
+
+/* True for the lines of a text that name a solid: their letters stay. */
+static bool names_solid(const char *line, size_t length) {
+    static const char *const words[] = {"solid", "endsolid"};
+    for (size_t k = 0; k < sizeof words / sizeof *words; k++) {
+        const size_t n = strlen(words[k]);
+        if (length >= n && strncasecmp(line, words[k], n) == 0 &&
+            (length == n || isspace((unsigned char)line[n])))
+            return true;
+    }
+    return false;
+}
+
+lam_status stl_normalised(const char *bytes, size_t length, char **out, size_t *out_length,
+                          lam_error *error) {
+    const size_t begin = text_begins(bytes, length);
+    size_t used = 0;
+    *out = NULL;
+    *out_length = length;
+    if (is_binary_stl(bytes, length, &used)) { /* its head may begin with "solid" */
+        *out_length = used;
+        return LAM_OK;
+    }
+    if (length - begin < 6 || !names_solid(bytes + begin, 6)) return LAM_OK;
+    char *made = memory_allocate(length - begin + 1, 1, "STL", error); /* and a NUL */
+    if (made == NULL) return LAM_ERR_MEMORY;
+    memcpy(made, bytes + begin, length - begin);
+    for (char *line = made, *end = made + (length - begin); line < end;) {
+        while (line < end && isspace((unsigned char)*line)) line++;
+        const char *stop = memchr(line, '\n', (size_t)(end - line));
+        const size_t n = stop != NULL ? (size_t)(stop - line) : (size_t)(end - line);
+        const size_t lowered = names_solid(line, n) ? strcspn(line, " \t\r\n") : n;
+        for (size_t k = 0; k < lowered && k < n; k++) line[k] = (char)tolower((unsigned char)line[k]);
+        line += n;
+    }
+    *out = made;
+    *out_length = length - begin;
+    return LAM_OK;
 }

@@ -115,12 +115,15 @@ lam_status imported_faces_add_camera(imported_faces *s, const char *path, const 
 lam_status imported_faces_split(imported_faces *s, const char *path, lam_error *error);
 
 /* Where a file that a scene names lies. */
-typedef enum asset_place { ASSET_MISSING, ASSET_FOUND, ASSET_OUTSIDE } asset_place;
+typedef enum asset_place { ASSET_MISSING, ASSET_FOUND, ASSET_OUTSIDE, ASSET_SEVERAL } asset_place;
 enum { ASSET_PATH = 4096 };
 
-/* Looks for file, which the file scene names: beside the scene, then in assets, unless that is NULL. out: its
- * path. ASSET_OUTSIDE: it exists, but lies neither below the scene's folder nor below assets, links resolved.
- */
+/* Looks for file, which the file scene names: beside the scene, then in assets, unless that is NULL. A file
+ * of another system is found by another spelling where none has its own: backslashes are slashes, a path on a
+ * drive (C:\) is its last name, and letters A to Z are a to z where one file alone matches. out: its path.
+ * ASSET_OUTSIDE: it exists, but lies neither below the scene's folder nor below assets, links resolved.
+ * ASSET_SEVERAL: files differ from it by capitals alone; out has two of their names, "a, b". Cost: where no
+ * file has the name, all names of the folders. */
 asset_place asset_find(const char *scene, const char *assets, const char *file, char out[ASSET_PATH]);
 
 /* *image = 1 + the index of the image of a key, decoded where the key is new, or 0 where it cannot be read,
@@ -177,6 +180,12 @@ lam_status gltf_read_cameras(const char *path, const char *bytes, size_t length,
 /* Some writers of GLB do not pad chunks to 4 bytes, which the library refuses. *out is a padded copy, freed
  * by the caller, or NULL where the file is not a GLB or is padded. Errors: LAM_ERR_MEMORY. */
 lam_status glb_padded(const char *glb, size_t length, char **out, size_t *out_length, lam_error *error);
+
+/* The library takes an STL for text where it begins with "solid" in small letters, and for binary where it
+ * has no byte more than its triangles. *out is a copy of a text that begins so, freed by the caller, its
+ * words in small letters but for names of solids; NULL for any other file. *out_length: bytes to be read.
+ * Errors: LAM_ERR_MEMORY. */
+lam_status stl_normalised(const char *bytes, size_t length, char **out, size_t *out_length, lam_error *error);
 
 /* A reader of one family of formats; runs in the child. */
 typedef lam_status scene_reader(const char *path, imported_faces *s, lam_error *error);

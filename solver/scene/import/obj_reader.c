@@ -3,6 +3,7 @@
 #include "solver/base/array_grow.h"
 #include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
+#include "solver/scene/import/obj_groups.h"
 
 #include <errno.h>
 #include <math.h>
@@ -242,6 +243,12 @@ static lam_status read_library(const char *path, uint32_t line, const char *file
              "%s:%u: the material file '%s' lies outside the scene's folder; --assets with its folder lets "
              "it be read",
              path, line, file);
+    if (place == ASSET_SEVERAL)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s:%u: the material file '%s' is missing, and several differ from it by capitals alone "
+             "(%.200s); "
+             "write the name of one",
+             path, line, file, full);
     if (*found) TRY(read_mtl(full, s, error));
 done:
     return status;
@@ -276,7 +283,9 @@ done:
 typedef struct obj_state {
     const char *path;
     imported_faces *s;
-    uint32_t object, group, material;
+    uint32_t object, material;
+    const char *group; /* the text of the last `g`, which stays in the file's; NULL: none */
+    obj_groups groups; /* of polygons without an object */
     uint32_t *corners; /* of the face being read */
     size_t corner_capacity;
     /* Coordinates of images are kept once a material has one. skipped: some were not. */
@@ -359,8 +368,9 @@ static lam_status read_face(obj_state *o, uint32_t line, const char *text, lam_e
         while (is_blank(*text)) text++;
     }
     if (n == 0) goto done;
-    TRY(imported_faces_add_polygon(o->s, o->corners, n, o->object != TABLE_NONE ? o->object : o->group,
-                                   o->material, line, error));
+    TRY(imported_faces_add_polygon(o->s, o->corners, n, o->object, o->material, line, error));
+    if (o->object == TABLE_NONE && o->group != NULL)
+        TRY(obj_groups_add(&o->groups, o->group, o->s->n_polygons, error));
     if (skinned) TRY(imported_faces_add_skin(o->s, o->skin, error));
 done:
     return status;
@@ -381,12 +391,7 @@ static bool has_images(const imported_faces *s) {
 /* *again: coordinates of images were skipped before a material had one. */
 static lam_status read_all(const char *path, imported_faces *s, bool keeps, bool *again, lam_error *error) {
     lam_status status = LAM_OK;
-    obj_state o = {.path = path,
-                   .s = s,
-                   .object = TABLE_NONE,
-                   .group = TABLE_NONE,
-                   .material = TABLE_NONE,
-                   .keeps = keeps};
+    obj_state o = {.path = path, .s = s, .object = TABLE_NONE, .material = TABLE_NONE, .keeps = keeps};
     size_t length = 0;
     char *rest, *text = NULL;
     line_cursor cursor;
@@ -402,7 +407,7 @@ static lam_status read_all(const char *path, imported_faces *s, bool keeps, bool
         else if ((rest = after_keyword(line, "o")) != NULL)
             TRY(read_name(s, rest, &o.object, error));
         else if ((rest = after_keyword(line, "g")) != NULL)
-            TRY(read_name(s, rest, &o.group, error));
+            o.group = *rest == '\0' ? NULL : rest;
         else if ((rest = after_keyword(line, "usemtl")) != NULL) {
             o.material = TABLE_NONE;
             if (*rest != '\0') TRY(imported_faces_add_material(s, rest, strlen(rest), &o.material, error));
@@ -412,11 +417,13 @@ static lam_status read_all(const char *path, imported_faces *s, bool keeps, bool
         }
     }
     *again = o.skipped && has_images(s);
+    TRY(obj_groups_settle(&o.groups, path, s, error));
     settle_colours(s);
 done:
     free(o.corners);
     free(o.uv);
     free(o.skin);
+    obj_groups_free(&o.groups);
     free(text);
     return status;
 }

@@ -57,18 +57,6 @@ done:
     return status;
 }
 
-/* Finds the file of an image; some programs write the folders of another system. */
-static asset_place find_file(const imported_faces *s, const char *path, const char *file,
-                             char full[ASSET_PATH]) {
-    char name[ASSET_PATH];
-    const asset_place place = asset_find(path, s->assets, file, full);
-    if (place != ASSET_MISSING || strchr(file, '\\') == NULL) return place;
-    snprintf(name, sizeof name, "%s", file);
-    for (char *c = name; *c != '\0'; c++)
-        if (*c == '\\') *c = '/';
-    return asset_find(path, s->assets, name, full);
-}
-
 lam_status imported_faces_find_image(imported_faces *s, const char *path, const char *file, uint32_t *image,
                                      lam_error *error) {
     lam_status status = LAM_OK;
@@ -80,12 +68,14 @@ lam_status imported_faces_find_image(imported_faces *s, const char *path, const 
     snprintf(key, sizeof key, "%s\n%s", path, file);
     TRY(find_key(s, key, &index, &known, error));
     if (!known) {
-        const asset_place place = find_file(s, path, file, full);
+        const asset_place place = asset_find(path, s->assets, file, full);
         if (place == ASSET_OUTSIDE)
             say_why(s, path, file,
                     "it lies outside the scene's folder; --assets with its folder lets it be read");
         else if (place == ASSET_MISSING)
             say_why(s, path, file, "it is missing");
+        else if (place == ASSET_SEVERAL)
+            say_why(s, path, file, "several files differ from it by capitals alone");
         else if (file_text(full, &bytes, &length, &unread) != LAM_OK)
             say_why(s, path, file, "it cannot be opened");
         else

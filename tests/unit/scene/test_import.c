@@ -19,28 +19,60 @@ static void teardown(void) {
 START_TEST(groups_follow_objects_then_materials) {
     import_report report;
     mtl_write(folder, "newmtl red\nKd .6 .1 .1\nnewmtl grey paint\nKd .5 .5 .5\n");
-    mesh m = obj_good(folder,
-                      "mtllib scene.mtl\n" SQUARE "v 0 0 1\nv 0 0 2\nv 0 0 3\nv 0 0 4\nv 0 0 5\nv 0 0 6\n"
-                      "f 1 2 3\n"                /* neither object nor material: the file's stem */
-                      "usemtl red\nf 2 3 5\n"    /* no object: the material */
-                      "g roof  tiles\nf 2 3 6\n" /* a group, as written */
-                      "o house\nf 2 3 7\n"       /* an object of two materials, whatever its groups */
-                      "g wall\nusemtl grey paint\nf 2 3 8\n"
-                      "o roof  tiles\nusemtl red\nf 2 3 9\n" /* the same name again */
-                      "o mixed.thing\nf 2 3 10\n",
-                      &report);
+    mesh m =
+        obj_good(folder,
+                 "mtllib scene.mtl\n" SQUARE "v 0 0 1\nv 0 0 2\nv 0 0 3\nv 0 0 4\nv 0 0 5\nv 0 0 6\nv 0 0 7\n"
+                 "f 1 2 3\n"             /* neither object nor material: the file's stem */
+                 "usemtl red\nf 2 3 5\n" /* no object: the material */
+                 "g roof\nf 2 3 6\n"     /* a group */
+                 "o house\nf 2 3 7\n"    /* an object of two materials, whatever its groups */
+                 "g wall\nusemtl grey paint\nf 2 3 8\n"
+                 "o roof\nusemtl red\nf 2 3 9\n" /* the same name again */
+                 "o mixed.thing\nf 2 3 10\n"
+                 "o roof  tiles\nf 2 3 11\n", /* an object, as written */
+                 &report);
     const struct {
         const char *name;
         size_t n;
     } expected[] = {
-        {"scene", 1},      {"red", 1}, {"roof  tiles", 2}, {"house.red", 1}, {"house.grey paint", 1},
-        {"mixed.thing", 1}};
-    ck_assert_uint_eq(m.n_groups, 6);
-    for (size_t g = 0; g < 6; g++) {
+        {"scene", 1},       {"red", 1},        {"roof", 2}, {"house.red", 1}, {"house.grey paint", 1},
+        {"mixed.thing", 1}, {"roof  tiles", 1}};
+    ck_assert_uint_eq(m.n_groups, 7);
+    for (size_t g = 0; g < 7; g++) {
         size_t n;
         group_area(&m, expected[g].name, &n);
         ck_assert_uint_eq(n, expected[g].n);
     }
+    mesh_free(&m);
+}
+END_TEST
+
+/* Programs write a part before or behind the whole; a part of the same size is the first one. */
+START_TEST(faces_of_several_groups_are_in_the_smallest) {
+    static const char *const texts[] = {
+        SQUARE "g floor all room\nf 1 2 3\ng wall all room\nf 1 2 4\nf 1 3 4\n",
+        SQUARE "g room\tall floor\nf 1 2 3\ng room  all wall \nf 1 2 4\nf 1 3 4\n",
+        SQUARE "g wall room\nf 1 2 4\ng\nf 2 3 4\ng room floor\nf 1 2 3\ng wall room\nf 1 3 4\n",
+        SQUARE "o floor\ng all wall\nf 1 2 3\no\nf 1 2 4\ng wall\nf 1 3 4\n"};
+    const size_t n_groups[] = {2, 2, 3, 3}, in_wall[] = {2, 2, 2, 1};
+    for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
+        import_report report;
+        size_t n;
+        mesh m = obj_good(folder, texts[k], &report);
+        ck_assert_uint_eq(m.n_groups, n_groups[k]);
+        group_area(&m, "floor", &n);
+        ck_assert_uint_eq(n, 1);
+        group_area(&m, "wall", &n);
+        ck_assert_uint_eq(n, in_wall[k]);
+        ck_assert_msg(strstr(report.warnings, "name several groups; a face counts to the smallest") != NULL,
+                      "%zu: '%s'", k, report.warnings);
+        mesh_free(&m);
+    }
+    import_report report;
+    mesh m = obj_good(folder, SQUARE "g a b\nf 1 2 3\ng wall wall\nf 1 3 4\n", &report);
+    ck_assert_str_eq(m.group_names[m.group[0]], "a");
+    ck_assert_str_eq(m.group_names[m.group[1]], "wall");
+    ck_assert_ptr_nonnull(strstr(report.warnings, "1 lines g name several groups"));
     mesh_free(&m);
 }
 END_TEST
@@ -455,6 +487,7 @@ int main(void) {
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, setup, teardown);
     tcase_add_test(tests, groups_follow_objects_then_materials);
+    tcase_add_test(tests, faces_of_several_groups_are_in_the_smallest);
     tcase_add_test(tests, gltf_groups_are_nodes);
     tcase_add_test(tests, mirrored_nodes_keep_their_fronts);
     tcase_add_test(tests, diffuse_of_one_or_more_is_clamped_with_a_warning);

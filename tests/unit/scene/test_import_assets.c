@@ -116,6 +116,47 @@ START_TEST(files_outside_the_folder_need_assets) {
 }
 END_TEST
 
+/* Other systems divide paths by backslashes and do not tell capitals from small letters. */
+START_TEST(names_of_other_systems_find_their_files) {
+    char path[256], text[512], inner[128];
+    mesh m = {0};
+    file_write(folder, "m.mtl", "newmtl a\nKd .25 .25 .25\n", path);
+    snprintf(inner, sizeof inner, "%s/Parts of it", folder);
+    ck_assert_int_eq(mkdir(inner, 0700), 0);
+    file_write(inner, "Grey.mtl", "newmtl a\nKd .75 .75 .75\n", path);
+    const struct {
+        const char *name, *refused;
+        float grey;
+    } cases[] = {{".\\m.mtl", NULL, .25f},
+                 {"M.MTL", NULL, .25f},
+                 {"./M.mtl", NULL, .25f},
+                 {"C:\\Users\\me\\M.mtl", NULL, .25f},
+                 {"parts OF it\\grey.MTL", NULL, .75f},
+                 {"Parts of it/../M.mtl", NULL, .25f},
+                 {"Grey.mtl", "'Grey.mtl' is missing", 0},
+                 {"m.mt", "'m.mt' is missing", 0},
+                 {"..\\m.mtl", "'..\\m.mtl' is missing", 0},
+                 {"C:/", "'C:/' is missing", 0}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        snprintf(text, sizeof text, "mtllib %s\n" SQUARE "usemtl a\nf 1 2 3 4\n", cases[k].name);
+        file_write(folder, "scene.obj", text, path);
+        import_beside(path, NULL, cases[k].refused, &m);
+        if (cases[k].refused == NULL) ck_assert_float_eq(m.reflectance[0], cases[k].grey);
+        mesh_free(&m);
+    }
+    file_write(folder, "scene.obj", "mtllib gREY.mtl\n" SQUARE "usemtl a\nf 1 2 3 4\n", path);
+    import_beside(path, inner, NULL, &m); /* among the assets */
+    mesh_free(&m);
+    file_write(folder, "M.mtl", "newmtl a\nKd .5 .5 .5\n", path);
+    file_write(folder, "scene.obj", "mtllib m.mtl\n" SQUARE "usemtl a\nf 1 2 3 4\n", path);
+    import_beside(path, NULL, NULL, &m); /* its own spelling */
+    ck_assert_float_eq(m.reflectance[0], .25f);
+    mesh_free(&m);
+    file_write(folder, "scene.obj", "mtllib M.MTL\n" SQUARE "usemtl a\nf 1 2 3 4\n", path);
+    import_beside(path, NULL, "several differ from it by capitals alone (", &m);
+}
+END_TEST
+
 START_TEST(buffers_outside_the_folder_need_assets) {
     const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     char path[256], inner[128];
@@ -179,6 +220,49 @@ START_TEST(headers_without_their_entries_are_refused) {
 }
 END_TEST
 
+#define FACET(A, B, C)                                                                                       \
+    "facet normal 0 0 0\nouter loop\nvertex " A "\nvertex " B "\nvertex " C "\nendloop\nendfacet\n"
+
+/* The library takes small letters alone, from the first byte on. */
+START_TEST(texts_of_stl_are_read_whatever_their_letters) {
+    static const char plain[] = "solid A b\n" FACET("0 0 0", "1.0e0 0 0", "0 1 0") "endsolid A b\n";
+    const char *const before[] = {"", "\n  \r\n\t", "\xEF\xBB\xBF", "\xEF\xBB\xBF\n "};
+    char path[256], text[512];
+    for (size_t k = 0; k < 8; k++) {
+        mesh m = {0};
+        int length = snprintf(text, sizeof text, "%s%s", before[k / 2], plain);
+        for (int c = 0; k % 2 == 1 && c < length; c++)
+            if (text[c] >= 'a' && text[c] <= 'z') text[c] = (char)(text[c] - 'a' + 'A');
+        file_write(folder, "scene.STL", text, path);
+        import_beside(path, NULL, NULL, &m);
+        ck_assert_double_eq_tol(total_area(&m), .5, 1e-7);
+        ck_assert_str_eq(m.group_names[0], "A");
+        mesh_free(&m);
+    }
+}
+END_TEST
+
+/* A head of a binary file may say "solid", and bytes may follow the last triangle. */
+START_TEST(binary_stl_may_begin_with_solid) {
+    char path[256], bytes[84 + 50 + 2] = " Solid made by a program";
+    const float corners[12] = {0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0};
+    bytes[80] = 1;
+    memcpy(bytes + 84, corners, sizeof corners);
+    for (size_t k = 0; k < 3; k++) {
+        mesh m = {0};
+        snprintf(path, sizeof path, "%s/scene.stl", folder);
+        FILE *f = fopen(path, "wb");
+        ck_assert_ptr_nonnull(f);
+        ck_assert_uint_eq(fwrite(bytes, sizeof bytes - k, 1, f), 1);
+        ck_assert_int_eq(fclose(f), 0);
+        import_beside(path, NULL, NULL, &m);
+        ck_assert_double_eq_tol(total_area(&m), .5, 1e-7);
+        mesh_free(&m);
+        memmove(bytes, bytes + (k == 0), 24); /* once with a blank before it, then without */
+    }
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("import_assets");
     TCase *tests = tcase_create("import_assets");
@@ -186,8 +270,11 @@ int main(void) {
     tcase_add_test(tests, byte_order_marks_are_passed_over);
     tcase_add_test(tests, names_become_utf8);
     tcase_add_test(tests, files_outside_the_folder_need_assets);
+    tcase_add_test(tests, names_of_other_systems_find_their_files);
     tcase_add_test(tests, buffers_outside_the_folder_need_assets);
     tcase_add_test(tests, headers_without_their_entries_are_refused);
+    tcase_add_test(tests, texts_of_stl_are_read_whatever_their_letters);
+    tcase_add_test(tests, binary_stl_may_begin_with_solid);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
