@@ -100,6 +100,12 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
     if (report.dropped_faces > 0)
         terminal_log(job->t, "%zu face%s of zero area dropped", report.dropped_faces,
                      report.dropped_faces == 1 ? "" : "s");
+    if (report.luminous > 0)
+        terminal_log(
+            job->t,
+            "the emission of %zu material%s is luminance in cd/m2, as glTF has it: the exitance is pi "
+            "times that",
+            report.luminous, report.luminous == 1 ? "" : "s");
     if (report.clamped > 0)
         terminal_log(job->t, "%zu material%s reflected all light or more, or nearly: set to .9999",
                      report.clamped, report.clamped == 1 ? "" : "s");

@@ -53,10 +53,10 @@ class Group:
         a, b, c = (self.position[self.triangles[:, k]].astype(float) for k in range(3))
         return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
-    def strength(self):
-        """emissiveFactor times emissiveStrength."""
+    def emission(self):
+        """The exitance: pi times the luminance, which is emissiveFactor times emissiveStrength."""
         extension = self.material.get("extensions", {}).get("KHR_materials_emissive_strength", {"emissiveStrength": 1})
-        return np.array(self.material.get("emissiveFactor", [0, 0, 0])) * extension["emissiveStrength"]
+        return np.pi * np.array(self.material.get("emissiveFactor", [0, 0, 0])) * extension["emissiveStrength"]
 
 
 def turned(vectors, up):
@@ -100,6 +100,6 @@ def check(test, raw, store, kind=None, reflectance=None):
         area = m["area"][members]
         np.testing.assert_allclose(group.material["pbrMetallicRoughness"]["baseColorFactor"],
                                    [*colour(m["reflectance"][:, members], area), 1], rtol=1e-6)
-        np.testing.assert_allclose(group.strength(), colour(m["emission"][:, members], area), rtol=1e-6)
+        np.testing.assert_allclose(group.emission(), colour(m["emission"][:, members], area), rtol=1e-6)
         test.assertEqual(group.material["name"], name)
     return glb

@@ -86,6 +86,8 @@ class Mesh(Case):
                 self.assertAlmostEqual(areas[1] / areas[0], 1, places=5)
                 rho = [f["mesh/reflectance"][()][:, f["mesh/group"][()] == g].mean() for f, g in zip((a, b), of)]
                 self.assertAlmostEqual(rho[1], rho[0], places=5)
+                lit = [f["mesh/emission"][()][:, f["mesh/group"][()] == g].mean() for f, g in zip((a, b), of)]
+                self.assertAlmostEqual(lit[1], lit[0], delta=1e-5 * lit[0])
 
     def test_codings_and_tags(self):
         path, _ = self.store(n=2000)

@@ -332,7 +332,7 @@ class GltfTexturesTest(TexturesCase):
         self.judge(store, pixels, lambda u, v: (3 * u, -2 * v))
         for i in range(8):
             uv = [(p[0] / 2, p[1]) for p in store.corners(i)]
-            self.close(store.emission[:, i], mean_of(lamp, uv) * (12, 6, 3), f"element {i}")
+            self.close(store.emission[:, i], mean_of(lamp, uv) * (12 * np.pi, 6 * np.pi, 3 * np.pi), f"element {i}")
         # Colours of corners are linear in between, and multiply.
         colours = np.c_[scene.corners[:, 0] / 4, np.full(6, .5), 1 - scene.corners[:, 1] / 2]
         for component, values in ((5126, colours.astype(np.float32)), (5126, np.c_[colours, np.ones(6)].astype(np.float32)),

@@ -1,6 +1,7 @@
 /* A scene is written as binary glTF 2.0 (ISO/IEC 12113:2022): plan() lays out groups and views, the say_
- * functions write the JSON chunk, and the put_ functions write the binary one. The emission is emissiveFactor
- * times emissiveStrength, and COLOR_0 is light / white cut to [0, 1]. */
+ * functions write the JSON chunk, and the put_ functions write the binary one. The emission is pi times
+ * emissiveFactor times emissiveStrength, which are a luminance, and COLOR_0 is light / white cut to [0, 1].
+ */
 #include "solver/codec/gltf/gltf.h"
 
 #include "solver/codec/gltf/corner_normals.h"
@@ -258,7 +259,8 @@ static bool say_meshes(const writer *w, buffer *b) {
     return good && buffer_append_text(b, "]");
 }
 
-/* emission = emissiveFactor, whose largest component is 1, times emissiveStrength. */
+/* The luminance, which is emission / pi of a diffuse surface, is emissiveFactor, whose largest component is
+ * 1, times emissiveStrength. */
 static bool say_emission(const double emission[3], buffer *b) {
     const double most = fmax(emission[0], fmax(emission[1], emission[2]));
     if (!(most > 0)) return true;
@@ -266,7 +268,7 @@ static bool say_emission(const double emission[3], buffer *b) {
     return say_numbers(b, ",\"emissiveFactor\":", 3, factor) &&
            buffer_append_text(
                b, ",\"extensions\":{\"KHR_materials_emissive_strength\":{\"emissiveStrength\":") &&
-           json_write_double(b, most) && buffer_append_text(b, "}}");
+           json_write_double(b, most / M_PI) && buffer_append_text(b, "}}");
 }
 
 static bool say_surface(const writer *w, const part *p, buffer *b) {

@@ -53,9 +53,9 @@ typedef struct gltf_mesh {
  *   - Corners of a group at one position share a normal, bit for bit, if they belong to one surface: elements
  *     that meet there at less than 30 degrees, directly or by others between them. It is the mean of their
  *     elements' normals by area. All other corners have those of their elements.
- *   - A material for each group: the mean by area of its reflectance as base colour, and of its emission as
- *     emissive factor and KHR_materials_emissive_strength. Of 1 channel these are grey, of 3 red, green and
- *     blue, of others the grey of their mean.
+ *   - A material for each group: the mean by area of its reflectance as base colour, and of its emission,
+ *     divided by pi, as emissive factor and KHR_materials_emissive_strength, which are a luminance. Of 1
+ * channel these are grey, of 3 red, green and blue, of others the grey of their mean.
  *   - With light each column is one more attribute (a float), and COLOR_0 its colour, cut to [0, 1].
  * Materials are then white and unlit (KHR_materials_unlit), and extras say "white".
  *   - A group whose elements all have one image (pictures) has TEXCOORD_0, _REFLECTANCE (three floats, that

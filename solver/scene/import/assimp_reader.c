@@ -63,7 +63,7 @@ static bool colour_of(const struct aiMaterial *m, const char *key, double out[3]
 }
 
 static const char colour_base[] = "$clr.base", colour_diffuse[] = "$clr.diffuse",
-                  colour_emissive[] = "$clr.emissive", emissive_intensity[] = "$mat.emissiveIntensity";
+                  colour_emissive[] = "$clr.emissive";
 
 /* True for the material that the library adds for faces without one: it has the library's default name, or
  * none; in a glTF, whose materials may be nameless, it is the last one. */
@@ -101,7 +101,6 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     const struct aiMaterial *m = a->scene->mMaterials[index];
     struct aiString given = {0};
     char name[sizeof given.data + 32];
-    ai_real strength = 1;
     aiGetMaterialString(m, AI_MATKEY_NAME, &given);
     const gltf_material *own = gltf_material_of(a, given.data);
     snprintf(name, sizeof name, "%.*s", (int)sizeof given.data - 1,
@@ -117,13 +116,13 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     fresh.has_diffuse =
         colour_of(m, colour_base, fresh.diffuse) || colour_of(m, colour_diffuse, fresh.diffuse);
     colour_of(m, colour_emissive, fresh.emission);
+    double scale = 1;
     if (own != NULL) {
-        strength = (ai_real)own->strength;
+        scale = M_PI * own->strength; /* of a luminance L, a diffuse surface sends out pi L */
         fresh.two_sided = own->two_sided;
         memcpy(fresh.textures, own->textures, sizeof fresh.textures);
-    } else if (aiGetMaterialFloatArray(m, emissive_intensity, 0, 0, &strength, NULL) != aiReturn_SUCCESS)
-        strength = 1;
-    for (int c = 0; c < 3; c++) fresh.emission[c] *= strength;
+    }
+    for (int c = 0; c < 3; c++) fresh.emission[c] *= scale;
     if (!a->gltf) tell_images(a, m, name, &fresh);
     if (v->defined && memcmp(v, &fresh, sizeof fresh) != 0) { /* two materials of one name */
         const size_t length = strlen(name);

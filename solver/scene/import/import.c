@@ -23,6 +23,11 @@ static const char *extension_of(const char *path) {
     return dot == NULL || (slash != NULL && dot < slash) ? "" : dot + 1;
 }
 
+static bool is_gltf(const char *path) {
+    const char *extension = extension_of(path);
+    return strcasecmp(extension, "gltf") == 0 || strcasecmp(extension, "glb") == 0;
+}
+
 static void stem_of(const char *path, char *out, size_t size) {
     const char *slash = strrchr(path, '/'), *name = slash == NULL ? path : slash + 1;
     const char *dot = strrchr(name, '.');
@@ -177,6 +182,9 @@ static lam_status apply_materials(imported_faces *s, const char *path, const imp
         import_warn(&s->warnings, "%s: %zu faces have no material; their reflectance is set to %g", path,
                     unnamed, default_reflectance);
     TRY(settle_materials(s, path, used, report, error));
+    for (size_t i = 0; is_gltf(path) && i < s->materials.n; i++)
+        report->luminous += used[i] && fmax(fmax(s->values[i].emission[0], s->values[i].emission[1]),
+                                            s->values[i].emission[2]) > 0;
     m->n_channels = 1;
     for (size_t i = 0; i < s->materials.n; i++)
         if (used[i] && (!is_grey(s->values[i].diffuse) || !is_grey(s->values[i].emission))) m->n_channels = 3;
@@ -360,9 +368,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     imported_faces s = {0};
     mesh made = {0};
     import_report found = {0};
-    const char *extension = extension_of(path);
-    const bool is_obj = strcasecmp(extension, "obj") == 0;
-    const bool is_gltf = strcasecmp(extension, "gltf") == 0 || strcasecmp(extension, "glb") == 0;
+    const bool is_obj = strcasecmp(extension_of(path), "obj") == 0;
     const child_limits limits = {
         .cpu_seconds = options->cpu_seconds > 0 ? options->cpu_seconds : 120,
         .memory_bytes = options->memory_bytes > 0 ? options->memory_bytes : (size_t)8 << 30,
@@ -372,7 +378,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     TRY(import_in_child(is_obj ? obj_read : assimp_read, path, &limits, &s, error));
     stem_of(path, made.name, sizeof made.name);
     made.unit = options->unit;
-    made.up = options->up != 0 ? options->up : is_gltf ? 'y' : 'z';
+    made.up = options->up != 0 ? options->up : is_gltf(path) ? 'y' : 'z';
     TRY(copy_geometry(&s, path, options->unit, &made, error));
     take_cameras(&s, options->unit, &made);
     TRY(name_groups(&s, &made, error));

@@ -18,6 +18,7 @@ typedef struct import_options {
 
 typedef struct import_report {
     size_t dropped_faces;         /* of zero area */
+    size_t luminous;              /* materials of a glTF that emit; their luminance was multiplied by pi */
     size_t clamped;               /* materials whose diffuse value was too near to 1, or more */
     coincident_report coincident; /* faces that were written twice and dropped, or overlap */
     char warnings[2048];          /* one line each, '\n' between them; cut with a count when there are more */

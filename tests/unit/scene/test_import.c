@@ -94,7 +94,7 @@ START_TEST(gltf_groups_are_nodes) {
     size_t lit = 0;
     for (size_t i = 0; i < m.n; i++)
         if (m.group[i] == group_find(&m, "Sphere")) {
-            ck_assert_float_eq_tol(m.emission[i], .801471f, 1e-5f);
+            ck_assert_float_eq_tol(m.emission[i], (float)(M_PI * .801471), 1e-5f);
             ck_assert_float_eq_tol(m.reflectance[m.n + i], .311419f, 1e-5f);
             lit++;
         }

@@ -85,8 +85,8 @@ function rgb(values: readonly number[] | undefined, otherwise: number): Rgb {
 
 function materialOf(gltf: Gltf, index: number | undefined): { reflectance: Rgb; emission: Rgb | null } {
     const material = index === undefined ? undefined : gltf.materials?.[index];
-    const strength = material?.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
-    const emission = rgb(material?.emissiveFactor, 0).map((v) => v * strength) as Rgb;
+    const luminance = material?.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
+    const emission = rgb(material?.emissiveFactor, 0).map((v) => v * luminance * Math.PI) as Rgb;
     return {
         reflectance: rgb(material?.pbrMetallicRoughness?.baseColorFactor, 1),
         emission: emission.some((v) => v > 0) ? emission : null,
