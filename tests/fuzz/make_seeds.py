@@ -84,7 +84,7 @@ jpeg = (fixtures / "tile.jpg").read_bytes()
 turned = {"KHR_texture_transform": {"offset": [.1, .2], "rotation": 1, "scale": [2, 3], "texCoord": 1}}
 document = {"asset": {"version": "2.0"}, "buffers": [{}], "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": len(jpeg)}],
             "images": [{"bufferView": 0}, {"uri": "none.png"}, {"uri": "data:;base64," + base64.b64encode(jpeg).decode()}],
-            "samplers": [{"wrapS": 33071, "wrapT": 33648}], "accessors": [{"componentType": 5123}],
+            "samplers": [{"wrapS": 33071, "wrapT": 33648}], "accessors": [{"bufferView": 0, "componentType": 5123, "count": 2, "type": "VEC2"}],
             "textures": [{"source": 0, "sampler": 0}, {"source": 1}, {"source": 2}, {"extensions": {"EXT_texture_webp": {"source": 0}}}],
             "meshes": [{"primitives": [{"attributes": {"TEXCOORD_0": 0}, "material": 1}]}], "extensionsUsed": ["KHR_materials_unlit"],
             "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": k, "extensions": turned if k == 0 else {}}},

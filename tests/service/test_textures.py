@@ -294,6 +294,20 @@ class GltfTexturesTest(TexturesCase):
         scene.json["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 0}}}]
         self.judge(self.store(self.write("a.glb", scene.glb()))[0], decode_png(FIXTURES / "textures" / "tile.webp.png"))
 
+    def test_coordinates_that_are_integers(self):
+        pixels = noise(8, 8)
+        self.write("a.png", png_bytes(pixels))
+        for component, kind, top in (5121, np.uint8, 255), (5123, np.uint16, 65535):
+            scene = Gltf(base_texture(), [{"uri": "a.png"}])
+            values = np.zeros((6, 4 // kind().itemsize), kind)
+            values[:, :2] = scene.corners / [2, 1] * top
+            scene.attribute("TEXCOORD_0", values, component, "VEC2", normalized=True)
+            scene.json["bufferViews"][-1]["byteStride"] = 4
+            store, errors = self.store(self.write("a.gltf", scene.text()), "--elements", 8)
+            self.assertEqual(errors, "")
+            self.judge(store, pixels)
+            self.judge(self.store(self.write("a.glb", scene.glb()), "--elements", 8)[0], pixels)
+
     def test_transforms_and_samplers(self):
         pixels = noise(30, 20)
         self.write("a.png", png_bytes(pixels))
@@ -382,10 +396,11 @@ class GltfTexturesTest(TexturesCase):
         material["pbrMetallicRoughness"]["metallicFactor"] = 1
         scene = Gltf(material, [{"uri": "a.png"}], extensionsUsed=["KHR_materials_unlit", "KHR_lights_punctual"],
                      extensions={"KHR_lights_punctual": {"lights": [{"type": "point"}]}})
+        scene.json["nodes"] += [{"extensions": {"KHR_lights_punctual": {"light": 0}}}] * 2
         _, errors = self.store(self.write("a.gltf", scene.text()))
-        for says in ("its 1 lights (KHR_lights_punctual) are not supported", "the alpha of 1 materials (MASK, BLEND) is left out",
+        for says in ("its 2 lights (KHR_lights_punctual) are left out", "the alpha of 1 materials (MASK, BLEND) is left out",
                      "normal and occlusion maps of 1 materials", "1 materials are metallic",
-                     "these extensions are left out: KHR_materials_unlit\n"):
+                     "these extensions are left out: KHR_materials_unlit (of 2 of 2 faces)\n"):
             self.assertIn(says, errors)
         self.assertEqual(errors.count("\n"), 5)
 
@@ -437,17 +452,6 @@ class BadImagesTest(TexturesCase):
         store, errors = self.store(self.write("a.gltf", scene.text()))
         np.testing.assert_allclose(store.reflectance, .5)
         self.assertIn("material 'paint' has no colour beside its image; its reflectance is set to 0.5", errors)
-
-    def test_coordinates_that_are_integers(self):
-        self.write("a.png", png_bytes(noise(8, 8)))
-        for component, kind in ((5121, np.uint8), (5123, np.uint16)):
-            scene = Gltf(base_texture([.4, .4, .4, 1]), [{"uri": "a.png"}])
-            values = np.zeros((6, 4 if kind == np.uint8 else 2), kind)
-            scene.attribute("TEXCOORD_0", values, component, "VEC2", normalized=True)
-            scene.json["bufferViews"][-1]["byteStride"] = 4
-            store, errors = self.store(self.write("a.gltf", scene.text()))
-            self.assertIn("1 images have texture coordinates that are not floating point", errors)
-            np.testing.assert_allclose(store.reflectance, .4)
 
     def test_a_broken_file_is_refused(self):
         text = Gltf(base_texture(), [{"uri": "a.png"}]).text()

@@ -256,7 +256,8 @@ typedef struct open_file {
 typedef struct scene_files {
     const char *path, *assets, *bytes;
     size_t length;
-    char outside[256]; /* the file refused first, or empty */
+    const gltf_numbers *numbers; /* the file GLTF_NUMBERS */
+    char outside[256];           /* the file refused first, or empty */
 } scene_files;
 
 static size_t read_file(struct aiFile *calls, char *out, size_t size, size_t count) {
@@ -321,6 +322,11 @@ static struct aiFile *open_for_library(struct aiFileIO *io, const char *name, co
     f->length = files->length;
     if (strcmp(name, files->path) == 0) return &f->calls;
     if (strncmp(name, files->path, folder) == 0) name += folder; /* the library has put it before */
+    if (files->numbers->length > 0 && strcmp(name, GLTF_NUMBERS) == 0) {
+        f->bytes = files->numbers->bytes;
+        f->length = files->numbers->length;
+        return &f->calls;
+    }
     const asset_place place = asset_find(files->path, files->assets, name, full);
     if (place == ASSET_FOUND && file_text(full, &f->owned, &f->length, &ignored) == LAM_OK) {
         f->bytes = f->owned;
@@ -349,6 +355,7 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     assimp_state a = {.s = s, .path = path};
     char *bytes = NULL, *padded = NULL, *rewritten = NULL;
     size_t length = 0, padded_length = 0, rewritten_length = 0;
+    gltf_numbers numbers = {.length = 0};
     a.gltf = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
     TRY(file_text(path, &bytes, &length, error));
     if (a.gltf) TRY(glb_padded(bytes, length, &padded, &padded_length, error));
@@ -359,9 +366,11 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
         TRY(stl_normalised(bytes, length, &padded, &padded_length, error));
     scene_files files = {.path = path,
                          .assets = s->assets,
+                         .numbers = &numbers,
                          .bytes = padded != NULL ? padded : bytes,
                          .length = padded_length > 0 ? padded_length : length};
-    if (a.gltf) TRY(gltf_rewrite(path, files.bytes, files.length, s, &rewritten, &rewritten_length, error));
+    if (a.gltf)
+        TRY(gltf_rewrite(path, files.bytes, files.length, s, &rewritten, &rewritten_length, &numbers, error));
     if (rewritten != NULL) files.bytes = rewritten, files.length = rewritten_length;
     a.scene = import_scene(&files);
     if (files.outside[0] != '\0')
@@ -392,5 +401,6 @@ done:
     free(bytes);
     free(padded);
     free(rewritten);
+    free(numbers.bytes);
     return status;
 }

@@ -49,6 +49,39 @@ void gltf_decode_uri(const char *uri, char out[ASSET_PATH]);
 #define GLTF_INSTANCES "EXT_mesh_gpu_instancing"
 lam_status gltf_expand_instances(gltf_file *g, bool *any, lam_error *error);
 
+/* The component types of the format. */
+enum {
+    GLTF_BYTE = 5120,
+    GLTF_UBYTE = 5121,
+    GLTF_SHORT = 5122,
+    GLTF_USHORT = 5123,
+    GLTF_UINT = 5125,
+    GLTF_FLOAT = 5126
+};
+
+/* The numbers of an accessor: n rows of width numbers, `size` bytes each, a row every `stride` bytes. */
+typedef struct gltf_values {
+    const char *bytes; /* in a buffer of the file; NULL: there are none */
+    size_t n, width, stride, size;
+    unsigned type; /* of components */
+    bool normalized;
+} gltf_values;
+
+/* Finds them; false where they are sparse, of another type than a number or a vector, or not in the bytes
+ * that the file has. */
+bool gltf_find_values(gltf_file *g, const json_t *accessor, gltf_values *out);
+
+/* Number k of a row; a normalized integer is from 0 or -1 to 1. */
+double gltf_value(const gltf_values *v, size_t row, size_t k);
+
+/* Turns positions and places in images that are integers into floats of a buffer, the last one, whose URI is
+ * GLTF_NUMBERS, and leaves out normals that are integers. numbers is empty where there are no integers.
+ * O(numbers). Errors: LAM_ERR_FORMAT (integers that cannot be read), LAM_ERR_MEMORY. */
+lam_status gltf_convert_integers(gltf_file *g, gltf_numbers *numbers, lam_error *error);
+
+/* Warns of lights, maps and extensions that are not read, a line for each kind. O(nodes) for an extension. */
+void gltf_tell_left_out(const gltf_file *g);
+
 /* The bytes of a buffer, read once; bytes is NULL where there are none. */
 gltf_buffer gltf_read_buffer(gltf_file *g, const json_t *index, lam_error *error);
 

@@ -21,71 +21,21 @@ static const struct {
                             {"ROTATION", "rotation", "VEC4", 4},
                             {"SCALE", "scale", "VEC3", 3}};
 
-/* The numbers of one attribute of all instances: `size` bytes each, every `stride` bytes. */
-typedef struct instance_values {
-    const char *bytes; /* NULL: it is not given */
-    size_t stride, size;
-    double component; /* type, by its number in the format */
-} instance_values;
-
-/* Bytes of a number of a component type; 0 for one that rotations may not have. */
-static size_t size_of(double component) {
-    return component == 5126 ? 4 : component == 5122 ? 2 : component == 5120 ? 1 : 0;
-}
-
-static double value_at(const instance_values *v, size_t instance, size_t k) {
-    const unsigned char *b = (const unsigned char *)v->bytes + instance * v->stride + k * v->size;
-    if (v->size == 1) return fmax((double)(signed char)b[0] / 127, -1);
-    const uint32_t low = b[0] | (uint32_t)b[1] << 8;
-    if (v->size == 2) return fmax((double)(int16_t)low / 32767, -1);
-    const uint32_t bits = low | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    return (double)value;
-}
-
-/* A count, an offset or a stride of the file, `otherwise` where it is not given; false for another thing. */
-static bool count_of(const json_t *owner, const char *name, size_t otherwise, size_t *out) {
-    const json_t *value = json_object_get(owner, name);
-    if (value != NULL &&
-        (!json_is_integer(value) || json_integer_value(value) < 0 || json_integer_value(value) > UINT32_MAX))
-        return false;
-    *out = value == NULL ? otherwise : (size_t)json_integer_value(value);
-    return true;
-}
-
-/* Finds the numbers of attribute a of n instances; false where the file does not have them, as the format
- * says: an accessor of this type, whose bytes lie in its view and its buffer. */
-static bool find_values(gltf_file *g, const json_t *accessor, size_t a, size_t *n, instance_values *out) {
-    lam_error ignored;
-    const json_t *view = gltf_entry(g, "bufferViews", json_object_get(accessor, "bufferView"));
-    const char *type = json_string_value(json_object_get(accessor, "type"));
-    const double component = gltf_number(json_object_get(accessor, "componentType"), 0);
-    size_t at, of_view, length, stride;
-    const size_t size = size_of(component), row = size * attributes[a].width;
-    const bool normalized = json_is_true(json_object_get(accessor, "normalized"));
-    if (view == NULL || type == NULL || strcmp(type, attributes[a].type) != 0 || size == 0) return false;
-    if (component != 5126 && (attributes[a].width != 4 || !normalized)) return false;
-    if (json_object_get(accessor, "sparse") != NULL) return false;
-    if (!count_of(accessor, "count", 0, n) || !count_of(accessor, "byteOffset", 0, &at) ||
-        !count_of(view, "byteOffset", 0, &of_view) || !count_of(view, "byteLength", 0, &length) ||
-        !count_of(view, "byteStride", row, &stride))
-        return false;
-    const gltf_buffer b = gltf_read_buffer(g, json_object_get(view, "buffer"), &ignored);
-    if (b.bytes == NULL || stride < row || of_view > b.length || length > b.length - of_view) return false;
-    if (at > length || (*n > 0 && (row > length - at || (*n - 1) > (length - at - row) / stride)))
-        return false;
-    *out = (instance_values){b.bytes + of_view + at, stride, size, component};
-    return true;
+/* Finds the numbers of attribute a of all instances; false where the file does not have them, as the
+ * extension says: floats, or of a rotation normalized signed integers. */
+static bool find_values(gltf_file *g, const json_t *accessor, size_t a, gltf_values *out) {
+    if (!gltf_find_values(g, accessor, out) || out->width != attributes[a].width) return false;
+    if (out->type == GLTF_FLOAT) return true;
+    return out->width == 4 && out->normalized && (out->type == GLTF_BYTE || out->type == GLTF_SHORT);
 }
 
 /* Adds translation, rotation or scale of an instance to a node; false where a number is not usable. A
  * rotation is made one of length 1, as rounded ones are not. */
-static bool set_member(json_t *node, size_t a, const instance_values *v, size_t instance) {
+static bool set_member(json_t *node, size_t a, const gltf_values *v, size_t instance) {
     double values[4], length = 0;
     json_t *array = json_array();
     for (size_t k = 0; k < attributes[a].width; k++) {
-        values[k] = value_at(v, instance, k);
+        values[k] = gltf_value(v, instance, k);
         length = hypot(length, values[k]);
     }
     const double by = attributes[a].width == 4 ? length : 1;
@@ -96,26 +46,26 @@ static bool set_member(json_t *node, size_t a, const instance_values *v, size_t 
 }
 
 /* The attributes of a node's instances and their number; false, with why, where they cannot be read. */
-static bool find_instances(gltf_file *g, const json_t *given, instance_values values[ATTRIBUTES], size_t *n,
+static bool find_instances(gltf_file *g, const json_t *given, gltf_values values[ATTRIBUTES], size_t *n,
                            char why[128]) {
     const json_t *of = json_object_get(given, "attributes");
     bool any = false;
     for (size_t a = 0; a < ATTRIBUTES; a++) {
         const json_t *index = json_object_get(of, attributes[a].name);
-        size_t count = 0;
-        values[a] = (instance_values){.bytes = NULL};
+        values[a] = (gltf_values){.bytes = NULL};
         if (index == NULL) continue;
-        if (!find_values(g, gltf_entry(g, "accessors", index), a, &count, &values[a])) {
+        if (!find_values(g, gltf_entry(g, "accessors", index), a, &values[a])) {
             snprintf(why, 128, "%s must be an accessor of %s of floats%s whose bytes the file has",
                      attributes[a].name, attributes[a].type,
                      attributes[a].width == 4 ? ", or normalized bytes or shorts," : "");
             return false;
         }
-        if (any && count != *n) {
-            snprintf(why, 128, "%s has %zu entries, another attribute %zu", attributes[a].name, count, *n);
+        if (any && values[a].n != *n) {
+            snprintf(why, 128, "%s has %zu entries, another attribute %zu", attributes[a].name, values[a].n,
+                     *n);
             return false;
         }
-        *n = count;
+        *n = values[a].n;
         any = true;
     }
     if (!any) snprintf(why, 128, "TRANSLATION, ROTATION and SCALE are missing");
@@ -128,7 +78,7 @@ static lam_status expand_node(gltf_file *g, json_t *nodes, size_t number, size_t
     json_t *node = json_array_get(nodes, number), *name = json_object_get(node, "name");
     const json_t *given = gltf_extension(node, extension);
     json_t *of_node = json_object_get(node, "mesh"), *children;
-    instance_values values[ATTRIBUTES];
+    gltf_values values[ATTRIBUTES];
     char why[128];
     size_t n = 0;
     if (given == NULL || of_node == NULL) return LAM_OK;

@@ -15,25 +15,11 @@ static bool is_readable(const char *extension) {
                                              "KHR_lights_",
                                              "KHR_xmp",
                                              "KHR_draco_mesh_compression",
+                                             "KHR_mesh_quantization",
                                              GLTF_INSTANCES};
     for (size_t i = 0; i < sizeof beginnings / sizeof *beginnings; i++)
         if (strncmp(extension, beginnings[i], strlen(beginnings[i])) == 0) return true;
     return false;
-}
-
-/* Extensions that are read, or have a line of their own where they matter. */
-static bool is_read(const char *extension) {
-    static const char *const names[] = {"KHR_texture_transform",
-                                        "KHR_materials_emissive_strength",
-                                        "KHR_materials_pbrSpecularGlossiness",
-                                        "KHR_draco_mesh_compression",
-                                        "KHR_lights_punctual",
-                                        "KHR_texture_basisu",
-                                        "EXT_texture_webp",
-                                        GLTF_INSTANCES};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (strcmp(extension, names[i]) == 0) return true;
-    return strncmp(extension, "KHR_xmp", 7) == 0;
 }
 
 /* Reads an image of the file: from a URI, or from a view of a buffer. */
@@ -123,74 +109,6 @@ done:
     return status;
 }
 
-/* Leaves out the images of materials whose coordinates are integers somewhere: the library takes their bytes
- * for floating point numbers. */
-static void leave_out_integers(const gltf_file *g, size_t n, gltf_material *materials) {
-    size_t i, k, found = 0;
-    json_t *m, *primitive;
-    json_array_foreach(json_object_get(g->root, "meshes"), i, m)
-        json_array_foreach(json_object_get(m, "primitives"), k, primitive) {
-        const json_t *index = json_object_get(primitive, "material");
-        if (!json_is_integer(index) || json_integer_value(index) < 0 ||
-            (size_t)json_integer_value(index) >= n)
-            continue;
-        gltf_material *of = &materials[json_integer_value(index)];
-        for (int q = 0; q < TEXTURE_QUANTITIES; q++) {
-            char name[32];
-            snprintf(name, sizeof name, "TEXCOORD_%u", of->textures[q].coordinates[0]);
-            const json_t *at = json_object_get(json_object_get(primitive, "attributes"), name);
-            const json_t *accessor = gltf_entry(g, "accessors", at);
-            const double type = gltf_number(json_object_get(accessor, "componentType"), 5126);
-            if (of->textures[q].image == 0 || type == 5126) continue;
-            of->textures[q].image = 0;
-            found++;
-        }
-    }
-    if (found > 0)
-        import_warn(
-            &g->s->warnings,
-            "%s: %zu images have texture coordinates that are not floating point and are not read; plain "
-            "colours take their place",
-            g->path, found);
-}
-
-/* One line for each kind of thing that is left out. */
-static void tell_left_out(const gltf_file *g) {
-    import_warnings *w = &g->s->warnings;
-    const json_t *lights = json_object_get(gltf_extension(g->root, "KHR_lights_punctual"), "lights");
-    size_t i, bumps = 0, alphas = 0, metals = 0, written = 0;
-    json_t *m, *name;
-    char list[512] = "";
-    json_array_foreach(json_object_get(g->root, "materials"), i, m) {
-        const json_t *pbr = json_object_get(m, "pbrMetallicRoughness");
-        const char *mode = json_string_value(json_object_get(m, "alphaMode"));
-        bumps +=
-            json_object_get(m, "normalTexture") != NULL || json_object_get(m, "occlusionTexture") != NULL;
-        alphas += mode != NULL && strcmp(mode, "OPAQUE") != 0;
-        metals += gltf_number(json_object_get(pbr, "metallicFactor"), 0) > 0 ||
-                  json_object_get(pbr, "metallicRoughnessTexture") != NULL;
-    }
-    if (json_array_size(lights) > 0)
-        import_warn(w, "%s: its %zu lights (KHR_lights_punctual) are not supported; only faces emit", g->path,
-                    json_array_size(lights));
-    if (alphas > 0)
-        import_warn(w, "%s: the alpha of %zu materials (MASK, BLEND) is left out; they are opaque", g->path,
-                    alphas);
-    if (bumps > 0)
-        import_warn(w, "%s: normal and occlusion maps of %zu materials are left out", g->path, bumps);
-    if (metals > 0)
-        import_warn(w,
-                    "%s: %zu materials are metallic or may be; they are diffuse here, of their base colour",
-                    g->path, metals);
-    json_array_foreach(json_object_get(g->root, "extensionsUsed"), i, name) {
-        const char *extension = json_string_value(name);
-        if (extension == NULL || is_read(extension) || written + 64 > sizeof list) continue;
-        written += (size_t)snprintf(list + written, sizeof list - written, "%s%.60s", written > 0 ? ", " : "",
-                                    extension);
-    }
-    if (written > 0) import_warn(w, "%s: these extensions are left out: %s", g->path, list);
-}
-
 void gltf_materials_free(size_t n, gltf_material *materials) {
     for (size_t i = 0; materials != NULL && i < n; i++) free(materials[i].name);
     free(materials);
@@ -219,8 +137,7 @@ lam_status gltf_read_materials(const char *path, const char *bytes, size_t lengt
     if (made == NULL) TRY(LAM_ERR_MEMORY);
     n_made = n_materials;
     for (i = 0; i < n_materials; i++) TRY(read_material(&g, json_array_get(materials, i), &made[i], error));
-    leave_out_integers(&g, n_materials, made);
-    tell_left_out(&g);
+    gltf_tell_left_out(&g);
     *out = made;
     *n = n_materials;
     made = NULL;

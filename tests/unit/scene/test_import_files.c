@@ -86,7 +86,9 @@ START_TEST(known_fixtures_have_their_sizes) {
         /* a regular tetrahedron would differ; this one has 4 faces of area sqrt(5) */
         {"meshes/tet.ply", 4, 4 * sqrt(5), 1e-6, 'z'},
         {"meshes/BoxInterleaved.glb", 12, 6, 1e-6, 'y'},
-        {"meshes/cube.glb", 12, 24, 1e-4, 'y'}, /* whose chunks lack their padding */
+        {"meshes/cube.glb", 12, 24, 1e-4, 'y'},       /* whose chunks lack their padding */
+        {"meshes/cube-draco.glb", 12, 24, 1e-3, 'y'}, /* the same by draco_transcoder: 11 bits a coordinate */
+        {"meshes/cube-quantized.glb", 12, 24, 1e-3, 'y'}, /* and by gltfpack: 14 bits */
         {"meshes/no_indices_3storybuilding.glb", 72, 12527.6824, .01, 'y'},
         {"gltf-odd/box01.glb", 12, 6, 1e-6, 'y'},
         {"gltf-odd/Cube/Cube.gltf", 12, 24, 1e-4, 'y'},

@@ -1,10 +1,10 @@
-/* What a glTF says in its own way: luminance in place of exitance. */
+/* A glTF in its own way: luminance in place of exitance, integers in place of floats, extensions. */
 #include "support/suite.h"
 
 #include "support/scene.h"
 
-/* A folder that each test has to itself. */
-static char folder[64];
+    /* A folder that each test has to itself. */
+    static char folder[64];
 
 static void setup(void) {
     folder_make(folder);
@@ -53,11 +53,106 @@ START_TEST(emission_is_luminance) {
 }
 END_TEST
 
+/* Writes a glTF of two triangles that make a square of 2 m in the plane y = 3, facing up, whose corners are
+ * integers of a type, from 0 to top, in rows of `stride` bytes. */
+static void write_square(const char *type, size_t size, double top, size_t stride, const char *more,
+                         char path[256]) {
+    static const int corners[4][3] = {{0, 0, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0, 0}};
+    static const unsigned char order[6] = {0, 1, 2, 0, 2, 3};
+    unsigned char bytes[4 * 16 + 6] = {0};
+    char text[2048];
+    for (size_t v = 0; v < 4; v++)
+        for (size_t k = 0; k < 3; k++) {
+            const uint16_t value = (uint16_t)(corners[v][k] * (int)top);
+            bytes[v * stride + k * size] = (unsigned char)value;
+            if (size == 2) bytes[v * stride + k * size + 1] = (unsigned char)(value >> 8);
+        }
+    memcpy(bytes + 4 * stride, order, sizeof order);
+    snprintf(path, 256, "%s/square.bin", folder);
+    FILE *f = fopen(path, "wb");
+    ck_assert_ptr_nonnull(f);
+    ck_assert_uint_eq(fwrite(bytes, 4 * stride + sizeof order, 1, f), 1);
+    ck_assert_int_eq(fclose(f), 0);
+    snprintf(
+        text, sizeof text,
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"extensionsUsed\":["
+        "\"KHR_mesh_quantization\"],\"extensionsRequired\":[\"KHR_mesh_quantization\"],"
+        "\"nodes\":[{\"mesh\":0,\"scale\":[%.17g,1,%.17g],\"translation\":[0,3,0]}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":0},\"indices\":1}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":%s,\"count\":4,\"type\":\"VEC3\"%s},"
+        "{\"bufferView\":1,\"componentType\":5121,\"count\":6,\"type\":\"SCALAR\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":%zu,\"byteStride\":%zu},{\"buffer\":0,"
+        "\"byteOffset\":%zu,\"byteLength\":6}],\"buffers\":[{\"byteLength\":%zu,\"uri\":\"square.bin\"}]}",
+        strstr(more, "true") != NULL ? 2. : 2 / top, strstr(more, "true") != NULL ? 2. : 2 / top, type, more,
+        4 * stride, stride, 4 * stride, 4 * stride + sizeof order);
+    file_write(folder, "square.gltf", text, path);
+}
+
+/* KHR_mesh_quantization: numbers times the scale of the node; normalized ones end at 1. */
+START_TEST(positions_may_be_integers) {
+    static const struct {
+        const char *type;
+        size_t size;
+        double top;
+    } types[] = {
+        {"5120", 1, 127}, {"5121", 1, 255}, {"5122", 2, 32767}, {"5123", 2, 65535}, {"5123", 2, 16383}};
+    char path[256];
+    for (size_t k = 0; k < sizeof types / sizeof *types; k++)
+        for (size_t stride = 3 * types[k].size; stride <= 16; stride += 16 - 3 * types[k].size)
+            for (int normalized = 0; normalized < (k == 4 ? 1 : 2); normalized++) {
+                import_report report;
+                write_square(types[k].type, types[k].size, types[k].top, stride,
+                             normalized == 1 ? ",\"normalized\":true" : "", path);
+                mesh m = import_good(path, &report);
+                ck_assert_uint_eq(m.n, 2);
+                ck_assert_double_eq_tol(total_area(&m), 4, 1e-5);
+                for (size_t v = 0; v < m.n_vertices; v++) ck_assert_double_eq_tol(m.vertices[v][1], 3, 1e-6);
+                for (size_t i = 0; i < m.n; i++) ck_assert_float_eq_tol(m.normal[i][1], 1, 1e-6f);
+                ck_assert_ptr_null(strstr(report.warnings, "quantization"));
+                mesh_free(&m);
+            }
+    const import_options options = import_plain();
+    mesh m = {0};
+    lam_error error = {0};
+    write_square("5121", 1, 255, 4, ",\"byteOffset\":4", path); /* beyond its bytes */
+    ck_assert_int_eq(scene_import(path, &options, &m, NULL, &error), LAM_ERR_FORMAT);
+    ck_assert_msg(strstr(error.message, "its POSITION are integers that cannot be read") != NULL, "%s",
+                  error.message);
+}
+END_TEST
+
+START_TEST(extensions_that_are_not_read_are_named_with_their_faces) {
+    static const char gltf[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0,1,2,3]}],"
+        "\"extensionsUsed\":[\"KHR_materials_clearcoat\",\"EXT_of_nodes\",\"EXT_of_nothing\",\"KHR_xmp\","
+        "\"KHR_lights_punctual\"],\"extensions\":{\"KHR_lights_punctual\":{\"lights\":[{\"type\":\"point\"}]}"
+        "},"
+        "\"nodes\":[{\"mesh\":0},{\"mesh\":1,\"translation\":[0,0,3],\"extensions\":{\"EXT_of_nodes\":{}}},"
+        "{\"translation\":[0,0,6],\"mesh\":1},{\"extensions\":{\"KHR_lights_punctual\":{\"light\":0}}}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]},"
+        "{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"material\":0}]}],"
+        "\"materials\":[{\"extensions\":{\"KHR_materials_clearcoat\":{}}}]," TRIANGLE "}";
+    char path[256];
+    import_report report;
+    file_write(folder, "more.gltf", gltf, path);
+    mesh m = import_good(path, &report);
+    ck_assert_uint_eq(m.n, 3);
+    ck_assert_msg(strstr(report.warnings,
+                         "extensions are left out: KHR_materials_clearcoat (of 2 of 3 faces), "
+                         "EXT_of_nodes (of 1 of 3 faces), EXT_of_nothing") != NULL,
+                  "%s", report.warnings);
+    ck_assert_ptr_nonnull(strstr(report.warnings, "its 1 light (KHR_lights_punctual) is left out"));
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("import_gltf");
     TCase *tests = tcase_create("import_gltf");
     tcase_add_checked_fixture(tests, setup, teardown);
     tcase_add_test(tests, emission_is_luminance);
+    tcase_add_test(tests, positions_may_be_integers);
+    tcase_add_test(tests, extensions_that_are_not_read_are_named_with_their_faces);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
