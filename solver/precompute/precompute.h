@@ -25,11 +25,12 @@ extern const char precompute_quality_words[];
 typedef struct precompute_options {
     const char *output;
     uint64_t elements;
-    double max_edge, unit, reflectance; /* reflectance: negative, the file's own */
-    double mesh_error;                  /* 0: as mesh says, or by size */
-    mesh_asked mesh;                    /* where no other option of the mesh is given */
-    const char *up;                     /* NULL: by the file */
-    const char *assets;                 /* a folder, or NULL */
+    double max_edge, reflectance; /* reflectance: negative, the file's own */
+    double unit;                  /* metres; 0: not given, 1 */
+    double mesh_error;            /* 0: as mesh says, or by size */
+    mesh_asked mesh;              /* where no other option of the mesh is given */
+    const char *up;               /* NULL: by the file */
+    const char *assets;           /* a folder, or NULL */
     bool orient;
     sides_asked two_sided;
     scene_closure closed;

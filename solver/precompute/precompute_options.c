@@ -5,6 +5,7 @@
 #include "solver/precompute/precompute.h"
 #include "solver/precompute/trial.h"
 #include "solver/scene/mesh_options.h"
+#include "solver/scene/size_question.h"
 
 #include <assert.h>
 #include <string.h>
@@ -22,6 +23,22 @@ static lam_status parse_sky(const char *text, void *field, lam_error *error) {
     *sky = text;
 done:
     sky_tiling_free(&tiling);
+    return status;
+}
+
+/* A number of metres, or the name of a unit. */
+static lam_status parse_unit(const char *text, void *field, lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_error ignored;
+    double metres = 0;
+    const length_unit *named = length_unit_find(text);
+    if (named != NULL)
+        metres = named->metres;
+    else if (option_number("--unit", text, &metres, &ignored) != LAM_OK || !(metres > 0))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--unit %s: must be the metres of a unit, above 0, or one of " LENGTH_UNIT_WORDS, text);
+    *(double *)field = metres;
+done:
     return status;
 }
 
@@ -79,11 +96,11 @@ static const option_row mesh_rows[] = {
              "constants on elements leave at most this share of the reflected light, of each light that "
              "--mesh names; at most --elements, else 40,000"},
     {.name = "unit",
-     .kind = OPTION_NUMBER,
+     .kind = OPTION_CUSTOM,
      .offset = FIELD(unit),
-     .argument = "METRES",
-     .preset = "1",
-     .above = true,
+     .argument = "METRES|" LENGTH_UNIT_WORDS,
+     .otherwise = "m",
+     .parse = parse_unit,
      .settled = fixed_mesh,
      .help = "Length of the unit of the file"},
     {.name = "up",

@@ -3,6 +3,7 @@
 #include "solver/formfactor/facing.h"
 #include "solver/precompute/stages.h"
 #include "solver/scene/import/import.h"
+#include "solver/scene/size_question.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -84,10 +85,23 @@ done:
     return status;
 }
 
+/* Asks for a unit or an axis that nobody gave and that the scene does not look like. */
+static void ask_of_size(const precompute_job *job, const mesh *m) {
+    const precompute_options *o = job->options;
+    double low[3], high[3];
+    const length_unit *unit = o->unit > 0 ? NULL : mesh_likely_unit(m);
+    const char up = o->up != NULL ? 0 : mesh_likely_up(m);
+    mesh_box(m, low, high);
+    if (unit != NULL)
+        terminal_warn(job->t, "%s: %.6g m x %.6g m x %.6g m: is the unit %s? --unit %s", o->input,
+                      high[0] - low[0], high[1] - low[1], high[2] - low[2], unit->name, unit->word);
+    if (up != 0) terminal_warn(job->t, "%s: does it lie on its side, with %c up? --up %c", o->input, up, up);
+}
+
 lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
-    const import_options how = {.unit = o->unit,
+    const import_options how = {.unit = o->unit > 0 ? o->unit : 1,
                                 .up = o->up != NULL ? o->up[0] : 0,
                                 .reflectance = o->reflectance,
                                 .two_sided = o->two_sided == SIDES_BOTH,
@@ -97,6 +111,7 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
     TRY(scene_import(o->input, &how, &scene->m, &report, error));
     scene->n_faces = scene->m.n;
     log_warnings(job->t, report.warnings);
+    ask_of_size(job, &scene->m);
     if (report.dropped_faces > 0)
         terminal_log(job->t, "%zu face%s of zero area dropped", report.dropped_faces,
                      report.dropped_faces == 1 ? "" : "s");

@@ -81,6 +81,38 @@ class Stores(Case):
         # A mesh that is fine already needs no advice: each of 96 faces has 1 %.
         self.assertNotIn(coarse, must("precompute", self.box, *quick).stderr)
 
+    def test_units_by_name_and_by_question(self):
+        sides, verbs = "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n", ("precompute", "classify")
+
+        def room(x, y, z):
+            path = self.path("plan.obj")
+            with open(path, "w", encoding="ascii") as file:
+                file.write("".join(f"v {a} {b} {c}\n" for c in (0, z) for a, b in ((0, 0), (x, 0), (x, y), (0, y))) + sides)
+            return path
+
+        def said(verb, path, *options):
+            output = ("-o", self.path("a.h5"), "--probes", 0) if verb == "precompute" else ()
+            return must(verb, path, *output, "--rays", 64, "--mesh", "faces", *options).stderr
+
+        for verb in verbs:
+            path = room(4000, 3000, 2500)
+            question = f"lambert {verb}: warning: {path}: 4000 m x 3000 m x 2500 m: is the unit millimetres? --unit mm\n"
+            self.assertIn(question, said(verb, path))
+            for word, size in (("m", "4000 m x 3000 m, 2500"), ("1", "4000 m x 3000 m, 2500"), ("mm", "4 m x 3 m, 2.5"),
+                               ("cm", "40 m x 30 m, 25"), ("ft", "1219 m x 914.4 m, 762"), ("in", "101.6 m x 76.2 m, 63.5")):
+                answered = said(verb, path, "--unit", word)
+                self.assertNotIn("is the unit", answered)
+                self.assertIn(f"\n{size} m high", answered)
+            self.assertIn("is the unit feet? --unit ft", said(verb, room(13.1, 9.8, 8.2)))
+            path = room(5, 2, 5)
+            self.assertIn(f"warning: {path}: does it lie on its side, with y up? --up y\n", said(verb, path))
+            for up in "zy":
+                self.assertNotIn("on its side", said(verb, path, "--up", up))
+            self.assertNotIn("?", said(verb, room(4, 3, 2.5)))
+            wrong = lambert(verb, path, "--unit", "inch", *(("-o", self.path("a.h5")) if verb == "precompute" else ()))
+            self.assertEqual((wrong.returncode, wrong.stderr), (2, f"lambert {verb}: --unit inch: must be the metres of a unit, above 0, "
+                                                                   "or one of mm|cm|m|in|ft\n"))
+
     def test_turned_faces_are_told_and_turned_back(self):
         right, wrong = self.path("right.obj"), self.path("wrong.obj")
         must("generate", "patio", "-o", right, "--elements", 1500)
