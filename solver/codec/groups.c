@@ -94,12 +94,14 @@ void group_index_free(group_index *index) {
     *index = (group_index){0};
 }
 
-/* Compares a group's name with name[0..length), or, with dot, the beginning of a group's name with
- * name[0..length) and a '.' behind it. */
-static int compare(const char *group, const char *name, size_t length, bool dot) {
+/* The part of a group's name that must agree with name[0..length): all of it; its beginning, with a '.'
+ * behind that; its beginning. */
+typedef enum name_part { NAME_WHOLE, NAME_OBJECT, NAME_BEGINNING } name_part;
+
+static int compare(const char *group, const char *name, size_t length, name_part part) {
     int order = strncmp(group, name, length);
-    if (order != 0) return order;
-    unsigned char next = (unsigned char)group[length], wanted = dot ? '.' : '\0';
+    if (order != 0 || part == NAME_BEGINNING) return order;
+    unsigned char next = (unsigned char)group[length], wanted = part == NAME_OBJECT ? '.' : '\0';
     return next < wanted ? -1 : next > wanted;
 }
 
@@ -109,12 +111,12 @@ typedef struct group_range {
 } group_range;
 
 /* The first place in a range whose name is not before (or, with beyond, is after) the wanted one. */
-static size_t bound(const group_index *index, group_range in, const char *name, size_t length, bool dot,
+static size_t bound(const group_index *index, group_range in, const char *name, size_t length, name_part part,
                     bool beyond) {
     size_t low = in.first, high = in.end;
     while (low < high) {
         size_t middle = low + (high - low) / 2;
-        int order = compare(index->names[index->sorted[middle]], name, length, dot);
+        int order = compare(index->names[index->sorted[middle]], name, length, part);
         if (order < 0 || (beyond && order == 0))
             low = middle + 1;
         else
@@ -123,11 +125,11 @@ static size_t bound(const group_index *index, group_range in, const char *name, 
     return low;
 }
 
-/* The groups of a range with exactly this name, or, with dot, all called `name.something`. */
-static size_t find_in(const group_index *index, group_range in, const char *name, size_t length, bool dot,
-                      const uint32_t **groups) {
-    const size_t first = bound(index, in, name, length, dot, false);
-    const size_t last = bound(index, in, name, length, dot, true);
+/* The groups of a range whose names agree with this one in that part. */
+static size_t find_in(const group_index *index, group_range in, const char *name, size_t length,
+                      name_part part, const uint32_t **groups) {
+    const size_t first = bound(index, in, name, length, part, false);
+    const size_t last = bound(index, in, name, length, part, true);
     if (first < last) *groups = index->sorted + first;
     return last - first;
 }
@@ -136,11 +138,14 @@ size_t group_index_find(const group_index *index, const char *name, size_t lengt
     const size_t suffix = sizeof SCENE_BACK - 1, n_fronts = index->n_groups - index->n_backs;
     const group_range fronts = {0, n_fronts}, backs = {n_fronts, index->n_groups};
     if (memchr(name, '\0', length) != NULL) return 0;
-    size_t found = find_in(index, fronts, name, length, false, groups);
-    if (found == 0) found = find_in(index, backs, name, length, false, groups);
-    if (found == 0) found = find_in(index, fronts, name, length, true, groups);
-    if (found == 0 && length > suffix && memcmp(name + length - suffix, SCENE_BACK, suffix) == 0)
-        found = find_in(index, backs, name, length - suffix, true, groups);
+    size_t found = find_in(index, fronts, name, length, NAME_WHOLE, groups);
+    if (found == 0) found = find_in(index, backs, name, length, NAME_WHOLE, groups);
+    if (found == 0) found = find_in(index, fronts, name, length, NAME_OBJECT, groups);
+    const bool of_backs = length > suffix && memcmp(name + length - suffix, SCENE_BACK, suffix) == 0;
+    if (found == 0 && of_backs) found = find_in(index, backs, name, length - suffix, NAME_OBJECT, groups);
+    const size_t beginning = of_backs ? length - suffix : length;
+    if (found == 0 && beginning > 0 && name[beginning - 1] == '*')
+        found = find_in(index, of_backs ? backs : fronts, name, beginning - 1, NAME_BEGINNING, groups);
     return found;
 }
 

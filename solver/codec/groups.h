@@ -29,7 +29,8 @@ void group_index_free(group_index *index);
 
 /* The groups that a name means: those of exactly this name, or else all called `name.something` (an object of
  * several materials), of which none has backs alone; or else, of `name.back`, those of backs called
- * `name.something`. Returns how many; *groups points at their numbers, owned by index. O(log g). */
+ * `name.something`; or else, of `beginning*`, all whose names begin so, and of `beginning*.back` such backs.
+ * Returns how many; *groups points at their numbers, owned by index. O(log g). */
 size_t group_index_find(const group_index *index, const char *name, size_t length, const uint32_t **groups);
 
 /* For a name that group_index_find does not know, writes `no group "lmap"; did you mean "lamp"?`, or the

@@ -78,7 +78,8 @@ static const option_row answer_options[] = {
      .kind = OPTION_LIST,
      .offset = FIELD(reduce),
      .argument = "GROUP=FIGURE",
-     .help = "mean, sum, min, max, uniformity or variance of a group; may be repeated"},
+     .help = "mean, sum, min, max, uniformity or variance of a group, or of all whose names begin so "
+             "('desk*'); may be repeated"},
     {.name = "at",
      .kind = OPTION_WORD,
      .offset = FIELD(at),

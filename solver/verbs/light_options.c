@@ -17,7 +17,8 @@ const option_row light_rows[] = {
      .offset = FIELD(emit),
      .argument = "GROUP=V[,V,V]",
      .unit = "W/m2",
-     .help = "A group emits V W/m2, one number or one per channel; may be repeated"},
+     .help = "A group emits V W/m2, one number or one per channel; 'desk*': all whose names begin so; may be "
+             "repeated"},
     {.name = "emission",
      .kind = OPTION_TEXT,
      .offset = FIELD(emission),

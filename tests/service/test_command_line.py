@@ -73,6 +73,12 @@ class Help(unittest.TestCase):
             self.assertEqual(text(LAMBERT, "help", verb), text(LAMBERT, verb, "--help"))
         self.assertEqual(text(LAMBERT, "help"), text(LAMBERT, "--help"))
 
+    def test_has_a_letter(self):
+        self.assertEqual(text(LAMBERT, "-h"), text(LAMBERT, "--help"))
+        for name, shown in helps():
+            self.assertEqual(text(*([LAMBERTD] if name == "lambertd" else [LAMBERT, name]), "-h"), shown)
+            self.assertIn("\n  -h, --help ", shown)
+
     def test_nothing_is_promised(self):
         for name, shown in helps():
             self.assertNotIn("not supported", shown, name)

@@ -130,7 +130,7 @@ static void zsh_command(const option_command *command, const option_table *table
         zsh_row(row);
         puts("' \\");
     }
-    printf("        '--help[Print this and stop]' \\\n        '1:argument:");
+    printf("        '(-h --help)'{-h,--help}'[Print this and stop]' \\\n        '1:argument:");
     if (command->choices != NULL) {
         putchar('(');
         print_words(command->choices);
@@ -180,7 +180,8 @@ static void fish_command(const option_command *command, const option_table *tabl
         print_description(row->help, escaped);
         puts("'");
     }
-    printf("complete -c %.*s%s -l help -d '%s'\n", length, command->name, condition, option_help_row.help);
+    printf("complete -c %.*s%s -s h -l help -d '%s'\n", length, command->name, condition,
+           option_help_row.help);
     if (command->choices == NULL) return;
     printf("complete -c %.*s%s -f -a '", length, command->name, condition);
     print_words(command->choices);

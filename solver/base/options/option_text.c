@@ -6,7 +6,8 @@
 
 enum { WIDTH = 80, COLUMN = 29, TEXT_MOST = 1024 };
 
-const option_row option_help_row = {.name = "help", .kind = OPTION_FLAG, .help = "Print this and stop"};
+const option_row option_help_row = {
+    .name = "help", .letter = 'h', .kind = OPTION_FLAG, .help = "Print this and stop"};
 
 bool option_is_first(const option_table *tables, const option_row *row) {
     if (row->help == NULL) return false;

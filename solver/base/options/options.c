@@ -15,7 +15,7 @@ typedef struct common_fields {
 } common_fields;
 
 static const option_row common_rows[] = {
-    {.name = "help", .kind = OPTION_FLAG, .offset = offsetof(common_fields, help)},
+    {.name = "help", .letter = 'h', .kind = OPTION_FLAG, .offset = offsetof(common_fields, help)},
     {.name = "print-manual", .kind = OPTION_FLAG, .offset = offsetof(common_fields, manual)},
     {.name = "print-completion",
      .kind = OPTION_CHOICE,
@@ -113,11 +113,11 @@ done:
 
 static lam_status find_letter(const parser *p, char letter, const option_row **found, lam_error *error) {
     lam_status status = LAM_OK;
-    OPTIONS_EACH_ROW(p->tables[1], t, row) {
-        if (row->letter != letter) continue;
-        *found = row;
-        return LAM_OK;
-    }
+    for (size_t k = 0; k < sizeof p->tables / sizeof *p->tables; k++) OPTIONS_EACH_ROW(p->tables[k], t, row) {
+            if (row->letter != letter) continue;
+            *found = row;
+            return LAM_OK;
+        }
     FAIL(error, LAM_ERR_ARGUMENT, "-%c: no such option; see %s --help", letter, p->command->name);
 done:
     return status;
@@ -273,7 +273,7 @@ static void print_verbs(const option_verb *verbs, char *option) {
 static int program_option(const option_command *program, const option_verb *verbs, char *option) {
     static const char completion[] = "--print-completion=";
     const char *shell = option + sizeof completion - 1;
-    if (strcmp(option, "--help") == 0) {
+    if (strcmp(option, "--help") == 0 || strcmp(option, "-h") == 0) {
         option_text_help_verbs(program, verbs);
     } else if (strcmp(option, "--version") == 0) {
         printf("%s " LAMBERT_VERSION "\n", program->name);

@@ -78,12 +78,47 @@ START_TEST(an_object_has_backs) {
 }
 END_TEST
 
+/* A star at the end stands for any rest of a name; a group that is called so is meant first. */
+START_TEST(a_star_means_names_that_begin_so) {
+    static const char *const made_of[] = {"desk-2", "desk",  "wall",      "desk-1",
+                                          "lamp*",  "lamps", "desk.back", "desk-2.back"};
+    static const uint32_t of[] = {0, 1, 2, 3, 4, 5, 6, 7};
+    static const struct {
+        const char *name, *found;
+    } cases[] = {{"desk*", "desk desk-1 desk-2 "},
+                 {"desk-*", "desk-1 desk-2 "},
+                 {"d*", "desk desk-1 desk-2 "},
+                 {"*", "desk desk-1 desk-2 lamp* lamps wall "},
+                 {"lamp*", "lamp* "},
+                 {"lam*", "lamp* lamps "},
+                 {"desk*.back", "desk-2.back desk.back "},
+                 {"*.back", "desk-2.back desk.back "},
+                 {"desk-2.b*", ""},
+                 {"x*", ""},
+                 {"*desk", ""},
+                 {"wall*.back", ""}};
+    group_index index = {0};
+    char **block = malloc(8 * (sizeof *block + 24)), *to = (char *)(block + 8);
+    for (size_t g = 0; g < 8; g++, to += 24) block[g] = strcpy(to, made_of[g]);
+    ck_assert_int_eq(group_index_make(8, 2, of, 8, block, &index, NULL), LAM_OK);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        const uint32_t *groups = NULL;
+        const size_t n = group_index_find(&index, cases[k].name, strlen(cases[k].name), &groups);
+        char text[256] = "";
+        for (size_t i = 0; i < n; i++) strcat(strcat(text, made_of[groups[i]]), " ");
+        ck_assert_str_eq(text, cases[k].found);
+    }
+    group_index_free(&index);
+}
+END_TEST
+
 int main(void) {
     Suite *s = suite_create("groups");
     TCase *c = tcase_create("all");
     tcase_add_test(c, an_object_means_its_fronts);
     tcase_add_test(c, without_backs_names_are_plain);
     tcase_add_test(c, an_object_has_backs);
+    tcase_add_test(c, a_star_means_names_that_begin_so);
     suite_add_tcase(s, c);
     return suite_run(s);
 }
