@@ -99,11 +99,19 @@ static void take_error(const answer_error *one, answer_notes *notes) {
     headline_raise(&notes->head, &one->parts);
 }
 
-/* Takes a name of one vector: its mean as the error of the answer, and the larger figures for the name. */
+/* Takes a name of one vector: its mean as the error of the answer, and the larger figures for the name. A
+ * name that no light reaches has an error and no light that this could be a share of: it says nothing of the
+ * answer unless all are so. */
 static void take_name(const name_error *one, double number, name_error *kept, answer_notes *notes) {
     const answer_error mean = {one->relative, one->mean, number, one->parts};
     headline of_name = {.known = true, .parts = kept->parts};
-    take_error(&mean, notes);
+    const bool any_lit = notes->indirect_mean >= 0 && headline_has_light(&notes->head.parts),
+               is_lit = headline_has_light(&one->parts);
+    if (is_lit && !any_lit) {
+        notes->relative_mean = notes->indirect_mean = -1;
+        notes->head.parts = (stated_parts){.mesh = -1};
+    }
+    if (is_lit || !any_lit) take_error(&mean, notes);
     headline_raise(&of_name, &one->parts);
     kept->parts = of_name.parts;
     if (is_larger(one->mean, kept->mean)) kept->mean = one->mean;

@@ -11,8 +11,12 @@ double headline_stated(const headline *h) {
     return hypot(h->parts.rest, fmax(h->parts.mesh, 0));
 }
 
+bool headline_has_light(const stated_parts *parts) {
+    return isfinite(parts->rest) && isfinite(parts->mesh);
+}
+
 bool headline_is_coarse(const headline *h) {
-    return h->known && headline_stated(h) > coarse;
+    return h->known && headline_has_light(&h->parts) && headline_stated(h) > coarse;
 }
 
 size_t headline_parts(const headline *h, headline_part out[HEADLINE_PARTS], size_t *largest) {

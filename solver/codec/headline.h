@@ -17,6 +17,9 @@ typedef struct headline {
 /* The error in one number: not finite where there is nothing that it could be relative to. */
 double headline_stated(const headline *h);
 
+/* False where no light reaches what the parts are of: an error is no share of it then. */
+bool headline_has_light(const stated_parts *parts);
+
 /* Above a tenth of the light. */
 bool headline_is_coarse(const headline *h);
 

@@ -74,6 +74,16 @@ static void print_reductions(const solution *s) {
     }
 }
 
+/* Names that are reduced and that no light reaches: their errors are shares of nothing. */
+static void print_dark_names(const solution *s) {
+    size_t n = 0;
+    for (size_t r = 0; s->name_errors != NULL && r < s->n_reductions; r++) {
+        if (headline_has_light(&s->name_errors[r].parts)) continue;
+        printf("%s%s", n++ == 0 ? "no error is stated of " : ", ", s->reductions[r].group);
+    }
+    if (n > 0) puts(", which no light reaches");
+}
+
 /* "stated error of this answer, of the light of receivers, emitted by sources, 4 emitters: 0.012, most of it
  * by the mesh", and its parts where these are wanted. */
 static void print_error(const solution *s) {
@@ -84,12 +94,17 @@ static void print_error(const solution *s) {
         printf("no error is stated: %s\n", s->head.advice);
         return;
     }
+    if (!headline_has_light(&s->head.parts)) {
+        puts("no error is stated: no light reaches what is asked for, so that it is no share of it");
+        return;
+    }
     headline_text(&s->head, text);
     printf("stated error of %s%s%s%s%s", own ? "this answer" : "the store",
            s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
            s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "");
     if (own) printf(", %.3g emitters", s->emitters);
     printf(": %s\n", text);
+    print_dark_names(s);
     if (!s->tells_parts) return;
     headline_text_parts(&s->head, text);
     printf("parts: %s; operator and form factors: relative %.3g", text, s->relative);

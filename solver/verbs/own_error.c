@@ -6,14 +6,30 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Takes the parts of the headline of a name of one vector, as the vector's own where they are the larger. */
-static void raise_name(name_error *kept, const name_error *own, answer_error *vector) {
-    headline of_name = {.known = true, .parts = kept->parts},
-             of_vector = {.known = true, .parts = vector->parts};
+/* Takes the larger of the figures of a name of one vector. */
+static void raise_name(name_error *kept, const name_error *own) {
+    headline of_name = {.known = true, .parts = kept->parts};
     headline_raise(&of_name, &own->parts);
-    headline_raise(&of_vector, &own->parts);
     kept->parts = of_name.parts;
+    kept->mean = fmax(kept->mean, own->mean);
+    kept->elements = fmax(kept->elements, own->elements);
+}
+
+/* The same for a vector. A name that no light reaches has an error and no light that this could be a share
+ * of: it says nothing of the vector unless all names are so. */
+static void raise_vector(answer_error *vector, const name_error *own, bool *any_lit) {
+    headline of_vector = {.known = true, .parts = vector->parts};
+    const bool name_is_lit = headline_has_light(&own->parts);
+    if (*any_lit && !name_is_lit) return;
+    if (name_is_lit && !*any_lit) {
+        of_vector.parts = (stated_parts){.mesh = -1};
+        vector->indirect = vector->relative = 0;
+    }
+    *any_lit = *any_lit || name_is_lit;
+    headline_raise(&of_vector, &own->parts);
     vector->parts = of_vector.parts;
+    vector->indirect = fmax(vector->indirect, own->mean);
+    vector->relative = fmax(vector->relative, own->relative);
 }
 
 /* The error of one vector, or of the names that are reduced: the larger figures stay. */
@@ -22,17 +38,14 @@ static lam_status add_own_error(const stated_errors *stated, const error_scene *
     const emission_size both = emission_size_sum(&of->size, &of->sky);
     const double number = emission_size_number(&both);
     answer_error one = {.relative = 0};
-    bool good = true;
+    bool good = true, any_lit = false;
     if (out->n_reductions == 0) good = answer_error_of(&stated->by_group, scene, of, &one);
     for (size_t r = 0; good && r < out->n_reductions; r++) {
         name_error name;
         good = name_errors_of(&stated->by_group, scene, of, &out->reductions[r].request, &name);
         if (!good) break;
-        names[r].mean = fmax(names[r].mean, name.mean);
-        names[r].elements = fmax(names[r].elements, name.elements);
-        one.indirect = fmax(one.indirect, name.mean);
-        one.relative = fmax(one.relative, name.relative);
-        raise_name(&names[r], &name, &one);
+        raise_name(&names[r], &name);
+        raise_vector(&one, &name, &any_lit);
     }
     if (!good) return status_fail(error, LAM_ERR_MEMORY, "not enough memory for the error of the answer");
     if (one.indirect >= out->indirect) out->emitters = number;
@@ -119,6 +132,7 @@ static lam_status take_mixture(const stated_errors *stated, const error_scene *s
             .quantity = out->quantity, .E = light, .H0 = light + C * n, .count = n, .values = values};
         if (!emitters_mix_create(e, C, weights, &mix)) TRY(LAM_ERR_MEMORY);
         answer_error one = {.emitters = mix.emitters};
+        bool any_lit = false;
         if (out->n_reductions == 0) {
             TRY(operator_emitters_light(lit->op, 1, weights, light, light + C * n, error));
             one = emitters_error_of(e, scene, &of, &mix);
@@ -127,11 +141,8 @@ static lam_status take_mixture(const stated_errors *stated, const error_scene *s
             const reduce_name *name = &out->reductions[r].request.names[0];
             mean_of_name(scene, name, values, mean);
             const name_error own = emitters_error_of_name(e, C, out->quantity, name, &mix, mean);
-            made[r].mean = fmax(made[r].mean, own.mean);
-            made[r].elements = fmax(made[r].elements, own.elements);
-            one.indirect = fmax(one.indirect, own.mean);
-            one.relative = fmax(one.relative, own.relative);
-            raise_name(&made[r], &own, &one);
+            raise_name(&made[r], &own);
+            raise_vector(&one, &own, &any_lit);
         }
         emitters_mix_free(&mix);
         if (one.indirect >= out->indirect) out->emitters = one.emitters;

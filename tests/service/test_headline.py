@@ -11,6 +11,7 @@ from case import Case
 from command import ENVIRONMENT, LAMBERT, lambert, must, of_faces
 from daemon import Daemon
 from patience import PATIENCE
+from quads import Quads
 
 
 def on_terminal(*arguments):
@@ -67,6 +68,34 @@ class Headline(Case):
             self.assertAlmostEqual(self.check(batch), max(whole["stated"], single["stated"]), delta=1e-6)
         told = json.loads(must("solve", self.lit, "--emit", "lamp-1=1", "--json").stdout)["error"]
         self.assertAlmostEqual(told["stated"], whole["stated"], delta=1e-4 * whole["stated"])
+
+    def test_dark_groups_have_no_share(self):
+        """A group that no light reaches has no error that were a share of it: it is left out, unless all are so."""
+        rooms = Quads()
+        for name, x in ("lit", 0), ("dark", 5):
+            rooms.box(name, (x, 0, 0), (x + 4, 3, 2), (8, 6, 4))
+        scene, store = self.path("two.obj"), self.path("two.h5")
+        rooms.write(scene, .5)
+        must("precompute", scene, "-o", store, "--probes", 8, "--method", "low-rank", "--quiet")
+        plain = ("solve", store, "--emit", "lit0=1", "--quantity", "irradiance")
+        with Daemon(store) as daemon:
+            for names in ("lit1", "dark1"), ("dark1", "lit1"), ("lit1",), ("dark1", "dark2"):
+                dark = [name for name in names if name.startswith("dark")]
+                reduced = [part for name in names for part in ("--reduce", name + "=max")]
+                error = json.loads(must(*plain, *reduced, "--json").stdout)["error"]
+                asked = daemon.radiosity("two", {"emission": {"groups": {"lit0": 1}}, "quantity": "irradiance",
+                                                 "reduce": {"groups": names, "with": ["max"]}}).json()["error"]
+                for told in error, asked:
+                    groups = told["groups"]
+                    self.assertEqual([name for name in names if groups[name]["stated"] is None], dark, told)
+                    self.assertEqual(told["stated"], None if len(dark) == len(names) else groups["lit1"]["stated"])
+                    self.assertNotIn("coarse", told)
+                lines = must(*plain, *reduced).stdout.splitlines()[1 + len(names):]
+                if len(dark) == len(names):
+                    self.assertEqual(lines, ["no error is stated: no light reaches what is asked for, so that it is no share of it"])
+                else:
+                    self.assertTrue(lines[0].startswith("stated error of this answer"))
+                    self.assertEqual(lines[1:], [f"no error is stated of {name}, which no light reaches" for name in dark])
 
     def test_nothing_measured_is_null(self):
         store = self.path("none.h5")

@@ -103,6 +103,23 @@ class Reduce(unittest.TestCase):
                 for emission, E in list(self.each_form(scene, np.random.default_rng(3)))[:3]:
                     self.check(name, {"emission": emission}, E, quantity=quantity)
 
+    def test_names_that_begin_so(self):
+        """A star means all groups whose names begin so, wherever groups are named."""
+        scene, wanted = self.scenes["many"], [f"g{k}" for k in (1, *range(10, 20))]
+        members = np.sort(np.concatenate([scene.members(name) for name in wanted]))
+        E = np.zeros((1, scene.n))
+        E[:, members] = 3
+        x = scene.solve(E, "radiosity", None)[0]
+        answer = self.ask("many", {"emission": {"groups": {"g1*": 3}}, "reduce": {"groups": ["g1*", "*"], "with": ["mean", "sum"]}})
+        for name, of in ("g1*", members), ("*", np.arange(scene.n)):
+            told = figures_of(x, scene.area, of)
+            for figure in "mean", "sum":
+                self.assertAlmostEqual(answer["groups"][name][figure], told[figure], delta=TOLERANCE * abs(told["sum"]))
+        chosen = self.ask("many", {"emission": E[0].tolist(), "select": {"groups": ["g1*"]}})
+        self.assertEqual(len(chosen["radiosity"]), len(members))
+        none = self.daemon.radiosity("many", {"emission": {"groups": {"h*": 1}}})
+        self.assertEqual(none.status, 422)
+
     def test_linear_figures(self):
         """Twice: by a row that is made, by the row that was kept; the same bits."""
         for name, scene in self.scenes.items():

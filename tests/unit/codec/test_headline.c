@@ -51,6 +51,9 @@ START_TEST(coarse_has_an_option) {
          NULL);
     h.parts.rest = .1; /* not above a tenth */
     ck_assert(!headline_is_coarse(&h));
+    h = (headline){.known = true, .parts = {.rest = INFINITY, .mesh = 0}, .share = .5}; /* no light */
+    told(&h, "\"stated\":null,\"parts\":{\"operator\":null,\"form_factors\":null,\"mesh\":0}", NULL);
+    ck_assert(!headline_has_light(&h.parts));
 }
 END_TEST
 
