@@ -77,6 +77,10 @@ double forecast_scratch_bytes(const forecast *f);
 lam_status forecast_check_disk(const forecast *f, const char *output, const scratch *rows,
                                const char *scratch_folder, lam_error *error);
 
+/* "812K", "8120M", "24.1G": at least three digits above 100K, so that two figures close to each other differ;
+ * rounded up, or down. */
+void forecast_format_room(double bytes, bool up, char text[32]);
+
 /* "812M", "2.4G" */
 void forecast_format_bytes(double bytes, char text[32]);
 

@@ -25,6 +25,17 @@ double forecast_scratch_bytes(const forecast *f) {
     return found + own->bytes(n, &f->recipe) + (f->probes > 0 ? forecast_reference_bytes(f) : 0);
 }
 
+void forecast_format_room(double bytes, bool up, char text[32]) {
+    const double unit = bytes < 10 * 0x1p20   ? 0x1p10
+                        : bytes < 10 * 0x1p30 ? 0x1p20
+                                              : .1 * 0x1p30,
+                 count = up ? ceil(bytes / unit) : floor(bytes / unit);
+    if (bytes < 10 * 0x1p30)
+        snprintf(text, 32, "%.0f%c", count, bytes < 10 * 0x1p20 ? 'K' : 'M');
+    else
+        snprintf(text, 32, "%.1fG", count / 10);
+}
+
 lam_status forecast_check_disk(const forecast *f, const char *output, const scratch *rows,
                                const char *scratch_folder, lam_error *error) {
     lam_status status = LAM_OK;
@@ -38,8 +49,8 @@ lam_status forecast_check_disk(const forecast *f, const char *output, const scra
     if (rows != NULL) {
         const double in_scratch = forecast_scratch_bytes(f), free_there = (double)scratch_free_bytes(rows);
         if (in_scratch > free_there) {
-            forecast_format_bytes(in_scratch, needs);
-            forecast_format_bytes(free_there, has);
+            forecast_format_room(in_scratch, true, needs);
+            forecast_format_room(free_there, false, has);
             FAIL(error, LAM_ERR_IO,
                  "--scratch %s: rows of form factors need about %s, %s are free there; use another folder or "
                  "fewer --rays",
@@ -51,8 +62,8 @@ lam_status forecast_check_disk(const forecast *f, const char *output, const scra
     if (statvfs(folder, &about) != 0) return LAM_OK; /* the write will fail with the reason */
     const double free_here = (double)about.f_bavail * (double)about.f_frsize;
     if (in_store > free_here) {
-        forecast_format_bytes(in_store, needs);
-        forecast_format_bytes(free_here, has);
+        forecast_format_room(in_store, true, needs);
+        forecast_format_room(free_here, false, has);
         const char *smaller = f->method != NULL ? f->method->smaller : NULL;
         FAIL(error, LAM_ERR_IO, "%s: needs about %s of the disk, %s are free; %s%s%swrite to another disk",
              output, needs, has, f->keep ? "leave out --keep-form-factors or " : "",

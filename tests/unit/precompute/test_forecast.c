@@ -250,6 +250,28 @@ START_TEST(more_work_takes_longer) {
 }
 END_TEST
 
+/* "needs about 1M of the disk, 1M are free" hid the reason. */
+START_TEST(room_is_told_by_figures_that_differ) {
+    static const struct {
+        double bytes;
+        const char *up, *down;
+    } cases[] = {{0, "0K", "0K"},
+                 {1, "1K", "0K"},
+                 {700e3, "684K", "683K"},
+                 {1.2e6, "1172K", "1171K"},
+                 {10 * 0x1p20, "10M", "10M"},
+                 {1.5e9, "1431M", "1430M"},
+                 {12.34 * 0x1p30, "12.4G", "12.3G"}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char text[32];
+        forecast_format_room(cases[k].bytes, true, text);
+        ck_assert_str_eq(text, cases[k].up);
+        forecast_format_room(cases[k].bytes, false, text);
+        ck_assert_str_eq(text, cases[k].down);
+    }
+}
+END_TEST
+
 START_TEST(what_does_not_fit_is_refused) {
     char folder[64], output[128];
     folder_make(folder);
@@ -290,6 +312,7 @@ int main(void) {
     TCase *cases = tcase_create("forecast");
     tcase_set_timeout(cases, 300);
     tcase_add_loop_test(cases, files_are_within_the_forecast, 0, sizeof recipes / sizeof *recipes);
+    tcase_add_test(cases, room_is_told_by_figures_that_differ);
     tcase_add_test(cases, fewer_bits_take_less_of_the_disk);
     tcase_add_test(cases, kept_blocks_have_room);
     tcase_add_test(cases, the_judge_of_blocks_takes_as_long);
