@@ -31,6 +31,7 @@ typedef struct precompute_options {
     mesh_asked mesh;              /* where no other option of the mesh is given */
     const char *up;               /* NULL: by the file */
     const char *assets;           /* a folder, or NULL */
+    const char *format;           /* NULL: by the extension of the input */
     bool orient;
     sides_asked two_sided;
     scene_closure closed;

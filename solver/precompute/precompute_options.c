@@ -4,6 +4,7 @@
 #include "solver/formfactor/recipe.h"
 #include "solver/precompute/precompute.h"
 #include "solver/precompute/trial.h"
+#include "solver/scene/import/import.h"
 #include "solver/scene/mesh_options.h"
 #include "solver/scene/size_question.h"
 
@@ -95,6 +96,13 @@ static const option_row mesh_rows[] = {
      .help = "Join faces of one material that lie in one plane and divide them where light changes, until "
              "constants on elements leave at most this share of the reflected light, of each light that "
              "--mesh names; at most --elements, else 40,000"},
+    {.name = "format",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(format),
+     .otherwise = "by the extension",
+     .choices = IMPORT_FORMATS,
+     .settled = fixed_mesh,
+     .help = "Format of the scene; - reads it from standard input"},
     {.name = "unit",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(unit),

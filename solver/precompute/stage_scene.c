@@ -106,6 +106,7 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
                                 .reflectance = o->reflectance,
                                 .two_sided = o->two_sided == SIDES_BOTH,
                                 .fronts_only = o->two_sided == SIDES_FRONTS,
+                                .format = o->format,
                                 .assets = o->assets};
     import_report report = {0};
     TRY(scene_import(o->input, &how, &scene->m, &report, error));

@@ -1,15 +1,17 @@
 """Black box: stores that `lambert precompute` makes, and what `info` and `verify` say of them."""
 
 import json
+import os
 import re
 import shutil
+import subprocess
 import unittest
 
 import h5py
 import numpy
 
 from case import Case
-from command import lambert, must
+from command import ENVIRONMENT, LAMBERT, lambert, must
 
 
 class Stores(Case):
@@ -112,6 +114,46 @@ class Stores(Case):
             wrong = lambert(verb, path, "--unit", "inch", *(("-o", self.path("a.h5")) if verb == "precompute" else ()))
             self.assertEqual((wrong.returncode, wrong.stderr), (2, f"lambert {verb}: --unit inch: must be the metres of a unit, above 0, "
                                                                    "or one of mm|cm|m|in|ft\n"))
+
+    def test_standard_input_and_formats_by_name(self):
+        """- is standard input, from a file or a pipe, of a format that is given; so may a file of any name be."""
+        with open(self.box, "rb") as file:
+            text = file.read()
+        beside, folder = os.path.dirname(self.box), self.path("odd")
+        os.mkdir(folder)
+        odd, store = os.path.join(folder, "box.txt"), self.path("input.h5")
+        with open(odd, "wb") as file:
+            file.write(text)
+        plain = ("precompute", "-o", store, "--probes", 0, "--mesh", "faces", "--format", "obj")
+
+        def run(*arguments, **more):
+            return subprocess.run([LAMBERT, *map(str, arguments)], cwd=beside, env=ENVIRONMENT, capture_output=True, text=True, **more)
+
+        def area(done):
+            self.assertEqual(done.returncode, 0, done.stderr)
+            with h5py.File(store) as file:
+                name = file.attrs["name"]
+                return name.decode() if isinstance(name, bytes) else name, file["mesh/area"][()].sum()
+
+        def group_names():
+            with h5py.File(store) as file:
+                return list(file["mesh/group_names"][()])
+
+        self.assertEqual(area(run("precompute", self.box, *plain[1:-2])), ("box", 6))
+        names = group_names()
+        with open(self.box, encoding="utf-8") as file:
+            self.assertEqual(area(run(*plain, "-", stdin=file)), ("stdin", 6))
+        self.assertEqual(group_names(), names)
+        self.assertEqual(area(run(*plain, "-", input=text.decode())), ("stdin", 6))
+        self.assertEqual(group_names(), names)
+        self.assertEqual(area(run(*plain, odd, "--assets", beside)), ("box", 6))
+        self.assertIn("elements            96" if False else "96 ", run("classify", "-", "--format", "obj", "--mesh", "faces",
+                                                                         input=text.decode()).stdout)
+        for options, says in (((), "standard input has no extension: give its format, obj|gltf|glb|ply|stl|off"),
+                              (("--format", "stl"), "-: not a scene that can be read"), (("--format", "obj"), "-: the scene is empty")):
+            done = run("precompute", "-", "-o", store, *options, input="" if options == ("--format", "obj") else text.decode())
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+            self.assertIn(says, done.stderr)
 
     def test_turned_faces_are_told_and_turned_back(self):
         right, wrong = self.path("right.obj"), self.path("wrong.obj")

@@ -351,20 +351,24 @@ static const struct aiScene *import_scene(scene_files *files) {
 
 lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
-    const char *dot = strrchr(path, '.');
+    const char *dot = strrchr(path, '.'), *format = s->format != NULL ? s->format
+                                                    : dot != NULL     ? dot + 1
+                                                                      : "";
     assimp_state a = {.s = s, .path = path};
+    char name[ASSET_PATH]; /* which tells the library the format */
     char *bytes = NULL, *padded = NULL, *rewritten = NULL;
     size_t length = 0, padded_length = 0, rewritten_length = 0;
     gltf_numbers numbers = {.length = 0};
-    a.gltf = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
-    TRY(file_text(path, &bytes, &length, error));
+    a.gltf = strcasecmp(format, "gltf") == 0 || strcasecmp(format, "glb") == 0;
+    snprintf(name, sizeof name, "%.*s%s%s", ASSET_PATH - 32, path, s->format != NULL ? "." : "",
+             s->format != NULL ? s->format : "");
+    TRY(file_text(s->source != NULL ? s->source : path, &bytes, &length, error));
     if (a.gltf) TRY(glb_padded(bytes, length, &padded, &padded_length, error));
     if (a.gltf)
         TRY(gltf_read_materials(path, bytes, length, s, &a.gltf_materials, &a.n_gltf_materials, error));
     TRY(ply_check_head(path, bytes, length, error));
-    if (!a.gltf && dot != NULL && strcasecmp(dot, ".stl") == 0)
-        TRY(stl_normalised(bytes, length, &padded, &padded_length, error));
-    scene_files files = {.path = path,
+    if (strcasecmp(format, "stl") == 0) TRY(stl_normalised(bytes, length, &padded, &padded_length, error));
+    scene_files files = {.path = name,
                          .assets = s->assets,
                          .numbers = &numbers,
                          .bytes = padded != NULL ? padded : bytes,

@@ -4,14 +4,18 @@
 #include "solver/base/utf8.h"
 #include "solver/scene/import/images.h"
 #include "solver/scene/import/imported_faces.h"
+#include "store/confined.h"
 
+#include <errno.h>
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 /* The reflectance of faces without a diffuse colour, or with none beside an image that is not read, and the
  * largest that a file's colour gives: light between two white walls must die out. */
@@ -23,9 +27,29 @@ static const char *extension_of(const char *path) {
     return dot == NULL || (slash != NULL && dot < slash) ? "" : dot + 1;
 }
 
-static bool is_gltf(const char *path) {
-    const char *extension = extension_of(path);
-    return strcasecmp(extension, "gltf") == 0 || strcasecmp(extension, "glb") == 0;
+static bool is_gltf(const char *path, const import_options *options) {
+    const char *format = options->format != NULL ? options->format : extension_of(path);
+    return strcasecmp(format, "gltf") == 0 || strcasecmp(format, "glb") == 0;
+}
+
+static bool is_input(const char *path) {
+    return strcmp(path, "-") == 0;
+}
+
+/* Standard input as a file, which can be read again from its begin. *fd: closed by the caller. */
+static lam_status keep_input(int *fd, lam_error *error) {
+    lam_status status = LAM_OK;
+    char bytes[65536];
+    *fd = memfd_create("scene", MFD_CLOEXEC);
+    if (*fd < 0) FAIL(error, LAM_ERR_IO, "standard input: cannot be kept: %s", strerror(errno));
+    for (ssize_t n; (n = read(STDIN_FILENO, bytes, sizeof bytes)) != 0;) {
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) FAIL(error, LAM_ERR_IO, "standard input: cannot read: %s", strerror(errno));
+        if (!confined_send(*fd, bytes, (size_t)n))
+            FAIL(error, LAM_ERR_IO, "standard input: cannot be kept: %s", strerror(errno));
+    }
+done:
+    return status;
 }
 
 static void stem_of(const char *path, char *out, size_t size) {
@@ -182,7 +206,7 @@ static lam_status apply_materials(imported_faces *s, const char *path, const imp
         import_warn(&s->warnings, "%s: %zu faces have no material; their reflectance is set to %g", path,
                     unnamed, default_reflectance);
     TRY(settle_materials(s, path, used, report, error));
-    for (size_t i = 0; is_gltf(path) && i < s->materials.n; i++)
+    for (size_t i = 0; is_gltf(path, options) && i < s->materials.n; i++)
         report->luminous += used[i] && fmax(fmax(s->values[i].emission[0], s->values[i].emission[1]),
                                             s->values[i].emission[2]) > 0;
     m->n_channels = 1;
@@ -368,17 +392,22 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     imported_faces s = {0};
     mesh made = {0};
     import_report found = {0};
-    const bool is_obj = strcasecmp(extension_of(path), "obj") == 0;
-    const child_limits limits = {
+    const bool is_obj =
+        strcasecmp(options->format != NULL ? options->format : extension_of(path), "obj") == 0;
+    child_limits limits = {
         .cpu_seconds = options->cpu_seconds > 0 ? options->cpu_seconds : 120,
         .memory_bytes = options->memory_bytes > 0 ? options->memory_bytes : (size_t)8 << 30,
         .assets = options->assets,
+        .format = options->format,
     };
     TRY(check_options(options, error));
+    if (is_input(path) && options->format == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "standard input has no extension: give its format, " IMPORT_FORMATS);
+    if (is_input(path)) TRY(keep_input(&limits.input, error));
     TRY(import_in_child(is_obj ? obj_read : assimp_read, path, &limits, &s, error));
-    stem_of(path, made.name, sizeof made.name);
+    stem_of(is_input(path) ? "stdin" : path, made.name, sizeof made.name);
     made.unit = options->unit;
-    made.up = options->up != 0 ? options->up : is_gltf(path) ? 'y' : 'z';
+    made.up = options->up != 0 ? options->up : is_gltf(path, options) ? 'y' : 'z';
     TRY(copy_geometry(&s, path, options->unit, &made, error));
     take_cameras(&s, options->unit, &made);
     TRY(name_groups(&s, &made, error));
@@ -402,6 +431,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     made = (mesh){0};
     if (report != NULL) *report = found;
 done:
+    if (limits.input > 0) close(limits.input);
     mesh_free(&made);
     imported_faces_free(&s);
     return status;

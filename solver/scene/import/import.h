@@ -5,12 +5,15 @@
 #include "solver/scene/coincident.h"
 #include "solver/scene/mesh.h"
 
+#define IMPORT_FORMATS "obj|gltf|glb|ply|stl|off"
+
 typedef struct import_options {
     double unit;          /* metres per unit of the file; 1 */
     char up;              /* 'x', 'y', 'z', or 0: y for glTF, z otherwise */
     double reflectance;   /* for every face, grey; negative: the file's own */
     bool two_sided;       /* both sides of each face will be elements: `--two-sided` */
     bool fronts_only;     /* no face gets a back by its material: `--two-sided=no` */
+    const char *format;   /* one of IMPORT_FORMATS; NULL: by the file's extension */
     const char *assets;   /* folder that files which the scene names may lie in, beside its own; NULL: none */
     unsigned cpu_seconds; /* limit for the child; 0 gives 120 */
     size_t memory_bytes;  /* limit for the child; 0 gives 8 GiB */
@@ -24,7 +27,8 @@ typedef struct import_report {
     char warnings[2048];          /* one line each, '\n' between them; cut with a count when there are more */
 } import_report;
 
-/* Reads OBJ+MTL, glTF/GLB, PLY, STL. m is filled and owned by the caller (mesh_free); faces of double-sided
+/* Reads OBJ+MTL, glTF/GLB, PLY, STL, OFF; path - is standard input, of the given format, as a file of the
+ * current folder that is called stdin. m is filled and owned by the caller (mesh_free); faces of double-sided
  * materials of a glTF are marked in has_back.
  * Every failure is one line that names the file and the place: unreadable, unknown format, missing MTL,
  * non-finite coordinate, empty scene, a crash, time-out or memory limit of the child. */

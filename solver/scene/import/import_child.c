@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
@@ -85,7 +86,11 @@ typedef struct child_work {
 
 static void read_in_child(void *context) {
     const child_work *work = context;
-    imported_faces s = {.assets = work->limits->assets};
+    char input[32];
+    snprintf(input, sizeof input, "/proc/self/fd/%d", (int)CONFINED_INPUT);
+    imported_faces s = {.assets = work->limits->assets,
+                        .format = work->limits->format,
+                        .source = work->limits->input > 0 ? input : NULL};
     lam_error error = {0};
     lam_status result = work->reader(work->path, &s, &error);
     if (result == LAM_OK) result = imported_faces_split(&s, work->path, &error);
@@ -294,7 +299,8 @@ lam_status import_in_child(scene_reader *reader, const char *path, const child_l
     int wait_status = 0;
     bool whole = false;
     imported_faces received = {0};
-    TRY(confined_start(read_in_child, &work, -1, &confined_to, path, &child, error));
+    TRY(confined_start(read_in_child, &work, limits->input > 0 ? limits->input : -1, &confined_to, path,
+                       &child, error));
     status = receive_reply(&child, path, limits->memory_bytes, &received, &whole, error);
     const lam_status ended = confined_end(&child, whole || status != LAM_OK, path, &wait_status, &ending);
     TRY(status);

@@ -85,6 +85,8 @@ typedef struct imported_faces {
     size_t n_cameras, camera_capacity;
     size_t latin1;      /* names that were not UTF-8 and were read as Latin-1 */
     const char *assets; /* folder that files of the scene may lie in beside the scene's own; NULL: none */
+    const char *source; /* the file that has the bytes of the scene; NULL: its path */
+    const char *format; /* "obj", "GLB"; NULL: by the extension of its path */
     import_warnings warnings;
 } imported_faces;
 
@@ -204,8 +206,9 @@ scene_reader assimp_read;
  * polygons). Every index and size is checked. */
 typedef struct child_limits {
     unsigned cpu_seconds;
-    size_t memory_bytes; /* beyond that of the caller */
-    const char *assets;  /* of imported_faces */
+    size_t memory_bytes;         /* beyond that of the caller */
+    const char *assets, *format; /* of imported_faces */
+    int input;                   /* the descriptor of a file that has the scene's bytes; 0: its path */
 } child_limits;
 
 lam_status import_in_child(scene_reader *reader, const char *path, const child_limits *limits,

@@ -395,7 +395,7 @@ static lam_status read_all(const char *path, imported_faces *s, bool keeps, bool
     size_t length = 0;
     char *rest, *text = NULL;
     line_cursor cursor;
-    TRY(file_text(path, &text, &length, error));
+    TRY(file_text(s->source != NULL ? s->source : path, &text, &length, error));
     TRY(begin_lines(path, text, length, &cursor, error));
     for (char *line; (line = next_line(&cursor)) != NULL;) {
         if ((rest = after_keyword(line, "v")) != NULL)
@@ -430,12 +430,12 @@ done:
 
 lam_status obj_read(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
-    const char *assets = s->assets;
+    const imported_faces asked = {.assets = s->assets, .source = s->source, .format = s->format};
     bool again = false;
     TRY(read_all(path, s, false, &again, error));
     if (!again) goto done;
     imported_faces_free(s);
-    s->assets = assets;
+    *s = asked;
     TRY(read_all(path, s, true, &again, error));
 done:
     return status;
