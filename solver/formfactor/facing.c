@@ -268,3 +268,42 @@ done:
     side_views_free(&w);
     return status;
 }
+
+/* Shares of rays from all fronts that meet anything, and from all backs that meet backs. */
+static lam_status survey_sides(const mesh *m, double *of_fronts, double *of_backs, lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    size_t met[2] = {0, 0};
+    double *before = memory_allocate(m->n + 1, sizeof *before, "the survey of sides", error);
+    if (before == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(visibility_create(m, &v, error));
+    const double area = accumulate(m, NULL, m->n, before);
+    for (int back = 0; back < 2; back++)
+        for (size_t p = 0; p < SURVEY_PACKETS; p++) {
+            hit_packet hits;
+            const double at = ((double)p + .5) / SURVEY_PACKETS * area;
+            cast_from(m, v, weighted_part(before, m->n, at), back == 1, p, &hits);
+            for (int i = 0; i < VISIBILITY_PACKET; i++)
+                met[back] += hits.element[i] != VISIBILITY_NOTHING && (back == 0 || hits.back[i]);
+        }
+    *of_fronts = (double)met[0] / (SURVEY_PACKETS * VISIBILITY_PACKET);
+    *of_backs = (double)met[1] / (SURVEY_PACKETS * VISIBILITY_PACKET);
+done:
+    visibility_destroy(v);
+    free(before);
+    return status;
+}
+
+/* A room from outside: rays meet something through cracks alone, and leave it through windows. */
+static const double outward_fronts = .002, outward_backs = .8;
+
+lam_status facing_turn_inward(mesh *m, bool *turned, lam_error *error) {
+    lam_status status = LAM_OK;
+    double of_fronts, of_backs;
+    TRY(survey_sides(m, &of_fronts, &of_backs, error));
+    const bool outward = of_fronts < outward_fronts && of_backs > outward_backs;
+    for (size_t i = 0; i < m->n && outward; i++) mesh_turn(m, i);
+    *turned = outward;
+done:
+    return status;
+}

@@ -29,4 +29,9 @@ typedef struct facing_turned {
  * LAM_ERR_INTERNAL, LAM_ERR_CANCELLED. */
 lam_status facing_orient(mesh *m, const progress *how, facing_turned *out, lam_error *error);
 
+/* Turns all elements where the fronts of a scene see nothing, and its backs hardly anything but backs: a room
+ * that was modelled from outside, which is *turned then. Casts 131,072 rays. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_INTERNAL. */
+lam_status facing_turn_inward(mesh *m, bool *turned, lam_error *error);
+
 #endif

@@ -32,7 +32,7 @@ typedef struct precompute_options {
     const char *up;               /* NULL: by the file */
     const char *assets;           /* a folder, or NULL */
     const char *format;           /* NULL: by the extension of the input */
-    bool orient;
+    bool orient, fix;
     sides_asked two_sided;
     scene_closure closed;
     unsigned form_factors; /* --form-factors: source_asked */

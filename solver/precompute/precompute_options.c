@@ -130,6 +130,14 @@ static const option_row mesh_rows[] = {
      .offset = FIELD(orient),
      .settled = fixed_mesh,
      .help = "Turn faces to the side that the light is on, where rays decide which that is"},
+    {.name = "fix",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(fix),
+     .settled = fixed_mesh,
+     .help =
+         "Take the unit and the axis that the scene looks like, where they are not given, turn faces as "
+         "--orient does, and all of them where a room is seen from outside and no sky lights it; say what "
+         "was done"},
     {.name = "closed",
      .kind = OPTION_SWITCH,
      .offset = FIELD(closed),

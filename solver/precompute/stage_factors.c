@@ -149,10 +149,9 @@ void factors_log(const precompute_job *job, const precompute_scene *scene,
                  f->repair_mean, f->repair_max);
     log_closure(job, factors);
     if (f->leaving_share > outward_share && !scene->m.two_sided)
-        terminal_log(
-            job->t,
-            "nearly all light leaves the scene; if this is a room, its faces look outward: turn them, or "
-            "give --two-sided");
+        terminal_log(job->t, "nearly all light leaves the scene; if this is a room, its faces look outward: "
+                             "turn them, --fix does it, or "
+                             "give --two-sided");
     if (f->pairs.accuracy > recipe_accuracy(&f->recipe))
         terminal_log(job->t,
                      "many pairs are partly hidden: their factors have a standard error of %.2g, not %.2g; "

@@ -46,8 +46,13 @@ static lam_status orient(const precompute_job *job, precompute_scene *scene, lam
     facing_turned turned;
     coincident_report found;
     TRY(facing_orient(&scene->m, &job->progress, &turned, error));
-    terminal_log(job->t, "%zu of %zu faces turned; for %zu the side was not decided", turned.turned,
-                 scene->m.n, turned.undecided);
+    if (job->options->fix && turned.turned > 0)
+        terminal_warn(job->t,
+                      "%s: --fix turns %zu of %zu faces to the light; of %zu the side was not decided",
+                      job->options->input, turned.turned, scene->m.n, turned.undecided);
+    else
+        terminal_log(job->t, "%zu of %zu faces turned; for %zu the side was not decided", turned.turned,
+                     scene->m.n, turned.undecided);
     TRY(mesh_settle_coincident(&scene->m, job->options->two_sided == SIDES_BOTH, &found, error));
     if (turned.turned > 0) warn_of_coincident(job->t, &found);
 done:
@@ -85,17 +90,40 @@ done:
     return status;
 }
 
-/* Asks for a unit or an axis that nobody gave and that the scene does not look like. */
-static void ask_of_size(const precompute_job *job, const mesh *m) {
+/* Asks for a unit or an axis that nobody gave and that the scene does not look like, or says that --fix took
+ * them. */
+static void ask_of_size(const precompute_job *job, const mesh *m, const import_report *report) {
     const precompute_options *o = job->options;
     double low[3], high[3];
-    const length_unit *unit = o->unit > 0 ? NULL : mesh_likely_unit(m);
-    const char up = o->up != NULL ? 0 : mesh_likely_up(m);
+    const length_unit *unit = o->unit > 0 || o->fix ? NULL : mesh_likely_unit(m);
+    const char up = o->up != NULL || o->fix ? 0 : mesh_likely_up(m);
     mesh_box(m, low, high);
+    const double size[3] = {high[0] - low[0], high[1] - low[1], high[2] - low[2]};
     if (unit != NULL)
-        terminal_warn(job->t, "%s: %.6g m x %.6g m x %.6g m: is the unit %s? --unit %s", o->input,
-                      high[0] - low[0], high[1] - low[1], high[2] - low[2], unit->name, unit->word);
+        terminal_warn(job->t, "%s: %.6g m x %.6g m x %.6g m: is the unit %s? --unit %s", o->input, size[0],
+                      size[1], size[2], unit->name, unit->word);
     if (up != 0) terminal_warn(job->t, "%s: does it lie on its side, with %c up? --up %c", o->input, up, up);
+    if (report->unit != NULL)
+        terminal_warn(job->t, "%s: --fix takes it for %s: %.6g m x %.6g m x %.6g m (--unit m leaves it)",
+                      o->input, report->unit->name, size[0], size[1], size[2]);
+    if (report->up != 0)
+        terminal_warn(job->t, "%s: --fix takes it to lie on its side: %c is up (--up leaves it)", o->input,
+                      report->up);
+}
+
+/* --fix: a room from outside is turned as a whole; what is left is turned as --orient does. */
+static lam_status fix_sides(const precompute_job *job, precompute_scene *scene, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = job->options;
+    bool turned = false;
+    if (o->two_sided == SIDES_BOTH) return LAM_OK; /* every side is there */
+    if (o->sky == NULL) TRY(facing_turn_inward(&scene->m, &turned, error));
+    if (turned)
+        terminal_warn(job->t, "%s: --fix turns all %zu faces: no face sees another one, and their backs do",
+                      o->input, scene->m.n);
+    TRY(orient(job, scene, error));
+done:
+    return status;
 }
 
 lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, lam_error *error) {
@@ -103,6 +131,8 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
     const precompute_options *o = job->options;
     const import_options how = {.unit = o->unit > 0 ? o->unit : 1,
                                 .up = o->up != NULL ? o->up[0] : 0,
+                                .guess_unit = o->fix && !(o->unit > 0),
+                                .guess_up = o->fix && o->up == NULL,
                                 .reflectance = o->reflectance,
                                 .two_sided = o->two_sided == SIDES_BOTH,
                                 .fronts_only = o->two_sided == SIDES_FRONTS,
@@ -112,7 +142,7 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
     TRY(scene_import(o->input, &how, &scene->m, &report, error));
     scene->n_faces = scene->m.n;
     log_warnings(job->t, report.warnings);
-    ask_of_size(job, &scene->m);
+    ask_of_size(job, &scene->m, &report);
     if (report.dropped_faces > 0)
         terminal_log(job->t, "%zu face%s of zero area dropped", report.dropped_faces,
                      report.dropped_faces == 1 ? "" : "s");
@@ -127,7 +157,10 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
                      report.clamped, report.clamped == 1 ? "" : "s");
     warn_of_coincident(job->t, &report.coincident);
     TRY(scene_take_portals(job, scene, error));
-    if (o->orient) TRY(orient(job, scene, error));
+    if (o->fix)
+        TRY(fix_sides(job, scene, error));
+    else if (o->orient)
+        TRY(orient(job, scene, error));
     TRY(scene_find_openings(job, scene, error));
     TRY(choose_backs(job, scene, error));
     TRY(count_tiles(job, scene, error));

@@ -115,6 +115,45 @@ class Stores(Case):
             self.assertEqual((wrong.returncode, wrong.stderr), (2, f"lambert {verb}: --unit inch: must be the metres of a unit, above 0, "
                                                                    "or one of mm|cm|m|in|ft\n"))
 
+    def test_fix_takes_unit_axis_and_sides(self):
+        """A room of millimetres on its side that looks outward becomes the one that was meant, and every step is said; what is right stays."""
+        meant, wrong, store = self.path("meant.obj"), self.path("wrong.obj"), self.path("fixed.h5")
+        plain = ("-o", store, "--probes", 0, "--mesh", "faces")
+        x, y, z = 5, 4, 2.5
+        corners = [(a, b, c) for c in (0, z) for a, b in ((0, 0), (x, 0), (x, y), (0, y))]
+        names, faces = ("floor", "ceiling", "south", "east", "north", "west"), (
+            (1, 2, 3, 4), (8, 7, 6, 5), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 8, 4), (4, 8, 5, 1))
+        for path, place, step in (meant, lambda a, b, c: (a, b, c), 1), (wrong, lambda a, b, c: (1000 * a, 1000 * c, -1000 * b), -1):
+            with open(path, "w", encoding="ascii") as file:
+                file.write("".join("v %g %g %g\n" % place(*v) for v in corners)
+                           + "".join(f"o {name}\nf " + " ".join(map(str, face[::step])) + "\n" for name, face in zip(names, faces)))
+
+        def floor():
+            answer = must("solve", store, "--emit", "ceiling=1", "--quantity", "irradiance", "--reduce", "floor=mean", "--json")
+            return json.loads(answer.stdout)["groups"]["floor"]["mean"]
+
+        said = must("precompute", meant, *plain).stderr
+        self.assertNotIn("warning: " + meant + ": --", said)
+        right = floor()
+        with h5py.File(store) as file:
+            geometry = file["mesh"].attrs["geometry_hash"]
+        self.assertNotIn("--fix", must("precompute", meant, *plain, "--fix").stderr)
+        with h5py.File(store) as file:
+            self.assertEqual(file["mesh"].attrs["geometry_hash"], geometry)
+        said = must("precompute", wrong, *plain, "--fix").stderr
+        for line in ("takes it for millimetres: 5 m x 2.5 m x 4 m (--unit m leaves it)", "takes it to lie on its side: y is up (--up leaves it)",
+                     "turns all 6 faces: no face sees another one, and their backs do"):
+            self.assertIn(f"lambert precompute: warning: {wrong}: --fix {line}\n", said)
+        self.assertIn("\n5 m x 4 m, 2.5 m high, y up", said)
+        self.assertAlmostEqual(floor(), right, delta=1e-4 * right)
+        with h5py.File(store) as file:
+            self.assertEqual(file.attrs["unit"], .001)
+        self.assertIn("has the same geometry and materials", must("verify", store, wrong, "--probes", 0).stdout)
+        # Answers that were given stay, and a house under a sky stays a house.
+        said = must("precompute", wrong, *plain, "--fix", "--unit", "cm", "--up", "z", "--sky", "tregenza").stderr
+        self.assertNotIn("warning: " + wrong + ": --fix", said)
+        self.assertIn("\n50 m x 25 m, 40 m high, z up", said)
+
     def test_standard_input_and_formats_by_name(self):
         """- is standard input, from a file or a pipe, of a format that is given; so may a file of any name be."""
         with open(self.box, "rb") as file:

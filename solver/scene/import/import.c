@@ -347,6 +347,21 @@ done:
     return status;
 }
 
+/* Takes the unit that a scene in metres is probably in; *unit stays where metres are as likely. */
+static lam_status guess_unit(mesh *m, const char *path, double *unit, const length_unit **guessed,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    *guessed = mesh_likely_unit(m);
+    if (*guessed == NULL) return LAM_OK;
+    *unit = (*guessed)->metres;
+    for (size_t v = 0; v < m->n_vertices; v++)
+        for (int k = 0; k < 3; k++) m->vertices[v][k] *= *unit;
+    TRY(check_size(m, path, *unit, error));
+    TRY(mesh_measure(m, error));
+done:
+    return status;
+}
+
 /* Cameras in metres. One that --unit moves too far is left out, as a vertex there would be refused. */
 static void take_cameras(imported_faces *s, double unit, mesh *m) {
     m->cameras = s->cameras;
@@ -392,6 +407,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     imported_faces s = {0};
     mesh made = {0};
     import_report found = {0};
+    double unit = options->unit;
     const bool is_obj =
         strcasecmp(options->format != NULL ? options->format : extension_of(path), "obj") == 0;
     child_limits limits = {
@@ -406,14 +422,17 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     if (is_input(path)) TRY(keep_input(&limits.input, error));
     TRY(import_in_child(is_obj ? obj_read : assimp_read, path, &limits, &s, error));
     stem_of(is_input(path) ? "stdin" : path, made.name, sizeof made.name);
-    made.unit = options->unit;
     made.up = options->up != 0 ? options->up : is_gltf(path, options) ? 'y' : 'z';
-    TRY(copy_geometry(&s, path, options->unit, &made, error));
-    take_cameras(&s, options->unit, &made);
+    TRY(copy_geometry(&s, path, unit, &made, error));
+    if (options->guess_unit) TRY(guess_unit(&made, path, &unit, &found.unit, error));
+    made.unit = unit;
+    take_cameras(&s, unit, &made);
     TRY(name_groups(&s, &made, error));
     TRY(apply_materials(&s, path, options, &made, &found, error));
-    TRY(lay_textures(&s, path, options->unit, &made, &found, error));
+    TRY(lay_textures(&s, path, unit, &made, &found, error));
     if (!options->fronts_only) TRY(mark_backs(&s, &made, error));
+    if (options->guess_up) found.up = mesh_likely_up(&made);
+    if (found.up != 0) made.up = found.up;
     if (!is_obj) warn_of_lost_precision(&s, path, &made);
     coincident_find_rounding(&made);
     TRY(mesh_settle_coincident(&made, options->two_sided, &found.coincident, error));

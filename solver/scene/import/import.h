@@ -4,12 +4,15 @@
 
 #include "solver/scene/coincident.h"
 #include "solver/scene/mesh.h"
+#include "solver/scene/size_question.h"
 
 #define IMPORT_FORMATS "obj|gltf|glb|ply|stl|off"
 
 typedef struct import_options {
     double unit;          /* metres per unit of the file; 1 */
     char up;              /* 'x', 'y', 'z', or 0: y for glTF, z otherwise */
+    bool guess_unit;      /* that which mesh_likely_unit finds, in place of unit; else unit */
+    bool guess_up;        /* the same of mesh_likely_up */
     double reflectance;   /* for every face, grey; negative: the file's own */
     bool two_sided;       /* both sides of each face will be elements: `--two-sided` */
     bool fronts_only;     /* no face gets a back by its material: `--two-sided=no` */
@@ -20,6 +23,8 @@ typedef struct import_options {
 } import_options;
 
 typedef struct import_report {
+    const length_unit *unit;      /* that was guessed; NULL: none */
+    char up;                      /* that was guessed; 0: none */
     size_t dropped_faces;         /* of zero area */
     size_t luminous;              /* materials of a glTF that emit; their luminance was multiplied by pi */
     size_t clamped;               /* materials whose diffuse value was too near to 1, or more */

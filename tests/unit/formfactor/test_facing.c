@@ -207,6 +207,30 @@ START_TEST(soups_are_turned_face_by_face) {
 }
 END_TEST
 
+/* An empty room from outside sees nothing with its fronts, and itself with its backs. */
+START_TEST(a_room_from_outside_is_turned_whole) {
+    for (int k = 0; k < 4; k++) {
+        mesh m = {0};
+        lam_error error = {0};
+        bool turned = false;
+        if (k < 2) {
+            add_box(&m, (const double[3]){0, 0, 0}, (const double[3]){4, 3, 2}, k == 1);
+            mesh_finish(&m, .5f);
+        } else if (k == 2) {
+            m = furnished_room();
+        } else { /* a leaf, whose backs see nothing either */
+            mesh_add_quad(&m, (const double[4][3]){{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+            mesh_finish(&m, .5f);
+        }
+        const float before[3] = {m.normal[0][0], m.normal[0][1], m.normal[0][2]};
+        ck_assert_msg(facing_turn_inward(&m, &turned, &error) == LAM_OK, "%s", error.message);
+        ck_assert_int_eq(turned, k == 0);
+        for (int d = 0; d < 3; d++) ck_assert_float_eq(m.normal[0][d], k == 0 ? -before[d] : before[d]);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
 START_TEST(what_is_alone_is_left) {
     mesh m = {0};
     add_box(&m, (const double[3]){0, 0, 0}, (const double[3]){1, 2, 1}, false);
@@ -237,6 +261,7 @@ int main(void) {
     tcase_add_test(tests, an_edge_of_three_joins_nothing);
     tcase_add_test(tests, the_largest_patch_is_turned_first);
     tcase_add_test(tests, soups_are_turned_face_by_face);
+    tcase_add_test(tests, a_room_from_outside_is_turned_whole);
     tcase_add_test(tests, what_is_alone_is_left);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
