@@ -203,6 +203,12 @@ test("many lamps with odd names are found, and fit", async () => {
     await kelvin.fill("3000");
     await page.keyboard.press("Enter");
     assert.equal(await page.evaluate(() => window.lambert.store.now.lighting.groups["desk-7"].kelvin), 3000);
+    // A comma is the point of a number, not nothing.
+    const strength = rows.first().getByRole("spinbutton").first();
+    await strength.fill("");
+    await strength.pressSequentially("12,5");
+    await page.keyboard.press("Enter");
+    assert.deepEqual([await strength.inputValue(), await page.evaluate(() => window.lambert.store.now.lighting.groups["desk-7"].power)], ["12.5", 12.5]);
     await filter.fill("");
     for (const tab of await page.getByRole("tab").all()) {
         if (!(await tab.isVisible())) continue;

@@ -157,6 +157,21 @@ test("smooth light has no step where elements of different sizes meet", async ()
     await daemon.stop();
 });
 
+test("in a model lower than people the eye is at .6 of its height", async () => {
+    const store = makeStore("low", "cornell", { generate: ["--elements", 300], precompute: ["--probes", 0, "--quality", "draft"] });
+    const daemon = await Daemon.start([store]), page = await openPage(daemon.address);
+    await page.evaluate(() => { const { store: s } = window.lambert; s.change({ ...s.now, view: { ...s.now.view, walk: true } }); });
+    await page.waitForFunction(() => { const { camera } = window.lambert.store.now.view; return camera !== null && Math.abs(camera[1] - camera[4]) < 1e-3; });
+    await settled(page);
+    const [eye, low, high] = await page.evaluate(() => {
+        const { cameras } = window.lambert.scene, heights = window.lambert.scene.now.mesh.positions.filter((_, k) => k % 3 === 1);
+        return [cameras.now[1], Math.min(...heights), Math.max(...heights)];
+    });
+    assert.ok(high - low < 0.6 && Math.abs(eye - low - 0.6 * (high - low)) < 1e-3, `${eye} in ${low} to ${high}`);
+    await page.context().close();
+    await daemon.stop();
+});
+
 test("who walks into a scene stands on its ground and looks ahead, and a cross reads what is under it then", async () => {
     const store = makeStore("hill", "city", { generate: ["--variant", 2, "--terrain", "hill", "--elements", 600], precompute: ["--probes", 0, "--rays", 128, "--sky", "tregenza"] });
     const daemon = await Daemon.start([store]), page = await openPage(daemon.address);

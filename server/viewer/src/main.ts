@@ -2,6 +2,7 @@
 import { App } from "./app/app.ts";
 import type { Page } from "./app/page.ts";
 import { make } from "./base/dom.ts";
+import { withPoint } from "./base/numbers.ts";
 import { makeBanner, makeBar, makeDrawer, makeLoading, makeStatus, makeTokenDialog,
     setBackground } from "./panels/frame.ts";
 import { comparePanel } from "./panels/compare.ts";
@@ -33,7 +34,18 @@ const panelMakers: readonly PanelMaker[] = [
 /** The fragment is written this long after the last change. */
 const LINK_MS = 300;
 
+/** Browsers drop a comma of a number: 12,5 would be 125 without a word. */
+function takeCommas(): void {
+    document.addEventListener("beforeinput", (event) => {
+        const { target, data } = event;
+        if (!(target instanceof HTMLInputElement) || target.type !== "number" || !data?.includes(",")) return;
+        event.preventDefault();
+        document.execCommand("insertText", false, withPoint(data));
+    });
+}
+
 function start(): void {
+    takeCommas();
     const canvas = make("canvas", { tabindex: 0,
         "aria-label":
             "The scene. Arrow keys turn it, plus and minus move, F shows all of it, R reads values at a cross." });

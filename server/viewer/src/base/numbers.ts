@@ -10,6 +10,15 @@ export function numberText(value: number, digits = 3): string {
     return value.toLocaleString("en-US", { minimumFractionDigits: 0, maximumFractionDigits: Math.min(places, 7) });
 }
 
+/** A number as it was typed or pasted, with a point: a comma is one, unless it parts thousands. */
+export function withPoint(text: string): string {
+    const comma = text.lastIndexOf(",");
+    if (comma < 0) return text;
+    if (/^\s*-?[1-9]\d{0,2}(,\d{3})+(\.\d*)?\s*$/.test(text) || comma < text.lastIndexOf("."))
+        return text.replaceAll(",", "");
+    return text.replaceAll(".", "").replace(",", ".");
+}
+
 export function percent(share: number): string {
     return `${numberText(100 * share, 2)} %`;
 }

@@ -29,6 +29,9 @@ const PACE = 1.4;
 /** Of a walker, above the floor, m. */
 const EYE = 1.6;
 
+/** In a model lower than this, m, a walker is small: the eye is at this share of its height. */
+const LOW = 2, EYE_SHARE = 0.6;
+
 export class Cameras {
     readonly camera = new PerspectiveCamera(ANGLE, 1, 0.01, 1000);
     private readonly controls: CameraControls;
@@ -109,7 +112,8 @@ export class Cameras {
             ahead.normalize();
             this.box.getCenter(eye);
             const floor = this.floorAt(eye.x, eye.z) ?? this.box.min.y;
-            eye.y = Math.min(floor + EYE, (floor + this.box.max.y) / 2);
+            const height = this.box.max.y - floor;
+            eye.y = floor + (height < LOW ? EYE_SHARE * height : EYE);
         }
         ahead.multiplyScalar(on ? size / 2000 : size / 4);
         this.controls.minDistance = on ? ahead.length() : 0;
