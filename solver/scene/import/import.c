@@ -36,15 +36,24 @@ static bool is_input(const char *path) {
     return strcmp(path, "-") == 0;
 }
 
-/* Standard input as a file, which can be read again from its begin. *fd: closed by the caller. */
-static lam_status keep_input(int *fd, lam_error *error) {
+/* Standard input as a file of at most `most` bytes, which can be read again from its begin. *fd: closed by
+ * the caller. */
+static lam_status keep_input(size_t most, int *fd, lam_error *error) {
     lam_status status = LAM_OK;
     char bytes[65536];
+    size_t left = most;
     *fd = memfd_create("scene", MFD_CLOEXEC);
     if (*fd < 0) FAIL(error, LAM_ERR_IO, "standard input: cannot be kept: %s", strerror(errno));
     for (ssize_t n; (n = read(STDIN_FILENO, bytes, sizeof bytes)) != 0;) {
         if (n < 0 && errno == EINTR) continue;
         if (n < 0) FAIL(error, LAM_ERR_IO, "standard input: cannot read: %s", strerror(errno));
+        if ((size_t)n > left)
+            FAIL(error, LAM_ERR_MEMORY,
+                 "standard input: more than the %zu MiB of the importer; write it to a file and leave out "
+                 "what is "
+                 "not needed",
+                 most >> 20);
+        left -= (size_t)n;
         if (!confined_send(*fd, bytes, (size_t)n))
             FAIL(error, LAM_ERR_IO, "standard input: cannot be kept: %s", strerror(errno));
     }
@@ -419,7 +428,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     TRY(check_options(options, error));
     if (is_input(path) && options->format == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "standard input has no extension: give its format, " IMPORT_FORMATS);
-    if (is_input(path)) TRY(keep_input(&limits.input, error));
+    if (is_input(path)) TRY(keep_input(limits.memory_bytes / 2, &limits.input, error));
     TRY(import_in_child(is_obj ? obj_read : assimp_read, path, &limits, &s, error));
     stem_of(is_input(path) ? "stdin" : path, made.name, sizeof made.name);
     made.up = options->up != 0 ? options->up : is_gltf(path, options) ? 'y' : 'z';

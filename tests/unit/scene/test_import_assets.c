@@ -220,6 +220,37 @@ START_TEST(headers_without_their_entries_are_refused) {
 }
 END_TEST
 
+/* - is standard input: its files lie in the current folder, and it may be as large as half of the memory. */
+START_TEST(standard_input_is_a_file_without_a_name) {
+    char path[256], large[1024];
+    const int kept = dup(STDIN_FILENO);
+    import_options options = import_plain();
+    lam_error error = {0};
+    mesh m = {0};
+    ck_assert_int_ge(kept, 0);
+    options.format = "obj";
+    options.assets = folder;
+    mtl_write(folder, "newmtl a\nKd .25 .25 .25\n");
+    file_write(folder, "odd", "mtllib scene.mtl\n" SQUARE "usemtl a\nf 1 2 3 4\n", path);
+    ck_assert_ptr_nonnull(freopen(path, "r", stdin));
+    ck_assert_msg(scene_import("-", &options, &m, NULL, &error) == LAM_OK, "%s", error.message);
+    ck_assert_float_eq(m.reflectance[0], .25f);
+    ck_assert_str_eq(m.name, "stdin");
+    mesh_free(&m);
+    memset(large, ' ', sizeof large - 1);
+    large[sizeof large - 1] = '\0';
+    file_write(folder, "odd", large, path);
+    ck_assert_ptr_nonnull(freopen(path, "r", stdin));
+    options.memory_bytes = 1024;
+    ck_assert_int_eq(scene_import("-", &options, &m, NULL, &error), LAM_ERR_MEMORY);
+    ck_assert_msg(strstr(error.message, "standard input: more than the") != NULL, "%s", error.message);
+    options.format = NULL;
+    ck_assert_int_eq(scene_import("-", &options, &m, NULL, &error), LAM_ERR_ARGUMENT);
+    ck_assert_int_eq(dup2(kept, STDIN_FILENO), STDIN_FILENO);
+    close(kept);
+}
+END_TEST
+
 #define FACET(A, B, C)                                                                                       \
     "facet normal 0 0 0\nouter loop\nvertex " A "\nvertex " B "\nvertex " C "\nendloop\nendfacet\n"
 
@@ -273,6 +304,7 @@ int main(void) {
     tcase_add_test(tests, names_of_other_systems_find_their_files);
     tcase_add_test(tests, buffers_outside_the_folder_need_assets);
     tcase_add_test(tests, headers_without_their_entries_are_refused);
+    tcase_add_test(tests, standard_input_is_a_file_without_a_name);
     tcase_add_test(tests, texts_of_stl_are_read_whatever_their_letters);
     tcase_add_test(tests, binary_stl_may_begin_with_solid);
     suite_add_tcase(suite, tests);
