@@ -294,14 +294,15 @@ done:
     return status;
 }
 
-/* A room from outside: rays meet something through cracks alone, and leave it through windows. */
-static const double outward_fronts = .002, outward_backs = .8;
+/* A room from outside: the rays of its backs may leave it through windows. Two bodies apart see little of
+ * each other, but something. */
+static const double outward_backs = .8;
 
 lam_status facing_turn_inward(mesh *m, bool *turned, lam_error *error) {
     lam_status status = LAM_OK;
     double of_fronts, of_backs;
     TRY(survey_sides(m, &of_fronts, &of_backs, error));
-    const bool outward = of_fronts < outward_fronts && of_backs > outward_backs;
+    const bool outward = !(of_fronts > 0) && of_backs > outward_backs;
     for (size_t i = 0; i < m->n && outward; i++) mesh_turn(m, i);
     *turned = outward;
 done:

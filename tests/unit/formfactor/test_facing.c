@@ -209,7 +209,7 @@ END_TEST
 
 /* An empty room from outside sees nothing with its fronts, and itself with its backs. */
 START_TEST(a_room_from_outside_is_turned_whole) {
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < 5; k++) {
         mesh m = {0};
         lam_error error = {0};
         bool turned = false;
@@ -218,6 +218,10 @@ START_TEST(a_room_from_outside_is_turned_whole) {
             mesh_finish(&m, .5f);
         } else if (k == 2) {
             m = furnished_room();
+        } else if (k == 3) { /* two bodies far from each other */
+            add_box(&m, (const double[3]){0, 0, 0}, (const double[3]){1, 1, 1}, false);
+            add_box(&m, (const double[3]){20, 0, 0}, (const double[3]){21, 1, 1}, false);
+            mesh_finish(&m, .5f);
         } else { /* a leaf, whose backs see nothing either */
             mesh_add_quad(&m, (const double[4][3]){{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
             mesh_finish(&m, .5f);
