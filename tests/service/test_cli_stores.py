@@ -116,7 +116,8 @@ class Stores(Case):
                                                                    "or one of mm|cm|m|in|ft\n"))
 
     def test_fix_takes_unit_axis_and_sides(self):
-        """A room of millimetres on its side that looks outward becomes the one that was meant, and every step is said; what is right stays."""
+        """A room of millimetres on its side that looks outward becomes the one that was meant, and every step is said; what is right
+        stays."""
         meant, wrong, store = self.path("meant.obj"), self.path("wrong.obj"), self.path("fixed.h5")
         plain = ("-o", store, "--probes", 0, "--mesh", "faces")
         x, y, z = 5, 4, 2.5
@@ -141,7 +142,8 @@ class Stores(Case):
         with h5py.File(store) as file:
             self.assertEqual(file["mesh"].attrs["geometry_hash"], geometry)
         said = must("precompute", wrong, *plain, "--fix").stderr
-        for line in ("takes it for millimetres: 5 m x 2.5 m x 4 m (--unit m leaves it)", "takes it to lie on its side: y is up (--up leaves it)",
+        for line in ("takes it for millimetres: 5 m x 2.5 m x 4 m (--unit m leaves it)",
+                     "takes it to lie on its side: y is up (--up leaves it)",
                      "turns all 6 faces: no face sees another one, and their backs do"):
             self.assertIn(f"lambert precompute: warning: {wrong}: --fix {line}\n", said)
         self.assertIn("\n5 m x 4 m, 2.5 m high, y up", said)

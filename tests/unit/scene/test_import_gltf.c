@@ -3,8 +3,8 @@
 
 #include "support/scene.h"
 
-    /* A folder that each test has to itself. */
-    static char folder[64];
+/* A folder that each test has to itself. */
+static char folder[64];
 
 static void setup(void) {
     folder_make(folder);
