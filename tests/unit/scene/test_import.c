@@ -15,6 +15,7 @@ static void teardown(void) {
 }
 
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+#define APEXES "v 0 0 1\nv 0 0 2\nv 0 0 3\n"
 
 START_TEST(groups_follow_objects_then_materials) {
     import_report report;
@@ -50,10 +51,10 @@ END_TEST
 /* Programs write a part before or behind the whole; a part of the same size is the first one. */
 START_TEST(faces_of_several_groups_are_in_the_smallest) {
     static const char *const texts[] = {
-        SQUARE "g floor all room\nf 1 2 3\ng wall all room\nf 1 2 4\nf 1 3 4\n",
-        SQUARE "g room\tall floor\nf 1 2 3\ng room  all wall \nf 1 2 4\nf 1 3 4\n",
-        SQUARE "g wall room\nf 1 2 4\ng\nf 2 3 4\ng room floor\nf 1 2 3\ng wall room\nf 1 3 4\n",
-        SQUARE "o floor\ng all wall\nf 1 2 3\no\nf 1 2 4\ng wall\nf 1 3 4\n"};
+        SQUARE APEXES "g floor all room\nf 1 2 3\ng wall all room\nf 2 3 5\nf 2 3 6\n",
+        SQUARE APEXES "g room\tall floor\nf 1 2 3\ng room  all wall \nf 2 3 5\nf 2 3 6\n",
+        SQUARE APEXES "g wall room\nf 2 3 5\ng\nf 2 3 7\ng room floor\nf 1 2 3\ng wall room\nf 2 3 6\n",
+        SQUARE APEXES "o floor\ng all wall\nf 1 2 3\no\nf 2 3 5\ng wall\nf 2 3 6\n"};
     const size_t n_groups[] = {2, 2, 3, 3}, in_wall[] = {2, 2, 2, 1};
     for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
         import_report report;
