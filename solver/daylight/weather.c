@@ -1,10 +1,12 @@
 /* EPW and WEA files are read line by line, and each field is checked against its range (EnergyPlus,
  * "EnergyPlus Weather File (EPW) Data Dictionary"; Radiance, gendaymtx(1)). The header of a WEA gives
- * longitude = -value and time zone = -value / 15. The step and the gaps are those of weather_times.h. */
-#include "solver/daylight/weather_times.h"
+ * longitude = -value and time zone = -value / 15. The step and the gaps are those of weather_times.h, missing
+ * values those of weather_mend.h. */
+#include "solver/daylight/weather_mend.h"
 
 #include <ctype.h>
 #include <errno.h>
+#include <float.h>
 #include <limits.h>
 #include <math.h>
 #include <stdint.h>
@@ -18,6 +20,8 @@
 #define RADIATION_MOST 3000
 #define MISSING_RADIATION 9999
 #define MISSING_DEW_POINT 99.9
+/* By night a pyranometer is colder above than below, and shows up to this much less than nothing. */
+#define OFFSET_MOST 10
 
 /* A text file by lines. */
 typedef struct reader {
@@ -46,9 +50,15 @@ static void reader_close(reader *r) {
     if (r->stream != NULL) fclose(r->stream);
 }
 
-static lam_status reader_open(reader *r, lam_error *error) {
+static lam_status reader_open(reader *r, const char *text, size_t length, lam_error *error) {
     lam_status status = LAM_OK;
     struct stat about;
+    if (text != NULL) {
+        /* The stream only reads, and is opened for nothing else. */
+        r->stream = fmemopen((void *)(uintptr_t)text, length, "rb");
+        if (r->stream == NULL) FAIL(error, LAM_ERR_FORMAT, "%s: %s", r->path, strerror(errno));
+        goto done;
+    }
     r->stream = fopen(r->path, "rb");
     if (r->stream == NULL || fstat(fileno(r->stream), &about) != 0)
         FAIL(error, LAM_ERR_IO, "%s: %s", r->path, strerror(errno));
@@ -132,15 +142,27 @@ done:
     return status;
 }
 
-/* Reads a radiation, and tells a missing value (9999) from one that is too large. */
-static lam_status read_radiation(const reader *r, const char *what, const char *text, double *out,
-                                 lam_error *error) {
+/* True for the numbers by which files mark what is missing. */
+static bool marks_missing(double value) {
+    return value >= MISSING_RADIATION || value == -999 || value == -9999;
+}
+
+/* Reads a radiation: NAN where it is missing, 0 where it is an offset below 0. */
+static lam_status read_radiation(const reader *r, const char *what, const char *text, weather_mended *mended,
+                                 double *out, lam_error *error) {
     lam_status status = LAM_OK;
     double value = 0;
-    if (read_number(r, what, text, MISSING_RADIATION, MISSING_RADIATION, &value, NULL) == LAM_OK)
-        FAIL(error, LAM_ERR_FORMAT,
-             "%s: line %zu: %s is missing (%d), must be from 0 to %d W/m2; fill the gap or take another file",
-             r->path, r->number, what, MISSING_RADIATION, RADIATION_MOST);
+    if (read_number(r, what, text, -MISSING_RADIATION, DBL_MAX, &value, NULL) == LAM_OK) {
+        if (marks_missing(value)) {
+            *out = NAN;
+            goto done;
+        }
+        if (value < 0 && value >= -OFFSET_MOST) {
+            mended->below++;
+            *out = 0;
+            goto done;
+        }
+    }
     TRY(read_number(r, what, text, 0, RADIATION_MOST, out, error));
 done:
     return status;
@@ -177,7 +199,8 @@ static size_t cut(char *text, char mark, const char **fields, size_t most) {
 enum { YEAR, MONTH, DAY, HOUR, MINUTE, DEW_POINT = 7, DIRECT = 14, DIFFUSE = 15, ROW_FIELDS };
 
 /* The hour is its beginning. */
-static lam_status read_epw_row(reader *r, weather_hour *h, weather_row *row, lam_error *error) {
+static lam_status read_epw_row(reader *r, weather_mended *mended, weather_hour *h, weather_row *row,
+                               lam_error *error) {
     lam_status status = LAM_OK;
     const char *fields[ROW_FIELDS];
     int hour = 0, minute = 0;
@@ -192,10 +215,14 @@ static lam_status read_epw_row(reader *r, weather_hour *h, weather_row *row, lam
     /* It matters only where an hour has several rows. */
     const bool sound = read_whole(r, "minute (field 5)", fields[MINUTE], 0, 60, &minute, NULL) == LAM_OK;
     row->minute = sound ? minute : NAN;
-    TRY(read_number(r, "dew point (field 8)", fields[DEW_POINT], -100, 100, &h->dew_point, error));
-    if (h->dew_point >= MISSING_DEW_POINT) h->dew_point = NAN;
-    TRY(read_radiation(r, "direct normal radiation (field 15)", fields[DIRECT], &h->direct, error));
-    TRY(read_radiation(r, "diffuse horizontal radiation (field 16)", fields[DIFFUSE], &h->diffuse, error));
+    TRY(read_number(r, "dew point (field 8)", fields[DEW_POINT], -MISSING_RADIATION, DBL_MAX, &h->dew_point,
+                    error));
+    if (h->dew_point >= MISSING_DEW_POINT || h->dew_point < -MISSING_DEW_POINT) {
+        mended->no_dew++;
+        h->dew_point = NAN;
+    }
+    TRY(read_radiation(r, WEATHER_EPW_DIRECT, fields[DIRECT], mended, &h->direct, error));
+    TRY(read_radiation(r, WEATHER_EPW_DIFFUSE, fields[DIFFUSE], mended, &h->diffuse, error));
 done:
     return status;
 }
@@ -287,7 +314,8 @@ done:
     return status;
 }
 
-static lam_status read_wea_row(reader *r, bool *leap, weather_hour *h, lam_error *error) {
+static lam_status read_wea_row(reader *r, weather_mended *mended, bool *leap, weather_hour *h,
+                               lam_error *error) {
     lam_status status = LAM_OK;
     const char *fields[6];
     size_t n = 0;
@@ -303,8 +331,8 @@ static lam_status read_wea_row(reader *r, bool *leap, weather_hour *h, lam_error
     TRY(read_date(r, fields[0], fields[1], h, error));
     *leap = *leap || (h->month == 2 && h->day == 29);
     TRY(read_number(r, "hour", fields[2], 0, 24, &h->hour, error));
-    TRY(read_radiation(r, "direct radiation", fields[3], &h->direct, error));
-    TRY(read_radiation(r, "diffuse horizontal radiation", fields[4], &h->diffuse, error));
+    TRY(read_radiation(r, WEATHER_WEA_DIRECT, fields[3], mended, &h->direct, error));
+    TRY(read_radiation(r, WEATHER_WEA_DIFFUSE, fields[4], mended, &h->diffuse, error));
     h->dew_point = NAN;
 done:
     return status;
@@ -350,31 +378,42 @@ done:
     return status;
 }
 
-lam_status weather_read(const char *path, weather *out, lam_error *error) {
+/* Reads all rows; *rows has as many. */
+static lam_status read_rows(reader *r, bool epw, weather *w, weather_row **rows, lam_error *error) {
+    lam_status status = LAM_OK;
+    bool more = true, leap = false;
+    TRY(allocate_hours(r, w, rows, error));
+    for (;;) {
+        TRY(reader_next(r, &more, error));
+        if (!more) break;
+        if (r->line[0] == '\0') continue;
+        (*rows)[w->n].line = r->number;
+        TRY(epw ? read_epw_row(r, &w->mended, &w->hours[w->n], &(*rows)[w->n], error)
+                : read_wea_row(r, &w->mended, &leap, &w->hours[w->n], error));
+        w->n++;
+    }
+    if (w->n == 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: no hours after its header of %d lines", r->path, epw ? 8 : 6);
+    for (size_t i = 0; i < w->n && !epw; i++) w->hours[i].year = leap ? 2000 : 2001;
+done:
+    return status;
+}
+
+/* Reads the text, or the file where that is NULL. */
+static lam_status read_either(const char *path, const char *text, size_t length, weather_gaps gaps,
+                              weather *out, lam_error *error) {
     lam_status status = LAM_OK;
     reader r = {.path = path};
     weather w = {0};
     weather_row *rows = NULL;
     weather_stated stated = {0};
-    bool more = true, leap = false;
     const bool epw = ends_in(path, ".epw");
-    TRY(reader_open(&r, error));
+    TRY(reader_open(&r, text, length, error));
     TRY(epw ? read_epw_header(&r, &w, &stated, error) : read_wea_header(&r, &w, error));
-    TRY(allocate_hours(&r, &w, &rows, error));
-    for (;;) {
-        TRY(reader_next(&r, &more, error));
-        if (!more) break;
-        if (r.line[0] == '\0') continue;
-        rows[w.n].line = r.number;
-        TRY(epw ? read_epw_row(&r, &w.hours[w.n], &rows[w.n], error)
-                : read_wea_row(&r, &leap, &w.hours[w.n], error));
-        w.n++;
-    }
-    if (w.n == 0) FAIL(error, LAM_ERR_FORMAT, "%s: no hours after its header of %d lines", path, epw ? 8 : 6);
-    for (size_t i = 0; i < w.n && !epw; i++) w.hours[i].year = leap ? 2000 : 2001;
-    const weather_times times = {.path = path, .rows = rows, .stated = epw ? &stated : NULL, .w = &w};
+    TRY(read_rows(&r, epw, &w, &rows, error));
+    weather_times times = {.path = path, .rows = rows, .stated = epw ? &stated : NULL, .w = &w};
     TRY(weather_find_step(&times, error));
-    TRY(weather_check_gaps(&times, error));
+    TRY(weather_mend(&times, gaps, &rows, error));
     *out = w;
     w = (weather){0};
 done:
@@ -382,4 +421,13 @@ done:
     free(rows);
     reader_close(&r);
     return status;
+}
+
+lam_status weather_read(const char *path, weather_gaps gaps, weather *out, lam_error *error) {
+    return read_either(path, NULL, 0, gaps, out, error);
+}
+
+lam_status weather_read_text(const char *name, const char *text, size_t length, weather_gaps gaps,
+                             weather *out, lam_error *error) {
+    return read_either(name, text, length, gaps, out, error);
 }

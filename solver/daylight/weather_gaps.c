@@ -44,15 +44,11 @@ static size_t find_twin(const weather *w, size_t row) {
     return SIZE_MAX;
 }
 
-/* Refuses rows at or before the time of a row above them. */
-static lam_status check_order(const weather_times *t, lam_error *error) {
-    lam_status status = LAM_OK;
-    const weather *w = t->w;
+size_t weather_rows_behind(const weather *w, size_t *first) {
     const bool calendar = is_calendar(w);
     const double tolerance = weather_tolerance(w->step);
     double passed = 0, year = 24 * 365;
-    size_t front = 0, first = 0, behind = 0;
-    char name[WEATHER_NAME];
+    size_t front = 0, behind = 0;
     for (size_t i = 0; i < w->n; i++)
         if (w->hours[i].month == 2 && w->hours[i].day == 29) year = 24 * 366;
     for (size_t i = 1; i < w->n; i++) {
@@ -60,12 +56,22 @@ static lam_status check_order(const weather_times *t, lam_error *error) {
         const double ahead = weather_ahead(&w->hours[front], &w->hours[i], &back);
         const bool again = !calendar && passed + ahead > year - tolerance;
         if (back || ahead <= tolerance || again) {
-            if (behind++ == 0) first = i;
+            if (behind++ == 0) *first = i;
             continue;
         }
         passed += ahead;
         front = i;
     }
+    return behind;
+}
+
+/* Refuses rows at or before the time of a row above them. */
+static lam_status check_order(const weather_times *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    const weather *w = t->w;
+    size_t first = 0;
+    const size_t behind = weather_rows_behind(w, &first);
+    char name[WEATHER_NAME];
     if (behind == 0) goto done;
     const size_t twin = find_twin(w, first);
     weather_name_row(t, first, t->stated != NULL ? w->step / 2 : 0, name);
@@ -192,14 +198,13 @@ static bool is_stated(const weather_stated *stated, double step, const weather_h
     return false;
 }
 
-/* Refuses gaps between rows that are in order. */
-static lam_status check_gaps(const weather_times *t, lam_error *error) {
+lam_status weather_find_gaps(const weather_times *t, weather_gap **gaps, size_t *n_gaps, lam_error *error) {
     lam_status status = LAM_OK;
     weather *w = t->w;
     chosen may = {.any = false};
-    size_t gaps = 0, first = 0;
-    double missing = 0, at_first = 0;
-    char name[WEATHER_NAME], more[80] = "";
+    size_t n = 0;
+    weather_gap *found = memory_allocate(w->n, sizeof *found, "the gaps of weather", error);
+    if (found == NULL) TRY(LAM_ERR_MEMORY);
     if (t->stated == NULL) TRY(find_chosen(w, &may, error));
     w->stretches = 1;
     for (size_t i = 1; i < w->n; i++) {
@@ -209,17 +214,32 @@ static lam_status check_gaps(const weather_times *t, lam_error *error) {
         if (left_out <= weather_tolerance(w->step)) continue;
         w->stretches++;
         if (t->stated != NULL ? is_stated(t->stated, w->step, a, b) : is_chosen(&may, a, b)) continue;
-        missing += left_out;
-        if (gaps++ > 0) continue;
-        first = i;
-        at_first = left_out;
+        found[n++] = (weather_gap){.row = i, .hours = left_out};
     }
-    if (gaps == 0) goto done;
-    weather_name_row(t, first, t->stated != NULL ? w->step / 2 : 0, name);
-    if (gaps > 1) snprintf(more, sizeof more, ", %.6g in %zu gaps of the file", missing, gaps);
-    FAIL(error, LAM_ERR_FORMAT, "%s: %s: before it %.6g %s missing%s; fill the gap or take another file",
-         t->path, name, at_first, hours_are(at_first), more);
+    *gaps = found;
+    *n_gaps = n;
+    found = NULL;
 done:
+    free(found);
+    return status;
+}
+
+/* Refuses gaps between rows that are in order. */
+static lam_status check_gaps(const weather_times *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    weather_gap *gaps = NULL;
+    size_t n = 0;
+    double missing = 0;
+    char name[WEATHER_NAME], more[80] = "";
+    TRY(weather_find_gaps(t, &gaps, &n, error));
+    if (n == 0) goto done;
+    for (size_t k = 0; k < n; k++) missing += gaps[k].hours;
+    weather_name_row(t, gaps[0].row, t->stated != NULL ? t->w->step / 2 : 0, name);
+    if (n > 1) snprintf(more, sizeof more, ", %.6g in %zu gaps of the file", missing, n);
+    FAIL(error, LAM_ERR_FORMAT, "%s: %s: before it %.6g %s missing%s; " WEATHER_ADVICE, t->path, name,
+         gaps[0].hours, hours_are(gaps[0].hours), more);
+done:
+    free(gaps);
     return status;
 }
 
@@ -233,13 +253,13 @@ static double hours_of_years(const weather_date *from, const weather_date *to) {
     return years > 0 ? weather_ahead(&a, &b, &back) + 24 + 24 * 365. * years : 0;
 }
 
-/* Refuses rows that are not all that an EPW states. */
-static lam_status check_periods(const weather_times *t, lam_error *error) {
-    lam_status status = LAM_OK;
+double weather_lacks(const weather_times *t) {
     weather *w = t->w;
     const weather_stated *stated = t->stated;
     bool is_in[DAYS] = {false};
     double there[DAYS] = {0}, missing = 0, wanted = 0;
+    w->outside = 0;
+    if (stated == NULL || stated->n == 0) return 0;
     for (size_t i = 0; i < w->n; i++) there[weather_day(w->hours[i].month, w->hours[i].day)] += w->step;
     for (size_t k = 0; k < stated->n; k++) {
         int day = weather_day(stated->from[k].month, stated->from[k].day);
@@ -254,7 +274,16 @@ static lam_status check_periods(const weather_times *t, lam_error *error) {
     }
     /* Of several years that are stated each has its days. */
     if (is_calendar(w)) missing = fmax(missing, wanted + there[LEAP_DAY] - (double)w->n * w->step);
-    if (missing < .5 * w->step) goto done;
+    return missing < .5 * w->step ? 0 : missing;
+}
+
+/* Refuses rows that are not all that an EPW states. */
+static lam_status check_periods(const weather_times *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    const weather *w = t->w;
+    const weather_stated *stated = t->stated;
+    const double missing = weather_lacks(t);
+    if (missing == 0) goto done;
     char name[WEATHER_NAME], end[WEATHER_NAME];
     weather_name_row(t, 0, w->step / 2, name);
     weather_name_row(t, w->n - 1, w->step / 2, end);
@@ -271,7 +300,7 @@ lam_status weather_check_gaps(const weather_times *t, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(check_order(t, error));
     TRY(check_gaps(t, error));
-    if (t->stated != NULL && t->stated->n > 0) TRY(check_periods(t, error));
+    TRY(check_periods(t, error));
 done:
     return status;
 }

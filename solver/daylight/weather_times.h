@@ -48,9 +48,29 @@ double weather_ahead(const weather_hour *from, const weather_hour *to, bool *bac
  * a distance is no multiple of the step, or where an EPW has no minute. O(n). */
 lam_status weather_find_step(const weather_times *t, lam_error *error);
 
+/* The number of rows at or before the time of a row above them; *first is the first of them. O(n). */
+size_t weather_rows_behind(const weather *w, size_t *first);
+
+/* The end of messages about missing hours. */
+#define WEATHER_ADVICE "fill the gap, or give --gaps fill or --gaps skip"
+
+/* A gap before a row. */
+typedef struct weather_gap {
+    size_t row;
+    double hours; /* that are missing */
+} weather_gap;
+
+/* The gaps between rows that are in order, freed with free(): without those between the periods that an EPW
+ * states, and those of a WEA that are chosen (weather_gaps.c says which). Sets w->stretches. O(n). Errors:
+ * LAM_ERR_MEMORY. */
+lam_status weather_find_gaps(const weather_times *t, weather_gap **gaps, size_t *n_gaps, lam_error *error);
+
+/* Hours that the periods of an EPW have and its rows lack; 0 of a WEA. Sets w->outside. O(n). */
+double weather_lacks(const weather_times *t);
+
 /* Refuses rows that are missing, repeated or out of order: LAM_ERR_FORMAT names the first and how many hours
  * are concerned. The rows of an EPW are the periods that its header states, or else one stretch. A WEA states
- * nothing: weather_gaps.c says which of its gaps are chosen. Sets w->stretches and w->outside. O(n). */
+ * nothing. Sets w->stretches and w->outside. O(n). */
 lam_status weather_check_gaps(const weather_times *t, lam_error *error);
 
 /* A row as it is named in messages, "line 33 (2001-06-22 00:30)", with a time so many hours before its own.

@@ -46,6 +46,31 @@ static void log_weather(terminal *t, const weather *w) {
                       w->time_zone, fabs(apart), w->longitude);
 }
 
+/* Says what was missing, and what became of it: a line each. */
+static void log_mended(terminal *t, const weather *w, bool photometric) {
+    const weather_mended *m = &w->mended;
+    if (m->night + m->below > 0)
+        terminal_log(t,
+                     "values that count as 0: %zu, of which %zu are missing by night, %zu from -10 to 0 W/m2",
+                     m->night + m->below, m->night, m->below);
+    if (photometric && m->no_dew > 0)
+        terminal_log(t, "rows without a dew point: %zu; the air holds 2 cm of water there", m->no_dew);
+    if (m->repeated > 0)
+        terminal_warn(t, "%zu repeated row%s dropped, of each time the later ones of the file", m->repeated,
+                      m->repeated == 1 ? " is" : "s are");
+    if (m->unordered > 0)
+        terminal_warn(t, "%zu row%s put in the order of time", m->unordered,
+                      m->unordered == 1 ? " is" : "s are");
+    if (m->skipped > 0)
+        terminal_warn(t, "%.6g hours are left out: sums lack them, and shares are of the other hours",
+                      m->skipped);
+    if (m->between + m->by_days + m->dark > 0)
+        terminal_warn(t,
+                      "%.6g hours are filled: %.6g from the rows beside the gap, %.6g from the same time of "
+                      "other days, %.6g by night",
+                      m->between + m->by_days + m->dark, m->between, m->by_days, m->dark);
+}
+
 /* Rows count by their duration, step hours each. */
 static void log_year(terminal *t, const year_summary *sum, double step, bool photometric) {
     terminal_log(t, "%.6g hours with light, %.6g with sun", (double)sum->lit * step,
@@ -63,21 +88,22 @@ static void log_year(terminal *t, const year_summary *sum, double step, bool pho
                       (double)sum->sunless * step, sum->left_out);
 }
 
-lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *options,
-                              terminal *t, weather_skies *out, lam_error *error) {
+lam_status weather_skies_read(const char *path, weather_gaps gaps, const sky_tiling *tiling,
+                              const year_options *options, terminal *t, weather_skies *out,
+                              lam_error *error) {
     lam_status status = LAM_OK;
     weather w = {0};
     weather_skies made = {0};
     year_summary sum = {0};
     size_t count = 0;
     const progress steps = terminal_progress(t);
-    TRY(weather_read(path, &w, error));
+    TRY(weather_read(path, gaps, &w, error));
     if (!size_multiply(w.n, tiling->n_tiles, &count))
         FAIL(error, LAM_ERR_MEMORY, "%s: too many hours of tiles for memory", path);
     made.n = w.n;
     made.L = memory_allocate(count, sizeof *made.L, "the skies", error);
     made.suns = memory_allocate(w.n, sizeof *made.suns, "the suns", error);
-    made.span = (weather_span){.n = w.n, .step = w.step, .apart = w.apart};
+    made.span = (weather_span){.n = w.n, .step = w.step, .apart = w.apart, .mended = w.mended};
     made.span.middle = memory_allocate(w.n, sizeof *made.span.middle, "the times of weather", error);
     if (made.L == NULL || made.suns == NULL || made.span.middle == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < w.n; i++) made.span.middle[i] = w.hours[i].hour;
@@ -89,6 +115,7 @@ lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const 
              path, (double)w.n * w.step);
     terminal_clear(t);
     log_weather(t, &w);
+    log_mended(t, &w, options->photometric);
     log_year(t, &sum, w.step, options->photometric);
     *out = made;
     made = (weather_skies){0};
@@ -127,7 +154,7 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
         FAIL(error, LAM_ERR_FORMAT, "%s: /sky has %zu tiles, %s has %zu", store_path(s), lam_sky_tiles(sky),
              tiling.name, tiling.n_tiles);
     const year_options year = {.photometric = options->photometric, .sun_in_tiles = few || !options->exact};
-    TRY(weather_skies_read(options->path, &tiling, &year, t, &made, error));
+    TRY(weather_skies_read(options->path, options->gaps, &tiling, &year, t, &made, error));
     TRY(emission_add_skies(e, options->path, m, tiling.n_tiles, made.n, made.L, error));
     if (e->n_vectors != made.n)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", options->path, e->n_vectors);

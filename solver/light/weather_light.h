@@ -13,6 +13,7 @@ typedef struct weather_span {
     double step;    /* h, that each row stands for */
     bool apart;     /* no two rows are neighbours, so that an hour is but assumed */
     double *middle; /* [n], of each row: hour of the day, standard time */
+    weather_mended mended;
 } weather_span;
 
 void weather_span_free(weather_span *s);
@@ -26,10 +27,22 @@ typedef struct weather_skies {
 
 void weather_skies_free(weather_skies *w);
 
-/* Reads a file, makes the skies of its rows and logs a summary. Errors: those of the file,
- * LAM_ERR_ARGUMENT where no hour has any light, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *options,
-                              terminal *t, weather_skies *out, lam_error *error);
+/* Reads a file, makes the skies of its rows and logs a summary, with what was missing. Errors: those of the
+ * file, LAM_ERR_ARGUMENT where no hour has any light, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status weather_skies_read(const char *path, weather_gaps gaps, const sky_tiling *tiling,
+                              const year_options *options, terminal *t, weather_skies *out, lam_error *error);
+
+/* The row of --gaps, a weather_gaps. */
+#define OPTION_ROW_GAPS(place)                                                                               \
+    {.name = "gaps",                                                                                         \
+     .kind = OPTION_WORD,                                                                                    \
+     .offset = (place),                                                                                      \
+     .choices = "refuse|fill|skip",                                                                          \
+     .preset = "refuse",                                                                                     \
+     .help = "Weather that is missing by day, and rows that are missing, repeated or out of order. fill: "   \
+             "up to 3 h from the rows beside the gap, more, up to 6 days, from the same time of other "      \
+             "days. skip: they are left out, and shares are of the other hours. Both drop the later one of " \
+             "repeated rows, and say how many hours are concerned"}
 
 /* The options of a command line about weather. */
 typedef struct weather_options {
@@ -37,6 +50,7 @@ typedef struct weather_options {
     bool photometric;  /* --photometric */
     bool exact;        /* --sun exact */
     size_t sun_points; /* --sun-points */
+    weather_gaps gaps; /* --gaps */
 } weather_options;
 
 /* Puts e under the rows of a file, on the tiles of an open store. With an exact sun, *sun holds it for the

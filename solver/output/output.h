@@ -32,6 +32,11 @@ lam_status reductions_elements(const mesh *m, const reduction *reductions, size_
 
 void reductions_free(reduction *reductions, size_t n);
 
+/* Hours of weather behind an answer. */
+typedef struct weather_hours {
+    double counted, left_out, filled; /* h; counted: with those that were filled */
+} weather_hours;
+
 /* An answer of the solver and its question. */
 typedef struct solution {
     const mesh *m;
@@ -58,6 +63,7 @@ typedef struct solution {
     const char *error_light;           /* likewise */
     double emitters;                   /* likewise */
     bool by_luminance;                 /* likewise */
+    const weather_hours *hours;        /* NULL: no weather */
     const name_error *name_errors;     /* [n_reductions], of error_light "own"; or NULL */
 } solution;
 

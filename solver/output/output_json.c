@@ -112,11 +112,19 @@ static bool write_vectors(const solution *s, const answer_shape *shape, const an
     return answer_end(b, shape, &as, notes, why);
 }
 
+static bool write_hours(const solution *s, buffer *b) {
+    const weather_hours *h = s->hours;
+    return h == NULL ||
+           (buffer_printf(b, ",\"hours\":{\"counted\":") && json_write_double(b, h->counted) &&
+            buffer_printf(b, ",\"left_out\":") && json_write_double(b, h->left_out) &&
+            buffer_printf(b, ",\"filled\":") && json_write_double(b, h->filled) && buffer_append(b, "}", 1));
+}
+
 /* An object of figures in place of vectors: means of all groups, figures of a year or reductions. */
 static bool write_object(const solution *s, bool means, const answer_notes *notes, buffer *b, FILE *stream,
                          problem *why) {
     const bool year = s->names != NULL, reduced = s->n_reductions > 0;
-    bool written = answer_head(b, s->m->n, s->m->n_channels, notes) &&
+    bool written = answer_head(b, s->m->n, s->m->n_channels, notes) && write_hours(s, b) &&
                    buffer_printf(b, ",\"%s\":{", year ? "annual" : "groups");
     if (means) {
         written = written && (year ? write_year_means(s, b) : write_means(s, 0, s->n_vectors, s->batch, b));

@@ -18,6 +18,7 @@
 typedef struct fields {
     const char *output, *tiles, *model;
     bool photometric;
+    weather_gaps gaps;
 } fields;
 
 static lam_status parse_tiles(const char *text, void *field, lam_error *error) {
@@ -62,6 +63,7 @@ static const option_row rows[] = {
      .help = "In cd/m2, by the luminous efficacies of Perez et al. 1990. Without a dew point (a .wea file "
              "has none) the air holds 2 cm of water. A matrix is multiplied by 179 lm/W, by which gendaymtx "
              "-O0 divides light"},
+    OPTION_ROW_GAPS(FIELD(gaps)),
     {0},
 };
 
@@ -76,7 +78,8 @@ static const option_command verb = {
         "where it is in the middle of what the row covers; direct light of a sun that is below the horizon "
         "then is left out. Rows may be an hour apart or less: the step comes from their times, and is one "
         "for "
-        "the whole file. Rows that are missing, repeated or out of order are refused. A .wea file is of the "
+        "the whole file. Rows that are missing, repeated or out of order are refused, but for --gaps. A .wea "
+        "file is of the "
         "year 2001, or of 2000 if it has a 29 February.\n"
         "A sky matrix of Radiance (gendaymtx, genskyvec) is taken as it is: ascii, float or double, with a "
         "row for the ground and for each patch, and a column for each time. The row of the ground is left "
@@ -93,7 +96,7 @@ static lam_status make_skies(const char *path, const fields *f, terminal *t, lam
     TRY(atomic_file_check(f->output, error));
     TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
     const year_options year = {.photometric = f->photometric, .sun_in_tiles = true};
-    TRY(weather_skies_read(path, &tiling, &year, t, &made, error));
+    TRY(weather_skies_read(path, f->gaps, &tiling, &year, t, &made, error));
     TRY(atomic_file_open(f->output, &file, error));
     TRY(output_array(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L, NULL, error));
     TRY(atomic_file_commit(&file, error));

@@ -33,6 +33,7 @@ typedef struct fields {
     sun_asked sun;
     place_asked at;
     uint64_t sun_points;
+    weather_gaps gaps;
     bool photometric, json, verbose, smooth, linear;
 } fields;
 
@@ -64,6 +65,7 @@ static const option_row weather_rows[] = {
      .kind = OPTION_FLAG,
      .offset = FIELD(photometric),
      .help = "--weather in lux, as `lambert sky --photometric`"},
+    OPTION_ROW_GAPS(FIELD(gaps)),
     {0},
 };
 static const option_row answer_options[] = {
@@ -227,6 +229,13 @@ done:
     return status;
 }
 
+static weather_hours hours_of(const weather_span *span) {
+    const weather_mended *m = &span->mended;
+    return (weather_hours){.counted = (double)span->n * span->step,
+                           .left_out = m->skipped,
+                           .filled = m->between + m->by_days + m->dark};
+}
+
 /* Puts refined values and their certificates into the solution, and the largest into the log. */
 static void take_refined(const refined_light *refined, solution *out, double tolerance, terminal *t) {
     double certificate = 0;
@@ -275,7 +284,8 @@ static lam_status add_weather(const fields *f, store *s, const mesh *m, size_t n
     const weather_options hours = {.path = f->weather,
                                    .photometric = f->photometric,
                                    .exact = f->sun == SUN_EXACT,
-                                   .sun_points = (size_t)f->sun_points};
+                                   .sun_points = (size_t)f->sun_points,
+                                   .gaps = f->gaps};
     return weather_light_add(&hours, s, m, lit->op, lit->sky, n_selected, selected, t, &lit->light, sun, span,
                              error);
 }
@@ -365,6 +375,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     error_scene about = {.n = 0};
     sunlight sun = {0};
     weather_span span = {0};
+    weather_hours hours;
     annual_options figures = *year;
     const char *names[ANNUAL_MOST];
     for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
@@ -413,6 +424,8 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                     .tells_parts = f->verbose,
                     .reductions = reductions,
                     .n_reductions = n_reductions};
+    hours = hours_of(&span);
+    if (f->weather != NULL) out.hours = &hours;
     if (f->tolerance == 0) take_error(&stated, &lit.light, n_selected, selected, t, &out);
     if (year->n_figures > 0) out.names = names;
     TRY(find_answers(path, f, &figures, &lit, n_selected, selected, t, &out, &made, error));
@@ -481,8 +494,8 @@ int cmd_solve(int argc, char **argv) {
     }
     if (f.weather != NULL && !weather_is_named(f.weather))
         return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
-    if (f.weather == NULL && (f.photometric || options_given(&given, "sun")))
-        return options_usage(verb.name, "--sun and --photometric are for --weather");
+    if (f.weather == NULL && (f.photometric || options_given(&given, "sun") || options_given(&given, "gaps")))
+        return options_usage(verb.name, "--sun, --photometric and --gaps are for --weather");
     if (f.sun != SUN_EXACT && options_given(&given, "sun-points"))
         return options_usage(verb.name, "--sun-points is for --sun exact");
     if (f.tolerance > 0 && f.annual.count > 0)

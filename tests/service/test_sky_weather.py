@@ -1,6 +1,7 @@
 """From a weather file to light on a floor: `lambert sky`, what it writes, what it refuses, and that `lambert solve`
 gives a horizontal square under the open sky what the file says."""
 
+import json
 import math
 import os
 import pathlib
@@ -155,6 +156,67 @@ class SkyWeather(unittest.TestCase):
                 ("mixed.wea", wea(hours[:24] + parts(hours[24:48], 2)), "but most rows are 0.5 h apart")):
             self.refused(1, wanted, self.write(name, text), "-o", out)
 
+    def test_gaps(self):
+        """Values that cannot matter pass with a line; the rest is filled or left out on request, and both are counted."""
+        days = [h for h in self.hours if h[:2] in ((6, 20), (6, 21), (6, 22))]
+        text = epw(days, dew=999, periods="6/20,6/22").splitlines(keepends=True)
+        whole = self.sky(self.write("whole.epw", "".join(text)))[0]
+        night = list(text)
+        night[10], night[11] = night[10].replace(",0,0,0,0,0,0\n", ",9999,9999,0,0,0,0\n"), text[11].replace(",0,0,0,0,0,0\n", ",0,-1,0,0,0,0\n")
+        skies, done = self.sky(self.write("night.epw", "".join(night)))
+        np.testing.assert_array_equal(skies, whole)
+        self.assertIn("values that count as 0: 3, of which 2 are missing by night, 1 from -10 to 0 W/m2\n", done.stderr)
+        self.assertNotIn("dew point", done.stderr)
+        self.assertIn("rows without a dew point: 72; the air holds 2 cm of water there\n",
+                      self.sky(self.folder / "night.epw", "--photometric")[1].stderr)
+        noon = list(text)
+        noon[8 + 36] = re.sub(r",(\d+),(\d+),0,0,0,0$", r",9999,\2,0,0,0,0", noon[8 + 36])
+        path, out = self.write("noon.epw", "".join(noon)), self.folder / "none.npy"
+        self.refused(1, "noon.epw: line 45 (2001-06-21 12:00): direct normal radiation (field 15) is missing by day; fill the gap, "
+                     "or give --gaps fill or --gaps skip", path, "-o", out)
+        skies, done = self.sky(path, "--gaps", "skip")
+        np.testing.assert_array_equal(skies, np.delete(whole, 36, axis=0))
+        self.assertIn("warning: 1 hours are left out: sums lack them", done.stderr)
+        skies, done = self.sky(path, "--gaps", "fill")
+        np.testing.assert_array_equal(np.delete(skies, 36, axis=0), np.delete(whole, 36, axis=0))
+        direct = [h[3] for h in days]
+        sun = sine_of_altitude(2001, 6, 21, 12.5)
+        # The file's diffuse light, and direct light between that of the rows beside it; the sun's place is good to .02 degrees.
+        self.assertAlmostEqual(float(skies[36] @ self.cosines()), days[36][4] + sun * (direct[35] + direct[37]) / 2, delta=1)
+        self.assertIn("warning: 0.5 hours are filled: 0.5 from the rows beside the gap, 0 from the same time", done.stderr)
+        again = text[:8] + text[32:56] + text[8:] + text[32:56]
+        path = self.write("again.epw", "".join(again))
+        self.refused(1, "line 33 (2001-06-20 00:00) is before the row above it", path, "-o", out)
+        for gaps in "fill", "skip":
+            skies, done = self.sky(path, "--gaps", gaps)
+            np.testing.assert_array_equal(skies, whole)
+            self.assertIn("warning: 48 repeated rows are dropped, of each time the later ones of the file\n", done.stderr)
+        self.refused(2, "--gaps", path, "-o", out, "--gaps", "guess")
+
+    def test_gaps_in_figures(self):
+        """Sums and shares are of the hours that are there; a day that is filled is the mean of its neighbours."""
+        days = [h for h in self.hours if h[:2] in ((6, 20), (6, 21), (6, 22))]
+        light = [self.horizontal[24 * 170 + 24 * k:][:24] for k in range(3)]
+        path = self.write("lacks.epw", epw(days[:24] + days[48:], periods="6/20,6/22"))
+
+        def figures(gaps):
+            done = must("solve", self.store, "--weather", path, "--gaps", gaps, "--annual", "sum", "--annual", "autonomy=100", "--json")
+            answer = json.loads(done.stdout)
+            return answer["hours"], *(answer["annual"][name]["square"]["mean"] for name in ("sum", "autonomy_100"))
+        wanted = {"skip": (light[0].sum() + light[2].sum(), np.mean(np.concatenate([light[0], light[2]]) >= 100)),
+                  "fill": (1.5 * (light[0].sum() + light[2].sum()), None)}
+        for gaps, (total, share) in wanted.items():
+            hours, got, bright = figures(gaps)
+            self.assertEqual(hours, {"counted": 48 if gaps == "skip" else 72, "left_out": 24 if gaps == "skip" else 0,
+                                     "filled": 0 if gaps == "skip" else 24})
+            # Noise of the first light of tiles, and the sun of 21 June in place of those beside it.
+            self.assertAlmostEqual(got / (total / 1000), 1, delta=.03, msg=gaps)
+            if share is not None:
+                self.assertAlmostEqual(bright, share, delta=1e-6)
+        done = lambert("solve", self.store, "--gaps", "skip")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("--gaps are for --weather", done.stderr)
+
     def test_photometric(self):
         skies, _ = self.sky(self.wea)
         light, done = self.sky(self.wea, "--photometric")
@@ -212,11 +274,11 @@ class SkyWeather(unittest.TestCase):
         good = wea(self.hours[:30]).splitlines(keepends=True)
         for name, text, wanted in (
                 ("row.wea", "".join(good[:20]) + "1 1 4.5 0\n", "row.wea: line 21 must hold five numbers"),
-                ("value.wea", "".join(good[:20]) + "1 1 4.5 0 -1\n", "line 21: diffuse horizontal radiation = -1"),
+                ("value.wea", "".join(good[:20]) + "1 1 4.5 0 -11\n", "line 21: diffuse horizontal radiation = -11"),
                 ("head.wea", "".join(good[1:]), "head.wea: line 1 begins with"),
                 ("month.wea", "".join(good[:6]) + "0 1 4.5 0 0\n", "line 7: month = 0, must be from 1 to 12"),
-                ("gap.epw", epw(self.hours[:30]).replace(",0,0,0,0,0,0\n", ",9999,0,0,0,0,0\n", 1),
-                 "gap.epw: line 9: direct normal radiation (field 15) is missing (9999)"),
+                ("large.epw", epw(self.hours[:30]).replace(",0,0,0,0,0,0\n", ",9998,0,0,0,0,0\n", 1),
+                 "large.epw: line 9: direct normal radiation (field 15) = 9998, must be from 0 to 3000"),
                 ("empty.epw", "", "empty.epw: ends at line 0"),
                 ("wea.epw", "".join(good), "an EPW has LOCATION there"),
                 ("binary.wea", "\0\1\2", "zero byte")):

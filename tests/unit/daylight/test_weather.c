@@ -31,7 +31,7 @@ static void write_file(char path[32], const char *extension, const char *text, s
 static lam_status read_text(const char *extension, const char *text, weather *w, lam_error *error) {
     char path[32];
     write_file(path, extension, text, strlen(text));
-    const lam_status status = weather_read(path, w, error);
+    const lam_status status = weather_read(path, WEATHER_REFUSE, w, error);
     unlink(path);
     return status;
 }
@@ -136,9 +136,10 @@ START_TEST(refused) {
         {".wea", WEA_HEAD "1 0 0.5 0 0\n", "line 7: day = 0, must be from 1 to 31"},
         {".wea", WEA_HEAD "1 1 24.5 0 0\n", "line 7: hour = 24.5, must be from 0 to 24"},
         {".wea", WEA_HEAD "1 1 -.5 0 0\n", "line 7: hour = -0.5"},
-        {".wea", WEA_HEAD "1 1 .5 -1 0\n", "line 7: direct radiation = -1, must be from 0 to 3000"},
+        {".wea", WEA_HEAD "1 1 .5 -11 0\n", "line 7: direct radiation = -11, must be from 0 to 3000"},
         {".wea", WEA_HEAD "1 1 .5 0 3001\n", "line 7: diffuse horizontal radiation = 3001"},
-        {".wea", WEA_HEAD "1 1 .5 9999 0\n", "line 7: direct radiation is missing (9999)"},
+        {".wea", WEA_HEAD "1 1 12.5 9999 0\n",
+         "line 7 (2001-01-01 12:30): direct radiation is missing by day; fill the gap, or give --gaps fill"},
         {".wea", WEA_HEAD "1 1 .5 0x10 0\n", "line 7: direct radiation is \"0x10\""},
         {".epw", "", "ends at line 0, before its line LOCATION"},
         {".epw", WEA_HEAD, "line 1 begins with \"place Somewhere_XX\", an EPW has LOCATION there"},
@@ -163,11 +164,11 @@ START_TEST(refused) {
         {".epw", EPW_HEAD EPW_ROW("1990,1,1,25", "1") "0,0\n", "line 9: hour (field 4) = 25"},
         {".epw", EPW_HEAD EPW_ROW("1990,1,1,1.5", "1") "0,0\n", "line 9: hour (field 4) = 1.5"},
         {".epw", EPW_HEAD EPW_ROW("1990,1,1,1", "x") "0,0\n", "line 9: dew point (field 8) is \"x\""},
-        {".epw", EPW_HEAD EPW_ROW("1990,1,1,1", "1") "9999,0\n",
-         "line 9: direct normal radiation (field 15) is missing (9999)"},
-        {".epw", EPW_HEAD EPW_ROW("1990,1,1,1", "1") "0,9999\n",
-         "line 9: diffuse horizontal radiation (field 16) is missing (9999)"},
-        {".epw", EPW_HEAD EPW_ROW("1990,1,1,1", "1") "0,-3\n", "(field 16) = -3, must be from 0 to 3000"},
+        {".epw", EPW_HEAD EPW_ROW("1990,1,1,13", "1") "9999,0\n",
+         "line 9 (1990-01-01 12:00): direct normal radiation (field 15) is missing by day"},
+        {".epw", EPW_HEAD EPW_ROW("1990,1,1,13", "1") "0,9999\n",
+         "line 9 (1990-01-01 12:00): diffuse horizontal radiation (field 16) is missing by day"},
+        {".epw", EPW_HEAD EPW_ROW("1990,1,1,1", "1") "0,-30\n", "(field 16) = -30, must be from 0 to 3000"},
         {".epw", EPW_HEAD EPW_ROW("1990,1,1,1", "1") ",0\n", "(field 15) is \"\", must be a number"},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
@@ -187,12 +188,12 @@ START_TEST(not_a_text_file) {
     weather w = {0};
     lam_error error = {0};
     char path[32];
-    ck_assert_int_eq(weather_read("/nonexistent/a.epw", &w, &error), LAM_ERR_IO);
+    ck_assert_int_eq(weather_read("/nonexistent/a.epw", WEATHER_REFUSE, &w, &error), LAM_ERR_IO);
     ck_assert_ptr_nonnull(strstr(error.message, "/nonexistent/a.epw"));
-    ck_assert_int_eq(weather_read("/dev/zero", &w, &error), LAM_ERR_IO);
-    ck_assert_int_eq(weather_read("/tmp", &w, &error), LAM_ERR_IO);
+    ck_assert_int_eq(weather_read("/dev/zero", WEATHER_REFUSE, &w, &error), LAM_ERR_IO);
+    ck_assert_int_eq(weather_read("/tmp", WEATHER_REFUSE, &w, &error), LAM_ERR_IO);
     write_file(path, ".wea", "place x\0y\n", 10);
-    ck_assert_int_eq(weather_read(path, &w, &error), LAM_ERR_FORMAT);
+    ck_assert_int_eq(weather_read(path, WEATHER_REFUSE, &w, &error), LAM_ERR_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, "line 1 holds a zero byte"));
     unlink(path);
 }

@@ -37,7 +37,7 @@ static text begin(bool epw, const char *periods) {
 
 static lam_status end(text *t, weather *w, lam_error *error) {
     ck_assert_int_eq(fclose(t->stream), 0);
-    const lam_status status = weather_read(t->path, w, error);
+    const lam_status status = weather_read(t->path, WEATHER_REFUSE, w, error);
     unlink(t->path);
     return status;
 }

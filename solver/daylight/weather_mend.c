@@ -1,0 +1,433 @@
+#include "solver/daylight/weather_mend.h"
+
+#include "solver/daylight/sun.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The sun is looked at every twelfth of an hour: between two looks it rises by a degree at most, and where it
+ * culminates by .003 degrees. */
+#define LOOKS_AN_HOUR 12
+
+enum { DAYS = 366, LEAP_DAY = 59 };
+
+bool weather_is_dark(const weather *w, const weather_hour *h) {
+    const int looks = (int)fmax(1, ceil(w->step * LOOKS_AN_HOUR));
+    for (int k = 0; k <= looks; k++) {
+        const double hour = h->hour + w->step * ((double)k / looks - .5);
+        const sun_position sun =
+            sun_at(w->latitude, w->longitude, w->time_zone, h->year, h->month, h->day, hour);
+        if (sun.direction[2] > 0) return false;
+    }
+    return true;
+}
+
+static bool is_missing(const weather_hour *h) {
+    return isnan(h->direct) || isnan(h->diffuse);
+}
+
+/* Values that are missing by night count as 0. */
+static void settle_nights(weather *w) {
+    for (size_t i = 0; i < w->n; i++) {
+        weather_hour *h = &w->hours[i];
+        if (!is_missing(h) || !weather_is_dark(w, h)) continue;
+        w->mended.night += (size_t)isnan(h->direct) + (size_t)isnan(h->diffuse);
+        if (isnan(h->direct)) h->direct = 0;
+        if (isnan(h->diffuse)) h->diffuse = 0;
+    }
+}
+
+static double earlier_of(const weather_times *t) {
+    return t->stated != NULL ? t->w->step / 2 : 0;
+}
+
+/* Refuses a value by day that is missing. */
+static lam_status check_values(const weather_times *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    const weather *w = t->w;
+    size_t first = w->n, n = 0;
+    char name[WEATHER_NAME], more[80] = "";
+    for (size_t i = 0; i < w->n; i++)
+        if (is_missing(&w->hours[i]) && n++ == 0) first = i;
+    if (n == 0) goto done;
+    const bool direct = isnan(w->hours[first].direct), epw = t->stated != NULL;
+    weather_name_row(t, first, earlier_of(t), name);
+    if (n > 1) snprintf(more, sizeof more, ", the first of %zu rows", n);
+    FAIL(error, LAM_ERR_FORMAT, "%s: %s: %s is missing by day%s; " WEATHER_ADVICE, t->path, name,
+         direct ? (epw ? WEATHER_EPW_DIRECT : WEATHER_WEA_DIRECT)
+                : (epw ? WEATHER_EPW_DIFFUSE : WEATHER_WEA_DIFFUSE),
+         more);
+done:
+    return status;
+}
+
+/* A row with its place in time and in the file. */
+typedef struct place {
+    double key; /* h */
+    size_t row;
+} place;
+
+static int compare_places(const void *a, const void *b) {
+    const place *one = a, *other = b;
+    if (one->key != other->key) return one->key < other->key ? -1 : 1;
+    return (one->row > other->row) - (one->row < other->row);
+}
+
+/* Hours from the beginning of a year that has a 29 February. */
+static double time_of_year(const weather_hour *h) {
+    return 24. * weather_day(h->month, h->day) + h->hour;
+}
+
+/* Fills places [n] in the order of the year. */
+static void sort_by_year(const weather *w, place *places) {
+    for (size_t i = 0; i < w->n; i++) places[i] = (place){.key = time_of_year(&w->hours[i]), .row = i};
+    qsort(places, w->n, sizeof *places, compare_places);
+}
+
+/* True where rows of several years have one time: the file is of several years. */
+static bool has_years(const weather *w, const place *sorted) {
+    for (size_t i = 1; i < w->n; i++)
+        if (sorted[i].key - sorted[i - 1].key <= weather_tolerance(w->step) &&
+            w->hours[sorted[i].row].year != w->hours[sorted[i - 1].row].year)
+            return true;
+    return false;
+}
+
+/* The time of the year at which rows of one year begin: after the longest gap, so that a winter is whole. */
+static double beginning(const weather *w, const place *sorted) {
+    double longest = sorted[0].key + 24. * DAYS - sorted[w->n - 1].key, from = sorted[0].key;
+    for (size_t i = 1; i < w->n; i++) {
+        const double gap = sorted[i].key - sorted[i - 1].key;
+        /* A year without its 29 February has a gap there that is none. */
+        if (gap <= longest + 24) continue;
+        longest = gap;
+        from = sorted[i].key;
+    }
+    return from - weather_tolerance(w->step);
+}
+
+/* Sorts rows by time where they are not in order, and drops the later ones of those of one time. */
+static lam_status put_in_order(weather_times *t, weather_row **rows, lam_error *error) {
+    lam_status status = LAM_OK;
+    weather *w = t->w;
+    size_t n = 0, kept = 0, furthest = 0;
+    double last = -INFINITY;
+    if (weather_rows_behind(w, &kept) == 0) return LAM_OK;
+    place *places = memory_allocate(w->n, sizeof *places, "the order of weather", error);
+    weather_hour *hours = memory_allocate(w->n, sizeof *hours, "the order of weather", error);
+    weather_row *ordered = memory_allocate(w->n, sizeof *ordered, "the order of weather", error);
+    if (places == NULL || hours == NULL || ordered == NULL) TRY(LAM_ERR_MEMORY);
+    sort_by_year(w, places);
+    const bool years = has_years(w, places);
+    const double from = beginning(w, places), year = 24. * DAYS;
+    for (size_t i = 0; i < w->n; i++) {
+        const double time = time_of_year(&w->hours[i]);
+        places[i] = (place){
+            .key = years ? w->hours[i].year * year + time : time - from + (time < from ? year : 0), .row = i};
+    }
+    qsort(places, w->n, sizeof *places, compare_places);
+    for (size_t i = 0; i < w->n; i++) {
+        /* Decimals of hours differ between repetitions, too: the first of the file is kept. */
+        const bool again = places[i].key - last <= weather_tolerance(w->step);
+        if (again) w->mended.repeated++;
+        if (again && places[i].row > kept) continue;
+        kept = places[i].row;
+        if (!again) last = places[i].key;
+        hours[again ? n - 1 : n] = w->hours[kept];
+        ordered[again ? n - 1 : n] = (*rows)[kept];
+        n += !again;
+    }
+    for (size_t i = 0; i < n; i++) {
+        w->mended.unordered += ordered[i].line < furthest;
+        if (ordered[i].line > furthest) furthest = ordered[i].line;
+    }
+    memcpy(w->hours, hours, n * sizeof *hours);
+    memcpy(*rows, ordered, n * sizeof *ordered);
+    w->n = n;
+done:
+    free(places);
+    free(hours);
+    free(ordered);
+    return status;
+}
+
+/* The times of the day that any row of a WEA has: others are chosen to be absent. Of an EPW NULL: all of
+ * them. Freed with free(). */
+static lam_status find_times(const weather_times *t, bool **times, lam_error *error) {
+    const double step = t->w->step;
+    *times = NULL;
+    if (t->stated != NULL) return LAM_OK;
+    *times = memory_allocate((size_t)ceil(24 / step) + 1, sizeof **times, "the times of weather", error);
+    if (*times == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < t->w->n; i++) (*times)[(size_t)(t->w->hours[i].hour / step)] = true;
+    return LAM_OK;
+}
+
+/* The time a step after another. A 29 February that the rows beside the gap do not have is passed over. */
+static weather_hour after(const weather_hour *h, double step, bool leap) {
+    static const int days[12] = {31, 29, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+    weather_hour next = *h;
+    next.hour += step;
+    if (next.hour < 24) return next;
+    next.hour -= 24;
+    next.day++;
+    if (next.day > days[next.month - 1] - (next.month == 2 && !leap)) {
+        next.day = 1;
+        next.month = next.month % 12 + 1;
+        next.year += next.month == 1;
+    }
+    return next;
+}
+
+/* Leaves rows without their values out, and counts them and the gaps. */
+static lam_status skip(weather_times *t, weather_row *rows, lam_error *error) {
+    lam_status status = LAM_OK;
+    weather *w = t->w;
+    weather_gap *gaps = NULL;
+    bool *times = NULL;
+    size_t n = 0, n_gaps = 0;
+    double between = 0;
+    /* Gaps of a WEA are chosen by the rows that are there, whatever they lack. */
+    TRY(find_times(t, &times, error));
+    TRY(weather_find_gaps(t, &gaps, &n_gaps, error));
+    for (size_t k = 0; k < n_gaps; k++) {
+        weather_hour h = w->hours[gaps[k].row - 1];
+        for (long left = lround(gaps[k].hours / w->step); left > 0; left--) {
+            h = after(&h, w->step, false);
+            if (times == NULL || times[(size_t)(h.hour / w->step)]) between += w->step;
+        }
+    }
+    w->mended.skipped = fmax(between, weather_lacks(t));
+    for (size_t i = 0; i < w->n; i++) {
+        if (is_missing(&w->hours[i])) continue;
+        w->hours[n] = w->hours[i];
+        rows[n++] = rows[i];
+    }
+    if (n == 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: all of %zu rows lack their radiation by day; take another file",
+             t->path, w->n);
+    w->mended.skipped += (double)(w->n - n) * w->step;
+    w->n = n;
+    free(gaps);
+    gaps = NULL;
+    TRY(weather_find_gaps(t, &gaps, &n_gaps, error));
+done:
+    free(times);
+    free(gaps);
+    return status;
+}
+
+/* Rows that are being added to. */
+typedef struct growing {
+    size_t n, room;
+    weather_hour *hours;
+    weather_row *rows;
+} growing;
+
+static lam_status append(growing *g, const weather_hour *h, const weather_row *row, lam_error *error) {
+    if (g->n == g->room) {
+        const size_t room = 2 * g->room + 64;
+        weather_hour *hours = realloc(g->hours, room * sizeof *hours);
+        if (hours != NULL) g->hours = hours;
+        weather_row *rows = realloc(g->rows, room * sizeof *rows);
+        if (rows != NULL) g->rows = rows;
+        if (hours == NULL || rows == NULL)
+            return status_fail(error, LAM_ERR_MEMORY, "not enough memory for %zu rows of weather", room);
+        g->room = room;
+    }
+    g->hours[g->n] = *h;
+    g->rows[g->n++] = *row;
+    return LAM_OK;
+}
+
+/* Appends rows without values that follow a time, at `times` of the day where that is not NULL, named by the
+ * line of a row beside the gap. */
+static lam_status append_gap(growing *g, const weather_hour *from, double hours, double step, bool leap,
+                             const bool *times, const weather_row *beside, lam_error *error) {
+    lam_status status = LAM_OK;
+    weather_hour h = *from;
+    h.direct = h.diffuse = h.dew_point = NAN;
+    for (long k = lround(hours / step); k > 0; k--) {
+        h = after(&h, step, leap);
+        if (times == NULL || times[(size_t)(h.hour / step)]) TRY(append(g, &h, beside, error));
+    }
+done:
+    return status;
+}
+
+/* Hours that the one period of an EPW has before the first row, or after the last one. */
+static void find_ends(const weather_times *t, double *before, double *behind) {
+    const weather *w = t->w;
+    const double step = w->step;
+    const weather_hour *first = &w->hours[0], *last = &w->hours[w->n - 1];
+    *before = *behind = 0;
+    if (t->stated == NULL || t->stated->n != 1 || weather_lacks(t) == 0) return;
+    const weather_date *from = &t->stated->from[0], *to = &t->stated->to[0];
+    const weather_hour begin = {.month = from->month, .day = from->day, .hour = -step / 2};
+    const weather_hour end = {.month = to->month, .day = to->day, .hour = 24 + step / 2};
+    bool back = false;
+    const double ahead = weather_ahead(&begin, first, &back) - step;
+    *before = back ? 0 : ahead;
+    const double rest = weather_ahead(last, &end, &back) - step;
+    *behind = back ? 0 : rest;
+    /* A whole year may begin at any row. */
+    const int one = weather_day(from->month, from->day), next = (weather_day(to->month, to->day) + 1) % DAYS;
+    if (next == one || (next == LEAP_DAY && one == LEAP_DAY + 1)) {
+        *before = 0;
+        *behind = weather_ahead(last, first, &back) - step;
+    }
+}
+
+static lam_status refuse_long(const weather_times *t, size_t row, double hours, lam_error *error) {
+    char name[WEATHER_NAME];
+    weather_name_row(t, row, earlier_of(t), name);
+    return status_fail(error, LAM_ERR_FORMAT,
+                       "%s: %s: beside it %.6g hours are missing, and at most %d are filled; --gaps skip "
+                       "leaves them out",
+                       t->path, name, hours, WEATHER_GAP_MOST);
+}
+
+/* Adds rows without values in gaps. */
+static lam_status add_rows(weather_times *t, weather_row **rows, lam_error *error) {
+    lam_status status = LAM_OK;
+    weather *w = t->w;
+    growing g = {.n = 0};
+    weather_gap *gaps = NULL;
+    bool *times = NULL;
+    size_t n_gaps = 0, k = 0;
+    double before = 0, behind = 0;
+    TRY(find_times(t, &times, error));
+    TRY(weather_find_gaps(t, &gaps, &n_gaps, error));
+    find_ends(t, &before, &behind);
+    for (size_t i = 0; i < n_gaps; i++)
+        if (gaps[i].hours > WEATHER_GAP_MOST) TRY(refuse_long(t, gaps[i].row, gaps[i].hours, error));
+    if (before > WEATHER_GAP_MOST) TRY(refuse_long(t, 0, before, error));
+    if (behind > WEATHER_GAP_MOST) TRY(refuse_long(t, w->n - 1, behind, error));
+    bool leap = false;
+    for (size_t i = 0; i < w->n; i++)
+        leap = leap || weather_day(w->hours[i].month, w->hours[i].day) == LEAP_DAY;
+    if (before > weather_tolerance(w->step)) {
+        weather_hour h = w->hours[0];
+        h.month = t->stated->from[0].month;
+        h.day = t->stated->from[0].day;
+        h.hour = -w->step / 2;
+        TRY(append_gap(&g, &h, before, w->step, leap, times, &(*rows)[0], error));
+    }
+    for (size_t i = 0; i < w->n; i++) {
+        if (k < n_gaps && gaps[k].row == i)
+            TRY(append_gap(&g, &w->hours[i - 1], gaps[k++].hours, w->step, leap, times, &(*rows)[i], error));
+        TRY(append(&g, &w->hours[i], &(*rows)[i], error));
+    }
+    TRY(append_gap(&g, &w->hours[w->n - 1], behind, w->step, leap, times, &(*rows)[w->n - 1], error));
+    free(w->hours);
+    free(*rows);
+    w->n = g.n;
+    w->hours = g.hours;
+    t->rows = *rows = g.rows;
+    g = (growing){.n = 0};
+done:
+    free(g.hours);
+    free(g.rows);
+    free(times);
+    free(gaps);
+    return status;
+}
+
+/* One of the values of a row. */
+static double *value_of(weather_hour *h, bool diffuse) {
+    return diffuse ? &h->diffuse : &h->direct;
+}
+
+/* The value of the same time of the nearest day before or after row i that has it; NAN: none has it. */
+static double same_time(const weather *w, weather_hour *read, size_t i, bool diffuse, bool later) {
+    const double tolerance = weather_tolerance(w->step), most = 24 * WEATHER_DAYS + tolerance;
+    for (size_t k = 1; later ? i + k < w->n : k <= i; k++) {
+        const size_t at = later ? i + k : i - k;
+        bool back = false;
+        const double apart = weather_ahead(&read[later ? i : at], &read[later ? at : i], &back);
+        if (back || apart > most) break;
+        const double value = *value_of(&read[at], diffuse);
+        if (fabs(apart - 24 * round(apart / 24)) <= tolerance && !isnan(value)) return value;
+    }
+    return NAN;
+}
+
+/* Fills the rows from first up to end, which lack a value; the values of read are those of the file. */
+static lam_status fill_run(const weather_times *t, weather_hour *read, bool diffuse, size_t first, size_t end,
+                           lam_error *error) {
+    weather *w = t->w;
+    const double most = WEATHER_BETWEEN + w->step + weather_tolerance(w->step);
+    bool back = false;
+    double apart = INFINITY;
+    if (first > 0 && end < w->n) apart = weather_ahead(&read[first - 1], &read[end], &back);
+    const bool is_short = !back && apart <= most;
+    for (size_t i = first; i < end; i++) {
+        double value = NAN;
+        if (is_short) {
+            const double share = weather_ahead(&read[first - 1], &read[i], &back) / apart;
+            value =
+                *value_of(&read[first - 1], diffuse) * (1 - share) + *value_of(&read[end], diffuse) * share;
+        } else {
+            const double before = same_time(w, read, i, diffuse, false);
+            const double behind = same_time(w, read, i, diffuse, true);
+            value = isnan(before) ? behind : isnan(behind) ? before : (before + behind) / 2;
+        }
+        if (isnan(value)) {
+            char name[WEATHER_NAME];
+            weather_name_row(t, i, earlier_of(t), name);
+            return status_fail(
+                error, LAM_ERR_FORMAT,
+                "%s: %s: %s radiation cannot be filled: the gap is longer than %d h, and no day "
+                "within %d days has the value at this time; --gaps skip leaves it out",
+                t->path, name, diffuse ? "diffuse" : "direct", WEATHER_BETWEEN, WEATHER_DAYS);
+        }
+        *value_of(&w->hours[i], diffuse) = value;
+        *(is_short ? &w->mended.between : &w->mended.by_days) += w->step / 2; /* of two values */
+    }
+    return LAM_OK;
+}
+
+static lam_status fill(weather_times *t, weather_row **rows, lam_error *error) {
+    lam_status status = LAM_OK;
+    weather *w = t->w;
+    weather_hour *read = NULL;
+    const size_t night = w->mended.night;
+    TRY(add_rows(t, rows, error));
+    settle_nights(w);
+    w->mended.dark = (double)((w->mended.night - night) / 2) * w->step;
+    w->mended.night = night;
+    read = memory_allocate(w->n, sizeof *read, "the rows of weather", error);
+    if (read == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(read, w->hours, w->n * sizeof *read);
+    for (int diffuse = 0; diffuse < 2; diffuse++)
+        for (size_t i = 0; i < w->n; i++) {
+            size_t end = i;
+            while (end < w->n && isnan(*value_of(&read[end], diffuse))) end++;
+            if (end > i) TRY(fill_run(t, read, diffuse, i, end, error));
+            i = end;
+        }
+done:
+    free(read);
+    return status;
+}
+
+lam_status weather_mend(weather_times *t, weather_gaps gaps, weather_row **rows, lam_error *error) {
+    lam_status status = LAM_OK;
+    settle_nights(t->w);
+    if (gaps == WEATHER_REFUSE) {
+        TRY(check_values(t, error));
+        TRY(weather_check_gaps(t, error));
+        goto done;
+    }
+    TRY(put_in_order(t, rows, error));
+    if (gaps == WEATHER_SKIP) {
+        TRY(skip(t, *rows, error));
+        goto done;
+    }
+    TRY(fill(t, rows, error));
+    TRY(weather_check_gaps(t, error));
+done:
+    return status;
+}
