@@ -125,7 +125,7 @@ class SkyWeather(unittest.TestCase):
         # Measured to the noise of the form factors with tiles.
         self.assertAlmostEqual(light.mean(axis=1).sum() / self.horizontal.sum(), 1, delta=.03)
         direct = self.folder / "direct.npy"
-        must("solve", self.store, "--sky", self.wea, "--quantity", "irradiance", "-o", direct)
+        must("solve", self.store, "--sky", self.wea, "--sun", "tiles", "--quantity", "irradiance", "-o", direct)
         np.testing.assert_array_equal(np.load(direct), light)
 
     def test_rows_of_parts_of_an_hour(self):
@@ -244,7 +244,7 @@ class SkyWeather(unittest.TestCase):
                 self.assertAlmostEqual(bright, share, delta=1e-6)
         done = lambert("solve", self.store, "--gaps", "skip")
         self.assertEqual(done.returncode, 2, done.stderr)
-        self.assertIn("--gaps are for --weather", done.stderr)
+        self.assertIn("--gaps is for --weather", done.stderr)
 
     def test_photometric(self):
         skies, _ = self.sky(self.wea)

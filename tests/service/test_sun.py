@@ -1,6 +1,7 @@
 """The sun of a weather file in `lambert solve`: in tiles it gives the sky of `lambert sky`; as a disc it casts the
 shadows that the geometry determines, at every hour, for either up axis, and its light is reflected."""
 
+import json
 import pathlib
 import tempfile
 import unittest
@@ -159,7 +160,8 @@ class Sun(unittest.TestCase):
         self.assertGreater((H0[16:] - wanted[16:])[sure].max(), 20)
         # All bounces: the solution of B = rho (H0 + F B).
         np.testing.assert_allclose(B, np.linalg.solve(np.eye(66) - .5 * F, .5 * H0.T).T, atol=2e-5 * B.max())
-        np.testing.assert_allclose(self.solve(self.grey, "--sun", "exact"), B / .5, rtol=1e-5, atol=1e-4)
+        np.testing.assert_array_equal(self.solve(self.grey), self.solve(self.grey, "--sun", "exact"))  # which is the preset
+        np.testing.assert_allclose(self.solve(self.grey), B / .5, rtol=1e-5, atol=1e-4)
         # Few emitters: direct light exact, bounces those of the tiles.
         few_H0, _, few_indirect = self.first_light(self.few)
         np.testing.assert_allclose(few_H0, H0, atol=2e-5 * H0.max())
@@ -175,7 +177,7 @@ class Sun(unittest.TestCase):
         for more in [], ["--photometric"]:
             must("sky", self.day, "-o", sky, *more)
             must("solve", self.grey, "--sky", sky, "--quantity", "irradiance", "-o", out)
-            np.testing.assert_array_equal(np.load(out), self.solve(self.grey, *more))
+            np.testing.assert_array_equal(np.load(out), self.solve(self.grey, "--sun", "tiles", *more))
         # A store of colours takes the same skies in each.
         colour = self.store("colour", "zup.obj", ".6 .5 .4", "--method", "exact")
         for mode in "tiles", "exact":
@@ -189,14 +191,14 @@ class Sun(unittest.TestCase):
 
     def test_annual(self):
         for store in self.grey, self.few:
-            for mode in "tiles", "exact":
-                hourly = self.solve(store, "--sun", mode).astype(float)
-                year = self.solve(store, "--sun", mode, "--annual", "sum", "--annual", "autonomy=150")
+            for mode in ["tiles"], ["exact", "--sun-points", 4]:
+                hourly = self.solve(store, "--sun", *mode).astype(float)
+                year = self.solve(store, "--sun", *mode, "--annual", "sum", "--annual", "autonomy=150")
                 np.testing.assert_allclose(year[0], hourly.sum(axis=0) / 1000, rtol=1e-5)
                 near = (np.abs(hourly - 150) < 1e-3).mean(axis=0)
                 self.assertTrue((np.abs(year[1] - (hourly >= 150).mean(axis=0)) <= near + 1e-6).all())
                 out = self.folder / "group.csv"
-                must("solve", store, "--weather", self.day, "--sun", mode, "--annual", "sum", "--reduce",
+                must("solve", store, "--weather", self.day, "--sun", *mode, "--annual", "sum", "--reduce",
                      "wall=mean,max", "-o", out)
                 mean, most = (float(line.split(",")[2]) for line in out.read_text().splitlines()[1:])
                 np.testing.assert_allclose([mean, most], [year[0, 64:].mean(), year[0, 64:].max()], rtol=1e-5)
@@ -214,6 +216,57 @@ class Sun(unittest.TestCase):
         for mode in "tiles", "exact":
             year = self.solve(store, "--sun", mode, "--annual", "sum", weather=path)
             np.testing.assert_allclose(year.mean(), wanted, rtol=1e-3)
+
+    def test_facades(self):
+        """At presets the walls of a cube get sum DNI cos over the year, in six places; formulas of the sun differ by .01 degrees."""
+        (self.folder / "yard.mtl").write_text("newmtl paint\nKd 0 0 0\n")
+        corners = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+        faces = {"roof": (5, 6, 8, 7), "south": (1, 2, 6, 5), "east": (2, 4, 8, 6), "north": (4, 3, 7, 8), "west": (3, 1, 5, 7)}
+        (self.folder / "cube.obj").write_text("mtllib yard.mtl\n" + "".join("v %d %d %d\n" % c for c in corners)
+                                              + "".join(f"o {k}\nusemtl paint\nf %d %d %d %d\n" % f for k, f in faces.items()))
+        store = self.folder / "cube.h5"
+        must("precompute", self.folder / "cube.obj", "-o", store, "--sky", "tregenza")
+        normals = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0)])
+        path, out = self.folder / "place.wea", self.folder / "cube.json"
+        # Every third day is chosen, at most half of them: a sum of these days.
+        days = [row for row in a_year() if (30 * row[0] + row[1]) % 3 == 0]
+        for place in (52.5, 13.4, 1), (-33.9, 151.2, 10), (28.6, 77.2, 5.5), (1.35, 103.8, 8), (69.6, 18.9, 1), (-33.4, -70.7, -4):
+            suns = np.array([sun(2001, *row[:3], place) for row in days])
+            direct = np.array([row[3] for row in days]) * (suns[:, 2] > 0)
+            wanted = direct @ np.maximum(suns @ normals.T, 0) / 1000
+            path.write_text(wea([(*row[:3], row[3], 0) for row in days], place[0], -place[1], -15 * place[2]))
+            must("solve", store, "--weather", path, "--annual", "sum", *(word for k in faces for word in ("--reduce", k + "=mean")), "-o", out)
+            got = [json.loads(out.read_text())["annual"]["sum"][k]["mean"] for k in faces]
+            np.testing.assert_allclose(got, wanted, rtol=1e-3, atol=.02, err_msg=str(place))
+
+    def test_a_window(self):
+        """The power that enters a black room through a window is on its surfaces, hour by hour and in the sum of a year."""
+        x, y, z, (a, b, c, d) = 6, 5, 3, (1.5, 4.5, 1, 2.5)
+
+        def south(x0, x1, z0, z1):
+            return [(x0, 0, z0), (x0, 0, z1), (x1, 0, z1), (x1, 0, z0)]
+        quads = [[(0, 0, 0), (x, 0, 0), (x, y, 0), (0, y, 0)], [(0, y, z), (x, y, z), (x, 0, z), (0, 0, z)],
+                 [(x, y, 0), (x, y, z), (0, y, z), (0, y, 0)], [(0, y, 0), (0, y, z), (0, 0, z), (0, 0, 0)],
+                 [(x, 0, 0), (x, 0, z), (x, y, z), (x, y, 0)],
+                 south(0, x, 0, c), south(0, x, d, z), south(0, a, c, d), south(b, x, c, d)]
+        (self.folder / "yard.mtl").write_text("newmtl paint\nKd 0 0 0\n")
+        (self.folder / "room.obj").write_text(
+            "mtllib yard.mtl\nusemtl paint\n" + "".join("".join("v %g %g %g\n" % p for p in quad) for quad in quads)
+            + "".join("f %d %d %d %d\n" % tuple(range(4 * k + 1, 4 * k + 5)) for k in range(len(quads))))
+        store = self.folder / "room.h5"
+        must("precompute", self.folder / "room.obj", "-o", store, "--sky", "tregenza", "--elements", 1500, "--probes", 0)
+        with h5py.File(store) as f:
+            area = f["mesh/area"][:]
+        rows = [(m, 21, h + .5, 800, 0) for m in (3, 6, 12) for h in range(24)]
+        path = self.folder / "noons.wea"
+        path.write_text(wea(rows))
+        suns = np.array([sun(2001, *row[:3]) for row in rows])
+        wanted = 800 * (b - a) * (d - c) * np.maximum(-suns[:, 1], 0) * (suns[:, 2] > 0)
+        got = self.solve(store, weather=path) @ area
+        bright = wanted > .2 * wanted.max()
+        self.assertGreater(bright.sum(), 15)
+        np.testing.assert_allclose(got[bright], wanted[bright], rtol=.02)
+        self.assertAlmostEqual(float(self.solve(store, "--annual", "sum", weather=path)[0] @ area) / (wanted.sum() / 1000), 1, delta=.01)
 
     def test_a_polar_year(self):
         """Months without a sun are dark; a file of them alone is refused."""
@@ -256,9 +309,9 @@ class Sun(unittest.TestCase):
         self.refused(1, "No such file", self.grey, "--weather", self.folder / "absent.wea")
         for wanted, more in (("give --sky or --weather, not both", [*day, "--sky", self.folder / "sky.npy"]),
                              ("must end in .epw or .wea", ["--weather", self.folder / "sky.npy"]),
-                             ("--sun and --photometric are for --weather", ["--sun", "exact"]),
-                             ("--sun and --photometric are for --weather", ["--photometric"]),
-                             ("--sun-points is for --sun exact", [*day, "--sun-points", 9]),
+                             ("--sun is for --weather", ["--sun", "exact"]),
+                             ("--photometric is for --weather", ["--photometric"]),
+                             ("--sun-points is for --sun exact", [*day, "--sun", "tiles", "--sun-points", 9]),
                              ("--sun-points", [*day, "--sun", "exact", "--sun-points", 0]),
                              ("--sun", [*day, "--sun", "near"])):
             self.refused(2, wanted, self.grey, *more)

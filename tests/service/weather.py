@@ -9,10 +9,11 @@ LATITUDE, LONGITUDE, ZONE = 37.5, -122.25, -8
 DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
 
-def sun(year, month, day, hour):
-    """East, north and up of the sun over the place above, by the formulas of Meeus, Astronomical Algorithms, ch. 25 and 28 (low accuracy,
+def sun(year, month, day, hour, place=(LATITUDE, LONGITUDE, ZONE)):
+    """East, north and up of the sun over a place, by the formulas of Meeus, Astronomical Algorithms, ch. 25 and 28 (low accuracy,
     good to .01 degrees), which are not those of the program."""
-    days = (datetime.date(year, month, day) - datetime.date(2000, 1, 1)).days - .5 + (hour - ZONE) / 24
+    latitude, longitude, zone = place
+    days = (datetime.date(year, month, day) - datetime.date(2000, 1, 1)).days - .5 + (hour - zone) / 24
     T = days / 36525
     L, M = math.radians(280.46646 + 36000.76983 * T), math.radians(357.52911 + 35999.05029 * T - .0001537 * T * T)
     centre = ((1.914602 - .004817 * T) * math.sin(M) + (.019993 - .000101 * T) * math.sin(2 * M)
@@ -24,8 +25,8 @@ def sun(year, month, day, hour):
     y, e = math.tan(tilt / 2) ** 2, .016708634 - .000042037 * T
     equation = (y * math.sin(2 * L) - 2 * e * math.sin(M) + 4 * e * y * math.sin(M) * math.cos(2 * L)
                 - y * y / 2 * math.sin(4 * L) - 1.25 * e * e * math.sin(2 * M))
-    turn = math.radians(15 * (hour - 12) + LONGITUDE - 15 * ZONE) + equation
-    phi = math.radians(LATITUDE)
+    turn = math.radians(15 * (hour - 12) + longitude - 15 * zone) + equation
+    phi = math.radians(latitude)
     return (-math.cos(declination) * math.sin(turn),
             math.sin(declination) * math.cos(phi) - math.cos(declination) * math.sin(phi) * math.cos(turn),
             math.sin(phi) * math.sin(declination) + math.cos(phi) * math.cos(declination) * math.cos(turn))

@@ -17,9 +17,9 @@ lam_status sun_rays_create(const mesh *m, size_t n_points, uint64_t seed, size_t
 void sun_rays_free(sun_rays *s);
 
 /* seen[k][i] = max(0, n_i . d) times the share of element i's points whose ray in direction d = direction[k],
- * a unit vector in the scene's axes, hits nothing. Rows seen[k] are [elements]; elements that are not wanted
- * stay unchanged. Many directions at once keep more threads busy. The bits depend neither on threads nor on
- * the other directions. */
+ * a unit vector in the scene's axes, hits nothing; where some of 16 or more hit, the share of eight times as
+ * many points. Rows seen[k] are [elements]; elements that are not wanted stay unchanged. Many directions at
+ * once keep more threads busy. The bits depend neither on threads nor on the other directions. */
 void sun_rays_cast(const sun_rays *s, size_t n_directions, const double (*direction)[3], float *const *seen);
 
 #endif
