@@ -61,17 +61,16 @@ static const double direct_efficacy[BINS][4] = {{57.20, -4.55, -2.98, 117.12}, {
                                                 {106.36, -3.97, -1.75, -6.16}, {107.19, -1.25, -1.51, -26.73},
                                                 {105.75, .77, -1.26, -34.44},  {101.18, 1.58, -1.10, -8.29}};
 
-/* Kasten 1966: relative optical air mass. */
-static double air_mass(double zenith) {
+double perez_air_mass(double zenith) {
     return 1 / (cos(zenith) + .15 * pow(93.885 - zenith * 180 / M_PI, -1.253));
 }
 
 perez_sky perez_sky_of(const sun_position *sun, double direct, double diffuse) {
     const double z = fmin(M_PI / 2 - sun->altitude, M_PI / 2), cube = 1.041 * z * z * z;
-    const double extraterrestrial = 1367 / (sun->distance * sun->distance);
+    const double extraterrestrial = PEREZ_SOLAR / (sun->distance * sun->distance);
     perez_sky p = {.zenith = z, .clearness = INFINITY};
     if (diffuse > 0) p.clearness = ((diffuse + direct) / diffuse + cube) / (1 + cube);
-    p.brightness = fmin(fmax(diffuse * air_mass(z) / extraterrestrial, .01), .6);
+    p.brightness = fmin(fmax(diffuse * perez_air_mass(z) / extraterrestrial, .01), .6);
     while (p.bin < BINS - 1 && p.clearness >= bin_from[p.bin]) p.bin++;
     /* In bins 2 to 5 the luminance of the horizon is unbounded below a brightness of .2. We take .2 there, as
      * Radiance's gendaylit and gendaymtx do. */

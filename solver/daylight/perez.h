@@ -7,6 +7,11 @@
 
 #define PEREZ_WATER 2. /* cm of precipitable water, assumed where the dew point is unknown */
 
+#define PEREZ_SOLAR 1367. /* W/m2 normal to the sun outside of the atmosphere, at one astronomical unit */
+
+/* Relative optical air mass by Kasten 1966, of an angle from the zenith in radians. */
+double perez_air_mass(double zenith);
+
 typedef struct perez_sky {
     double zenith;        /* of the sun, radians, at most pi/2 */
     double clearness;     /* epsilon, from 1 (overcast); infinite without diffuse light */

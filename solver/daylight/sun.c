@@ -31,3 +31,19 @@ sun_position sun_at(double latitude, double longitude, double time_zone, int yea
     s.azimuth = atan2(s.direction[0], s.direction[1]);
     return s;
 }
+
+sun_position sun_of_angles(double azimuth, double altitude) {
+    const double a = remainder(azimuth, 360) * DEGREE, h = altitude * DEGREE;
+    return (sun_position){
+        .altitude = h, .azimuth = a, .direction = {sin(a) * cos(h), cos(a) * cos(h), sin(h)}, .distance = 1};
+}
+
+sun_position sun_turned(sun_position s, double north) {
+    /* Without a turn the bits stay. */
+    if (north == 0) return s;
+    const double turn = north * DEGREE, east = s.direction[0], ahead = s.direction[1];
+    s.azimuth = remainder(s.azimuth + turn, 2 * M_PI);
+    s.direction[0] = east * cos(turn) + ahead * sin(turn);
+    s.direction[1] = ahead * cos(turn) - east * sin(turn);
+    return s;
+}

@@ -17,4 +17,11 @@ typedef struct sun_position {
 sun_position sun_at(double latitude, double longitude, double time_zone, int year, int month, int day,
                     double hour);
 
+/* A position by its azimuth from north by east and its altitude, in degrees, one astronomical unit away. */
+sun_position sun_of_angles(double azimuth, double altitude);
+
+/* The position in a model whose north is `north` degrees from its +y (z up) or -z (y up), by east as azimuths
+ * are: at 90 north is +x. The azimuth grows by that; its sky goes with it. */
+sun_position sun_turned(sun_position s, double north);
+
 #endif

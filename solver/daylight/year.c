@@ -60,8 +60,8 @@ void year_add_sun(const sky_tiling *s, const double sun[3], double horizontal, d
 /* One hour: L [n_tiles]. */
 static void make_hour(const weather *w, const weather_hour *h, const sky_tiling *s,
                       const year_options *options, double *L, year_sun *seen, year_summary *sum) {
-    const sun_position sun =
-        sun_at(w->latitude, w->longitude, w->time_zone, h->year, h->month, h->day, h->hour);
+    const sun_position sun = sun_turned(
+        sun_at(w->latitude, w->longitude, w->time_zone, h->year, h->month, h->day, h->hour), options->north);
     const bool up = sun.direction[2] > 0;
     double direct = h->direct, horizontal = up ? direct * sun.direction[2] : 0;
     if (w->direct_is_horizontal && up) {
@@ -82,7 +82,7 @@ static void make_hour(const weather *w, const weather_hour *h, const sky_tiling 
     const double direct_light = horizontal * (options->photometric ? perez_direct_efficacy(&p, water) : 1);
     if (diffuse_light > 0) year_add_sky(s, &p, &sun, diffuse_light, L);
     if (horizontal > 0) {
-        const double most = w->direct_is_horizontal ? 1367 / (sun.distance * sun.distance) : INFINITY;
+        const double most = w->direct_is_horizontal ? PEREZ_SOLAR / (sun.distance * sun.distance) : INFINITY;
         seen->horizontal = direct_light;
         seen->normal = direct_light / horizontal * fmin(direct, most);
     }

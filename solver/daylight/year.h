@@ -43,6 +43,7 @@ typedef struct year_sun {
 typedef struct year_options {
     bool photometric;  /* cd/m2 and lux in place of W/(m2 sr) and W/m2 */
     bool sun_in_tiles; /* adds each sun to the tile in its direction */
+    double north;      /* degrees: see sun_turned */
 } year_options;
 
 /* L [w->n][n_tiles], W/(m2 sr), or cd/m2; suns [w->n], or NULL for none. Errors: LAM_ERR_MEMORY,
