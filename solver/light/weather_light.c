@@ -88,7 +88,7 @@ static void log_year(terminal *t, const year_summary *sum, double step, bool pho
                       (double)sum->sunless * step, sum->left_out);
 }
 
-lam_status weather_skies_read(const char *path, weather_gaps gaps, const sky_tiling *tiling,
+lam_status weather_skies_read(const char *path, weather_gaps gaps, const moment *at, const sky_tiling *tiling,
                               const year_options *options, terminal *t, weather_skies *out,
                               lam_error *error) {
     lam_status status = LAM_OK;
@@ -98,6 +98,7 @@ lam_status weather_skies_read(const char *path, weather_gaps gaps, const sky_til
     size_t count = 0;
     const progress steps = terminal_progress(t);
     TRY(weather_read(path, gaps, &w, error));
+    if (at != NULL) TRY(moment_pick(at, path, &w, error));
     if (!size_multiply(w.n, tiling->n_tiles, &count))
         FAIL(error, LAM_ERR_MEMORY, "%s: too many hours of tiles for memory", path);
     made.n = w.n;
@@ -108,6 +109,11 @@ lam_status weather_skies_read(const char *path, weather_gaps gaps, const sky_til
     if (made.L == NULL || made.suns == NULL || made.span.middle == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < w.n; i++) made.span.middle[i] = w.hours[i].hour;
     TRY(year_skies(&w, tiling, options, &steps, made.L, made.suns, &sum, error));
+    if (sum.lit == 0 && at != NULL) {
+        char name[MOMENT_BYTES];
+        moment_name(at, name);
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: the sky is dark at %s", path, name);
+    }
     if (sum.lit == 0)
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the sky is dark all year: of %.6g hours none has diffuse light, nor direct light of a sun "
@@ -115,6 +121,11 @@ lam_status weather_skies_read(const char *path, weather_gaps gaps, const sky_til
              path, (double)w.n * w.step);
     terminal_clear(t);
     log_weather(t, &w);
+    if (at != NULL) {
+        const long from = lround(60 * (w.hours[0].hour - w.step / 2)),
+                   to = lround(60 * (w.hours[0].hour + w.step / 2));
+        terminal_log(t, "the row from %02ld:%02ld to %02ld:%02ld", from / 60, from % 60, to / 60, to % 60);
+    }
     log_mended(t, &w, options->photometric);
     log_year(t, &sum, w.step, options->photometric);
     *out = made;
@@ -125,14 +136,20 @@ done:
     return status;
 }
 
-/* The tiling of a store's sky, without what it holds. */
-static lam_status load_tiling(store *s, sky_tiling *out, lam_error *error) {
+lam_status weather_tiling_load(store *s, const lam_sky *sky, sky_tiling *out, lam_error *error) {
     lam_status status = LAM_OK;
+    sky_tiling made = {0};
     char *name = NULL, *up = NULL;
     TRY(store_get_text(s, STORE_SKY, "tiling", &name, error));
     TRY(store_get_text(s, STORE_SKY, "up", &up, error));
-    TRY(sky_tiling_create(name, up[0], out, error));
+    TRY(sky_tiling_create(name, up[0], &made, error));
+    if (made.n_tiles != lam_sky_tiles(sky))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /sky has %zu tiles, %s has %zu", store_path(s), lam_sky_tiles(sky),
+             made.name, made.n_tiles);
+    *out = made;
+    made = (sky_tiling){0};
 done:
+    sky_tiling_free(&made);
     free(name);
     free(up);
     return status;
@@ -145,17 +162,16 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
     sky_tiling tiling = {0};
     weather_skies made = {0};
     /* Few emitters answer nothing but their tiles: the sun bounces from those. */
-    const bool few = lam_operator_emitters(op) > 0;
+    const bool few = lam_operator_emitters(op) > 0, batch = e->batch;
     if (sky == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "--weather %s: the store has no sky; precompute it with --sky",
              options->path);
-    TRY(load_tiling(s, &tiling, error));
-    if (tiling.n_tiles != lam_sky_tiles(sky))
-        FAIL(error, LAM_ERR_FORMAT, "%s: /sky has %zu tiles, %s has %zu", store_path(s), lam_sky_tiles(sky),
-             tiling.name, tiling.n_tiles);
-    const year_options year = {.photometric = options->photometric, .sun_in_tiles = few || !options->exact};
-    TRY(weather_skies_read(options->path, options->gaps, &tiling, &year, t, &made, error));
+    TRY(weather_tiling_load(s, sky, &tiling, error));
+    const year_options year = {
+        .photometric = options->photometric, .sun_in_tiles = few || !options->exact, .north = options->north};
+    TRY(weather_skies_read(options->path, options->gaps, options->at, &tiling, &year, t, &made, error));
     TRY(emission_add_skies(e, options->path, m, tiling.n_tiles, made.n, made.L, error));
+    if (options->at != NULL) e->batch = batch;
     if (e->n_vectors != made.n)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", options->path, e->n_vectors);
     *span = made.span;

@@ -3,6 +3,7 @@
 #define LAMBERT_LIGHT_WEATHER_LIGHT_H
 
 #include "solver/base/terminal.h"
+#include "solver/daylight/moment.h"
 #include "solver/daylight/year.h"
 #include "solver/light/emission.h"
 #include "solver/light/sunlight.h"
@@ -27,9 +28,17 @@ typedef struct weather_skies {
 
 void weather_skies_free(weather_skies *w);
 
-/* Reads a file, makes the skies of its rows and logs a summary, with what was missing. Errors: those of the
- * file, LAM_ERR_ARGUMENT where no hour has any light, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status weather_skies_read(const char *path, weather_gaps gaps, const sky_tiling *tiling,
+/* Points of an element that are tested for the sun: of hours by themselves, and of figures of a year. */
+enum { SUN_POINTS = 16, SUN_POINTS_YEAR = 4 };
+
+/* The tiling of a store's sky, without what it holds. Freed by sky_tiling_free. Errors: those of the store,
+ * LAM_ERR_FORMAT where the sky has other tiles. */
+lam_status weather_tiling_load(store *s, const lam_sky *sky, sky_tiling *out, lam_error *error);
+
+/* Reads a file, makes the skies of its rows, or, unless `at` is NULL, of the row that covers this moment, and
+ * logs a summary, with what was missing. Errors: those of the file, LAM_ERR_ARGUMENT where no hour has any
+ * light, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status weather_skies_read(const char *path, weather_gaps gaps, const moment *at, const sky_tiling *tiling,
                               const year_options *options, terminal *t, weather_skies *out, lam_error *error);
 
 /* The row of --gaps, a weather_gaps. */
@@ -51,6 +60,8 @@ typedef struct weather_options {
     bool exact;        /* --sun exact */
     size_t sun_points; /* --sun-points */
     weather_gaps gaps; /* --gaps */
+    const moment *at;  /* --date or --hour; NULL: all rows, a batch */
+    double north;      /* degrees */
 } weather_options;
 
 /* Puts e under the rows of a file, on the tiles of an open store. With an exact sun, *sun holds it for the

@@ -46,6 +46,7 @@ typedef struct solution {
     size_t n_vectors;
     bool batch;
     const char *const *names; /* [n_vectors], of figures of a year in place of vectors; NULL: numbers */
+    const char *named_as;     /* the member of JSON that holds them; NULL: "annual" */
     const float *values;      /* [n_vectors][C][n]; NULL where they are refined: */
     const float *corners;     /* [n_vectors][C][n][4] beside values, the 4th of a triangle NaN; or NULL */
     const double *refined;    /* [n_vectors][C][n], and, of each vector, [n_vectors]: */

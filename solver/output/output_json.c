@@ -125,7 +125,10 @@ static bool write_object(const solution *s, bool means, const answer_notes *note
                          problem *why) {
     const bool year = s->names != NULL, reduced = s->n_reductions > 0;
     bool written = answer_head(b, s->m->n, s->m->n_channels, notes) && write_hours(s, b) &&
-                   buffer_printf(b, ",\"%s\":{", year ? "annual" : "groups");
+                   buffer_printf(b, ",\"%s\":{",
+                                 !year                 ? "groups"
+                                 : s->named_as != NULL ? s->named_as
+                                                       : "annual");
     if (means) {
         written = written && (year ? write_year_means(s, b) : write_means(s, 0, s->n_vectors, s->batch, b));
     } else if (year && !reduced) {

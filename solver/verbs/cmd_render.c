@@ -7,6 +7,7 @@
 #include "solver/verbs/light_options.h"
 #include "solver/verbs/verbs.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -171,13 +172,14 @@ static void log_unused(const render_options *f, const option_result *given, term
 }
 
 int cmd_render(int argc, char **argv) {
-    render_options f = {0};
+    render_options f = {.light.at.north = NAN};
     option_result result = {0};
     lam_error error = {0};
     terminal t;
     char nothing[80];
     const option_table tables[] = {
         {NULL, render_output_rows, &f},       {LIGHT_HEADING, light_rows, &f.light},
+        {"", sky_time_rows, &f.light.at},     {"", sky_named_rows, &f.light.at},
         {"view", render_view_rows, &f},       {"false colour", render_color_rows, &f},
         {"animation", render_frame_rows, &f}, {0}};
     int go = options_parse(&verb, tables, argc, argv, &result);

@@ -1,9 +1,10 @@
-/* lambert sky: turns a weather file or a sky matrix of Radiance into the radiance of the tiles of a sky, hour
- * by hour. */
+/* lambert sky: turns a weather file, a sky matrix of Radiance or the name of a sky into the radiance of the
+ * tiles of a sky, hour by hour. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/daylight/sky_matrix.h"
+#include "solver/light/sky_options.h"
 #include "solver/light/weather_light.h"
 #include "solver/output/output.h"
 #include "solver/verbs/verbs.h"
@@ -17,8 +18,8 @@
 
 typedef struct fields {
     const char *output, *tiles, *model;
-    bool photometric;
     weather_gaps gaps;
+    sky_options at;
 } fields;
 
 static lam_status parse_tiles(const char *text, void *field, lam_error *error) {
@@ -57,21 +58,16 @@ static const option_row rows[] = {
      .choices = "perez",
      .preset = "perez",
      .help = "The all-weather sky of Perez, Seals and Michalsky 1993"},
-    {.name = "photometric",
-     .kind = OPTION_FLAG,
-     .offset = FIELD(photometric),
-     .help = "In cd/m2, by the luminous efficacies of Perez et al. 1990. Without a dew point (a .wea file "
-             "has none) the air holds 2 cm of water. A matrix is multiplied by 179 lm/W, by which gendaymtx "
-             "-O0 divides light"},
     OPTION_ROW_GAPS(FIELD(gaps)),
     {0},
 };
 
 static const option_command verb = {
     .name = "lambert sky",
-    .arguments = "WEATHER.epw|.wea|MATRIX.mtx -o SKY.npy",
-    .summary = "Turn the weather of a year, or a sky matrix of Radiance, into the radiance of the tiles of a "
-               "sky, row by row.",
+    .arguments = "WEATHER.epw|.wea|MATRIX.mtx|NAME -o SKY.npy",
+    .summary =
+        "Turn the weather of a year, a sky matrix of Radiance, or a sky by name (even, overcast, clear, "
+        "turbidity:T), into the radiance of the tiles of a sky, row by row.",
     .notes =
         "The sky of a row is as bright as the diffuse light in the file, and the one tile that holds the "
         "sun has the direct light: a horizontal plane receives exactly what the file states. The sun stands "
@@ -95,19 +91,53 @@ static lam_status make_skies(const char *path, const fields *f, terminal *t, lam
     atomic_file file = {0};
     TRY(atomic_file_check(f->output, error));
     TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
-    const year_options year = {.photometric = f->photometric, .sun_in_tiles = true};
-    TRY(weather_skies_read(path, f->gaps, &tiling, &year, t, &made, error));
+    const year_options year = {.photometric = f->at.photometric,
+                               .sun_in_tiles = true,
+                               .north = isnan(f->at.north) ? 0 : f->at.north};
+    TRY(weather_skies_read(path, f->gaps, sky_options_moment(&f->at), &tiling, &year, t, &made, error));
     TRY(atomic_file_open(f->output, &file, error));
     TRY(output_array(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L, NULL, error));
     TRY(atomic_file_commit(&file, error));
     printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, made.n, tiling.n_tiles, tiling.name,
-           f->photometric ? "cd/m2" : "W/(m2 sr)");
+           f->at.photometric ? "cd/m2" : "W/(m2 sr)");
     /* An array holds no times. */
     if (made.span.step != 1)
         terminal_log(t, "figures of a year of this array need --hours-per-vector %.10g", made.span.step);
 done:
     atomic_file_abort(&file);
     weather_skies_free(&made);
+    sky_tiling_free(&tiling);
+    return status;
+}
+
+/* One sky by name. */
+static lam_status make_named(const char *name, const fields *f, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_tiling tiling = {0};
+    atomic_file file = {0};
+    double *L = NULL;
+    float *narrow = NULL;
+    year_sun sun;
+    char said[SKY_SAID] = "";
+    const bool lux = f->at.photometric || f->at.lux_outside > 0 || !f->at.place.given;
+    TRY(atomic_file_check(f->output, error));
+    TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
+    L = memory_allocate(tiling.n_tiles, sizeof *L, "the sky", error);
+    narrow = memory_allocate(tiling.n_tiles, sizeof *narrow, "the sky", error);
+    if (L == NULL || narrow == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(sky_options_make(&f->at, name, isnan(f->at.north) ? 0 : f->at.north, &tiling, true, L, &sun, said,
+                         error));
+    for (size_t k = 0; k < tiling.n_tiles; k++) narrow[k] = (float)L[k];
+    terminal_log(t, "%s", said);
+    TRY(atomic_file_open(f->output, &file, error));
+    TRY(output_array(file.stream, 2, (const size_t[2]){1, tiling.n_tiles}, narrow, NULL, error));
+    TRY(atomic_file_commit(&file, error));
+    printf("%s: 1 sky of %zu tiles (%s), %s\n", f->output, tiling.n_tiles, tiling.name,
+           lux ? "cd/m2" : "W/(m2 sr)");
+done:
+    atomic_file_abort(&file);
+    free(L);
+    free(narrow);
     sky_tiling_free(&tiling);
     return status;
 }
@@ -133,7 +163,7 @@ static lam_status convert_matrix(const char *path, const fields *f, terminal *t,
     bool lit = false;
     TRY(atomic_file_check(f->output, error));
     TRY(sky_matrix_read(path, f->tiles, &steps, &m, error));
-    weigh(&m, f->photometric ? WHITE_EFFICACY : 1, received, &lit);
+    weigh(&m, f->at.photometric ? WHITE_EFFICACY : 1, received, &lit);
     terminal_clear(t);
     if (!lit) FAIL(error, LAM_ERR_ARGUMENT, "%s: the sky is dark in all %zu columns", path, m.n);
     for (size_t c = 0; c < m.n_channels; c++)
@@ -142,7 +172,7 @@ static lam_status convert_matrix(const char *path, const fields *f, terminal *t,
                      : c == 0          ? ", first component"
                      : c == 1          ? ", second"
                                        : ", third",
-                     received[c] * 1e-3, f->photometric ? "klx h" : "kWh/m2");
+                     received[c] * 1e-3, f->at.photometric ? "klx h" : "kWh/m2");
     TRY(atomic_file_open(f->output, &file, error));
     if (m.n_channels == 1)
         TRY(output_array(file.stream, 2, (const size_t[2]){m.n, m.tiling.n_tiles}, m.L, NULL, error));
@@ -151,7 +181,7 @@ static lam_status convert_matrix(const char *path, const fields *f, terminal *t,
                          error));
     TRY(atomic_file_commit(&file, error));
     printf("%s: %zu skies of %zu tiles (%s), %s%s\n", f->output, m.n, m.tiling.n_tiles, m.tiling.name,
-           m.n_channels == 1 ? "" : "three components, ", f->photometric ? "cd/m2" : "W/(m2 sr)");
+           m.n_channels == 1 ? "" : "three components, ", f->at.photometric ? "cd/m2" : "W/(m2 sr)");
 done:
     atomic_file_abort(&file);
     sky_matrix_free(&m);
@@ -159,22 +189,33 @@ done:
 }
 
 int cmd_sky(int argc, char **argv) {
-    fields f = {0};
+    fields f = {.at.north = NAN};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     char extension[16];
-    const option_table tables[] = {{NULL, rows, &f}, {0}};
+    const option_table tables[] = {
+        {NULL, rows, &f}, {"", sky_time_rows, &f.at}, {"", sky_named_rows, &f.at}, {0}};
     int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     const char *path = given.arguments[0];
     if (f.output == NULL) return options_usage(verb.name, "no -o SKY.npy given");
     atomic_file_extension(f.output, extension);
     if (strcmp(extension, "npy") != 0) return options_usage(verb.name, "-o %s: must end in .npy", f.output);
-    const bool matrix = sky_matrix_is_named(path);
-    if (!matrix && !weather_is_named(path))
-        return options_usage(verb.name, "%s: must end in .epw or .wea, or in .mtx or .smx", path);
+    const bool matrix = sky_matrix_is_named(path), named = named_sky_is(path);
+    if (!matrix && !named && !weather_is_named(path))
+        return options_usage(verb.name, "%s: must end in .epw or .wea, or in .mtx or .smx, or name a sky",
+                             path);
+    if ((matrix || named) && options_given(&given, "gaps"))
+        return options_usage(verb.name, "--gaps is for weather");
+    /* A matrix is of a time and a place, and knows light in W alone. */
+    sky_options at = f.at;
+    if (matrix) at.photometric = false;
+    if (sky_options_check(&at, named ? path : NULL, !matrix && !named, &error) != LAM_OK)
+        return options_usage(verb.name, "%s", error.message);
     terminal_open(&term, verb.name, false, false);
-    const lam_status status = (matrix ? convert_matrix : make_skies)(path, &f, &term, &error);
+    const lam_status status = (matrix  ? convert_matrix
+                               : named ? make_named
+                                       : make_skies)(path, &f, &term, &error);
     return status == LAM_OK ? 0 : terminal_fail(&term, &error);
 }

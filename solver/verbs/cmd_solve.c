@@ -3,14 +3,12 @@
 #include "solver/base/terminal.h"
 #include "solver/codec/request.h"
 #include "solver/codec/stated_errors.h"
-#include "solver/light/annual.h"
 #include "solver/light/emission_refine.h"
-#include "solver/light/weather_light.h"
 #include "solver/output/output.h"
 #include "solver/render/smooth.h"
-#include "solver/verbs/light_options.h"
 #include "solver/verbs/own_error.h"
 #include "solver/verbs/solve_faces.h"
+#include "solver/verbs/solve_options.h"
 #include "solver/verbs/verbs.h"
 
 #include <math.h>
@@ -18,139 +16,6 @@
 #include <string.h>
 
 #define A_LEAP_YEAR (24. * 366)
-
-/* --sun: the light of its tile, or the sun itself. */
-typedef enum sun_asked { SUN_TILES, SUN_EXACT } sun_asked;
-
-/* --at: the places of the values. */
-typedef enum place_asked { AT_ELEMENTS, AT_FACES } place_asked;
-
-typedef struct fields {
-    light_options light;
-    option_list reduce, annual;
-    const char *weather, *quantity, *output, *occupied;
-    double hours, tolerance;
-    sun_asked sun;
-    place_asked at;
-    uint64_t sun_points;
-    weather_gaps gaps;
-    bool photometric, json, verbose, smooth, linear;
-    bool sun_given; /* --sun was */
-} fields;
-
-#define FIELD(member) offsetof(fields, member)
-static const option_row weather_rows[] = {
-    {.name = "weather",
-     .kind = OPTION_TEXT,
-     .offset = FIELD(weather),
-     .argument = "FILE.epw|.wea",
-     .help = "The hours of a weather file in place of --sky, as `lambert sky` converts them to the tiles of "
-             "the store"},
-    {.name = "sun",
-     .kind = OPTION_WORD,
-     .offset = FIELD(sun),
-     .choices = "tiles|exact",
-     .preset = "exact",
-     .help = "Sun of --weather. exact: the sun itself and its shadows, by rays at the mesh of the store; a "
-             "store of few emitters then has exact direct light and takes the bounces from the tile. tiles: "
-             "the light of the tile that holds the sun, which is quicker, and 3 to 40 % off on walls"},
-    {.name = "sun-points",
-     .kind = OPTION_COUNT,
-     .offset = FIELD(sun_points),
-     .argument = "N",
-     .otherwise = "16, or 4 with --annual",
-     .least = 1,
-     .most = SUN_RAYS_MOST,
-     .help =
-         "--sun exact: points of an element that are tested for the sun in each hour; from 16 on, elements "
-         "that the sun reaches a part of are tested by 8 times as many"},
-    {.name = "photometric",
-     .kind = OPTION_FLAG,
-     .offset = FIELD(photometric),
-     .help = "--weather in lux, as `lambert sky --photometric`"},
-    OPTION_ROW_GAPS(FIELD(gaps)),
-    {0},
-};
-static const option_row answer_options[] = {
-    {.name = "quantity",
-     .kind = OPTION_CHOICE,
-     .offset = FIELD(quantity),
-     .choices = "radiosity|irradiance|indirect",
-     .otherwise = "radiosity; irradiance with --annual",
-     .argument = "NAME",
-     .help = "radiosity, irradiance or indirect"},
-    {.name = "reduce",
-     .kind = OPTION_LIST,
-     .offset = FIELD(reduce),
-     .argument = "GROUP=FIGURE",
-     .help = "mean, sum, min, max, uniformity or variance of a group, or of all whose names begin so "
-             "('desk*'); may be repeated"},
-    {.name = "at",
-     .kind = OPTION_WORD,
-     .offset = FIELD(at),
-     .choices = "elements|faces",
-     .preset = "elements",
-     .help = "The places of values. faces: means by area over the fronts of each face of the scene file, in "
-             "its order (.npy: NaN, .json: null, .csv: nothing for a face without an element), into "
-             ".npy, .json, .csv, or as a table"},
-    {.name = "smooth",
-     .kind = OPTION_FLAG,
-     .offset = FIELD(smooth),
-     .help = "Write the light at the corners of elements, which neighbours give it, beside the mean (.ply, "
-             ".vtu) or in its place (.glb; .npy: one more dimension, 4, NaN where a triangle has no corner)"},
-    {.name = "linear",
-     .kind = OPTION_FLAG,
-     .offset = FIELD(linear),
-     .help = "Leave light below zero, which else is raised to zero with the means of groups kept"},
-    {.name = "json",
-     .kind = OPTION_FLAG,
-     .offset = FIELD(json),
-     .help = "Print JSON in place of a table, without -o"},
-    {.name = "verbose",
-     .kind = OPTION_FLAG,
-     .offset = FIELD(verbose),
-     .help = "Print the parts of the stated error, too"},
-    {.name = "tolerance",
-     .kind = OPTION_NUMBER,
-     .offset = FIELD(tolerance),
-     .argument = "X",
-     .least = 0,
-     .most = 1,
-     .above = true,
-     .below = true,
-     .help = "Refine the answer in double until its certified error is at most X times the largest indirect "
-             "light, and write double; the store must keep its form factors"},
-    {0},
-};
-static const option_row year_rows[] = {
-    {.name = "annual",
-     .kind = OPTION_LIST,
-     .offset = FIELD(annual),
-     .argument = "FIGURE",
-     .help = "sum: over all hours, in 1000 h (kWh/m2 from W/m2, klx h from lx); autonomy=X: share of the "
-             "hours (0 to 1) with at least X; useful=LOW,HIGH: share of the hours with LOW to HIGH, both "
-             "included (100,2000 lx); may be repeated. X, LOW and HIGH are in the unit of the answer: lx if "
-             "the skies are in cd/m2"},
-    {.name = "occupied",
-     .kind = OPTION_TEXT,
-     .offset = FIELD(occupied),
-     .argument = "FROM-TO",
-     .otherwise = "all",
-     .help = "Hours of the day in standard time that shares refer to, such as 8-18; the batch must be whole "
-             "days from midnight on, or rows of --weather, which have their times"},
-    {.name = "hours-per-vector",
-     .kind = OPTION_NUMBER,
-     .offset = FIELD(hours),
-     .argument = "H",
-     .otherwise = "1, or the step of the rows of --weather",
-     .least = 0,
-     .above = true,
-     .most = 8784,
-     .help =
-         "Duration of each vector of the batch. With --weather it must be that of the rows, unless no two "
-         "rows are neighbours"},
-    {0},
-};
 
 static const option_command verb = {
     .name = "lambert solve",
@@ -281,18 +146,23 @@ done:
 }
 
 /* Adds the light of --weather to the light: of the elements selected, or of all. */
-static lam_status add_weather(const fields *f, store *s, const mesh *m, size_t n_selected,
+static lam_status add_weather(const solve_options *f, store *s, const mesh *m, size_t n_selected,
                               const uint32_t *selected, terminal *t, lit_store *lit, sunlight *sun,
                               weather_span *span, lam_error *error) {
     /* Few emitters are refined by the light of their tiles alone. */
     const bool in_tiles = !f->sun_given && f->tolerance > 0 && lam_operator_emitters(lit->op) > 0;
+    double north = 0;
+    const lam_status status = sky_options_north(&f->light.at, s, &north, error);
+    if (status != LAM_OK) return status;
     const weather_options hours = {.path = f->weather,
-                                   .photometric = f->photometric,
+                                   .photometric = f->light.at.photometric,
                                    .exact = f->sun == SUN_EXACT && !in_tiles,
                                    .sun_points = f->sun_points > 0     ? (size_t)f->sun_points
-                                                 : f->annual.count > 0 ? 4
-                                                                       : 16,
-                                   .gaps = f->gaps};
+                                                 : f->annual.count > 0 ? SUN_POINTS_YEAR
+                                                                       : SUN_POINTS,
+                                   .gaps = f->gaps,
+                                   .at = sky_options_moment(&f->light.at),
+                                   .north = north};
     return weather_light_add(&hours, s, m, lit->op, lit->sky, n_selected, selected, t, &lit->light, sun, span,
                              error);
 }
@@ -314,8 +184,9 @@ static void answers_free(answers *a) {
 }
 
 /* The answers, and how many elements of each were limited. */
-static lam_status answer(const fields *f, const lit_store *lit, size_t n_selected, const uint32_t *selected,
-                         terminal *t, solution *out, answers *made, lam_error *error) {
+static lam_status answer(const solve_options *f, const lit_store *lit, size_t n_selected,
+                         const uint32_t *selected, terminal *t, solution *out, answers *made,
+                         lam_error *error) {
     lam_status status = LAM_OK;
     made->limited = memory_allocate(lit->light.n_vectors, sizeof *made->limited, "the solution", error);
     if (made->limited == NULL) TRY(LAM_ERR_MEMORY);
@@ -328,7 +199,7 @@ done:
 }
 
 /* The answers to each light, refined, or figures of a year, as the options ask for. */
-static lam_status find_answers(const char *path, const fields *f, const annual_options *year,
+static lam_status find_answers(const char *path, const solve_options *f, const annual_options *year,
                                const lit_store *lit, size_t n_selected, const uint32_t *selected, terminal *t,
                                solution *out, answers *made, lam_error *error) {
     lam_status status = LAM_OK;
@@ -347,7 +218,7 @@ done:
     return status;
 }
 
-static lam_status put_out(const solution *out, const fields *f, lam_error *error) {
+static lam_status put_out(const solution *out, const solve_options *f, lam_error *error) {
     if (f->output != NULL) return output_write(out, f->output, error);
     if (f->json) return output_print_json(out, error);
     output_print(out);
@@ -365,8 +236,8 @@ static error_scene error_scene_of(const mesh *m, const emission_scene *scene) {
                          .members = scene->groups.elements};
 }
 
-static lam_status solve(const char *path, const fields *f, const annual_options *year, reduction *reductions,
-                        size_t n_reductions, terminal *t, lam_error *error) {
+static lam_status solve(const char *path, const solve_options *f, const annual_options *year,
+                        reduction *reductions, size_t n_reductions, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     mesh m = {0};
@@ -434,7 +305,9 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     hours = hours_of(&span);
     if (f->weather != NULL) out.hours = &hours;
     if (f->tolerance == 0) take_error(&stated, &lit.light, n_selected, selected, t, &out);
-    if (year->n_figures > 0) out.names = names;
+    if (f->figure != NULL) names[0] = "daylight_factor";
+    if (year->n_figures > 0 || f->figure != NULL) out.names = names;
+    if (f->figure != NULL) out.named_as = "figures";
     TRY(find_answers(path, f, &figures, &lit, n_selected, selected, t, &out, &made, error));
     if (made.values != NULL && year->n_figures == 0)
         TRY(own_error_take(&stated, &about, &lit, n_selected, selected, &out, &made.name_errors, error));
@@ -458,22 +331,8 @@ done:
     return status;
 }
 
-/* The figures of --annual and their options. */
-static lam_status read_year(const fields *f, annual_options *year, lam_error *error) {
-    lam_status status = LAM_OK;
-    for (size_t i = 0; i < f->annual.count; i++) TRY(annual_add(year, f->annual.items[i], error));
-    if (f->annual.count == 0 && f->hours > 0)
-        FAIL(error, LAM_ERR_ARGUMENT, "--hours-per-vector is for --annual");
-    if (!annual_has_shares(year) && f->occupied != NULL)
-        FAIL(error, LAM_ERR_ARGUMENT, "--occupied is for --annual autonomy=X and useful=LOW,HIGH");
-    if (f->hours > 0) year->hours = f->hours;
-    if (f->occupied != NULL) TRY(annual_parse_occupied(f->occupied, year, error));
-done:
-    return status;
-}
-
 int cmd_solve(int argc, char **argv) {
-    fields f = {.light.signs = true};
+    solve_options f = {.light.signs = true, .light.at.north = NAN};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
@@ -481,52 +340,22 @@ int cmd_solve(int argc, char **argv) {
     char formats[OUTPUT_FORMATS], output_help[2 * OUTPUT_FORMATS];
     output_formats(OUTPUT_ELEMENTS, formats);
     snprintf(output_help, sizeof output_help, "%s; without it the mean of every group is printed", formats);
-    const option_row output_rows[] = {OPTION_ROW_OUTPUT(FIELD(output), "FILE", .help = output_help), {0}};
+    const option_row output_rows[] = {
+        OPTION_ROW_OUTPUT(offsetof(solve_options, output), "FILE", .help = output_help), {0}};
     const option_table tables[] = {
         {NULL, output_rows, &f},
         {LIGHT_HEADING, light_rows, &f.light},
-        {"", weather_rows, &f},
-        {"answer", answer_options, &f},
+        {"", solve_weather_rows, &f},
+        {"", sky_time_rows, &f.light.at},
+        {"", sky_named_rows, &f.light.at},
+        {"answer", solve_answer_rows, &f},
         {"a year: figures of each element over a batch of skies or emissions, in place of the batch",
-         year_rows, &f},
+         solve_year_rows, &f},
         {0}};
     int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
-    if (light_check(&f.light, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
-    if (f.light.sky != NULL && f.weather != NULL)
-        return options_usage(verb.name, "give --sky or --weather, not both");
-    if (f.light.sky != NULL && weather_is_named(f.light.sky)) {
-        f.weather = f.light.sky;
-        f.light.sky = NULL;
-    }
-    if (f.weather != NULL && !weather_is_named(f.weather))
-        return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
-    static const char *const of_weather[] = {"sun", "sun-points", "photometric", "gaps"};
-    for (size_t k = 0; f.weather == NULL && k < sizeof of_weather / sizeof of_weather[0]; k++)
-        if (options_given(&given, of_weather[k]))
-            return options_usage(verb.name, "--%s is for --weather", of_weather[k]);
-    f.sun_given = options_given(&given, "sun");
-    if (f.sun != SUN_EXACT && options_given(&given, "sun-points"))
-        return options_usage(verb.name, "--sun-points is for --sun exact");
-    if (f.tolerance > 0 && f.annual.count > 0)
-        return options_usage(verb.name, "--tolerance is not for --annual");
-    if (f.tolerance > 0 && f.linear)
-        return options_usage(verb.name, "--linear is not for --tolerance, whose answers are not below zero");
-    if (f.json && f.output != NULL) return options_usage(verb.name, "give --json or -o, not both");
-    if (f.smooth && (f.output == NULL || f.reduce.count > 0 || f.tolerance > 0))
-        return options_usage(verb.name, "--smooth is for -o, without --reduce and --tolerance");
-    if (f.at == AT_FACES && (f.reduce.count > 0 || f.smooth))
-        return options_usage(verb.name, "--at faces is of single faces: leave out --%s",
-                             f.smooth ? "smooth" : "reduce");
-    const output_content content = f.smooth             ? OUTPUT_CORNERS
-                                   : f.at == AT_FACES   ? OUTPUT_FACES
-                                   : f.reduce.count > 0 ? OUTPUT_GROUPS
-                                                        : OUTPUT_ELEMENTS;
-    if (f.output != NULL && output_check(f.output, content, &error) != LAM_OK)
+    if (solve_options_check(&f, &given, &year, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);
-    if (read_year(&f, &year, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
-    /* Studies of daylight ask for the light that a place receives. */
-    if (f.quantity == NULL) f.quantity = year.n_figures > 0 ? "irradiance" : "radiosity";
     reduction reductions[OPTION_LIST_MAX] = {0};
     size_t n_reductions = 0;
     lam_status status = LAM_OK;

@@ -27,17 +27,23 @@ const option_row light_rows[] = {
     {.name = "sky",
      .kind = OPTION_TEXT,
      .offset = FIELD(sky),
-     .argument = "FILE.npy|.mtx|.smx|.epw|.wea",
+     .argument = "NAME|FILE.npy|.mtx|.smx|.epw|.wea",
      .help =
-         "Radiances of the tiles of the sky, W/(m2 sr): [m], [C][m], or a batch of them for solve; alone "
+         "even, overcast, clear or turbidity:T (of Linke, 1 to 20): a sky by name. Or radiances of the tiles "
+         "of the sky, W/(m2 sr): [m], [C][m], or a batch of them for solve; alone "
          "or added to the other light. solve also takes what `lambert sky` reads: a matrix of Radiance on "
          "the tiles of the store, and weather, as --weather does. A store of one channel takes coloured "
          "skies, [b][3][m], by their luminance"},
     {0},
 };
 
+const char *light_named_sky(const light_options *options) {
+    return options->sky != NULL && named_sky_is(options->sky) ? options->sky : NULL;
+}
+
 lam_status light_check(const light_options *options, lam_error *error) {
     lam_status status = LAM_OK;
+    TRY(sky_options_check(&options->at, light_named_sky(options), options->weather, error));
     if (options->emit.count > 0 && options->emission != NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "give --emit or --emission, not both");
     TRY(emission_check_items(&options->emit, error));
@@ -50,12 +56,13 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
     lam_status status = LAM_OK;
     char *tiling = NULL;
     form_factor_storage how;
+    const char *const named = light_named_sky(options);
     const emission_options given = {.items = &options->emit,
                                     .path = options->emission,
                                     .frames = options->frames,
-                                    .sky = options->sky,
+                                    .sky = named != NULL ? NULL : options->sky,
                                     .signs = options->signs,
-                                    .other = other};
+                                    .other = other || named != NULL};
     TRY(emission_scene_create(m, &out->scene, error));
     TRY(sky_load(s, m->n, &out->sky, error));
     TRY(operator_load(s, &out->op, error));
@@ -65,6 +72,9 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
     if (out->sky != NULL) TRY(store_get_text(s, STORE_SKY, "tiling", &tiling, error));
     if (tiling != NULL) snprintf(out->scene.tiling, sizeof out->scene.tiling, "%s", tiling);
     TRY(emission_choose(&out->scene, &given, &out->light, &out->own, error));
+    if (named != NULL)
+        TRY(named_light_add(&options->at, named, s, m, out->op, out->sky, &out->light, &out->sun, out->said,
+                            error));
     const emitters *few = operator_emitters_of(out->op);
     if (out->own && few != NULL && few->a.direct != NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
@@ -83,11 +93,13 @@ done:
 void light_close(lit_store *lit) {
     emission_scene_free(&lit->scene);
     emission_free(&lit->light);
+    sunlight_free(&lit->sun);
     lam_operator_close(lit->op);
     lam_sky_close(lit->sky);
 }
 
 void light_log(const lit_store *lit, terminal *t) {
+    if (lit->said[0] != '\0') terminal_log(t, "%s", lit->said);
     if (lit->light.by_luminance)
         terminal_log(t, "the store is grey: the coloured sky lights it by its luminance, .265 R + .670 G + "
                         ".065 B");

@@ -4,6 +4,7 @@
 
 #include "solver/base/terminal.h"
 #include "solver/light/emission.h"
+#include "solver/light/sky_options.h"
 #include "solver/operator/limiter.h"
 #include "store/store.h"
 
@@ -12,12 +13,17 @@
 typedef struct light_options {
     option_list emit;
     const char *emission, *sky;
+    sky_options at;     /* of a named sky, and of weather */
+    bool weather;       /* there is weather, which the verb adds; no row of the table */
     bool signs;         /* --emission may be negative; no row of the table */
     const char *frames; /* of an animation, in place of --emit and --emission; no row of the table */
 } light_options;
 
-/* The rows of a table that fills light_options. */
+/* The rows of a table that fills light_options; those of sky_options.h fill its member `at`. */
 extern const option_row light_rows[];
+
+/* The named sky of --sky; NULL: it is a file, or there is none. */
+const char *light_named_sky(const light_options *options);
 
 /* Checks what does not depend on the store; an error is wrong usage. */
 lam_status light_check(const light_options *options, lam_error *error);
@@ -30,6 +36,8 @@ typedef struct lit_store {
     emission light;
     lam_limiter limiter; /* of its answers, which borrows from mesh and scene; light has it */
     bool own;            /* the light is the scene's own */
+    sunlight sun;        /* of a named sky; light has it */
+    char said[SKY_SAID]; /* of a named sky; "": there is none */
 } lit_store;
 
 /* Loads from an open store with all threads for the operator. `other` is light that the caller adds later, so
@@ -38,7 +46,7 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
                       lam_error *error);
 void light_close(lit_store *lit);
 
-/* Says where a coloured sky lights a grey store. */
+/* Says how bright a named sky is, and where a coloured sky lights a grey store. */
 void light_log(const lit_store *lit, terminal *t);
 
 /* Says how many values of answers were below zero, of which each vector had so many. */

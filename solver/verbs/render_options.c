@@ -247,7 +247,7 @@ static lam_status check_frames(const render_options *f, lam_error *error) {
         FAIL(error, LAM_ERR_ARGUMENT, "--quantity %s shows no light: there is none to animate",
              render_quantity_name(f, name));
     if (strcmp(frames, ANIMATE_SKY) == 0) {
-        if (f->light.sky == NULL)
+        if (f->light.sky == NULL || light_named_sky(&f->light) != NULL)
             FAIL(error, LAM_ERR_ARGUMENT, "--animate sky is of the skies of --sky FILE");
         goto done;
     }
