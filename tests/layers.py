@@ -72,7 +72,7 @@ ALLOWED = {
     "server/net": f"{BELOW_LINALG} solver/codec/",
     "server/queue": f"{BELOW_LINALG} solver/codec/",
     "server/scene": f"{OPERATOR} solver/codec/ server/queue/ server/config.h",
-    "server/route": f"{OPERATOR} solver/codec/ server/net/ server/queue/ server/scene/ server/config.h",
+    "server/route": f"{OPERATOR} solver/codec/ solver/daylight/ server/net/ server/queue/ server/scene/ server/config.h",
     "server/http": f"{OPERATOR} solver/codec/ server/net/ server/queue/ server/scene/ server/route/ server/config.h",
     "server": f"{OPERATOR} solver/codec/ solver/waits.h server/",
     "tests/bench": "lambert/ store/ solver/ server/ support/ tests/bench/suites/stats.h tests/bench/suites/mesh_truths.h",

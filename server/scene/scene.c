@@ -249,12 +249,28 @@ static size_t threads_of(const lam_operator *op, size_t most) {
     return worth < 1 ? 1 : worth < most ? worth : most;
 }
 
+/* The tiling of the sky by name, where the store states it. */
+static lam_status read_tiling(store *s, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *name = NULL, *up = NULL;
+    if (made->sky == NULL || !store_has(s, STORE_SKY "/tiles")) goto done;
+    TRY(store_get_text(s, STORE_SKY, "tiling", &name, error));
+    TRY(store_get_text(s, STORE_SKY, "up", &up, error));
+    if (strlen(name) < sizeof made->sky_tiling) strcpy(made->sky_tiling, name);
+    made->sky_up = up[0];
+done:
+    free(name);
+    free(up);
+    return status;
+}
+
 /* Once the scene is described. */
 static lam_status keep_texts(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     buffer tiles = {0};
     uint64_t memory;
     TRY(scene_texts_describe(&made->texts, made->description, made->ledger, error));
+    TRY(read_tiling(s, made, error));
     if (made->sky != NULL) TRY(tile_places_read(s, lam_sky_tiles(made->sky), &tiles, error));
     TRY(scene_texts_add_sky(&made->texts, &tiles, &made->weather, made->ledger, &memory, error));
     made->memory += memory;

@@ -40,6 +40,8 @@ struct scene {
     double *area;          /* [n], m^2 */
     lam_limiter limiter;   /* of answers below zero; it borrows groups and areas */
     lam_sky *sky;          /* NULL: none */
+    char sky_tiling[32];   /* the name of its tiles; "": not known. A variant has none of its own */
+    char sky_up;           /* 'x', 'y' or 'z' */
     weather_file weather;  /* beside the file; its text is in texts. A variant has none of its own */
     size_t n_emitters;     /* 0: the store answers any emission */
     uint64_t bytes;        /* of /operator as stored; of a variant, of the cores alone */

@@ -50,16 +50,15 @@ void moment_name(const moment *m, char text[MOMENT_BYTES]) {
              minutes % 60);
 }
 
-lam_status moment_pick(const moment *m, const char *path, weather *w, lam_error *error) {
+lam_status moment_find(const moment *m, const char *path, const weather *w, weather_hour *out,
+                       lam_error *error) {
     char name[MOMENT_BYTES];
     for (size_t i = 0; i < w->n; i++) {
         const weather_hour *h = &w->hours[i];
         /* Decimals of hours are rounded. */
         const double from = h->hour - w->step / 2 - 1e-3, to = h->hour + w->step / 2 - 1e-3;
         if (h->month != m->month || h->day != m->day || m->hour < from || m->hour >= to) continue;
-        w->hours[0] = *h;
-        w->n = 1;
-        w->stretches = 1;
+        *out = *h;
         return LAM_OK;
     }
     moment_name(m, name);
@@ -67,4 +66,13 @@ lam_status moment_pick(const moment *m, const char *path, weather *w, lam_error 
                        "%s: no row covers %s; it has %zu rows of %.4g h from %d/%d to %d/%d", path, name,
                        w->n, w->step, w->hours[0].month, w->hours[0].day, w->hours[w->n - 1].month,
                        w->hours[w->n - 1].day);
+}
+
+lam_status moment_pick(const moment *m, const char *path, weather *w, lam_error *error) {
+    weather_hour found;
+    const lam_status status = moment_find(m, path, w, &found, error);
+    if (status != LAM_OK) return status;
+    w->hours[0] = found;
+    w->n = w->stretches = 1;
+    return LAM_OK;
 }

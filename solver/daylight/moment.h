@@ -20,8 +20,12 @@ enum { MOMENT_BYTES = 24 };
 /* "21 Mar 12:00". */
 void moment_name(const moment *m, char text[MOMENT_BYTES]);
 
-/* Leaves of w the row whose part of the day holds the moment, the first where years repeat it. Errors:
+/* The row of w whose part of the day holds the moment, the first where years repeat it. Errors:
  * LAM_ERR_ARGUMENT where no row does; path names the file. O(n). */
+lam_status moment_find(const moment *m, const char *path, const weather *w, weather_hour *out,
+                       lam_error *error);
+
+/* Leaves of w that row alone. */
 lam_status moment_pick(const moment *m, const char *path, weather *w, lam_error *error);
 
 #endif

@@ -153,8 +153,8 @@ done:
     return status;
 }
 
-/* The times of the day that any row of a WEA has: others are chosen to be absent. Of an EPW NULL: all of
- * them. Freed with free(). */
+/* The times of the day that any row of a WEA has: others are chosen to be absent. It is NULL
+ * of an EPW, whose times all count. Freed with free(). */
 static lam_status find_times(const weather_times *t, bool **times, lam_error *error) {
     const double step = t->w->step;
     *times = NULL;

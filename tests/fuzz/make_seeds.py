@@ -13,7 +13,7 @@ import tempfile
 import numpy as np
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
-for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf"):
+for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -33,6 +33,22 @@ for e in emissions:
             for name in ("adjoint",) if "cotangent" in body else ("json",):
                 (folder / name / f"{count:03}").write_text(json.dumps(body) + blank)
             count += 1
+
+# Skies, and small weather of both formats; the last byte says the format and what becomes of gaps.
+for k, sky in enumerate(["even", {"name": "clear", "place": {"latitude": 1, "longitude": 2, "zone": 3}, "date": "1 May 9:00"},
+                         {"direct": 1, "diffuse": 2, "sun": {"azimuth": 3, "altitude": 4}, "north": 5, "lux_outside": 6, "dew_point": 7},
+                         {"weather": True, "hour": 4380.5, "gaps": "fill", "photometric": True, "sun_in_tiles": False}]):
+    (folder / "skies" / f"{k}").write_text(json.dumps({"sky": sky}))
+    (folder / "skies" / f"many{k}").write_text(json.dumps({"skies": [sky, sky]}))
+wea = ("place x\nlatitude 37.5\nlongitude 122\ntime_zone 120\nsite_elevation 2\nweather_data_file_units 1\n"
+       + "".join(f"6 {day} {hour}.5 {9999 if hour == 12 else 100} 50\n" for day in (20, 22, 21) for hour in range(24)))
+epw = ("LOCATION,x,XX,USA,TMY3,0,37.5,-122,-8,2\nDESIGN CONDITIONS,0\nTYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0\n"
+       "HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,\nCOMMENTS 2,\nDATA PERIODS,1,1,Data,Sunday,6/20,6/23\n"
+       + "".join(f"2001,6,{day},{hour},60,?,15,999,60,101300,0,0,300,0,{9999 if hour == 12 else 100},50,0\n"
+                 for day in (20, 21, 21, 22) for hour in range(1, 25)))
+for k in range(3):
+    (folder / "weather" / f"wea{k}").write_text(wea + chr(2 * k))
+    (folder / "weather" / f"epw{k}").write_text(epw + chr(2 * k + 1))
 
 # Files of emissions: an EMISSION by itself.
 for k, e in enumerate(emissions):

@@ -1,0 +1,223 @@
+/* POST /v1/scenes/NAME/skies: radiances of the tiles of a store for skies by name, of direct and diffuse
+ * light, and of a moment of the weather beside the store, by solver/daylight. A sky of the answer is the
+ * `sky` of an emission. */
+#include "server/route/routes.h"
+#include "solver/codec/answer.h"
+#include "solver/codec/json_writer.h"
+#include "solver/codec/sky_request.h"
+#include "solver/daylight/moment.h"
+#include "solver/daylight/named_sky.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DEGREE (M_PI / 180)
+
+/* Bytes of the answer beside those of tiles, and of a number of a tile, at most. */
+enum { HEAD_BYTES = 512, TILE_BYTES = 18 };
+/* A row of weather is read from 20 bytes or more. */
+enum { ROW_TEXT = 10 };
+
+/* Parts that the skies of a request share. */
+typedef struct making {
+    const call *in;
+    const scene *store;
+    sky_tiling tiling;
+    double *L;
+    float *narrow;
+    weather weather;
+    char gaps[SKY_REQUEST_TEXT]; /* of the weather that was read; n of it 0: none was */
+} making;
+
+static const scene *store_of(const call *in) {
+    return in->scene->base != NULL ? in->scene->base : in->scene;
+}
+
+/* Refuses sky k of a request. */
+static bool refuse(problem *why, problem_kind kind, size_t k, const char *text) {
+    return problem_set(why, kind, "sky %zu: %s", k, text);
+}
+
+static bool find_gaps(const char *word, weather_gaps *gaps) {
+    static const char *const words[] = {"refuse", "fill", "skip"};
+    *gaps = WEATHER_REFUSE;
+    if (word[0] == '\0') return true;
+    for (size_t k = 0; k < 3; k++)
+        if (strcmp(word, words[k]) == 0) {
+            *gaps = (weather_gaps)k;
+            return true;
+        }
+    return false;
+}
+
+/* Reads the weather beside the store, once for skies that follow each other with one way of gaps. */
+static bool read_weather(making *m, const sky_request *sky, size_t k, problem *why) {
+    const scene *s = m->store;
+    weather_gaps gaps;
+    char name[16];
+    lam_error error = {.message = ""};
+    if (!find_gaps(sky->gaps, &gaps))
+        return refuse(why, PROBLEM_UNKNOWN_WORD, k, "gaps must be refuse, fill or skip");
+    if (s->texts.weather == NULL)
+        return problem_set(why, PROBLEM_NOT_IN_STORE, "sky %zu: %s", k, s->weather.why);
+    if (m->weather.n > 0 && strcmp(m->gaps, sky->gaps) == 0) return true;
+    weather_free(&m->weather);
+    kept_bytes *text = kept_forms_find(s->texts.weather, 0);
+    if (text == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "the weather of the scene is not there");
+    const size_t bytes = bytes_times(text->content.length / ROW_TEXT, sizeof(weather_hour));
+    snprintf(name, sizeof name, "weather.%s", s->weather.format);
+    const bool room = request_memory_take(m->in->memory, bytes, why);
+    const lam_status status =
+        room ? weather_read_text(name, text->content.bytes, text->content.length, gaps, &m->weather, &error)
+             : LAM_OK;
+    kept_bytes_release(text);
+    if (!room) return false;
+    snprintf(m->gaps, sizeof m->gaps, "%s", sky->gaps);
+    return status == LAM_OK ||
+           refuse(why, status == LAM_ERR_MEMORY ? PROBLEM_NO_MEMORY : PROBLEM_NOT_IN_STORE, k, error.message);
+}
+
+/* The moment of a sky; false where it names none, or a wrong one. */
+static bool find_moment(const sky_request *sky, size_t k, moment *at, problem *why) {
+    lam_error error = {.message = ""};
+    if (sky->date[0] != '\0')
+        return moment_parse("date", sky->date, at, &error) == LAM_OK ||
+               refuse(why, PROBLEM_BAD_VALUE, k, error.message);
+    if (isnan(sky->hour))
+        return refuse(why, PROBLEM_WRONG_MEMBERS, k, "needs a date, as \"21 Jun 12:00\", or an hour");
+    if (sky->hour >= 8760) return refuse(why, PROBLEM_BAD_VALUE, k, "hour must be below 8760");
+    *at = moment_of_hour(sky->hour);
+    return true;
+}
+
+/* The model of a sky, and, where it needs one, its sun before it is turned. */
+static bool find_model(making *m, const sky_request *sky, size_t k, named_sky *model, sun_position *sun,
+                       problem *why) {
+    lam_error error = {.message = ""};
+    moment at;
+    if (sky->source == SKY_BY_NAME && named_sky_parse("name", sky->name, model, &error) != LAM_OK)
+        return refuse(why, PROBLEM_UNKNOWN_WORD, k, error.message);
+    if (sky->source == SKY_BY_LIGHT)
+        *model = (named_sky){.model = SKY_GIVEN,
+                             .direct = isnan(sky->direct) ? 0 : sky->direct,
+                             .diffuse = sky->diffuse,
+                             .dew_point = sky->dew_point};
+    if (sky->source == SKY_BY_WEATHER) {
+        if (!find_moment(sky, k, &at, why) || !read_weather(m, sky, k, why)) return false;
+        const weather *w = &m->weather;
+        weather_hour h;
+        if (moment_find(&at, "weather", w, &h, &error) != LAM_OK)
+            return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
+        *sun = sun_at(w->latitude, w->longitude, w->time_zone, h.year, h.month, h.day, h.hour);
+        const double up = sun->direction[2];
+        *model = (named_sky){
+            .model = SKY_GIVEN, .direct = h.direct, .diffuse = h.diffuse, .dew_point = h.dew_point};
+        if (w->direct_is_horizontal) model->direct = up > 0 ? fmin(h.direct / up, PEREZ_SOLAR) : 0;
+    } else {
+        model->lux_outside = isnan(sky->lux_outside) ? 0 : sky->lux_outside;
+        if (named_sky_needs_sun(model)) {
+            if (!isnan(sky->azimuth)) {
+                *sun = sun_of_angles(sky->azimuth, sky->altitude);
+            } else if (isnan(sky->latitude)) {
+                return refuse(why, PROBLEM_WRONG_MEMBERS, k,
+                              "needs its sun: give sun, or place and date or hour");
+            } else {
+                if (!find_moment(sky, k, &at, why)) return false;
+                *sun = sun_at(sky->latitude, sky->longitude, sky->zone, 2001, at.month, at.day, at.hour);
+            }
+        } else if (!isnan(sky->azimuth) || !isnan(sky->latitude) || !isnan(sky->hour) ||
+                   sky->date[0] != '\0' || !isnan(sky->north)) {
+            return refuse(why, PROBLEM_WRONG_MEMBERS, k,
+                          "has no sun: leave out sun, place, date, hour and north");
+        }
+    }
+    model->photometric = sky->photometric;
+    return true;
+}
+
+static bool write_sun(buffer *b, const sun_position *told, const sky_tiling *tiling, const year_sun *sun) {
+    double direction[3];
+    for (int d = 0; d < 3; d++) direction[tiling->axis[d]] = (double)tiling->sign[d] * sun->direction[d];
+    return buffer_append_text(b, ",\"sun\":{\"azimuth\":") && json_write_double(b, told->azimuth / DEGREE) &&
+           buffer_append_text(b, ",\"altitude\":") && json_write_double(b, told->altitude / DEGREE) &&
+           buffer_append_text(b, ",\"direction\":") && json_write_doubles(b, direction, 3) &&
+           buffer_append_text(b, ",\"normal\":") && json_write_double(b, sun->normal) &&
+           buffer_append_text(b, "}");
+}
+
+/* Makes and writes sky k. */
+static bool add_sky(making *m, const sky_request *sky, size_t k, buffer *b, problem *why) {
+    named_sky model = {.dew_point = NAN};
+    sun_position told = {.distance = 1};
+    year_sun sun;
+    sky_horizontal of;
+    lam_error error = {.message = ""};
+    if (!find_model(m, sky, k, &model, &told, why)) return false;
+    const sun_position at = sun_turned(told, isnan(sky->north) ? 0 : sky->north);
+    if (named_sky_make(&model, &at, &m->tiling, sky->sun_in_tiles, m->L, &sun, &of, &error) != LAM_OK)
+        return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
+    for (size_t t = 0; t < m->tiling.n_tiles; t++) m->narrow[t] = (float)m->L[t];
+    const bool written =
+        buffer_append_text(b, k > 0 ? ",{\"sky\":" : "{\"sky\":") &&
+        json_write_floats(b, m->narrow, m->tiling.n_tiles) &&
+        buffer_printf(b, ",\"unit\":\"%s\",\"diffuse\":", named_sky_is_photometric(&model) ? "lx" : "W/m2") &&
+        json_write_double(b, of.diffuse) && buffer_append_text(b, ",\"direct\":") &&
+        json_write_double(b, of.direct) &&
+        (named_sky_needs_sun(&model) ? write_sun(b, &told, &m->tiling, &sun)
+                                     : buffer_append_text(b, ",\"sun\":null")) &&
+        buffer_append_text(b, "}");
+    return written || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
+}
+
+static bool prepare(making *m, size_t n_skies, buffer *b, problem *why) {
+    const scene *s = m->store;
+    lam_error error = {.message = ""};
+    if (s->sky == NULL || s->sky_tiling[0] == '\0')
+        return problem_set(why, PROBLEM_NOT_IN_STORE, "the store has no sky%s; precompute it %s",
+                           s->sky != NULL ? " whose tiles it states" : "",
+                           s->sky != NULL ? "again" : "with --sky");
+    const size_t n = lam_sky_tiles(s->sky), most = bytes_times(n_skies, n * TILE_BYTES + HEAD_BYTES);
+    if (!request_memory_take(
+            m->in->memory, bytes_plus(most, n * (sizeof *m->L + sizeof *m->narrow + sizeof(sky_tile))), why))
+        return false;
+    m->L = malloc(n * sizeof *m->L);
+    m->narrow = malloc(n * sizeof *m->narrow);
+    if (m->L == NULL || m->narrow == NULL || !buffer_reserve(b, most) ||
+        sky_tiling_create(s->sky_tiling, s->sky_up, &m->tiling, &error) != LAM_OK)
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for skies%s%s",
+                           error.message[0] != '\0' ? ": " : "", error.message);
+    return m->tiling.n_tiles == n ||
+           problem_set(why, PROBLEM_NOT_IN_STORE, "the sky of the store has %zu tiles, %s has %zu", n,
+                       m->tiling.name, m->tiling.n_tiles);
+}
+
+void post_skies(call *in, answer *out) {
+    making m = {.in = in, .store = store_of(in)};
+    problem why = {0};
+    buffer b = {0};
+    size_t n = 0;
+    sky_request *skies = NULL;
+    const codec_scene about = call_codec_scene(in);
+    bool good = in->body_type == MEDIA_JSON ||
+                problem_set(&why, PROBLEM_MEDIA_TYPE, "Content-Type must be application/json");
+    if (good) skies = call_allocate(in, SKY_REQUEST_MOST * sizeof *skies, "skies", &why);
+    good = good && skies != NULL && codec_read_skies_json(&about, in->body, in->length, skies, &n, &why) &&
+           prepare(&m, n, &b, &why);
+    if (good && !(buffer_append_text(&b, "{\"scene\":") && json_write_text(&b, in->scene->name) &&
+                  buffer_printf(&b, ",\"tiles\":%zu,\"skies\":[", m.tiling.n_tiles)))
+        good = problem_set(&why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
+    in->n_rhs = n;
+    for (size_t k = 0; good && k < n; k++) good = add_sky(&m, &skies[k], k, &b, &why);
+    if (good)
+        answer_json(out, &b, buffer_append_text(&b, "]}\n"));
+    else
+        answer_problem(out, &why);
+    buffer_free(&b);
+    weather_free(&m.weather);
+    sky_tiling_free(&m.tiling);
+    free(m.L);
+    free(m.narrow);
+    free(skies);
+}
