@@ -44,6 +44,7 @@ typedef struct weather {
     size_t stretches; /* of rows without a gap */
     size_t stated_steps; /* records an hour in the header of an EPW; 0: none is stated */
     size_t outside;      /* rows outside of the periods in the header of an EPW */
+    bool days_chosen;    /* of the period in the header of an EPW, of which it holds at most half */
     weather_mended mended;
     size_t n;
     weather_hour *hours; /* [n], freed by weather_free */

@@ -1,7 +1,8 @@
 /* Refuses weather whose rows are missing, repeated or out of order; see weather_times.h.
  *
- * An EPW states its periods, and its rows must be these. A WEA states nothing, and people choose what they
- * put into one: some days of a year, hours of every day, hours with sun. Its gaps are chosen, not missing:
+ * An EPW states its periods, and its rows must be these; but whole days of one period may be chosen as those
+ * of a WEA, with a warning. A WEA states nothing, and people choose what they put into one: some days of a
+ * year, hours of every day, hours with sun. Its gaps are chosen, not missing:
  * - within a day, where every day has the same times and there are several days, or where at most half of the
  *   times from the first to the last of a day are there;
  * - by night, where no night is passed through and each day begins and ends as its neighbours do, within a
@@ -198,6 +199,23 @@ static bool is_stated(const weather_stated *stated, double step, const weather_h
     return false;
 }
 
+/* True where an EPW of one period holds chosen days of it: each is whole, and at most half of those from the
+ * first to the last are there. */
+static bool chooses_days(const weather_times *t) {
+    const weather *w = t->w;
+    const size_t a_day = (size_t)lround(24 / w->step), n_days = w->n / a_day;
+    bool back = false;
+    if (t->all_days || t->stated == NULL || t->stated->n != 1 || w->n % a_day != 0 || n_days < 2)
+        return false;
+    for (size_t i = 0; i < w->n; i++)
+        if (!same_day(&w->hours[i], &w->hours[i / a_day * a_day])) return false;
+    for (size_t i = a_day; i < w->n; i += a_day)
+        if (same_day(&w->hours[i], &w->hours[i - 1])) return false;
+    weather_hour first = w->hours[0], last = w->hours[w->n - 1];
+    first.hour = last.hour = 0;
+    return 2 * (double)n_days <= 1 + weather_ahead(&first, &last, &back) / 24;
+}
+
 lam_status weather_find_gaps(const weather_times *t, weather_gap **gaps, size_t *n_gaps, lam_error *error) {
     lam_status status = LAM_OK;
     weather *w = t->w;
@@ -207,13 +225,15 @@ lam_status weather_find_gaps(const weather_times *t, weather_gap **gaps, size_t 
     if (found == NULL) TRY(LAM_ERR_MEMORY);
     if (t->stated == NULL) TRY(find_chosen(w, &may, error));
     w->stretches = 1;
+    w->days_chosen = chooses_days(t);
     for (size_t i = 1; i < w->n; i++) {
         bool back = false;
         const weather_hour *a = &w->hours[i - 1], *b = &w->hours[i];
         const double left_out = weather_ahead(a, b, &back) - w->step;
         if (left_out <= weather_tolerance(w->step)) continue;
         w->stretches++;
-        if (t->stated != NULL ? is_stated(t->stated, w->step, a, b) : is_chosen(&may, a, b)) continue;
+        if (t->stated != NULL ? w->days_chosen || is_stated(t->stated, w->step, a, b) : is_chosen(&may, a, b))
+            continue;
         found[n++] = (weather_gap){.row = i, .hours = left_out};
     }
     *gaps = found;
@@ -272,6 +292,7 @@ double weather_lacks(const weather_times *t) {
         if (is_in[day] && !may_lack) missing += fmax(0, 24 - there[day]);
         if (!is_in[day]) w->outside += (size_t)lround(there[day] / w->step);
     }
+    if (chooses_days(t)) return 0;
     /* Of several years that are stated each has its days. */
     if (is_calendar(w)) missing = fmax(missing, wanted + there[LEAP_DAY] - (double)w->n * w->step);
     return missing < .5 * w->step ? 0 : missing;

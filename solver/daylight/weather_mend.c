@@ -421,6 +421,7 @@ lam_status weather_mend(weather_times *t, weather_gaps gaps, weather_row **rows,
         TRY(weather_check_gaps(t, error));
         goto done;
     }
+    t->all_days = true;
     TRY(put_in_order(t, rows, error));
     if (gaps == WEATHER_SKIP) {
         TRY(skip(t, *rows, error));

@@ -27,6 +27,7 @@ typedef struct weather_times {
     const weather_row *rows;      /* [w->n] */
     const weather_stated *stated; /* NULL: a WEA, which states nothing */
     weather *w;
+    bool all_days; /* days of an EPW are missing that else may be chosen */
 } weather_times;
 
 /* Times that are this close to a multiple of the step are on it: decimals of hours are rounded to .001 or .01

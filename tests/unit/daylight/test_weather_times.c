@@ -210,6 +210,27 @@ START_TEST(whole_years) {
 }
 END_TEST
 
+/* Whole days of a period that is stated may be chosen, where they are at most half of those from the first to
+ * the last. */
+START_TEST(days_of_a_period) {
+    for (int per_hour = 1; per_hour <= 2; per_hour++) {
+        text t = begin(true, "1,1,Data,Sunday,3/21,12/21");
+        for (int month = 3; month <= 12; month += 3) epw_day(&t, 2001, month, 21, 0, 24, per_hour, 1);
+        check_taken(&t, (size_t)(96 * per_hour), 1. / per_hour, 4);
+        t = begin(true, "1,1,Data,Sunday,3/21,12/21"); /* one of them is not whole */
+        for (int month = 3; month <= 12; month += 3)
+            epw_day(&t, 2001, month, 21, 0, month == 6 ? 23 : 24, per_hour, 1);
+        check_refused(&t, "(2001-06-21 00:00): before it 2184 hours are missing");
+    }
+    text t = begin(true, "1,1,Data,Sunday,6/1,6/9"); /* five of nine are no choice, but holes */
+    for (int day = 1; day <= 9; day += 2) epw_day(&t, 2001, 6, day, 0, 24, 1, 1);
+    check_refused(&t, "(2001-06-03 00:00): before it 24 hours are missing, 96 in 4 gaps");
+    t = begin(true, "1,1,Data,Sunday,6/1,6/30"); /* nor is an end that is cut off */
+    for (int day = 1; day <= 10; day++) epw_day(&t, 2001, 6, day, 0, 24, 1, 1);
+    check_refused(&t, ": 480 hours are missing");
+}
+END_TEST
+
 START_TEST(rows_outside_of_the_header) {
     weather w = {0};
     lam_error error = {0};
@@ -375,6 +396,7 @@ int main(void) {
     tcase_add_test(c, steps);
     tcase_add_test(c, mixed_steps);
     tcase_add_test(c, whole_years);
+    tcase_add_test(c, days_of_a_period);
     tcase_add_test(c, rows_outside_of_the_header);
     tcase_add_test(c, rows_that_are_missing);
     tcase_add_test(c, rows_that_are_repeated);
