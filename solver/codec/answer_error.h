@@ -21,13 +21,14 @@ typedef struct error_answer {
     double lost2; /* with L_sent: (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
 } error_answer;
 
-/* The two parts of the headline (headline.h), over all light that surfaces reflect, |B - E|, the direct light
+/* The parts of the headline (headline.h), over all light that surfaces reflect, |B - E|, the direct light
  * of a sky with it, of irradiance over |H|, of the indirect light over itself. The direct light of positions
  * is known and left out. */
 typedef struct stated_parts {
     double rest; /* of operator and form factors; where nothing is reflected over |B|; not finite where that
                     is 0, too */
     double mesh; /* of constants on elements; negative: not stated */
+    double sun;  /* of the way in which an answer takes the sun of a year; 0: it takes none */
 } stated_parts;
 
 /* The root of the mean squared error over the light that is left where that error is taken out of the light

@@ -6,9 +6,14 @@
 #include <stdio.h>
 
 static const double coarse = .1;
+static const char sun_option[] = "--sun exact --sun-points 64";
+
+static const char *verb_of(const headline_part *part) {
+    return part->option == sun_option ? "solve" : "precompute";
+}
 
 double headline_stated(const headline *h) {
-    return hypot(h->parts.rest, fmax(h->parts.mesh, 0));
+    return hypot(hypot(h->parts.rest, fmax(h->parts.mesh, 0)), h->parts.sun);
 }
 
 bool headline_has_light(const stated_parts *parts) {
@@ -29,6 +34,7 @@ size_t headline_parts(const headline *h, headline_part out[HEADLINE_PARTS], size
         out[n++] = (headline_part){"form_factors", "form factors", "--quality high", rest * sqrt(1 - share)};
     }
     if (h->parts.mesh >= 0) out[n++] = (headline_part){"mesh", "mesh", "--mesh-error .05", h->parts.mesh};
+    if (h->parts.sun > 0) out[n++] = (headline_part){"sun", "sun", sun_option, h->parts.sun};
     *largest = 0;
     for (size_t k = 1; k < n; k++)
         if (out[k].error > out[*largest].error) *largest = k;
@@ -49,8 +55,8 @@ bool headline_write(buffer *b, const headline *h) {
     const size_t n = headline_parts(h, parts, &largest);
     bool written = buffer_append_text(b, "\"stated\":") && json_write_double(b, headline_stated(h));
     if (headline_is_coarse(h))
-        written = written && buffer_printf(b, ",\"coarse\":true,\"advice\":\"precompute with %s\"",
-                                           parts[largest].option);
+        written = written && buffer_printf(b, ",\"coarse\":true,\"advice\":\"%s with %s\"",
+                                           verb_of(&parts[largest]), parts[largest].option);
     written = written && buffer_append_text(b, ",\"parts\":{");
     for (size_t k = 0; written && k < n; k++)
         written = buffer_printf(b, "%s\"%s\":", k > 0 ? "," : "", parts[k].name) &&
@@ -63,8 +69,9 @@ void headline_text(const headline *h, char text[HEADLINE_BYTES]) {
     size_t largest;
     headline_parts(h, parts, &largest);
     const char *const option = headline_is_coarse(h) ? parts[largest].option : "";
-    snprintf(text, HEADLINE_BYTES, "%.2g, most of it by the %s%s%s", headline_stated(h), parts[largest].words,
-             option[0] != '\0' ? ": coarse; precompute with " : "", option);
+    snprintf(text, HEADLINE_BYTES, "%.2g, most of it by the %s%s%s%s%s", headline_stated(h),
+             parts[largest].words, option[0] != '\0' ? ": coarse; " : "",
+             option[0] != '\0' ? verb_of(&parts[largest]) : "", option[0] != '\0' ? " with " : "", option);
 }
 
 void headline_text_parts(const headline *h, char text[HEADLINE_BYTES]) {

@@ -152,6 +152,27 @@ done:
     return status;
 }
 
+void annual_mean_free(annual_mean *m) {
+    emission_free(&m->light);
+    sunlight_free(&m->sun);
+    *m = (annual_mean){.light = {.n_vectors = 0}};
+}
+
+lam_status annual_mean_find(const emission *light, const lam_operator *op, const lam_sky *sky,
+                            const progress *steps, annual_mean *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const widths width = widths_of(op, sky);
+    *out = (annual_mean){.light = {.n_vectors = 0}};
+    TRY(mean_of(light, &width, &out->light, error));
+    out->light.limiter = light->limiter;
+    if (light->sun == NULL) goto done;
+    TRY(sunlight_mean(light->sun, steps, &out->sun, error));
+    out->light.sun = &out->sun;
+done:
+    if (status != LAM_OK) annual_mean_free(out);
+    return status;
+}
+
 /* An answer under way. */
 typedef struct work {
     const annual_options *options;
@@ -167,29 +188,24 @@ typedef struct work {
 
 static lam_status make_sums(const work *w, const emission *light, lam_error *error) {
     lam_status status = LAM_OK;
-    const widths width = widths_of(w->op, w->sky);
     const double scale = (double)light->n_vectors * w->options->hours / 1000;
-    emission mean = {0};
-    sunlight sun = {0};
+    const emission *mean = w->options->mean;
+    annual_mean found = {.light = {.n_vectors = 0}};
     emission_pass p = {0};
     for (size_t k = 0; k < w->options->n_figures; k++) {
         if (!w->options->figures[k].is_sum) continue;
         float *to = w->made + k * w->row;
-        TRY(mean_of(light, &width, &mean, error));
-        mean.limiter = light->limiter;
-        if (light->sun != NULL) {
-            TRY(sunlight_mean(light->sun, w->steps, &sun, error));
-            mean.sun = &sun;
+        if (mean == NULL) {
+            TRY(annual_mean_find(light, w->op, w->sky, w->steps, &found, error));
+            mean = &found.light;
         }
-        TRY(emission_pass_create(&mean, w->op, w->sky, w->quantity, w->n_selected, w->selected, 1, &p,
-                                 error));
+        TRY(emission_pass_create(mean, w->op, w->sky, w->quantity, w->n_selected, w->selected, 1, &p, error));
         TRY(emission_pass_solve(&p, 1, (const size_t[]){0}, to, error));
         for (size_t i = 0; i < w->row; i++) to[i] = (float)((double)to[i] * scale);
     }
 done:
     emission_pass_free(&p);
-    sunlight_free(&sun);
-    emission_free(&mean);
+    annual_mean_free(&found);
     return status;
 }
 

@@ -5,6 +5,7 @@
 
 #include "solver/base/progress.h"
 #include "solver/light/emission_apply.h"
+#include "solver/light/sunlight.h"
 
 enum { ANNUAL_MOST = 16, ANNUAL_NAME = 40 };
 
@@ -26,6 +27,7 @@ typedef struct annual_options {
     double hours;         /* that a vector stands for */
     double from, to;      /* hours of the day: vectors count whose middle is from <= t < to; 0 and 24: all */
     const double *middle; /* [vectors], hours of the day; NULL: vectors follow each other from midnight on */
+    const emission *mean; /* of annual_mean_find; NULL: it is found where sums need it */
 } annual_options;
 
 /* Adds the figure of an item: sum, autonomy=X or useful=LOW,HIGH. LAM_ERR_ARGUMENT names the item. */
@@ -36,6 +38,18 @@ lam_status annual_parse_occupied(const char *text, annual_options *w, lam_error 
 
 /* True when a figure is a share of the hours, not a sum. */
 bool annual_has_shares(const annual_options *w);
+
+/* The mean of all vectors, as one. */
+typedef struct annual_mean {
+    emission light; /* its sun is the one below */
+    sunlight sun;
+} annual_mean;
+
+/* *out must not move while it is used; freed by annual_mean_free. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED.
+ */
+lam_status annual_mean_find(const emission *light, const lam_operator *op, const lam_sky *sky,
+                            const progress *steps, annual_mean *out, lam_error *error);
+void annual_mean_free(annual_mean *m);
 
 /* The vectors behind the figures. */
 typedef struct annual_summary {

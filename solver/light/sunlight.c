@@ -1,6 +1,7 @@
 #include "solver/light/sunlight.h"
 
 #include "solver/formfactor/sky_bounce.h"
+#include "store/groups.h"
 
 #include <assert.h>
 #include <math.h>
@@ -47,6 +48,18 @@ lam_status sunlight_create(store *s, const mesh *m, year_sun *suns, size_t n_vec
 done:
     sky_bounce_free(&bounce);
     sunlight_free(&made);
+    return status;
+}
+
+lam_status sky_tiling_of_store(store *s, sky_tiling *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *name = NULL, *up = NULL;
+    TRY(store_get_text(s, STORE_SKY, "tiling", &name, error));
+    TRY(store_get_text(s, STORE_SKY, "up", &up, error));
+    TRY(sky_tiling_create(name, up[0], out, error));
+done:
+    free(name);
+    free(up);
     return status;
 }
 
@@ -105,7 +118,7 @@ void sunlight_irradiance(const sunlight *s, size_t n_vectors, const size_t *vect
 
 lam_status sunlight_mean(const sunlight *s, const progress *steps, sunlight *out, lam_error *error) {
     lam_status status = LAM_OK;
-    sunlight made = {.n_vectors = 1, .n = s->n};
+    sunlight made = {.n_vectors = 1, .n = s->n, .sky = s->sky};
     double *sum = memory_allocate(s->n, sizeof *sum, "the sun of a year", error);
     float *H = memory_allocate(SUNLIGHT_MOST, s->n * sizeof *H, "the sun of a year", error);
     float *work = memory_allocate(sunlight_work(s), sizeof *work, "the sun of a year", error);

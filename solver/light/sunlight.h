@@ -31,6 +31,10 @@ lam_status sunlight_create(store *s, const mesh *m, year_sun *suns, size_t n_vec
                            lam_error *error);
 void sunlight_free(sunlight *s);
 
+/* The tiling of a store's sky, without what it holds. Freed by sky_tiling_free. Errors: those of the store.
+ */
+lam_status sky_tiling_of_store(store *s, sky_tiling *out, lam_error *error);
+
 /* True where the sun shines in a vector. */
 bool sunlight_shines(const sunlight *s, size_t vector);
 

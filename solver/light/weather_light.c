@@ -1,7 +1,6 @@
 #include "solver/light/weather_light.h"
 
 #include "solver/daylight/weather.h"
-#include "store/groups.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -35,6 +34,9 @@ static void log_weather(terminal *t, const weather *w) {
     if (w->outside > 0)
         terminal_warn(t, "%.6g hours are outside of the DATA PERIODS that the file states; they count too",
                       (double)w->outside * w->step);
+    if (w->days_chosen)
+        terminal_warn(t, "the file holds %.6g days of the DATA PERIODS that it states: these count alone",
+                      (double)w->n * w->step / 24);
     if (w->apart && w->n > 1)
         terminal_warn(t, "no two rows are an hour apart or less: each stands for one hour");
     /* Clocks are set for political reasons, but not by more than this. */
@@ -139,10 +141,7 @@ done:
 lam_status weather_tiling_load(store *s, const lam_sky *sky, sky_tiling *out, lam_error *error) {
     lam_status status = LAM_OK;
     sky_tiling made = {0};
-    char *name = NULL, *up = NULL;
-    TRY(store_get_text(s, STORE_SKY, "tiling", &name, error));
-    TRY(store_get_text(s, STORE_SKY, "up", &up, error));
-    TRY(sky_tiling_create(name, up[0], &made, error));
+    TRY(sky_tiling_of_store(s, &made, error));
     if (made.n_tiles != lam_sky_tiles(sky))
         FAIL(error, LAM_ERR_FORMAT, "%s: /sky has %zu tiles, %s has %zu", store_path(s), lam_sky_tiles(sky),
              made.name, made.n_tiles);
@@ -150,8 +149,6 @@ lam_status weather_tiling_load(store *s, const lam_sky *sky, sky_tiling *out, la
     made = (sky_tiling){0};
 done:
     sky_tiling_free(&made);
-    free(name);
-    free(up);
     return status;
 }
 
@@ -176,6 +173,12 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
         FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", options->path, e->n_vectors);
     *span = made.span;
     made.span = (weather_span){0};
+    if (options->way != NULL) {
+        const progress steps = terminal_progress(t);
+        TRY(sun_way_measure(s, m, sky, made.suns, made.n, options->exact ? options->sun_points : 0,
+                            n_selected, selected, &steps, options->way, error));
+        terminal_clear(t);
+    }
     if (!options->exact) goto done;
     year_sun *suns = made.suns;
     made.suns = NULL;

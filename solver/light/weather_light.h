@@ -6,7 +6,7 @@
 #include "solver/daylight/moment.h"
 #include "solver/daylight/year.h"
 #include "solver/light/emission.h"
-#include "solver/light/sunlight.h"
+#include "solver/light/sun_way.h"
 
 /* The times of the rows of weather. */
 typedef struct weather_span {
@@ -62,6 +62,7 @@ typedef struct weather_options {
     weather_gaps gaps; /* --gaps */
     const moment *at;  /* --date or --hour; NULL: all rows, a batch */
     double north;      /* degrees */
+    sun_way *way;      /* the difference that the way of the sun makes is measured there; NULL: it is not */
 } weather_options;
 
 /* Puts e under the rows of a file, on the tiles of an open store. With an exact sun, *sun holds it for the

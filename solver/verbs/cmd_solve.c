@@ -10,6 +10,7 @@
 #include "solver/verbs/solve_faces.h"
 #include "solver/verbs/solve_options.h"
 #include "solver/verbs/verbs.h"
+#include "solver/verbs/year_error.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -148,7 +149,7 @@ done:
 /* Adds the light of --weather to the light: of the elements selected, or of all. */
 static lam_status add_weather(const solve_options *f, store *s, const mesh *m, size_t n_selected,
                               const uint32_t *selected, terminal *t, lit_store *lit, sunlight *sun,
-                              weather_span *span, lam_error *error) {
+                              sun_way *way, weather_span *span, lam_error *error) {
     /* Few emitters are refined by the light of their tiles alone. */
     const bool in_tiles = !f->sun_given && f->tolerance > 0 && lam_operator_emitters(lit->op) > 0;
     double north = 0;
@@ -162,13 +163,15 @@ static lam_status add_weather(const solve_options *f, store *s, const mesh *m, s
                                                                        : SUN_POINTS,
                                    .gaps = f->gaps,
                                    .at = sky_options_moment(&f->light.at),
-                                   .north = north};
+                                   .north = north,
+                                   .way = way};
     return weather_light_add(&hours, s, m, lit->op, lit->sky, n_selected, selected, t, &lit->light, sun, span,
                              error);
 }
 
 /* The arrays of an answer. */
 typedef struct answers {
+    annual_mean mean; /* of a year, where its sum alone is asked for */
     float *values, *corners;
     size_t *limited;
     refined_light refined;
@@ -181,6 +184,7 @@ static void answers_free(answers *a) {
     free(a->limited);
     refined_light_free(&a->refined);
     free(a->name_errors);
+    annual_mean_free(&a->mean);
 }
 
 /* The answers, and how many elements of each were limited. */
@@ -198,13 +202,24 @@ done:
     return status;
 }
 
+/* True where the sum of a year is all that is asked for: it is linear in the light, and so has its error. */
+static bool is_sum(const annual_options *year) {
+    return year->n_figures == 1 && year->figures[0].is_sum;
+}
+
 /* The answers to each light, refined, or figures of a year, as the options ask for. */
 static lam_status find_answers(const char *path, const solve_options *f, const annual_options *year,
                                const lit_store *lit, size_t n_selected, const uint32_t *selected, terminal *t,
                                solution *out, answers *made, lam_error *error) {
     lam_status status = LAM_OK;
     if (year->n_figures > 0) {
-        TRY(solve_year(year, &lit->light, lit->op, lit->sky, n_selected, selected, t, out, &made->values,
+        annual_options figures = *year;
+        const progress steps = terminal_progress(t);
+        if (is_sum(year)) {
+            TRY(annual_mean_find(&lit->light, lit->op, lit->sky, &steps, &made->mean, error));
+            figures.mean = &made->mean.light;
+        }
+        TRY(solve_year(&figures, &lit->light, lit->op, lit->sky, n_selected, selected, t, out, &made->values,
                        error));
     } else if (f->tolerance > 0) {
         TRY(emission_refine(&lit->light, path, lit->op, lit->sky, out->quantity, f->tolerance, terminal_check,
@@ -252,6 +267,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     stated_errors stated = {.n = 0};
     error_scene about = {.n = 0};
     sunlight sun = {0};
+    sun_way way = {.n = 0};
     weather_span span = {0};
     weather_hours hours;
     annual_options figures = *year;
@@ -280,8 +296,8 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     if (f->weather != NULL) {
         /* The error of an answer is told by all that the sun shines on. */
         const bool some = year->n_figures > 0;
-        TRY(add_weather(f, s, &m, some ? n_selected : 0, some ? selected : NULL, t, &lit, &sun, &span,
-                        error));
+        TRY(add_weather(f, s, &m, some ? n_selected : 0, some ? selected : NULL, t, &lit, &sun,
+                        is_sum(year) ? &way : NULL, &span, error));
         TRY(take_span(&span, f->weather, f->hours, &figures, error));
     }
     if (year->n_figures > 0 && !lit.light.batch)
@@ -311,6 +327,10 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     TRY(find_answers(path, f, &figures, &lit, n_selected, selected, t, &out, &made, error));
     if (made.values != NULL && year->n_figures == 0)
         TRY(own_error_take(&stated, &about, &lit, n_selected, selected, &out, &made.name_errors, error));
+    if (is_sum(year))
+        TRY(year_error_take(&stated, &about, &lit, &made.mean.light, &way,
+                            (double)lit.light.n_vectors * figures.hours / 1000, n_selected, selected, &out,
+                            &made.name_errors, error));
     if (f->smooth) TRY(find_corners(&out, &lit.light, &made.corners, error));
     out.corners = made.corners;
     if (f->at == AT_FACES) TRY(solve_faces_take(&faces, &made.values, &made.refined, &out, error));
@@ -324,6 +344,7 @@ done:
     face_index_free(&faces);
     free(row_sums);
     sunlight_free(&sun);
+    sun_way_free(&way);
     weather_span_free(&span);
     light_close(&lit);
     mesh_free(&m);

@@ -77,6 +77,8 @@ static void add_sun(own_light *l, size_t v) {
     size_t tile;
     double radiance;
     const bool in_tile = sunlight_in_tile(sun, v, &tile, &radiance);
+    /* Of a mean the tiles hold many suns: H is then what they lack, and it is not sent on. */
+    const bool lost = in_tile || (sun->given != NULL && sun->sky != NULL);
     sunlight_irradiance(sun, 1, &v, l->sun, l->work);
     l->lost2 = 0;
     for (size_t c = 0; c < C; c++) {
@@ -86,9 +88,9 @@ static void add_sun(own_light *l, size_t v) {
             power += flux;
             squares += flux * flux;
             l->H0[c * n + i] += l->sun[i];
-            l->sent[c * n + i] = l->E[c * n + i] + (in_tile ? 0 : rho[c * n + i] * l->sun[i]);
+            l->sent[c * n + i] = l->E[c * n + i] + (lost ? 0 : rho[c * n + i] * l->sun[i]);
         }
-        if (in_tile) l->lost2 += power * power + squares;
+        if (lost) l->lost2 += power * power + squares;
         memset(l->L_sent + c * m, 0, m * sizeof *l->L_sent);
         if (!in_tile || tile >= m) continue;
         l->L_sent[c * m + tile] = fminf(l->L[c * m + tile], (float)radiance);

@@ -238,6 +238,18 @@ class Sun(unittest.TestCase):
             must("solve", store, "--weather", path, "--annual", "sum", *(word for k in faces for word in ("--reduce", k + "=mean")), "-o", out)
             got = [json.loads(out.read_text())["annual"]["sum"][k]["mean"] for k in faces]
             np.testing.assert_allclose(got, wanted, rtol=1e-3, atol=.02, err_msg=str(place))
+        # The stated error of the sum contains what the sun's way leaves: nothing here, or the tiles' error on the worst wall.
+        for side, mode, limits in (("north", "tiles", (.5, 2)), ("south", "tiles", (.5, 2)), ("north", "exact", None)):
+            must("solve", store, "--weather", path, "--sun", mode, "--annual", "sum", "--reduce", side + "=mean", "-o", out)
+            answer = json.loads(out.read_text())
+            off = abs(answer["annual"]["sum"][side]["mean"] / wanted[list(faces).index(side)] - 1)
+            stated = answer["error"]["stated"]
+            if limits is None:
+                self.assertLess(stated, 1e-3)
+                continue
+            self.assertGreater(off, .01)
+            self.assertTrue(limits[0] * off < answer["error"]["parts"]["sun"] < limits[1] * off, (side, off, answer["error"]))
+            self.assertGreaterEqual(stated, answer["error"]["parts"]["sun"])
 
     def test_a_window(self):
         """The power that enters a black room through a window is on its surfaces, hour by hour and in the sum of a year."""

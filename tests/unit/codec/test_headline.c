@@ -74,6 +74,22 @@ START_TEST(the_larger_is_kept) {
 }
 END_TEST
 
+/* The sun of a year is a part of its own, which solve lowers. */
+START_TEST(sun) {
+    headline h = {.known = true, .parts = {.rest = .03, .mesh = .04, .sun = .12}, .share = 1};
+    headline_part parts[HEADLINE_PARTS];
+    size_t largest = 0;
+    char text[HEADLINE_BYTES];
+    ck_assert_uint_eq(headline_parts(&h, parts, &largest), 4);
+    ck_assert_str_eq(parts[largest].name, "sun");
+    ck_assert_double_eq_tol(headline_stated(&h), .13, 1e-12);
+    headline_text(&h, text);
+    ck_assert_str_eq(text, "0.13, most of it by the sun: coarse; solve with --sun exact --sun-points 64");
+    h.parts.sun = 0;
+    ck_assert_uint_eq(headline_parts(&h, parts, &largest), 3);
+}
+END_TEST
+
 int main(void) {
     Suite *s = suite_create("headline");
     TCase *c = tcase_create("headline");
@@ -81,6 +97,7 @@ int main(void) {
     tcase_add_test(c, coarse_has_an_option);
     tcase_add_test(c, unknown_says_what_to_do);
     tcase_add_test(c, the_larger_is_kept);
+    tcase_add_test(c, sun);
     suite_add_tcase(s, c);
     return suite_run(s);
 }
