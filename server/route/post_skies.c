@@ -155,7 +155,7 @@ static bool add_sky(making *m, const sky_request *sky, size_t k, buffer *b, prob
     sky_horizontal of;
     lam_error error = {.message = ""};
     if (!find_model(m, sky, k, &model, &told, why)) return false;
-    const sun_position at = sun_turned(told, isnan(sky->north) ? 0 : sky->north);
+    const sun_position at = sun_turned(told, isnan(sky->north) ? m->store->sky_north : sky->north);
     if (named_sky_make(&model, &at, &m->tiling, sky->sun_in_tiles, m->L, &sun, &of, &error) != LAM_OK)
         return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
     for (size_t t = 0; t < m->tiling.n_tiles; t++) m->narrow[t] = (float)m->L[t];

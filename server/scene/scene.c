@@ -258,6 +258,11 @@ static lam_status read_tiling(store *s, scene *made, lam_error *error) {
     TRY(store_get_text(s, STORE_SKY, "up", &up, error));
     if (strlen(name) < sizeof made->sky_tiling) strcpy(made->sky_tiling, name);
     made->sky_up = up[0];
+    if (store_has_attribute(s, STORE_SKY, "north"))
+        TRY(store_get_number(s, STORE_SKY, "north", &made->sky_north, error));
+    if (!(fabs(made->sky_north) <= 360))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /sky attribute north is %g, must be from -360 to 360", store_path(s),
+             made->sky_north);
 done:
     free(name);
     free(up);

@@ -42,6 +42,7 @@ struct scene {
     lam_sky *sky;          /* NULL: none */
     char sky_tiling[32];   /* the name of its tiles; "": not known. A variant has none of its own */
     char sky_up;           /* 'x', 'y' or 'z' */
+    double sky_north;      /* degrees of its model; 0 where it states none */
     weather_file weather;  /* beside the file; its text is in texts. A variant has none of its own */
     size_t n_emitters;     /* 0: the store answers any emission */
     uint64_t bytes;        /* of /operator as stored; of a variant, of the cores alone */

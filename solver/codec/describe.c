@@ -291,6 +291,7 @@ static lam_status add_sky(store *s, json_t *out, lam_error *error) {
     copy_member(sky, "tiling", attributes, "tiling");
     json_object_set_new(sky, "tiles", json_integer((json_int_t)dims[0]));
     copy_member(sky, "ground_albedo", attributes, "ground_albedo");
+    if (json_object_get(attributes, "north") != NULL) copy_member(sky, "north", attributes, "north");
     json_object_set(out, "sky", sky);
 done:
     json_decref(attributes);

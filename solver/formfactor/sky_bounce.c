@@ -79,6 +79,19 @@ lam_status sky_bounce_save(const sky_bounce *b, store *s, lam_error *error) {
     TRY(store_set_text(s, GROUP, "tiling", b->tiling.name, error));
     TRY(store_set_number(s, GROUP, "ground_albedo", b->ground_albedo, error));
     TRY(store_set_text(s, GROUP, "up", up, error));
+    if (b->north != 0) TRY(store_set_number(s, GROUP, "north", b->north, error));
+done:
+    return status;
+}
+
+lam_status sky_north_load(store *s, double *north, lam_error *error) {
+    lam_status status = LAM_OK;
+    double read = 0;
+    if (store_has_attribute(s, GROUP, "north")) TRY(store_get_number(s, GROUP, "north", &read, error));
+    if (!(fabs(read) <= 360))
+        FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP " attribute north is %g, must be from -360 to 360",
+             store_path(s), read);
+    *north = read;
 done:
     return status;
 }
@@ -92,6 +105,7 @@ lam_status sky_bounce_load(store *s, size_t n, sky_bounce *out, lam_error *error
     TRY(store_get_text(s, GROUP, "tiling", &name, error));
     TRY(store_get_text(s, GROUP, "up", &up, error));
     TRY(store_get_number(s, GROUP, "ground_albedo", &b.ground_albedo, error));
+    TRY(sky_north_load(s, &b.north, error));
     if (strlen(up) != 1 || strchr("xyz", up[0]) == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP " attribute up is '%.20s', must be x, y or z", store_path(s),
              up);

@@ -11,6 +11,7 @@
 typedef struct sky_bounce {
     sky_tiling tiling;
     double ground_albedo;
+    double north; /* degrees, of the model (sun.h); a sun is turned by it, and the bounce does not know it */
     size_t n;
     /* [m][n], sr: pi F_i,tile; until sky_bounce_close, the shares of an element's rays */
     float *first_bounce;
@@ -39,5 +40,8 @@ void sky_bounce_close(sky_bounce *s, const double *scale);
 /* /sky of a store. Loading checks it against the n elements of the store's mesh. */
 lam_status sky_bounce_save(const sky_bounce *b, store *s, lam_error *error);
 lam_status sky_bounce_load(store *s, size_t n, sky_bounce *out, lam_error *error);
+
+/* The north of a store's sky, degrees; 0 where it states none. Errors: LAM_ERR_FORMAT. */
+lam_status sky_north_load(store *s, double *north, lam_error *error);
 
 #endif

@@ -1,5 +1,6 @@
 #include "solver/light/sky_options.h"
 
+#include "solver/formfactor/sky_bounce.h"
 #include "solver/light/weather_light.h"
 #include "store/groups.h"
 
@@ -64,7 +65,7 @@ const option_row sky_time_rows[] = {
      .kind = OPTION_NUMBER,
      .offset = FIELD(north),
      .argument = "DEGREES",
-     .otherwise = "0",
+     .otherwise = "that of the store, or 0",
      .least = -360,
      .most = 360,
      .help = "Where north is in the model, from +y (z up) or -z (y up) by east, that is clockwise from "
@@ -130,9 +131,8 @@ done:
 }
 
 lam_status sky_options_north(const sky_options *o, store *s, double *north, lam_error *error) {
-    (void)s;
-    (void)error;
-    *north = isnan(o->north) ? 0 : o->north;
+    if (isnan(o->north)) return sky_north_load(s, north, error);
+    *north = o->north;
     return LAM_OK;
 }
 

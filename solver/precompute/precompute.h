@@ -40,6 +40,7 @@ typedef struct precompute_options {
     uint64_t rays, resolution; /* rays: OPTION_AUTO */
     const char *sky;           /* a tiling, or NULL; from a store: that of the store */
     double ground_albedo;
+    double north;        /* degrees; NAN: 0, or that of the store */
     option_list portals; /* names of groups */
     bool keep_form_factors;
     const char *emitters;               /* FILE, group=NAME, sky; or NULL */

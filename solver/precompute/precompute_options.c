@@ -9,6 +9,7 @@
 #include "solver/scene/size_question.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 /* NULL: none. */
@@ -207,6 +208,16 @@ static const option_row form_factor_rows[] = {
      .most = 1,
      .settled = kept_sky,
      .help = "Share of the light of the sky that the ground below the horizon reflects"},
+    {.name = "north",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(north),
+     .argument = "DEGREES",
+     .otherwise = "0, or that of the store",
+     .least = -360,
+     .most = 360,
+     .help =
+         "Where north is in the model, from +y (z up) or -z (y up) by east, that is clockwise from above: at "
+         "90 it is +x. The store keeps it beside its --sky, and solve and lambertd turn sun and sky by it"},
     {.name = "keep-form-factors",
      .kind = OPTION_FLAG,
      .offset = FIELD(keep_form_factors),
@@ -320,7 +331,7 @@ static void add(precompute_tables *t, const char *heading, const option_row *row
 }
 
 void precompute_tables_make(precompute_options *o, bool to_classify, precompute_tables *out) {
-    *o = (precompute_options){.reflectance = -1, .build = {.method = "auto"}};
+    *o = (precompute_options){.reflectance = -1, .north = NAN, .build = {.method = "auto"}};
     out->n_tables = 0;
     method_choices(out->methods);
     source_words(out->sources);

@@ -2,6 +2,7 @@
 #include "solver/precompute/stages.h"
 #include "store/groups.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -93,6 +94,7 @@ lam_status stage_store(const precompute_job *job, const precompute_scene *scene,
         if (scene->m.n > FORM_FACTORS_ROWS_MOST) TRY(form_factors_gather(&factors->f, scene->m.area, error));
         TRY(form_factors_save(&factors->f, s, error));
     }
+    if (!isnan(o->north)) factors->f.sky.north = o->north;
     if (factors->f.sky.first_bounce != NULL) TRY(sky_bounce_save(&factors->f.sky, s, error));
     TRY(terminal_check(error));
     TRY(operator_save(made->op, s, error));

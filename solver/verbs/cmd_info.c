@@ -228,9 +228,12 @@ static void print_overlap(const json_t *area) {
 static void print_sky(const json_t *sky) {
     if (!json_is_object(sky)) return;
     const char *tiling = json_string_value(json_object_get(sky, "tiling"));
-    printf("%-18s%s, %" JSON_INTEGER_FORMAT " tiles, ground albedo %g\n", "sky",
+    const double north = json_number_value(json_object_get(sky, "north"));
+    char turned[48] = "";
+    if (north != 0) snprintf(turned, sizeof turned, ", north at %g degrees", north);
+    printf("%-18s%s, %" JSON_INTEGER_FORMAT " tiles, ground albedo %g%s\n", "sky",
            tiling != NULL ? tiling : "?", json_integer_value(json_object_get(sky, "tiles")),
-           json_number_value(json_object_get(sky, "ground_albedo")));
+           json_number_value(json_object_get(sky, "ground_albedo")), turned);
 }
 
 /* The elements that are read, or that emit, and what others are. */

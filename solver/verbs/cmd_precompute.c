@@ -196,6 +196,7 @@ static bool unused_by_form_factors(const char *name, const precompute_options *o
     if (strcmp(name, "resolution") == 0) return o->from_store || !hemicube;
     if (strcmp(name, "quality") == 0) return o->from_store || hemicube || o->rays != OPTION_AUTO;
     if (strcmp(name, "ground-albedo") == 0) return o->sky == NULL;
+    if (strcmp(name, "north") == 0) return o->sky == NULL;
     if (strcmp(name, "rays") == 0) return o->from_store ? o->probes == 0 : hemicube;
     return false;
 }

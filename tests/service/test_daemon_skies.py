@@ -28,6 +28,8 @@ class Skies(unittest.TestCase):
         for name, up in ("box", "z"), ("other", "y"):
             must("precompute", cls.folder / "box.obj", "-o", cls.folder / f"{name}.h5", "--up", up, "--sky", "tregenza", "--rays", 64,
                  "--probes", 0, "--quiet")
+        must("precompute", cls.folder / "box.obj", "-o", cls.folder / "turned.h5", "--sky", "tregenza", "--rays", 64, "--probes", 0, "--quiet",
+             "--north", 40)
         Scene(60).write(cls.folder / "plain.h5", "plain")
         cls.days = [row for row in a_year() if row[:2] in ((6, 20), (6, 21), (6, 22))]
         (cls.folder / "box.wea").write_text(wea(cls.days))
@@ -71,6 +73,10 @@ class Skies(unittest.TestCase):
         alone = self.skies({"sky": {"name": "clear", **day, "sun_in_tiles": False}})[0]
         self.assertEqual(alone["sun"], told[2]["sun"])
         self.assertEqual(sum(a != b for a, b in zip(alone["sky"], told[2]["sky"])), 1)
+        # A store's own north, unless a request has one.
+        for scene, north, wanted in (("turned", {}, 40), ("turned", {"north": 10}, 10), ("turned", {"north": 0}, 0), ("box", {"north": 40}, 40)):
+            got = self.skies({"sky": {"name": "clear", **day, **north}}, scene)[0]
+            np.testing.assert_array_equal(np.float32(got["sky"]), self.by_program("clear", *WHERE, "--date", "21 Jun 9:00", "--north", wanted)[0])
         # Where y is up, the sun stands in the axes of that scene.
         np.testing.assert_allclose(self.skies({"sky": {"name": "clear", **day}}, "other")[0]["sun"]["direction"], [at[0], at[2], -at[1]], atol=4e-4)
 

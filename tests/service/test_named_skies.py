@@ -112,6 +112,27 @@ class NamedSkies(unittest.TestCase):
         self.refused(1, "days.wea: the sky is dark at 21 Mar 02:00", self.store, "--weather", path, "--date", "21 Mar 2:00")
         self.refused(2, "--annual is of all rows", self.store, "--weather", path, "--date", "21 Mar 12:00", "--annual", "sum")
 
+    def test_the_north_of_a_store(self):
+        """precompute --north is what solve, render and the daemon take unless they are told another; from store to store it stays."""
+        store, again, other = (self.folder / name for name in ("turned.h5", "again.h5", "other.h5"))
+        must("precompute", self.folder / "cube.obj", "-o", store, "--sky", "reinhart:2", "--mesh", "faces", "--method", "exact", "--probes", 0,
+             "--north", 90, "--keep-form-factors")
+        must("precompute", store, "-o", again, "--method", "low-rank", "--probes", 0)
+        must("precompute", store, "-o", other, "--method", "exact", "--probes", 0, "--north", -30)
+        self.assertIn("ground albedo 0, north at 90 degrees", must("info", store).stdout)
+        self.assertEqual(json.loads(must("info", again, "--json").stdout)["sky"]["north"], 90)
+        self.assertNotIn("north", json.loads(must("info", self.store, "--json").stdout)["sky"])
+        where = ["--sky", "clear", "--place", ",".join(map(str, PLACE)), "--date", "21 Jun 9:00", "--quantity", "irradiance"]
+        out = self.folder / "north.npy"
+
+        def light(path, *more):
+            must("solve", path, *where, *more, "-o", out)
+            return np.load(out)
+        for path, north in (store, 90), (again, 90), (other, -30):
+            np.testing.assert_allclose(light(path), light(self.store, "--north", north), rtol=.01, atol=2)
+            np.testing.assert_allclose(light(path, "--north", 0), light(self.store), rtol=.01, atol=2)
+        self.assertGreater(np.abs(light(store) - light(self.store)).max(), 50)
+
     def test_arrays_and_pictures(self):
         sky, out = self.folder / "sky.npy", self.folder / "out.npy"
         where = ["--place", ",".join(map(str, PLACE)), "--date", "21 Jun 9:00", "--north", 20]
