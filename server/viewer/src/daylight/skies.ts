@@ -25,8 +25,10 @@ interface Day {
     diffuse: number;
 }
 
-/** CIE standard clear sky, low turbidity: type 12 of CIE S 011 (ISO 15469). */
-const CIE_CLEAR: Shape = { a: -1, b: -0.32, c: 10, d: -3, e: 0.45 };
+/** CIE standard clear sky, low turbidity: type 12 of CIE S 011 (ISO 15469), over 1 - 10 exp(-3 pi / 2), as luminances
+ * are relative. */
+const CIE_BASE = 1 - 10 * Math.exp((-3 * Math.PI) / 2);
+const CIE_CLEAR: Shape = { a: -1, b: -0.32, c: 10 / CIE_BASE, d: -3, e: 0.45 / CIE_BASE };
 
 const ZENITH = [0, 0, 1] as const;
 

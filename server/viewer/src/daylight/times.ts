@@ -226,6 +226,16 @@ function hoursOfYears({ from, to }: Periods[number]): number {
     return years > 0 ? ahead({ ...from, ...row }, { ...to, ...row }).hours + 24 + 24 * 365 * years : 0;
 }
 
+/** True where an EPW of one period holds whole days of it, at most half of those from the first to the last. */
+function choosesDays(rows: Row[], step: number, periods: Periods | null): boolean {
+    const aDay = Math.round(24 / step), count = Math.floor(rows.length / aDay);
+    if (periods?.length !== 1 || rows.length % aDay !== 0 || count < 2) return false;
+    const isWhole = rows.every((row, i) =>
+        sameDay(row, rows[i - (i % aDay)]) && (i % aDay > 0 || i === 0 || !sameDay(row, rows[i - 1]))
+    );
+    return isWhole && 2 * count <= 1 + ahead(atMidnight(rows[0]), atMidnight(rows[rows.length - 1])).hours / 24;
+}
+
 function checkPeriods(rows: Row[], step: number, periods: Periods): void {
     const there = new Array<number>(DAYS).fill(0), isIn = new Array<boolean>(DAYS).fill(false);
     for (const row of rows) there[dayIn(row)] += step;
@@ -257,12 +267,15 @@ export function readTimes(rows: Row[], periods: Periods | null): number {
     const { step, isApart } = findStep(rows, periods !== null), earlier = periods === null ? 0 : step / 2,
         near = tolerance(step);
     checkOrder(rows, step, earlier);
+    const isChosen = choosesDays(rows, step, periods);
     const isDate = (date: StatedDate, row: Row): boolean => date.month === row.month && date.day === row.day;
     checkGaps(rows, step, earlier, periods === null
         ? chosenGaps(rows, step, isApart)
         : (a, b) =>
-            a.hour + step > 24 - near && b.hour - step < near
-            && periods.some(({ to }, k) => k + 1 < periods.length && isDate(to, a) && isDate(periods[k + 1].from, b)));
-    if (periods !== null && periods.length > 0) checkPeriods(rows, step, periods);
+            isChosen || (a.hour + step > 24 - near && b.hour - step < near
+                && periods.some(({ to }, k) =>
+                    k + 1 < periods.length && isDate(to, a) && isDate(periods[k + 1].from, b)
+                )));
+    if (periods !== null && periods.length > 0 && !isChosen) checkPeriods(rows, step, periods);
     return step;
 }

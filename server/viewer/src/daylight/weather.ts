@@ -1,6 +1,6 @@
 // Reads the irradiances of a weather file, row by row: EPW of EnergyPlus, or WEA of Radiance's gendaymtx. The page
 // keeps it to itself: nothing is sent anywhere.
-import { dateOf, dayOf } from "./sun.ts";
+import { dateOf, dayOf, sunAt } from "./sun.ts";
 import { readTimes, type Periods, type Row, type StatedDate, type WeatherHour } from "./times.ts";
 import type { Moment } from "../state/state.ts";
 
@@ -21,6 +21,8 @@ export interface Weather {
 const RADIATION_MOST = 3000;
 const MISSING_RADIATION = 9999;
 const MISSING_DEW_POINT = 99.9;
+/** By night a pyranometer shows up to this much less than nothing. */
+const OFFSET_MOST = 10;
 
 const EPW_HEAD = ["LOCATION", "DESIGN CONDITIONS", "TYPICAL/EXTREME PERIODS", "GROUND TEMPERATURES",
     "HOLIDAYS/DAYLIGHT SAVINGS", "COMMENTS 1", "COMMENTS 2", "DATA PERIODS"];
@@ -38,11 +40,14 @@ function read(line: number, what: string, text: string | undefined, low: number,
     return value;
 }
 
+/** NaN where it is missing, 0 where it is an offset below 0. */
 function readRadiation(line: number, what: string, text: string | undefined): number {
-    if (Number(text) === MISSING_RADIATION)
-        throw wrong(line, `${what} is missing (${MISSING_RADIATION}); fill the gap or take another file`);
-    return read(line, what, text, 0, RADIATION_MOST);
+    const value = text === undefined || text.trim() === "" ? NaN : Number(text);
+    if (value >= MISSING_RADIATION || value === -999 || value === -MISSING_RADIATION) return NaN;
+    return value < 0 && value >= -OFFSET_MOST ? 0 : read(line, what, text, 0, RADIATION_MOST);
 }
+
+type Place = Pick<Weather, "latitude" | "longitude" | "zone">;
 
 /** What is read before the times are looked at. */
 interface Draft extends Omit<Weather, "times" | "step" | "hours"> {
@@ -88,7 +93,8 @@ function readEpw(lines: string[]): Draft {
     const rows = lines.slice(8).flatMap((text, k): Row[] => {
         if (text.trim() === "") return [];
         const fields = text.split(","), line = k + 9;
-        const dew = read(line, "dew point (field 8)", fields[7], -100, 100), written = (fields[4] ?? "").trim(),
+        const dew = read(line, "dew point (field 8)", fields[7], -MISSING_RADIATION, Number.MAX_VALUE),
+            written = (fields[4] ?? "").trim(),
             minute = written === "" ? NaN : Number(written);
         return [{
             line,
@@ -97,7 +103,7 @@ function readEpw(lines: string[]): Draft {
             month: read(line, "month", fields[1], 1, 12),
             day: readDay(line, fields[1], fields[2]),
             hour: read(line, "hour (field 4)", fields[3], 1, 24) - 1,
-            dewPoint: dew >= MISSING_DEW_POINT ? NaN : dew,
+            dewPoint: dew >= MISSING_DEW_POINT || dew < -MISSING_DEW_POINT ? NaN : dew,
             direct: readRadiation(line, "direct normal radiation (field 15)", fields[14]),
             diffuse: readRadiation(line, "diffuse horizontal radiation (field 16)", fields[15]),
         }];
@@ -159,6 +165,30 @@ function readWea(lines: string[]): Draft {
 /** Hours from the beginning of a year of 365 days. */
 const timeOf = (hour: WeatherHour): number => 24 * (dayOf(hour.month, hour.day) - 1) + hour.hour;
 
+/** True where the sun is below the horizon during the whole step of a row. */
+function isDark({ latitude, longitude, zone }: Place, row: Row, step: number): boolean {
+    const looks = Math.max(1, Math.ceil(12 * step));
+    for (let k = 0; k <= looks; k++) {
+        const hour = row.hour + step * (k / looks - 0.5);
+        if (sunAt(latitude, longitude, zone, row, hour).direction[2] > 0) return false;
+    }
+    return true;
+}
+
+/** Values that are missing by night count as 0; an Error names one by day. */
+function settle(rows: Row[], step: number, place: Place, isEpw: boolean): void {
+    const missing = rows.filter((row) => Number.isNaN(row.direct + row.diffuse));
+    const byDay = missing.filter((row) => !isDark(place, row, step));
+    for (const row of missing) {
+        if (Number.isNaN(row.direct)) row.direct = 0;
+        if (Number.isNaN(row.diffuse)) row.diffuse = 0;
+    }
+    if (byDay.length > 0)
+        throw wrong(byDay[0].line,
+            `radiation is missing by day, ${byDay.length > 1 ? `the first of ${byDay.length} rows` : "in this row"}; `
+                + `fill the gap or take another ${isEpw ? "EPW" : "WEA"}`);
+}
+
 /** Reads the text of a file; an Error says which line is wrong and why. */
 export function readWeather(text: string): Weather {
     const lines = text.replace(/^\uFEFF/, "").split(/\r?\n/);
@@ -168,6 +198,7 @@ export function readWeather(text: string): Weather {
     const { rows, periods, ...weather } = isEpw ? readEpw(lines) : readWea(lines);
     if (rows.length === 0) throw new Error("The weather file has no hours after its head.");
     const step = readTimes(rows, periods);
+    settle(rows, step, weather, isEpw);
     // Months of a typical year are often of several years: what counts is the time of the year.
     const hours: WeatherHour[] = rows.sort((one, other) => timeOf(one) - timeOf(other));
     return { ...weather, step, hours, times: Float64Array.from(hours, timeOf) };
