@@ -310,7 +310,7 @@ static lam_status check_periods(const weather_times *t, lam_error *error) {
     weather_name_row(t, w->n - 1, w->step / 2, end);
     FAIL(error, LAM_ERR_FORMAT,
          "%s: line %zu states %d/%d to %d/%d, but rows are from %s to %s: %.6g %s missing; fill the gap or "
-         "state what the file holds",
+         "state what the file holds, or give --gaps fill or --gaps skip",
          t->path, stated->line, stated->from[0].month, stated->from[0].day, stated->to[stated->n - 1].month,
          stated->to[stated->n - 1].day, name, end, missing, hours_are(missing));
 done:

@@ -268,7 +268,7 @@ START_TEST(rows_that_are_missing) {
                       "(2001-12-31 22:00): 1 hour is missing");
     t = begin(true, "1,1,Data,Sunday,6/20,6/22");
     days_between(&t, 2001, 6, 20, 6, 21, false);
-    check_refused(&t, ": 24 hours are missing; fill the gap or state what the file holds");
+    check_refused(&t, ": 24 hours are missing; fill the gap or state what the file holds, or give --gaps");
     t = begin(true, "1,1,Data,Sunday,6/20,6/22");
     epw_day(&t, 2001, 6, 20, 3, 24, 1, 1);
     days_between(&t, 2001, 6, 21, 6, 22, false);
