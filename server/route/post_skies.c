@@ -7,6 +7,7 @@
 #include "solver/codec/sky_request.h"
 #include "solver/daylight/moment.h"
 #include "solver/daylight/named_sky.h"
+#include "solver/daylight/weather_mend.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -17,8 +18,8 @@
 
 /* Bytes of the answer beside those of tiles, and of a number of a tile, at most. */
 enum { HEAD_BYTES = 512, TILE_BYTES = 18 };
-/* A row of weather is read from 20 bytes or more. */
-enum { ROW_TEXT = 10 };
+/* A row of a WEA has 10 bytes or more, five numbers; one of an EPW 32, sixteen fields. */
+enum { WEA_ROW_BYTES = 10, EPW_ROW_BYTES = 32 };
 
 /* Parts that the skies of a request share. */
 typedef struct making {
@@ -66,7 +67,9 @@ static bool read_weather(making *m, const sky_request *sky, size_t k, problem *w
     weather_free(&m->weather);
     kept_bytes *text = kept_forms_find(s->texts.weather, 0);
     if (text == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "the weather of the scene is not there");
-    const size_t bytes = bytes_times(text->content.length / ROW_TEXT, sizeof(weather_hour));
+    const size_t row = strcmp(s->weather.format, "epw") == 0 ? EPW_ROW_BYTES : WEA_ROW_BYTES;
+    const size_t times = gaps == WEATHER_FILL ? 1 + WEATHER_FILL_MOST : 1;
+    const size_t bytes = bytes_times(text->content.length / row + 1, times * sizeof(weather_hour));
     snprintf(name, sizeof name, "weather.%s", s->weather.format);
     const bool room = request_memory_take(m->in->memory, bytes, why);
     const lam_status status =

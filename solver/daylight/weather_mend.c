@@ -305,6 +305,14 @@ static lam_status add_rows(weather_times *t, weather_row **rows, lam_error *erro
         if (gaps[i].hours > WEATHER_GAP_MOST) TRY(refuse_long(t, gaps[i].row, gaps[i].hours, error));
     if (before > WEATHER_GAP_MOST) TRY(refuse_long(t, 0, before, error));
     if (behind > WEATHER_GAP_MOST) TRY(refuse_long(t, w->n - 1, behind, error));
+    double missing = before + behind;
+    for (size_t i = 0; i < n_gaps; i++) missing += gaps[i].hours;
+    if (missing > WEATHER_FILL_MOST * (double)w->n * w->step)
+        FAIL(
+            error, LAM_ERR_FORMAT,
+            "%s: %.6g hours are missing beside %.6g that are there, and at most %d times as many are filled; "
+            "--gaps skip leaves them out",
+            t->path, missing, (double)w->n * w->step, WEATHER_FILL_MOST);
     bool leap = false;
     for (size_t i = 0; i < w->n; i++)
         leap = leap || weather_day(w->hours[i].month, w->hours[i].day) == LEAP_DAY;
@@ -340,16 +348,30 @@ static double *value_of(weather_hour *h, bool diffuse) {
     return diffuse ? &h->diffuse : &h->direct;
 }
 
-/* The value of the same time of the nearest day before or after row i that has it; NAN: none has it. */
+/* Hours between row i and the k-th row after it, or before it. */
+static double hours_apart(const weather_hour *read, size_t i, size_t k, bool later) {
+    bool back = false;
+    return later ? weather_ahead(&read[i], &read[i + k], &back)
+                 : weather_ahead(&read[i - k], &read[i], &back);
+}
+
+/* The value of the same time of the nearest day before or after row i that has it; NAN: none has it. Found by
+ * bisection among the rows that the days can hold. */
 static double same_time(const weather *w, weather_hour *read, size_t i, bool diffuse, bool later) {
-    const double tolerance = weather_tolerance(w->step), most = 24 * WEATHER_DAYS + tolerance;
-    for (size_t k = 1; later ? i + k < w->n : k <= i; k++) {
-        const size_t at = later ? i + k : i - k;
-        bool back = false;
-        const double apart = weather_ahead(&read[later ? i : at], &read[later ? at : i], &back);
-        if (back || apart > most) break;
-        const double value = *value_of(&read[at], diffuse);
-        if (fabs(apart - 24 * round(apart / 24)) <= tolerance && !isnan(value)) return value;
+    const double tolerance = weather_tolerance(w->step);
+    const size_t there = later ? w->n - 1 - i : i, held = (size_t)(24 * WEATHER_DAYS / w->step + 1);
+    for (int day = 1; day <= WEATHER_DAYS; day++) {
+        size_t low = 1, high = (there < held ? there : held) + 1;
+        while (low < high) {
+            const size_t middle = low + (high - low) / 2;
+            if (hours_apart(read, i, middle, later) < 24 * day - tolerance)
+                low = middle + 1;
+            else
+                high = middle;
+        }
+        if (low > there || fabs(hours_apart(read, i, low, later) - 24 * day) > tolerance) continue;
+        const double value = *value_of(&read[later ? i + low : i - low], diffuse);
+        if (!isnan(value)) return value;
     }
     return NAN;
 }

@@ -14,6 +14,9 @@
 /* True where the sun is below the horizon during the whole step of a row. */
 bool weather_is_dark(const weather *w, const weather_hour *h);
 
+/* Rows that are added are at most so many times as many as there are: memory stays bounded by the file. */
+enum { WEATHER_FILL_MOST = 8 };
+
 /* Sets values by night that are missing (NAN) to 0. Then, of values by day, rows and order:
  *   WEATHER_REFUSE  refuses each that is missing or wrong
  *   WEATHER_FILL    drops the later one of two rows of one time, sorts rows by time, and adds rows in gaps of

@@ -206,6 +206,10 @@ START_TEST(rows_are_filled) {
     good_rows(&t, 24 * 9, 24 * 20);
     check_refused(&t, WEATHER_FILL,
                   "beside it 192 hours are missing, and at most 144 are filled; --gaps skip");
+    t = begin(true, "6/1,6/30", 60); /* minutes of each fifth day: what is added stays bounded by the file */
+    for (int day = 0; day < 30; day += 5) good_rows(&t, 1440 * day + 720, 1440 * day + 722);
+    check_refused(&t, WEATHER_FILL,
+                  "hours are missing beside 0.2 that are there, and at most 8 times as many");
     for (int how = WEATHER_FILL; how <= WEATHER_SKIP; how++) {
         t = begin(false, NULL, 1); /* the hours of a WEA are chosen: others are not missing */
         for (int day = 0; day < 20; day++)
