@@ -28,8 +28,8 @@ class Skies(unittest.TestCase):
         for name, up in ("box", "z"), ("other", "y"):
             must("precompute", cls.folder / "box.obj", "-o", cls.folder / f"{name}.h5", "--up", up, "--sky", "tregenza", "--rays", 64,
                  "--probes", 0, "--quiet")
-        must("precompute", cls.folder / "box.obj", "-o", cls.folder / "turned.h5", "--sky", "tregenza", "--rays", 64, "--probes", 0, "--quiet",
-             "--north", 40)
+        must("precompute", cls.folder / "box.obj", "-o", cls.folder / "turned.h5", "--sky", "tregenza", "--rays", 64, "--probes", 0,
+             "--quiet", "--north", 40)
         Scene(60).write(cls.folder / "plain.h5", "plain")
         cls.days = [row for row in a_year() if row[:2] in ((6, 20), (6, 21), (6, 22))]
         (cls.folder / "box.wea").write_text(wea(cls.days))
@@ -74,14 +74,18 @@ class Skies(unittest.TestCase):
         self.assertEqual(alone["sun"], told[2]["sun"])
         self.assertEqual(sum(a != b for a, b in zip(alone["sky"], told[2]["sky"])), 1)
         # A store's own north, unless a request has one.
-        for scene, north, wanted in (("turned", {}, 40), ("turned", {"north": 10}, 10), ("turned", {"north": 0}, 0), ("box", {"north": 40}, 40)):
+        for scene, north, wanted in (("turned", {}, 40), ("turned", {"north": 10}, 10), ("turned", {"north": 0}, 0),
+                                     ("box", {"north": 40}, 40)):
             got = self.skies({"sky": {"name": "clear", **day, **north}}, scene)[0]
-            np.testing.assert_array_equal(np.float32(got["sky"]), self.by_program("clear", *WHERE, "--date", "21 Jun 9:00", "--north", wanted)[0])
+            np.testing.assert_array_equal(np.float32(got["sky"]), self.by_program("clear", *WHERE, "--date", "21 Jun 9:00", "--north",
+                wanted)[0])
         # Where y is up, the sun stands in the axes of that scene.
-        np.testing.assert_allclose(self.skies({"sky": {"name": "clear", **day}}, "other")[0]["sun"]["direction"], [at[0], at[2], -at[1]], atol=4e-4)
+        np.testing.assert_allclose(self.skies({"sky": {"name": "clear", **day}}, "other")[0]["sun"]["direction"], [at[0], at[2], -at[1]],
+            atol=4e-4)
 
     def test_light_that_is_stated(self):
-        told = self.skies({"skies": [{"direct": 800, "diffuse": 100, "sun": {"azimuth": 180, "altitude": 30}}, {"diffuse": 100, "sun": {"azimuth": 0, "altitude": -3}},
+        told = self.skies({"skies": [{"direct": 800, "diffuse": 100, "sun": {"azimuth": 180, "altitude": 30}},
+                                     {"diffuse": 100, "sun": {"azimuth": 0, "altitude": -3}},
                                      {"direct": 800, "diffuse": 100, "place": PLACE, "date": "21 Jun 12:00", "lux_outside": 7}]})
         self.assertAlmostEqual(told[0]["direct"], 400, delta=1e-6)
         self.assertAlmostEqual(told[0]["diffuse"], 100, delta=1e-6)
@@ -103,29 +107,54 @@ class Skies(unittest.TestCase):
         self.assertEqual(answer.status, 422)
         self.assertIn("sky 0: weather.epw: line 45 (2001-06-21 13:00): before it 1 hour is missing", answer.json()["detail"])
         filled = self.skies({"sky": {"weather": True, "date": "21 Jun 12:00", "gaps": "fill"}}, "other")[0]
-        np.testing.assert_allclose(np.float32(filled["sky"]), self.by_program(path, "--gaps", "fill", "--date", "21 Jun 12:00")[0], rtol=1e-6)
+        np.testing.assert_allclose(np.float32(filled["sky"]), self.by_program(path, "--gaps", "fill", "--date", "21 Jun 12:00")[0],
+            rtol=1e-6)
         self.assertEqual(self.ask({"sky": {"weather": True, "date": "21 Jun 12:00", "gaps": "skip"}}, "other").status, 422)
 
     def test_refused(self):
         noon = {"date": "21 Jun 12:00"}
-        for wanted, sky in (("no such sky", "cloudy"), ("turbidity must be", "turbidity:99"), ("needs its sun", "clear"), ("must be a name or an object", 7),
-                            ("one of name, diffuse, and weather", {}), ("one of name, diffuse, and weather", {"weather": False}),
-                            ("one of name, diffuse, and weather", {"name": "even", "diffuse": 1}), ("sky/place lacks zone", {"name": "clear", "place": {"latitude": 1, "longitude": 2}}),
-                            ("needs a date", {"name": "clear", "place": PLACE}), ("both date and hour", {"weather": True, **noon, "hour": 1}),
-                            ("must be DAY MONTH HH:MM", {"weather": True, "date": "noon"}), ("no row covers 1 Jan", {"weather": True, "date": "1 Jan 12:00"}),
-                            ("sky is dark", {"weather": True, "date": "21 Jun 1:00"}), ("sky is dark", {"name": "clear", "sun": {"azimuth": 0, "altitude": -5}}),
-                            ("sky/hour = 9000, must be from 0 to 8760", {"weather": True, "hour": 9000}), ("must be below 8760", {"weather": True, "hour": 8760}),
-                            ("sky/diffuse = -1, must be from 0 to 3000", {"diffuse": -1}), ("gaps does not go with name", {"name": "even", "gaps": "fill"}),
-                            ("place does not go with weather", {"weather": True, "place": PLACE}), ("gaps must be refuse, fill or skip", {"weather": True, **noon, "gaps": "x"}),
-                            ("leave out sun, place", {"name": "even", "north": 3}), ("one way only", {"name": "clear", "sun": {"azimuth": 0, "altitude": 5}, **noon}),
-                            ("sky/lux_outside = 0, must be from", {"name": "even", "lux_outside": 0}), ("sky/clouds is not a member", {"name": "even", "clouds": 1}),
-                            ("must be true or false", {"name": "even", "photometric": 1}), ("must be a number", {"diffuse": None}), ("a text of 1 to", {"name": "x" * 99})):
+        for wanted, sky in (
+                ("no such sky", "cloudy"),
+                ("turbidity must be", "turbidity:99"),
+                ("needs its sun", "clear"),
+                ("must be a name or an object", 7),
+                ("one of name, diffuse, and weather", {}),
+                ("one of name, diffuse, and weather", {"weather": False}),
+                ("one of name, diffuse, and weather", {"name": "even", "diffuse": 1}),
+                ("sky/place lacks zone", {"name": "clear", "place": {"latitude": 1, "longitude": 2}}),
+                ("needs a date", {"name": "clear", "place": PLACE}),
+                ("both date and hour", {"weather": True, **noon, "hour": 1}),
+                ("must be DAY MONTH HH:MM", {"weather": True, "date": "noon"}),
+                ("no row covers 1 Jan", {"weather": True, "date": "1 Jan 12:00"}),
+                ("sky is dark", {"weather": True, "date": "21 Jun 1:00"}),
+                ("sky is dark", {"name": "clear", "sun": {"azimuth": 0, "altitude": -5}}),
+                ("sky/hour = 9000, must be from 0 to 8760", {"weather": True, "hour": 9000}),
+                ("must be below 8760", {"weather": True, "hour": 8760}),
+                ("sky/diffuse = -1, must be from 0 to 3000", {"diffuse": -1}),
+                ("gaps does not go with name", {"name": "even", "gaps": "fill"}),
+                ("place does not go with weather", {"weather": True, "place": PLACE}),
+                ("gaps must be refuse, fill or skip", {"weather": True, **noon, "gaps": "x"}),
+                ("leave out sun, place", {"name": "even", "north": 3}),
+                ("one way only", {"name": "clear", "sun": {"azimuth": 0, "altitude": 5}, **noon}),
+                ("sky/lux_outside = 0, must be from", {"name": "even", "lux_outside": 0}),
+                ("sky/clouds is not a member", {"name": "even", "clouds": 1}),
+                ("must be true or false", {"name": "even", "photometric": 1}),
+                ("must be a number", {"diffuse": None}),
+                ("a text of 1 to", {"name": "x" * 99})):
             answer = self.ask({"sky": sky})
             with self.subTest(sky=sky):
                 self.assertEqual(answer.status, 422, answer.body)
                 self.assertIn(wanted, answer.json()["detail"])
-        for status, body in ((422, {}), (422, []), (422, {"sky": "even", "skies": ["even"]}), (422, {"skies": []}), (422, {"skies": ["even"] * 65}), (400, "{"),
-                             (400, '{"sky": "even"'), (422, '{"sky": {"name": "ev\\u0000en"}}'), (400, '{"sky": {"diffuse": 1e999x}}')):
+        for status, body in (
+                (422, {}),
+                (422, []),
+                (422, {"sky": "even", "skies": ["even"]}),
+                (422, {"skies": []}),
+                (422, {"skies": ["even"] * 65}),
+                (400, "{"),
+                (400, '{"sky": "even"'),
+                (422, '{"sky": {"name": "ev\\u0000en"}}'),
+                (400, '{"sky": {"diffuse": 1e999x}}')):
             self.assertEqual(self.ask(body).status, status, body)
         self.assertEqual(self.ask({"sky": "even"}, headers={"Content-Type": "application/x-npy"}).status, 415)
         self.assertEqual(self.daemon.get("/v1/scenes/box/skies").status, 405)

@@ -115,8 +115,8 @@ class NamedSkies(unittest.TestCase):
     def test_the_north_of_a_store(self):
         """precompute --north is what solve, render and the daemon take unless they are told another; from store to store it stays."""
         store, again, other = (self.folder / name for name in ("turned.h5", "again.h5", "other.h5"))
-        must("precompute", self.folder / "cube.obj", "-o", store, "--sky", "reinhart:2", "--mesh", "faces", "--method", "exact", "--probes", 0,
-             "--north", 90, "--keep-form-factors")
+        must("precompute", self.folder / "cube.obj", "-o", store, "--sky", "reinhart:2", "--mesh", "faces", "--method", "exact",
+             "--probes", 0, "--north", 90, "--keep-form-factors")
         must("precompute", store, "-o", again, "--method", "low-rank", "--probes", 0)
         must("precompute", store, "-o", other, "--method", "exact", "--probes", 0, "--north", -30)
         self.assertIn("ground albedo 0, north at 90 degrees", must("info", store).stdout)

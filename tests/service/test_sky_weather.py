@@ -40,7 +40,8 @@ class SkyWeather(unittest.TestCase):
                   "v 0 1 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n")
         cls.write("cube.mtl", "newmtl black\nKd 0 0 0\n")
         cls.yard = cls.folder / "cube.h5"
-        must("precompute", cls.folder / "cube.obj", "-o", cls.yard, "--mesh", "faces", "--sky", "tregenza", "--method", "exact", "--probes", 0)
+        must("precompute", cls.folder / "cube.obj", "-o", cls.yard, "--mesh", "faces", "--sky", "tregenza", "--method", "exact",
+            "--probes", 0)
 
     @classmethod
     def write(cls, name, text):
@@ -164,8 +165,8 @@ class SkyWeather(unittest.TestCase):
                     # Smooth to the horizon, as the midpoint rule wants it.
                     rows.append((month, 21, hour, round(900 * math.exp(-.25 / up), 3) if up > 0 else 0, round(120 * up, 3)))
             light = self.folder / "steps.json"
-            must("solve", self.yard, "--weather", self.write("steps.wea", wea(rows)), "--sun", "exact", "--sun-points", 1, "--annual", "sum",
-                 "-o", light)
+            must("solve", self.yard, "--weather", self.write("steps.wea", wea(rows)), "--sun", "exact", "--sun-points", 1, "--annual",
+                 "sum", "-o", light)
             sums[n] = np.array(json.loads(light.read_text())["annual"]["sum"])
         for n in 1, 2, 4:
             np.testing.assert_allclose(sums[n][0], sums[6][0], rtol=1e-3, err_msg=f"{60 // n} minutes")
@@ -191,7 +192,8 @@ class SkyWeather(unittest.TestCase):
         text = epw(days, dew=999, periods="6/20,6/22").splitlines(keepends=True)
         whole = self.sky(self.write("whole.epw", "".join(text)))[0]
         night = list(text)
-        night[10], night[11] = night[10].replace(",0,0,0,0,0,0\n", ",9999,9999,0,0,0,0\n"), text[11].replace(",0,0,0,0,0,0\n", ",0,-1,0,0,0,0\n")
+        night[10], night[11] = night[10].replace(",0,0,0,0,0,0\n", ",9999,9999,0,0,0,0\n"), text[11].replace(
+            ",0,0,0,0,0,0\n", ",0,-1,0,0,0,0\n")
         skies, done = self.sky(self.write("night.epw", "".join(night)))
         np.testing.assert_array_equal(skies, whole)
         self.assertIn("values that count as 0: 3, of which 2 are missing by night, 1 from -10 to 0 W/m2\n", done.stderr)

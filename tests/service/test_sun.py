@@ -235,7 +235,8 @@ class Sun(unittest.TestCase):
             direct = np.array([row[3] for row in days]) * (suns[:, 2] > 0)
             wanted = direct @ np.maximum(suns @ normals.T, 0) / 1000
             path.write_text(wea([(*row[:3], row[3], 0) for row in days], place[0], -place[1], -15 * place[2]))
-            must("solve", store, "--weather", path, "--annual", "sum", *(word for k in faces for word in ("--reduce", k + "=mean")), "-o", out)
+            must("solve", store, "--weather", path, "--annual", "sum", *(word for k in faces for word in ("--reduce", k + "=mean")), "-o",
+                out)
             got = [json.loads(out.read_text())["annual"]["sum"][k]["mean"] for k in faces]
             np.testing.assert_allclose(got, wanted, rtol=1e-3, atol=.02, err_msg=str(place))
         # The stated error of the sum contains what the sun's way leaves: nothing here, or the tiles' error on the worst wall.
