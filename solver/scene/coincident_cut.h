@@ -8,7 +8,7 @@
 
 typedef struct coincident_cuts {
     size_t cut, covered; /* faces that lose a part, and those of which nothing is left */
-    size_t parts;        /* what is left of the cut ones, as faces */
+    size_t parts;        /* faces that are left of the cut ones */
     size_t whole;        /* faces that stay as they are, as they would become too many parts */
     double area;         /* m^2 that go */
     double *lost;        /* [n_groups], of these */
