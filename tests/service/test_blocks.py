@@ -124,20 +124,20 @@ class Blocks(Case):
         self.assertLess(numpy.linalg.norm(answers[0] - answers[1]), .03 * numpy.linalg.norm(answers[1]))
 
     def test_faces_that_coincide_are_told_and_lose_no_light(self):
-        """A closed box with two of its floors in one place, each of which sees all walls, the second one in triangles: the
-        rows are repaired, and the answer is that of pairs, which are repaired likewise."""
-        double = self.path("double.obj")
-        must("generate", "box", "--divisions", 6, "--reflectance", .5, "-o", double)
-        with open(double) as file:
-            faces = [line for line in file if line.startswith("f ")]
-        with open(double, "a") as file:
-            for face in faces[: len(faces) // 6]:
-                a, b, c, d = face.split()[1:]
-                file.write(f"f {a} {b} {c}\nf {a} {c} {d}\n")
-        answers = []
+        """A closed box with 676 squares on its floor, too many to cut it around them: both see all walls. The rows are
+        repaired, and the answer is that of pairs, which are repaired likewise."""
+        double, answers, quads = self.path("double.obj"), [], Quads()
+        quads.box("wall", (0, 0, 0), (1, 1, 1), (6, 6, 6))
+        floor = [k for k, group in enumerate(quads.groups) if group == "wall4"]
+        quads.groups, quads.faces = ([x for k, x in enumerate(of) if k not in floor] for of in (quads.groups, quads.faces))
+        quads.grid("floor", 2, 0, 1, numpy.array([0, 1]), numpy.array([0, 1]))
+        for x in numpy.arange(26) / 26:
+            for y in numpy.arange(26) / 26:
+                quads.grid("tiles", 2, 0, 1, x + numpy.array([.003, .035]), y + numpy.array([.003, .035]))
+        quads.write(double, .5)
         for method in ("blocks", "rays"):
             done = must("precompute", double, "-o", self.path("double.h5"), "--method", "hierarchical", "--probes", 0,
-                        "--epsilon", .01, "--form-factors", method)
+                        "--mesh", "faces", "--epsilon", .01, "--form-factors", method)
             self.assertIn("some faces may coincide", done.stderr)
             self.assertIn(" overlap others in one plane, ", done.stderr)
             count = h5py.File(self.path("double.h5"))["/mesh/elements"].shape[0]
