@@ -218,7 +218,7 @@ class ObjTexturesTest(TexturesCase):
         np.testing.assert_allclose(store.reflectance[:, 0], .9999)
         self.assertIn("material 'white': a mean reflectance above 0.9999 is clamped to it", errors)
         self.assertIn("a.mtl: 1 map of other things than Kd and Ke is left out", errors)
-        self.assertIn("a.mtl: transparency (d, Tr, map_d) is left out", errors)
+        self.assertIn("a.mtl: transparency (d, Tr, Tf, map_d) is left out: what has it is opaque; --portal GROUP ", errors)
         self.assertIn("a.obj: 1 faces of materials with images have no texture coordinates", errors)
         truth = mean_of(rgba[..., :3], [(0, 1), (2.5, 1), (2.5, -.25)])
         self.close(store.reflectance[:, 1], truth, "alpha is left out")

@@ -116,13 +116,15 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     fresh.has_diffuse =
         colour_of(m, colour_base, fresh.diffuse) || colour_of(m, colour_diffuse, fresh.diffuse);
     colour_of(m, colour_emissive, fresh.emission);
-    double scale = 1;
+    double scale = 1, diffuse = 1;
     if (own != NULL) {
+        diffuse = own->diffuse;
         scale = M_PI * own->strength; /* of a luminance L, a diffuse surface sends out pi L */
         fresh.two_sided = own->two_sided;
         memcpy(fresh.textures, own->textures, sizeof fresh.textures);
     }
     for (int c = 0; c < 3; c++) fresh.emission[c] *= scale;
+    for (int c = 0; c < 3; c++) fresh.diffuse[c] *= diffuse;
     if (!a->gltf) tell_images(a, m, name, &fresh);
     if (v->defined && memcmp(v, &fresh, sizeof fresh) != 0) { /* two materials of one name */
         const size_t length = strlen(name);

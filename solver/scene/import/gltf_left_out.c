@@ -7,15 +7,11 @@
 
 /* Extensions that are read, or have a line of their own where they matter. */
 static bool is_read(const char *extension) {
-    static const char *const names[] = {"KHR_texture_transform",
-                                        "KHR_materials_emissive_strength",
-                                        "KHR_materials_pbrSpecularGlossiness",
-                                        "KHR_draco_mesh_compression",
-                                        "KHR_mesh_quantization",
-                                        "KHR_lights_punctual",
-                                        "KHR_texture_basisu",
-                                        "EXT_texture_webp",
-                                        GLTF_INSTANCES};
+    static const char *const names[] = {"KHR_texture_transform",      "KHR_materials_emissive_strength",
+                                        "KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness",
+                                        "KHR_draco_mesh_compression", "KHR_mesh_quantization",
+                                        "KHR_lights_punctual",        "KHR_texture_basisu",
+                                        "EXT_texture_webp",           GLTF_INSTANCES};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (strcmp(extension, names[i]) == 0) return true;
     return strncmp(extension, "KHR_xmp", 7) == 0;
@@ -71,14 +67,15 @@ static void tell_extensions(const gltf_file *g) {
 
 void gltf_tell_left_out(const gltf_file *g) {
     import_warnings *w = &g->s->warnings;
-    static const char punctual[] = "KHR_lights_punctual";
-    size_t i, lights = 0, bumps = 0, alphas = 0, metals = 0;
+    static const char punctual[] = "KHR_lights_punctual", transmission[] = "KHR_materials_transmission";
+    size_t i, lights = 0, bumps = 0, alphas = 0, metals = 0, panes = 0;
     json_t *m;
     json_array_foreach(json_object_get(g->root, "materials"), i, m) {
         const json_t *pbr = json_object_get(m, "pbrMetallicRoughness");
         const char *mode = json_string_value(json_object_get(m, "alphaMode"));
         bumps +=
             json_object_get(m, "normalTexture") != NULL || json_object_get(m, "occlusionTexture") != NULL;
+        panes += gltf_extension(m, transmission) != NULL;
         alphas += mode != NULL && strcmp(mode, "OPAQUE") != 0;
         metals += gltf_number(json_object_get(pbr, "metallicFactor"), 0) > 0 ||
                   json_object_get(pbr, "metallicRoughnessTexture") != NULL;
@@ -90,6 +87,12 @@ void gltf_tell_left_out(const gltf_file *g) {
     if (alphas > 0)
         import_warn(w, "%s: the alpha of %zu materials (MASK, BLEND) is left out; they are opaque", g->path,
                     alphas);
+    if (panes > 0)
+        import_warn(
+            w,
+            "%s: no light passes %zu material%s (%s), which reflect%s what is not transmitted; --portal "
+            "GROUP takes a pane away",
+            g->path, panes, panes == 1 ? "" : "s", transmission, panes == 1 ? "s" : "");
     if (bumps > 0)
         import_warn(w, "%s: normal and occlusion maps of %zu materials are left out", g->path, bumps);
     if (metals > 0)

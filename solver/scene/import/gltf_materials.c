@@ -97,12 +97,14 @@ static lam_status read_material(gltf_file *g, const json_t *m, gltf_material *ou
     const json_t *base = json_object_get(json_object_get(m, "pbrMetallicRoughness"), "baseColorTexture");
     const json_t *glossy = gltf_extension(m, "KHR_materials_pbrSpecularGlossiness");
     const json_t *strong = gltf_extension(m, "KHR_materials_emissive_strength");
+    const json_t *clear = gltf_extension(m, "KHR_materials_transmission");
     if (json_object_get(glossy, "diffuseTexture") != NULL) base = json_object_get(glossy, "diffuseTexture");
     const char *name = json_string_value(json_object_get(m, "name"));
     if (name != NULL && name[0] != '\0' && (out->name = strdup(name)) == NULL)
         FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for its materials", g->path);
     out->two_sided = json_is_true(json_object_get(m, "doubleSided"));
     out->strength = gltf_number(json_object_get(strong, "emissiveStrength"), 1);
+    out->diffuse = 1 - fmin(fmax(gltf_number(json_object_get(clear, "transmissionFactor"), 0), 0), 1);
     TRY(read_texture(g, base, &out->textures[TEXTURE_REFLECTANCE], error));
     TRY(read_texture(g, json_object_get(m, "emissiveTexture"), &out->textures[TEXTURE_EMISSION], error));
 done:

@@ -147,6 +147,7 @@ void imported_faces_fit_images(imported_faces *s);
 typedef struct gltf_material {
     char *name;      /* NULL: it has none */
     double strength; /* KHR_materials_emissive_strength; 1 */
+    double diffuse;  /* the share of its colour that is not transmitted (KHR_materials_transmission); 1 */
     bool two_sided;
     imported_texture textures[TEXTURE_QUANTITIES];
 } gltf_material;

@@ -172,9 +172,11 @@ static void settle_colours(imported_faces *s) {
     }
 }
 
-/* Counts of statements that are not read. */
+/* Counts of statements that are not read; clear: the material has a filter (Tf) that lets less than all pass,
+ * glass: its illum is one of those of glass, by which a filter counts. */
 typedef struct left_out {
     size_t maps, transparent;
+    bool clear, glass;
 } left_out;
 
 static void count_left_out(char *line, left_out *out) {
@@ -188,7 +190,18 @@ static void count_left_out(char *line, left_out *out) {
         out->transparent += read_numbers(rest, 1, &number) == 1 && number < 1;
     else if ((rest = after_keyword(line, "Tr")) != NULL)
         out->transparent += read_numbers(rest, 1, &number) == 1 && number > 0;
+    else if ((rest = after_keyword(line, "Tf")) != NULL)
+        out->clear = read_numbers(rest, 1, &number) == 1 && number > 0 && number < 1;
+    else if ((rest = after_keyword(line, "illum")) != NULL)
+        out->glass =
+            read_numbers(rest, 1, &number) == 1 && (number == 4 || number == 6 || number == 7 || number == 9);
 }
+
+static void end_material(left_out *out) {
+    out->transparent += out->clear && out->glass;
+    out->clear = out->glass = false;
+}
+
 static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
     size_t length = 0;
@@ -200,6 +213,7 @@ static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error
     TRY(begin_lines(path, text, length, &cursor, error));
     for (char *line; (line = next_line(&cursor)) != NULL;) {
         if ((rest = after_keyword(line, "newmtl")) != NULL) {
+            end_material(&out);
             TRY(imported_faces_add_material(s, rest, strlen(rest), &current, error));
             if (s->values[current].defined) {
                 import_warn(&s->warnings, "%s:%u: material '%s' is defined again; the first one counts", path,
@@ -221,11 +235,16 @@ static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error
         } else
             count_left_out(line, &out);
     }
+    end_material(&out);
     if (out.maps > 0)
         import_warn(&s->warnings, "%s: %zu map%s of other things than Kd and Ke %s left out", path, out.maps,
                     out.maps == 1 ? "" : "s", out.maps == 1 ? "is" : "are");
     if (out.transparent > 0)
-        import_warn(&s->warnings, "%s: transparency (d, Tr, map_d) is left out: what has it is opaque", path);
+        import_warn(
+            &s->warnings,
+            "%s: transparency (d, Tr, Tf, map_d) is left out: what has it is opaque; --portal GROUP takes "
+            "a pane away",
+            path);
 done:
     free(text);
     return status;
