@@ -16,6 +16,9 @@ import time
 import h5py
 import numpy as np
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "service"))
+from polygon_factor import polygon_factor # noqa: E402
+
 ELEMENTS = (600, 1200, 2500, 8000)
 OPTIONS = ((), ("--form-factors", "rays"), ("--quality", "high"))
 STYLES = ("strips", "grid", "triangles", "seam")
@@ -83,19 +86,6 @@ def room(random):
     return sides, style
 
 
-def lambert_factor(points, corners):
-    """Factors of points of the floor to a polygon."""
-    to = np.asarray(corners)[None] - points[:, None]
-    to /= np.linalg.norm(to, axis=2, keepdims=True)
-    total = 0
-    for k in range(len(corners)):
-        a, b = to[:, k], to[:, (k + 1) % len(corners)]
-        across = np.cross(a, b)
-        length = np.linalg.norm(across, axis=1)
-        total = total + np.arctan2(length, (a * b).sum(1)) * across[:, 2] / np.maximum(length, 1e-300)
-    return np.abs(total) / (2 * np.pi)
-
-
 def truth_of(sides, corners):
     """Means over elements by 27 x 27 points of the Gauss rule, each of 3 x 3 parts."""
     places, weights = np.array([.5 - np.sqrt(.15), .5, .5 + np.sqrt(.15)]), np.array([5, 8, 5]) / 18
@@ -107,7 +97,7 @@ def truth_of(sides, corners):
             points = ((1 - u) * (1 - v) * corners[:, 0] + u * (1 - v) * corners[:, 1] + u * v * corners[:, 2] + (1 - u) * v * corners[:, 3])
             for side in sides:
                 for window in side.windows:
-                    total = total + wu * wv * lambert_factor(points, side.points(rectangle(*window)))
+                    total = total + wu * wv * polygon_factor(points, np.array([0, 0, 1]), side.points(rectangle(*window)))
     return total
 
 

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 
 from command import lambert as run
+from polygon_factor import polygon_factor
 
 X, Y, Z = 6, 8, 3
 WINDOW = (2.5, 3.5, 1, 2)  # x and z in the plane y = 0
@@ -41,19 +42,6 @@ def keyhole(a, b, c, d):
 def to_ceiling(a, b, c, d):
     """Pillars and a sill: above, the hole is closed by the edge of the ceiling."""
     return [south(0, a, 0, Z), south(b, X, 0, Z), south(a, b, 0, c)]
-
-
-def lambert(points, normal, corners):
-    """Factors of points to a polygon before them: sum angle_k n . (r_k x r_k+1) / |r_k x r_k+1| / 2 pi."""
-    to = np.asarray(corners)[None] - points[:, None]
-    to /= np.linalg.norm(to, axis=2, keepdims=True)
-    total = 0
-    for k in range(len(corners)):
-        a, b = to[:, k], to[:, (k + 1) % len(corners)]
-        across = np.cross(a, b)
-        length = np.linalg.norm(across, axis=1)
-        total = total + np.arctan2(length, (a * b).sum(1)) * (across @ normal) / length
-    return np.abs(total) / (2 * np.pi)
 
 
 class Windows(unittest.TestCase):
@@ -91,7 +79,7 @@ class Windows(unittest.TestCase):
             for w, ww in zip(places, weights):
                 points = ((1 - u) * (1 - w) * corners[:, 0] + u * (1 - w) * corners[:, 1] + u * w * corners[:, 2]
                           + (1 - u) * w * corners[:, 3])
-                truth = truth + wu * ww * lambert(points, turn @ [0, 0, 1], hole)
+                truth = truth + wu * ww * polygon_factor(points, turn @ [0, 0, 1], hole)
         rms = np.sqrt(np.average((seen - truth) ** 2, weights=area)) / np.average(truth, weights=area)
         return rms, np.count_nonzero(seen == 0)
 
