@@ -156,7 +156,8 @@ class SameVerdicts(unittest.TestCase):
     def test_texts(self):
         for text in TEXTS:
             bare = text.encode("utf-8", "surrogatepass")
-            wrapped = b'{"emission":' + bare + b"}"
+            inner = bare.removeprefix(b"\xef\xbb\xbf") # a mark stands before all of a text
+            wrapped = bare[: len(bare) - len(inner)] + b'{"emission":' + inner + b"}"
             self.compare("grey", self.write("bare.json", bare), wrapped)
             self.compare("grey", self.write("one.json", wrapped), wrapped)
 
