@@ -130,7 +130,7 @@ export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:ex
 # The daemon shares its passes among threads of its own; OpenMP's runtime, which the unit tests' operators use, is not
 # instrumented: its barriers would look like races.
 export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-run_ctest tsan 'service\.(daemon|reduce|guard|headers|io_thread|fair|leaving|request_memory)|unit\.(batch|kept_forms|turns|request_memory|thread_budget|adjoint_rows|guard_parts)' \
+run_ctest tsan 'service\.(daemon|refusals|reduce|guard|headers|io_thread|fair|leaving|request_memory)|unit\.(batch|kept_forms|turns|request_memory|thread_budget|adjoint_rows|guard_parts|lingering)' \
     -j $((jobs + 1))
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS
 
