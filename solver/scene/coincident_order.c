@@ -56,8 +56,7 @@ lam_status coincident_order_find(const mesh *m, coincident_order *out, lam_error
     for (uint32_t i = 0; i < m->n; i++) o.surface[i] = i;
     joining s = {.m = m, .surface = o.surface, .planes = coincident_planes_of(m)};
     /* Neighbours have the axis of an edge in common, or a slanting edge none. */
-    const box_pairs how = {
-        .distance = fmax(s.planes.distance, 2 * m->rounding), .long_axes = 0, .visit = join, .context = &s};
+    const box_pairs how = {.distance = s.planes.reach, .long_axes = 0, .visit = join, .context = &s};
     TRY(box_pairs_visit(m, &how, &cut, error));
     for (uint32_t i = 0; i < m->n; i++) {
         o.surface[i] = union_find_root(o.surface, i);

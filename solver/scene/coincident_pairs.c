@@ -45,9 +45,12 @@ void coincident_find_rounding(mesh *m) {
 }
 
 coincident_planes coincident_planes_of(const mesh *m) {
-    double centre[3], radius;
+    double centre[3], radius, largest = 0;
     mesh_bounds(m, centre, &radius);
-    return (coincident_planes){.m = m, .distance = plane_same_place * radius};
+    for (size_t i = 0; i < m->n; i++) largest = fmax(largest, 2 * sqrt(m->area[i]));
+    const double distance = plane_same_place * radius;
+    const double rounded = fmin(2 * m->rounding, plane_gap(largest, largest));
+    return (coincident_planes){.m = m, .distance = distance, .reach = fmax(distance, rounded)};
 }
 
 static double cosine_between(const mesh *m, uint32_t i, uint32_t j) {
@@ -171,11 +174,8 @@ lam_status coincident_pairs_find(const mesh *m, coincident_sort sort, coincident
     search s = {.planes = coincident_planes_of(m), .sort = sort, .out = &found};
     /* A part of a plane that is in both is long along two axes. Faces that share an edge along an axis are
      * no further apart, but their boxes have only that axis in common. */
-    const box_pairs how = {.distance = fmax(s.planes.distance, 2 * m->rounding),
-                           .least = s.planes.distance,
-                           .long_axes = 2,
-                           .visit = look,
-                           .context = &s};
+    const box_pairs how = {
+        .distance = s.planes.reach, .least = s.planes.distance, .long_axes = 2, .visit = look, .context = &s};
     TRY(box_pairs_visit(m, &how, &found.cut, error));
     *out = found;
     found = (coincident_pairs){.n = 0};

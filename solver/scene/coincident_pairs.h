@@ -22,8 +22,10 @@ typedef struct coincident_pairs {
 typedef struct coincident_planes {
     const mesh *m;
     double distance; /* m: planes, and corners, that are no further apart are one */
+    double reach;    /* m: no faces of one plane are further apart, however they were rounded */
 } coincident_planes;
 
+/* Cost: O(n). */
 coincident_planes coincident_planes_of(const mesh *m);
 
 /* True where the smaller of two faces lies in the plane of the larger one, on either side: as far as rounding
