@@ -131,6 +131,34 @@ START_TEST(a_closed_room_stays_closed) {
 }
 END_TEST
 
+/* What leaves through a crack is followed from elements that are not buried: the crack is one, and what is
+ * below the floor is none of it. */
+START_TEST(a_crack_is_no_opening) {
+    writer w = {.used = 0};
+    form_factors f = {0};
+    put_box(&w, "box", (const double[3]){1, 1, 0}, (const double[3]){3, 3, 1}, false, 2);
+    put(&w, "o room\n");
+    for (int face = 0; face < 6; face++) {
+        const double gap = face == 5 ? .003 : 0;
+        put_face(&w, face / 2, (face % 2 == 1 ? room_high : room_low)[face / 2] + gap, room_low, room_high,
+                 face % 2 == 1 ? -1 : 1, 4);
+    }
+    mesh m = scene_of(&w);
+    ck_assert_uint_eq(find(&m), 4 + 4);
+    uint32_t *order = calloc(m.n, sizeof *order);
+    for (uint32_t i = 0; i < m.n; i++) order[i] = i;
+    const form_factor_options how = {.recipe = {.source = &source_rays, .rays = 16384, .seed = 3}};
+    ck_ok(form_factors_make(&m, order, &how, &f, &error));
+    ck_assert_double_gt(f.leaving_share, 0);
+    ck_assert_double_lt(f.leaving_share, .002);
+    ck_assert_double_eq(f.outlet.openings, 0);
+    ck_assert(f.closed);
+    form_factors_free(&f);
+    free(order);
+    mesh_free(&m);
+}
+END_TEST
+
 /* A leg stands in the middle of a large square of the floor: its underside is buried, the square is not. */
 START_TEST(a_leg_on_a_large_square) {
     writer w = {.used = 0};
@@ -171,6 +199,7 @@ int main(void) {
     Suite *suite = suite_create("buried");
     TCase *tests = tcase_create("buried");
     tcase_add_loop_test(tests, a_closed_room_stays_closed, 0, RECIPES);
+    tcase_add_test(tests, a_crack_is_no_opening);
     tcase_add_test(tests, a_leg_on_a_large_square);
     tcase_add_test(tests, sheets_are_not_buried);
     suite_add_tcase(suite, tests);
