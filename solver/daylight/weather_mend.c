@@ -1,6 +1,8 @@
 #include "solver/daylight/weather_mend.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/daylight/sun.h"
+#include "solver/daylight/weather_mend_steps.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -39,10 +41,6 @@ static void settle_nights(weather *w) {
     }
 }
 
-static double earlier_of(const weather_times *t) {
-    return t->stated != NULL ? t->w->step / 2 : 0;
-}
-
 /* Refuses a value by day that is missing. */
 static lam_status check_values(const weather_times *t, lam_error *error) {
     lam_status status = LAM_OK;
@@ -53,103 +51,13 @@ static lam_status check_values(const weather_times *t, lam_error *error) {
         if (is_missing(&w->hours[i]) && n++ == 0) first = i;
     if (n == 0) goto done;
     const bool direct = isnan(w->hours[first].direct), epw = t->stated != NULL;
-    weather_name_row(t, first, earlier_of(t), name);
+    weather_name_row(t, first, weather_named_earlier(t), name);
     if (n > 1) snprintf(more, sizeof more, ", the first of %zu rows", n);
     FAIL(error, LAM_ERR_FORMAT, "%s: %s: %s is missing by day%s; " WEATHER_ADVICE, t->path, name,
          direct ? (epw ? WEATHER_EPW_DIRECT : WEATHER_WEA_DIRECT)
                 : (epw ? WEATHER_EPW_DIFFUSE : WEATHER_WEA_DIFFUSE),
          more);
 done:
-    return status;
-}
-
-/* A row with its place in time and in the file. */
-typedef struct place {
-    double key; /* h */
-    size_t row;
-} place;
-
-static int compare_places(const void *a, const void *b) {
-    const place *one = a, *other = b;
-    if (one->key != other->key) return one->key < other->key ? -1 : 1;
-    return (one->row > other->row) - (one->row < other->row);
-}
-
-/* Hours from the beginning of a year that has a 29 February. */
-static double time_of_year(const weather_hour *h) {
-    return 24. * weather_day(h->month, h->day) + h->hour;
-}
-
-/* Fills places [n] in the order of the year. */
-static void sort_by_year(const weather *w, place *places) {
-    for (size_t i = 0; i < w->n; i++) places[i] = (place){.key = time_of_year(&w->hours[i]), .row = i};
-    qsort(places, w->n, sizeof *places, compare_places);
-}
-
-/* True where rows of several years have one time: the file is of several years. */
-static bool has_years(const weather *w, const place *sorted) {
-    for (size_t i = 1; i < w->n; i++)
-        if (sorted[i].key - sorted[i - 1].key <= weather_tolerance(w->step) &&
-            w->hours[sorted[i].row].year != w->hours[sorted[i - 1].row].year)
-            return true;
-    return false;
-}
-
-/* The time of the year at which rows of one year begin: after the longest gap, so that a winter is whole. */
-static double beginning(const weather *w, const place *sorted) {
-    double longest = sorted[0].key + 24. * DAYS - sorted[w->n - 1].key, from = sorted[0].key;
-    for (size_t i = 1; i < w->n; i++) {
-        const double gap = sorted[i].key - sorted[i - 1].key;
-        /* A year without its 29 February has a gap there that is none. */
-        if (gap <= longest + 24) continue;
-        longest = gap;
-        from = sorted[i].key;
-    }
-    return from - weather_tolerance(w->step);
-}
-
-/* Sorts rows by time where they are not in order, and drops the later ones of those of one time. */
-static lam_status put_in_order(weather_times *t, weather_row **rows, lam_error *error) {
-    lam_status status = LAM_OK;
-    weather *w = t->w;
-    size_t n = 0, kept = 0, furthest = 0;
-    double last = -INFINITY;
-    if (weather_rows_behind(w, &kept) == 0) return LAM_OK;
-    place *places = memory_allocate(w->n, sizeof *places, "the order of weather", error);
-    weather_hour *hours = memory_allocate(w->n, sizeof *hours, "the order of weather", error);
-    weather_row *ordered = memory_allocate(w->n, sizeof *ordered, "the order of weather", error);
-    if (places == NULL || hours == NULL || ordered == NULL) TRY(LAM_ERR_MEMORY);
-    sort_by_year(w, places);
-    const bool years = has_years(w, places);
-    const double from = beginning(w, places), year = 24. * DAYS;
-    for (size_t i = 0; i < w->n; i++) {
-        const double time = time_of_year(&w->hours[i]);
-        places[i] = (place){
-            .key = years ? w->hours[i].year * year + time : time - from + (time < from ? year : 0), .row = i};
-    }
-    qsort(places, w->n, sizeof *places, compare_places);
-    for (size_t i = 0; i < w->n; i++) {
-        /* Decimals of hours differ between repetitions, too: the first of the file is kept. */
-        const bool again = places[i].key - last <= weather_tolerance(w->step);
-        if (again) w->mended.repeated++;
-        if (again && places[i].row > kept) continue;
-        kept = places[i].row;
-        if (!again) last = places[i].key;
-        hours[again ? n - 1 : n] = w->hours[kept];
-        ordered[again ? n - 1 : n] = (*rows)[kept];
-        n += !again;
-    }
-    for (size_t i = 0; i < n; i++) {
-        w->mended.unordered += ordered[i].line < furthest;
-        if (ordered[i].line > furthest) furthest = ordered[i].line;
-    }
-    memcpy(w->hours, hours, n * sizeof *hours);
-    memcpy(*rows, ordered, n * sizeof *ordered);
-    w->n = n;
-done:
-    free(places);
-    free(hours);
-    free(ordered);
     return status;
 }
 
@@ -221,25 +129,19 @@ done:
 
 /* Rows that are being added to. */
 typedef struct growing {
-    size_t n, room;
+    size_t n, hour_capacity, row_capacity;
     weather_hour *hours;
     weather_row *rows;
 } growing;
 
 static lam_status append(growing *g, const weather_hour *h, const weather_row *row, lam_error *error) {
-    if (g->n == g->room) {
-        const size_t room = 2 * g->room + 64;
-        weather_hour *hours = realloc(g->hours, room * sizeof *hours);
-        if (hours != NULL) g->hours = hours;
-        weather_row *rows = realloc(g->rows, room * sizeof *rows);
-        if (rows != NULL) g->rows = rows;
-        if (hours == NULL || rows == NULL)
-            return status_fail(error, LAM_ERR_MEMORY, "not enough memory for %zu rows of weather", room);
-        g->room = room;
-    }
+    lam_status status = LAM_OK;
+    TRY(array_grow(&g->hours, &g->hour_capacity, g->n + 1, sizeof *g->hours, "rows of weather", error));
+    TRY(array_grow(&g->rows, &g->row_capacity, g->n + 1, sizeof *g->rows, "rows of weather", error));
     g->hours[g->n] = *h;
     g->rows[g->n++] = *row;
-    return LAM_OK;
+done:
+    return status;
 }
 
 /* Appends rows without values that follow a time, at `times` of the day where that is not NULL, named by the
@@ -282,7 +184,7 @@ static void find_ends(const weather_times *t, double *before, double *behind) {
 
 static lam_status refuse_long(const weather_times *t, size_t row, double hours, lam_error *error) {
     char name[WEATHER_NAME];
-    weather_name_row(t, row, earlier_of(t), name);
+    weather_name_row(t, row, weather_named_earlier(t), name);
     return status_fail(error, LAM_ERR_FORMAT,
                        "%s: %s: beside it %.6g hours are missing, and at most %d are filled; --gaps skip "
                        "leaves them out",
@@ -343,95 +245,16 @@ done:
     return status;
 }
 
-/* One of the values of a row. */
-static double *value_of(weather_hour *h, bool diffuse) {
-    return diffuse ? &h->diffuse : &h->direct;
-}
-
-/* Hours between row i and the k-th row after it, or before it. */
-static double hours_apart(const weather_hour *read, size_t i, size_t k, bool later) {
-    bool back = false;
-    return later ? weather_ahead(&read[i], &read[i + k], &back)
-                 : weather_ahead(&read[i - k], &read[i], &back);
-}
-
-/* The value of the same time of the nearest day before or after row i that has it; NAN: none has it. Found by
- * bisection among the rows that the days can hold. */
-static double same_time(const weather *w, weather_hour *read, size_t i, bool diffuse, bool later) {
-    const double tolerance = weather_tolerance(w->step);
-    const size_t there = later ? w->n - 1 - i : i, held = (size_t)(24 * WEATHER_DAYS / w->step + 1);
-    for (int day = 1; day <= WEATHER_DAYS; day++) {
-        size_t low = 1, high = (there < held ? there : held) + 1;
-        while (low < high) {
-            const size_t middle = low + (high - low) / 2;
-            if (hours_apart(read, i, middle, later) < 24 * day - tolerance)
-                low = middle + 1;
-            else
-                high = middle;
-        }
-        if (low > there || fabs(hours_apart(read, i, low, later) - 24 * day) > tolerance) continue;
-        const double value = *value_of(&read[later ? i + low : i - low], diffuse);
-        if (!isnan(value)) return value;
-    }
-    return NAN;
-}
-
-/* Fills the rows from first up to end, which lack a value; the values of read are those of the file. */
-static lam_status fill_run(const weather_times *t, weather_hour *read, bool diffuse, size_t first, size_t end,
-                           lam_error *error) {
-    weather *w = t->w;
-    const double most = WEATHER_BETWEEN + w->step + weather_tolerance(w->step);
-    bool back = false;
-    double apart = INFINITY;
-    if (first > 0 && end < w->n) apart = weather_ahead(&read[first - 1], &read[end], &back);
-    const bool is_short = !back && apart <= most;
-    for (size_t i = first; i < end; i++) {
-        double value = NAN;
-        if (is_short) {
-            const double share = weather_ahead(&read[first - 1], &read[i], &back) / apart;
-            value =
-                *value_of(&read[first - 1], diffuse) * (1 - share) + *value_of(&read[end], diffuse) * share;
-        } else {
-            const double before = same_time(w, read, i, diffuse, false);
-            const double behind = same_time(w, read, i, diffuse, true);
-            value = isnan(before) ? behind : isnan(behind) ? before : (before + behind) / 2;
-        }
-        if (isnan(value)) {
-            char name[WEATHER_NAME];
-            weather_name_row(t, i, earlier_of(t), name);
-            return status_fail(
-                error, LAM_ERR_FORMAT,
-                "%s: %s: %s radiation cannot be filled: the gap is longer than %d h, and no day "
-                "within %d days has the value at this time; --gaps skip leaves it out",
-                t->path, name, diffuse ? "diffuse" : "direct", WEATHER_BETWEEN, WEATHER_DAYS);
-        }
-        *value_of(&w->hours[i], diffuse) = value;
-        *(is_short ? &w->mended.between : &w->mended.by_days) += w->step / 2; /* of two values */
-    }
-    return LAM_OK;
-}
-
 static lam_status fill(weather_times *t, weather_row **rows, lam_error *error) {
     lam_status status = LAM_OK;
     weather *w = t->w;
-    weather_hour *read = NULL;
     const size_t night = w->mended.night;
     TRY(add_rows(t, rows, error));
     settle_nights(w);
     w->mended.dark = (double)((w->mended.night - night) / 2) * w->step;
     w->mended.night = night;
-    read = memory_allocate(w->n, sizeof *read, "the rows of weather", error);
-    if (read == NULL) TRY(LAM_ERR_MEMORY);
-    memcpy(read, w->hours, w->n * sizeof *read);
-    for (int diffuse = 0; diffuse < 2; diffuse++)
-        for (size_t i = 0; i < w->n; i++) {
-            size_t end = i;
-            while (end < w->n && isnan(*value_of(&read[end], diffuse))) end++;
-            if (end > i) TRY(fill_run(t, read, diffuse, i, end, error));
-            i = end;
-        }
+    TRY(weather_fill_values(t, error));
 done:
-    free(read);
     return status;
 }
 
@@ -444,7 +267,7 @@ lam_status weather_mend(weather_times *t, weather_gaps gaps, weather_row **rows,
         goto done;
     }
     t->all_days = true;
-    TRY(put_in_order(t, rows, error));
+    TRY(weather_put_in_order(t, rows, error));
     if (gaps == WEATHER_SKIP) {
         TRY(skip(t, *rows, error));
         goto done;
