@@ -1,6 +1,7 @@
 /* Times of weather: the step between rows, and rows that are missing, repeated or out of order. */
 #include "solver/daylight/weather.h"
 #include "support/suite.h"
+#include "support/weather_text.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -19,19 +20,7 @@ typedef struct text {
 
 static text begin(bool epw, const char *periods) {
     text t = {.epw = epw};
-    snprintf(t.path, sizeof t.path, "/tmp/test-XXXXXX%s", epw ? ".epw" : ".wea");
-    const int descriptor = mkstemps(t.path, 4);
-    ck_assert_int_ge(descriptor, 0);
-    t.stream = fdopen(descriptor, "w");
-    if (epw)
-        fprintf(t.stream,
-                "LOCATION,Some Where,CA,USA,TMY3,724930,37.5,-122.25,-8.0,2.0\nDESIGN CONDITIONS,0\n"
-                "TYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0\nHOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\n"
-                "COMMENTS 1,\nCOMMENTS 2,\nDATA PERIODS,%s\n",
-                periods);
-    else
-        fprintf(t.stream, "place Somewhere_XX\nlatitude 37.5\nlongitude 122.25\ntime_zone 120\n"
-                          "site_elevation 2.0\nweather_data_file_units 1\n");
+    t.stream = weather_text_begin(epw, periods, t.path);
     return t;
 }
 
