@@ -49,12 +49,11 @@ done:
 }
 
 /* The same by the tiles that hold them. */
-static lam_status by_tiles(store *s, const mesh *m, const lam_sky *sky, const year_sun *suns, size_t n,
-                           float *H, lam_error *error) {
+static lam_status by_tiles(store *s, const lam_sky *sky, const year_sun *suns, size_t n, float *H,
+                           lam_error *error) {
     lam_status status = LAM_OK;
     sky_tiling tiling = {0};
     float *L = memory_allocate(lam_sky_tiles(sky), sizeof *L, "the suns", error);
-    (void)m;
     if (L == NULL) TRY(LAM_ERR_MEMORY);
     TRY(sky_tiling_of_store(s, &tiling, error));
     for (size_t v = 0; v < n; v++) {
@@ -90,7 +89,7 @@ lam_status sun_way_measure(store *s, const mesh *m, const lam_sky *sky, const ye
     if (w.n > 0) {
         TRY(by_rays(s, m, some, n_some, REFERENCE_POINTS, &w, steps, H, error));
         TRY(n_points > 0 ? by_rays(s, m, some, n_some, n_points, &w, steps, H + m->n, error)
-                         : by_tiles(s, m, sky, some, n_some, H + m->n, error));
+                         : by_tiles(s, sky, some, n_some, H + m->n, error));
     }
     for (size_t k = 0; k < w.n; k++) {
         const uint32_t i = w.elements[k];
