@@ -95,11 +95,42 @@ static bool find_moment(const sky_request *sky, size_t k, moment *at, problem *w
     return true;
 }
 
-/* The model of a sky, and, where it needs one, its sun before it is turned. */
-static bool find_model(making *m, const sky_request *sky, size_t k, named_sky *model, sun_position *sun,
-                       problem *why) {
+/* The model of a moment of the weather, and its sun. */
+static bool model_of_weather(making *m, const sky_request *sky, size_t k, named_sky *model, sun_position *sun,
+                             problem *why) {
     lam_error error = {.message = ""};
     moment at;
+    weather_hour h;
+    if (!find_moment(sky, k, &at, why) || !read_weather(m, sky, k, why)) return false;
+    const weather *w = &m->weather;
+    if (moment_find(&at, "weather", w, &h, &error) != LAM_OK)
+        return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
+    *sun = sun_at(w->latitude, w->longitude, w->time_zone, h.year, h.month, h.day, h.hour);
+    const double up = sun->direction[2];
+    *model =
+        (named_sky){.model = SKY_GIVEN, .direct = h.direct, .diffuse = h.diffuse, .dew_point = h.dew_point};
+    if (w->direct_is_horizontal) model->direct = up > 0 ? fmin(h.direct / up, PEREZ_SOLAR) : 0;
+    return true;
+}
+
+/* The sun that a request gives, by angles or by place and time. */
+static bool sun_of_request(const sky_request *sky, size_t k, sun_position *sun, problem *why) {
+    moment at;
+    if (!isnan(sky->azimuth)) {
+        *sun = sun_of_angles(sky->azimuth, sky->altitude);
+        return true;
+    }
+    if (isnan(sky->latitude))
+        return refuse(why, PROBLEM_WRONG_MEMBERS, k, "needs its sun: give sun, or place and date or hour");
+    if (!find_moment(sky, k, &at, why)) return false;
+    *sun = sun_at(sky->latitude, sky->longitude, sky->zone, 2001, at.month, at.day, at.hour);
+    return true;
+}
+
+/* The model of a sky by name or by its light, and, where it needs one, its sun. */
+static bool model_of_request(const sky_request *sky, size_t k, named_sky *model, sun_position *sun,
+                             problem *why) {
+    lam_error error = {.message = ""};
     if (sky->source == SKY_BY_NAME && named_sky_parse("name", sky->name, model, &error) != LAM_OK)
         return refuse(why, PROBLEM_UNKNOWN_WORD, k, error.message);
     if (sky->source == SKY_BY_LIGHT)
@@ -107,37 +138,12 @@ static bool find_model(making *m, const sky_request *sky, size_t k, named_sky *m
                              .direct = isnan(sky->direct) ? 0 : sky->direct,
                              .diffuse = sky->diffuse,
                              .dew_point = sky->dew_point};
-    if (sky->source == SKY_BY_WEATHER) {
-        if (!find_moment(sky, k, &at, why) || !read_weather(m, sky, k, why)) return false;
-        const weather *w = &m->weather;
-        weather_hour h;
-        if (moment_find(&at, "weather", w, &h, &error) != LAM_OK)
-            return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
-        *sun = sun_at(w->latitude, w->longitude, w->time_zone, h.year, h.month, h.day, h.hour);
-        const double up = sun->direction[2];
-        *model = (named_sky){
-            .model = SKY_GIVEN, .direct = h.direct, .diffuse = h.diffuse, .dew_point = h.dew_point};
-        if (w->direct_is_horizontal) model->direct = up > 0 ? fmin(h.direct / up, PEREZ_SOLAR) : 0;
-    } else {
-        model->lux_outside = isnan(sky->lux_outside) ? 0 : sky->lux_outside;
-        if (named_sky_needs_sun(model)) {
-            if (!isnan(sky->azimuth)) {
-                *sun = sun_of_angles(sky->azimuth, sky->altitude);
-            } else if (isnan(sky->latitude)) {
-                return refuse(why, PROBLEM_WRONG_MEMBERS, k,
-                              "needs its sun: give sun, or place and date or hour");
-            } else {
-                if (!find_moment(sky, k, &at, why)) return false;
-                *sun = sun_at(sky->latitude, sky->longitude, sky->zone, 2001, at.month, at.day, at.hour);
-            }
-        } else if (!isnan(sky->azimuth) || !isnan(sky->latitude) || !isnan(sky->hour) ||
-                   sky->date[0] != '\0' || !isnan(sky->north)) {
-            return refuse(why, PROBLEM_WRONG_MEMBERS, k,
-                          "has no sun: leave out sun, place, date, hour and north");
-        }
-    }
-    model->photometric = sky->photometric;
-    return true;
+    model->lux_outside = isnan(sky->lux_outside) ? 0 : sky->lux_outside;
+    if (named_sky_needs_sun(model)) return sun_of_request(sky, k, sun, why);
+    const bool asks_for_sun = !isnan(sky->azimuth) || !isnan(sky->latitude) || !isnan(sky->hour) ||
+                              sky->date[0] != '\0' || !isnan(sky->north);
+    return !asks_for_sun ||
+           refuse(why, PROBLEM_WRONG_MEMBERS, k, "has no sun: leave out sun, place, date, hour and north");
 }
 
 static bool write_sun(buffer *b, const sun_position *told, const sky_tiling *tiling, const year_sun *sun) {
@@ -157,7 +163,10 @@ static bool add_sky(making *m, const sky_request *sky, size_t k, buffer *b, prob
     year_sun sun;
     sky_horizontal of;
     lam_error error = {.message = ""};
-    if (!find_model(m, sky, k, &model, &told, why)) return false;
+    if (sky->source == SKY_BY_WEATHER ? !model_of_weather(m, sky, k, &model, &told, why)
+                                      : !model_of_request(sky, k, &model, &told, why))
+        return false;
+    model.photometric = sky->photometric;
     const sun_position at = sun_turned(told, isnan(sky->north) ? m->store->sky_north : sky->north);
     if (named_sky_make(&model, &at, &m->tiling, sky->sun_in_tiles, m->L, &sun, &of, &error) != LAM_OK)
         return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
