@@ -131,7 +131,7 @@ START_TEST(a_closed_room_stays_closed) {
 }
 END_TEST
 
-/* What leaves through a crack is followed from elements that are not buried: the crack is one, and what is
+/* Light through a crack is followed from elements that are not buried: the crack is one, and what is
  * below the floor is none of it. */
 START_TEST(a_crack_is_no_opening) {
     writer w = {.used = 0};
