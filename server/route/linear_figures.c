@@ -94,7 +94,7 @@ static bool evaluate(const scene *s, const radiosity_request *request, size_t fi
         adjoint_row_evaluate(s, row, request, f->weights, f->means);
         if (row->area > 0 && !check_means(s, request, first + k, f->means, why)) return false;
         limit_means(s, request, f->means);
-        if (!scene_mean_errors_add(s, request, first + k, f->means, &f->errors, notes))
+        if (!scene_mean_errors_add(s, request, first + k, row->buried, f->means, &f->errors, notes))
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
         reduce_means(r, first + k, s->n_channels, request->n_rhs, row->area, f->means, f->figures);
     }

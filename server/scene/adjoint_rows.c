@@ -129,18 +129,24 @@ static adjoint_row *row_allocate(const scene *s, const reduce_name *name, lam_qu
     return NULL;
 }
 
-/* g = A 1_group / sum A in every channel, [C][n]; returns sum A. */
-static double write_cotangent(const scene *s, const reduce_name *name, float *g) {
+/* g = A 1_group / sum A in every channel, [C][n]; returns sum A. Both are of elements that figures take in;
+ * *buried is the share of the area of all that they leave out. */
+static double write_cotangent(const scene *s, const reduce_name *name, float *g, double *buried) {
     const group_index *groups = &s->groups;
-    double total = 0;
+    double total = 0, all = 0;
     for (size_t m = 0; m < name->n_groups; m++)
-        for (size_t e = groups->start[name->groups[m]]; e < groups->start[name->groups[m] + 1]; e++)
-            total += s->area[groups->elements[e]];
+        for (size_t e = groups->start[name->groups[m]]; e < groups->start[name->groups[m] + 1]; e++) {
+            const double area = s->area[groups->elements[e]];
+            all += area;
+            if (group_index_counts(groups, groups->elements[e])) total += area;
+        }
+    *buried = all > 0 ? 1 - total / all : 0;
     memset(g, 0, s->n_channels * s->n * sizeof *g);
     for (size_t m = 0; total > 0 && m < name->n_groups; m++)
         for (size_t e = groups->start[name->groups[m]]; e < groups->start[name->groups[m] + 1]; e++) {
             const size_t i = groups->elements[e];
-            for (size_t c = 0; c < s->n_channels; c++) g[c * s->n + i] = (float)(s->area[i] / total);
+            const double share = group_index_counts(groups, i) ? s->area[i] / total : 0;
+            for (size_t c = 0; c < s->n_channels; c++) g[c * s->n + i] = (float)share;
         }
     return total;
 }
@@ -217,7 +223,7 @@ static bool make_rows(const scene *s, const reduce_name *names, lam_quantity qua
     lam_error error;
     const emitter_weights *weights;
     adjoint_row *made[BATCH_PASS] = {NULL};
-    double area[BATCH_PASS];
+    double area[BATCH_PASS], buried[BATCH_PASS];
     bool allocated, good = false;
     float *const g = memory_allocate(1, pass_bytes(s, count), "rows", NULL);
     void *work = work_bytes > 0 ? batch_workspace_get(workspace, work_bytes) : NULL;
@@ -229,7 +235,8 @@ static bool make_rows(const scene *s, const reduce_name *names, lam_quantity qua
         goto done;
     }
     float *const w = g + count * C * n;
-    for (size_t k = 0; k < count; k++) area[k] = write_cotangent(s, &names[which[k]], g + k * C * n);
+    for (size_t k = 0; k < count; k++)
+        area[k] = write_cotangent(s, &names[which[k]], g + k * C * n, &buried[k]);
     const lam_status status =
         s->n_emitters > 0
             ? lam_operator_adjoint_emitters(s->op, count, quantity, g, w, work, work_bytes, &error)
@@ -240,6 +247,7 @@ static bool make_rows(const scene *s, const reduce_name *names, lam_quantity qua
     }
     for (size_t k = 0; k < count; k++) {
         made[k]->area = area[k];
+        made[k]->buried = buried[k];
         if (s->n_emitters > 0)
             fill_from_emitters(s, weights, w + k * C * width, made[k]);
         else

@@ -12,7 +12,8 @@
 
 typedef struct row_cache row_cache;
 
-/* w = (dq/dE)^T (A 1_group / sum A) of C channels: the mean of quantity q over a group is w^T E. */
+/* w = (dq/dE)^T (A 1_group / sum A) of C channels: the mean of quantity q over a group is w^T E. Buried
+ * elements are in neither. */
 typedef struct adjoint_row {
     size_t references;
     uint64_t used; /* number of its last use */
@@ -22,6 +23,7 @@ typedef struct adjoint_row {
     size_t n_groups;
     lam_quantity quantity;
     double area;      /* sum A; 0: the row is 0, and the mean has no value */
+    double buried;    /* share of the area of the groups that buried elements have */
     float *w;         /* [C][n]; NULL where the store answers for its own emitters only */
     float *emitters;  /* [C][s], by emitter, in place of w */
     double *of_group; /* [C][groups of the scene], sum of w over each; NaN: not determined by the emitters */

@@ -8,6 +8,7 @@
 #include "server/scene/tile_places.h"
 #include "solver/base/clock.h"
 #include "solver/base/scene/scene_backs.h"
+#include "solver/base/scene/scene_buried.h"
 #include "solver/codec/describe.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
@@ -147,6 +148,7 @@ static lam_status read_groups(store *s, scene *made, lam_error *error) {
     TRY(store_read_texts(s, STORE_MESH "/group_names", &n_groups, &names, error));
     status = group_index_make(made->n, n_backs, group, n_groups, names, &made->groups, &cause);
     if (status != LAM_OK) FAIL(error, status, "%s: %s", made->path, cause.message);
+    TRY(scene_buried_load(s, made->n, &made->groups.buried, error));
 done:
     free(group);
     return status;
@@ -200,26 +202,38 @@ static uint64_t face_parts(const store *s) {
     return store_array_bytes(s, STORE_MESH "/face_part_area") / sizeof(double);
 }
 
-/* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, an index of these, and
- * one of faces. */
+/* Marks of buried elements. */
+static uint64_t buried_memory(const store *s) {
+    const bool any = store_array_bytes(s, STORE_MESH "/buried") > 0;
+    return any ? store_array_bytes(s, STORE_MESH "/group") / sizeof(uint32_t) * sizeof(bool) : 0;
+}
+
+/* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, an index of these, one
+ * of faces, and marks of buried elements. */
 static uint64_t mesh_memory(const store *s) {
     const uint64_t n = store_array_bytes(s, STORE_MESH "/face") / sizeof(uint32_t),
                    n_faces = store_array_bytes(s, STORE_MESH "/face_area") / sizeof(double);
     const uint64_t names = store_texts_memory(s, STORE_MESH "/group_names");
-    return store_array_bytes(s, STORE_MESH "/area") + store_array_bytes(s, STORE_MESH "/reflectance") +
-           store_array_bytes(s, STORE_MESH "/group") + face_index_bytes(n, n_faces, face_parts(s)) + names +
+    return buried_memory(s) + store_array_bytes(s, STORE_MESH "/area") +
+           store_array_bytes(s, STORE_MESH "/reflectance") + store_array_bytes(s, STORE_MESH "/group") +
+           face_index_bytes(n, n_faces, face_parts(s)) + names +
            names / (sizeof(char *) + 1) * 2 * sizeof(uint32_t);
 }
 
 /* The bytes that are read beside that and freed again before the scene is open: of groups by element, the
- * names as they are stored, parts of faces, receivers and sources. */
+ * names as they are stored, parts of faces, receivers and sources; where there are buried elements, these and
+ * areas, for the description. */
 static lam_status passing_memory(store *s, uint64_t *memory, lam_error *error) {
     lam_status status = LAM_OK;
     uint64_t receivers, sources;
+    const uint64_t buried = buried_memory(s) > 0
+                                ? buried_memory(s) + store_array_bytes(s, STORE_MESH "/buried") +
+                                      store_array_bytes(s, STORE_MESH "/area")
+                                : 0;
     TRY(bytes_below(s, STORE_IMPORTANCE, &receivers, error));
     TRY(bytes_below(s, STORE_SOURCES, &sources, error));
     *memory = store_array_bytes(s, STORE_MESH "/group") + store_texts_memory(s, STORE_MESH "/group_names") +
-              16 * face_parts(s) + receivers + sources;
+              16 * face_parts(s) + buried + receivers + sources;
 done:
     return status;
 }

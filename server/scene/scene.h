@@ -118,14 +118,14 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
 bool scene_note_emitters_error(const scene *s, const radiosity_request *request, const float *W,
                                const float *values, answer_notes *notes, name_error **names);
 
-/* The same of a linear reduction, name by name; means are [n_rhs][C]. The notes refer to it until it is
- * freed. False when memory is short. */
+/* The same of a linear reduction, name by name; means are [n_rhs][C]; buried is the share of the name's area
+ * that they leave out. The notes refer to it until it is freed. False when memory is short. */
 typedef struct mean_errors {
     name_error *names;    /* [n_names]; NULL: that of the store stays */
     emission_size *sizes; /* [n_rhs] */
     whole_light *whole;   /* [n_vectors], of n_rhs; NULL: nothing of it is known */
     size_t n_vectors;
-    double *emission; /* [2][n_rhs][C], work */
+    double *emission; /* [2][n_rhs][C], of a store of emitters [C], work */
     /* These are needed where the request has weights of emitters; NULL: it has none. */
     float *E;     /* [C][n], work */
     double *sums; /* [n_rhs][C][n_groups], of A E of groups */
@@ -133,8 +133,8 @@ typedef struct mean_errors {
 } mean_errors;
 bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, answer_notes *notes,
                              mean_errors *out);
-bool scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, const double *means,
-                           mean_errors *to, answer_notes *notes);
+bool scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, double buried,
+                           const double *means, mean_errors *to, answer_notes *notes);
 void mean_errors_free(mean_errors *e);
 
 /* The message of an error of this scene for clients: without the path of its store, which is none of theirs.

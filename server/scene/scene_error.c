@@ -57,7 +57,8 @@ error_scene scene_for_errors(const scene *s) {
                          .start = s->groups.start,
                          .members = s->groups.elements,
                          .read = s->errors.read,
-                         .emits = s->errors.emits};
+                         .emits = s->errors.emits,
+                         .buried = s->groups.buried};
 }
 
 /* True where weights of emitters are given, some of which may be of the sky. */
@@ -332,7 +333,11 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
     *out = made;
     if (emitters_error_knows_groups(&s->errors.emitters) && notes->has_error) {
         made.names = memory_allocate(reduce->n_names, sizeof *made.names, "errors", NULL);
-        if (made.names == NULL) return false;
+        made.emission = memory_allocate(s->n_channels, sizeof *made.emission, "errors", NULL);
+        if (made.names == NULL || made.emission == NULL) {
+            mean_errors_free(&made);
+            return false;
+        }
         begin_own(reduce, made.names, notes);
         *out = made;
         return true;
@@ -367,8 +372,8 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
     return true;
 }
 
-bool scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, const double *means,
-                           mean_errors *to, answer_notes *notes) {
+bool scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, double buried,
+                           const double *means, mean_errors *to, answer_notes *notes) {
     const reduce_name *name = &request->reduce.names[k];
     const size_t C = s->n_channels;
     if (to->names == NULL) return true;
@@ -378,7 +383,9 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
             emitters_mix mix;
             if (!emitters_mix_create(e, C, request->emitters.values + v * C * s->n_emitters, &mix))
                 return false;
-            const name_error one = emitters_error_of_name(e, C, request->quantity, name, &mix, means + v * C);
+            /* The law is of all elements; no light reaches those that are buried. */
+            for (size_t c = 0; c < C; c++) to->emission[c] = (1 - buried) * means[v * C + c];
+            const name_error one = emitters_error_of_name(e, C, request->quantity, name, &mix, to->emission);
             take_name(&one, mix.emitters, &to->names[k], notes);
             emitters_mix_free(&mix);
         }
@@ -395,6 +402,7 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
                                .whole = to->whole[v],
                                .sky = size_of_sky(s, L),
                                .L = L,
+                               .buried = buried,
                                .value = means + v * C,
                                .emission = to->emission + v * C,
                                .direct = direct + v * C};

@@ -138,6 +138,7 @@ static gltf_sizes sizes_of(const scene_mesh *mesh) {
                         .n_textures = mesh->n_textures,
                         .image_bytes = mesh->image_bytes};
     sizes.n_texts = strlen(s->name);
+    for (size_t i = 0; i < s->n; i++) sizes.n_buried += !group_index_counts(&s->groups, i);
     for (size_t g = 0; g < s->groups.n_groups; g++) sizes.n_texts += strlen(s->groups.names[g]);
     return sizes;
 }

@@ -77,8 +77,9 @@ static void add_run(const error_scene *scene, const error_answer *of, size_t fir
     }
 }
 
-/* [n_bins]; freed with free(). */
-static value_sums *sum_values(const error_by_group *e, const error_scene *scene, const error_answer *of) {
+/* [n_bins]; freed with free(). For figures: without elements that these leave out. */
+static value_sums *sum_values(const error_by_group *e, const error_scene *scene, const error_answer *of,
+                              bool for_figures) {
     const size_t C = scene->n_channels;
     size_t bytes;
     if (!size_multiply(e->n_bins, sizeof(value_sums) + 3 * C * sizeof(double), &bytes)) return NULL;
@@ -90,10 +91,15 @@ static value_sums *sum_values(const error_by_group *e, const error_scene *scene,
         sums[b].radiosity = sums[b].reflected + C;
         sums[b].light = sums[b].radiosity + C;
     }
+    const bool *buried = for_figures ? scene->buried : NULL;
     for (size_t first = 0, last; first < of->count; first = last) {
-        const uint32_t bin = e->bin[of->selected != NULL ? of->selected[first] : first];
-        for (last = first + 1; last < of->count; last++)
-            if (e->bin[of->selected != NULL ? of->selected[last] : last] != bin) break;
+        const size_t i = of->selected != NULL ? of->selected[first] : first;
+        const uint32_t bin = e->bin[i];
+        for (last = first + 1; last < of->count; last++) {
+            const size_t next = of->selected != NULL ? of->selected[last] : last;
+            if (e->bin[next] != bin || (buried != NULL && buried[next] != buried[i])) break;
+        }
+        if (buried != NULL && buried[i]) continue;
         add_run(scene, of, first, last, &sums[bin]);
     }
     return sums;
@@ -122,7 +128,7 @@ bool answer_error_of(const error_by_group *e, const error_scene *scene, const er
     double off = 0, reflected = 0, radiosity = 0, light = 0, mesh = 0;
     const emission_size both = emission_size_sum(&of->size, &of->sky);
     light_sizes sizes;
-    value_sums *sums = sizes_of_answer(e, scene, of, &sizes) ? sum_values(e, scene, of) : NULL;
+    value_sums *sums = sizes_of_answer(e, scene, of, &sizes) ? sum_values(e, scene, of, false) : NULL;
     if (sums == NULL) {
         whole_light_free(&sizes.whole);
         return false;
@@ -162,6 +168,15 @@ static void add_bin(const error_by_group *e, const light_sizes *size, size_t bin
     to->mesh += area * sqrt(mesh_lack_of_bin(e, size, bin).mean2);
 }
 
+/* Turns errors of all elements of a name, of which a share of the area is buried and has none, into those of
+ * the others: the error of the mean is the same power on less area. */
+static void leave_out(double buried, name_sums *s) {
+    const double seen = 1 - buried;
+    if (!(seen > 0)) return;
+    s->mean2 /= seen * seen;
+    s->elements2 /= seen;
+}
+
 /* reflected2, radiosity2: squares of the means over the name. */
 static name_error error_of_squares(double mean2, double elements2, double reflected2, double radiosity2) {
     return (name_error){.mean = error_ratio(mean2, reflected2),
@@ -183,7 +198,7 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
                     const reduce_request *names, name_error *errors) {
     const size_t n_rows = e->n_bins / e->figures.n_groups;
     light_sizes sizes;
-    value_sums *sums = sizes_of_answer(e, scene, of, &sizes) ? sum_values(e, scene, of) : NULL;
+    value_sums *sums = sizes_of_answer(e, scene, of, &sizes) ? sum_values(e, scene, of, true) : NULL;
     if (sums == NULL) {
         whole_light_free(&sizes.whole);
         return false;
@@ -191,11 +206,17 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
     for (size_t k = 0; k < names->n_names; k++) {
         const reduce_name *name = &names->names[k];
         name_sums s = {.area = 0};
-        double reflected2 = 0, radiosity2 = 0, light2 = 0;
+        double reflected2 = 0, radiosity2 = 0, light2 = 0, all = 0;
         for (size_t g = 0; g < name->n_groups; g++)
             for (size_t row = 0; row < n_rows; row++) {
                 const size_t bin = row * e->figures.n_groups + name->groups[g];
+                all += e->area[bin];
                 add_bin(e, &sizes, bin, sums[bin].area, &s);
+            }
+        if (scene->buried != NULL) leave_out(1 - s.area / all, &s);
+        for (size_t g = 0; g < name->n_groups; g++)
+            for (size_t row = 0; row < n_rows; row++) {
+                const size_t bin = row * e->figures.n_groups + name->groups[g];
                 s.elements2 += overlap_elements2(e, bin) * sums[bin].light2;
             }
         for (size_t c = 0; c < scene->n_channels; c++) {
@@ -236,6 +257,7 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
             add_bin(e, &sizes, bin, e->area[bin], &s);
             covered += overlap_of_bin(e, bin) * e->area[bin];
         }
+    leave_out(means->buried, &s);
     for (size_t c = 0; c < e->figures.n_channels; c++) {
         double rho = 0;
         for (size_t g = 0; g < name->n_groups; g++)
@@ -243,15 +265,15 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
                 rho += e->area[row * e->figures.n_groups + name->groups[g]] *
                        e->reflectance[c * e->figures.n_groups + name->groups[g]];
         rho /= s.area;
-        const double value = means->value[c], direct = means->emission[c] + rho * means->direct[c];
+        const double value = means->value[c];
+        const double sky = means->buried < 1 ? means->direct[c] / (1 - means->buried) : 0;
+        const double direct = means->emission[c] + rho * sky;
         const bool irradiance = means->quantity == LAM_IRRADIANCE;
-        const double r = value - (irradiance                         ? means->direct[c]
-                                  : means->quantity == LAM_RADIOSITY ? direct
-                                                                     : 0);
+        const double r = value - (irradiance ? sky : means->quantity == LAM_RADIOSITY ? direct : 0);
         reflected2 += r * r;
         radiosity2 += irradiance ? value * value : (r + direct) * (r + direct);
         /* As if it were even over the name. */
-        const double light = r + (irradiance ? 1 : rho) * means->direct[c];
+        const double light = r + (irradiance ? 1 : rho) * sky;
         light2 += light * light;
         s.mean2 += s.area * overlap_mean2(e, light, covered / s.area * light);
         s.elements2 += s.area * (e->repair * e->repair + covered / s.area / 2) * light * light;

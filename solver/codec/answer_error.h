@@ -59,12 +59,14 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
                     const reduce_request *names, name_error *errors);
 
 /* The same of one name, by its means, [C] each, of the quantity, of the emission, and of the direct light of
- * the sky. Cost: O(C groups of the name), and under a sky n_tiles times as much. */
+ * the sky, of which the last two are over all elements. Cost: O(C groups of the name), and under a sky
+ * n_tiles times as much. */
 typedef struct name_means {
     lam_quantity quantity;
     emission_size size, sky;
     whole_light whole; /* of size; a view */
     const float *L;    /* [C][n_tiles]; NULL: no sky */
+    double buried;     /* share of the area of the name that the value leaves out: no light reaches it */
     const double *value, *emission, *direct;
 } name_means;
 name_error name_error_of_means(const error_by_group *e, const reduce_name *name, const name_means *means);

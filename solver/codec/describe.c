@@ -3,6 +3,7 @@
  * deploy/docs/api.md). A whole number is written as an integer, and one that is not finite as null. */
 #include "solver/codec/describe.h"
 
+#include "solver/base/scene/scene_buried.h"
 #include "solver/base/scene/scene_cameras.h"
 #include "solver/base/scene/scene_faces.h"
 #include "solver/codec/headline.h"
@@ -44,6 +45,39 @@ static void copy_member(json_t *to, const char *name, const json_t *from, const 
     json_object_set_new(to, name, value != NULL ? json_incref(value) : json_null());
 }
 
+/* Adds to groups, by the numbers of elements' groups, {"buried":{"elements":N,"area":m2}} where they have
+ * elements that figures leave out. */
+static lam_status add_buried(store *s, size_t n, const uint32_t *group, json_t *groups, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n_groups = json_array_size(groups);
+    bool *buried = NULL;
+    void *area = NULL;
+    size_t *counts = NULL;
+    double *sums = NULL;
+    TRY(scene_buried_load(s, n, &buried, error));
+    if (buried == NULL) goto done;
+    TRY(store_read(s, STORE_MESH "/area", STORE_F64, 1, (size_t[]){n}, &area, error));
+    counts = memory_allocate(n_groups, sizeof *counts, "group sizes", error);
+    sums = memory_allocate(n_groups, sizeof *sums, "group sizes", error);
+    if (counts == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) {
+        if (!buried[i]) continue;
+        counts[group[i]]++;
+        sums[group[i]] += ((const double *)area)[i];
+    }
+    for (size_t g = 0; g < n_groups; g++)
+        if (counts[g] > 0)
+            json_object_set_new(
+                json_array_get(groups, g), "buried",
+                json_pack("{s:I, s:o}", "elements", (json_int_t)counts[g], "area", describe_number(sums[g])));
+done:
+    free(buried);
+    free(area);
+    free(counts);
+    free(sums);
+    return status;
+}
+
 static lam_status add_groups(store *s, size_t n, json_t *out, lam_error *error) {
     lam_status status = LAM_OK;
     void *data = NULL;
@@ -66,6 +100,7 @@ static lam_status add_groups(store *s, size_t n, json_t *out, lam_error *error) 
         if (json_array_append_new(
                 groups, json_pack("{s:s, s:I}", "name", names[g], "elements", (json_int_t)counts[g])) != 0)
             FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group_names[%zu] is not UTF-8", store_path(s), g);
+    TRY(add_buried(s, n, group, groups, error));
     json_object_set(out, "groups", groups);
 done:
     json_decref(groups);

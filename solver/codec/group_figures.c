@@ -110,6 +110,7 @@ static void figures_of(size_t n_named, const uint32_t *named, const group_index 
         const uint32_t g = named[m], *elements = groups->elements + groups->start[g];
         for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
             const double value = value_at(x, x_begin + (begin != NULL ? begin[g] + e : elements[e]));
+            if (!group_index_counts(groups, elements[e])) continue;
             total += area[elements[e]];
             sum += area[elements[e]] * value;
             low = fmin(low, value);
@@ -121,6 +122,7 @@ static void figures_of(size_t n_named, const uint32_t *named, const group_index 
         const uint32_t g = named[m], *elements = groups->elements + groups->start[g];
         for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
             const double off = value_at(x, x_begin + (begin != NULL ? begin[g] + e : elements[e])) - mean;
+            if (!group_index_counts(groups, elements[e])) continue;
             squares += area[elements[e]] * off * off;
         }
     }

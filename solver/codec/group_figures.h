@@ -1,5 +1,6 @@
 /* Figures over groups of elements, in place of vectors: mean = sum A x / sum A, sum = sum A x, min, max,
- * uniformity = min / mean, variance = sum A (x - mean)^2 / sum A. No I/O. */
+ * uniformity = min / mean, variance = sum A (x - mean)^2 / sum A. Buried elements, which no light reaches,
+ * have no part in them. No I/O. */
 #ifndef LAMBERT_CODEC_GROUP_FIGURES_H
 #define LAMBERT_CODEC_GROUP_FIGURES_H
 

@@ -91,7 +91,19 @@ void group_index_free(group_index *index) {
     free(index->start);
     free(index->elements);
     free(index->sorted);
+    free(index->buried);
     *index = (group_index){0};
+}
+
+void group_index_measure(const group_index *index, size_t group, const double *area, group_extent *counted,
+                         group_extent *buried) {
+    *counted = *buried = (group_extent){0};
+    for (uint32_t at = index->start[group]; at < index->start[group + 1]; at++) {
+        const uint32_t i = index->elements[at];
+        group_extent *const to = group_index_counts(index, i) ? counted : buried;
+        to->elements++;
+        to->area += area[i];
+    }
 }
 
 /* The part of a group's name that must agree with name[0..length): all of it; its beginning, with a '.'

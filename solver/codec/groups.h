@@ -4,6 +4,7 @@
 
 #include "store/status.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 typedef struct group_index {
@@ -14,6 +15,7 @@ typedef struct group_index {
     uint32_t *elements; /* [n]: those of group 0 in mesh order, of group 1, ... */
     uint32_t *sorted;   /* [n_groups]: groups in the order of their names, those of backs alone at the end */
     size_t n_backs;     /* groups of backs alone */
+    bool *buried;       /* [n], owned: elements that figures leave out (scene_buried.h); NULL: none */
 } group_index;
 
 /* Takes over names, also on an error. group is [n], of which the last n_backs elements are the backs of
@@ -26,6 +28,22 @@ lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, siz
 lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam_error *error);
 
 void group_index_free(group_index *index);
+
+/* True where the figures of its groups take an element in. */
+static inline bool group_index_counts(const group_index *index, size_t element) {
+    return index->buried == NULL || !index->buried[element];
+}
+
+/* Elements and their area, m^2. */
+typedef struct group_extent {
+    size_t elements;
+    double area;
+} group_extent;
+
+/* Measures the part of a group that its figures take in, and the part that they leave out. O(elements of the
+ * group). */
+void group_index_measure(const group_index *index, size_t group, const double *area, group_extent *counted,
+                         group_extent *buried);
 
 /* The groups that a name means: those of exactly this name, or else all called `name.something` (an object of
  * several materials), of which none has backs alone; or else, of `name.back`, those of backs called

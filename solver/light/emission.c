@@ -41,8 +41,15 @@ lam_status emission_scene_create(const mesh *m, emission_scene *out, lam_error *
     char **names = copy_names(m, error);
     if (names == NULL) TRY(LAM_ERR_MEMORY);
     TRY(group_index_make(m->n, m->n_backs, m->group, m->n_groups, names, &made.groups, error));
+    if (m->buried != NULL) {
+        made.groups.buried = memory_allocate(m->n, sizeof *m->buried, "buried elements", error);
+        if (made.groups.buried == NULL) TRY(LAM_ERR_MEMORY);
+        memcpy(made.groups.buried, m->buried, m->n * sizeof *m->buried);
+    }
     *out = made;
+    made = (emission_scene){.m = NULL};
 done:
+    group_index_free(&made.groups);
     return status;
 }
 

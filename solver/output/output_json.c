@@ -70,16 +70,21 @@ static bool write_mean(const solution *s, uint32_t g, size_t v, buffer *b) {
     return written && (C == 1 || buffer_append(b, "]", 1));
 }
 
-/* "floor":{"elements":N,"area":A,"mean":...},... of vectors v0 to end; a list of means for a batch. */
+/* "floor":{"elements":N,"area":A,"mean":...},..., with "buried" where figures leave some out, of vectors v0
+ * to end; a list of means for a batch. */
 static bool write_means(const solution *s, size_t v0, size_t end, bool list, buffer *b) {
     bool written = true;
     for (uint32_t g = 0; written && g < s->m->n_groups; g++) {
-        const uint32_t first = s->groups->start[g], last = s->groups->start[g + 1];
-        double area = 0;
-        for (uint32_t e = first; e < last; e++) area += s->m->area[s->groups->elements[e]];
+        group_extent counted, buried;
+        group_index_measure(s->groups, g, s->m->area, &counted, &buried);
         written = (g == 0 || buffer_append(b, ",", 1)) && json_write_text(b, s->m->group_names[g]) &&
-                  buffer_printf(b, ":{\"elements\":%u,\"area\":", last - first) &&
-                  json_write_double(b, area) && buffer_printf(b, ",\"mean\":%s", list ? "[" : "");
+                  buffer_printf(b, ":{\"elements\":%zu,\"area\":", counted.elements) &&
+                  json_write_double(b, counted.area);
+        if (buried.elements > 0)
+            written = written &&
+                      buffer_printf(b, ",\"buried\":{\"elements\":%zu,\"area\":", buried.elements) &&
+                      json_write_double(b, buried.area) && buffer_append(b, "}", 1);
+        written = written && buffer_printf(b, ",\"mean\":%s", list ? "[" : "");
         for (size_t v = v0; written && v < end; v++)
             written = (v == v0 || buffer_append(b, ",", 1)) && write_mean(s, g, v, b);
         written = written && buffer_printf(b, "%s", list ? "]}" : "}");

@@ -23,20 +23,27 @@ static void print_columns(const solution *s, const char *first) {
     putchar('\n');
 }
 
+/* A figure of nothing has no value. */
+static void print_figure(int width, double value) {
+    if (isnan(value))
+        printf(" %*s", width, "-");
+    else
+        printf(" %*.6g", width, value);
+}
+
 static void print_means(const solution *s) {
     const mesh *m = s->m;
     print_columns(s, "group                    elements   area, m2");
     for (uint32_t g = 0; g < m->n_groups; g++) {
-        double area = 0;
-        const uint32_t first = s->groups->start[g], end = s->groups->start[g + 1];
-        for (uint32_t e = first; e < end; e++) area += m->area[s->groups->elements[e]];
-        printf("%-24s %8u %10.4g", m->group_names[g], end - first, area);
+        group_extent counted, buried;
+        group_index_measure(s->groups, g, m->area, &counted, &buried);
+        printf("%-24s %8zu %10.4g", m->group_names[g], counted.elements, counted.area);
         for (size_t k = 0; k < s->n_vectors * m->n_channels; k++) {
             double figures[REDUCE_COUNT];
             const reduce_values x = {.floats = s->values != NULL ? s->values + k * m->n : NULL,
                                      .doubles = s->refined != NULL ? s->refined + k * m->n : NULL};
             reduce_groups(1, &g, s->groups, m->area, x, figures);
-            printf(" %*.6g", column_width(s, k), figures[REDUCE_MEAN]);
+            print_figure(column_width(s, k), figures[REDUCE_MEAN]);
         }
         putchar('\n');
     }
@@ -68,10 +75,29 @@ static void print_reductions(const solution *s) {
         for (size_t k = 0; k < of->request.n_with; k++) {
             printf("%-24s %-10s", of->group, reduce_statistic_name(of->request.with[k]));
             for (size_t column = 0; column < s->n_vectors * s->m->n_channels; column++)
-                printf(" %*.6g", column_width(s, column), output_figure(s, of, k, column));
+                print_figure(column_width(s, column), output_figure(s, of, k, column));
             putchar('\n');
         }
     }
+}
+
+/* Elements that lie below bodies, of the groups printed: figures leave them out. */
+static void print_buried(const solution *s) {
+    const char *before = "figures leave out ";
+    if (s->groups->buried == NULL || s->faces != NULL) return;
+    for (uint32_t g = 0; g < s->m->n_groups; g++) {
+        group_extent counted, buried;
+        bool is_printed = s->n_reductions == 0;
+        for (size_t r = 0; r < s->n_reductions; r++)
+            for (size_t k = 0; k < s->reductions[r].request.names[0].n_groups; k++)
+                is_printed = is_printed || s->reductions[r].request.names[0].groups[k] == g;
+        group_index_measure(s->groups, g, s->m->area, &counted, &buried);
+        if (!is_printed || buried.elements == 0) continue;
+        printf("%s%zu element%s of %s, %.4g m2", before, buried.elements, buried.elements == 1 ? "" : "s",
+               s->m->group_names[g], buried.area);
+        before = "; ";
+    }
+    if (before[0] == ';') puts(", below bodies that stand on them");
 }
 
 /* Names that are reduced and that no light reaches: their errors are shares of nothing. */
@@ -121,5 +147,6 @@ void output_print(const solution *s) {
         print_faces(s);
     else
         print_means(s);
+    print_buried(s);
     print_error(s);
 }

@@ -39,14 +39,14 @@ typedef struct mesh {
     scene_camera *cameras; /* [n_cameras], of the scene file */
     bool *has_back; /* [n]: faces that mesh_make_backs gives a second element; NULL: none, or all are made */
     size_t n_backs;
-    bool *buried;    /* [n]: elements between a body and the face that it stands on, which see nothing and are
-                        not seen (buried.h); NULL: none, or not looked for. Only after the last change of
-                        elements */
-    bool two_sided;  /* every element has its back, or is one */
-    double unit;     /* metres per unit of the scene file, for the record */
-    double rounding; /* m: the step of the decimals of the file, or 0 where it has more than eight */
-    char up;         /* 'x', 'y' or 'z' */
-    char name[128];  /* the scene file's stem */
+    bool *buried;   /* [n]: elements between a body and the face that it stands on, which see nothing, are not
+                       seen (buried.h), and which figures of groups leave out; NULL: none, or not looked
+                       for. Only after the last change of elements */
+    bool two_sided; /* every element has its back, or is one */
+    double unit;    /* metres per unit of the scene file, for the record */
+    double rounding;      /* m: the step of the decimals of the file, or 0 where it has more than eight */
+    char up;              /* 'x', 'y' or 'z' */
+    char name[128];       /* the scene file's stem */
     char source_hash[33]; /* of the faces as imported, before any subdivision: hex */
 } mesh;
 

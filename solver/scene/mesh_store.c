@@ -1,5 +1,6 @@
 /* /mesh and /cameras of a store: written as it is, read back with every index and value checked. */
 #include "solver/base/scene/scene_backs.h"
+#include "solver/base/scene/scene_buried.h"
 #include "solver/scene/mesh.h"
 
 #include "solver/scene/coincident.h"
@@ -27,6 +28,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_write_texts(s, STORE_MESH "/group_names", m->n_groups, (const char *const *)m->group_names,
                           error));
     TRY(scene_faces_save(&m->faces, m->n, m->n - m->n_backs, m->area, s, error));
+    TRY(scene_buried_save(m->buried, m->n, s, error));
     if (m->overlap != NULL)
         TRY(store_write(s, STORE_MESH "/overlap", STORE_F64, 1, &m->n_groups, m->overlap, error));
     if (m->overlap != NULL) TRY(store_set_number(s, STORE_MESH, "overlap_area", mesh_overlap_area(m), error));
@@ -180,6 +182,7 @@ lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
             FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group[%zu] = %u, there are %zu group names", store_path(s),
                  i, loaded.group[i], loaded.n_groups);
     TRY(scene_faces_load(s, loaded.n, loaded.n - loaded.n_backs, &loaded.faces, error));
+    TRY(scene_buried_load(s, loaded.n, &loaded.buried, error));
     if (store_has(s, STORE_MESH "/overlap")) {
         TRY(load_f64(s, STORE_MESH "/overlap", loaded.n_groups, 0, false, &loaded.overlap, error));
         for (size_t g = 0; g < loaded.n_groups; g++)

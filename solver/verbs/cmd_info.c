@@ -206,6 +206,14 @@ static void print_cameras(const json_t *cameras) {
     puts(count > MOST ? ", ... (--json has them all)" : "");
 }
 
+/* The part of a group below bodies that stand on it. */
+static void print_buried(const json_t *buried) {
+    if (buried == NULL) return;
+    printf("; %" JSON_INTEGER_FORMAT " of these, %.4g m2, lie below a body: figures leave them out",
+           json_integer_value(json_object_get(buried, "elements")),
+           json_number_value(json_object_get(buried, "area")));
+}
+
 /* Prints as many groups as fit on a screen: a city has hundreds of them. */
 static void print_groups(const json_t *groups) {
     enum { MOST = 20 };
@@ -213,8 +221,10 @@ static void print_groups(const json_t *groups) {
     for (size_t i = 0; i < shown; i++) {
         const json_t *group = json_array_get(groups, i);
         const json_int_t elements = json_integer_value(json_object_get(group, "elements"));
-        printf("%-18s%s, %" JSON_INTEGER_FORMAT " element%s\n", i == 0 ? "groups" : "",
+        printf("%-18s%s, %" JSON_INTEGER_FORMAT " element%s", i == 0 ? "groups" : "",
                json_string_value(json_object_get(group, "name")), elements, elements == 1 ? "" : "s");
+        print_buried(json_object_get(group, "buried"));
+        putchar('\n');
     }
     if (shown < count) printf("%-18sand %zu more (--json names them)\n", "", count - shown);
 }

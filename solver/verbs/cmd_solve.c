@@ -248,7 +248,8 @@ static error_scene error_scene_of(const mesh *m, const emission_scene *scene) {
                          .area = m->area,
                          .reflectance = m->reflectance,
                          .start = scene->groups.start,
-                         .members = scene->groups.elements};
+                         .members = scene->groups.elements,
+                         .buried = scene->groups.buried};
 }
 
 static lam_status solve(const char *path, const solve_options *f, const annual_options *year,

@@ -29,6 +29,7 @@ gltf_file gltf_load(const gltf_mesh *m) {
         sizes.n_textures = m->pictures->n_surfaces + m->pictures->n_files;
         sizes.image_bytes = m->pictures->start[m->pictures->n_files] + 3 * m->pictures->n_files;
     }
+    for (size_t i = 0; i < m->n; i++) sizes.n_buried += !group_index_counts(m->groups, i);
     for (size_t g = 0; g < m->groups->n_groups; g++) sizes.n_texts += strlen(m->groups->names[g]);
     ck_ok(gltf_write(m, &l.file, &error));
     if (m->light == NULL) ck_assert_uint_le(l.file.length, gltf_bytes_most(&sizes));

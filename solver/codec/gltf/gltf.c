@@ -208,6 +208,19 @@ static bool say_extras(const writer *w, buffer *b) {
     return good && buffer_append_text(b, "}}");
 }
 
+/* The elements of a part that figures leave out. */
+static bool say_buried(const writer *w, const part *p, buffer *b) {
+    const uint32_t *elements = elements_of(w->m, p->group);
+    const char *before = ",\"buried\":[";
+    bool good = true;
+    for (size_t j = 0; j < p->n_elements; j++) {
+        if (group_index_counts(w->m->groups, elements[j])) continue;
+        good = good && buffer_printf(b, "%s%u", before, elements[j]);
+        before = ",";
+    }
+    return good && (before[1] != '\0' || buffer_append_text(b, "]"));
+}
+
 /* Node 0 is the root, node and mesh and material 1 + k, k and k are those of part k. */
 static bool say_nodes(const writer *w, buffer *b) {
     bool good = buffer_append_text(b, ",\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"name\":") &&
@@ -217,8 +230,9 @@ static bool say_nodes(const writer *w, buffer *b) {
     for (size_t k = 0; k < w->n_parts; k++)
         good = good && buffer_append_text(b, ",{\"name\":") &&
                json_write_text(b, w->m->groups->names[w->parts[k].group]) &&
-               buffer_printf(b, ",\"mesh\":%zu,\"extras\":{\"group\":%zu,\"elements\":%zu}}", k,
-                             w->parts[k].group, w->parts[k].n_elements);
+               buffer_printf(b, ",\"mesh\":%zu,\"extras\":{\"group\":%zu,\"elements\":%zu", k,
+                             w->parts[k].group, w->parts[k].n_elements) &&
+               say_buried(w, &w->parts[k], b) && buffer_append_text(b, "}}");
     return good && buffer_append_text(b, "]");
 }
 

@@ -62,7 +62,8 @@ typedef struct gltf_mesh {
  * of the element) and a material of the image and its factor in place of the mean. The JPEG files stand in
  * the file.
  *   - extras of the file and of the root node: {"lambert":{"name","elements","channels","up","kind"}}, `up`
- *     being the axis that was turned into y; of the node of a group: {"group","elements"}.
+ *     being the axis that was turned into y; of the node of a group: {"group","elements"}, and "buried", the
+ *     numbers of elements that figures of groups leave out, where there are any.
  * O(n). Errors: LAM_ERR_ARGUMENT (more than GLTF_ELEMENTS_MOST elements, more bytes than a file of glTF has,
  * a position beyond float), LAM_ERR_MEMORY; out is then empty. */
 lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error);
@@ -70,6 +71,7 @@ lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error);
 /* The sizes of a mesh that is not read yet; n_texts: bytes of all names. */
 typedef struct gltf_sizes {
     size_t n, n_vertices, n_groups, n_texts;
+    size_t n_buried;                /* elements */
     size_t n_textured;              /* elements that may have an image: n or 0 */
     size_t n_textures, image_bytes; /* surfaces and images together */
 } gltf_sizes;

@@ -14,10 +14,12 @@ static size_t sum_of_products(size_t n, const size_t (*terms)[2]) {
 #define JSON_OF_NAME 18
 #define JSON_OF_GROUP 2048
 #define JSON_OF_FILE 4096
+#define JSON_OF_NUMBER 9 /* of an element, with a comma */
 
 size_t gltf_bytes_most(const gltf_sizes *sizes) {
     const size_t element = 4 * 8 * sizeof(float) + 6 * sizeof(uint32_t);
-    return sum_of_products(7, (const size_t[][2]){{sizes->n, element},
+    return sum_of_products(8, (const size_t[][2]){{sizes->n, element},
+                                                  {sizes->n_buried, JSON_OF_NUMBER},
                                                   {sizes->n_textured, 4 * 5 * sizeof(float)},
                                                   {sizes->n_textures, JSON_OF_GROUP},
                                                   {sizes->image_bytes, 1},
@@ -30,7 +32,8 @@ size_t gltf_work_bytes(const gltf_sizes *sizes) {
     /* A vertex takes its position, three numbers, and up to four places of a hash table. */
     const size_t vertex = 3 * sizeof(float) + 7 * sizeof(uint32_t),
                  element = 4 * (3 * sizeof(float) + sizeof(uint32_t));
-    return sum_of_products(6, (const size_t[][2]){{sizes->n, element},
+    return sum_of_products(7, (const size_t[][2]){{sizes->n, element},
+                                                  {sizes->n_buried, JSON_OF_NUMBER},
                                                   {sizes->n_textures, JSON_OF_GROUP},
                                                   {sizes->n_vertices, vertex},
                                                   {sizes->n_texts, JSON_OF_NAME},

@@ -15,6 +15,7 @@ typedef struct error_scene {
     const uint32_t *start, *members; /* [n_groups + 1], [n]: those of group g from members[start[g]] on */
     const bool *read;                /* [n], true of receivers; NULL: all are */
     const bool *emits;               /* [n], true of sources; NULL: all are */
+    const bool *buried;              /* [n], true of elements that figures leave out; NULL: none is */
 } error_scene;
 
 /* Figures with what their formulas need of the mesh. A bin is the elements of a group, or of those that are

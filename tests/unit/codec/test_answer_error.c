@@ -209,6 +209,35 @@ START_TEST(names_have_errors_of_their_means) {
 }
 END_TEST
 
+/* Element 1 is buried, two thirds of desk: the same power on a third of the area is thrice as far off. */
+START_TEST(buried_elements_have_no_part) {
+    static const bool buried[N] = {false, true, false};
+    const uint32_t desk[] = {0};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}};
+    const reduce_request request = {.on = true, .names = list, .n_names = 1};
+    float values[C * N];
+    name_error found;
+    error_scene standing = scene;
+    standing.buried = buried;
+    fill(LAM_INDIRECT, false, values);
+    const error_answer of = answer_of(LAM_INDIRECT, values);
+    ck_assert(name_errors_of(&stated, &standing, &of, &request, &found));
+    const double number = P2 / A2E2, reflected = r[0] * r[0] + r[N] * r[N];
+    ck_assert_double_eq_tol(found.mean, ratio(9 * law(P2, number, .03, .02, .001), reflected), 1e-5);
+    ck_assert_double_eq_tol(found.elements, ratio(3 * law(P2, number, .03, .04, .01), reflected), 1e-4);
+    const double value[C] = {r[0], r[N]}, nothing[C] = {0};
+    const name_means means = {.quantity = LAM_INDIRECT,
+                              .size = of.size,
+                              .buried = 2. / 3,
+                              .value = value,
+                              .emission = nothing,
+                              .direct = nothing};
+    const name_error same = name_error_of_means(&stated, &list[0], &means);
+    ck_assert_double_eq_tol(same.mean, found.mean, 1e-6);
+    ck_assert_double_eq_tol(same.elements, found.elements, 1e-5);
+}
+END_TEST
+
 /* Single tiles are off each by its own: with spreads (2/3)^2 and (4/3)^2 of the first channel D = rho^2 (4
  * d_0 + 16 d_1) / 9, the second has none, and W likewise. A tile that no ray met may be off by all that it
  * sends. */
@@ -492,6 +521,7 @@ int main(void) {
     tcase_add_loop_test(cases, all_elements_count_by_their_group, 0, 6);
     tcase_add_test(cases, selected_elements_are_those_of_the_answer);
     tcase_add_loop_test(cases, names_have_errors_of_their_means, 0, 3);
+    tcase_add_test(cases, buried_elements_have_no_part);
     tcase_add_test(cases, single_tiles_have_their_own_errors);
     tcase_add_test(cases, faces_that_count_twice_are_off_by_their_light);
     tcase_add_test(cases, reflected_light_has_no_direct_errors);

@@ -157,6 +157,27 @@ START_TEST(elements_have_the_numbers_of_their_faces) {
 }
 END_TEST
 
+/* Elements that figures leave out are named where there are any. */
+START_TEST(buried_elements_are_named) {
+    static const char *const names[] = {"floor", "lamp"};
+    small s = {.m = {.n = 0}};
+    fill_mixed(&s);
+    const gltf_mesh *m = finish(&s, 2, names);
+    const uint32_t g = s.group[2];
+    s.groups.buried = calloc(m->n, sizeof *s.groups.buried);
+    s.groups.buried[2] = true;
+    gltf_file l = gltf_load(m);
+    for (uint32_t k = 0; k < 2; k++) {
+        const json_t *list = json_object_get(gltf_primitive_of(&l, k + 1).extras, "buried");
+        ck_assert_uint_eq(json_array_size(list), k == g ? 1 : 0);
+        ck_assert((list != NULL) == (k == g));
+        if (k == g) ck_assert_int_eq(json_integer_value(json_array_get(list, 0)), 2);
+    }
+    gltf_unload(&l);
+    group_index_free(&s.groups);
+}
+END_TEST
+
 START_TEST(groups_without_elements_are_left_out) {
     static const char *const names[] = {"nothing", "floor", "none", "lamp", "empty"};
     small s = {.m = {.n = 0}};
@@ -516,6 +537,7 @@ int main(void) {
     tcase_add_test(tests, a_file_has_what_the_mesh_has);
     tcase_add_test(tests, elements_have_the_numbers_of_their_faces);
     tcase_add_test(tests, groups_without_elements_are_left_out);
+    tcase_add_test(tests, buried_elements_are_named);
     tcase_add_test(tests, normals_keep_creases);
     tcase_add_test(tests, a_surface_goes_around_its_corner);
     tcase_add_test(tests, y_is_up);

@@ -1,5 +1,6 @@
 #include "support/suite.h"
 
+#include "solver/base/scene/scene_buried.h"
 #include "solver/scene/mesh.h"
 #include "support/scene.h"
 #include "support/solids.h"
@@ -91,6 +92,38 @@ static mesh named_cube(size_t n_groups, const char *const *names, const uint32_t
     return m;
 }
 
+/* Buried elements come back; a number that is no element, or that stands twice, is refused. */
+START_TEST(buried_elements_are_kept) {
+    static const bool buried[6] = {false, true, false, false, true, false};
+    static const uint32_t wrong[][2] = {{1, 6}, {4, 4}, {4, 1}};
+    lam_error error;
+    char folder[64], path[256];
+    mesh m = make_cube(), back = {0};
+    m.unit = 1, m.up = 'z';
+    m.buried = malloc(sizeof buried);
+    memcpy(m.buried, buried, sizeof buried);
+    ck_assert_msg(save_and_load(&m, &back, NULL, &error) == LAM_OK, "%s", error.message);
+    ck_assert_mem_eq(back.buried, buried, sizeof buried);
+    folder_make(folder);
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        store *s = NULL;
+        bool *read = NULL;
+        snprintf(path, sizeof path, "%s/%zu.h5", folder, k);
+        ck_ok(store_create(path, &s, &error));
+        ck_ok(store_write(s, "/mesh/buried", STORE_U32, 1, (size_t[]){2}, wrong[k], &error));
+        ck_ok(store_seal(s, &error));
+        ck_ok(store_open(path, &s, &error));
+        ck_assert_int_eq(scene_buried_load(s, 6, &read, &error), LAM_ERR_FORMAT);
+        ck_assert_ptr_nonnull(strstr(error.message, "/mesh/buried[1] = "));
+        ck_assert_ptr_null(read);
+        store_close(s);
+    }
+    folder_remove(folder);
+    mesh_free(&back);
+    mesh_free(&m);
+}
+END_TEST
+
 /* Some faces have backs: these lie behind all elements, in groups of their own, whose names are new. */
 START_TEST(some_faces_have_backs) {
     static const char *const names[] = {"walls", "lid", "walls.back"};
@@ -126,6 +159,7 @@ START_TEST(some_faces_have_backs) {
         m.unit = 1, m.up = 'z';
         ck_assert_msg(save_and_load(&m, &back, NULL, &error) == LAM_OK, "%s", error.message);
         ck_assert_uint_eq(back.n_backs, 3 * parts);
+        ck_assert_ptr_null(back.buried);
         ck_assert(!back.two_sided);
         mesh_free(&back);
         mesh_free(&m);
@@ -486,6 +520,7 @@ int main(void) {
     tcase_add_test(tests, measuring_refuses_bad_elements);
     tcase_add_test(tests, two_sided_meshes_have_backs);
     tcase_add_test(tests, some_faces_have_backs);
+    tcase_add_test(tests, buried_elements_are_kept);
     tcase_add_test(tests, dropped_faces_take_their_backs);
     tcase_add_test(tests, centroid_and_bounds);
     tcase_add_test(tests, hash_tells_geometries_apart);

@@ -172,6 +172,40 @@ START_TEST(figures_are_sums_written_out) {
 }
 END_TEST
 
+/* Of elements 0 2 4 and 1 3 the second and the last are buried, and all of b. */
+START_TEST(figures_leave_out_what_is_buried) {
+    static const double area[N] = {1, 2, 3, 1, 1, 4, 0};
+    static const bool buried[N] = {false, false, true, true, false, true, true};
+    static const float x[N] = {3, 6, 0, -1, 1, 7, 5}, part[5] = {6, -1, 3, 0, 1};
+    group_index groups = make_groups();
+    reduce_request r = {
+        .with = {REDUCE_MEAN, REDUCE_SUM, REDUCE_MIN, REDUCE_MAX, REDUCE_UNIFORMITY, REDUCE_VARIANCE},
+        .n_with = 6};
+    group_extent counted, left_out;
+    double every[REDUCE_COUNT];
+    groups.buried = malloc(sizeof buried);
+    memcpy(groups.buried, buried, sizeof buried);
+    add(&r, &groups, "a.y", true);
+    add(&r, &groups, "a.x", true);
+    double *figures = reduce_figures(&r, 1, 1);
+    const char *wanted =
+        "{\"a.y\":{\"mean\":6,\"sum\":12,\"min\":6,\"max\":6,\"uniformity\":1,\"variance\":0},"
+        "\"a.x\":{\"mean\":2,\"sum\":4,\"min\":1,\"max\":3,\"uniformity\":0.5,\"variance\":1}}";
+    ck_assert(
+        reduce_vectors(&r, &groups, area, 1, 1, 0, 1, (reduce_values){.floats = x, .whole = true}, figures));
+    write_is(&r, 1, 1, false, figures, wanted);
+    ck_assert(reduce_vectors(&r, &groups, area, 1, 1, 0, 1, (reduce_values){.floats = part}, figures));
+    write_is(&r, 1, 1, false, figures, wanted);
+    reduce_groups(1, (uint32_t[]){2}, &groups, area, (reduce_values){.floats = x}, every);
+    for (int k = 0; k < REDUCE_COUNT; k++) ck_assert(isnan(every[k]));
+    group_index_measure(&groups, 0, area, &counted, &left_out);
+    ck_assert(counted.elements == 2 && counted.area == 2 && left_out.elements == 1 && left_out.area == 3);
+    free(figures);
+    reduce_request_free(&r);
+    group_index_free(&groups);
+}
+END_TEST
+
 START_TEST(figures_have_the_shape_asked) {
     group_index groups = make_groups();
     reduce_request r = {.with = {REDUCE_SUM, REDUCE_MEAN}, .n_with = 2};
@@ -196,6 +230,7 @@ int main(void) {
     TCase *tcase = tcase_create("gradient");
     tcase_add_test(tcase, gradients_are_differences);
     tcase_add_test(tcase, figures_are_sums_written_out);
+    tcase_add_test(tcase, figures_leave_out_what_is_buried);
     tcase_add_test(tcase, figures_have_the_shape_asked);
     suite_add_tcase(suite, tcase);
     return suite_run(suite);

@@ -6,6 +6,8 @@ export interface MeshGroup {
     name: string;
     /** Its elements, ascending. */
     elements: Uint32Array;
+    /** Those of them that figures take in: not those below a body that stands on them. */
+    counted: Uint32Array;
     /** Mean reflectance. */
     reflectance: Rgb;
     /** Emission of its own, in the store's unit; null: it is dark. */
@@ -37,6 +39,8 @@ export interface SceneMesh {
     groupOf: Uint32Array;
     area: Float64Array;
     groups: MeshGroup[];
+    /** Elements below a body that stands on them, which figures leave out. */
+    buried: ReadonlySet<number>;
     /** The axis of the store that became y. */
     up: "x" | "y" | "z";
     images: MeshImage[];
@@ -54,7 +58,7 @@ interface Accessor {
     type: string;
 }
 interface Gltf {
-    nodes: { name?: string; mesh?: number; children?: number[] }[];
+    nodes: { name?: string; mesh?: number; children?: number[]; extras?: { buried?: number[] } }[];
     meshes: { primitives: { attributes: { [name: string]: number }; indices: number; material?: number }[] }[];
     accessors: Accessor[];
     bufferViews: { byteOffset?: number; byteLength: number }[];
@@ -100,7 +104,9 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
             start + (gltf.bufferViews[accessor.bufferView].byteOffset ?? 0) + (accessor.byteOffset ?? 0),
             accessor.count * WIDTHS[accessor.type]);
     const parts = gltf.nodes.filter((node) => node.mesh !== undefined).flatMap((node) =>
-        gltf.meshes[node.mesh as number].primitives.map((primitive) => ({ name: node.name ?? "", primitive }))
+        gltf.meshes[node.mesh as number].primitives.map((primitive) => ({ name: node.name ?? "",
+            hidden: node.extras?.buried ?? [], primitive })
+        )
     );
     let vertices = 0, indices = 0;
     for (const { primitive } of parts) {
@@ -110,8 +116,10 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
     const positions = new Float32Array(3 * vertices), normals = new Float32Array(3 * vertices);
     const elementOf = new Uint32Array(vertices), index = new Uint32Array(indices);
     const ranges: { name: string; vertices: [number, number]; material: number | undefined }[] = [];
+    const buried = new Set<number>();
     let atVertex = 0, atIndex = 0, elements = 0;
-    for (const { name, primitive } of parts) {
+    for (const { name, hidden, primitive } of parts) {
+        for (const element of hidden) buried.add(element);
         positions.set(floats(gltf.accessors[primitive.attributes.POSITION]), 3 * atVertex);
         normals.set(floats(gltf.accessors[primitive.attributes.NORMAL]), 3 * atVertex);
         const ids = floats(gltf.accessors[primitive.attributes._ELEMENT]);
@@ -140,7 +148,13 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
             groupOf[element] = g;
             total += area[element];
         }
-        return { name, elements: ascending, area: total, ...materialOf(gltf, material) };
+        return {
+            name,
+            elements: ascending,
+            counted: ascending.filter((element) => !buried.has(element)),
+            area: total,
+            ...materialOf(gltf, material),
+        };
     });
     const { up } = gltf.extras?.lambert ?? {};
     const mesh: SceneMesh = {
@@ -152,6 +166,7 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
         groupOf,
         area,
         groups,
+        buried,
         up: up === "x" || up === "z" ? up : "y",
         images: [],
         uv: null,

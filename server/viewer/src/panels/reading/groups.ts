@@ -90,7 +90,7 @@ export class Groups {
         const { now: scene, fields: [field] } = this.page.scene;
         if (scene === null || field === null) return [];
         const lines = scene.mesh.groups.map((group): Line => {
-            const figures = figuresOf(field.values, scene.mesh.area, group.elements);
+            const figures = figuresOf(field.values, scene.mesh.area, group.counted);
             const mean = this.means.get(group.name) ?? figures.mean;
             return { ...figures, name: group.name, mean, uniformity: mean > 0 ? Math.min(1, figures.min / mean) : NaN };
         });

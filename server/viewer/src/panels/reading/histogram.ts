@@ -55,8 +55,8 @@ export class Histogram {
         if (!this.isSeen() || scene === null || field === null || this.place.clientWidth === 0) return;
         const group = view.judged === null ? undefined : scene.mesh.groups.find((g) => g.name === view.judged);
         const counts = group === undefined
-            ? (): boolean => true
-            : (i: number): boolean => scene.mesh.groups[scene.mesh.groupOf[i]] === group;
+            ? (i: number): boolean => !scene.mesh.buried.has(i)
+            : (i: number): boolean => scene.mesh.groups[scene.mesh.groupOf[i]] === group && !scene.mesh.buried.has(i);
         // The ends of the palette are in sight, and all but the last hundredth of the area; in log four decades at
         // most.
         const palette = exposure.axis(view);

@@ -88,8 +88,8 @@ export class Judge {
         this.unit.textContent = view.unit;
         const select = this.group.querySelector("select");
         if (select !== null) select.value = view.judged ?? "";
-        const elements = scene.mesh.groups.find((group) => group.name === view.judged)?.elements
-            ?? scene.mesh.groupOf.keys();
+        const judged = scene.mesh.groups.find((group) => group.name === view.judged);
+        const elements = judged?.counted ?? scene.mesh.groups.flatMap((group) => [...group.counted]);
         const figures = figuresOf(field.values, scene.mesh.area, elements, view.threshold);
         const line = (name: string, text: string, target: string, isMet: boolean): HTMLElement =>
             make("tr", {}, make("th", { scope: "row" }, name), make("td", {}, text), make("td", {}, target),

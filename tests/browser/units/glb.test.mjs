@@ -1,0 +1,45 @@
+// The mesh of a scene as the daemon writes it: groups, areas, and elements that figures leave out.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { sourceOf } from "../source.mjs";
+
+const { readMesh } = await sourceOf("picture/glb"), { figuresOf } = await sourceOf("picture/scale");
+
+/** A binary glTF of unit squares in the plane y = 0, those of a group side by side. */
+function squares(groups) {
+    const gltf = { nodes: [{ children: groups.map((_, k) => k + 1) }], meshes: [], accessors: [], bufferViews: [] }, parts = [];
+    let at = 0, element = 0;
+    const put = (values, type, width) => {
+        parts.push(Buffer.from(values.buffer));
+        gltf.bufferViews.push({ byteOffset: at, byteLength: values.byteLength });
+        gltf.accessors.push({ bufferView: gltf.bufferViews.length - 1, componentType: values instanceof Uint32Array ? 5125 : 5126, type,
+            count: values.length / width });
+        at += values.byteLength;
+        return gltf.accessors.length - 1;
+    };
+    for (const { name, count, buried } of groups) {
+        const each = (make) => Array.from({ length: count }, (_, k) => make(k)).flat();
+        const attributes = { POSITION: put(Float32Array.from(each((k) => [k, 0, 0, k, 0, 1, k + 1, 0, 1, k + 1, 0, 0])), "VEC3", 3),
+            NORMAL: put(Float32Array.from(each(() => [0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0])), "VEC3", 3),
+            _ELEMENT: put(Float32Array.from(each((k) => Array(4).fill(element + k))), "SCALAR", 1) };
+        const indices = put(Uint32Array.from(each((k) => [0, 1, 2, 0, 2, 3].map((i) => 4 * k + i))), "SCALAR", 1);
+        gltf.nodes.push({ name, mesh: gltf.meshes.length, extras: buried === undefined ? {} : { buried } });
+        gltf.meshes.push({ primitives: [{ attributes, indices }] });
+        element += count;
+    }
+    let text = JSON.stringify(gltf);
+    text += " ".repeat((4 - text.length % 4) % 4);
+    const file = Buffer.concat([Buffer.alloc(20), Buffer.from(text), Buffer.alloc(8), ...parts]);
+    file.writeUInt32LE(0x46546c67, 0);
+    file.writeUInt32LE(text.length, 12);
+    return file.buffer.slice(file.byteOffset, file.byteOffset + file.length);
+}
+
+test("elements below a body have no part in figures", () => {
+    const mesh = readMesh(squares([{ name: "floor", count: 4, buried: [1, 3] }, { name: "lamp", count: 2 }]));
+    assert.deepEqual(mesh.groups.map(({ name, elements, counted }) => [name, [...elements], [...counted]]),
+        [["floor", [0, 1, 2, 3], [0, 2]], ["lamp", [4, 5], [4, 5]]]);
+    assert.deepEqual([...mesh.buried], [1, 3]);
+    const { min, mean, area, uniformity } = figuresOf(Float32Array.of(2, 0, 6, 0, 9, 9), mesh.area, mesh.groups[0].counted);
+    assert.deepEqual([min, mean, area, uniformity], [2, 4, 2, 0.5]);
+});
