@@ -10,6 +10,11 @@
 #include <stdio.h>
 
 const double error_advice_most = .03;
+const double error_advice_sky_large = .1;
+
+/* A scene of which more of the light leaves has no windows, or, where the error is large, is outdoors. */
+#define WINDOWS_SHARE .1
+#define OPEN_SHARE .5
 
 /* Of the squared error, the share from which on compression is the larger part. */
 static const double compression_share = .5;
@@ -90,15 +95,20 @@ void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]
 
 void error_advice_sky(const error_advice_input *input, double leaving_share, size_t n_aimed,
                       char text[ERROR_ADVICE_BYTES]) {
-    static const double open_share = .1;
     const error_report *e = input->errors;
     const double error = e->sky.total_relative.mean;
+    const bool large = error > error_advice_sky_large;
+    char option[160] = "more --rays lower it";
     text[0] = '\0';
-    if (!e->has_total || e->sky.probes == 0 || leaving_share > open_share) return;
+    if (!e->has_total || e->sky.probes == 0 || leaving_share > (large ? OPEN_SHARE : WINDOWS_SHARE)) return;
     if (!(error > error_advice_most)) return;
+    if (n_aimed == 0)
+        snprintf(option, sizeof option,
+                 "no window was found: --portal GROUP names faces that stand in one; or take more --rays");
+    else if (large)
+        snprintf(option, sizeof option,
+                 "%zu opening%s found: --portal GROUP names faces that stand in each; or take more --rays",
+                 n_aimed, n_aimed == 1 ? " was" : "s were");
     snprintf(text, ERROR_ADVICE_BYTES, "the error of light from the sky is stated as %.2g, above %g; %s",
-             error, error_advice_most,
-             n_aimed > 0 ? "more --rays lower it"
-                         : "no window was found: --portal GROUP names faces that stand in one; or take more "
-                           "--rays");
+             error, large ? error_advice_sky_large : error_advice_most, option);
 }

@@ -12,6 +12,9 @@ enum { ERROR_ADVICE_BYTES = 384 };
  * warning, unless --epsilon asks for another one: .03. */
 extern const double error_advice_most;
 
+/* An error of light from the sky above it may be that of a window that was not found: .1. */
+extern const double error_advice_sky_large;
+
 /* The makings of a store whose errors were measured. */
 typedef struct error_advice_input {
     const error_report *errors;
@@ -41,8 +44,9 @@ typedef struct error_advice_input {
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]);
 
 /* text: about light from the sky, where its error, that of the first bounce included, is above
- * error_advice_most in a scene of which at most a tenth of the light leaves (leaving_share); else empty. It
- * names --portal where rays were aimed at no opening. */
+ * error_advice_most in a scene of which at most a tenth of the light leaves (leaving_share), or above
+ * error_advice_sky_large in one of which at most half does; else empty. It names --portal where rays were
+ * aimed at no opening, and above error_advice_sky_large always. */
 void error_advice_sky(const error_advice_input *input, double leaving_share, size_t n_aimed,
                       char text[ERROR_ADVICE_BYTES]);
 

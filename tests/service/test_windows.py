@@ -98,6 +98,27 @@ class Windows(unittest.TestCase):
         self.assertEqual(dark, 0)
         self.assertLessEqual(rms, 0.03)
 
+    def test_a_large_error_names_portals(self):
+        """A round tower whose window goes over three of its flat faces, and so lies in no plane."""
+        round_by = np.linspace(0, 2 * np.pi, 25)
+        rim = np.stack([3 * np.cos(round_by), 3 * np.sin(round_by)], axis=1)
+        faces = [[(*rim[k], 0) for k in range(24)], [(*rim[k], 3) for k in range(24)][::-1]]
+        for k in range(24):
+            for low, high in ((0, 1), (2, 3)) if k < 3 else ((0, 3),):
+                faces.append([(*rim[j], z) for j, z in ((k, low), (k, high), (k + 1, high), (k + 1, low))])
+        lines, count = [], 0
+        for face in faces:
+            lines += [f"v {x:.6g} {y:.6g} {z:.6g}" for x, y, z in face]
+            lines.append("f " + " ".join(str(count + c + 1) for c in range(len(face))))
+            count += len(face)
+        with tempfile.TemporaryDirectory() as folder:
+            scene = pathlib.Path(folder) / "tower.obj"
+            scene.write_text("\n".join(lines) + "\n")
+            done = run("precompute", scene, "-o", scene.with_suffix(".h5"), "--sky", "tregenza", "--elements", 1200, "--reflectance", 0.5)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, r"the error of light from the sky is stated as [\d.]+, above 0.1; \d+ openings? w\w+ found: "
+                                      "--portal GROUP names faces")
+
 
 if __name__ == "__main__":
     unittest.main()

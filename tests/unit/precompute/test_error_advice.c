@@ -154,12 +154,23 @@ START_TEST(a_sky_takes_rays_or_portals) {
     error_report errors = {.sky = {.probes = 8, .total_relative = {.12, 0, .2}}, .has_total = true};
     const error_advice_input input = {.errors = &errors, .recipe = rays, .epsilon = .05};
     error_advice_sky(&input, .01, 2, text);
-    ck_assert_str_eq(text,
-                     "the error of light from the sky is stated as 0.12, above 0.03; more --rays lower it");
+    ck_assert_str_eq(
+        text, "the error of light from the sky is stated as 0.12, above 0.1; 2 openings were found: --portal "
+              "GROUP names faces that stand in each; or take more --rays");
+    error_advice_sky(&input, .2, 1, text);
+    ck_assert_ptr_nonnull(strstr(text, "; 1 opening was found: --portal GROUP names"));
     error_advice_sky(&input, .01, 0, text);
     ck_assert_ptr_nonnull(strstr(text, "no window was found: --portal GROUP"));
-    error_advice_sky(&input, .2, 0, text); /* an open scene has no windows */
+    error_advice_sky(&input, .6, 0, text); /* an open scene has no windows */
     ck_assert_str_eq(text, "");
+    errors.sky.total_relative.mean = .1;
+    error_advice_sky(&input, .01, 2, text);
+    ck_assert_str_eq(text,
+                     "the error of light from the sky is stated as 0.1, above 0.03; more --rays lower it");
+    error_advice_sky(&input, .2, 0, text);
+    ck_assert_str_eq(text, "");
+    error_advice_sky(&input, .01, 0, text);
+    ck_assert_ptr_nonnull(strstr(text, "no window was found: --portal GROUP"));
     errors.sky.total_relative.mean = .0299;
     error_advice_sky(&input, .01, 0, text);
     ck_assert_str_eq(text, "");
