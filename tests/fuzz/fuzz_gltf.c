@@ -25,14 +25,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     gltf_materials_free(n, materials);
     char *rewritten = NULL;
     size_t length = 0;
-    gltf_numbers numbers = {.length = 0};
+    gltf_numbers unpacked = {.length = 0}, numbers = {.length = 0};
     error.message[0] = '\0';
-    if (gltf_rewrite("none/scene.gltf", (const char *)data, size, &s, &rewritten, &length, &numbers,
-                     &error) != LAM_OK)
+    if (gltf_rewrite("none/scene.gltf", (const char *)data, size, &s, &rewritten, &length, &unpacked,
+                     &numbers, &error) != LAM_OK)
         FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);
     FUZZ_CHECK(rewritten == NULL || length > 0);
     FUZZ_CHECK(numbers.length <= numbers.capacity && numbers.length % sizeof(float) == 0);
     free(rewritten);
+    free(unpacked.bytes);
     free(numbers.bytes);
     imported_faces_free(&s);
     return 0;

@@ -258,8 +258,8 @@ typedef struct open_file {
 typedef struct scene_files {
     const char *path, *assets, *bytes;
     size_t length;
-    const gltf_numbers *numbers; /* the file GLTF_NUMBERS */
-    char outside[256];           /* the file refused first, or empty */
+    const gltf_numbers *unpacked, *numbers; /* the files GLTF_UNPACKED and GLTF_NUMBERS */
+    char outside[256];                      /* the file refused first, or empty */
 } scene_files;
 
 static size_t read_file(struct aiFile *calls, char *out, size_t size, size_t count) {
@@ -324,9 +324,12 @@ static struct aiFile *open_for_library(struct aiFileIO *io, const char *name, co
     f->length = files->length;
     if (strcmp(name, files->path) == 0) return &f->calls;
     if (strncmp(name, files->path, folder) == 0) name += folder; /* the library has put it before */
-    if (files->numbers->length > 0 && strcmp(name, GLTF_NUMBERS) == 0) {
-        f->bytes = files->numbers->bytes;
-        f->length = files->numbers->length;
+    const gltf_numbers *made = strcmp(name, GLTF_NUMBERS) == 0    ? files->numbers
+                               : strcmp(name, GLTF_UNPACKED) == 0 ? files->unpacked
+                                                                  : NULL;
+    if (made != NULL && made->length > 0) {
+        f->bytes = made->bytes;
+        f->length = made->length;
         return &f->calls;
     }
     const asset_place place = asset_find(files->path, files->assets, name, full);
@@ -360,7 +363,7 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     char name[ASSET_PATH]; /* which tells the library the format */
     char *bytes = NULL, *padded = NULL, *rewritten = NULL;
     size_t length = 0, padded_length = 0, rewritten_length = 0;
-    gltf_numbers numbers = {.length = 0};
+    gltf_numbers unpacked = {.length = 0}, numbers = {.length = 0};
     a.gltf = strcasecmp(format, "gltf") == 0 || strcasecmp(format, "glb") == 0;
     snprintf(name, sizeof name, "%.*s%s%s", ASSET_PATH - 32, path, s->format != NULL ? "." : "",
              s->format != NULL ? s->format : "");
@@ -372,11 +375,13 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     if (strcasecmp(format, "stl") == 0) TRY(stl_normalised(bytes, length, &padded, &padded_length, error));
     scene_files files = {.path = name,
                          .assets = s->assets,
+                         .unpacked = &unpacked,
                          .numbers = &numbers,
                          .bytes = padded != NULL ? padded : bytes,
                          .length = padded_length > 0 ? padded_length : length};
     if (a.gltf)
-        TRY(gltf_rewrite(path, files.bytes, files.length, s, &rewritten, &rewritten_length, &numbers, error));
+        TRY(gltf_rewrite(path, files.bytes, files.length, s, &rewritten, &rewritten_length, &unpacked,
+                         &numbers, error));
     if (rewritten != NULL) files.bytes = rewritten, files.length = rewritten_length;
     a.scene = import_scene(&files);
     if (files.outside[0] != '\0')
@@ -407,6 +412,7 @@ done:
     free(bytes);
     free(padded);
     free(rewritten);
+    free(unpacked.bytes);
     free(numbers.bytes);
     return status;
 }

@@ -20,8 +20,7 @@ static size_t size_of(unsigned type) {
     }
 }
 
-/* A count, an offset or a stride of the file, `otherwise` where it is not given; false for another thing. */
-static bool count_of(const json_t *owner, const char *name, size_t otherwise, size_t *out) {
+bool gltf_count(const json_t *owner, const char *name, size_t otherwise, size_t *out) {
     const json_t *value = json_object_get(owner, name);
     if (value != NULL &&
         (!json_is_integer(value) || json_integer_value(value) < 0 || json_integer_value(value) > UINT32_MAX))
@@ -43,11 +42,11 @@ bool gltf_find_values(gltf_file *g, const json_t *accessor, gltf_values *out) {
     const json_t *view = gltf_entry(g, "bufferViews", json_object_get(accessor, "bufferView"));
     size_t n, at, of_view, length, stride, type;
     if (view == NULL || json_object_get(accessor, "sparse") != NULL) return false;
-    if (!count_of(accessor, "componentType", 0, &type)) return false;
+    if (!gltf_count(accessor, "componentType", 0, &type)) return false;
     const size_t width = width_of(accessor), size = size_of((unsigned)type), row = size * width;
-    if (row == 0 || !count_of(accessor, "count", 0, &n) || !count_of(accessor, "byteOffset", 0, &at) ||
-        !count_of(view, "byteOffset", 0, &of_view) || !count_of(view, "byteLength", 0, &length) ||
-        !count_of(view, "byteStride", row, &stride))
+    if (row == 0 || !gltf_count(accessor, "count", 0, &n) || !gltf_count(accessor, "byteOffset", 0, &at) ||
+        !gltf_count(view, "byteOffset", 0, &of_view) || !gltf_count(view, "byteLength", 0, &length) ||
+        !gltf_count(view, "byteStride", row, &stride))
         return false;
     const gltf_buffer b = gltf_read_buffer(g, json_object_get(view, "buffer"), &ignored);
     if (b.bytes == NULL || stride < row || of_view > b.length || length > b.length - of_view) return false;

@@ -29,8 +29,16 @@ void gltf_parse(gltf_file *g, const char *bytes, size_t length) {
 
 lam_status gltf_hold_buffers(gltf_file *g, lam_error *error) {
     g->n_buffers = json_array_size(json_object_get(g->root, "buffers"));
-    g->buffers = memory_allocate(g->n_buffers, sizeof *g->buffers, "buffers", error);
+    g->buffers = memory_allocate(g->n_buffers + 2, sizeof *g->buffers, "buffers", error);
     return g->buffers != NULL ? LAM_OK : LAM_ERR_MEMORY;
+}
+
+lam_status gltf_add_buffer(gltf_file *g, const char *uri, const gltf_numbers *bytes, lam_error *error) {
+    json_t *buffer = json_pack("{sIss}", "byteLength", (json_int_t)bytes->length, "uri", uri);
+    if (json_array_append_new(json_object_get(g->root, "buffers"), buffer) != 0)
+        return status_fail(error, LAM_ERR_MEMORY, "%s: not enough memory for its vertices", g->path);
+    g->buffers[g->n_buffers++] = (gltf_buffer){.bytes = bytes->bytes, .length = bytes->length};
+    return LAM_OK;
 }
 
 void gltf_close(gltf_file *g) {

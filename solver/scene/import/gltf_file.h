@@ -26,7 +26,7 @@ typedef struct gltf_file {
  * file is broken. The bytes are the caller's until gltf_close. */
 void gltf_parse(gltf_file *g, const char *bytes, size_t length);
 
-/* Room for the buffers, of which none is read yet. Errors: LAM_ERR_MEMORY. */
+/* Room for the buffers, of which none is read yet, and for two more. Errors: LAM_ERR_MEMORY. */
 lam_status gltf_hold_buffers(gltf_file *g, lam_error *error);
 
 void gltf_close(gltf_file *g);
@@ -48,6 +48,9 @@ void gltf_decode_uri(const char *uri, char out[ASSET_PATH]);
  * LAM_ERR_MEMORY. */
 #define GLTF_INSTANCES "EXT_mesh_gpu_instancing"
 lam_status gltf_expand_instances(gltf_file *g, bool *any, lam_error *error);
+
+/* A count, an offset or a stride of the file, `otherwise` where it is not given; false for another thing. */
+bool gltf_count(const json_t *owner, const char *name, size_t otherwise, size_t *out);
 
 /* The component types of the format. */
 enum {
@@ -73,6 +76,17 @@ bool gltf_find_values(gltf_file *g, const json_t *accessor, gltf_values *out);
 
 /* Number k of a row; a normalized integer is from 0 or -1 to 1. */
 double gltf_value(const gltf_values *v, size_t row, size_t k);
+
+/* Adds a buffer of this URI behind the others, for as long as bytes stay where they are. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status gltf_add_buffer(gltf_file *g, const char *uri, const gltf_numbers *bytes, lam_error *error);
+
+/* Whether this build reads compressed views, and their bytes in a buffer of the URI GLTF_UNPACKED; unpacked
+ * is empty where there are none. O(bytes). Errors: LAM_ERR_FORMAT (views that cannot be read, more than 4 GiB
+ * of them), LAM_ERR_MEMORY. */
+#define GLTF_MESHOPT "EXT_meshopt_compression"
+bool gltf_reads_meshopt(void);
+lam_status gltf_unpack_views(gltf_file *g, gltf_numbers *unpacked, lam_error *error);
 
 /* Turns positions and places in images that are integers into floats of a buffer, the last one, whose URI is
  * GLTF_NUMBERS, and leaves out normals that are integers. numbers is empty where there are no integers.

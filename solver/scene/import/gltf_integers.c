@@ -86,15 +86,13 @@ done:
 
 lam_status gltf_convert_integers(gltf_file *g, gltf_numbers *numbers, lam_error *error) {
     lam_status status = LAM_OK;
-    json_t *owner, *primitive, *buffers = json_object_get(g->root, "buffers");
+    json_t *owner, *primitive;
     size_t i, k;
     json_array_foreach(json_object_get(g->root, "meshes"), i, owner)
         json_array_foreach(json_object_get(owner, "primitives"), k, primitive)
             TRY(convert_primitive(g, json_object_get(primitive, "attributes"), numbers, error));
     if (numbers->length == 0) goto done;
-    json_t *buffer = json_pack("{sIss}", "byteLength", (json_int_t)numbers->length, "uri", GLTF_NUMBERS);
-    if (json_array_append_new(buffers, buffer) != 0)
-        FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for its vertices", g->path);
+    TRY(gltf_add_buffer(g, GLTF_NUMBERS, numbers, error));
 done:
     return status;
 }

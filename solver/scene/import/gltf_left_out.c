@@ -7,11 +7,17 @@
 
 /* Extensions that are read, or have a line of their own where they matter. */
 static bool is_read(const char *extension) {
-    static const char *const names[] = {"KHR_texture_transform",      "KHR_materials_emissive_strength",
-                                        "KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness",
-                                        "KHR_draco_mesh_compression", "KHR_mesh_quantization",
-                                        "KHR_lights_punctual",        "KHR_texture_basisu",
-                                        "EXT_texture_webp",           GLTF_INSTANCES};
+    static const char *const names[] = {"KHR_texture_transform",
+                                        "KHR_materials_emissive_strength",
+                                        "KHR_materials_transmission",
+                                        "KHR_materials_pbrSpecularGlossiness",
+                                        "KHR_draco_mesh_compression",
+                                        "KHR_mesh_quantization",
+                                        "KHR_lights_punctual",
+                                        "KHR_texture_basisu",
+                                        "EXT_texture_webp",
+                                        GLTF_INSTANCES,
+                                        GLTF_MESHOPT};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (strcmp(extension, names[i]) == 0) return true;
     return strncmp(extension, "KHR_xmp", 7) == 0;

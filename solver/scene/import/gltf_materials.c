@@ -17,6 +17,7 @@ static bool is_readable(const char *extension) {
                                              "KHR_draco_mesh_compression",
                                              "KHR_mesh_quantization",
                                              GLTF_INSTANCES};
+    if (strcmp(extension, GLTF_MESHOPT) == 0) return gltf_reads_meshopt();
     for (size_t i = 0; i < sizeof beginnings / sizeof *beginnings; i++)
         if (strncmp(extension, beginnings[i], strlen(beginnings[i])) == 0) return true;
     return false;
@@ -129,8 +130,9 @@ lam_status gltf_read_materials(const char *path, const char *bytes, size_t lengt
         const char *extension = json_string_value(name);
         if (extension != NULL && !is_readable(extension))
             FAIL(error, LAM_ERR_FORMAT,
-                 "%s: it requires the extension '%.60s', which is not read; export it without", path,
-                 extension);
+                 "%s: it requires the extension '%.60s', which is not read%s; export it without", path,
+                 extension,
+                 strcmp(extension, GLTF_MESHOPT) == 0 ? " by a build without libmeshoptimizer" : "");
     }
     const json_t *materials = json_object_get(g.root, "materials");
     const size_t n_materials = json_array_size(materials);

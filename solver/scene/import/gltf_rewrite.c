@@ -1,6 +1,6 @@
-/* A glTF as the library gets it: with nodes in place of instances and floats in place of integers, which it
- * does not know, and with numbers in place of the names of materials, which it tells in the order that meshes
- * use them first. Runs in the child. */
+/* A glTF as the library gets it: with nodes in place of instances, plain bytes in place of compressed ones
+ * and floats in place of integers, which it does not know, and with numbers in place of the names of
+ * materials, which it tells in the order that meshes use them first. Runs in the child. */
 #include "solver/scene/import/gltf_file.h"
 
 #include <stdio.h>
@@ -58,7 +58,7 @@ done:
 }
 
 lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, imported_faces *s, char **out,
-                        size_t *out_length, gltf_numbers *numbers, lam_error *error) {
+                        size_t *out_length, gltf_numbers *unpacked, gltf_numbers *numbers, lam_error *error) {
     lam_status status = LAM_OK;
     gltf_file g = {.path = path, .s = s};
     const bool names_instances = memmem(bytes, length, GLTF_INSTANCES, sizeof GLTF_INSTANCES - 1) != NULL;
@@ -70,9 +70,10 @@ lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, impo
              "%s: its JSON is broken, and its instances (" GLTF_INSTANCES ") cannot be read", path);
     if (g.root == NULL) goto done; /* the library says why */
     TRY(gltf_hold_buffers(&g, error));
+    TRY(gltf_unpack_views(&g, unpacked, error));
     TRY(gltf_convert_integers(&g, numbers, error));
     TRY(gltf_expand_instances(&g, &changed, error));
-    changed = changed || numbers->length > 0;
+    changed = changed || unpacked->length > 0 || numbers->length > 0;
     changed = changed || json_array_size(json_object_get(g.root, "materials")) > 0;
     TRY(number_materials(&g, error));
     if (changed) TRY(write_file(&g, bytes, length, out, out_length, error));

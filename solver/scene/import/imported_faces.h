@@ -159,7 +159,9 @@ lam_status gltf_read_materials(const char *path, const char *bytes, size_t lengt
                                gltf_material **out, size_t *n, lam_error *error);
 void gltf_materials_free(size_t n, gltf_material *materials);
 
-/* Numbers that a rewritten glTF has in place of integers, as a file of this name. */
+/* Numbers that a rewritten glTF has in place of compressed views, and of integers, as files of these names.
+ */
+#define GLTF_UNPACKED "lambert-unpacked.bin"
 #define GLTF_NUMBERS "lambert-numbers.bin"
 typedef struct gltf_numbers {
     char *bytes;
@@ -167,13 +169,13 @@ typedef struct gltf_numbers {
 } gltf_numbers;
 
 /* Rewrites a glTF or GLB for the library: with a child for each instance of a node (EXT_mesh_gpu_instancing),
- * with floats, in numbers, in place of integers, and with GLTF_NUMBER and its place in the file for the name
- * of each material. *out is a copy of the file, freed by the caller as numbers->bytes, or NULL where there is
- * nothing to rewrite. Errors: LAM_ERR_FORMAT (instances or integers that cannot be read, or too many),
- * LAM_ERR_MEMORY. */
+ * with plain bytes, in unpacked, in place of compressed ones, with floats, in numbers, in place of integers,
+ * and with GLTF_NUMBER and its place in the file for the name of each material. *out is a copy of the file,
+ * freed by the caller as the bytes of both, or NULL where there is nothing to rewrite. Errors: LAM_ERR_FORMAT
+ * (instances, views or integers that cannot be read, or too many), LAM_ERR_MEMORY. */
 #define GLTF_NUMBER "lambert material "
 lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, imported_faces *s, char **out,
-                        size_t *out_length, gltf_numbers *numbers, lam_error *error);
+                        size_t *out_length, gltf_numbers *unpacked, gltf_numbers *numbers, lam_error *error);
 
 /* Refuses a PLY that is shorter than its header says: a library may take minutes to notice. */
 lam_status ply_check_head(const char *path, const char *bytes, size_t length, lam_error *error);

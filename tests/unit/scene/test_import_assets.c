@@ -187,9 +187,9 @@ START_TEST(buffers_outside_the_folder_need_assets) {
     import_beside(path, NULL, NULL, &m);
     mesh_free(&m);
     snprintf(whole, sizeof whole, text, "corners.bin",
-             ",\"extensionsRequired\":[\"KHR_materials_ior\",\"EXT_meshopt_compression\"]");
+             ",\"extensionsRequired\":[\"KHR_materials_ior\",\"KHR_meshopt_compression\"]");
     file_write(folder, "scene.gltf", whole, path);
-    import_beside(path, NULL, "requires the extension 'EXT_meshopt_compression'", &m);
+    import_beside(path, NULL, "requires the extension 'KHR_meshopt_compression'", &m);
 }
 END_TEST
 

@@ -1,7 +1,7 @@
 /* Imports files of other programs, whole, broken and damaged. */
 #include "support/suite.h"
 
-#include "solver/scene/import/imported_faces.h"
+#include "solver/scene/import/gltf_file.h"
 #include "support/scene.h"
 
 #include <dirent.h>
@@ -135,6 +135,67 @@ START_TEST(broken_fixtures_are_refused) {
 }
 END_TEST
 
+/* The cube by `gltfpack -c -kn`, with one text or byte of the file replaced by another of its length. */
+static lam_status import_packed(size_t at, const char *text, const char *by, mesh *m, lam_error *error) {
+    char bytes[4096], path[256];
+    const import_options options = import_plain();
+    FILE *file = fopen(FIXTURES "/meshes/cube-meshopt.glb", "rb");
+    ck_assert_ptr_nonnull(file);
+    const size_t length = fread(bytes, 1, sizeof bytes, file);
+    fclose(file);
+    char *place = text != NULL ? memmem(bytes, length, text, strlen(text)) : bytes + (length - at);
+    ck_assert_ptr_nonnull(place);
+    if (text != NULL)
+        memcpy(place, by, strlen(by));
+    else if (at > 0)
+        *place ^= 0x55;
+    snprintf(path, sizeof path, "%s/packed.glb", folder);
+    file = fopen(path, "wb");
+    ck_assert_uint_eq(fwrite(bytes, 1, length, file), length);
+    fclose(file);
+    return scene_import(path, &options, m, NULL, error);
+}
+
+/* Compressed views are read where the library is there, and else refused by name; views that the format does
+ * not have, or whose bytes are damaged, are refused with their number. */
+START_TEST(compressed_views_are_read_or_refused) {
+    static const char *const wrong[][3] = {
+        {"\"byteLength\":75,", "\"byteLength\":99,", "bufferViews[0] is compressed"},
+        {"\"byteLength\":75,", "\"byteLength\":5 ,", "bufferViews[0] is compressed"},
+        {"\"byteStride\":8,\"mode", "\"byteStride\":6,\"mode", "way that the format does not have"},
+        {"\"ATTRIBUTES\"", "\"ATTRIBUTED\"", "way that the format does not have"},
+        {"\"count\":8}", "\"count\":-}", "packed.glb"},
+        {"\"count\":36}", "\"count\":35}", "bufferViews[1] is compressed"},
+        {"\"count\":36}", "\"count\":3e}", "packed.glb"},
+        {"\"extensionsRequired\"", "\"extensionsInquired\"", NULL},
+    };
+    mesh m = {0};
+    lam_error error = {0};
+    if (!gltf_reads_meshopt()) {
+        ck_assert_int_eq(import_packed(0, NULL, NULL, &m, &error), LAM_ERR_FORMAT);
+        ck_assert_ptr_nonnull(strstr(error.message, "by a build without libmeshoptimizer"));
+        return;
+    }
+    ck_assert_msg(import_packed(0, NULL, NULL, &m, &error) == LAM_OK, "%s", error.message);
+    ck_assert_uint_eq(m.n, 12);
+    ck_assert_double_eq_tol(total_area(&m), 24, 1e-3);
+    mesh_free(&m);
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        const lam_status status = import_packed(0, wrong[k][0], wrong[k][1], &m, &error);
+        ck_assert_msg(status == (wrong[k][2] != NULL ? LAM_ERR_FORMAT : LAM_OK), "%s", error.message);
+        if (wrong[k][2] != NULL)
+            ck_assert_msg(strstr(error.message, wrong[k][2]) != NULL, "%s", error.message);
+        mesh_free(&m);
+    }
+    /* Each byte of the chunk by itself: it is refused, or makes some mesh. */
+    for (size_t at = 1; at <= 108; at += 3) {
+        if (import_packed(at, NULL, NULL, &m, &error) != LAM_OK)
+            ck_assert_ptr_nonnull(strstr(error.message, "packed.glb"));
+        mesh_free(&m);
+    }
+}
+END_TEST
+
 START_TEST(damaged_files_never_hurt) {
     const char *const names[] = {"meshes/BoxInterleaved.glb", "meshes/cube.glb",  "meshes/tet.ply",
                                  "meshes/unit_cube.STL",      "obj-odd/cube.obj", "gltf-odd/Cube/Cube.gltf"};
@@ -180,6 +241,7 @@ int main(void) {
     tcase_add_loop_test(tests, every_odd_file_loads_or_is_refused, 0, 3);
     tcase_add_test(tests, known_fixtures_have_their_sizes);
     tcase_add_test(tests, broken_fixtures_are_refused);
+    tcase_add_test(tests, compressed_views_are_read_or_refused);
     tcase_add_loop_test(tests, damaged_files_never_hurt, 0, 6);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
