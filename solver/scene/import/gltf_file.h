@@ -81,9 +81,9 @@ double gltf_value(const gltf_values *v, size_t row, size_t k);
  * LAM_ERR_MEMORY. */
 lam_status gltf_add_buffer(gltf_file *g, const char *uri, const gltf_numbers *bytes, lam_error *error);
 
-/* Whether this build reads compressed views, and their bytes in a buffer of the URI GLTF_UNPACKED; unpacked
- * is empty where there are none. O(bytes). Errors: LAM_ERR_FORMAT (views that cannot be read, more than 4 GiB
- * of them), LAM_ERR_MEMORY. */
+/* The first is true of a build that reads compressed views. The second puts their bytes into a buffer of the
+ * URI GLTF_UNPACKED; unpacked is empty where there are none. O(bytes). Errors: LAM_ERR_FORMAT (views that
+ * cannot be read, more than 4 GiB of them), LAM_ERR_MEMORY. */
 #define GLTF_MESHOPT "EXT_meshopt_compression"
 bool gltf_reads_meshopt(void);
 lam_status gltf_unpack_views(gltf_file *g, gltf_numbers *unpacked, lam_error *error);
