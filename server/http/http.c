@@ -33,7 +33,8 @@ struct http {
  */
 #define DROP_MAX ((uint64_t)1 << 20)
 
-/* The part of a body without a length beyond --max-body that is read before its answer. */
+/* The part of a body without a length beyond --max-body that is read before its answer, for the sake of the
+ * connection. */
 #define EXCESS_MAX ((uint64_t)64 << 20)
 
 /* True if the client may have the route, by its token where one is needed. */
@@ -299,8 +300,13 @@ static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
     }
     r->received += *size;
     client_received(r->service->connections, r->client, *size);
-    /* libmicrohttpd sends no answer in the middle of a body: the connection of one without end is closed. */
-    if (r->received > c->max_body + EXCESS_MAX) return MHD_NO;
+    /* libmicrohttpd sends no answer in the middle of a body, and closes the connection of one without end. */
+    if (r->received > c->max_body + EXCESS_MAX) {
+        if (!r->answered) refuse_length(r); /* of a route that takes no body */
+        client_linger(r->service->connections, r->client);
+        http_write_refusal(r);
+        return MHD_NO;
+    }
     *size = 0;
     return MHD_YES;
 }
@@ -324,7 +330,8 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     const double seconds = clock_seconds() - r->start;
     turns_leave(h->service->turns, &r->turn);
     client_enter(h->service->connections, r->client, STAGE_IDLE, 0);
-    unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
+    const bool sent = r->written || (r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
+    unsigned status = sent ? r->answer.status : 0;
     request_log(r, status, seconds * 1e3);
     if (r->answer.problem != PROBLEM_NONE) problem_counts_add(&h->service->problems, r->answer.problem);
     catalog_release(r->snapshot);

@@ -6,6 +6,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/socket.h>
 
 /* Bodies of this capacity give back what they do not use. */
 #define TRIM_LEAST ((size_t)256 << 10)
@@ -190,4 +191,26 @@ enum MHD_Result http_send_answer(request *r) {
     MHD_destroy_response(response);
     r->queued = result == MHD_YES;
     return result;
+}
+
+void http_write_refusal(request *r) {
+    const answer *a = &r->answer;
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+    buffer b = {0};
+    bool good =
+        info != NULL && a->body.bytes != NULL &&
+        buffer_printf(&b,
+                      "HTTP/1.1 %u %s\r\nConnection: close\r\nContent-Type: %s\r\nContent-Length: %zu\r\n"
+                      "X-Request-Id: %s\r\nX-Content-Type-Options: nosniff\r\n",
+                      a->status, MHD_get_reason_phrase_for(a->status), a->type, a->body.length, r->id);
+    if (r->origin != NULL)
+        good = good && buffer_printf(&b, "Access-Control-Allow-Origin: %s\r\nVary: Origin\r\n", r->origin);
+    if (a->retry_after > 0) good = good && buffer_printf(&b, "Retry-After: %u\r\n", a->retry_after);
+    good = good && buffer_append_text(&b, "\r\n") && buffer_append(&b, a->body.bytes, a->body.length);
+    const ssize_t written =
+        good ? send(info->connect_fd, b.bytes, b.length, MSG_DONTWAIT | MSG_NOSIGNAL) : -1;
+    r->written = written == (ssize_t)b.length;
+    if (r->written) r->sent = a->body.length;
+    buffer_free(&b);
 }

@@ -42,6 +42,7 @@ typedef struct request {
     bool answered;          /* the answer is made; the rest of the body is dropped */
     bool last;              /* the connection ends with this answer */
     bool queued;            /* the answer was handed to libmicrohttpd */
+    bool written;           /* the answer was written past libmicrohttpd, in the middle of the body */
     buffer body;            /* counted in memory */
     request_memory memory;  /* of the body, of what is computed, of the answer */
     turn turn;
@@ -87,5 +88,9 @@ void http_finish_answer(request *r, bool on_io_thread);
 
 /* Hands a finished answer to libmicrohttpd. */
 enum MHD_Result http_send_answer(request *r);
+
+/* Writes a refusal to the socket in the middle of a body, where libmicrohttpd sends none: the connection is
+ * then to be closed. An answer that the socket has no room for is lost. */
+void http_write_refusal(request *r);
 
 #endif

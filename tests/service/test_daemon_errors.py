@@ -242,12 +242,30 @@ class Errors(unittest.TestCase):
         self.still_works()
 
     def test_a_chunked_body_without_end_is_cut(self):
+        """Beyond --max-body and 64 MiB the answer comes in the middle of the body, and its client may send on for a while;
+        one without any end is cut."""
+        head = (b"POST /v1/scenes/grey/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+                b"X-Request-Id: long\r\nTransfer-Encoding: chunked\r\n\r\n")
+        piece = b"40000\r\n" + b" " * 0x40000 + b"\r\n"
         with self.daemon.raw() as s:
-            s.sendall(b"POST /v1/scenes/grey/radiosity HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
-                      b"Transfer-Encoding: chunked\r\n\r\n")
+            s.sendall(head)
+            for _ in range(400):  # 100 MiB
+                s.sendall(piece)
+            s.sendall(b"0\r\n\r\n")
+            answer = b""
+            while part := s.recv(65536):
+                answer += part
+        told, _, body = answer.partition(b"\r\n\r\n")
+        self.assertTrue(told.startswith(b"HTTP/1.1 413 "), told)
+        self.assertIn(b"Connection: close", told)
+        self.assertIn(b"X-Request-Id: long", told)
+        self.assertEqual(int(told.split(b"Content-Length: ")[1].split()[0]), len(body))
+        self.assertIn("--max-body", json.loads(body)["detail"])
+        with self.daemon.raw() as s:
+            s.sendall(head)
             with self.assertRaises(OSError):
-                for _ in range(10_000):
-                    s.sendall(b"4000\r\n" + b" " * 0x4000 + b"\r\n")
+                for _ in range(6_000):  # 1.5 GiB
+                    s.sendall(piece)
         self.still_works()
 
     def test_wrong_length(self):
