@@ -71,6 +71,51 @@ static void tell_extensions(const gltf_file *g) {
     if (written > 0) import_warn(&g->s->warnings, "%s: these extensions are left out: %s", g->path, list);
 }
 
+static bool any_weight(const json_t *owner) {
+    size_t k;
+    json_t *weight;
+    bool any = false;
+    json_array_foreach(json_object_get(owner, "weights"), k, weight) any = any || gltf_number(weight, 0) != 0;
+    return any;
+}
+
+/* Tells of meshes that bones or shape keys would move. */
+static void tell_moved(const gltf_file *g) {
+    size_t i, skins = 0, shapes = 0;
+    json_t *node;
+    json_array_foreach(json_object_get(g->root, "nodes"), i, node) {
+        const json_t *of = gltf_entry(g, "meshes", json_object_get(node, "mesh"));
+        const bool keyed =
+            json_object_get(json_array_get(json_object_get(of, "primitives"), 0), "targets") != NULL;
+        skins += of != NULL && json_object_get(node, "skin") != NULL;
+        shapes += keyed && any_weight(json_object_get(node, "weights") != NULL ? node : of);
+    }
+    if (skins > 0)
+        import_warn(
+            &g->s->warnings,
+            "%s: the bones of %zu mesh%s (skins) are left out: each stands as it was modelled; apply the "
+            "armature before the export",
+            g->path, skins, skins == 1 ? "" : "es");
+    if (shapes > 0)
+        import_warn(
+            &g->s->warnings,
+            "%s: the shape keys of %zu mesh%s (targets) are left out: each has its basic shape; apply them "
+            "before the export",
+            g->path, shapes, shapes == 1 ? "" : "es");
+}
+
+/* Tells of primitives that are no faces. */
+static void tell_lines(const gltf_file *g) {
+    size_t i, k, n = 0;
+    json_t *of, *primitive;
+    json_array_foreach(json_object_get(g->root, "meshes"), i, of)
+        json_array_foreach(json_object_get(of, "primitives"), k, primitive) n +=
+        gltf_number(json_object_get(primitive, "mode"), 4) < 4;
+    if (n > 0)
+        import_warn(&g->s->warnings, "%s: %zu primitive%s of lines or points %s left out: no faces", g->path,
+                    n, n == 1 ? "" : "s", n == 1 ? "is" : "are");
+}
+
 void gltf_tell_left_out(const gltf_file *g) {
     import_warnings *w = &g->s->warnings;
     static const char punctual[] = "KHR_lights_punctual", transmission[] = "KHR_materials_transmission";
@@ -105,5 +150,7 @@ void gltf_tell_left_out(const gltf_file *g) {
         import_warn(w,
                     "%s: %zu materials are metallic or may be; they are diffuse here, of their base colour",
                     g->path, metals);
+    tell_moved(g);
+    tell_lines(g);
     tell_extensions(g);
 }

@@ -21,6 +21,17 @@ static lam_status number_materials(gltf_file *g, lam_error *error) {
     return LAM_OK;
 }
 
+/* Takes the bones off meshes, which gltf_tell_left_out has named: the library reads some of them wrong, and
+ * none where the matrices are left out. True where there are any. */
+static bool drop_skins(gltf_file *g) {
+    json_t *node;
+    size_t i;
+    bool any = false;
+    json_array_foreach(json_object_get(g->root, "nodes"), i, node) any =
+        (json_is_object(node) && json_object_del(node, "skin") == 0) || any;
+    return (json_is_object(g->root) && json_object_del(g->root, "skins") == 0) || any;
+}
+
 static void put_little_endian(char *bytes, size_t x) {
     for (int k = 0; k < 4; k++) bytes[k] = (char)(x >> 8 * k & 255);
 }
@@ -62,18 +73,19 @@ lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, impo
     lam_status status = LAM_OK;
     gltf_file g = {.path = path, .s = s};
     const bool names_instances = memmem(bytes, length, GLTF_INSTANCES, sizeof GLTF_INSTANCES - 1) != NULL;
-    bool changed = false;
+    bool changed = false, bones;
     *out = NULL;
     gltf_parse(&g, bytes, length);
     if (g.root == NULL && names_instances)
         FAIL(error, LAM_ERR_FORMAT,
              "%s: its JSON is broken, and its instances (" GLTF_INSTANCES ") cannot be read", path);
     if (g.root == NULL) goto done; /* the library says why */
+    bones = drop_skins(&g);
     TRY(gltf_hold_buffers(&g, error));
     TRY(gltf_unpack_views(&g, unpacked, error));
     TRY(gltf_convert_integers(&g, numbers, error));
     TRY(gltf_expand_instances(&g, &changed, error));
-    changed = changed || unpacked->length > 0 || numbers->length > 0;
+    changed = changed || bones || unpacked->length > 0 || numbers->length > 0;
     changed = changed || json_array_size(json_object_get(g.root, "materials")) > 0;
     TRY(number_materials(&g, error));
     if (changed) TRY(write_file(&g, bytes, length, out, out_length, error));

@@ -277,7 +277,9 @@ done:
 static lam_status read_libraries(const char *path, uint32_t line, char *names, imported_faces *s,
                                  lam_error *error) {
     lam_status status = LAM_OK;
-    bool found;
+    char whole[256];
+    bool found, is_first = true;
+    snprintf(whole, sizeof whole, "%s", names);
     TRY(read_library(path, line, names, s, &found, error));
     while (!found && *names != '\0') {
         char *file = names, *out = names;
@@ -289,10 +291,14 @@ static lam_status read_libraries(const char *path, uint32_t line, char *names, i
         const bool more = *names != '\0';
         if (out < names) *out = '\0';
         TRY(read_library(path, line, file, s, &found, error));
+        const bool several = is_first && strcmp(whole, file) != 0;
+        is_first = false;
         if (!found)
             FAIL(error, LAM_ERR_FORMAT,
-                 "%s:%u: the material file '%s' is missing; put it beside the OBJ or remove the mtllib line",
-                 path, line, file);
+                 "%s:%u: the material file '%s'%s%s%s is missing; put it beside the OBJ or remove the mtllib "
+                 "line",
+                 path, line, several ? whole : file, several ? ", or '" : "", several ? file : "",
+                 several ? "' if these are several names," : "");
         found = !more;
     }
 done:
@@ -309,6 +315,7 @@ typedef struct obj_state {
     size_t corner_capacity;
     /* Coordinates of images are kept once a material has one. skipped: some were not. */
     bool keeps, skipped;
+    size_t n_surfaces, first_surface; /* free-form ones, and the line of the first */
     double (*uv)[2];
     imported_corner *skin; /* of the face being read */
     size_t n_uv, uv_capacity, skin_capacity;
@@ -430,12 +437,19 @@ static lam_status read_all(const char *path, imported_faces *s, bool keeps, bool
         else if ((rest = after_keyword(line, "usemtl")) != NULL) {
             o.material = TABLE_NONE;
             if (*rest != '\0') TRY(imported_faces_add_material(s, rest, strlen(rest), &o.material, error));
+        } else if (after_keyword(line, "surf") != NULL) {
+            if (o.n_surfaces++ == 0) o.first_surface = cursor.number;
         } else if ((rest = after_keyword(line, "mtllib")) != NULL) {
             TRY(read_libraries(path, cursor.number, rest, s, error));
             o.keeps = o.keeps || (!o.skipped && has_images(s));
         }
     }
     *again = o.skipped && has_images(s);
+    if (o.n_surfaces > 0)
+        import_warn(&s->warnings,
+                    "%s:%zu: faces are missing: %zu free-form surface%s (surf) %s not read; export polygons",
+                    path, o.first_surface, o.n_surfaces, o.n_surfaces == 1 ? "" : "s",
+                    o.n_surfaces == 1 ? "is" : "are");
     TRY(obj_groups_settle(&o.groups, path, s, error));
     settle_colours(s);
 done:

@@ -238,6 +238,22 @@ START_TEST(reflectance_option_overrides_but_keeps_emission) {
 }
 END_TEST
 
+/* Rhino and others write these beside polygons. */
+START_TEST(free_form_surfaces_are_told) {
+    import_report report;
+    mesh m = obj_good(
+        folder,
+        SQUARE "f 1 2 3\ncstype bspline\ndeg 1 1\nsurf 0 1 0 1 1 2 3 4\nend\nsurf 0 1 0 1 1 2 3 4\nend\n",
+        &report);
+    ck_assert_uint_eq(m.n, 1);
+    ck_assert_msg(
+        strstr(report.warnings,
+               ":8: faces are missing: 2 free-form surfaces (surf) are not read; export polygons") != NULL,
+        "%s", report.warnings);
+    mesh_free(&m);
+}
+END_TEST
+
 START_TEST(missing_material_files_are_named_with_their_line) {
     char path[256];
     obj_bad(folder, SQUARE "mtllib nowhere.mtl\nf 1 2 3\n",
@@ -245,6 +261,8 @@ START_TEST(missing_material_files_are_named_with_their_line) {
     mtl_write(folder, "newmtl a\nKd .1 .1 .1\n");
     obj_bad(folder, "mtllib scene.mtl nowhere.mtl\n" SQUARE "f 1 2 3\n",
             "scene.obj:1: the material file 'nowhere.mtl'");
+    obj_bad(folder, "mtllib my room.mtl\n" SQUARE "f 1 2 3\n",
+            "scene.obj:1: the material file 'my room.mtl', or 'my' if these are several names, is missing");
     file_write(folder, "with a blank.mtl", "newmtl b\nKd .2 .2 .2\n", path);
     import_report report;
     mesh m = obj_good(folder,
@@ -497,6 +515,7 @@ int main(void) {
     tcase_add_test(tests, missing_colours_have_a_default_and_a_warning);
     tcase_add_test(tests, bad_colours_are_errors);
     tcase_add_test(tests, reflectance_option_overrides_but_keeps_emission);
+    tcase_add_test(tests, free_form_surfaces_are_told);
     tcase_add_test(tests, missing_material_files_are_named_with_their_line);
     tcase_add_test(tests, planar_convex_quads_stay_and_others_become_triangles);
     tcase_add_test(tests, concave_polygons_keep_area_and_side);

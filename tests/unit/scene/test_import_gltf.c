@@ -146,6 +146,34 @@ START_TEST(extensions_that_are_not_read_are_named_with_their_faces) {
 }
 END_TEST
 
+/* Bones whose matrices are left out, which is allowed, made the library crash; shape keys count by their
+ * weights. */
+START_TEST(bones_shapes_and_lines_are_told) {
+    static const char gltf[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0,1,2]}],\"skins\":[{"
+        "\"joints\":[0]}],"
+        "\"nodes\":[{\"mesh\":0,\"skin\":0},{\"mesh\":1,\"translation\":[0,0,3],\"weights\":[0,0.5]},"
+        "{\"mesh\":1,\"translation\":[0,0,6]}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}},{\"attributes\":{\"POSITION\":0},"
+        "\"mode\":2}]},"
+        "{\"weights\":[0,0],\"primitives\":[{\"attributes\":{\"POSITION\":0},\"targets\":[{\"POSITION\":0},{"
+        "\"POSITION\":0}]}]}]," TRIANGLE "}";
+    static const char *const told[] = {
+        ": the bones of 1 mesh (skins) are left out: each stands as it was modelled",
+        ": the shape keys of 1 mesh (targets) are left out: each has its basic shape",
+        ": 1 primitive of lines or points is left out: no faces"};
+    char path[256];
+    import_report report;
+    file_write(folder, "moved.gltf", gltf, path);
+    mesh m = import_good(path, &report);
+    ck_assert_uint_eq(m.n, 3);
+    ck_assert_double_eq_tol(total_area(&m), 1.5, 1e-6);
+    for (size_t k = 0; k < sizeof told / sizeof *told; k++)
+        ck_assert_msg(strstr(report.warnings, told[k]) != NULL, "%s", report.warnings);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("import_gltf");
     TCase *tests = tcase_create("import_gltf");
@@ -153,6 +181,7 @@ int main(void) {
     tcase_add_test(tests, emission_is_luminance);
     tcase_add_test(tests, positions_may_be_integers);
     tcase_add_test(tests, extensions_that_are_not_read_are_named_with_their_faces);
+    tcase_add_test(tests, bones_shapes_and_lines_are_told);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
