@@ -1,4 +1,5 @@
 /* `lambert`: the list of its verbs; each is in its own cmd_*.c. */
+#include "solver/base/file_stem.h"
 #include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/linalg/core.h"
@@ -6,6 +7,9 @@
 #include "solver/waits.h"
 
 #include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 static const option_verb verbs[] = {
     {"generate", cmd_generate, "write one of the known scenes"},
@@ -28,9 +32,27 @@ static const option_command program = {
     .notes = "`lambert help VERB` explains a verb. Exit status: 0 done, 1 it failed, 2 wrong usage.",
 };
 
+/* A file in the place of a verb: tells which verb it wants. */
+static int want_verb(const char *path) {
+    char *stem = file_stem(path);
+    const size_t length = strlen(path);
+    const bool is_store = length > 3 && strcmp(path + length - 3, ".h5") == 0;
+    const int code =
+        is_store
+            ? options_usage(program.name, "%s: a store needs a verb: lambert view %s, or lambert info %s",
+                            path, path, path)
+            : options_usage(program.name, "%s: a scene needs a verb: lambert precompute %s -o %s.h5", path,
+                            path, stem != NULL ? stem : "STORE");
+    free(stem);
+    return code;
+}
+
 int main(int argc, char **argv) {
     waits_sleep(argv);
     signal(SIGCHLD, SIG_DFL); /* if the launcher left it ignored, the end of a child would be unknown */
     core_keep_thread_limit();
+    /* No verb has such a character in it. */
+    if (argc > 1 && argv[1][0] != '-' && strpbrk(argv[1], "./") != NULL && access(argv[1], F_OK) == 0)
+        return terminal_finish(program.name, want_verb(argv[1]));
     return terminal_finish(program.name, options_run_verb(&program, verbs, argc, argv));
 }

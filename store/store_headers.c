@@ -228,7 +228,8 @@ static lam_status open_hdf5(store *s, lam_error *error) {
     /* Version 0, of other HDF5 files, has no checksum: it is refused without asking HDF5. */
     if (memcmp(head, signature, sizeof signature) != 0 || head[8] < 2 || head[8] > 3 || head[9] != 8 ||
         head[10] != 8)
-        FAIL(error, LAM_ERR_FORMAT, "%s: not a Lambert store", s->path);
+        FAIL(error, LAM_ERR_FORMAT, "%s: not a Lambert store; lambert precompute makes one of a scene",
+             s->path);
     access = store_driver_properties(&s->file);
     if (access < 0) TRY(store_hdf5_failure(s, "the file", "open", error));
     s->h5 = H5Fopen(s->path, H5F_ACC_RDONLY, access);

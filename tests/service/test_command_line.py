@@ -85,6 +85,21 @@ class Help(unittest.TestCase):
 
 
 class Suggestions(unittest.TestCase):
+    def test_a_file_wants_a_verb(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, wanted in (("room.obj", "a scene needs a verb: lambert precompute {0} -o room.h5"),
+                                 ("room.h5", "a store needs a verb: lambert view {0}, or lambert info {0}")):
+                path = os.path.join(folder, name)
+                with open(path, "w", encoding="ascii") as file:
+                    file.write("v 0 0 0\n" * 400)
+                done = run(LAMBERT, path)
+                self.assertEqual((done.returncode, done.stdout, done.stderr), (2, "", f"lambert: {path}: {wanted.format(path)}\n"))
+                done = run(LAMBERT, "solve", path)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(f"{path}: not a Lambert store; lambert precompute makes one of a scene", done.stderr)
+            done = run(LAMBERT, os.path.join(folder, "none.obj"))
+            self.assertIn("no such verb", done.stderr)
+
     def test_nearest(self):
         for wanted, arguments in (
                 ("lambert: slove: no such verb; did you mean solve?", (LAMBERT, "slove", "a.h5")),
