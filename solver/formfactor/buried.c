@@ -17,14 +17,16 @@ static const double covered_share = .99;
  * a part of it. */
 static const double backs_share = .25;
 
-/* Rays to the back start behind the plane, in lengths of the element's side, or they would meet what covers
- * it. */
-static const float behind_by = 1e-4f;
+/* Rays start this far from the plane on the side that they look to, in lengths of the element's side, or they
+ * would meet what covers it: at least the first, at most the second. Between them is the distance that one
+ * plane may have, as few decimals of a file may move what covers an element to its other side. */
+static const double off_least = 1e-4, off_most = 1e-2;
 
 typedef struct search {
     const mesh *m;
     const visibility *v;
     const double *shared; /* [n], m^2 */
+    double reach;         /* m, of one plane */
 } search;
 
 static bool is_covered(const search *s, size_t element) {
@@ -40,7 +42,8 @@ static meeting look(const search *s, size_t element, bool behind) {
     meeting met = {0, 0, 0};
     element_sampler sampler;
     uint32_t self[VISIBILITY_PACKET];
-    const float by = behind_by * (float)sqrt(s->m->area[element]);
+    const double side = sqrt(s->m->area[element]);
+    const float by = (float)fmax(off_least * side, fmin(s->reach, off_most * side)) * (behind ? -1.f : 1.f);
     element_sampler_init(&sampler, s->m, s->v, element, 0);
     for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
     for (uint32_t p = 0; p < PACKETS; p++) {
@@ -48,8 +51,8 @@ static meeting look(const search *s, size_t element, bool behind) {
         hit_packet hits;
         element_sampler_packet(&sampler, p * VISIBILITY_PACKET, &rays);
         if (behind) element_sampler_turn(&sampler, &rays);
-        for (int d = 0; d < 3 && behind; d++)
-            for (int i = 0; i < VISIBILITY_PACKET; i++) rays.origin[d][i] -= by * sampler.frame.normal[d];
+        for (int d = 0; d < 3; d++)
+            for (int i = 0; i < VISIBILITY_PACKET; i++) rays.origin[d][i] += by * sampler.frame.normal[d];
         visibility_cast(s->v, &rays, VISIBILITY_PACKET, self, 0, &hits);
         for (int i = 0; i < VISIBILITY_PACKET; i++) {
             const bool nothing = hits.element[i] == VISIBILITY_NOTHING;
@@ -79,7 +82,7 @@ lam_status buried_find(mesh *m, size_t *n, lam_error *error) {
     size_t covered = 0, found = 0;
     bool *buried = NULL;
     double *shared = memory_allocate(m->n, sizeof *shared, "covered elements", error);
-    search s = {.m = m, .shared = shared};
+    search s = {.m = m, .shared = shared, .reach = coincident_reach(m)};
     if (shared == NULL) return LAM_ERR_MEMORY;
     TRY(mesh_find_sheets(m, shared, error));
     for (size_t i = 0; i < m->n; i++) covered += is_covered(&s, i);

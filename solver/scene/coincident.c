@@ -191,6 +191,10 @@ done:
     return status;
 }
 
+double coincident_reach(const mesh *m) {
+    return coincident_planes_of(m).reach;
+}
+
 /* Sums over one side of each face. */
 static double overlap_sum(const mesh *m, double *all) {
     const size_t n = m->n - m->n_backs;

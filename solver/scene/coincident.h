@@ -32,6 +32,9 @@ lam_status mesh_settle_coincident(mesh *m, bool both_sides, coincident_report *o
  * of fronts aside. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
 lam_status mesh_find_sheets(const mesh *m, double *shared, lam_error *error);
 
+/* m: no faces of one plane are further apart, however they were rounded. Cost: O(n). */
+double coincident_reach(const mesh *m);
+
 /* The m^2 that the overlapping faces of a mesh cover more than once: half the sum of what each of them
  * shares; and the share of the mesh's area that they have together. 0 where none overlaps. */
 double mesh_overlap_area(const mesh *m);
