@@ -116,6 +116,17 @@ static void tell_lines(const gltf_file *g) {
                     n, n == 1 ? "" : "s", n == 1 ? "is" : "are");
 }
 
+/* Tells of scenes beside the one that the file names, or its first. */
+static void tell_scenes(const gltf_file *g) {
+    const json_t *given = json_object_get(g->root, "scene");
+    const size_t n = json_array_size(json_object_get(g->root, "scenes"));
+    const long long one = json_is_integer(given) ? (long long)json_integer_value(given) : 0;
+    if (n > 1)
+        import_warn(&g->s->warnings,
+                    "%s: of its %zu scenes only scenes[%lld] is read; faces of others may be missing",
+                    g->path, n, one);
+}
+
 void gltf_tell_left_out(const gltf_file *g) {
     import_warnings *w = &g->s->warnings;
     static const char punctual[] = "KHR_lights_punctual", transmission[] = "KHR_materials_transmission";
@@ -152,5 +163,6 @@ void gltf_tell_left_out(const gltf_file *g) {
                     g->path, metals);
     tell_moved(g);
     tell_lines(g);
+    tell_scenes(g);
     tell_extensions(g);
 }

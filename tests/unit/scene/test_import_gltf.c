@@ -150,7 +150,8 @@ END_TEST
  * weights. */
 START_TEST(bones_shapes_and_lines_are_told) {
     static const char gltf[] =
-        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0,1,2]}],\"skins\":[{"
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":1,\"scenes\":[{\"nodes\":[0]},{\"nodes\":[0,1,2]}],"
+        "\"skins\":[{"
         "\"joints\":[0]}],"
         "\"nodes\":[{\"mesh\":0,\"skin\":0},{\"mesh\":1,\"translation\":[0,0,3],\"weights\":[0,0.5]},"
         "{\"mesh\":1,\"translation\":[0,0,6]}],"
@@ -159,6 +160,7 @@ START_TEST(bones_shapes_and_lines_are_told) {
         "{\"weights\":[0,0],\"primitives\":[{\"attributes\":{\"POSITION\":0},\"targets\":[{\"POSITION\":0},{"
         "\"POSITION\":0}]}]}]," TRIANGLE "}";
     static const char *const told[] = {
+        ": of its 2 scenes only scenes[1] is read",
         ": the bones of 1 mesh (skins) are left out: each stands as it was modelled",
         ": the shape keys of 1 mesh (targets) are left out: each has its basic shape",
         ": 1 primitive of lines or points is left out: no faces"};
