@@ -1,14 +1,14 @@
 #include "solver/light/sunlight.h"
 
 #include "solver/formfactor/sky_bounce.h"
+#include "solver/shadow/sun_ground.h"
+#include "solver/shadow/sun_shares.h"
 #include "store/groups.h"
 
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define SEED 20 /* of the points on the elements: the same in every hour and every run */
 
 void sunlight_free(sunlight *s) {
     free(s->suns);
@@ -17,17 +17,6 @@ void sunlight_free(sunlight *s) {
     free(s->ground);
     free(s->given);
     *s = (sunlight){0};
-}
-
-/* ground [n]: see sunlight_create. */
-static void find_ground(const sky_bounce *b, const mesh *m, float *ground) {
-    for (size_t i = 0; i < m->n; i++) {
-        const double up = (double)b->tiling.sign[2] * (double)m->normal[i][b->tiling.axis[2]];
-        double least = b->ground_albedo * fmax(0, 1 - up) / 2;
-        for (size_t t = 0; t < b->tiling.n_tiles; t++)
-            least = fmin(least, (double)b->first_bounce[t * m->n + i] / b->tiling.tiles[t].cosine);
-        ground[i] = (float)least;
-    }
 }
 
 lam_status sunlight_create(store *s, const mesh *m, year_sun *suns, size_t n_vectors, size_t n_points,
@@ -39,10 +28,11 @@ lam_status sunlight_create(store *s, const mesh *m, year_sun *suns, size_t n_vec
     made.ground = memory_allocate(m->n, sizeof *made.ground, "the light of the ground", error);
     if (made.ground == NULL) TRY(LAM_ERR_MEMORY);
     TRY(sky_bounce_load(s, m->n, &bounce, error));
-    find_ground(&bounce, m, made.ground);
+    sun_ground_find(&bounce.tiling, bounce.ground_albedo, bounce.first_bounce, m->n,
+                    (const float(*)[3])m->normal, made.ground);
     made.tiling = bounce.tiling;
     bounce.tiling = (sky_tiling){0};
-    TRY(sun_rays_create(m, n_points, SEED, n_wanted, wanted, &made.rays, error));
+    TRY(sun_rays_create(m, n_points, SUN_SEED, n_wanted, wanted, &made.rays, error));
     *out = made;
     made = (sunlight){0};
 done:

@@ -22,9 +22,8 @@ typedef struct sunlight {
 } sunlight;
 
 /* Takes over suns [n_vectors], also on an error. Rays are n_points per element, of those wanted or, where
- * that is NULL, of all. in_tiles: the sky whose answers have the sun in a tile, or NULL. The light of the
- * ground on an element is found from the tiles that it does not see, where first_bounce = a F_ground c: the
- * least of first_bounce / c, at most the share of an open ground at this inclination, a (1 - n_up) / 2.
+ * that is NULL, of all. in_tiles: the sky whose answers have the sun in a tile, or NULL. The
+ * light of the ground is that of sun_ground.h.
  * Errors: those of the store's /sky, LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
 lam_status sunlight_create(store *s, const mesh *m, year_sun *suns, size_t n_vectors, size_t n_points,
                            size_t n_wanted, const uint32_t *wanted, const lam_sky *in_tiles, sunlight *out,

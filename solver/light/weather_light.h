@@ -7,6 +7,7 @@
 #include "solver/daylight/year.h"
 #include "solver/light/emission.h"
 #include "solver/light/sun_way.h"
+#include "solver/shadow/sun_shares.h"
 
 /* The times of the rows of weather. */
 typedef struct weather_span {
@@ -28,8 +29,9 @@ typedef struct weather_skies {
 
 void weather_skies_free(weather_skies *w);
 
-/* Points of an element that are tested for the sun: of hours by themselves, and of figures of a year. */
-enum { SUN_POINTS = 16, SUN_POINTS_YEAR = 4 };
+/* Points of an element that are tested for the sun of figures of a year; SUN_POINTS: of hours by themselves.
+ */
+enum { SUN_POINTS_YEAR = 4 };
 
 /* The tiling of a store's sky, without what it holds. Freed by sky_tiling_free. Errors: those of the store,
  * LAM_ERR_FORMAT where the sky has other tiles. */
