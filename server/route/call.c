@@ -67,7 +67,8 @@ codec_scene call_codec_scene(const call *in) {
                          .max_bytes = SIZE_MAX, /* the memory of the request is the limit */
                          .take = request_memory_take_of,
                          .owner = in->memory,
-                         .max_rows = adjoint_rows_capacity(s)};
+                         .max_rows = adjoint_rows_capacity(s),
+                         .no_sun = scene_sun_why_not(s)};
 }
 
 size_t call_parse_bytes(const call *in) {

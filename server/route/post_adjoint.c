@@ -1,18 +1,21 @@
 /* POST /v1/scenes/NAME/adjoint: gradients of J = g . q by emission, reflectance, sky, emitters and groups.
  * gradient.h has the formulas. */
 #include "server/route/routes.h"
+#include "server/route/sun_answer.h"
 #include "server/scene/gradient.h"
 #include "solver/base/clock.h"
 #include "solver/codec/adjoint.h"
 #include "solver/codec/answer.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 /* Arrays [C][n], and the work area of the operator in the workspace of the thread. */
 typedef struct adjoint_memory {
     float *w, *H, *H0, *v; /* w begins what is freed */
-    float *narrow;         /* [C][m] of tiles, or [C][s] of emitters */
-    float *of_groups;      /* [C][g] */
+    sun_answer sun;
+    float *narrow;    /* [C][m] of tiles, or [C][s] of emitters */
+    float *of_groups; /* [C][g] */
     void *work;
     size_t work_bytes;
 } adjoint_memory;
@@ -68,15 +71,17 @@ static bool get_memory(call *in, const adjoint_request *request, adjoint_memory 
     return true;
 }
 
-/* Irradiance H of the emission and its sky; *H0 is that of the sky alone, NULL without one. */
+/* Irradiance H of the emission, its sky and its sun; *H0 is that of these two, NULL without them. */
 static bool solve_irradiance(const scene *s, const radiosity_request *light, adjoint_memory *memory,
                              const float **H0, problem *why) {
     lam_error error;
     *H0 = NULL;
-    if (light->sky.values != NULL) {
+    if (light->sky.values != NULL || light->n_suns > 0) *H0 = memory->H0;
+    if (light->sky.values != NULL)
         lam_sky_irradiance(s->sky, s->n_channels, light->sky.values, memory->H0);
-        *H0 = memory->H0;
-    }
+    else if (light->n_suns > 0)
+        memset(memory->H0, 0, s->n_channels * s->n * sizeof *memory->H0);
+    if (light->n_suns > 0) sun_answer_add(s, light, &memory->sun, 0, 1, memory->H0);
     return lam_operator_apply_lit(s->op, 1, LAM_IRRADIANCE, light->E, *H0, memory->H, memory->work,
                                   memory->work_bytes, &error) == LAM_OK ||
            problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
@@ -181,7 +186,10 @@ void post_adjoint(call *in, answer *out) {
     problem why = {0};
     buffer b = {0};
     const double start = clock_ms();
-    bool good = read_body(in, &request, &why) && get_memory(in, &request, &memory, &b, &why);
+    bool good = read_body(in, &request, &why) && get_memory(in, &request, &memory, &b, &why) &&
+                sun_answer_begin(in, &request.light, &memory.sun, &why) &&
+                (sun_answer_find(in, &request.light, 0, 1, &memory.sun) ||
+                 problem_set(&why, PROBLEM_UNAVAILABLE, "nobody waits for the answer any more"));
     const double parsed = clock_ms();
     notes.parse_ms = parsed - start;
     notes.quantity = request.quantity;
@@ -199,5 +207,6 @@ void post_adjoint(call *in, answer *out) {
     }
     buffer_free(&b);
     free(memory.w);
+    sun_answer_free(&memory.sun);
     adjoint_request_free(&request);
 }

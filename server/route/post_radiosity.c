@@ -6,12 +6,15 @@
 #include "server/route/radiosity_figures.h"
 #include "server/route/refined_answer.h"
 #include "server/route/routes.h"
+#include "server/route/sun_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
 #include "solver/operator/operator.h"
 
+#include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* The state of a solve from begin to end. */
 typedef struct radiosity_solve {
@@ -20,13 +23,14 @@ typedef struct radiosity_solve {
     answer_shape shape;
     size_t n_computed; /* elements that passes compute: all, those selected, or those of faces */
     buffer answer;
-    float *out;             /* [n_rhs][C][n_computed]: inside `answer` if its encoding allows, else own */
-    float *own;             /* or NULL */
-    float *means;           /* [n_rhs][C][n_values] of faces, a part of `answer` or allocated; else NULL */
-    bool means_placed;      /* they are inside `answer` */
-    answer_stream *stream;  /* of these, until the answer has it */
-    bool streams;           /* the values are encoded while the answer is sent */
-    float *H0;              /* [n_rhs][C][n], direct irradiance of the sky; NULL if no vector has a sky */
+    float *out;            /* [n_rhs][C][n_computed]: inside `answer` if its encoding allows, else own */
+    float *own;            /* or NULL */
+    float *means;          /* [n_rhs][C][n_values] of faces, a part of `answer` or allocated; else NULL */
+    bool means_placed;     /* they are inside `answer` */
+    answer_stream *stream; /* of these, until the answer has it */
+    bool streams;          /* the values are encoded while the answer is sent */
+    float *H0;             /* [n_rhs][C][n], direct irradiance of sky and sun; NULL if no vector has any */
+    sun_answer sun;
     double *figures;        /* of reduce, in place of values; else NULL */
     float *W;               /* [n_rhs][C][s], weights of a store of emitters; else NULL */
     refined_solve *refined; /* for a request with a tolerance; else NULL */
@@ -46,6 +50,7 @@ static void solve_free(radiosity_solve *s) {
     refined_free(s->refined, &s->notes);
     linear_figures_free(s->linear);
     limited_free(&s->limit);
+    sun_answer_free(&s->sun);
     free(s->own);
     if (!s->means_placed) free(s->means);
     free(s->figures);
@@ -63,18 +68,22 @@ static float *allocate_rows(const call *in, const radiosity_solve *s, size_t wid
         what, why);
 }
 
-/* Computes the direct irradiance of skies, or, for a store of emitters, the weights of these. */
+/* Computes the direct irradiance of skies, to which passes add that of suns, or, for a store of emitters, the
+ * weights of these. */
 static bool find_light(const call *in, radiosity_solve *solve, problem *why) {
     const scene *s = in->scene;
     const radiosity_request *request = &solve->request;
     const size_t C = s->n_channels, n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
     lam_error error;
     if (s->n_emitters == 0) {
-        if (request->sky.values == NULL) return true;
+        if (request->sky.values == NULL && request->n_suns == 0) return true;
         solve->H0 = allocate_rows(in, solve, s->n, "skies", why);
         if (solve->H0 == NULL) return false;
-        lam_sky_irradiance(s->sky, request->n_rhs * C, request->sky.values, solve->H0);
-        return true;
+        if (request->sky.values != NULL)
+            lam_sky_irradiance(s->sky, request->n_rhs * C, request->sky.values, solve->H0);
+        else
+            memset(solve->H0, 0, request->n_rhs * C * s->n * sizeof *solve->H0);
+        return sun_answer_begin(in, request, &solve->sun, why);
     }
     solve->W = allocate_rows(in, solve, s->n_emitters, "the weights of emitters", why);
     if (solve->W == NULL) return false;
@@ -201,6 +210,7 @@ static bool begin(call *in, answer *out) {
     in->state = s;
     in->n_written = request->reduce.on ? 0 : request->n_rhs * of->n_channels * s->shape.n_values;
     in->job.n_vectors = vectors_of(s) + request->reduce.on;
+    if (s->sun.shares != NULL) in->cost = fmin((double)request->n_rhs, BATCH_PASS) * sun_answer_cost(of);
     /* Answers for all elements share passes. Answers for selected elements, figures, and answers of emitters
      * have passes of their own. Refined answers take many times as long: one common key lets one such pass
      * run at a time, and leaves the other threads to other requests. */
@@ -243,7 +253,8 @@ static bool judge(const call *in, radiosity_solve *s) {
     s->judged = true;
     return (in->scene->errors.emitters.figures.s > 0
                 ? scene_note_emitters_error(in->scene, &s->request, s->W, s->out, &s->notes, &s->errors)
-                : scene_note_own_error(in->scene, &s->request, s->H0, s->W, s->out, &s->notes, &s->errors)) ||
+                : scene_note_own_error(in->scene, &s->request, s->H0, s->sun.shares, s->W, s->out, &s->notes,
+                                       &s->errors)) ||
            problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
 }
 
@@ -282,6 +293,16 @@ static void pass_refined(const batch_part *parts, size_t n_parts) {
     }
 }
 
+/* Adds the suns of a part to the direct light. */
+static void add_suns(call *in, radiosity_solve *solve, const batch_part *part) {
+    const scene *s = in->scene;
+    if (solve->sun.shares == NULL || solve->failed) return;
+    solve->failed = !sun_answer_find(in, &solve->request, part->first, part->count, &solve->sun);
+    if (!solve->failed)
+        sun_answer_add(s, &solve->request, &solve->sun, part->first, part->count,
+                       solve->H0 + part->first * s->n_channels * s->n);
+}
+
 /* Parts are of one scene, or all of them refined. There are several only for answers for all elements. */
 static void pass_vectors(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
     const call *first = call_of(parts[0].job);
@@ -297,8 +318,9 @@ static void pass_vectors(const batch_part *parts, size_t n_parts, batch_workspac
         return;
     }
     for (size_t p = 0; p < n_parts; p++) {
-        const radiosity_solve *solve = call_of(parts[p].job)->state;
+        radiosity_solve *solve = call_of(parts[p].job)->state;
         const size_t before = parts[p].first * s->n_channels * s->n;
+        add_suns(call_of(parts[p].job), solve, &parts[p]);
         shared[p] = (lam_part){.n_rhs = parts[p].count,
                                .quantity = solve->request.quantity,
                                .E = solve->request.E + before,

@@ -1,6 +1,7 @@
 #include "server/route/refined_answer.h"
 
 #include "server/route/radiosity_figures.h"
+#include "server/route/sun_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
 #include "solver/operator/emitters.h"
@@ -21,6 +22,7 @@
 typedef struct pass_memory {
     double *E, *H0, *out; /* [BATCH_PASS][C][n] */
     double *L;            /* [BATCH_PASS][C][m] */
+    sun_answer sun;       /* of all vectors */
     double *some;         /* [BATCH_PASS][C][selected] */
     double *means;        /* [C][n_values], of faces, of one vector */
     float *start; /* [BATCH_PASS][C][n], of a store of emitters: its own answer, the start of the iteration */
@@ -40,6 +42,7 @@ struct refined_solve {
 };
 
 static void pass_memory_free(pass_memory *p) {
+    sun_answer_free(&p->sun);
     free(p->E);
     free(p->H0);
     free(p->out);
@@ -57,8 +60,8 @@ static size_t vectors_of_pass(const radiosity_request *request) {
 
 /* Bytes of the arrays of a pass, and of those that refining takes beside them. */
 static size_t pass_memory_bytes(const scene *s, const radiosity_request *request, size_t rows) {
-    const bool few = s->n_emitters > 0, sky = request->sky.values != NULL;
-    const size_t doubles = (size_t)(REFINING_VECTORS + 2 + (few || sky)) * s->n +
+    const bool few = s->n_emitters > 0, sky = request->sky.values != NULL, sun = request->n_suns > 0;
+    const size_t doubles = (size_t)(REFINING_VECTORS + 2 + (few || sky || sun)) * s->n +
                            (sky ? lam_sky_tiles(s->sky) : 0) + (request->select ? request->n_selected : 0);
     const size_t means = request->at_faces ? radiosity_request_values(request, s->n, &s->faces) : 0;
     const size_t floats = few ? s->n + s->n_emitters : 0;
@@ -75,7 +78,7 @@ static bool pass_memory_allocate(const scene *s, const radiosity_request *reques
     p->E = memory_allocate(rows, row, "E", NULL);
     p->out = memory_allocate(rows, row, "B", NULL);
     bool good = p->E != NULL && p->out != NULL;
-    if (few || request->sky.values != NULL) {
+    if (few || request->sky.values != NULL || request->n_suns > 0) {
         p->H0 = memory_allocate(rows, row, "H0", NULL);
         good = good && p->H0 != NULL;
     }
@@ -130,14 +133,23 @@ done:
     return status == LAM_OK || refuse(s, status, &error, why);
 }
 
-static void light_any(const scene *s, const radiosity_request *request, size_t first, size_t count,
+/* False where the request is no longer wanted. */
+static bool light_any(call *in, const radiosity_request *request, size_t first, size_t count,
                       pass_memory *p) {
+    const scene *s = in->scene;
     const size_t C = s->n_channels, E_begin = first * C * s->n;
     for (size_t k = 0; k < count * C * s->n; k++) p->E[k] = (double)request->E[E_begin + k];
-    if (p->L == NULL) return;
-    const size_t n_tiles = lam_sky_tiles(s->sky), L_begin = first * C * n_tiles;
-    for (size_t k = 0; k < count * C * n_tiles; k++) p->L[k] = (double)request->sky.values[L_begin + k];
-    sky_irradiance_double(s->sky, count * C, p->L, p->H0);
+    if (p->H0 == NULL) return true;
+    memset(p->H0, 0, count * C * s->n * sizeof *p->H0);
+    if (p->L != NULL) {
+        const size_t n_tiles = lam_sky_tiles(s->sky), L_begin = first * C * n_tiles;
+        for (size_t k = 0; k < count * C * n_tiles; k++) p->L[k] = (double)request->sky.values[L_begin + k];
+        sky_irradiance_double(s->sky, count * C, p->L, p->H0);
+    }
+    if (p->sun.shares == NULL) return true;
+    if (!sun_answer_find(in, request, first, count, &p->sun)) return false;
+    sun_answer_add_double(s, request, &p->sun, first, count, p->H0);
+    return true;
 }
 
 static bool go_on(void *context) {
@@ -152,9 +164,8 @@ static const double *refine(call *in, const lam_refiner *refiner, const radiosit
     const scene *s = in->scene;
     const refine_watch watch = {go_on, in};
     lam_error error;
-    if (s->n_emitters == 0)
-        light_any(s, request, first, count, p);
-    else if (!light_emitters(s, request, first, count, p, why))
+    if (s->n_emitters == 0 ? !light_any(in, request, first, count, p)
+                           : !light_emitters(s, request, first, count, p, why))
         return NULL;
     const lam_status status =
         refine_watched(refiner, count, request->quantity, p->E, p->H0, p->start, request->tolerance, p->out,
@@ -198,7 +209,8 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
     /* The memory of the pass is included, as what waits for memory must not have begun. */
     const size_t of_pass = pass_memory_bytes(s, request, vectors_of_pass(request) * s->n_channels);
     if (!request_memory_take(in->memory, bytes_plus(of_pass, bytes_needed(in, request, &r->shape, &r->as)),
-                             why))
+                             why) ||
+        !sun_answer_begin(in, request, &r->p.sun, why))
         return false;
     r->certificates = memory_allocate(request->n_rhs, sizeof *r->certificates, "certificates", NULL);
     r->iterations = memory_allocate(request->n_rhs, sizeof *r->iterations, "certificates", NULL);

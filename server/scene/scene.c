@@ -336,6 +336,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(keep_texts(s, made, error));
     made->memory += strlen(made->description);
     TRY(scene_mesh_create(s, made, &made->mesh, error));
+    if (made->sky_tiling[0] != '\0' && store_has_attribute(s, STORE_SKY, "ground_albedo"))
+        TRY(scene_sun_create(s, made, &made->sun, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
     const bool first = options->verify || store_map_bytes(store_map_of(s)) < options->verify_below;
     TRY(scene_health_create(made->path, made->map, first, &made->health, error));
@@ -402,6 +404,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->area = base->area;
     made->limiter = base->limiter;
     made->sky = base->sky;
+    made->sun = base->sun;
     made->map = base->map;
     made->health = base->health;
     made->work_bytes = base->work_bytes;
@@ -424,7 +427,8 @@ done:
 
 uint64_t scene_grown(const scene *s) {
     return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) +
-           kept_forms_held(scene_mesh_forms(s->mesh)) + scene_texts_held(&s->texts);
+           kept_forms_held(scene_mesh_forms(s->mesh)) + scene_texts_held(&s->texts) +
+           (s->base == NULL ? scene_sun_held(s->sun) : 0);
 }
 
 void scene_drop_computed(const scene *s) {
@@ -446,6 +450,7 @@ void scene_release(scene *s) {
     scene_mesh_destroy(s->mesh);
     scene_texts_free(&s->texts);
     if (s->base == NULL) {
+        scene_sun_destroy(s->sun);
         lam_sky_close(s->sky);
         weather_file_free(&s->weather);
         group_index_free(&s->groups);

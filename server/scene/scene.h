@@ -7,6 +7,7 @@
 #include "server/scene/refined.h"
 #include "server/scene/row_cache.h"
 #include "server/scene/scene_mesh.h"
+#include "server/scene/scene_sun.h"
 #include "server/scene/scene_texts.h"
 #include "solver/codec/groups.h"
 #include "solver/codec/request.h"
@@ -43,6 +44,7 @@ struct scene {
     char sky_tiling[32];   /* the name of its tiles; "": not known. A variant has none of its own */
     char sky_up;           /* 'x', 'y' or 'z' */
     double sky_north;      /* degrees of its model; 0 where it states none */
+    scene_sun *sun;        /* over it; NULL: its tiles are not known. Of a variant that of its store */
     weather_file weather;  /* beside the file; its text is in texts. A variant has none of its own */
     size_t n_emitters;     /* 0: the store answers any emission */
     uint64_t bytes;        /* of /operator as stored; of a variant, of the cores alone */
@@ -106,12 +108,13 @@ error_scene scene_for_errors(const scene *s);
 
 /* Replaces that error by the one of the answer's own emission and sky, where the store states errors by
  * group: of a batch the largest over its vectors. E of the request holds every vector; values are
- * [n_rhs][C][count] of all elements or of those selected, H0 the direct light of the sky or NULL, W
+ * [n_rhs][C][count] of all elements or of those selected, H0 the direct light of sky and sun or NULL, sun
+ * [n_suns][n] the part of a sun in it, of its direct light, W
  * [n_rhs][C][s] the weights of all that shines in a store of emitters, else NULL. *names
  * (freed with free() after the answer is written) belongs to the notes. O(n_rhs C n). False when memory is
  * short. */
-bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0, const float *W,
-                          const float *values, answer_notes *notes, name_error **names);
+bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0, const float *sun,
+                          const float *W, const float *values, answer_notes *notes, name_error **names);
 
 /* The same of a store of emitters that states their covariance, for weights W [n_rhs][C][s]. O(n_rhs (C n s +
  * g s^2)). False when memory is short. */

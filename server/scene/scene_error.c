@@ -35,6 +35,8 @@ static bool has_strange_light(const scene *s, const radiosity_request *request) 
     }
     for (size_t k = 0; sky->values != NULL && k < sky->n * C * lam_sky_tiles(s->sky); k++)
         if (sky->values[k] > 0) return true;
+    for (size_t k = 0; k < request->n_suns * C; k++)
+        if (request->sunlight[k] > 0) return true;
     return stated_errors_is_strange(&s->errors, rows, request->E);
 }
 
@@ -146,8 +148,22 @@ static bool light_of_weights(const scene *s, const float *weights, float *own, v
     return true;
 }
 
-bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0, const float *W,
-                          const float *values, answer_notes *notes, name_error **names) {
+/* The light that vector v sends on in channel c: its emission E [C][n], and the reflected part of the sun.
+ * sent is [n]. */
+static const float *sent_of(const scene *s, const radiosity_request *request, size_t v, size_t c,
+                            const float *E, const float *sun, float *sent) {
+    const size_t n = s->n, C = s->n_channels;
+    memcpy(sent, E + c * n, n * sizeof *sent);
+    for (size_t k = 0; k < request->n_suns; k++) {
+        const float direct = request->sunlight[k * C + c], *share = sun + k * n;
+        if (request->suns[k].vector != v) continue;
+        for (size_t i = 0; i < n; i++) sent[i] += s->reflectance[c * n + i] * direct * share[i];
+    }
+    return sent;
+}
+
+bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0, const float *sun,
+                          const float *W, const float *values, answer_notes *notes, name_error **names) {
     const error_scene about = scene_for_errors(s);
     const reduce_request *reduce = &request->reduce;
     const size_t C = s->n_channels, vector = C * s->n;
@@ -158,7 +174,8 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     name_error *const kept = memory_allocate(reduce->n_names, 2 * sizeof *kept, "errors", NULL);
     const size_t n_own = W != NULL ? 2 * vector + C * s->errors.by_group.figures.n_tiles : 0;
     float *const own = memory_allocate(n_own, sizeof *own, "errors", NULL);
-    bool good = kept != NULL && own != NULL;
+    float *const sent = sun != NULL ? memory_allocate(s->n, sizeof *sent, "errors", NULL) : NULL;
+    bool good = kept != NULL && own != NULL && (sun == NULL || sent != NULL);
     if (good) begin_own(reduce, kept, &made);
     for (size_t v = 0; good && v < request->n_rhs; v++) {
         vector_light light = {request->E + v * vector, H0 != NULL ? H0 + v * vector : NULL,
@@ -173,7 +190,9 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
                            .selected = request->select ? request->selected : NULL,
                            .values = values + v * C * count,
                            .L = light.L};
-        for (size_t c = 0; c < C; c++) emission_size_add(&of.size, s->n, s->area, of.E + c * s->n);
+        for (size_t c = 0; c < C; c++)
+            emission_size_add(&of.size, s->n, s->area,
+                              sent == NULL ? of.E + c * s->n : sent_of(s, request, v, c, of.E, sun, sent));
         of.sky = size_of_sky(s, light.L);
         if (reduce->on) {
             good = name_errors_of(&s->errors.by_group, &about, &of, reduce, kept + reduce->n_names);
@@ -189,6 +208,7 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     if (good) *names = kept;
     if (!good) free(kept);
     free(own);
+    free(sent);
     return good;
 }
 

@@ -312,7 +312,8 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
     bool good = parser_begin(&p, scene, text, length, request, why) && read_body(&p) && settle_faces(&p) &&
                 parser_fill_sides(&p);
     if (!parser_end(&p, good)) return false;
-    if (request->tolerance > 0 || reduce->n_names > scene->max_rows) reduce->linear = false;
+    if (request->tolerance > 0 || request->n_suns > 0 || reduce->n_names > scene->max_rows)
+        reduce->linear = false;
     if (scene->only_linear && !reduce->linear) return parser_not_linear(&p);
     if (reduce->on && !reduce->linear && !select_reduced(scene, request, why)) return false;
     return (reduce->linear && request->n_dense == 0) || radiosity_request_expand(request, scene, why);

@@ -200,9 +200,7 @@ static bool read_groups(parser *p) {
     return p->why->status == 0;
 }
 
-/* The radiance of a tile: as a colour is read; of a store of one channel also red, green and blue, which
- * count by their luminance. */
-static bool read_radiance(parser *p, float *colour) {
+bool parser_read_radiance(parser *p, float *colour) {
     const size_t mark = p->pointer_length;
     float rgb[3] = {0};
     size_t k = 0;
@@ -256,7 +254,7 @@ static bool read_sky(parser *p) {
                              parser_here(p));
     if (!parser_expect(p, JSON_ARRAY, "an array of radiances")) return false;
     if (!radiosity_request_sky(p->request, p->scene, &L, p->why)) return refused_here(p);
-    return read_side(p, p->scene->n_tiles, "tile", read_radiance, L);
+    return read_side(p, p->scene->n_tiles, "tile", parser_read_radiance, L);
 }
 
 /* {"pose-1": w, ...} into row [C][s]: the others are 0. */
@@ -301,8 +299,8 @@ static bool read_emitters(parser *p) {
 }
 
 static bool read_emission_object(parser *p) {
-    static const char *const names[] = {"elements", "values", "groups", "sky", "emitters"};
-    enum { ELEMENTS, VALUES, GROUPS, SKY, EMITTERS, N_NAMES };
+    static const char *const names[] = {"elements", "values", "groups", "sky", "sun", "emitters"};
+    enum { ELEMENTS, VALUES, GROUPS, SKY, SUN, EMITTERS, N_NAMES };
     const size_t C = p->scene->n_channels, mark = p->pointer_length;
     size_t n_values = 0, which;
     unsigned seen = 0;
@@ -311,7 +309,7 @@ static bool read_emission_object(parser *p) {
     while (parser_next_member(p, &key)) {
         bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
         if (!good) return false;
-        if (p->request->any_sign && (which == SKY || which == EMITTERS))
+        if (p->request->any_sign && which >= SKY)
             return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s: a cotangent is of elements or groups",
                                  parser_here(p));
         switch (which) {
@@ -326,7 +324,7 @@ static bool read_emission_object(parser *p) {
             break;
         default:
             p->in_side = true;
-            good = which == SKY ? read_sky(p) : read_emitters(p);
+            good = which == SKY ? read_sky(p) : which == SUN ? parser_read_sun(p) : read_emitters(p);
             p->in_side = false;
         }
         if (!good) return false;
@@ -334,12 +332,13 @@ static bool read_emission_object(parser *p) {
     }
     if (p->why->status != 0) return false;
     const bool sparse = (seen & (1u << ELEMENTS | 1u << VALUES)) != 0;
-    const bool groups = (seen & 1u << GROUPS) != 0, sky = (seen & 1u << SKY) != 0;
+    const bool groups = (seen & 1u << GROUPS) != 0, sky = (seen & (1u << SKY | 1u << SUN)) != 0;
     const bool emitters = (seen & 1u << EMITTERS) != 0;
     const int ways = sparse + groups + emitters;
     if (ways > 1 || (ways == 0 && !sky))
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
-                             "%s must hold either elements and values or groups or emitters, or a sky",
+                             "%s must hold either elements and values or groups or emitters, or a sky or "
+                             "a sun",
                              parser_here(p));
     if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold both elements and values",

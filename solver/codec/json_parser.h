@@ -108,7 +108,15 @@ bool parser_read_indices(parser *p, index_kind kind, bool once, index_list *indi
 /* The value of `quantity`. */
 bool parser_read_quantity(parser *p, lam_quantity *quantity);
 
-/* The value of `emission`, and of `emissions`; of `cotangent`, which has neither sky nor emitters. */
+/* A number for all channels or one each, of which none is below 0; of one channel also red, green and blue,
+ * which count by their luminance. colour is [C]. */
+bool parser_read_radiance(parser *p, float *colour);
+
+/* The value of `sun` in an emission, of its vector. */
+bool parser_read_sun(parser *p);
+
+/* The value of `emission`, and of `emissions`; of `cotangent`, which has neither sky nor sun nor
+ * emitters. */
 bool parser_read_emission(parser *p);
 bool parser_read_emissions(parser *p);
 

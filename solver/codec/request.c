@@ -15,6 +15,8 @@ void radiosity_request_free(radiosity_request *request) {
     free(request->colours);
     free(request->sky.values);
     free(request->emitters.values);
+    free(request->suns);
+    free(request->sunlight);
     free(request->selected);
     free(request->faces);
     reduce_request_free(&request->reduce);
@@ -182,6 +184,24 @@ bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene,
 bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
                                 problem *why) {
     return add_side(request, scene, &request->emitters, scene->n_emitters, "emitters", row, why);
+}
+
+bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene, const request_sun *sun,
+                           const float *direct, problem *why) {
+    const size_t C = scene->n_channels, each = sizeof *request->suns + C * sizeof *request->sunlight;
+    if (request->n_suns == request->suns_capacity) {
+        const size_t more = array_capacity(request->suns_capacity, request->n_suns + 1);
+        if (!take_memory(scene, (more - request->suns_capacity) * each, why)) return false;
+        if (array_resize(&request->suns, more, sizeof *request->suns, "suns", NULL) != LAM_OK ||
+            array_resize(&request->sunlight, more, C * sizeof *direct, "suns", NULL) != LAM_OK)
+            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for suns");
+        request->suns_capacity = more;
+    }
+    request->suns[request->n_suns] = *sun;
+    request->suns[request->n_suns].vector = (uint32_t)(request->n_rhs - 1);
+    memcpy(request->sunlight + request->n_suns * C, direct, C * sizeof *direct);
+    request->n_suns++;
+    return true;
 }
 
 static const char *const quantities[] = {

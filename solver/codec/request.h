@@ -30,6 +30,7 @@ typedef struct codec_scene {
     bool signs;       /* emissions may be negative: radiosity is linear in them. Skies and weights may not */
     const char *source; /* the word for the bytes in messages; NULL: "the body" */
     const char *item;   /* the word for one of the n values of an NPY row; NULL: "element" */
+    const char *no_sun; /* why a sun is not answered; NULL: it is */
     bool frames;        /* an array of two axes is always a batch, of vectors that all channels share */
 } codec_scene;
 
@@ -50,6 +51,13 @@ typedef struct side_rows {
     float *values; /* NULL: no vector has any */
     size_t n, capacity;
 } side_rows;
+
+/* The sun over a vector, which has one at most. */
+typedef struct request_sun {
+    uint32_t vector;
+    double azimuth, altitude; /* degrees */
+    double north;             /* of the model, degrees; NAN: the store's own */
+} request_sun;
 
 /* Starts zeroed. */
 typedef struct radiosity_request {
@@ -74,6 +82,9 @@ typedef struct radiosity_request {
     side_rows sky;         /* radiances of its tiles */
     bool by_luminance;     /* some are the luminance of a colour, for a store of one channel */
     side_rows emitters;    /* their weights */
+    request_sun *suns;     /* [n_suns], by growing vector */
+    float *sunlight;       /* [n_suns][C], irradiance of a plane normal to them */
+    size_t n_suns, suns_capacity;
 
     size_t n_dense, dense_capacity; /* vectors that E holds, and has room for */
     size_t spots_capacity;
@@ -122,6 +133,10 @@ bool radiosity_request_expand(radiosity_request *request, const codec_scene *sce
 bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene, float **row, problem *why);
 bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
                                 problem *why);
+
+/* A sun over the last vector, which is set here; direct is [C]. */
+bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene, const request_sun *sun,
+                           const float *direct, problem *why);
 
 /* The luminance of a colour by which a store of one channel takes coloured skies, Radiance's: .265 R + .670 G
  * + .065 B. */

@@ -62,7 +62,9 @@ lam_status emission_read(const char *path, const emission_scene *scene, bool sig
                                .n_tiles = scene->n_tiles,
                                .n_emitters = scene->n_emitters,
                                .emitters = &scene->emitters,
-                               .signs = signs && scene->n_emitters == 0};
+                               .signs = signs && scene->n_emitters == 0,
+                               .no_sun = "a file of emissions has no sun here: lambertd answers one, and "
+                                         "--weather or --sky clear has its own"};
     atomic_file_extension(path, extension);
     const bool npy = strcmp(extension, "npy") == 0;
     if (!npy && strcmp(extension, "json") != 0)

@@ -91,6 +91,10 @@ size_t lam_sky_elements(const lam_sky *sky) {
     return sky->n;
 }
 
+const float *sky_first_bounce(const lam_sky *sky) {
+    return sky->first_bounce;
+}
+
 void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float *H0) {
     enum { BLOCK = 512 }; /* elements whose rows of first_bounce stay in the cache from one row to the next */
     const size_t m = sky->n_tiles, n = sky->n;
