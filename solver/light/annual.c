@@ -1,6 +1,7 @@
 /* A sum over the year is n hours / 1000 times the answer to the mean vector, as answers are linear. A share
  * is (hours with low <= x <= high) / (hours that count), the daylight autonomy or useful daylight of
- * annual.h; with fewer tiles than hours, x_h = x_E + sum_t L_ht x_t from one answer x_t for each tile. */
+ * annual.h; with fewer tiles than hours, x_h = x_E + sum_t L_ht x_t + x_h,sun from one answer x_t for each
+ * tile, and one x_h,sun for each hour with an exact sun. */
 #include "solver/light/annual.h"
 
 #include "solver/light/sunlight.h"
@@ -210,18 +211,25 @@ done:
 }
 
 /* The answers to all tiles of a sky and to a steady emission beside it, of which the answer to any hour is a
- * sum: x_h = x_E + sum_t L_ht x_t. */
+ * sum: x_h = x_E + sum_t L_ht x_t, and the answer to its sun. */
 typedef struct tile_answers {
     size_t terms; /* tiles + 1; 0: hours are answered one by one */
     float *x;     /* [C][terms][width], the emission last */
     float *share; /* [AT_ONCE][terms], of one channel */
     float *mixed; /* [AT_ONCE][width] */
+    float *dark;  /* [C][n], the emission of suns */
+    emission suns;
+    emission_pass by_suns; /* of suns alone */
+    float *sunny;          /* [AT_ONCE][row], answers to suns; NULL: there are none */
 } tile_answers;
 
 static void tile_answers_free(tile_answers *a) {
     free(a->x);
     free(a->share);
     free(a->mixed);
+    emission_pass_free(&a->by_suns);
+    free(a->dark);
+    free(a->sunny);
     *a = (tile_answers){.terms = 0};
 }
 
@@ -231,8 +239,7 @@ static void tile_answers_free(tile_answers *a) {
 static const double mixed_bytes = 0x1p30;
 
 static bool worth_mixing(const work *w, const emission *light, size_t n_vectors) {
-    if (light->L == NULL || !light->steady || light->sun != NULL || lam_operator_emitters(w->op) > 0)
-        return false;
+    if (light->L == NULL || !light->steady || lam_operator_emitters(w->op) > 0) return false;
     const double terms = (double)lam_sky_tiles(w->sky) + 1;
     return terms < (double)n_vectors && terms * (double)w->row * sizeof(float) <= mixed_bytes;
 }
@@ -262,6 +269,25 @@ static lam_status add_answers(const work *w, const emission *light, size_t n, ti
 done:
     emission_pass_free(&p);
     free(x);
+    return status;
+}
+
+/* Readies *a, which stays where it is, for the suns of light. */
+static lam_status add_suns(const work *w, const emission *light, tile_answers *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = lam_operator_channels(w->op), n = lam_operator_elements(w->op);
+    if (light->sun == NULL) return LAM_OK;
+    a->dark = memory_allocate(C * n, sizeof *a->dark, "answers to suns", error);
+    a->sunny = memory_allocate(AT_ONCE, w->row * sizeof *a->sunny, "answers to suns", error);
+    if (a->dark == NULL || a->sunny == NULL) TRY(LAM_ERR_MEMORY);
+    a->suns = (emission){.n_vectors = light->n_vectors,
+                         .steady = true,
+                         .E = a->dark,
+                         .sun = light->sun,
+                         .limiter = light->limiter};
+    TRY(emission_pass_create(&a->suns, w->op, w->sky, w->quantity, w->n_selected, w->selected, AT_ONCE,
+                             &a->by_suns, error));
+done:
     return status;
 }
 
@@ -313,18 +339,41 @@ static void count_all(const work *w, size_t n, size_t width, const float *x, uin
             count_hours(&w->options->figures[k], n, width, x, count + k * w->row);
 }
 
-/* Counts n hours that are sums of the answers to tiles. */
-static void count_mixed(const work *w, const emission *light, const tile_answers *a, size_t n,
-                        const size_t *vectors, uint32_t *count) {
+/* Answers the suns of those of n hours in which one shines. sunny [n]: its place among these answers, or n.
+ */
+static lam_status answer_suns(tile_answers *a, size_t n, const size_t *vectors, size_t *sunny,
+                              lam_error *error) {
+    size_t shining[AT_ONCE], n_shining = 0;
+    for (size_t k = 0; k < n; k++) {
+        const bool shines = a->sunny != NULL && sunlight_shines(a->suns.sun, vectors[k]);
+        sunny[k] = shines ? n_shining : n;
+        if (shines) shining[n_shining++] = vectors[k];
+    }
+    return n_shining > 0 ? emission_pass_solve(&a->by_suns, n_shining, shining, a->sunny, error) : LAM_OK;
+}
+
+/* Counts n hours that are sums of the answers to tiles and to their suns. */
+static lam_status count_mixed(const work *w, const emission *light, tile_answers *a, size_t n,
+                              const size_t *vectors, uint32_t *count, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t sunny[AT_ONCE];
     const size_t C = lam_operator_channels(w->op), m = a->terms - 1, width = w->row / C;
+    TRY(answer_suns(a, n, vectors, sunny, error));
     for (size_t c = 0; c < C; c++) {
         for (size_t k = 0; k < n; k++) {
             memcpy(a->share + k * a->terms, light->L + (vectors[k] * C + c) * m, m * sizeof *a->share);
             a->share[k * a->terms + m] = 1;
         }
         dense_multiply(n, a->terms, width, a->share, a->x + c * a->terms * width, false, a->mixed);
+        for (size_t k = 0; k < n; k++) {
+            if (sunny[k] == n) continue;
+            const float *by_sun = a->sunny + (sunny[k] * C + c) * width;
+            for (size_t i = 0; i < width; i++) a->mixed[k * width + i] += by_sun[i];
+        }
         count_all(w, n, width, a->mixed, count + c * width);
     }
+done:
+    return status;
 }
 
 static lam_status make_shares(const work *w, const emission *light, const size_t *vectors, size_t n_vectors,
@@ -338,9 +387,10 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
     uint32_t *count = memory_allocate(n_figures, w->row * sizeof *count, "hours", error);
     float *x = memory_allocate(most + 1, w->row * sizeof *x, "hours", error);
     if (count == NULL || x == NULL) TRY(LAM_ERR_MEMORY);
-    if (mixed)
+    if (mixed) {
         TRY(tile_answers_make(w, light, &tiles, error));
-    else if (n_vectors > 0)
+        TRY(add_suns(w, light, &tiles, error));
+    } else if (n_vectors > 0)
         TRY(emission_pass_create(light, w->op, w->sky, w->quantity, w->n_selected, w->selected, most, &p,
                                  error));
     for (size_t first = 0; first < n_vectors; first += most) {
@@ -348,7 +398,7 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
         if (progress_cancelled(w->steps)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         progress_report(w->steps, "hours", (double)first / (double)n_vectors);
         if (mixed) {
-            count_mixed(w, light, &tiles, now, vectors + first, count);
+            TRY(count_mixed(w, light, &tiles, now, vectors + first, count, error));
             continue;
         }
         TRY(emission_pass_solve(&p, now, vectors + first, x, error));

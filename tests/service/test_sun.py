@@ -190,7 +190,10 @@ class Sun(unittest.TestCase):
         np.testing.assert_allclose(lamp, np.broadcast_to(np.load(out), lamp.shape), atol=1e-3)
 
     def test_annual(self):
-        for store in self.grey, self.few:
+        # Of fewer tiles than hours each tile is solved once, and each hour's sun beside them.
+        tiled = self.folder / "tiled.h5"
+        must("precompute", self.folder / "zup.obj", "-o", tiled, "--sky", "grid:2x2", "--rays", 1024, "--probes", 0, "--reflectance", .5)
+        for store in self.grey, self.few, tiled:
             for mode in ["tiles"], ["exact", "--sun-points", 4]:
                 hourly = self.solve(store, "--sun", *mode).astype(float)
                 year = self.solve(store, "--sun", *mode, "--annual", "sum", "--annual", "autonomy=150")
