@@ -119,6 +119,37 @@ test("a link restores a sky", async () => {
     }
 });
 
+test("the sun itself is the daemon's, by rays", async () => {
+    const page = await openScene("yard");
+    await skyTo(page, { model: "given", direct: 700, diffuse: 100, factor: 1, latitude: 40, longitude: 0, zone: 0, day: 80, hour: 10, sun: "exact" });
+    await settled(page);
+    const { emission: { sun, groups }, scale } = await page.evaluate(() => window.lambert.ask.wanted());
+    // The daemon's own sky of this light, and its sun.
+    const place = { latitude: 40, longitude: 0, zone: 0 };
+    const { skies: [own] } = await daemon.json("/v1/scenes/yard/skies", { sky: { diffuse: 100, direct: 700, place, date: "21 Mar 10:00", north: 0, sun_in_tiles: false } });
+    assert.ok(Math.abs(sun.azimuth - own.sun.azimuth) < 1e-3 && Math.abs(sun.altitude - own.sun.altitude) < 1e-3, JSON.stringify([sun, own.sun]));
+    const channels = await page.evaluate(() => window.lambert.scene.now.description.channels);
+    assert.ok([sun.direct].flat().every((v) => Math.abs(v * scale - 700) < 1e-6 * 700));
+    const emission = { sky: own.sky, sun: { azimuth: own.sun.azimuth, altitude: own.sun.altitude, north: 0, direct: own.sun.normal } };
+    if (groups !== undefined) emission.groups = Object.fromEntries(Object.entries(groups).map(([name, v]) => [name, Array.isArray(v) ? v.map((x) => x * scale) : v * scale]));
+    const { radiosity } = await daemon.json("/v1/scenes/yard/radiosity", { emission });
+    const wanted = channels === 1 ? [radiosity] : radiosity;
+    const shown = await page.evaluate(() => {
+        const [field] = window.lambert.scene.fields;
+        return Array.from({ length: field.elements }, (_, i) => field.at(i)[0]);
+    });
+    const most = Math.max(...wanted[0]);
+    assert.ok(most > 100 && shown.every((v, i) => Math.abs(v - wanted[0][i]) <= 2e-3 * most), JSON.stringify([most, shown.slice(0, 5), wanted[0].slice(0, 5)]));
+    // A store of few emitters has it in its tile.
+    await page.evaluate(() => window.lambert.ask.open("dome", null));
+    await settled(page);
+    await skyTo(page, { model: "clear", hour: 10, sun: "exact" });
+    await settled(page);
+    assert.deepEqual(Object.keys((await page.evaluate(() => window.lambert.ask.wanted())).emission), ["sky"]);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
 test("a store of the tiles of a sky takes a sky, or their weights", async () => {
     const page = await openScene("dome");
     await page.getByRole("tab", { name: "Sky" }).click();

@@ -45,10 +45,12 @@ export class Asking {
         const other = side === 1 ? now.compare?.scene ?? null : null,
             of = other === null ? scene.description : this.comparable.get(other);
         if (of === undefined) return null;
+        const sun = sky.exactSun(lighting, of);
         return wantedFor(of.name, quantity, lighting, {
             ...abilitiesOf(of),
             emitters: of.emitters?.length ?? 0,
-            sky: sky.radiances(lighting, of),
+            sky: sun === null ? sky.radiances(lighting, of) : sun.sky,
+            sun: sun === null ? null : sun.sun,
         });
     }
 

@@ -78,10 +78,11 @@ export class SharpSun {
         const { description } = scene,
             parts = (description.emitters?.length ?? 0) > 0 ? null : sky.parts(lighting, description);
         if (parts === null) return null;
-        const can = { ...abilitiesOf(description), emitters: 0 };
+        const can = { ...abilitiesOf(description), emitters: 0 }, exact = sky.exactSun(lighting, description);
         return {
             rest: wantedFor(description.name, "radiosity", lighting, { ...can, sky: parts.sky }),
-            further: wantedFor(description.name, "indirect", { ...lighting, groups: {} }, { ...can, sky: parts.sun }),
+            further: wantedFor(description.name, "indirect", { ...lighting, groups: {} }, { ...can,
+                ...(exact === null ? { sky: parts.sun } : { sky: null, sun: exact.sun }) }),
             parts,
         };
     }

@@ -1,6 +1,7 @@
 // The sky of the scene that is open, from the tiles of its store and the weather beside it, and those of scenes that
 // it is compared with.
 import type { Api, Description } from "../daemon/api.ts";
+import type { ExactSun } from "../state/request.ts";
 import type { Lighting, SkyLight } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
 import { SkySource, type SunParts } from "./source.ts";
@@ -24,6 +25,23 @@ export class SceneSky {
         const { source } = this, isOpen = of === this.open;
         if (of.sky === null || lighting.solo !== null || !(isOpen || source.knows(of.name))) return null;
         return source.radiances(lighting.sky, this.isPhotometric, of.channels, isOpen ? null : of.name);
+    }
+
+    /** The sky without its sun, and the sun itself, where the lighting wants that of the daemon and a scene has it: a
+     * store of few emitters answers the sun by its tile alone. Else null. */
+    exactSun(lighting: Lighting, of: Description): { sky: SunParts["sky"]; sun: ExactSun } | null {
+        const { source } = this, isOpen = of === this.open;
+        if (lighting.sky.sun !== "exact" || of.sky === null || lighting.solo !== null || (of.emitters?.length ?? 0) > 0)
+            return null;
+        if (!(isOpen || source.knows(of.name))) return null;
+        const parts = source.parts(lighting.sky, this.isPhotometric, of.channels, isOpen ? null : of.name);
+        if (parts === null) return null;
+        const [east, north, up] = parts.direction, degrees = 180 / Math.PI;
+        return { sky: parts.sky, sun: {
+            azimuth: Math.atan2(east, north) * degrees,
+            altitude: Math.atan2(up, Math.hypot(east, north)) * degrees,
+            direct: of.channels === 3 ? parts.light : parts.light[0],
+        } };
     }
 
     /** The sky and its sun apart, of the scene that is open. Null: no sun shines. */

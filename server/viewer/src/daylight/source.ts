@@ -102,9 +102,9 @@ export class SkySource {
         return this.find(light, photometric, channels, other).values;
     }
 
-    /** The same of the open scene, with the sun apart; null without a sun. */
-    parts(light: SkyLight, photometric: boolean, channels: number): SunParts | null {
-        const { sky } = this.find(light, photometric, channels, null);
+    /** The same of the open scene or another one, with the sun apart; null without a sun. */
+    parts(light: SkyLight, photometric: boolean, channels: number, scene: string | null = null): SunParts | null {
+        const { sky } = this.find(light, photometric, channels, scene);
         if (sky === null || !(sky.directHorizontal > 0)) return null;
         const isColoured = light.tinted && channels === 3, normal = sky.directHorizontal / sky.sun.direction[2];
         const [one, other] = isColoured ? colouredParts(sky) : [Array.from(sky.diffuse), Array.from(sky.direct)];

@@ -133,8 +133,8 @@ function makeControls(page: Page, change: Change): Controls {
     const { store, scene } = page;
     const first = skyOff;
     const model = choice("Sky", MODELS, first.model, (to) => changeModel(page, to));
-    const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["off", "Left out"]],
-        first.sun, (to) => change({ sun: to }));
+    const sun = choice("Sun", [["spread", "Spread over tiles near it"], ["tile", "In one tile"], ["exact",
+        "Itself, with its shadows"], ["off", "Left out"]], first.sun, (to) => change({ sun: to }));
     const sharp = tick("Sharp sun (drawn)", store.now.view.sharpSun, (on) => {
         const { now } = store;
         store.change({ ...now, view: { ...now.view, sharpSun: on } });
@@ -142,7 +142,9 @@ function makeControls(page: Page, change: Change): Controls {
     const drawn = make("p", { class: "hint" });
     const tellDrawn = (): void => {
         drawn.textContent = scene.isSunSharp
-            ? "The picture has the sun in its true place, with the half-shadows of its disc once the view rests; all numbers have it in tiles of the sky."
+            ? `The picture has the sun in its true place, with the half-shadows of its disc once the view rests; all numbers have it ${
+                store.now.lighting.sky.sun === "exact" ? "as a mean over each element" : "in tiles of the sky"
+            }.`
             : "Not now: no sun shines, or the picture shows numbers (false colour, a threshold, a comparison).";
     };
     store.listen(tellDrawn);

@@ -68,7 +68,7 @@ function restoreSky(given: unknown): SkyLight {
         turbidity: held(out.turbidity, skyOff.turbidity, 1, 20),
         direct: held(out.direct, skyOff.direct, 0, 3000),
         diffuse: held(out.diffuse, skyOff.diffuse, 0, 3000),
-        sun: oneOf(["spread", "tile", "off"], out.sun, "spread"),
+        sun: oneOf(["spread", "tile", "exact", "off"], out.sun, "spread"),
         tinted: out.tinted,
         latitude: held(out.latitude, skyOff.latitude, -90, 90),
         longitude: held(out.longitude, skyOff.longitude, -180, 180),

@@ -18,6 +18,15 @@ export interface Abilities {
     emitters: number;
     /** One radiance per tile of the sky in the store's unit; null: no sky, or dark. */
     sky: readonly (number | number[])[] | null;
+    /** The sun itself beside that, which is then without it. */
+    sun?: ExactSun | null;
+}
+
+/** Degrees from north by east and above the horizon; irradiance of a plane that faces the sun. */
+export interface ExactSun {
+    azimuth: number;
+    altitude: number;
+    direct: number | number[];
 }
 
 export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting, can: Abilities): Wanted {
@@ -35,7 +44,8 @@ export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting,
         return most;
     };
     const most = Math.max(largest(groups.flatMap(([, v]) => [v].flat())),
-        largest((sky ?? []).flatMap((v) => [v].flat())), lighting.dim * largest(weights.map(([, weight]) => weight)));
+        largest((sky ?? []).flatMap((v) => [v].flat())), largest([can.sun?.direct ?? 0].flat()),
+        lighting.dim * largest(weights.map(([, weight]) => weight)));
     if (most <= 0 || !Number.isFinite(most)) return { scene, quantity, emission: null, scale: 1 };
     const scaled = <T extends number | number[]>(value: T): T =>
         (typeof value === "number" ? value / most : value.map((v) => v / most)) as T;
@@ -49,5 +59,8 @@ export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting,
         emission.groups = Object.fromEntries(groups.map(([name, value]) => [name, scaled(value)]));
     }
     if (sky !== null) emission.sky = sky.map(scaled);
+    // Tiles of the page are not turned by the north of the store, and neither is its sun.
+    if (can.sun !== undefined && can.sun !== null)
+        emission.sun = { ...can.sun, north: 0, direct: scaled(can.sun.direct) };
     return { scene, quantity, emission, scale: most };
 }

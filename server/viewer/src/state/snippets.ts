@@ -17,7 +17,15 @@ export function plainRequest(wanted: Wanted, tolerance: number | null): PlainReq
         // Twelve digits undo the rounding of dividing and multiplying.
         if (typeof value === "number") return Number((value * wanted.scale).toPrecision(12));
         if (Array.isArray(value)) return value.map(times);
-        return Object.fromEntries(Object.entries(value as object).map(([name, inner]) => [name, times(inner)]));
+        const members = Object.entries(value as object);
+        // Of a sun only its light is scaled.
+        return Object.fromEntries(
+            members.map((
+                [name, inner],
+            ) => [name,
+                name === "sun" ? { ...inner, direct: times((inner as { direct: unknown }).direct) } : times(inner)]
+            ),
+        );
     };
     return {
         scene: wanted.scene,

@@ -42,8 +42,8 @@ export interface SkyLight {
     /** W/m² of a given sky: direct light facing the sun, and diffuse light on the ground. */
     direct: number;
     diffuse: number;
-    /** The sun is in one tile, spread over those near it, or left out. */
-    sun: "tile" | "spread" | "off";
+    /** The sun is itself, by rays that the daemon casts, in one tile, spread over those near it, or left out. */
+    sun: "exact" | "tile" | "spread" | "off";
     /** Where the store has channels, the sky is bluish and the sun warm. */
     tinted: boolean;
     latitude: number;
