@@ -20,10 +20,13 @@ struct scene_sun {
     const scene *of;
     size_t n_vertices, n_backs;
     double ground_albedo;
-    pthread_mutex_t lock; /* of the three below while they are made */
+    pthread_mutex_t lock; /* of those below while they are made */
     shadow_tree *tree;    /* NULL until then */
     sky_tiling tiling;
     float *ground; /* [n], of the irradiance of the ground */
+    float *last;   /* [n], the shares of the last sun: clients change lamps under one that stands still */
+    request_sun last_of;
+    bool has_last; /* with `last` and its sun under the lock */
     atomic_size_t held;
 };
 
@@ -60,6 +63,7 @@ void scene_sun_destroy(scene_sun *sun) {
     shadow_tree_free(sun->tree);
     sky_tiling_free(&sun->tiling);
     free(sun->ground);
+    free(sun->last);
     pthread_mutex_destroy(&sun->lock);
     free(sun);
 }
@@ -123,7 +127,8 @@ static lam_status make(scene_sun *sun, lam_error *error) {
         FAIL(error, LAM_ERR_FORMAT, "%s: /sky has %zu tiles, %s has %zu", of->path, lam_sky_tiles(of->sky),
              sun->tiling.name, sun->tiling.n_tiles);
     if (sun->ground == NULL) sun->ground = memory_allocate(of->n, sizeof *sun->ground, "the sun", error);
-    if (sun->ground == NULL) TRY(LAM_ERR_MEMORY);
+    if (sun->last == NULL) sun->last = memory_allocate(of->n, sizeof *sun->last, "the sun", error);
+    if (sun->ground == NULL || sun->last == NULL) TRY(LAM_ERR_MEMORY);
     const shadow_faces faces = {.n = of->n,
                                 .n_fronts = of->n - sun->n_backs,
                                 .n_vertices = sun->n_vertices,
@@ -145,7 +150,7 @@ done:
 /* The same within the memory that the ledger has. */
 static lam_status take(scene_sun *sun, lam_error *error) {
     const scene *of = sun->of;
-    const size_t stays = of->n * sizeof *sun->ground, most = shadow_tree_bytes_most(of->n);
+    const size_t stays = 2 * of->n * sizeof *sun->ground, most = shadow_tree_bytes_most(of->n);
     size_t wanted;
     if (__builtin_add_overflow(most, stays + array_bytes(sun), &wanted) ||
         !memory_ledger_take(of->ledger, wanted))
@@ -167,19 +172,37 @@ lam_status scene_sun_make(scene_sun *sun, lam_error *error) {
     return status;
 }
 
-void scene_sun_shares(const scene_sun *sun, const request_sun *of, float *shares) {
-    const size_t n = sun->of->n;
-    const sun_position at = sun_turned(sun_of_angles(of->azimuth, of->altitude),
-                                       isnan(of->north) ? sun->of->sky_north : of->north);
+static void cast(const scene_sun *sun, const sun_position *at, float *shares) {
     double direction[3];
+    for (int d = 0; d < 3; d++)
+        direction[sun->tiling.axis[d]] = (double)sun->tiling.sign[d] * at->direction[d];
+    sun_shares_find(sun->tree, parallel_threads(), 1, (const double(*)[3])direction, &shares);
+    for (size_t i = 0; i < sun->of->n; i++) shares[i] += sun->ground[i] * (float)at->direction[2];
+}
+
+void scene_sun_shares(scene_sun *sun, const request_sun *of, float *shares) {
+    const size_t bytes = sun->of->n * sizeof *shares;
+    const request_sun wanted = {.azimuth = of->azimuth,
+                                .altitude = of->altitude,
+                                .north = isnan(of->north) ? sun->of->sky_north : of->north};
+    const sun_position at = sun_turned(sun_of_angles(wanted.azimuth, wanted.altitude), wanted.north);
     if (!(at.direction[2] > 0)) {
-        memset(shares, 0, n * sizeof *shares);
+        memset(shares, 0, bytes);
         return;
     }
-    for (int d = 0; d < 3; d++)
-        direction[sun->tiling.axis[d]] = (double)sun->tiling.sign[d] * at.direction[d];
-    sun_shares_find(sun->tree, parallel_threads(), 1, (const double(*)[3])direction, &shares);
-    for (size_t i = 0; i < n; i++) shares[i] += sun->ground[i] * (float)at.direction[2];
+    pthread_mutex_lock(&sun->lock);
+    const request_sun *last = &sun->last_of;
+    const bool known = sun->has_last && last->azimuth == wanted.azimuth &&
+                       last->altitude == wanted.altitude && last->north == wanted.north;
+    if (known) memcpy(shares, sun->last, bytes);
+    pthread_mutex_unlock(&sun->lock);
+    if (known) return;
+    cast(sun, &at, shares);
+    pthread_mutex_lock(&sun->lock);
+    memcpy(sun->last, shares, bytes);
+    sun->last_of = wanted;
+    sun->has_last = true;
+    pthread_mutex_unlock(&sun->lock);
 }
 
 size_t scene_sun_held(const scene_sun *sun) {

@@ -27,8 +27,9 @@ lam_status scene_sun_make(scene_sun *sun, lam_error *error);
 
 /* shares [n]: the irradiance of each element by a sun and by the ground that it lights, of the irradiance of
  * a plane normal to it. All 0 where the sun is below the horizon. After scene_sun_make. Threads of the
- * caller's pool share the work. Cost: n rays times 16, and more where shadows end. */
-void scene_sun_shares(const scene_sun *sun, const request_sun *of, float *shares);
+ * caller's pool share the work. Cost: n rays times 16, and more where shadows end; O(n) for the sun of the
+ * last call. */
+void scene_sun_shares(scene_sun *sun, const request_sun *of, float *shares);
 
 /* Bytes taken of the ledger. Does not wait. */
 size_t scene_sun_held(const scene_sun *sun);
