@@ -93,6 +93,8 @@ typedef struct form_factor_options {
     size_t *n_aimed; /* set by rays_count: the number of openings that rays were aimed at; NULL: not wanted */
     double *variance;  /* [n], set by rays_count: of leaving; NULL: not wanted */
     bool without_rows; /* rays_count leaves all rows empty: only the shares that leave the scene are wanted */
+    const double *row_sums;    /* [n], that rows of blocks are to have, as a store has them; NULL: those that
+                                  form_factors_make_blocks finds */
     struct block_scene *ready; /* of form_factors_make_blocks: the mesh on its tree, which can only be
                                   destroyed afterwards; NULL: it makes its own */
     size_t only_first; /* rays_count and hemicube_trace find only this many rows of the order and leave the

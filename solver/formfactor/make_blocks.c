@@ -243,7 +243,8 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
         if (targets == NULL) TRY(LAM_ERR_MEMORY);
         TRY(unhidden_row_sums(m, &known, targets, error));
     }
-    TRY(balance_blocks(&f, m, &made, known ? targets : NULL, judged != NULL ? judge_balance : 0, error));
+    TRY(balance_blocks(&f, m, &made, known ? targets : options->row_sums, judged != NULL ? judge_balance : 0,
+                       error));
     if (f.sky.first_bounce != NULL) TRY(leaving_to_sky(&f, m, error));
     *out = f;
     *blocks = made;

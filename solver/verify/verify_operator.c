@@ -263,8 +263,11 @@ static importance *importance_of(examination *e) {
 /* The form factors that the operator was built from, where the store does not keep them. */
 static lam_status find_again(examination *e, const recipe *from, const uint32_t *order, lam_error *error) {
     lam_status status = LAM_OK;
-    const form_factor_options how = {
-        .recipe = *from, .progress = e->progress, .stage = "form factors", .importance = importance_of(e)};
+    const form_factor_options how = {.recipe = *from,
+                                     .progress = e->progress,
+                                     .stage = "form factors",
+                                     .importance = importance_of(e),
+                                     .row_sums = e->row_sums};
     if (has_form_factors(e)) return LAM_OK;
     if (!recipe_can(from, SOURCE_BLOCKS)) return form_factors_make(&e->m, order, &how, &e->f, error);
     TRY(form_factors_tree(&e->m, &e->tree, error));
