@@ -51,11 +51,12 @@ ALLOWED = {
     "solver/formfactor/visibility": f"{FORMFACTOR}",
     "solver/formfactor/rows": f"{FORMFACTOR} solver/formfactor/visibility/",
     "solver/formfactor/rays": f"{FORMFACTOR} solver/formfactor/visibility/ solver/formfactor/rows/",
+    "solver/formfactor/glass": f"{FORMFACTOR} solver/formfactor/visibility/ solver/formfactor/rows/ solver/formfactor/rays/",
     "solver/formfactor/clusters": f"{FORMFACTOR} solver/formfactor/visibility/",
     "solver/formfactor/exchange": f"{FORMFACTOR} solver/formfactor/clusters/",
     "solver/formfactor/sight": (f"{FORMFACTOR} solver/formfactor/visibility/ solver/formfactor/clusters/ solver/formfactor/exchange/"),
     "solver/formfactor/pairs": (f"{FORMFACTOR} solver/formfactor/visibility/ solver/formfactor/rows/ solver/formfactor/rays/ "
-        "solver/formfactor/clusters/ solver/formfactor/exchange/ solver/formfactor/sight/"),
+        "solver/formfactor/clusters/ solver/formfactor/exchange/ solver/formfactor/sight/ solver/formfactor/glass/"),
     "solver/formfactor/blocks": (f"{FORMFACTOR} solver/formfactor/visibility/ solver/formfactor/exchange/ solver/formfactor/sight/"),
     "solver/walk": ("lambert/ store/status.h solver/base/ solver/scene/mesh.h solver/formfactor/leaving.h solver/formfactor/visibility/"),
     "solver/method": f"{OPERATOR}",

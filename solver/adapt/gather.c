@@ -3,6 +3,7 @@
 #include "solver/adapt/lamp_groups.h"
 #include "solver/base/cosine.h"
 #include "solver/base/random.h"
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/scene/element_face.h"
 
@@ -91,17 +92,17 @@ static void draw(const gather *g, uint32_t element, uint64_t key, size_t n_point
     }
 }
 
-/* E_j K / (R K + S q_j), to the first light, with K = cos cos' / (pi r^2) the density of rays at the place
- * and q_j that of lamp samples. */
-static void add_lamp(const gather *g, const gather_samples *s, uint32_t j, double K, double *H) {
+/* T E_j K / (R K + S q_j), to the first light, with K = cos cos' / (pi r^2) the density of rays at the place,
+ * q_j that of lamp samples, and T what panes between them pass. */
+static void add_lamp(const gather *g, const gather_samples *s, uint32_t j, double K, double T, double *H) {
     const double q = lamp_groups_density(&g->lamps, &s->shares, j);
-    const double weight = K / (GATHER_RAYS * K + GATHER_LAMP_SAMPLES * q);
+    const double weight = T * K / (GATHER_RAYS * K + GATHER_LAMP_SAMPLES * q);
     for (size_t c = 0; c < g->m->n_channels; c++) H[c] += (double)g->lamps.E[c * g->m->n + j] * weight;
 }
 
-/* The light that a ray brings from the element that it hits. */
+/* The light that a ray brings from the element that it hits, through panes that pass T. */
 static void add_hit(const gather *g, const gather_samples *s, const float direction[3], uint32_t j,
-                    double distance, double cosine, double *H) {
+                    double distance, double cosine, double T, double *H) {
     const mesh *m = g->m;
     const float *normal = m->normal[j];
     const double facing =
@@ -112,19 +113,20 @@ static void add_hit(const gather *g, const gather_samples *s, const float direct
             const size_t row = l * m->n_channels + c;
             double B = (double)g->B[row * m->n + j];
             if (l == 0 && lamp) B -= (double)g->lamps.E[c * m->n + j];
-            H[row] += B / GATHER_RAYS;
+            H[row] += T * B / GATHER_RAYS;
         }
-    if (lamp) add_lamp(g, s, j, cosine * fmax(facing, 0) / (M_PI * fmax(distance * distance, 1e-300)), H);
+    if (lamp) add_lamp(g, s, j, cosine * fmax(facing, 0) / (M_PI * fmax(distance * distance, 1e-300)), T, H);
 }
 
 /* The light that the rays of a packet bring from where they leave the scene: pi times the radiance there. */
-static void add_sky(const gather *g, const ray_packet *rays, const hit_packet *hits, double *H) {
+static void add_sky(const gather *g, const ray_packet *rays, const hit_packet *hits,
+                    const double passed[VISIBILITY_PACKET], double *H) {
     uint32_t tile[SKY_PACKET];
     const size_t channels = g->m->n_channels, tiles = g->sky->tiling->n_tiles;
     sky_tiling_find(g->sky->tiling, rays->direction, tile);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++)
         for (size_t row = 0; hits->element[i] == VISIBILITY_NOTHING && row < g->n_lights * channels; row++)
-            H[row] += M_PI * g->sky->L[row / channels * (tiles + 1) + tile[i]] / GATHER_RAYS;
+            H[row] += passed[i] * M_PI * g->sky->L[row / channels * (tiles + 1) + tile[i]] / GATHER_RAYS;
 }
 
 /* Casts the packet of rays of a half that begins with the first. */
@@ -141,20 +143,35 @@ static void cast(const gather *g, const gather_samples *s, size_t half, size_t f
     visibility_cast(g->v, rays, VISIBILITY_PACKET, self, 0, hits);
 }
 
+/* The light of the fronts that rays from a point meet: that of panes, or of all others. */
+static void add_hits(const gather *g, const gather_samples *s, const float *normal, const float origin[3],
+                     const ray_packet *rays, const hit_packet *hits, const double passed[VISIBILITY_PACKET],
+                     bool panes, double *H) {
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        const float to[3] = {rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]};
+        double before = 0;
+        if (hits->element[i] == VISIBILITY_NOTHING || hits->back[i]) continue;
+        if (mesh_is_pane(g->m, hits->element[i]) != panes) continue;
+        for (int d = 0; d < 3; d++) before += (double)(rays->origin[d][i] - origin[d]) * (double)to[d];
+        add_hit(g, s, to, hits->element[i], before + (double)hits->distance[i],
+                (double)(to[0] * normal[0] + to[1] * normal[1] + to[2] * normal[2]), passed[i], H);
+    }
+}
+
 static void add_rays(const gather *g, const gather_samples *s, size_t half, uint32_t element,
                      const float origin[3], double *H) {
     const float *normal = g->m->normal[element];
     for (size_t first = 0; first < GATHER_RAYS; first += VISIBILITY_PACKET) {
         ray_packet rays;
         hit_packet hits;
+        double passed[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
         cast(g, s, half, first, element, origin, &rays, &hits);
-        if (g->sky != NULL) add_sky(g, &rays, &hits, H);
-        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-            const float *to = s->direction[half][first + i];
-            if (hits.element[i] == VISIBILITY_NOTHING || hits.back[i]) continue;
-            add_hit(g, s, to, hits.element[i], (double)hits.distance[i],
-                    (double)(to[0] * normal[0] + to[1] * normal[1] + to[2] * normal[2]), H);
+        if (g->m->glass != NULL) {
+            add_hits(g, s, normal, origin, &rays, &hits, passed, true, H);
+            pane_path_follow(g->v, g->m, &rays, VISIBILITY_PACKET, &hits, passed, NULL);
         }
+        if (g->sky != NULL) add_sky(g, &rays, &hits, passed, H);
+        add_hits(g, s, normal, origin, &rays, &hits, passed, false, H);
     }
 }
 
@@ -167,6 +184,20 @@ static double kernel(const mesh *m, uint32_t from, uint32_t to, const double seg
         arrives -= segment[d] * (double)m->normal[to][d];
     }
     return leaves > 0 && arrives > 0 ? leaves * arrives / (M_PI * r2 * r2) : 0;
+}
+
+/* The share of segments that all panes between their ends pass, 0 where anything else blocks them. */
+static void pass_panes(const gather *g, ray_packet *segments, size_t n, const uint32_t *from,
+                       double passed[VISIBILITY_PACKET]) {
+    static const double nearly = 1 - 1e-4;
+    double end[VISIBILITY_PACKET];
+    hit_packet hits;
+    for (size_t i = 0; i < n; i++) {
+        end[i] = nearly;
+        passed[i] = 1;
+    }
+    visibility_cast(g->v, segments, n, from, 0, &hits);
+    pane_path_reach(g->v, g->m, segments, n, &hits, end, passed);
 }
 
 /* Adds the lamp samples of a packet's size that begin with the first. */
@@ -193,8 +224,11 @@ static void add_lamps(const gather *g, const gather_samples *s, size_t half, siz
     }
     if (n == 0) return;
     const unsigned blocked = visibility_blocked(g->v, &segments, n, from, to);
+    double passed[VISIBILITY_PACKET];
+    for (size_t i = 0; i < n; i++) passed[i] = blocked >> i & 1 ? 0 : 1;
+    if (blocked != 0 && g->m->glass != NULL) pass_panes(g, &segments, n, from, passed);
     for (size_t i = 0; i < n; i++)
-        if (!(blocked >> i & 1)) add_lamp(g, s, to[i], K[i], H);
+        if (passed[i] > 0) add_lamp(g, s, to[i], K[i], passed[i], H);
 }
 
 void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],

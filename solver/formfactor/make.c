@@ -2,6 +2,7 @@
 #include "solver/formfactor/formfactor.h"
 
 #include "solver/base/clock.h"
+#include "solver/formfactor/glass/pane_factors.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/rays/hemicube.h"
 #include "solver/formfactor/rays/rays.h"
@@ -34,6 +35,7 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     TRY(visibility_create(m, &v, error));
     TRY(source->make(m, v, order, options, &f, error));
     if (asked->sky != NULL) TRY(leaving_to_sky(&f, m, error));
+    TRY(panes_add(m, v, order, options, panes_rays(&options->recipe), options->recipe.seed, &f, error));
     if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
     *out = f;
     f = (form_factors){0};

@@ -5,6 +5,7 @@
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/blocks/blocks_importance.h"
 #include "solver/formfactor/blocks/unhidden.h"
+#include "solver/formfactor/glass/pane_factors.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/row_scaling.h"
@@ -246,6 +247,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     TRY(balance_blocks(&f, m, &made, known ? targets : options->row_sums, judged != NULL ? judge_balance : 0,
                        error));
     if (f.sky.first_bounce != NULL) TRY(leaving_to_sky(&f, m, error));
+    TRY(panes_add_sky(m, block_scene_visibility(scene), order, options, panes_rays(r), r->seed, &f, error));
     *out = f;
     *blocks = made;
     f = (form_factors){0};

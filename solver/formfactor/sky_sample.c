@@ -1,7 +1,9 @@
 #include "solver/formfactor/sky_sample.h"
 
+#include "solver/formfactor/glass/pane_factors.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/source.h"
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -27,6 +29,7 @@ lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounc
     for (size_t i = 0; i < m->n; i++) scale[i] = 1;
     memcpy(ground, made.ground, m->n * sizeof *ground);
     sky_bounce_close(&made, scale);
+    TRY(panes_add_bounce(m, v, order, &how, panes_rays(&how.recipe), how.recipe.seed, &made, ground, error));
     made.ground = ground;
     *out = made;
     ground = NULL;
@@ -52,8 +55,8 @@ static void aim(const sky_tiling *tiling, const sky_tile *tile, const double u[V
     }
 }
 
-/* The mean over the rays of cos V, V = 1 of those that hit nothing. */
-static double seen_share(const visibility *v, const element_sampler *from, size_t element,
+/* The mean over the rays of cos V, V = 1 of those that hit nothing, less what panes hold back. */
+static double seen_share(const mesh *m, const visibility *v, const element_sampler *from, size_t element,
                          const sky_tiling *tiling, size_t tile, size_t rays, uint64_t seed) {
     uint32_t self[VISIBILITY_PACKET];
     double sum = 0;
@@ -79,6 +82,7 @@ static double seen_share(const visibility *v, const element_sampler *from, size_
         }
         if (!any) continue;
         visibility_cast(v, &packet, VISIBILITY_PACKET, self, VISIBILITY_TOGETHER, &hits);
+        pane_path_follow(v, m, &packet, VISIBILITY_PACKET, &hits, cosine, NULL);
         for (int k = 0; k < VISIBILITY_PACKET; k++)
             if (hits.element[k] == VISIBILITY_NOTHING) sum += fmax(0, cosine[k]);
     }
@@ -104,7 +108,7 @@ lam_status sky_sample_tiles(const mesh *m, const sky_bounce *sampled, size_t ray
         element_sampler from;
         element_sampler_init(&from, m, v, i, seed);
         for (size_t k = 0; k < n_tiles; k++) {
-            const double seen = seen_share(v, &from, i, tiling, tiles[k], rays, seed);
+            const double seen = seen_share(m, v, &from, i, tiling, tiles[k], rays, seed);
             first[k * m->n + i] = first_bounce_of(sampled, i, tiles[k], seen);
         }
     }
@@ -123,7 +127,7 @@ lam_status sky_sample_pairs(const mesh *m, const sky_bounce *sampled, size_t ray
     for (size_t k = 0; k < count; k++) {
         element_sampler from;
         element_sampler_init(&from, m, v, elements[k], seed);
-        const double seen = seen_share(v, &from, elements[k], &sampled->tiling, tiles[k], rays, seed);
+        const double seen = seen_share(m, v, &from, elements[k], &sampled->tiling, tiles[k], rays, seed);
         first[k] = first_bounce_of(sampled, elements[k], tiles[k], seen);
     }
 done:

@@ -63,7 +63,13 @@ lam_status plan_blocks_possible(const precompute_job *job, precompute_scene *sce
     lam_status status = LAM_OK;
     const bool asked = source_asked(job->options->form_factors) == &source_blocks;
     *possible = false;
-    if (!asked && scene->m.n < ELEMENTS_LEAST) goto done;
+    if (!asked && (scene->m.n < ELEMENTS_LEAST || scene->panes_between > 0)) goto done;
+    if (scene->panes_between > 0)
+        FAIL(
+            error, LAM_ERR_ARGUMENT,
+            "--form-factors blocks: %.2g %% of the light comes to other elements through panes, which blocks "
+            "do not have; give --form-factors pairs or rays",
+            100 * scene->panes_between);
     TRY(scene_make_tree(scene, error));
     *possible = asked || is_possible(&scene->tree);
     if (asked) TRY(check_asked(job->options, method, true, &scene->tree, error));

@@ -162,6 +162,7 @@ static lam_status choose_stream(const precompute_job *job, const precompute_scen
     const build_method *method;
     bool final;
     plan->streamed = false;
+    if (scene->m.glass != NULL) return LAM_OK; /* light through panes is added to rows that are held */
     if (kept || job->holds || !ray_rows_can(&plan->recipe) || !(bytes > held_most)) return LAM_OK;
     TRY(plan_expect_method(job, scene, n, recipe_noise(&plan->recipe), &method, &final, error));
     plan->streamed = final && (method->flags & METHOD_STREAMS);

@@ -22,6 +22,9 @@ extern const char precompute_quality_words[];
 
 /* The options, as the rows of precompute_tables_make fill them; texts point into argv. The members after
  * progress belong to the verb. */
+/* The light that panes pass: less of it aslant, or the same from every side. */
+typedef enum glass_law { GLASS_BY_ANGLE, GLASS_EVENLY } glass_law;
+
 typedef struct precompute_options {
     const char *output;
     uint64_t elements;
@@ -42,6 +45,8 @@ typedef struct precompute_options {
     double ground_albedo;
     double north;        /* degrees; NAN: 0, or that of the store */
     option_list portals; /* names of groups */
+    option_list glass;   /* GROUP=T[,FACES] */
+    glass_law glass_law;
     bool keep_form_factors;
     const char *emitters;               /* FILE, group=NAME, sky; or NULL */
     const char *receivers, *importance; /* NAME,NAME; FILE; one of them, or both NULL */

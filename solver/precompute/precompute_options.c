@@ -147,6 +147,23 @@ static const option_row mesh_rows[] = {
      .help = "No light leaves the scene, whatever rays find: what they lose goes back to the row. no: light "
              "leaves through every gap. Without it, light leaves through gaps wider than the diagonal of the "
              "scene over 800, and narrower ones are cracks"},
+    {.name = "glass",
+     .kind = OPTION_LIST,
+     .offset = FIELD(glass),
+     .argument = "GROUP=T[,FACES]",
+     .otherwise = "materials of the file that let light pass",
+     .settled = fixed_mesh,
+     .help = "Light passes the faces of a group, straight on: the part T of it, from 0 to 1, at normal "
+             "incidence. FACES: the faces that a ray crosses one behind the other, of a pane with two sides "
+             "or of several panes, which pass T together (1). May be repeated"},
+    {.name = "glass-law",
+     .kind = OPTION_WORD,
+     .offset = FIELD(glass_law),
+     .preset = "angle",
+     .choices = "angle|none",
+     .settled = fixed_mesh,
+     .help = "angle: panes pass T min(1, 1.018 cos t (1 + sin^3 t)) of light at the angle t to their "
+             "normals, as clear glass does. none: T at any angle"},
     OPTION_ROW_REFLECTANCE(FIELD(reflectance),
                            .help = "Grey reflectance of every face, in place of that in the file"),
     OPTION_ROW_ASSETS(FIELD(assets), .settled = fixed_mesh),

@@ -177,7 +177,7 @@ void factors_log(const precompute_job *job, const precompute_scene *scene,
     if (sky->first_bounce != NULL)
         terminal_log(job->t, "sky: %s, %zu tiles, ground albedo %g%s", sky->tiling.name, sky->tiling.n_tiles,
                      sky->ground_albedo, aimed);
-    if (sky->first_bounce != NULL && f->closed)
+    if (sky->first_bounce != NULL && f->closed && scene->m.glass == NULL)
         terminal_warn(job->t,
                       "the scene is closed: no element sees the sky; --portal GROUP takes away faces that "
                       "stand in a window");

@@ -3,6 +3,7 @@
 #include "solver/precompute/judging.h"
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
+#include "solver/scene/glass.h"
 #include "solver/scene/surfaces.h"
 
 #include <math.h>
@@ -285,7 +286,7 @@ void stage_advise(const finished_trial *t, char advice[ERROR_ADVICE_BYTES]) {
     error_advice(&input, advice);
     if (advice[0] != '\0') terminal_warn(t->job->t, "%s", advice);
     char of_sky[ERROR_ADVICE_BYTES];
-    error_advice_sky(&input, f->leaving_share, f->n_aimed, of_sky);
+    error_advice_sky(&input, f->leaving_share, f->n_aimed + mesh_pane_groups(&t->scene->m), of_sky);
     if (of_sky[0] != '\0') terminal_warn(t->job->t, "%s", of_sky);
 }
 

@@ -56,6 +56,11 @@ static lam_status read_light(const precompute_job *job, precompute_scene *scene,
                                         .frames = listed ? 0 : (size_t)how->frames,
                                         .unit = job->options->from_store ? 1 : scene->m.unit};
     bool coloured = false;
+    if (scene->m.glass != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: the paths of --positions and --path do not pass panes; --glass GROUP=0 makes a group "
+             "opaque, --portal GROUP takes it away",
+             job->options->input);
     TRY(light_path_read(&request, &walked->light, &coloured, error));
     if (coloured) TRY(take_colours(&scene->m, error));
     terminal_log(job->t, "%zu positions of a light of %.3g m2", walked->light.n, walked->light.area);

@@ -163,6 +163,7 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
         TRY(orient(job, scene, error));
     TRY(scene_find_openings(job, scene, error));
     TRY(choose_backs(job, scene, error));
+    TRY(scene_take_glass(job, scene, error));
     TRY(count_tiles(job, scene, error));
 done:
     return status;

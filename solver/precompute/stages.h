@@ -88,6 +88,11 @@ lam_status factors_warn_of_backs(const precompute_job *job, const precompute_sce
 
 /* Takes the groups of --portal out of the mesh, and rectangles around them as openings: stage_portals.c. */
 lam_status scene_take_portals(const precompute_job *job, precompute_scene *scene, lam_error *error);
+
+/* Makes panes of the groups of --glass, too, gives panes their backs and says what light passes:
+ * stage_glass.c. */
+lam_status scene_take_glass(const precompute_job *job, precompute_scene *scene, lam_error *error);
+
 /* Without --portal finds the openings of the faces, before these are divided, where there is a sky. */
 lam_status scene_find_openings(const precompute_job *job, precompute_scene *scene, lam_error *error);
 

@@ -1,7 +1,7 @@
 /* Elements for the backs of faces, behind all fronts, with groups of their own. */
 #include "solver/base/array_grow.h"
 #include "solver/base/scene/scene_backs.h"
-#include "solver/scene/mesh.h"
+#include "solver/scene/glass.h"
 #include "solver/scene/tables.h"
 
 #include <stdio.h>
@@ -63,6 +63,18 @@ done:
     return status;
 }
 
+/* An array [n_groups] of size-byte values with those of the groups of backs, of which group g has of[g] or
+ * TABLE_NONE, behind them: [n_all]. NULL on failure. */
+static void *with_back_groups(const void *data, size_t size, size_t n_groups, size_t n_all,
+                              const uint32_t *of, lam_error *error) {
+    char *out = memory_allocate(n_all, size, "groups of backs", error);
+    if (out == NULL) return NULL;
+    memcpy(out, data, n_groups * size);
+    for (size_t g = 0; g < n_groups; g++)
+        if (of[g] != TABLE_NONE) memcpy(out + of[g] * size, (const char *)data + g * size, size);
+    return out;
+}
+
 /* Moves the last m->n_backs elements to groups of their own, behind the others. A mesh whose groups have no
  * names yet keeps them as they are. */
 static lam_status part_groups(mesh *m, lam_error *error) {
@@ -72,6 +84,7 @@ static lam_status part_groups(mesh *m, lam_error *error) {
     size_t capacity = 0;
     uint32_t index, *of = NULL;
     double *overlap = NULL;
+    struct group_glass *glass = NULL;
     if (m->group_names == NULL) return LAM_OK;
     of = memory_allocate(m->n_groups, sizeof *of, "group names", error);
     if (of == NULL) TRY(LAM_ERR_MEMORY);
@@ -84,14 +97,25 @@ static lam_status part_groups(mesh *m, lam_error *error) {
         if (of[g] != TABLE_NONE) TRY(add_back_name(&names, g, &text, &capacity, &of[g], error));
     block = name_table_block(&names, error);
     if (block == NULL) TRY(LAM_ERR_MEMORY);
-    if (m->overlap != NULL) { /* a back lies under the same faces as its front */
-        overlap = memory_allocate(names.n, sizeof *overlap, "overlapping faces", error);
+    /* A back lies under the same faces as its front, and lets the same light pass. */
+    if (m->overlap != NULL) {
+        overlap = with_back_groups(m->overlap, sizeof *overlap, m->n_groups, names.n, of, error);
         if (overlap == NULL) TRY(LAM_ERR_MEMORY);
-        memcpy(overlap, m->overlap, m->n_groups * sizeof *overlap);
-        for (size_t g = 0; g < m->n_groups; g++)
-            if (of[g] != TABLE_NONE) overlap[of[g]] = m->overlap[g];
+    }
+    if (m->glass != NULL) {
+        glass = with_back_groups(m->glass, sizeof *glass, m->n_groups, names.n, of, error);
+        if (glass == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    if (overlap != NULL) {
         free(m->overlap);
         m->overlap = overlap;
+        overlap = NULL;
+    }
+    if (glass != NULL) {
+        free(m->glass);
+        m->glass = glass;
+        m->n_glass = names.n;
+        glass = NULL;
     }
     for (size_t i = m->n - m->n_backs; i < m->n; i++) m->group[i] = of[m->group[i]];
     free(m->group_names);
@@ -100,6 +124,8 @@ static lam_status part_groups(mesh *m, lam_error *error) {
 done:
     free(of);
     free(text);
+    free(overlap);
+    free(glass);
     name_table_free(&names);
     return status;
 }

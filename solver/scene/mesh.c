@@ -1,6 +1,7 @@
 /* Measures, bounds and the hash of a mesh; refinement, order and storage have files of their own. */
 #include "solver/scene/mesh.h"
 
+#include "solver/scene/glass.h"
 #include "solver/scene/plane.h"
 #include "solver/scene/texture.h"
 
@@ -18,6 +19,7 @@ void mesh_free(mesh *m) {
     free(m->group);
     free(m->group_names);
     free(m->overlap);
+    free(m->glass);
     scene_faces_free(&m->faces);
     free(m->reflectance);
     free(m->emission);
@@ -139,10 +141,12 @@ static void drop_empty_groups(mesh *m, uint32_t *number) {
         if (number[g] == 0) continue;
         m->group_names[kept] = m->group_names[g];
         if (m->overlap != NULL) m->overlap[kept] = m->overlap[g];
+        if (m->glass != NULL) m->glass[kept] = m->glass[g];
         number[g] = kept++;
     }
     for (size_t i = 0; i < m->n; i++) m->group[i] = number[m->group[i]];
     m->n_groups = kept;
+    if (m->glass != NULL) m->n_glass = kept;
 }
 
 lam_status mesh_drop(mesh *m, const bool *dropped, lam_error *error) {

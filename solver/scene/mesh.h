@@ -42,8 +42,11 @@ typedef struct mesh {
     bool *buried;   /* [n]: elements between a body and the face that it stands on, which see nothing, are not
                        seen (buried.h), and which figures of groups leave out; NULL: none, or not looked
                        for. Only after the last change of elements */
-    bool two_sided; /* every element has its back, or is one */
-    double unit;    /* metres per unit of the scene file, for the record */
+    size_t n_glass; /* that of the groups where some of them let light pass, else 0 */
+    struct group_glass *glass; /* [n_glass] (glass.h); NULL: none does */
+    bool glass_by_angle;       /* they pass less of light that comes aslant */
+    bool two_sided;            /* every element has its back, or is one */
+    double unit;               /* metres per unit of the scene file, for the record */
     double rounding;      /* m: the step of the decimals of the file, or 0 where it has more than eight */
     char up;              /* 'x', 'y' or 'z' */
     char name[128];       /* the scene file's stem */

@@ -1,5 +1,6 @@
 /* Subdivision: every face into a grid of cells, or m^2 triangles, with vertices shared across faces. */
 #include "solver/scene/face_grid.h"
+#include "solver/scene/glass.h"
 #include "solver/scene/mesh_cells.h"
 #include "solver/scene/mesh_refined.h"
 #include "solver/scene/texture.h"
@@ -198,6 +199,7 @@ lam_status refined_mesh_end(refined_mesh *r, const mesh *m, mesh *out, lam_error
         if (fine.has_back == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t i = 0; i < n; i++) fine.has_back[i] = m->has_back[r->face[i]];
     }
+    TRY(mesh_copy_glass(m, &fine, error));
     fine.elements = r->elements;
     fine.vertices = r->points.points;
     fine.n_vertices = r->points.n;
@@ -220,6 +222,11 @@ void mesh_replace(mesh *m, mesh *by) {
     m->group_names = NULL;
     by->overlap = m->overlap;
     m->overlap = NULL;
+    free(by->glass);
+    by->n_glass = m->n_glass;
+    by->glass = m->glass;
+    by->glass_by_angle = m->glass_by_angle;
+    m->glass = NULL;
     by->n_cameras = m->n_cameras;
     by->cameras = m->cameras;
     m->cameras = NULL;

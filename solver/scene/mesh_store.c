@@ -4,6 +4,7 @@
 #include "solver/scene/mesh.h"
 
 #include "solver/scene/coincident.h"
+#include "solver/scene/glass.h"
 #include "solver/scene/texture.h"
 #include "store/groups.h"
 
@@ -31,6 +32,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(scene_buried_save(m->buried, m->n, s, error));
     if (m->overlap != NULL)
         TRY(store_write(s, STORE_MESH "/overlap", STORE_F64, 1, &m->n_groups, m->overlap, error));
+    TRY(mesh_save_glass(m, s, error));
     if (m->overlap != NULL) TRY(store_set_number(s, STORE_MESH, "overlap_area", mesh_overlap_area(m), error));
     if (row_sums != NULL) TRY(store_write(s, STORE_MESH "/row_sums", STORE_F64, 1, &m->n, row_sums, error));
     TRY(scene_pictures_save(m->pictures, m->n, s, error));
@@ -190,6 +192,7 @@ lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
                 FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/overlap[%zu] = %g, must be at most 1", store_path(s),
                      g, loaded.overlap[g]);
     }
+    TRY(mesh_load_glass(s, &loaded, error));
     if (store_has(s, STORE_MESH "/row_sums") || store_has(s, STORE_FORM_FACTORS) || store_has(s, STORE_SKY))
         TRY(load_f64(s, STORE_MESH "/row_sums", loaded.n, 0, false, &sums, error));
     TRY(scene_cameras_load(s, &loaded.n_cameras, &loaded.cameras, error));

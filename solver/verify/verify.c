@@ -1,6 +1,7 @@
 /* Checks of the file and the mesh, the form factors, and the scene it came from. */
 #include "solver/verify/verify.h"
 
+#include "solver/scene/glass.h"
 #include "solver/scene/import/import.h"
 #include "store/groups.h"
 
@@ -84,14 +85,19 @@ lam_status verify_mesh(examination *e, check *c, lam_error *error) {
     if (e->row_sums == NULL && !store_has(e->s, STORE_OPERATOR "/direct"))
         check_say(c, VERDICT_BROKEN, STORE_MESH "/row_sums is missing");
     for (size_t i = 0; i < m->n && e->row_sums != NULL && c->verdict == VERDICT_OK; i++)
-        if (!(e->row_sums[i] >= 0 && e->row_sums[i] <= 1 + 1e-6))
-            check_say(c, VERDICT_BROKEN, "row_sums[%zu] = %.9g, must be from 0 to 1", i, e->row_sums[i]);
+        if (!(e->row_sums[i] >= 0 && e->row_sums[i] <= mesh_row_most(m) + 1e-6))
+            check_say(c, VERDICT_BROKEN, "row_sums[%zu] = %.9g, must be from 0 to %g", i, e->row_sums[i],
+                      mesh_row_most(m));
     for (size_t i = 0; i < m->n_channels * m->n && c->verdict == VERDICT_OK; i++) {
         const double rho = (double)m->reflectance[i], emitted = (double)m->emission[i];
         if (!(rho >= 0 && rho < 1))
             check_say(c, VERDICT_BROKEN, "reflectance[%zu] = %g, must be at least 0 and below 1", i, rho);
         if (!(emitted >= 0 && isfinite(emitted)))
             check_say(c, VERDICT_BROKEN, "emission[%zu] = %g, must be at least 0", i, emitted);
+        if (mesh_is_pane(m, i % m->n) && rho > 1 - mesh_pane_passes(m, i % m->n, 1) + 1e-6)
+            check_say(c, VERDICT_BROKEN,
+                      "element %zu of a pane reflects %g and passes %g: more light than comes to it",
+                      i % m->n, rho, mesh_pane_passes(m, i % m->n, 1));
     }
     if (c->verdict == VERDICT_OK) TRY(measure_again(m, c, error));
 done:
@@ -159,7 +165,7 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
             }
         }
         /* Single precision rounds each of the row's entries by 6e-8 of itself. */
-        if (sum > 1 + 1e-6 || fabs(sum - e->row_sums[i]) > 1e-6) {
+        if (sum > mesh_row_most(&e->m) + 1e-6 || fabs(sum - e->row_sums[i]) > 1e-6) {
             check_say(c, VERDICT_BROKEN, "row %zu sums to %.9g, /mesh/row_sums says %.9g", i, sum,
                       e->row_sums[i]);
             return LAM_OK;
@@ -167,8 +173,8 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
     }
     check_say(c, worst <= 1e-6 ? VERDICT_OK : VERDICT_BROKEN,
               "reciprocity within %.2g (at most 1e-6), rows sum "
-              "to at most 1",
-              worst);
+              "to at most %g",
+              worst, mesh_row_most(&e->m));
     return LAM_OK;
 }
 

@@ -1,4 +1,5 @@
 /* The check of a store's sky. */
+#include "solver/scene/glass.h"
 #include "solver/verify/verify.h"
 #include "store/groups.h"
 
@@ -18,8 +19,8 @@ lam_status verify_sky(examination *e, check *c, lam_error *error) {
     }
     const size_t n = e->m.n;
     TRY(sky_bounce_load(e->s, n, &sky, error));
-    check_say(c, VERDICT_OK, "%s, %zu tiles, ground albedo %g; rows and sky sum to at most 1",
-              sky.tiling.name, sky.tiling.n_tiles, sky.ground_albedo);
+    check_say(c, VERDICT_OK, "%s, %zu tiles, ground albedo %g; rows and sky sum to at most %g",
+              sky.tiling.name, sky.tiling.n_tiles, sky.ground_albedo, mesh_row_most(&e->m));
     if (sky.tiling.up != e->m.up)
         check_say(c, VERDICT_BROKEN, "%c is up in the sky, %c in the mesh", sky.tiling.up, e->m.up);
     sums = memory_allocate(n, sizeof *sums, "the light of the sky", error);
@@ -28,9 +29,9 @@ lam_status verify_sky(examination *e, check *c, lam_error *error) {
         for (size_t i = 0; i < n; i++) sums[i] += (double)sky.first_bounce[t * n + i] * M_1_PI;
     for (size_t i = 0; i < n && c->verdict == VERDICT_OK; i++)
         /* Single precision rounds each of the row's and the sky's entries by 6e-8 of itself. */
-        if (sums[i] > 1 - e->row_sums[i] + 1e-6)
+        if (sums[i] > mesh_row_most(&e->m) - e->row_sums[i] + 1e-6)
             check_say(c, VERDICT_BROKEN, "element %zu receives %.9g of the sky, its row leaves %.9g outside",
-                      i, sums[i], 1 - e->row_sums[i]);
+                      i, sums[i], mesh_row_most(&e->m) - e->row_sums[i]);
 done:
     free(sums);
     sky_bounce_free(&sky);

@@ -2,6 +2,7 @@
  * at once. */
 #include "solver/base/cpu.h"
 #include "solver/base/vector3.h"
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/walk/blend.h"
 #include "solver/walk/walk_steps.h"
 
@@ -82,6 +83,34 @@ void walk_leave(size_t n, const walk_shape *const *shape, const float *share,
     leaves[cpu_best()](n, shape, share, place, rays, facet);
 }
 
+/* A ray that meets a pane passes it with a probability of at most this, and else comes to it. */
+static const double passing_most = .9;
+
+/* Of the light that meets a pane T goes on behind it, and all of it comes to the pane, where a part may be
+ * reflected. A walk goes one of the ways: on with the probability q = min(T, .9) and T / q times its weight,
+ * or to the pane with 1 / (1 - q) times its weight, which leaves the expectation as it is. */
+static void cross_panes(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, hit_packet *hits) {
+    for (size_t first = 0; first < n; first += VISIBILITY_PACKET, rays++, hits++) {
+        const size_t count = n - first < VISIBILITY_PACKET ? n - first : VISIBILITY_PACKET;
+        bool ahead[VISIBILITY_PACKET], there[VISIBILITY_PACKET] = {false}, any = true;
+        for (int crossed = 0; any && crossed < PANES_MOST; crossed++) {
+            any = false;
+            for (size_t i = 0; i < count; i++) {
+                const uint32_t pane = hits->element[i];
+                ahead[i] = false;
+                if (there[i] || pane == VISIBILITY_NOTHING || !mesh_is_pane(s->m, pane)) continue;
+                const double T = pane_path_passes(s->m, pane, rays, i), q = fmin(T, passing_most);
+                ahead[i] = random_unit(&w->random[first + i]) < q;
+                there[i] = !ahead[i];
+                for (size_t c = 0; c < WALK_CHANNELS; c++)
+                    w->weight[c][first + i] *= ahead[i] ? T / q : 1 / (1 - q);
+                any = any || ahead[i];
+            }
+            pane_path_step(s->v, s->m, rays, count, ahead, hits);
+        }
+    }
+}
+
 void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, hit_packet *hits) {
     const size_t filled = (n + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET * VISIBILITY_PACKET;
     const walk_shape *shape[WALK_STREAM];
@@ -101,6 +130,7 @@ void walk_cast(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, 
     }
     walk_leave(filled, shape, share, w->place, rays, facet);
     visibility_cast_lifted(s->v, rays, n, self, facet, hits);
+    if (s->m->glass != NULL) cross_panes(s, w, n, rays, hits);
     for (size_t j = n; j < filled; j++) {
         hits[j / VISIBILITY_PACKET].element[j % VISIBILITY_PACKET] = VISIBILITY_NOTHING;
         hits[j / VISIBILITY_PACKET].back[j % VISIBILITY_PACKET] = false;

@@ -1,5 +1,6 @@
 /* Form factors pair by pair, of all pairs. */
 #include "solver/formfactor/closing.h"
+#include "solver/formfactor/glass/pane_factors.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/pairs/pairs_sample.h"
@@ -116,6 +117,8 @@ lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const f
         f[h].upper = G[h];
         G[h] = (csr){.n = 0};
         TRY(close_pairs(&f[h], m, v, NULL, error));
+        TRY(panes_add(m, v, order, options, 2 * panes_rays(&options->recipe),
+                      h == 0 ? options->recipe.seed : other_seed, &f[h], error));
         TRY(form_factors_expand(&f[h], m->area, error));
     }
     for (int h = 0; h < 2; h++) {

@@ -16,11 +16,9 @@ double portals_weight(const portals *p, const portal_aim *aim, size_t n_rays, co
     return sum > 0 ? of_cosine / sum : 0;
 }
 
-/* Eight rays from points of an element to points of portals; a lane whose point lies behind the element
- * is cast along its normal, and cosine is 0. */
-static void aim(const portals *p, const portal_aim *to_groups, const element_sampler *sampler,
-                const double x[4][VISIBILITY_PACKET], ray_packet *rays,
-                double direction[VISIBILITY_PACKET][3], double cosine[VISIBILITY_PACKET]) {
+void portals_rays(const portals *p, const portal_aim *to_groups, const element_sampler *sampler,
+                  const double x[4][VISIBILITY_PACKET], ray_packet *rays,
+                  double direction[VISIBILITY_PACKET][3], double cosine[VISIBILITY_PACKET]) {
     for (int i = 0; i < VISIBILITY_PACKET; i++) {
         float from[3];
         double to[3], normal[3];
@@ -53,7 +51,8 @@ static double open_share_of(const ray_context *c, const element_sampler *sampler
     for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
     pair_sampler_init(&points, c->seed + RANDOM_STEP, element, c->m->n + g);
     pair_sampler_packet(&points, 0, x);
-    aim(c->portals, &alone, sampler, (const double(*)[VISIBILITY_PACKET])x, &rays, direction, cosine);
+    portals_rays(c->portals, &alone, sampler, (const double(*)[VISIBILITY_PACKET])x, &rays, direction,
+                 cosine);
     visibility_cast(c->v, &rays, VISIBILITY_PACKET, self, VISIBILITY_TOGETHER, &hits);
     for (int i = 0; i < VISIBILITY_PACKET; i++) {
         all += cosine[i];
@@ -82,7 +81,8 @@ void portals_cast(const ray_context *c, const element_sampler *sampler, size_t e
         hit_packet hits;
         unsigned leaving = 0;
         pair_sampler_packet(&points, ray, x);
-        aim(c->portals, &c->aim, sampler, (const double(*)[VISIBILITY_PACKET])x, &rays, direction, cosine);
+        portals_rays(c->portals, &c->aim, sampler, (const double(*)[VISIBILITY_PACKET])x, &rays, direction,
+                     cosine);
         visibility_cast(c->v, &rays, VISIBILITY_PACKET, self, VISIBILITY_TOGETHER, &hits);
         for (int i = 0; i < VISIBILITY_PACKET; i++) {
             if (hits.element[i] != VISIBILITY_NOTHING || !(cosine[i] > 0)) continue;

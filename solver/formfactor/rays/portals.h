@@ -27,6 +27,12 @@ void portals_try(ray_context *c, const element_sampler *sampler, size_t element)
 double portals_weight(const portals *p, const portal_aim *aim, size_t n_rays, const double origin[3],
                       const double direction[3], double cosine);
 
+/* Eight rays from points of an element to points of its portals, by points x of the unit cube; direction has
+ * length 1. A lane whose point lies behind the element is cast along its normal, and its cosine is 0. */
+void portals_rays(const portals *p, const portal_aim *to_groups, const element_sampler *sampler,
+                  const double x[4][VISIBILITY_PACKET], ray_packet *rays,
+                  double direction[VISIBILITY_PACKET][3], double cosine[VISIBILITY_PACKET]);
+
 /* Casts the rays of the present element of a context (rays_aim) towards its portals; those that leave the
  * scene are added with their weights to tally and, where the context has a sky, to its bins. */
 void portals_cast(const ray_context *c, const element_sampler *sampler, size_t element, ray_tally *tally,

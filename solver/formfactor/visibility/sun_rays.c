@@ -1,5 +1,6 @@
 #include "solver/formfactor/visibility/sun_rays.h"
 
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -81,9 +82,11 @@ typedef struct waiting {
 
 static void cast(const sun_rays *s, waiting *w, const float share[], float *seen) {
     hit_packet hits;
+    double passed[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
     visibility_cast(s->v, &w->rays, w->n, w->self, 0, &hits);
+    pane_path_follow(s->v, s->m, &w->rays, w->n, &hits, passed, NULL);
     for (size_t k = 0; k < w->n; k++)
-        if (hits.element[k] == VISIBILITY_NOTHING) seen[w->self[k]] += share[k];
+        if (hits.element[k] == VISIBILITY_NOTHING) seen[w->self[k]] += (float)passed[k] * share[k];
     w->n = 0;
 }
 

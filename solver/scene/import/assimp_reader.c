@@ -121,6 +121,7 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
         diffuse = own->diffuse;
         scale = M_PI * own->strength; /* of a luminance L, a diffuse surface sends out pi L */
         fresh.two_sided = own->two_sided;
+        fresh.transmittance = own->transmittance;
         memcpy(fresh.textures, own->textures, sizeof fresh.textures);
     }
     for (int c = 0; c < 3; c++) fresh.emission[c] *= scale;

@@ -129,16 +129,17 @@ static void tell_scenes(const gltf_file *g) {
 
 void gltf_tell_left_out(const gltf_file *g) {
     import_warnings *w = &g->s->warnings;
-    static const char punctual[] = "KHR_lights_punctual", transmission[] = "KHR_materials_transmission";
-    size_t i, lights = 0, bumps = 0, alphas = 0, metals = 0, panes = 0;
+    static const char punctual[] = "KHR_lights_punctual";
+    size_t i, lights = 0, bumps = 0, alphas = 0, metals = 0;
     json_t *m;
     json_array_foreach(json_object_get(g->root, "materials"), i, m) {
         const json_t *pbr = json_object_get(m, "pbrMetallicRoughness");
         const char *mode = json_string_value(json_object_get(m, "alphaMode"));
         bumps +=
             json_object_get(m, "normalTexture") != NULL || json_object_get(m, "occlusionTexture") != NULL;
-        panes += gltf_extension(m, transmission) != NULL;
-        alphas += mode != NULL && strcmp(mode, "OPAQUE") != 0;
+        const double alpha = gltf_number(json_array_get(json_object_get(pbr, "baseColorFactor"), 3), 1);
+        const bool blended = mode != NULL && strcmp(mode, "BLEND") == 0;
+        alphas += mode != NULL && strcmp(mode, "OPAQUE") != 0 && !(blended && alpha < 1);
         metals += gltf_number(json_object_get(pbr, "metallicFactor"), 0) > 0 ||
                   json_object_get(pbr, "metallicRoughnessTexture") != NULL;
     }
@@ -147,14 +148,8 @@ void gltf_tell_left_out(const gltf_file *g) {
         import_warn(w, "%s: its %zu light%s (%s) %s left out; only faces emit", g->path, lights,
                     lights == 1 ? "" : "s", punctual, lights == 1 ? "is" : "are");
     if (alphas > 0)
-        import_warn(w, "%s: the alpha of %zu materials (MASK, BLEND) is left out; they are opaque", g->path,
-                    alphas);
-    if (panes > 0)
-        import_warn(
-            w,
-            "%s: no light passes %zu material%s (%s), which reflect%s what is not transmitted; --portal "
-            "GROUP takes a pane away",
-            g->path, panes, panes == 1 ? "" : "s", transmission, panes == 1 ? "s" : "");
+        import_warn(w, "%s: the alpha of %zu materials (MASK, or in an image) is left out; they are opaque",
+                    g->path, alphas);
     if (bumps > 0)
         import_warn(w, "%s: normal and occlusion maps of %zu materials are left out", g->path, bumps);
     if (metals > 0)

@@ -93,19 +93,38 @@ done:
     return status;
 }
 
+static double gltf_share(const json_t *value, double otherwise) {
+    return fmin(fmax(gltf_number(value, otherwise), 0), 1);
+}
+
+/* The part of light that passes: of a material that is blended, 1 - alpha; and of the rest what is
+ * transmitted, coloured by the base colour, of which this is the luminance (Rec. 709). */
+static void read_transmittance(const json_t *m, gltf_material *out) {
+    const json_t *colour = json_object_get(json_object_get(m, "pbrMetallicRoughness"), "baseColorFactor");
+    const json_t *clear = gltf_extension(m, "KHR_materials_transmission");
+    const char *mode = json_string_value(json_object_get(m, "alphaMode"));
+    const bool blended = mode != NULL && strcmp(mode, "BLEND") == 0;
+    const double factor = gltf_share(json_object_get(clear, "transmissionFactor"), 0);
+    const double alpha = blended ? gltf_share(json_array_get(colour, 3), 1) : 1;
+    const double luminance = .2126 * gltf_share(json_array_get(colour, 0), 1) +
+                             .7152 * gltf_share(json_array_get(colour, 1), 1) +
+                             .0722 * gltf_share(json_array_get(colour, 2), 1);
+    out->diffuse = alpha * (1 - factor);
+    out->transmittance = fmin(1 - alpha + alpha * factor * luminance, 1);
+}
+
 static lam_status read_material(gltf_file *g, const json_t *m, gltf_material *out, lam_error *error) {
     lam_status status = LAM_OK;
     const json_t *base = json_object_get(json_object_get(m, "pbrMetallicRoughness"), "baseColorTexture");
     const json_t *glossy = gltf_extension(m, "KHR_materials_pbrSpecularGlossiness");
     const json_t *strong = gltf_extension(m, "KHR_materials_emissive_strength");
-    const json_t *clear = gltf_extension(m, "KHR_materials_transmission");
     if (json_object_get(glossy, "diffuseTexture") != NULL) base = json_object_get(glossy, "diffuseTexture");
     const char *name = json_string_value(json_object_get(m, "name"));
     if (name != NULL && name[0] != '\0' && (out->name = strdup(name)) == NULL)
         FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for its materials", g->path);
     out->two_sided = json_is_true(json_object_get(m, "doubleSided"));
     out->strength = gltf_number(json_object_get(strong, "emissiveStrength"), 1);
-    out->diffuse = 1 - fmin(fmax(gltf_number(json_object_get(clear, "transmissionFactor"), 0), 0), 1);
+    read_transmittance(m, out);
     TRY(read_texture(g, base, &out->textures[TEXTURE_REFLECTANCE], error));
     TRY(read_texture(g, json_object_get(m, "emissiveTexture"), &out->textures[TEXTURE_EMISSION], error));
 done:

@@ -1,7 +1,9 @@
 /* Turns the faces that the child read into a mesh: groups, materials, units. */
 #include "solver/scene/import/import.h"
+
 #include "solver/base/array_grow.h"
 #include "solver/base/utf8.h"
+#include "solver/scene/glass.h"
 #include "solver/scene/import/images.h"
 #include "solver/scene/import/imported_faces.h"
 #include "store/confined.h"
@@ -88,6 +90,10 @@ static lam_status settle_materials(imported_faces *s, const char *path, const bo
         const char *name = name_table_get(&s->materials, i);
         bool clamped = false;
         if (!used[i]) continue;
+        if (!(v->transmittance >= 0 && v->transmittance <= 1))
+            FAIL(error, LAM_ERR_FORMAT, "%s: material '%s': transmittance %g, must be from 0 to 1", path,
+                 name, v->transmittance);
+        if (v->transmittance > 0) v->has_diffuse = 1; /* clear, unless it has a colour */
         const imported_texture *image = &v->textures[TEXTURE_REFLECTANCE];
         const bool unread = image->named != 0 && image->image == 0;
         if (unread ? is_filler(v->diffuse) : !v->has_diffuse && image->image == 0) {
@@ -249,6 +255,35 @@ static lam_status apply_materials(imported_faces *s, const char *path, const imp
             path, bare);
 done:
     free(used);
+    return status;
+}
+
+/* Makes panes of the groups all of whose faces let the same part of the light pass. */
+static lam_status find_panes(imported_faces *s, const char *path, mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    static const double unseen = -1, mixed = -2;
+    size_t n_mixed = 0;
+    double *passes = memory_allocate(m->n_groups, sizeof *passes, "panes", error);
+    if (passes == NULL) return LAM_ERR_MEMORY;
+    for (size_t g = 0; g < m->n_groups; g++) passes[g] = unseen;
+    for (size_t i = 0; i < m->n; i++) {
+        const uint32_t material = s->elements[i].material;
+        const double T = material != TABLE_NONE ? s->values[material].transmittance : 0;
+        double *const of = &passes[m->group[i]];
+        *of = *of == unseen || *of == T ? T : mixed;
+    }
+    for (size_t g = 0; g < m->n_groups; g++) {
+        const struct group_glass glass = {.transmittance = passes[g], .faces = 1};
+        n_mixed += passes[g] == mixed;
+        if (passes[g] > 0) TRY(mesh_set_glass(m, g, &glass, error));
+    }
+    if (n_mixed > 0)
+        import_warn(&s->warnings,
+                    "%s: %zu group%s panes and other faces under one name and pass%s no light; --glass "
+                    "GROUP=T makes all faces of a group panes",
+                    path, n_mixed, n_mixed == 1 ? " has" : "s have", n_mixed == 1 ? "es" : "");
+done:
+    free(passes);
     return status;
 }
 
@@ -439,6 +474,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     TRY(name_groups(&s, &made, error));
     TRY(apply_materials(&s, path, options, &made, &found, error));
     TRY(lay_textures(&s, path, unit, &made, &found, error));
+    TRY(find_panes(&s, path, &made, error));
     if (!options->fronts_only) TRY(mark_backs(&s, &made, error));
     if (options->guess_up) found.up = mesh_likely_up(&made);
     if (found.up != 0) made.up = found.up;

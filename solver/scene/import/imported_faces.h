@@ -32,6 +32,7 @@ typedef struct imported_material {
     uint64_t defined;     /* 0: the file only names it */
     uint64_t has_diffuse; /* 0: the file gives none */
     uint64_t two_sided;   /* 1: its faces have it on their backs, too */
+    double transmittance; /* of a pane (scene/glass.h); 0: it is opaque */
     imported_texture textures[TEXTURE_QUANTITIES];
 } imported_material;
 
@@ -145,9 +146,11 @@ void imported_faces_fit_images(imported_faces *s);
 
 /* The parts of a glTF's material that the library does not tell. */
 typedef struct gltf_material {
-    char *name;      /* NULL: it has none */
-    double strength; /* KHR_materials_emissive_strength; 1 */
-    double diffuse;  /* the share of its colour that is not transmitted (KHR_materials_transmission); 1 */
+    char *name;           /* NULL: it has none */
+    double strength;      /* KHR_materials_emissive_strength; 1 */
+    double diffuse;       /* the share of its colour that a diffuse surface has: what is neither transmitted
+                             (KHR_materials_transmission) nor blended with what lies behind (alphaMode); 1 */
+    double transmittance; /* 0: opaque */
     bool two_sided;
     imported_texture textures[TEXTURE_QUANTITIES];
 } gltf_material;

@@ -172,34 +172,58 @@ static void settle_colours(imported_faces *s) {
     }
 }
 
-/* Counts of statements that are not read; clear: the material has a filter (Tf) that lets less than all pass,
- * glass: its illum is one of those of glass, by which a filter counts. */
+/* Counts of statements that are not read. */
 typedef struct left_out {
-    size_t maps, transparent;
-    bool clear, glass;
+    size_t maps, alpha_maps;
 } left_out;
 
 static void count_left_out(char *line, left_out *out) {
     static const char *const maps[] = {"map_Ka", "map_Ks", "map_Ns", "map_Bump", "map_bump", "bump", "norm",
                                        "disp",   "map_Pr", "map_Pm", "map_Ps",   "refl",     "decal"};
-    const char *rest;
-    double number;
     for (size_t k = 0; k < sizeof maps / sizeof *maps; k++) out->maps += after_keyword(line, maps[k]) != NULL;
-    out->transparent += after_keyword(line, "map_d") != NULL;
-    if ((rest = after_keyword(line, "d")) != NULL)
-        out->transparent += read_numbers(rest, 1, &number) == 1 && number < 1;
-    else if ((rest = after_keyword(line, "Tr")) != NULL)
-        out->transparent += read_numbers(rest, 1, &number) == 1 && number > 0;
-    else if ((rest = after_keyword(line, "Tf")) != NULL)
-        out->clear = read_numbers(rest, 1, &number) == 1 && number > 0 && number < 1;
-    else if ((rest = after_keyword(line, "illum")) != NULL)
-        out->glass =
-            read_numbers(rest, 1, &number) == 1 && (number == 4 || number == 6 || number == 7 || number == 9);
+    out->alpha_maps += after_keyword(line, "map_d") != NULL;
 }
 
-static void end_material(left_out *out) {
-    out->transparent += out->clear && out->glass;
-    out->clear = out->glass = false;
+/* The light that a material lets pass, by its statements so far. */
+typedef struct clearness {
+    double opaque;    /* d, or 1 - Tr; 1 */
+    double filter[3]; /* Tf; 1 */
+    bool glass;       /* illum is one of those of glass, by which a filter counts */
+} clearness;
+
+static const clearness opaque = {.opaque = 1, .filter = {1, 1, 1}};
+
+/* Reads d, Tr, Tf or illum; false: the line is none of these. */
+static bool read_clearness(char *line, clearness *c) {
+    char *rest;
+    double number, filter[3];
+    if ((rest = after_keyword(line, "d")) != NULL || (rest = after_keyword(line, "Tr")) != NULL) {
+        const bool turned = line[0] == 'T';
+        if (read_numbers(rest, 1, &number) == 1) c->opaque = fmin(fmax(turned ? 1 - number : number, 0), 1);
+        return true;
+    }
+    if ((rest = after_keyword(line, "Tf")) != NULL) {
+        const size_t n = read_numbers(rest, 3, filter);
+        for (int k = 0; k < 3 && n > 0; k++) c->filter[k] = fmin(fmax(filter[n == 3 ? k : 0], 0), 1);
+        return true;
+    }
+    if ((rest = after_keyword(line, "illum")) != NULL) {
+        c->glass =
+            read_numbers(rest, 1, &number) == 1 && (number == 4 || number == 6 || number == 7 || number == 9);
+        return true;
+    }
+    return false;
+}
+
+/* A material of d < 1 passes the rest, coloured by its filter, and has its diffuse colour in the share d. A
+ * filter below 1 counts by itself where the illum is of glass: many programs write others for opaque
+ * materials. Colours become luminance (Rec. 709). */
+static void end_material(const clearness *c, imported_material *out) {
+    const double filter = .2126 * c->filter[0] + .7152 * c->filter[1] + .0722 * c->filter[2];
+    const bool filters = c->glass && filter > 0 && filter < 1;
+    const double share = c->opaque < 1 ? 1 - c->opaque : filters ? 1 : 0;
+    out->transmittance = share * (filters ? filter : 1);
+    for (int k = 0; k < 3 && c->opaque < 1; k++) out->diffuse[k] *= c->opaque;
 }
 
 static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error) {
@@ -209,11 +233,13 @@ static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error
     char *rest, *text = NULL;
     line_cursor cursor;
     left_out out = {.maps = 0};
+    clearness clear = opaque;
     TRY(file_text(path, &text, &length, error));
     TRY(begin_lines(path, text, length, &cursor, error));
     for (char *line; (line = next_line(&cursor)) != NULL;) {
         if ((rest = after_keyword(line, "newmtl")) != NULL) {
-            end_material(&out);
+            if (current != TABLE_NONE) end_material(&clear, &s->values[current]);
+            clear = opaque;
             TRY(imported_faces_add_material(s, rest, strlen(rest), &current, error));
             if (s->values[current].defined) {
                 import_warn(&s->warnings, "%s:%u: material '%s' is defined again; the first one counts", path,
@@ -232,19 +258,16 @@ static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error
             TRY(read_map(path, s, current, TEXTURE_REFLECTANCE, rest, error));
         } else if ((rest = after_keyword(line, "map_Ke")) != NULL) {
             TRY(read_map(path, s, current, TEXTURE_EMISSION, rest, error));
-        } else
+        } else if (!read_clearness(line, &clear))
             count_left_out(line, &out);
     }
-    end_material(&out);
+    if (current != TABLE_NONE) end_material(&clear, &s->values[current]);
     if (out.maps > 0)
         import_warn(&s->warnings, "%s: %zu map%s of other things than Kd and Ke %s left out", path, out.maps,
                     out.maps == 1 ? "" : "s", out.maps == 1 ? "is" : "are");
-    if (out.transparent > 0)
-        import_warn(
-            &s->warnings,
-            "%s: transparency (d, Tr, Tf, map_d) is left out: what has it is opaque; --portal GROUP takes "
-            "a pane away",
-            path);
+    if (out.alpha_maps > 0)
+        import_warn(&s->warnings, "%s: images of transparency (map_d) are left out: what has one is opaque",
+                    path);
 done:
     free(text);
     return status;

@@ -1,0 +1,34 @@
+/* Form factors and the first bounce of a sky with the light that panes let pass (pane_light.h). */
+#ifndef LAMBERT_FORMFACTOR_GLASS_PANE_FACTORS_H
+#define LAMBERT_FORMFACTOR_GLASS_PANE_FACTORS_H
+
+#include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/visibility/visibility.h"
+
+/* The rays of an element by the cosine, and towards panes, beside form factors of a recipe: half of its own,
+ * from 256 on. */
+size_t panes_rays(const recipe *r);
+
+/* Adds to closed form factors, whose upper triangle f has, the exchange through panes,
+ *     A_i F_ij += A_i F_ij through panes,
+ * and to f->sky, unless that is zero, what comes from the tiles and the ground through panes. Row sums then
+ * are up to 1 + T where a pane is in sight: it receives all of the light that it passes on. f->panes says how
+ * much that is. Does nothing where there are no panes. rays: of pane_light.h, rounded up to a multiple of 8.
+ * Cost: as pane_light_make. Errors: LAM_ERR_MEMORY, LAM_ERR_IO, LAM_ERR_CANCELLED. */
+lam_status panes_add(const mesh *m, const visibility *v, const uint32_t *order,
+                     const form_factor_options *options, size_t rays, uint64_t seed, form_factors *f,
+                     lam_error *error);
+
+/* The same for form factors by blocks, to the sky alone. Errors: also LAM_ERR_ARGUMENT where elements see
+ * each other through panes, which blocks do not have. */
+lam_status panes_add_sky(const mesh *m, const visibility *v, const uint32_t *order,
+                         const form_factor_options *options, size_t rays, uint64_t seed, form_factors *f,
+                         lam_error *error);
+
+/* The same for a sky alone: first bounces of a sky that is closed (sky_bounce_close), whose tiling and ground
+ * it has; ground, [n] or NULL, gets the shares of the ground through panes added. */
+lam_status panes_add_bounce(const mesh *m, const visibility *v, const uint32_t *order,
+                            const form_factor_options *options, size_t rays, uint64_t seed,
+                            sky_bounce *bounce, double *ground, lam_error *error);
+
+#endif

@@ -1,0 +1,158 @@
+#include "solver/scene/glass.h"
+
+#include "store/groups.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DATASET STORE_MESH "/glass"
+#define LAW "glass_law"
+static const char law_angle[] = "angle", law_none[] = "none";
+
+double glass_passes(const struct group_glass *glass, bool by_angle, double cosine) {
+    const double c = fmin(fmax(cosine, 0), 1), sine = sqrt(1 - c * c);
+    const double g = by_angle ? fmin(1, 1.018 * c * (1 + sine * sine * sine)) : 1;
+    const double whole = glass->transmittance * g;
+    return glass->faces > 1 ? pow(whole, 1 / glass->faces) : whole;
+}
+
+double mesh_pane_passes(const mesh *m, size_t element, double cosine) {
+    return glass_passes(&m->glass[m->group[element]], m->glass_by_angle, cosine);
+}
+
+size_t mesh_pane_groups(const mesh *m) {
+    size_t n = 0, fronts = 0;
+    for (size_t i = 0; m->glass != NULL && i < m->n - m->n_backs; i++)
+        if (m->group[i] >= fronts) fronts = m->group[i] + (size_t)1;
+    for (size_t g = 0; g < fronts; g++) n += m->glass[g].transmittance > 0;
+    return n;
+}
+
+lam_status mesh_set_glass(mesh *m, size_t group, const struct group_glass *glass, lam_error *error) {
+    if (m->glass == NULL) m->glass = memory_allocate(m->n_groups, sizeof *m->glass, "panes", error);
+    if (m->glass == NULL) return LAM_ERR_MEMORY;
+    m->n_glass = m->n_groups;
+    m->glass[group] = *glass;
+    return LAM_OK;
+}
+
+lam_status mesh_copy_glass(const mesh *from, mesh *to, lam_error *error) {
+    if (from->glass == NULL) return LAM_OK;
+    to->glass = memory_allocate(from->n_glass, sizeof *to->glass, "panes", error);
+    if (to->glass == NULL) return LAM_ERR_MEMORY;
+    memcpy(to->glass, from->glass, from->n_glass * sizeof *to->glass);
+    to->n_glass = from->n_glass;
+    to->glass_by_angle = from->glass_by_angle;
+    return LAM_OK;
+}
+
+/* An element with its corners in ascending order. */
+typedef struct pane_corners {
+    uint32_t vertex[4], element;
+} pane_corners;
+
+static int compare_corners(const void *a, const void *b) {
+    const pane_corners *x = a, *y = b;
+    for (int k = 0; k < 4; k++)
+        if (x->vertex[k] != y->vertex[k]) return x->vertex[k] < y->vertex[k] ? -1 : 1;
+    return (x->element > y->element) - (x->element < y->element);
+}
+
+static void sort_corners(const mesh *m, uint32_t element, pane_corners *out) {
+    memcpy(out->vertex, m->elements[element], sizeof out->vertex);
+    out->element = element;
+    for (int i = 1; i < 4; i++)
+        for (int k = i; k > 0 && out->vertex[k - 1] > out->vertex[k]; k--) {
+            const uint32_t other = out->vertex[k];
+            out->vertex[k] = out->vertex[k - 1];
+            out->vertex[k - 1] = other;
+        }
+}
+
+/* Takes the marks of panes that lie back to back away again: each is the back of the other. */
+static lam_status unmark_sheets(mesh *m, size_t n_panes, lam_error *error) {
+    pane_corners *all = memory_allocate(n_panes, sizeof *all, "panes", error);
+    size_t n = 0;
+    if (all == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++)
+        if (mesh_is_pane(m, i)) sort_corners(m, (uint32_t)i, &all[n++]);
+    qsort(all, n, sizeof *all, compare_corners);
+    for (size_t k = 1; k < n; k++) {
+        const uint32_t i = all[k - 1].element, j = all[k].element;
+        const float *a = m->normal[i], *b = m->normal[j];
+        if (memcmp(all[k - 1].vertex, all[k].vertex, sizeof all[k].vertex) != 0) continue;
+        if (a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < 0) m->has_back[i] = m->has_back[j] = false;
+    }
+    free(all);
+    return LAM_OK;
+}
+
+/* rho + T <= 1, in single precision, too. */
+static void limit_reflectance(mesh *m, size_t element, glass_report *report) {
+    const float most = (float)(1 - m->glass[m->group[element]].transmittance);
+    bool over = false;
+    for (size_t c = 0; c < m->n_channels; c++) {
+        float *const rho = &m->reflectance[c * m->n + element];
+        if (*rho <= most) continue;
+        report->limited_most = fmax(report->limited_most, (double)*rho);
+        *rho = most;
+        over = true;
+    }
+    report->limited += over;
+}
+
+lam_status mesh_settle_glass(mesh *m, glass_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    *report = (glass_report){.groups = 0};
+    if (m->glass == NULL) return LAM_OK;
+    for (size_t g = 0; g < m->n_groups; g++) report->groups += m->glass[g].transmittance > 0;
+    if (m->has_back == NULL) m->has_back = memory_allocate(m->n, sizeof *m->has_back, "panes", error);
+    if (m->has_back == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++) {
+        if (!mesh_is_pane(m, i)) continue;
+        report->faces++;
+        m->has_back[i] = true;
+        limit_reflectance(m, i, report);
+    }
+    TRY(unmark_sheets(m, report->faces, error));
+done:
+    return status;
+}
+
+lam_status mesh_save_glass(const mesh *m, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t shape[2] = {m->n_glass, 2};
+    if (m->glass == NULL) return LAM_OK;
+    TRY(store_write(s, DATASET, STORE_F64, 2, shape, m->glass, error));
+    TRY(store_set_text(s, STORE_MESH, LAW, m->glass_by_angle ? law_angle : law_none, error));
+done:
+    return status;
+}
+
+lam_status mesh_load_glass(store *s, mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *law = NULL;
+    void *data = NULL;
+    if (!store_has(s, DATASET)) return LAM_OK;
+    TRY(store_get_text(s, STORE_MESH, LAW, &law, error));
+    if (strcmp(law, law_angle) != 0 && strcmp(law, law_none) != 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute " LAW " is '%.20s', must be angle or none",
+             store_path(s), law);
+    TRY(store_read(s, DATASET, STORE_F64, 2, (size_t[]){m->n_groups, 2}, &data, error));
+    m->glass = data;
+    m->n_glass = m->n_groups;
+    m->glass_by_angle = strcmp(law, law_angle) == 0;
+    for (size_t g = 0; g < m->n_groups; g++) {
+        const struct group_glass *of = &m->glass[g];
+        if (!(of->transmittance >= 0 && of->transmittance <= 1))
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/glass[%zu][0] = %g, must be from 0 to 1", store_path(s), g,
+                 of->transmittance);
+        if (of->transmittance > 0 && !(of->faces >= 1 && of->faces <= GLASS_FACES_MOST))
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/glass[%zu][1] = %g, must be from 1 to %d", store_path(s),
+                 g, of->faces, GLASS_FACES_MOST);
+    }
+done:
+    free(law);
+    return status;
+}

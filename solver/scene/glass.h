@@ -1,0 +1,63 @@
+/* Panes: groups of faces that let a part of the light pass, straight on. Owns the law of that part and which
+ * groups are panes; must not know rays.
+ *
+ * A pane of transmittance T at normal incidence passes, of light at the angle t to its normal,
+ *     T g(t),    g(t) = min(1, 1.018 cos t (1 + sin^3 t))
+ * (Rivero 1958, clear glass). Where a ray crosses p faces one behind the other, each passes the p-th root. */
+#ifndef LAMBERT_SCENE_GLASS_H
+#define LAMBERT_SCENE_GLASS_H
+
+#include "solver/scene/mesh.h"
+
+/* A group whose transmittance is 0 is opaque. */
+struct group_glass {
+    double transmittance; /* at normal incidence, of all faces that a ray crosses together; 0 to 1 */
+    double faces;         /* that a ray crosses one behind the other, 1 or more */
+};
+
+/* Faces that a ray crosses at most, one behind the other, of one pane. */
+enum { GLASS_FACES_MOST = 16 };
+
+/* The part of the light that one face passes, of which a ray has this cosine, 0 to 1, to its normal. */
+double glass_passes(const struct group_glass *glass, bool by_angle, double cosine);
+
+static inline bool mesh_is_pane(const mesh *m, size_t element) {
+    return m->glass != NULL && m->glass[m->group[element]].transmittance > 0;
+}
+
+/* The part that an element of a pane passes. */
+double mesh_pane_passes(const mesh *m, size_t element, double cosine);
+
+/* The largest sum of form factors of a row: 1, or 2 where there are panes, which receive all of the light
+ * that they pass on to others. */
+static inline double mesh_row_most(const mesh *m) {
+    return m->glass != NULL ? 2 : 1;
+}
+
+/* The groups that are panes, those of backs left out: these lie behind the others. */
+size_t mesh_pane_groups(const mesh *m);
+
+/* Makes a group a pane, or opaque again. Errors: LAM_ERR_MEMORY. */
+lam_status mesh_set_glass(mesh *m, size_t group, const struct group_glass *glass, lam_error *error);
+
+/* Gives a mesh the panes of another one, by whose groups its elements are numbered. Errors: LAM_ERR_MEMORY.
+ */
+lam_status mesh_copy_glass(const mesh *from, mesh *to, lam_error *error);
+
+/* The panes of a scene, once they are settled. */
+typedef struct glass_report {
+    size_t groups, faces; /* that are panes */
+    size_t limited;       /* faces whose reflectance was more than what they do not pass, and is that now */
+    double limited_most;  /* the largest such reflectance before */
+} glass_report;
+
+/* Settles the panes of a mesh before its backs are made: each face of one gets a back, as light comes from
+ * both sides, unless another face of a pane lies in the same place and looks the other way; and none reflects
+ * more than it does not pass. Does nothing where there are no panes. Errors: LAM_ERR_MEMORY. */
+lam_status mesh_settle_glass(mesh *m, glass_report *report, lam_error *error);
+
+/* /mesh/glass of a store, and its law; nothing where there are no panes. Loading checks every value. */
+lam_status mesh_save_glass(const mesh *m, store *s, lam_error *error);
+lam_status mesh_load_glass(store *s, mesh *m, lam_error *error);
+
+#endif
