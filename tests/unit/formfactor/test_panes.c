@@ -1,0 +1,345 @@
+/* Panes between two black rooms and in a window: form factors and the light of an even sky by every source,
+ * against sums over points in double; sheets, panes of several faces, files and stores. */
+#include "solver/formfactor/glass/pane_light.h"
+#include "solver/formfactor/source.h"
+#include "solver/scene/glass.h"
+#include "store/groups.h"
+#include "support/scene.h"
+
+#include <stdarg.h>
+
+static lam_error error;
+
+typedef struct writer {
+    char text[1 << 15];
+    size_t used;
+} writer;
+
+static void put(writer *w, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    w->used += (size_t)vsnprintf(w->text + w->used, sizeof w->text - w->used, format, arguments);
+    va_end(arguments);
+    ck_assert_uint_lt(w->used, sizeof w->text);
+}
+
+/* n x n squares from a corner along two edges, whose cross product is the normal. */
+static void put_group(writer *w, const char *name, const double corner[3], const double u[3],
+                      const double v[3], int n) {
+    put(w, "o %s\n", name);
+    for (int k = 0; k < n * n; k++) {
+        static const int turn[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        for (int c = 0; c < 4; c++) {
+            const double a = (k % n + turn[c][0]) / (double)n, b = (k / n + turn[c][1]) / (double)n;
+            put(w, "v %.9g %.9g %.9g\n", corner[0] + a * u[0] + b * v[0], corner[1] + a * u[1] + b * v[1],
+                corner[2] + a * u[2] + b * v[2]);
+        }
+        put(w, "f -4 -3 -2 -1\n");
+    }
+}
+
+static const double X[3] = {2, 0, 0}, Y[3] = {0, 2, 0}, Z[3] = {0, 0, 2};
+
+/* The sides of a room from x to x + 2 along x but for those across it. */
+static void put_sides(writer *w, double x, int n) {
+    const double low[3] = {x, 0, 0}, north[3] = {x, 2, 0}, top[3] = {x, 0, 2};
+    put_group(w, "floor", low, X, Y, n);
+    put_group(w, "ceiling", top, Y, X, n);
+    put_group(w, "south", low, Z, X, n);
+    put_group(w, "north", north, X, Z, n);
+}
+
+/* Two rooms of 2 m, side by side, with `panes` panes .01 m apart between them; sheet: of two faces each. */
+static mesh two_rooms(int panes, bool sheet) {
+    writer w = {.used = 0};
+    char folder[64];
+    import_report report;
+    put_group(&w, "west", (const double[3]){0, 0, 0}, Y, Z, 3);
+    put_sides(&w, 0, 3);
+    put_sides(&w, 2, 3);
+    put_group(&w, "east", (const double[3]){4, 0, 0}, Z, Y, 3);
+    for (int k = 0; k < panes; k++) {
+        const double corner[3] = {2 + .01 * k, 0, 0};
+        put_group(&w, "pane", corner, Y, Z, 2);
+        if (sheet) put_group(&w, "pane", corner, Z, Y, 2);
+    }
+    folder_make(folder);
+    mesh m = obj_good(folder, w.text, &report);
+    folder_remove(folder);
+    return m;
+}
+
+static glass_report glaze(mesh *m, double transmittance, double faces, bool by_angle) {
+    const struct group_glass glass = {transmittance, faces};
+    glass_report report;
+    ck_ok(mesh_set_glass(m, group_find(m, "pane"), &glass, &error));
+    m->glass_by_angle = by_angle;
+    ck_ok(mesh_settle_glass(m, &report, &error));
+    ck_ok(mesh_make_backs(m, &error));
+    return report;
+}
+
+static double law(double c) {
+    const double s = sqrt(1 - c * c), g = 1.018 * c * (1 + s * s * s);
+    return g < 1 ? g : 1;
+}
+
+START_TEST(the_law_of_a_pane) {
+    const struct group_glass one = {.78, 1}, two = {.78, 2};
+    ck_assert_double_eq(glass_passes(&one, true, 1), .78);
+    ck_assert_double_eq_tol(glass_passes(&one, true, .5), .78 * 1.018 * .5 * (1 + pow(.75, 1.5)), 1e-14);
+    ck_assert_double_eq(glass_passes(&one, true, 0), 0);
+    ck_assert_double_eq(glass_passes(&one, false, .01), .78);
+    for (int k = 0; k <= 100; k++) {
+        const double c = k / 100., once = glass_passes(&one, true, c), twice = glass_passes(&two, true, c);
+        ck_assert_double_le(once, .78);
+        ck_assert_double_eq_tol(once, .78 * law(c), 1e-14);
+        ck_assert_double_eq_tol(twice * twice, once, 1e-14);
+    }
+}
+END_TEST
+
+/* The mean irradiance of a square across x at 4, or of the floor from x = 2 to 4, by the square at x = 0
+ * whose exitance is 1, through a pane at x = 2 of transmittance T. */
+static double through(bool floor, double T) {
+    enum { N = 20 };
+    double sum = 0;
+    for (int a = 0; a < N; a++)
+        for (int b = 0; b < N; b++)
+            for (int c = 0; c < N; c++)
+                for (int d = 0; d < N; d++) {
+                    const double y = (c + .5) * 2 / N, z = (d + .5) * 2 / N, s = (a + .5) * 2 / N,
+                                 t = (b + .5) * 2 / N;
+                    const double way[3] = {floor ? 2 + s : 4, (floor ? t : s) - y, (floor ? 0 : t) - z};
+                    const double r2 = way[0] * way[0] + way[1] * way[1] + way[2] * way[2], r = sqrt(r2);
+                    const double leaves = way[0] / r, arrives = floor ? -way[2] / r : way[0] / r;
+                    sum += leaves * arrives / (M_PI * r2) * T * law(leaves);
+                }
+    return sum * 4 / pow(N, 4);
+}
+
+static form_factors make(const mesh *m, const recipe *r, const char *sky) {
+    form_factors f;
+    uint32_t *order = calloc(m->n, sizeof *order);
+    for (uint32_t i = 0; i < m->n; i++) order[i] = i;
+    const form_factor_options how = {.recipe = *r, .sky = sky};
+    ck_ok(form_factors_make(m, order, &how, &f, &error));
+    free(order);
+    return f;
+}
+
+/* The part of the light of group `from` that reaches the group `to`. */
+static double share(const mesh *m, const form_factors *f, const char *from, const char *to) {
+    const size_t source = group_find(m, from), target = group_find(m, to);
+    double sum = 0, area = 0;
+    for (size_t i = 0; i < m->n; i++) {
+        if (m->group[i] != source) continue;
+        area += m->area[i];
+        for (uint64_t p = f->F.indptr[i]; p < f->F.indptr[i + 1]; p++)
+            if (m->group[f->F.indices[p]] == target) sum += m->area[i] * (double)f->F.data[p];
+    }
+    return sum / area;
+}
+
+static const recipe recipes[] = {{.source = &source_pairs, .rays = 4096, .accuracy = 7e-5, .seed = 1},
+                                 {.source = &source_near_pairs, .rays = 4096, .accuracy = 7e-5, .seed = 2},
+                                 {.source = &source_rays, .rays = 4096, .seed = 3},
+                                 {.source = &source_hemicube, .rays = 4096, .resolution = 64, .seed = 4}};
+enum { RECIPES = sizeof recipes / sizeof *recipes };
+
+/* Rays leave 1 % of noise in the light of a group; quadrature of 20 points a side is good to .5 %. */
+static const double noise = .02;
+
+START_TEST(light_passes_from_room_to_room) {
+    static const double T = .78;
+    mesh m = two_rooms(1, false);
+    ck_assert_uint_eq(glaze(&m, T, 1, true).faces, 4);
+    ck_assert_uint_eq(m.n_backs, 4);
+    const form_factors f = make(&m, &recipes[_i], NULL);
+    const double east = through(false, T), direct = share(&m, &f, "west", "pane.back");
+    ck_assert_double_eq_tol(share(&m, &f, "west", "east"), east, noise * east);
+    ck_assert_double_eq_tol(share(&m, &f, "east", "west"), east, noise * east);
+    /* All that meets the pane comes to it: .19982 of the light of the opposite side of a cube; the pixels of
+     * a hemicube see .003 more. */
+    ck_assert_double_eq_tol(direct, .19982, 4e-3);
+    ck_assert_double_eq(share(&m, &f, "west", "pane"), 0);
+    ck_assert_double_gt(f.panes, .02);
+    for (size_t i = 0; i < m.n; i++) ck_assert_double_le(f.row_sums[i], 1 + T);
+    form_factors g = f;
+    form_factors_free(&g);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(panes_of_several_faces) {
+    static const double T = .78;
+    const double one = through(false, T);
+    mesh sheet = two_rooms(1, true), two = two_rooms(2, false), plain = two_rooms(1, false);
+    ck_assert_uint_eq(glaze(&sheet, T, 1, true).faces, 8);
+    ck_assert_uint_eq(sheet.n_backs, 0); /* each face is the back of the other */
+    glaze(&two, T, 2, true);
+    glaze(&plain, T, 1, false);
+    form_factors f = make(&sheet, &recipes[2], NULL), g = make(&two, &recipes[2], NULL),
+                 h = make(&plain, &recipes[2], NULL);
+    ck_assert_double_eq_tol(share(&sheet, &f, "west", "east"), one, noise * one);
+    ck_assert_double_eq_tol(share(&two, &g, "west", "east"), one, noise * one);
+    /* Without the law a pane passes T of what an open side passes: .0686 of two squares at twice their side.
+     */
+    ck_assert_double_eq_tol(share(&plain, &h, "west", "east"), T * .06859, noise * one);
+    form_factors_free(&f);
+    form_factors_free(&g);
+    form_factors_free(&h);
+    mesh_free(&sheet);
+    mesh_free(&two);
+    mesh_free(&plain);
+}
+END_TEST
+
+/* The mean irradiance of the floor of a room whose east side is a pane, under a sky of radiance 1: N points a
+ * side, N - |c| of the pairs of which lie c apart along the pane. */
+static double floor_by_sky_of(int N, double T) {
+    double sum = 0;
+    for (int a = 0; a < N; a++)
+        for (int c = 1 - N; c < N; c++)
+            for (int d = 0; d < N; d++) {
+                const double way[3] = {2 - (a + .5) * 2 / N, c * 2. / N, (d + .5) * 2 / N};
+                const double r2 = way[0] * way[0] + way[1] * way[1] + way[2] * way[2], r = sqrt(r2);
+                sum += (N - abs(c)) * way[0] / r * way[2] / r / r2 * T * law(way[0] / r);
+            }
+    return sum * 4 / pow(N, 4);
+}
+
+/* The edge that floor and pane share leaves an error of first order in 1 / N, which two sums cancel. */
+static double floor_by_sky(double T) {
+    return 2 * floor_by_sky_of(120, T) - floor_by_sky_of(60, T);
+}
+
+START_TEST(an_even_sky_shines_through) {
+    static const double T = .78;
+    static const recipe blocks = {.source = &source_blocks, .rays = 4096, .accuracy = 1e-4, .seed = 5};
+    writer w = {.used = 0};
+    char folder[64];
+    import_report report;
+    double between = 1, irradiance = 0, area = 0;
+    form_factors f;
+    put_group(&w, "west", (const double[3]){0, 0, 0}, Y, Z, 3);
+    put_sides(&w, 0, 3);
+    put_group(&w, "pane", (const double[3]){2, 0, 0}, Y, Z, 2);
+    folder_make(folder);
+    mesh m = obj_good(folder, w.text, &report);
+    folder_remove(folder);
+    glaze(&m, T, 1, true);
+    visibility *v = NULL;
+    ck_ok(visibility_create(&m, &v, &error));
+    ck_ok(pane_light_between(&m, v, &between, &error));
+    visibility_destroy(v);
+    ck_assert_double_eq(between, 0);
+    if (_i < RECIPES) {
+        f = make(&m, &recipes[_i], "tregenza");
+    } else {
+        plane_tree tree;
+        block_factors made;
+        uint32_t *order = calloc(m.n, sizeof *order);
+        for (uint32_t i = 0; i < m.n; i++) order[i] = i;
+        const form_factor_options how = {.recipe = blocks, .sky = "tregenza"};
+        ck_ok(form_factors_tree(&m, &tree, &error));
+        ck_ok(form_factors_make_blocks(&m, order, &tree, NULL, &how, &f, &made, &error));
+        block_factors_free(&made);
+        plane_tree_free(&tree);
+        free(order);
+    }
+    for (size_t i = 0; i < m.n; i++) {
+        if (m.group[i] != group_find(&m, "floor")) continue;
+        area += m.area[i];
+        for (size_t t = 0; t < f.sky.tiling.n_tiles; t++)
+            irradiance += m.area[i] * (double)f.sky.first_bounce[t * m.n + i];
+    }
+    const double wanted = floor_by_sky(T);
+    ck_assert_double_eq_tol(irradiance / area, wanted, .01 * wanted);
+    ck_assert_double_eq(f.panes, 0);
+    form_factors_free(&f);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(blocks_refuse_light_between_elements) {
+    mesh m = two_rooms(1, false);
+    plane_tree tree;
+    block_factors made;
+    form_factors f;
+    glaze(&m, .78, 1, true);
+    uint32_t *order = calloc(m.n, sizeof *order);
+    for (uint32_t i = 0; i < m.n; i++) order[i] = i;
+    const form_factor_options how = {
+        .recipe = {.source = &source_blocks, .rays = 64, .accuracy = 1e-3, .seed = 5}};
+    ck_ok(form_factors_tree(&m, &tree, &error));
+    ck_assert_int_eq(form_factors_make_blocks(&m, order, &tree, NULL, &how, &f, &made, &error),
+                     LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "panes"));
+    plane_tree_free(&tree);
+    free(order);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(reflectance_leaves_room_for_what_passes) {
+    mesh m = two_rooms(1, false); /* of .5 */
+    const glass_report report = glaze(&m, .78, 1, true);
+    ck_assert_uint_eq(report.limited, 4);
+    ck_assert_double_eq(report.limited_most, .5);
+    for (size_t i = 0; i < m.n; i++) {
+        const double rho = (double)m.reflectance[i];
+        if (mesh_is_pane(&m, i))
+            ck_assert_double_le(rho + .78, 1 + 1e-7);
+        else
+            ck_assert_double_eq(rho, .5);
+    }
+    mesh_free(&m);
+}
+END_TEST
+
+/* A store keeps panes and their law, and wrong numbers are refused by their place. */
+START_TEST(stores_keep_panes) {
+    char folder[64], path[256];
+    mesh m = two_rooms(1, false), again = {0};
+    store *s = NULL;
+    glaze(&m, .78, 2, false);
+    folder_make(folder);
+    for (int wrong = 0; wrong < 3; wrong++) {
+        snprintf(path, sizeof path, "%s/panes-%d.h5", folder, wrong);
+        ck_ok(store_create(path, &s, &error));
+        if (wrong == 1) m.glass[group_find(&m, "pane")].transmittance = 1.5;
+        if (wrong == 2) m.glass[group_find(&m, "pane")] = (struct group_glass){.5, 0};
+        ck_ok(mesh_save(&m, NULL, s, &error));
+        ck_ok(store_seal(s, &error));
+        ck_ok(store_open(path, &s, &error));
+        if (wrong > 0) {
+            ck_assert_int_eq(mesh_load(s, &again, NULL, &error), LAM_ERR_FORMAT);
+            ck_assert_ptr_nonnull(strstr(error.message, "/mesh/glass["));
+        } else {
+            ck_ok(mesh_load(s, &again, NULL, &error));
+            ck_assert_uint_eq(again.n_glass, m.n_groups);
+            ck_assert_mem_eq(again.glass, m.glass, m.n_groups * sizeof *m.glass);
+            ck_assert(!again.glass_by_angle);
+            mesh_free(&again);
+        }
+        store_close(s);
+    }
+    folder_remove(folder);
+    mesh_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("panes");
+    TCase *tests = tcase_create("panes");
+    tcase_add_test(tests, the_law_of_a_pane);
+    tcase_add_loop_test(tests, light_passes_from_room_to_room, 0, RECIPES);
+    tcase_add_test(tests, panes_of_several_faces);
+    tcase_add_loop_test(tests, an_even_sky_shines_through, 0, RECIPES + 1);
+    tcase_add_test(tests, blocks_refuse_light_between_elements);
+    tcase_add_test(tests, reflectance_leaves_room_for_what_passes);
+    tcase_add_test(tests, stores_keep_panes);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}
