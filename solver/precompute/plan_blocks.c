@@ -68,7 +68,7 @@ lam_status plan_blocks_possible(const precompute_job *job, precompute_scene *sce
         FAIL(
             error, LAM_ERR_ARGUMENT,
             "--form-factors blocks: %.2g %% of the light comes to other elements through panes, which blocks "
-            "do not have; give --form-factors pairs or rays",
+            "do not have; give --form-factors rays",
             100 * scene->panes_between);
     TRY(scene_make_tree(scene, error));
     *possible = asked || is_possible(&scene->tree);

@@ -10,7 +10,7 @@
 static const char stage[] = "light through panes";
 
 size_t panes_rays(const recipe *r) {
-    enum { LEAST = 256 };
+    enum { LEAST = 512 };
     return r->rays / 2 > LEAST ? r->rays / 2 : LEAST;
 }
 
@@ -131,7 +131,7 @@ lam_status panes_add_sky(const mesh *m, const visibility *v, const uint32_t *ord
     if (between > 0)
         FAIL(error, LAM_ERR_ARGUMENT,
              "blocks: %.2g %% of the light comes to other elements through panes, which blocks do not have; "
-             "give --form-factors pairs or rays",
+             "give --form-factors rays",
              100 * between);
     if (f->sky.first_bounce != NULL)
         TRY(panes_add_bounce(m, v, order, options, rays, seed, &f->sky, NULL, error));

@@ -6,7 +6,7 @@
 #include "solver/formfactor/visibility/visibility.h"
 
 /* The rays of an element by the cosine, and towards panes, beside form factors of a recipe: half of its own,
- * from 256 on. */
+ * from 512 on. */
 size_t panes_rays(const recipe *r);
 
 /* Adds to closed form factors, whose upper triangle f has, the exchange through panes,

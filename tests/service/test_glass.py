@@ -1,0 +1,255 @@
+"""Panes: files whose materials let light pass, --glass, the sky and the sun through a window, rooms that see each other
+through a pane by every source and kind, the walks that judge them, and what is refused."""
+
+import json
+import pathlib
+import tempfile
+import unittest
+
+import h5py
+import numpy as np
+
+from command import lambert, must
+from weather import sun, wea
+
+TAU = .78
+
+
+def law(cosine):
+    return np.minimum(1, 1.018 * cosine * (1 + np.sqrt(1 - cosine ** 2) ** 3))
+
+
+class Obj:
+    def __init__(self):
+        self.lines, self.n = ["mtllib s.mtl"], 0
+
+    def quad(self, group, material, *corners):
+        self.lines.append(f"o {group}\nusemtl {material}")
+        self.lines.extend("v %.9g %.9g %.9g" % tuple(corner) for corner in corners)
+        self.lines.append("f " + " ".join(str(self.n + k + 1) for k in range(4)))
+        self.n += 4
+
+    def sides(self, x):
+        """The sides of a room of 2 m but for those across x."""
+        self.quad("floor", "w", (x, 0, 0), (x + 2, 0, 0), (x + 2, 2, 0), (x, 2, 0))
+        self.quad("ceiling", "w", (x, 0, 2), (x, 2, 2), (x + 2, 2, 2), (x + 2, 0, 2))
+        self.quad("south", "w", (x, 0, 0), (x, 0, 2), (x + 2, 0, 2), (x + 2, 0, 0))
+        self.quad("north", "w", (x, 2, 0), (x + 2, 2, 0), (x + 2, 2, 2), (x, 2, 2))
+
+    def text(self):
+        return "\n".join(self.lines) + "\n"
+
+
+def two_rooms():
+    o = Obj()
+    o.quad("west", "lamp", (0, 0, 0), (0, 2, 0), (0, 2, 2), (0, 0, 2))
+    o.sides(0)
+    o.sides(2)
+    o.quad("east", "w", (4, 0, 0), (4, 0, 2), (4, 2, 2), (4, 2, 0))
+    o.quad("pane", "g", (2, 0, 0), (2, 2, 0), (2, 2, 2), (2, 0, 2))
+    return o.text()
+
+
+def window_room(pane=True):
+    """4 x 3 x 2.5 m with a window of 2 x 1.5 m in the south; the sun shines in at noon."""
+    o = Obj()
+    o.quad("floor", "w", (0, 0, 0), (4, 0, 0), (4, 3, 0), (0, 3, 0))
+    o.quad("ceiling", "w", (0, 0, 2.5), (0, 3, 2.5), (4, 3, 2.5), (4, 0, 2.5))
+    o.quad("north", "w", (0, 3, 0), (4, 3, 0), (4, 3, 2.5), (0, 3, 2.5))
+    o.quad("west", "w", (0, 0, 0), (0, 3, 0), (0, 3, 2.5), (0, 0, 2.5))
+    o.quad("east", "w", (4, 0, 0), (4, 0, 2.5), (4, 3, 2.5), (4, 3, 0))
+    for a, b, c, d in ((0, 1, 0, 2.5), (3, 4, 0, 2.5), (1, 3, 0, .5), (1, 3, 2, 2.5)):
+        o.quad("wall", "w", (a, 0, c), (a, 0, d), (b, 0, d), (b, 0, c))
+    if pane:
+        o.quad("pane", "g", (1, 0, .5), (3, 0, .5), (3, 0, 2), (1, 0, 2))
+    return o.text()
+
+
+def paint(wall, pane=f"Kd 0 0 0\nd {1 - TAU:g}", lamp="Ke 1 1 1"):
+    return f"newmtl w\nKd {wall}\nnewmtl lamp\nKd {wall}\n{lamp}\nnewmtl g\n{pane}\n"
+
+
+INSIDE = ("floor", "ceiling", "north", "west", "east", "wall")
+
+
+class Glass(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="lambert-glass-")
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def write(self, obj, mtl):
+        (self.folder / "s.obj").write_text(obj)
+        (self.folder / "s.mtl").write_text(mtl)
+        return self.folder / "s.obj"
+
+    def precompute(self, *options, name="s.h5"):
+        out = self.folder / name
+        done = must("precompute", self.folder / "s.obj", "-o", out, *options, "--verbose")
+        return out, done.stderr
+
+    def means(self, store, *options):
+        groups = self.groups(store)
+        asked = [word for g in groups for word in ("--reduce", f"{g}=mean")]
+        out = json.loads(must("solve", store, *options, "--quantity", "irradiance", *asked, "--json").stdout)
+        return {group: np.ravel(out["groups"][group]["mean"])[0] for group in groups}
+
+    @staticmethod
+    def groups(store):
+        with h5py.File(store) as f:
+            return [name.decode() for name in f["mesh/group_names"][:]]
+
+    def test_materials_that_let_light_pass(self):
+        cases = {"Kd .2 .2 .2\nd .22": (.78, .044), "Kd .2 .2 .2\nTr .78": (.78, .044),
+                 "Kd 0 0 0\nTf .88 .88 .88\nillum 6": (.88, 0), "Kd .5 .5 .5\nTf .88 .88 .88\nillum 4": (.88, .12),
+                 "Tf 1 0 0\nd .5\nillum 9": (.5 * .2126, 0), "Kd .3 .3 .3\nTf .88 .88 .88\nillum 2": (0, .3),
+                 "Kd .3 .3 .3\nTf 1 1 1\nillum 4": (0, .3), "Kd .3 .3 .3\nmap_d a.png": (0, .3)}
+        for pane, (passes, reflects) in cases.items():
+            self.write(window_room(), paint(".5 .5 .5", pane))
+            store, log = self.precompute("--mesh", "faces", "--probes", 0)
+            with h5py.File(store) as f:
+                names = [name.decode() for name in f["mesh/group_names"][:]]
+                glass = f["mesh/glass"][:, 0] if "mesh/glass" in f else np.zeros(len(names))
+                rho = f["mesh/reflectance"][0][f["mesh/group"][:] == names.index("pane")]
+            self.assertAlmostEqual(glass[names.index("pane")], passes, places=9, msg=pane)
+            np.testing.assert_allclose(rho, reflects, atol=1e-6, err_msg=pane)
+            self.assertEqual("pane.back" in names, passes > 0)
+            self.assertEqual(f"pane {passes:.3g}" in log, passes > 0, log)
+            self.assertEqual("reflect up to" in log, passes + .5 > 1 and ".5 .5 .5\nTf" in pane, log)
+
+    def test_glTF(self):
+        material = {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 1], "metallicFactor": 0}}
+        clear = {"KHR_materials_transmission": {"transmissionFactor": .9}}
+        base = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+                "nodes": [{"mesh": 0, "name": "paper"}, {"mesh": 1, "name": "pane"}],
+                "buffers": [{"byteLength": 72, "uri": "s.bin"}],
+                "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 36}],
+                "accessors": [{"bufferView": k, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, k],
+                               "max": [1, 1, k]} for k in (0, 1)],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": k}, "material": k}]} for k in (0, 1)]}
+        (self.folder / "s.bin").write_bytes(
+            np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]], "<f4").tobytes())
+        blend = {"pbrMetallicRoughness": {"baseColorFactor": [.5, .5, .5, .25], "metallicFactor": 0}, "alphaMode": "BLEND"}
+        for pane, passes, reflects in ((dict(material, extensions=clear), .9, .1), (blend, .75, .125)):
+            base["materials"] = [material, dict(pane, name="glass")]
+            base["extensionsUsed"] = ["KHR_materials_transmission"]
+            (self.folder / "s.gltf").write_text(json.dumps(base))
+            out = self.folder / "g.h5"
+            log = must("precompute", self.folder / "s.gltf", "-o", out, "--mesh", "faces", "--verbose").stderr
+            with h5py.File(out) as f:
+                self.assertAlmostEqual(f["mesh/glass"][1, 0], passes, places=6)
+                np.testing.assert_allclose(f["mesh/reflectance"][0][[1, 2]], reflects, atol=1e-6)
+            self.assertIn("light passes 1 face of panes", log)
+            self.assertNotIn("left out", log)
+
+    def test_rooms_see_each_other_by_every_source_and_kind(self):
+        self.write(two_rooms(), paint(".5 .5 .5", f"Kd .1 .1 .1\nd {1 - TAU:g}"))
+        wanted = None
+        for options, delta in ((["--method", "exact"], 0), (["--form-factors", "rays"], .03),
+                               (["--form-factors", "hemicube"], .03), (["--method", "hierarchical"], .03),
+                               (["--emitters", "group=west"], .03), (["--method", "exact", "--two-sided"], .03),
+                               (["--method", "low-rank"], .15), (["--method", "sparse"], .15), (["--method", "2msc"], .15)):
+            rays = [] if "hemicube" in options else ["--rays", 2048]
+            store, _ = self.precompute("--elements", 200, *rays, *options, "--probes", 4, name="k.h5")
+            found = self.means(store)
+            wanted = wanted or found
+            self.assertGreater(found["floor"], 0)
+            for group in ("east", "pane", "pane.back"):  # kinds that compress err by more
+                self.assertAlmostEqual(found[group], wanted[group], delta=delta * wanted[group] if delta < .1 else
+                                       delta * wanted["pane.back"], msg=f"{options} {group}")
+        checks = json.loads(must("verify", self.folder / "k.h5", "--json").stdout)
+        self.assertNotIn("broken", [c["result"] for c in checks["checks"]])
+        # Walks know no form factor between elements.
+        store, _ = self.precompute("--elements", 200, "--method", "exact", name="exact.h5")
+        self.assertGreater(found["east"], .02)
+        must("verify", store, "--walks", 4096)
+
+    def test_sky_through_a_window(self):
+        """Under an even sky the share that a pane passes is the mean of its law over what each point sees."""
+        for name, pane, options in (("open", False, []), ("pane", True, []), ("none", True, ["--glass-law", "none"])):
+            self.write(window_room(pane), paint("0 0 0"))
+            self.precompute("--elements", 400, "--sky", "reinhart:2", "--rays", 4096, "--probes", 0, *options,
+                            name=name + ".h5")
+        found = {name: self.means(self.folder / (name + ".h5"), "--sky", "even") for name in ("open", "pane", "none")}
+        for group in INSIDE:
+            whole = found["open"][group]
+            if whole > 1:
+                self.assertAlmostEqual(found["none"][group] / whole, TAU, delta=.01, msg=group)
+        # A point of the floor: sums over the window.
+        n = 200
+        x, z = np.meshgrid(1 + (np.arange(n) + .5) * 2 / n, .5 + (np.arange(n) + .5) * 1.5 / n)
+        floor, area = np.meshgrid((np.arange(8) + .5) / 2, (np.arange(8) + .5) * 3 / 8), 3 / n ** 2
+        sums = np.zeros(2)
+        for px, py in zip(floor[0].ravel(), floor[1].ravel()):
+            r2 = (x - px) ** 2 + py ** 2 + z ** 2
+            cosine = py / np.sqrt(r2)
+            each = z / np.sqrt(r2) * cosine / r2 * area
+            sums += (each.sum(), (each * TAU * law(cosine)).sum())
+        self.assertAlmostEqual(found["pane"]["floor"] / found["open"]["floor"], sums[1] / sums[0], delta=.01)
+
+    def test_sun_through_a_window(self):
+        hours = [(month, 21, hour + .5, 800, 0) for month in (3, 6, 12) for hour in range(9, 16)]
+        (self.folder / "s.wea").write_text(wea(hours))
+        entering, bare = [], []
+        for month, day, hour, direct, _ in hours:
+            cosine = max(0, -sun(2001, month, day, hour)[1])
+            bare.append(3 * direct * cosine)
+            entering.append(3 * direct * cosine * TAU * law(cosine))
+        for pane, wanted in ((True, entering), (False, bare)):
+            self.write(window_room(pane), paint("0 0 0"))
+            store, _ = self.precompute("--elements", 800, "--sky", "tregenza", "--probes", 0)
+            out = self.folder / "h.npy"
+            must("solve", store, "--weather", self.folder / "s.wea", "--sun", "exact", "--sun-points", 64, "--quantity",
+                 "irradiance", "-o", out)
+            H = np.load(out)
+            with h5py.File(store) as f:
+                inside = np.isin(f["mesh/group"][:], [k for k, g in enumerate(self.groups(store)) if g in INSIDE])
+                area = f["mesh/area"][:]
+            # The way out of the room, and the sky of the store, do not count: walls are black and the sky is dark.
+            np.testing.assert_allclose(H[:, inside] @ area[inside], wanted, rtol=.01)
+
+    def test_a_thick_pane_and_names_on_the_command_line(self):
+        o = Obj()
+        o.lines, o.n = window_room(False).splitlines(), 36
+        o.quad("glass", "w", (1, 0, .5), (3, 0, .5), (3, 0, 2), (1, 0, 2))
+        o.quad("glass", "w", (1, -.006, .5), (1, -.006, 2), (3, -.006, 2), (3, -.006, .5))
+        self.write(o.text(), paint("0 0 0"))
+        thick, log = self.precompute("--elements", 400, "--sky", "tregenza", "--rays", 4096, "--probes", 0, "--glass",
+                                     "gla*=.78,2")
+        self.assertIn("glass 0.78 in 2 faces", log)
+        self.write(window_room(), paint("0 0 0"))
+        thin, _ = self.precompute("--elements", 400, "--sky", "tregenza", "--rays", 4096, "--probes", 0, name="t.h5")
+        a, b = self.means(thick, "--sky", "even"), self.means(thin, "--sky", "even")
+        for group in ("floor", "north"):
+            self.assertAlmostEqual(a[group] / b[group], 1, delta=.02)
+        opaque, _ = self.precompute("--elements", 400, "--sky", "tregenza", "--glass", "pane=0", "--probes", 0)
+        self.assertEqual(self.means(opaque, "--sky", "even")["floor"], 0)
+
+    def test_refusals(self):
+        self.write(two_rooms(), paint(".5 .5 .5"))
+        for options, says in ((["--glass", "pane"], "must be GROUP=T"), (["--glass", "pane=1.2"], "from 0 to 1"),
+                              (["--glass", "pane=.78,0"], "from 1 to 16"), (["--glass", "pane=.78,1.5"], "whole number"),
+                              (["--glass", "pane=.78x"], "'x' is left over"), (["--glass", "pain=.78"], "pain"),
+                              (["--glass-law", "angel"], "angle"),
+                              (["--form-factors", "blocks", "--elements", 2000], "through panes"),
+                              (["--positions", "lamp.json"], "panes")):
+            done = lambert("precompute", self.folder / "s.obj", "-o", self.folder / "r.h5", *options)
+            self.assertNotEqual(done.returncode, 0, options)
+            self.assertIn(says, done.stderr)
+            self.assertFalse((self.folder / "r.h5").exists())
+
+    def test_a_store_keeps_its_panes(self):
+        self.write(window_room(), paint(".5 .5 .5"))
+        store, _ = self.precompute("--elements", 400, "--sky", "tregenza", "--keep-form-factors", "--probes", 0)
+        again = self.folder / "again.h5"
+        done = lambert("precompute", store, "-o", again, "--glass", "pane=.5")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("--glass", done.stderr)
+        must("precompute", store, "-o", again, "--method", "exact", "--probes", 0)
+        with h5py.File(store) as a, h5py.File(again) as b:
+            np.testing.assert_array_equal(a["mesh/glass"][:], b["mesh/glass"][:])
+            self.assertEqual(b["mesh"].attrs["glass_law"], b"angle")
+
+
+if __name__ == "__main__":
+    unittest.main()
