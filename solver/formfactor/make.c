@@ -20,6 +20,7 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     form_factor_options own = *asked;
     const form_factor_options *const options = &own;
     const factor_source *const source = recipe_source(&asked->recipe);
+    const pane_samples through = panes_beside(&options->recipe);
     form_factors f = {.recipe = options->recipe};
     TRY(recipe_check(&options->recipe, error));
     if (source->make == NULL)
@@ -35,7 +36,7 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     TRY(visibility_create(m, &v, error));
     TRY(source->make(m, v, order, options, &f, error));
     if (asked->sky != NULL) TRY(leaving_to_sky(&f, m, error));
-    TRY(panes_add(m, v, order, options, panes_rays(&options->recipe), options->recipe.seed, &f, error));
+    TRY(panes_add(m, v, order, options, &through, &f, error));
     if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
     *out = f;
     f = (form_factors){0};

@@ -212,6 +212,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     const recipe *r = &options->recipe;
     form_factors f = {.recipe = *r};
     block_factors made = {.n = 0};
+    const pane_samples through = panes_beside(r);
     block_scene *own = NULL, *scene = options->ready;
     double *targets = NULL;
     bool known = false;
@@ -247,7 +248,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     TRY(balance_blocks(&f, m, &made, known ? targets : options->row_sums, judged != NULL ? judge_balance : 0,
                        error));
     if (f.sky.first_bounce != NULL) TRY(leaving_to_sky(&f, m, error));
-    TRY(panes_add_sky(m, block_scene_visibility(scene), order, options, panes_rays(r), r->seed, &f, error));
+    TRY(panes_add_sky(m, block_scene_visibility(scene), order, options, &through, &f, error));
     *out = f;
     *blocks = made;
     f = (form_factors){0};

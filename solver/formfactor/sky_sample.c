@@ -22,6 +22,7 @@ lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounc
     how.recipe.source = &source_rays;
     how.without_rows = true;
     how.bounce = &made;
+    const pane_samples through = panes_beside(&how.recipe);
     if (scale == NULL || ground == NULL) TRY(LAM_ERR_MEMORY);
     TRY(sky_bounce_create(like->tiling.name, m->up, like->ground_albedo, m->n, &made, error));
     TRY(visibility_create(m, &v, error));
@@ -29,7 +30,7 @@ lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounc
     for (size_t i = 0; i < m->n; i++) scale[i] = 1;
     memcpy(ground, made.ground, m->n * sizeof *ground);
     sky_bounce_close(&made, scale);
-    TRY(panes_add_bounce(m, v, order, &how, panes_rays(&how.recipe), how.recipe.seed, &made, ground, error));
+    TRY(panes_add_bounce(m, v, order, &how, &through, &made, ground, error));
     made.ground = ground;
     *out = made;
     ground = NULL;

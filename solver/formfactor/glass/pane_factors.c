@@ -9,21 +9,22 @@
 
 static const char stage[] = "light through panes";
 
-size_t panes_rays(const recipe *r) {
+pane_samples panes_beside(const recipe *r) {
     enum { LEAST = 512 };
-    return r->rays / 2 > LEAST ? r->rays / 2 : LEAST;
+    return (pane_samples){
+        .rays = r->rays / 2 > LEAST ? r->rays / 2 : LEAST, .n_seeds = 1, .seeds = {r->seed}};
 }
 
-/* The rows, unless rows is NULL, and the bins of a sky, unless bounce is NULL. */
+/* The rows of sample k, unless rows is NULL, and the bins of a sky, unless bounce is NULL. */
 static lam_status find(const mesh *m, const visibility *v, const uint32_t *order,
-                       const form_factor_options *options, size_t rays, uint64_t seed, packed_rows *rows,
-                       sky_bounce *bounce, lam_error *error) {
+                       const form_factor_options *options, const pane_samples *samples, size_t k,
+                       packed_rows *rows, sky_bounce *bounce, lam_error *error) {
     lam_status status = LAM_OK;
     packed_rows unused = {0};
-    const recipe how = {.source = options->recipe.source, .rays = rays, .seed = seed};
+    const size_t rays = (samples->rays + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET * VISIBILITY_PACKET;
+    const recipe how = {.source = options->recipe.source, .rays = rays, .seed = samples->seeds[k]};
     const pane_light_options wanted = {.recipe = &how,
-                                       .rays = (rays + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET *
-                                               VISIBILITY_PACKET,
+                                       .rays = rays,
                                        .sky = bounce,
                                        .without_rows = rows == NULL,
                                        .progress = options->progress,
@@ -34,18 +35,19 @@ done:
     return status;
 }
 
-/* first_bounce += that of the bins through panes. */
-static lam_status add_bins(sky_bounce *bins, sky_bounce *bounce, double *ground, lam_error *error) {
+/* first_bounce += share times that of the bins through panes. */
+static lam_status add_bins(sky_bounce *bins, double share, sky_bounce *bounce, double *ground,
+                           lam_error *error) {
     const size_t count = bounce->tiling.n_tiles * bounce->n;
-    double *ones = memory_allocate(bounce->n, sizeof *ones, "light through panes", error);
-    if (ones == NULL) return LAM_ERR_MEMORY;
+    double *shares = memory_allocate(bounce->n, sizeof *shares, stage, error);
+    if (shares == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < bounce->n; i++) {
-        ones[i] = 1;
-        if (ground != NULL) ground[i] += bins->ground[i];
+        shares[i] = share;
+        if (ground != NULL) ground[i] += share * bins->ground[i];
     }
-    sky_bounce_close(bins, ones);
+    sky_bounce_close(bins, shares);
     for (size_t k = 0; k < count; k++) bounce->first_bounce[k] += bins->first_bounce[k];
-    free(ones);
+    free(shares);
     return LAM_OK;
 }
 
@@ -77,52 +79,70 @@ static double add_sums(const csr *more, const double *area, form_factors *f) {
     return sum / all;
 }
 
-lam_status panes_add(const mesh *m, const visibility *v, const uint32_t *order,
-                     const form_factor_options *options, size_t rays, uint64_t seed, form_factors *f,
-                     lam_error *error) {
+/* upper += share times the rows, which are freed. */
+static lam_status add_rows(const mesh *m, packed_rows *rows, double share, form_factors *f,
+                           lam_error *error) {
     lam_status status = LAM_OK;
-    packed_rows rows = {0};
-    sky_bounce bins = {.n = 0};
     csr more = {.n = 0}, sum = {.n = 0};
-    const sky_bounce *sky = &f->sky;
-    if (m->glass == NULL) return LAM_OK;
-    if (sky->first_bounce != NULL)
-        TRY(sky_bounce_create(sky->tiling.name, m->up, sky->ground_albedo, m->n, &bins, error));
-    TRY(find(m, v, order, options, rays, seed, &rows, sky->first_bounce != NULL ? &bins : NULL, error));
-    if (sky->first_bounce != NULL) TRY(add_bins(&bins, &f->sky, NULL, error));
-    TRY(upper_merge(&rows, 1, m->area, NULL, &more, error));
-    packed_rows_free(&rows);
+    TRY(upper_merge(rows, 1, m->area, NULL, &more, error));
+    packed_rows_free(rows);
     if (more.indptr[more.n] == 0) goto done;
-    f->panes = add_sums(&more, m->area, f);
+    for (uint64_t p = 0; p < more.indptr[more.n]; p++) more.data[p] *= (float)share;
+    f->panes += add_sums(&more, m->area, f);
     add_common(&f->upper, &more);
     TRY(csr_replace(&f->upper, &more, &sum, error));
     csr_free(&f->upper);
     f->upper = sum;
     sum = (csr){.n = 0};
 done:
-    packed_rows_free(&rows);
-    sky_bounce_free(&bins);
     csr_free(&more);
     csr_free(&sum);
     return status;
 }
 
+lam_status panes_add(const mesh *m, const visibility *v, const uint32_t *order,
+                     const form_factor_options *options, const pane_samples *samples, form_factors *f,
+                     lam_error *error) {
+    lam_status status = LAM_OK;
+    packed_rows rows = {0};
+    sky_bounce bins = {.n = 0};
+    sky_bounce *const sky = &f->sky;
+    const double share = 1 / (double)samples->n_seeds;
+    if (m->glass == NULL) return LAM_OK;
+    for (size_t k = 0; k < samples->n_seeds; k++) {
+        sky_bounce *const into = sky->first_bounce != NULL ? &bins : NULL;
+        sky_bounce_free(&bins);
+        if (into != NULL)
+            TRY(sky_bounce_create(sky->tiling.name, m->up, sky->ground_albedo, m->n, into, error));
+        TRY(find(m, v, order, options, samples, k, &rows, into, error));
+        if (into != NULL) TRY(add_bins(into, share, sky, NULL, error));
+        TRY(add_rows(m, &rows, share, f, error));
+    }
+done:
+    packed_rows_free(&rows);
+    sky_bounce_free(&bins);
+    return status;
+}
+
 lam_status panes_add_bounce(const mesh *m, const visibility *v, const uint32_t *order,
-                            const form_factor_options *options, size_t rays, uint64_t seed,
+                            const form_factor_options *options, const pane_samples *samples,
                             sky_bounce *bounce, double *ground, lam_error *error) {
     lam_status status = LAM_OK;
     sky_bounce bins = {.n = 0};
     if (m->glass == NULL) return LAM_OK;
-    TRY(sky_bounce_create(bounce->tiling.name, m->up, bounce->ground_albedo, m->n, &bins, error));
-    TRY(find(m, v, order, options, rays, seed, NULL, &bins, error));
-    TRY(add_bins(&bins, bounce, ground, error));
+    for (size_t k = 0; k < samples->n_seeds; k++) {
+        sky_bounce_free(&bins);
+        TRY(sky_bounce_create(bounce->tiling.name, m->up, bounce->ground_albedo, m->n, &bins, error));
+        TRY(find(m, v, order, options, samples, k, NULL, &bins, error));
+        TRY(add_bins(&bins, 1 / (double)samples->n_seeds, bounce, ground, error));
+    }
 done:
     sky_bounce_free(&bins);
     return status;
 }
 
 lam_status panes_add_sky(const mesh *m, const visibility *v, const uint32_t *order,
-                         const form_factor_options *options, size_t rays, uint64_t seed, form_factors *f,
+                         const form_factor_options *options, const pane_samples *samples, form_factors *f,
                          lam_error *error) {
     lam_status status = LAM_OK;
     double between = 0;
@@ -134,7 +154,7 @@ lam_status panes_add_sky(const mesh *m, const visibility *v, const uint32_t *ord
              "give --form-factors rays",
              100 * between);
     if (f->sky.first_bounce != NULL)
-        TRY(panes_add_bounce(m, v, order, options, rays, seed, &f->sky, NULL, error));
+        TRY(panes_add_bounce(m, v, order, options, samples, &f->sky, NULL, error));
 done:
     return status;
 }

@@ -5,30 +5,36 @@
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/visibility/visibility.h"
 
-/* The rays of an element by the cosine, and towards panes, beside form factors of a recipe: half of its own,
- * from 512 on. */
-size_t panes_rays(const recipe *r);
+/* The samples whose mean is taken: of each of the seeds by so many rays by the cosine, and as many towards
+ * panes, from an element, rounded up to a multiple of 8. */
+typedef struct pane_samples {
+    size_t rays, n_seeds;
+    uint64_t seeds[2];
+} pane_samples;
+
+/* The sample beside form factors of a recipe: by half of its own rays, from 512 on, and its seed. */
+pane_samples panes_beside(const recipe *r);
 
 /* Adds to closed form factors, whose upper triangle f has, the exchange through panes,
  *     A_i F_ij += A_i F_ij through panes,
  * and to f->sky, unless that is zero, what comes from the tiles and the ground through panes. Row sums then
  * are up to 1 + T where a pane is in sight: it receives all of the light that it passes on. f->panes says how
- * much that is. Does nothing where there are no panes. rays: of pane_light.h, rounded up to a multiple of 8.
- * Cost: as pane_light_make. Errors: LAM_ERR_MEMORY, LAM_ERR_IO, LAM_ERR_CANCELLED. */
+ * much that is. Does nothing where there are no panes. Cost: as pane_light_make. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_IO, LAM_ERR_CANCELLED. */
 lam_status panes_add(const mesh *m, const visibility *v, const uint32_t *order,
-                     const form_factor_options *options, size_t rays, uint64_t seed, form_factors *f,
+                     const form_factor_options *options, const pane_samples *samples, form_factors *f,
                      lam_error *error);
 
 /* The same for form factors by blocks, to the sky alone. Errors: also LAM_ERR_ARGUMENT where elements see
  * each other through panes, which blocks do not have. */
 lam_status panes_add_sky(const mesh *m, const visibility *v, const uint32_t *order,
-                         const form_factor_options *options, size_t rays, uint64_t seed, form_factors *f,
+                         const form_factor_options *options, const pane_samples *samples, form_factors *f,
                          lam_error *error);
 
 /* The same for a sky alone: first bounces of a sky that is closed (sky_bounce_close), whose tiling and ground
  * it has; ground, [n] or NULL, gets the shares of the ground through panes added. */
 lam_status panes_add_bounce(const mesh *m, const visibility *v, const uint32_t *order,
-                            const form_factor_options *options, size_t rays, uint64_t seed,
+                            const form_factor_options *options, const pane_samples *samples,
                             sky_bounce *bounce, double *ground, lam_error *error);
 
 #endif

@@ -93,6 +93,10 @@ done:
     return status;
 }
 
+/* Rays through panes of a reference, for each of the form factors that it judges: its own noise is a third of
+ * theirs then. */
+enum { FINER_THROUGH_PANES = 4 };
+
 lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const form_factor_options *options,
                                    uint64_t other_seed, const char *const stages[2], form_factors out[2],
                                    lam_error *error) {
@@ -117,8 +121,11 @@ lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const f
         f[h].upper = G[h];
         G[h] = (csr){.n = 0};
         TRY(close_pairs(&f[h], m, v, NULL, error));
-        TRY(panes_add(m, v, order, options, 2 * panes_rays(&options->recipe),
-                      h == 0 ? options->recipe.seed : other_seed, &f[h], error));
+        /* As pairs: the mean of two samples, and the same with half their difference. */
+        const pane_samples through = {.rays = FINER_THROUGH_PANES * panes_beside(&options->recipe).rays,
+                                      .n_seeds = h == 0 ? 2 : 1,
+                                      .seeds = {options->recipe.seed, other_seed}};
+        TRY(panes_add(m, v, order, options, &through, &f[h], error));
         TRY(form_factors_expand(&f[h], m->area, error));
     }
     for (int h = 0; h < 2; h++) {
