@@ -1,5 +1,6 @@
 #include "solver/render/raster.h"
 
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/render/shade.h"
 
 #include <stdlib.h>
@@ -37,6 +38,26 @@ static void aim(const raster_view *view, double x, double y, ray_packet *rays, s
     }
 }
 
+/* Casts n rays of the eye; elements are those that are seen. Panes are seen where nothing lies behind them.
+ */
+static void cast_eye(const raster_view *view, ray_packet *rays, size_t n, unsigned how, uint32_t *element) {
+    const mesh *m = view->mesh;
+    hit_packet hits;
+    visibility_cast(view->visibility, rays, n, NULL, VISIBILITY_CULL_BACK | how, &hits);
+    memcpy(element, hits.element, n * sizeof *element);
+    for (int crossed = 0; m->glass != NULL && crossed < PANES_MOST; crossed++) {
+        bool ahead[VISIBILITY_PACKET], any = false;
+        for (size_t i = 0; i < n; i++) {
+            ahead[i] = hits.element[i] != VISIBILITY_NOTHING && mesh_is_pane(m, hits.element[i]);
+            any = any || ahead[i];
+        }
+        if (!any) return;
+        pane_path_step(view->visibility, m, rays, n, ahead, VISIBILITY_CULL_BACK, &hits);
+        for (size_t i = 0; i < n; i++)
+            if (hits.element[i] != VISIBILITY_NOTHING) element[i] = hits.element[i];
+    }
+}
+
 /* Elements that only touch leave gaps of rounding. In a pixel with hits, a miss is cast again a little
  * aside. */
 static void cast_misses_again(const raster_view *view, ray_row *row, size_t first) {
@@ -45,14 +66,12 @@ static void cast_misses_again(const raster_view *view, ray_row *row, size_t firs
     if (missed == view->samples) return;
     for (size_t s = first; s < first + view->samples && missed > 0; s++) {
         ray_packet rays;
-        hit_packet hits;
         if (row->element[s] != VISIBILITY_NOTHING) continue;
         const double x = row->x[s] + SIDESTEP / (double)view->width,
                      y = row->y[s] + SIDESTEP / (double)view->height;
         memset(&rays, 0, sizeof rays);
         aim(view, x, y, &rays, 0);
-        visibility_cast(view->visibility, &rays, 1, NULL, VISIBILITY_CULL_BACK, &hits);
-        row->element[s] = hits.element[0];
+        cast_eye(view, &rays, 1, 0, &row->element[s]);
         if (row->element[s] == VISIBILITY_NOTHING) continue;
         row->x[s] = x;
         row->y[s] = y;
@@ -64,7 +83,6 @@ static void cast_row(const raster_view *view, size_t left, size_t right, size_t 
     for (size_t first = 0; first < count; first += VISIBILITY_PACKET) {
         const size_t now = count - first < VISIBILITY_PACKET ? count - first : VISIBILITY_PACKET;
         ray_packet rays;
-        hit_packet hits;
         memset(&rays, 0, sizeof rays);
         for (size_t i = 0; i < now; i++) {
             const size_t k = first + i, px = left + k / view->samples, s = k % view->samples;
@@ -72,9 +90,7 @@ static void cast_row(const raster_view *view, size_t left, size_t right, size_t 
             row->y[k] = ((double)py + sample_y(s, view->samples)) / (double)view->height;
             aim(view, row->x[k], row->y[k], &rays, i);
         }
-        visibility_cast(view->visibility, &rays, now, NULL, VISIBILITY_CULL_BACK | VISIBILITY_TOGETHER,
-                        &hits);
-        memcpy(row->element + first, hits.element, now * sizeof row->element[0]);
+        cast_eye(view, &rays, now, VISIBILITY_TOGETHER, row->element + first);
     }
     for (size_t first = 0; first < count; first += view->samples) cast_misses_again(view, row, first);
 }

@@ -106,7 +106,7 @@ static void cross_panes(const walk_scene *s, walk_stream *w, size_t n, ray_packe
                     w->weight[c][first + i] *= ahead[i] ? T / q : 1 / (1 - q);
                 any = any || ahead[i];
             }
-            pane_path_step(s->v, s->m, rays, count, ahead, hits);
+            pane_path_step(s->v, s->m, rays, count, ahead, 0, hits);
         }
     }
 }

@@ -33,7 +33,7 @@ static void put_behind(const visibility *v, const mesh *m, uint32_t pane, double
 }
 
 void pane_path_step(const visibility *v, const mesh *m, ray_packet *rays, size_t n, const bool *ahead,
-                    hit_packet *hits) {
+                    unsigned how, hit_packet *hits) {
     static const uint32_t self[VISIBILITY_PACKET] = {
         VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING,
         VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING};
@@ -50,7 +50,7 @@ void pane_path_step(const visibility *v, const mesh *m, ray_packet *rays, size_t
         lane[count++] = i;
     }
     if (count == 0) return;
-    visibility_cast(v, &behind, count, self, 0, &met);
+    visibility_cast(v, &behind, count, self, how, &met);
     for (size_t k = 0; k < count; k++) {
         hits->element[lane[k]] = met.element[k];
         hits->back[lane[k]] = met.back[k];
@@ -74,7 +74,7 @@ static void follow(const visibility *v, const mesh *m, ray_packet *rays, size_t 
             ahead[i] = any = true;
         }
         if (!any || crossed == PANES_MOST) return;
-        pane_path_step(v, m, rays, n, ahead, hits);
+        pane_path_step(v, m, rays, n, ahead, 0, hits);
     }
 }
 

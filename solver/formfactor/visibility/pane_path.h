@@ -26,9 +26,10 @@ void pane_path_follow(const visibility *v, const mesh *m, ray_packet *rays, size
 void pane_path_reach(const visibility *v, const mesh *m, ray_packet *segments, size_t n, hit_packet *hits,
                      const double end[VISIBILITY_PACKET], double weight[VISIBILITY_PACKET]);
 
-/* Takes rays i of n with ahead[i], whose hits are panes, to what lies behind these. */
+/* Takes rays i of n with ahead[i], whose hits are panes, to what lies behind these; how: of visibility_cast.
+ */
 void pane_path_step(const visibility *v, const mesh *m, ray_packet *rays, size_t n, const bool *ahead,
-                    hit_packet *hits);
+                    unsigned how, hit_packet *hits);
 
 /* The part of ray i of a packet that the pane which it has met passes. */
 double pane_path_passes(const mesh *m, uint32_t pane, const ray_packet *rays, size_t i);
