@@ -87,6 +87,7 @@ lam_status scene_take_glass(const precompute_job *job, precompute_scene *scene, 
     glass_report report;
     if (given->count > 0) TRY(emission_scene_create(m, &named, error));
     for (size_t k = 0; k < given->count; k++) TRY(take_glass(m, &named.groups, given->items[k], error));
+    m->glass_given = given->count > 0;
     m->glass_by_angle = job->options->glass_law == GLASS_BY_ANGLE;
     TRY(mesh_settle_glass(m, &report, error));
     if (report.groups > 0) log_panes(job, m, &report);

@@ -8,6 +8,7 @@
 
 #define DATASET STORE_MESH "/glass"
 #define LAW "glass_law"
+#define GIVEN "glass_given"
 static const char law_angle[] = "angle", law_none[] = "none";
 
 double glass_passes(const struct group_glass *glass, bool by_angle, double cosine) {
@@ -126,6 +127,7 @@ lam_status mesh_save_glass(const mesh *m, store *s, lam_error *error) {
     if (m->glass == NULL) return LAM_OK;
     TRY(store_write(s, DATASET, STORE_F64, 2, shape, m->glass, error));
     TRY(store_set_text(s, STORE_MESH, LAW, m->glass_by_angle ? law_angle : law_none, error));
+    if (m->glass_given) TRY(store_set_integer(s, STORE_MESH, GIVEN, 1, error));
 done:
     return status;
 }
@@ -143,6 +145,7 @@ lam_status mesh_load_glass(store *s, mesh *m, lam_error *error) {
     m->glass = data;
     m->n_glass = m->n_groups;
     m->glass_by_angle = strcmp(law, law_angle) == 0;
+    m->glass_given = store_has_attribute(s, STORE_MESH, GIVEN);
     for (size_t g = 0; g < m->n_groups; g++) {
         const struct group_glass *of = &m->glass[g];
         if (!(of->transmittance >= 0 && of->transmittance <= 1))

@@ -45,6 +45,7 @@ typedef struct mesh {
     size_t n_glass; /* that of the groups where some of them let light pass, else 0 */
     struct group_glass *glass; /* [n_glass] (glass.h); NULL: none does */
     bool glass_by_angle;       /* they pass less of light that comes aslant */
+    bool glass_given;          /* --glass said more than the scene file */
     bool two_sided;            /* every element has its back, or is one */
     double unit;               /* metres per unit of the scene file, for the record */
     double rounding;      /* m: the step of the decimals of the file, or 0 where it has more than eight */

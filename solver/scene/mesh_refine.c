@@ -226,6 +226,7 @@ void mesh_replace(mesh *m, mesh *by) {
     by->n_glass = m->n_glass;
     by->glass = m->glass;
     by->glass_by_angle = m->glass_by_angle;
+    by->glass_given = m->glass_given;
     m->glass = NULL;
     by->n_cameras = m->n_cameras;
     by->cameras = m->cameras;

@@ -202,6 +202,21 @@ static size_t count_front_groups(const mesh *m) {
     return n;
 }
 
+/* The panes of the scene now, where the file says what they are; those of the store, where --glass did. */
+static lam_status settle_panes(const mesh *stored, mesh *now, lam_error *error) {
+    lam_status status = LAM_OK;
+    glass_report ignored;
+    for (size_t g = 0; stored->glass_given && g < now->n_groups && g < stored->n_glass; g++)
+        TRY(mesh_set_glass(now, g, &stored->glass[g], error));
+    TRY(mesh_settle_glass(now, &ignored, error));
+done:
+    return status;
+}
+
+static double passes(const mesh *m, size_t group) {
+    return m->glass != NULL ? m->glass[group].transmittance : 0;
+}
+
 /* The same groups with the same materials, by their fronts. */
 static lam_status compare_groups(const mesh *stored, const mesh *now, check *c, lam_error *error) {
     lam_status status = LAM_OK;
@@ -222,6 +237,7 @@ static lam_status compare_groups(const mesh *stored, const mesh *now, check *c, 
         for (size_t k = 0; k < width; k++)
             same = same && fabs(a[g * width + k] - b[g * width + k]) <=
                                1e-5 * fmax(fabs(a[g * width + k]), 1e-6 * a[g * width]);
+        same = same && fabs(passes(stored, g) - passes(now, g)) <= 1e-9;
         if (!same)
             check_say(c, VERDICT_BROKEN, "stale: group %s has another material or size in the scene",
                       stored->group_names[g]);
@@ -255,7 +271,8 @@ lam_status verify_scene(examination *e, check *c, lam_error *error) {
         check_say(c, VERDICT_BROKEN, "stale: %s has another geometry (%s, stored: %s)", e->scene,
                   now.source_hash, e->m.source_hash);
     else
-        TRY(compare_groups(&e->m, &now, c, error));
+        TRY(settle_panes(&e->m, &now, error));
+    if (c->verdict == VERDICT_OK) TRY(compare_groups(&e->m, &now, c, error));
 done:
     mesh_free(&now);
     return check_failed(c, status, error);

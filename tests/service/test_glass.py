@@ -238,6 +238,18 @@ class Glass(unittest.TestCase):
             self.assertIn(says, done.stderr)
             self.assertFalse((self.folder / "r.h5").exists())
 
+    def test_scenes_are_compared_with_their_panes(self):
+        for pane, options, other in (("Kd .5 .5 .5\nTf .88 .88 .88\nillum 4", [], "Kd .5 .5 .5\nTf .8 .8 .8\nillum 4"),
+                                     ("Kd 0 0 0\nd .22", [], "Kd 0 0 0\nd .3"), ("Kd 0 0 0\nd .22", [], "Kd 0 0 0"),
+                                     ("Kd .5 .5 .5", ["--glass", "pane=.78"], "Kd .1 .1 .1")):
+            scene = self.write(window_room(), paint(".5 .5 .5", pane))
+            store, _ = self.precompute("--mesh", "faces", "--probes", 0, *options)
+            must("verify", store, scene)
+            self.write(window_room(), paint(".5 .5 .5", other))
+            done = lambert("verify", store, scene)
+            self.assertEqual(done.returncode, 1, pane)
+            self.assertIn("stale: group pane", done.stdout)
+
     def test_a_store_keeps_its_panes(self):
         self.write(window_room(), paint(".5 .5 .5"))
         store, _ = self.precompute("--elements", 400, "--sky", "tregenza", "--keep-form-factors", "--probes", 0)
