@@ -1,5 +1,6 @@
 /* The emissions of a request: dense, sparse, by group, by sky. */
 #include "solver/base/array_grow.h"
+#include "solver/base/photometry.h"
 #include "solver/codec/json_parser.h"
 
 #include <float.h>
@@ -219,7 +220,7 @@ bool parser_read_radiance(parser *p, float *colour) {
                              "%s holds %zu values, must be one for the channel, or red, green and blue",
                              parser_here(p), k);
     const bool grey = k == 1 || (rgb[0] == rgb[1] && rgb[1] == rgb[2]);
-    colour[0] = grey ? rgb[0] : codec_luminance(rgb);
+    colour[0] = grey ? rgb[0] : (float)luminance_of_radiance((double)rgb[0], (double)rgb[1], (double)rgb[2]);
     p->request->by_luminance = p->request->by_luminance || !grey;
     return true;
 }

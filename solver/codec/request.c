@@ -173,10 +173,6 @@ static bool add_side(const radiosity_request *request, const codec_scene *scene,
     return true;
 }
 
-float codec_luminance(const float rgb[3]) {
-    return (float)(.265 * (double)rgb[0] + .670 * (double)rgb[1] + .065 * (double)rgb[2]);
-}
-
 bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene, float **row, problem *why) {
     return add_side(request, scene, &request->sky, scene->n_tiles, "tiles", row, why);
 }

@@ -138,10 +138,6 @@ bool radiosity_request_emitters(radiosity_request *request, const codec_scene *s
 bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene, const request_sun *sun,
                            const float *direct, problem *why);
 
-/* The luminance of a colour by which a store of one channel takes coloured skies, Radiance's: .265 R + .670 G
- * + .065 B. */
-float codec_luminance(const float rgb[3]);
-
 /* The faces of an answer of faces, and the numbers of an answer to one vector in one channel. */
 face_choice radiosity_request_faces(const radiosity_request *request, const face_index *faces);
 size_t radiosity_request_values(const radiosity_request *request, size_t n, const face_index *faces);

@@ -73,8 +73,8 @@ lam_status emission_read_frames(const char *path, const emission_scene *scene, e
 
 /* Puts e under the sky of an NPY file, shaped as an emission of m tiles, or of a matrix of Radiance (.mtx,
  * .smx) on the tiles of the scene. One sky goes with every emission, one emission with every sky (steady);
- * else there must be as many of both. A coloured sky lights a grey store by its luminance, .265 R + .670 G +
- * .065 B (Radiance's), and sets by_luminance: an NPY file of it is [b][3][m]. */
+ * else there must be as many of both. A coloured sky lights a grey store by its luminance, that of Radiance
+ * (photometry.h), and sets by_luminance: an NPY file of it is [b][3][m]. */
 lam_status emission_add_sky(emission *e, const char *path, const emission_scene *scene, lam_error *error);
 
 /* The same for a batch of skies L [n_skies][m], which is copied to every channel; path names it in messages.

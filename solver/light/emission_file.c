@@ -1,6 +1,7 @@
 /* Emissions and skies from files, which codec reads, and batches of the two side by side. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/file_text.h"
+#include "solver/base/photometry.h"
 #include "solver/codec/request.h"
 #include "solver/daylight/sky_matrix.h"
 #include "solver/daylight/weather.h"
@@ -179,8 +180,9 @@ static void take_luminance(size_t n_skies, size_t n_tiles, float *L) {
     for (size_t v = 0; v < n_skies; v++)
         for (size_t t = 0; t < n_tiles; t++) {
             const float *from = L + 3 * v * n_tiles + t;
-            const float rgb[3] = {from[0], from[n_tiles], from[2 * n_tiles]};
-            L[v * n_tiles + t] = codec_luminance(rgb); /* at or before all that is read later */
+            /* It lies at or before all that is read later. */
+            L[v * n_tiles + t] = (float)luminance_of_radiance((double)from[0], (double)from[n_tiles],
+                                                              (double)from[2 * n_tiles]);
         }
 }
 

@@ -1,5 +1,7 @@
 #include "solver/render/tone.h"
 
+#include "solver/base/photometry.h"
+
 #include <math.h>
 
 /* Bins of luminances from 2^LOWEST on, BINS_PER_OCTAVE for each octave; bin 0 holds all darker ones. */
@@ -14,7 +16,9 @@
 
 float tone_luminance(const float *values, size_t n_channels) {
     if (n_channels == 1) return values[0];
-    if (n_channels == 3) return 0.2126f * values[0] + 0.7152f * values[1] + 0.0722f * values[2];
+    if (n_channels == 3)
+        return (float)LUMINANCE_RED * values[0] + (float)LUMINANCE_GREEN * values[1] +
+               (float)LUMINANCE_BLUE * values[2];
     float sum = 0;
     for (size_t c = 0; c < n_channels; c++) sum += values[c];
     return sum / (float)n_channels;

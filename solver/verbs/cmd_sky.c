@@ -2,6 +2,7 @@
  * tiles of a sky, hour by hour. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/options/options.h"
+#include "solver/base/photometry.h"
 #include "solver/base/terminal.h"
 #include "solver/daylight/sky_matrix.h"
 #include "solver/light/sky_options.h"
@@ -13,8 +14,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define WHITE_EFFICACY 179. /* lm/W of equal-energy white in Radiance */
 
 typedef struct fields {
     const char *output, *tiles, *model;

@@ -1,5 +1,6 @@
 #include "solver/verbs/light_options.h"
 
+#include "solver/base/photometry.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/refine/form_factor_rows.h"
@@ -101,8 +102,9 @@ void light_close(lit_store *lit) {
 void light_log(const lit_store *lit, terminal *t) {
     if (lit->said[0] != '\0') terminal_log(t, "%s", lit->said);
     if (lit->light.by_luminance)
-        terminal_log(t, "the store is grey: the coloured sky lights it by its luminance, .265 R + .670 G + "
-                        ".065 B");
+        terminal_log(t,
+                     "the store is grey: the coloured sky lights it by its luminance, %s, as Radiance has it",
+                     RADIANCE_LUMINANCE_TEXT);
 }
 
 void light_log_limited(size_t n_vectors, const size_t *limited, terminal *t) {

@@ -1,6 +1,7 @@
 #include "solver/verbs/view_link.h"
 
 #include "solver/base/file_stem.h"
+#include "solver/base/photometry.h"
 #include "store/groups.h"
 #include "store/store.h"
 
@@ -49,8 +50,7 @@ done:
 
 /* A light as the page has it: its luminance, and a colour whose luminance is 1. */
 static json_t *light_of(size_t count, const double values[3]) {
-    const double luminance =
-        count == 3 ? .2126 * values[0] + .7152 * values[1] + .0722 * values[2] : values[0];
+    const double luminance = count == 3 ? luminance_of(values[0], values[1], values[2]) : values[0];
     double colour[3] = {1, 1, 1};
     for (int c = 0; c < 3 && count == 3 && luminance > 0; c++) colour[c] = values[c] / luminance;
     return json_pack("{s:b, s:f, s:[f, f, f], s:n}", "on", 1, "power", luminance, "colour", colour[0],

@@ -142,7 +142,7 @@ class SkyMatrix(unittest.TestCase):
         must("solve", self.stores["grey"], "--sky", self.folder / "grey.npy", "-o", by_way)
         for sky in path, self.folder / "a.npy":
             done = must("solve", self.stores["grey"], "--sky", sky, "-o", direct)
-            self.assertEqual(done.stderr.count("lights it by its luminance, .265 R + .670 G + .065 B"), 1)
+            self.assertEqual(done.stderr.count("lights it by its luminance, 0.265 R + 0.670 G + 0.065 B"), 1)
             np.testing.assert_allclose(np.load(direct), np.load(by_way), rtol=1e-6)
         path.write_bytes(matrix(values[:, :, :1] * np.ones(3)))  # grey: no word of luminance, in either store
         done = must("solve", self.stores["colour"], "--sky", path, "--annual", "sum", "-o", direct)
