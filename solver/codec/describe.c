@@ -388,6 +388,9 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     json_object_set_new(made, "elements", json_integer((json_int_t)dims[1]));
     TRY(add_faces(s, made, error));
     json_object_set_new(made, "channels", json_integer((json_int_t)dims[0]));
+    /* Older stores do not say it, and count in W. */
+    const json_t *lights = json_object_get(mesh, "lights");
+    json_object_set_new(made, "lights", lights != NULL ? json_deep_copy(lights) : json_string("W"));
     const json_t *kind = json_object_get(operator_attributes, "kind");
     if (!json_is_string(kind))
         FAIL(error, LAM_ERR_FORMAT, "%s: /operator has no attribute \"kind\"", store_path(s));

@@ -35,6 +35,7 @@ typedef struct precompute_options {
     const char *up;               /* NULL: by the file */
     const char *assets;           /* a folder, or NULL */
     const char *format;           /* NULL: by the extension of the input */
+    const char *lights;           /* W or lm; NULL: by the file, or that of the store */
     bool orient, fix;
     sides_asked two_sided;
     scene_closure closed;

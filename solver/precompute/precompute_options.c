@@ -167,6 +167,13 @@ static const option_row mesh_rows[] = {
     OPTION_ROW_REFLECTANCE(FIELD(reflectance),
                            .help = "Grey reflectance of every face, in place of that in the file"),
     OPTION_ROW_ASSETS(FIELD(assets), .settled = fixed_mesh),
+    {.name = "lights",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(lights),
+     .choices = LIGHT_KIND_WORDS,
+     .otherwise = "lm for a glTF with lights, W for other scenes; that of a store",
+     .help = "The light of the emission in the file and of answers: W/m2, or lm/m2, lx and cd/m2. Numbers "
+             "stay as they are"},
     {0},
 };
 

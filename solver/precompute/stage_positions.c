@@ -37,6 +37,7 @@ static lam_status load_mesh(const precompute_job *job, precompute_scene *scene, 
     store *s = NULL;
     TRY(store_open(job->options->input, &s, error));
     TRY(mesh_load(s, &scene->m, NULL, error));
+    scene_take_lights(job, &scene->m);
     if (scene->m.n_channels != 1 && scene->m.n_channels != MOVING_LIGHT_CHANNELS)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: has %zu channels, a moving light needs 1 or %d",
              job->options->input, scene->m.n_channels, MOVING_LIGHT_CHANNELS);

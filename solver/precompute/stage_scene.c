@@ -126,6 +126,14 @@ done:
     return status;
 }
 
+void scene_take_lights(const precompute_job *job, mesh *m) {
+    const char *asked = job->options->lights;
+    const light_kind found = m->lights;
+    if (asked == NULL || !light_kind_find(asked, &m->lights) || m->lights == found) return;
+    terminal_log(job->t, "--lights %s: emission and answers of the store are in %s, with the numbers of %s",
+                 asked, m->lights == LIGHT_PHOTOMETRIC ? "lm/m2 and lx" : "W/m2", light_kind_word(found));
+}
+
 lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
@@ -150,8 +158,9 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
         terminal_log(
             job->t,
             "the emission of %zu material%s is luminance in cd/m2, as glTF has it: the exitance is pi "
-            "times that",
+            "times that, in lm/m2",
             report.luminous, report.luminous == 1 ? "" : "s");
+    scene_take_lights(job, &scene->m);
     if (report.clamped > 0)
         terminal_log(job->t, "%zu material%s reflected all light or more, or nearly: set to .9999",
                      report.clamped, report.clamped == 1 ? "" : "s");

@@ -86,6 +86,9 @@ void factors_log_kept(const precompute_job *job, size_t n, const form_factors *f
 lam_status factors_warn_of_backs(const precompute_job *job, const precompute_scene *scene,
                                  const precompute_factors *factors, lam_error *error);
 
+/* --lights in place of the kind of light that file or store say, and a line where that differs. */
+void scene_take_lights(const precompute_job *job, mesh *m);
+
 /* Takes the groups of --portal out of the mesh, and rectangles around them as openings: stage_portals.c. */
 lam_status scene_take_portals(const precompute_job *job, precompute_scene *scene, lam_error *error);
 

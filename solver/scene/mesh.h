@@ -2,6 +2,7 @@
 #ifndef LAMBERT_SCENE_MESH_H
 #define LAMBERT_SCENE_MESH_H
 
+#include "solver/base/photometry.h"
 #include "solver/base/progress.h"
 #include "solver/base/scene/scene_cameras.h"
 #include "solver/base/scene/scene_faces.h"
@@ -31,7 +32,7 @@ typedef struct mesh {
                                         plane (coincident.h); NULL: none */
     size_t n_channels;               /* 1 when every reflectance and emission is grey, else 3 */
     float *reflectance;              /* [C][n], in [0, 1) */
-    float *emission;                 /* [C][n], W/m^2 */
+    float *emission;                 /* [C][n], W/m^2 or lm/m^2, as lights says */
     struct mesh_textures *textures;  /* NULL: none (texture.h) */
     struct scene_pictures *pictures; /* for those who show the elements; NULL: none */
     uint32_t *textured_face; /* [n], of textures, or TEXTURE_NONE; NULL: no element has a textured face */
@@ -46,6 +47,7 @@ typedef struct mesh {
     struct group_glass *glass; /* [n_glass] (glass.h); NULL: none does */
     bool glass_by_angle;       /* they pass less of light that comes aslant */
     bool glass_given;          /* --glass said more than the scene file */
+    light_kind lights;         /* W or lm, of emission */
     bool two_sided;            /* every element has its back, or is one */
     double unit;               /* metres per unit of the scene file, for the record */
     double rounding;      /* m: the step of the decimals of the file, or 0 where it has more than eight */

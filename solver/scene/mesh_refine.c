@@ -228,6 +228,7 @@ void mesh_replace(mesh *m, mesh *by) {
     by->glass_by_angle = m->glass_by_angle;
     by->glass_given = m->glass_given;
     m->glass = NULL;
+    by->lights = m->lights;
     by->n_cameras = m->n_cameras;
     by->cameras = m->cameras;
     m->cameras = NULL;

@@ -1,6 +1,7 @@
 /* /mesh and /cameras of a store: written as it is, read back with every index and value checked. */
 #include "solver/base/scene/scene_backs.h"
 #include "solver/base/scene/scene_buried.h"
+#include "solver/base/scene/scene_lights.h"
 #include "solver/scene/mesh.h"
 
 #include "solver/scene/coincident.h"
@@ -42,6 +43,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_set_text(s, STORE_MESH, "up", up, error));
     TRY(store_set_number(s, STORE_MESH, "unit", m->unit, error));
     if (m->rounding > 0) TRY(store_set_number(s, STORE_MESH, "rounding", m->rounding, error));
+    TRY(scene_lights_save(m->lights, s, error));
     TRY(scene_backs_save(m->n_backs, m->two_sided, s, error));
     TRY(scene_cameras_save(m->n_cameras, m->cameras, s, error));
 done:
@@ -80,6 +82,7 @@ static lam_status load_attributes(store *s, mesh *m, lam_error *error) {
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute unit is %g, must be positive", store_path(s),
              m->unit);
     m->up = up[0];
+    TRY(scene_lights_load(s, &m->lights, error));
 done:
     return status;
 }

@@ -255,7 +255,7 @@ static void print_elements(const char *label, const json_t *elements, const char
 }
 
 static void print_text(const json_t *about) {
-    static const char *const plain[] = {"name", "elements", "faces",  "channels",
+    static const char *const plain[] = {"name", "elements", "faces",  "channels", "lights",
                                         "kind", "method",   "reason", "epsilon"};
     for (size_t i = 0; i < sizeof plain / sizeof plain[0]; i++)
         print_value(plain[i], json_object_get(about, plain[i]));

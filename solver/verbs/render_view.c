@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static float luminance_of(const mesh *m, const float *values, size_t i) {
+static float element_luminance(const mesh *m, const float *values, size_t i) {
     float channels[3] = {0, 0, 0};
     for (size_t c = 0; c < m->n_channels && c < 3; c++) channels[c] = values[c * m->n + i];
     return tone_luminance(channels, m->n_channels);
@@ -14,13 +14,13 @@ static float luminance_of(const mesh *m, const float *values, size_t i) {
 
 void render_mark_lit(const mesh *m, const float *values, bool *lit) {
     float largest = 0;
-    for (size_t i = 0; i < m->n; i++) largest = fmaxf(largest, luminance_of(m, values, i));
-    for (size_t i = 0; i < m->n; i++) lit[i] = luminance_of(m, values, i) > 1e-6f * largest;
+    for (size_t i = 0; i < m->n; i++) largest = fmaxf(largest, element_luminance(m, values, i));
+    for (size_t i = 0; i < m->n; i++) lit[i] = element_luminance(m, values, i) > 1e-6f * largest;
 }
 
 void render_mark_glowing(const mesh *m, const float *values, const float *E, bool *glows) {
     for (size_t i = 0; i < m->n; i++)
-        glows[i] = E != NULL && luminance_of(m, E, i) > .5f * luminance_of(m, values, i);
+        glows[i] = E != NULL && element_luminance(m, E, i) > .5f * element_luminance(m, values, i);
 }
 
 double render_round_up(double x) {

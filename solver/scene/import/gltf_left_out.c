@@ -144,6 +144,7 @@ void gltf_tell_left_out(const gltf_file *g) {
                   json_object_get(pbr, "metallicRoughnessTexture") != NULL;
     }
     json_array_foreach(json_object_get(g->root, "nodes"), i, m) lights += gltf_extension(m, punctual) != NULL;
+    g->s->punctual = lights;
     if (lights > 0)
         import_warn(w, "%s: its %zu light%s (%s) %s left out; only faces emit", g->path, lights,
                     lights == 1 ? "" : "s", punctual, lights == 1 ? "is" : "are");

@@ -483,6 +483,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     TRY(mesh_settle_coincident(&made, options->two_sided, &found.coincident, error));
     mesh_geometry_hash(&made, made.source_hash);
     found.dropped_faces = s.dropped;
+    if (is_gltf(path, options) && found.luminous + s.punctual > 0) made.lights = LIGHT_PHOTOMETRIC;
     if (s.latin1 > 0)
         import_warn(&s.warnings, "%s: %zu name%s not UTF-8, read as Latin-1", path, s.latin1,
                     s.latin1 == 1 ? " is" : "s are");

@@ -20,7 +20,7 @@ typedef struct reply_header {
     char message[sizeof((lam_error *)0)->message];
     import_warnings warnings;
     uint64_t n_points, n_polygons, n_elements, n_objects, object_bytes, n_materials, material_bytes,
-        n_cameras, dropped, latin1, n_faces, n_images;
+        n_cameras, dropped, punctual, latin1, n_faces, n_images;
 } reply_header;
 
 static const char reply_magic[8] = "lamsoup";
@@ -57,6 +57,7 @@ static void send_reply(lam_status result, const lam_error *error, const imported
     header.material_bytes = s->materials.text_bytes;
     header.n_cameras = s->n_cameras;
     header.dropped = s->dropped;
+    header.punctual = s->punctual;
     header.latin1 = s->latin1;
     header.n_faces = s->n_faces;
     header.n_images = s->n_images;
@@ -254,6 +255,7 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
         FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
     s->warnings = header.warnings;
     s->dropped = header.dropped;
+    s->punctual = header.punctual;
     s->latin1 = header.latin1;
 done:
     free(objects);

@@ -84,6 +84,7 @@ typedef struct imported_faces {
     size_t value_capacity;
     scene_camera *cameras; /* in units of the file, settled; names differ */
     size_t n_cameras, camera_capacity;
+    uint64_t punctual;  /* lights of a glTF that are no faces, which are left out */
     size_t latin1;      /* names that were not UTF-8 and were read as Latin-1 */
     const char *assets; /* folder that files of the scene may lie in beside the scene's own; NULL: none */
     const char *source; /* the file that has the bytes of the scene; NULL: its path */
