@@ -97,6 +97,12 @@ static bool add_limited(struct MHD_Response *response, const answer *a) {
     return http_add_header(response, "Lambert-Limited", limited);
 }
 
+/* The unit of the numbers and their conversion, likewise. */
+static bool add_unit(struct MHD_Response *response, const answer *a) {
+    return http_add_header(response, "Lambert-Unit", a->unit) &&
+           (a->converted[0] == '\0' || http_add_header(response, "Lambert-Converted-By", a->converted));
+}
+
 /* The times of parsing, solving and encoding, which pages read as performance entries. */
 static bool add_times(struct MHD_Response *response, const answer *a) {
     char times[120];
@@ -115,6 +121,7 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
     if (a->timed) good = good && add_times(response, a);
     if (a->refined) good = good && add_refined(response, a);
     if (a->counts_limited) good = good && add_limited(response, a);
+    if (a->unit != NULL) good = good && add_unit(response, a);
     if (a->retry_after > 0) {
         char seconds[16];
         snprintf(seconds, sizeof seconds, "%u", a->retry_after);

@@ -57,6 +57,7 @@ codec_scene call_codec_scene(const call *in) {
     const scene *s = in->scene;
     return (codec_scene){.n = s->n,
                          .n_channels = s->n_channels,
+                         .lights = s->lights,
                          .groups = &s->groups,
                          .faces = &s->faces,
                          .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
@@ -93,6 +94,11 @@ void answer_set_times(answer *out, const answer_notes *notes) {
     out->parse_ms = notes->parse_ms;
     out->solve_ms = notes->solve_ms;
     out->encode_ms = notes->encode_ms;
+}
+
+void answer_set_unit(answer *out, const answer_notes *notes) {
+    out->unit = notes->unit;
+    snprintf(out->converted, sizeof out->converted, "%s", notes->converted_by);
 }
 
 answer_notes call_notes(const call *in) {

@@ -77,7 +77,9 @@ struct answer {
     size_t iterations;
     bool counts_limited; /* `limited` is set: elements that were limited, of all its vectors */
     size_t limited;
-    bool timed; /* the times below are set, in ms */
+    const char *unit;                      /* of an answer in NPY, static; or NULL */
+    char converted[LIGHT_CONVERSION_TEXT]; /* the conversion of its numbers; "": none */
+    bool timed;                            /* the times below are set, in ms */
     double parse_ms, solve_ms, encode_ms;
     char *location; /* of a 202, owned; or NULL */
     bool cacheable; /* gets an ETag */
@@ -101,6 +103,9 @@ void answer_json(answer *out, buffer *b, bool written);
 
 /* States the times of the notes with the answer, whatever its type. */
 void answer_set_times(answer *out, const answer_notes *notes);
+
+/* States the unit of the notes with an answer in NPY, which has no place for it. */
+void answer_set_unit(answer *out, const answer_notes *notes);
 
 /* The scene as a body is read against, and the notes of an answer beside its numbers and its
  * error (scene_note_error), for a route with {name}. */

@@ -59,7 +59,8 @@ static bool weights_of(const call *in, radiosity_request *request, float **weigh
 static bool figures_allocate(const call *in, radiosity_request *request, linear_figures *f,
                              answer_notes *notes, problem *why) {
     const scene *s = in->scene;
-    f->figures = reduce_figures(&request->reduce, request->n_rhs, s->n_channels);
+    f->figures =
+        reduce_figures(&request->reduce, request->n_rhs, radiosity_request_channels(request, s->n_channels));
     f->means = memory_allocate(request->n_rhs, s->n_channels * sizeof *f->means, "means", NULL);
     return (f->figures != NULL && f->means != NULL &&
             scene_mean_errors_begin(s, request, notes, &f->errors)) ||
@@ -96,7 +97,9 @@ static bool evaluate(const scene *s, const radiosity_request *request, size_t fi
         limit_means(s, request, f->means);
         if (!scene_mean_errors_add(s, request, first + k, row->buried, f->means, &f->errors, notes))
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
-        reduce_means(r, first + k, s->n_channels, request->n_rhs, row->area, f->means, f->figures);
+        if (request->told.luminance) answer_luminance_double(request->n_rhs, 1, f->means, NULL);
+        reduce_means(r, first + k, radiosity_request_channels(request, s->n_channels), request->n_rhs,
+                     row->area, f->means, f->figures);
     }
     return true;
 }
@@ -178,6 +181,7 @@ bool quick_radiosity(call *in, answer *out) {
     radiosity_request request = {0};
     problem why = {0};
     buffer b = {0};
+    char converted[LIGHT_CONVERSION_TEXT];
     adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
     const size_t held = in->memory->held;
     const double start = clock_ms();
@@ -195,6 +199,7 @@ bool quick_radiosity(call *in, answer *out) {
         bool done = false;
         notes.parse_ms = parsed - start;
         notes.quantity = request.quantity;
+        answer_note_unit(&request.told, request.quantity, converted, &notes);
         scene_note_error(s, &request, &notes);
         in->n_rhs = request.n_rhs;
         good = figures_allocate(in, &request, &f, &notes, &why) &&

@@ -181,6 +181,7 @@ static bool read_body(const call *in, adjoint_request *request, problem *why) {
 
 void post_adjoint(call *in, answer *out) {
     answer_notes notes = call_notes(in);
+    char converted[LIGHT_CONVERSION_TEXT];
     adjoint_request request = {0};
     adjoint_memory memory = {0};
     problem why = {0};
@@ -194,6 +195,8 @@ void post_adjoint(call *in, answer *out) {
     notes.parse_ms = parsed - start;
     notes.quantity = request.quantity;
     notes.by_luminance = request.light.by_luminance;
+    light_conversion_text(&request.light.told, converted);
+    notes.converted_by = converted;
     in->n_rhs = 1;
     good = good && solve(in->scene, &request, &memory, in->service->metrics, &why);
     notes.solve_ms = clock_ms() - parsed;

@@ -31,15 +31,17 @@ typedef struct radiosity_solve {
     bool streams;          /* the values are encoded while the answer is sent */
     float *H0;             /* [n_rhs][C][n], direct irradiance of sky and sun; NULL if no vector has any */
     sun_answer sun;
-    double *figures;        /* of reduce, in place of values; else NULL */
-    float *W;               /* [n_rhs][C][s], weights of a store of emitters; else NULL */
-    refined_solve *refined; /* for a request with a tolerance; else NULL */
-    limited_solve limit;    /* of light below zero */
-    linear_figures *linear; /* for a linear reduction, which computes no vectors; else NULL */
-    figures_text text;      /* of figures */
-    bool judged;            /* the error of figures was found */
-    name_error *errors;     /* of names that are reduced, or NULL */
-    problem why;            /* of a pass that failed */
+    double *figures; /* of reduce, in place of values; else NULL */
+    float *W;        /* [n_rhs][C][s], weights of a store of emitters; else NULL */
+    float *one;      /* [C][n_computed], work: a vector that is reduced by its luminance; else NULL */
+    char converted[LIGHT_CONVERSION_TEXT]; /* of notes */
+    refined_solve *refined;                /* for a request with a tolerance; else NULL */
+    limited_solve limit;                   /* of light below zero */
+    linear_figures *linear;                /* for a linear reduction, which computes no vectors; else NULL */
+    figures_text text;                     /* of figures */
+    bool judged;                           /* the error of figures was found */
+    name_error *errors;                    /* of names that are reduced, or NULL */
+    problem why;                           /* of a pass that failed */
     bool failed;
 } radiosity_solve;
 
@@ -56,15 +58,17 @@ static void solve_free(radiosity_solve *s) {
     free(s->figures);
     free(s->H0);
     free(s->W);
+    free(s->one);
     free(s->errors);
     free(s);
 }
 
-/* [n_rhs][C][width] floats, not cleared; NULL with *why. */
+/* [n_rhs][C][width] floats of the scene's channels, not cleared; NULL with *why. */
 static float *allocate_rows(const call *in, const radiosity_solve *s, size_t width, const char *what,
                             problem *why) {
     return call_allocate(
-        in, bytes_times(bytes_times(s->shape.n_rhs, s->shape.n_channels), bytes_times(width, sizeof(float))),
+        in,
+        bytes_times(bytes_times(s->shape.n_rhs, in->scene->n_channels), bytes_times(width, sizeof(float))),
         what, why);
 }
 
@@ -107,11 +111,16 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
             return false;
         s->figures = reduce_figures(reduce, s->shape.n_rhs, s->shape.n_channels);
         s->out = s->own = allocate_rows(in, s, s->n_computed, "values to reduce", why);
-        return s->own != NULL &&
+        if (s->own == NULL) return false;
+        if (s->request.told.luminance)
+            s->one =
+                call_allocate(in, 3 * bytes_times(s->n_computed, sizeof *s->one), "values to reduce", why);
+        return (s->one != NULL || !s->request.told.luminance) &&
                (s->figures != NULL || problem_set(why, PROBLEM_NO_MEMORY,
                                                   "not enough memory to reduce %zu vectors", s->shape.n_rhs));
     }
-    const bool placed = in->accept.type == MEDIA_NPY && in->accept.npy == NPY_F4;
+    const bool placed =
+        in->accept.type == MEDIA_NPY && in->accept.npy == NPY_F4 && !s->request.told.luminance;
     s->streams = !placed && most > ANSWER_WHOLE;
     if (!s->streams && (!request_memory_take(in->memory, most, why) ||
                         !(buffer_reserve(&s->answer, most) ||
@@ -138,7 +147,7 @@ static void take_means(const call *in, radiosity_solve *s) {
     const face_index *faces = &in->scene->faces;
     const face_choice chosen = radiosity_request_faces(&s->request, faces);
     if (s->means == NULL) return;
-    face_means_floats(faces, &chosen, s->shape.n_rhs * s->shape.n_channels, s->out, s->means);
+    face_means_floats(faces, &chosen, s->shape.n_rhs * in->scene->n_channels, s->out, s->means);
     free(s->own);
     s->own = s->means_placed ? NULL : s->means;
     s->means = NULL;
@@ -186,9 +195,10 @@ static bool begin(call *in, answer *out) {
     s->notes.quantity = request->quantity;
     s->notes.by_luminance = request->by_luminance;
     s->notes.at_faces = request->at_faces;
+    answer_note_unit(&request->told, request->quantity, s->converted, &s->notes);
     s->notes.parse_ms = clock_ms() - start;
     s->shape = (answer_shape){.n = of->n,
-                              .n_channels = of->n_channels,
+                              .n_channels = radiosity_request_channels(request, of->n_channels),
                               .n_rhs = request->n_rhs,
                               .batch = request->batch,
                               .n_values = radiosity_request_values(request, of->n, &of->faces),
@@ -208,7 +218,7 @@ static bool begin(call *in, answer *out) {
         return false;
     }
     in->state = s;
-    in->n_written = request->reduce.on ? 0 : request->n_rhs * of->n_channels * s->shape.n_values;
+    in->n_written = request->reduce.on ? 0 : request->n_rhs * s->shape.n_channels * s->shape.n_values;
     in->job.n_vectors = vectors_of(s) + request->reduce.on;
     if (s->sun.shares != NULL) in->cost = fmin((double)request->n_rhs, BATCH_PASS) * sun_answer_cost(of);
     /* Answers for all elements share passes. Answers for selected elements, figures, and answers of emitters
@@ -278,7 +288,7 @@ static void pass_figures(call *in, radiosity_solve *s, size_t computed, batch_wo
 static bool add_figures(const scene *of, radiosity_solve *s, const batch_part *part) {
     const float *x = s->own + part->first * of->n_channels * s->n_computed;
     return s->figures == NULL ||
-           figures_add(of, &s->request, part->first, part->count, x, s->figures, &s->why);
+           figures_add(of, &s->request, part->first, part->count, x, s->one, s->figures, &s->why);
 }
 
 static void pass_refined(const batch_part *parts, size_t n_parts) {
@@ -397,6 +407,7 @@ static bool write_answer(call *in, radiosity_solve *s) {
     if (s->refined != NULL) return good && refined_end(s->refined, &s->notes, &s->answer, &s->why);
     if (good && in->accept.type == MEDIA_JSON) good = judge(in, s);
     if (good) take_means(in, s);
+    if (good && s->request.told.luminance) answer_luminance(s->shape.n_rhs, s->shape.n_values, s->own);
     if (s->streams) return good && make_stream(in, s);
     good = good && (s->own == NULL
                         ? answer_placed(&s->answer, &s->shape, &s->why)
@@ -412,7 +423,10 @@ static void end(call *in, answer *out) {
         answer_set_times(out, &s->notes);
         out->stream = s->stream;
         s->stream = NULL;
-        if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
+        if (in->accept.type == MEDIA_NPY) {
+            out->type = "application/x-npy";
+            answer_set_unit(out, &s->notes);
+        }
         limited_set_header(&s->limit, s->request.n_rhs, out);
         if (s->refined != NULL) refined_set_headers(&s->notes, s->request.n_rhs, out);
     } else {

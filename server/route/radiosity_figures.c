@@ -2,11 +2,13 @@
 
 #include "server/route/routes.h"
 #include "solver/base/clock.h"
+#include "solver/codec/answer.h"
 #include "solver/codec/group_figures.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 bool figures_acceptable(const call *in, const radiosity_request *request, problem *why) {
     return !request->reduce.on || in->accept.type == MEDIA_JSON ||
@@ -27,16 +29,31 @@ size_t figures_bytes(const radiosity_request *request, size_t n_channels) {
                       bytes_times(bytes_times(request->n_rhs, n_channels), 8 * sizeof(double)));
 }
 
+/* The vectors one by one, by their luminance. */
+static bool add_luminance(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                          const float *x, float *one, double *figures) {
+    const size_t row = s->n_channels * request->n_selected;
+    bool good = true;
+    for (size_t v = 0; good && v < count; v++) {
+        memcpy(one, x + v * row, row * sizeof *one);
+        answer_luminance(1, request->n_selected, one);
+        good = reduce_vectors(&request->reduce, &s->groups, s->area, 1, request->n_rhs, first + v, 1,
+                              (reduce_values){.floats = one}, figures);
+    }
+    return good;
+}
+
 bool figures_add(const scene *s, const radiosity_request *request, size_t first, size_t count, const float *x,
-                 double *figures, problem *why) {
+                 float *one, double *figures, problem *why) {
     const size_t n_values = count * s->n_channels * request->n_selected;
     int bad = 0;
     for (size_t i = 0; i < n_values; i++) bad |= !(fabsf(x[i]) <= FLT_MAX);
     if (bad)
         return problem_set(why, PROBLEM_NOT_IN_ENCODING,
                            "the answer passes the range of single precision (3.4e38); scale the emission");
-    return reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs, first, count,
-                          (reduce_values){.floats = x}, figures) ||
+    return (one != NULL ? add_luminance(s, request, first, count, x, one, figures)
+                        : reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs,
+                                         first, count, (reduce_values){.floats = x}, figures)) ||
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
 }
 
@@ -48,10 +65,9 @@ bool figures_refuse(const reduce_request *r, size_t k, size_t statistic, problem
 }
 
 /* NaN stands for a figure that has no value, so that it is no error here. */
-static bool check_figures(const scene *s, const radiosity_request *request, const double *figures,
-                          size_t first, size_t count, problem *why) {
+static bool check_figures(const radiosity_request *request, size_t C, const double *figures, size_t first,
+                          size_t count, problem *why) {
     const reduce_request *r = &request->reduce;
-    const size_t C = s->n_channels;
     for (size_t v = first * C; v < (first + count) * C; v++) {
         const size_t at = v / C / request->n_rhs;
         if (isinf(figures[v])) return figures_refuse(r, at / r->n_with, at % r->n_with, why);
@@ -66,16 +82,15 @@ bool figures_write(const scene *s, const radiosity_request *request, const doubl
                    figures_text *at, answer_notes *notes, buffer *b, bool *done, problem *why) {
     const reduce_request *r = &request->reduce;
     const size_t all = reduce_vectors_written(r, request->n_rhs);
+    const size_t C = radiosity_request_channels(request, s->n_channels);
     const double start = clock_ms();
-    bool written =
-        at->begun || (answer_head(b, s->n, s->n_channels, notes) && buffer_append_text(b, ",\"groups\":{"));
+    bool written = at->begun || (answer_head(b, s->n, C, notes) && buffer_append_text(b, ",\"groups\":{"));
     at->begun = true;
     *done = false;
     while (written && at->next < all && clock_ms() < until) {
         const size_t left = all - at->next, count = left < BETWEEN_LOOKS ? left : BETWEEN_LOOKS;
-        if (!check_figures(s, request, figures, at->next, count, why)) return false;
-        written =
-            reduce_write_some(r, s->n_channels, request->n_rhs, request->batch, figures, at->next, count, b);
+        if (!check_figures(request, C, figures, at->next, count, why)) return false;
+        written = reduce_write_some(r, C, request->n_rhs, request->batch, figures, at->next, count, b);
         at->next += count;
     }
     notes->encode_ms += clock_ms() - start;

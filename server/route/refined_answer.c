@@ -158,9 +158,8 @@ static bool go_on(void *context) {
 }
 
 /* Refines vectors first ... first + count; returns them, or their selected elements, or NULL with *why. */
-static const double *refine(call *in, const lam_refiner *refiner, const radiosity_request *request,
-                            size_t first, size_t count, pass_memory *p, double *certificates,
-                            size_t *iterations, problem *why) {
+static double *refine(call *in, const lam_refiner *refiner, const radiosity_request *request, size_t first,
+                      size_t count, pass_memory *p, double *certificates, size_t *iterations, problem *why) {
     const scene *s = in->scene;
     const refine_watch watch = {go_on, in};
     lam_error error;
@@ -200,7 +199,7 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
     r->as = in->accept;
     if (!r->as.npy_given) r->as.npy = NPY_F8;
     r->shape = (answer_shape){.n = s->n,
-                              .n_channels = s->n_channels,
+                              .n_channels = radiosity_request_channels(request, s->n_channels),
                               .n_rhs = request->n_rhs,
                               .batch = request->batch,
                               .n_values = radiosity_request_values(request, s->n, &s->faces),
@@ -216,7 +215,8 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
     r->iterations = memory_allocate(request->n_rhs, sizeof *r->iterations, "certificates", NULL);
     notes->certificates = r->certificates;
     notes->iterations = r->iterations;
-    if (request->reduce.on) r->figures = reduce_figures(&request->reduce, request->n_rhs, s->n_channels);
+    if (request->reduce.on)
+        r->figures = reduce_figures(&request->reduce, request->n_rhs, r->shape.n_channels);
     return (r->certificates != NULL && r->iterations != NULL &&
             (r->figures != NULL || !request->reduce.on)) ||
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu certificates", request->n_rhs);
@@ -240,7 +240,8 @@ static bool find_refiner(const scene *s, const lam_refiner **refiner, problem *w
 static const double *means_of(const scene *s, const radiosity_request *request, const double *values,
                               pass_memory *p, double *rounding) {
     const face_choice chosen = radiosity_request_faces(request, &s->faces);
-    face_means_doubles(&s->faces, &chosen, s->n_channels, values, p->means, rounding);
+    face_means_doubles(&s->faces, &chosen, radiosity_request_channels(request, s->n_channels), values,
+                       p->means, rounding);
     return p->means;
 }
 
@@ -256,20 +257,21 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
         good = pass_memory_allocate(s, request, &r->p, why) &&
                (r->figures != NULL || answer_begin(b, &r->shape, &r->as, notes, why));
     }
-    const double *x = good ? refine(in, refiner, request, first, count, &r->p, r->certificates + first,
-                                    r->iterations + first, why)
-                           : NULL;
+    double *x = good ? refine(in, refiner, request, first, count, &r->p, r->certificates + first,
+                              r->iterations + first, why)
+                     : NULL;
     const double solved = clock_ms();
     notes->solve_ms += solved - begin;
     good = x != NULL;
+    if (good && request->told.luminance) answer_luminance_double(count, width, x, r->certificates + first);
     if (good && r->figures != NULL)
-        good = reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs, first,
-                              count, (reduce_values){.doubles = x}, r->figures) ||
+        good = reduce_vectors(&request->reduce, &s->groups, s->area, r->shape.n_channels, request->n_rhs,
+                              first, count, (reduce_values){.doubles = x}, r->figures) ||
                problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
     for (size_t v = 0; good && r->figures == NULL && v < count; v++) {
         /* One by one: each vector has its own rounding errors, which count in its certificate. */
         double rounding = 0, of_means = 0;
-        const double *values = x + v * s->n_channels * width;
+        const double *values = x + v * r->shape.n_channels * width;
         if (request->at_faces) values = means_of(s, request, values, &r->p, &of_means);
         good = answer_add_doubles(b, &r->shape, &r->as, first + v, 1, values, &rounding, why);
         r->certificates[first + v] += rounding + of_means;

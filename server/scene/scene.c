@@ -9,6 +9,7 @@
 #include "solver/base/clock.h"
 #include "solver/base/scene/scene_backs.h"
 #include "solver/base/scene/scene_buried.h"
+#include "solver/base/scene/scene_lights.h"
 #include "solver/codec/describe.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
@@ -208,8 +209,8 @@ static uint64_t buried_memory(const store *s) {
     return any ? store_array_bytes(s, STORE_MESH "/group") / sizeof(uint32_t) * sizeof(bool) : 0;
 }
 
-/* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, an index of these, one
- * of faces, and marks of buried elements. */
+/* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, areas and an index
+ * of these, one of faces, and marks of buried elements. */
 static uint64_t mesh_memory(const store *s) {
     const uint64_t n = store_array_bytes(s, STORE_MESH "/face") / sizeof(uint32_t),
                    n_faces = store_array_bytes(s, STORE_MESH "/face_area") / sizeof(double);
@@ -217,7 +218,7 @@ static uint64_t mesh_memory(const store *s) {
     return buried_memory(s) + store_array_bytes(s, STORE_MESH "/area") +
            store_array_bytes(s, STORE_MESH "/reflectance") + store_array_bytes(s, STORE_MESH "/group") +
            face_index_bytes(n, n_faces, face_parts(s)) + names +
-           names / (sizeof(char *) + 1) * 2 * sizeof(uint32_t);
+           names / (sizeof(char *) + 1) * (2 * sizeof(uint32_t) + sizeof(double));
 }
 
 /* The bytes that are read beside that and freed again before the scene is open: of groups by element, the
@@ -324,6 +325,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
+    TRY(group_index_measure(&made->groups, made->area, error));
+    TRY(scene_lights_load(s, &made->lights, error));
     TRY(read_faces(s, made, error));
     made->limiter =
         limiter_of(made->n, made->groups.n_groups, made->groups.start, made->groups.elements, made->area);
@@ -400,6 +403,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->op = op;
     made->reflectance = op->reflectance;
     made->groups = base->groups;
+    made->lights = base->lights;
     made->faces = base->faces;
     made->area = base->area;
     made->limiter = base->limiter;

@@ -35,7 +35,8 @@ struct scene {
     size_t n_channels;
     lam_operator *op;
     const float *reflectance; /* [C][n], of op */
-    group_index groups;
+    group_index groups;       /* measured */
+    light_kind lights;
     group_index emitters;  /* by name */
     face_index faces;      /* of the scene file; empty: the store does not know them */
     double *area;          /* [n], m^2 */

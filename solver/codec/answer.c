@@ -15,9 +15,41 @@ static bool no_memory(problem *why) {
 }
 
 bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes) {
+    const char *by = notes->converted_by;
     return buffer_append_text(b, "{\"scene\":") && json_write_text(b, notes->scene) &&
            buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\"%s", n, n_channels,
-                         codec_quantity_name(notes->quantity), notes->at_faces ? ",\"at\":\"faces\"" : "");
+                         codec_quantity_name(notes->quantity), notes->at_faces ? ",\"at\":\"faces\"" : "") &&
+           (notes->unit == NULL || buffer_printf(b, ",\"unit\":\"%s\"", notes->unit)) &&
+           (notes->sum_unit == NULL || buffer_printf(b, ",\"sum_unit\":\"%s\"", notes->sum_unit)) &&
+           (by == NULL || by[0] == '\0' || buffer_printf(b, ",\"converted_by\":\"%s\"", by));
+}
+
+void answer_note_unit(const light_conversion *told, lam_quantity quantity, char text[LIGHT_CONVERSION_TEXT],
+                      answer_notes *notes) {
+    light_conversion_text(told, text);
+    notes->unit = light_conversion_unit(told, quantity != LAM_IRRADIANCE);
+    notes->converted_by = text;
+}
+
+/* A number is written at or before all that is read later. */
+void answer_luminance(size_t n_rows, size_t n, float *x) {
+    for (size_t row = 0; row < n_rows; row++) {
+        const float *from = x + 3 * row * n;
+        for (size_t i = 0; i < n; i++)
+            x[row * n + i] =
+                (float)luminance_of((double)from[i], (double)from[n + i], (double)from[2 * n + i]);
+    }
+}
+
+/* Three products and two sums of at most the largest number. */
+void answer_luminance_double(size_t n_rows, size_t n, double *x, double *certificates) {
+    for (size_t row = 0; row < n_rows; row++) {
+        const double *from = x + 3 * row * n;
+        double largest = 0;
+        for (size_t i = 0; i < 3 * n; i++) largest = fmax(largest, fabs(from[i]));
+        if (certificates != NULL) certificates[row] += 5 * 0x1p-53 * largest;
+        for (size_t i = 0; i < n; i++) x[row * n + i] = luminance_of(from[i], from[n + i], from[2 * n + i]);
+    }
 }
 
 /* The light that the figures are of, and those of each name that is reduced. */

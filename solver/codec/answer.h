@@ -3,6 +3,7 @@
 #define LAMBERT_CODEC_ANSWER_H
 
 #include "lambert/lambert.h"
+#include "solver/base/photometry.h"
 #include "solver/codec/answer_error.h"
 #include "solver/codec/headline.h"
 #include "solver/codec/media.h"
@@ -21,6 +22,9 @@ typedef struct answer_shape {
 typedef struct answer_notes {
     const char *scene;
     lam_quantity quantity;
+    const char *unit;     /* of the numbers; NULL: it is not stated */
+    const char *sum_unit; /* of the sum of a year, of which unit is that of the hours; NULL: there is none */
+    const char *converted_by; /* the text of their light_conversion; NULL or "": they were not converted */
     bool has_error;
     double relative_mean, indirect_mean; /* not finite: there is nothing that they could be relative to */
     headline head;                       /* known only with has_error */
@@ -52,6 +56,15 @@ bool answer_of_vectors(buffer *b, size_t n_rhs, bool batch, const answer_notes *
  * brace. False when memory is short. */
 bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes);
 bool answer_tail(buffer *b, const answer_notes *notes);
+
+/* Puts the unit of an answer of a request, and its conversion, which text holds, into notes. */
+void answer_note_unit(const light_conversion *told, lam_quantity quantity, char text[LIGHT_CONVERSION_TEXT],
+                      answer_notes *notes);
+
+/* Three channels to their luminance, in place: of x [n_rows][3][n] to [n_rows][n]. Certificates [n_rows], of
+ * every channel, are also of their mean; they grow by its rounding. NULL: there are none. */
+void answer_luminance(size_t n_rows, size_t n, float *x);
+void answer_luminance_double(size_t n_rows, size_t n, double *x, double *certificates);
 
 /* Checks that an answer is within single precision; 422. */
 bool answer_check(const float *x, size_t count, problem *why);

@@ -59,6 +59,21 @@ done:
     return status;
 }
 
+lam_status group_index_measure(group_index *index, const double *area, lam_error *error) {
+    index->area = memory_allocate(index->n_groups, sizeof *index->area, "areas of groups", error);
+    if (index->area == NULL) return LAM_ERR_MEMORY;
+    for (size_t g = 0; g < index->n_groups; g++)
+        for (uint32_t e = index->start[g]; e < index->start[g + 1]; e++)
+            if (group_index_counts(index, index->elements[e])) index->area[g] += area[index->elements[e]];
+    return LAM_OK;
+}
+
+double group_index_area(const group_index *index, size_t n_groups, const uint32_t *groups) {
+    double sum = 0;
+    for (size_t k = 0; k < n_groups; k++) sum += index->area[groups[k]];
+    return sum;
+}
+
 lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t s = lam_operator_emitters(op);
@@ -92,11 +107,12 @@ void group_index_free(group_index *index) {
     free(index->elements);
     free(index->sorted);
     free(index->buried);
+    free(index->area);
     *index = (group_index){0};
 }
 
-void group_index_measure(const group_index *index, size_t group, const double *area, group_extent *counted,
-                         group_extent *buried) {
+void group_index_extent(const group_index *index, size_t group, const double *area, group_extent *counted,
+                        group_extent *buried) {
     *counted = *buried = (group_extent){0};
     for (uint32_t at = index->start[group]; at < index->start[group + 1]; at++) {
         const uint32_t i = index->elements[at];

@@ -16,12 +16,16 @@ typedef struct group_index {
     uint32_t *sorted;   /* [n_groups]: groups in the order of their names, those of backs alone at the end */
     size_t n_backs;     /* groups of backs alone */
     bool *buried;       /* [n], owned: elements that figures leave out (scene_buried.h); NULL: none */
+    double *area;       /* [n_groups], m^2, after group_index_measure; else NULL */
 } group_index;
 
 /* Takes over names, also on an error. group is [n], of which the last n_backs elements are the backs of
  * others. Errors: LAM_ERR_FORMAT (a group that has no name). */
 lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, size_t n_groups, char **names,
                             group_index *out, lam_error *error);
+
+/* Sums up the areas of elements [n] by group. Errors: LAM_ERR_MEMORY. */
+lam_status group_index_measure(group_index *index, const double *area, lam_error *error);
 
 /* The emitters of an operator of few emitters, by name: emitter k is group k of element k. Of another
  * operator it is empty. Errors: LAM_ERR_MEMORY. */
@@ -42,14 +46,17 @@ typedef struct group_extent {
 
 /* Measures the part of a group that its figures take in, and the part that they leave out. O(elements of the
  * group). */
-void group_index_measure(const group_index *index, size_t group, const double *area, group_extent *counted,
-                         group_extent *buried);
+void group_index_extent(const group_index *index, size_t group, const double *area, group_extent *counted,
+                        group_extent *buried);
 
 /* The groups that a name means: those of exactly this name, or else all called `name.something` (an object of
  * several materials), of which none has backs alone; or else, of `name.back`, those of backs called
  * `name.something`; or else, of `beginning*`, all whose names begin so, and of `beginning*.back` such backs.
  * Returns how many; *groups points at their numbers, owned by index. O(log g). */
 size_t group_index_find(const group_index *index, const char *name, size_t length, const uint32_t **groups);
+
+/* The area of some groups together, m^2; index is measured. */
+double group_index_area(const group_index *index, size_t n_groups, const uint32_t *groups);
 
 /* For a name that group_index_find does not know, writes `no group "lmap"; did you mean "lamp"?`, or the
  * first names there are where none is near. O(g). */

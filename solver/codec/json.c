@@ -248,9 +248,9 @@ static bool read_lights(parser *p, size_t which, unsigned seen) {
 }
 
 static bool read_body(parser *p) {
-    static const char *const names[] = {"emission",  "emissions", "select", "quantity",
-                                        "tolerance", "reduce",    "limit",  "at"};
-    enum { SELECT = EMISSIONS + 1, QUANTITY, TOLERANCE, REDUCE, LIMIT, AT, N_NAMES };
+    static const char *const names[] = {"emission", "emissions", "select", "quantity", "tolerance",
+                                        "reduce",   "limit",     "at",     "unit",     "photometric"};
+    enum { SELECT = EMISSIONS + 1, QUANTITY, TOLERANCE, REDUCE, LIMIT, AT, UNIT, PHOTOMETRIC, N_NAMES };
     unsigned seen = 0;
     size_t which;
     json_slice key;
@@ -278,6 +278,12 @@ static bool read_body(parser *p) {
             break;
         case AT:
             good = read_at(p);
+            break;
+        case UNIT:
+            good = parser_read_unit(p);
+            break;
+        case PHOTOMETRIC:
+            good = parser_read_photometric(p);
             break;
         default:
             good = read_lights(p, which, seen);
@@ -310,7 +316,7 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
     parser p;
     reduce_request *reduce = &request->reduce;
     bool good = parser_begin(&p, scene, text, length, request, why) && read_body(&p) && settle_faces(&p) &&
-                parser_fill_sides(&p);
+                parser_convert(&p) && parser_fill_sides(&p);
     if (!parser_end(&p, good)) return false;
     if (request->tolerance > 0 || request->n_suns > 0 || reduce->n_names > scene->max_rows)
         reduce->linear = false;

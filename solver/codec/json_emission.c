@@ -185,7 +185,9 @@ static bool read_groups(parser *p) {
         parser_point_key(p, key.bytes, key.length);
         size_t n_found;
         if (!parser_find_group(p, &key, &found, &n_found)) return false;
-        if (!read_colour(p, p->colour)) return false;
+        const bool light = !p->request->any_sign && json_peek(&p->r) == JSON_TEXT;
+        if (!(light ? parser_read_light(p, n_found, found, p->colour) : read_colour(p, p->colour)))
+            return false;
         for (size_t k = 0; k < n_found; k++) {
             const index_set_result added = index_set_add(&p->seen, found[k]);
             if (added == INDEX_SET_KNOWN)

@@ -201,6 +201,7 @@ bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t 
                   radiosity_request *request, problem *why) {
     *p = (parser){.scene = scene, .request = request, .why = why};
     *why = (problem){0};
+    if (request != NULL) request->told.from = scene->lights;
     json_begin(&p->r, text, length);
     p->colour = memory_allocate(scene->n_channels, sizeof *p->colour, "colour", NULL);
     return p->colour != NULL ||

@@ -49,6 +49,8 @@ typedef struct parser {
     float *colour;  /* [C] */
     index_set seen; /* elements, groups or faces */
     place_word at;
+    bool sky_given; /* the request says what its radiances are: */
+    light_kind sky_lights;
     select_word selects;      /* with select */
     index_list groups, faces; /* that are selected */
 } parser;
@@ -119,5 +121,15 @@ bool parser_read_sun(parser *p);
  * emitters. */
 bool parser_read_emission(parser *p);
 bool parser_read_emissions(parser *p);
+
+/* A text such as "3600lm" for some groups, as their exitance colour [C] in the store's kind of light. */
+bool parser_read_light(parser *p, size_t n_groups, const uint32_t *groups, float *colour);
+
+/* The values of `unit` and of `photometric`. */
+bool parser_read_unit(parser *p);
+bool parser_read_photometric(parser *p);
+
+/* Puts all light of a request, whose members are read, into the unit of its answer, which is linear in it. */
+bool parser_convert(parser *p);
 
 #endif

@@ -150,7 +150,7 @@ static bool read_sky(parser *p, sky_request *sky) {
     json_slice key;
     bool by_weather = false;
     const size_t mark = p->pointer_length;
-    *sky = (sky_request){.sun_in_tiles = true};
+    *sky = (sky_request){.sun_in_tiles = true, .photometric = p->scene->lights == LIGHT_PHOTOMETRIC};
     double *const numbers[] = {&sky->direct,  &sky->diffuse,  &sky->dew_point, &sky->lux_outside,
                                &sky->azimuth, &sky->altitude, &sky->latitude,  &sky->longitude,
                                &sky->zone,    &sky->hour,     &sky->north};

@@ -304,6 +304,7 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
                            length - h.data, size);
     request->batch = found.batch;
     request->n_rhs = found.n_rhs;
+    request->told.from = scene->lights;
     float *last;
     if (!radiosity_request_dense(request, scene, &last, why)) return false;
     const size_t stride = scene->n_channels * row;

@@ -4,6 +4,7 @@
 #define LAMBERT_CODEC_REQUEST_H
 
 #include "lambert/lambert.h"
+#include "solver/base/photometry.h"
 #include "solver/codec/face_means.h"
 #include "solver/codec/group_figures.h"
 #include "solver/codec/groups.h"
@@ -13,7 +14,8 @@
 typedef struct codec_scene {
     size_t n;
     size_t n_channels;
-    const group_index *groups;
+    light_kind lights;           /* of emissions and radiances without a unit */
+    const group_index *groups;   /* measured, where lights may be given as flux */
     const face_index *faces;     /* of the scene file; NULL or empty: they are not known */
     size_t n_tiles;              /* of the sky; 0: none */
     size_t n_emitters;           /* 0: none */
@@ -75,8 +77,9 @@ typedef struct radiosity_request {
     uint32_t *faces; /* [n_faces], these; NULL: all */
     size_t n_faces;
     lam_quantity quantity;
-    bool linear_map;  /* "limit": false: light below zero stays */
-    double tolerance; /* of a refined answer, above 0 and below 1; 0: none is asked for */
+    light_conversion told; /* of the answer; once read, the light above is in its unit */
+    bool linear_map;       /* "limit": false: light below zero stays */
+    double tolerance;      /* of a refined answer, above 0 and below 1; 0: none is asked for */
 
     reduce_request reduce; /* figures of groups in place of vectors */
     side_rows sky;         /* radiances of its tiles */
@@ -141,6 +144,11 @@ bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene,
 /* The faces of an answer of faces, and the numbers of an answer to one vector in one channel. */
 face_choice radiosity_request_faces(const radiosity_request *request, const face_index *faces);
 size_t radiosity_request_values(const radiosity_request *request, size_t n, const face_index *faces);
+
+/* Channels of the answer, of C of the scene: 1 where it is of their luminance. */
+static inline size_t radiosity_request_channels(const radiosity_request *request, size_t n_channels) {
+    return request->told.luminance ? 1 : n_channels;
+}
 
 /* The contract's word for a quantity, and the quantity of a word: false for any other word. */
 const char *codec_quantity_name(lam_quantity quantity);

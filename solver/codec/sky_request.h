@@ -19,7 +19,7 @@ typedef struct sky_request {
     double azimuth, altitude;         /* of `sun`, degrees; both or none */
     double latitude, longitude, zone; /* of `place`; all or none */
     double hour, north;
-    bool photometric, sun_in_tiles; /* false, true */
+    bool photometric, sun_in_tiles; /* as the scene counts light; true */
 } sky_request;
 
 /* Reads {"sky": SKY} or {"skies": [SKY, ...]}: skies [SKY_REQUEST_MOST]. False with why. */

@@ -4,6 +4,7 @@
  * tile, and one x_h,sun for each hour with an exact sun. */
 #include "solver/light/annual.h"
 
+#include "solver/codec/answer.h"
 #include "solver/light/sunlight.h"
 #include "solver/linalg/dense.h"
 
@@ -67,6 +68,12 @@ done:
 bool annual_has_shares(const annual_options *w) {
     for (size_t k = 0; k < w->n_figures; k++)
         if (!w->figures[k].is_sum) return true;
+    return false;
+}
+
+bool annual_has_sum(const annual_options *w) {
+    for (size_t k = 0; k < w->n_figures; k++)
+        if (w->figures[k].is_sum) return true;
     return false;
 }
 
@@ -184,7 +191,8 @@ typedef struct work {
     const uint32_t *selected;
     const progress *steps;
     size_t row;  /* numbers of an answer: C times the elements wanted */
-    float *made; /* [n_figures][row] */
+    size_t told; /* numbers of a figure: row, or the elements where it is of the luminance */
+    float *made; /* [n_figures][told] */
 } work;
 
 static lam_status make_sums(const work *w, const emission *light, lam_error *error) {
@@ -193,18 +201,22 @@ static lam_status make_sums(const work *w, const emission *light, lam_error *err
     const emission *mean = w->options->mean;
     annual_mean found = {.light = {.n_vectors = 0}};
     emission_pass p = {0};
+    float *x = memory_allocate(1, w->row * sizeof *x, "the sum of a year", error);
+    if (x == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < w->options->n_figures; k++) {
         if (!w->options->figures[k].is_sum) continue;
-        float *to = w->made + k * w->row;
+        float *to = w->made + k * w->told;
         if (mean == NULL) {
             TRY(annual_mean_find(light, w->op, w->sky, w->steps, &found, error));
             mean = &found.light;
         }
         TRY(emission_pass_create(mean, w->op, w->sky, w->quantity, w->n_selected, w->selected, 1, &p, error));
-        TRY(emission_pass_solve(&p, 1, (const size_t[]){0}, to, error));
-        for (size_t i = 0; i < w->row; i++) to[i] = (float)((double)to[i] * scale);
+        TRY(emission_pass_solve(&p, 1, (const size_t[]){0}, x, error));
+        if (w->options->luminance) answer_luminance(1, w->told, x);
+        for (size_t i = 0; i < w->told; i++) to[i] = (float)((double)x[i] * scale);
     }
 done:
+    free(x);
     emission_pass_free(&p);
     annual_mean_free(&found);
     return status;
@@ -216,7 +228,7 @@ typedef struct tile_answers {
     size_t terms; /* tiles + 1; 0: hours are answered one by one */
     float *x;     /* [C][terms][width], the emission last */
     float *share; /* [AT_ONCE][terms], of one channel */
-    float *mixed; /* [AT_ONCE][width] */
+    float *mixed; /* [AT_ONCE][width], with luminance of each channel: [C][AT_ONCE][width] */
     float *dark;  /* [C][n], the emission of suns */
     emission suns;
     emission_pass by_suns; /* of suns alone */
@@ -301,7 +313,8 @@ static lam_status tile_answers_make(const work *w, const emission *light, tile_a
     float *units = memory_allocate(m + 1, C * m * sizeof *units, "answers to tiles", error);
     a.x = memory_allocate(terms, w->row * sizeof *a.x, "answers to tiles", error);
     a.share = memory_allocate(AT_ONCE, terms * sizeof *a.share, "answers to tiles", error);
-    a.mixed = memory_allocate(AT_ONCE, width * sizeof *a.mixed, "answers to tiles", error);
+    a.mixed = memory_allocate(w->options->luminance ? C * AT_ONCE : AT_ONCE, width * sizeof *a.mixed,
+                              "answers to tiles", error);
     if (dark == NULL || units == NULL || a.x == NULL || a.share == NULL || a.mixed == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < m; t++)
@@ -336,7 +349,7 @@ static void count_hours(const annual_figure *f, size_t n, size_t width, const fl
 static void count_all(const work *w, size_t n, size_t width, const float *x, uint32_t *count) {
     for (size_t k = 0; k < w->options->n_figures; k++)
         if (!w->options->figures[k].is_sum)
-            count_hours(&w->options->figures[k], n, width, x, count + k * w->row);
+            count_hours(&w->options->figures[k], n, width, x, count + k * w->told);
 }
 
 /* Answers the suns of those of n hours in which one shines. sunny [n]: its place among these answers, or n.
@@ -364,14 +377,18 @@ static lam_status count_mixed(const work *w, const emission *light, tile_answers
             memcpy(a->share + k * a->terms, light->L + (vectors[k] * C + c) * m, m * sizeof *a->share);
             a->share[k * a->terms + m] = 1;
         }
-        dense_multiply(n, a->terms, width, a->share, a->x + c * a->terms * width, false, a->mixed);
+        float *mixed = a->mixed + (w->options->luminance ? c * n * width : 0);
+        dense_multiply(n, a->terms, width, a->share, a->x + c * a->terms * width, false, mixed);
         for (size_t k = 0; k < n; k++) {
             if (sunny[k] == n) continue;
             const float *by_sun = a->sunny + (sunny[k] * C + c) * width;
-            for (size_t i = 0; i < width; i++) a->mixed[k * width + i] += by_sun[i];
+            for (size_t i = 0; i < width; i++) mixed[k * width + i] += by_sun[i];
         }
-        count_all(w, n, width, a->mixed, count + c * width);
+        if (!w->options->luminance) count_all(w, n, width, mixed, count + c * width);
     }
+    if (!w->options->luminance) goto done;
+    answer_luminance(1, n * width, a->mixed);
+    count_all(w, n, width, a->mixed, count);
 done:
     return status;
 }
@@ -384,7 +401,7 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
     const bool mixed = worth_mixing(w, light, n_vectors);
     emission_pass p = {0};
     tile_answers tiles = {.terms = 0};
-    uint32_t *count = memory_allocate(n_figures, w->row * sizeof *count, "hours", error);
+    uint32_t *count = memory_allocate(n_figures, w->told * sizeof *count, "hours", error);
     float *x = memory_allocate(most + 1, w->row * sizeof *x, "hours", error);
     if (count == NULL || x == NULL) TRY(LAM_ERR_MEMORY);
     if (mixed) {
@@ -402,14 +419,15 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
             continue;
         }
         TRY(emission_pass_solve(&p, now, vectors + first, x, error));
-        count_all(w, now, w->row, x, count);
+        if (w->options->luminance) answer_luminance(now, w->told, x);
+        count_all(w, now, w->told, x, count);
     }
     for (size_t k = 0; k < n_figures; k++) {
         const annual_figure *f = &w->options->figures[k];
         const size_t always = f->low <= 0 ? dark : 0; /* hours of exactly 0 */
-        for (size_t i = 0; i < w->row && !f->is_sum; i++)
-            w->made[k * w->row + i] =
-                (float)((double)(count[k * w->row + i] + always) / (double)sum->counted);
+        for (size_t i = 0; i < w->told && !f->is_sum; i++)
+            w->made[k * w->told + i] =
+                (float)((double)(count[k * w->told + i] + always) / (double)sum->counted);
     }
 done:
     emission_pass_free(&p);
@@ -424,7 +442,8 @@ lam_status annual_apply(const annual_options *options, const emission *light, co
                         const uint32_t *selected, const progress *steps, float **values,
                         annual_summary *summary, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t C = lam_operator_channels(op), n = lam_operator_elements(op);
+    const size_t C = options->luminance ? 1 : lam_operator_channels(op), n = lam_operator_elements(op);
+    const size_t wanted = selected != NULL ? n_selected : n;
     const widths width = widths_of(op, sky);
     annual_summary sum = {.n = light->n_vectors};
     work w = {.options = options,
@@ -434,12 +453,13 @@ lam_status annual_apply(const annual_options *options, const emission *light, co
               .n_selected = n_selected,
               .selected = selected,
               .steps = steps,
-              .row = C * (selected != NULL ? n_selected : n)};
+              .row = lam_operator_channels(op) * wanted,
+              .told = C * wanted};
     size_t *lit = NULL, n_lit = 0; /* vectors that are lit and count */
     float *whole = NULL;
     TRY(check_days(options, light->n_vectors, error));
     lit = memory_allocate(light->n_vectors, sizeof *lit, "hours", error);
-    w.made = memory_allocate(options->n_figures, w.row * sizeof *w.made, "figures of the year", error);
+    w.made = memory_allocate(options->n_figures, w.told * sizeof *w.made, "figures of the year", error);
     if (lit == NULL || w.made == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < light->n_vectors; v++) {
         const bool shines = is_lit(light, &width, v), counted = counts(options, v);

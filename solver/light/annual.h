@@ -27,6 +27,7 @@ typedef struct annual_options {
     double hours;         /* that a vector stands for */
     double from, to;      /* hours of the day: vectors count whose middle is from <= t < to; 0 and 24: all */
     const double *middle; /* [vectors], hours of the day; NULL: vectors follow each other from midnight on */
+    bool luminance;       /* figures are of the luminance of three channels, and have one */
     const emission *mean; /* of annual_mean_find; NULL: it is found where sums need it */
 } annual_options;
 
@@ -38,6 +39,9 @@ lam_status annual_parse_occupied(const char *text, annual_options *w, lam_error 
 
 /* True when a figure is a share of the hours, not a sum. */
 bool annual_has_shares(const annual_options *w);
+
+/* True when a figure is a sum. */
+bool annual_has_sum(const annual_options *w);
 
 /* The mean of all vectors, as one. */
 typedef struct annual_mean {
@@ -58,14 +62,14 @@ typedef struct annual_summary {
     size_t lit;     /* with any light at all */
 } annual_summary;
 
-/* *values is [n_figures][C][n], freed with free(): the figures of the answers to all vectors; with selected
- * (not NULL) of these elements only, and 0 elsewhere. The mean vector is solved for the sum, which is linear;
- * for shares all lit vectors that count, a few at a time. Where these are more than the tiles of the sky, and
- * the emission beside it is steady, each tile is solved once, and hours are sums of tiles and of one
- * answer to their sun where it is exact, each limited by itself. Cost: one answer for sums; for shares one a
- * lit and counted vector, or one a tile and an exact sun and a product of [tiles][n] a vector;
- * memory O(n), or O(n tiles) of at most 1 GiB. Errors: LAM_ERR_ARGUMENT (not whole days, where hours of the
- * day are asked for), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. */
+/* *values is [n_figures][C][n], C = 1 with luminance, freed with free(): the figures of the answers to all
+ * vectors; with selected (not NULL) of these elements only, and 0 elsewhere. The mean vector is solved for
+ * the sum, which is linear; for shares all lit vectors that count, a few at a time. Where these are more than
+ * the tiles of the sky, and the emission beside it is steady, each tile is solved once, and hours are sums of
+ * tiles and of one answer to their sun where it is exact, each limited by itself. Cost: one answer for sums;
+ * for shares one a lit and counted vector, or one a tile and an exact sun and a product of [tiles][n] a
+ * vector; memory O(n), or O(n tiles) of at most 1 GiB. Errors: LAM_ERR_ARGUMENT (not whole days, where hours
+ * of the day are asked for), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. */
 lam_status annual_apply(const annual_options *w, const emission *light, const lam_operator *op,
                         const lam_sky *sky, lam_quantity quantity, size_t n_selected,
                         const uint32_t *selected, const progress *steps, float **values,

@@ -46,10 +46,11 @@ lam_status emission_scene_create(const mesh *m, emission_scene *out, lam_error *
         if (made.groups.buried == NULL) TRY(LAM_ERR_MEMORY);
         memcpy(made.groups.buried, m->buried, m->n * sizeof *m->buried);
     }
+    TRY(group_index_measure(&made.groups, m->area, error));
     *out = made;
     made = (emission_scene){.m = NULL};
 done:
-    group_index_free(&made.groups);
+    emission_scene_free(&made);
     return status;
 }
 
@@ -84,48 +85,55 @@ lam_status emission_fill_group(const emission_scene *scene, const char *what, co
     return LAM_OK;
 }
 
-/* The group's name and the values of an item; both are freed with free(). */
-static lam_status item_parse(const char *item, char **name, double **values, size_t *found,
-                             lam_error *error) {
+/* An item of --emit: the group's name, and numbers in a unit. */
+typedef struct emit_item {
+    char *name;
+    double *values;
+    size_t n;
+    given_unit unit;
+} emit_item;
+
+static void item_free(emit_item *item) {
+    free(item->name);
+    free(item->values);
+}
+
+/* *out is freed by item_free, also after an error. */
+static lam_status item_parse(const char *item, emit_item *out, lam_error *error) {
     lam_status status = LAM_OK;
-    char what[128];
-    char *before = NULL;
-    double *numbers = NULL;
+    char what[128], *text = NULL;
     size_t most = 2;
     const char *equals = strrchr(item, '=');
+    *out = (emit_item){.n = 0};
     if (equals == NULL || equals == item)
-        FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: must be GROUP=V or GROUP=V,V,V", item);
+        FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: must be GROUP=V or GROUP=V,V,V, with or without a unit",
+             item);
     for (const char *at = equals; *at != '\0'; at++) most += *at == ',';
-    before = strndup(item, (size_t)(equals - item));
-    if (before == NULL) FAIL(error, LAM_ERR_MEMORY, "--emit %s: not enough memory", item);
-    numbers = memory_allocate(most, sizeof *numbers, "--emit", error);
-    if (numbers == NULL) TRY(LAM_ERR_MEMORY);
-    snprintf(what, sizeof what, "--emit %s:", before);
-    TRY(option_numbers(what, equals + 1, most, false, numbers, found, error));
-    for (size_t c = 0; c < *found; c++)
-        if (numbers[c] < 0 || numbers[c] > (double)FLT_MAX)
+    out->name = strndup(item, (size_t)(equals - item));
+    text = strndup(equals + 1, given_unit_split(equals + 1, strlen(equals + 1), &out->unit));
+    if (out->name == NULL || text == NULL) FAIL(error, LAM_ERR_MEMORY, "--emit %s: not enough memory", item);
+    out->values = memory_allocate(most, sizeof *out->values, "--emit", error);
+    if (out->values == NULL) TRY(LAM_ERR_MEMORY);
+    if (text[strspn(text, "0123456789+-.,eE")] != '\0')
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--emit %s: must be numbers between commas, without a unit or in " GIVEN_UNIT_WORDS, item);
+    snprintf(what, sizeof what, "--emit %s:", out->name);
+    TRY(option_numbers(what, text, most, false, out->values, &out->n, error));
+    for (size_t c = 0; c < out->n; c++)
+        if (out->values[c] < 0 || out->values[c] > (double)FLT_MAX)
             FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: must be from 0 to %g", item, (double)FLT_MAX);
-    *name = before;
-    *values = numbers;
-    before = NULL;
-    numbers = NULL;
 done:
-    free(before);
-    free(numbers);
+    free(text);
     return status;
 }
 
 lam_status emission_check_items(const option_list *items, lam_error *error) {
     lam_status status = LAM_OK;
-    for (size_t i = 0; i < items->count; i++) {
-        char *name = NULL;
-        double *values = NULL;
-        size_t found = 0;
-        TRY(item_parse(items->items[i], &name, &values, &found, error));
-        free(name);
-        free(values);
+    for (size_t i = 0; status == LAM_OK && i < items->count; i++) {
+        emit_item item;
+        status = item_parse(items->items[i], &item, error);
+        item_free(&item);
     }
-done:
     return status;
 }
 
@@ -140,25 +148,61 @@ static bool fill_emitter(const emission_scene *scene, const char *name, const do
     return n_found > 0;
 }
 
-/* Into E, or, of an emitter, into W, which is NULL where the store has none. */
-static lam_status fill_item(const emission_scene *scene, const char *item, float *E, float *W,
-                            lam_error *error) {
+/* One value for each channel, as exitances of the store's kind of light. Of a name that the scene does not
+ * have the area is 0, and the name is refused later. */
+static lam_status settle_values(const emission_scene *scene, const char *text, emit_item *item,
+                                lam_error *error) {
     lam_status status = LAM_OK;
     const size_t C = scene->m->n_channels;
-    double *values = NULL;
-    size_t found = 0;
-    char what[240], *name = NULL;
-    TRY(item_parse(item, &name, &values, &found, error));
-    if (found != 1 && found != C)
+    const uint32_t *found = NULL;
+    const size_t n_found = group_index_find(&scene->groups, item->name, strlen(item->name), &found);
+    const double area = group_index_area(&scene->groups, n_found, found);
+    const double each = given_unit_exitance(item->unit, area > 0 ? area : 1, scene->m->lights);
+    double *values = memory_allocate(C, sizeof *values, "--emit", error);
+    if (values == NULL) return LAM_ERR_MEMORY;
+    if (item->n != 1 && item->n != C)
         FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: %zu values, must be 1 or one for each of %zu channels",
-             item, found, C);
-    if (found < C) {
-        const double all = values[0];
-        free(values);
-        values = memory_allocate(C, sizeof *values, "--emit", error);
-        if (values == NULL) TRY(LAM_ERR_MEMORY);
-        for (size_t c = 0; c < C; c++) values[c] = all;
-    }
+             text, item->n, C);
+    for (size_t c = 0; c < C; c++) values[c] = item->values[item->n == 1 ? 0 : c] * each;
+    for (size_t c = 0; c < C; c++)
+        if (values[c] > (double)FLT_MAX)
+            FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: is %g %s/m2, must be at most %g", text, values[c],
+                 light_kind_word(scene->m->lights), (double)FLT_MAX);
+    free(item->values);
+    item->values = values;
+    values = NULL;
+done:
+    free(values);
+    return status;
+}
+
+lam_status emission_read_item(const emission_scene *scene, const char *text, char **name, double **values,
+                              bool *converted, lam_error *error) {
+    lam_status status = LAM_OK;
+    emit_item item = {.n = 0};
+    const uint32_t *found = NULL;
+    TRY(item_parse(text, &item, error));
+    if (item.unit != GIVEN_PLAIN && scene->n_emitters > 0 &&
+        group_index_find(&scene->emitters, item.name, strlen(item.name), &found) > 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--emit %.200s: is an emitter of the store, whose weight has no unit",
+             text);
+    TRY(settle_values(scene, text, &item, error));
+    *converted = *converted || given_unit_kind(item.unit, scene->m->lights) != scene->m->lights;
+    *name = item.name;
+    *values = item.values;
+    item = (emit_item){.n = 0};
+done:
+    item_free(&item);
+    return status;
+}
+
+/* Into E, or, of an emitter, into W, which is NULL where the store has none. */
+static lam_status fill_item(const emission_scene *scene, const char *item, float *E, float *W,
+                            bool *converted, lam_error *error) {
+    lam_status status = LAM_OK;
+    char what[240], *name = NULL;
+    double *values = NULL;
+    TRY(emission_read_item(scene, item, &name, &values, converted, error));
     snprintf(what, sizeof what, "--emit %s", item);
     if (W != NULL && fill_emitter(scene, name, values, W)) goto done;
     status = emission_fill_group(scene, what, name, values, E, error);
@@ -181,11 +225,12 @@ lam_status emission_from_groups(const emission_scene *scene, const option_list *
                                 lam_error *error) {
     lam_status status = LAM_OK;
     float *E = NULL, *W = NULL;
+    bool converted = false;
     TRY(one_vector(scene->m, &E, error));
     if (scene->n_emitters > 0)
         TRY(emission_allocate("emission", scene->m->n_channels, scene->n_emitters, 1, &W, error));
-    for (size_t i = 0; i < items->count; i++) TRY(fill_item(scene, items->items[i], E, W, error));
-    *out = (emission){.n_vectors = 1, .E = E, .W = W};
+    for (size_t i = 0; i < items->count; i++) TRY(fill_item(scene, items->items[i], E, W, &converted, error));
+    *out = (emission){.n_vectors = 1, .E = E, .W = W, .converted = converted};
     E = W = NULL;
 done:
     free(E);
@@ -219,7 +264,8 @@ lam_status emission_choose(const emission_scene *scene, const emission_options *
         TRY(emission_read(options->path, scene, options->signs, &e, error));
     else
         TRY(one_vector(scene->m, &e.E, error));
-    if (options->sky != NULL) TRY(emission_add_sky(&e, options->sky, scene, error));
+    e.lights = scene->m->lights;
+    if (options->sky != NULL) TRY(emission_add_sky(&e, options->sky, scene, options->photometric, error));
     *out = e;
     e = (emission){0};
 done:

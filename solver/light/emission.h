@@ -1,22 +1,26 @@
-/* Emissions of a command line or of files: --emit GROUP=V[,V,V], --emission FILE.npy|.json and --sky
+/* Emissions of a command line or of files: --emit GROUP=V[,V,V][UNIT], --emission FILE.npy|.json and --sky
  * FILE.npy|.mtx|.smx. The room codec knows the formats; this one knows files, options and batches. */
 #ifndef LAMBERT_LIGHT_EMISSION_H
 #define LAMBERT_LIGHT_EMISSION_H
 
 #include "lambert/lambert.h"
 #include "solver/base/options/options.h"
+#include "solver/base/photometry.h"
 #include "solver/codec/groups.h"
 #include "solver/scene/mesh.h"
 
-/* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2; NULL: W is all there is.
- */
+/* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2 or lm/m^2; NULL: W is all there is. */
 typedef struct emission {
     size_t n_vectors;
     bool batch;  /* given as a batch (also of one), so answered as one */
     bool steady; /* E and W are one vector, which goes with every sky of L: a year need not repeat it */
     float *E;
-    float *L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr); NULL: no sky */
+    float *
+        L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr) or cd/m^2; NULL: no sky
+            */
     float *W; /* [n_vectors][C][s], weights of the store's emitters, beside E and L; NULL: none given */
+    light_kind lights;          /* of all numbers */
+    bool converted;             /* some were given in the other kind */
     bool by_luminance;          /* L is the luminance of a coloured sky, for a grey store */
     const struct sunlight *sun; /* [n_vectors], on every channel, beside L; borrowed, NULL: none */
     const lam_limiter *limiter; /* of answers below zero; borrowed, NULL: they are those of the linear map */
@@ -48,10 +52,17 @@ lam_status emission_fill_group(const emission_scene *scene, const char *what, co
                                const double *values, float *E, lam_error *error);
 
 /* One vector by names of groups, or of emitters of a store of few, which then is W: each item is NAME=V or
- * NAME=V,V,V, one V per channel; the others are dark. A later item replaces an earlier one. Errors:
- * LAM_ERR_ARGUMENT names the item. */
+ * NAME=V,V,V, one V per channel; the others are dark. A unit may stand behind the last V (photometry.h), but
+ * of weights of emitters: a flux is that of all that the name means, and is spread evenly over its area. A
+ * later item replaces an earlier one. Errors: LAM_ERR_ARGUMENT names the item. */
 lam_status emission_from_groups(const emission_scene *scene, const option_list *items, emission *out,
                                 lam_error *error);
+
+/* The name of an item and its values [C], as exitances of the store's kind of light, or as weights without a
+ * unit; both are freed with free(). converted is set where they were given in the other kind. Errors:
+ * LAM_ERR_ARGUMENT names the item. */
+lam_status emission_read_item(const emission_scene *scene, const char *item, char **name, double **values,
+                              bool *converted, lam_error *error);
 
 /* Checks the form of every item, which needs no store: an error is wrong usage. */
 lam_status emission_check_items(const option_list *items, lam_error *error);
@@ -74,8 +85,11 @@ lam_status emission_read_frames(const char *path, const emission_scene *scene, e
 /* Puts e under the sky of an NPY file, shaped as an emission of m tiles, or of a matrix of Radiance (.mtx,
  * .smx) on the tiles of the scene. One sky goes with every emission, one emission with every sky (steady);
  * else there must be as many of both. A coloured sky lights a grey store by its luminance, that of Radiance
- * (photometry.h), and sets by_luminance: an NPY file of it is [b][3][m]. */
-lam_status emission_add_sky(emission *e, const char *path, const emission_scene *scene, lam_error *error);
+ * (photometry.h), and sets by_luminance: an NPY file of it is [b][3][m]. An NPY file is
+ * of the store's kind of light, or photometric; a matrix is radiometric, and becomes photometric where that
+ * is asked. */
+lam_status emission_add_sky(emission *e, const char *path, const emission_scene *scene, bool photometric,
+                            lam_error *error);
 
 /* The same for a batch of skies L [n_skies][m], which is copied to every channel; path names it in messages.
  */
@@ -95,6 +109,7 @@ typedef struct emission_options {
     const char *path;         /* --emission, or NULL */
     const char *frames;       /* for emission_read_frames in place of both, or NULL */
     const char *sky;          /* --sky, or NULL */
+    bool photometric;         /* the sky is, whatever the store is */
     bool signs;               /* the emission of path may be negative, where the store answers any emission */
     bool other;               /* light is added later: the scene's own is not the preset */
 } emission_options;

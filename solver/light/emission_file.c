@@ -6,6 +6,7 @@
 #include "solver/daylight/sky_matrix.h"
 #include "solver/daylight/weather.h"
 #include "solver/light/emission.h"
+#include "solver/light/light_units.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -59,6 +60,7 @@ lam_status emission_read(const char *path, const emission_scene *scene, bool sig
     radiosity_request read = {0};
     const codec_scene about = {.n = scene->m->n,
                                .n_channels = scene->m->n_channels,
+                               .lights = scene->m->lights,
                                .groups = &scene->groups,
                                .n_tiles = scene->n_tiles,
                                .n_emitters = scene->n_emitters,
@@ -75,6 +77,7 @@ lam_status emission_read(const char *path, const emission_scene *scene, bool sig
                       .batch = read.batch,
                       .E = read.E,
                       .L = read.sky.values,
+                      .converted = read.told.lights,
                       .by_luminance = read.by_luminance,
                       .W = read.emitters.values};
     read.E = read.sky.values = read.emitters.values = NULL;
@@ -187,7 +190,8 @@ static void take_luminance(size_t n_skies, size_t n_tiles, float *L) {
 }
 
 /* The sky of a matrix, whose patches must be the tiles of the scene. */
-static lam_status add_matrix(emission *e, const char *path, const emission_scene *scene, lam_error *error) {
+static lam_status add_matrix(emission *e, const char *path, const emission_scene *scene, bool photometric,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     const size_t C = scene->m->n_channels, m = scene->n_tiles;
     sky_matrix read = {.n = 0};
@@ -212,13 +216,17 @@ static lam_status add_matrix(emission *e, const char *path, const emission_scene
         memcpy(L + row * m, read.L + (read.n_channels == C ? row : row / C) * m, m * sizeof *L);
     TRY(put_under(e, path, C, m, read.n, &L, error));
     e->batch = true;
+    /* Matrices are in W, whatever the answer is to be in. */
+    if (photometric) light_units_meet_sky(e, scene, LIGHT_PHOTOMETRIC);
+    light_units_meet_sky(e, scene, LIGHT_RADIOMETRIC);
 done:
     free(L);
     sky_matrix_free(&read);
     return status;
 }
 
-lam_status emission_add_sky(emission *e, const char *path, const emission_scene *scene, lam_error *error) {
+lam_status emission_add_sky(emission *e, const char *path, const emission_scene *scene, bool photometric,
+                            lam_error *error) {
     lam_status status = LAM_OK;
     radiosity_request sky = {0};
     codec_scene about = {.n = scene->n_tiles, .n_channels = scene->m->n_channels, .item = "tile of the sky"};
@@ -227,7 +235,7 @@ lam_status emission_add_sky(emission *e, const char *path, const emission_scene 
         FAIL(error, LAM_ERR_ARGUMENT, "--sky %s: the store has no sky; precompute it with --sky", path);
     if (weather_is_named(path))
         FAIL(error, LAM_ERR_ARGUMENT, "--sky %s: hours of a weather file are for lambert solve", path);
-    if (sky_matrix_is_named(path)) return add_matrix(e, path, scene, error);
+    if (sky_matrix_is_named(path)) return add_matrix(e, path, scene, photometric, error);
     status = read_with(codec_read_npy, path, about, &sky, error);
     if (status == LAM_ERR_ARGUMENT && about.n_channels == 1) { /* of another shape: perhaps a coloured one */
         about.n_channels = 3;
@@ -239,6 +247,7 @@ lam_status emission_add_sky(emission *e, const char *path, const emission_scene 
     TRY(status);
     TRY(put_under(e, path, scene->m->n_channels, about.n, sky.n_rhs, &sky.E, error));
     e->batch = e->batch || sky.batch;
+    if (photometric) light_units_meet_sky(e, scene, LIGHT_PHOTOMETRIC);
 done:
     radiosity_request_free(&sky);
     return status;

@@ -94,7 +94,8 @@ const option_row sky_named_rows[] = {
     {.name = "photometric",
      .kind = OPTION_FLAG,
      .offset = FIELD(photometric),
-     .help = "Weather and named skies in lux, as `lambert sky --photometric`"},
+     .help = "Weather and named skies in lux, as `lambert sky --photometric`; a --sky FILE.npy is in cd/m2, "
+             "and one of Radiance becomes so. Of a store in lm without this option, too, but for FILE.npy"},
     {0},
 };
 
@@ -102,7 +103,8 @@ const moment *sky_options_moment(const sky_options *o) {
     return o->date.given ? &o->date.m : o->hour.given ? &o->hour.m : NULL;
 }
 
-lam_status sky_options_check(const sky_options *o, const char *name, bool by_weather, lam_error *error) {
+lam_status sky_options_check(const sky_options *o, const char *name, bool by_weather, bool by_file,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     named_sky k = {.model = SKY_EVEN};
     const moment *at = sky_options_moment(o);
@@ -114,8 +116,8 @@ lam_status sky_options_check(const sky_options *o, const char *name, bool by_wea
                                                  : NULL;
     if (name == NULL && o->lux_outside > 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--lux-outside is for --sky even, overcast, clear or turbidity:T");
-    if (name == NULL && !by_weather && o->photometric)
-        FAIL(error, LAM_ERR_ARGUMENT, "--photometric is for --weather and named skies");
+    if (name == NULL && !by_weather && !by_file && o->photometric)
+        FAIL(error, LAM_ERR_ARGUMENT, "--photometric is for --weather and --sky");
     if (!sun && !by_weather && alone != NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "--%s is for weather, and for --sky clear and turbidity:T", alone);
     if (!sun && o->place.given)
@@ -167,6 +169,15 @@ done:
     return status;
 }
 
+light_kind sky_options_kind(const sky_options *o, const char *name, light_kind of_store) {
+    named_sky k = {.model = SKY_EVEN, .photometric = o->photometric || of_store == LIGHT_PHOTOMETRIC};
+    if (name == NULL || named_sky_parse("--sky", name, &k, NULL) != LAM_OK)
+        return k.photometric ? LIGHT_PHOTOMETRIC : LIGHT_RADIOMETRIC;
+    k.lux_outside = o->lux_outside;
+    k.photometric = o->photometric || of_store == LIGHT_PHOTOMETRIC;
+    return named_sky_is_photometric(&k) ? LIGHT_PHOTOMETRIC : LIGHT_RADIOMETRIC;
+}
+
 lam_status named_light_add(const sky_options *o, const char *name, store *s, const mesh *m,
                            const lam_operator *op, const lam_sky *sky, emission *e, sunlight *sun,
                            char said[SKY_SAID], lam_error *error) {
@@ -183,7 +194,9 @@ lam_status named_light_add(const sky_options *o, const char *name, store *s, con
     L = memory_allocate(tiling.n_tiles, sizeof *L, "the sky", error);
     narrow = memory_allocate(tiling.n_tiles, sizeof *narrow, "the sky", error);
     if (L == NULL || narrow == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(sky_options_make(o, name, north, &tiling, few || o->sun_in_tiles, L, &shines, said, error));
+    sky_options of = *o;
+    of.photometric = sky_options_kind(o, name, m->lights) == LIGHT_PHOTOMETRIC;
+    TRY(sky_options_make(&of, name, north, &tiling, few || o->sun_in_tiles, L, &shines, said, error));
     for (size_t t = 0; t < tiling.n_tiles; t++) narrow[t] = (float)L[t];
     TRY(emission_add_skies(e, name, m, tiling.n_tiles, 1, narrow, error));
     e->batch = batch;

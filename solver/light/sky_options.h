@@ -38,8 +38,9 @@ extern const option_row sky_time_rows[], sky_named_rows[];
 const moment *sky_options_moment(const sky_options *o);
 
 /* Checks what goes together: `name` is a named sky, or NULL, `by_weather` says that there is a file of
- * weather. Errors: LAM_ERR_ARGUMENT, wrong usage. */
-lam_status sky_options_check(const sky_options *o, const char *name, bool by_weather, lam_error *error);
+ * weather, `by_file` one of a sky. Errors: LAM_ERR_ARGUMENT, wrong usage. */
+lam_status sky_options_check(const sky_options *o, const char *name, bool by_weather, bool by_file,
+                             lam_error *error);
 
 /* The north of an answer: as asked, or that of an open store. Errors: those of the store. */
 lam_status sky_options_north(const sky_options *o, store *s, double *north, lam_error *error);
@@ -51,9 +52,13 @@ lam_status sky_options_make(const sky_options *o, const char *name, double north
                             bool sun_in_tiles, double *L, year_sun *sun, char said[SKY_SAID],
                             lam_error *error);
 
-/* Puts e under a named sky on the tiles of an open store. A sun that is not in a tile is in *sun, and e
- * points there: sunlight_free it after the last use of e. Errors: also LAM_ERR_ARGUMENT for a store without a
- * sky. */
+/* The kind of light of a named sky, or of weather where name is NULL, over a store of this kind: photometric
+ * where either says so. */
+light_kind sky_options_kind(const sky_options *o, const char *name, light_kind of_store);
+
+/* Puts e under a named sky on the tiles of an open store, of sky_options_kind. A sun that is not in a tile is
+ * in *sun, and e points there: sunlight_free it after the last use of e. Errors: also LAM_ERR_ARGUMENT for a
+ * store without a sky. */
 lam_status named_light_add(const sky_options *o, const char *name, store *s, const mesh *m,
                            const lam_operator *op, const lam_sky *sky, emission *e, sunlight *sun,
                            char said[SKY_SAID], lam_error *error);

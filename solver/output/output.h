@@ -40,12 +40,17 @@ typedef struct weather_hours {
 /* An answer of the solver and its question. */
 typedef struct solution {
     const mesh *m;
+    const mesh *materials; /* m with all its channels, where values have one, their luminance; else NULL */
     const group_index *groups;
     const char *scene;
     lam_quantity quantity;
+    const char *unit;         /* of values, or of the hours of a year */
+    const char *sum_unit;     /* of the sum of a year; NULL: there is none */
+    const char *converted_by; /* the text of a light_conversion */
     size_t n_vectors;
     bool batch;
     const char *const *names; /* [n_vectors], of figures of a year in place of vectors; NULL: numbers */
+    const char *const *units; /* [n_vectors], beside names: "" of shares */
     const char *named_as;     /* the member of JSON that holds them; NULL: "annual" */
     const float *values;      /* [n_vectors][C][n]; NULL where they are refined: */
     const float *corners;     /* [n_vectors][C][n][4] beside values, the 4th of a triangle NaN; or NULL */
@@ -98,6 +103,11 @@ lam_status output_array(FILE *stream, size_t rank, const size_t *shape, const fl
 /* "radiosity", "radiosity_g", "radiosity_3_g", "irradiance_sum": the column of a vector and channel. */
 #define OUTPUT_COLUMN 64
 void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]);
+
+/* The unit of the values of a vector, or "". */
+static inline const char *output_unit(const solution *s, size_t vector) {
+    return s->units != NULL ? s->units[vector] : s->unit;
+}
 
 /* Numbers of a vector in a channel. */
 static inline size_t output_width(const solution *s) {

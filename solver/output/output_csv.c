@@ -5,13 +5,15 @@
 #include <math.h>
 #include <string.h>
 
+/* A column has the unit of its values in brackets; sums of figures are in that times m2. */
 static void header(const solution *s, const char *first, FILE *stream) {
     char name[OUTPUT_COLUMN];
     fputs(first, stream);
     for (size_t v = 0; v < s->n_vectors; v++)
         for (size_t c = 0; c < s->m->n_channels; c++) {
+            const char *unit = output_unit(s, v);
             output_column(s, v, c, name);
-            fprintf(stream, ",%s", name);
+            fprintf(stream, unit[0] != '\0' ? ",%s [%s]" : ",%s", name, unit);
         }
     fputs("\n", stream);
 }

@@ -48,7 +48,7 @@ static lam_status name_columns(const solution *s, size_t count, char ***names, l
 
 lam_status output_glb(const solution *s, FILE *stream, lam_error *error) {
     lam_status status = LAM_OK;
-    const mesh *m = s->m;
+    const mesh *m = s->m, *coloured = s->materials != NULL ? s->materials : m;
     char **names = NULL;
     buffer b = {0};
     const double mean = mean_of(s);
@@ -61,7 +61,7 @@ lam_status output_glb(const solution *s, FILE *stream, lam_error *error) {
     const gltf_mesh of = {.name = s->scene,
                           .n_vertices = m->n_vertices,
                           .n = m->n,
-                          .n_channels = m->n_channels,
+                          .n_channels = coloured->n_channels,
                           .vertices = (const double(*)[3])m->vertices,
                           .elements = (const uint32_t(*)[4])m->elements,
                           .normal = (const float(*)[3])m->normal,

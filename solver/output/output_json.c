@@ -76,7 +76,7 @@ static bool write_means(const solution *s, size_t v0, size_t end, bool list, buf
     bool written = true;
     for (uint32_t g = 0; written && g < s->m->n_groups; g++) {
         group_extent counted, buried;
-        group_index_measure(s->groups, g, s->m->area, &counted, &buried);
+        group_index_extent(s->groups, g, s->m->area, &counted, &buried);
         written = (g == 0 || buffer_append(b, ",", 1)) && json_write_text(b, s->m->group_names[g]) &&
                   buffer_printf(b, ":{\"elements\":%zu,\"area\":", counted.elements) &&
                   json_write_double(b, counted.area);
@@ -158,6 +158,9 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .at_faces = s->faces != NULL};
     const answer_notes notes = {.scene = s->scene,
                                 .quantity = s->quantity,
+                                .unit = s->unit,
+                                .sum_unit = s->sum_unit,
+                                .converted_by = s->converted_by,
                                 .has_error = s->relative >= 0,
                                 .relative_mean = s->relative,
                                 .indirect_mean = s->indirect,

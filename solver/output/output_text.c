@@ -6,18 +6,28 @@
 
 enum { NARROWEST = 14 };
 
+/* "irradiance, lx": the name of the column of a vector and channel, with its unit. */
+enum { COLUMN = OUTPUT_COLUMN + 16 };
+static void column_name(const solution *s, size_t column, char name[COLUMN]) {
+    const size_t v = column / s->m->n_channels;
+    output_column(s, v, column % s->m->n_channels, name);
+    const size_t length = strlen(name);
+    const char *unit = output_unit(s, v);
+    if (unit[0] != '\0') snprintf(name + length, COLUMN - length, ", %s", unit);
+}
+
 /* The width of the column of a vector and channel, under its name. */
 static int column_width(const solution *s, size_t column) {
-    char name[OUTPUT_COLUMN];
-    output_column(s, column / s->m->n_channels, column % s->m->n_channels, name);
+    char name[COLUMN];
+    column_name(s, column, name);
     return strlen(name) > NARROWEST ? (int)strlen(name) : NARROWEST;
 }
 
 static void print_columns(const solution *s, const char *first) {
-    char name[OUTPUT_COLUMN];
+    char name[COLUMN];
     fputs(first, stdout);
     for (size_t k = 0; k < s->n_vectors * s->m->n_channels; k++) {
-        output_column(s, k / s->m->n_channels, k % s->m->n_channels, name);
+        column_name(s, k, name);
         printf(" %*s", NARROWEST, name);
     }
     putchar('\n');
@@ -36,7 +46,7 @@ static void print_means(const solution *s) {
     print_columns(s, "group                    elements   area, m2");
     for (uint32_t g = 0; g < m->n_groups; g++) {
         group_extent counted, buried;
-        group_index_measure(s->groups, g, m->area, &counted, &buried);
+        group_index_extent(s->groups, g, m->area, &counted, &buried);
         printf("%-24s %8zu %10.4g", m->group_names[g], counted.elements, counted.area);
         for (size_t k = 0; k < s->n_vectors * m->n_channels; k++) {
             double figures[REDUCE_COUNT];
@@ -91,7 +101,7 @@ static void print_buried(const solution *s) {
         for (size_t r = 0; r < s->n_reductions; r++)
             for (size_t k = 0; k < s->reductions[r].request.names[0].n_groups; k++)
                 is_printed = is_printed || s->reductions[r].request.names[0].groups[k] == g;
-        group_index_measure(s->groups, g, s->m->area, &counted, &buried);
+        group_index_extent(s->groups, g, s->m->area, &counted, &buried);
         if (!is_printed || buried.elements == 0) continue;
         printf("%s%zu element%s of %s, %.4g m2", before, buried.elements, buried.elements == 1 ? "" : "s",
                s->m->group_names[g], buried.area);

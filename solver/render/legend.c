@@ -36,6 +36,9 @@ static const glyph font[] = {{.symbol = '0', .rows = 075557},
                              {.symbol = 'l', .rows = 022222},
                              {.symbol = 'x', .rows = 000525},
                              {.symbol = 'k', .rows = 045655},
+                             {.symbol = 'f', .rows = 032722},
+                             {.symbol = 'c', .rows = 003443},
+                             {.symbol = 't', .rows = 027223},
                              {.symbol = 'W', .rows = 0x118d6aa, .width = 5},
                              {.symbol = 'm', .rows = 0xd56b5, .width = 5}};
 

@@ -69,8 +69,8 @@ lam_status picture_values_draw(const raster_view *view, const shade *light, cons
 /* The columns that a legend takes at the right of a picture; 0 where the picture is too small for one. */
 size_t picture_legend_width(size_t width, size_t height);
 
-/* Draws a bar of the scale there, with its numbers and, above, their unit: "" or letters of W/m2, lx, 1000.
- * Other characters leave a gap. */
+/* Draws a bar of the scale there, with its numbers and, above, their unit: "" or letters of W/m2, klx, fc,
+ * lm/ft2, 1000. Other characters leave a gap. */
 void picture_legend(const color_scale *scale, const char *unit, image *picture);
 
 #endif

@@ -121,7 +121,7 @@ static lam_status write_frame(animation *a, size_t k, const frame *at, lam_error
         picture_values_fill(&a->pixels, at->shown, &sheet.values);
     else
         TRY(picture_fill(&a->pixels, at->shown, &a->style, &sheet.picture, error));
-    TRY(render_sheet_write(a->f, &a->style, &sheet, name, &clamped, error));
+    TRY(render_sheet_write(a->f, &a->style, render_unit(a->f, &a->lit), &sheet, name, &clamped, error));
 #pragma omp atomic
     a->written++;
 #pragma omp atomic
@@ -230,6 +230,7 @@ static lam_status open_sequence(const char *path, animation *a, terminal *t, lam
     a->quantity = (lam_quantity)f->quantity; /* frames show light */
     TRY(render_view_open(path, f, &a->view, error));
     TRY(light_open(a->view.s, &a->view.m, &light, false, &a->lit, error));
+    TRY(light_convert(&f->light, &a->lit.sun, NULL, &a->lit, error));
     light_log(&a->lit, t);
     a->names = frame_names_of(f->output, a->lit.light.n_vectors);
     lit = memory_allocate(a->view.m.n, sizeof *lit, "lit elements", error);
@@ -290,7 +291,7 @@ lam_status animate(const char *path, const render_options *f, terminal *t, char 
                  1e3 * a.measuring / (double)a.names.n, 1e3 * a.drawing / (double)a.names.n);
     warn_of_older(&a.names, t);
     render_log_camera(&a.view.camera, t);
-    render_log_style(f, &a.style, t);
+    render_log_style(f, &a.style, render_unit(f, &a.lit), t);
     render_log_clamped(a.clamped, t);
     if (video_is_named(f->output)) TRY(video_write(&a.names, f->fps, &waiting, error));
 done:

@@ -22,7 +22,7 @@ static const option_command verb = {
 
 /* Draws, and says where the camera stands. */
 static lam_status draw(const render_options *f, const render_view *v, const shade *light,
-                       const picture_options *style, terminal *t, lam_error *error) {
+                       const picture_options *style, const char *unit, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     const progress how = terminal_progress(t);
     render_sheet sheet = {.picture = {0}};
@@ -32,7 +32,7 @@ static lam_status draw(const render_options *f, const render_view *v, const shad
         TRY(picture_values_draw(&v->pixels, light, &how, &sheet.values, error));
     else
         TRY(picture_draw(&v->pixels, light, style, &how, &sheet.picture, error));
-    TRY(render_sheet_write(f, style, &sheet, f->output, &clamped, error));
+    TRY(render_sheet_write(f, style, unit, &sheet, f->output, &clamped, error));
     render_log_camera(&v->camera, t);
     render_log_clamped(clamped, t);
 done:
@@ -54,6 +54,7 @@ static lam_status render(const char *path, const render_options *f, terminal *t,
     if (!render_needs_no_light(f)) quantity = (lam_quantity)f->quantity;
     TRY(render_view_open(path, f, &v, error));
     TRY(light_open(v.s, &v.m, &f->light, false, &lit, error));
+    TRY(light_convert(&f->light, &lit.sun, NULL, &lit, error));
     light_log(&lit, t);
     if (lit.light.n_vectors != 1)
         FAIL(error, LAM_ERR_ARGUMENT,
@@ -77,8 +78,8 @@ static lam_status render(const char *path, const render_options *f, terminal *t,
     TRY(raster_create(&measured, NULL, &coarse, error));
     picture_measure(&coarse, shown, glows, sum);
     const picture_options style = render_style(f, sum, &v.nodes);
-    TRY(draw(f, &v, shown, &style, t, error));
-    render_log_style(f, &style, t);
+    TRY(draw(f, &v, shown, &style, render_unit(f, &lit), t, error));
+    render_log_style(f, &style, render_unit(f, &lit), t);
 done:
     raster_free(&coarse);
     shade_destroy(shown);
@@ -150,7 +151,7 @@ static lam_status render_unlit(const char *path, const render_options *f, termin
     memset(all, true, v.m.n);
     TRY(render_view_aim(f, false, all, &v, error));
     TRY(render_view_shade(&v, render_is_patch(f) ? 3 : 1, values, NULL, &shown, error));
-    TRY(draw(f, &v, shown, &style, t, error));
+    TRY(draw(f, &v, shown, &style, "", t, error));
 done:
     shade_destroy(shown);
     free(all);
@@ -161,8 +162,8 @@ done:
 
 /* Logs the given options that a picture without light does not use. */
 static void log_unused(const render_options *f, const option_result *given, terminal *t) {
-    static const char *const unused[] = {"emit",    "emission",  "sky",        "exposure",
-                                         "smooth",  "iso-lines", "value-unit", "false-color",
+    static const char *const unused[] = {"emit",    "emission",  "sky",      "exposure",
+                                         "smooth",  "iso-lines", "unit-out", "false-color",
                                          "palette", "range",     "log"};
     char name[OPTION_WORD_BYTES];
     const size_t all = sizeof unused / sizeof *unused, count = f->false_color ? 7 : all;

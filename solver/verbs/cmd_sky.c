@@ -210,7 +210,7 @@ int cmd_sky(int argc, char **argv) {
     /* A matrix is of a time and a place, and knows light in W alone. */
     sky_options at = f.at;
     if (matrix) at.photometric = false;
-    if (sky_options_check(&at, named ? path : NULL, !matrix && !named, &error) != LAM_OK)
+    if (sky_options_check(&at, named ? path : NULL, !matrix && !named, false, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);
     terminal_open(&term, verb.name, false, false);
     const lam_status status = (matrix  ? convert_matrix

@@ -1,6 +1,7 @@
 /* lambert solve: lights a store and writes the answer. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/terminal.h"
+#include "solver/codec/answer.h"
 #include "solver/codec/request.h"
 #include "solver/codec/stated_errors.h"
 #include "solver/light/emission_refine.h"
@@ -155,8 +156,9 @@ static lam_status add_weather(const solve_options *f, store *s, const mesh *m, s
     double north = 0;
     const lam_status status = sky_options_north(&f->light.at, s, &north, error);
     if (status != LAM_OK) return status;
+    const light_kind kind = sky_options_kind(&f->light.at, NULL, m->lights);
     const weather_options hours = {.path = f->weather,
-                                   .photometric = f->light.at.photometric,
+                                   .photometric = kind == LIGHT_PHOTOMETRIC,
                                    .exact = f->sun == SUN_EXACT && !in_tiles,
                                    .sun_points = f->sun_points > 0     ? (size_t)f->sun_points
                                                  : f->annual.count > 0 ? SUN_POINTS_YEAR
@@ -165,8 +167,10 @@ static lam_status add_weather(const solve_options *f, store *s, const mesh *m, s
                                    .at = sky_options_moment(&f->light.at),
                                    .north = north,
                                    .way = way};
-    return weather_light_add(&hours, s, m, lit->op, lit->sky, n_selected, selected, t, &lit->light, sun, span,
-                             error);
+    const lam_status added = weather_light_add(&hours, s, m, lit->op, lit->sky, n_selected, selected, t,
+                                               &lit->light, sun, span, error);
+    if (added == LAM_OK) light_units_meet_sky(&lit->light, &lit->scene, kind);
+    return added;
 }
 
 /* The arrays of an answer. */
@@ -240,6 +244,52 @@ static lam_status put_out(const solution *out, const solve_options *f, lam_error
     return LAM_OK;
 }
 
+/* The names and units of an answer. */
+typedef struct answer_words {
+    const char *names[ANNUAL_MOST], *units[ANNUAL_MOST];
+    char converted[LIGHT_CONVERSION_TEXT];
+} answer_words;
+
+/* Tells them to the solution, whose quantity is set: figures of a year have names and units of their own. */
+static void take_words(const annual_options *year, const char *figure, const light_conversion *told,
+                       answer_words *words, solution *out) {
+    const bool leaves = out->quantity != LAM_IRRADIANCE;
+    light_conversion_text(told, words->converted);
+    out->converted_by = words->converted;
+    out->unit = figure != NULL ? "%" : light_conversion_unit(told, leaves);
+    if (annual_has_sum(year)) out->sum_unit = light_conversion_year(told, leaves);
+    for (size_t k = 0; k < year->n_figures; k++) {
+        words->names[k] = year->figures[k].name;
+        words->units[k] = year->figures[k].is_sum ? out->sum_unit : "";
+    }
+    if (figure != NULL) {
+        words->names[0] = "daylight_factor";
+        words->units[0] = out->unit;
+        out->named_as = "figures";
+    }
+    if (year->n_figures == 0 && figure == NULL) return;
+    out->names = words->names;
+    out->units = words->units;
+}
+
+/* Lets the solution see one channel of its mesh, which is that of the luminance. */
+static void show_luminance(mesh *view, solution *out) {
+    *view = *out->m;
+    view->n_channels = 1;
+    out->materials = out->m;
+    out->m = view;
+}
+
+/* The answers in three channels become their luminance. */
+static void take_luminance(answers *made, mesh *view, solution *out) {
+    const size_t n = output_width(out);
+    if (made->values != NULL) answer_luminance(out->n_vectors, n, made->values);
+    if (made->corners != NULL) answer_luminance(out->n_vectors, 4 * n, made->corners);
+    if (made->refined.values != NULL)
+        answer_luminance_double(out->n_vectors, n, made->refined.values, made->refined.certificates);
+    show_luminance(view, out);
+}
+
 /* Views of both. */
 static error_scene error_scene_of(const mesh *m, const emission_scene *scene) {
     return (error_scene){.n = m->n,
@@ -259,7 +309,6 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     mesh m = {0};
     lit_store lit = {0};
     lam_quantity quantity = LAM_RADIOSITY;
-    double *row_sums = NULL;
     answers made = {.values = NULL};
     face_index faces = {.n_faces = 0};
     char *scene = NULL;
@@ -271,16 +320,15 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     sun_way way = {.n = 0};
     weather_span span = {0};
     weather_hours hours;
+    mesh one_channel;
+    answer_words words;
     annual_options figures = *year;
-    const char *names[ANNUAL_MOST];
-    for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
     if (f->output != NULL) TRY(atomic_file_check(f->output, error));
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
-    TRY(mesh_load(s, &m, &row_sums, error));
+    TRY(mesh_load(s, &m, NULL, error));
     if (f->at == AT_FACES) TRY(solve_faces_find(path, &m, &faces, error));
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
-    light_log(&lit, t);
     if (f->linear) lit.light.limiter = NULL;
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
     if (lit.own && is_dark(&lit.light, m.n * m.n_channels))
@@ -301,6 +349,9 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
                         is_sum(year) ? &way : NULL, &span, error));
         TRY(take_span(&span, f->weather, f->hours, &figures, error));
     }
+    TRY(light_convert(&f->light, f->weather != NULL ? &sun : &lit.sun, &way, &lit, error));
+    light_log(&lit, t);
+    figures.luminance = lit.told.luminance && year->n_figures > 0 && !is_sum(year);
     if (year->n_figures > 0 && !lit.light.batch)
         FAIL(error, LAM_ERR_ARGUMENT,
              "--annual is of a batch, one vector an hour, and this is one light; give --sky [hours][tiles] "
@@ -322,10 +373,9 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     hours = hours_of(&span);
     if (f->weather != NULL) out.hours = &hours;
     if (f->tolerance == 0) take_error(&stated, &lit.light, n_selected, selected, t, &out);
-    if (f->figure != NULL) names[0] = "daylight_factor";
-    if (year->n_figures > 0 || f->figure != NULL) out.names = names;
-    if (f->figure != NULL) out.named_as = "figures";
+    take_words(year, f->figure, &lit.told, &words, &out);
     TRY(find_answers(path, f, &figures, &lit, n_selected, selected, t, &out, &made, error));
+    if (figures.luminance) show_luminance(&one_channel, &out);
     if (made.values != NULL && year->n_figures == 0)
         TRY(own_error_take(&stated, &about, &lit, n_selected, selected, &out, &made.name_errors, error));
     if (is_sum(year))
@@ -335,6 +385,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     if (f->smooth) TRY(find_corners(&out, &lit.light, &made.corners, error));
     out.corners = made.corners;
     if (f->at == AT_FACES) TRY(solve_faces_take(&faces, &made.values, &made.refined, &out, error));
+    if (lit.told.luminance && !figures.luminance) take_luminance(&made, &one_channel, &out);
     TRY(reductions_fill(&out, error));
     TRY(put_out(&out, f, error));
 done:
@@ -343,7 +394,6 @@ done:
     stated_errors_free(&stated);
     answers_free(&made);
     face_index_free(&faces);
-    free(row_sums);
     sunlight_free(&sun);
     sun_way_free(&way);
     weather_span_free(&span);

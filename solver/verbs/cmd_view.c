@@ -39,11 +39,10 @@ static const option_row rows[] = {
     {.name = "emit",
      .kind = OPTION_LIST,
      .offset = offsetof(view_options, emit),
-     .argument = "GROUP=V[,V,V]",
+     .argument = "GROUP=V[,V,V][UNIT]",
      .otherwise = "the emission in the scene",
-     .unit = "W/m2",
-     .help = "The page begins with the first store lit by these groups alone, as the address says; may be "
-             "repeated"},
+     .help = "The page begins with the first store lit by these groups alone, as the address says, with "
+             "units as `lambert solve` has them; may be repeated"},
     {.name = "no-browser",
      .kind = OPTION_FLAG,
      .offset = offsetof(view_options, no_browser),

@@ -10,16 +10,17 @@
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define FIELD(member) offsetof(light_options, member)
 const option_row light_rows[] = {
     {.name = "emit",
      .kind = OPTION_LIST,
      .offset = FIELD(emit),
-     .argument = "GROUP=V[,V,V]",
-     .unit = "W/m2",
-     .help = "A group emits V W/m2, one number or one per channel; 'desk*': all whose names begin so; may be "
-             "repeated"},
+     .argument = "GROUP=V[,V,V][UNIT]",
+     .help = "A group emits V, one number or one per channel; 'desk*': all whose names begin so; may be "
+             "repeated. 3600lm, 40W: the flux of all of it together; 500cd/m2, 100lm/m2, 12W/m2; a number "
+             "alone is the exitance in the unit of the store (`lambert info`)"},
     {.name = "emission",
      .kind = OPTION_TEXT,
      .offset = FIELD(emission),
@@ -35,6 +36,15 @@ const option_row light_rows[] = {
          "or added to the other light. solve also takes what `lambert sky` reads: a matrix of Radiance on "
          "the tiles of the store, and weather, as --weather does. A store of one channel takes coloured "
          "skies, [b][3][m], by their luminance"},
+    {.name = "unit-out",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(unit),
+     .argument = "UNIT",
+     .choices = ANSWER_UNIT_WORDS,
+     .otherwise = "that of the light",
+     .help =
+         "Unit of the answer; W become lm by 179 lm/W, three channels lx by their luminance. Of radiosity "
+         "and indirect light the same per area that they leave: lm/m2, klm/m2, lm/ft2"},
     {0},
 };
 
@@ -44,7 +54,8 @@ const char *light_named_sky(const light_options *options) {
 
 lam_status light_check(const light_options *options, lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(sky_options_check(&options->at, light_named_sky(options), options->weather, error));
+    TRY(sky_options_check(&options->at, light_named_sky(options), options->weather, options->sky != NULL,
+                          error));
     if (options->emit.count > 0 && options->emission != NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "give --emit or --emission, not both");
     TRY(emission_check_items(&options->emit, error));
@@ -62,6 +73,7 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
                                     .path = options->emission,
                                     .frames = options->frames,
                                     .sky = named != NULL ? NULL : options->sky,
+                                    .photometric = options->at.photometric,
                                     .signs = options->signs,
                                     .other = other || named != NULL};
     TRY(emission_scene_create(m, &out->scene, error));
@@ -73,9 +85,11 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
     if (out->sky != NULL) TRY(store_get_text(s, STORE_SKY, "tiling", &tiling, error));
     if (tiling != NULL) snprintf(out->scene.tiling, sizeof out->scene.tiling, "%s", tiling);
     TRY(emission_choose(&out->scene, &given, &out->light, &out->own, error));
-    if (named != NULL)
+    if (named != NULL) {
         TRY(named_light_add(&options->at, named, s, m, out->op, out->sky, &out->light, &out->sun, out->said,
                             error));
+        light_units_meet_sky(&out->light, &out->scene, sky_options_kind(&options->at, named, m->lights));
+    }
     const emitters *few = operator_emitters_of(out->op);
     if (out->own && few != NULL && few->a.direct != NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
@@ -99,7 +113,17 @@ void light_close(lit_store *lit) {
     lam_sky_close(lit->sky);
 }
 
+lam_status light_convert(const light_options *options, sunlight *sun, sun_way *way, lit_store *lit,
+                         lam_error *error) {
+    answer_unit unit = ANSWER_PLAIN;
+    if (options->unit != NULL) answer_unit_find(options->unit, strlen(options->unit), &unit);
+    return light_units_convert(&lit->light, &lit->scene, unit, sun, way, &lit->told, error);
+}
+
 void light_log(const lit_store *lit, terminal *t) {
+    char by[LIGHT_CONVERSION_TEXT];
+    light_conversion_text(&lit->told, by);
+    if (by[0] != '\0') terminal_log(t, "converted by %s", by);
     if (lit->said[0] != '\0') terminal_log(t, "%s", lit->said);
     if (lit->light.by_luminance)
         terminal_log(t,

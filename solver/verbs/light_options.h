@@ -4,6 +4,7 @@
 
 #include "solver/base/terminal.h"
 #include "solver/light/emission.h"
+#include "solver/light/light_units.h"
 #include "solver/light/sky_options.h"
 #include "solver/operator/limiter.h"
 #include "store/store.h"
@@ -14,6 +15,7 @@ typedef struct light_options {
     option_list emit;
     const char *emission, *sky;
     sky_options at;     /* of a named sky, and of weather */
+    const char *unit;   /* --unit-out; NULL: that of the light */
     bool weather;       /* there is weather, which the verb adds; no row of the table */
     bool signs;         /* --emission may be negative; no row of the table */
     const char *frames; /* of an animation, in place of --emit and --emission; no row of the table */
@@ -34,10 +36,11 @@ typedef struct lit_store {
     lam_sky *sky; /* NULL: the store has none */
     emission_scene scene;
     emission light;
-    lam_limiter limiter; /* of its answers, which borrows from mesh and scene; light has it */
-    bool own;            /* the light is the scene's own */
-    sunlight sun;        /* of a named sky; light has it */
-    char said[SKY_SAID]; /* of a named sky; "": there is none */
+    lam_limiter limiter;   /* of its answers, which borrows from mesh and scene; light has it */
+    bool own;              /* the light is the scene's own */
+    sunlight sun;          /* of a named sky; light has it */
+    char said[SKY_SAID];   /* of a named sky; "": there is none */
+    light_conversion told; /* of its answers, after light_convert */
 } lit_store;
 
 /* Loads from an open store with all threads for the operator. `other` is light that the caller adds later, so
@@ -46,7 +49,12 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
                       lam_error *error);
 void light_close(lit_store *lit);
 
-/* Says how bright a named sky is, and where a coloured sky lights a grey store. */
+/* Puts the light, once it is whole, into the unit that is asked for, and its conversion into told; sun and
+ * way are those of weather, or NULL. Errors: as light_units_convert. */
+lam_status light_convert(const light_options *options, sunlight *sun, sun_way *way, lit_store *lit,
+                         lam_error *error);
+
+/* Says how bright a named sky is, where a coloured sky lights a grey store, and how light was converted. */
 void light_log(const lit_store *lit, terminal *t);
 
 /* Says how many values of answers were below zero, of which each vector had so many. */

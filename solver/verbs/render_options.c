@@ -96,9 +96,8 @@ const option_row render_color_rows[] = {
      .otherwise =
          "0, or with --log the darkest hundredth and at most three decades, to the brightest hundredth, "
          "moved by --exposure",
-     .unit = "W/m2",
      .parse = parse_range,
-     .help = "Values of the first and the last colour"},
+     .help = "Values of the first and the last colour, in the unit of the answer"},
     {.name = "log",
      .kind = OPTION_FLAG,
      .offset = FIELD(logarithmic),
@@ -180,14 +179,6 @@ const option_row render_view_rows[] = {
      .least = -60,
      .most = 60,
      .help = "Each step of 1 doubles the brightness"},
-    {.name = "value-unit",
-     .kind = OPTION_CHOICE,
-     .offset = FIELD(unit),
-     .argument = "UNIT",
-     .choices = "W/m2|lx|klx",
-     .preset = "W/m2",
-     .help =
-         "Unit of the light that is given, for the legend, an EXR and the log; numbers are not converted"},
     {.name = "smooth",
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),

@@ -45,9 +45,8 @@ typedef struct render_options {
     render_range range;
     bool logarithmic;
     uint64_t iso_lines;
-    const char *unit; /* of the legend */
-    bool single;      /* 32-bit values in an EXR */
-    double fps;       /* of a video */
+    bool single; /* 32-bit values in an EXR */
+    double fps;  /* of a video */
     const char *output;
 } render_options;
 

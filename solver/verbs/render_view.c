@@ -155,9 +155,12 @@ void render_sheet_free(render_sheet *sheet) {
     picture_values_free(&sheet->values);
 }
 
-lam_status render_sheet_write(const render_options *f, const picture_options *style, render_sheet *sheet,
-                              const char *path, size_t *clamped, lam_error *error) {
-    const char *unit = render_needs_no_light(f) ? "" : f->unit;
+const char *render_unit(const render_options *f, const lit_store *lit) {
+    return light_conversion_unit(&lit->told, (lam_quantity)f->quantity != LAM_IRRADIANCE);
+}
+
+lam_status render_sheet_write(const render_options *f, const picture_options *style, const char *unit,
+                              render_sheet *sheet, const char *path, size_t *clamped, lam_error *error) {
     char name[OPTION_WORD_BYTES];
     const exr_notes notes = {.quantity = render_quantity_name(f, name), .unit = unit};
     *clamped = 0;
@@ -177,10 +180,10 @@ void render_log_camera(const camera *c, terminal *t) {
                  2 * atan(c->tan_y) * 180 / M_PI);
 }
 
-void render_log_style(const render_options *f, const picture_options *style, terminal *t) {
+void render_log_style(const render_options *f, const picture_options *style, const char *unit, terminal *t) {
     if (render_is_exr(f)) return;
     if (style->scale.palette != NULL)
-        terminal_log(t, "colours from %g to %g %s", style->scale.low, style->scale.high, f->unit);
+        terminal_log(t, "colours from %g to %g %s", style->scale.low, style->scale.high, unit);
     else
-        terminal_log(t, "white is about %.3g %s", 1 / style->exposure, f->unit);
+        terminal_log(t, "white is about %.3g %s", 1 / style->exposure, unit);
 }

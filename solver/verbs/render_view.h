@@ -57,15 +57,19 @@ lam_status render_sheet_create(const render_options *f, const picture_options *s
                                render_sheet *out, lam_error *error);
 void render_sheet_free(render_sheet *sheet);
 
-/* Writes the file, with the legend of a scale. *clamped: as exr_write says, else 0. */
-lam_status render_sheet_write(const render_options *f, const picture_options *style, render_sheet *sheet,
-                              const char *path, size_t *clamped, lam_error *error);
+/* Writes the file, with the unit of its light and the legend of a scale. *clamped: as exr_write says, else 0.
+ */
+lam_status render_sheet_write(const render_options *f, const picture_options *style, const char *unit,
+                              render_sheet *sheet, const char *path, size_t *clamped, lam_error *error);
 
 /* Says that values were beyond those of an EXR, where any were. */
 void render_log_clamped(size_t clamped, terminal *t);
 
 /* Says where the camera stands, as --camera reads it, and what the brightness means. */
 void render_log_camera(const camera *c, terminal *t);
-void render_log_style(const render_options *f, const picture_options *style, terminal *t);
+void render_log_style(const render_options *f, const picture_options *style, const char *unit, terminal *t);
+
+/* The unit of the light that is drawn. */
+const char *render_unit(const render_options *f, const lit_store *lit);
 
 #endif

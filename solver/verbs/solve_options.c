@@ -46,7 +46,7 @@ const option_row solve_answer_rows[] = {
      .kind = OPTION_CHOICE,
      .offset = FIELD(figure),
      .choices = "daylight-factor",
-     .not_with = "tolerance|annual|emit|emission|weather|lux-outside",
+     .not_with = "tolerance|annual|emit|emission|weather|lux-outside|unit-out",
      .help = "daylight-factor: per cent of the illuminance outside that reaches each element under --sky "
              "overcast, "
              "which it implies; 100 H / H outside"},
@@ -98,10 +98,11 @@ const option_row solve_year_rows[] = {
      .kind = OPTION_LIST,
      .offset = FIELD(annual),
      .argument = "FIGURE",
-     .help = "sum: over all hours, in 1000 h (kWh/m2 from W/m2, klx h from lx); autonomy=X: share of the "
-             "hours (0 to 1) with at least X; useful=LOW,HIGH: share of the hours with LOW to HIGH, both "
-             "included (100,2000 lx); may be repeated. X, LOW and HIGH are in the unit of the answer: lx if "
-             "the skies are in cd/m2"},
+     .help =
+         "sum: over all hours, in 1000 h (kWh/m2 from W/m2, klx h from lx); autonomy=X: share of the "
+         "hours (0 to 1) with at least X; useful=LOW,HIGH: share of the hours with LOW to HIGH, both "
+         "included (100,2000 lx); may be repeated. X, LOW and HIGH are in the unit of the answer: lx with "
+         "--photometric, --unit-out lx or a store in lm"},
     {.name = "occupied",
      .kind = OPTION_TEXT,
      .offset = FIELD(occupied),

@@ -2,7 +2,7 @@
 
 #include "solver/base/file_stem.h"
 #include "solver/base/photometry.h"
-#include "store/groups.h"
+#include "solver/light/emission.h"
 #include "store/store.h"
 
 #include <jansson.h>
@@ -13,22 +13,20 @@
 /* The scene of a link. */
 typedef struct linked_scene {
     char *name;
-    char **groups;
-    size_t n_groups, n_channels;
+    mesh m;
+    emission_scene of;
 } linked_scene;
 
 static void scene_free(linked_scene *s) {
     free(s->name);
-    free(s->groups);
+    emission_scene_free(&s->of);
+    mesh_free(&s->m);
 }
 
 /* Opens STORE.h5, or STORE.h5:NAME where no file has that name. */
 static lam_status read_scene(const char *argument, linked_scene *out, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
-    size_t dims[STORE_MAX_RANK];
-    store_type type;
-    int rank;
     char *path = strdup(argument), *given = NULL;
     if (path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
     char *colon = strrchr(path, ':');
@@ -37,9 +35,8 @@ static lam_status read_scene(const char *argument, linked_scene *out, lam_error 
         given = colon + 1;
     }
     TRY(store_open(path, &s, error));
-    TRY(store_read_texts(s, STORE_MESH "/group_names", &out->n_groups, &out->groups, error));
-    TRY(store_array_info(s, STORE_MESH "/reflectance", &type, &rank, dims, error));
-    out->n_channels = dims[0];
+    TRY(mesh_load(s, &out->m, NULL, error));
+    TRY(emission_scene_create(&out->m, &out->of, error));
     out->name = given != NULL ? strdup(given) : file_stem(path);
     if (out->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
 done:
@@ -49,33 +46,29 @@ done:
 }
 
 /* A light as the page has it: its luminance, and a colour whose luminance is 1. */
-static json_t *light_of(size_t count, const double values[3]) {
-    const double luminance = count == 3 ? luminance_of(values[0], values[1], values[2]) : values[0];
+static json_t *light_of(size_t n_channels, const double *values) {
+    const bool grey = n_channels != 3 || (values[0] == values[1] && values[1] == values[2]);
+    const double luminance = grey ? values[0] : luminance_of(values[0], values[1], values[2]);
     double colour[3] = {1, 1, 1};
-    for (int c = 0; c < 3 && count == 3 && luminance > 0; c++) colour[c] = values[c] / luminance;
+    for (int c = 0; c < 3 && !grey && luminance > 0; c++) colour[c] = values[c] / luminance;
     return json_pack("{s:b, s:f, s:[f, f, f], s:n}", "on", 1, "power", luminance, "colour", colour[0],
                      colour[1], colour[2], "kelvin");
 }
 
 static lam_status add_item(const linked_scene *s, const char *item, json_t *groups, lam_error *error) {
     lam_status status = LAM_OK;
-    const char *equals = strrchr(item, '=');
-    double values[3];
-    size_t count = 0, g = 0;
-    if (equals == NULL) FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: must be GROUP=V or GROUP=V,V,V", item);
-    const size_t length = (size_t)(equals - item);
-    while (g < s->n_groups && (strlen(s->groups[g]) != length || memcmp(s->groups[g], item, length) != 0))
-        g++;
-    if (g == s->n_groups)
-        FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: %s has no group '%.*s'", item, s->name, (int)length, item);
-    TRY(option_numbers("--emit", equals + 1, 3, false, values, &count, error));
-    for (size_t k = 0; k < count; k++)
-        if (!(values[k] >= 0)) FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: must not be negative", item);
-    if (count == 2 || (count == 3 && s->n_channels != 3))
-        FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: %zu values, %s has %zu channel%s", item, count, s->name,
-             s->n_channels, s->n_channels == 1 ? "" : "s");
-    json_object_set_new(groups, s->groups[g], light_of(count, values));
+    char *name = NULL;
+    double *values = NULL;
+    bool converted = false;
+    size_t g = 0;
+    TRY(emission_read_item(&s->of, item, &name, &values, &converted, error));
+    while (g < s->m.n_groups && strcmp(s->m.group_names[g], name) != 0) g++;
+    if (g == s->m.n_groups)
+        FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: %s has no group '%s'", item, s->name, name);
+    json_object_set_new(groups, name, light_of(s->m.n_channels, values));
 done:
+    free(name);
+    free(values);
     return status;
 }
 

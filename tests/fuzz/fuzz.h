@@ -59,12 +59,14 @@ static inline const face_index *fuzz_faces(void) {
 static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
     static const char *names[] = {"lamp", "wall", "wall.red", "\xc3\xa9t\xc3\xa9"};
     static const uint32_t group_of[] = {0, 1, 2, 3, 1, 2, 3};
+    static const double area[] = {1, .5, 2, 1, 0, 3, 1};
     enum { N = sizeof group_of / sizeof *group_of, GROUPS = sizeof names / sizeof *names };
     char **copies = malloc(GROUPS * (sizeof *copies + 16)); /* one block, as a store's names are */
     lam_error error;
     FUZZ_CHECK(copies != NULL);
     for (int g = 0; g < GROUPS; g++) copies[g] = strcpy((char *)(copies + GROUPS) + 16 * g, names[g]);
     FUZZ_CHECK(group_index_make(N, 0, group_of, GROUPS, copies, groups, &error) == LAM_OK);
+    FUZZ_CHECK(group_index_measure(groups, area, &error) == LAM_OK);
     return (codec_scene){.n = N,
                          .n_channels = shape & 1 ? 3 : 1,
                          .groups = groups,

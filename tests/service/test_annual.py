@@ -4,6 +4,7 @@ annual sum of an open square by what its weather file says."""
 import csv
 import json
 import pathlib
+import re
 import signal
 import subprocess
 import tempfile
@@ -103,7 +104,7 @@ class Annual(unittest.TestCase):
         figures = "sum", "autonomy_60", "useful_20_150"
         options = ["--annual", "sum", "--annual", "autonomy=60", "--annual", "useful=20,150"]
         got, _ = self.year(self.stores["exact"], *options)
-        columns = [f"irradiance_{figure}_{c}" for figure in figures for c in "rgb"]
+        columns = [f"irradiance_{figure}_{c}{' [kWh/m2]' if figure == 'sum' else ''}" for figure in figures for c in "rgb"]
         out = self.folder / "year.csv"
         light = ["--sky", self.folder / "sky.npy"]
         must("solve", self.stores["exact"], *light, *options, "-o", out)
@@ -119,10 +120,12 @@ class Annual(unittest.TestCase):
             must("solve", self.stores["exact"], *light, *options, "-o", self.folder / name)
             text = (self.folder / name).read_bytes()
             for column in columns:
-                self.assertIn((f'"_{column.upper()}"' if name == "year.glb" else column).encode(), text)
+                name_of = column.split(" ")[0]
+                self.assertIn((f'"_{name_of.upper()}"' if name == "year.glb" else name_of).encode(), text)
         # Means of groups where no file is asked for.
         said = must("solve", self.stores["exact"], *light, *options).stdout.splitlines()
-        self.assertEqual(said[0].split()[-9:], columns)
+        columns = [column.replace(" [", ", ").rstrip("]") for column in columns]
+        self.assertEqual(re.findall(r"irradiance_\w+(?:, \S+)?", said[0]), columns)
         for column in columns:  # each number ends under the end of its name
             end = said[0].index(column) + len(column)
             self.assertRegex(said[1][end - 1:end + 1], r"^\d ?$")

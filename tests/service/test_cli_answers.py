@@ -45,7 +45,7 @@ class Answers(Case):
         numpy.testing.assert_array_equal(numpy.array(answer["radiosity"], "f4"), B)
         with open(self.solve("a.csv", *light), newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
-        numpy.testing.assert_array_equal(numpy.array([row["radiosity"] for row in rows], "f4"), B)
+        numpy.testing.assert_array_equal(numpy.array([row["radiosity [W/m2]"] for row in rows], "f4"), B)
         self.assertEqual([int(row["element"]) for row in rows], list(range(96)))
         self.assertEqual({row["group"] for row in rows},
                          {"floor", "ceiling", "wall-x0", "wall-x1", "wall-y0", "wall-y1"})
@@ -235,7 +235,7 @@ class Answers(Case):
             self.assertAlmostEqual(groups["floor"][name], value, delta=1e-6 * abs(value), msg=name)
         self.assertEqual(set(groups["wall-x0"]), {"mean"})
         with open(self.solve("r.csv", "--reduce", figures, *light), newline="", encoding="utf-8") as file:
-            rows = {row["statistic"]: float(row["radiosity"]) for row in csv.DictReader(file)}
+            rows = {row["statistic"]: float(row["radiosity [W/m2]"]) for row in csv.DictReader(file)}
         self.assertAlmostEqual(rows["mean"], mean, delta=1e-6 * mean)
         self.refused(1, "no group", "solve", self.store, "--reduce", "lava=mean", *light)
         table = must("solve", self.store, *light).stdout
@@ -267,7 +267,7 @@ class Answers(Case):
         self.assertEqual((abs(batch[1, 1:]).max(), batch[1, 0].max() > 0), (0, True))
         must("solve", store, "-o", self.path("a.csv"))
         with open(self.path("a.csv"), encoding="utf-8") as header:
-            self.assertEqual(header.readline(), "element,group,area,radiosity_r,radiosity_g,radiosity_b\n")
+            self.assertEqual(header.readline(), "element,group,area,radiosity_r [W/m2],radiosity_g [W/m2],radiosity_b [W/m2]\n")
 
 
 if __name__ == "__main__":

@@ -61,7 +61,7 @@ class NamedSkies(unittest.TestCase):
                 self.assertAlmostEqual(got[side], overcast[side] / 100, delta=1e-4)
         path = self.folder / "factor.csv"
         must("solve", self.store, "--figure", "daylight-factor", "-o", path)
-        self.assertTrue(path.read_text().startswith("element,group,area,irradiance_daylight_factor\n"))
+        self.assertTrue(path.read_text().startswith("element,group,area,irradiance_daylight_factor [%]\n"))
         factor = ["--figure", "daylight-factor"]
         for wanted, more in (("is of --sky overcast", ["--sky", "even"]), ("is of --quantity irradiance", ["--quantity", "radiosity"]),
                              ("exclude each other", ["--emit", "roof=1"]), ("exclude each other", ["--lux-outside", 9]),
@@ -162,7 +162,7 @@ class NamedSkies(unittest.TestCase):
                              ("--north is for weather", ["--sky", "even", "--north", 5]),
                              ("--north is for weather", ["--sky", self.folder / "sky.npy", "--north", 5]),
                              ("--lux-outside is for --sky even", ["--emit", "roof=1", "--lux-outside", 5]),
-                             ("--photometric is for --weather and named skies", ["--photometric"]),
+                             ("--photometric is for --weather and --sky", ["--photometric"]),
                              ("must be DAY MONTH HH:MM", ["--sky", "clear", *place, "--date", "noon"]),
                              ("from 0 to below 8760", ["--sky", "clear", *place, "--hour", 8760]),
                              ("must be LATITUDE,LONGITUDE,ZONE", ["--sky", "clear", "--place", "95,0,0", "--hour", 12]),

@@ -175,7 +175,7 @@ class Render(unittest.TestCase):
                 self.assertLess((nearest / seen).max(), tolerance, kind)
         # One channel; a value that halves do not hold; another quantity and unit.
         said = must("render", self.furnace, *(word.replace("=1", "=1e5") for word in GLOW), "--size", "20x20", "-o",
-                    image, "--quantity", "irradiance", "--value-unit", "lx").stderr
+                    image, "--quantity", "irradiance", "--unit-out", "lx").stderr
         planes, notes = decode_exr(image)
         self.assertEqual(list(planes), ["Y"])
         self.assertEqual((notes["quantity"], notes["unit"]), ("irradiance", "lx"))

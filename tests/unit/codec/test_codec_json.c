@@ -215,6 +215,59 @@ START_TEST(good_requests_are_read) {
 }
 END_TEST
 
+/* A flux is spread over the elements of its group; the answer's unit scales all light, which is linear. */
+START_TEST(units_are_read) {
+    static const double area[N] = {9, .5, 1, 9, 3};
+    static const char flux[] = "{\"emission\":{\"groups\":{\"lamp\":\"358lm\",\"box\":\"26W\"}}}";
+    static const char lit[] = "{\"unit\":\"klx\",\"emission\":{\"groups\":{\"lamp\":2},\"sky\":[1,2,3]}}";
+    static const char both[] =
+        "{\"emission\":{\"groups\":{\"lamp\":2},\"sky\":[1,2,3]},\"photometric\":true}";
+    static const char colour[] = "{\"unit\":\"fc\",\"emission\":{\"groups\":{\"box.red\":\"4,8,12W\"}}}";
+    static const char *const bad[] = {"{\"unit\":\"lux\",\"emission\":[1,2,3,4,5]}",
+                                      "{\"unit\":1,\"emission\":[1,2,3,4,5]}",
+                                      "{\"photometric\":true,\"emission\":[1,2,3,4,5]}",
+                                      "{\"emission\":{\"groups\":{\"lamp\":\"3\"}}}",
+                                      "{\"emission\":{\"groups\":{\"lamp\":\"3lux\"}}}",
+                                      "{\"emission\":{\"groups\":{\"lamp\":\"-3lm\"}}}",
+                                      "{\"emission\":{\"groups\":{\"lamp\":\"1,2lm\"}}}",
+                                      "{\"emission\":{\"groups\":{\"lamp\":\"1e308lm\"}}}",
+                                      "{\"emission\":{\"groups\":{\"lamp\":\"3\\u0000lm\"}}}",
+                                      "{\"unit\":\"lx\",\"emission\":[3e38,2,3,4,5]}"};
+    fixture f = make_scene(1), three = make_scene(3);
+    radiosity_request request = {0};
+    ck_assert_uint_eq(status_of(&f, flux, sizeof flux - 1, NULL), 422); /* the groups have no areas */
+    ck_assert_int_eq(group_index_measure(&f.groups, area, NULL), LAM_OK);
+    ck_assert_int_eq(group_index_measure(&three.groups, area, NULL), LAM_OK);
+    ck_assert_uint_eq(status_of(&f, flux, sizeof flux - 1, &request), 0);
+    ck_assert_float_eq_tol(request.E[1], 4, 1e-6f); /* 358 lm / .5 m2 / 179 lm/W */
+    ck_assert_float_eq_tol(request.E[2], 2, 1e-6f);
+    ck_assert_float_eq_tol(request.E[4], 2, 1e-6f);
+    ck_assert(request.told.lights && request.told.from == LIGHT_RADIOMETRIC);
+    radiosity_request_free(&request);
+    ck_assert_uint_eq(status_of(&f, lit, sizeof lit - 1, &request), 0);
+    ck_assert_float_eq_tol(request.E[1], .358f, 1e-6f);
+    ck_assert_float_eq_tol(request.sky.values[2], .537f, 1e-6f);
+    ck_assert(!request.told.lights && request.told.unit == ANSWER_KLX);
+    radiosity_request_free(&request);
+    ck_assert_uint_eq(status_of(&f, both, sizeof both - 1, &request), 0);
+    ck_assert_float_eq_tol(request.E[1], 358, 1e-3f);
+    ck_assert_float_eq(request.sky.values[2], 3);
+    ck_assert(request.told.lights && request.told.from == LIGHT_PHOTOMETRIC);
+    radiosity_request_free(&request);
+    three.scene.lights = LIGHT_PHOTOMETRIC;
+    ck_assert_uint_eq(status_of(&three, colour, sizeof colour - 1, &request), 0);
+    for (int c = 0; c < 3; c++)
+        ck_assert_float_eq_tol(request.E[c * N + 4], (float)((c + 1) * 179 * .3048 * .3048), 1e-4f);
+    ck_assert(request.told.luminance && radiosity_request_channels(&request, 3) == 1);
+    radiosity_request_free(&request);
+    f.scene.signs = false;
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++)
+        ck_assert_msg(status_of(&f, bad[k], strlen(bad[k]), NULL) == 422, "%s", bad[k]);
+    group_index_free(&f.groups);
+    group_index_free(&three.groups);
+}
+END_TEST
+
 START_TEST(a_request_cut_anywhere_is_not_json) {
     fixture f = make_scene(1);
     for (size_t i = 0; i < N_GOOD; i++) {
@@ -322,6 +375,7 @@ int main(void) {
     tcase_add_test(tcase, tolerances);
     tcase_add_test(tcase, good_requests_are_read);
     tcase_add_test(tcase, skies_are_read);
+    tcase_add_test(tcase, units_are_read);
     tcase_add_test(tcase, a_request_cut_anywhere_is_not_json);
     tcase_add_test(tcase, changed_requests_never_do_harm);
     tcase_add_test(tcase, nesting_has_a_limit);

@@ -290,7 +290,7 @@ static lam_status under_sky(const mesh *m, size_t n_vectors, size_t rank, const 
     *e = (emission){.n_vectors = n_vectors};
     ck_assert_int_eq(emission_allocate(path, m->n_channels, N, n_vectors, &e->E, error), LAM_OK);
     e->E[1] = 3;
-    const lam_status status = emission_add_sky(e, path, &scene, error);
+    const lam_status status = emission_add_sky(e, path, &scene, false, error);
     emission_scene_free(&scene);
     unlink(path);
     return status;

@@ -198,7 +198,7 @@ START_TEST(figures_leave_out_what_is_buried) {
     write_is(&r, 1, 1, false, figures, wanted);
     reduce_groups(1, (uint32_t[]){2}, &groups, area, (reduce_values){.floats = x}, every);
     for (int k = 0; k < REDUCE_COUNT; k++) ck_assert(isnan(every[k]));
-    group_index_measure(&groups, 0, area, &counted, &left_out);
+    group_index_extent(&groups, 0, area, &counted, &left_out);
     ck_assert(counted.elements == 2 && counted.area == 2 && left_out.elements == 1 && left_out.area == 3);
     free(figures);
     reduce_request_free(&r);
