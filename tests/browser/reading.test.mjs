@@ -30,7 +30,8 @@ before(async () => {
     // The same under the tiles of its sky, each solved once: the sky is all the light there is.
     lambert("precompute", inFolder("yard.obj"), "-o", inFolder("tiles.h5"), "--elements", 200, "--rays", 256, "--probes", 2, "--quiet",
         "--sky", "grid:4x3", "--emitters", "sky");
-    daemon = await Daemon.start([inFolder("yard.h5"), `${inFolder("tiles.h5")}:tiles`]);
+    lambert("precompute", inFolder("yard.obj"), "-o", inFolder("lumens.h5"), "--rays", 64, "--probes", 0, "--quiet", "--lights", "lm", "--sky", "grid:4x3");
+    daemon = await Daemon.start([inFolder("yard.h5"), `${inFolder("tiles.h5")}:tiles`, inFolder("lumens.h5")]);
 });
 
 /** A page that shows the panel, seen from above, under an even sky. */
@@ -338,4 +339,22 @@ test("keys and fingers read too, and a link keeps the pins", async () => {
     assert.deepEqual([...page.faults, ...other.faults], []);
     await other.context().close();
     await page.context().close();
+});
+
+test("lamps, skies and readings are in the unit of the store, whatever a link says", async () => {
+    for (const [scene, unit, lamp, strength] of [["yard", "W/m²", "W/m²", 100], ["lumens", "lx", "lm/m²", 10000]]) {
+        const odd = { scene, view: { unit: unit === "lx" ? "W/m²" : "lx" } };
+        const page = await openPage(daemon.address, { hash: "#1." + Buffer.from(JSON.stringify(odd)).toString("base64url") });
+        await settled(page);
+        assert.equal(await page.evaluate(() => window.lambert.store.now.view.unit), unit);
+        assert.equal(await page.evaluate(() => window.lambert.store.now.lighting.sky.strength), strength);
+        await page.getByRole("tab", { name: "View" }).click();
+        await page.getByText(unit === "lx" ? "The store counts in lm" : "The store counts in W").waitFor();
+        await page.getByRole("tab", { name: "Lights" }).click();
+        await page.locator(".unit:visible", { hasText: lamp }).first().waitFor();
+        await page.getByRole("tab", { name: "Sky" }).click();
+        await page.locator(".unit:visible", { hasText: unit }).first().waitFor();
+        await isFine(page);
+        await page.context().close();
+    }
 });

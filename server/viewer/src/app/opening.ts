@@ -56,10 +56,11 @@ export class Opening {
 }
 
 /** The state that a scene begins with: a given one, whose lamps that it does not name are the scene's own, or that of
- * the page as it is, in the scene's own light, seen whole. */
-function stateOf({ mesh, defaultLighting }: OpenScene, given: State | null, before: State): State {
+ * the page as it is, in the scene's own light, seen whole. Its unit is that of the store. */
+function stateOf({ description, mesh, defaultLighting }: OpenScene, given: State | null, before: State): State {
     const base = given ?? { ...firstState, view: { ...before.view, camera: null, exposure: null, range: null } };
     const lighting = { ...base.lighting, groups: { ...defaultLighting.groups, ...base.lighting.groups } };
     if (base.lighting === firstState.lighting) Object.assign(lighting, defaultLighting);
-    return { ...base, lighting, pins: base.pins.filter((pin) => pin < mesh.elements) };
+    const view: View = { ...base.view, unit: description.lights === "lm" ? "lx" : "W/m²" };
+    return { ...base, view, lighting, pins: base.pins.filter((pin) => pin < mesh.elements) };
 }

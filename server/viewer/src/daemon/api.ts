@@ -29,6 +29,8 @@ export interface Description {
     name: string;
     elements: number;
     channels: number;
+    /** The light that numbers of the store count: W/m², or lm/m² and lx. */
+    lights: "W" | "lm";
     kind: string;
     method: string;
     reason: string;

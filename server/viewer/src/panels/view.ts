@@ -37,8 +37,6 @@ export function viewPanel(page: Page): Panel {
             (tone) => change({ tone })),
         palette: choice("Palette", [["viridis", "Viridis"], ["inferno", "Inferno"], ["turbo", "Turbo"]], view.palette,
             (palette) => change({ palette })),
-        unit: choice("Unit of the store", [["W/m²", "W/m²"], ["lx", "lm/m² (lx)"]], view.unit,
-            (unit) => change({ unit })),
         walk: choice("Camera", [["orbit", "Around the scene"], ["walk", "On foot (W A S D)"]],
             view.walk ? "walk" : "orbit", (way) => change({ walk: way === "walk" })),
     };
@@ -52,6 +50,13 @@ export function viewPanel(page: Page): Panel {
     };
     least.addEventListener("change", setRange);
     most.addEventListener("change", setRange);
+    const unit = make("p", { class: "hint" });
+    const tellUnit = (): void => {
+        const isPhotometric = scene.now?.description.lights === "lm";
+        unit.textContent = isPhotometric
+            ? "The store counts in lm: emission and radiosity are in lm/m², irradiance in lx, skies in cd/m²."
+            : "The store counts in W; lambert precompute --lights lm makes one in lm, for lx.";
+    };
     const light = make("div", {}, exposure.element, follow,
         button("Expose for this light", null, () => change({ exposure: null })), fields.tone);
     const colour = make("div", {}, fields.quantity, fields.palette, log, iso.element,
@@ -77,7 +82,10 @@ export function viewPanel(page: Page): Panel {
     store.listen((now, before) => {
         if (now.view !== before.view) update();
     });
-    scene.on("scene", update);
+    scene.on("scene", () => {
+        update();
+        tellUnit();
+    });
     scene.on("field", () => {
         least.placeholder = "0";
         most.placeholder = numberText(scene.exposure.spread.high).replaceAll(",", "");
@@ -91,7 +99,7 @@ export function viewPanel(page: Page): Panel {
     return {
         id: "view",
         title: "View",
-        element: make("div", {}, fields.picture, light, colour, smooth, textured, fields.unit, fields.walk,
+        element: make("div", {}, fields.picture, light, colour, smooth, textured, fields.walk, unit,
             button("Fit (F)", "Show the whole scene", () => scene.cameras.fit(true)), keptViews(page)),
     };
 }

@@ -4,6 +4,9 @@ import type { Description } from "../daemon/api.ts";
 import type { SceneMesh } from "../picture/glb.ts";
 import { firstState, type GroupLight, type Lighting } from "./state.ts";
 
+/** Light of an overcast sky on the ground, lx, as the daemon's named skies have it. */
+const LUX_OUTSIDE = 10000;
+
 /** Lights as the scene has them: each group that emits, with its power and colour. */
 export function defaultLightingOf(mesh: SceneMesh, description: Description): Lighting {
     const groups: { [name: string]: GroupLight } = {};
@@ -19,7 +22,8 @@ export function defaultLightingOf(mesh: SceneMesh, description: Description): Li
     });
     const sky = description.sky === null
         ? firstState.lighting.sky
-        : { ...firstState.lighting.sky, model: "overcast" as const };
+        : { ...firstState.lighting.sky, model: "overcast" as const,
+            strength: description.lights === "lm" ? LUX_OUTSIDE : firstState.lighting.sky.strength };
     return { ...firstState.lighting, groups, emitters, sky };
 }
 

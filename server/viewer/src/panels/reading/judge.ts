@@ -112,6 +112,6 @@ export class Judge {
                 && make("p", { class: "bad" }, "The picture does not show irradiance, which such targets are about."),
             view.unit !== "lx"
                 && make("p", { class: "hint" },
-                    "Targets of the standard are in lx. If the store's numbers are photometric, say so: “Unit of the store” in View."));
+                    "Targets of the standard are in lx, and this store counts in W. `lambert precompute` has --lights lm for that."));
     }
 }
