@@ -106,7 +106,8 @@ static const struct unit_row *unit_of(const light_conversion *c) {
 }
 
 bool light_conversion_make(light_kind from, answer_unit unit, size_t n_channels, light_conversion *out) {
-    light_conversion made = {.from = from, .unit = unit, .factor = 1, .lights = out->lights};
+    light_conversion made = {
+        .from = from, .unit = unit, .factor = 1, .lights = out->lights, .efficacies = out->efficacies};
     const struct unit_row *to = unit_of(&made);
     const bool photometric = unit != ANSWER_PLAIN && to->kind == LIGHT_PHOTOMETRIC;
     if (photometric && n_channels != 1 && n_channels != 3) return false;
@@ -130,8 +131,11 @@ void light_conversion_text(const light_conversion *c, char text[LIGHT_CONVERSION
     const struct unit_row *row = unit_of(c);
     size_t length = 0;
     text[0] = '\0';
+    if (c->efficacies)
+        length += (size_t)snprintf(text, LIGHT_CONVERSION_TEXT, "luminous efficacies of Perez et al. 1990");
     if (c->lights || row->kind != c->from)
-        length += (size_t)snprintf(text, LIGHT_CONVERSION_TEXT, "%g lm/W", WHITE_EFFICACY);
+        length += (size_t)snprintf(text + length, LIGHT_CONVERSION_TEXT - length, "%s%g lm/W",
+                                   length > 0 ? "; " : "", WHITE_EFFICACY);
     if (c->luminance)
         length += (size_t)snprintf(text + length, LIGHT_CONVERSION_TEXT - length, "%sluminance %s",
                                    length > 0 ? "; " : "", LUMINANCE_TEXT);

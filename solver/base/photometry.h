@@ -2,8 +2,9 @@
  * units that lights are given and answers are told in. The only place of these numbers; knows no scene.
  *
  * A radiometric store counts in W, a photometric one in lm. Its channels are those of white: light that is
- * the same in all of them is white, and its luminance is that number. White light of equal energy in W makes
- * WHITE_EFFICACY lm/W, as Radiance has it, that of the sky too; 683 lm/W is of light of 555 nm alone. */
+ * the same in all of them is white, and its luminance is that number. White light of equal energy makes
+ * WHITE_EFFICACY lm of each W in the visible range, as Radiance has it; 683 lm/W is of light of 555 nm alone.
+ * Solar radiation, of which a part is visible, has efficacies of its own (perez.h). */
 #ifndef LAMBERT_BASE_PHOTOMETRY_H
 #define LAMBERT_BASE_PHOTOMETRY_H
 
@@ -63,6 +64,7 @@ typedef struct light_conversion {
     double factor;    /* of every channel; 0 stands for 1 */
     bool luminance;   /* three channels become one, their luminance */
     bool lights;      /* some lights were of the other kind, and were converted too */
+    bool efficacies;  /* solar radiation became light by the luminous efficacies of perez.h */
 } light_conversion;
 
 /* False where n_channels has no luminance (neither 1 nor 3) and one is asked for. */
@@ -76,7 +78,7 @@ const char *light_conversion_year(const light_conversion *c, bool exitance);
 
 /* Puts the conversion of the numbers into text, "179 lm/W; luminance 0.2126 R + ...; 1 fc = 10.7639 lx"; ""
  * where none was. */
-#define LIGHT_CONVERSION_TEXT 128
+#define LIGHT_CONVERSION_TEXT 160
 void light_conversion_text(const light_conversion *c, char text[LIGHT_CONVERSION_TEXT]);
 
 #endif

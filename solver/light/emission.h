@@ -21,6 +21,7 @@ typedef struct emission {
     float *W; /* [n_vectors][C][s], weights of the store's emitters, beside E and L; NULL: none given */
     light_kind lights;          /* of all numbers */
     bool converted;             /* some were given in the other kind */
+    bool efficacies;            /* its sky is solar radiation, by luminous efficacies */
     bool by_luminance;          /* L is the luminance of a coloured sky, for a grey store */
     const struct sunlight *sun; /* [n_vectors], on every channel, beside L; borrowed, NULL: none */
     const lam_limiter *limiter; /* of answers below zero; borrowed, NULL: they are those of the linear map */

@@ -41,7 +41,7 @@ lam_status light_units_convert(emission *e, const emission_scene *scene, answer_
     lam_status status = LAM_OK;
     const size_t C = scene->m->n_channels;
     bool any = false;
-    *out = (light_conversion){.lights = e->converted};
+    *out = (light_conversion){.lights = e->converted, .efficacies = e->efficacies};
     if (!light_conversion_make(e->lights, unit, C, out))
         FAIL(error, LAM_ERR_ARGUMENT,
              "--unit-out: the store has %zu channels, whose luminance is not known; ask for W/m2", C);

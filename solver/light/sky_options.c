@@ -199,6 +199,8 @@ lam_status named_light_add(const sky_options *o, const char *name, store *s, con
     TRY(sky_options_make(&of, name, north, &tiling, few || o->sun_in_tiles, L, &shines, said, error));
     for (size_t t = 0; t < tiling.n_tiles; t++) narrow[t] = (float)L[t];
     TRY(emission_add_skies(e, name, m, tiling.n_tiles, 1, narrow, error));
+    /* A brightness that is given in lx is light already, and so are skies without a sun. */
+    e->efficacies = of.photometric && o->place.given && !(o->lux_outside > 0);
     e->batch = batch;
     if (o->sun_in_tiles || shines.horizontal <= 0) goto done;
     suns = memory_allocate(e->n_vectors, sizeof *suns, "the sun", error);

@@ -168,6 +168,7 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
         .photometric = options->photometric, .sun_in_tiles = few || !options->exact, .north = options->north};
     TRY(weather_skies_read(options->path, options->gaps, options->at, &tiling, &year, t, &made, error));
     TRY(emission_add_skies(e, options->path, m, tiling.n_tiles, made.n, made.L, error));
+    e->efficacies = options->photometric;
     if (options->at != NULL) e->batch = batch;
     if (e->n_vectors != made.n)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", options->path, e->n_vectors);

@@ -42,9 +42,9 @@ const option_row light_rows[] = {
      .argument = "UNIT",
      .choices = ANSWER_UNIT_WORDS,
      .otherwise = "that of the light",
-     .help =
-         "Unit of the answer; W become lm by 179 lm/W, three channels lx by their luminance. Of radiosity "
-         "and indirect light the same per area that they leave: lm/m2, klm/m2, lm/ft2"},
+     .help = "Unit of the answer. W become lm by 179 lm/W, weather and skies with a sun as by --photometric; "
+             "three channels become lx by their luminance. Of radiosity and indirect light the same per area "
+             "that they leave: lm/m2, klm/m2, lm/ft2"},
     {0},
 };
 
@@ -52,8 +52,18 @@ const char *light_named_sky(const light_options *options) {
     return options->sky != NULL && named_sky_is(options->sky) ? options->sky : NULL;
 }
 
-lam_status light_check(const light_options *options, lam_error *error) {
+/* --unit-out */
+static answer_unit unit_asked(const light_options *options) {
+    answer_unit unit = ANSWER_PLAIN;
+    if (options->unit != NULL) answer_unit_find(options->unit, strlen(options->unit), &unit);
+    return unit;
+}
+
+lam_status light_check(light_options *options, lam_error *error) {
     lam_status status = LAM_OK;
+    const answer_unit unit = unit_asked(options);
+    const bool solar = options->weather || light_named_sky(options) != NULL;
+    if (solar && unit != ANSWER_PLAIN && unit != ANSWER_W_M2) options->at.photometric = true;
     TRY(sky_options_check(&options->at, light_named_sky(options), options->weather, options->sky != NULL,
                           error));
     if (options->emit.count > 0 && options->emission != NULL)
@@ -115,9 +125,7 @@ void light_close(lit_store *lit) {
 
 lam_status light_convert(const light_options *options, sunlight *sun, sun_way *way, lit_store *lit,
                          lam_error *error) {
-    answer_unit unit = ANSWER_PLAIN;
-    if (options->unit != NULL) answer_unit_find(options->unit, strlen(options->unit), &unit);
-    return light_units_convert(&lit->light, &lit->scene, unit, sun, way, &lit->told, error);
+    return light_units_convert(&lit->light, &lit->scene, unit_asked(options), sun, way, &lit->told, error);
 }
 
 void light_log(const lit_store *lit, terminal *t) {

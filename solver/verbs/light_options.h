@@ -27,8 +27,10 @@ extern const option_row light_rows[];
 /* The named sky of --sky; NULL: it is a file, or there is none. */
 const char *light_named_sky(const light_options *options);
 
-/* Checks what does not depend on the store; an error is wrong usage. */
-lam_status light_check(const light_options *options, lam_error *error);
+/* Checks what does not depend on the store; an error is wrong usage. Weather and named skies become
+ * photometric where the answer is: their W are of all solar radiation, of which 179 lm/W would make too much.
+ */
+lam_status light_check(light_options *options, lam_error *error);
 
 /* A store's operator and sky, and the light that options ask for. */
 typedef struct lit_store {

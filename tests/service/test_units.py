@@ -346,6 +346,9 @@ class Answers(unittest.TestCase):
         self.assertIn("converted by 179 lm/W", log)
 
 
+PEREZ = "luminous efficacies of Perez et al. 1990"
+
+
 class Years(unittest.TestCase):
     """Figures of a year in the unit that is asked for."""
 
@@ -382,7 +385,7 @@ class Years(unittest.TestCase):
             year = self.figures("colour", "--unit-out", "lx", *way, "--annual", "sum", "--annual", f"autonomy={low:.6g}",
                                 "--annual", f"useful={low:.6g},{high:.6g}")
             self.assertEqual((year["channels"], year["unit"], year["sum_unit"]), (1, "lx", "klx h"))
-            self.assertEqual(year["converted_by"], "179 lm/W; luminance 0.2126 R + 0.7152 G + 0.0722 B")
+            self.assertEqual(year["converted_by"], f"{PEREZ}; luminance 0.2126 R + 0.7152 G + 0.0722 B")
             total, autonomy, useful = map(np.array, year["annual"].values())
             np.testing.assert_allclose(total, hours.sum(0) / 1000, rtol=1e-4, atol=1e-4)
             self.assertGreater(np.ptp(autonomy), .1)
@@ -394,8 +397,11 @@ class Years(unittest.TestCase):
         """The error that is stated is a share: the same in any unit, that of the sun too."""
         plain = self.figures("watts", "--annual", "sum")
         self.assertEqual((plain["unit"], plain["sum_unit"], plain.get("converted_by")), ("W/m2", "kWh/m2", None))
-        for unit, size, of_sum in ("fc", 179 * FOOT ** 2, "kfc h"), ("lx", 179, "klx h"), ("klx", .179, "Mlx h"):
-            told = self.figures("watts", "--annual", "sum", "--unit-out", unit)
+        plain = self.figures("watts", "--annual", "sum", "--photometric")
+        self.assertEqual((plain["unit"], plain["sum_unit"], plain["converted_by"]), ("lx", "klx h", PEREZ))
+        for unit, size, of_sum in ("fc", FOOT ** 2, "kfc h"), ("lx", 1, "klx h"), ("klx", .001, "Mlx h"), ("W/m2", 1 / 179, "kWh/m2"):
+            options = ("--photometric",) if unit == "W/m2" else ()
+            told = self.figures("watts", "--annual", "sum", "--unit-out", unit, *options)
             self.assertEqual((told["unit"], told["sum_unit"]), (unit, of_sum))
             np.testing.assert_allclose(told["annual"]["sum"], size * np.array(plain["annual"]["sum"]), rtol=1e-5, atol=1e-6)
             self.assertEqual(set(told["error"]), set(plain["error"]))
@@ -406,15 +412,19 @@ class Years(unittest.TestCase):
                          "element,group,area,irradiance_sum [kWh/m2],irradiance_autonomy_1")
 
     def test_weather_of_a_store_in_lumens_is_photometric(self):
-        """By the efficacies of sky and sun, not by 179 lm/W."""
+        """By the efficacies of sky and sun, not by 179 lm/W; so is that of a store in W where lx are asked for."""
         right = self.hours("watts", "--photometric")
+        np.testing.assert_allclose(self.hours("watts", "--unit-out", "klx"), right / 1000, rtol=1e-6, atol=1e-9)
+        clear = ["--sky", "clear", "--place", "52.5,13.4,1", "--date", "21 Jun 9:00", "--quantity", "irradiance", "--json"]
+        one, other = (json.loads(must("solve", self.folder / f"{name}.h5", *clear, "--unit-out", "lx").stdout) for name in ("watts", "lumens"))
+        self.assertEqual((one["unit"], one["converted_by"], one["groups"]), ("lx", PEREZ, other["groups"]))
         for options in (), ("--photometric",), ("--unit-out", "lx"):
             np.testing.assert_allclose(self.hours("lumens", *options), right, rtol=1e-6, atol=1e-6)
         told = self.figures("lumens", "--annual", "sum")
-        self.assertEqual((told["unit"], told.get("converted_by")), ("lx", None))
+        self.assertEqual((told["unit"], told["converted_by"]), ("lx", PEREZ))
         np.testing.assert_allclose(self.hours("lumens", "--unit-out", "W/m2"), right / 179, rtol=1e-5, atol=1e-6)
         lamp = self.figures("watts", "--photometric", "--emit", "lamp=1", "--annual", "sum")
-        self.assertEqual((lamp["unit"], lamp["converted_by"]), ("lx", "179 lm/W"))
+        self.assertEqual((lamp["unit"], lamp["converted_by"]), ("lx", f"{PEREZ}; 179 lm/W"))
 
 
 if __name__ == "__main__":

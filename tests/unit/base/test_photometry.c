@@ -94,6 +94,14 @@ START_TEST(three_channels_become_their_luminance) {
     ck_assert(light_conversion_make(LIGHT_PHOTOMETRIC, ANSWER_FC, 3, &c) && c.luminance && c.lights);
     light_conversion_text(&c, text);
     ck_assert_str_eq(text, "179 lm/W; luminance 0.2126 R + 0.7152 G + 0.0722 B; 1 fc = 10.7639 lx");
+    /* The longest text has room. */
+    c.efficacies = true;
+    ck_assert(light_conversion_make(LIGHT_RADIOMETRIC, ANSWER_KLX, 3, &c) && c.efficacies);
+    light_conversion_text(&c, text);
+    ck_assert_str_eq(text,
+                     "luminous efficacies of Perez et al. 1990; 179 lm/W; luminance 0.2126 R + 0.7152 G + "
+                     "0.0722 B; 1 klx = 1000 lx");
+    c.efficacies = false;
     ck_assert(light_conversion_make(LIGHT_PHOTOMETRIC, ANSWER_PLAIN, 3, &c) && !c.luminance);
     ck_assert(light_conversion_make(LIGHT_PHOTOMETRIC, ANSWER_W_M2, 3, &c) && !c.luminance);
     ck_assert(light_conversion_make(LIGHT_RADIOMETRIC, ANSWER_W_M2, 5, &c));
