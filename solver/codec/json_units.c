@@ -17,11 +17,11 @@ static bool take_numbers(parser *p, const char *text, given_unit unit, double ar
     lam_error error;
     if (option_numbers("", text, sizeof values / sizeof *values, false, values, &found, &error) != LAM_OK)
         return parser_refuse(p, PROBLEM_BAD_VALUE,
-                             "%s = \"%s ...\", must be numbers between commas, and a unit", parser_here(p),
-                             text);
+                             "%s begins with \"%s\", must be numbers between commas before the unit",
+                             parser_here(p), text);
     if (found != 1 && found != C)
         return parser_refuse(p, PROBLEM_WRONG_LENGTH,
-                             "%s holds %zu values, must be 1 or %zu, one for each channel", parser_here(p),
+                             "%s holds %zu values, must be 1 or one for each of %zu channels", parser_here(p),
                              found, C);
     for (size_t c = 0; c < C; c++) {
         const double exitance = values[found == 1 ? 0 : c] * each;
