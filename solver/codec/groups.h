@@ -24,7 +24,7 @@ typedef struct group_index {
 lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, size_t n_groups, char **names,
                             group_index *out, lam_error *error);
 
-/* Sums up the areas of elements [n] by group. Errors: LAM_ERR_MEMORY. */
+/* Sums up the areas of the elements that figures take in, of area [n], by group. Errors: LAM_ERR_MEMORY. */
 lam_status group_index_measure(group_index *index, const double *area, lam_error *error);
 
 /* The emitters of an operator of few emitters, by name: emitter k is group k of element k. Of another
