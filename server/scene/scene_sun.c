@@ -19,6 +19,7 @@
 struct scene_sun {
     const scene *of;
     size_t n_vertices, n_backs;
+    bool has_panes;
     double ground_albedo;
     pthread_mutex_t lock; /* of those below while they are made */
     shadow_tree *tree;    /* NULL until then */
@@ -46,6 +47,7 @@ lam_status scene_sun_create(store *s, const scene *of, scene_sun **out, lam_erro
     if (type != STORE_F64 || rank != 2 || dims[1] != 3)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/vertices must be [v][3] of f64", store_path(s));
     made->n_vertices = dims[0];
+    made->has_panes = store_has(s, STORE_MESH "/glass");
     TRY(store_get_number(s, STORE_SKY, "ground_albedo", &made->ground_albedo, error));
     if (!(made->ground_albedo >= 0 && made->ground_albedo <= 1))
         FAIL(error, LAM_ERR_FORMAT, "%s: /sky attribute ground_albedo is %g, must be from 0 to 1",
@@ -71,6 +73,10 @@ void scene_sun_destroy(scene_sun *sun) {
 const char *scene_sun_why_not(const scene *s) {
     if (s->sky == NULL) return "the store has no sky; precompute it with --sky";
     if (s->sun == NULL) return "the store does not state the tiles of its sky; precompute it again";
+    if (s->sun->has_panes)
+        return "the rays of this program do not pass the panes of the scene: ask for skies with "
+               "sun_in_tiles, "
+               "or let `lambert solve` find it";
     if (s->n_emitters > 0)
         return "a store of few emitters answers the sun by the tile that holds it: ask for skies with "
                "sun_in_tiles, or precompute it by another method";
