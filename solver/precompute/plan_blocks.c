@@ -23,15 +23,23 @@ bool plan_may_have_blocks(const precompute_job *job, double n) {
            o->quality != QUALITY_DRAFT && n >= ELEMENTS_LEAST;
 }
 
-/* Blocks of large planes, or of clusters of several planes where nothing hides anything. */
-static bool is_possible(const plane_tree *tree) {
-    return blocks_are_planar(tree) || tree->view == PLANE_VIEW_UNHIDDEN;
+/* Blocks of large planes, or of clusters of several planes where nothing hides anything; none have the light
+ * that elements send each other through panes. */
+static bool is_possible(const precompute_scene *scene) {
+    const plane_tree *tree = &scene->tree;
+    return (blocks_are_planar(tree) || tree->view == PLANE_VIEW_UNHIDDEN) && !(scene->panes_between > 0);
 }
 
 /* Refuses options that --form-factors blocks cannot be given together with. */
 static lam_status check_asked(const precompute_options *o, const build_method *method, bool final,
-                              const plane_tree *tree, lam_error *error) {
+                              const precompute_scene *scene, lam_error *error) {
+    const plane_tree *const tree = &scene->tree;
     const char *other = NULL;
+    if (scene->panes_between > 0)
+        return status_fail(error, LAM_ERR_ARGUMENT,
+                           "--form-factors blocks: %.2g %% of the light comes to other elements through "
+                           "panes, which blocks do not have; give --form-factors rays",
+                           100 * scene->panes_between);
     if (o->scratch != NULL) other = "--scratch";
     if (o->emitters != NULL) other = "--emitters";
     if (other != NULL)
@@ -43,7 +51,7 @@ static lam_status check_asked(const precompute_options *o, const build_method *m
         return status_fail(error, LAM_ERR_ARGUMENT,
                            "--form-factors blocks: --method %s needs rows; give --form-factors rays",
                            method->name);
-    if (!is_possible(tree) && tree->n_frames > BLOCK_PLANES_MOST)
+    if (!is_possible(scene) && tree->n_frames > BLOCK_PLANES_MOST)
         return status_fail(
             error, LAM_ERR_ARGUMENT,
             "--form-factors blocks: the elements lie in %zu planes, at most %d are possible; give "
@@ -63,16 +71,10 @@ lam_status plan_blocks_possible(const precompute_job *job, precompute_scene *sce
     lam_status status = LAM_OK;
     const bool asked = source_asked(job->options->form_factors) == &source_blocks;
     *possible = false;
-    if (!asked && (scene->m.n < ELEMENTS_LEAST || scene->panes_between > 0)) goto done;
-    if (scene->panes_between > 0)
-        FAIL(
-            error, LAM_ERR_ARGUMENT,
-            "--form-factors blocks: %.2g %% of the light comes to other elements through panes, which blocks "
-            "do not have; give --form-factors rays",
-            100 * scene->panes_between);
+    if (!asked && scene->m.n < ELEMENTS_LEAST) goto done;
     TRY(scene_make_tree(scene, error));
-    *possible = asked || is_possible(&scene->tree);
-    if (asked) TRY(check_asked(job->options, method, true, &scene->tree, error));
+    *possible = asked || is_possible(scene);
+    if (asked) TRY(check_asked(job->options, method, true, scene, error));
 done:
     return status;
 }
@@ -157,8 +159,8 @@ lam_status plan_weigh_blocks(const precompute_job *job, precompute_scene *scene,
     if (!plan_may_have_blocks(job, n) || built == NULL) return LAM_OK;
     if (final && !able && !asked) return LAM_OK;
     TRY(scene_make_tree(scene, error));
-    if (asked) TRY(check_asked(o, method, final, &scene->tree, error));
-    if (!asked && !is_possible(&scene->tree)) goto done;
+    if (asked) TRY(check_asked(o, method, final, scene, error));
+    if (!asked && !is_possible(scene)) goto done;
     /* The rays of a sky are those that find its share beside pairs, too. */
     recipe blocks = {.source = &source_blocks,
                      .rays = o->sky != NULL ? plan->recipe.rays : recipe_rays_beside_blocks(scene->m.n),

@@ -7,6 +7,7 @@
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
 #include "solver/scene/facet/face_join.h"
+#include "solver/scene/glass.h"
 #include "solver/scene/import/picture_files.h"
 
 #include <math.h>
@@ -270,11 +271,13 @@ static double elements_after(const mesh *m, const precompute_options *o) {
     return o->mesh_error > 0 ? n : fmax(n, (double)o->elements);
 }
 
-/* Finds by few rays how much light elements send each other through panes. */
+/* Finds by few rays how much light elements send each other through panes, of which none reflects too much.
+ */
 static lam_status look_through_panes(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     visibility *v = NULL;
     if (scene->m.glass == NULL) return LAM_OK;
+    mesh_limit_panes(&scene->m);
     TRY(visibility_create(&scene->m, &v, error));
     TRY(pane_light_between(&scene->m, v, &scene->panes_between, error));
     if (scene->panes_between > 0)

@@ -89,18 +89,22 @@ static lam_status unmark_sheets(mesh *m, size_t n_panes, lam_error *error) {
     return LAM_OK;
 }
 
-/* rho + T <= 1, in single precision, too. */
-static void limit_reflectance(mesh *m, size_t element, glass_report *report) {
+/* rho + T <= 1, in single precision, too; returns the largest rho before where it was more, else 0. */
+static double limit_reflectance(mesh *m, size_t element) {
     const float most = (float)(1 - m->glass[m->group[element]].transmittance);
-    bool over = false;
+    double largest = 0;
     for (size_t c = 0; c < m->n_channels; c++) {
         float *const rho = &m->reflectance[c * m->n + element];
         if (*rho <= most) continue;
-        report->limited_most = fmax(report->limited_most, (double)*rho);
+        largest = fmax(largest, (double)*rho);
         *rho = most;
-        over = true;
     }
-    report->limited += over;
+    return largest;
+}
+
+void mesh_limit_panes(mesh *m) {
+    for (size_t i = 0; m->glass != NULL && i < m->n; i++)
+        if (mesh_is_pane(m, i)) limit_reflectance(m, i);
 }
 
 lam_status mesh_settle_glass(mesh *m, glass_report *report, lam_error *error) {
@@ -114,7 +118,9 @@ lam_status mesh_settle_glass(mesh *m, glass_report *report, lam_error *error) {
         if (!mesh_is_pane(m, i)) continue;
         report->faces++;
         m->has_back[i] = true;
-        limit_reflectance(m, i, report);
+        const double reflected = limit_reflectance(m, i);
+        report->limited += reflected > 0;
+        report->limited_most = fmax(report->limited_most, reflected);
     }
     TRY(unmark_sheets(m, report->faces, error));
 done:

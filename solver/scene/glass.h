@@ -56,6 +56,10 @@ typedef struct glass_report {
  * more than it does not pass. Does nothing where there are no panes. Errors: LAM_ERR_MEMORY. */
 lam_status mesh_settle_glass(mesh *m, glass_report *report, lam_error *error);
 
+/* The same limit for the elements of a divided mesh, which have the means of their own parts of images. O(n).
+ */
+void mesh_limit_panes(mesh *m);
+
 /* /mesh/glass of a store, and its law; nothing where there are no panes. Loading checks every value. */
 lam_status mesh_save_glass(const mesh *m, store *s, lam_error *error);
 lam_status mesh_load_glass(store *s, mesh *m, lam_error *error);

@@ -164,6 +164,17 @@ class Glass(unittest.TestCase):
         self.assertGreater(found["east"], .02)
         must("verify", store, "--walks", 4096)
 
+    def test_blocks_give_way(self):
+        """Light between elements takes rows where blocks would be taken; panes before the sky alone keep blocks."""
+        self.write(two_rooms(), paint(".5 .5 .5"))
+        _, log = self.precompute("--elements", 1300, "--probes", 0)
+        self.assertIn("of the light comes to other elements through panes", log)
+        self.assertNotIn("blocks of clusters", log)
+        self.write(window_room(), paint(".5 .5 .5"))
+        _, log = self.precompute("--elements", 1300, "--sky", "tregenza", "--probes", 0)
+        self.assertIn("blocks of clusters are taken", log)
+        self.assertNotIn("of the light comes to other elements", log)
+
     def test_sky_through_a_window(self):
         """Under an even sky the share that a pane passes is the mean of its law over what each point sees."""
         for name, pane, options in (("open", False, []), ("pane", True, []), ("none", True, ["--glass-law", "none"])):

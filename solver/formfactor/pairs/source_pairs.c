@@ -93,9 +93,15 @@ done:
     return status;
 }
 
-/* Rays through panes of a reference, for each of the form factors that it judges: its own noise is a third of
- * theirs then. */
-enum { FINER_THROUGH_PANES = 4 };
+/* Rays of an element through panes for a reference: four times those of the form factors that it judges, so
+ * that its own noise is a third of theirs, but of all elements together no more than a limit allows. */
+static size_t reference_rays(const recipe *r, size_t n) {
+    enum { FINER = 4, TOGETHER_MOST = 1 << 22 };
+    const size_t own = panes_beside(r).rays;
+    size_t rays = FINER * own;
+    while (rays > own && rays > TOGETHER_MOST / n) rays /= 2;
+    return rays;
+}
 
 lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const form_factor_options *options,
                                    uint64_t other_seed, const char *const stages[2], form_factors out[2],
@@ -122,7 +128,7 @@ lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const f
         G[h] = (csr){.n = 0};
         TRY(close_pairs(&f[h], m, v, NULL, error));
         /* As pairs: the mean of two samples, and the same with half their difference. */
-        const pane_samples through = {.rays = FINER_THROUGH_PANES * panes_beside(&options->recipe).rays,
+        const pane_samples through = {.rays = reference_rays(&options->recipe, m->n),
                                       .n_seeds = h == 0 ? 2 : 1,
                                       .seeds = {options->recipe.seed, other_seed}};
         TRY(panes_add(m, v, order, options, &through, &f[h], error));
