@@ -19,7 +19,6 @@
 struct scene_sun {
     const scene *of;
     size_t n_vertices, n_backs;
-    bool has_panes;
     double ground_albedo;
     pthread_mutex_t lock; /* of those below while they are made */
     shadow_tree *tree;    /* NULL until then */
@@ -47,7 +46,6 @@ lam_status scene_sun_create(store *s, const scene *of, scene_sun **out, lam_erro
     if (type != STORE_F64 || rank != 2 || dims[1] != 3)
         FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/vertices must be [v][3] of f64", store_path(s));
     made->n_vertices = dims[0];
-    made->has_panes = store_has(s, STORE_MESH "/glass");
     TRY(store_get_number(s, STORE_SKY, "ground_albedo", &made->ground_albedo, error));
     if (!(made->ground_albedo >= 0 && made->ground_albedo <= 1))
         FAIL(error, LAM_ERR_FORMAT, "%s: /sky attribute ground_albedo is %g, must be from 0 to 1",
@@ -73,10 +71,6 @@ void scene_sun_destroy(scene_sun *sun) {
 const char *scene_sun_why_not(const scene *s) {
     if (s->sky == NULL) return "the store has no sky; precompute it with --sky";
     if (s->sun == NULL) return "the store does not state the tiles of its sky; precompute it again";
-    if (s->sun->has_panes)
-        return "the rays of this program do not pass the panes of the scene: ask for skies with "
-               "sun_in_tiles, "
-               "or let `lambert solve` find it";
     if (s->n_emitters > 0)
         return "a store of few emitters answers the sun by the tile that holds it: ask for skies with "
                "sun_in_tiles, or precompute it by another method";
@@ -85,8 +79,21 @@ const char *scene_sun_why_not(const scene *s) {
 
 /* Arrays of /mesh that a scene does not hold. */
 typedef struct arrays {
-    void *vertices, *elements, *normal;
+    void *vertices, *elements, *normal, *group;
+    scene_glass glass;
 } arrays;
+
+/* The group of each element. */
+static lam_status read_groups(store *s, const scene *of, void **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(store_read(s, STORE_MESH "/group", STORE_U32, 1, (size_t[]){of->n}, out, error));
+    for (size_t i = 0; i < of->n; i++)
+        if (((const uint32_t *)*out)[i] >= of->groups.n_groups)
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group[%zu] = %u, there are %zu groups", store_path(s), i,
+                 ((const uint32_t *)*out)[i], of->groups.n_groups);
+done:
+    return status;
+}
 
 static lam_status read_arrays(store *s, const scene_sun *sun, arrays *a, lam_error *error) {
     lam_status status = LAM_OK;
@@ -94,6 +101,8 @@ static lam_status read_arrays(store *s, const scene_sun *sun, arrays *a, lam_err
     TRY(store_read(s, STORE_MESH "/vertices", STORE_F64, 2, (size_t[]){v, 3}, &a->vertices, error));
     TRY(store_read(s, STORE_MESH "/elements", STORE_U32, 2, (size_t[]){n, 4}, &a->elements, error));
     TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, (size_t[]){n, 3}, &a->normal, error));
+    TRY(scene_glass_load(s, sun->of->groups.n_groups, &a->glass, error));
+    if (a->glass.of != NULL) TRY(read_groups(s, sun->of, &a->group, error));
     const double *x = a->vertices;
     const uint32_t *e = a->elements;
     const float *normal = a->normal;
@@ -114,7 +123,8 @@ done:
 }
 
 static size_t array_bytes(const scene_sun *sun) {
-    return sun->n_vertices * 3 * sizeof(double) + sun->of->n * (4 * sizeof(uint32_t) + 3 * sizeof(float));
+    return sun->n_vertices * 3 * sizeof(double) + sun->of->n * (5 * sizeof(uint32_t) + 3 * sizeof(float)) +
+           sun->of->groups.n_groups * sizeof(struct group_glass);
 }
 
 static lam_status make(scene_sun *sun, lam_error *error) {
@@ -140,7 +150,9 @@ static lam_status make(scene_sun *sun, lam_error *error) {
                                 .n_vertices = sun->n_vertices,
                                 .vertices = (const double(*)[3])a.vertices,
                                 .elements = (const uint32_t(*)[4])a.elements,
-                                .normal = (const float(*)[3])a.normal};
+                                .normal = (const float(*)[3])a.normal,
+                                .glass = &a.glass,
+                                .group = a.group};
     sun_ground_find(&sun->tiling, sun->ground_albedo, sky_first_bounce(of->sky), of->n, faces.normal,
                     sun->ground);
     TRY(shadow_tree_create(&faces, &tree, error));
@@ -150,6 +162,8 @@ done:
     free(a.vertices);
     free(a.elements);
     free(a.normal);
+    free(a.group);
+    free(a.glass.of);
     return status;
 }
 

@@ -1,22 +1,8 @@
 #include "solver/scene/glass.h"
 
-#include "store/groups.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define DATASET STORE_MESH "/glass"
-#define LAW "glass_law"
-#define GIVEN "glass_given"
-static const char law_angle[] = "angle", law_none[] = "none";
-
-double glass_passes(const struct group_glass *glass, bool by_angle, double cosine) {
-    const double c = fmin(fmax(cosine, 0), 1), sine = sqrt(1 - c * c);
-    const double g = by_angle ? fmin(1, 1.018 * c * (1 + sine * sine * sine)) : 1;
-    const double whole = glass->transmittance * g;
-    return glass->faces > 1 ? pow(whole, 1 / glass->faces) : whole;
-}
 
 double mesh_pane_passes(const mesh *m, size_t element, double cosine) {
     return glass_passes(&m->glass[m->group[element]], m->glass_by_angle, cosine);
@@ -128,40 +114,16 @@ done:
 }
 
 lam_status mesh_save_glass(const mesh *m, store *s, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t shape[2] = {m->n_glass, 2};
-    if (m->glass == NULL) return LAM_OK;
-    TRY(store_write(s, DATASET, STORE_F64, 2, shape, m->glass, error));
-    TRY(store_set_text(s, STORE_MESH, LAW, m->glass_by_angle ? law_angle : law_none, error));
-    if (m->glass_given) TRY(store_set_integer(s, STORE_MESH, GIVEN, 1, error));
-done:
-    return status;
+    const scene_glass glass = {.of = m->glass, .by_angle = m->glass_by_angle, .given = m->glass_given};
+    return scene_glass_save(&glass, m->n_glass, s, error);
 }
 
 lam_status mesh_load_glass(store *s, mesh *m, lam_error *error) {
-    lam_status status = LAM_OK;
-    char *law = NULL;
-    void *data = NULL;
-    if (!store_has(s, DATASET)) return LAM_OK;
-    TRY(store_get_text(s, STORE_MESH, LAW, &law, error));
-    if (strcmp(law, law_angle) != 0 && strcmp(law, law_none) != 0)
-        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute " LAW " is '%.20s', must be angle or none",
-             store_path(s), law);
-    TRY(store_read(s, DATASET, STORE_F64, 2, (size_t[]){m->n_groups, 2}, &data, error));
-    m->glass = data;
-    m->n_glass = m->n_groups;
-    m->glass_by_angle = strcmp(law, law_angle) == 0;
-    m->glass_given = store_has_attribute(s, STORE_MESH, GIVEN);
-    for (size_t g = 0; g < m->n_groups; g++) {
-        const struct group_glass *of = &m->glass[g];
-        if (!(of->transmittance >= 0 && of->transmittance <= 1))
-            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/glass[%zu][0] = %g, must be from 0 to 1", store_path(s), g,
-                 of->transmittance);
-        if (of->transmittance > 0 && !(of->faces >= 1 && of->faces <= GLASS_FACES_MOST))
-            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/glass[%zu][1] = %g, must be from 1 to %d", store_path(s),
-                 g, of->faces, GLASS_FACES_MOST);
-    }
-done:
-    free(law);
+    scene_glass glass;
+    const lam_status status = scene_glass_load(s, m->n_groups, &glass, error);
+    m->glass = glass.of;
+    m->n_glass = glass.of != NULL ? m->n_groups : 0;
+    m->glass_by_angle = glass.by_angle;
+    m->glass_given = glass.given;
     return status;
 }

@@ -1,25 +1,10 @@
-/* Panes: groups of faces that let a part of the light pass, straight on. Owns the law of that part and which
- * groups are panes; must not know rays.
- *
- * A pane of transmittance T at normal incidence passes, of light at the angle t to its normal,
- *     T g(t),    g(t) = min(1, 1.018 cos t (1 + sin^3 t))
- * (Rivero 1958, clear glass). Where a ray crosses p faces one behind the other, each passes the p-th root. */
+/* The elements of a mesh that are panes (scene_glass.h), and how their backs and reflectances must be. Must
+ * not know rays. */
 #ifndef LAMBERT_SCENE_GLASS_H
 #define LAMBERT_SCENE_GLASS_H
 
+#include "solver/base/scene/scene_glass.h"
 #include "solver/scene/mesh.h"
-
-/* A group whose transmittance is 0 is opaque. */
-struct group_glass {
-    double transmittance; /* at normal incidence, of all faces that a ray crosses together; 0 to 1 */
-    double faces;         /* that a ray crosses one behind the other, 1 or more */
-};
-
-/* Faces that a ray crosses at most, one behind the other, of one pane. */
-enum { GLASS_FACES_MOST = 16 };
-
-/* The part of the light that one face passes, of which a ray has this cosine, 0 to 1, to its normal. */
-double glass_passes(const struct group_glass *glass, bool by_angle, double cosine);
 
 static inline bool mesh_is_pane(const mesh *m, size_t element) {
     return m->glass != NULL && m->glass[m->group[element]].transmittance > 0;

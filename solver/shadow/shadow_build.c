@@ -217,10 +217,11 @@ done:
 size_t shadow_tree_bytes_most(size_t n) {
     /* A node has two parts of more than SHADOW_LEAF triangles together, or is the root. */
     const size_t pieces = 2, nodes = 1;
-    const size_t each = sizeof(float[4][3]) + sizeof(float[3]) + 1 +
+    const size_t of_panes = sizeof(bool) + sizeof(struct group_glass) + pieces * sizeof(uint32_t);
+    const size_t each = sizeof(float[4][3]) + sizeof(float[3]) + 1 + of_panes +
                         pieces * (sizeof(uint32_t) + sizeof(box)) + nodes * 2 * sizeof(shadow_node);
     size_t bytes;
-    return size_multiply(n + 1, each, &bytes) ? bytes : SIZE_MAX;
+    return size_multiply(n + 2, each, &bytes) ? bytes : SIZE_MAX;
 }
 
 lam_status shadow_tree_build(shadow_tree *t, lam_error *error) {

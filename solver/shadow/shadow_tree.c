@@ -35,6 +35,8 @@ void shadow_tree_free(shadow_tree *t) {
     free(t->shape);
     free(t->pieces);
     free(t->nodes);
+    free(t->is_pane);
+    shadow_panes_free(&t->panes);
     free(t);
 }
 
@@ -44,7 +46,8 @@ size_t shadow_tree_elements(const shadow_tree *t) {
 
 size_t shadow_tree_bytes(const shadow_tree *t) {
     return sizeof *t + t->n * (sizeof *t->corners + sizeof *t->normal + sizeof *t->shape) +
-           t->n_pieces * sizeof *t->pieces + t->n_nodes * sizeof *t->nodes;
+           t->n_pieces * sizeof *t->pieces + t->n_nodes * sizeof *t->nodes +
+           (t->is_pane != NULL ? t->n * sizeof *t->is_pane : 0) + shadow_panes_bytes(&t->panes);
 }
 
 const float (*shadow_tree_corners(const shadow_tree *t, size_t element, shadow_shape *shape))[3] {
@@ -108,7 +111,11 @@ lam_status shadow_tree_create(const shadow_faces *faces, shadow_tree **out, lam_
             for (int d = 0; d < 3; d++)
                 t->corners[i][c][d] =
                     (float)(faces->vertices[faces->elements[i][triangle && c == 3 ? 2 : c]][d] - middle[d]);
-        if (i >= faces->n_fronts) continue;
+    }
+    TRY(shadow_panes_make(t, faces, error));
+    for (size_t i = 0; i < faces->n_fronts; i++) {
+        const bool triangle = t->shape[i] == SHADOW_TRIANGLE;
+        if (t->is_pane != NULL && t->is_pane[i]) continue;
         t->pieces[t->n_pieces++] = (uint32_t)i << 1;
         if (!triangle) t->pieces[t->n_pieces++] = (uint32_t)i << 1 | 1;
     }
@@ -118,17 +125,6 @@ lam_status shadow_tree_create(const shadow_faces *faces, shadow_tree **out, lam_
 done:
     shadow_tree_free(t);
     return status;
-}
-
-/* The corner of a triangle and its edges from there. */
-static inline void piece_of(const shadow_tree *t, uint32_t piece, float a[3], float one[3], float other[3]) {
-    const float(*corner)[3] = (const float(*)[3])t->corners[piece >> 1];
-    const uint32_t second = 1 + (piece & 1);
-    for (int d = 0; d < 3; d++) {
-        a[d] = corner[0][d];
-        one[d] = corner[second][d] - a[d];
-        other[d] = corner[second + 1][d] - a[d];
-    }
 }
 
 /* An element as a face. */

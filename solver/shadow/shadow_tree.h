@@ -3,6 +3,7 @@
 #ifndef LAMBERT_SHADOW_SHADOW_TREE_H
 #define LAMBERT_SHADOW_SHADOW_TREE_H
 
+#include "solver/base/scene/scene_glass.h"
 #include "store/status.h"
 
 #include <stdint.h>
@@ -15,6 +16,8 @@ typedef struct shadow_faces {
     const double (*vertices)[3];   /* m */
     const uint32_t (*elements)[4]; /* the 4th is SHADOW_NO_VERTEX: a triangle */
     const float (*normal)[3];      /* unit, of the front */
+    const scene_glass *glass;      /* panes, by groups; NULL, or without `of`: there are none */
+    const uint32_t *group;         /* [n], with glass */
 } shadow_faces;
 
 #define SHADOW_NO_VERTEX 0xFFFFFFFFu
@@ -54,11 +57,20 @@ typedef struct shadow_rays {
     float at[3][SHADOW_PACKET];
 } shadow_rays;
 
-/* Bit k of the result: ray k in this direction, a unit vector in front of the element, meets nothing. Rays
- * are lifted above the element by 2 roundings of single precision, which changes `at`; faces in its own plane
- * (solver/scene/plane.h) block none of them, as a file's decimals may put these before it. *last, 0 at first
- * and the caller's own from one call to the next, is a guess at what blocks rays, for speed alone. */
+/* Bit k of the result: ray k in this direction, a unit vector in front of the element, meets nothing but
+ * panes. Rays are lifted above the element by 2 roundings of single precision, which changes `at`; faces in
+ * its own plane (solver/scene/plane.h) block none of them, as a file's decimals may put these before it.
+ * *last, 0 at first and the caller's own from one call to the next, is a guess at what blocks rays, for speed
+ * alone. */
 unsigned shadow_tree_open(const shadow_tree *t, size_t element, const float direction[3], shadow_rays *rays,
                           uint32_t *last);
+
+/* passed[k], of the rays of `open` after shadow_tree_open: the part that the panes pass which ray k crosses,
+ * 1 where it crosses none. Edges that panes share, and sheets, count once. Does nothing in a scene without
+ * panes. */
+void shadow_tree_pass(const shadow_tree *t, const float direction[3], const shadow_rays *rays, unsigned open,
+                      double passed[SHADOW_PACKET]);
+
+bool shadow_tree_has_panes(const shadow_tree *t);
 
 #endif

@@ -67,16 +67,25 @@ static void place(const area *a, size_t k, size_t n, shadow_rays *to) {
     for (int d = 0; d < 3; d++) to->at[d][to->n] = a->corner[d] + u * one[d] + w * other[d];
 }
 
-/* The share of n points of an element that see the sun. */
+/* The share of the sun that n points of an element get. */
 static double share_of(const shadow_tree *t, const area *a, size_t element, const float direction[3],
                        size_t n, uint32_t *last) {
-    size_t open = 0;
+    const bool panes = shadow_tree_has_panes(t);
+    double sum = 0;
     for (size_t first = 0; first < n; first += SHADOW_PACKET) {
         shadow_rays rays = {.n = 0};
         for (size_t k = first; k < n && rays.n < SHADOW_PACKET; k++, rays.n++) place(a, k, n, &rays);
-        open += (size_t)__builtin_popcount(shadow_tree_open(t, element, direction, &rays, last));
+        const unsigned open = shadow_tree_open(t, element, direction, &rays, last);
+        if (!panes) {
+            sum += __builtin_popcount(open);
+            continue;
+        }
+        double passed[SHADOW_PACKET];
+        shadow_tree_pass(t, direction, &rays, open, passed);
+        for (size_t k = 0; k < rays.n; k++)
+            if (open >> k & 1) sum += passed[k];
     }
-    return (double)open / (double)n;
+    return sum / (double)n;
 }
 
 typedef struct casting {

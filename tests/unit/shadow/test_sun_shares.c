@@ -106,6 +106,56 @@ START_TEST(shade) {
 }
 END_TEST
 
+/* The table becomes 36 panes, with a sheet's other faces on 12 of them, and another pane stands above it all:
+ * squares in the shadow get what both pass, whatever edges the rays meet. Panes alone are a scene, too. */
+START_TEST(panes) {
+    static const struct group_glass of[] = {{0, 0}, {.78, 1}, {.5, 2}};
+    const scene_glass glass = {.of = (struct group_glass[]){of[0], of[1], of[2]}, .by_angle = true};
+    static const double d[3] = {.48, .36, .8};
+    static uint32_t group[MOST];
+    static float seen[MOST];
+    make_table(&scene);
+    scene.n--;
+    for (size_t i = 0; i < scene.n; i++) group[i] = 0;
+    for (int k = 0; k < 48; k++) {
+        const int sheet = k >= 36;
+        const double at[3] = {9 + k % 6, 9 + k / 6 % 6, 2}, x[3] = {1, 0, 0}, y[3] = {0, 1, 0};
+        group[scene.n] = 1;
+        rectangle(&scene, at, sheet ? y : x, sheet ? x : y);
+    }
+    group[scene.n] = 2;
+    rectangle(&scene, (double[]){-40, -40, 3}, (double[]){100, 0, 0}, (double[]){0, 100, 0});
+    for (int alone = 0; alone < 2; alone++) {
+        const shadow_faces f = {.n = scene.n,
+                                .n_fronts = scene.n,
+                                .n_vertices = 4 * scene.n,
+                                .vertices = (const double(*)[3])scene.vertices,
+                                .elements = (const uint32_t(*)[4])scene.elements,
+                                .normal = (const float(*)[3])scene.normal,
+                                .glass = &glass,
+                                .group = group};
+        shadow_tree *t = NULL;
+        lam_error error = {0};
+        ck_assert_msg(shadow_tree_create(&f, &t, &error) == LAM_OK, "%s", error.message);
+        ck_assert_uint_le(shadow_tree_bytes(t), shadow_tree_bytes_most(scene.n));
+        ck_assert(shadow_tree_has_panes(t));
+        sun_shares_find(t, 1, 1, &d, (float *[]){seen});
+        for (size_t i = 0; i + 1 < N; i++) {
+            const double part = overlap(9 - 2 * d[0] / d[2], 15 - 2 * d[0] / d[2], (double)(i % SIDE)) *
+                                overlap(9 - 2 * d[1] / d[2], 15 - 2 * d[1] / d[2], (double)(i / SIDE));
+            const double above = glass_passes(&of[2], true, d[2]), table = glass_passes(&of[1], true, d[2]);
+            const double right = d[2] * above * (1 - part + part * table);
+            ck_assert_msg(fabs((double)seen[i] - right) <= (part == 0 || part == 1 ? 1e-6 : .1),
+                          "%zu: %g, is %g", i, (double)seen[i], right);
+        }
+        shadow_tree_free(t);
+        /* The floor lets light pass, too; it has none below it. */
+        for (size_t i = 0; i < scene.n; i++)
+            if (group[i] == 0) group[i] = 1;
+    }
+}
+END_TEST
+
 START_TEST(same_bits) {
     enum { WAYS = 7 };
     static float batch[WAYS][MOST], one[MOST];
@@ -274,12 +324,16 @@ END_TEST
 
 START_TEST(no_memory) {
     make_table(&scene);
+    static const uint32_t group[MOST] = {1};
+    const scene_glass glass = {.of = (struct group_glass[]){{0, 0}, {.78, 1}}};
     const shadow_faces f = {.n = scene.n,
                             .n_fronts = scene.n,
                             .n_vertices = 4 * scene.n,
                             .vertices = (const double(*)[3])scene.vertices,
                             .elements = (const uint32_t(*)[4])scene.elements,
-                            .normal = (const float(*)[3])scene.normal};
+                            .normal = (const float(*)[3])scene.normal,
+                            .glass = &glass,
+                            .group = group};
     shadow_tree *t = NULL;
     lam_error error = {0};
     long failed = 0;
@@ -300,6 +354,7 @@ int main(void) {
     TCase *c = tcase_create("all");
     tcase_set_timeout(c, 60);
     tcase_add_test(c, shade);
+    tcase_add_test(c, panes);
     tcase_add_test(c, same_bits);
     tcase_add_test(c, soup);
     tcase_add_test(c, sheets);

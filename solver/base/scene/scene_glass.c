@@ -1,0 +1,61 @@
+#include "solver/base/scene/scene_glass.h"
+
+#include "store/groups.h"
+#include "store/status.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DATASET STORE_MESH "/glass"
+#define LAW "glass_law"
+#define GIVEN "glass_given"
+static const char law_angle[] = "angle", law_none[] = "none";
+
+double glass_passes(const struct group_glass *glass, bool by_angle, double cosine) {
+    const double c = fmin(fmax(cosine, 0), 1), sine = sqrt(1 - c * c);
+    const double g = by_angle ? fmin(1, 1.018 * c * (1 + sine * sine * sine)) : 1;
+    const double whole = glass->transmittance * g;
+    return glass->faces > 1 ? pow(whole, 1 / glass->faces) : whole;
+}
+
+lam_status scene_glass_save(const scene_glass *glass, size_t n_groups, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t shape[2] = {n_groups, 2};
+    if (glass->of == NULL) return LAM_OK;
+    TRY(store_write(s, DATASET, STORE_F64, 2, shape, glass->of, error));
+    TRY(store_set_text(s, STORE_MESH, LAW, glass->by_angle ? law_angle : law_none, error));
+    if (glass->given) TRY(store_set_integer(s, STORE_MESH, GIVEN, 1, error));
+done:
+    return status;
+}
+
+lam_status scene_glass_load(store *s, size_t n_groups, scene_glass *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *law = NULL;
+    void *data = NULL;
+    *out = (scene_glass){.of = NULL};
+    if (!store_has(s, DATASET)) return LAM_OK;
+    TRY(store_get_text(s, STORE_MESH, LAW, &law, error));
+    if (strcmp(law, law_angle) != 0 && strcmp(law, law_none) != 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute " LAW " is '%.20s', must be angle or none",
+             store_path(s), law);
+    TRY(store_read(s, DATASET, STORE_F64, 2, (size_t[]){n_groups, 2}, &data, error));
+    const struct group_glass *of = data;
+    for (size_t g = 0; g < n_groups; g++) {
+        if (!(of[g].transmittance >= 0 && of[g].transmittance <= 1))
+            FAIL(error, LAM_ERR_FORMAT, "%s: " DATASET "[%zu][0] = %g, must be from 0 to 1", store_path(s), g,
+                 of[g].transmittance);
+        if (of[g].transmittance > 0 && !(of[g].faces >= 1 && of[g].faces <= GLASS_FACES_MOST))
+            FAIL(error, LAM_ERR_FORMAT, "%s: " DATASET "[%zu][1] = %g, must be from 1 to %d", store_path(s),
+                 g, of[g].faces, GLASS_FACES_MOST);
+    }
+    *out = (scene_glass){.of = data,
+                         .by_angle = strcmp(law, law_angle) == 0,
+                         .given = store_has_attribute(s, STORE_MESH, GIVEN)};
+    data = NULL;
+done:
+    free(law);
+    free(data);
+    return status;
+}
