@@ -326,7 +326,7 @@ class Sun(unittest.TestCase):
         for wanted, more in (("give --sky or --weather, not both", [*day, "--sky", self.folder / "sky.npy"]),
                              ("must end in .epw or .wea", ["--weather", self.folder / "sky.npy"]),
                              ("--sun is for --weather", ["--sun", "exact"]),
-                             ("--photometric is for --weather and named skies", ["--photometric"]),
+                             ("--photometric is for --weather and --sky", ["--photometric"]),
                              ("--sun-points is for --sun exact", [*day, "--sun", "tiles", "--sun-points", 9]),
                              ("--sun-points", [*day, "--sun", "exact", "--sun-points", 0]),
                              ("--sun", [*day, "--sun", "near"])):

@@ -118,10 +118,11 @@ static lam_status unpack_view(gltf_file *g, size_t number, json_t *view, gltf_nu
              "%s: bufferViews[%zu] is compressed (" GLTF_MESHOPT
              "), and its bytes are damaged; export it again",
              g->path, number);
+    const size_t length = p.count * p.stride;
     unpacked->length = at + size;
     if (json_object_set_new(view, "buffer", json_integer((json_int_t)g->n_buffers)) != 0 ||
         json_object_set_new(view, "byteOffset", json_integer((json_int_t)at)) != 0 ||
-        json_object_set_new(view, "byteLength", json_integer((json_int_t)(p.count * p.stride))) != 0)
+        json_object_set_new(view, "byteLength", json_integer((json_int_t)length)) != 0)
         FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for its vertices", g->path);
     json_object_del(json_object_get(view, "extensions"), GLTF_MESHOPT);
 done:
