@@ -61,13 +61,12 @@ typedef struct form_factors {
     double *repair;   /* [n], row sum + outside share - 1 before repair; NULL: blocks */
     sky_bounce sky;   /* zero without a sky */
     recipe recipe;
-    size_t rows_kept;    /* rows that an interrupted run had left in the scratch folder */
-    pairs_report pairs;  /* of recipes with pairs, when just made */
-    block_report blocks; /* of blocks, when just made */
-    double panes;        /* share of the light that comes to elements through panes; 0: none, or of a store */
-    bool closed;         /* nothing leaves but through cracks between elements */
-    size_t n_aimed;      /* openings that rays for the sky were aimed at (rays/portals.h) */
-    scene_outlet outlet; /* the rays that decided that (leaving.h) */
+    size_t rows_kept;     /* rows that an interrupted run had left in the scratch folder */
+    pairs_report pairs;   /* of recipes with pairs, when just made */
+    block_report blocks;  /* of blocks, when just made */
+    bool closed;          /* nothing leaves but through cracks between elements */
+    size_t n_aimed;       /* openings that rays for the sky were aimed at (rays/portals.h) */
+    scene_outlet outlet;  /* the rays that decided that (leaving.h) */
     double leaving_share; /* area-weighted means */
     double absorbed_share;
     double closure_error;           /* largest |row sum - its target| after repair */

@@ -88,13 +88,15 @@ static void arrive(void *context, size_t n, const walk_stream *w, const uint32_t
         if (element[i] != VISIBILITY_NOTHING) arrive_one(context, w, i, element[i]);
 }
 
-/* A visit adds at most the largest emission, and its weight is at most the largest at a start, 1. */
+/* A visit adds at most the largest emission, and its weight is at most the largest at a start, 1, or behind a
+ * pane. */
 static void set_largest(const mesh *m, const walk_problem *p, walk_estimates *e) {
     for (size_t row = 0; row < e->n_rhs * e->n_channels; row++) {
         double largest = 0;
         for (size_t i = 0; i < m->n; i++)
             if ((double)p->E[row * m->n + i] > largest) largest = (double)p->E[row * m->n + i];
-        for (size_t t = 0; t < e->n_targets; t++) e->largest[row * e->n_targets + t] = largest;
+        for (size_t t = 0; t < e->n_targets; t++)
+            e->largest[row * e->n_targets + t] = largest * walk_heaviest(m);
     }
 }
 

@@ -83,12 +83,9 @@ void walk_leave(size_t n, const walk_shape *const *shape, const float *share,
     leaves[cpu_best()](n, shape, share, place, rays, facet);
 }
 
-/* A ray that meets a pane passes it with a probability of at most this, and else comes to it. */
-static const double passing_most = .9;
-
 /* Of the light that meets a pane T goes on behind it, and all of it comes to the pane, where a part may be
- * reflected. A walk goes one of the ways: on with the probability q = min(T, .9) and T / q times its weight,
- * or to the pane with 1 / (1 - q) times its weight, which leaves the expectation as it is. */
+ * reflected. A walk goes one of the ways with 1 + T times its weight, on with the probability T / (1 + T),
+ * which leaves the expectation as it is; no other probabilities leave a smaller largest weight. */
 static void cross_panes(const walk_scene *s, walk_stream *w, size_t n, ray_packet *rays, hit_packet *hits) {
     for (size_t first = 0; first < n; first += VISIBILITY_PACKET, rays++, hits++) {
         const size_t count = n - first < VISIBILITY_PACKET ? n - first : VISIBILITY_PACKET;
@@ -99,11 +96,10 @@ static void cross_panes(const walk_scene *s, walk_stream *w, size_t n, ray_packe
                 const uint32_t pane = hits->element[i];
                 ahead[i] = false;
                 if (there[i] || pane == VISIBILITY_NOTHING || !mesh_is_pane(s->m, pane)) continue;
-                const double T = pane_path_passes(s->m, pane, rays, i), q = fmin(T, passing_most);
-                ahead[i] = random_unit(&w->random[first + i]) < q;
+                const double T = pane_path_passes(s->m, pane, rays, i);
+                ahead[i] = random_unit(&w->random[first + i]) * (1 + T) < T;
                 there[i] = !ahead[i];
-                for (size_t c = 0; c < WALK_CHANNELS; c++)
-                    w->weight[c][first + i] *= ahead[i] ? T / q : 1 / (1 - q);
+                for (size_t c = 0; c < WALK_CHANNELS; c++) w->weight[c][first + i] *= 1 + T;
                 any = any || ahead[i];
             }
             pane_path_step(s->v, s->m, rays, count, ahead, 0, hits);

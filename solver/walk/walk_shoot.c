@@ -112,7 +112,7 @@ static void shoot(const walk_scene *scene, const walk_problem *p, size_t r, walk
             walk_batches_join(s->sums + t * channels + c, each, &e->mean[k], &e->error[k]);
             e->mean[k] *= per_walk;
             e->error[k] *= per_walk;
-            e->largest[k] = all / s->area[t];
+            e->largest[k] = all / s->area[t] * walk_heaviest(m);
         }
         for (size_t b = 0; b < WALK_BATCHES; b++) e->visits[r * targets + t] += s->visits[b * targets + t];
     }

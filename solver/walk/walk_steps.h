@@ -4,6 +4,7 @@
 #define LAMBERT_WALK_WALK_STEPS_H
 
 #include "solver/base/random.h"
+#include "solver/base/scene/scene_glass.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/walk/walk.h"
 
@@ -104,6 +105,15 @@ static inline bool walk_survives(const walk_scene *s, walker *w, uint32_t elemen
     const double scale = before / after;
     for (size_t c = 0; c < WALK_CHANNELS; c++) w->weight[c] = weight[c] * scale;
     return random_unit(&w->random) * before < after;
+}
+
+/* The largest weight of a walk, over that at its start: each pane on its way makes it 1 + T times as large,
+ * of which one is taken to be there. Few walks meet more, and the bound is for estimates of few visits. */
+static inline double walk_heaviest(const mesh *m) {
+    double most = 0;
+    for (size_t g = 0; g < m->n_glass; g++)
+        most = m->glass[g].transmittance > most ? m->glass[g].transmittance : most;
+    return 1 + most;
 }
 
 /* Makes the shapes of a scene, freed with it. Errors: LAM_ERR_MEMORY. */

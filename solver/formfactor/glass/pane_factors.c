@@ -64,19 +64,14 @@ static void add_common(const csr *upper, csr *more) {
     }
 }
 
-/* Adds the exchange of more, A_i F_ij, to the row sums of f; returns that of all elements over their area. */
-static double add_sums(const csr *more, const double *area, form_factors *f) {
-    double sum = 0, all = 0;
-    for (size_t i = 0; i < more->n; i++) {
-        all += area[i];
+/* Adds the exchange of more, A_i F_ij, to the row sums of f. */
+static void add_sums(const csr *more, const double *area, form_factors *f) {
+    for (size_t i = 0; i < more->n; i++)
         for (uint64_t p = more->indptr[i]; p < more->indptr[i + 1]; p++) {
-            const double g = (double)more->data[p];
-            f->row_sums[i] += g / area[i];
-            f->row_sums[more->indices[p]] += g / area[more->indices[p]];
-            sum += 2 * g;
+            const uint32_t j = more->indices[p];
+            f->row_sums[i] += (double)more->data[p] / area[i];
+            f->row_sums[j] += (double)more->data[p] / area[j];
         }
-    }
-    return sum / all;
 }
 
 /* upper += share times the rows, which are freed. */
@@ -88,7 +83,7 @@ static lam_status add_rows(const mesh *m, packed_rows *rows, double share, form_
     packed_rows_free(rows);
     if (more.indptr[more.n] == 0) goto done;
     for (uint64_t p = 0; p < more.indptr[more.n]; p++) more.data[p] *= (float)share;
-    f->panes += add_sums(&more, m->area, f);
+    add_sums(&more, m->area, f);
     add_common(&f->upper, &more);
     TRY(csr_replace(&f->upper, &more, &sum, error));
     csr_free(&f->upper);
@@ -100,23 +95,23 @@ done:
     return status;
 }
 
-lam_status panes_add(const mesh *m, const visibility *v, const uint32_t *order,
-                     const form_factor_options *options, const pane_samples *samples, form_factors *f,
-                     lam_error *error) {
+/* To the rows of f and to a sky; either may be NULL. */
+static lam_status add(const mesh *m, const visibility *v, const uint32_t *order,
+                      const form_factor_options *options, const pane_samples *samples, form_factors *f,
+                      sky_bounce *sky, double *ground, lam_error *error) {
     lam_status status = LAM_OK;
     packed_rows rows = {0};
     sky_bounce bins = {.n = 0};
-    sky_bounce *const sky = &f->sky;
     const double share = 1 / (double)samples->n_seeds;
     if (m->glass == NULL) return LAM_OK;
     for (size_t k = 0; k < samples->n_seeds; k++) {
-        sky_bounce *const into = sky->first_bounce != NULL ? &bins : NULL;
         sky_bounce_free(&bins);
-        if (into != NULL)
-            TRY(sky_bounce_create(sky->tiling.name, m->up, sky->ground_albedo, m->n, into, error));
-        TRY(find(m, v, order, options, samples, k, &rows, into, error));
-        if (into != NULL) TRY(add_bins(into, share, sky, NULL, error));
-        TRY(add_rows(m, &rows, share, f, error));
+        if (sky != NULL)
+            TRY(sky_bounce_create(sky->tiling.name, m->up, sky->ground_albedo, m->n, &bins, error));
+        TRY(find(m, v, order, options, samples, k, f != NULL ? &rows : NULL, sky != NULL ? &bins : NULL,
+                 error));
+        if (sky != NULL) TRY(add_bins(&bins, share, sky, ground, error));
+        if (f != NULL) TRY(add_rows(m, &rows, share, f, error));
     }
 done:
     packed_rows_free(&rows);
@@ -124,21 +119,17 @@ done:
     return status;
 }
 
+lam_status panes_add(const mesh *m, const visibility *v, const uint32_t *order,
+                     const form_factor_options *options, const pane_samples *samples, form_factors *f,
+                     lam_error *error) {
+    sky_bounce *const sky = f->sky.first_bounce != NULL ? &f->sky : NULL;
+    return add(m, v, order, options, samples, f, sky, NULL, error);
+}
+
 lam_status panes_add_bounce(const mesh *m, const visibility *v, const uint32_t *order,
                             const form_factor_options *options, const pane_samples *samples,
                             sky_bounce *bounce, double *ground, lam_error *error) {
-    lam_status status = LAM_OK;
-    sky_bounce bins = {.n = 0};
-    if (m->glass == NULL) return LAM_OK;
-    for (size_t k = 0; k < samples->n_seeds; k++) {
-        sky_bounce_free(&bins);
-        TRY(sky_bounce_create(bounce->tiling.name, m->up, bounce->ground_albedo, m->n, &bins, error));
-        TRY(find(m, v, order, options, samples, k, NULL, &bins, error));
-        TRY(add_bins(&bins, 1 / (double)samples->n_seeds, bounce, ground, error));
-    }
-done:
-    sky_bounce_free(&bins);
-    return status;
+    return add(m, v, order, options, samples, NULL, bounce, ground, error);
 }
 
 lam_status panes_add_sky(const mesh *m, const visibility *v, const uint32_t *order,

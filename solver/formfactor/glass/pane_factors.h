@@ -18,9 +18,9 @@ pane_samples panes_beside(const recipe *r);
 /* Adds to closed form factors, whose upper triangle f has, the exchange through panes,
  *     A_i F_ij += A_i F_ij through panes,
  * and to f->sky, unless that is zero, what comes from the tiles and the ground through panes. Row sums then
- * are up to 1 + T where a pane is in sight: it receives all of the light that it passes on. f->panes says how
- * much that is. Does nothing where there are no panes. Cost: as pane_light_make. Errors: LAM_ERR_MEMORY,
- * LAM_ERR_IO, LAM_ERR_CANCELLED. */
+ * are up to 1 + T where a pane is in sight: it receives all of the light that it passes on. Does nothing
+ * where there are no panes. Cost: as pane_light_make. Errors: LAM_ERR_MEMORY, LAM_ERR_IO, LAM_ERR_CANCELLED.
+ */
 lam_status panes_add(const mesh *m, const visibility *v, const uint32_t *order,
                      const form_factor_options *options, const pane_samples *samples, form_factors *f,
                      lam_error *error);
