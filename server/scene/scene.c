@@ -5,6 +5,7 @@
 
 #include "server/queue/batch.h"
 #include "server/scene/map_guard.h"
+#include "server/scene/scene_memory.h"
 #include "server/scene/tile_places.h"
 #include "solver/base/clock.h"
 #include "solver/base/scene/scene_backs.h"
@@ -192,69 +193,6 @@ uint64_t scene_work_memory(size_t n_threads, size_t work_bytes) {
     return (uint64_t)n_threads * work_bytes;
 }
 
-/* The bytes below a group; 0: there is none. */
-static lam_status bytes_below(store *s, const char *group, uint64_t *bytes, lam_error *error) {
-    *bytes = 0;
-    return store_has(s, group) ? store_group_bytes(s, group, bytes, error) : LAM_OK;
-}
-
-/* Parts of faces in elements of several. */
-static uint64_t face_parts(const store *s) {
-    return store_array_bytes(s, STORE_MESH "/face_part_area") / sizeof(double);
-}
-
-/* Marks of buried elements. */
-static uint64_t buried_memory(const store *s) {
-    const bool any = store_array_bytes(s, STORE_MESH "/buried") > 0;
-    return any ? store_array_bytes(s, STORE_MESH "/group") / sizeof(uint32_t) * sizeof(bool) : 0;
-}
-
-/* The bytes that a scene has of /mesh: areas, reflectances, groups with their names, areas and an index
- * of these, one of faces, and marks of buried elements. */
-static uint64_t mesh_memory(const store *s) {
-    const uint64_t n = store_array_bytes(s, STORE_MESH "/face") / sizeof(uint32_t),
-                   n_faces = store_array_bytes(s, STORE_MESH "/face_area") / sizeof(double);
-    const uint64_t names = store_texts_memory(s, STORE_MESH "/group_names");
-    return buried_memory(s) + store_array_bytes(s, STORE_MESH "/area") +
-           store_array_bytes(s, STORE_MESH "/reflectance") + store_array_bytes(s, STORE_MESH "/group") +
-           face_index_bytes(n, n_faces, face_parts(s)) + names +
-           names / (sizeof(char *) + 1) * (2 * sizeof(uint32_t) + sizeof(double));
-}
-
-/* The bytes that are read beside that and freed again before the scene is open: of groups by element, the
- * names as they are stored, parts of faces, receivers and sources; where there are buried elements, these and
- * areas, for the description. */
-static lam_status passing_memory(store *s, uint64_t *memory, lam_error *error) {
-    lam_status status = LAM_OK;
-    uint64_t receivers, sources;
-    const uint64_t buried = buried_memory(s) > 0
-                                ? buried_memory(s) + store_array_bytes(s, STORE_MESH "/buried") +
-                                      store_array_bytes(s, STORE_MESH "/area")
-                                : 0;
-    TRY(bytes_below(s, STORE_IMPORTANCE, &receivers, error));
-    TRY(bytes_below(s, STORE_SOURCES, &sources, error));
-    *memory = store_array_bytes(s, STORE_MESH "/group") + store_texts_memory(s, STORE_MESH "/group_names") +
-              16 * face_parts(s) + buried + receivers + sources;
-done:
-    return status;
-}
-
-/* *memory: bytes of the operator in memory, of the sky, of the mesh and of errors, mapped or read, found
- * before anything is read. */
-static lam_status memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error) {
-    lam_status status = LAM_OK;
-    char *kind = NULL;
-    uint64_t sky, errors;
-    TRY(store_group_bytes(s, STORE_OPERATOR, operator_bytes, error));
-    TRY(bytes_below(s, STORE_SKY, &sky, error));
-    TRY(bytes_below(s, STORE_ERROR, &errors, error));
-    TRY(store_get_text(s, STORE_OPERATOR, "kind", &kind, error));
-    *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky + errors + mesh_memory(s);
-done:
-    free(kind);
-    return status;
-}
-
 /* Waking a thread for a part of a pass takes about as long as reading this many bytes; a smaller part costs
  * more than it saves. */
 #define LEAST_OF_THREAD ((size_t)8 << 20)
@@ -304,8 +242,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     if (!store_has(s, STORE_OPERATOR))
         FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", options->path);
     uint64_t passing;
-    TRY(memory_of(s, &made->memory, &made->bytes, error));
-    TRY(passing_memory(s, &passing, error));
+    TRY(scene_memory_of(s, &made->memory, &made->bytes, error));
+    TRY(scene_memory_passing(s, &passing, error));
     if (made->memory + passing > options->memory)
         FAIL(error, LAM_ERR_MEMORY,
              "%s: takes %llu bytes, and %llu more while it is read, %llu are left of --max-memory; raise it",
