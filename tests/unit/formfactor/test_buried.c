@@ -3,28 +3,12 @@
 #include "solver/formfactor/buried.h"
 #include "solver/formfactor/facing.h"
 #include "solver/formfactor/source.h"
-#include "support/scene.h"
-
-#include <stdarg.h>
+#include "support/obj_text.h"
 
 static lam_error error;
 
-typedef struct writer {
-    char text[1 << 16];
-    size_t used;
-    int vertices;
-} writer;
-
-static void put(writer *w, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    w->used += (size_t)vsnprintf(w->text + w->used, sizeof w->text - w->used, format, arguments);
-    va_end(arguments);
-    ck_assert_uint_lt(w->used, sizeof w->text);
-}
-
 /* A face of n x n squares across an axis; `looks` is the side of its normal. */
-static void put_face(writer *w, int axis, double at, const double low[3], const double high[3], int looks,
+static void put_face(obj_text *w, int axis, double at, const double low[3], const double high[3], int looks,
                      int n) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     for (int k = 0; k < n * n; k++) {
@@ -35,33 +19,23 @@ static void put_face(writer *w, int axis, double at, const double low[3], const 
             p[axis] = at;
             p[u] = low[u] + (high[u] - low[u]) * (k % n + of[0]) / n;
             p[v] = low[v] + (high[v] - low[v]) * (k / n + of[1]) / n;
-            put(w, "v %.9g %.9g %.9g\n", p[0], p[1], p[2]);
+            obj_text_put(w, "v %.9g %.9g %.9g\n", p[0], p[1], p[2]);
         }
-        put(w, "f -4 -3 -2 -1\n");
-        w->vertices += 4;
+        obj_text_put(w, "f -4 -3 -2 -1\n");
     }
 }
 
 /* The faces of a box, named g0 to g5 after their axes and sides; inward: a room. */
-static void put_box(writer *w, const char *name, const double low[3], const double high[3], bool inward,
+static void put_box(obj_text *w, const char *name, const double low[3], const double high[3], bool inward,
                     int n) {
     for (int face = 0; face < 6; face++) {
-        put(w, "o %s%d\n", name, face);
+        obj_text_put(w, "o %s%d\n", name, face);
         const bool top = face % 2 == 1;
         put_face(w, face / 2, top ? high[face / 2] : low[face / 2], low, high, top == inward ? -1 : 1, n);
     }
 }
 
 static const double room_low[3] = {0, 0, 0}, room_high[3] = {4, 4, 4};
-
-static mesh scene_of(const writer *w) {
-    char folder[64];
-    import_report report;
-    folder_make(folder);
-    mesh m = obj_good(folder, w->text, &report);
-    folder_remove(folder);
-    return m;
-}
 
 static size_t buried_of(mesh *m, const char *group) {
     size_t n = 0;
@@ -86,7 +60,7 @@ enum { RECIPES = sizeof recipes / sizeof *recipes };
 /* A room of squares of 1 m, in which one box stands on four squares of the floor and another one on the
  * first, as large as one of its squares. */
 START_TEST(a_closed_room_stays_closed) {
-    writer w = {.used = 0};
+    obj_text w = {.used = 0};
     const recipe *r = &recipes[_i];
     form_factors f = {0};
     block_factors blocks = {.n = 0};
@@ -94,7 +68,7 @@ START_TEST(a_closed_room_stays_closed) {
     put_box(&w, "room", room_low, room_high, true, 4);
     put_box(&w, "box", (const double[3]){1, 1, 0}, (const double[3]){3, 3, 1}, false, 2);
     put_box(&w, "top", (const double[3]){1, 2, 1}, (const double[3]){2, 3, 2}, false, 1);
-    mesh m = scene_of(&w);
+    mesh m = obj_text_mesh(&w);
     ck_assert_uint_eq(find(&m), 4 + 4 + 1 + 1);
     ck_assert_uint_eq(buried_of(&m, "room4"), 4);
     ck_assert_uint_eq(buried_of(&m, "box4"), 4);
@@ -134,16 +108,16 @@ END_TEST
 /* Light through a crack is followed from elements that are not buried: the crack is one, and what is
  * below the floor is none of it. */
 START_TEST(a_crack_is_no_opening) {
-    writer w = {.used = 0};
+    obj_text w = {.used = 0};
     form_factors f = {0};
     put_box(&w, "box", (const double[3]){1, 1, 0}, (const double[3]){3, 3, 1}, false, 2);
-    put(&w, "o room\n");
+    obj_text_put(&w, "o room\n");
     for (int face = 0; face < 6; face++) {
         const double gap = face == 5 ? .003 : 0;
         put_face(&w, face / 2, (face % 2 == 1 ? room_high : room_low)[face / 2] + gap, room_low, room_high,
                  face % 2 == 1 ? -1 : 1, 4);
     }
-    mesh m = scene_of(&w);
+    mesh m = obj_text_mesh(&w);
     ck_assert_uint_eq(find(&m), 4 + 4);
     uint32_t *order = calloc(m.n, sizeof *order);
     for (uint32_t i = 0; i < m.n; i++) order[i] = i;
@@ -161,10 +135,10 @@ END_TEST
 
 /* A leg stands in the middle of a large square of the floor: its underside is buried, the square is not. */
 START_TEST(a_leg_on_a_large_square) {
-    writer w = {.used = 0};
+    obj_text w = {.used = 0};
     put_box(&w, "room", room_low, room_high, true, 1);
     put_box(&w, "leg", (const double[3]){1, 1, 0}, (const double[3]){1.05, 1.05, 1}, false, 1);
-    mesh m = scene_of(&w);
+    mesh m = obj_text_mesh(&w);
     ck_assert_uint_eq(find(&m), 1);
     ck_assert_uint_eq(buried_of(&m, "leg4"), 1);
     mesh_free(&m);
@@ -174,7 +148,7 @@ END_TEST
 /* A leaf in the open, one in a room, and the walls of a house of sheets see something from both sides. A
  * floor that was made two-sided has no other side that covers it. */
 START_TEST(sheets_are_not_buried) {
-    writer open = {.used = 0}, inside = {.used = 0}, house = {.used = 0}, alone = {.used = 0};
+    obj_text open = {.used = 0}, inside = {.used = 0}, house = {.used = 0}, alone = {.used = 0};
     const double low[3] = {1, 1, 1}, high[3] = {2, 2, 1};
     put_face(&open, 2, 1, low, high, 1, 2);
     put_face(&open, 2, 1, low, high, -1, 2);
@@ -184,9 +158,9 @@ START_TEST(sheets_are_not_buried) {
     put_box(&house, "in", room_low, room_high, true, 2);
     put_box(&house, "out", room_low, room_high, false, 2);
     put_box(&alone, "room", room_low, room_high, true, 2);
-    const writer *all[] = {&open, &inside, &house, &alone};
+    const obj_text *all[] = {&open, &inside, &house, &alone};
     for (int k = 0; k < 4; k++) {
-        mesh m = scene_of(all[k]);
+        mesh m = obj_text_mesh(all[k]);
         if (k == 3) ck_ok(mesh_make_two_sided(&m, &error));
         ck_assert_uint_eq(find(&m), 0);
         ck_assert_ptr_null(m.buried);

@@ -4,44 +4,29 @@
 #include "solver/formfactor/source.h"
 #include "solver/scene/glass.h"
 #include "store/groups.h"
-#include "support/scene.h"
-
-#include <stdarg.h>
+#include "support/obj_text.h"
 
 static lam_error error;
 
-typedef struct writer {
-    char text[1 << 15];
-    size_t used;
-} writer;
-
-static void put(writer *w, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    w->used += (size_t)vsnprintf(w->text + w->used, sizeof w->text - w->used, format, arguments);
-    va_end(arguments);
-    ck_assert_uint_lt(w->used, sizeof w->text);
-}
-
 /* n x n squares from a corner along two edges, whose cross product is the normal. */
-static void put_group(writer *w, const char *name, const double corner[3], const double u[3],
+static void put_group(obj_text *w, const char *name, const double corner[3], const double u[3],
                       const double v[3], int n) {
-    put(w, "o %s\n", name);
+    obj_text_put(w, "o %s\n", name);
     for (int k = 0; k < n * n; k++) {
         static const int turn[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
         for (int c = 0; c < 4; c++) {
             const double a = (k % n + turn[c][0]) / (double)n, b = (k / n + turn[c][1]) / (double)n;
-            put(w, "v %.9g %.9g %.9g\n", corner[0] + a * u[0] + b * v[0], corner[1] + a * u[1] + b * v[1],
-                corner[2] + a * u[2] + b * v[2]);
+            obj_text_put(w, "v %.9g %.9g %.9g\n", corner[0] + a * u[0] + b * v[0],
+                         corner[1] + a * u[1] + b * v[1], corner[2] + a * u[2] + b * v[2]);
         }
-        put(w, "f -4 -3 -2 -1\n");
+        obj_text_put(w, "f -4 -3 -2 -1\n");
     }
 }
 
 static const double X[3] = {2, 0, 0}, Y[3] = {0, 2, 0}, Z[3] = {0, 0, 2};
 
 /* The sides of a room from x to x + 2 along x but for those across it. */
-static void put_sides(writer *w, double x, int n) {
+static void put_sides(obj_text *w, double x, int n) {
     const double low[3] = {x, 0, 0}, north[3] = {x, 2, 0}, top[3] = {x, 0, 2};
     put_group(w, "floor", low, X, Y, n);
     put_group(w, "ceiling", top, Y, X, n);
@@ -51,9 +36,7 @@ static void put_sides(writer *w, double x, int n) {
 
 /* Two rooms of 2 m, side by side, with `panes` panes .01 m apart between them; sheet: of two faces each. */
 static mesh two_rooms(int panes, bool sheet) {
-    writer w = {.used = 0};
-    char folder[64];
-    import_report report;
+    obj_text w = {.used = 0};
     put_group(&w, "west", (const double[3]){0, 0, 0}, Y, Z, 3);
     put_sides(&w, 0, 3);
     put_sides(&w, 2, 3);
@@ -63,10 +46,7 @@ static mesh two_rooms(int panes, bool sheet) {
         put_group(&w, "pane", corner, Y, Z, 2);
         if (sheet) put_group(&w, "pane", corner, Z, Y, 2);
     }
-    folder_make(folder);
-    mesh m = obj_good(folder, w.text, &report);
-    folder_remove(folder);
-    return m;
+    return obj_text_mesh(&w);
 }
 
 static glass_report glaze(mesh *m, double transmittance, double faces, bool by_angle) {
@@ -216,17 +196,13 @@ static double floor_by_sky(double T) {
 START_TEST(an_even_sky_shines_through) {
     static const double T = .78;
     static const recipe blocks = {.source = &source_blocks, .rays = 4096, .accuracy = 1e-4, .seed = 5};
-    writer w = {.used = 0};
-    char folder[64];
-    import_report report;
+    obj_text w = {.used = 0};
     double between = 1, irradiance = 0, area = 0;
     form_factors f;
     put_group(&w, "west", (const double[3]){0, 0, 0}, Y, Z, 3);
     put_sides(&w, 0, 3);
     put_group(&w, "pane", (const double[3]){2, 0, 0}, Y, Z, 2);
-    folder_make(folder);
-    mesh m = obj_good(folder, w.text, &report);
-    folder_remove(folder);
+    mesh m = obj_text_mesh(&w);
     glaze(&m, T, 1, true);
     visibility *v = NULL;
     ck_ok(visibility_create(&m, &v, &error));
