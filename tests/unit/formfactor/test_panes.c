@@ -1,6 +1,7 @@
 /* Panes between two black rooms and in a window: form factors and the light of an even sky by every source,
  * against sums over points in double; sheets, panes of several faces, files and stores. */
 #include "solver/formfactor/glass/pane_light.h"
+#include "solver/formfactor/sky_sample.h"
 #include "solver/formfactor/source.h"
 #include "solver/scene/glass.h"
 #include "store/groups.h"
@@ -193,6 +194,38 @@ static double floor_by_sky(double T) {
     return 2 * floor_by_sky_of(120, T) - floor_by_sky_of(60, T);
 }
 
+/* The light of single tiles on the floor: by rays towards them, as a judge has it, that of the first bounce.
+ */
+static void tiles_agree(const mesh *m, const sky_bounce *sky) {
+    const size_t n_tiles = sky->tiling.n_tiles, floor_group = group_find(m, "floor");
+    size_t *tiles = calloc(n_tiles, sizeof *tiles);
+    float *first = calloc(n_tiles * m->n, sizeof *first);
+    uint32_t *order = calloc(m->n, sizeof *order);
+    sky_bounce sampled;
+    double sum = 0, off = 0;
+    for (uint32_t i = 0; i < m->n; i++) order[i] = i;
+    for (size_t t = 0; t < n_tiles; t++) tiles[t] = t;
+    const form_factor_options how = {.recipe = {.source = &source_rays, .rays = 64, .seed = 7}};
+    ck_ok(sky_sample_make(m, order, sky, &how, &sampled, &error));
+    ck_ok(sky_sample_tiles(m, &sampled, 64, 8, n_tiles, tiles, first, &error));
+    for (size_t t = 0; t < n_tiles; t++) {
+        double by_rays = 0, by_tile = 0;
+        for (size_t i = 0; i < m->n; i++) {
+            if (m->group[i] != floor_group) continue;
+            by_rays += m->area[i] * (double)sky->first_bounce[t * m->n + i];
+            by_tile += m->area[i] * (double)first[t * m->n + i];
+        }
+        sum += by_rays;
+        off += fabs(by_tile - by_rays);
+    }
+    ck_assert_double_gt(sum, 0);
+    ck_assert_double_lt(off, .05 * sum);
+    sky_bounce_free(&sampled);
+    free(tiles);
+    free(first);
+    free(order);
+}
+
 START_TEST(an_even_sky_shines_through) {
     static const double T = .78;
     static const recipe blocks = {.source = &source_blocks, .rays = 4096, .accuracy = 1e-4, .seed = 5};
@@ -231,6 +264,7 @@ START_TEST(an_even_sky_shines_through) {
     }
     const double wanted = floor_by_sky(T);
     ck_assert_double_eq_tol(irradiance / area, wanted, .01 * wanted);
+    if (_i == 2) tiles_agree(&m, &f.sky);
     for (size_t i = 0; i < m.n && _i < RECIPES; i++) ck_assert_double_le(f.row_sums[i], 1 + 1e-6);
     form_factors_free(&f);
     mesh_free(&m);
