@@ -1,5 +1,6 @@
 /* The interface of form factors: F[i][j], the fraction of the power leaving element i that reaches element j,
- * as sparse rows with A_i F_ij = A_j F_ji and row sums of at most 1. */
+ * as sparse rows with A_i F_ij = A_j F_ji and row sums of at most 1, or 2 where panes let light
+ * pass (glass/pane_factors.h). */
 #ifndef LAMBERT_FORMFACTOR_FORMFACTOR_H
 #define LAMBERT_FORMFACTOR_FORMFACTOR_H
 
