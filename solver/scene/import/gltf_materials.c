@@ -1,4 +1,5 @@
 /* Materials of a glTF with their images. Runs in the child. */
+#include "solver/base/photometry.h"
 #include "solver/scene/import/gltf_file.h"
 
 #include <math.h>
@@ -98,7 +99,7 @@ static double gltf_share(const json_t *value, double otherwise) {
 }
 
 /* The part of light that passes: of a material that is blended, 1 - alpha; and of the rest what is
- * transmitted, coloured by the base colour, of which this is the luminance (Rec. 709). */
+ * transmitted, coloured by the base colour, of which this is the luminance. */
 static void read_transmittance(const json_t *m, gltf_material *out) {
     const json_t *colour = json_object_get(json_object_get(m, "pbrMetallicRoughness"), "baseColorFactor");
     const json_t *clear = gltf_extension(m, "KHR_materials_transmission");
@@ -106,9 +107,9 @@ static void read_transmittance(const json_t *m, gltf_material *out) {
     const bool blended = mode != NULL && strcmp(mode, "BLEND") == 0;
     const double factor = gltf_share(json_object_get(clear, "transmissionFactor"), 0);
     const double alpha = blended ? gltf_share(json_array_get(colour, 3), 1) : 1;
-    const double luminance = .2126 * gltf_share(json_array_get(colour, 0), 1) +
-                             .7152 * gltf_share(json_array_get(colour, 1), 1) +
-                             .0722 * gltf_share(json_array_get(colour, 2), 1);
+    const double luminance =
+        luminance_of(gltf_share(json_array_get(colour, 0), 1), gltf_share(json_array_get(colour, 1), 1),
+                     gltf_share(json_array_get(colour, 2), 1));
     out->diffuse = alpha * (1 - factor);
     out->transmittance = fmin(1 - alpha + alpha * factor * luminance, 1);
 }

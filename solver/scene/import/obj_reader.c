@@ -2,6 +2,7 @@
  * of `o` and `g`, invent a diffuse colour and only log a missing MTL. Runs in the child. */
 #include "solver/base/array_grow.h"
 #include "solver/base/file_text.h"
+#include "solver/base/photometry.h"
 #include "solver/scene/import/imported_faces.h"
 #include "solver/scene/import/obj_groups.h"
 
@@ -217,9 +218,9 @@ static bool read_clearness(char *line, clearness *c) {
 
 /* A material of d < 1 passes the rest, coloured by its filter, and has its diffuse colour in the share d. A
  * filter below 1 counts by itself where the illum is of glass: many programs write others for opaque
- * materials. Colours become luminance (Rec. 709). */
+ * materials. Colours become luminance. */
 static void end_material(const clearness *c, imported_material *out) {
-    const double filter = .2126 * c->filter[0] + .7152 * c->filter[1] + .0722 * c->filter[2];
+    const double filter = luminance_of(c->filter[0], c->filter[1], c->filter[2]);
     const bool filters = c->glass && filter > 0 && filter < 1;
     const double share = c->opaque < 1 ? 1 - c->opaque : filters ? 1 : 0;
     out->transmittance = share * (filters ? filter : 1);
