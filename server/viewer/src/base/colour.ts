@@ -2,9 +2,11 @@
 
 export type Rgb = [number, number, number];
 
-/** Luminance of linear sRGB (IEC 61966-2-1). */
+/** The weights of luminance in linear sRGB (IEC 61966-2-1). */
+export const LUMINANCE: readonly number[] = [0.2126, 0.7152, 0.0722];
+
 export function luminance(c: readonly number[]): number {
-    return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+    return LUMINANCE[0] * c[0] + LUMINANCE[1] * c[1] + LUMINANCE[2] * c[2];
 }
 
 /** Linear sRGB of a black body of this temperature in K, luminance 1; the chromaticity is the cubic of Kim et al.

@@ -1,4 +1,5 @@
 // The values of all elements as one answer brought them: half precision as it came, planar by channel, times a scale.
+import { LUMINANCE } from "../base/colour.ts";
 import { halfToNumber, halvesToFloats } from "../base/half.ts";
 import type { Npy } from "../base/npy.ts";
 
@@ -36,7 +37,7 @@ export class Field {
 }
 
 export function channelWeights(channels: number): number[] {
-    return channels === 3 ? [0.2126, 0.7152, 0.0722] : new Array<number>(channels).fill(1 / channels);
+    return channels === 3 ? [...LUMINANCE] : new Array<number>(channels).fill(1 / channels);
 }
 
 export interface Spread {
