@@ -71,7 +71,7 @@ static void translate(const char *file, char out[ASSET_PATH]) {
     for (char *c = out; *c != '\0'; c++)
         if (*c == '\\') *c = '/';
     const char *last = strrchr(out, '/');
-    if (isalpha((unsigned char)out[0]) && out[1] == ':' && last != NULL) memmove(out, last + 1, strlen(last));
+    if (isalpha((unsigned char)out[0]) && out[1] == ':' && last != NULL) memmove(out, last + 1, strlen(last + 1) + 1);
 }
 
 /* Finds a name, of which out becomes the path, in a folder as it is spelled. */
