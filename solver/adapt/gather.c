@@ -186,20 +186,6 @@ static double kernel(const mesh *m, uint32_t from, uint32_t to, const double seg
     return leaves > 0 && arrives > 0 ? leaves * arrives / (M_PI * r2 * r2) : 0;
 }
 
-/* The share of segments that all panes between their ends pass, 0 where anything else blocks them. */
-static void pass_panes(const gather *g, ray_packet *segments, size_t n, const uint32_t *from,
-                       double passed[VISIBILITY_PACKET]) {
-    static const double nearly = 1 - 1e-4;
-    double end[VISIBILITY_PACKET];
-    hit_packet hits;
-    for (size_t i = 0; i < n; i++) {
-        end[i] = nearly;
-        passed[i] = 1;
-    }
-    visibility_cast(g->v, segments, n, from, 0, &hits);
-    pane_path_reach(g->v, g->m, segments, n, &hits, end, passed);
-}
-
 /* Adds the lamp samples of a packet's size that begin with the first. */
 static void add_lamps(const gather *g, const gather_samples *s, size_t half, size_t first, uint32_t element,
                       const float origin[3], double *H) {
@@ -225,8 +211,7 @@ static void add_lamps(const gather *g, const gather_samples *s, size_t half, siz
     if (n == 0) return;
     const unsigned blocked = visibility_blocked(g->v, &segments, n, from, to);
     double passed[VISIBILITY_PACKET];
-    for (size_t i = 0; i < n; i++) passed[i] = blocked >> i & 1 ? 0 : 1;
-    if (blocked != 0 && g->m->glass != NULL) pass_panes(g, &segments, n, from, passed);
+    pane_path_between(g->v, g->m, &segments, n, from, to, blocked, passed);
     for (size_t i = 0; i < n; i++)
         if (passed[i] > 0) add_lamp(g, s, to[i], K[i], passed[i], H);
 }

@@ -6,6 +6,7 @@
 #include "solver/formfactor/source.h"
 #include "solver/operator/blocks/block_store.h"
 #include "solver/operator/refine/form_factor_rows.h"
+#include "solver/scene/glass.h"
 #include "store/groups.h"
 
 #include <stdlib.h>
@@ -17,6 +18,7 @@ void form_factors_free(form_factors *f) {
     csr_free(&f->F);
     csr_free(&f->upper);
     free(f->row_sums);
+    free(f->through);
     free(f->leaving);
     free(f->absorbed);
     free(f->repair);
@@ -159,6 +161,7 @@ lam_status form_factors_load_blocks(store *s, const mesh *m, plane_tree *tree, b
                                     form_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
     form_factors f = {0};
+    const double most = mesh_row_most(m);
     double *ones = memory_allocate(m->n, 2 * sizeof *ones, "form factors", error);
     if (ones == NULL) TRY(LAM_ERR_MEMORY);
     TRY(load_about(s, m, &f, error));
@@ -167,10 +170,10 @@ lam_status form_factors_load_blocks(store *s, const mesh *m, plane_tree *tree, b
     TRY(block_factors_multiply(blocks, 1, ones, ones + m->n, error));
     for (size_t p = 0; p < m->n; p++) {
         const double sum = ones[m->n + p];
-        if (!(sum <= 1 + 1e-5))
-            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %u sum to %g, must be at most 1",
-                 store_path(s), blocks->order[p], sum);
-        f.row_sums[blocks->order[p]] = sum < 1 ? sum : 1;
+        if (!(sum <= most * (1 + 1e-5)))
+            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %u sum to %g, must be at most %.4g",
+                 store_path(s), blocks->order[p], sum, most);
+        f.row_sums[blocks->order[p]] = sum < most ? sum : most;
     }
     *out = f;
     f = (form_factors){0};

@@ -1,6 +1,6 @@
 /* The interface of form factors: F[i][j], the fraction of the power leaving element i that reaches element j,
- * as sparse rows with A_i F_ij = A_j F_ji and row sums of at most 1, or 2 where panes let light
- * pass (glass/pane_factors.h). */
+ * as sparse rows with A_i F_ij = A_j F_ji and row sums of at most 1, or more where panes let
+ * light pass (glass_row_most). */
 #ifndef LAMBERT_FORMFACTOR_FORMFACTOR_H
 #define LAMBERT_FORMFACTOR_FORMFACTOR_H
 
@@ -56,7 +56,8 @@ enum { FORM_FACTORS_ROWS_MOST = 10240 };
 typedef struct form_factors {
     csr F;            /* rows F[i][.], mesh order */
     csr upper;        /* A_i F_ij for j > i, m^2 */
-    double *row_sums; /* [n], of F after repair, <= 1 */
+    double *row_sums; /* [n], of F after repair, <= mesh_row_most */
+    double *through;  /* [n], the part of those of blocks that comes through panes; NULL: none does */
     double *leaving;  /* [n], share of an element's rays that left the scene */
     double *absorbed; /* [n], share that hit a back face */
     double *repair;   /* [n], row sum + outside share - 1 before repair; NULL: blocks */

@@ -75,17 +75,18 @@ static const double judge_balance = 3e-6;
 /* No row sum is smaller than this: a scaling cannot make it 0. */
 static const double least_target = 1e-9;
 
-/* F' = D F D with the given row sums [n], by element, to a tolerance (0: the least); targets NULL: rows that
- * sum to 1 in a closed scene, and to at most 1 in others. Beside a sky, whose many rays tell each element's
- * share outside better than a block tells its own, rows without targets sum to 1 with that share, which is
- * scaled with them. Rows of buried elements are empty. Sets the row sums of f, and how much they were
- * repaired. */
+/* F' = D F D with the given row sums [n], by element, through panes included, to a tolerance (0: the least);
+ * targets NULL: rows that sum to 1 in a closed scene, and to at most 1 in others. Beside a sky, whose many
+ * rays tell each element's share outside better than a block tells its own, rows without targets sum to 1
+ * with that share, which is scaled with them. Rows of buried elements are empty. Sets the row sums of f, and
+ * how much they were repaired. */
 static lam_status balance_blocks(form_factors *f, const mesh *m, block_factors *blocks, const double *targets,
                                  double tolerance, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = blocks->n;
     const bool closed = targets == NULL && leaving_nothing(f);
     const bool sky = targets == NULL && !closed && f->sky.first_bounce != NULL;
+    const double *const through = f->through;
     double *outside = memory_allocate(n, sizeof *outside, "form factors", error);
     double *wanted = memory_allocate(n, sizeof *wanted, "form factors", error); /* A_i times the row sum */
     double *before = memory_allocate(n, sizeof *before, "form factors", error), area = 0;
@@ -101,7 +102,8 @@ static lam_status balance_blocks(form_factors *f, const mesh *m, block_factors *
     for (size_t p = 0; p < n; p++) {
         ones[p] = 1;
         const uint32_t i = blocks->order[p];
-        const double target = targets != NULL ? targets[i] : mesh_is_buried(m, i) && !sky ? 0 : 1;
+        const double all = mesh_is_buried(m, i) && !sky ? 0 : 1 + (through != NULL ? through[i] : 0);
+        const double target = targets != NULL ? targets[i] : all;
         outside[p] = sky ? leaving_outside(f, m, i) : 0;
         wanted[p] = blocks->area[p] * fmax(target, least_target);
     }
@@ -121,11 +123,12 @@ static lam_status balance_blocks(form_factors *f, const mesh *m, block_factors *
     for (size_t p = 0; p < n; p++) {
         const double sum = r[p] / blocks->area[p], off = fabs(before[p] / wanted[p] - 1);
         area += blocks->area[p];
-        f->row_sums[blocks->order[p]] = fmin(sum - d[p] * outside[p], 1);
+        f->row_sums[blocks->order[p]] =
+            fmin(sum - d[p] * outside[p], 1 + (through != NULL ? through[blocks->order[p]] : 0));
         if (mesh_is_buried(m, blocks->order[p])) continue;
         f->repair_mean += blocks->area[p] * off;
         f->repair_max = fmax(f->repair_max, off);
-        if (closed) f->closure_error = fmax(f->closure_error, fabs(sum - 1));
+        if (closed) f->closure_error = fmax(f->closure_error, fabs(sum - wanted[p] / blocks->area[p]));
     }
     f->repair_mean /= area;
 done:
@@ -239,7 +242,14 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
         TRY(blocks_importance(m, block_scene_visibility(scene), tree, &how, options->importance, error));
         how.importance = options->importance;
     }
-    TRY(blocks_find_in(scene, &how, &made, &f.blocks, error));
+    TRY(blocks_find_in(scene, &how, &made, &f.blocks, &f.through, error));
+    if (options->row_sums != NULL && judged != NULL && judged->through != NULL) {
+        targets = memory_allocate(m->n, sizeof *targets, "form factors", error);
+        if (targets == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t i = 0; i < m->n; i++)
+            targets[i] = options->row_sums[i] - judged->through[i] + (f.through != NULL ? f.through[i] : 0);
+        known = true;
+    }
     if (f.blocks.joined) {
         targets = memory_allocate(m->n, sizeof *targets, "form factors", error);
         if (targets == NULL) TRY(LAM_ERR_MEMORY);
@@ -247,8 +257,11 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     }
     TRY(balance_blocks(&f, m, &made, known ? targets : options->row_sums, judged != NULL ? judge_balance : 0,
                        error));
-    if (f.sky.first_bounce != NULL) TRY(leaving_to_sky(&f, m, error));
-    TRY(panes_add_sky(m, block_scene_visibility(scene), order, options, &through, &f, error));
+    if (f.sky.first_bounce != NULL) {
+        TRY(leaving_to_sky(&f, m, error));
+        TRY(panes_add_bounce(m, block_scene_visibility(scene), order, options, &through, &f.sky, NULL,
+                             error));
+    }
     *out = f;
     *blocks = made;
     f = (form_factors){0};

@@ -54,7 +54,6 @@ typedef struct precompute_scene {
     block_scene *ready;            /* the mesh on that tree, from a forecast of blocks to these; or NULL */
     face_openings of_faces;        /* of the faces of the file, or around the groups of --portal */
     const face_openings *openings; /* these; NULL: there is no sky, or only a store's mesh is known */
-    double panes_between;          /* share of the light that comes to elements through panes */
     size_t sky_tiles;
     emitter_list emitters;
     emitter_source emitting; /* a view of emitters, for methods */

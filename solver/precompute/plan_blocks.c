@@ -23,11 +23,10 @@ bool plan_may_have_blocks(const precompute_job *job, double n) {
            o->quality != QUALITY_DRAFT && n >= ELEMENTS_LEAST;
 }
 
-/* Blocks of large planes, or of clusters of several planes where nothing hides anything; none have the light
- * that elements send each other through panes. */
+/* Blocks of large planes, or of clusters of several planes where nothing hides anything. */
 static bool is_possible(const precompute_scene *scene) {
     const plane_tree *tree = &scene->tree;
-    return (blocks_are_planar(tree) || tree->view == PLANE_VIEW_UNHIDDEN) && !(scene->panes_between > 0);
+    return blocks_are_planar(tree) || tree->view == PLANE_VIEW_UNHIDDEN;
 }
 
 /* Refuses options that --form-factors blocks cannot be given together with. */
@@ -35,11 +34,6 @@ static lam_status check_asked(const precompute_options *o, const build_method *m
                               const precompute_scene *scene, lam_error *error) {
     const plane_tree *const tree = &scene->tree;
     const char *other = NULL;
-    if (scene->panes_between > 0)
-        return status_fail(error, LAM_ERR_ARGUMENT,
-                           "--form-factors blocks: %.2g %% of the light comes to other elements through "
-                           "panes, which blocks do not have; give --form-factors rays",
-                           100 * scene->panes_between);
     if (o->scratch != NULL) other = "--scratch";
     if (o->emitters != NULL) other = "--emitters";
     if (other != NULL)

@@ -276,13 +276,13 @@ static double elements_after(const mesh *m, const precompute_options *o) {
 static lam_status look_through_panes(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     visibility *v = NULL;
+    double between = 0;
     if (scene->m.glass == NULL) return LAM_OK;
     mesh_limit_panes(&scene->m);
     TRY(visibility_create(&scene->m, &v, error));
-    TRY(pane_light_between(&scene->m, v, &scene->panes_between, error));
-    if (scene->panes_between > 0)
-        terminal_log(job->t, "%.2g %% of the light comes to other elements through panes",
-                     100 * scene->panes_between);
+    TRY(pane_light_between(&scene->m, v, &between, error));
+    if (between > 0)
+        terminal_log(job->t, "%.2g %% of the light comes to other elements through panes", 100 * between);
 done:
     visibility_destroy(v);
     return status;

@@ -13,10 +13,9 @@ static inline bool mesh_is_pane(const mesh *m, size_t element) {
 /* The part that an element of a pane passes. */
 double mesh_pane_passes(const mesh *m, size_t element, double cosine);
 
-/* The largest sum of form factors of a row: 1, or 2 where there are panes, which receive all of the light
- * that they pass on to others. */
+/* The largest sum of form factors of a row (glass_row_most). */
 static inline double mesh_row_most(const mesh *m) {
-    return m->glass != NULL ? 2 : 1;
+    return glass_row_most(m->glass, m->n_glass);
 }
 
 /* The groups that are panes, those of backs left out: these lie behind the others. */

@@ -77,6 +77,7 @@ lam_status verify_mesh(examination *e, check *c, lam_error *error) {
     if (loaded != LAM_OK) return check_failed(c, loaded, error);
     e->has_mesh = true;
     const mesh *m = &e->m;
+    const double most = mesh_row_most(m);
     check_say(c, VERDICT_OK, "%zu elements, %zu vertices, %zu groups", m->n, m->n_vertices, m->n_groups);
     TRY(store_get_text(e->s, STORE_MESH, "geometry_hash", &recorded, error));
     mesh_geometry_hash(m, hash);
@@ -85,9 +86,9 @@ lam_status verify_mesh(examination *e, check *c, lam_error *error) {
     if (e->row_sums == NULL && !store_has(e->s, STORE_OPERATOR "/direct"))
         check_say(c, VERDICT_BROKEN, STORE_MESH "/row_sums is missing");
     for (size_t i = 0; i < m->n && e->row_sums != NULL && c->verdict == VERDICT_OK; i++)
-        if (!(e->row_sums[i] >= 0 && e->row_sums[i] <= mesh_row_most(m) + 1e-6))
+        if (!(e->row_sums[i] >= 0 && e->row_sums[i] <= most + 1e-6))
             check_say(c, VERDICT_BROKEN, "row_sums[%zu] = %.9g, must be from 0 to %g", i, e->row_sums[i],
-                      mesh_row_most(m));
+                      most);
     for (size_t i = 0; i < m->n_channels * m->n && c->verdict == VERDICT_OK; i++) {
         const double rho = (double)m->reflectance[i], emitted = (double)m->emission[i];
         if (!(rho >= 0 && rho < 1))
@@ -151,6 +152,7 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
     const csr *F = &e->f.F;
     const double *A = e->m.area;
     double worst = 0;
+    const double most = mesh_row_most(&e->m);
     for (size_t i = 0; i < F->n; i++) {
         double sum = 0;
         for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) {
@@ -165,7 +167,7 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
             }
         }
         /* Single precision rounds each of the row's entries by 6e-8 of itself. */
-        if (sum > mesh_row_most(&e->m) + 1e-6 || fabs(sum - e->row_sums[i]) > 1e-6) {
+        if (sum > most + 1e-6 || fabs(sum - e->row_sums[i]) > 1e-6) {
             check_say(c, VERDICT_BROKEN, "row %zu sums to %.9g, /mesh/row_sums says %.9g", i, sum,
                       e->row_sums[i]);
             return LAM_OK;
@@ -174,7 +176,7 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
     check_say(c, worst <= 1e-6 ? VERDICT_OK : VERDICT_BROKEN,
               "reciprocity within %.2g (at most 1e-6), rows sum "
               "to at most %g",
-              worst, mesh_row_most(&e->m));
+              worst, most);
     return LAM_OK;
 }
 

@@ -18,9 +18,10 @@ lam_status verify_sky(examination *e, check *c, lam_error *error) {
         return LAM_OK;
     }
     const size_t n = e->m.n;
+    const double most = mesh_row_most(&e->m);
     TRY(sky_bounce_load(e->s, n, &sky, error));
     check_say(c, VERDICT_OK, "%s, %zu tiles, ground albedo %g; rows and sky sum to at most %g",
-              sky.tiling.name, sky.tiling.n_tiles, sky.ground_albedo, mesh_row_most(&e->m));
+              sky.tiling.name, sky.tiling.n_tiles, sky.ground_albedo, most);
     if (sky.tiling.up != e->m.up)
         check_say(c, VERDICT_BROKEN, "%c is up in the sky, %c in the mesh", sky.tiling.up, e->m.up);
     sums = memory_allocate(n, sizeof *sums, "the light of the sky", error);
@@ -29,9 +30,9 @@ lam_status verify_sky(examination *e, check *c, lam_error *error) {
         for (size_t i = 0; i < n; i++) sums[i] += (double)sky.first_bounce[t * n + i] * M_1_PI;
     for (size_t i = 0; i < n && c->verdict == VERDICT_OK; i++)
         /* Single precision rounds each of the row's and the sky's entries by 6e-8 of itself. */
-        if (sums[i] > mesh_row_most(&e->m) - e->row_sums[i] + 1e-6)
+        if (sums[i] > most - e->row_sums[i] + 1e-6)
             check_say(c, VERDICT_BROKEN, "element %zu receives %.9g of the sky, its row leaves %.9g outside",
-                      i, sums[i], mesh_row_most(&e->m) - e->row_sums[i]);
+                      i, sums[i], most - e->row_sums[i]);
 done:
     free(sums);
     sky_bounce_free(&sky);

@@ -19,6 +19,29 @@ double glass_passes(const struct group_glass *glass, bool by_angle, double cosin
     return glass->faces > 1 ? pow(whole, 1 / glass->faces) : whole;
 }
 
+double glass_row_most(const struct group_glass *of, size_t n) {
+    double largest = 0, part = 1, sum = 1;
+    for (size_t g = 0; g < n; g++) largest = fmax(largest, glass_passes(&of[g], false, 1));
+    for (int k = 0; k < PANES_MOST; k++) sum += part *= largest;
+    return sum;
+}
+
+lam_status glass_row_most_of(store *s, double *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    scene_glass glass = {.of = NULL};
+    store_type type;
+    size_t dims[STORE_MAX_RANK] = {0};
+    int rank;
+    *out = 1;
+    if (!store_has(s, DATASET)) return LAM_OK;
+    TRY(store_array_info(s, DATASET, &type, &rank, dims, error));
+    TRY(scene_glass_load(s, dims[0], &glass, error));
+    *out = glass_row_most(glass.of, dims[0]);
+done:
+    free(glass.of);
+    return status;
+}
+
 lam_status scene_glass_save(const scene_glass *glass, size_t n_groups, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t shape[2] = {n_groups, 2};

@@ -19,6 +19,8 @@ struct group_glass {
 
 /* Faces that a ray crosses at most, one behind the other, of one pane. */
 enum { GLASS_FACES_MOST = 16 };
+/* Panes that a ray crosses at most; behind so many nothing is left of its light. */
+enum { PANES_MOST = 64 };
 
 typedef struct scene_glass {
     struct group_glass *of; /* [groups]; NULL: no group is a pane */
@@ -28,6 +30,14 @@ typedef struct scene_glass {
 
 /* The part of the light that one face passes, of which a ray has this cosine, 0 to 1, to its normal. */
 double glass_passes(const struct group_glass *glass, bool by_angle, double cosine);
+
+/* The largest sum of form factors of a row where the panes of n groups are, of one side: each of p panes, one
+ * behind the other, receives all that those before it pass, 1 + t + ... + t^p with the largest t that a face
+ * passes. 1 without panes. */
+double glass_row_most(const struct group_glass *of, size_t n);
+
+/* The same of a store, which may have no panes. Errors: those of scene_glass_load. */
+lam_status glass_row_most_of(store *s, double *out, lam_error *error);
 
 /* /mesh/glass of a store of so many groups, with its law; out->of is the caller's, and NULL where there are
  * no panes. Errors: LAM_ERR_FORMAT, LAM_ERR_DAMAGED, LAM_ERR_MEMORY. */

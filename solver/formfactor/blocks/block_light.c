@@ -5,6 +5,7 @@
 
 #include "solver/base/random.h"
 #include "solver/formfactor/blocks/block_walk.h"
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -250,9 +251,11 @@ static void cast_packet(const shining *s, const pair_sampler *sampler, uint32_t 
             leaving > 0 && arriving > 0 ? (double)s->E[ends[0][k]] * leaving * arriving / (r2 * r2) : 0;
     }
     const unsigned blocked = visibility_blocked(s->l->v, &segments, VISIBILITY_PACKET, ends[0], ends[1]);
+    double passed[VISIBILITY_PACKET];
+    pane_path_between(s->l->v, s->l->m, &segments, VISIBILITY_PACKET, ends[0], ends[1], blocked, passed);
     for (int k = 0; k < VISIBILITY_PACKET; k++) {
         *all += weight[k];
-        if ((blocked >> k & 1) == 0) *seen += weight[k];
+        *seen += passed[k] * weight[k];
     }
 }
 

@@ -11,9 +11,10 @@ typedef struct visible_share {
     double of[SHARE_TERMS];
 } visible_share;
 
-/* One segment: its places on both rectangles, in [-1, 1]^2 each, and 1 where it is not blocked. */
+/* One segment: its places on both rectangles, in [-1, 1]^2 each, 1 where it is not blocked, or what panes
+ * between its ends pass, and the part of that which comes through panes. */
 typedef struct seen_segment {
-    double place[4], seen;
+    double place[4], seen, through;
 } seen_segment;
 
 /* Fits the visible share to segments by least squares. */

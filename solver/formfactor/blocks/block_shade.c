@@ -1,5 +1,6 @@
 #include "solver/formfactor/blocks/block_shade.h"
 
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -23,8 +24,9 @@ static void take_point(const flat_clusters *f, uint32_t node, const double at[2]
     *element = f->tree->order[flat_cluster_sample(f, node, at[0], at[1], place, point)];
 }
 
-/* Bits of the segments that Embree finds blocked. */
-static void block_by_scene(const visibility *v, const segment_ends *ends, seen_segment *out) {
+/* Embree tells which segments are seen. */
+static void block_by_scene(const shade_scene *s, const segment_ends *ends, seen_segment *out) {
+    const visibility *v = s->v;
     for (size_t first = 0; first < SEGMENT_LANES; first += VISIBILITY_PACKET) {
         ray_packet packet;
         for (size_t k = 0; k < VISIBILITY_PACKET; k++) {
@@ -38,8 +40,29 @@ static void block_by_scene(const visibility *v, const segment_ends *ends, seen_s
         }
         const unsigned blocked = visibility_blocked(v, &packet, VISIBILITY_PACKET, &ends->elements[0][first],
                                                     &ends->elements[1][first]);
-        for (size_t k = 0; k < VISIBILITY_PACKET; k++) out[first + k].seen = (blocked >> k & 1) ? 0 : 1;
+        double passed[VISIBILITY_PACKET];
+        for (size_t k = 0; k < VISIBILITY_PACKET; k++) passed[k] = blocked >> k & 1 ? 0 : 1;
+        if (s->glass != NULL)
+            pane_path_between(v, s->glass, &packet, VISIBILITY_PACKET, &ends->elements[0][first],
+                              &ends->elements[1][first], blocked, passed);
+        for (size_t k = 0; k < VISIBILITY_PACKET; k++) {
+            out[first + k].seen = passed[k];
+            out[first + k].through = blocked >> k & 1 ? passed[k] : 0;
+        }
     }
+}
+
+/* Segment k crosses a pane. */
+static void pass_pane(const shade_scene *s, const occluder *pane, const segment_ends *ends, int k,
+                      seen_segment *out) {
+    double along = 0, square = 0;
+    for (int d = 0; d < 3; d++) {
+        const double way = ends->to[k][d] - ends->from[k][d];
+        along += way * pane->normal[d];
+        square += way * way;
+    }
+    out->seen *= mesh_pane_passes(s->glass, pane->pane, fabs(along) / sqrt(square));
+    out->through = out->seen;
 }
 
 static void block_by_candidates(const shade_scene *s, const double origin[3], const candidates *among,
@@ -51,8 +74,24 @@ static void block_by_candidates(const shade_scene *s, const double origin[3], co
             lanes.from[d][k] = (float)(ends->from[k][d] - origin[d]);
             lanes.to[d][k] = (float)(ends->to[k][d] - origin[d]);
         }
-    candidates_block(s->occluders, among, origin, &lanes, blocked);
+    if (s->glass == NULL) {
+        candidates_block(s->occluders, among, origin, &lanes, blocked);
+        for (int k = 0; k < SEGMENT_LANES; k++) out[k].seen = 1 - (double)blocked[k];
+        return;
+    }
+    candidates opaque = {.count = 0}, panes = {.count = 0};
+    for (int c = 0; c < among->count; c++) {
+        candidates *const to = s->occluders->of[among->of[c]].pane == MESH_NO_VERTEX ? &opaque : &panes;
+        to->of[to->count++] = among->of[c];
+    }
+    candidates_block(s->occluders, &opaque, origin, &lanes, blocked);
     for (int k = 0; k < SEGMENT_LANES; k++) out[k].seen = 1 - (double)blocked[k];
+    for (int c = 0; c < panes.count; c++) {
+        const candidates one = {.count = 1, .of = {panes.of[c]}};
+        candidates_block(s->occluders, &one, origin, &lanes, blocked);
+        for (int k = 0; k < SEGMENT_LANES; k++)
+            if (blocked[k] > 0) pass_pane(s, &s->occluders->of[panes.of[c]], ends, k, &out[k]);
+    }
 }
 
 void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidates *among,
@@ -60,6 +99,7 @@ void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidat
     const flat_clusters *f = s->f;
     const bool by_scene = among->count == CANDIDATES_UNKNOWN;
     segment_ends ends = {.elements = {{0}}};
+    for (int k = 0; k < SEGMENT_LANES; k++) out[k].through = 0;
     pair_sampler sampler;
     pair_sampler_init(&sampler, s->seed, a, b);
     for (size_t begin = 0; begin < SEGMENT_LANES; begin += VISIBILITY_PACKET) {
@@ -73,7 +113,7 @@ void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidat
         }
     }
     if (by_scene)
-        block_by_scene(s->v, &ends, out);
+        block_by_scene(s, &ends, out);
     else
         block_by_candidates(s, f->of[a].centre, among, &ends, out);
 }

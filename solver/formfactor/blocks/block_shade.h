@@ -10,6 +10,7 @@ typedef struct shade_scene {
     const flat_clusters *f;
     const occluders *occluders;
     const visibility *v;
+    const mesh *glass; /* has panes; NULL: there are none */
     uint64_t seed;
 } shade_scene;
 

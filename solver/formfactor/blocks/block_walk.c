@@ -5,7 +5,6 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/base/random.h"
-#include "solver/formfactor/sight/open_scene.h"
 #include "solver/operator/blocks/importance.h"
 
 #include <math.h>
@@ -18,18 +17,12 @@ static const double share_crossing = .15;
 /* Clusters of several planes have a block where at least this many radii of the larger one lie between their
  * spheres. */
 static const double separation = .5;
-/* The kernel of such a block may vary by this share of itself, times the root of the bound of the 2-norm that
- * open blocks err by: .08 at the bound of the default. A bound of the norm alone would leave errors of .6 for
- * single elements, as no block of small clusters has much of it. */
-static const double spread_most = 5;
-/* That holds for blocks of this share of all elements, the geometric mean of both sides. Smaller blocks are
- * many and hold little of the light, larger ones few and hold most of it: n / s of s elements, with s / n of
- * the energy each. Blocks of 1 / spread^2 on each level then err least in sum where spread goes as s^-1/2.
- * A bowl of 40,000 triangles has a third of the blocks that an even spread has for the same error. */
+/* The spread of a finder holds for blocks of this share of all elements, the geometric mean of both sides.
+ * Smaller blocks are many and hold little of the light, larger ones few and hold most of it: n / s of s
+ * elements, with s / n of the energy each. Blocks of 1 / spread^2 on each level then err least in sum where
+ * spread goes as s^-1/2. A bowl of 40,000 triangles has a third of the blocks that an even spread has for the
+ * same error. */
 static const double share_of_block = 1. / 2000, spread_times_most = 2;
-/* Single pairs beside such blocks are computed to this share of what a kernel varies by: an error that is
- * much smaller than those of the blocks is not seen in any sum of both. */
-static const double share_of_spread = .01;
 /* Clusters in planes that meet others at many edges have linear blocks up to this roughness. */
 static const double rough_most = .3;
 /* Standard errors of the visible share of a pair of elements: within the bound of blocks, and beyond it,
@@ -39,8 +32,6 @@ static const double rough_most = .3;
  * not depend on what the first segments see: small openings would lose the light of pairs in which all are
  * blocked. */
 static const double error_within = .0675, error_beyond = .0416, pair_error_in_bounds = .54;
-/* Shapes of this many elements at most are kept, 16 MB. */
-enum { SHAPES_MOST = 1 << 16 };
 /* So few candidates cost less to test than to sift. */
 enum { CANDIDATES_FEW = 4 };
 
@@ -61,12 +52,15 @@ node_children block_finder_children(const block_finder *k, uint32_t t) {
     return out;
 }
 
-static lam_status add_block(block_walk *w, const cluster_block *made) {
-    block_list *to = &w->found;
+static lam_status add_to(block_walk *w, block_list *to, const cluster_block *made) {
     if (array_grow(&to->list, &to->capacity, to->count + 1, sizeof *to->list, "blocks", w->error) != LAM_OK)
         return LAM_ERR_MEMORY;
     to->list[to->count++] = *made;
     return LAM_OK;
+}
+
+static lam_status add_block(block_walk *w, const cluster_block *made) {
+    return add_to(w, &w->found, made);
 }
 
 static lam_status visit(block_walk *w, uint32_t a, uint32_t b, const candidates *among);
@@ -213,6 +207,11 @@ static lam_status add_shaded_pair(block_walk *w, uint32_t a, uint32_t b, double 
     if (!(share > 0)) return LAM_OK;
     if (share >= 1 && is_smooth(w, a, b, most, crosses)) return add_linear(w, a, b);
     if (exchange < 0) exchange = exchange_of_pair(w->finder, &two);
+    if (effort.through > 0) {
+        cluster_block made = {.a = a, .b = b};
+        block_numbers_of_pair(f, exchange * effort.through, &made);
+        if (add_to(w, &w->through, &made) != LAM_OK) return LAM_ERR_MEMORY;
+    }
     return add_exchange(w, a, b, exchange * share);
 }
 
@@ -225,6 +224,20 @@ static lam_status split_for_smoothness(block_walk *w, uint32_t a, uint32_t b, co
     if (behind[0] && a < n_clusters) return split(w, a, b, among, 1, 0);
     if (behind[1] && b < n_clusters) return split(w, a, b, among, 0, 1);
     return split(w, a, b, among, f->of[a].radius, f->of[b].radius);
+}
+
+/* The block of what comes through panes alone. */
+static lam_status add_through(block_walk *w, uint32_t a, uint32_t b, seen_segment segments[SEGMENT_LANES]) {
+    cluster_block made = {.a = a, .b = b};
+    double through = 0;
+    for (int k = 0; k < SEGMENT_LANES; k++) {
+        through += segments[k].through;
+        segments[k].seen = segments[k].through;
+    }
+    if (!(through > 0)) return LAM_OK;
+    const visible_share share = visible_share_fit(segments, SEGMENT_LANES);
+    block_numbers_set(&w->finder->flat, &share, &made);
+    return add_to(w, &w->through, &made);
 }
 
 static lam_status add_shaded(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
@@ -242,6 +255,7 @@ static lam_status add_shaded(block_walk *w, uint32_t a, uint32_t b, const candid
     }
     const visible_share share = visible_share_fit(segments, SEGMENT_LANES);
     block_numbers_set(&w->finder->flat, seen < SEGMENT_LANES ? &share : NULL, &made);
+    if (w->finder->pieces.glass != NULL && add_through(w, a, b, segments) != LAM_OK) return LAM_ERR_MEMORY;
     return add_block(w, &made);
 }
 
@@ -410,79 +424,4 @@ void block_report_add(const block_report *from, double times, block_report *to) 
     to->elements_away += times * from->elements_away;
     to->elements_hidden += times * from->elements_hidden;
     to->elements_unseen += times * from->elements_unseen;
-}
-
-lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tree *tree, block_factors *nodes,
-                             block_finder *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    *out = (block_finder){.tree = tree, .n_clusters = tree->n_clusters};
-    double(*centre)[3] = memory_allocate(m->n, sizeof *centre, "blocks", error);
-    if (centre == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, centre[i]);
-    TRY(block_factors_begin(tree, m->area, (const double(*)[3])centre, nodes, error));
-    TRY(flat_clusters_make(m, v, tree, nodes, &out->flat, error));
-    TRY(occluders_make(m, visibility_facets(v), out->flat.slack, &out->pieces, error));
-    TRY(flat_clusters_find_sets(v, tree, &out->pieces, &out->flat, error));
-    out->joined = tree->view == PLANE_VIEW_UNHIDDEN;
-    if (tree->view == PLANE_VIEW_UNKNOWN && !blocks_are_planar(tree))
-        TRY(mesh_is_unhidden(m, &out->joined, NULL, error));
-    pair_factor_rules_init(&out->rules);
-    out->shade = (shade_scene){.f = &out->flat, .occluders = &out->pieces, .v = v};
-    out->occlusion = (occlusion){.v = v, .area = m->area, .rules = &out->rules};
-    TRY(segment_occluders_make(&out->pieces, visibility_centre(v), &out->segment_pieces, error));
-    out->occlusion.occluders = out->segment_pieces;
-    if (m->n <= SHAPES_MOST) {
-        out->shapes = memory_allocate(m->n, sizeof *out->shapes, "blocks", error);
-        if (out->shapes == NULL) TRY(LAM_ERR_MEMORY);
-        for (size_t i = 0; i < m->n; i++) polygon_of_element(m, i, &out->shapes[i]);
-    }
-done:
-    free(centre);
-    return status;
-}
-
-lam_status block_finder_set(block_finder *k, const block_options *options, lam_error *error) {
-    lam_status status = LAM_OK;
-    k->options = options;
-    k->spread = spread_most * sqrt(options->open);
-    k->exact = k->joined ? fmax(options->exact, share_of_spread * k->spread) : options->exact;
-    k->shade.seed = k->occlusion.seed = options->seed;
-    importance_nodes_free(&k->important);
-    if (options->importance != NULL)
-        TRY(importance_nodes_make(options->importance, k->flat.m->area, k->tree, &k->important, error));
-    if (k->joined && k->elements == NULL) {
-        k->elements = memory_allocate(k->tree->n, sizeof *k->elements, "blocks", error);
-        if (k->elements == NULL) TRY(LAM_ERR_MEMORY);
-        joined_elements_set(&k->flat, k->elements);
-    }
-    k->kernel = (joined_kernel){&k->flat, k->elements, &k->rules, k->exact, options->seed};
-done:
-    return status;
-}
-
-void block_finder_free(block_finder *k) {
-    occluders_free(&k->pieces);
-    flat_clusters_free(&k->flat);
-    free(k->elements);
-    free(k->segment_pieces);
-    free(k->shapes);
-    importance_nodes_free(&k->important);
-    k->elements = NULL;
-    k->segment_pieces = NULL;
-    k->shapes = NULL;
-}
-
-lam_status block_finder_planes(const block_finder *k, uint32_t **out, size_t *count, lam_error *error) {
-    const plane_tree *tree = k->tree;
-    uint32_t *roots = memory_allocate(tree->n_frames, sizeof *roots, "blocks", error);
-    if (roots == NULL) return LAM_ERR_MEMORY;
-    *count = 0;
-    if (k->joined) roots[(*count)++] = (uint32_t)tree->n_clusters - 1;
-    for (uint32_t t = 0; !k->joined && t < tree->n_clusters; t++) {
-        const uint32_t parent = k->flat.tree->nodes[t].parent;
-        if (tree->clusters[t].frame == PLANE_ABOVE) continue;
-        if (parent == BLOCK_NO_NODE || tree->clusters[parent].frame == PLANE_ABOVE) roots[(*count)++] = t;
-    }
-    *out = roots;
-    return LAM_OK;
 }

@@ -73,6 +73,7 @@ typedef struct block_walk {
     const block_finder *finder;
     block_sampling sampling;
     block_list found;
+    block_list through; /* the parts of those that come through panes */
     block_report report;
     lam_error *error;
 } block_walk;

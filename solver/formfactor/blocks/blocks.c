@@ -153,6 +153,42 @@ static lam_status join_lists(block_walk *works, int n_threads, block_factors *ou
     return status;
 }
 
+/* Row sums of the blocks of what comes through panes, by all threads, which lose them; nodes: of all blocks.
+ * *out is NULL where there are none. */
+static lam_status sum_through(block_walk *works, int n_threads, const block_factors *nodes, double **out,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = nodes->n;
+    size_t count = 0;
+    block_factors blocks = *nodes; /* with nodes, places and areas of theirs */
+    double *ones = memory_allocate(n, sizeof *ones, "blocks", error);
+    double *sums = memory_allocate(n, sizeof *sums, "blocks", error);
+    block_list *lists = memory_allocate((size_t)n_threads, sizeof *lists, "blocks", error);
+    if (ones == NULL || sums == NULL || lists == NULL) TRY(LAM_ERR_MEMORY);
+    for (int t = 0; t < n_threads; t++) {
+        lists[t] = works[t].through;
+        works[t].through = (block_list){.list = NULL};
+        count += lists[t].count;
+    }
+    if (count == 0) goto done;
+    TRY(block_factors_end_lists(&blocks, (size_t)n_threads, lists, error));
+    const factor_product product = block_factors_product(&blocks);
+    for (size_t i = 0; i < n; i++) ones[i] = 1;
+    TRY(product.multiply(product.context, 1, ones, sums, error));
+    *out = sums;
+    sums = NULL;
+done:
+    for (int t = 0; lists != NULL && t < n_threads; t++) free(lists[t].list);
+    blocks.nodes = NULL;
+    blocks.place = NULL;
+    blocks.area = NULL;
+    block_factors_free(&blocks);
+    free(ones);
+    free(sums);
+    free(lists);
+    return status;
+}
+
 block_options block_options_of(const recipe *r) {
     return (block_options){
         .open = r->accuracy, .shadow = recipe_shadow(r), .exact = recipe_tolerance(r), .seed = r->seed};
@@ -160,7 +196,7 @@ block_options block_options_of(const recipe *r) {
 
 /* Takes the nodes of the blocks. */
 static lam_status find(block_finder *k, const block_options *options, block_factors *nodes,
-                       block_factors *out, block_report *report, lam_error *error) {
+                       block_factors *out, block_report *report, double **through, lam_error *error) {
     lam_status status = LAM_OK;
     const int n_threads = omp_get_max_threads();
     size_t n_reduced = 0;
@@ -174,6 +210,7 @@ static lam_status find(block_finder *k, const block_options *options, block_fact
     for (size_t p = 0; p < pairs.count; p++) team.all += pairs.list[p].elements;
     find_all(&team, n_threads);
     TRY(team.status);
+    if (through != NULL) TRY(sum_through(works, n_threads, nodes, through, error));
     TRY(join_lists(works, n_threads, nodes, error));
     TRY(block_factors_reduce(nodes, &n_reduced, error));
     if (report != NULL) {
@@ -184,7 +221,10 @@ static lam_status find(block_finder *k, const block_options *options, block_fact
     *out = *nodes;
     *nodes = (block_factors){.n = 0};
 done:
-    for (int t = 0; works != NULL && t < n_threads; t++) free(works[t].found.list);
+    for (int t = 0; works != NULL && t < n_threads; t++) {
+        free(works[t].found.list);
+        free(works[t].through.list);
+    }
     free(works);
     free(pairs.list);
     return status;
@@ -197,7 +237,7 @@ lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tre
     block_factors nodes = {.n = 0};
     block_finder k = {.tree = tree};
     TRY(block_finder_make(m, v, tree, &nodes, &k, error));
-    TRY(find(&k, options, &nodes, out, report, error));
+    TRY(find(&k, options, &nodes, out, report, NULL, error));
 done:
     block_finder_free(&k);
     block_factors_free(&nodes);
@@ -205,8 +245,9 @@ done:
 }
 
 lam_status blocks_find_in(block_scene *s, const block_options *options, block_factors *out,
-                          block_report *report, lam_error *error) {
-    return find(&s->finder, options, &s->nodes, out, report, error);
+                          block_report *report, double **through, lam_error *error) {
+    if (through != NULL) *through = NULL;
+    return find(&s->finder, options, &s->nodes, out, report, through, error);
 }
 
 lam_status block_scene_make(const mesh *m, const plane_tree *tree, block_scene **out, lam_error *error) {

@@ -42,16 +42,19 @@ block_options block_options_of(const recipe *r);
 /* Finds the blocks of all pairs of planes of a tree, which must outlive them. Where the tree is not planar
  * and nothing hides anything, clusters of several planes have blocks of one number. Visible shares come from
  * segments, or lines between elements, against the occluders in between, from Embree where these are many,
- * and from nothing where none is. The bits do not depend on the number of threads: both are seeded by the
- * pair of clusters. report may be NULL. out is freed by block_factors_free.
+ * and from nothing where none is; segments through panes count by what these pass. The bits do not depend on
+ * the number of threads: both are seeded by the pair of clusters. report may be NULL. out is freed by
+ * block_factors_free.
  *
  * Cost: blocks grow like n^1/2 in rooms of large planes; partly hidden ones do not grow with n (measured).
  * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tree,
                        const block_options *options, block_factors *out, block_report *report,
                        lam_error *error);
-/* The same in a scene that is ready; it can only be destroyed afterwards, also after an error. */
+/* The same in a scene that is ready; it can only be destroyed afterwards, also after an error. *through is
+ * set to the part of each row sum that comes through panes, [n] in mesh order, which the caller frees, or to
+ * NULL where there are none; NULL: not wanted. */
 lam_status blocks_find_in(block_scene *s, const block_options *options, block_factors *out,
-                          block_report *report, lam_error *error);
+                          block_report *report, double **through, lam_error *error);
 
 #endif

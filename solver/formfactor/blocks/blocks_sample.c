@@ -27,7 +27,7 @@ lam_status blocks_sample(block_scene *scene, const block_options *options, block
         if (progress_cancelled(options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         for (size_t j = k->joined ? i : i + 1; j < n_roots; j++) {
             TRY(block_walk_visit(&w, roots[i], roots[j]));
-            w.found.count = 0; /* only the report counts */
+            w.found.count = w.through.count = 0; /* only the report counts */
         }
     }
     if (trial != NULL) {
@@ -40,6 +40,7 @@ lam_status blocks_sample(block_scene *scene, const block_options *options, block
     out->joined = k->joined;
 done:
     free(w.found.list);
+    free(w.through.list);
     free(roots);
     return status;
 }

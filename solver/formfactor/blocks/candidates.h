@@ -23,8 +23,8 @@ enum { CANDIDATES_UNKNOWN = -1 };
 /* Keeps those of `among` (NULL or unknown: all of the scene) that may block a segment between the rectangles
  * of a and b, with corners `at`. Left out are pieces that a plane through one of their edges, or their own
  * plane, holds apart from both rectangles, and those behind the plane of either; up to slack. Where one of
- * them blocks every segment, out->hidden is set and the others are left out; that is never so of clusters
- * whose elements differ in height. */
+ * them blocks every segment, out->hidden is set and the others are left out; that is never so of panes, and
+ * of clusters whose elements differ in height. */
 void candidates_between(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
                         const flat_pair *at, const candidates *among, candidates *out);
 

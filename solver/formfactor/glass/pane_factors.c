@@ -131,21 +131,3 @@ lam_status panes_add_bounce(const mesh *m, const visibility *v, const uint32_t *
                             sky_bounce *bounce, double *ground, lam_error *error) {
     return add(m, v, order, options, samples, NULL, bounce, ground, error);
 }
-
-lam_status panes_add_sky(const mesh *m, const visibility *v, const uint32_t *order,
-                         const form_factor_options *options, const pane_samples *samples, form_factors *f,
-                         lam_error *error) {
-    lam_status status = LAM_OK;
-    double between = 0;
-    if (m->glass == NULL) return LAM_OK;
-    TRY(pane_light_between(m, v, &between, error));
-    if (between > 0)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "blocks: %.2g %% of the light comes to other elements through panes, which blocks do not have; "
-             "give --form-factors rays",
-             100 * between);
-    if (f->sky.first_bounce != NULL)
-        TRY(panes_add_bounce(m, v, order, options, samples, &f->sky, NULL, error));
-done:
-    return status;
-}

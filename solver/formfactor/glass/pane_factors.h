@@ -25,12 +25,6 @@ lam_status panes_add(const mesh *m, const visibility *v, const uint32_t *order,
                      const form_factor_options *options, const pane_samples *samples, form_factors *f,
                      lam_error *error);
 
-/* The same for form factors by blocks, to the sky alone. Errors: also LAM_ERR_ARGUMENT where elements see
- * each other through panes, which blocks do not have. */
-lam_status panes_add_sky(const mesh *m, const visibility *v, const uint32_t *order,
-                         const form_factor_options *options, const pane_samples *samples, form_factors *f,
-                         lam_error *error);
-
 /* The same for a sky alone: first bounces of a sky that is closed (sky_bounce_close), whose tiling and ground
  * it has; ground, [n] or NULL, gets the shares of the ground through panes added. */
 lam_status panes_add_bounce(const mesh *m, const visibility *v, const uint32_t *order,

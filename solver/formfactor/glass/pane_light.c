@@ -9,11 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The two patches of a quad, or one of a parallelogram or a triangle; returns how many. */
-static size_t patches_of(const mesh *m, size_t element, plane_patch out[2]) {
-    const uint32_t *e = m->elements[element];
+/* The two patches of a quad, or one of a parallelogram or a triangle, by its corners; returns how many. */
+static size_t patches_of(const mesh *m, const uint32_t e[4], plane_patch out[2]) {
     const double *a = m->vertices[e[0]], *b = m->vertices[e[1]], *c = m->vertices[e[2]];
-    const bool triangle = mesh_corners(m, element) == 3;
+    const bool triangle = e[3] == MESH_NO_VERTEX;
     const double *last = triangle ? c : m->vertices[e[3]];
     double off = 0, size = 0;
     out[0] = (plane_patch){.triangle = triangle};
@@ -33,20 +32,26 @@ static size_t patches_of(const mesh *m, size_t element, plane_patch out[2]) {
     return 2;
 }
 
-/* Panes as portals, that rays are aimed at. Freed by portals_free. */
+/* True for a piece of a pane; a back is in the place of its front. */
+static bool is_of_pane(const mesh *m, const facets *f, size_t piece) {
+    return mesh_is_pane(m, f->elements[f->first[f->piece_facet[piece]]]);
+}
+
+/* Panes as portals, that rays are aimed at: their facets, however finely they are divided. Freed by
+ * portals_free. */
 static lam_status panes_as_portals(const mesh *m, const visibility *v, portals *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t fronts = m->n - m->n_backs; /* a back is in the place of its front */
+    const facets *const f = visibility_facets(v);
     size_t n = 0;
     portal *array = NULL;
-    for (size_t i = 0; i < fronts; i++) n += mesh_is_pane(m, i);
+    for (size_t p = 0; p < f->n_pieces; p++) n += is_of_pane(m, f, p);
     array = memory_allocate(2 * n + 1, sizeof *array, "panes", error);
     if (array == NULL) return LAM_ERR_MEMORY;
     n = 0;
-    for (size_t i = 0; i < fronts; i++) {
+    for (size_t p = 0; p < f->n_pieces; p++) {
         plane_patch patches[2];
-        if (!mesh_is_pane(m, i)) continue;
-        const size_t count = patches_of(m, i, patches);
+        if (!is_of_pane(m, f, p)) continue;
+        const size_t count = patches_of(m, f->pieces[p], patches);
         for (size_t k = 0; k < count; k++) {
             array[n] = portal_of(&patches[k], visibility_centre(v));
             array[n].strength[0] = array[n].strength[1] = 1;

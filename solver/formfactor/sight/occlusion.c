@@ -6,6 +6,7 @@
 #include "solver/base/random.h"
 #include "solver/formfactor/exchange/affine_segments.h"
 #include "solver/formfactor/sight/visible_lines.h"
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -85,6 +86,7 @@ typedef struct piece_pair {
     uint32_t i, j;
     const polygon *a, *b;
     segment_list *among; /* see occlusion_estimate */
+    segment_list panes;  /* of occlusion_share, beside those that block */
     bool lifts;          /* both ends, above the planes of the elements */
     affine_pair maps;
     pair_sampler sampler;
@@ -125,8 +127,50 @@ typedef struct cast_segments {
     unsigned facing[SEGMENT_PACKETS], blocked[SEGMENT_PACKETS];
 } cast_segments;
 
-/* Casts as many packets, from segment `first` on. */
-static void cast(const occlusion *o, const piece_pair *two, size_t first, int packets, cast_segments *out) {
+/* The part of each segment that panes pass, and the bits of those that cross any. */
+typedef struct passed_segments {
+    double passed[SEGMENT_PACKETS][VISIBILITY_PACKET];
+    unsigned crossing[SEGMENT_PACKETS];
+} passed_segments;
+
+/* The listed panes that segments of a packet cross. */
+static void pass_listed(const occlusion *o, const piece_pair *two, const ray_packet *s, unsigned blocked,
+                        double passed[VISIBILITY_PACKET], unsigned *crossing) {
+    for (int c = 0; c < two->panes.count; c++) {
+        segment_list one = {.count = 1, .of = &two->panes.of[c]};
+        unsigned crosses = 0;
+        segment_occluders_block(o->occluders, &one, s, 1, &crosses);
+        crosses &= ~blocked;
+        *crossing |= crosses;
+        for (size_t k = 0; k < VISIBILITY_PACKET; k++)
+            if (crosses >> k & 1) passed[k] *= pane_path_passes(o->glass, o->occluders[*one.of].pane, s, k);
+    }
+}
+
+/* The part that is left behind panes of segments that were cast. */
+static void pass_panes(const occlusion *o, const piece_pair *two, const ray_packet *s, int packets,
+                       const cast_segments *cast, passed_segments *out) {
+    uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET];
+    for (int k = 0; k < VISIBILITY_PACKET; k++) {
+        from[k] = two->i;
+        to[k] = two->j;
+    }
+    for (int p = 0; p < packets; p++) {
+        out->crossing[p] = 0;
+        if (two->among == NULL) {
+            pane_path_between(o->v, o->glass, &s[p], VISIBILITY_PACKET, from, to, cast->blocked[p],
+                              out->passed[p]);
+            out->crossing[p] = cast->blocked[p];
+            continue;
+        }
+        for (int k = 0; k < VISIBILITY_PACKET; k++) out->passed[p][k] = cast->blocked[p] >> k & 1 ? 0 : 1;
+        pass_listed(o, two, &s[p], cast->blocked[p], out->passed[p], &out->crossing[p]);
+    }
+}
+
+/* Casts as many packets, from segment `first` on; panes, unless NULL, gets what they pass. */
+static void cast(const occlusion *o, const piece_pair *two, size_t first, int packets, cast_segments *out,
+                 passed_segments *panes) {
     ray_packet s[SEGMENT_PACKETS];
     for (int p = 0; p < packets; p++) {
         out->facing[p] = segments_of(o, two, first + (size_t)p * VISIBILITY_PACKET, &s[p], out->kernel[p]);
@@ -135,6 +179,7 @@ static void cast(const occlusion *o, const piece_pair *two, size_t first, int pa
     }
     if (two->among != NULL) {
         segment_occluders_block(o->occluders, two->among, s, packets, out->blocked);
+        if (panes != NULL) pass_panes(o, two, s, packets, out, panes);
         return;
     }
     uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET];
@@ -144,6 +189,7 @@ static void cast(const occlusion *o, const piece_pair *two, size_t first, int pa
     }
     for (int p = 0; p < packets; p++)
         out->blocked[p] = visibility_blocked(o->v, &s[p], VISIBILITY_PACKET, from, to);
+    if (panes != NULL) pass_panes(o, two, s, packets, out, panes);
 }
 
 bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double g) {
@@ -159,7 +205,7 @@ occlusion_verdict occlusion_test(const occlusion *o, segment_list *among, uint32
     two.lifts = among != NULL;
     for (size_t first = 0; first < segments && !(any_open && any_blocked); first += VISIBILITY_PACKET) {
         cast_segments s;
-        cast(o, &two, first, 1, &s);
+        cast(o, &two, first, 1, &s, NULL);
         any_open = any_open || (s.facing[0] & ~s.blocked[0]) != 0;
         any_blocked = any_blocked || (s.facing[0] & s.blocked[0]) != 0;
         for (int k = 0; k < VISIBILITY_PACKET; k++) {
@@ -182,7 +228,7 @@ static double visible_share(const occlusion *o, const piece_pair *two, size_t n_
         cast_segments s;
         const size_t wanted = (n_segments - facing + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET;
         const int packets = wanted < SEGMENT_PACKETS ? (int)wanted : SEGMENT_PACKETS;
-        cast(o, two, first, packets, &s);
+        cast(o, two, first, packets, &s, NULL);
         for (int p = 0; p < packets; p++) {
             facing += (size_t)__builtin_popcount(s.facing[p]);
             for (int k = 0; k < VISIBILITY_PACKET; k++) {
@@ -193,6 +239,40 @@ static double visible_share(const occlusion *o, const piece_pair *two, size_t n_
         first += (size_t)packets * VISIBILITY_PACKET;
     }
     return all > 0 ? seen / all : 1;
+}
+
+/* The same where light passes panes; *through is the part of the share that does. */
+static double passed_share(const occlusion *o, const piece_pair *two, size_t n_segments, double *through) {
+    double seen = 0, all = 0, crossing = 0;
+    for (size_t first = 0; first < n_segments; first += SEGMENT_PACKETS * VISIBILITY_PACKET) {
+        cast_segments s;
+        passed_segments panes;
+        cast(o, two, first, SEGMENT_PACKETS, &s, &panes);
+        for (int p = 0; p < SEGMENT_PACKETS; p++)
+            for (int k = 0; k < VISIBILITY_PACKET; k++) {
+                const double part = s.kernel[p][k] * panes.passed[p][k];
+                all += s.kernel[p][k];
+                seen += part;
+                if (panes.crossing[p] >> k & 1) crossing += part;
+            }
+    }
+    *through = all > 0 ? crossing / all : 0;
+    return all > 0 ? seen / all : 1;
+}
+
+/* Moves the panes of a list behind what blocks, into a list of their own. */
+static void part_panes(const occlusion *o, piece_pair *two) {
+    segment_list *const among = two->among;
+    int opaque = 0;
+    if (o->glass == NULL || among == NULL) return;
+    for (int c = 0; c < among->count; c++) {
+        const uint32_t at = among->of[c];
+        if (o->occluders[at].pane != MESH_NO_VERTEX) continue;
+        among->of[c] = among->of[opaque];
+        among->of[opaque++] = at;
+    }
+    two->panes = (segment_list){.count = among->count - opaque, .of = among->of + opaque};
+    among->count = opaque;
 }
 
 /* N of a law error = constant N^-power, in packets of so many. */
@@ -217,12 +297,18 @@ static bool has_lines(const occlusion *o, const piece_pair *two, double error, l
 double occlusion_share(const occlusion *o, segment_list *among, uint32_t i, const polygon *a, uint32_t j,
                        const polygon *b, share_effort *effort) {
     enum { SEGMENTS_LAST = 1024, LINES_LAST = 512, SEGMENTS_EACH = SEGMENT_PACKETS * VISIBILITY_PACKET };
-    const piece_pair two = piece_pair_of(o->seed, among, i, a, j, b);
+    piece_pair two = piece_pair_of(o->seed, among, i, a, j, b);
     line_sums sums = {0, 0};
     line_pair lines;
     const size_t segments =
         number_for(effort->error, SEGMENTS_ERROR, SEGMENTS_POWER, SEGMENTS_EACH, SEGMENTS_LAST);
     effort->segments = effort->lines = effort->replaced = 0;
+    effort->through = 0;
+    part_panes(o, &two);
+    if (two.panes.count > 0 || (o->glass != NULL && among == NULL)) {
+        effort->segments = segments;
+        return passed_share(o, &two, segments, &effort->through);
+    }
     if (!has_lines(o, &two, effort->error, &lines)) {
         effort->segments = segments;
         return visible_share(o, &two, segments);

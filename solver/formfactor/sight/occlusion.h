@@ -1,6 +1,7 @@
 /* Occlusion of a pair of elements or of clusters, estimated by visibility segments between points of the two:
  *     A_i F_ij ~ g sum_k K_k V_k / sum_k K_k,   K = cos cos' / (pi r^2),   V = 1 where segment k is not
- * blocked with g the unoccluded exchange area of pair_factor.h. Knows no rows. */
+ * blocked with g the unoccluded exchange area of pair_factor.h. Panes block, but in occlusion_share. Knows no
+ * rows. */
 #ifndef LAMBERT_FORMFACTOR_SIGHT_OCCLUSION_H
 #define LAMBERT_FORMFACTOR_SIGHT_OCCLUSION_H
 
@@ -30,6 +31,7 @@ typedef struct occlusion {
     size_t segments;  /* the least that occlusion_estimate casts; a multiple of VISIBILITY_PACKET */
     uint64_t seed;
     const segment_occluder *occluders; /* of the lists; NULL: no pair has one */
+    const mesh *glass;                 /* whose panes let light of occlusion_share pass; NULL: none does */
 } occlusion;
 
 typedef enum occlusion_verdict { OCCLUSION_NONE, OCCLUSION_TOTAL, OCCLUSION_PARTIAL } occlusion_verdict;
@@ -65,6 +67,7 @@ double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g);
 typedef struct share_effort {
     double error;                     /* standard error, about; segments are 16 to 1,024, lines 8 to 512 */
     size_t segments, lines, replaced; /* replaced: the segments that the lines stand for */
+    double through;                   /* the part of the share that comes through panes */
 } share_effort;
 
 /* The visible share of elements i and j with the polygons a and b: sum K V / sum K over segments or lines

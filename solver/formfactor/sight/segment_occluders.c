@@ -20,6 +20,7 @@ lam_status segment_occluders_make(const occluders *o, const double centre[3], se
     for (size_t k = 0; k < o->n; k++) {
         const occluder *one = &o->of[k];
         made[k].n = one->n;
+        made[k].pane = one->pane;
         made[k].level = (float)(one->level - dot3(one->normal, centre));
         for (int d = 0; d < 3; d++) made[k].normal[d] = (float)one->normal[d];
         for (int e = 0; e < one->n; e++) {

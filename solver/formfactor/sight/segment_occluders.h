@@ -11,6 +11,7 @@
 typedef struct segment_occluder {
     float normal[3], level, edge[OCCLUDER_CORNERS][4];
     int n;
+    uint32_t pane; /* as of occluder */
 } segment_occluder;
 
 /* Segments of a pair for which a list is made, at least: making it takes the time of some packets. */

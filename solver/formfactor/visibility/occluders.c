@@ -2,6 +2,7 @@
 
 #include "solver/base/union_find.h"
 #include "solver/base/vector3.h"
+#include "solver/scene/glass.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -94,9 +95,15 @@ static void drop_twins(occluders *o) {
     if (o->n > 0) qsort(o->of, o->n, sizeof *o->of, by_low);
     for (size_t k = 0; k < o->n; k++) {
         bool twin = false;
-        for (size_t p = kept; p > 0 && !twin && kept - p < NEAREST; p--)
-            twin = coincide(&o->of[k], &o->of[p - 1], o->slack);
-        if (!twin) o->of[kept++] = o->of[k];
+        occluder *last = NULL;
+        for (size_t p = kept; p > 0 && !twin && kept - p < NEAREST; p--) {
+            last = &o->of[p - 1];
+            twin = coincide(&o->of[k], last, o->slack);
+        }
+        if (!twin)
+            o->of[kept++] = o->of[k];
+        else if (o->of[k].pane == MESH_NO_VERTEX)
+            last->pane = MESH_NO_VERTEX;
     }
     o->n = kept;
 }
@@ -160,17 +167,28 @@ static lam_status make_tree(occluders *o, lam_error *error) {
     return enough ? LAM_OK : LAM_ERR_MEMORY;
 }
 
+/* The group of a facet of a pane, from 1 on; 0: it is opaque. */
+static uint32_t pane_of_facet(const mesh *m, const facets *f, size_t facet) {
+    const uint32_t element = f->elements[f->first[facet]];
+    return mesh_is_pane(m, element) ? m->group[element] + 1 : 0;
+}
+
 lam_status occluders_make(const mesh *m, const facets *f, double slack, occluders *out, lam_error *error) {
     lam_status status = LAM_OK;
     joined_polygon *pieces = NULL;
     size_t n_pieces = 0;
-    occluders o = {.slack = slack, .n_facets = f->n};
+    occluders o = {.slack = slack, .n_facets = f->n, .glass = m->glass != NULL ? m : NULL};
+    uint32_t *panes = memory_allocate(f->n, sizeof *panes, "occluders", error);
     o.set_of_facet = memory_allocate(f->n, sizeof *o.set_of_facet, "occluders", error);
-    if (o.set_of_facet == NULL) return LAM_ERR_MEMORY;
-    for (uint32_t k = 0; k < f->n; k++) o.set_of_facet[k] = k;
+    if (o.set_of_facet == NULL || panes == NULL) TRY(LAM_ERR_MEMORY);
+    for (uint32_t k = 0; k < f->n; k++) {
+        o.set_of_facet[k] = k;
+        panes[k] = pane_of_facet(m, f, k);
+    }
     const polygon_join_options how = {.n = f->n_pieces,
                                       .polygons = (const uint32_t(*)[4])f->pieces,
                                       .label = f->piece_facet,
+                                      .kinds = panes,
                                       .split = true,
                                       .label_sets = o.set_of_facet,
                                       .corners = OCCLUDER_CORNERS,
@@ -180,8 +198,10 @@ lam_status occluders_make(const mesh *m, const facets *f, double slack, occluder
     if (o.of == NULL) TRY(LAM_ERR_MEMORY);
     for (uint32_t k = 0; k < f->n; k++) o.set_of_facet[k] = union_find_root(o.set_of_facet, k);
     for (size_t k = 0; k < n_pieces; k++) {
+        const uint32_t facet = f->piece_facet[pieces[k].first];
         if (!set_occluder(m, &pieces[k], slack, &o.of[o.n])) continue;
-        o.of[o.n++].set = o.set_of_facet[f->piece_facet[pieces[k].first]];
+        o.of[o.n].pane = panes[facet] != 0 ? f->elements[f->first[facet]] : MESH_NO_VERTEX;
+        o.of[o.n++].set = o.set_of_facet[facet];
     }
     drop_twins(&o);
     TRY(make_tree(&o, error));
@@ -189,6 +209,7 @@ lam_status occluders_make(const mesh *m, const facets *f, double slack, occluder
     o = (occluders){.n = 0};
 done:
     free(pieces);
+    free(panes);
     occluders_free(&o);
     return status;
 }

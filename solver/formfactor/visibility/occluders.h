@@ -10,14 +10,15 @@
 /* Corners of an occluder at most. */
 enum { OCCLUDER_CORNERS = JOINED_CORNERS };
 
-/* A planar convex polygon that hides from both sides: a point x of its plane is inside where edge[e] . (x, 1)
- * >= 0 for all. */
+/* A planar convex polygon that hides from both sides, unless it is of a pane: a point x of its plane is
+ * inside where edge[e] . (x, 1) >= 0 for all. */
 typedef struct occluder {
     double low[3], high[3], normal[3], level; /* unit; normal . x = level */
     double middle[3], radius;                 /* of a sphere about all corners */
     int n;
     uint32_t facet;                     /* MESH_NO_VERTEX: of several, in one plane */
     uint32_t set;                       /* of facets that lie in one plane (occluders.set_of_facet) */
+    uint32_t pane;                      /* an element of the pane; MESH_NO_VERTEX: it is opaque */
     double edge[OCCLUDER_CORNERS][4];   /* the distance of x from the edge, inwards, metres */
     double across[4][OCCLUDER_CORNERS]; /* the edges by component, repeated to fill */
     double corner[OCCLUDER_CORNERS][3]; /* counter-clockwise about the normal */
@@ -36,11 +37,13 @@ typedef struct occluders {
     occluder_node *nodes;
     uint32_t *set_of_facet; /* [n_facets], below n_facets: facets that were joined have one */
     size_t n_facets;
-    double slack; /* metres: rounding may move a point by that much */
+    double slack;      /* metres: rounding may move a point by that much */
+    const mesh *glass; /* whose panes some occluders are; NULL: all are opaque */
 } occluders;
 
-/* The joined pieces (polygon_join.h) of all facets. Of two with the same corners one is kept, and those
- * thinner than slack are left out. Cost: O(n log n). Freed by occluders_free. Errors: LAM_ERR_MEMORY. */
+/* The joined pieces (polygon_join.h) of all facets, those of a pane apart. Of two with the same corners one
+ * is kept, an opaque one before a pane, and those thinner than slack are left out. The mesh must outlive it.
+ * Cost: O(n log n). Freed by occluders_free. Errors: LAM_ERR_MEMORY. */
 lam_status occluders_make(const mesh *m, const facets *f, double slack, occluders *out, lam_error *error);
 void occluders_free(occluders *o);
 

@@ -91,3 +91,43 @@ void pane_path_reach(const visibility *v, const mesh *m, ray_packet *segments, s
     for (size_t i = 0; i < n; i++)
         if (hits->element[i] != VISIBILITY_NOTHING && (double)hits->distance[i] < left[i]) weight[i] = 0;
 }
+
+/* Both ends, above their elements and what rises from these. */
+static void lift(const visibility *v, const mesh *m, uint32_t from, uint32_t to, ray_packet *segments,
+                 size_t i) {
+    const double height = 2 * visibility_rounding(v);
+    const double begin = height + visibility_rise(v, from), end = height + visibility_rise(v, to);
+    for (int d = 0; d < 3; d++) {
+        const double up = begin * (double)m->normal[from][d], down = end * (double)m->normal[to][d];
+        segments->origin[d][i] += (float)up;
+        segments->direction[d][i] += (float)(down - up);
+    }
+}
+
+void pane_path_between(const visibility *v, const mesh *m, const ray_packet *segments, size_t n,
+                       const uint32_t *from, const uint32_t *to, unsigned blocked,
+                       double passed[VISIBILITY_PACKET]) {
+    static const double nearly = 1 - 1e-5;
+    ray_packet cast = {.origin = {{0}}};
+    size_t lane[VISIBILITY_PACKET], count = 0;
+    uint32_t self[VISIBILITY_PACKET];
+    double end[VISIBILITY_PACKET], weight[VISIBILITY_PACKET];
+    hit_packet hits;
+    for (size_t i = 0; i < n; i++) {
+        passed[i] = blocked >> i & 1 ? 0 : 1;
+        if (passed[i] > 0 || m->glass == NULL) continue;
+        for (int d = 0; d < 3; d++) {
+            cast.origin[d][count] = segments->origin[d][i];
+            cast.direction[d][count] = segments->direction[d][i];
+        }
+        lift(v, m, from[i], to[i], &cast, count);
+        self[count] = from[i];
+        end[count] = nearly;
+        weight[count] = 1;
+        lane[count++] = i;
+    }
+    if (count == 0) return;
+    visibility_cast(v, &cast, count, self, 0, &hits);
+    pane_path_reach(v, m, &cast, count, &hits, end, weight);
+    for (size_t k = 0; k < count; k++) passed[lane[k]] = weight[k];
+}

@@ -5,9 +5,6 @@
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/scene/glass.h"
 
-/* Panes that a ray crosses at most; behind so many nothing is left of its light. */
-enum { PANES_MOST = 64 };
-
 /* Called where a ray comes to the front of a pane with the light that the panes before it have passed. */
 typedef struct pane_visitor {
     void (*meet)(void *context, uint32_t element, double weight);
@@ -25,6 +22,13 @@ void pane_path_follow(const visibility *v, const mesh *m, ray_packet *rays, size
  * end[i], a share of the segment, counts no more. weight[i] is 0 where anything opaque is nearer. */
 void pane_path_reach(const visibility *v, const mesh *m, ray_packet *segments, size_t n, hit_packet *hits,
                      const double end[VISIBILITY_PACKET], double weight[VISIBILITY_PACKET]);
+
+/* passed[i]: 1 of segments from points of the elements from[i] to points of to[i] that are not blocked, which
+ * are those without a bit of visibility_blocked, what panes pass of the others, and 0 where anything opaque
+ * is between. Faces in the planes of both ends block nothing. */
+void pane_path_between(const visibility *v, const mesh *m, const ray_packet *segments, size_t n,
+                       const uint32_t *from, const uint32_t *to, unsigned blocked,
+                       double passed[VISIBILITY_PACKET]);
 
 /* Takes rays i of n with ahead[i], whose hits are panes, to what lies behind these; how: of visibility_cast.
  */

@@ -3,6 +3,7 @@
  * the certificate in refinement.h. Blocks are left to kept_blocks.h. */
 #include "solver/operator/refine/form_factor_rows.h"
 
+#include "solver/base/scene/scene_glass.h"
 #include "store/groups.h"
 #include "store/status.h"
 
@@ -56,15 +57,15 @@ done:
     return status;
 }
 
-/* The largest sum of a row: a pane receives all of the light that it passes on to others. */
-static double row_most(store *s) {
-    return (store_has(s, STORE_MESH "/glass") ? 2 : 1) * (1 + 1e-5);
-}
+/* Row sums may be above their largest value by this share of it, as numbers are rounded. */
+static const double rounded = 1e-5;
 
 /* Each entry from 0 to 1, each row at most row_most; fills row_sums. */
 static lam_status check_rows(store *s, const csr *F, double *row_sums, lam_error *error) {
     lam_status status = LAM_OK;
-    const double most = row_most(s);
+    double most;
+    TRY(glass_row_most_of(s, &most, error));
+    most *= 1 + rounded;
     for (size_t i = 0; i < F->n; i++) {
         row_sums[i] = 0;
         for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) {
@@ -75,8 +76,8 @@ static lam_status check_rows(store *s, const csr *F, double *row_sums, lam_error
             row_sums[i] += (double)value;
         }
         if (row_sums[i] > most)
-            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be at most %g",
-                 store_path(s), i, row_sums[i], floor(most));
+            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be at most %.4g",
+                 store_path(s), i, row_sums[i], most);
     }
 done:
     return status;
@@ -86,7 +87,9 @@ done:
 static lam_status check_upper(store *s, const csr *g, const double *area, double *row_sums,
                               lam_error *error) {
     lam_status status = LAM_OK;
-    const double most = row_most(s);
+    double most;
+    TRY(glass_row_most_of(s, &most, error));
+    most *= 1 + rounded;
     memset(row_sums, 0, g->n * sizeof *row_sums);
     for (size_t i = 0; i < g->n; i++) {
         for (uint64_t p = g->indptr[i]; p < g->indptr[i + 1]; p++) {
@@ -106,8 +109,8 @@ static lam_status check_upper(store *s, const csr *g, const double *area, double
     }
     for (size_t i = 0; i < g->n; i++)
         if (row_sums[i] > most)
-            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be at most %g",
-                 store_path(s), i, row_sums[i], floor(most));
+            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be at most %.4g",
+                 store_path(s), i, row_sums[i], most);
 done:
     return status;
 }
@@ -226,7 +229,10 @@ static lam_status open_blocks(store *s, lam_form_factors *f, lam_error *error) {
     f->blocks = memory_allocate(1, sizeof *f->blocks, "form factors", error);
     f->row_norms = memory_allocate(f->n, sizeof *f->row_norms, "form factors", error);
     if (f->blocks == NULL || f->row_norms == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(kept_blocks_load(s, f->n, f->area, f->blocks, f->row_sums, f->row_norms, error));
+    double most;
+    TRY(glass_row_most_of(s, &most, error));
+    TRY(kept_blocks_load(s, f->n, f->area, most * (1 + rounded), f->blocks, f->row_sums, f->row_norms,
+                         error));
 done:
     return status;
 }
@@ -308,7 +314,7 @@ lam_status form_factors_of_blocks(plane_tree *tree, block_factors *f, lam_form_f
     if (made->area == NULL || made->row_sums == NULL || made->row_norms == NULL || made->blocks == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t p = 0; p < n; p++) made->area[f->order[p]] = f->area[p];
-    TRY(kept_blocks_make(tree, f, made->blocks, made->row_sums, made->row_norms, error));
+    TRY(kept_blocks_make(tree, f, 1 + rounded, made->blocks, made->row_sums, made->row_norms, error));
     *out = made;
     made = NULL;
 done:

@@ -14,9 +14,8 @@ static inline float upper_factor(float exchange, double area) {
 }
 
 /* Reads the form factors of n elements: held is F when *rows is true, else g_ij = A_i F_ij for j > i. Every
- * entry must be from 0 to 1 and every row sum, which goes to row_sums [n], at most 1 + 1e-5, in
- * a store with panes twice that. held lies in
- * place (NULL: in memory), and the caller frees it with csr_free, also after an error. Errors:
+ * entry must be from 0 to 1 and every row sum, which goes to row_sums [n], at most glass_row_most (1 + 1e-5).
+ * held lies in place (NULL: in memory), and the caller frees it with csr_free, also after an error. Errors:
  * LAM_ERR_FORMAT, LAM_ERR_UNSUPPORTED (another storage), those of store_read and csr_reserve. */
 lam_status form_factor_rows_read(store *s, size_t n, const double *area, const large_place *place, csr *held,
                                  bool *rows, double *row_sums, lam_error *error);

@@ -90,8 +90,8 @@ static lam_status find_norms(const block_factors *f, double *value, double *weig
     return LAM_OK;
 }
 
-lam_status kept_blocks_make(plane_tree *tree, block_factors *f, kept_blocks *out, double *row_sums,
-                            double *row_norms, lam_error *error) {
+lam_status kept_blocks_make(plane_tree *tree, block_factors *f, double most, kept_blocks *out,
+                            double *row_sums, double *row_norms, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = f->n;
     kept_blocks made = {.tree = *tree, .f = *f};
@@ -113,9 +113,9 @@ lam_status kept_blocks_make(plane_tree *tree, block_factors *f, kept_blocks *out
     for (size_t p = 0; p < n; p++) {
         const size_t i = made.f.order[p];
         row_sums[i] = of_row[p] + made.rounding;
-        if (!(row_sums[i] <= 1 + 1e-5))
-            FAIL(error, LAM_ERR_FORMAT, "form factors of element %zu sum to %g, must be at most 1", i,
-                 row_sums[i]);
+        if (!(row_sums[i] <= most))
+            FAIL(error, LAM_ERR_FORMAT, "form factors of element %zu sum to %g, must be at most %.4g", i,
+                 row_sums[i], most);
     }
     *out = made;
     out->f.tree = &out->tree;
@@ -130,15 +130,15 @@ done:
     return status;
 }
 
-lam_status kept_blocks_load(store *s, size_t n, const double *area, kept_blocks *out, double *row_sums,
-                            double *row_norms, lam_error *error) {
+lam_status kept_blocks_load(store *s, size_t n, const double *area, double most, kept_blocks *out,
+                            double *row_sums, double *row_norms, lam_error *error) {
     lam_status status = LAM_OK;
     lam_error why;
     plane_tree tree;
     block_factors f;
     status = block_factors_load(s, n, area, &tree, &f, error);
     if (status != LAM_OK) goto done;
-    status = kept_blocks_make(&tree, &f, out, row_sums, row_norms, &why);
+    status = kept_blocks_make(&tree, &f, most, out, row_sums, row_norms, &why);
     if (status != LAM_OK) FAIL(error, status, "%s: %s", store_path(s), why.message);
 done:
     block_factors_free(&f);

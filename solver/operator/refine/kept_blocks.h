@@ -29,14 +29,14 @@ void kept_blocks_free(kept_blocks *k);
 /* From blocks after block_factors_end with a balance, whose tree is `tree`; both are taken over, also on an
  * error; out must stay where it is. Sets rounding, and by element upper bounds of the row sums of F and of
  * its row norms (sum_j F_ij^2 / A_j)^1/2, both [n]. Cost: some products. Errors: LAM_ERR_MEMORY;
- * LAM_ERR_FORMAT when a row sum is above 1 + 1e-5. */
-lam_status kept_blocks_make(plane_tree *tree, block_factors *f, kept_blocks *out, double *row_sums,
-                            double *row_norms, lam_error *error);
+ * LAM_ERR_FORMAT when a row sum is above most. */
+lam_status kept_blocks_make(plane_tree *tree, block_factors *f, double most, kept_blocks *out,
+                            double *row_sums, double *row_norms, lam_error *error);
 
 /* Reads them from a store, with areas by element. Errors: those of block_factors_load and of
  * kept_blocks_make. */
-lam_status kept_blocks_load(store *s, size_t n, const double *area, kept_blocks *out, double *row_sums,
-                            double *row_norms, lam_error *error);
+lam_status kept_blocks_load(store *s, size_t n, const double *area, double most, kept_blocks *out,
+                            double *row_sums, double *row_norms, lam_error *error);
 
 /* Bytes that a product reads: each block as either side's. */
 size_t kept_blocks_bytes(const kept_blocks *k);

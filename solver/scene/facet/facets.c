@@ -6,6 +6,7 @@
 #include "solver/base/array_sort.h"
 #include "solver/base/union_find.h"
 #include "solver/scene/facet/facet_outline.h"
+#include "solver/scene/glass.h"
 #include "solver/scene/plane.h"
 #include "solver/scene/tables.h"
 
@@ -62,11 +63,16 @@ static double off_plane(const mesh *m, size_t element, const double at[3], const
     return most;
 }
 
+/* Panes differ from group to group in what they pass: their elements are not joined with others. */
+static bool of_one_pane(const mesh *m, uint32_t a, uint32_t b) {
+    return m->glass == NULL || m->group[a] == m->group[b] || (!mesh_is_pane(m, a) && !mesh_is_pane(m, b));
+}
+
 static bool of_one_plane(const joining *j, uint32_t a, uint32_t b) {
     const mesh *m = j->m;
     const double p[3] = {m->normal[a][0], m->normal[a][1], m->normal[a][2]};
     const double q[3] = {m->normal[b][0], m->normal[b][1], m->normal[b][2]};
-    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2] >= 1 - plane_same_direction &&
+    return of_one_pane(m, a, b) && p[0] * q[0] + p[1] * q[1] + p[2] * q[2] >= 1 - plane_same_direction &&
            off_plane(m, b, m->vertices[m->elements[a][0]], p) <= j->flat &&
            off_plane(m, a, m->vertices[m->elements[b][0]], q) <= j->flat;
 }

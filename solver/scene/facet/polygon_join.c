@@ -107,7 +107,10 @@ static uint32_t make_convex(const joining *j, const double normal[3], uint32_t *
 static bool unite(const joining *j, const piece *p, uint32_t i, const piece *q, uint32_t k, uint32_t most,
                   piece *out) {
     uint32_t corner[UNION_MOST], n = 0;
-    if (j->options->within_labels && p->shape.label != q->shape.label) return false;
+    const polygon_join_options *of = j->options;
+    if (of->within_labels && p->shape.label != q->shape.label) return false;
+    if (of->kinds != NULL && of->kinds[of->label[p->shape.first]] != of->kinds[of->label[q->shape.first]])
+        return false;
     if (!lies_in_plane(j, p, q) || !lies_in_plane(j, q, p)) return false;
     for (uint32_t c = 1; c <= p->shape.n; c++) corner[n++] = p->shape.corner[(i + c) % p->shape.n];
     for (uint32_t c = 2; c < q->shape.n; c++) corner[n++] = q->shape.corner[(k + c) % q->shape.n];

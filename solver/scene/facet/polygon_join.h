@@ -21,13 +21,15 @@ typedef struct polygon_join_options {
     const uint32_t (*polygons)[4]; /* [n], as elements of the mesh */
     const uint32_t *label;         /* [n] */
     bool within_labels;            /* only polygons of one label are joined */
-    bool split;           /* a polygon of four corners that is not plane and convex is two triangles */
-    uint32_t corners;     /* of a union at most: 4, or JOINED_CORNERS */
-    double slack;         /* metres: what deviates less from a line or a plane lies in it */
-    uint32_t *label_sets; /* [labels], initially i: labels of one union become one set (union_find.h). NULL:
-                             not wanted */
-    uint32_t *joined;     /* [n], filled: the union that each became a part of; MESH_NO_VERTEX: none. NULL, as
-                             with split: not wanted */
+    const uint32_t *kinds; /* [labels]: only polygons whose labels are of one kind are joined; NULL: all
+                              are of one */
+    bool split;            /* a polygon of four corners that is not plane and convex is two triangles */
+    uint32_t corners;      /* of a union at most: 4, or JOINED_CORNERS */
+    double slack;          /* metres: what deviates less from a line or a plane lies in it */
+    uint32_t *label_sets;  /* [labels], initially i: labels of one union become one set (union_find.h). NULL:
+                              not wanted */
+    uint32_t *joined; /* [n], filled: the union that each became a part of; MESH_NO_VERTEX: none. NULL, as
+                         with split: not wanted */
 } polygon_join_options;
 
 /* Joins two polygons at a time that face the same way, lie in one plane, share a whole edge and make a convex

@@ -33,7 +33,7 @@ static block_report sample(const mesh *m, int n_threads, block_report *whole, bl
     omp_set_num_threads(most);
     if (whole != NULL) {
         block_factors f;
-        ck_ok(blocks_find_in(scene, &options, &f, whole, &error));
+        ck_ok(blocks_find_in(scene, &options, &f, whole, NULL, &error));
         block_factors_free(&f);
     }
     block_scene_destroy(scene);
@@ -100,7 +100,7 @@ START_TEST(forecasts_know_receivers) {
     ck_ok(blocks_forecast(scene, &r, &read, NULL, &of_read, &error));
     ck_ok(importance_even_out(&read, &even, &error));
     options.importance = &read;
-    ck_ok(blocks_find_in(scene, &options, &f, &found, &error));
+    ck_ok(blocks_find_in(scene, &options, &f, &found, NULL, &error));
     block_factors_free(&f);
     block_scene_destroy(scene);
     finer.importance = &even;

@@ -1,5 +1,6 @@
 /* Panes between two black rooms and in a window: form factors and the light of an even sky by every source,
  * against sums over points in double; sheets, panes of several faces, files and stores. */
+#include "solver/formfactor/blocks/block_light.h"
 #include "solver/formfactor/glass/pane_light.h"
 #include "solver/formfactor/sky_sample.h"
 #include "solver/formfactor/source.h"
@@ -271,23 +272,107 @@ START_TEST(an_even_sky_shines_through) {
 }
 END_TEST
 
-START_TEST(blocks_refuse_light_between_elements) {
-    mesh m = two_rooms(1, false);
+/* Two rooms and the blocks of them. */
+typedef struct blocks_of_rooms {
+    mesh m;
+    uint32_t *order;
     plane_tree tree;
     block_factors made;
     form_factors f;
-    glaze(&m, .78, 1, true);
-    uint32_t *order = calloc(m.n, sizeof *order);
-    for (uint32_t i = 0; i < m.n; i++) order[i] = i;
-    const form_factor_options how = {
-        .recipe = {.source = &source_blocks, .rays = 64, .accuracy = 1e-3, .seed = 5}};
-    ck_ok(form_factors_tree(&m, &tree, &error));
-    ck_assert_int_eq(form_factors_make_blocks(&m, order, &tree, NULL, &how, &f, &made, &error),
-                     LAM_ERR_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(error.message, "panes"));
-    plane_tree_free(&tree);
-    free(order);
-    mesh_free(&m);
+} blocks_of_rooms;
+
+static const recipe blocks_recipe = {.source = &source_blocks, .rays = 64, .accuracy = 3e-4, .seed = 5};
+
+/* Of squares that are halved so many times. */
+static void blocks_setup(int levels, int panes, bool sheet, double faces, blocks_of_rooms *s) {
+    const mesh_refinement finer = {.subdivide_levels = levels};
+    *s = (blocks_of_rooms){.m = two_rooms(panes, sheet)};
+    ck_ok(mesh_refine(&s->m, &finer, &error));
+    glaze(&s->m, .78, faces, true);
+    s->order = calloc(s->m.n, sizeof *s->order);
+    for (uint32_t i = 0; i < s->m.n; i++) s->order[i] = i;
+    const form_factor_options how = {.recipe = blocks_recipe};
+    ck_ok(form_factors_tree(&s->m, &s->tree, &error));
+    ck_ok(form_factors_make_blocks(&s->m, s->order, &s->tree, NULL, &how, &s->f, &s->made, &error));
+}
+
+static void blocks_teardown(blocks_of_rooms *s) {
+    block_factors_free(&s->made);
+    form_factors_free(&s->f);
+    plane_tree_free(&s->tree);
+    free(s->order);
+    mesh_free(&s->m);
+}
+
+/* Mean irradiance of the east side by the exitance 1 of the west side. */
+static double east_by_west(const mesh *m, const block_factors *blocks) {
+    const size_t west = group_find(m, "west"), east = group_find(m, "east");
+    const factor_product product = block_factors_product(blocks);
+    double *E = calloc(m->n, sizeof *E), *H = calloc(m->n, sizeof *H), sum = 0, area = 0;
+    for (size_t i = 0; i < m->n; i++) E[i] = m->group[i] == west ? 1 : 0;
+    ck_ok(product.multiply(product.context, 1, E, H, &error));
+    for (size_t i = 0; i < m->n; i++) {
+        if (m->group[i] != east) continue;
+        area += m->area[i];
+        sum += m->area[i] * H[i];
+    }
+    free(E);
+    free(H);
+    return sum / area;
+}
+
+/* By single pairs, by clusters, through a sheet and through two panes; a judge's segments are those of the
+ * whole scene. */
+START_TEST(blocks_pass_light_from_room_to_room) {
+    static const int levels[] = {0, 2, 1, 1}, panes[] = {1, 1, 1, 2};
+    const double wanted = through(false, .78);
+    blocks_of_rooms s;
+    blocks_setup(levels[_i], panes[_i], _i == 2, panes[_i], &s);
+    ck_assert(s.f.closed);
+    ck_assert_double_eq_tol(east_by_west(&s.m, &s.made), wanted, noise * wanted);
+    ck_assert_ptr_nonnull(s.f.through);
+    for (size_t i = 0; i < s.m.n; i++) {
+        ck_assert_double_ge(s.f.through[i], 0);
+        ck_assert_double_le(s.f.through[i], mesh_row_most(&s.m) - 1);
+        ck_assert_double_eq_tol(s.f.row_sums[i], 1 + s.f.through[i], 2e-3);
+    }
+    form_factors judge;
+    block_factors again;
+    recipe other = blocks_recipe;
+    other.seed = 77;
+    const form_factor_options how = {.recipe = other, .row_sums = s.f.row_sums};
+    ck_ok(form_factors_make_blocks(&s.m, s.order, &s.tree, &s.f, &how, &judge, &again, &error));
+    ck_assert_double_eq_tol(east_by_west(&s.m, &again), wanted, noise * wanted);
+    block_factors_free(&again);
+    form_factors_free(&judge);
+    blocks_teardown(&s);
+}
+END_TEST
+
+/* The first light of a judge of blocks, in two halves. */
+START_TEST(light_of_sources_passes_panes) {
+    const double wanted = through(false, .78);
+    blocks_of_rooms s;
+    block_light *l = NULL;
+    bool known = false;
+    blocks_setup(1, 1, false, 1, &s);
+    float *E = calloc(s.m.n, sizeof *E);
+    double *H = calloc(s.m.n, sizeof *H), *D = calloc(s.m.n, sizeof *D), sum = 0, area = 0;
+    for (size_t i = 0; i < s.m.n; i++) E[i] = s.m.group[i] == group_find(&s.m, "west") ? 1 : 0;
+    ck_ok(block_light_create(&s.m, &s.tree, 1e-5, 3, &l, &error));
+    ck_ok(block_light_of(l, E, H, D, &known, &error));
+    ck_assert(known);
+    for (size_t i = 0; i < s.m.n; i++) {
+        if (s.m.group[i] != group_find(&s.m, "east")) continue;
+        area += s.m.area[i];
+        sum += s.m.area[i] * H[i];
+    }
+    ck_assert_double_eq_tol(sum / area, wanted, noise * wanted);
+    block_light_destroy(l);
+    free(E);
+    free(H);
+    free(D);
+    blocks_teardown(&s);
 }
 END_TEST
 
@@ -346,7 +431,8 @@ int main(void) {
     tcase_add_loop_test(tests, light_passes_from_room_to_room, 0, RECIPES);
     tcase_add_test(tests, panes_of_several_faces);
     tcase_add_loop_test(tests, an_even_sky_shines_through, 0, RECIPES + 1);
-    tcase_add_test(tests, blocks_refuse_light_between_elements);
+    tcase_add_loop_test(tests, blocks_pass_light_from_room_to_room, 0, 4);
+    tcase_add_test(tests, light_of_sources_passes_panes);
     tcase_add_test(tests, reflectance_leaves_room_for_what_passes);
     tcase_add_test(tests, stores_keep_panes);
     suite_add_tcase(suite, tests);
