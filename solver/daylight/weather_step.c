@@ -81,7 +81,9 @@ static double long_step(const weather *w) {
     bool back = false;
     const double step = weather_ahead(&w->hours[0], &w->hours[1], &back), a_day = 24 / step;
     const double tolerance = weather_tolerance(1);
-    if (back || step > LONGEST || fabs(a_day - round(a_day)) > 1e-3 || w->n % (size_t)round(a_day) != 0)
+    /* Rows of one time, as far as decimals tell, have no step. */
+    if (back || step <= tolerance || step > LONGEST || fabs(a_day - round(a_day)) > 1e-3 ||
+        w->n % (size_t)round(a_day) != 0)
         return 0;
     for (size_t i = 1; i < w->n; i++) {
         /* A day is left only after its last row. */

@@ -313,6 +313,14 @@ START_TEST(rows_that_are_repeated) {
     days_between(&t, 0, 1, 1, 12, 31, false);
     wea_day(&t, 1, 1, 0, 24, 1);
     check_refused(&t, "line 8767 (2001-01-01 00:30) has the time of line 7: 24 hours are there twice");
+    t = begin(false, NULL); /* nothing but one time */
+    wea_row(&t, 6, 21, .5);
+    wea_row(&t, 6, 21, .5);
+    check_refused(&t, "line 8 (2001-06-21 00:30) has the time of line 7: 1 hour is there twice");
+    t = begin(false, NULL);
+    wea_row(&t, 6, 21, .5);
+    wea_row(&t, 6, 21, .501);
+    check_refused(&t, "line 8 (2001-06-21 00:30) is 0.001 h after the row before it");
 }
 END_TEST
 
