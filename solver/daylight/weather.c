@@ -275,6 +275,11 @@ done:
     return status;
 }
 
+/* The line that was read, of the first one without a byte order mark. */
+static char *line_of(const reader *r) {
+    return r->line + (r->number == 1 && strncmp(r->line, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0);
+}
+
 static lam_status read_epw_header(reader *r, weather *w, weather_stated *stated, lam_error *error) {
     lam_status status = LAM_OK;
     static const char *const names[8] = {"LOCATION",
@@ -289,8 +294,7 @@ static lam_status read_epw_header(reader *r, weather *w, weather_stated *stated,
     const char *fields[FIELDS];
     for (int k = 0; k < 8; k++) {
         TRY(reader_need(r, names[k], error));
-        /* The file may begin with a byte order mark. */
-        char *line = r->line + (k == 0 && strncmp(r->line, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0);
+        char *line = line_of(r);
         const size_t n = cut(line, ',', fields, FIELDS);
         if (n == 0 || strcasecmp(fields[0], names[k]) != 0)
             FAIL(error, LAM_ERR_FORMAT, "%s: line %zu begins with \"%.40s\", an EPW has %s there", r->path,
@@ -354,11 +358,12 @@ static lam_status read_wea_header(reader *r, weather *w, lam_error *error) {
     for (int k = 0; k < 6; k++) {
         TRY(reader_need(r, lines[k].name, error));
         const size_t length = strlen(lines[k].name);
-        if (strncmp(r->line, lines[k].name, length) != 0 ||
-            (r->line[length] != ' ' && r->line[length] != '\t' && r->line[length] != '\0'))
+        const char *line = line_of(r);
+        if (strncmp(line, lines[k].name, length) != 0 ||
+            (line[length] != ' ' && line[length] != '\t' && line[length] != '\0'))
             FAIL(error, LAM_ERR_FORMAT, "%s: line %zu begins with \"%.40s\", a WEA has %s there", r->path,
-                 r->number, r->line, lines[k].name);
-        const char *value = r->line + length;
+                 r->number, line, lines[k].name);
+        const char *value = line + length;
         while (*value == ' ' || *value == '\t') value++;
         if (k == 0)
             snprintf(w->place, sizeof w->place, "%s", value);

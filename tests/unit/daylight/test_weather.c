@@ -100,6 +100,9 @@ START_TEST(epw) {
     ck_assert_uint_eq(w.n, 1);
     ck_assert_double_eq(w.hours[0].hour, 23.5);
     weather_free(&w);
+    w = must_read(".wea", "\xEF\xBB\xBF" WEA_HEAD "6 21 23.5 1 2\r\n");
+    ck_assert_uint_eq(w.n, 1);
+    weather_free(&w);
 }
 END_TEST
 
