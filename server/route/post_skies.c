@@ -2,12 +2,12 @@
  * light, and of a moment of the weather beside the store, by solver/daylight. A sky of the answer is the
  * `sky` of an emission. */
 #include "server/route/routes.h"
+#include "server/route/weather_text.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/json_writer.h"
 #include "solver/codec/sky_request.h"
 #include "solver/daylight/moment.h"
 #include "solver/daylight/named_sky.h"
-#include "solver/daylight/weather_mend.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -16,17 +16,16 @@
 
 #define DEGREE (M_PI / 180)
 
-/* Bytes of the answer beside those of tiles, and of a number of a tile, at most. */
-enum { HEAD_BYTES = 512, TILE_BYTES = 18 };
-/* A row of a WEA has 10 bytes or more, five numbers; one of an EPW 32, sixteen fields. */
-enum { WEA_ROW_BYTES = 10, EPW_ROW_BYTES = 32 };
+/* Bytes of the answer beside those of tiles, of a number of a tile, and of one that has light of the sun with
+ * its index, at most. */
+enum { HEAD_BYTES = 768, TILE_BYTES = 18, SUN_TILE_BYTES = 2 * TILE_BYTES };
 
 /* Parts that the skies of a request share. */
 typedef struct making {
     const call *in;
     const scene *store;
     sky_tiling tiling;
-    double *L;
+    double *L, *of_sun; /* of the sky alone, and of its sun */
     float *narrow;
     weather weather;
     char gaps[SKY_REQUEST_TEXT]; /* of the weather that was read; n of it 0: none was */
@@ -41,45 +40,15 @@ static bool refuse(problem *why, problem_kind kind, size_t k, const char *text) 
     return problem_set(why, kind, "sky %zu: %s", k, text);
 }
 
-static bool find_gaps(const char *word, weather_gaps *gaps) {
-    static const char *const words[] = {"refuse", "fill", "skip"};
-    *gaps = WEATHER_REFUSE;
-    if (word[0] == '\0') return true;
-    for (size_t k = 0; k < 3; k++)
-        if (strcmp(word, words[k]) == 0) {
-            *gaps = (weather_gaps)k;
-            return true;
-        }
-    return false;
-}
-
 /* Reads the weather beside the store, once for skies that follow each other with one way of gaps. */
 static bool read_weather(making *m, const sky_request *sky, size_t k, problem *why) {
-    const scene *s = m->store;
-    weather_gaps gaps;
-    char name[16];
-    lam_error error = {.message = ""};
-    if (!find_gaps(sky->gaps, &gaps))
-        return refuse(why, PROBLEM_UNKNOWN_WORD, k, "gaps must be refuse, fill or skip");
-    if (s->texts.weather == NULL)
-        return problem_set(why, PROBLEM_NOT_IN_STORE, "sky %zu: %s", k, s->weather.why);
+    char what[32];
     if (m->weather.n > 0 && strcmp(m->gaps, sky->gaps) == 0) return true;
     weather_free(&m->weather);
-    kept_bytes *text = kept_forms_find(s->texts.weather, 0);
-    if (text == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "the weather of the scene is not there");
-    const size_t row = strcmp(s->weather.format, "epw") == 0 ? EPW_ROW_BYTES : WEA_ROW_BYTES;
-    const size_t times = gaps == WEATHER_FILL ? 1 + WEATHER_FILL_MOST : 1;
-    const size_t bytes = bytes_times(text->content.length / row + 1, times * sizeof(weather_hour));
-    snprintf(name, sizeof name, "weather.%s", s->weather.format);
-    const bool room = request_memory_take(m->in->memory, bytes, why);
-    const lam_status status =
-        room ? weather_read_text(name, text->content.bytes, text->content.length, gaps, &m->weather, &error)
-             : LAM_OK;
-    kept_bytes_release(text);
-    if (!room) return false;
+    snprintf(what, sizeof what, "sky %zu: ", k);
+    if (!weather_text_read_beside(m->in, sky->gaps, what, &m->weather, why)) return false;
     snprintf(m->gaps, sizeof m->gaps, "%s", sky->gaps);
-    return status == LAM_OK ||
-           refuse(why, status == LAM_ERR_MEMORY ? PROBLEM_NO_MEMORY : PROBLEM_NOT_IN_STORE, k, error.message);
+    return true;
 }
 
 /* The moment of a sky; false where it names none, or a wrong one. */
@@ -95,6 +64,13 @@ static bool find_moment(const sky_request *sky, size_t k, moment *at, problem *w
     return true;
 }
 
+/* Light normal to the sun of light on a horizontal plane: at most the extraterrestrial irradiance, as the
+ * quotient is unbounded for a rising sun. */
+static double normal_of(double horizontal, const sun_position *sun) {
+    const double up = sun->direction[2];
+    return up > 0 ? fmin(horizontal / up, PEREZ_SOLAR / (sun->distance * sun->distance)) : 0;
+}
+
 /* The model of a moment of the weather, and its sun. */
 static bool model_of_weather(making *m, const sky_request *sky, size_t k, named_sky *model, sun_position *sun,
                              problem *why) {
@@ -106,10 +82,10 @@ static bool model_of_weather(making *m, const sky_request *sky, size_t k, named_
     if (moment_find(&at, "weather", w, &h, &error) != LAM_OK)
         return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
     *sun = sun_at(w->latitude, w->longitude, w->time_zone, h.year, h.month, h.day, h.hour);
-    const double up = sun->direction[2];
-    *model =
-        (named_sky){.model = SKY_GIVEN, .direct = h.direct, .diffuse = h.diffuse, .dew_point = h.dew_point};
-    if (w->direct_is_horizontal) model->direct = up > 0 ? fmin(h.direct / up, PEREZ_SOLAR) : 0;
+    *model = (named_sky){.model = SKY_GIVEN,
+                         .direct = w->direct_is_horizontal ? normal_of(h.direct, sun) : h.direct,
+                         .diffuse = h.diffuse,
+                         .dew_point = h.dew_point};
     return true;
 }
 
@@ -123,7 +99,8 @@ static bool sun_of_request(const sky_request *sky, size_t k, sun_position *sun, 
     if (isnan(sky->latitude))
         return refuse(why, PROBLEM_WRONG_MEMBERS, k, "needs its sun: give sun, or place and date or hour");
     if (!find_moment(sky, k, &at, why)) return false;
-    *sun = sun_at(sky->latitude, sky->longitude, sky->zone, 2001, at.month, at.day, at.hour);
+    *sun = sun_at(sky->latitude, sky->longitude, sky->zone, isnan(sky->year) ? 2001 : (int)sky->year,
+                  at.month, at.day, at.hour);
     return true;
 }
 
@@ -139,21 +116,59 @@ static bool model_of_request(const sky_request *sky, size_t k, named_sky *model,
                              .diffuse = sky->diffuse,
                              .dew_point = sky->dew_point};
     model->lux_outside = isnan(sky->lux_outside) ? 0 : sky->lux_outside;
-    if (named_sky_needs_sun(model)) return sun_of_request(sky, k, sun, why);
+    if (named_sky_needs_sun(model)) {
+        if (!sun_of_request(sky, k, sun, why)) return false;
+        if (!isnan(sky->direct_horizontal)) model->direct = normal_of(sky->direct_horizontal, sun);
+        return true;
+    }
     const bool asks_for_sun = !isnan(sky->azimuth) || !isnan(sky->latitude) || !isnan(sky->hour) ||
                               sky->date[0] != '\0' || !isnan(sky->north);
     return !asks_for_sun ||
            refuse(why, PROBLEM_WRONG_MEMBERS, k, "has no sun: leave out sun, place, date, hour and north");
 }
 
-static bool write_sun(buffer *b, const sun_position *told, const sky_tiling *tiling, const year_sun *sun) {
+/* The tiles that have light of the sun, and their radiance by it. */
+static bool write_sun_tiles(const making *m, buffer *b) {
+    bool written = buffer_append_text(b, ",\"tiles\":[");
+    size_t n = 0;
+    for (size_t t = 0; t < m->tiling.n_tiles && written; t++) {
+        if (!(m->of_sun[t] > 0)) continue;
+        written = buffer_printf(b, n > 0 ? ",%zu" : "%zu", t);
+        m->narrow[n++] = (float)m->of_sun[t];
+    }
+    return written && buffer_append_text(b, "],\"radiance\":") && json_write_floats(b, m->narrow, n);
+}
+
+static bool write_sun(const making *m, buffer *b, const sun_position *told, const year_sun *sun) {
+    const sky_tiling *tiling = &m->tiling;
     double direction[3];
     for (int d = 0; d < 3; d++) direction[tiling->axis[d]] = (double)tiling->sign[d] * sun->direction[d];
     return buffer_append_text(b, ",\"sun\":{\"azimuth\":") && json_write_double(b, told->azimuth / DEGREE) &&
            buffer_append_text(b, ",\"altitude\":") && json_write_double(b, told->altitude / DEGREE) &&
            buffer_append_text(b, ",\"direction\":") && json_write_doubles(b, direction, 3) &&
            buffer_append_text(b, ",\"normal\":") && json_write_double(b, sun->normal) &&
-           buffer_append_text(b, "}");
+           write_sun_tiles(m, b) && buffer_append_text(b, "}");
+}
+
+/* Sets L, of_sun and narrow, and the sun. */
+static bool make_sky(making *m, const sky_request *sky, size_t k, const named_sky *model,
+                     const sun_position *at, year_sun *sun, sky_horizontal *of, problem *why) {
+    lam_error error = {.message = ""};
+    const size_t n = m->tiling.n_tiles;
+    memset(m->L, 0, n * sizeof *m->L);
+    memset(m->of_sun, 0, n * sizeof *m->of_sun);
+    if (sky->dark && named_sky_is_dark(model, at)) {
+        *sun = (year_sun){.direction = {at->direction[0], at->direction[1], at->direction[2]}};
+        *of = (sky_horizontal){.clearness = NAN, .brightness = NAN};
+    } else if (named_sky_make(model, at, &m->tiling, false, m->L, sun, of, &error) != LAM_OK) {
+        return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
+    }
+    if (sun->horizontal > 0 && sky->sun_spread)
+        year_spread_sun(&m->tiling, sun->direction, sun->horizontal, m->of_sun);
+    else if (sun->horizontal > 0)
+        year_add_sun(&m->tiling, sun->direction, sun->horizontal, m->of_sun);
+    for (size_t t = 0; t < n; t++) m->narrow[t] = (float)(m->L[t] + (sky->sun_in_tiles ? m->of_sun[t] : 0));
+    return true;
 }
 
 /* Makes and writes sky k. */
@@ -162,41 +177,43 @@ static bool add_sky(making *m, const sky_request *sky, size_t k, buffer *b, prob
     sun_position told = {.distance = 1};
     year_sun sun;
     sky_horizontal of;
-    lam_error error = {.message = ""};
     if (sky->source == SKY_BY_WEATHER ? !model_of_weather(m, sky, k, &model, &told, why)
                                       : !model_of_request(sky, k, &model, &told, why))
         return false;
     model.photometric = sky->photometric;
     const sun_position at = sun_turned(told, isnan(sky->north) ? m->store->sky_north : sky->north);
-    if (named_sky_make(&model, &at, &m->tiling, sky->sun_in_tiles, m->L, &sun, &of, &error) != LAM_OK)
-        return refuse(why, PROBLEM_BAD_VALUE, k, error.message);
-    for (size_t t = 0; t < m->tiling.n_tiles; t++) m->narrow[t] = (float)m->L[t];
+    if (!make_sky(m, sky, k, &model, &at, &sun, &of, why)) return false;
     const bool written =
         buffer_append_text(b, k > 0 ? ",{\"sky\":" : "{\"sky\":") &&
         json_write_floats(b, m->narrow, m->tiling.n_tiles) &&
         buffer_printf(b, ",\"unit\":\"%s\",\"diffuse\":", named_sky_is_photometric(&model) ? "lx" : "W/m2") &&
         json_write_double(b, of.diffuse) && buffer_append_text(b, ",\"direct\":") &&
-        json_write_double(b, of.direct) &&
-        (named_sky_needs_sun(&model) ? write_sun(b, &told, &m->tiling, &sun)
+        json_write_double(b, of.direct) && buffer_append_text(b, ",\"clearness\":") &&
+        json_write_double(b, of.clearness) && buffer_append_text(b, ",\"brightness\":") &&
+        json_write_double(b, of.brightness) &&
+        (named_sky_needs_sun(&model) ? write_sun(m, b, &told, &sun)
                                      : buffer_append_text(b, ",\"sun\":null")) &&
         buffer_append_text(b, "}");
     return written || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
 }
 
-static bool prepare(making *m, size_t n_skies, buffer *b, problem *why) {
+static bool prepare(making *m, const sky_request *skies, size_t n_skies, buffer *b, problem *why) {
     const scene *s = m->store;
     lam_error error = {.message = ""};
     if (s->sky == NULL || s->sky_tiling[0] == '\0')
         return problem_set(why, PROBLEM_NOT_IN_STORE, "the store has no sky%s; precompute it %s",
                            s->sky != NULL ? " whose tiles it states" : "",
                            s->sky != NULL ? "again" : "with --sky");
-    const size_t n = lam_sky_tiles(s->sky), most = bytes_times(n_skies, n * TILE_BYTES + HEAD_BYTES);
-    if (!request_memory_take(
-            m->in->memory, bytes_plus(most, n * (sizeof *m->L + sizeof *m->narrow + sizeof(sky_tile))), why))
-        return false;
+    const size_t n = lam_sky_tiles(s->sky);
+    size_t most = bytes_times(n_skies, n * TILE_BYTES + HEAD_BYTES);
+    for (size_t k = 0; k < n_skies; k++)
+        if (skies[k].sun_spread) most = bytes_plus(most, n * SUN_TILE_BYTES);
+    const size_t work = n * (2 * sizeof *m->L + sizeof *m->narrow + sizeof(sky_tile));
+    if (!request_memory_take(m->in->memory, bytes_plus(most, work), why)) return false;
     m->L = malloc(n * sizeof *m->L);
+    m->of_sun = malloc(n * sizeof *m->of_sun);
     m->narrow = malloc(n * sizeof *m->narrow);
-    if (m->L == NULL || m->narrow == NULL || !buffer_reserve(b, most) ||
+    if (m->L == NULL || m->of_sun == NULL || m->narrow == NULL || !buffer_reserve(b, most) ||
         sky_tiling_create(s->sky_tiling, s->sky_up, &m->tiling, &error) != LAM_OK)
         return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for skies%s%s",
                            error.message[0] != '\0' ? ": " : "", error.message);
@@ -216,7 +233,7 @@ void post_skies(call *in, answer *out) {
                 problem_set(&why, PROBLEM_MEDIA_TYPE, "Content-Type must be application/json");
     if (good) skies = call_allocate(in, SKY_REQUEST_MOST * sizeof *skies, "skies", &why);
     good = good && skies != NULL && codec_read_skies_json(&about, in->body, in->length, skies, &n, &why) &&
-           prepare(&m, n, &b, &why);
+           prepare(&m, skies, n, &b, &why);
     if (good && !(buffer_append_text(&b, "{\"scene\":") && json_write_text(&b, in->scene->name) &&
                   buffer_printf(&b, ",\"tiles\":%zu,\"skies\":[", m.tiling.n_tiles)))
         good = problem_set(&why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
@@ -230,6 +247,7 @@ void post_skies(call *in, answer *out) {
     weather_free(&m.weather);
     sky_tiling_free(&m.tiling);
     free(m.L);
+    free(m.of_sun);
     free(m.narrow);
     free(skies);
 }

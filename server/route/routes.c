@@ -21,6 +21,7 @@ static const route routes[] = {
     {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", KEPT(keeps_mesh)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/sky", KEPT(keeps_sky)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/weather", KEPT(keeps_weather)},
+    {.method = "POST", .pattern = "/v1/scenes/{name}/weather", .handle = post_weather, .with_body = true},
     {.method = "POST",
      .pattern = "/v1/scenes/{name}/radiosity",
      .steps = &post_radiosity,
@@ -39,6 +40,8 @@ static const route routes[] = {
      .with_body = true,
      .also_built = true,
      .right = TOKEN_VARY},
+    {.method = "POST", .pattern = "/v1/sun", .handle = post_sun, .with_body = true},
+    {.method = "POST", .pattern = "/v1/weather", .handle = post_weather, .with_body = true},
     {.method = "GET", .pattern = "/v1/openapi.json", KEPT(keeps_openapi)},
     /* The type of a problem is a relative reference, which resolves beside the path that was asked for. */
     {.method = "GET", .pattern = "/deploy/docs/api.md", KEPT(keeps_manual), .open = true, .below_any = true},

@@ -1,8 +1,10 @@
-/* The body of a request for skies, {"sky": SKY} or {"skies": [SKY, ...]}. A SKY is a name, or an object. */
+/* The body of a request for skies, {"sky": SKY} or {"skies": [SKY, ...]}. A SKY is a name, or an object. And
+ * those for positions of the sun and for rows of weather, which share its members. */
 #include "solver/codec/json_parser.h"
 #include "solver/codec/sky_request.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 typedef enum member_kind { MEMBER_TEXT, MEMBER_NUMBER, MEMBER_FLAG, MEMBER_OBJECT } member_kind;
@@ -26,6 +28,7 @@ static const member place_members[] = {{"latitude", MEMBER_NUMBER, FIELD(latitud
 enum {
     NAME,
     DIRECT,
+    DIRECT_HORIZONTAL,
     DIFFUSE,
     WEATHER,
     DEW_POINT,
@@ -35,12 +38,14 @@ enum {
     DATE,
     HOUR,
     NORTH,
+    YEAR,
     GAPS,
-    SKY_MEMBERS = 14
+    SKY_MEMBERS = 18
 };
 static const member sky_members[SKY_MEMBERS] = {
     [NAME] = {"name", MEMBER_TEXT, FIELD(name), 0, 0, NULL, 0},
     [DIRECT] = {"direct", MEMBER_NUMBER, FIELD(direct), 0, 3000, NULL, 0},
+    [DIRECT_HORIZONTAL] = {"direct_horizontal", MEMBER_NUMBER, FIELD(direct_horizontal), 0, 3000, NULL, 0},
     [DIFFUSE] = {"diffuse", MEMBER_NUMBER, FIELD(diffuse), 0, 3000, NULL, 0},
     [WEATHER] = {"weather", MEMBER_FLAG, 0, 0, 0, NULL, 0},
     [DEW_POINT] = {"dew_point", MEMBER_NUMBER, FIELD(dew_point), -100, 100, NULL, 0},
@@ -50,9 +55,12 @@ static const member sky_members[SKY_MEMBERS] = {
     [DATE] = {"date", MEMBER_TEXT, FIELD(date), 0, 0, NULL, 0},
     [HOUR] = {"hour", MEMBER_NUMBER, FIELD(hour), 0, 8760, NULL, 0},
     [NORTH] = {"north", MEMBER_NUMBER, FIELD(north), -360, 360, NULL, 0},
+    [YEAR] = {"year", MEMBER_NUMBER, FIELD(year), 1900, 2100, NULL, 0},
     [GAPS] = {"gaps", MEMBER_TEXT, FIELD(gaps), 0, 0, NULL, 0},
     {"photometric", MEMBER_FLAG, FIELD(photometric), 0, 0, NULL, 0},
-    {"sun_in_tiles", MEMBER_FLAG, FIELD(sun_in_tiles), 0, 0, NULL, 0}};
+    {"sun_in_tiles", MEMBER_FLAG, FIELD(sun_in_tiles), 0, 0, NULL, 0},
+    {"sun_spread", MEMBER_FLAG, FIELD(sun_spread), 0, 0, NULL, 0},
+    {"dark", MEMBER_FLAG, FIELD(dark), 0, 0, NULL, 0}};
 
 static bool read_text(parser *p, char *to) {
     json_slice text;
@@ -83,8 +91,8 @@ static bool read_flag(parser *p, bool *to) {
     return json_read_boolean(&p->r, to) || parser_fault(p);
 }
 
-/* The members of a SKY that are objects hold numbers alone. */
-static bool read_inside(parser *p, const member *of, sky_request *sky) {
+/* The members of a SKY that are objects hold numbers alone; offsets are those in `to`. */
+static bool read_inside(parser *p, const member *of, void *to) {
     const char *names[3];
     unsigned seen = 0;
     size_t which;
@@ -95,7 +103,7 @@ static bool read_inside(parser *p, const member *of, sky_request *sky) {
     if (!json_enter_object(&p->r)) return parser_fault(p);
     while (parser_next_member(p, &key)) {
         if (!parser_known_member(p, &key, names, of->n_inside, &seen, &which)) return false;
-        if (!read_number(p, &of->inside[which], (double *)(void *)((char *)sky + of->inside[which].offset)))
+        if (!read_number(p, &of->inside[which], (double *)(void *)((char *)to + of->inside[which].offset)))
             return false;
         p->pointer_length = mark;
     }
@@ -110,6 +118,12 @@ static bool has(unsigned seen, int which) {
     return (seen & 1u << which) != 0;
 }
 
+static bool check_year(parser *p, double year) {
+    return year == floor(year) ||
+           parser_refuse(p, PROBLEM_BAD_VALUE, "%s: year = %.10g, must be a whole number", parser_here(p),
+                         year);
+}
+
 /* Checks which members stand together; the sources know what each of them needs. */
 static bool check_members(parser *p, unsigned seen, bool by_weather, sky_request *sky) {
     const int sources = has(seen, NAME) + has(seen, DIFFUSE) + (has(seen, WEATHER) && by_weather);
@@ -121,10 +135,12 @@ static bool check_members(parser *p, unsigned seen, bool by_weather, sky_request
         int member;
         unsigned sources; /* that it goes with */
     } goes[] = {{DIRECT, 1u << SKY_BY_LIGHT},
+                {DIRECT_HORIZONTAL, 1u << SKY_BY_LIGHT},
                 {DEW_POINT, 1u << SKY_BY_LIGHT},
                 {LUX_OUTSIDE, 1u << SKY_BY_NAME | 1u << SKY_BY_LIGHT},
                 {SUN, 1u << SKY_BY_NAME | 1u << SKY_BY_LIGHT},
                 {PLACE, 1u << SKY_BY_NAME | 1u << SKY_BY_LIGHT},
+                {YEAR, 1u << SKY_BY_NAME | 1u << SKY_BY_LIGHT},
                 {GAPS, 1u << SKY_BY_WEATHER}};
     for (size_t k = 0; k < sizeof goes / sizeof goes[0]; k++)
         if (has(seen, goes[k].member) && (goes[k].sources & 1u << sky->source) == 0)
@@ -134,6 +150,13 @@ static bool check_members(parser *p, unsigned seen, bool by_weather, sky_request
                                              : has(seen, DIFFUSE) ? DIFFUSE
                                                                   : WEATHER]
                                      .name);
+    if (has(seen, DIRECT) && has(seen, DIRECT_HORIZONTAL))
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                             "%s holds both direct and direct_horizontal, must hold one of them",
+                             parser_here(p));
+    if (has(seen, YEAR) && !has(seen, PLACE))
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s: year goes with place", parser_here(p));
+    if (has(seen, YEAR) && !check_year(p, sky->year)) return false;
     if (has(seen, DATE) && has(seen, HOUR))
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s holds both date and hour, must hold one of them",
                              parser_here(p));
@@ -151,9 +174,13 @@ static bool read_sky(parser *p, sky_request *sky) {
     bool by_weather = false;
     const size_t mark = p->pointer_length;
     *sky = (sky_request){.sun_in_tiles = true, .photometric = p->scene->lights == LIGHT_PHOTOMETRIC};
-    double *const numbers[] = {&sky->direct,  &sky->diffuse,  &sky->dew_point, &sky->lux_outside,
-                               &sky->azimuth, &sky->altitude, &sky->latitude,  &sky->longitude,
-                               &sky->zone,    &sky->hour,     &sky->north};
+    double *const numbers[] = {&sky->direct,      &sky->direct_horizontal,
+                               &sky->diffuse,     &sky->dew_point,
+                               &sky->lux_outside, &sky->azimuth,
+                               &sky->altitude,    &sky->latitude,
+                               &sky->longitude,   &sky->zone,
+                               &sky->hour,        &sky->north,
+                               &sky->year};
     for (size_t k = 0; k < sizeof numbers / sizeof numbers[0]; k++) *numbers[k] = NAN;
     for (size_t k = 0; k < SKY_MEMBERS; k++) names[k] = sky_members[k].name;
     if (json_peek(&p->r) == JSON_TEXT) return read_text(p, sky->name);
@@ -213,4 +240,104 @@ bool codec_read_skies_json(const codec_scene *scene, const char *text, size_t le
                            size_t *n_skies, problem *why) {
     parser p;
     return parser_end(&p, parser_begin(&p, scene, text, length, NULL, why) && read_body(&p, skies, n_skies));
+}
+
+#define SUN_FIELD(field) offsetof(sun_request, field)
+static const member sun_place_members[] = {
+    {"latitude", MEMBER_NUMBER, SUN_FIELD(latitude), -90, 90, NULL, 0},
+    {"longitude", MEMBER_NUMBER, SUN_FIELD(longitude), -180, 180, NULL, 0},
+    {"zone", MEMBER_NUMBER, SUN_FIELD(zone), -14, 14, NULL, 0}};
+
+static bool read_hours(parser *p, sun_request *out) {
+    static const member hour = {"hours", MEMBER_NUMBER, 0, 0, 8760, NULL, 0};
+    const size_t mark = p->pointer_length;
+    if (!parser_expect(p, JSON_ARRAY, "an array of hours of a year")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    while (json_next_element(&p->r)) {
+        if (out->n_hours == SUN_REQUEST_MOST)
+            return parser_refuse(p, PROBLEM_TOO_MUCH, "%s holds more than %d hours", parser_here(p),
+                                 SUN_REQUEST_MOST);
+        parser_point_index(p, out->n_hours);
+        if (!read_number(p, &hour, &out->hours[out->n_hours])) return false;
+        out->n_hours++;
+        p->pointer_length = mark;
+    }
+    return parser_closed(p);
+}
+
+static bool read_sun_body(parser *p, sun_request *out) {
+    enum { AT_PLACE, AT_HOURS, AT_YEAR, SUN_BODY };
+    static const char *const names[] = {[AT_PLACE] = "place", [AT_HOURS] = "hours", [AT_YEAR] = "year"};
+    static const member place = {"place", MEMBER_OBJECT, 0, 0, 0, sun_place_members, 3};
+    unsigned seen = 0;
+    size_t which;
+    json_slice key;
+    if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        if (!parser_known_member(p, &key, names, SUN_BODY, &seen, &which)) return false;
+        if (!(which == AT_PLACE ? read_inside(p, &place, out)
+              : which == AT_HOURS
+                  ? read_hours(p, out)
+                  : read_number(p, &sky_members[YEAR], &out->year) && check_year(p, out->year)))
+            return false;
+        p->pointer_length = 0;
+    }
+    if (p->why->status != 0) return false;
+    if (!json_finish(&p->r)) return parser_fault(p);
+    return (has(seen, AT_PLACE) && has(seen, AT_HOURS)) ||
+           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body must hold place and hours");
+}
+
+bool codec_read_sun_json(const codec_scene *scene, const char *text, size_t length, sun_request *out,
+                         problem *why) {
+    parser p;
+    *out = (sun_request){.year = 2001, .hours = out->hours};
+    return parser_end(&p, parser_begin(&p, scene, text, length, NULL, why) && read_sun_body(&p, out));
+}
+
+static bool read_weather_text(parser *p, weather_request *out) {
+    json_slice text;
+    if (!parser_expect(p, JSON_TEXT, "the text of a weather file")) return false;
+    if (!json_read_text(&p->r, &text)) return parser_fault(p);
+    if (text.length == 0) return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s is empty", parser_here(p));
+    out->text = malloc(text.length);
+    if (out->text == NULL)
+        return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a text of %zu bytes",
+                           text.length);
+    memcpy(out->text, text.bytes, text.length);
+    out->length = text.length;
+    return true;
+}
+
+static bool read_weather_body(parser *p, bool beside, weather_request *out) {
+    enum { AT_GAPS, AT_TEXT, WEATHER_BODY };
+    static const char *const names[] = {[AT_GAPS] = "gaps", [AT_TEXT] = "text"};
+    unsigned seen = 0;
+    size_t which;
+    json_slice key;
+    if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        if (!parser_known_member(p, &key, names, WEATHER_BODY - beside, &seen, &which)) return false;
+        if (!(which == AT_TEXT ? read_weather_text(p, out) : read_text(p, out->gaps))) return false;
+        p->pointer_length = 0;
+    }
+    if (p->why->status != 0) return false;
+    if (!json_finish(&p->r)) return parser_fault(p);
+    return beside || has(seen, AT_TEXT) ||
+           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body lacks text, that of a weather file");
+}
+
+bool codec_read_weather_json(const codec_scene *scene, bool beside, const char *body, size_t length,
+                             weather_request *out, problem *why) {
+    parser p;
+    *out = (weather_request){.text = NULL};
+    const bool good = parser_end(&p, parser_begin(&p, scene, body, length, NULL, why) &&
+                                         read_weather_body(&p, beside, out));
+    if (!good) {
+        free(out->text);
+        out->text = NULL;
+    }
+    return good;
 }

@@ -101,25 +101,36 @@ static void scale(double factor, size_t n, double *L, year_sun *sun, sky_horizon
     horizontal->direct *= factor;
 }
 
+/* The light of a sky that has a sun; none by a sun below the horizon, whose own skies are dark too. */
+static light light_of(const named_sky *k, const sun_position *at) {
+    const bool up = at->direction[2] > 0;
+    if (k->model == SKY_GIVEN) return (light){.direct = up ? k->direct : 0, .diffuse = k->diffuse};
+    if (!up) return (light){.direct = 0};
+    return k->model == SKY_CLEAR ? clear_light(at) : turbid_light(at, k->turbidity);
+}
+
+bool named_sky_is_dark(const named_sky *k, const sun_position *at) {
+    if (!named_sky_needs_sun(k)) return false;
+    const light of = light_of(k, at);
+    return !(of.direct > 0 || of.diffuse > 0);
+}
+
 lam_status named_sky_make(const named_sky *k, const sun_position *at, const sky_tiling *s, bool sun_in_tiles,
                           double *L, year_sun *sun, sky_horizontal *horizontal, lam_error *error) {
     *sun = (year_sun){.normal = 0};
-    *horizontal = (sky_horizontal){.direct = 0};
+    *horizontal = (sky_horizontal){.clearness = NAN, .brightness = NAN};
     if (!named_sky_needs_sun(k)) {
         horizontal->diffuse = k->lux_outside > 0 ? k->lux_outside : SKY_LUX_OUTSIDE;
         fill_plain(s, k->model == SKY_OVERCAST, horizontal->diffuse, L);
         return LAM_OK;
     }
     const double up = at->direction[2];
-    light of = {.direct = k->direct, .diffuse = k->diffuse};
+    const light of = light_of(k, at);
     if (up <= 0 && k->model != SKY_GIVEN)
         return status_fail(error, LAM_ERR_ARGUMENT,
                            "the sky is dark: the sun is %.1f degrees below the horizon",
                            -at->altitude * 180 / M_PI);
-    if (k->model == SKY_CLEAR) of = clear_light(at);
-    if (k->model == SKY_TURBID) of = turbid_light(at, k->turbidity);
-    if (up <= 0) of.direct = 0;
-    if (!(of.direct > 0 || of.diffuse > 0))
+    if (named_sky_is_dark(k, at))
         return status_fail(error, LAM_ERR_ARGUMENT,
                            "the sky is dark: it has no diffuse light, and no sun above the horizon");
     const perez_sky p = perez_sky_of(at, of.direct, of.diffuse);
@@ -127,6 +138,10 @@ lam_status named_sky_make(const named_sky *k, const sun_position *at, const sky_
     const double water = perez_water(k->dew_point);
     horizontal->diffuse = of.diffuse * (lux ? perez_diffuse_efficacy(&p, water) : 1);
     horizontal->direct = of.direct * fmax(up, 0) * (lux ? perez_direct_efficacy(&p, water) : 1);
+    if (k->model != SKY_CLEAR) {
+        horizontal->clearness = p.clearness;
+        horizontal->brightness = p.brightness;
+    }
     for (size_t t = 0; t < s->n_tiles; t++) L[t] = 0;
     const perez_sky cie = cie_clear();
     if (horizontal->diffuse > 0)

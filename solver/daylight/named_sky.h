@@ -39,9 +39,15 @@ bool named_sky_needs_sun(const named_sky *k);
 /* True where the result is in lx and cd/m2. */
 bool named_sky_is_photometric(const named_sky *k);
 
-/* Irradiance of a horizontal plane by the sky and by the sun, W/m2 or lx. */
+/* True where the sky has no light: no diffuse light, and no sun above the horizon. `at` is not read where the
+ * sky needs no sun. */
+bool named_sky_is_dark(const named_sky *k, const sun_position *at);
+
+/* Irradiance of a horizontal plane by the sky and by the sun, W/m2 or lx; and of a sky whose distribution is
+ * that of Perez, its clearness (infinite without diffuse light) and its brightness: NAN of others. */
 typedef struct sky_horizontal {
     double diffuse, direct;
+    double clearness, brightness;
 } sky_horizontal;
 
 /* Sets L [n_tiles], W/(m2 sr) or cd/m2, and the sun, which is in its tile too where sun_in_tiles says so.

@@ -57,6 +57,26 @@ void year_add_sun(const sky_tiling *s, const double sun[3], double horizontal, d
     L[tile] += horizontal / s->tiles[tile].cosine;
 }
 
+/* 1 in the direction of the sun, less by the angle to the middle of the tile, 0 from `reach` on. */
+static double spread_weight(const sky_tiling *s, const sky_tile *tile, const double sun[3], double reach) {
+    double cosine = 0;
+    for (int d = 0; d < 3; d++) cosine += tile->centre[s->axis[d]] * (double)s->sign[d] * sun[d];
+    return fmax(1 - acos(fmin(fmax(cosine, -1), 1)) / reach, 0);
+}
+
+void year_spread_sun(const sky_tiling *s, const double sun[3], double horizontal, double *L) {
+    const double reach = 1.5 * sqrt(s->tiles[year_sun_tile(s, sun)].solid_angle);
+    double received = 0;
+    for (size_t t = 0; t < s->n_tiles; t++)
+        received += spread_weight(s, &s->tiles[t], sun, reach) * s->tiles[t].cosine;
+    if (!(received > 0)) {
+        year_add_sun(s, sun, horizontal, L);
+        return;
+    }
+    for (size_t t = 0; t < s->n_tiles; t++)
+        L[t] += spread_weight(s, &s->tiles[t], sun, reach) * horizontal / received;
+}
+
 /* One hour: L [n_tiles]. */
 static void make_hour(const weather *w, const weather_hour *h, const sky_tiling *s,
                       const year_options *options, double *L, year_sun *seen, year_summary *sum) {

@@ -22,6 +22,10 @@ size_t year_sun_tile(const sky_tiling *s, const double sun[3]);
  * a high one. The error matters for walls under a low sun and coarse tiles. */
 void year_add_sun(const sky_tiling *s, const double sun[3], double horizontal, double *L);
 
+/* The same light over the tiles whose middles are within a tile and a half of the sun, by their distance, so
+ * that a sun that moves brightens no tile in a step. O(n_tiles). */
+void year_spread_sun(const sky_tiling *s, const double sun[3], double horizontal, double *L);
+
 /* Sums over the rows of a year, on a horizontal plane, W/m2: times the step of the rows they are Wh/m2. */
 typedef struct year_summary {
     double direct, diffuse;

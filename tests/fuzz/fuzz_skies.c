@@ -1,4 +1,4 @@
-/* Requests for skies as a client may send them. */
+/* Requests for skies, for the sun and for rows of weather as a client may send them. */
 #include "fuzz/fuzz.h"
 #include "solver/codec/sky_request.h"
 
@@ -17,6 +17,21 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         fuzz_check_problem(&why);
     }
     free(skies);
+    problem why_sun = {0}, why_weather = {0};
+    sun_request sun = {.hours = malloc(SUN_REQUEST_MOST * sizeof *sun.hours)};
+    weather_request weather;
+    if (sun.hours != NULL && codec_read_sun_json(&scene, text, size, &sun, &why_sun)) {
+        FUZZ_CHECK(sun.n_hours <= SUN_REQUEST_MOST && sun.year >= 1900 && sun.year <= 2100);
+        for (size_t k = 0; k < sun.n_hours; k++) FUZZ_CHECK(sun.hours[k] >= 0 && sun.hours[k] <= 8760);
+    } else if (sun.hours != NULL) {
+        fuzz_check_problem(&why_sun);
+    }
+    if (codec_read_weather_json(&scene, false, text, size, &weather, &why_weather))
+        FUZZ_CHECK(weather.text != NULL && weather.length > 0 && weather.length <= size);
+    else
+        fuzz_check_problem(&why_weather);
+    free(weather.text);
+    free(sun.hours);
     free(text);
     return 0;
 }

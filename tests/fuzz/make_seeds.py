@@ -40,6 +40,8 @@ for k, sky in enumerate(["even", {"name": "clear", "place": {"latitude": 1, "lon
                          {"weather": True, "hour": 4380.5, "gaps": "fill", "photometric": True, "sun_in_tiles": False}]):
     (folder / "skies" / f"{k}").write_text(json.dumps({"sky": sky}))
     (folder / "skies" / f"many{k}").write_text(json.dumps({"skies": [sky, sky]}))
+(folder / "skies" / "sun").write_text('{"place":{"latitude":1,"longitude":2,"zone":3},"hours":[0,12.5,8760],"year":1999}')
+(folder / "skies" / "weather").write_text('{"gaps":"fill","text":"place x\\nlatitude 1\\n"}')
 wea = ("place x\nlatitude 37.5\nlongitude 122\ntime_zone 120\nsite_elevation 2\nweather_data_file_units 1\n"
        + "".join(f"6 {day} {hour}.5 {9999 if hour == 12 else 100} 50\n" for day in (20, 22, 21) for hour in range(24)))
 epw = ("LOCATION,x,XX,USA,TMY3,0,37.5,-122,-8,2\nDESIGN CONDITIONS,0\nTYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0\n"

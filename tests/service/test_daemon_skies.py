@@ -97,6 +97,54 @@ class Skies(unittest.TestCase):
         answer = self.daemon.radiosity("box", {"emissions": [{"sky": one["sky"]} for one in told]})
         self.assertEqual(answer.status, 200)
 
+    def test_the_sun_apart(self):
+        cosine = np.array(self.daemon.get("/v1/scenes/box/sky").json()["cosine"])
+        given = {"direct": 800, "diffuse": 100, "sun": {"azimuth": 190, "altitude": 33}}
+        whole, alone, spread, apart = self.skies({"skies": [given, {**given, "sun_in_tiles": False}, {**given, "sun_spread": True},
+                                                            {**given, "sun_spread": True, "sun_in_tiles": False}]})
+        for with_sun, without in ((whole, alone), (spread, apart)):
+            tiles, radiance = without["sun"]["tiles"], np.array(without["sun"]["radiance"])
+            self.assertEqual((with_sun["sun"]["tiles"], with_sun["sun"]["radiance"]), (tiles, list(radiance)))
+            sky = np.array(without["sky"])
+            sky[tiles] += radiance
+            np.testing.assert_allclose(sky, with_sun["sky"], rtol=1e-6)
+            self.assertAlmostEqual(float(radiance @ cosine[tiles]), whole["direct"], delta=1e-4 * whole["direct"])
+        self.assertEqual(alone["sky"], apart["sky"])
+        self.assertEqual(len(alone["sun"]["tiles"]), 1)
+        self.assertIn(alone["sun"]["tiles"][0], apart["sun"]["tiles"])
+        self.assertGreater(len(apart["sun"]["tiles"]), 3)
+        # Figures of Perez, eq. 1 and 2.
+        cube = 1.041 * math.radians(57) ** 3
+        self.assertAlmostEqual(whole["clearness"], (9 + cube) / (1 + cube), delta=1e-9)
+        self.assertTrue(.05 < whole["brightness"] < .3)
+        blue, plain = self.skies({"skies": [{**given, "diffuse": 0}, "even"]})
+        self.assertEqual((blue["clearness"], plain["clearness"], plain["brightness"]), (None, None, None))
+        self.assertGreater(blue["brightness"], 0)
+        # Light on a horizontal plane is that over the sine of the altitude, within what reaches the earth.
+        flat, low = self.skies({"skies": [{"diffuse": 100, "direct_horizontal": 300, "sun": given["sun"]},
+                                          {"diffuse": 100, "direct_horizontal": 300, "sun": {"azimuth": 0, "altitude": 1}}]})
+        self.assertAlmostEqual(flat["direct"], 300, delta=1e-9 * 300)
+        self.assertAlmostEqual(low["sun"]["normal"], 1367, delta=1e-6)
+
+    def test_dark_skies_are_answered_where_they_may_be(self):
+        night = {"place": PLACE, "date": "21 Jun 0:30", "dark": True}
+        told = self.skies({"skies": [{"name": "clear", **night}, {"name": "turbidity:3", **night}, {"diffuse": 0, "direct": 700, **night},
+                                     {"weather": True, "date": "21 Jun 1:30", "dark": True}, {"name": "clear", **night, "date": "21 Jun 12:00"}]})
+        for one in told[:4]:
+            self.assertEqual((max(one["sky"]), one["diffuse"], one["direct"], one["sun"]["normal"], one["sun"]["tiles"]), (0, 0, 0, 0, []))
+            self.assertLess(one["sun"]["altitude"], 0)
+        self.assertGreater(told[4]["direct"], 500)
+        del night["dark"]
+        self.assertEqual(self.ask({"skies": ["even", {"name": "clear", **night}]}).status, 422)
+
+    def test_the_year_of_the_sun(self):
+        for year in (1999, 2040):
+            one = self.skies({"sky": {"name": "clear", "place": PLACE, "year": year, "date": "21 Mar 9:00"}})[0]
+            np.testing.assert_allclose(one["sun"]["direction"], sun(year, 3, 21, 9, (52.5, 13.4, 1)), atol=3e-4)
+        # Equinoxes wander by a quarter of a day each year: .25 * .4 degrees.
+        a, b = self.skies({"skies": [{"name": "clear", "place": PLACE, "year": y, "date": "21 Mar 12:00"} for y in (2000, 2003)]})
+        self.assertTrue(.2 < a["sun"]["altitude"] - b["sun"]["altitude"] < .4)
+
     def test_weather(self):
         every = self.by_program(self.folder / "box.wea")
         told = self.skies({"skies": [{"weather": True, "date": f"21 Jun {hour}:30"} for hour in (8, 12, 17)]})
@@ -136,6 +184,13 @@ class Skies(unittest.TestCase):
                 ("gaps must be refuse, fill or skip", {"weather": True, **noon, "gaps": "x"}),
                 ("leave out sun, place", {"name": "even", "north": 3}),
                 ("one way only", {"name": "clear", "sun": {"azimuth": 0, "altitude": 5}, **noon}),
+                ("both direct and direct_horizontal", {"diffuse": 1, "direct": 1, "direct_horizontal": 1}),
+                ("direct_horizontal does not go with name", {"name": "even", "direct_horizontal": 1}),
+                ("year goes with place", {"diffuse": 1, "year": 2000}),
+                ("year does not go with weather", {"weather": True, **noon, "year": 2000}),
+                ("sky/year = 1899, must be from 1900", {"diffuse": 1, "place": PLACE, **noon, "year": 1899}),
+                ("year = 2000.5, must be a whole", {"diffuse": 1, "place": PLACE, **noon, "year": 2000.5}),
+                ("must be true or false", {"diffuse": 1, "dark": 1}),
                 ("sky/lux_outside = 0, must be from", {"name": "even", "lux_outside": 0}),
                 ("sky/clouds is not a member", {"name": "even", "clouds": 1}),
                 ("must be true or false", {"name": "even", "photometric": 1}),

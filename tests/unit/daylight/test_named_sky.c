@@ -216,6 +216,78 @@ START_TEST(moments) {
 }
 END_TEST
 
+/* The sun over tiles near it gives a horizontal plane the same light, nearest tiles are brightest, tiles
+ * beyond a tile and a half have none, and a sun that moves changes no tile by more than its way. */
+START_TEST(spread) {
+    static const char *const tilings[] = {"tregenza", "reinhart:4", "grid:7x5", "grid:1x1", "grid:360x3"};
+    for (size_t n = 0; n < sizeof tilings / sizeof tilings[0]; n++)
+        for (char up = 'x'; up <= 'z'; up++) {
+            sky_tiling s = {0};
+            lam_error error = {0};
+            ck_assert_int_eq(sky_tiling_create(tilings[n], up, &s, &error), LAM_OK);
+            double *L = calloc(2 * s.n_tiles, sizeof *L), *next = L + s.n_tiles;
+            for (int k = 0; k < 90; k++) {
+                const sun_position sun = sun_of_angles(37 * k, k + .5), moved = sun_of_angles(37 * k, k + .4);
+                memset(L, 0, 2 * s.n_tiles * sizeof *L);
+                year_spread_sun(&s, sun.direction, 800, L);
+                year_spread_sun(&s, moved.direction, 800, next);
+                ck_assert_double_eq_tol(received(&s, L), 800, 1e-9 * 800);
+                const double reach = 1.5 * sqrt(s.tiles[year_sun_tile(&s, sun.direction)].solid_angle);
+                size_t lit = 0;
+                for (size_t t = 0; t < s.n_tiles; t++) {
+                    double c = 0;
+                    for (int d = 0; d < 3; d++)
+                        c += s.tiles[t].centre[s.axis[d]] * (double)s.sign[d] * sun.direction[d];
+                    ck_assert(L[t] >= 0);
+                    lit += L[t] > 0;
+                    if (n < 2) ck_assert_int_eq(L[t] > 0, acos(fmin(c, 1)) < reach);
+                    /* A tenth of the light at most leaves a tile within a tenth of a degree. */
+                    if (n == 0) ck_assert_double_le(fabs(next[t] - L[t]), .1 * 800 / s.tiles[t].cosine);
+                }
+                ck_assert(lit >= 1);
+            }
+            free(L);
+            sky_tiling_free(&s);
+        }
+}
+END_TEST
+
+/* Clearness and brightness are told of skies by Perez alone; a sky is dark exactly where it cannot be made.
+ */
+START_TEST(perez_figures_and_darkness) {
+    sky_tiling s = tiles_of("tregenza");
+    double L[145];
+    lam_error error = {0};
+    year_sun sun;
+    sky_horizontal of;
+    const sun_position suns[] = {sun_of_angles(90, 30), sun_of_angles(90, 0), sun_of_angles(90, -.5)};
+    const named_sky skies[] = {parsed("even"),
+                               parsed("clear"),
+                               parsed("turbidity:3"),
+                               {.model = SKY_GIVEN, .direct = 800, .diffuse = 100, .dew_point = NAN},
+                               {.model = SKY_GIVEN, .direct = 800, .dew_point = NAN},
+                               {.model = SKY_GIVEN, .diffuse = 100, .dew_point = NAN},
+                               {.model = SKY_GIVEN, .dew_point = NAN}};
+    size_t n_dark = 0;
+    for (size_t k = 0; k < sizeof skies / sizeof skies[0]; k++)
+        for (size_t i = 0; i < 3; i++) {
+            const bool made = named_sky_make(&skies[k], &suns[i], &s, true, L, &sun, &of, &error) == LAM_OK;
+            ck_assert_int_eq(made, !named_sky_is_dark(&skies[k], &suns[i]));
+            n_dark += !made;
+            if (made) ck_assert_int_eq(isnan(of.clearness), k < 2);
+            if (made) ck_assert_int_eq(isnan(of.brightness), k < 2);
+        }
+    ck_assert_uint_eq(n_dark, 2 + 2 + 2 + 3);
+    /* epsilon = ((D + I) / D + 1.041 Z^3) / (1 + 1.041 Z^3), Z = pi/3; infinite without diffuse light. */
+    ck_assert_int_eq(named_sky_make(&skies[3], &suns[0], &s, true, L, &sun, &of, &error), LAM_OK);
+    const double cube = 1.041 * pow(M_PI / 3, 3);
+    ck_assert_double_eq_tol(of.clearness, (9 + cube) / (1 + cube), 1e-9);
+    ck_assert_int_eq(named_sky_make(&skies[4], &suns[0], &s, true, L, &sun, &of, &error), LAM_OK);
+    ck_assert(isinf(of.clearness) && of.brightness > 0);
+    sky_tiling_free(&s);
+}
+END_TEST
+
 int main(void) {
     Suite *s = suite_create("named_sky");
     TCase *c = tcase_create("all");
@@ -225,6 +297,8 @@ int main(void) {
     tcase_add_test(c, clear_shape);
     tcase_add_test(c, turbid_values);
     tcase_add_test(c, dark_and_given);
+    tcase_add_test(c, spread);
+    tcase_add_test(c, perez_figures_and_darkness);
     tcase_add_test(c, turned);
     tcase_add_test(c, moments);
     suite_add_tcase(s, c);
