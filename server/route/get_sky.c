@@ -1,4 +1,4 @@
-/* GET /v1/scenes/NAME/sky: the tiles of the sky of a store, which pages make skies for.
+/* GET /v1/scenes/NAME/sky: where the tiles of the sky of a store are.
  * GET /v1/scenes/NAME/weather: the weather file beside the store, as it is. */
 #include "server/route/kept_answer.h"
 

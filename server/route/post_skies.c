@@ -181,7 +181,8 @@ static bool add_sky(making *m, const sky_request *sky, size_t k, buffer *b, prob
                                       : !model_of_request(sky, k, &model, &told, why))
         return false;
     model.photometric = sky->photometric;
-    const sun_position at = sun_turned(told, isnan(sky->north) ? m->store->sky_north : sky->north);
+    const double north = isnan(sky->north) ? m->store->sky_north : sky->north;
+    const sun_position at = sun_turned(told, north);
     if (!make_sky(m, sky, k, &model, &at, &sun, &of, why)) return false;
     const bool written =
         buffer_append_text(b, k > 0 ? ",{\"sky\":" : "{\"sky\":") &&
@@ -190,7 +191,8 @@ static bool add_sky(making *m, const sky_request *sky, size_t k, buffer *b, prob
         json_write_double(b, of.diffuse) && buffer_append_text(b, ",\"direct\":") &&
         json_write_double(b, of.direct) && buffer_append_text(b, ",\"clearness\":") &&
         json_write_double(b, of.clearness) && buffer_append_text(b, ",\"brightness\":") &&
-        json_write_double(b, of.brightness) &&
+        json_write_double(b, of.brightness) && buffer_append_text(b, ",\"north\":") &&
+        json_write_double(b, north) &&
         (named_sky_needs_sun(&model) ? write_sun(m, b, &told, &sun)
                                      : buffer_append_text(b, ",\"sun\":null")) &&
         buffer_append_text(b, "}");

@@ -1,4 +1,4 @@
-/* The places of the tiles of a store's sky, as /sky/tiles states them, for pages that make skies. Knows no
+/* The places of the tiles of a store's sky, as /sky/tiles states them, for clients that draw skies. Knows no
  * tiling by name and no sky. */
 #ifndef LAMBERT_SERVER_SCENE_TILE_PLACES_H
 #define LAMBERT_SERVER_SCENE_TILE_PLACES_H

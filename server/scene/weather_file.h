@@ -1,5 +1,5 @@
-/* The weather beside a store: NAME.epw or NAME.wea beside NAME.h5, as text, for pages that make skies of it.
- * Reads its beginning only: whether it is sound, pages find out. */
+/* The weather beside a store: NAME.epw or NAME.wea beside NAME.h5, as text. Reads its beginning only: a route
+ * that needs its rows finds out whether it is sound. */
 #ifndef LAMBERT_SERVER_SCENE_WEATHER_FILE_H
 #define LAMBERT_SERVER_SCENE_WEATHER_FILE_H
 

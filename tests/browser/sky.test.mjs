@@ -8,7 +8,7 @@ import { epw, HOURS, LATITUDE, LONGITUDE, rowsOf, wea, ZONE } from "./weather.mj
 
 let daemon, dayOf;
 before(async () => {
-    ({ dayOf } = await sourceOf("daylight/sun"));
+    ({ dayOf } = await sourceOf("daylight/dates"));
     const patio = makeStore("patio", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "reinhart:2"] });
     writeFileSync(inFolder("patio.epw"), epw());
     const yard = makeStore("yard", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "tregenza"] });
@@ -126,11 +126,11 @@ test("the sun itself is the daemon's, by rays", async () => {
     const { emission: { sun, groups }, scale } = await page.evaluate(() => window.lambert.ask.wanted());
     // The daemon's own sky of this light, and its sun.
     const place = { latitude: 40, longitude: 0, zone: 0 };
-    const { skies: [own] } = await daemon.json("/v1/scenes/yard/skies", { sky: { diffuse: 100, direct: 700, place, date: "21 Mar 10:00", north: 0, sun_in_tiles: false } });
+    const { skies: [own] } = await daemon.json("/v1/scenes/yard/skies", { sky: { diffuse: 100, direct: 700, place, date: "21 Mar 10:00", sun_in_tiles: false } });
     assert.ok(Math.abs(sun.azimuth - own.sun.azimuth) < 1e-3 && Math.abs(sun.altitude - own.sun.altitude) < 1e-3, JSON.stringify([sun, own.sun]));
     const channels = await page.evaluate(() => window.lambert.scene.now.description.channels);
     assert.ok([sun.direct].flat().every((v) => Math.abs(v * scale - 700) < 1e-6 * 700));
-    const emission = { sky: own.sky, sun: { azimuth: own.sun.azimuth, altitude: own.sun.altitude, north: 0, direct: own.sun.normal } };
+    const emission = { sky: own.sky, sun: { azimuth: own.sun.azimuth, altitude: own.sun.altitude, direct: own.sun.normal } };
     if (groups !== undefined) emission.groups = Object.fromEntries(Object.entries(groups).map(([name, v]) => [name, Array.isArray(v) ? v.map((x) => x * scale) : v * scale]));
     const { radiosity } = await daemon.json("/v1/scenes/yard/radiosity", { emission });
     const wanted = channels === 1 ? [radiosity] : radiosity;
@@ -205,24 +205,30 @@ test("a day goes by, by keys too, and stands still for those who ask for it", as
     await page.context().close();
 });
 
-test("a weather file that is picked stays on the page", async () => {
+test("a weather file that is picked is read by the daemon, once, and its hours are skies", async () => {
     const page = await openScene("yard", { width: 360, height: 740 });
     await page.getByRole("tab", { name: "Sky" }).click();
-    const sent = [];
+    const sent = [], before = await skyNow(page);
     page.on("request", (request) => sent.push([request.method(), new URL(request.url()).pathname, request.postData() ?? ""]));
     writeFileSync(inFolder("bad.wea"), wea().replace("latitude 37.5", "latitude 375"));
     await page.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("bad.wea"));
-    await page.getByText("line 2: latitude is \"375\", must be a number from -90 to 90").waitFor();
+    await page.getByText("bad.wea is not taken: weather.wea: line 2: latitude = 375, must be from -90 to 90.").waitFor();
+    writeFileSync(inFolder("photo.wea"), Buffer.from([0xff, 0xd8, 0, 1, 2]));
+    await page.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("photo.wea"));
+    await page.getByText("photo.wea is not taken: text is neither an EPW nor a WEA").waitFor();
+    assert.deepEqual(await skyNow(page), before);
     writeFileSync(inFolder("good.wea"), wea());
     await page.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("good.wea"));
     await page.getByText("Somewhere_XX: 120 hours. A link holds the weather of the time that is shown, not the file.").waitFor();
     await settled(page);
     const sky = await skyNow(page);
     assert.deepEqual([sky.model, sky.latitude, sky.longitude, sky.zone], ["perez", LATITUDE, LONGITUDE, ZONE]);
-    assert.ok(sent.length > 0);
-    for (const [method, path, body] of sent) {
-        // The browser may ask for the icon of the page meanwhile; nothing has the file, or any hour of it.
-        assert.ok(method === "GET" ? body === "" : path.startsWith("/v1/scenes/yard/"), `${method} ${path}`);
+    // The text is sent to that route alone; an hour is sent as a sky of its light.
+    const [read, rest] = [true, false].map((is) => sent.filter(([, path]) => (path === "/v1/weather") === is));
+    assert.equal(read.length, 3);
+    assert.deepEqual(JSON.parse(read[2][2]), { text: wea() });
+    for (const [method, path, body] of rest) {
+        assert.ok(method === "GET" ? body === "" : path.startsWith("/v1/scenes/yard/") || path === "/v1/sun", `${method} ${path}`);
         assert.ok(!body.includes("Somewhere") && !body.includes("time_zone"));
     }
     // A link has the weather of its hour, so that the picture is the same elsewhere; of other hours the page says that it is missing.

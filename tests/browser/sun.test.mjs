@@ -3,7 +3,6 @@ import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
 import { Daemon, inFolder, lambert, near, openPage, pixel, pixels, settled, toSrgb, violations } from "./page.mjs";
-import { sourceOf } from "./source.mjs";
 
 const RHO = 0.5, PARTS = 20;
 
@@ -41,10 +40,8 @@ function highPlate() {
     return `mtllib plate.mtl\n${square(0, 10, 0)}${square(3, 7, HIGH)}g floor\nusemtl grey\nf 1 2 3 4\ng plate\nusemtl grey\nf 5 6 7 8\n`;
 }
 
-let daemon, daylight, state;
+let daemon;
 before(async () => {
-    daylight = { ...await sourceOf("daylight/source"), ...await sourceOf("daylight/sun") };
-    state = await sourceOf("state/state");
     writeFileSync(inFolder("plate.mtl"), `newmtl grey\nKd ${RHO} ${RHO} ${RHO}\n`);
     for (const up of Object.keys(AXES)) {
         writeFileSync(inFolder(`${up}.obj`), plateAboveFloor(up));
@@ -57,6 +54,16 @@ before(async () => {
 
 const LIGHT = { model: "given", direct: 700, diffuse: 100, factor: 1, latitude: 20, longitude: 0, zone: 0, day: 80 };
 const EXPOSURE = -10;
+
+/** The daemon's sky of this light: radiances of its tiles and of those of its sun, spread, apart; light on the ground by the sun; its direction. */
+async function skyAt(name, hour) {
+    const { latitude, longitude, zone, day, direct, diffuse } = LIGHT, place = { latitude, longitude, zone };
+    const asked = { direct, diffuse, place, hour: 24 * (day - 1) + hour, sun_in_tiles: false, sun_spread: true };
+    const { skies: [{ sky, sun, direct: horizontal }] } = await daemon.json(`/v1/scenes/${name}/skies`, { sky: asked });
+    const [azimuth, altitude] = [sun.azimuth, sun.altitude].map((angle) => (angle * Math.PI) / 180), tiles = sky.map(() => 0);
+    sun.tiles.forEach((t, k) => { tiles[t] = sun.radiance[k]; });
+    return { sky, tiles, horizontal, direction: [Math.cos(altitude) * Math.sin(azimuth), Math.cos(altitude) * Math.cos(azimuth), Math.sin(altitude)] };
+}
 
 const set = (page, view, sky) => page.evaluate(([v, s]) => {
     const { store } = window.lambert, { now } = store;
@@ -91,17 +98,15 @@ async function openFromAbove(up) {
 }
 
 for (const [up, hours] of [["z", [9.5, 12, 15]], ["y", [15]], ["x", [15]]]) test(`the sun's shadow and light are where and as they must be, ${up} up`, async () => {
-    const page = await openFromAbove(up), source = new daylight.SkySource();
-    source.take(await daemon.json(`/v1/scenes/${up}/sky`));
+    const page = await openFromAbove(up);
     await set(page, { smooth: false, tone: "linear", exposure: EXPOSURE, sharpSun: true }, { ...LIGHT, sun: "spread" });
     for (const hour of hours) {
         await set(page, {}, { hour });
         await settled(page);
-        const { sun, directHorizontal } = source.sky({ ...state.skyOff, ...LIGHT, sun: "spread", hour }, false), [east, north, height] = sun.direction;
-        assert.ok(Math.abs(directHorizontal - 700 * height) < 1e-6 * directHorizontal);
-        const { sky, sun: tiles } = source.parts({ ...state.skyOff, ...LIGHT, sun: "spread", hour }, false, 1);
+        const { sky, tiles, horizontal, direction: [east, north, height] } = await skyAt(up, hour);
+        assert.ok(Math.abs(horizontal - 700 * height) < 1e-6 * horizontal);
         const ask = async (radiances, quantity) => (await daemon.json(`/v1/scenes/${up}/radiosity`, { emission: { sky: radiances }, quantity }))[quantity].flat();
-        const [rest, further] = await Promise.all([ask([...sky], "radiosity"), ask([...tiles], "indirect")]);
+        const [rest, further] = await Promise.all([ask(sky, "radiosity"), ask(tiles, "indirect")]);
         // The shadow of the plate's corners, 4 to 6, by similar triangles; points 5 cm to either side of its edges, and the plate itself.
         const [dx, dy] = [(-2 * east) / height, (-2 * north) / height], points = [];
         for (const t of [4.3, 5, 5.8])
@@ -154,12 +159,11 @@ function shadowOf([east, north, up]) {
 const shareOfDisc = (x) => (Math.abs(x) >= 1 ? Number(x > 0) : 0.5 + (x * Math.sqrt(1 - x * x) + Math.asin(x)) / Math.PI);
 
 async function openHigh(hour) {
-    const page = await openPage(daemon.address, SMALL), source = new daylight.SkySource();
-    source.take(await daemon.json("/v1/scenes/high/sky"));
+    const page = await openPage(daemon.address, SMALL);
     await page.evaluate(() => window.lambert.ask.open("high", null));
     await set(page, { smooth: false, tone: "linear", exposure: -9, sharpSun: true }, { ...LIGHT, sun: "spread", hour });
     await settled(page);
-    return { page, sun: source.sky({ ...state.skyOff, ...LIGHT, sun: "spread", hour }, false).sun.direction };
+    return { page, sun: (await skyAt("high", hour)).direction };
 }
 
 const look = (page, eye, target) => page.evaluate((place) => {

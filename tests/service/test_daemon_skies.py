@@ -77,6 +77,7 @@ class Skies(unittest.TestCase):
         for scene, north, wanted in (("turned", {}, 40), ("turned", {"north": 10}, 10), ("turned", {"north": 0}, 0),
                                      ("box", {"north": 40}, 40)):
             got = self.skies({"sky": {"name": "clear", **day, **north}}, scene)[0]
+            self.assertEqual(got["north"], wanted)
             np.testing.assert_array_equal(np.float32(got["sky"]), self.by_program("clear", *WHERE, "--date", "21 Jun 9:00", "--north",
                 wanted)[0])
         # Where y is up, the sun stands in the axes of that scene.

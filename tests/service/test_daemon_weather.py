@@ -100,6 +100,29 @@ class Weather(unittest.TestCase):
         self.assertEqual(self.ask("/v1/scenes/box/weather", {"text": "place"}).status, 422)
         self.assertEqual(self.ask("/v1/scenes/none/weather", {}).status, 404)
 
+    def test_rows_are_skies(self):
+        """A row's light at its place and hour gives the sky of `lambert sky`, in both units, of both formats."""
+        for name, text in (("a.wea", wea(self.days)), ("flat.wea", wea(self.days, units=2)), ("a.epw", epw(self.days, periods="6/20,6/22", dew=12.5))):
+            told = self.read(text)
+            (self.folder / name).write_text(text)
+            direct = "direct_horizontal" if "direct_horizontal" in told else "direct"
+            for photometric in False, True:
+                must("sky", self.folder / name, "--tiles", "tregenza", *["--photometric"] * photometric, "-o", self.folder / "sky.npy")
+                wanted, lit = np.load(self.folder / "sky.npy"), 0
+                for first in range(0, told["rows"], 64):
+                    rows = range(first, min(first + 64, told["rows"]))
+                    asked = [{direct: told[direct][i], "diffuse": told["diffuse"][i], "year": told["year"][i], "photometric": photometric, "dark": True,
+                              "place": {key: told[key] for key in PLACE}, "hour": 24 * (170 + told["day"][i] - 20) + told["hour"][i],
+                              **({} if told["dew_point"][i] is None else {"dew_point": told["dew_point"][i]})} for i in rows]
+                    skies = self.ask("/v1/scenes/box/skies", {"skies": asked}).json()["skies"]
+                    for i, one in zip(rows, skies):
+                        # Light facing the sun is at most what reaches the earth; that on the ground is then less than the row's.
+                        if direct == "direct_horizontal" and told[direct][i] > 1300 * max(0, math.sin(math.radians(one["sun"]["altitude"]))) > 0:
+                            continue
+                        np.testing.assert_allclose(one["sky"], wanted[i], rtol=2e-5, err_msg=f"{name}, row {i}")
+                        lit += max(one["sky"]) > 0
+                self.assertGreater(lit, 15)
+
     def test_what_is_wrong_is_named_by_its_line(self):
         good = wea(self.days)
         for detail, text in (("weather.wea: line 2: latitude = 375, must be from -90 to 90", good.replace("latitude 37.5", "latitude 375")),

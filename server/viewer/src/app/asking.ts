@@ -1,15 +1,29 @@
 // Asks the daemon for the values that the state wants, for both sides of a comparison, and has the answers shown.
-import type { Api, Description } from "../daemon/api.ts";
+import type { Api, Description, Quantity } from "../daemon/api.ts";
+import type { SkyShare } from "../daylight/scene_sky.ts";
 import { Newest } from "../daemon/newest.ts";
 import { Field } from "../picture/field.ts";
 import type { Comparable } from "../state/comparable.ts";
 import { wantedFor, type Wanted } from "../state/request.ts";
+import { quantityOf, type Lighting } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
 import type { Side, Timing } from "./page.ts";
 import type { Shown } from "./shown.ts";
 
 /** An answer was of another mesh than the one that is shown. */
 export class Replaced extends Error {}
+
+/** What is to be shown of a side. Its sky may have to be asked for before it is a request. */
+interface Plan {
+    of: Description;
+    quantity: Quantity;
+    lighting: Lighting;
+}
+
+interface Answer {
+    field: Field;
+    isDark: boolean;
+}
 
 /** What becomes of requests. */
 export interface Outcome {
@@ -20,15 +34,15 @@ export interface Outcome {
 
 export class Asking {
     private timing: Timing = { roundTrip: 0, solve: null };
-    private readonly askers: readonly [Newest<Wanted, Field>, Newest<Wanted, Field>];
+    private readonly askers: readonly [Newest<Plan, Answer>, Newest<Plan, Answer>];
     private asked = ["", ""];
 
     constructor(private readonly api: Pick<Api, "radiosity">, private readonly store: Store,
         private readonly scene: Pick<Shown, "now" | "fields" | "sky" | "show" | "tell">,
         private readonly comparable: Comparable, private readonly outcome: Outcome)
     {
-        const asker = (side: Side): Newest<Wanted, Field> =>
-            new Newest((wanted) => this.solve(wanted), (field, wanted) => this.take(side, field, wanted), (reason) =>
+        const asker = (side: Side): Newest<Plan, Answer> =>
+            new Newest((plan) => this.answer(plan), (answer) => this.take(side, answer), (reason) =>
                 outcome.fail(reason));
         this.askers = [asker(0), asker(1)];
     }
@@ -38,30 +52,26 @@ export class Asking {
     }
 
     wanted(side: Side): Wanted | null {
-        const { scene: { now: scene, sky }, store: { now } } = this;
+        const plan = this.plan(side), sky = plan === null ? undefined : this.scene.sky.known(plan.lighting, plan.of);
+        return plan === null || sky === undefined ? null : wantedOf(plan, sky);
+    }
+
+    private plan(side: Side): Plan | null {
+        const { scene: { now: scene }, store: { now } } = this;
         if (scene === null || (side === 1 && now.compare === null)) return null;
-        const quantity = now.view.picture === "light" ? "radiosity" : now.view.quantity;
         const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
         const other = side === 1 ? now.compare?.scene ?? null : null,
             of = other === null ? scene.description : this.comparable.get(other);
-        if (of === undefined) return null;
-        const sun = sky.exactSun(lighting, of);
-        return wantedFor(of.name, quantity, lighting, {
-            ...abilitiesOf(of),
-            emitters: of.emitters?.length ?? 0,
-            sky: sun === null ? sky.radiances(lighting, of) : sun.sky,
-            sun: sun === null ? null : sun.sun,
-        });
+        return of === undefined ? null : { of, quantity: quantityOf(now.view), lighting };
     }
 
     /** Asks for what is to be shown, if that has changed. */
     ask(again: boolean): void {
         for (const side of [0, 1] as const) {
-            const wanted = this.wanted(side);
-            const key = wanted === null ? "" : JSON.stringify(wanted);
-            if (wanted === null || (key === this.asked[side] && !again)) continue;
+            const plan = this.plan(side), key = plan === null ? "" : this.keyOf(plan);
+            if (plan === null || (key === this.asked[side] && !again)) continue;
             this.asked[side] = key;
-            this.askers[side].want(wanted);
+            this.askers[side].want(plan);
         }
     }
 
@@ -88,11 +98,26 @@ export class Asking {
         return field;
     }
 
-    private take(side: Side, field: Field, wanted: Wanted): void {
+    /** Plans of one key have one answer. */
+    private keyOf(plan: Plan): string {
+        const { of, lighting } = plan, rest = wantedOf(plan, { sky: null, sun: null });
+        return JSON.stringify([rest, this.scene.sky.keyOf(lighting, of)]);
+    }
+
+    private async answer(plan: Plan): Promise<Answer> {
+        const { lighting, of } = plan, wanted = wantedOf(plan, await this.scene.sky.ask(lighting, of));
+        return { field: await this.solve(wanted), isDark: wanted.emission === null };
+    }
+
+    private take(side: Side, { field, isDark }: Answer): void {
         this.outcome.answered();
-        this.scene.show(side, field, wanted.emission === null);
+        this.scene.show(side, field, isDark);
         this.scene.tell("timing", this.timing);
     }
+}
+
+function wantedOf({ of, quantity, lighting }: Plan, sky: SkyShare): Wanted {
+    return wantedFor(of.name, quantity, lighting, { ...abilitiesOf(of), emitters: of.emitters?.length ?? 0, ...sky });
 }
 
 /** The channels and groups that a store takes emission of. */

@@ -2,26 +2,31 @@
 // numbers have for it. The light that the sun's own light casts further, and all other light, stay the daemon's.
 import { floatsToHalves, halfToNumber } from "../base/half.ts";
 import { Newest } from "../daemon/newest.ts";
-import type { SunParts } from "../daylight/source.ts";
+import type { Description } from "../daemon/api.ts";
+import type { SunParts } from "../daylight/sky.ts";
 import { Field } from "../picture/field.ts";
 import { turned } from "../picture/glb.ts";
 import { wantedFor, type Wanted } from "../state/request.ts";
+import type { Lighting } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
 import { abilitiesOf } from "./asking.ts";
 import type { Shown } from "./shown.ts";
 
 interface WantedSharp {
-    /** Radiosity without the sun, and what the sun's light gives further. */
-    rest: Wanted;
-    further: Wanted;
+    of: Description;
+    lighting: Lighting;
+}
+
+interface Sharp {
+    field: Field;
     parts: SunParts;
 }
 
 export class SharpSun {
     private key = "";
-    private readonly asker = new Newest<WantedSharp, Field>(
+    private readonly asker = new Newest<WantedSharp, Sharp | null>(
         (wanted) => this.sum(wanted),
-        (field, wanted) => this.show(field, wanted),
+        (sharp) => this.show(sharp),
         (reason) => {
             this.end();
             this.fail(reason);
@@ -46,7 +51,7 @@ export class SharpSun {
             if (this.scene.isSunSharp) this.end();
             return;
         }
-        const key = JSON.stringify(wanted);
+        const { lighting, of } = wanted, key = JSON.stringify([lighting, this.scene.sky.keyOf(lighting, of)]);
         if (key === this.key && !again) return;
         this.set(key);
         this.asker.want(wanted);
@@ -70,38 +75,42 @@ export class SharpSun {
         if (field !== null) stage.setField(0, field);
     }
 
-    /** Null where it is off, or the picture shows numbers: in false colour, comparisons and by a threshold. */
+    /** Null where it is off, or the picture shows numbers: in false colour, comparisons and by a threshold; and where
+     * the sky has no sun, as far as that is known. */
     private wanted(): WantedSharp | null {
         const { scene: { now: scene, sky }, store: { now: { view, lighting, compare } } } = this;
         if (scene === null || !view.sharpSun || view.picture !== "light" || view.threshold !== null || compare !== null)
             return null;
-        const { description } = scene,
-            parts = (description.emitters?.length ?? 0) > 0 ? null : sky.parts(lighting, description);
-        if (parts === null) return null;
-        const can = { ...abilitiesOf(description), emitters: 0 }, exact = sky.exactSun(lighting, description);
-        return {
-            rest: wantedFor(description.name, "radiosity", lighting, { ...can, sky: parts.sky }),
-            further: wantedFor(description.name, "indirect", { ...lighting, groups: {} }, { ...can,
-                ...(exact === null ? { sky: parts.sun } : { sky: null, sun: exact.sun }) }),
-            parts,
-        };
+        const { description: of } = scene;
+        if ((of.emitters?.length ?? 0) > 0) return null;
+        const known = sky.knownSky(lighting, of);
+        return known === undefined || (known?.parts(of.channels) ?? null) !== null ? { of, lighting } : null;
     }
 
-    private async sum({ rest, further }: WantedSharp): Promise<Field> {
+    /** Null: no sun shines. */
+    private async sum({ of, lighting }: WantedSharp): Promise<Sharp | null> {
+        const sky = await this.scene.sky.askSky(lighting, of), parts = sky?.parts(of.channels) ?? null;
+        if (sky === null || parts === null) return null;
+        const can = { ...abilitiesOf(of), emitters: 0 },
+            exact = lighting.sky.sun === "exact" ? sky.exact(of.channels) : null;
+        // Radiosity without the sun, and what the sun's light gives further.
+        const rest = wantedFor(of.name, "radiosity", lighting, { ...can, sky: parts.sky });
+        const further = wantedFor(of.name, "indirect", { ...lighting, groups: {} }, { ...can,
+            ...(exact === null ? { sky: parts.sun } : { sky: null, sun: exact.sun }) });
         const [one, other] = await Promise.all([this.solve(rest), this.solve(further)]);
         const scale = Math.max(one.scale, other.scale), sum = new Float32Array(one.bits.length);
         for (let i = 0; i < sum.length; i++)
             sum[i] = halfToNumber(one.bits[i]) * (one.scale / scale)
                 + halfToNumber(other.bits[i]) * (other.scale / scale);
-        return new Field(floatsToHalves(sum), [one.channels, one.elements], scale);
+        return { field: new Field(floatsToHalves(sum), [one.channels, one.elements], scale), parts };
     }
 
-    private show(field: Field, { parts: { direction: [east, north, up], light } }: WantedSharp): void {
+    private show(sharp: Sharp | null): void {
         const { stage, now: scene, isSunSharp } = this.scene;
+        if (sharp === null) return this.end();
+        const { field, parts: { direction, light } } = sharp;
         if (!isSunSharp || scene === null || field.elements !== scene.mesh.elements) return;
         stage.setField(0, field);
-        // The axes of stores, as solver/daylight/sky_tiles.h has them.
-        const axes = { x: [up, east, north], y: [east, up, -north], z: [east, north, up] } as const;
-        stage.setSun({ direction: turned(scene.mesh.up, axes[scene.mesh.up]), light });
+        stage.setSun({ direction: turned(scene.mesh.up, [...direction]), light });
     }
 }

@@ -1,6 +1,6 @@
 // Asks the daemon. Knows its routes and their JSON, and nothing of pictures.
-import type { SkyAnswer } from "../daylight/tiles.ts";
 import { readNpy, type Npy } from "../base/npy.ts";
+import type { Place, SkyMade, SkyRequest, SkyTiles, SunPositions, WeatherRows } from "./daylight.ts";
 
 export interface SceneLine {
     name: string;
@@ -134,13 +134,29 @@ export class Api {
         return (await answer.json()) as Description;
     }
 
-    async sky(scene: string): Promise<SkyAnswer> {
-        return (await (await this.ask(Api.path(scene, "/sky"))).json()) as SkyAnswer;
+    async sky(scene: string): Promise<SkyTiles> {
+        return (await (await this.ask(Api.path(scene, "/sky"))).json()) as SkyTiles;
     }
 
-    /** The weather file beside the store. */
-    async weather(scene: string): Promise<string> {
-        return (await this.ask(Api.path(scene, "/weather"), {}, "text/plain")).text();
+    /** Radiances of the tiles of a scene. */
+    async makeSky(scene: string, sky: SkyRequest): Promise<SkyMade> {
+        const answer = await this.post(Api.path(scene, "/skies"), { sky }, "application/json");
+        return ((await answer.json()) as { skies: SkyMade[] }).skies[0];
+    }
+
+    /** At hours of a year of 365 days. */
+    async sunPositions(place: Place, hours: readonly number[]): Promise<SunPositions> {
+        return (await (await this.post("v1/sun", { place, hours }, "application/json")).json()) as SunPositions;
+    }
+
+    /** The rows of a weather file, of which the daemon keeps nothing. */
+    async readWeather(text: string): Promise<WeatherRows> {
+        return (await (await this.post("v1/weather", { text }, "application/json")).json()) as WeatherRows;
+    }
+
+    /** Those of the weather file beside the store. */
+    async weatherBeside(scene: string): Promise<WeatherRows> {
+        return (await (await this.post(Api.path(scene, "/weather"), {}, "application/json")).json()) as WeatherRows;
     }
 
     async mesh(scene: string): Promise<ArrayBuffer> {

@@ -1,91 +1,146 @@
-// The sky of the scene that is open, from the tiles of its store and the weather beside it, and those of scenes that
-// it is compared with.
-import type { Api, Description } from "../daemon/api.ts";
+// The sky of the scene that is open, by the daemon, from the weather beside its store or a file that was picked, and
+// those of scenes that it is compared with.
+import { Problem, type Api, type Description } from "../daemon/api.ts";
+import type { SkyTiles, WeatherRows } from "../daemon/daylight.ts";
 import type { ExactSun } from "../state/request.ts";
 import type { Lighting, SkyLight } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
-import { SkySource, type SunParts } from "./source.ts";
-import type { SkyAnswer } from "./tiles.ts";
+import { placeOf } from "./request.ts";
+import type { Radiances, Sky, SunParts } from "./sky.ts";
+import { SkySource } from "./source.ts";
+
+/** What the sky of a lighting adds to an emission. */
+export interface SkyShare {
+    /** With the sun in tiles; without it where that is itself. */
+    sky: Radiances | null;
+    sun: ExactSun | null;
+}
+
+const NOTHING: SkyShare = { sky: null, sun: null };
+
+type Asked = Pick<Api, "sky" | "makeSky" | "readWeather" | "weatherBeside">;
 
 export class SceneSky {
-    readonly source = new SkySource();
+    readonly source: SkySource;
     /** What the tiles are of: another scene may be shown before its own have come. */
     private open: Description | null = null;
 
-    constructor(private readonly api: Pick<Api, "sky" | "weather">, private readonly store: Store,
+    constructor(private readonly api: Asked, private readonly store: Store,
         private readonly fail: (reason: unknown) => void)
-    {}
+    {
+        this.source = new SkySource(api);
+    }
 
     get isPhotometric(): boolean {
         return this.store.now.view.unit === "lx";
     }
 
-    /** Of the tiles of a scene; null: it has no sky, or its tiles are not known. */
-    radiances(lighting: Lighting, of: Description): readonly (number | number[])[] | null {
-        const { source } = this, isOpen = of === this.open;
-        if (of.sky === null || lighting.solo !== null || !(isOpen || source.knows(of.name))) return null;
-        return source.radiances(lighting.sky, this.isPhotometric, of.channels, isOpen ? null : of.name);
+    /** What the sky of a lighting is made by: another one is another sky. */
+    keyOf(lighting: Lighting, of: Description): string {
+        if (!this.isLit(lighting, of)) return "";
+        const { strength, factor, sun, tinted } = lighting.sky;
+        return JSON.stringify([this.source.request(lighting.sky, this.isPhotometric), strength, factor, sun, tinted]);
     }
 
-    /** The sky without its sun, and the sun itself, where the lighting wants that of the daemon and a scene has it: a
-     * store of few emitters answers the sun by its tile alone. Else null. */
-    exactSun(lighting: Lighting, of: Description): { sky: SunParts["sky"]; sun: ExactSun } | null {
-        const { source } = this, isOpen = of === this.open;
-        if (lighting.sky.sun !== "exact" || of.sky === null || lighting.solo !== null || (of.emitters?.length ?? 0) > 0)
-            return null;
-        if (!(isOpen || source.knows(of.name))) return null;
-        const parts = source.parts(lighting.sky, this.isPhotometric, of.channels, isOpen ? null : of.name);
-        if (parts === null) return null;
-        const [east, north, up] = parts.direction, degrees = 180 / Math.PI;
-        return { sky: parts.sky, sun: {
-            azimuth: Math.atan2(east, north) * degrees,
-            altitude: Math.atan2(up, Math.hypot(east, north)) * degrees,
-            direct: of.channels === 3 ? parts.light : parts.light[0],
-        } };
+    /** What a scene's sky adds to the emission, where it is known; undefined: it is to be asked for. */
+    known(lighting: Lighting, of: Description): SkyShare | undefined {
+        const sky = this.knownSky(lighting, of);
+        return sky === undefined ? undefined : shareOf(sky, lighting, of);
     }
 
-    /** The sky and its sun apart, of the scene that is open. Null: no sun shines. */
+    /** The same, asked for where it has to be. */
+    async ask(lighting: Lighting, of: Description): Promise<SkyShare> {
+        return shareOf(await this.askSky(lighting, of), lighting, of);
+    }
+
+    /** Radiances of the tiles of a scene; null: it has no sky, or that is not known. */
+    radiances(lighting: Lighting, of: Description): Radiances | null {
+        return this.knownSky(lighting, of)?.radiances(of.channels) ?? null;
+    }
+
+    /** The sky and its sun apart, of the scene that is open, as radiances. Null: no sun shines, or it is not known. */
     parts(lighting: Lighting, of: Description): SunParts | null {
-        if (of !== this.open || lighting.solo !== null) return null;
-        return this.source.parts(lighting.sky, this.isPhotometric, of.channels);
+        return of !== this.open ? null : this.knownSky(lighting, of)?.parts(of.channels) ?? null;
+    }
+
+    /** Null: no sky shines. */
+    knownSky(lighting: Lighting, of: Description): Sky | null | undefined {
+        return this.isLit(lighting, of) ? this.source.known(of.name, lighting.sky, this.isPhotometric) : null;
+    }
+
+    async askSky(lighting: Lighting, of: Description): Promise<Sky | null> {
+        return this.isLit(lighting, of) ? this.source.sky(of.name, lighting.sky, this.isPhotometric) : null;
+    }
+
+    /** Reads a weather file; one that is wrong is not taken, and `problem` says why. True if it is taken. */
+    async read(file: File): Promise<boolean> {
+        const { source } = this;
+        try {
+            source.takeWeather(await this.api.readWeather(await file.text()), false);
+            return true;
+        } catch (reason) {
+            if (!(reason instanceof Problem) || reason.status !== 422) throw reason;
+            source.problem = `${file.name} is not taken: ${reason.message}.`;
+            return false;
+        }
     }
 
     /** Fetches what a scene that is opened needs, without which it can still be shown. The function that it returns
      * takes that in; of the scene's default lighting it makes the one by the weather beside the store. */
     async prepare(description: Description): Promise<(lighting: Lighting) => Lighting> {
-        const { answer, weather, reason } = await this.fetch(description);
+        const { answer, weather, problem, reason } = await this.fetch(description);
         return (lighting) => {
             const { source } = this;
             this.open = description;
             source.take(answer);
             if (reason !== null) this.fail(reason);
             source.forget();
-            if (weather !== null) source.read(weather, true);
-            if (source.weather === null) return lighting;
-            const { latitude, longitude, zone } = source.weather;
-            const sky: SkyLight = { ...lighting.sky, model: "perez", latitude, longitude, zone };
+            source.problem = problem;
+            if (weather === null) return lighting;
+            source.takeWeather(weather, true);
+            const sky: SkyLight = { ...lighting.sky, model: "perez", ...placeOf(weather) };
             return { ...lighting, sky };
         };
     }
 
-    /** Fetches what a scene that is compared needs. */
+    /** Makes sure that a scene that is compared has tiles. */
     async prepareOther({ name, sky }: Description): Promise<void> {
-        if (sky !== null) this.source.takeOther(name, await this.api.sky(name));
+        if (sky === null) return;
+        await this.api.sky(name);
+        this.source.takeOther(name);
+    }
+
+    private isLit(lighting: Lighting, of: Description): boolean {
+        const { source } = this, hasTiles = of === this.open ? source.tiles !== null : source.knows(of.name);
+        return of.sky !== null && lighting.solo === null && hasTiles;
     }
 
     private async fetch({ name, sky }: Description): Promise<Fetched> {
-        if (sky === null) return { answer: null, weather: null, reason: null };
+        const fetched: Fetched = { answer: null, weather: null, problem: null, reason: null };
+        if (sky === null) return fetched;
         try {
-            const answer = await this.api.sky(name);
-            return { answer, weather: answer.weather === null ? null : await this.api.weather(name), reason: null };
+            fetched.answer = await this.api.sky(name);
+            if (fetched.answer.weather !== null) fetched.weather = await this.api.weatherBeside(name);
         } catch (reason) {
-            return { answer: null, weather: null, reason };
+            if (fetched.answer !== null && reason instanceof Problem && reason.status === 422)
+                fetched.problem = `The file beside the store is not taken: ${reason.message}.`;
+            else fetched.reason = reason;
         }
+        return fetched;
     }
 }
 
 interface Fetched {
-    answer: SkyAnswer | null;
-    weather: string | null;
+    answer: SkyTiles | null;
+    weather: WeatherRows | null;
+    problem: string | null;
     reason: unknown;
+}
+
+/** The sun is itself where the lighting wants that of the daemon and a scene has it: a store of few emitters answers
+ * the sun by its tile alone. */
+function shareOf(sky: Sky | null, lighting: Lighting, of: Description): SkyShare {
+    if (sky === null) return NOTHING;
+    const hasSun = lighting.sky.sun === "exact" && (of.emitters?.length ?? 0) === 0;
+    return (hasSun ? sky.exact(of.channels) : null) ?? { sky: sky.radiances(of.channels), sun: null };
 }

@@ -1,65 +1,53 @@
-// The tiles of the open store and the weather that skies are made of; answers with radiances for a lighting.
-import { ofTemperature } from "../base/colour.ts";
+// Skies of the daemon for lightings, each asked for once, and the weather that they are made of.
+import type { Api } from "../daemon/api.ts";
+import type { SkyMade, SkyRequest, SkyTiles, WeatherRows } from "../daemon/daylight.ts";
 import type { Moment, SkyLight } from "../state/state.ts";
-import { skyFor, type Sky } from "./skies.ts";
-import { tilesOf, type SkyAnswer, type Tiles } from "./tiles.ts";
-import { readWeather, weatherAt, weatherOf, type Weather } from "./weather.ts";
+import { skyRequest } from "./request.ts";
+import { Sky } from "./sky.ts";
+import { weatherAt, weatherFrom, weatherOf, type Weather } from "./weather.ts";
 
-/** Skies that are kept, for two lightings beside each other that take turns. */
-const KEPT = 4;
-
-/** Colour temperatures of a tinted sky, K: without a sun, beside a sun, and of the sun. */
-const OVERCAST_K = 6500, BLUE_K = 12000, SUN_K = 5200;
-
-/** The light of a sky and of its sun. */
-export interface SunParts {
-    /** Radiances of the tiles: of the sky without the sun, and of the sun alone. */
-    sky: readonly (number | number[])[];
-    sun: readonly (number | number[])[];
-    /** To the sun: east, north, up. */
-    direction: readonly [number, number, number];
-    /** Irradiance that faces the sun, by red, green and blue. */
-    light: [number, number, number];
-}
+/** Answers that are kept: those of a slider that goes back and forth, at some 150 to 40,000 numbers each. */
+const KEPT = 32;
 
 export class SkySource {
     /** Of the open scene. */
-    tiles: Tiles | null = null;
+    tiles: SkyTiles | null = null;
     weather: Weather | null = null;
     /** True where the weather is that beside the store, so that a link restores it. */
     isBeside = false;
     /** What is wrong with the last file that was to be read. */
     problem: string | null = null;
-    private readonly others = new Map<string, Tiles>();
-    private kept = new Map<string, { sky: Sky | null; values: readonly (number | number[])[] | null }>();
+    private readonly others = new Set<string>();
+    /** By scene and request; those on their way have no answer yet. */
+    private kept = new Map<string, { made: SkyMade | null; answer: Promise<SkyMade> }>();
+
+    constructor(private readonly api: Pick<Api, "makeSky">) {}
 
     /** Takes in the tiles of the scene that is opened. */
-    take(answer: SkyAnswer | null): void {
-        this.tiles = answer === null ? null : tilesOf(answer);
+    take(tiles: SkyTiles | null): void {
+        this.tiles = tiles;
         this.others.clear();
         this.kept.clear();
     }
 
-    /** Takes in those of another scene, which the open one is compared with. */
-    takeOther(name: string, answer: SkyAnswer): void {
-        this.others.set(name, tilesOf(answer));
+    /** Another scene, which the open one is compared with, has tiles too. */
+    takeOther(name: string): void {
+        this.others.add(name);
     }
 
     knows(other: string): boolean {
         return this.others.has(other);
     }
 
-    /** Reads a weather file; one that is wrong is not taken, and `problem` says why. True if it is taken. */
-    read(text: string, isBeside: boolean): boolean {
+    takeWeather(rows: WeatherRows, isBeside: boolean): void {
         this.problem = null;
-        try {
-            this.weather = readWeather(text);
-            this.isBeside = isBeside;
-        } catch (reason) {
-            this.problem = (reason as Error).message;
-        }
-        this.kept.clear();
-        return this.problem === null;
+        this.weather = weatherFrom(rows);
+        this.isBeside = isBeside;
+    }
+
+    forget(): void {
+        this.weather = null;
+        this.problem = null;
     }
 
     /** That of a link holds at its own time, until a file is picked. */
@@ -84,73 +72,52 @@ export class SkySource {
         };
     }
 
-    forget(): void {
-        this.weather = null;
-        this.problem = null;
-        this.kept.clear();
+    /** What a sky is asked for by; null: it is dark. */
+    request(light: SkyLight, photometric: boolean): SkyRequest | null {
+        return skyRequest(light, photometric, this.weatherFor(light));
     }
 
-    sky(light: SkyLight, photometric: boolean): Sky | null {
-        return this.find(light, photometric, 1, null).sky;
+    /** The sky of a scene where it is known: null where it is dark, undefined where it is to be asked for. */
+    known(scene: string, light: SkyLight, photometric: boolean): Sky | null | undefined {
+        const request = this.request(light, photometric);
+        if (request === null) return null;
+        const made = this.kept.get(keyOf(scene, request))?.made;
+        return made === undefined || made === null ? undefined : new Sky(made, light);
     }
 
-    /** One radiance a tile of the open scene (other null) or of another one, or three; null without light. */
-    radiances(light: SkyLight, photometric: boolean, channels: number, other: string | null = null):
-        | readonly (number | number[])[]
-        | null
-    {
-        return this.find(light, photometric, channels, other).values;
+    /** Asks for the sky of a scene, unless it is known; null: it is dark. */
+    async sky(scene: string, light: SkyLight, photometric: boolean): Promise<Sky | null> {
+        const request = this.request(light, photometric);
+        return request === null ? null : new Sky(await this.made(scene, request), light);
     }
 
-    /** The same of the open scene or another one, with the sun apart; null without a sun. */
-    parts(light: SkyLight, photometric: boolean, channels: number, scene: string | null = null): SunParts | null {
-        const { sky } = this.find(light, photometric, channels, scene);
-        if (sky === null || !(sky.directHorizontal > 0)) return null;
-        const isColoured = light.tinted && channels === 3, normal = sky.directHorizontal / sky.sun.direction[2];
-        const [one, other] = isColoured ? colouredParts(sky) : [Array.from(sky.diffuse), Array.from(sky.direct)];
-        return { sky: one, sun: other, direction: sky.sun.direction,
-            light: (isColoured ? ofTemperature(SUN_K) : [1, 1, 1]).map((v) => v * normal) as SunParts["light"] };
-    }
-
-    private find(light: SkyLight, photometric: boolean, channels: number,
-        other: string | null): { sky: Sky | null; values: readonly (number | number[])[] | null }
-    {
-        const isColoured = light.tinted && channels === 3;
-        const key = JSON.stringify([light, photometric, isColoured, other]);
-        let found = this.kept.get(key);
-        if (found === undefined) {
-            const tiles = other === null ? this.tiles : this.others.get(other) ?? null,
-                sky = tiles === null ? null : skyFor(tiles, light, photometric, this.weatherFor(light));
-            found = { sky, values: sky === null
-                ? null
-                : isColoured
-                ? coloured(sky)
-                : Array.from(sky.diffuse, (value, t) => value + sky.direct[t]) };
-            this.kept.set(key, found);
-            if (this.kept.size > KEPT) this.kept.delete(this.kept.keys().next().value as string);
+    private made(scene: string, request: SkyRequest): Promise<SkyMade> {
+        const { kept } = this, key = keyOf(scene, request), there = kept.get(key);
+        // The one that was needed last goes last.
+        if (there !== undefined) {
+            kept.delete(key);
+            kept.set(key, there);
+            return there.answer;
         }
-        return found;
+        const entry: { made: SkyMade | null; answer: Promise<SkyMade> } = { made: null,
+            answer: this.api.makeSky(scene, request).then((made) => entry.made = made, (reason: unknown) => {
+                // It is asked for again when it is needed again.
+                if (kept.get(key) === entry) kept.delete(key);
+                throw reason;
+            }) };
+        kept.set(key, entry);
+        if (kept.size > KEPT) kept.delete(kept.keys().next().value as string);
+        return entry.answer;
     }
 }
 
-/** Sky and sun with their luminances as they are. */
-function colouredParts(sky: Sky): [number[][], number[][]] {
-    const blue = ofTemperature(sky.directHorizontal > 0 ? BLUE_K : OVERCAST_K), warm = ofTemperature(SUN_K);
-    const times = (values: Float64Array, colour: readonly number[]): number[][] =>
-        Array.from(values, (value) => colour.map((c) => value * c));
-    return [times(sky.diffuse, blue), times(sky.direct, warm)];
-}
-
-function coloured(sky: Sky): number[][] {
-    const [one, other] = colouredParts(sky);
-    return one.map((values, t) => values.map((value, c) => value + other[t][c]));
-}
+const keyOf = (scene: string, request: SkyRequest): string => JSON.stringify([scene, request]);
 
 const WINDS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 
 /** Degrees from north by east, 0 to 360, and the wind's name. */
 export function windOf(azimuth: number): string {
-    const degrees = (((azimuth * 180) / Math.PI) % 360 + 360) % 360;
+    const degrees = ((azimuth % 360) + 360) % 360;
     return `${degrees.toFixed(0)}° (${WINDS[Math.round(degrees / 45) % 8]})`;
 }
 

@@ -1,14 +1,17 @@
 // A small picture of the sky as a map: north above, east to the right, the zenith in the middle, the horizon around.
 import { make } from "../base/dom.ts";
-import type { Sky } from "../daylight/skies.ts";
-import type { Tiles } from "../daylight/tiles.ts";
+import type { SkyTiles } from "../daemon/daylight.ts";
+import type { Sky } from "../daylight/sky.ts";
 
 export interface Dome {
     element: HTMLElement;
-    draw(tiles: Tiles | null, sky: Sky | null): void;
+    /** The sun is drawn where it is above the horizon, whether it shines or not; degrees. */
+    draw(tiles: SkyTiles | null, sky: Sky | null, sun: { azimuth: number; altitude: number } | null): void;
 }
 
 const SIZE = 220, MARGIN = 18;
+
+const RADIANS = Math.PI / 180;
 
 /** Colours from a tenth of the mean luminance to ten times of it. */
 const RAMP = [[18, 30, 66], [52, 98, 172], [138, 186, 232], [228, 240, 252], [255, 250, 222]];
@@ -26,12 +29,13 @@ export function makeDome(): Dome {
         "aria-label": "The sky" });
     const pen = canvas.getContext("2d");
     const radius = SIZE / 2 - MARGIN, middle = SIZE / 2;
-    const away = (altitude: number): number => radius * (1 - altitude / (Math.PI / 2));
-    const drawTile = (tiles: Tiles, t: number, colour: string): void => {
+    const away = (altitude: number): number => radius * (1 - altitude / 90);
+    /** Tiles are where the axes of the model say; its north is `north` degrees further by east. */
+    const drawTile = (tiles: SkyTiles, t: number, north: number, colour: string): void => {
         if (pen === null) return;
-        const [low, high] = [tiles.altitude[2 * t], tiles.altitude[2 * t + 1]];
+        const [low, high] = tiles.altitude[t];
         // Azimuths run from north by east; angles of a canvas from east by south.
-        const [from, to] = [tiles.azimuth[2 * t] - Math.PI / 2, tiles.azimuth[2 * t + 1] - Math.PI / 2];
+        const [from, to] = tiles.azimuth[t].map((azimuth) => (azimuth - north - 90) * RADIANS);
         pen.beginPath();
         pen.arc(middle, middle, away(low), from, to);
         if (away(high) > 0.5) pen.arc(middle, middle, away(high), to, from, true);
@@ -42,16 +46,16 @@ export function makeDome(): Dome {
         pen.fill();
         pen.stroke();
     };
-    const draw = (tiles: Tiles | null, sky: Sky | null): void => {
+    const draw: Dome["draw"] = (tiles, sky, sun) => {
         if (pen === null) return;
         pen.setTransform(ratio, 0, 0, ratio, 0, 0);
         pen.clearRect(0, 0, SIZE, SIZE);
         pen.lineWidth = 0.5;
         const mean = sky === null ? 0 : sky.diffuseHorizontal / Math.PI;
-        for (let t = 0; tiles !== null && t < tiles.count; t++)
-            drawTile(tiles, t, colourOf(sky === null ? 0 : sky.diffuse[t], mean));
-        if (sky !== null && sky.sun.altitude > 0) {
-            const { azimuth, altitude } = sky.sun;
+        for (let t = 0; tiles !== null && t < tiles.tiles; t++)
+            drawTile(tiles, t, sky?.made.north ?? 0, colourOf(sky === null ? 0 : sky.diffuse[t], mean));
+        if (sky !== null && sun !== null && sun.altitude > 0) {
+            const azimuth = sun.azimuth * RADIANS, { altitude } = sun;
             pen.beginPath();
             pen.arc(middle + away(altitude) * Math.sin(azimuth), middle - away(altitude) * Math.cos(azimuth), 5, 0,
                 2 * Math.PI);

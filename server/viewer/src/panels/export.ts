@@ -173,6 +173,8 @@ function requestPart(page: Page): HTMLElement {
             update();
     });
     scene.on("scene", update);
+    // By then the sky of the request is known.
+    scene.on("field", update);
     return part;
 }
 

@@ -2,17 +2,20 @@
 import type { Page } from "../app/page.ts";
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { count, numberText } from "../base/numbers.ts";
+import { Newest } from "../daemon/newest.ts";
+import { dateOf, dayOf } from "../daylight/dates.ts";
+import { placeOf } from "../daylight/request.ts";
+import type { Sky } from "../daylight/sky.ts";
 import { clockOf, windOf, type SkySource } from "../daylight/source.ts";
-import type { Sky } from "../daylight/skies.ts";
-import { dateOf, dayOf, sunAt } from "../daylight/sun.ts";
+import { SunPath } from "../daylight/sun_path.ts";
 import { skyOff, type SkyLight } from "../state/state.ts";
 import { makeDome } from "./dome.ts";
 import type { Panel } from "./panel.ts";
 import { player } from "./player.ts";
 import { slider } from "./slider.ts";
 
-/** A year has 1.6 MB. */
-const FILE_MOST = 16e6;
+/** A year has 1.6 MB; the daemon takes 16 MiB. */
+const FILE_MOST = 16 * 2 ** 20;
 
 const MONTHS = ["January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
     "November", "December"];
@@ -34,11 +37,13 @@ const MODELS = [
 
 type Change = (to: Partial<SkyLight>, tag?: string | null) => void;
 
+/** The sun by night: below the horizon by more than this, degrees. */
+const NIGHT = -6;
+
 /** The hour that is so many hours later, and by day where the sun rises at all. */
-export function goOn(light: SkyLight, hours: number): number {
+export function goOn(light: SkyLight, hours: number, path: Pick<SunPath, "at">): number {
     const wrap = (hour: number): number => ((hour % 24) + 24) % 24;
-    const isNight = (hour: number): boolean =>
-        sunAt(light.latitude, light.longitude, light.zone, { year: 2001, ...dateOf(light.day) }, hour).altitude < -0.1;
+    const isNight = (hour: number): boolean => (path.at(light, hour)?.altitude ?? 0) < NIGHT;
     const next = wrap(light.hour + hours);
     for (let skipped = 0; skipped < 24; skipped += 0.25) {
         const hour = wrap(next + Math.sign(hours) * skipped);
@@ -48,7 +53,8 @@ export function goOn(light: SkyLight, hours: number): number {
 }
 
 export function skyPanel(page: Page): Panel {
-    const { store, scene } = page, { source } = scene.sky;
+    const { store, scene, ask, tell } = page, { source } = scene.sky;
+    const path = new SunPath(ask.api, () => update(), (reason) => tell.fail(reason));
     const change: Change = (to, tag = null) => {
         const { now } = store;
         store.change({ ...now, lighting: { ...now.lighting, sky: { ...now.lighting.sky, ...to } } }, tag);
@@ -68,16 +74,33 @@ export function skyPanel(page: Page): Panel {
         speed: "1",
         step: 0.5,
         stepLabel: "Half an hour",
-        advance: (hours) => change({ hour: Number(goOn(store.now.lighting.sky, hours).toFixed(3)) }, "hour of the sky"),
+        advance: (hours) =>
+            change({ hour: Number(goOn(store.now.lighting.sky, hours, path).toFixed(3)) }, "hour of the sky"),
     });
     const note = make("p", { class: "hint", role: "status" });
+    // The sky is also shown where the picture is without it, by solo; a picture that fails tells of it.
+    const asker = new Newest(
+        (light: SkyLight) => source.sky(scene.now?.description.name ?? "", light, scene.sky.isPhotometric),
+        () => update(),
+        () => undefined,
+        1,
+    );
+    const drawSky = (light: SkyLight): void => {
+        const { now: open, sky: { isPhotometric } } = scene, { tiles } = source;
+        const sky = open === null || tiles === null ? null : source.known(open.description.name, light, isPhotometric);
+        if (open !== null && tiles !== null) path.want(light);
+        // Until it has come, the one before it stays.
+        if (sky === undefined) return asker.want(light);
+        const sun = sky?.made.sun ?? path.at(light);
+        dome.draw(tiles, sky, sun);
+        drawFigures(figures, dome.element, sky, sun, isPhotometric ? "lx" : "W/m²");
+    };
     const update = (): void => {
-        const light = store.now.lighting.sky, { isPhotometric } = scene.sky, sky = source.sky(light, isPhotometric);
+        const light = store.now.lighting.sky;
         controls.update(light);
         weather.update(light);
         moment.textContent = `${dateText(light.day)}, ${clockOf(light.hour)}`;
-        dome.draw(source.tiles, sky);
-        drawFigures(figures, dome.element, light, sky, isPhotometric ? "lx" : "W/m²");
+        drawSky(light);
         note.textContent = noteOf(light, source, store.now.lighting.solo);
         note.hidden = note.textContent === "";
     };
@@ -86,6 +109,7 @@ export function skyPanel(page: Page): Panel {
         update();
     });
     scene.on("theme", update);
+    scene.on("field", () => drawSky(store.now.lighting.sky));
     store.listen((now, before) => {
         if (now.lighting.sky !== before.lighting.sky || now.view.unit !== before.view.unit
             || now.view.sharpSun !== before.view.sharpSun) update();
@@ -109,7 +133,7 @@ function noteOf(light: SkyLight, source: SkySource, solo: string | null): string
             : `The link holds the weather of ${dateText(light.moment.day)}, ${
                 clockOf(light.moment.hour)
             }, alone. Pick its file below; until then the sky of other times is dark.`;
-    if (light.model === "perez" && source.sky(light, false) === null)
+    if (light.model === "perez" && source.request(light, false) === null)
         return "The weather file has nothing at this time.";
     return "";
 }
@@ -207,7 +231,7 @@ function makeControls(page: Page, change: Change): Controls {
     };
 }
 
-/** The weather file: picked or dropped, read by the page itself. */
+/** The weather file: picked or dropped, and read by the daemon. */
 function makeWeather({ scene, ask, tell }: Page, change: Change,
     done: () => void): { element: HTMLElement; update(light: SkyLight): void }
 {
@@ -216,12 +240,12 @@ function makeWeather({ scene, ask, tell }: Page, change: Change,
     const place = (): void => {
         const { weather } = source;
         if (weather === null) return;
-        change({ model: "perez", latitude: weather.latitude, longitude: weather.longitude, zone: weather.zone });
+        change({ model: "perez", ...placeOf(weather) });
     };
     const take = async (file: File): Promise<void> => {
         if (file.size > FILE_MOST)
             source.problem = `${file.name} has ${count(file.size)} bytes, a weather file at most ${count(FILE_MOST)}.`;
-        else if (source.read(await file.text(), false)) place();
+        else if (await scene.sky.read(file)) place();
         done();
         ask.shown();
     };
@@ -255,7 +279,7 @@ function makeWeather({ scene, ask, tell }: Page, change: Change,
         problem.textContent = source.problem ?? "";
         problem.hidden = source.problem === null;
         about.textContent = weather === null
-            ? "EPW or WEA. Pick it, or drop it on the page. It stays on this machine; nothing is sent."
+            ? "EPW or WEA. Pick it, or drop it on the page. The daemon reads it and keeps nothing of it."
             : `${weather.place}: ${count(Math.round(weather.hours.length * weather.step))} hours${
                 weather.step === 1 ? "" : ` in ${count(weather.hours.length)} rows`
             }${
@@ -267,27 +291,24 @@ function makeWeather({ scene, ask, tell }: Page, change: Change,
     return { element, update };
 }
 
-function drawFigures(table: HTMLTableElement, dome: HTMLElement, light: SkyLight, sky: Sky | null, unit: string): void {
-    const sun = sky?.sun
-        ?? sunAt(light.latitude, light.longitude, light.zone, { year: 2001, ...dateOf(light.day) }, light.hour);
-    const altitude = `${((sun.altitude * 180) / Math.PI).toFixed(1)}°`;
+type Position = { azimuth: number; altitude: number } | null;
+
+function drawFigures(table: HTMLTableElement, dome: HTMLElement, sky: Sky | null, sun: Position, unit: string): void {
+    const altitude = sun === null ? "–" : `${sun.altitude.toFixed(1)}°`,
+        wind = sun === null ? "–" : windOf(sun.azimuth);
     const rows: [string, string, string][] = [
-        ["Sun's altitude", sun.altitude > 0 ? altitude : `${altitude}, below the horizon`, "altitude"],
-        ["Sun's azimuth", windOf(sun.azimuth), "azimuth"],
+        ["Sun's altitude", sun === null || sun.altitude > 0 ? altitude : `${altitude}, below the horizon`, "altitude"],
+        ["Sun's azimuth", wind, "azimuth"],
         ["Sky on the ground", sky === null ? "–" : `${numberText(sky.diffuseHorizontal)} ${unit}`, "diffuse"],
         ["Sun on the ground", sky === null ? "–" : `${numberText(sky.directHorizontal)} ${unit}`, "direct"],
     ];
-    if (sky !== null && sky.perez !== null)
-        rows.push(
-            ["Clearness ε", Number.isFinite(sky.perez.clearness) ? sky.perez.clearness.toFixed(2) : "no diffuse light",
-                "clearness"],
-            ["Brightness Δ", sky.perez.brightness.toFixed(3), "brightness"],
-        );
+    if (sky !== null && sky.made.brightness !== null)
+        rows.push(["Clearness ε", sky.made.clearness?.toFixed(2) ?? "no diffuse light", "clearness"], ["Brightness Δ",
+            sky.made.brightness.toFixed(3), "brightness"]);
     fill(table,
         make("tbody", {},
             ...rows.map(([name, text, figure]) =>
                 make("tr", {}, make("th", { scope: "row" }, name), make("td", { "data-sky": figure }, text))
             )));
-    dome.setAttribute("aria-label",
-        `Map of the sky, north above: sun at altitude ${altitude}, azimuth ${windOf(sun.azimuth)}.`);
+    dome.setAttribute("aria-label", `Map of the sky, north above: sun at altitude ${altitude}, azimuth ${wind}.`);
 }

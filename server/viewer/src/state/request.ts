@@ -59,8 +59,7 @@ export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting,
         emission.groups = Object.fromEntries(groups.map(([name, value]) => [name, scaled(value)]));
     }
     if (sky !== null) emission.sky = sky.map(scaled);
-    // Tiles of the page are not turned by the north of the store, and neither is its sun.
-    if (can.sun !== undefined && can.sun !== null)
-        emission.sun = { ...can.sun, north: 0, direct: scaled(can.sun.direct) };
+    // Both are turned by the north of the store.
+    if (can.sun !== undefined && can.sun !== null) emission.sun = { ...can.sun, direct: scaled(can.sun.direct) };
     return { scene, quantity, emission, scale: most };
 }

@@ -190,6 +190,11 @@ export const firstState: State = {
     tolerance: null,
 };
 
+/** What a picture is of. */
+export function quantityOf(view: View): Quantity {
+    return view.picture === "light" ? "radiosity" : view.quantity;
+}
+
 /** Emission of each group under a lighting, per channel, in the store's unit; groups that are dark are absent. */
 export function emissionOf(lighting: Lighting, channels: number): { [name: string]: number | number[] } {
     const out: { [name: string]: number | number[] } = {};

@@ -5,7 +5,7 @@ import { count, numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
-import { emissionOf } from "../../state/state.ts";
+import { emissionOf, quantityOf } from "../../state/state.ts";
 import type { Wanted } from "../../state/request.ts";
 
 /** By element, a number for each channel. */
@@ -131,7 +131,7 @@ export class Pins {
             : typeof emission === "number"
             ? new Array<number>(channels).fill(emission)
             : emission;
-        const shown = this.page.ask.wanted()?.quantity, live = field?.at(element);
+        const shown = quantityOf(now.view), live = field?.at(element);
         const rows: [string, string, number[] | null | undefined][] = [
             ["B", "Radiosity", exact?.B ?? (shown === "radiosity" ? live : undefined)],
             ["H", "Irradiance", exact?.H ?? (shown === "irradiance" ? live : undefined)],

@@ -5,6 +5,7 @@ import type { OpenScene, Page } from "../../app/page.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { partsOf, type Gradient } from "../../state/shares.ts";
+import { quantityOf } from "../../state/state.ts";
 
 interface Asked {
     scene: string;
@@ -47,7 +48,7 @@ export class Shares {
         const { pins, scene, view } = this.page.store.now, element = pins[pins.length - 1];
         return element === undefined
             ? null
-            : { scene, element, quantity: view.picture === "light" ? "radiosity" : view.quantity };
+            : { scene, element, quantity: quantityOf(view) };
     }
 
     private async ask(asked: Asked): Promise<Gradient> {
@@ -94,6 +95,8 @@ export class Shares {
             return;
         }
         const { description, mesh } = scene;
+        // It is drawn with the picture of a sky that is on its way.
+        if (sky.known(now.lighting, description) === undefined) return;
         const parts = partsOf(gradient, now.lighting, description.channels,
             description.groups.map((group) => group.name), description.emitters ?? [],
             description.sky === null ? null : sky.radiances(now.lighting, description));
