@@ -23,7 +23,8 @@ before(async () => {
     const way = makeStore("way", "cornell", {
         generate: ["--elements", 300], precompute: ["--path", inFolder("lamp.json"), "--frames", 5, "--paths", 500],
     });
-    daemon = await Daemon.start([patio, yard, dome, way]);
+    const turned = makeStore("turned", "patio", { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "tregenza", "--north", 40] });
+    daemon = await Daemon.start([patio, yard, dome, way, turned]);
 });
 
 test("turbidity and irradiances are set on the page, and the figures say what they give", async () => {
@@ -146,6 +147,48 @@ test("the sun itself is the daemon's, by rays", async () => {
     await skyTo(page, { model: "clear", hour: 10, sun: "exact" });
     await settled(page);
     assert.deepEqual(Object.keys((await page.evaluate(() => window.lambert.ask.wanted())).emission), ["sky"]);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("a sky and its sun are turned as their store is", async () => {
+    const page = await openScene("turned"), place = { latitude: 40, longitude: 0, zone: 0 }, asked = { name: "clear", place, date: "21 Mar 10:00", dark: true };
+    await skyTo(page, { model: "clear", ...place, day: 80, hour: 10, sun: "tile" });
+    await settled(page);
+    const { emission, scale } = await page.evaluate(() => window.lambert.ask.wanted());
+    const { skies: [turned, plain] } = await daemon.json("/v1/scenes/turned/skies", { skies: [asked, { ...asked, north: 0 }] });
+    emission.sky.forEach((v, t) => assert.ok(Math.abs(v * scale - turned.sky[t]) <= 1e-6 * turned.sky[t]));
+    assert.ok(plain.sky.some((v, t) => Math.abs(v - turned.sky[t]) > 0.1 * v));
+    // The sun itself is at its own azimuth, which the daemon turns.
+    await skyTo(page, { sun: "exact" });
+    await settled(page);
+    const { sun } = (await page.evaluate(() => window.lambert.ask.wanted())).emission;
+    assert.ok(Math.abs(sun.azimuth - plain.sun.azimuth) < 1e-9 && !("north" in sun));
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+test("a sky that the daemon refuses is told of once, and the next one is shown", async () => {
+    const page = await openScene("yard");
+    await skyTo(page, { model: "clear", hour: 10 });
+    await settled(page);
+    let refused = 0;
+    const detail = "sky/dark is not a member that can stand here";
+    await page.route("**/skies", (route) => {
+        refused += 1;
+        return route.fulfill({ status: 422, contentType: "application/problem+json", body: JSON.stringify({ status: 422, detail }) });
+    });
+    await skyTo(page, { hour: 11 });
+    await page.getByText(`The daemon did not do what this page asked for (422): ${detail}`).waitFor();
+    const shown = await page.evaluate(() => window.lambert.scene.answers);
+    await page.waitForTimeout(1000);
+    assert.ok(refused >= 1 && refused <= 4, `${refused} requests`);
+    assert.equal(await page.evaluate(() => window.lambert.scene.answers), shown);
+    await page.unroute("**/skies");
+    await skyTo(page, { hour: 12 });
+    await page.waitForFunction((before) => window.lambert.scene.answers > before, shown);
+    await settled(page);
+    assert.ok((await page.evaluate(() => window.lambert.ask.wanted())).emission.sky.length > 0);
     assert.deepEqual(page.faults, []);
     await page.context().close();
 });
