@@ -20,11 +20,6 @@ interface Plan {
     lighting: Lighting;
 }
 
-interface Answer {
-    field: Field;
-    isDark: boolean;
-}
-
 /** What becomes of requests. */
 export interface Outcome {
     /** An answer has come, and is shown next. */
@@ -34,21 +29,28 @@ export interface Outcome {
 
 export class Asking {
     private timing: Timing = { roundTrip: 0, solve: null };
-    private readonly askers: readonly [Newest<Plan, Answer>, Newest<Plan, Answer>];
+    /** Of each side first its sky, then its values: while the values of one moment are on their way, the sky of the
+     * next one is asked for. */
+    private readonly skies: readonly [Newest<Plan, Wanted>, Newest<Plan, Wanted>];
+    private readonly askers: readonly [Newest<Wanted, Field>, Newest<Wanted, Field>];
     private asked = ["", ""];
 
     constructor(private readonly api: Pick<Api, "radiosity">, private readonly store: Store,
         private readonly scene: Pick<Shown, "now" | "fields" | "sky" | "show" | "tell">,
         private readonly comparable: Comparable, private readonly outcome: Outcome)
     {
-        const asker = (side: Side): Newest<Plan, Answer> =>
-            new Newest((plan) => this.answer(plan), (answer) => this.take(side, answer), (reason) =>
-                outcome.fail(reason));
+        const fail = (reason: unknown): void => outcome.fail(reason);
+        const asker = (side: Side): Newest<Wanted, Field> =>
+            new Newest((wanted) => this.solve(wanted), (field, wanted) => this.take(side, field, wanted), fail);
+        const skies = (side: Side): Newest<Plan, Wanted> =>
+            new Newest(async (plan) => wantedOf(plan, await scene.sky.ask(plan.lighting, plan.of)), (wanted) =>
+                this.askers[side].want(wanted), fail, 1);
         this.askers = [asker(0), asker(1)];
+        this.skies = [skies(0), skies(1)];
     }
 
     get isIdle(): boolean {
-        return this.askers.every((asker) => asker.isIdle);
+        return [...this.skies, ...this.askers].every((asker) => asker.isIdle);
     }
 
     wanted(side: Side): Wanted | null {
@@ -71,7 +73,13 @@ export class Asking {
             const plan = this.plan(side), key = plan === null ? "" : this.keyOf(plan);
             if (plan === null || (key === this.asked[side] && !again)) continue;
             this.asked[side] = key;
-            this.askers[side].want(plan);
+            const sky = this.scene.sky.known(plan.lighting, plan.of);
+            if (sky === undefined) {
+                this.skies[side].want(plan);
+            } else {
+                this.skies[side].forget();
+                this.askers[side].want(wantedOf(plan, sky));
+            }
         }
     }
 
@@ -79,6 +87,7 @@ export class Asking {
     forget(side: Side): void {
         this.scene.fields[side] = null;
         this.asked[side] = "";
+        this.skies[side].forget();
         this.askers[side].forget();
     }
 
@@ -104,14 +113,9 @@ export class Asking {
         return JSON.stringify([rest, this.scene.sky.keyOf(lighting, of)]);
     }
 
-    private async answer(plan: Plan): Promise<Answer> {
-        const { lighting, of } = plan, wanted = wantedOf(plan, await this.scene.sky.ask(lighting, of));
-        return { field: await this.solve(wanted), isDark: wanted.emission === null };
-    }
-
-    private take(side: Side, { field, isDark }: Answer): void {
+    private take(side: Side, field: Field, wanted: Wanted): void {
         this.outcome.answered();
-        this.scene.show(side, field, isDark);
+        this.scene.show(side, field, wanted.emission === null);
         this.scene.tell("timing", this.timing);
     }
 }

@@ -78,7 +78,7 @@ export function skyPanel(page: Page): Panel {
             change({ hour: Number(goOn(store.now.lighting.sky, hours, path).toFixed(3)) }, "hour of the sky"),
     });
     const note = make("p", { class: "hint", role: "status" });
-    // The sky is also shown where the picture is without it, by solo; a picture that fails tells of it.
+    // The sky is also shown where the picture is without it, by solo.
     const asker = new Newest(
         (light: SkyLight) => source.sky(scene.now?.description.name ?? "", light, scene.sky.isPhotometric),
         () => update(),
@@ -89,8 +89,11 @@ export function skyPanel(page: Page): Panel {
         const { now: open, sky: { isPhotometric } } = scene, { tiles } = source;
         const sky = open === null || tiles === null ? null : source.known(open.description.name, light, isPhotometric);
         if (open !== null && tiles !== null) path.want(light);
-        // Until it has come, the one before it stays.
-        if (sky === undefined) return asker.want(light);
+        // Until it has come, with the picture that needs it or alone, the one before it stays.
+        if (sky === undefined) {
+            if (store.now.lighting.solo !== null) asker.want(light);
+            return;
+        }
         const sun = sky?.made.sun ?? path.at(light);
         dome.draw(tiles, sky, sun);
         drawFigures(figures, dome.element, sky, sun, isPhotometric ? "lx" : "W/m²");
