@@ -2,7 +2,7 @@
  * light, and of a moment of the weather beside the store, by solver/daylight. A sky of the answer is the
  * `sky` of an emission. */
 #include "server/route/routes.h"
-#include "server/route/weather_text.h"
+#include "server/route/weather_source.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/json_writer.h"
 #include "solver/codec/sky_request.h"
@@ -46,7 +46,7 @@ static bool read_weather(making *m, const sky_request *sky, size_t k, problem *w
     if (m->weather.n > 0 && strcmp(m->gaps, sky->gaps) == 0) return true;
     weather_free(&m->weather);
     snprintf(what, sizeof what, "sky %zu: ", k);
-    if (!weather_text_read_beside(m->in, sky->gaps, what, &m->weather, why)) return false;
+    if (!weather_source_read_beside(m->in, sky->gaps, what, &m->weather, why)) return false;
     snprintf(m->gaps, sizeof m->gaps, "%s", sky->gaps);
     return true;
 }

@@ -1,7 +1,7 @@
 /* POST /v1/weather: the place, the times and the rows of a weather file whose text is sent. POST
  * /v1/scenes/NAME/weather: those of the file beside the store. Nothing is kept. */
 #include "server/route/routes.h"
-#include "server/route/weather_text.h"
+#include "server/route/weather_source.h"
 #include "solver/codec/json_writer.h"
 #include "solver/codec/sky_request.h"
 #include "solver/daylight/weather_mend.h"
@@ -92,17 +92,17 @@ static bool read_weather(const call *in, weather_request *request, const char **
         return false;
     if (beside) {
         *format = (in->scene->base != NULL ? in->scene->base : in->scene)->weather.format;
-        return weather_text_read_beside(in, request->gaps, "", w, why);
+        return weather_source_read_beside(in, request->gaps, "", w, why);
     }
-    *format = weather_text_format(request->text, request->length);
+    *format = weather_source_format(request->text, request->length);
     if (*format == NULL)
         return problem_set(why, PROBLEM_BAD_VALUE,
                            "text is neither an EPW nor a WEA: it begins with neither LOCATION nor place");
     if (request->length > TEXT_MOST)
         return problem_set(why, PROBLEM_TOO_MUCH, "text has %zu bytes, a weather file at most %d",
                            request->length, TEXT_MOST);
-    const weather_text text = {.bytes = request->text, .length = request->length, .format = *format};
-    return weather_text_read(in, &text, request->gaps, PROBLEM_BAD_VALUE, "", w, why);
+    const weather_source text = {.bytes = request->text, .length = request->length, .format = *format};
+    return weather_source_read(in, &text, request->gaps, PROBLEM_BAD_VALUE, "", w, why);
 }
 
 void post_weather(call *in, answer *out) {

@@ -212,7 +212,7 @@ class OpenApi(unittest.TestCase):
                    ("scenes", "get_scenes.c"), ("scene", "get_scenes.c"), ("mesh", "get_mesh.c"), ("openapi", "get_documents.c"), ("manual", "get_documents.c"),
                    ("sky", "get_sky.c"), ("weather", "get_sky.c"))},
                "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c"], "post_adjoint": ["post_adjoint.c"],
-               "post_skies": ["post_skies.c", "weather_text.c"], "post_weather": ["post_weather.c", "weather_text.c"], "post_sun": ["post_sun.c"],
+               "post_skies": ["post_skies.c", "weather_source.c"], "post_weather": ["post_weather.c", "weather_source.c"], "post_sun": ["post_sun.c"],
                "put_reflectance": ["reflectance_variants.c"], "delete_reflectance": ["reflectance_variants.c"],
                "delete_scene": ["reflectance_variants.c"],
                **{f"get_viewer_{part}": ["get_viewer.c"] for part in ("page", "script", "style", "icon", "licences")}}

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { sourceOf } from "../source.mjs";
 import { HOURS, LATITUDE, LONGITUDE, ZONE } from "../weather.mjs";
 
-const daylight = { ...await sourceOf("daylight/source"), ...await sourceOf("daylight/sky"), ...await sourceOf("daylight/request"), ...await sourceOf("daylight/weather"),
+const daylight = { ...await sourceOf("daylight/source"), ...await sourceOf("daylight/made_sky"), ...await sourceOf("daylight/sky_request"), ...await sourceOf("daylight/weather"),
     ...await sourceOf("daylight/dates"), ...await sourceOf("daylight/sun_path") };
 const state = await sourceOf("state/state"), { goOn } = await sourceOf("panels/sky"), { ofTemperature } = await sourceOf("base/colour");
 

@@ -3,7 +3,7 @@
 import { floatsToHalves, halfToNumber } from "../base/half.ts";
 import { Newest } from "../daemon/newest.ts";
 import type { Description } from "../daemon/api.ts";
-import type { SunParts } from "../daylight/sky.ts";
+import type { SunParts } from "../daylight/made_sky.ts";
 import { Field } from "../picture/field.ts";
 import { turned } from "../picture/glb.ts";
 import { wantedFor, type Wanted } from "../state/request.ts";

@@ -5,8 +5,8 @@ import type { SkyTiles, WeatherRows } from "../daemon/daylight.ts";
 import type { ExactSun } from "../state/request.ts";
 import type { Lighting, SkyLight } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
-import { placeOf } from "./request.ts";
-import type { Radiances, Sky, SunParts } from "./sky.ts";
+import { placeOf } from "./sky_request.ts";
+import type { Radiances, Sky, SunParts } from "./made_sky.ts";
 import { SkySource } from "./source.ts";
 
 /** What the sky of a lighting adds to an emission. */

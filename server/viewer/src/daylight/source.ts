@@ -2,8 +2,8 @@
 import type { Api } from "../daemon/api.ts";
 import type { SkyMade, SkyRequest, SkyTiles, WeatherRows } from "../daemon/daylight.ts";
 import type { Moment, SkyLight } from "../state/state.ts";
-import { skyRequest } from "./request.ts";
-import { Sky } from "./sky.ts";
+import { skyRequest } from "./sky_request.ts";
+import { Sky } from "./made_sky.ts";
 import { weatherAt, weatherFrom, weatherOf, type Weather } from "./weather.ts";
 
 /** Answers that are kept: those of a slider that goes back and forth, at some 150 to 40,000 numbers each. */

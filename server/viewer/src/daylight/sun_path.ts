@@ -5,7 +5,7 @@ import type { SunPositions } from "../daemon/daylight.ts";
 import { Newest } from "../daemon/newest.ts";
 import type { SkyLight } from "../state/state.ts";
 import { hourOfYear } from "./dates.ts";
-import { placeOf } from "./request.ts";
+import { placeOf } from "./sky_request.ts";
 
 /** Positions an hour; between two of them the sun is off its mean by .03 degrees at most. */
 const PER_HOUR = 4;

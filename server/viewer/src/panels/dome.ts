@@ -1,7 +1,7 @@
 // A small picture of the sky as a map: north above, east to the right, the zenith in the middle, the horizon around.
 import { make } from "../base/dom.ts";
 import type { SkyTiles } from "../daemon/daylight.ts";
-import type { Sky } from "../daylight/sky.ts";
+import type { Sky } from "../daylight/made_sky.ts";
 
 export interface Dome {
     element: HTMLElement;

@@ -1,4 +1,4 @@
-#include "server/route/weather_text.h"
+#include "server/route/weather_source.h"
 
 #include "solver/daylight/weather_mend.h"
 #include "solver/daylight/weather_times.h"
@@ -10,7 +10,7 @@
 /* A row of a WEA has 10 bytes or more, five numbers; one of an EPW 32, sixteen fields. */
 enum { WEA_ROW_BYTES = 10, EPW_ROW_BYTES = 32 };
 
-const char *weather_text_format(const char *bytes, size_t length) {
+const char *weather_source_format(const char *bytes, size_t length) {
     static const char epw[] = "LOCATION,", wea[] = "place";
     if (length >= 3 && memcmp(bytes, "\xEF\xBB\xBF", 3) == 0) { /* a byte order mark */
         bytes += 3;
@@ -32,8 +32,8 @@ static bool find_gaps(const char *word, weather_gaps *gaps) {
     return false;
 }
 
-bool weather_text_read(const call *in, const weather_text *text, const char *gaps, problem_kind wrong,
-                       const char *what, weather *out, problem *why) {
+bool weather_source_read(const call *in, const weather_source *text, const char *gaps, problem_kind wrong,
+                         const char *what, weather *out, problem *why) {
     weather_gaps way;
     char name[16];
     lam_error error = {.message = ""};
@@ -50,16 +50,16 @@ bool weather_text_read(const call *in, const weather_text *text, const char *gap
                                            what, error.message);
 }
 
-bool weather_text_read_beside(const call *in, const char *gaps, const char *what, weather *out,
-                              problem *why) {
+bool weather_source_read_beside(const call *in, const char *gaps, const char *what, weather *out,
+                                problem *why) {
     const scene *s = in->scene->base != NULL ? in->scene->base : in->scene;
     if (s->texts.weather == NULL) return problem_set(why, PROBLEM_NOT_IN_STORE, "%s%s", what, s->weather.why);
     kept_bytes *kept = kept_forms_find(s->texts.weather, 0);
     if (kept == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "the weather of the scene is not there");
-    const weather_text text = {.bytes = (const char *)kept->content.bytes,
-                               .length = kept->content.length,
-                               .format = s->weather.format};
-    const bool read = weather_text_read(in, &text, gaps, PROBLEM_NOT_IN_STORE, what, out, why);
+    const weather_source text = {.bytes = (const char *)kept->content.bytes,
+                                 .length = kept->content.length,
+                                 .format = s->weather.format};
+    const bool read = weather_source_read(in, &text, gaps, PROBLEM_NOT_IN_STORE, what, out, why);
     kept_bytes_release(kept);
     return read;
 }
