@@ -269,11 +269,26 @@ test("a weather file that is picked is read by the daemon, once, and its hours a
     // The text is sent to that route alone; an hour is sent as a sky of its light.
     const [read, rest] = [true, false].map((is) => sent.filter(([, path]) => (path === "/v1/weather") === is));
     assert.equal(read.length, 3);
-    assert.deepEqual(JSON.parse(read[2][2]), { text: wea() });
+    assert.deepEqual(JSON.parse(read[2][2]), { text: wea(), gaps: "refuse" });
     for (const [method, path, body] of rest) {
         assert.ok(method === "GET" ? body === "" : path.startsWith("/v1/scenes/yard/") || path === "/v1/sun", `${method} ${path}`);
         assert.ok(!body.includes("Somewhere") && !body.includes("time_zone"));
     }
+    // Rows that are missing are refused, unless a person says otherwise.
+    const hole = wea().split("\n").filter((_, k) => k !== 20).join("\n"), missing = page.getByLabel("Missing rows (--gaps)");
+    writeFileSync(inFolder("hole.wea"), hole);
+    await page.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("hole.wea"));
+    await page.getByText("hole.wea is not taken: weather.wea: line 21 (2001-03-21 15:30): before it 1 hour is missing").waitFor();
+    await missing.selectOption("skip");
+    await page.getByText("Somewhere_XX: 119 hours.").waitFor();
+    await missing.selectOption("fill");
+    await page.getByText("Somewhere_XX: 120 hours.").waitFor();
+    await page.getByText("hole.wea is not taken").waitFor({ state: "hidden" });
+    await missing.selectOption("refuse");
+    await page.getByText("hole.wea is not taken").waitFor();
+    await page.getByLabel("Weather file (EPW or WEA)").setInputFiles(inFolder("good.wea"));
+    await page.getByText("hole.wea is not taken").waitFor({ state: "hidden" });
+    await settled(page);
     // A link has the weather of its hour, so that the picture is the same elsewhere; of other hours the page says that it is missing.
     await skyTo(page, { day: 172, hour: 10.25 });
     await settled(page);

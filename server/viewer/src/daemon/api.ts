@@ -1,6 +1,6 @@
 // Asks the daemon. Knows its routes and their JSON, and nothing of pictures.
 import { readNpy, type Npy } from "../base/npy.ts";
-import type { Place, SkyMade, SkyRequest, SkyTiles, SunPositions, WeatherRows } from "./daylight.ts";
+import type { Gaps, Place, SkyMade, SkyRequest, SkyTiles, SunPositions, WeatherRows } from "./daylight.ts";
 
 export interface SceneLine {
     name: string;
@@ -150,13 +150,14 @@ export class Api {
     }
 
     /** The rows of a weather file, of which the daemon keeps nothing. */
-    async readWeather(text: string): Promise<WeatherRows> {
-        return (await (await this.post("v1/weather", { text }, "application/json")).json()) as WeatherRows;
+    async readWeather(text: string, gaps: Gaps): Promise<WeatherRows> {
+        return (await (await this.post("v1/weather", { text, gaps }, "application/json")).json()) as WeatherRows;
     }
 
     /** Those of the weather file beside the store. */
-    async weatherBeside(scene: string): Promise<WeatherRows> {
-        return (await (await this.post(Api.path(scene, "/weather"), {}, "application/json")).json()) as WeatherRows;
+    async weatherBeside(scene: string, gaps: Gaps): Promise<WeatherRows> {
+        return (await (await this.post(Api.path(scene, "/weather"), { gaps }, "application/json"))
+            .json()) as WeatherRows;
     }
 
     async mesh(scene: string): Promise<ArrayBuffer> {

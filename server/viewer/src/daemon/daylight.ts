@@ -50,6 +50,9 @@ export interface SunPositions {
     altitude: number[];
 }
 
+/** What becomes of rows and values by day that are missing. */
+export type Gaps = "refuse" | "fill" | "skip";
+
 /** A weather file, by columns; one of the two of direct light is there. */
 export interface WeatherRows extends Place {
     place: string;

@@ -1,7 +1,7 @@
 // The sky of the scene that is open, by the daemon, from the weather beside its store or a file that was picked, and
 // those of scenes that it is compared with.
 import { Problem, type Api, type Description } from "../daemon/api.ts";
-import type { SkyTiles, WeatherRows } from "../daemon/daylight.ts";
+import type { Gaps, SkyTiles, WeatherRows } from "../daemon/daylight.ts";
 import type { ExactSun } from "../state/request.ts";
 import type { Lighting, SkyLight } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
@@ -15,6 +15,8 @@ export interface SkyShare {
     sky: Radiances | null;
     sun: ExactSun | null;
 }
+
+const BESIDE = "The file beside the store";
 
 const NOTHING: SkyShare = { sky: null, sun: null };
 
@@ -72,15 +74,21 @@ export class SceneSky {
         return this.isLit(lighting, of) ? this.source.sky(of.name, lighting.sky, this.isPhotometric) : null;
     }
 
-    /** Reads a weather file; one that is wrong is not taken, and `problem` says why. True if it is taken. */
-    async read(file: File): Promise<boolean> {
-        const { source } = this;
+    /** Reads a weather file, or that beside the store (null); one that is wrong is not taken, and `problem` says why.
+     * True if it is taken. */
+    async read(file: File | null, gaps: Gaps): Promise<boolean> {
+        const { api, source, open } = this;
+        if (open === null) return false;
         try {
-            source.takeWeather(await this.api.readWeather(await file.text()), false);
-            return true;
+            const rows = file === null
+                ? await api.weatherBeside(open.name, gaps)
+                : await api.readWeather(await file.text(), gaps);
+            // A link cannot restore what was mended.
+            if (open === this.open) source.takeWeather(rows, file === null && gaps === "refuse");
+            return open === this.open;
         } catch (reason) {
             if (!(reason instanceof Problem) || reason.status !== 422) throw reason;
-            source.problem = `${file.name} is not taken: ${reason.message}.`;
+            source.problem = `${file === null ? BESIDE : file.name} is not taken: ${reason.message}.`;
             return false;
         }
     }
@@ -120,10 +128,10 @@ export class SceneSky {
         if (sky === null) return fetched;
         try {
             fetched.answer = await this.api.sky(name);
-            if (fetched.answer.weather !== null) fetched.weather = await this.api.weatherBeside(name);
+            if (fetched.answer.weather !== null) fetched.weather = await this.api.weatherBeside(name, "refuse");
         } catch (reason) {
             if (fetched.answer !== null && reason instanceof Problem && reason.status === 422)
-                fetched.problem = `The file beside the store is not taken: ${reason.message}.`;
+                fetched.problem = `${BESIDE} is not taken: ${reason.message}.`;
             else fetched.reason = reason;
         }
         return fetched;

@@ -2,6 +2,7 @@
 import type { Page } from "../app/page.ts";
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { count, numberText } from "../base/numbers.ts";
+import type { Gaps } from "../daemon/daylight.ts";
 import { Newest } from "../daemon/newest.ts";
 import { dateOf, dayOf } from "../daylight/dates.ts";
 import { placeOf } from "../daylight/sky_request.ts";
@@ -245,12 +246,21 @@ function makeWeather({ scene, ask, tell }: Page, change: Change,
         if (weather === null) return;
         change({ model: "perez", ...placeOf(weather) });
     };
-    const take = async (file: File): Promise<void> => {
-        if (file.size > FILE_MOST)
-            source.problem = `${file.name} has ${count(file.size)} bytes, a weather file at most ${count(FILE_MOST)}.`;
-        else if (await scene.sky.read(file)) place();
-        done();
-        ask.shown();
+    // A file that was picked, until another scene is opened; null: that beside the store.
+    let picked: File | null = null, gaps: Gaps = "refuse";
+    const take = async (file: File | null): Promise<void> => {
+        picked = file;
+        if (file !== null) about.textContent = `Reading ${file.name} …`;
+        try {
+            if (file !== null && file.size > FILE_MOST)
+                source.problem = `${file.name} has ${count(file.size)} bytes, a weather file at most ${
+                    count(FILE_MOST)
+                }.`;
+            else if (await scene.sky.read(file, gaps)) place();
+        } finally {
+            done();
+            ask.shown();
+        }
     };
     const picker = make("input", {
         type: "file",
@@ -262,7 +272,17 @@ function makeWeather({ scene, ask, tell }: Page, change: Change,
             picker.value = "";
         },
     });
-    const element = make("div", { class: "drop" }, make("h2", {}, "Weather file"), about, problem, picker,
+    const missing = choice("Missing rows (--gaps)", [["refuse", "Refused"], ["fill", "Filled"], ["skip", "Left out"]],
+        gaps, (to) => {
+        gaps = to;
+        take(picked).catch((reason: unknown) => tell.fail(reason));
+    });
+    scene.on("scene", () => {
+        picked = null;
+        gaps = "refuse";
+        (missing.querySelector("select") as HTMLSelectElement).value = gaps;
+    });
+    const element = make("div", { class: "drop" }, make("h2", {}, "Weather file"), about, problem, picker, missing,
         button("Its place", "Latitude, longitude and clock of the weather file", place));
     // Anywhere on the page, as a file that is dropped beside would replace the page.
     document.addEventListener("dragover", (event) => {
@@ -279,6 +299,7 @@ function makeWeather({ scene, ask, tell }: Page, change: Change,
         const { weather } = source;
         element.hidden = light.model === "off";
         (element.querySelector("button") as HTMLButtonElement).hidden = weather === null;
+        missing.hidden = picked === null && (source.tiles?.weather ?? null) === null;
         problem.textContent = source.problem ?? "";
         problem.hidden = source.problem === null;
         about.textContent = weather === null
