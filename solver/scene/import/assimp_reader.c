@@ -1,6 +1,7 @@
 /* Reads glTF, PLY, STL and the other formats of libassimp: the only file that knows libassimp. Runs in the
  * child. */
 #include "solver/base/array_grow.h"
+#include "solver/base/asset_files.h"
 #include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
 

@@ -3,6 +3,7 @@
 #ifndef LAMBERT_SCENE_IMPORT_GLTF_FILE_H
 #define LAMBERT_SCENE_IMPORT_GLTF_FILE_H
 
+#include "solver/base/asset_files.h"
 #include "solver/scene/import/imported_faces.h"
 
 #include <jansson.h>

@@ -118,18 +118,6 @@ lam_status imported_faces_add_camera(imported_faces *s, const char *path, const 
  * scene or a bad index. */
 lam_status imported_faces_split(imported_faces *s, const char *path, lam_error *error);
 
-/* Where a file that a scene names lies. */
-typedef enum asset_place { ASSET_MISSING, ASSET_FOUND, ASSET_OUTSIDE, ASSET_SEVERAL } asset_place;
-enum { ASSET_PATH = 4096 };
-
-/* Looks for file, which the file scene names: beside the scene, then in assets, unless that is NULL. A file
- * of another system is found by another spelling where none has its own: backslashes are slashes, a path on a
- * drive (C:\) is its last name, and letters A to Z are a to z where one file alone matches. out: its path.
- * ASSET_OUTSIDE: it exists, but lies neither below the scene's folder nor below assets, links resolved.
- * ASSET_SEVERAL: files differ from it by capitals alone; out has two of their names, "a, b". Cost: where no
- * file has the name, all names of the folders. */
-asset_place asset_find(const char *scene, const char *assets, const char *file, char out[ASSET_PATH]);
-
 /* *image = 1 + the index of the image of a key, decoded where the key is new, or 0 where it cannot be read,
  * which a warning says once for each key. label: its name for people. imported_faces_find_image looks for the
  * file as asset_find does. Errors: LAM_ERR_MEMORY for the tables alone. */

@@ -1,6 +1,7 @@
 /* Reads OBJ + MTL in double precision. libassimp would keep coordinates in single precision, merge the names
  * of `o` and `g`, invent a diffuse colour and only log a missing MTL. Runs in the child. */
 #include "solver/base/array_grow.h"
+#include "solver/base/asset_files.h"
 #include "solver/base/file_text.h"
 #include "solver/base/photometry.h"
 #include "solver/scene/import/imported_faces.h"

@@ -1,5 +1,6 @@
 /* The images that a scene names, each read once. Runs in the child. */
 #include "solver/base/array_grow.h"
+#include "solver/base/asset_files.h"
 #include "solver/base/file_text.h"
 #include "solver/scene/import/images.h"
 #include "solver/scene/import/imported_faces.h"

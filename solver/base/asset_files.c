@@ -1,10 +1,9 @@
-/* Files that a scene names: they are read from the scene's own folder, from folders in it, and from --assets.
- */
-#include "solver/scene/import/imported_faces.h"
+#include "solver/base/asset_files.h"
 
 #include <ctype.h>
 #include <dirent.h>
 #include <limits.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -71,7 +70,8 @@ static void translate(const char *file, char out[ASSET_PATH]) {
     for (char *c = out; *c != '\0'; c++)
         if (*c == '\\') *c = '/';
     const char *last = strrchr(out, '/');
-    if (isalpha((unsigned char)out[0]) && out[1] == ':' && last != NULL) memmove(out, last + 1, strlen(last + 1) + 1);
+    if (isalpha((unsigned char)out[0]) && out[1] == ':' && last != NULL)
+        memmove(out, last + 1, strlen(last + 1) + 1);
 }
 
 /* Finds a name, of which out becomes the path, in a folder as it is spelled. */
