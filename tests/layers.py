@@ -42,6 +42,7 @@ ALLOWED = {
     "solver/codec": f"{BELOW_LINALG} solver/operator/operator.h solver/operator/blocks/importance.h solver/operator/stated/",
     "solver/codec/gltf": "lambert/ store/ solver/base/ solver/codec/",
     "solver/daylight": f"{BELOW_LINALG}",
+    "solver/luminaire": f"{BELOW_LINALG}",
     "solver/shadow": f"{BELOW_LINALG} solver/daylight/sky_tiles.h solver/scene/plane.h",
     "solver/scene": f"{BELOW_LINALG}",
     "solver/scene/facet": f"{SCENE}",
