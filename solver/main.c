@@ -17,6 +17,7 @@ static const option_verb verbs[] = {
     {"info", cmd_info, "print the contents of a store and its measured errors"},
     {"classify", cmd_classify, "choose the operator that suits a scene, with the reason"},
     {"sky", cmd_sky, "turn weather into the radiance of sky tiles"},
+    {"luminaire", cmd_luminaire, "print what a luminaire file says, its lumens and candela"},
     {"solve", cmd_solve, "light a store and write the radiosity"},
     {"verify", cmd_verify, "check a store: checksums, invariants, error"},
     {"render", cmd_render, "draw a picture of a store under any light"},

@@ -121,8 +121,8 @@ static lam_status read_size(line_reader *r, table_size *size, lam_error *error) 
                     .most = 4,
                     .whole = true,
                     .limit = "must be from 0 to 4"},
-        planes = {.what = "number of C-planes", .least = 1, .most = 1e9, .whole = true},
-        angles = {.what = "number of intensities of a plane", .least = 2, .most = 1e9, .whole = true},
+        planes = {.what = "number of C-planes", .least = 1, .most = 1e15, .whole = true},
+        angles = {.what = "number of intensities of a plane", .least = 2, .most = 1e15, .whole = true},
         step = {.what = "distance of C-planes", .least = 0, .most = 360, .optional = true},
         angle_step = {.what = "distance of intensities", .least = 0, .most = 180, .optional = true};
     double value = 0;

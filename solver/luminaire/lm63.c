@@ -253,7 +253,7 @@ static lam_status read_description(number_stream *n, luminaire *l, double v[FIEL
                                    lam_error *error) {
     lam_status status = LAM_OK;
     const bool counts = l->format <= LM63_1991;
-    const double any = LUMINAIRE_CANDELA_MOST, size = LUMINAIRE_LENGTH_MOST, most = 1e9;
+    const double any = LUMINAIRE_CANDELA_MOST, size = LUMINAIRE_LENGTH_MOST, most = 1e15;
     static const char dark[] = "must be above 0; at 0 the luminaire is dark";
     const number_field fields[FIELDS] = {
         [LAMPS] = {.what = "number of lamps", .least = -any, .most = any},

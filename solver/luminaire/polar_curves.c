@@ -106,6 +106,14 @@ static void write_place(double share, double gamma, int side, FILE *stream) {
             CENTRE_Y + share * RADIUS * cos(angle));
 }
 
+/* The largest intensity of the curves C0-C180 and C90-C270. */
+static double most_of_curves(const luminaire *l, const angle_list *gammas) {
+    double most = 0;
+    for (int C = 0; C < 360; C += 90)
+        for (size_t k = 0; k < gammas->n; k++) most = fmax(most, luminaire_candela(l, C, gammas->values[k]));
+    return most;
+}
+
 /* One curve: the plane to the left, from its last gamma, then the plane to the right. */
 static void write_curve(const luminaire *l, const angle_list *gammas, double most, double right,
                         const char *style, FILE *stream) {
@@ -119,7 +127,8 @@ static void write_curve(const luminaire *l, const angle_list *gammas, double mos
     fputs("\"/>\n", stream);
 }
 
-static void write_grid(double most, FILE *stream) {
+/* labels: 1 or -1, the side of the centre, below or above, where the circles have their intensities. */
+static void write_grid(double most, int labels, FILE *stream) {
     fputs("<g fill=\"none\" stroke=\"#bbb\">\n", stream);
     for (int k = 1; k <= RINGS; k++)
         fprintf(stream, "<circle cx=\"%d\" cy=\"%d\" r=\"%d\"/>\n", CENTRE_X, CENTRE_Y, RADIUS * k / RINGS);
@@ -130,8 +139,8 @@ static void write_grid(double most, FILE *stream) {
     }
     fputs("</g>\n<g fill=\"#555\" font-size=\"11\" text-anchor=\"middle\">\n", stream);
     for (int k = 1; k <= RINGS; k++)
-        fprintf(stream, "<text x=\"%d\" y=\"%d\">%.4g</text>\n", CENTRE_X, CENTRE_Y + RADIUS * k / RINGS - 3,
-                most * k / RINGS);
+        fprintf(stream, "<text x=\"%d\" y=\"%d\">%.4g</text>\n", CENTRE_X,
+                CENTRE_Y + labels * RADIUS * k / RINGS - 3, most * k / RINGS);
     for (int gamma = 30; gamma <= 150; gamma += 30)
         for (int side = -1; side <= 1; side += 2) {
             const double angle = gamma * (M_PI / 180), r = RADIUS + 18;
@@ -150,7 +159,7 @@ lam_status polar_curves_svg(const luminaire *l, const char *title, FILE *stream,
     double C = 0, gamma = 0;
     const int n_curves = l->symmetry == SYMMETRY_ROTATIONAL ? 1 : 2;
     TRY(list_gammas(l, 1, &gammas, error));
-    const double most = round_up(luminaire_peak(l, &C, &gamma));
+    const double most = round_up(most_of_curves(l, &gammas));
     fprintf(
         stream,
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" "
@@ -160,7 +169,7 @@ lam_status polar_curves_svg(const luminaire *l, const char *title, FILE *stream,
     fprintf(stream, "<text x=\"%d\" y=\"28\" font-size=\"16\" text-anchor=\"middle\">", CENTRE_X);
     write_escaped(title, stream);
     fputs("</text>\n", stream);
-    write_grid(most, stream);
+    write_grid(most, luminaire_candela(l, 0, 180) > luminaire_candela(l, 0, 0) ? 1 : -1, stream);
     for (int k = 0; k < n_curves; k++) {
         write_curve(l, &gammas, most, 90 * k, styles[k], stream);
         fprintf(stream,

@@ -8,6 +8,7 @@ int cmd_precompute(int argc, char **argv);
 int cmd_classify(int argc, char **argv);
 int cmd_info(int argc, char **argv);
 int cmd_sky(int argc, char **argv);
+int cmd_luminaire(int argc, char **argv);
 int cmd_solve(int argc, char **argv);
 int cmd_verify(int argc, char **argv);
 int cmd_render(int argc, char **argv);

@@ -20,7 +20,7 @@ class Usage(Case):
     def test_help_and_version(self):
         self.assertRegex(must("--version").stdout, r"^lambert \d+\.\d+\.\d+\n$")
         verbs = must("--help").stdout
-        for verb in ("generate", "precompute", "info", "sky", "solve", "verify", "render"):
+        for verb in ("generate", "precompute", "info", "sky", "luminaire", "solve", "verify", "render"):
             self.assertIn(verb, verbs)
             about = must(verb, "--help")
             self.assertIn("Usage: lambert " + verb, about.stdout)

@@ -12,7 +12,7 @@ from command import LAMBERT
 from patience import PATIENCE
 
 LAMBERTD = os.environ["LAMBERTD"]
-VERBS = ("generate", "precompute", "info", "classify", "sky", "solve", "verify", "render")
+VERBS = ("generate", "precompute", "info", "classify", "sky", "luminaire", "solve", "verify", "render")
 
 
 def run(*arguments):
