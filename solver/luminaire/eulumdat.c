@@ -192,7 +192,7 @@ static lam_status read_body(line_reader *r, luminaire *l, double *factor, lam_er
     enum { N = sizeof fields / sizeof *fields };
     double v[N] = {0};
     for (int k = 0; k < N; k++) TRY(read_number(r, &fields[k], &v[k], error));
-    find_opening(v[LINE_OPENING - LINE_BODY], v[LINE_OPENING + 1 - LINE_BODY], v + LINE_SIDES - LINE_BODY,
+    find_opening(v[LINE_OPENING - LINE_BODY], v[LINE_OPENING + 1 - LINE_BODY], v + (LINE_SIDES - LINE_BODY),
                  &l->opening);
     l->output_ratio = v[LINE_LORL - LINE_BODY] / 100;
     *factor = v[N - 2];

@@ -13,7 +13,7 @@ import tempfile
 import numpy as np
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
-for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies"):
+for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies", "luminaire"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -51,6 +51,17 @@ epw = ("LOCATION,x,XX,USA,TMY3,0,37.5,-122,-8,2\nDESIGN CONDITIONS,0\nTYPICAL/EX
 for k in range(3):
     (folder / "weather" / f"wea{k}").write_text(wea + chr(2 * k))
     (folder / "weather" / f"epw{k}").write_text(epw + chr(2 * k + 1))
+
+# Files of luminaires; the last byte says the lamp set, and the extension of the name.
+files = pathlib.Path(__file__).resolve().parent.parent / "fixtures" / "luminaires"
+for k, file in enumerate(sorted(files.glob("*/*.*"))):
+    if file.stat().st_size < 4000:
+        (folder / "luminaire" / file.name).write_bytes(file.read_bytes() + bytes([k % 12]))
+for k, opening in enumerate(("-1 -1 0", "-1 0 0", ".3 1 .1", "-1 2 -1", "0 1 -1", "-1 -1 -1")):
+    for type_, planes in ((1, "0 30 90"), (1, "0 120 240"), (1, "90 180 270"), (1, "0 90 180"), (2, "0 45 90"), (3, "-60 0 60")):
+        (folder / "luminaire" / f"small{k}-{type_}-{planes}").write_text(
+            f"{('', 'IESNA91', 'IESNA:LM-63-1995', 'IESNA:LM-63-2002', 'IES:LM-63-2019')[k % 5]}\n[LAMP] x\n[MORE] y\n"
+            f"TILT=INCLUDE\n1 2 0 90 1 .5\n1 1000 2 2 3 {type_} {1 + k % 2} {opening}\n.9 1 9\n0 90\n{planes}\n1 2 3 4e1 5,6\n\0")
 
 # Files of emissions: an EMISSION by itself.
 for k, e in enumerate(emissions):

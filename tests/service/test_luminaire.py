@@ -17,7 +17,7 @@ FILES = pathlib.Path(os.environ["FIXTURES"], "luminaires")
 QUADRANT, ISYM2 = "quadrant-0-90.ies", "isym2.ldt"
 
 # A change of a file, (line, its new text, where None drops it) or bytes of all of it, and words of the message.
-# Files of LM-63 have 119 lines: the lamp is line 7, the angles begin in lines 9 and 19. Those of EULUMDAT have 1,520.
+# The file of LM-63 has 119 lines: the lamp is line 7, the angles begin in lines 9 and 19. The EULUMDAT has 1,520.
 LM63_FAULTS = (
     ("empty", b"", "the file is empty"),
     ("no TILT", (6, None), "has no line TILT="),
@@ -166,7 +166,7 @@ class Faults(Case):
                                        "no shape of LM-63-2002 has width -1, length 2 and height 3"),
                                       (QUADRANT, (7, "1 -1 1 91 10 3 2 0 0 0"), None),
                                       ("isym1-mc1.ldt", (9, "x"), None), (ISYM2, (7, "0"), None)):
-            path = self.changed("a.ies", base, change)  # what a file is, its text says
+            path = self.changed("a.ies", base, change)  # the text says which format it has, not the name
             got = about(path)
             self.assertEqual(got["format"], "EULUMDAT" if base.endswith("ldt") else "LM-63-2002")
             if warning:
@@ -178,7 +178,8 @@ class Faults(Case):
         values += b"\n" + b" ".join(b"%.4f" % (k * 360 / 2999) for k in range(3000)) + b"\n" + b"1 " * (1801 * 3000)
         for text, wanted in ((b"IESNA91 " * 6250000, "has 50000000 bytes, more than the 16 MiB that a luminaire file may have"),
                              (b"1 2\n" * 4000000, "has no line TILT="), (b"\n" * 16000000 + b"x", "has no line TILT="),
-                             (b"a\n1\n0\n4000000\n0\n4000000\n" + b"1\n" * 8000000, "line 44: C-plane (degrees) = 1, must be above 1"), (values, None)):
+                             (b"a\n1\n0\n4000000\n0\n4000000\n" + b"1\n" * 8000000, "line 44: C-plane (degrees) = 1, must be above 1"),
+                             (values, None)):
             path = self.changed("a.ies", QUADRANT, text)
             done = subprocess.run([sys.executable, "-c", MEASURED, LAMBERT, "luminaire", str(path)], capture_output=True,
                                   text=True, check=False, env=ENVIRONMENT)
