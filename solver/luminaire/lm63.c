@@ -139,6 +139,7 @@ static lam_status read_words(luminaire *l, size_t *capacity, const char *begin, 
         luminaire_clean(begin + 1, close, key, sizeof key);
         begin = close + 1;
     }
+    if (l->n_words == LUMINAIRE_WORDS_MOST) return LAM_OK; /* the word that it belongs to may be left out */
     if (strcasecmp(key, "MORE") != 0 || l->n_words == 0)
         return luminaire_add_word(l, capacity, key, begin, end, error);
     char *text = l->words[l->n_words - 1].text;
@@ -273,7 +274,7 @@ static lam_status read_description(number_stream *n, luminaire *l, double v[FIEL
                    .limit = "must be 1 (feet) or 2 (metres)"},
         [WIDTH] = {.what = "width", .least = -size, .most = size},
         [LENGTH] = {.what = "length", .least = -size, .most = size},
-        [HEIGHT] = {"height", -size, size}};
+        [HEIGHT] = {.what = "height", .least = -size, .most = size}};
     const number_field ballast = {.what = "ballast factor",
                                   .least = 0,
                                   .most = any,

@@ -62,21 +62,19 @@ static double mirrored_plane(const luminaire *l, double C) {
 
 /* The angles of the table that a direction has: along the planes, and in them. */
 static void table_angles(const luminaire *l, double C, double gamma, double *plane, double *angle) {
-    const double x = sin(radians(gamma)) * cos(radians(C)), y = sin(radians(gamma)) * sin(radians(C)),
-                 down = cos(radians(gamma));
-    double *turned = plane, *tipped = angle; /* type A: tan H = y / down, sin V = x */
     if (l->type == LUMINAIRE_C) {
-        *plane = mirrored_plane(l, C);
+        *plane = l->symmetry == SYMMETRY_ROTATIONAL ? 0 : mirrored_plane(l, C);
         *angle = gamma;
         return;
     }
-    if (l->type == LUMINAIRE_B) { /* tan V = x / down, sin H = y */
-        turned = angle;
-        tipped = plane;
-    }
-    const double across = l->type == LUMINAIRE_B ? x : y, along = l->type == LUMINAIRE_B ? y : x;
-    *turned = atan2(across, down) * (180 / M_PI);
-    *tipped = asin(fmin(1, fmax(-1, along))) * (180 / M_PI);
+    const double x = sin(radians(gamma)) * cos(radians(C)), y = sin(radians(gamma)) * sin(radians(C)),
+                 down = cos(radians(gamma));
+    const bool is_b =
+        l->type == LUMINAIRE_B; /* tan V = x / down, sin H = y; A: tan H = y / down, sin V = x */
+    const double turned = atan2(is_b ? x : y, down) * (180 / M_PI),
+                 tipped = asin(fmin(1, fmax(-1, is_b ? y : x))) * (180 / M_PI);
+    *plane = is_b ? tipped : turned;
+    *angle = is_b ? turned : tipped;
     if (l->symmetry == SYMMETRY_C0_C180 || l->symmetry == SYMMETRY_QUADRANT) *plane = fabs(*plane);
     if (l->symmetry == SYMMETRY_C90_C270 || l->symmetry == SYMMETRY_QUADRANT) *angle = fabs(*angle);
 }

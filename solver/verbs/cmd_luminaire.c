@@ -171,7 +171,7 @@ static lam_status print_json(const luminaire *l, const char *path, const fields 
         text_or_null(name_of(l)), "number", text_or_null(number_of(l)), "lumens", luminaire_lumens(l), "peak",
         "candela", peak, "C", C, "gamma", gamma, "symmetry", luminaire_symmetry_name(l->symmetry), "planes",
         (json_int_t)l->n_planes, "angles", (json_int_t)l->n_angles, "opening", json_of_opening(&l->opening),
-        "lamp_set", (json_int_t)(l->set + 1), "lamp_sets", json_of_lamps(l), "output_ratio",
+        "lamp_set", (json_int_t)l->set + 1, "lamp_sets", json_of_lamps(l), "output_ratio",
         number_or_null(l->output_ratio), "measured_tilt", isfinite(l->measured_tilt) ? l->measured_tilt : 0.,
         "tilt", json_of_tilt(&l->tilt), "words", json_of_words(l), "warnings", json_of_warnings(l));
     if (about != NULL && f->directions.count > 0)
