@@ -22,6 +22,8 @@ enum {
     LINE_SETS = 26
 };
 
+static const char shifted[] = "is a line missing before it, or one too many?";
+
 typedef struct line_reader {
     const luminaire_source *s;
     const char *at, *begin, *end; /* the next line, and the one that was read last */
@@ -35,6 +37,7 @@ typedef struct line_field {
     bool whole, above; /* above: more than least */
     bool optional;     /* an empty line is a 0 */
     bool leading;      /* words may stand behind it: "1 x LED" */
+    bool shifts;       /* a wrong value is likely that of another line */
     const char *limit; /* in words; NULL: least and most say it */
 } line_field;
 
@@ -74,16 +77,21 @@ static bool leading_number(const line_reader *r, double *out) {
 
 static lam_status read_number(line_reader *r, const line_field *f, double *out, lam_error *error) {
     lam_status status = LAM_OK;
-    char limit[LUMINAIRE_LIMIT];
+    char limit[LUMINAIRE_LIMIT], advice[160];
     double value = 0;
     TRY(read_line(r, f->what, error));
     const bool empty = r->begin == r->end && f->optional;
     if (!empty && !luminaire_number(r->begin, r->end, true, &value) &&
-        !(f->leading && leading_number(r, &value)))
-        TRY(wrong(r, f->what, "must be one number; is a line missing before it, or one too many?", error));
+        !(f->leading && leading_number(r, &value))) {
+        snprintf(advice, sizeof advice, "must be one number; %s", shifted);
+        TRY(wrong(r, f->what, advice, error));
+    }
     if (f->whole && value != floor(value)) TRY(wrong(r, f->what, "must be a whole number", error));
-    if (!luminaire_in_limits(value, f->least, f->most, f->above, limit))
-        TRY(wrong(r, f->what, f->limit != NULL ? f->limit : limit, error));
+    if (!luminaire_in_limits(value, f->least, f->most, f->above, limit)) {
+        snprintf(advice, sizeof advice, "%s%s%s", f->limit != NULL ? f->limit : limit, f->shifts ? "; " : "",
+                 f->shifts ? shifted : "");
+        TRY(wrong(r, f->what, advice, error));
+    }
     *out = value;
 done:
     return status;
@@ -187,7 +195,7 @@ static lam_status read_body(line_reader *r, luminaire *l, double *factor, lam_er
         {"height of the luminous area at C270 (mm)", 0, most, .optional = true},
         {"downward flux fraction (%)", -1e3, 1e6, .optional = true},
         {"light output ratio (%)", -1e3, 1e6, .optional = true},
-        {"conversion factor for intensities", 0, LUMINAIRE_CANDELA_MOST, .above = true},
+        {"conversion factor for intensities", 0, LUMINAIRE_CANDELA_MOST, .above = true, .shifts = true},
         {"tilt during measurement (degrees)", -360, 360, .optional = true}};
     enum { N = sizeof fields / sizeof *fields };
     double v[N] = {0};
@@ -213,7 +221,11 @@ static lam_status read_text(line_reader *r, const char *what, char out[LUMINAIRE
 static lam_status read_lamp_sets(line_reader *r, luminaire *l, lam_error *error) {
     lam_status status = LAM_OK;
     static const line_field
-        sets = {.what = "number of lamp sets", .least = 1, .most = LUMINAIRE_SETS_MOST, .whole = true},
+        sets = {.what = "number of lamp sets",
+                .least = 1,
+                .most = LUMINAIRE_SETS_MOST,
+                .whole = true,
+                .shifts = true},
         number = {.what = "number of lamps", .least = -1e6, .most = 1e6, .leading = true},
         lumens = {.what = "lumens of a lamp set",
                   .least = 0,

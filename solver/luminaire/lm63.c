@@ -426,11 +426,23 @@ static void describe_lamps(luminaire *l) {
             snprintf(texts[k].out, LUMINAIRE_TEXT, "%s", luminaire_find_word(l, texts[k].keys[j]));
 }
 
+/* Asks for the decimal mark where a comma between two digits may be one. */
+static void ask_for_decimal_mark(const luminaire_source *s, const char *at, lam_error *error) {
+    if (error == NULL) return;
+    const size_t used = strlen(error->message);
+    for (const char *c = at; (c = memchr(c, ',', (size_t)(s->end - c))) != NULL; c++)
+        if (c > at && c + 1 < s->end && isdigit((unsigned char)c[-1]) && isdigit((unsigned char)c[1])) {
+            snprintf(error->message + used, sizeof error->message - used,
+                     "; commas separate numbers, is one of them a decimal mark?");
+            return;
+        }
+}
+
 lam_status lm63_read(const luminaire_source *s, const luminaire_options *options, luminaire *l,
                      lam_error *error) {
     lam_status status = LAM_OK;
     number_stream n = {.s = s, .at = s->text};
-    const char *tilt = NULL, *tilt_end = NULL;
+    const char *tilt = NULL, *tilt_end = NULL, *numbers = NULL;
     double v[FIELDS] = {0}, factor = 1;
     if (options->set > 1)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: --set %zu: an IES LM-63 has one lamp set", s->name, options->set);
@@ -440,8 +452,10 @@ lam_status lm63_read(const luminaire_source *s, const luminaire_options *options
     TRY(read_head(s, l, &n.at, &tilt, &tilt_end, error));
     describe_lamps(l);
     TRY(read_tilt(&n, tilt, tilt_end, options, l, error));
+    numbers = n.at;
     TRY(read_description(&n, l, v, &factor, error));
     TRY(read_table(&n, l, v, factor, error));
 done:
+    if (status == LAM_ERR_FORMAT && numbers != NULL) ask_for_decimal_mark(s, numbers, error);
     return status;
 }

@@ -136,7 +136,8 @@ START_TEST(lamp_sets) {
     ck_assert_int_eq(read_set(text, 3, &l, &error), LAM_ERR_ARGUMENT);
     ck_assert(strstr(error.message, "--set 3: it has 2 lamp sets") != NULL);
     p.sets = "0\n";
-    refused(&p, "line 26: number of lamp sets = 0, must be at least 1");
+    refused(&p, "line 26: number of lamp sets = 0, must be at least 1; is a line missing before it, or one "
+                "too many?");
     p.sets = "900\n1\n";
     refused(&p, "line 26: number of lamp sets = 900, more than the rest of the file can hold");
     p.sets = "10000000\n1\n";
@@ -274,7 +275,7 @@ START_TEST(faults_have_a_place) {
         {{.head = "Maker\n1\n1\n1\n0\n900000\n45\nr\nL\n4\nf\n2\n"},
          "line 6: number of intensities of a plane = 900000, more than"},
         {{.body = "600\n600\n80\n580\n580\n0\n0\n0\n0\n100\n100\n0\n0\n"},
-         "line 24: conversion factor for intensities = 0, must be above 0"},
+         "line 24: conversion factor for intensities = 0, must be above 0; is a line missing before it"},
         {{.body = "600\n600\n80\n580\n580\n0\n0\n0\n0\n100\n100\n\n0\n"},
          "line 24: conversion factor for intensities = nothing, must be one number"},
         {{.body = "600\n600\n80\n-5\n580\n0\n0\n0\n0\n100\n100\n1\n0\n"},

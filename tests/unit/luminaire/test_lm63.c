@@ -334,6 +334,15 @@ START_TEST(faults_have_a_place) {
         {" \r\n \x1a", "the file is empty"},
     };
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) refused(rows[k].text, rows[k].wanted);
+    /* Commas separate numbers; where one stands between digits the file may mean a decimal mark. */
+    static const char asked[] = "; commas separate numbers, is one of them a decimal mark?";
+    refused(HEAD TILT "1 -1 1,5 3 1 1 2 0 0 0\n1 1 10\n" TABLE, asked);
+    refused(HEAD TILT "1 -1 1 3 1 1 2 0 0 0\n1 1 10\n0 45 90\n0\n100,5 50 0\n", asked);
+    lam_error error = {0};
+    luminaire l = {0};
+    const char spaced[] = HEAD TILT "1, -1, 1, 3, 1, 1, 2, 0, 0, 0\n1, 1, 10\n0, 45, 90\n0\n100, 50\n";
+    ck_assert_int_eq(read_bytes(spaced, strlen(spaced), &l, &error), LAM_ERR_FORMAT);
+    ck_assert_ptr_null(strstr(error.message, asked));
     /* The control characters of a word are not shown. */
     refused(HEAD TILT "1 -1 1 3 1 1 2 0 0 0\n1 1 \x1b[31m\n" TABLE, "input watts = ?[31m");
 }
