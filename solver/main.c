@@ -1,4 +1,5 @@
 /* `lambert`: the list of its verbs; each is in its own cmd_*.c. */
+#include "solver/base/atomic_file.h"
 #include "solver/base/file_stem.h"
 #include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
@@ -35,15 +36,17 @@ static const option_command program = {
 
 /* A file in the place of a verb: tells which verb it wants. */
 static int want_verb(const char *path) {
-    char *stem = file_stem(path);
-    const size_t length = strlen(path);
-    const bool is_store = length > 3 && strcmp(path + length - 3, ".h5") == 0;
-    const int code =
-        is_store
-            ? options_usage(program.name, "%s: a store needs a verb: lambert view %s, or lambert info %s",
-                            path, path, path)
-            : options_usage(program.name, "%s: a scene needs a verb: lambert precompute %s -o %s.h5", path,
-                            path, stem != NULL ? stem : "STORE");
+    char *stem = file_stem(path), extension[16];
+    int code;
+    atomic_file_extension(path, extension);
+    if (strcmp(extension, "h5") == 0)
+        code = options_usage(program.name, "%s: a store needs a verb: lambert view %s, or lambert info %s",
+                             path, path, path);
+    else if (strcmp(extension, "ies") == 0 || strcmp(extension, "ldt") == 0)
+        code = options_usage(program.name, "%s: a luminaire needs a verb: lambert luminaire %s", path, path);
+    else
+        code = options_usage(program.name, "%s: a scene needs a verb: lambert precompute %s -o %s.h5", path,
+                             path, stem != NULL ? stem : "STORE");
     free(stem);
     return code;
 }

@@ -33,9 +33,10 @@ static const struct shape_row {
     {OF_1995, "-0-", OPENING_SPHERE, OPENING_ELLIPSOID, true},
     {OF_1995, "0+-", OPENING_CYLINDER_X, OPENING_CYLINDER_X, true},
     {OF_1995, "+0-", OPENING_CYLINDER_Y, OPENING_CYLINDER_Y, true},
-    {OF_2002, "--0", OPENING_DISC, OPENING_ELLIPSE, false},
-    {OF_2002, "--+", OPENING_CYLINDER, OPENING_CYLINDER, false},
-    {OF_2002, "---", OPENING_SPHERE, OPENING_ELLIPSOID, false},
+    /* These are of 2002; no older version has them, but files of its number do. */
+    {ANY, "--0", OPENING_DISC, OPENING_ELLIPSE, false},
+    {ANY, "--+", OPENING_CYLINDER, OPENING_CYLINDER, false},
+    {ANY, "---", OPENING_SPHERE, OPENING_ELLIPSOID, false},
     {OF_2002, "+--", OPENING_CYLINDER_Y, OPENING_CYLINDER_Y, false},
     {OF_2002, "-+-", OPENING_CYLINDER_X, OPENING_CYLINDER_X, false},
     {OF_2002, "0--", OPENING_UPRIGHT_DISC, OPENING_UPRIGHT_DISC, false},

@@ -88,6 +88,8 @@ class Suggestions(unittest.TestCase):
     def test_a_file_wants_a_verb(self):
         with tempfile.TemporaryDirectory() as folder:
             for name, wanted in (("room.obj", "a scene needs a verb: lambert precompute {0} -o room.h5"),
+                                 ("lamp.IES", "a luminaire needs a verb: lambert luminaire {0}"),
+                                 ("lamp.ldt", "a luminaire needs a verb: lambert luminaire {0}"),
                                  ("room.h5", "a store needs a verb: lambert view {0}, or lambert info {0}")):
                 path = os.path.join(folder, name)
                 with open(path, "w", encoding="ascii") as file:

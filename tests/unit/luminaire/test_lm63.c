@@ -189,7 +189,9 @@ START_TEST(openings) {
                 {"IESNA91", "-.3 .4 .5", OPENING_ELLIPSOID, .4, .3, .5},
                 {"IESNA91", "-.3 0 .5", OPENING_CYLINDER, .3, .3, .5},
                 {"IESNA91", "-.3 .4 0", OPENING_ELLIPSE, .4, .3, 0},
-                {"IESNA91", "-.3 -.3 0", OPENING_POINT, 0, 0, 0},
+                {"IESNA91", "-.3 -.3 0", OPENING_DISC, .3, .3, 0},
+                {"IESNA:LM-63-1995", "-.3 -.4 .2", OPENING_CYLINDER, .4, .3, .2},
+                {"IESNA91", "-.3 0 -.3", OPENING_POINT, 0, 0, 0},
                 {"IESNA:LM-63-2002", "-.3 .4 .5", OPENING_POINT, 0, 0, 0},
                 {"IESNA:LM-63-1995", ".3 .4 -.5", OPENING_POINT, 0, 0, 0}};
     char text[256];
