@@ -203,22 +203,23 @@ done:
 static lam_status read_tilt_file(const luminaire_source *s, const char *assets, const char *file,
                                  luminaire_tilt *tilt, lam_error *error) {
     lam_status status = LAM_OK;
-    char path[ASSET_PATH], *text = NULL;
+    char path[ASSET_PATH], shown[64], *text = NULL;
     size_t length = 0;
     struct stat about;
     luminaire_source own;
     const size_t line = luminaire_source_place(s, s->end, NULL);
+    luminaire_clean(file, file + strlen(file), shown, sizeof shown);
     const asset_place place = asset_find(s->name, assets, file, path);
     if (place == ASSET_SEVERAL)
-        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: TILT=%s may be either of %s", s->name, line, file, path);
+        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: TILT=%s may be either of %s", s->name, line, shown, path);
     if (place != ASSET_FOUND)
-        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: TILT=%s %s", s->name, line, file,
+        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: TILT=%s %s", s->name, line, shown,
              place == ASSET_OUTSIDE
                  ? "lies outside of the file's folder; --assets with its folder lets it be read"
                  : "is not there: put it beside the file, or name its folder by --assets");
     if (stat(path, &about) != 0 || !S_ISREG(about.st_mode) || about.st_size > (off_t)LUMINAIRE_BYTES_MOST)
         FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: TILT=%s is not a file of at most %zu MiB", s->name, line,
-             file, LUMINAIRE_BYTES_MOST >> 20);
+             shown, LUMINAIRE_BYTES_MOST >> 20);
     TRY(file_text(path, &text, &length, error));
     TRY(luminaire_source_open(path, text, length, &own, error));
     number_stream n = {.s = &own, .at = own.text};
@@ -232,17 +233,18 @@ done:
 
 static lam_status read_tilt(number_stream *n, const char *begin, const char *end,
                             const luminaire_options *options, luminaire *l, lam_error *error) {
-    char file[ASSET_PATH];
+    char file[ASSET_PATH], shown[64];
     const size_t length = (size_t)(end - begin);
     if (length == 0 || (length == 4 && strncasecmp(begin, "NONE", 4) == 0)) return LAM_OK;
     if (length == 7 && strncasecmp(begin, "INCLUDE", 7) == 0) return read_tilt_table(n, &l->tilt, error);
     luminaire_source head = *n->s; /* whose end is the line of TILT */
     head.end = end;
     snprintf(file, sizeof file, "%.*s", (int)(length < sizeof file ? length : sizeof file - 1), begin);
+    luminaire_clean(begin, end, shown, sizeof shown);
     if (l->format == LM63_2019)
         return status_fail(error, LAM_ERR_FORMAT,
-                           "%s: line %zu: TILT=%.60s, must be NONE or INCLUDE in LM-63-2019", n->s->name,
-                           luminaire_source_place(&head, end, NULL), file);
+                           "%s: line %zu: TILT=%s, must be NONE or INCLUDE in LM-63-2019", n->s->name,
+                           luminaire_source_place(&head, end, NULL), shown);
     return read_tilt_file(&head, options->assets, file, &l->tilt, error);
 }
 

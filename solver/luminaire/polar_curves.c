@@ -1,5 +1,7 @@
 #include "solver/luminaire/polar_curves.h"
 
+#include "solver/base/utf8.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -78,14 +80,20 @@ done:
     return status;
 }
 
-/* A text of an SVG. */
+/* A text of an SVG: bytes and characters that XML does not allow become '?'. */
 static void write_escaped(const char *text, FILE *stream) {
-    for (const char *c = text; *c != '\0'; c++) {
-        const char *name = *c == '&' ? "&amp;" : *c == '<' ? "&lt;" : *c == '>' ? "&gt;" : NULL;
+    const char *end = text + strlen(text);
+    for (size_t length; text < end; text += length) {
+        const char *name = *text == '&' ? "&amp;" : *text == '<' ? "&lt;" : *text == '>' ? "&gt;" : NULL;
+        const size_t valid = utf8_sequence(text, end);
+        length = valid > 0 ? valid : 1;
+        const bool is_none = valid == 3 && memcmp(text, "\xef\xbf", 2) == 0 && (unsigned char)text[2] >= 0xBE;
         if (name != NULL)
             fputs(name, stream);
+        else if (valid == 0 || is_none || (unsigned char)*text < 0x20 || *text == 0x7F)
+            fputc('?', stream);
         else
-            fputc((unsigned char)*c < 0x20 || *c == 0x7F ? ' ' : *c, stream);
+            fwrite(text, 1, length, stream);
     }
 }
 
