@@ -1,9 +1,9 @@
 /* Reads a luminaire's file in a child process with limits, which sends the table through a pipe. The parent
  * checks all that it receives. */
-#include "solver/luminaire/luminaire_source.h"
+#include "solver/luminaire/luminaire_child.h"
 
 #include "solver/base/file_text.h"
-#include "store/confined.h"
+#include "solver/luminaire/luminaire_source.h"
 
 #include <errno.h>
 #include <math.h>
@@ -53,24 +53,29 @@ done:
     return status;
 }
 
-static void read_in_child(void *context) {
-    luminaire l = {.n_planes = 0};
-    lam_error error = {.message = ""};
+bool luminaire_send(int fd, lam_status result, const lam_error *error, const luminaire *l) {
     reply_header header;
-    const lam_status result = read_file(context, &l, &error);
     memset(&header, 0, sizeof header);
     memcpy(header.magic, reply_magic, sizeof reply_magic);
     header.status = (uint64_t)result;
-    memcpy(header.message, error.message, sizeof header.message);
-    header.made = l;
-    if (!confined_send(CONFINED_REPLY, &header, sizeof header) || result != LAM_OK) return;
-    (void)(confined_send(CONFINED_REPLY, l.planes, l.n_planes * sizeof *l.planes) &&
-           confined_send(CONFINED_REPLY, l.angles, l.n_angles * sizeof *l.angles) &&
-           confined_send(CONFINED_REPLY, l.candela, l.n_planes * l.n_angles * sizeof *l.candela) &&
-           confined_send(CONFINED_REPLY, l.tilt.angles, l.tilt.n * sizeof *l.tilt.angles) &&
-           confined_send(CONFINED_REPLY, l.tilt.factors, l.tilt.n * sizeof *l.tilt.factors) &&
-           confined_send(CONFINED_REPLY, l.sets, l.n_sets * sizeof *l.sets) &&
-           confined_send(CONFINED_REPLY, l.words, l.n_words * sizeof *l.words));
+    memcpy(header.message, error->message, sizeof header.message);
+    header.made = *l;
+    if (!confined_send(fd, &header, sizeof header)) return false;
+    if (result != LAM_OK) return true;
+    return confined_send(fd, l->planes, l->n_planes * sizeof *l->planes) &&
+           confined_send(fd, l->angles, l->n_angles * sizeof *l->angles) &&
+           confined_send(fd, l->candela, l->n_planes * l->n_angles * sizeof *l->candela) &&
+           confined_send(fd, l->tilt.angles, l->tilt.n * sizeof *l->tilt.angles) &&
+           confined_send(fd, l->tilt.factors, l->tilt.n * sizeof *l->tilt.factors) &&
+           confined_send(fd, l->sets, l->n_sets * sizeof *l->sets) &&
+           confined_send(fd, l->words, l->n_words * sizeof *l->words);
+}
+
+static void read_in_child(void *context) {
+    luminaire l = {.n_planes = 0};
+    lam_error error = {.message = ""};
+    const lam_status result = read_file(context, &l, &error);
+    (void)luminaire_send(CONFINED_REPLY, result, &error, &l);
 }
 
 /* Reads an array of count values of size bytes; *whole becomes false where the pipe ends. */
@@ -136,10 +141,9 @@ static lam_status child_verdict(const char *path, bool late, int wait_status, la
                        number != 0 ? number : WEXITSTATUS(wait_status));
 }
 
-lam_status luminaire_read(const char *path, const luminaire_options *options, luminaire *out,
-                          lam_error *error) {
+lam_status luminaire_receive(confined_main *run, void *context, const char *path, luminaire *out,
+                             lam_error *error) {
     lam_status status = LAM_OK;
-    child_work work = {path, options};
     const confined_limits limits = {.cpu_seconds = CHILD_SECONDS,
                                     .all_seconds = 4 * CHILD_SECONDS,
                                     .memory_bytes = child_bytes,
@@ -150,7 +154,7 @@ lam_status luminaire_read(const char *path, const luminaire_options *options, lu
     int wait_status = 0;
     bool whole = false;
     luminaire l = {.n_planes = 0};
-    TRY(confined_start(read_in_child, &work, -1, &limits, path, &child, error));
+    TRY(confined_start(run, context, -1, &limits, path, &child, error));
     status = receive_reply(&child, path, &l, &whole, error);
     const lam_status ended = confined_end(&child, whole || status != LAM_OK, path, &wait_status, &ending);
     TRY(status);
@@ -161,4 +165,10 @@ lam_status luminaire_read(const char *path, const luminaire_options *options, lu
 done:
     luminaire_free(&l);
     return status;
+}
+
+lam_status luminaire_read(const char *path, const luminaire_options *options, luminaire *out,
+                          lam_error *error) {
+    child_work work = {path, options};
+    return luminaire_receive(read_in_child, &work, path, out, error);
 }

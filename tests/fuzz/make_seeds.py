@@ -13,7 +13,8 @@ import tempfile
 import numpy as np
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
-for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies", "luminaire"):
+for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies", "luminaire",
+             "luminaire_reply"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -62,6 +63,9 @@ for k, opening in enumerate(("-1 -1 0", "-1 0 0", ".3 1 .1", "-1 2 -1", "0 1 -1"
         (folder / "luminaire" / f"small{k}-{type_}-{planes}").write_text(
             f"{('', 'IESNA91', 'IESNA:LM-63-1995', 'IESNA:LM-63-2002', 'IES:LM-63-2019')[k % 5]}\n[LAMP] x\n[MORE] y\n"
             f"TILT=INCLUDE\n1 2 0 90 1 .5\n1 1000 2 2 3 {type_} {1 + k % 2} {opening}\n.9 1 9\n0 90\n{planes}\n1 2 3 4e1 5,6\n\0")
+
+for k, change in enumerate((b"", b"\x10", b"\0\0x", b"\x08\0\1", b"\xf8\1\xff", b"\0\2\1\0\3\1", b"\x30\2\2\x38\2\2")):
+    (folder / "luminaire_reply" / str(k)).write_bytes(change)
 
 # Files of emissions: an EMISSION by itself.
 for k, e in enumerate(emissions):

@@ -1,5 +1,5 @@
 /* Luminaires read from files by the process without rights: what it may open, and what comes back. */
-#include "solver/luminaire/luminaire.h"
+#include "solver/luminaire/luminaire_child.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -128,6 +128,65 @@ START_TEST(files_of_tilt) {
 }
 END_TEST
 
+/* Bytes that a child sends in the place of a reply. */
+typedef struct sent {
+    unsigned char *bytes;
+    size_t length;
+} sent;
+
+static void send_bytes(void *context) {
+    const sent *s = context;
+    (void)confined_send(CONFINED_REPLY, s->bytes, s->length);
+}
+
+/* A sound reply; the caller frees its bytes. */
+static sent make_reply(void) {
+    const luminaire_options options = {.set = 0};
+    const char text[] = "IESNA91\n[A] b\nTILT=INCLUDE\n" TILT_TABLE NUMBERS;
+    lam_error error = {.message = ""};
+    luminaire l = {0};
+    char path[64];
+    ck_ok(luminaire_read_text("a.ies", text, strlen(text), &options, &l, &error));
+    snprintf(path, sizeof path, "/tmp/test-XXXXXX");
+    const int fd = mkstemp(path);
+    ck_assert(luminaire_send(fd, LAM_OK, &error, &l));
+    sent s = {.length = (size_t)lseek(fd, 0, SEEK_END)};
+    s.bytes = malloc(s.length);
+    ck_assert_int_eq(pread(fd, s.bytes, s.length, 0), (ssize_t)s.length);
+    close(fd);
+    unlink(path);
+    luminaire_free(&l);
+    return s;
+}
+
+START_TEST(replies_that_are_damaged) {
+    sent s = make_reply();
+    const size_t length = s.length;
+    lam_error error = {0};
+    luminaire l = {0};
+    ck_ok(luminaire_receive(send_bytes, &s, "a", &l, &error));
+    ck_assert(l.n_angles == 3 && l.tilt.n == 3 && l.n_words == 1);
+    luminaire_free(&l);
+    for (s.length = 0; s.length < length; s.length += 97) {
+        ck_assert_int_eq(luminaire_receive(send_bytes, &s, "a", &l, &error), LAM_ERR_FORMAT);
+        ck_assert_msg(strstr(error.message, "ended without an answer") != NULL, "%s", error.message);
+    }
+    /* Bytes of ones: counts that are too large, texts without an end, numbers that are none. */
+    s.length = length;
+    for (size_t at = 0; at + 8 <= length; at += 8) {
+        unsigned char kept[8];
+        memcpy(kept, s.bytes + at, sizeof kept);
+        memset(s.bytes + at, 0xFF, sizeof kept);
+        const lam_status status = luminaire_receive(send_bytes, &s, "a", &l, &error);
+        if (status == LAM_OK) ck_assert(luminaire_is_sound(&l)); /* a pointer, or a byte that nothing reads */
+        if (status == LAM_OK) luminaire_free(&l);
+        memcpy(s.bytes + at, kept, sizeof kept);
+        if (at > 600 && at + 2400 < length) at += 480; /* long texts */
+    }
+    free(s.bytes);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("luminaire_files");
     TCase *tests = tcase_create("all");
@@ -135,6 +194,8 @@ int main(void) {
     tcase_add_test(tests, all_of_it_comes_back);
     tcase_add_test(tests, files_that_cannot_be_read);
     tcase_add_test(tests, files_of_tilt);
+    tcase_add_test(tests, replies_that_are_damaged);
+    tcase_set_timeout(tests, 120);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
