@@ -103,7 +103,7 @@ bool eulumdat_is_it(const luminaire_source *s) {
     for (int line = 1; line <= LINE_NG; line++) {
         if (!luminaire_source_line(s, &at, &begin, &end)) return false;
         luminaire_trim(&begin, &end);
-        if (line == 1) continue;
+        if (line == 1 || (line == LINE_MC + 1 && begin == end)) continue; /* a distance may be left out */
         if (!luminaire_number(begin, end, true, &value)) return false;
         if (line <= LINE_MC && (value < 0 || value != floor(value))) return false;
     }
