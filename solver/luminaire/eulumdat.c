@@ -11,15 +11,13 @@
 
 /* Lines that have a place of their own. */
 enum {
-    LINE_ITYP = 2,
-    LINE_ISYM,
-    LINE_MC,
+    LINE_ISYM = 3,
+    LINE_MC = 4,
     LINE_NG = 6,
     LINE_BODY = 13,
     LINE_OPENING = 16,
     LINE_SIDES = 18,
-    LINE_LORL = 23,
-    LINE_SETS = 26
+    LINE_LORL = 23
 };
 
 static const char shifted[] = "is a line missing before it, or one too many?";
@@ -268,7 +266,7 @@ static lam_status choose_set(const char *name, const luminaire_options *options,
     return LAM_OK;
 }
 
-/* Reads ascending angles, of which `from` on and `count` many, those below it after all others, are kept. */
+/* Reads ascending angles. */
 static lam_status read_angles(line_reader *r, const line_field *f, size_t n, double *out, lam_error *error) {
     lam_status status = LAM_OK;
     char limit[96];
@@ -283,8 +281,8 @@ done:
     return status;
 }
 
-/* The listed planes of which intensities are stored: stored many from `first` on, which go on behind the last
- * at the first one; NAN limits: any. */
+/* The listed planes of which intensities are stored: n many from the index `first` on, where the first plane
+ * follows the last. They have to go from one angle to another; NAN: any. */
 typedef struct stored_planes {
     size_t first, n;
     double from, to; /* degrees */

@@ -120,7 +120,8 @@ typedef struct luminaire_options {
 lam_status luminaire_read(const char *path, const luminaire_options *options, luminaire *out,
                           lam_error *error);
 
-/* The same of a text of so many bytes, in this process; messages have `name` for a path. */
+/* The same of a text of so many bytes, in this process; messages have `name` for a path, beside which a file
+ * of TILT is looked for. */
 lam_status luminaire_read_text(const char *name, const char *text, size_t length,
                                const luminaire_options *options, luminaire *out, lam_error *error);
 
