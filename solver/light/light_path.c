@@ -4,6 +4,7 @@
 #include "solver/light/light_path.h"
 
 #include "solver/base/file_text.h"
+#include "solver/base/options/options.h"
 #include "solver/base/vector3.h"
 #include "solver/codec/json_mark.h"
 
@@ -73,11 +74,39 @@ done:
     return status;
 }
 
-static lam_status read_emission(const json_t *value, const place *at, moving_light *l, bool *coloured,
-                                lam_error *error) {
+/* "800lm" or "300,200,100 lm": the exitance of the polygon. */
+static lam_status read_light_text(const json_t *value, const place *at, const moving_light *l, light_kind to,
+                                  bool *converted, double E[3], lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *text = json_string_value(value);
+    char numbers[128], what[sizeof at->text + 16];
+    given_unit unit;
+    size_t found = 0;
+    const size_t length = given_unit_split(text, json_string_length(value), &unit);
+    if (unit == GIVEN_PLAIN || length >= sizeof numbers || memchr(text, 0, length) != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: emission = \"%.60s\", must be a number, three of them, or a text of numbers and a "
+             "unit: " GIVEN_UNIT_WORDS,
+             at->text, text);
+    memcpy(numbers, text, length);
+    numbers[length] = '\0';
+    snprintf(what, sizeof what, "%s: emission", at->text);
+    TRY(option_numbers(what, numbers, 3, false, E, &found, error));
+    if (found == 2) FAIL(error, LAM_ERR_ARGUMENT, "%s has 2 numbers, must have 1 or 3", what);
+    for (size_t d = found; d < 3; d++) E[d] = E[0];
+    for (size_t d = 0; d < 3; d++) E[d] *= given_unit_exitance(unit, l->area, to);
+    *converted = given_unit_kind(unit, to) != to;
+done:
+    return status;
+}
+
+static lam_status read_emission(const json_t *value, const place *at, light_kind to, moving_light *l,
+                                bool *coloured, bool *converted, lam_error *error) {
     lam_status status = LAM_OK;
     double E[3] = {0, 0, 0};
-    if (json_is_array(value)) {
+    if (json_is_string(value)) {
+        TRY(read_light_text(value, at, l, to, converted, E, error));
+    } else if (json_is_array(value)) {
         TRY(read_three(value, "emission", at, E, error));
     } else {
         TRY(read_number(value, "emission", at, &E[0], error));
@@ -92,11 +121,11 @@ done:
     return status;
 }
 
-static lam_status read_light(const char *file, json_t *light, double unit, moving_light *l, bool *coloured,
-                             lam_error *error) {
+static lam_status read_light(const light_path_request *request, json_t *light, moving_light *l,
+                             bool *coloured, bool *converted, lam_error *error) {
     static const char *const names[] = {"polygon", "emission", NULL};
     lam_status status = LAM_OK;
-    const place at = member(file, "light", SIZE_MAX);
+    const place at = member(request->path, "light", SIZE_MAX);
     lam_error why = {.message = ""};
     double(*corner)[3] = NULL;
     TRY(check_members(light, names, &at, error));
@@ -109,12 +138,13 @@ static lam_status read_light(const char *file, json_t *light, double unit, movin
     if (corner == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < n; k++) {
         TRY(read_three(json_array_get(polygon, k), "a corner of polygon", &at, corner[k], error));
-        for (int d = 0; d < 3; d++) corner[k][d] *= unit;
+        for (int d = 0; d < 3; d++) corner[k][d] *= request->unit;
     }
     status = moving_light_create(n, corner, l, &why);
     corner = NULL;
-    if (status != LAM_OK) FAIL(error, status, "%.200s: %s", file, why.message);
-    TRY(read_emission(json_object_get(light, "emission"), &at, l, coloured, error));
+    if (status != LAM_OK) FAIL(error, status, "%.200s: %s", request->path, why.message);
+    TRY(read_emission(json_object_get(light, "emission"), &at, request->lights, l, coloured, converted,
+                      error));
 done:
     free(corner);
     return status;
@@ -348,7 +378,7 @@ done:
 }
 
 lam_status light_path_read(const light_path_request *request, moving_light *out, bool *coloured,
-                           lam_error *error) {
+                           bool *converted, lam_error *error) {
     static const char *const of_positions[] = {"light", "positions", NULL}, *const of_path[] = {
                                                                                 "light", "path", "closed",
                                                                                 NULL};
@@ -375,7 +405,7 @@ lam_status light_path_read(const light_path_request *request, moving_light *out,
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: it has a path, which is for --path and --frames",
              request->path);
     TRY(check_members(root, listed ? of_positions : of_path, &at, error));
-    TRY(read_light(request->path, json_object_get(root, "light"), request->unit, &l, coloured, error));
+    TRY(read_light(request, json_object_get(root, "light"), &l, coloured, converted, error));
     if (listed)
         TRY(read_positions(request->path, json_object_get(root, "positions"), request->unit, &l, error));
     else

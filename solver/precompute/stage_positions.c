@@ -55,16 +55,23 @@ static lam_status read_light(const precompute_job *job, precompute_scene *scene,
     const bool listed = how->positions != NULL;
     const light_path_request request = {.path = listed ? how->positions : how->path,
                                         .frames = listed ? 0 : (size_t)how->frames,
-                                        .unit = job->options->from_store ? 1 : scene->m.unit};
-    bool coloured = false;
+                                        .unit = job->options->from_store ? 1 : scene->m.unit,
+                                        .lights = scene->m.lights};
+    const light_conversion plain = {.from = scene->m.lights};
+    bool coloured = false, converted = false;
     if (scene->m.glass != NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the paths of --positions and --path do not pass panes; --glass GROUP=0 makes a group "
              "opaque, --portal GROUP takes it away",
              job->options->input);
-    TRY(light_path_read(&request, &walked->light, &coloured, error));
+    TRY(light_path_read(&request, &walked->light, &coloured, &converted, error));
     if (coloured) TRY(take_colours(&scene->m, error));
-    terminal_log(job->t, "%zu positions of a light of %.3g m2", walked->light.n, walked->light.area);
+    const double *E = walked->light.emission;
+    char of_channels[64];
+    snprintf(of_channels, sizeof of_channels, coloured ? "%.4g, %.4g, %.4g" : "%.4g", E[0], E[1], E[2]);
+    terminal_log(job->t, "%zu positions of a light of %.3g m2, %s %s", walked->light.n, walked->light.area,
+                 of_channels, light_conversion_unit(&plain, true));
+    if (converted) terminal_log(job->t, "converted by %g lm/W", WHITE_EFFICACY);
 done:
     return status;
 }

@@ -1,4 +1,5 @@
 /* lambert verify: checks a store and prints one line for each check. */
+#include "solver/base/photometry.h"
 #include "solver/scene/mesh_options.h"
 #include "solver/verbs/verbs.h"
 #include "solver/verify/verify.h"
@@ -69,6 +70,12 @@ static const struct {
 
 static const char *const words[] = {"ok", "BROKEN", "skipped"};
 
+/* That of the irradiances that are compared. */
+static const char *compared_unit(const examination *e) {
+    const light_conversion plain = {.from = e->m.lights};
+    return light_conversion_unit(&plain, false);
+}
+
 /* One line for each emission and group or element: the channel with the largest score. */
 static void print_compared(const examination *e) {
     for (size_t k = 0; k < e->n_compared; k += e->m.n_channels) {
@@ -76,8 +83,8 @@ static void print_compared(const examination *e) {
         char at[32];
         for (size_t c = 1; c < e->m.n_channels; c++)
             if (fabs(e->compared[k + c].score) > fabs(w->score)) w = &e->compared[k + c];
-        printf("        %+7.1f  operator %-11.6g walks %-11.6g +- %-8.2g  %s under %s%s\n", w->score,
-               w->answer, w->mean, w->error, walk_comparison_target(w, at), w->emission,
+        printf("        %+7.1f  operator %-11.6g walks %-11.6g +- %-8.2g %s  %s under %s%s\n", w->score,
+               w->answer, w->mean, w->error, compared_unit(e), walk_comparison_target(w, at), w->emission,
                w->dark ? ", dark" : "");
     }
 }
@@ -106,7 +113,11 @@ static lam_status print_json(const char *path, const check *done, const examinat
         json_array_append_new(list, json_pack("{s:s, s:s, s:s}", "name", done[i].name, "result",
                                               words[done[i].verdict], "detail", done[i].detail));
     json_t *root = json_pack("{s:s, s:b, s:o}", "store", path, "ok", !broken, "checks", list);
-    if (e->n_compared > 0) json_object_set_new(root, "walks", compared_json(e));
+    if (e->has_mesh) json_object_set_new(root, "lights", json_string(light_kind_word(e->m.lights)));
+    if (e->n_compared > 0) {
+        json_object_set_new(root, "walks", compared_json(e));
+        json_object_set_new(root, "unit", json_string(compared_unit(e)));
+    }
     char *text = json_dumps(root, JSON_INDENT(2));
     if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: the result cannot be written as JSON", path);
     puts(text);

@@ -1,6 +1,7 @@
 /* Checks of the file and the mesh, the form factors, and the scene it came from. */
 #include "solver/verify/verify.h"
 
+#include "solver/base/photometry.h"
 #include "solver/scene/glass.h"
 #include "solver/scene/import/import.h"
 #include "store/groups.h"
@@ -78,7 +79,10 @@ lam_status verify_mesh(examination *e, check *c, lam_error *error) {
     e->has_mesh = true;
     const mesh *m = &e->m;
     const double most = mesh_row_most(m);
-    check_say(c, VERDICT_OK, "%zu elements, %zu vertices, %zu groups", m->n, m->n_vertices, m->n_groups);
+    const light_conversion plain = {.from = m->lights};
+    const char *const unit = light_conversion_unit(&plain, true);
+    check_say(c, VERDICT_OK, "%zu elements, %zu vertices, %zu groups, lights in %s", m->n, m->n_vertices,
+              m->n_groups, unit);
     TRY(store_get_text(e->s, STORE_MESH, "geometry_hash", &recorded, error));
     mesh_geometry_hash(m, hash);
     if (strcmp(recorded, hash) != 0)
@@ -94,7 +98,7 @@ lam_status verify_mesh(examination *e, check *c, lam_error *error) {
         if (!(rho >= 0 && rho < 1))
             check_say(c, VERDICT_BROKEN, "reflectance[%zu] = %g, must be at least 0 and below 1", i, rho);
         if (!(emitted >= 0 && isfinite(emitted)))
-            check_say(c, VERDICT_BROKEN, "emission[%zu] = %g, must be at least 0", i, emitted);
+            check_say(c, VERDICT_BROKEN, "emission[%zu] = %g %s, must be at least 0", i, emitted, unit);
         if (mesh_is_pane(m, i % m->n) && rho > 1 - mesh_pane_passes(m, i % m->n, 1) + 1e-6)
             check_say(c, VERDICT_BROKEN,
                       "element %zu of a pane reflects %g and passes %g: more light than comes to it",

@@ -21,7 +21,7 @@ typedef struct moving_light {
     double *share; /* [n_corners - 2]: the part of the area up to each triangle of the fan */
     size_t n;
     light_pose *pose;                       /* [n] */
-    double emission[MOVING_LIGHT_CHANNELS]; /* W/m2 of each channel of the scene */
+    double emission[MOVING_LIGHT_CHANNELS]; /* W/m2 or lm/m2 of each channel of the scene */
 } moving_light;
 
 /* Takes corners over; poses and emission are the caller's to add. Errors: LAM_ERR_ARGUMENT (fewer than three

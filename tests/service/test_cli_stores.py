@@ -388,7 +388,7 @@ class Stores(Case):
         for walk, line in zip(walks, lines[at + 1:]):  # the same for any number of threads
             name = walk.get("group", f"element {walk.get('element')}")
             self.assertEqual(line.split(), f"{walk['z']:+.1f} operator {walk['operator']:.6g} walks {walk['walks']:.6g} "
-                             f"+- {walk['standard_error']:.2g} {name} under {walk['emission']}".split())
+                             f"+- {walk['standard_error']:.2g} W/m2 {name} under {walk['emission']}".split())
             self.assertFalse(walk["dark"])
         self.refused(2, "--walks -1: must not be negative", "verify", self.store, "--walks", "-1")
 

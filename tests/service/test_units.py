@@ -337,6 +337,49 @@ class Answers(unittest.TestCase):
         np.testing.assert_allclose(asked[0]["gradient"]["reflectance"], asked[1]["gradient"]["reflectance"], rtol=1e-5, atol=1e-9)
         self.assertEqual([a.get("converted_by") for a in asked], ["179 lm/W", None])
 
+    def test_a_check_has_units(self):
+        """`verify` names the kind of light, and its irradiances have their unit."""
+        for name, lights, exitance, irradiance in ("watts", "W", "W/m2", "W/m2"), ("lumens", "lm", "lm/m2", "lx"):
+            command = "verify", self.folder / f"{name}.h5", "--probes", 0, "--walks", 64
+            lines = must(*command).stdout.splitlines()
+            self.assertRegex(lines[1], rf"^ok +mesh +.* groups, lights in {exitance}$")
+            compared = [line for line in lines if "walks " in line and " under " in line and line.startswith("     ")]
+            self.assertGreater(len(compared), 8)
+            for line in compared:
+                self.assertRegex(line, rf" \+- \S+ +{irradiance}  \S.* under ")
+            told = json.loads(must(*command, "--json").stdout)
+            self.assertEqual((told["lights"], told["unit"]), (lights, irradiance))
+
+    def test_a_light_that_moves(self):
+        """Its emission has a unit as --emit has: the flux is that of the polygon, and its answers are in the unit of the store."""
+        polygon = [[-.3, -.3, 0], [.3, -.3, 0], [.3, .3, 0], [-.3, .3, 0]]
+        place = [{"name": "here", "move": [2, 2, 2], "turn": {"axis": [1, 0, 0], "degrees": 180}}]
+        store, file = self.folder.parent / (self.folder.name + "-moves.h5"), self.folder / "moves.json"
+        self.addCleanup(store.unlink, missing_ok=True)
+        given = (("900lm", 900 / .36, "lm"), ("18 W", 18 / .36, "W"), ("500cd/m2", np.pi * 500, "lm"), ("7lm/m2", 7, "lm"), (12, 12, ""),
+                 ("300,200,100lm", np.array([300, 200, 100]) / .36, "lm"))
+        for lights, unit, irradiance in ("W", "W/m2", "W/m2"), ("lm", "lm/m2", "lx"):
+            for text, exitance, own in given:
+                file.write_text(json.dumps({"light": {"polygon": polygon, "emission": text}, "positions": place}))
+                log = must("precompute", self.folder / "watts.h5", "--lights", lights, "--positions", file, "--paths", 64, "-o", store).stderr
+                factor = {"": 1, lights: 1}.get(own, 179 if lights == "lm" else 1 / 179)
+                with h5py.File(store) as f:
+                    np.testing.assert_allclose(f["operator/exitance"][:], exitance * factor, rtol=1e-6)
+                self.assertRegex(log, rf"1 positions of a light of 0.36 m2, [\d.e+, ]+ {unit}\n")
+                self.assertEqual("converted by 179 lm/W" in log, factor != 1, log)
+            told = json.loads(must("solve", store, "--emit", "here=1", "--quantity", "irradiance", "--json").stdout)
+            self.assertEqual(told["unit"], irradiance)
+            must("solve", store, "--emit", "here=1", "-o", self.folder / "moves.csv")
+            self.assertIn(f" [{unit}]", (self.folder / "moves.csv").read_text().splitlines()[0])
+            self.assertIn(f"lights in {unit}", must("verify", store).stdout)
+        for text in "900lux", "lm", "1,2lm", "1,2,3,4lm", "nanlm", "-3lm", "0lm", "":
+            file.write_text(json.dumps({"light": {"polygon": polygon, "emission": text}, "positions": place}))
+            done = lambert("precompute", self.folder / "watts.h5", "--positions", file, "-o", store)
+            self.assertEqual((done.returncode, done.stderr.count("lambert precompute: ")), (1, 1), done.stderr)
+            self.assertIn("moves.json: light: emission", done.stderr.splitlines()[-1])
+        done = lambert("solve", store, "--emit", "here=3lm")
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+
     def test_files_of_lights(self):
         file = self.folder / "light.json"
         file.write_text(json.dumps({"emissions": [{"groups": {"lamp": "179lm"}}, {"groups": {"lamp": 1 / AREA}}]}))
