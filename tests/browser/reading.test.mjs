@@ -1,6 +1,6 @@
 // The panel of readings: what it tells agrees with what the daemon answers.
 import assert from "node:assert/strict";
-import { writeFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
 import { pathToFileURL } from "node:url";
 import { Daemon, elementAt, inFolder, lambert, openPage, settled, violations } from "./page.mjs";
@@ -354,6 +354,30 @@ test("lamps, skies and readings are in the unit of the store, whatever a link sa
         await page.locator(".unit:visible", { hasText: lamp }).first().waitFor();
         await page.getByRole("tab", { name: "Sky" }).click();
         await page.locator(".unit:visible", { hasText: unit }).first().waitFor();
+        // Light that falls on a surface is in lx; light that leaves one is not, whatever part of the page says so.
+        await page.getByRole("tab", { name: "Reading" }).click();
+        await page.evaluate(() => {
+            const { store } = window.lambert;
+            store.change({ ...store.now, pins: [0] });
+        });
+        for (const quantity of ["radiosity", "irradiance", "indirect"]) {
+            const word = quantity === "irradiance" ? unit : lamp;
+            await page.evaluate((wanted) => {
+                const { store } = window.lambert, { now } = store;
+                store.change({ ...now, view: { ...now.view, picture: "false", quantity: wanted } });
+            }, quantity);
+            await settled(page);
+            await page.getByText(`Groups: ${quantity}, ${word}`).waitFor();
+            await page.getByText(`Spread over the area of all groups, ${word}`).waitFor();
+            assert.match(await page.locator(".legend").getAttribute("aria-label"), new RegExp(`, ${word}, from `));
+            assert.deepEqual(await page.locator('.pin[data-pin="0"] tr small').allTextContents(), [lamp, unit, lamp]);
+            await page.getByRole("tab", { name: "Export" }).click();
+            const coming = page.waitForEvent("download");
+            await page.getByRole("button", { name: "Save CSV" }).click();
+            const csv = readFileSync(await (await coming).path(), "utf8").split("\r\n")[0];
+            assert.ok(csv.includes(`${quantity}${scene === "yard" ? "_red" : ""}`) && csv.endsWith(` (${word})`), csv);
+            await page.getByRole("tab", { name: "Reading" }).click();
+        }
         await isFine(page);
         await page.context().close();
     }

@@ -5,7 +5,7 @@ import { Newest } from "../daemon/newest.ts";
 import { Field } from "../picture/field.ts";
 import type { Comparable } from "../state/comparable.ts";
 import { wantedFor, type Wanted } from "../state/request.ts";
-import { quantityOf, type Lighting } from "../state/state.ts";
+import { quantityShown, type Lighting } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
 import type { Side, Timing } from "./page.ts";
 import type { Shown } from "./shown.ts";
@@ -64,7 +64,7 @@ export class Asking {
         const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
         const other = side === 1 ? now.compare?.scene ?? null : null,
             of = other === null ? scene.description : this.comparable.get(other);
-        return of === undefined ? null : { of, quantity: quantityOf(now.view), lighting };
+        return of === undefined ? null : { of, quantity: quantityShown(now.view), lighting };
     }
 
     /** Asks for what is to be shown, if that has changed. */

@@ -5,6 +5,7 @@ import { readNpy } from "../base/npy.ts";
 import type { Page } from "../app/page.ts";
 import { drawLegend, SIDE_MOST, snapshot, type Legend } from "../picture/snapshot.ts";
 import { curlCommand, plainRequest, pythonProgram, type PlainRequest } from "../state/snippets.ts";
+import { quantityShown, unitOf, unitShown } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
 import type { Panel } from "./panel.ts";
 
@@ -81,10 +82,10 @@ function picturePart(page: Page, tries: (what: () => Promise<string>) => void, s
 
 /** Null where the picture is that of the eye. */
 function legendOf({ store, scene }: Page): Legend | null {
-    const { view, compare } = store.now, title = `${QUANTITIES[view.quantity]}, ${view.unit}`;
+    const { view, compare } = store.now, title = `${QUANTITIES[view.quantity]}, ${unitShown(view)}`;
     if (compare !== null && compare.how === "difference" && scene.fields[1] !== null) {
         const most = scene.stage.uniforms.change.value as number;
-        return { title: `B − A, ${view.unit}`, low: -most, high: most, log: false, palette: "change" };
+        return { title: `B − A, ${unitShown(view)}`, low: -most, high: most, log: false, palette: "change" };
     }
     if (view.picture !== "false") return null;
     const range = scene.stage.uniforms.range.value as { x: number; y: number };
@@ -101,9 +102,7 @@ function request({ store, ask }: Page): PlainRequest | null {
 /** A name that every system of files takes. */
 function fileName(store: Store): string {
     const { scene, view } = store.now;
-    return `${scene.replace(/[^\p{L}\p{N}._@-]+/gu, "-").slice(0, 80) || "scene"}-${
-        view.picture === "light" ? "radiosity" : view.quantity
-    }`;
+    return `${scene.replace(/[^\p{L}\p{N}._@-]+/gu, "-").slice(0, 80) || "scene"}-${quantityShown(view)}`;
 }
 
 async function values(page: Page): Promise<ArrayBuffer> {
@@ -119,10 +118,11 @@ async function saveNpy(page: Page): Promise<string> {
 }
 
 async function saveCsv(page: Page): Promise<string> {
-    const loaded = page.scene.now, { unit } = page.store.now.view, what = request(page);
+    const loaded = page.scene.now, what = request(page);
     const { data } = readNpy(await values(page));
     if (loaded === null || what === null) return "";
-    const { mesh, description: { channels } } = loaded, { quantity } = what.body;
+    const { mesh, description: { channels } } = loaded, { quantity } = what.body,
+        unit = unitOf(page.store.now.view, quantity);
     const channelNames = channels === 3
         ? ["red", "green", "blue"]
         : channels === 1

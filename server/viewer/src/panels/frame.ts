@@ -3,6 +3,7 @@ import { button, choice, fill, make } from "../base/dom.ts";
 import { count, percent, numberText } from "../base/numbers.ts";
 import { headlineOf } from "../daemon/headline.ts";
 import type { OpenScene, Page, Scene } from "../app/page.ts";
+import { unitShown } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
 
 /** What takes less is not told of. */
@@ -140,9 +141,9 @@ export function makeStatus({ store, scene, ask }: Page): HTMLElement {
     const drawError = (): void => {
         const { description } = scene.now as OpenScene;
         if (scene.certificate !== null) {
-            error.textContent = `certified: no number is off by more than ${
-                numberText(scene.certificate.bound, 2)
-            } ${store.now.view.unit}`;
+            error.textContent = `certified: no number is off by more than ${numberText(scene.certificate.bound, 2)} ${
+                unitShown(store.now.view)
+            }`;
             return;
         }
         const headline = headlineOf(description.error, ask.wanted()?.emission ?? null);

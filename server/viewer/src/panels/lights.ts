@@ -2,7 +2,7 @@
 import { fromHex, luminance, ofTemperature, toHex, type Rgb } from "../base/colour.ts";
 import { button, choice, fill, make, tick, unique } from "../base/dom.ts";
 import type { Page } from "../app/page.ts";
-import type { GroupLight, Lighting, Preset } from "../state/state.ts";
+import { unitOf, type GroupLight, type Lighting, type Preset } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
 import { slider, type Slider } from "./slider.ts";
 
@@ -115,7 +115,7 @@ function lightRow({ store, scene }: Page, name: string, light: GroupLight,
     const most = Math.max(1e-6, 4 * (light.power || 1));
     const power: Slider = slider({
         label: "Power",
-        unit: store.now.view.unit === "lx" ? "lm/m²" : "W/m²",
+        unit: unitOf(store.now.view, "radiosity"),
         least: 0,
         most,
         log: true,

@@ -4,6 +4,7 @@ import { clamp, numberText } from "../base/numbers.ts";
 import { toHex } from "../base/colour.ts";
 import type { Page } from "../app/page.ts";
 import { changeColour } from "../picture/changes.ts";
+import { unitShown } from "../state/state.ts";
 
 /** Parts of the width that a key moves the line by. */
 const STEP = 0.01, LEAP = 0.1;
@@ -92,7 +93,7 @@ export function changeLegend({ store }: Page): { element: HTMLElement; set(most:
         element,
         set: (most) => {
             low.textContent = `−${numberText(most)}`;
-            high.textContent = `+${numberText(most)} ${store.now.view.unit}`;
+            high.textContent = `+${numberText(most)} ${unitShown(store.now.view)}`;
         },
     };
 }

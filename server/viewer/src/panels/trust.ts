@@ -9,6 +9,7 @@ import { Newest } from "../daemon/newest.ts";
 import type { OpenScene, Page } from "../app/page.ts";
 import { Field } from "../picture/field.ts";
 import type { Wanted } from "../state/request.ts";
+import { unitShown } from "../state/state.ts";
 import type { Panel } from "./panel.ts";
 
 /** Errors and certificates are asked for this long after the last answer, so that a drag costs neither. */
@@ -229,9 +230,9 @@ function certifier({ store, scene, ask, tell }: Page): { element: HTMLElement; r
                 scene.certify(new Field(floatsToHalves(data as Float32Array), shape, wanted.scale), { bound, iterations,
                     solve: answer.solveMs });
                 said.textContent =
-                    `Certified: no number of this answer is off by more than ${
-                        numberText(bound, 2)
-                    } ${store.now.view.unit}. `
+                    `Certified: no number of this answer is off by more than ${numberText(bound, 2)} ${
+                        unitShown(store.now.view)
+                    }. `
                     + `${iterations} multiplications by the form factors, ${
                         numberText(answer.solveMs ?? performance.now() - start, 2)
                     } ms. The picture rounds to 11 bits.`;

@@ -95,6 +95,7 @@ export interface View {
     range: [number, number] | null;
     log: boolean;
     isoLines: number;
+    /** Of the store, by its irradiance: unitOf has that of other quantities. */
     unit: Unit;
     /** Elements below this value are marked; null: no marks. */
     threshold: number | null;
@@ -190,9 +191,20 @@ export const firstState: State = {
     tolerance: null,
 };
 
-/** What a picture is of. */
-export function quantityOf(view: View): Quantity {
-    return view.picture === "light" ? "radiosity" : view.quantity;
+/** The quantity of the picture and of all readings. */
+export function quantityShown({ picture, quantity }: View): Quantity {
+    return picture === "light" ? "radiosity" : quantity;
+}
+
+/** The unit of a quantity: light in lx falls on a surface, and light that leaves one is in lm/m², as the answers of
+ * the daemon say it. */
+export function unitOf({ unit }: View, quantity: Quantity): string {
+    return unit === "lx" && quantity !== "irradiance" ? "lm/m²" : unit;
+}
+
+/** The unit of the picture. */
+export function unitShown(view: View): string {
+    return unitOf(view, quantityShown(view));
 }
 
 /** Emission of each group under a lighting, per channel, in the store's unit; groups that are dark are absent. */

@@ -8,7 +8,7 @@ import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { figuresOf, type Figures } from "../../picture/scale.ts";
 import type { Wanted } from "../../state/request.ts";
-import { quantityOf } from "../../state/state.ts";
+import { quantityShown, unitShown } from "../../state/state.ts";
 
 type Column = "name" | "mean" | "min" | "max" | "uniformity";
 const COLUMNS: readonly (readonly [Column, string, string])[] = [
@@ -106,7 +106,7 @@ export class Groups {
     draw(): void {
         if (!this.isSeen() || this.page.scene.now === null) return;
         const { view } = this.page.store.now, { lines } = this;
-        this.head.textContent = `Groups: ${quantityOf(view)}, ${view.unit}`;
+        this.head.textContent = `Groups: ${quantityShown(view)}, ${unitShown(view)}`;
         this.heads.forEach((head, i) => {
             if (COLUMNS[i][0] === this.column) head.setAttribute("aria-sort", this.isUp ? "ascending" : "descending");
             else head.removeAttribute("aria-sort");

@@ -4,6 +4,7 @@ import { make } from "../../base/dom.ts";
 import { percent, numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
 import { areaByValue, ticksOf, valueAt, type Axis } from "../../picture/scale.ts";
+import { unitShown } from "../../state/state.ts";
 
 const BINS = 60;
 const HEIGHT = 140;
@@ -68,7 +69,7 @@ export class Histogram {
         const { axis } = this;
         const areas = areaByValue(field.values, scene.mesh.area, counts, axis, BINS);
         const total = areas.reduce((sum, a) => sum + a, 0) || 1;
-        this.head.textContent = `Spread over the area of ${view.judged ?? "all groups"}, ${view.unit}${
+        this.head.textContent = `Spread over the area of ${view.judged ?? "all groups"}, ${unitShown(view)}${
             spread.most > high ? "; the last bar has all above" : ""
         }`;
         if (document.activeElement !== this.low) this.low.value = String(Number(palette.low.toPrecision(4)));
@@ -76,12 +77,12 @@ export class Histogram {
         const at = Array.from(areas, (_, k) => (k + 0.5) / BINS);
         const largest = areas.indexOf(Math.max(...areas));
         this.place.setAttribute("aria-label",
-            `Histogram of values from ${numberText(axis.low)} to ${numberText(axis.high)} ${view.unit}; most area, ${
-                percent(areas[largest] / total)
-            }, `
+            `Histogram of values from ${numberText(axis.low)} to ${numberText(axis.high)} ${
+                unitShown(view)
+            }; most area, ${percent(areas[largest] / total)}, `
                 + `has ${numberText(valueAt(largest / BINS, axis))} to ${
                     numberText(valueAt((largest + 1) / BINS, axis))
-                } ${view.unit}.`);
+                } ${unitShown(view)}.`);
         this.plot ??= this.makePlot();
         this.plot.setData([at, Array.from(areas, (a) => (100 * a) / total)]);
     }

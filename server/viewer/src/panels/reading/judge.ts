@@ -4,7 +4,7 @@ import { choice, fill, make, tick } from "../../base/dom.ts";
 import { percent, numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
 import { figuresOf } from "../../picture/scale.ts";
-import type { View } from "../../state/state.ts";
+import { unitShown, type View } from "../../state/state.ts";
 
 /** Maintained illuminance Em and uniformity U0 of task areas, after EN 12464-1. */
 const TASKS: readonly (readonly [string, number, number])[] = [
@@ -80,12 +80,13 @@ export class Judge {
 
     draw(): void {
         const { scene: { now: scene, fields: [field] }, store: { now: { view } } } = this.page;
+        const unit = unitShown(view);
         (this.on.querySelector("input") as HTMLInputElement).checked = view.threshold !== null;
         this.fields.hidden = view.threshold === null;
         if (!this.isSeen() || view.threshold === null || scene === null || field === null) return;
         if (document.activeElement !== this.level) this.level.value = String(view.threshold);
         if (document.activeElement !== this.evenness) this.evenness.value = String(view.uniformity);
-        this.unit.textContent = view.unit;
+        this.unit.textContent = unit;
         const select = this.group.querySelector("select");
         if (select !== null) select.value = view.judged ?? "";
         const judged = scene.mesh.groups.find((group) => group.name === view.judged);
@@ -99,15 +100,15 @@ export class Judge {
             make("p", { class: "reached" },
                 `${percent(figures.reached)} of ${view.judged ?? "all"} (${
                     numberText(figures.area * figures.reached)
-                } of ${numberText(figures.area)} m²) has at least ${numberText(view.threshold)} ${view.unit}.`),
+                } of ${numberText(figures.area)} m²) has at least ${numberText(view.threshold)} ${unit}.`),
             make("table", {},
                 make("tbody", {},
-                    line("Mean Em", `${numberText(figures.mean)} ${view.unit}`, `≥ ${numberText(view.threshold)}`,
+                    line("Mean Em", `${numberText(figures.mean)} ${unit}`, `≥ ${numberText(view.threshold)}`,
                         figures.mean >= view.threshold),
                     line("U0 = min/mean", Number.isFinite(figures.uniformity) ? figures.uniformity.toFixed(2) : "–",
                         `≥ ${view.uniformity.toFixed(2)}`, figures.uniformity >= view.uniformity),
                     make("tr", {}, make("th", { scope: "row" }, "Min"),
-                        make("td", {}, `${numberText(figures.min)} ${view.unit}`), make("td", {}), make("td", {})))),
+                        make("td", {}, `${numberText(figures.min)} ${unit}`), make("td", {}), make("td", {})))),
             !isIrradiance
                 && make("p", { class: "bad" }, "The picture does not show irradiance, which such targets are about."),
             view.unit !== "lx"

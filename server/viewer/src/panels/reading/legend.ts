@@ -4,7 +4,7 @@ import { numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
 import { paletteBytes } from "../../picture/palettes.ts";
 import { placeOf, ticksOf, valueAt } from "../../picture/scale.ts";
-import type { Palette } from "../../state/state.ts";
+import { unitShown, type Palette } from "../../state/state.ts";
 
 const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indirect: "Indirect" };
 
@@ -26,7 +26,7 @@ export function addLegend({ store, scene }: Page): void {
             for (let i = 0; i < 256; i++) picture.data.set(bytes.subarray(4 * i, 4 * i + 4), 4 * (255 - i));
             ramp.getContext("2d")?.putImageData(picture, 0, 0);
         }
-        const text = `${QUANTITIES[view.quantity]}, ${view.unit}`;
+        const text = `${QUANTITIES[view.quantity]}, ${unitShown(view)}`;
         const rows = Math.max(3, Math.floor(ramp.clientHeight / 18));
         const key = JSON.stringify([axis, view.isoLines, text, rows]);
         if (key === drawn) return;

@@ -3,9 +3,10 @@
 import { button, fill, make } from "../../base/dom.ts";
 import { count, numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
+import type { Quantity } from "../../daemon/api.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
-import { emissionOf, quantityOf } from "../../state/state.ts";
+import { emissionOf, quantityShown, unitOf } from "../../state/state.ts";
 import type { Wanted } from "../../state/request.ts";
 
 /** By element, a number for each channel. */
@@ -131,24 +132,25 @@ export class Pins {
             : typeof emission === "number"
             ? new Array<number>(channels).fill(emission)
             : emission;
-        const shown = quantityOf(now.view), live = field?.at(element);
-        const rows: [string, string, number[] | null | undefined][] = [
-            ["B", "Radiosity", exact?.B ?? (shown === "radiosity" ? live : undefined)],
-            ["H", "Irradiance", exact?.H ?? (shown === "irradiance" ? live : undefined)],
-            ["E", "Emission", E],
+        const shown = quantityShown(now.view), live = field?.at(element);
+        const rows: [string, string, Quantity, number[] | null | undefined][] = [
+            ["B", "Radiosity", "radiosity", exact?.B ?? (shown === "radiosity" ? live : undefined)],
+            ["H", "Irradiance", "irradiance", exact?.H ?? (shown === "irradiance" ? live : undefined)],
+            ["E", "Emission", "radiosity", E],
         ];
         const weights = channelWeights(channels),
             names = channels === 3 ? ["red", "green", "blue"] : Array.from({ length: channels }, (_, c) => `${c + 1}`);
         fill(card.querySelector("table") as HTMLElement,
             make("thead", {},
-                make("tr", {}, make("th", { scope: "col" }, now.view.unit),
+                make("tr", {}, make("td", {}),
                     ...(channels > 1 ? [...names, channels === 3 ? "lum." : "mean"] : ["value"]).map((name) =>
                         make("th", { scope: "col", title: name === "lum." ? "luminance" : null }, name)
                     ))),
             make("tbody", {},
-                ...rows.map(([letter, name, values]) =>
-                    make("tr", { "data-row": letter }, make("th", { scope: "row", title: name }, `${name} ${letter}`),
-                        ...(channels > 1
+                ...rows.map(([letter, name, of, values]) =>
+                    make("tr", { "data-row": letter },
+                        make("th", { scope: "row", title: name }, `${name} ${letter} `,
+                            make("small", {}, unitOf(now.view, of))), ...(channels > 1
                             ? [...(values ?? new Array<number>(channels).fill(NaN)), values?.reduce((sum, v, c) =>
                                 sum + v * weights[c], 0) ?? NaN]
                             : [values?.[0] ?? NaN]).map((value) => make("td", {}, numberText(value))))

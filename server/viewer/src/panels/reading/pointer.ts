@@ -3,6 +3,7 @@ import { button, make } from "../../base/dom.ts";
 import { clamp, numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
 import { pinsAfter } from "../../state/shares.ts";
+import { unitShown } from "../../state/state.ts";
 
 /** A pointer that moved less than this, in pixels, between down and up has clicked. */
 const CLICK_PX = 5;
@@ -156,7 +157,7 @@ export class Pointer {
             if (this.isByKeys) this.told.textContent = "nothing";
             return;
         }
-        const text = `${numberText(field.values[element])} ${view.unit} · ${
+        const text = `${numberText(field.values[element])} ${unitShown(view)} · ${
             scene.mesh.groups[scene.mesh.groupOf[element]]?.name ?? ""
         }`;
         this.tip.textContent = text;

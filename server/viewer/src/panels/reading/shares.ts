@@ -2,15 +2,16 @@
 import { fill, make } from "../../base/dom.ts";
 import { count, percent, numberText } from "../../base/numbers.ts";
 import type { OpenScene, Page } from "../../app/page.ts";
+import type { Quantity } from "../../daemon/api.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { partsOf, type Gradient } from "../../state/shares.ts";
-import { quantityOf } from "../../state/state.ts";
+import { quantityShown, unitOf } from "../../state/state.ts";
 
 interface Asked {
     scene: string;
     element: number;
-    quantity: string;
+    quantity: Quantity;
 }
 
 const LINES_MOST = 12;
@@ -48,7 +49,7 @@ export class Shares {
         const { pins, scene, view } = this.page.store.now, element = pins[pins.length - 1];
         return element === undefined
             ? null
-            : { scene, element, quantity: quantityOf(view) };
+            : { scene, element, quantity: quantityShown(view) };
     }
 
     private async ask(asked: Asked): Promise<Gradient> {
@@ -107,8 +108,9 @@ export class Shares {
         if (parts.length > LINES_MOST) listed.push({ name: `${parts.length - LINES_MOST} others`, value: rest });
         fill(this.body,
             make("p", {},
-                `${group}, element ${count(asked.element)}: ${asked.quantity} ${numberText(total)} ${now.view.unit}`),
-            parts.length === 0 && make("p", { class: "hint" }, "Nothing shines."),
+                `${group}, element ${count(asked.element)}: ${asked.quantity} ${numberText(total)} ${
+                    unitOf(now.view, asked.quantity)
+                }`), parts.length === 0 && make("p", { class: "hint" }, "Nothing shines."),
             make("ol", {}, ...listed.map(({ name, value }) => {
                 const share = total > 0 ? value / total : 0;
                 const bar = make("span", { class: "bar", "aria-hidden": "true" });
@@ -116,7 +118,7 @@ export class Shares {
                 return make("li", { "data-part": name },
                     make("span", { class: "row" }, make("span", { class: "grow" }, name),
                         make("span", { class: "figures" },
-                            `${percent(share)} · ${numberText(value)} ${now.view.unit}`)),
+                            `${percent(share)} · ${numberText(value)} ${unitOf(now.view, asked.quantity)}`)),
                     make("span", { class: "track", "aria-hidden": "true" }, bar));
             })));
     }
