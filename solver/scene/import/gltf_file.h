@@ -21,6 +21,7 @@ typedef struct gltf_file {
     const char *chunk; /* the binary one of a GLB, or NULL */
     size_t chunk_length, n_buffers;
     gltf_buffer *buffers; /* those read so far */
+    size_t own_nodes; /* nodes of the file; those behind are instances, children of the node that has them */
 } gltf_file;
 
 /* Parses the JSON and finds the binary chunk, into a file that has its path and s; root is NULL where the
@@ -94,8 +95,10 @@ lam_status gltf_unpack_views(gltf_file *g, gltf_numbers *unpacked, lam_error *er
  * O(numbers). Errors: LAM_ERR_FORMAT (integers that cannot be read), LAM_ERR_MEMORY. */
 lam_status gltf_convert_integers(gltf_file *g, gltf_numbers *numbers, lam_error *error);
 
-/* Warns of lights, maps and extensions that are not read, a line for each kind. O(nodes) for an extension. */
-void gltf_tell_left_out(const gltf_file *g);
+/* Warns of lights, maps, scenes and extensions that are not read, a line for each kind, with the faces that
+ * each is about and their area: of plain bytes, instances that are nodes, and bones. O(faces) where there are
+ * some. Errors: LAM_ERR_MEMORY. */
+lam_status gltf_tell_left_out(gltf_file *g, lam_error *error);
 
 /* The bytes of a buffer, read once; bytes is NULL where there are none. */
 gltf_buffer gltf_read_buffer(gltf_file *g, const json_t *index, lam_error *error);

@@ -116,6 +116,7 @@ lam_status gltf_expand_instances(gltf_file *g, bool *any, lam_error *error) {
     size_t total = 0;
     json_t *nodes = json_object_get(g->root, "nodes");
     const size_t n = json_array_size(nodes);
+    g->own_nodes = n;
     for (size_t i = 0; i < n; i++) {
         if (gltf_extension(json_array_get(nodes, i), extension) == NULL) continue;
         TRY(expand_node(g, nodes, i, &total, error));

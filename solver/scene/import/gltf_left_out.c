@@ -1,7 +1,8 @@
 /* Parts of a glTF that are not read, for people: lights, maps, extensions with the faces that they are about.
  * Runs in the child. */
-#include "solver/scene/import/gltf_file.h"
+#include "solver/scene/import/gltf_amount.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -23,52 +24,101 @@ static bool is_read(const char *extension) {
     return strncmp(extension, "KHR_xmp", 7) == 0;
 }
 
-/* Triangles of a primitive. */
-static size_t faces_of(const gltf_file *g, const json_t *primitive) {
-    const double mode = gltf_number(json_object_get(primitive, "mode"), 4);
-    const json_t *index = json_object_get(primitive, "indices");
-    if (index == NULL) index = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
-    const double n = gltf_number(json_object_get(gltf_entry(g, "accessors", index), "count"), 0);
-    const double faces = mode == 4 ? n / 3 : mode > 4 ? n - 2 : 0;
-    return faces > 0 && faces < 1e15 ? (size_t)faces : 0;
-}
+enum { EXTENSIONS_MOST = 16 };
 
-/* Faces of all nodes, and in *with those that an extension is about: by their node, mesh or material. */
-static size_t count_faces(const gltf_file *g, const char *extension, size_t *with) {
-    size_t i, k, all = 0;
-    json_t *node, *primitive;
-    *with = 0;
-    json_array_foreach(json_object_get(g->root, "nodes"), i, node) {
-        const json_t *of = gltf_entry(g, "meshes", json_object_get(node, "mesh"));
-        const bool whole = gltf_extension(node, extension) != NULL || gltf_extension(of, extension) != NULL;
-        json_array_foreach(json_object_get(of, "primitives"), k, primitive) {
-            const json_t *material = gltf_entry(g, "materials", json_object_get(primitive, "material"));
-            const size_t faces = faces_of(g, primitive);
-            all += faces;
-            if (whole || gltf_extension(primitive, extension) != NULL ||
-                gltf_extension(material, extension) != NULL)
-                *with += faces;
-        }
-    }
-    return all;
-}
+/* Extensions that are left out, with the faces that each is about. */
+typedef struct left_out {
+    size_t n, more; /* those named, and others */
+    const char *name[EXTENSIONS_MOST];
+    gltf_amount with[EXTENSIONS_MOST];
+    gltf_amount read, unread; /* of the scene that is read; of other nodes */
+} left_out;
 
-static void tell_extensions(const gltf_file *g) {
-    size_t i, written = 0;
+static void find_extensions(const gltf_file *g, left_out *out) {
+    size_t i;
     json_t *name;
-    char list[1024] = "";
     json_array_foreach(json_object_get(g->root, "extensionsUsed"), i, name) {
         const char *extension = json_string_value(name);
-        size_t with;
-        if (extension == NULL || is_read(extension) || written + 128 > sizeof list) continue;
-        const size_t all = count_faces(g, extension, &with);
-        written += (size_t)snprintf(list + written, sizeof list - written, "%s%.60s", written > 0 ? ", " : "",
-                                    extension);
-        if (with > 0)
-            written +=
-                (size_t)snprintf(list + written, sizeof list - written, " (of %zu of %zu faces)", with, all);
+        if (extension == NULL || is_read(extension)) continue;
+        if (out->n < EXTENSIONS_MOST)
+            out->name[out->n++] = extension;
+        else
+            out->more++;
     }
-    if (written > 0) import_warn(&g->s->warnings, "%s: these extensions are left out: %s", g->path, list);
+}
+
+/* True where an extension is about the faces of a primitive: by its node, mesh or material. */
+static bool is_about(const gltf_file *g, const char *extension, const json_t *node, const json_t *of,
+                     const json_t *primitive) {
+    const json_t *material = gltf_entry(g, "materials", json_object_get(primitive, "material"));
+    return gltf_extension(node, extension) != NULL || gltf_extension(of, extension) != NULL ||
+           gltf_extension(primitive, extension) != NULL || gltf_extension(material, extension) != NULL;
+}
+
+/* Adds the faces of all nodes. An instance has the extensions of its node, which is its parent. */
+static void add_faces(gltf_file *g, const gltf_nodes *nodes, left_out *out) {
+    const json_t *list = json_object_get(g->root, "nodes"), *primitive;
+    for (size_t k = 0; k < nodes->n; k++) {
+        const size_t at = nodes->order[k];
+        const json_t *node = json_array_get(list, at);
+        const json_t *of = gltf_entry(g, "meshes", json_object_get(node, "mesh"));
+        const json_t *owner = at < g->own_nodes ? node : json_array_get(list, nodes->parent[at]);
+        size_t p;
+        json_array_foreach(json_object_get(of, "primitives"), p, primitive) {
+            const gltf_amount amount = gltf_amount_of(g, primitive, &nodes->placed[at]);
+            gltf_amount_add(k < nodes->n_read ? &out->read : &out->unread, &amount);
+            for (size_t e = 0; k < nodes->n_read && e < out->n; e++)
+                if (is_about(g, out->name[e], owner, of, primitive)) gltf_amount_add(&out->with[e], &amount);
+        }
+    }
+}
+
+static void tell_extensions(const gltf_file *g, const left_out *found) {
+    char list[EXTENSIONS_MOST * 256] = "", amount[GLTF_AMOUNT_TEXT];
+    size_t written = 0;
+    for (size_t e = 0; e < found->n; e++) {
+        written += (size_t)snprintf(list + written, sizeof list - written, "%s%.60s", e > 0 ? ", " : "",
+                                    found->name[e]);
+        if (!(found->with[e].faces > 0)) continue;
+        gltf_amount_text(&found->with[e], &found->read, g->s->unit, amount);
+        written += (size_t)snprintf(list + written, sizeof list - written, " (of %s)", amount);
+    }
+    if (found->more > 0) snprintf(list + written, sizeof list - written, " and %zu more", found->more);
+    if (found->n > 0)
+        import_warn(&g->s->warnings, "%s: these extensions are left out: %.1500s", g->path, list);
+}
+
+/* Tells of scenes beside the one that is read, and of nodes that stand in none. */
+static void tell_scenes(const gltf_file *g, const left_out *found) {
+    const size_t n = json_array_size(json_object_get(g->root, "scenes")), one = gltf_scene_read(g->root);
+    gltf_amount all = found->read;
+    char amount[GLTF_AMOUNT_TEXT];
+    gltf_amount_add(&all, &found->unread);
+    gltf_amount_text(&found->unread, &all, g->s->unit, amount);
+    if (n > 1 && found->unread.faces > 0)
+        import_warn(&g->s->warnings, "%s: of its %zu scenes only scenes[%zu] is read; faces are missing: %s",
+                    g->path, n, one, amount);
+    else if (n > 1)
+        import_warn(&g->s->warnings, "%s: of its %zu scenes only scenes[%zu] is read, which has all faces",
+                    g->path, n, one);
+    else if (found->unread.faces > 0)
+        import_warn(&g->s->warnings, "%s: faces are missing, as their nodes are in no scene: %s", g->path,
+                    amount);
+}
+
+/* Finds faces where something is left out that they tell of. */
+static lam_status tell_amounts(gltf_file *g, lam_error *error) {
+    lam_status status = LAM_OK;
+    left_out found = {.n = 0};
+    gltf_nodes nodes = {.n = 0};
+    find_extensions(g, &found);
+    TRY(gltf_nodes_place(g->root, &nodes, error));
+    if (found.n > 0 || nodes.n_read < nodes.n) add_faces(g, &nodes, &found);
+    tell_scenes(g, &found);
+    tell_extensions(g, &found);
+done:
+    gltf_nodes_free(&nodes);
+    return status;
 }
 
 static bool any_weight(const json_t *owner) {
@@ -110,24 +160,13 @@ static void tell_lines(const gltf_file *g) {
     json_t *of, *primitive;
     json_array_foreach(json_object_get(g->root, "meshes"), i, of)
         json_array_foreach(json_object_get(of, "primitives"), k, primitive) n +=
-        gltf_number(json_object_get(primitive, "mode"), 4) < 4;
+        fabs(gltf_number(json_object_get(primitive, "mode"), 4) - 5) > 1;
     if (n > 0)
         import_warn(&g->s->warnings, "%s: %zu primitive%s of lines or points %s left out: no faces", g->path,
                     n, n == 1 ? "" : "s", n == 1 ? "is" : "are");
 }
 
-/* Tells of scenes beside the one that the file names, or its first. */
-static void tell_scenes(const gltf_file *g) {
-    const json_t *given = json_object_get(g->root, "scene");
-    const size_t n = json_array_size(json_object_get(g->root, "scenes"));
-    const long long one = json_is_integer(given) ? (long long)json_integer_value(given) : 0;
-    if (n > 1)
-        import_warn(&g->s->warnings,
-                    "%s: of its %zu scenes only scenes[%lld] is read; faces of others may be missing",
-                    g->path, n, one);
-}
-
-void gltf_tell_left_out(const gltf_file *g) {
+lam_status gltf_tell_left_out(gltf_file *g, lam_error *error) {
     import_warnings *w = &g->s->warnings;
     static const char punctual[] = "KHR_lights_punctual";
     size_t i, lights = 0, bumps = 0, alphas = 0, metals = 0;
@@ -159,6 +198,5 @@ void gltf_tell_left_out(const gltf_file *g) {
                     g->path, metals);
     tell_moved(g);
     tell_lines(g);
-    tell_scenes(g);
-    tell_extensions(g);
+    return tell_amounts(g, error);
 }

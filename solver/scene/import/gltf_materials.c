@@ -161,7 +161,6 @@ lam_status gltf_read_materials(const char *path, const char *bytes, size_t lengt
     if (made == NULL) TRY(LAM_ERR_MEMORY);
     n_made = n_materials;
     for (i = 0; i < n_materials; i++) TRY(read_material(&g, json_array_get(materials, i), &made[i], error));
-    gltf_tell_left_out(&g);
     *out = made;
     *n = n_materials;
     made = NULL;

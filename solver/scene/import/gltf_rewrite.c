@@ -80,11 +80,12 @@ lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, impo
         FAIL(error, LAM_ERR_FORMAT,
              "%s: its JSON is broken, and its instances (" GLTF_INSTANCES ") cannot be read", path);
     if (g.root == NULL) goto done; /* the library says why */
-    bones = drop_skins(&g);
     TRY(gltf_hold_buffers(&g, error));
     TRY(gltf_unpack_views(&g, unpacked, error));
     TRY(gltf_convert_integers(&g, numbers, error));
     TRY(gltf_expand_instances(&g, &changed, error));
+    TRY(gltf_tell_left_out(&g, error));
+    bones = drop_skins(&g);
     changed = changed || bones || unpacked->length > 0 || numbers->length > 0;
     changed = changed || json_array_size(json_object_get(g.root, "materials")) > 0;
     TRY(number_materials(&g, error));

@@ -459,6 +459,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
         .memory_bytes = options->memory_bytes > 0 ? options->memory_bytes : (size_t)8 << 30,
         .assets = options->assets,
         .format = options->format,
+        .unit = options->guess_unit ? 0 : options->unit,
     };
     TRY(check_options(options, error));
     if (is_input(path) && options->format == NULL)

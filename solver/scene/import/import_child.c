@@ -91,6 +91,7 @@ static void read_in_child(void *context) {
     snprintf(input, sizeof input, "/proc/self/fd/%d", (int)CONFINED_INPUT);
     imported_faces s = {.assets = work->limits->assets,
                         .format = work->limits->format,
+                        .unit = work->limits->unit,
                         .source = work->limits->input > 0 ? input : NULL};
     lam_error error = {0};
     lam_status result = work->reader(work->path, &s, &error);

@@ -89,6 +89,7 @@ typedef struct imported_faces {
     const char *assets; /* folder that files of the scene may lie in beside the scene's own; NULL: none */
     const char *source; /* the file that has the bytes of the scene; NULL: its path */
     const char *format; /* "obj", "GLB"; NULL: by the extension of its path */
+    double unit;        /* metres of the file's, for people; 0: not known yet */
     import_warnings warnings;
 } imported_faces;
 
@@ -145,8 +146,8 @@ typedef struct gltf_material {
 } gltf_material;
 
 /* Reads the materials of a glTF or GLB with their images, *out [*n], freed by gltf_materials_free, in the
- * file's order; warns of what is left out. Errors: LAM_ERR_FORMAT where it requires an extension which
- * changes what is read and is not read here; other faults are the library's to tell. */
+ * file's order. Errors: LAM_ERR_FORMAT where it requires an extension which changes what is read and is not
+ * read here; other faults are the library's to tell. */
 lam_status gltf_read_materials(const char *path, const char *bytes, size_t length, imported_faces *s,
                                gltf_material **out, size_t *n, lam_error *error);
 void gltf_materials_free(size_t n, gltf_material *materials);
@@ -162,9 +163,10 @@ typedef struct gltf_numbers {
 
 /* Rewrites a glTF or GLB for the library: with a child for each instance of a node (EXT_mesh_gpu_instancing),
  * with plain bytes, in unpacked, in place of compressed ones, with floats, in numbers, in place of integers,
- * and with GLTF_NUMBER and its place in the file for the name of each material. *out is a copy of the file,
- * freed by the caller as the bytes of both, or NULL where there is nothing to rewrite. Errors: LAM_ERR_FORMAT
- * (instances, views or integers that cannot be read, or too many), LAM_ERR_MEMORY. */
+ * and with GLTF_NUMBER and its place in the file for the name of each material; warns of what is left out.
+ * *out is a copy of the file, freed by the caller as the bytes of both, or NULL where there is nothing to
+ * rewrite. Errors: LAM_ERR_FORMAT (instances, views or integers that cannot be read, or too many),
+ * LAM_ERR_MEMORY. */
 #define GLTF_NUMBER "lambert material "
 lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, imported_faces *s, char **out,
                         size_t *out_length, gltf_numbers *unpacked, gltf_numbers *numbers, lam_error *error);
@@ -203,6 +205,7 @@ typedef struct child_limits {
     unsigned cpu_seconds;
     size_t memory_bytes;         /* beyond that of the caller */
     const char *assets, *format; /* of imported_faces */
+    double unit;                 /* the same */
     int input;                   /* the descriptor of a file that has the scene's bytes; 0: its path */
 } child_limits;
 

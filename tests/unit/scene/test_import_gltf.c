@@ -138,11 +138,67 @@ START_TEST(extensions_that_are_not_read_are_named_with_their_faces) {
     mesh m = import_good(path, &report);
     ck_assert_uint_eq(m.n, 3);
     ck_assert_msg(strstr(report.warnings,
-                         "extensions are left out: KHR_materials_clearcoat (of 2 of 3 faces), "
-                         "EXT_of_nodes (of 1 of 3 faces), EXT_of_nothing") != NULL,
+                         "extensions are left out: KHR_materials_clearcoat (of 2 of 3 faces, 1 of 1.5 m2), "
+                         "EXT_of_nodes (of 1 of 3 faces, 0.5 of 1.5 m2), EXT_of_nothing") != NULL,
                   "%s", report.warnings);
     ck_assert_ptr_nonnull(strstr(report.warnings, "its 1 light (KHR_lights_punctual) is left out"));
     mesh_free(&m);
+}
+END_TEST
+
+static void import_told(const char *gltf, double unit, bool guess, size_t n, const char *told) {
+    import_options options = import_plain();
+    char path[256];
+    import_report report;
+    lam_error error = {0};
+    mesh m = {0};
+    options.unit = unit;
+    options.guess_unit = guess;
+    file_write(folder, "told.gltf", gltf, path);
+    ck_assert_msg(scene_import(path, &options, &m, &report, &error) == LAM_OK, "%s", error.message);
+    ck_assert_uint_eq(m.n, n);
+    ck_assert_msg(strstr(report.warnings, told) != NULL, "%s", report.warnings);
+    mesh_free(&m);
+}
+
+/* Nodes of another scene, or of none, are not read: the larger one has four times the area of a triangle. */
+START_TEST(faces_that_are_not_read_are_told_with_their_area) {
+#define HEAD "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,"
+#define MESHES "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}]," TRIANGLE "}"
+    static const char of_another[] =
+        HEAD "\"scenes\":[{\"nodes\":[0]},{\"nodes\":[1]}],\"nodes\":[{\"mesh\":0},"
+             "{\"mesh\":0,\"scale\":[2,2,2]}]," MESHES;
+    static const char of_none[] = HEAD
+        "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0},{\"matrix\":[2,0,0,0,0,2,0,0,0,0,2,0,5,5,5,1],"
+        "\"children\":[2]},{\"mesh\":0},{\"mesh\":0,\"children\":[4]},{\"children\":[3]}]," MESHES;
+    /* Three instances, each with the extension of their node. */
+    static const char of_instances[] =
+        HEAD "\"extensionsUsed\":[\"EXT_x\"],\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"mesh\":0,"
+             "\"translation\":[0,"
+             "0,3]},{\"mesh\":0,\"scale\":[2,2,2],\"extensions\":{\"EXT_x\":{},\"EXT_mesh_gpu_instancing\":{"
+             "\"attributes\":{\"TRANSLATION\":0}}}}]," MESHES;
+    import_told(of_another, 1, false, 1,
+                ": of its 2 scenes only scenes[0] is read; faces are missing: 1 of 2 faces, 2 of 2.5 m2");
+    import_told(of_another, .1, false, 1, "faces are missing: 1 of 2 faces, 0.02 of 0.025 m2");
+    import_told(of_another, 1, true, 1, "faces are missing: 1 of 2 faces, 80 % of the area");
+    import_told(of_none, 1, false, 1,
+                ": faces are missing, as their nodes are in no scene: 2 of 3 faces, 2.5 of 3 m2");
+    import_told(of_instances, 1, false, 4, "EXT_x (of 3 of 4 faces, 6 of 6.5 m2)");
+    /* Vertices that are sparse are the library's to read: they have no area that could be told. */
+    static const char unknown[] = HEAD
+        "\"scenes\":[{\"nodes\":[0]},{\"nodes\":[1]}],\"nodes\":[{\"mesh\":0},{\"mesh\":1}],\"meshes\":[{"
+        "\"primitives\":[{\"attributes\":{\"POSITION\":0}}]},{\"primitives\":[{\"attributes\":{\"POSITION\":"
+        "1}}]"
+        "}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+        "{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\",\"sparse\":{\"count\":1,"
+        "\"indices\":{\"bufferView\":0,\"componentType\":5121},\"values\":{\"bufferView\":0}}}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],\"buffers\":[{\"byteLength\":36,\"uri\":\"data:"
+        "application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}";
+    import_told(
+        unknown, 1, false, 1,
+        "1 of 2 faces, of an area that is not known: their vertices are compressed, sparse or missing");
+#undef HEAD
+#undef MESHES
 }
 END_TEST
 
@@ -160,7 +216,7 @@ START_TEST(bones_shapes_and_lines_are_told) {
         "{\"weights\":[0,0],\"primitives\":[{\"attributes\":{\"POSITION\":0},\"targets\":[{\"POSITION\":0},{"
         "\"POSITION\":0}]}]}]," TRIANGLE "}";
     static const char *const told[] = {
-        ": of its 2 scenes only scenes[1] is read",
+        ": of its 2 scenes only scenes[1] is read, which has all faces",
         ": the bones of 1 mesh (skins) are left out: each stands as it was modelled",
         ": the shape keys of 1 mesh (targets) are left out: each has its basic shape",
         ": 1 primitive of lines or points is left out: no faces"};
@@ -183,6 +239,7 @@ int main(void) {
     tcase_add_test(tests, emission_is_luminance);
     tcase_add_test(tests, positions_may_be_integers);
     tcase_add_test(tests, extensions_that_are_not_read_are_named_with_their_faces);
+    tcase_add_test(tests, faces_that_are_not_read_are_told_with_their_area);
     tcase_add_test(tests, bones_shapes_and_lines_are_told);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
