@@ -1,5 +1,7 @@
 #include "solver/scene/glass.h"
 
+#include "solver/scene/coincident.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,45 +36,54 @@ lam_status mesh_copy_glass(const mesh *from, mesh *to, lam_error *error) {
     return LAM_OK;
 }
 
-/* An element with its corners in ascending order. */
-typedef struct pane_corners {
-    uint32_t vertex[4], element;
-} pane_corners;
-
-static int compare_corners(const void *a, const void *b) {
-    const pane_corners *x = a, *y = b;
-    for (int k = 0; k < 4; k++)
-        if (x->vertex[k] != y->vertex[k]) return x->vertex[k] < y->vertex[k] ? -1 : 1;
-    return (x->element > y->element) - (x->element < y->element);
-}
-
-static void sort_corners(const mesh *m, uint32_t element, pane_corners *out) {
-    memcpy(out->vertex, m->elements[element], sizeof out->vertex);
-    out->element = element;
-    for (int i = 1; i < 4; i++)
-        for (int k = i; k > 0 && out->vertex[k - 1] > out->vertex[k]; k--) {
-            const uint32_t other = out->vertex[k];
-            out->vertex[k] = out->vertex[k - 1];
-            out->vertex[k - 1] = other;
-        }
-}
-
-/* Takes the marks of panes that lie back to back away again: each is the back of the other. */
-static lam_status unmark_sheets(mesh *m, size_t n_panes, lam_error *error) {
-    pane_corners *all = memory_allocate(n_panes, sizeof *all, "panes", error);
-    size_t n = 0;
-    if (all == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < m->n; i++)
-        if (mesh_is_pane(m, i)) sort_corners(m, (uint32_t)i, &all[n++]);
-    qsort(all, n, sizeof *all, compare_corners);
-    for (size_t k = 1; k < n; k++) {
-        const uint32_t i = all[k - 1].element, j = all[k].element;
-        const float *a = m->normal[i], *b = m->normal[j];
-        if (memcmp(all[k - 1].vertex, all[k].vertex, sizeof all[k].vertex) != 0) continue;
-        if (a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < 0) m->has_back[i] = m->has_back[j] = false;
+/* The faces that are panes, as a mesh of their own that shares all else with m; *of [n_panes]: their numbers
+ * in m. Freed by pane_faces_free. */
+static lam_status pane_faces_take(const mesh *m, size_t n_panes, mesh *out, uint32_t **of, lam_error *error) {
+    *out = *m;
+    out->n = 0;
+    out->has_back = NULL;
+    out->elements = memory_allocate(n_panes, sizeof *out->elements, "panes", error);
+    out->area = memory_allocate(n_panes, sizeof *out->area, "panes", error);
+    out->normal = memory_allocate(n_panes, sizeof *out->normal, "panes", error);
+    *of = memory_allocate(n_panes, sizeof **of, "panes", error);
+    if (out->elements == NULL || out->area == NULL || out->normal == NULL || *of == NULL)
+        return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++) {
+        if (!mesh_is_pane(m, i)) continue;
+        memcpy(out->elements[out->n], m->elements[i], sizeof *out->elements);
+        memcpy(out->normal[out->n], m->normal[i], sizeof *out->normal);
+        out->area[out->n] = m->area[i];
+        (*of)[out->n++] = (uint32_t)i;
     }
-    free(all);
     return LAM_OK;
+}
+
+static void pane_faces_free(mesh *panes) {
+    free(panes->elements);
+    free(panes->area);
+    free(panes->normal);
+}
+
+/* The part of a face that others must cover for it to have a back: corners are rounded. */
+static const double covered_least = .999;
+
+/* Takes the marks of panes off faces that others cover from behind, however both are divided: each is the
+ * back of the other. */
+static lam_status unmark_sheets(mesh *m, size_t n_panes, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh panes = {.n = 0};
+    uint32_t *of = NULL;
+    double *shared = memory_allocate(n_panes, sizeof *shared, "panes", error);
+    if (shared == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(pane_faces_take(m, n_panes, &panes, &of, error));
+    TRY(mesh_find_sheets(&panes, shared, error));
+    for (size_t k = 0; k < panes.n; k++)
+        if (shared[k] >= covered_least * panes.area[k]) m->has_back[of[k]] = false;
+done:
+    pane_faces_free(&panes);
+    free(of);
+    free(shared);
+    return status;
 }
 
 /* rho + T <= 1, in single precision, too; returns the largest rho before where it was more, else 0. */

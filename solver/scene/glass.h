@@ -36,8 +36,8 @@ typedef struct glass_report {
 } glass_report;
 
 /* Settles the panes of a mesh before its backs are made: each face of one gets a back, as light comes from
- * both sides, unless another face of a pane lies in the same place and looks the other way; and none reflects
- * more than it does not pass. Does nothing where there are no panes. Errors: LAM_ERR_MEMORY. */
+ * both sides, unless other faces of panes cover its place and look the other way; and none reflects more than
+ * it does not pass. Does nothing where there are no panes. O(n log n). Errors: LAM_ERR_MEMORY. */
 lam_status mesh_settle_glass(mesh *m, glass_report *report, lam_error *error);
 
 /* The same limit for the elements of a divided mesh, which have the means of their own parts of images. O(n).

@@ -10,8 +10,8 @@ typedef struct gltf_amount {
     bool blind;         /* of some faces the area is not known */
 } gltf_amount;
 
-/* Counts a primitive where a node puts it, and nothing of points and lines. The area is not known where the file
- * has no plain vertices of it: of a compressed mesh, of sparse or missing ones. O(faces). */
+/* Counts a primitive where a node puts it, and nothing of points and lines. The area is not known where the
+ * file has no plain vertices of it: of a compressed mesh, of sparse or missing ones. O(faces). */
 gltf_amount gltf_amount_of(gltf_file *g, const json_t *primitive, const gltf_transform *placed);
 
 void gltf_amount_add(gltf_amount *sum, const gltf_amount *more);

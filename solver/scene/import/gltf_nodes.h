@@ -20,8 +20,8 @@ typedef struct gltf_nodes {
     gltf_transform *placed; /* [n], of a node */
 } gltf_nodes;
 
-/* Places the nodes of a file; the caller frees them with gltf_nodes_free. A node has its first parent alone, and a ring of nodes
- * ends. O(n). Errors: LAM_ERR_MEMORY. */
+/* Places the nodes of a file; the caller frees them with gltf_nodes_free. A node has its first parent alone,
+ * and a ring of nodes ends. O(n). Errors: LAM_ERR_MEMORY. */
 lam_status gltf_nodes_place(const json_t *root, gltf_nodes *out, lam_error *error);
 void gltf_nodes_free(gltf_nodes *nodes);
 
