@@ -154,14 +154,17 @@ size_t scene_mesh_build_bytes(const scene_mesh *mesh) {
     const size_t on_element = sizeof(uint32_t) + 8 * sizeof(float), of_texture = 4 * sizeof(uint64_t) * 3;
     const size_t images =
         sum(times(sizes.n_textured, on_element), sum(times(sizes.n_textures, of_texture), sizes.image_bytes));
-    return sum(sum(times(mesh->n_vertices, 3 * sizeof(double)), sum(times(sizes.n, element), images)),
-               sum(gltf_bytes_most(&sizes), gltf_work_bytes(&sizes)));
+    const size_t panes = times(sizes.n_groups, sizeof(struct group_glass));
+    return sum(
+        sum(times(mesh->n_vertices, 3 * sizeof(double)), sum(times(sizes.n, element), sum(images, panes))),
+        sum(gltf_bytes_most(&sizes), gltf_work_bytes(&sizes)));
 }
 
 /* Arrays of /mesh that a scene does not hold. */
 typedef struct arrays {
     void *vertices, *elements, *normal, *emission;
     scene_pictures *pictures;
+    scene_glass glass;
 } arrays;
 
 static lam_status read_arrays(store *s, const scene_mesh *mesh, arrays *a, lam_error *error) {
@@ -173,6 +176,7 @@ static lam_status read_arrays(store *s, const scene_mesh *mesh, arrays *a, lam_e
     TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, (size_t[]){n, 3}, &a->normal, error));
     TRY(store_read(s, STORE_MESH "/emission", STORE_F32, 2, (size_t[]){C, n}, &a->emission, error));
     if (mesh->n_textured > 0) TRY(scene_pictures_load(s, n, &a->pictures, error));
+    TRY(scene_glass_load(s, mesh->of->groups.n_groups, &a->glass, error));
     const uint32_t(*elements)[4] = a->elements;
     for (size_t i = 0; i < n; i++)
         for (int k = 0; k < 4; k++)
@@ -221,6 +225,7 @@ lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *erro
                          .emission = a.emission,
                          .face = root->faces.of.of,
                          .groups = &root->groups,
+                         .glass = a.glass.of != NULL ? &a.glass : NULL,
                          .pictures = a.pictures,
                          .up = mesh->up};
     status = gltf_write(&m, out, &cause);
@@ -233,5 +238,6 @@ done:
     free(a.elements);
     free(a.normal);
     free(a.emission);
+    free(a.glass.of);
     return status;
 }

@@ -6,6 +6,7 @@
 #include "solver/base/scene/scene_buried.h"
 #include "solver/base/scene/scene_cameras.h"
 #include "solver/base/scene/scene_faces.h"
+#include "solver/base/scene/scene_glass.h"
 #include "solver/codec/headline.h"
 #include "solver/codec/stated_errors.h"
 #include "solver/operator/operator.h"
@@ -43,6 +44,23 @@ static lam_status attributes_of(store *s, const char *group, json_t **out, lam_e
 static void copy_member(json_t *to, const char *name, const json_t *from, const char *from_name) {
     json_t *value = json_object_get(from, from_name);
     json_object_set_new(to, name, value != NULL ? json_incref(value) : json_null());
+}
+
+/* Adds {"glass":{"transmittance":T,"faces":N}} to groups that are panes, and the law of these to out. */
+static lam_status add_glass(store *s, json_t *groups, json_t *out, lam_error *error) {
+    const size_t n_groups = json_array_size(groups);
+    scene_glass glass;
+    const lam_status status = scene_glass_load(s, n_groups, &glass, error);
+    if (status != LAM_OK || glass.of == NULL) return status;
+    for (size_t g = 0; g < n_groups; g++)
+        if (glass.of[g].transmittance > 0)
+            json_object_set_new(json_array_get(groups, g), "glass",
+                                json_pack("{s:o, s:o}", "transmittance",
+                                          describe_number(glass.of[g].transmittance), "faces",
+                                          describe_number(glass.of[g].faces)));
+    json_object_set_new(out, "glass_law", json_string(glass_law_word(&glass)));
+    free(glass.of);
+    return LAM_OK;
 }
 
 /* Adds to groups, by the numbers of elements' groups, {"buried":{"elements":N,"area":m2}} where they have
@@ -101,6 +119,7 @@ static lam_status add_groups(store *s, size_t n, json_t *out, lam_error *error) 
                 groups, json_pack("{s:s, s:I}", "name", names[g], "elements", (json_int_t)counts[g])) != 0)
             FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group_names[%zu] is not UTF-8", store_path(s), g);
     TRY(add_buried(s, n, group, groups, error));
+    TRY(add_glass(s, groups, out, error));
     json_object_set(out, "groups", groups);
 done:
     json_decref(groups);

@@ -58,6 +58,7 @@ lam_status output_glb(const solution *s, FILE *stream, lam_error *error) {
                         .white = mean > 0 && isfinite(mean) ? WHITE_IN_MEANS * mean : 1};
     TRY(name_columns(s, light.n_columns, &names, error));
     light.columns = (const char *const *)names;
+    const scene_glass glass = {.of = m->glass, .by_angle = m->glass_by_angle};
     const gltf_mesh of = {.name = s->scene,
                           .n_vertices = m->n_vertices,
                           .n = m->n,
@@ -70,6 +71,7 @@ lam_status output_glb(const solution *s, FILE *stream, lam_error *error) {
                           .emission = m->emission,
                           .face = m->faces.of,
                           .groups = s->groups,
+                          .glass = m->glass != NULL ? &glass : NULL,
                           .light = &light,
                           .up = m->up};
     TRY(gltf_write(&of, &b, error));

@@ -214,8 +214,17 @@ static void print_buried(const json_t *buried) {
            json_number_value(json_object_get(buried, "area")));
 }
 
+/* The part of light that a group of panes lets pass, by its law. */
+static void print_glass(const json_t *glass, const json_t *law) {
+    if (glass == NULL) return;
+    const double faces = json_number_value(json_object_get(glass, "faces"));
+    printf("; a pane, T = %g", json_number_value(json_object_get(glass, "transmittance")));
+    if (faces > 1) printf(" of %g faces together", faces);
+    printf(strcmp(json_string_value(law), "angle") == 0 ? " at normal incidence" : " at any angle");
+}
+
 /* Prints as many groups as fit on a screen: a city has hundreds of them. */
-static void print_groups(const json_t *groups) {
+static void print_groups(const json_t *groups, const json_t *law) {
     enum { MOST = 20 };
     const size_t count = json_array_size(groups), shown = count <= MOST ? count : MOST - 1;
     for (size_t i = 0; i < shown; i++) {
@@ -223,6 +232,7 @@ static void print_groups(const json_t *groups) {
         const json_int_t elements = json_integer_value(json_object_get(group, "elements"));
         printf("%-18s%s, %" JSON_INTEGER_FORMAT " element%s", i == 0 ? "groups" : "",
                json_string_value(json_object_get(group, "name")), elements, elements == 1 ? "" : "s");
+        print_glass(json_object_get(group, "glass"), law);
         print_buried(json_object_get(group, "buried"));
         putchar('\n');
     }
@@ -264,7 +274,7 @@ static void print_text(const json_t *about) {
     print_value("precision", json_object_get(about, "precision"));
     print_bytes(json_number_value(json_object_get(about, "bytes")));
     print_report(json_object_get(about, "report"));
-    print_groups(json_object_get(about, "groups"));
+    print_groups(json_object_get(about, "groups"), json_object_get(about, "glass_law"));
     print_overlap(json_object_get(about, "overlap_area"));
     print_emitters(json_object_get(about, "emitters"));
     print_cameras(json_object_get(about, "cameras"));

@@ -9,7 +9,9 @@ import unittest
 import h5py
 import numpy as np
 
+import glb
 from command import lambert, must
+from daemon import Daemon
 from weather import sun, wea
 
 TAU = .78
@@ -299,6 +301,56 @@ class Glass(unittest.TestCase):
         with h5py.File(store) as a, h5py.File(again) as b:
             np.testing.assert_array_equal(a["mesh/glass"][:], b["mesh/glass"][:])
             self.assertEqual(b["mesh"].attrs["glass_law"], b"angle")
+
+    def test_every_client_is_told_and_meshes_read_back(self):
+        """`info` and the daemon name panes with T and the law; GET .../mesh and solve -o X.glb have blended materials, which are
+        the same panes again: T, both sides, what they reflect, and the light of the floor."""
+        sky = "--sky", "even", "--quantity", "irradiance"
+        for pane, options, glass, law in (("Kd .3 .3 .3\nd .22", (), {"transmittance": .78, "faces": 1}, "angle"),
+                                          ("Kd .2 .2 .2\nd .5", ("--glass", "pane=.49,2", "--glass-law", "none"),
+                                           {"transmittance": .49, "faces": 2}, "none"),
+                                          ("Kd 0 0 0", ("--glass", "pane=1"), {"transmittance": 1, "faces": 1}, "angle")):
+            self.write(window_room(), paint(".5 .5 .5", pane))
+            store, _ = self.precompute("--elements", 300, "--sky", "tregenza", "--probes", 0, *options)
+            about = json.loads(must("info", store, "--json").stdout)
+            named = {group["name"]: group.get("glass") for group in about["groups"]}
+            self.assertEqual((about["glass_law"], named["pane"], named["pane.back"], named["floor"]), (law, glass, glass, None))
+            self.assertRegex(must("info", store).stdout, rf"\n +pane, \d+ elements?; a pane, T = {glass['transmittance']:g}"
+                             f"{' of 2 faces together' if glass['faces'] == 2 else ''} at {'normal incidence' if law == 'angle' else 'any angle'}\n")
+            each = glass["transmittance"] ** (1 / glass["faces"])
+            with Daemon(store) as daemon:
+                described = daemon.get("/v1/scenes/s").json()
+                self.assertEqual((described["groups"], described["glass_law"]), (about["groups"], law))
+                (self.folder / "mesh.glb").write_bytes(daemon.get("/v1/scenes/s/mesh").body)
+            must("solve", store, *sky, "-o", self.folder / "light.glb")
+            for name in "mesh", "light":
+                told = glb.Glb((self.folder / f"{name}.glb").read_bytes()).json
+                self.assertEqual(told["extras"]["lambert"]["glass_law"], law)
+                nodes = {node["name"]: node for node in told["nodes"]}
+                for group in "pane", "pane.back", "floor":
+                    material = told["materials"][told["meshes"][nodes[group]["mesh"]]["primitives"][0]["material"]]
+                    is_pane = group != "floor"
+                    self.assertEqual(nodes[group]["extras"].get("glass"), glass if is_pane else None)
+                    self.assertEqual(material.get("alphaMode"), "BLEND" if is_pane else None)
+                    if is_pane:
+                        self.assertAlmostEqual(material["pbrMetallicRoughness"]["baseColorFactor"][3], 1 - each, places=9)
+                again = self.folder / f"{name}.h5"
+                log = must("precompute", self.folder / f"{name}.glb", "-o", again, "--mesh", "faces", "--sky", "tregenza", "--probes", 0,
+                           "--form-factors", "rays", "--rays", 1024, "--glass-law", law).stderr
+                self.assertNotIn("coincide", log)
+                read = {g["name"]: g.get("glass") for g in json.loads(must("info", again, "--json").stdout)["groups"]}
+                for group in "pane", "pane.back":
+                    self.assertAlmostEqual(read[group]["transmittance"], each, places=6)
+                if name == "light" or glass["faces"] == 2:
+                    continue
+                with h5py.File(store) as a, h5py.File(again) as b:
+                    for f in a, b:
+                        at = self.groups(store if f is a else again).index("pane")
+                        rho = f["mesh/reflectance"][0][f["mesh/group"][:] == at]
+                        np.testing.assert_allclose(rho, 0 if each == 1 else .066, atol=1e-6)
+                # The same elements, but halves of quads, and rays: 1 % is left.
+                one, other = (self.means(s, "--sky", "even")["floor"] for s in (store, again))
+                self.assertAlmostEqual(other / one, 1, delta=.01)
 
 
 if __name__ == "__main__":

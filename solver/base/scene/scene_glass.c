@@ -12,6 +12,10 @@
 #define GIVEN "glass_given"
 static const char law_angle[] = "angle", law_none[] = "none";
 
+const char *glass_law_word(const scene_glass *glass) {
+    return glass->by_angle ? law_angle : law_none;
+}
+
 double glass_passes(const struct group_glass *glass, bool by_angle, double cosine) {
     const double c = fmin(fmax(cosine, 0), 1), sine = sqrt(1 - c * c);
     const double g = by_angle ? fmin(1, 1.018 * c * (1 + sine * sine * sine)) : 1;
@@ -47,7 +51,7 @@ lam_status scene_glass_save(const scene_glass *glass, size_t n_groups, store *s,
     const size_t shape[2] = {n_groups, 2};
     if (glass->of == NULL) return LAM_OK;
     TRY(store_write(s, DATASET, STORE_F64, 2, shape, glass->of, error));
-    TRY(store_set_text(s, STORE_MESH, LAW, glass->by_angle ? law_angle : law_none, error));
+    TRY(store_set_text(s, STORE_MESH, LAW, glass_law_word(glass), error));
     if (glass->given) TRY(store_set_integer(s, STORE_MESH, GIVEN, 1, error));
 done:
     return status;

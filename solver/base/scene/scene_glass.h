@@ -28,6 +28,9 @@ typedef struct scene_glass {
     bool given;             /* --glass said more than the scene file */
 } scene_glass;
 
+/* "angle" or "none", the words of stores for the law. */
+const char *glass_law_word(const scene_glass *glass);
+
 /* The part of the light that one face passes, of which a ray has this cosine, 0 to 1, to its normal. */
 double glass_passes(const struct group_glass *glass, bool by_angle, double cosine);
 

@@ -5,6 +5,7 @@
 #include "solver/codec/gltf/gltf.h"
 
 #include "solver/codec/gltf/corner_normals.h"
+#include "solver/codec/gltf/gltf_surface.h"
 #include "solver/codec/json_writer.h"
 #include "store/status.h"
 
@@ -129,11 +130,16 @@ static size_t items_of(const writer *w, size_t view) {
     return w->pictures != NULL && view >= VIEW_TEXCOORD ? w->n_textured_vertices : w->n_vertices;
 }
 
-/* The surface of all elements of a group, or PICTURE_NONE. */
+/* The part of the light that a face of a group lets pass at normal incidence. */
+static double passes_of(const gltf_mesh *m, size_t g) {
+    return m->glass == NULL ? 0 : glass_passes(&m->glass->of[g], false, 1);
+}
+
+/* The surface of all elements of a group, or PICTURE_NONE; that of a pane is its mean. */
 static uint32_t surface_of(const gltf_mesh *m, size_t g) {
     const uint32_t *elements = elements_of(m, g);
     const size_t count = m->groups->start[g + 1] - m->groups->start[g];
-    if (m->pictures == NULL) return PICTURE_NONE;
+    if (m->pictures == NULL || passes_of(m, g) > 0) return PICTURE_NONE;
     for (size_t j = 1; j < count; j++)
         if (m->pictures->surface[elements[j]] != m->pictures->surface[elements[0]]) return PICTURE_NONE;
     return m->pictures->surface[elements[0]];
@@ -187,13 +193,9 @@ done:
     return status;
 }
 
-static bool say_numbers(buffer *b, const char *name, size_t count, const double *values) {
-    return buffer_printf(b, "%s", name) && json_write_doubles(b, values, count);
-}
-
 static bool say_floats(buffer *b, const char *name, const float values[3]) {
-    return say_numbers(b, name, 3,
-                       (const double[3]){(double)values[0], (double)values[1], (double)values[2]});
+    const double numbers[3] = {(double)values[0], (double)values[1], (double)values[2]};
+    return buffer_append_text(b, name) && json_write_doubles(b, numbers, 3);
 }
 
 static bool say_extras(const writer *w, buffer *b) {
@@ -203,6 +205,8 @@ static bool say_extras(const writer *w, buffer *b) {
                               w->m->n_channels, w->m->up);
     if (w->m->light != NULL)
         good = good && buffer_append_text(b, ",\"white\":") && json_write_double(b, w->m->light->white);
+    if (w->m->glass != NULL)
+        good = good && buffer_printf(b, ",\"glass_law\":\"%s\"", glass_law_word(w->m->glass));
     if (w->m->kind != NULL)
         good = good && buffer_append_text(b, ",\"kind\":") && json_write_text(b, w->m->kind);
     return good && buffer_append_text(b, "}}");
@@ -221,6 +225,14 @@ static bool say_buried(const writer *w, const part *p, buffer *b) {
     return good && (before[1] != '\0' || buffer_append_text(b, "]"));
 }
 
+static bool say_glass(const writer *w, const part *p, buffer *b) {
+    if (!(passes_of(w->m, p->group) > 0)) return true;
+    const struct group_glass *of = &w->m->glass->of[p->group];
+    return buffer_append_text(b, ",\"glass\":{\"transmittance\":") &&
+           json_write_double(b, of->transmittance) && buffer_append_text(b, ",\"faces\":") &&
+           json_write_double(b, of->faces) && buffer_append_text(b, "}");
+}
+
 /* Node 0 is the root, node and mesh and material 1 + k, k and k are those of part k. */
 static bool say_nodes(const writer *w, buffer *b) {
     bool good = buffer_append_text(b, ",\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"name\":") &&
@@ -232,7 +244,7 @@ static bool say_nodes(const writer *w, buffer *b) {
                json_write_text(b, w->m->groups->names[w->parts[k].group]) &&
                buffer_printf(b, ",\"mesh\":%zu,\"extras\":{\"group\":%zu,\"elements\":%zu", k,
                              w->parts[k].group, w->parts[k].n_elements) &&
-               say_buried(w, &w->parts[k], b) && buffer_append_text(b, "}}");
+               say_buried(w, &w->parts[k], b) && say_glass(w, &w->parts[k], b) && buffer_append_text(b, "}}");
     return good && buffer_append_text(b, "]");
 }
 
@@ -273,28 +285,15 @@ static bool say_meshes(const writer *w, buffer *b) {
     return good && buffer_append_text(b, "]");
 }
 
-/* The luminance, which is emission / pi of a diffuse surface, is emissiveFactor, whose largest component is
- * 1, times emissiveStrength. */
-static bool say_emission(const double emission[3], buffer *b) {
-    const double most = fmax(emission[0], fmax(emission[1], emission[2]));
-    if (!(most > 0)) return true;
-    const double factor[3] = {emission[0] / most, emission[1] / most, emission[2] / most};
-    return say_numbers(b, ",\"emissiveFactor\":", 3, factor) &&
-           buffer_append_text(
-               b, ",\"extensions\":{\"KHR_materials_emissive_strength\":{\"emissiveStrength\":") &&
-           json_write_double(b, most / M_PI) && buffer_append_text(b, "}}");
-}
-
 static bool say_surface(const writer *w, const part *p, buffer *b) {
-    double colour[4] = {0, 0, 0, 1};
-    const bool has_image = p->surface != PICTURE_NONE;
-    for (int c = 0; c < 3; c++)
-        colour[c] =
-            has_image ? (double)w->pictures->surfaces[p->surface].factor[c] : fmin(p->reflectance[c], 1);
-    return say_numbers(b, ",\"pbrMetallicRoughness\":{\"baseColorFactor\":", 4, colour) &&
-           (!has_image || buffer_printf(b, ",\"baseColorTexture\":{\"index\":%u}", p->surface)) &&
-           buffer_append_text(b, ",\"metallicFactor\":0,\"roughnessFactor\":1},\"doubleSided\":false") &&
-           say_emission(p->emission, b);
+    gltf_surface s = {.image = -1, .passes = passes_of(w->m, p->group), .lit = w->m->light != NULL};
+    memcpy(s.reflectance, p->reflectance, sizeof s.reflectance);
+    memcpy(s.emission, p->emission, sizeof s.emission);
+    if (p->surface != PICTURE_NONE) {
+        s.image = (long)p->surface;
+        for (int c = 0; c < 3; c++) s.factor[c] = (double)w->pictures->surfaces[p->surface].factor[c];
+    }
+    return gltf_say_surface(&s, b);
 }
 
 static bool say_materials(const writer *w, buffer *b) {
@@ -303,9 +302,7 @@ static bool say_materials(const writer *w, buffer *b) {
     for (size_t k = 0; k < w->n_parts; k++) {
         const part *p = &w->parts[k];
         good = good && buffer_append_text(b, k > 0 ? ",{\"name\":" : "{\"name\":") &&
-               json_write_text(b, w->m->groups->names[p->group]) &&
-               (lit ? buffer_append_text(b, ",\"extensions\":{\"KHR_materials_unlit\":{}}")
-                    : say_surface(w, p, b)) &&
+               json_write_text(b, w->m->groups->names[p->group]) && say_surface(w, p, b) &&
                buffer_append_text(b, "}");
         emits = emits || fmax(p->emission[0], fmax(p->emission[1], p->emission[2])) > 0;
     }

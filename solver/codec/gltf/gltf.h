@@ -3,6 +3,7 @@
 #ifndef LAMBERT_CODEC_GLTF_GLTF_H
 #define LAMBERT_CODEC_GLTF_GLTF_H
 
+#include "solver/base/scene/scene_glass.h"
 #include "solver/base/scene/scene_pictures.h"
 #include "solver/codec/buffer.h"
 #include "solver/codec/groups.h"
@@ -39,6 +40,7 @@ typedef struct gltf_mesh {
     const float *emission;         /* [C][n], W/m^2 */
     const uint32_t *face;          /* [n], of the scene file (scene_faces); NULL: not known */
     const group_index *groups;
+    const scene_glass *glass;       /* with panes, by group; or NULL */
     const gltf_light *light;        /* or NULL */
     const scene_pictures *pictures; /* or NULL; not beside light, of 1 channel (grey images) or 3 */
     char up;                        /* 'x', 'y' or 'z' */
@@ -55,7 +57,8 @@ typedef struct gltf_mesh {
  *     elements' normals by area. All other corners have those of their elements.
  *   - A material for each group: the mean by area of its reflectance as base colour, and of its emission,
  *     divided by pi, as emissive factor and KHR_materials_emissive_strength, which are a luminance. Of 1
- * channel these are grey, of 3 red, green and blue, of others the grey of their mean.
+ *     channel these are grey, of 3 red, green and blue, of others the grey of their mean. That of a pane is
+ *     blended (gltf_surface.h), and shows no image.
  *   - With light each column is one more attribute (a float), and COLOR_0 its colour, cut to [0, 1].
  * Materials are then white and unlit (KHR_materials_unlit), and extras say "white".
  *   - A group whose elements all have one image (pictures) has TEXCOORD_0, _REFLECTANCE (three floats, that
@@ -63,7 +66,8 @@ typedef struct gltf_mesh {
  * the file.
  *   - extras of the file and of the root node: {"lambert":{"name","elements","channels","up","kind"}}, `up`
  *     being the axis that was turned into y; of the node of a group: {"group","elements"}, and "buried", the
- *     numbers of elements that figures of groups leave out, where there are any.
+ *     numbers of elements that figures of groups leave out, where there are any; of that of a pane "glass":
+ *     {"transmittance","faces"} (scene_glass.h), and of a file with panes "glass_law" in "lambert".
  * O(n). Errors: LAM_ERR_ARGUMENT (more than GLTF_ELEMENTS_MOST elements, more bytes than a file of glTF has,
  * a position beyond float), LAM_ERR_MEMORY; out is then empty. */
 lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error);
