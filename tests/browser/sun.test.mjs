@@ -49,7 +49,9 @@ before(async () => {
     }
     writeFileSync(inFolder("high.obj"), highPlate());
     lambert("precompute", inFolder("high.obj"), "-o", inFolder("high.h5"), "--quiet", "--probes", 0, "--rays", 256, "--sky", "tregenza", "--up", "z");
-    daemon = await Daemon.start([...Object.keys(AXES), "high"].map((name) => inFolder(`${name}.h5`)));
+    lambert("precompute", inFolder("z.obj"), "-o", inFolder("pane.h5"), "--quiet", "--probes", 0, "--rays", 256, "--sky", "tregenza", "--up", "z", "--mesh", "faces",
+        "--glass", `plate=${PASSES}`);
+    daemon = await Daemon.start([...Object.keys(AXES), "high", "pane"].map((name) => inFolder(`${name}.h5`)));
 });
 
 const LIGHT = { model: "given", direct: 700, diffuse: 100, factor: 1, latitude: 20, longitude: 0, zone: 0, day: 80 };
@@ -93,7 +95,7 @@ async function openFromAbove(up) {
         const { cameras } = window.lambert.scene;
         cameras.place(place, false);
         cameras.advance(1);
-    }, [[5, 4.9, 13], [5, 5, 0]].flatMap(AXES[up][1]));
+    }, [[5, 4.9, 13], [5, 5, 0]].flatMap((AXES[up] ?? AXES.z)[1]));
     return page;
 }
 
@@ -130,6 +132,48 @@ for (const [up, hours] of [["z", [9.5, 12, 15]], ["y", [15]], ["x", [15]]]) test
     await finished(page);
     assert.equal(await page.evaluate(() => window.lambert.scene.stage.uniforms.is_soft.value), false);
     assert.deepEqual(page.faults, []);
+    await page.context().close();
+});
+
+const PASSES = 0.5, law = (c) => Math.min(1, 1.018 * c * (1 + (1 - c * c) ** 1.5));
+
+/** The plate as a pane: the sun comes through it, dimmed by its angle, and the floor is seen through it. */
+test("light passes panes, and so do looks", async () => {
+    const page = await openFromAbove("pane"), source = new daylight.SkySource();
+    source.take(await daemon.json("/v1/scenes/pane/sky"));
+    assert.deepEqual(await page.evaluate(() => window.lambert.scene.now.mesh.groups.map(({ name, glass }) => [name, glass?.transmittance ?? 0])),
+        [["floor", 0], ["plate", PASSES], ["plate.back", PASSES]]);
+    await set(page, { smooth: false, tone: "linear", exposure: EXPOSURE, sharpSun: true }, { ...LIGHT, sun: "spread", hour: 15 });
+    await settled(page);
+    const sky = { ...state.skyOff, ...LIGHT, sun: "spread", hour: 15 }, { sun: { direction: [east, north, height] } } = source.sky(sky, false);
+    const parts = source.parts(sky, false, 1);
+    const ask = async (radiances, quantity) => (await daemon.json("/v1/scenes/pane/radiosity", { emission: { sky: radiances }, quantity }))[quantity].flat();
+    const [rest, further] = await Promise.all([ask([...parts.sky], "radiosity"), ask([...parts.sun], "indirect")]);
+    const direct = RHO * 700 * height, [dx, dy] = [(-2 * east) / height, (-2 * north) / height];
+    const floorAt = ([x, y]) => {
+        const isBehind = x > 4 + dx && x < 6 + dx && y > 4 + dy && y < 6 + dy, i = Math.floor((x * PARTS) / 10) * PARTS + Math.floor((y * PARTS) / 10);
+        return [rest[i] + further[i] + direct * (isBehind ? PASSES * law(height) : 1), isBehind];
+    };
+    // Beside the plate, in its shadow and out of it; and through it, whose own light comes on top.
+    const places = [[3.2, 5.3], [3.7, 4.3], [6.7, 5.2], [8.2, 8.2], [5, 5], [4.4, 5.3]].map((at) => [...at, 0]);
+    const colours = await pixels(page, await seenAt(page, "z", places)), plate = PARTS * PARTS, own = rest[plate] + further[plate] + direct;
+    let behind = 0;
+    for (const [k, at] of places.entries()) {
+        const [B, isBehind] = floorAt(at), seen = toSrgb(Array(3).fill(B * 2 ** EXPOSURE)), glare = toSrgb(Array(3).fill(own * 2 ** EXPOSURE));
+        behind += isBehind;
+        near(colours[k], k < 4 ? seen : seen.map((v, c) => Math.min(255, glare[c] + v * PASSES ** (1 / 2.2))), 2);
+    }
+    assert.ok(behind >= 1 && behind < places.length, `${behind}`);
+    // What a person picks, and the list of groups, say what passes.
+    await page.evaluate((element) => {
+        const { store } = window.lambert;
+        store.change({ ...store.now, pins: [element] });
+    }, plate);
+    await page.getByRole("tab", { name: "Reading" }).click();
+    await page.locator(".pin h2", { hasText: "pane, T = 0.5" }).waitFor();
+    await page.locator('tr[data-group="plate.back"] small', { hasText: "pane, T = 0.5" }).waitFor();
+    assert.deepEqual(page.faults, []);
+    assert.deepEqual(await violations(page), []);
     await page.context().close();
 });
 

@@ -3,11 +3,11 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { sourceOf } from "../source.mjs";
 
-const { readMesh } = await sourceOf("picture/glb"), { figuresOf } = await sourceOf("picture/scale");
+const { glassText, readMesh } = await sourceOf("picture/glb"), { figuresOf } = await sourceOf("picture/scale");
 
 /** A binary glTF of unit squares in the plane y = 0, those of a group side by side. */
-function squares(groups) {
-    const gltf = { nodes: [{ children: groups.map((_, k) => k + 1) }], meshes: [], accessors: [], bufferViews: [] }, parts = [];
+function squares(groups, lambert = {}) {
+    const gltf = { extras: { lambert }, materials: [], nodes: [{ children: groups.map((_, k) => k + 1) }], meshes: [], accessors: [], bufferViews: [] }, parts = [];
     let at = 0, element = 0;
     const put = (values, type, width) => {
         parts.push(Buffer.from(values.buffer));
@@ -17,14 +17,15 @@ function squares(groups) {
         at += values.byteLength;
         return gltf.accessors.length - 1;
     };
-    for (const { name, count, buried } of groups) {
+    for (const { name, count, buried, glass, colour } of groups) {
         const each = (make) => Array.from({ length: count }, (_, k) => make(k)).flat();
         const attributes = { POSITION: put(Float32Array.from(each((k) => [k, 0, 0, k, 0, 1, k + 1, 0, 1, k + 1, 0, 0])), "VEC3", 3),
             NORMAL: put(Float32Array.from(each(() => [0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0])), "VEC3", 3),
             _ELEMENT: put(Float32Array.from(each((k) => Array(4).fill(element + k))), "SCALAR", 1) };
         const indices = put(Uint32Array.from(each((k) => [0, 1, 2, 0, 2, 3].map((i) => 4 * k + i))), "SCALAR", 1);
-        gltf.nodes.push({ name, mesh: gltf.meshes.length, extras: buried === undefined ? {} : { buried } });
-        gltf.meshes.push({ primitives: [{ attributes, indices }] });
+        gltf.nodes.push({ name, mesh: gltf.meshes.length, extras: { buried, glass } });
+        if (colour !== undefined) gltf.materials.push({ pbrMetallicRoughness: { baseColorFactor: colour } });
+        gltf.meshes.push({ primitives: [{ attributes, indices, ...(colour === undefined ? {} : { material: gltf.materials.length - 1 }) }] });
         element += count;
     }
     let text = JSON.stringify(gltf);
@@ -42,4 +43,16 @@ test("elements below a body have no part in figures", () => {
     assert.deepEqual([...mesh.buried], [1, 3]);
     const { min, mean, area, uniformity } = figuresOf(Float32Array.of(2, 0, 6, 0, 9, 9), mesh.area, mesh.groups[0].counted);
     assert.deepEqual([min, mean, area, uniformity], [2, 4, 2, 0.5]);
+});
+
+test("panes have their part of the index, what they let pass and what they reflect", () => {
+    const glass = { transmittance: 0.49, faces: 2 };
+    const mesh = readMesh(squares([{ name: "floor", count: 2, colour: [0.5, 0.4, 0.3, 1] }, { name: "pane", count: 3, glass, colour: [0.2, 0.2, 0.1, 0.3] }],
+        { glass_law: "none" }));
+    assert.deepEqual([mesh.panes, mesh.glassByAngle], [[{ first: 12, count: 18, glass }], false]);
+    assert.deepEqual(mesh.groups.map((group) => group.glass), [null, glass]);
+    const near = mesh.groups.map((group) => group.reflectance.map((v) => Number(v.toFixed(12))));
+    assert.deepEqual(near, [[0.5, 0.4, 0.3], [0.06, 0.06, 0.03]]);
+    assert.equal(readMesh(squares([{ name: "floor", count: 1 }])).glassByAngle, true);
+    assert.deepEqual([glassText(glass), glassText({ transmittance: 0.7812, faces: 1 })], ["pane, T = 0.49 of 2 faces together", "pane, T = 0.781"]);
 });

@@ -88,11 +88,13 @@ test("a corner inside an edge has the edge's value there", async () => {
     close(nodeAt(crossed, found, [0, 8, 0, 0, 0, 0, 0], 1, 6), nodeAt(crossed, found, [0, 4, 0, 0, 0, 0, 0], 1, 4) + nodeAt(crossed, found, [0, 4, 0, 0, 0, 0, 0], 1, 8));
 });
 
-test("images keep to their elements, and their places in these", async () => {
+test("images and panes keep to their elements, and places in images to these", async () => {
     const mesh = quads([[0, 0, 2, 2], [2, 0, 1, 1], [2, 1, 1, 1]]), uv = Float32Array.from({ length: 24 }, (_, k) => mesh.positions[3 * (k >> 1) + k % 2]);
     const index = Uint32Array.from([0, 1, 2].flatMap((e) => [0, 1, 2, 0, 2, 3].map((k) => 4 * e + k)));
-    const drawn = splitEdges({ ...mesh, index, uv, images: [{ first: 0, count: 6 }, { first: 6, count: 12 }] }, findNodes(mesh));
+    const drawn = splitEdges({ ...mesh, index, uv, images: [{ first: 0, count: 6 }, { first: 6, count: 12 }], panes: [{ first: 6, count: 6 }] },
+        findNodes(mesh));
     assert.deepEqual(drawn.images, [{ first: 0, count: 9 }, { first: 9, count: 12 }]);
+    assert.deepEqual(drawn.panes, [{ first: 9, count: 6 }]);
     assert.deepEqual([...drawn.index.subarray(9)], [...index.subarray(6)]);
     assert.deepEqual([[...drawn.positions.subarray(36)], [...drawn.uv.subarray(24)], [...drawn.elementOf.subarray(12)]], [[2, 1, 0], [2, 1], [0]]);
 });

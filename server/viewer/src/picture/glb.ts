@@ -2,6 +2,12 @@
 // (one node per group, POSITION, NORMAL, _ELEMENT, indices; an element's corners are its own).
 import type { Rgb } from "../base/colour.ts";
 
+/** The light that a pane lets pass: its part at normal incidence, by all faces that a ray crosses together. */
+export interface Glass {
+    transmittance: number;
+    faces: number;
+}
+
 export interface MeshGroup {
     name: string;
     /** Its elements, ascending. */
@@ -13,6 +19,21 @@ export interface MeshGroup {
     /** Emission of its own, in the store's unit; null: it is dark. */
     emission: Rgb | null;
     area: number;
+    /** Null: it is opaque. */
+    glass: Glass | null;
+}
+
+/** "pane, T = 0.78", for people. */
+export function glassText({ transmittance, faces }: Glass): string {
+    return `pane, T = ${Number(transmittance.toPrecision(3))}${faces > 1 ? ` of ${faces} faces together` : ""}`;
+}
+
+/** A group of panes. */
+export interface MeshPane {
+    /** Its part of the index. */
+    first: number;
+    count: number;
+    glass: Glass;
 }
 
 /** An image on all elements of a group. */
@@ -44,6 +65,9 @@ export interface SceneMesh {
     /** The axis of the store that became y. */
     up: "x" | "y" | "z";
     images: MeshImage[];
+    panes: MeshPane[];
+    /** Panes pass less of the light that comes aslant. */
+    glassByAngle: boolean;
     /** Of each vertex its place in the image; null without images. */
     uv: Float32Array | null;
     /** [3][elements], 1 without an image; null without images. */
@@ -58,7 +82,7 @@ interface Accessor {
     type: string;
 }
 interface Gltf {
-    nodes: { name?: string; mesh?: number; children?: number[]; extras?: { buried?: number[] } }[];
+    nodes: { name?: string; mesh?: number; children?: number[]; extras?: { buried?: number[]; glass?: Glass } }[];
     meshes: { primitives: { attributes: { [name: string]: number }; indices: number; material?: number }[] }[];
     accessors: Accessor[];
     bufferViews: { byteOffset?: number; byteLength: number }[];
@@ -70,7 +94,7 @@ interface Gltf {
     textures?: { sampler?: number; source: number }[];
     samplers?: { wrapS?: number; wrapT?: number }[];
     images?: { bufferView?: number }[];
-    extras?: { lambert?: { up?: string } };
+    extras?: { lambert?: { up?: string; glass_law?: string } };
 }
 
 const WIDTHS: { [type: string]: number } = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
@@ -91,8 +115,10 @@ function materialOf(gltf: Gltf, index: number | undefined): { reflectance: Rgb; 
     const material = index === undefined ? undefined : gltf.materials?.[index];
     const luminance = material?.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
     const emission = rgb(material?.emissiveFactor, 0).map((v) => v * luminance * Math.PI) as Rgb;
+    const colour = material?.pbrMetallicRoughness?.baseColorFactor;
     return {
-        reflectance: rgb(material?.pbrMetallicRoughness?.baseColorFactor, 1),
+        // Of a pane, which is blended, this share of its colour is diffuse.
+        reflectance: rgb(colour, 1).map((v) => v * (colour?.[3] ?? 1)) as Rgb,
         emission: emission.some((v) => v > 0) ? emission : null,
     };
 }
@@ -105,7 +131,7 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
             accessor.count * WIDTHS[accessor.type]);
     const parts = gltf.nodes.filter((node) => node.mesh !== undefined).flatMap((node) =>
         gltf.meshes[node.mesh as number].primitives.map((primitive) => ({ name: node.name ?? "",
-            hidden: node.extras?.buried ?? [], primitive })
+            hidden: node.extras?.buried ?? [], glass: node.extras?.glass ?? null, primitive })
         )
     );
     let vertices = 0, indices = 0;
@@ -115,10 +141,12 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
     }
     const positions = new Float32Array(3 * vertices), normals = new Float32Array(3 * vertices);
     const elementOf = new Uint32Array(vertices), index = new Uint32Array(indices);
-    const ranges: { name: string; vertices: [number, number]; material: number | undefined }[] = [];
+    const ranges: { name: string; vertices: [number, number]; material: number | undefined; glass: Glass | null }[] =
+        [];
+    const panes: MeshPane[] = [];
     const buried = new Set<number>();
     let atVertex = 0, atIndex = 0, elements = 0;
-    for (const { name, hidden, primitive } of parts) {
+    for (const { name, hidden, glass, primitive } of parts) {
         for (const element of hidden) buried.add(element);
         positions.set(floats(gltf.accessors[primitive.attributes.POSITION]), 3 * atVertex);
         normals.set(floats(gltf.accessors[primitive.attributes.NORMAL]), 3 * atVertex);
@@ -133,13 +161,14 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
             ? new Uint32Array(file, from, accessor.count)
             : new Uint16Array(file, from, accessor.count);
         for (let i = 0; i < own.length; i++) index[atIndex + i] = own[i] + atVertex;
-        ranges.push({ name, vertices: [atVertex, atVertex + ids.length], material: primitive.material });
+        ranges.push({ name, vertices: [atVertex, atVertex + ids.length], material: primitive.material, glass });
+        if (glass !== null) panes.push({ first: atIndex, count: own.length, glass });
         atVertex += ids.length;
         atIndex += own.length;
     }
     const area = new Float64Array(elements), groupOf = new Uint32Array(elements);
     addAreas(positions, elementOf, index, area);
-    const groups = ranges.map(({ name, vertices: [first, end], material }, g) => {
+    const groups = ranges.map(({ name, vertices: [first, end], material, glass }, g) => {
         const own = new Set<number>();
         for (let v = first; v < end; v++) own.add(elementOf[v]);
         const ascending = Uint32Array.from(own).sort();
@@ -153,10 +182,11 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
             elements: ascending,
             counted: ascending.filter((element) => !buried.has(element)),
             area: total,
+            glass,
             ...materialOf(gltf, material),
         };
     });
-    const { up } = gltf.extras?.lambert ?? {};
+    const { up, glass_law: law } = gltf.extras?.lambert ?? {};
     const mesh: SceneMesh = {
         elements,
         positions,
@@ -169,6 +199,8 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
         buried,
         up: up === "x" || up === "z" ? up : "y",
         images: [],
+        panes,
+        glassByAngle: law !== "none",
         uv: null,
         reflectance: null,
     };

@@ -1,9 +1,10 @@
 // The shaders. One texel per element and channel, half precision as the daemon sent it; a vertex looks up the texel of
 // its element (flat) or of its node (smooth, whose means a pass over the nodes makes). Tone curve, exposure, palette,
 // iso-lines, threshold and the comparison are in the fragment shader: none of them costs a request.
-import { GLSL3, Matrix4, RawShaderMaterial, ShaderChunk, Vector2, Vector3, Vector4, type IUniform,
-    type Texture } from "three";
-import { sunSeen } from "./sun_shadow.ts";
+import { CustomBlending, GLSL3, Matrix4, OneFactor, OneMinusSrcAlphaFactor, RawShaderMaterial, ShaderChunk, Vector2,
+    Vector3, Vector4, type IUniform, type Texture } from "three";
+import type { MeshPane } from "./glb.ts";
+import { glassPasses, glassVector, sunSeen } from "./sun_shadow.ts";
 
 const fetchElement = `
 uniform highp sampler2D values_a, values_b;
@@ -146,6 +147,7 @@ uniform bool is_sunny;        // the sun is drawn
 uniform vec3 sun_direction;
 uniform vec3 sun_light;       // what faces it receives
 ${sunSeen}
+${glassPasses}
 uniform bool is_soft;         // several points of its disc were looked from
 uniform highp sampler2D sun_places;       // of the pixels: place, and number of the element from 1
 uniform highp sampler2D sun_sum;          // of what was seen from the points
@@ -184,6 +186,8 @@ vec3 sunshine() {
     if (cosine <= 0.0) return vec3(0.0);
     vec3 reflected = three(reflectances, element);
     if (is_textured) reflected /= max(three(reflectance, element), 0.004);
+    // The light that passes a pane is not yet dimmed where the pane itself reflects it.
+    if (glass.x > 0.0) reflected /= max(glass_passes(cosine), 0.004);
     return reflected * sun_light * cosine * sun_share(normal);
 }
 
@@ -233,8 +237,19 @@ void main() {
         if (is_dark && mod(gl_FragCoord.x - gl_FragCoord.y, 12.0) < 3.0) shown *= 0.55;
     } else if (is_marked && is_judged(element) && mod(gl_FragCoord.x + gl_FragCoord.y, 14.0) < 2.0)
         shown = mix(shown, vec3(1.0, 0.85, 0.2), 0.7);
-    if (element == hovered || any(equal(pins, ivec4(element)))) shown = mix(shown, vec3(1.0, 0.85, 0.2), 0.5);
+    bool is_picked = element == hovered || any(equal(pins, ivec4(element)));
+    if (is_picked) shown = mix(shown, vec3(1.0, 0.85, 0.2), 0.5);
     if (right && gl_FragCoord.x < split + 1.5 || compare == 1 && abs(gl_FragCoord.x - split) < 1.0) shown = vec3(1.0);
+    if (glass.x > 0.0) {
+        // What lies behind a pane is dimmed, in the light of the screen, and the pane's own light comes on top of it; a
+        // colour that stands for a number is mixed with it.
+        float passes = glass_passes(1.0), alpha = 1.0 - passes;
+        bool is_light = picture == 0 && compare != 2 && !is_picked;
+        if (is_light) alpha = 1.0 - pow(passes, 1.0 / 2.2);
+        if (is_picked) alpha = max(alpha, 0.5);
+        pixel = vec4(is_light ? shown : shown * alpha, alpha);
+        return;
+    }
     pixel = vec4(shown, 1.0);
 }
 `;
@@ -277,6 +292,7 @@ export function makeUniforms(nothing: Texture): Uniforms {
         sun_matrix: of(new Matrix4()),
         sun_step: of(new Vector2()),
         sun_depth: of(nothing),
+        sun_glass: of(nothing),
         normals: of(nothing),
         reflectances: of(nothing),
         is_soft: of(false),
@@ -297,10 +313,25 @@ export function sceneMaterial(uniforms: Uniforms, image: Texture,
 {
     return new RawShaderMaterial({
         glslVersion: GLSL3,
-        uniforms: { ...uniforms, image: { value: image }, factor: { value: new Vector3(...factor) } },
+        uniforms: { ...uniforms, image: { value: image }, factor: { value: new Vector3(...factor) },
+            glass: { value: new Vector3() } },
         vertexShader: sceneVertex,
         fragmentShader: sceneFragment,
     });
+}
+
+/** The material of a group of panes, which are drawn after all else and hide nothing. */
+export function paneMaterial(uniforms: Uniforms, white: Texture, { glass }: MeshPane,
+    isByAngle: boolean): RawShaderMaterial
+{
+    const material = sceneMaterial(uniforms, white, [1, 1, 1]);
+    material.uniforms.glass = { value: glassVector(glass, isByAngle) };
+    material.transparent = true;
+    material.depthWrite = false;
+    material.blending = CustomBlending;
+    material.blendSrc = OneFactor;
+    material.blendDst = OneMinusSrcAlphaFactor;
+    return material;
 }
 
 export function nodesMaterial(uniforms: Uniforms): RawShaderMaterial {

@@ -1,6 +1,6 @@
 // Elements with hanging corners in their edges are drawn as polygons that have these, too: triangles that meet only
 // half of an edge leave single pixels between them free, as their edges are rounded apart.
-import type { MeshImage, SceneMesh } from "./glb.ts";
+import type { MeshImage, MeshPane, SceneMesh } from "./glb.ts";
 import type { Nodes } from "./t_junctions.ts";
 
 /** What is drawn of a mesh; vertices of its own stand behind those of the mesh. */
@@ -11,6 +11,7 @@ export interface Drawn {
     index: Uint32Array;
     uv: Float32Array | null;
     images: MeshImage[];
+    panes: MeshPane[];
 }
 
 /** Triangles of a convex polygon, of which some corners lie in an edge (`isFlat`): each triangle has an area. */
@@ -32,13 +33,15 @@ export function trianglesOf(corners: readonly number[], isFlat: readonly boolean
 
 /** O(vertices). */
 export function splitEdges(mesh: SceneMesh, nodes: Nodes): Drawn {
-    const { positions, elementOf, index, uv, images } = mesh, { nodeOf, inner } = nodes;
-    if (inner.size === 0) return { positions, elementOf, nodeOf, index, uv, images };
+    const { positions, elementOf, index, uv, images, panes } = mesh, { nodeOf, inner } = nodes;
+    if (inner.size === 0) return { positions, elementOf, nodeOf, index, uv, images, panes };
     const vertices = elementOf.length,
         own: { like: number; node: number; element: number; uv: [number, number] }[] = [],
         all: number[] = [];
     // Of each place in the index, what it became.
-    const moved = new Map<number, number>(images.flatMap(({ first, count }) => [[first, 0], [first + count, 0]]));
+    const moved = new Map<number, number>(
+        [...images, ...panes].flatMap(({ first, count }) => [[first, 0], [first + count, 0]]),
+    );
     let at = 0;
     for (let begin = 0, end = 0; begin < vertices; begin = end) {
         while (end < vertices && elementOf[end] === elementOf[begin]) end++;
@@ -67,16 +70,18 @@ export function splitEdges(mesh: SceneMesh, nodes: Nodes): Drawn {
         to.set(from);
         return to;
     };
+    const place = <T extends { first: number; count: number }>(part: T): T => {
+        const first = moved.get(part.first) as number;
+        return { ...part, first, count: (moved.get(part.first + part.count) as number) - first };
+    };
     const drawn: Drawn = {
         positions: longer(new Float32Array(3 * (vertices + own.length)), positions),
         elementOf: longer(new Uint32Array(vertices + own.length), elementOf),
         nodeOf: longer(new Uint32Array(vertices + own.length), nodeOf),
         index: Uint32Array.from(all),
         uv: uv === null ? null : longer(new Float32Array(2 * (vertices + own.length)), uv),
-        images: images.map((image) => {
-            const first = moved.get(image.first) as number;
-            return { ...image, first, count: (moved.get(image.first + image.count) as number) - first };
-        }),
+        images: images.map(place),
+        panes: panes.map(place),
     };
     own.forEach((one, k) => {
         drawn.positions.set(positions.subarray(3 * one.like, 3 * one.like + 3), 3 * (vertices + k));

@@ -10,7 +10,7 @@ import type { SceneMesh } from "./glb.ts";
 import { findNodes } from "./nodes.ts";
 import { splitEdges, type Drawn } from "./split_edges.ts";
 import { Sunlight } from "./sunlight.ts";
-import { makeUniforms, nodesMaterial, sceneMaterial, type Uniforms } from "./material.ts";
+import { makeUniforms, nodesMaterial, paneMaterial, sceneMaterial, type Uniforms } from "./material.ts";
 import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor,
     whiteTexture } from "./textures.ts";
 
@@ -112,7 +112,7 @@ export class Stage {
         this.drawn = drawn;
         this.geometry = geometry;
         this.mesh = mesh;
-        const materials = this.addImages(geometry, mesh, drawn);
+        const materials = this.addParts(geometry, mesh, drawn);
         const body = new Mesh(geometry, materials);
         body.name = "scene";
         // Until the first answer all of it is black.
@@ -147,16 +147,21 @@ export class Stage {
         this.judge(() => true);
     }
 
-    /** The materials of the parts of the geometry: the first is that of all without an image. */
-    private addImages(geometry: BufferGeometry, mesh: SceneMesh, drawn: Drawn): RawShaderMaterial[] {
-        const { white } = this, materials = [sceneMaterial(this.uniforms, white, [1, 1, 1])];
+    /** The materials of the parts of the geometry: the first is that of all opaque ones without an image, the last are
+     * those of panes. */
+    private addParts(geometry: BufferGeometry, mesh: SceneMesh, drawn: Drawn): RawShaderMaterial[] {
+        const { white, uniforms } = this;
+        const materials = [sceneMaterial(uniforms, white, [1, 1, 1]),
+            ...drawn.images.map(({ factor }) => sceneMaterial(uniforms, white, factor)),
+            ...drawn.panes.map((pane) => paneMaterial(uniforms, white, pane, mesh.glassByAngle))];
+        const parts = [...drawn.images, ...drawn.panes].map((part, k) => ({ ...part, material: k + 1 }))
+            .sort((one, other) => one.first - other.first);
         this.hasImages = false;
         let first = 0;
-        for (const image of drawn.images) {
-            if (image.first > first) geometry.addGroup(first, image.first - first, 0);
-            geometry.addGroup(image.first, image.count, materials.length);
-            materials.push(sceneMaterial(this.uniforms, white, image.factor));
-            first = image.first + image.count;
+        for (const part of parts) {
+            if (part.first > first) geometry.addGroup(first, part.first - first, 0);
+            geometry.addGroup(part.first, part.count, part.material);
+            first = part.first + part.count;
         }
         if (first < drawn.index.length) geometry.addGroup(first, drawn.index.length - first, 0);
         if (drawn.uv === null || mesh.reflectance === null) return materials;
@@ -201,7 +206,8 @@ export class Stage {
             this.sunlight?.rest();
             return;
         }
-        this.sunlight ??= new Sunlight(this.renderer, u, geometry, mesh, this.nothing);
+        this.sunlight ??= new Sunlight(this.renderer, u, geometry, mesh, { opaque: 1 + mesh.images.length,
+            panes: mesh.panes.map((pane) => pane.glass), isByAngle: mesh.glassByAngle }, this.nothing);
         this.sunlight.set(new Vector3(...sun.direction), sun.light);
     }
 

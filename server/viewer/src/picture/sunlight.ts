@@ -6,7 +6,7 @@ import { FloatType, GLSL3, Matrix4, Mesh, NearestFilter, OrthographicCamera, Pla
     type WebGLRenderer } from "three";
 import { normalsOf, reflectancesOf } from "./elements.ts";
 import type { SceneMesh } from "./glb.ts";
-import { SunShadow, sunSeen } from "./sun_shadow.ts";
+import { opaqueMaterials, SunShadow, sunSeen, type Parts } from "./sun_shadow.ts";
 import { floatTexture } from "./textures.ts";
 import type { Uniforms } from "./material.ts";
 
@@ -100,6 +100,8 @@ export class Sunlight {
     private readonly shadow: SunShadow;
     private readonly places = target(RGBAFormat, true);
     private readonly sums = [target(RedFormat, false), target(RedFormat, false)] as const;
+    private readonly placesMaterial = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: placesVertex,
+        fragmentShader: placesFragment });
     private readonly body: Mesh;
     private readonly bodyScene = new Scene();
     private readonly sumScene = new Scene();
@@ -117,15 +119,15 @@ export class Sunlight {
 
     /** The geometry stays the stage's; `nothing` takes the place of textures that are gone. */
     constructor(private readonly renderer: WebGLRenderer, private readonly uniforms: Uniforms, geometry: BufferGeometry,
-        mesh: SceneMesh, private readonly nothing: Texture)
+        mesh: SceneMesh, parts: Parts, private readonly nothing: Texture)
     {
-        this.shadow = new SunShadow(renderer, geometry);
+        this.shadow = new SunShadow(renderer, geometry, parts);
         uniforms.sun_depth.value = this.shadow.depth;
+        uniforms.sun_glass.value = this.shadow.glass;
         uniforms.normals.value = floatTexture(normalsOf(mesh));
         uniforms.reflectances.value = floatTexture(reflectancesOf(mesh));
         uniforms.sun_places.value = this.places.texture;
-        this.body = new Mesh(geometry,
-            new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: placesVertex, fragmentShader: placesFragment }));
+        this.body = new Mesh(geometry, opaqueMaterials(this.placesMaterial, parts.opaque, parts.panes.length));
         this.body.frustumCulled = false;
         this.bodyScene.add(this.body);
         this.plane = new Mesh(new PlaneGeometry(2, 2), new RawShaderMaterial({
@@ -161,8 +163,8 @@ export class Sunlight {
     release(): void {
         this.shadow.dispose();
         for (const name of ["normals", "reflectances"]) (this.uniforms[name].value as Texture).dispose();
-        for (const one of [this.places, ...this.sums, this.plane.geometry, this.plane.material,
-            this.body.material as RawShaderMaterial]) one.dispose();
+        for (const one of [this.places, ...this.sums, this.plane.geometry, this.plane.material, this.placesMaterial])
+            one.dispose();
     }
 
     /** The graphics card has lost all that was drawn. */
@@ -253,7 +255,7 @@ export class Sunlight {
     dispose(): void {
         this.release();
         // Textures that uniforms still name would be made anew by the next picture.
-        for (const name of ["sun_depth", "sun_places", "sun_sum", "normals", "reflectances"])
+        for (const name of ["sun_depth", "sun_glass", "sun_places", "sun_sum", "normals", "reflectances"])
             this.uniforms[name].value = this.nothing;
     }
 }

@@ -6,6 +6,7 @@ import { numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
+import { glassText } from "../../picture/glb.ts";
 import { figuresOf, type Figures } from "../../picture/scale.ts";
 import type { Wanted } from "../../state/request.ts";
 import { quantityShown, unitShown } from "../../state/state.ts";
@@ -134,7 +135,9 @@ export class Groups {
             const { store } = this.page, { view } = store.now;
             store.change({ ...store.now, view: { ...view, judged: view.judged === name ? null : name } });
         }, { class: "plain" });
-        return make("tr", { "data-group": name }, make("th", { scope: "row" }, mark), make("td", {}), make("td", {}),
-            make("td", {}), make("td", {}));
+        const glass = this.page.scene.now?.mesh.groups.find((group) => group.name === name)?.glass ?? null;
+        return make("tr", { "data-group": name },
+            make("th", { scope: "row" }, mark, glass !== null && make("small", {}, glassText(glass))), make("td", {}),
+            make("td", {}), make("td", {}), make("td", {}));
     }
 }

@@ -6,6 +6,7 @@ import type { Page } from "../../app/page.ts";
 import type { Quantity } from "../../daemon/api.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
+import { glassText } from "../../picture/glb.ts";
 import { emissionOf, quantityShown, unitOf } from "../../state/state.ts";
 import type { Wanted } from "../../state/request.ts";
 
@@ -122,10 +123,12 @@ export class Pins {
         const { scene: { now: scene, fields: [field] }, store: { now } } = this.page;
         if (scene === null || element >= scene.mesh.elements) return;
         const { mesh, description: { channels, emitters } } = scene;
-        const group = mesh.groups[mesh.groupOf[element]]?.name ?? "";
+        const { name: group = "", glass = null } = mesh.groups[mesh.groupOf[element]] ?? {};
         (card.querySelector("h2") as HTMLElement).textContent = `${
             isHovered ? "Under the pointer: " : ""
-        }${group}, element ${count(element)}, ${numberText(mesh.area[element])} m²`;
+        }${group}, element ${count(element)}, ${numberText(mesh.area[element])} m²${
+            glass === null ? "" : `, ${glassText(glass)}`
+        }`;
         const exact = this.exact.get(element), emission = emissionOf(now.lighting, channels)[group] ?? 0;
         const E = (emitters?.length ?? 0) > 0
             ? null
