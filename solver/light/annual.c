@@ -1,7 +1,8 @@
 /* A sum over the year is n hours / 1000 times the answer to the mean vector, as answers are linear. A share
  * is (hours with low <= x <= high) / (hours that count), the daylight autonomy or useful daylight of
  * annual.h; with fewer tiles than hours, x_h = x_E + sum_t L_ht x_t + x_h,sun from one answer x_t for each
- * tile, and one x_h,sun for each hour with an exact sun. */
+ * tile, and one x_h,sun for each hour with an exact sun; the sum is limited, not its parts, as an answer to
+ * the hour would be. */
 #include "solver/light/annual.h"
 
 #include "solver/codec/answer.h"
@@ -228,18 +229,23 @@ typedef struct tile_answers {
     size_t terms; /* tiles + 1; 0: hours are answered one by one */
     float *x;     /* [C][terms][width], the emission last */
     float *share; /* [AT_ONCE][terms], of one channel */
-    float *mixed; /* [AT_ONCE][width], with luminance of each channel: [C][AT_ONCE][width] */
+    float *mixed; /* [AT_ONCE][width], of one channel */
+    float *whole; /* [AT_ONCE][row], of all channels */
     float *dark;  /* [C][n], the emission of suns */
     emission suns;
     emission_pass by_suns; /* of suns alone */
     float *sunny;          /* [AT_ONCE][row], answers to suns; NULL: there are none */
+    bool below_zero;       /* some answers are, and sums of them are limited by the next */
+    emission_pass limits;
 } tile_answers;
 
 static void tile_answers_free(tile_answers *a) {
     free(a->x);
     free(a->share);
     free(a->mixed);
+    free(a->whole);
     emission_pass_free(&a->by_suns);
+    emission_pass_free(&a->limits);
     free(a->dark);
     free(a->sunny);
     *a = (tile_answers){.terms = 0};
@@ -256,23 +262,34 @@ static bool worth_mixing(const work *w, const emission *light, size_t n_vectors)
     return terms < (double)n_vectors && terms * (double)w->row * sizeof(float) <= mixed_bytes;
 }
 
-/* Answers n vectors of light and puts them behind the terms that are there. */
-static lam_status add_answers(const work *w, const emission *light, size_t n, tile_answers *a,
-                              lam_error *error) {
+/* Answers n vectors of light and puts them behind the terms that are there, not limited. Sums of them are to
+ * be limited where they would be. */
+static lam_status add_answers(const work *w, const emission *light, size_t n, const lam_limiter *limiter,
+                              tile_answers *a, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t C = lam_operator_channels(w->op), width = w->row / C, terms = lam_sky_tiles(w->sky) + 1;
     const size_t most = n < AT_ONCE ? n : AT_ONCE;
-    emission_pass p = {0};
+    emission limited = *light;
+    emission_pass p = {0}, q = {0};
     size_t vectors[AT_ONCE];
     float *x = memory_allocate(most, w->row * sizeof *x, "answers to tiles", error);
-    if (x == NULL) TRY(LAM_ERR_MEMORY);
+    float *y = memory_allocate(most, w->row * sizeof *y, "answers to tiles", error);
+    if (x == NULL || y == NULL) TRY(LAM_ERR_MEMORY);
+    limited.limiter = limiter;
     TRY(emission_pass_create(light, w->op, w->sky, w->quantity, w->n_selected, w->selected, most, &p, error));
+    TRY(emission_pass_create(&limited, w->op, w->sky, w->quantity, w->n_selected, w->selected, most, &q,
+                             error));
     for (size_t first = 0; first < n; first += most) {
         const size_t now = n - first < most ? n - first : most;
         if (progress_cancelled(w->steps)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         progress_report(w->steps, "tiles", (double)first / (double)n);
         for (size_t k = 0; k < now; k++) vectors[k] = first + k;
         TRY(emission_pass_solve(&p, now, vectors, x, error));
+        if (limiter != NULL) {
+            memcpy(y, x, now * w->row * sizeof *y);
+            emission_pass_limit(&q, now, vectors, y);
+            for (size_t k = 0; k < now; k++) a->below_zero = a->below_zero || q.limited[k] > 0;
+        }
         for (size_t k = 0; k < now; k++)
             for (size_t c = 0; c < C; c++)
                 memcpy(a->x + (c * terms + a->terms + k) * width, x + (k * C + c) * width, width * sizeof *x);
@@ -280,7 +297,9 @@ static lam_status add_answers(const work *w, const emission *light, size_t n, ti
     }
 done:
     emission_pass_free(&p);
+    emission_pass_free(&q);
     free(x);
+    free(y);
     return status;
 }
 
@@ -292,13 +311,10 @@ static lam_status add_suns(const work *w, const emission *light, tile_answers *a
     a->dark = memory_allocate(C * n, sizeof *a->dark, "answers to suns", error);
     a->sunny = memory_allocate(AT_ONCE, w->row * sizeof *a->sunny, "answers to suns", error);
     if (a->dark == NULL || a->sunny == NULL) TRY(LAM_ERR_MEMORY);
-    a->suns = (emission){.n_vectors = light->n_vectors,
-                         .steady = true,
-                         .E = a->dark,
-                         .sun = light->sun,
-                         .limiter = light->limiter};
+    a->suns = (emission){.n_vectors = light->n_vectors, .steady = true, .E = a->dark, .sun = light->sun};
     TRY(emission_pass_create(&a->suns, w->op, w->sky, w->quantity, w->n_selected, w->selected, AT_ONCE,
                              &a->by_suns, error));
+    a->below_zero = light->limiter != NULL;
 done:
     return status;
 }
@@ -313,21 +329,16 @@ static lam_status tile_answers_make(const work *w, const emission *light, tile_a
     float *units = memory_allocate(m + 1, C * m * sizeof *units, "answers to tiles", error);
     a.x = memory_allocate(terms, w->row * sizeof *a.x, "answers to tiles", error);
     a.share = memory_allocate(AT_ONCE, terms * sizeof *a.share, "answers to tiles", error);
-    a.mixed = memory_allocate(w->options->luminance ? C * AT_ONCE : AT_ONCE, width * sizeof *a.mixed,
-                              "answers to tiles", error);
-    if (dark == NULL || units == NULL || a.x == NULL || a.share == NULL || a.mixed == NULL)
+    a.mixed = memory_allocate(AT_ONCE, width * sizeof *a.mixed, "answers to tiles", error);
+    a.whole = memory_allocate(AT_ONCE, w->row * sizeof *a.whole, "answers to tiles", error);
+    if (dark == NULL || units == NULL || a.x == NULL || a.share == NULL || a.mixed == NULL || a.whole == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < m; t++)
         for (size_t c = 0; c < C; c++) units[(t * C + c) * m + t] = 1;
-    const lam_limiter *limiter = light->limiter;
-    const emission tiles = {.n_vectors = m, .steady = true, .E = dark, .L = units, .limiter = limiter},
-                   lamps = {.n_vectors = 1,
-                            .steady = true,
-                            .E = light->E,
-                            .L = units + m * C * m,
-                            .limiter = limiter};
-    TRY(add_answers(w, &tiles, m, &a, error));
-    TRY(add_answers(w, &lamps, 1, &a, error));
+    const emission tiles = {.n_vectors = m, .steady = true, .E = dark, .L = units},
+                   lamps = {.n_vectors = 1, .steady = true, .E = light->E, .L = units + m * C * m};
+    TRY(add_answers(w, &tiles, m, light->limiter, &a, error));
+    TRY(add_answers(w, &lamps, 1, light->limiter, &a, error));
     *out = a;
     a = (tile_answers){.terms = 0};
 done:
@@ -377,18 +388,18 @@ static lam_status count_mixed(const work *w, const emission *light, tile_answers
             memcpy(a->share + k * a->terms, light->L + (vectors[k] * C + c) * m, m * sizeof *a->share);
             a->share[k * a->terms + m] = 1;
         }
-        float *mixed = a->mixed + (w->options->luminance ? c * n * width : 0);
-        dense_multiply(n, a->terms, width, a->share, a->x + c * a->terms * width, false, mixed);
+        dense_multiply(n, a->terms, width, a->share, a->x + c * a->terms * width, false, a->mixed);
         for (size_t k = 0; k < n; k++) {
+            float *const x = a->whole + (k * C + c) * width;
+            memcpy(x, a->mixed + k * width, width * sizeof *x);
             if (sunny[k] == n) continue;
             const float *by_sun = a->sunny + (sunny[k] * C + c) * width;
-            for (size_t i = 0; i < width; i++) mixed[k * width + i] += by_sun[i];
+            for (size_t i = 0; i < width; i++) x[i] += by_sun[i];
         }
-        if (!w->options->luminance) count_all(w, n, width, mixed, count + c * width);
     }
-    if (!w->options->luminance) goto done;
-    answer_luminance(1, n * width, a->mixed);
-    count_all(w, n, width, a->mixed, count);
+    if (a->below_zero) emission_pass_limit(&a->limits, n, vectors, a->whole);
+    if (w->options->luminance) answer_luminance(n, w->told, a->whole);
+    count_all(w, n, w->told, a->whole, count);
 done:
     return status;
 }
@@ -407,6 +418,9 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
     if (mixed) {
         TRY(tile_answers_make(w, light, &tiles, error));
         TRY(add_suns(w, light, &tiles, error));
+        if (tiles.below_zero)
+            TRY(emission_pass_create(light, w->op, w->sky, w->quantity, w->n_selected, w->selected, AT_ONCE,
+                                     &tiles.limits, error));
     } else if (n_vectors > 0)
         TRY(emission_pass_create(light, w->op, w->sky, w->quantity, w->n_selected, w->selected, most, &p,
                                  error));

@@ -66,10 +66,11 @@ typedef struct annual_summary {
  * vectors; with selected (not NULL) of these elements only, and 0 elsewhere. The mean vector is solved for
  * the sum, which is linear; for shares all lit vectors that count, a few at a time. Where these are more than
  * the tiles of the sky, and the emission beside it is steady, each tile is solved once, and hours are sums of
- * tiles and of one answer to their sun where it is exact, each limited by itself. Cost: one answer for sums;
+ * tiles and of one answer to their sun where it is exact, limited as one. Cost: one answer for sums;
  * for shares one a lit and counted vector, or one a tile and an exact sun and a product of [tiles][n] a
- * vector; memory O(n), or O(n tiles) of at most 1 GiB. Errors: LAM_ERR_ARGUMENT (not whole days, where hours
- * of the day are asked for), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. */
+ * vector, two where answers are below zero; memory O(n), or O(n tiles) of at most 1 GiB. Errors:
+ * LAM_ERR_ARGUMENT (not whole days, where hours of the day are asked for), LAM_ERR_CANCELLED, LAM_ERR_MEMORY.
+ */
 lam_status annual_apply(const annual_options *w, const emission *light, const lam_operator *op,
                         const lam_sky *sky, lam_quantity quantity, size_t n_selected,
                         const uint32_t *selected, const progress *steps, float **values,

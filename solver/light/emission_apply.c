@@ -124,13 +124,24 @@ static void light_answers(emission_pass *p, size_t n, const size_t *vectors, flo
         }
 }
 
-lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors, float *out,
-                               lam_error *error) {
-    lam_status status = LAM_OK;
+/* The light of n vectors side by side. */
+static void take_light(emission_pass *p, size_t n, const size_t *vectors) {
     const emission *e = p->light;
     const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
     if (!e->steady && p->E != NULL) gather(n, vectors, C * n_elements, e->E, p->E);
     if (e->L != NULL) gather(n, vectors, C * lam_sky_tiles(p->sky), e->L, p->L);
+}
+
+void emission_pass_limit(emission_pass *p, size_t n, const size_t *vectors, float *out) {
+    take_light(p, n, vectors);
+    if (p->H0 != NULL) light_directly(p, n, vectors);
+    limit(p, n, out);
+}
+
+lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors, float *out,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    take_light(p, n, vectors);
     if (p->W != NULL) {
         TRY(find_weights(p, n, vectors, error));
         TRY(lam_operator_apply_emitters(p->op, n, p->quantity, p->W, p->n_selected, p->selected, out, p->work,

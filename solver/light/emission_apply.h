@@ -37,6 +37,10 @@ void emission_pass_free(emission_pass *p);
 lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors, float *out,
                                lam_error *error);
 
+/* Limits answers to n vectors, as emission_pass_solve gives them, which were summed from answers that are not
+ * limited; not of an operator of few emitters. Cost: the light of the sky, and of suns. */
+void emission_pass_limit(emission_pass *p, size_t n, const size_t *vectors, float *out);
+
 /* *values is [n_vectors][C][n], freed with free(): the answer to each vector under its sky; with selected
  * (not NULL) of these elements only, and 0 elsewhere. limited [n_vectors], unless NULL, gets the elements of
  * each that were below zero. stop, which may be NULL, is asked between passes and ends the work with its
