@@ -46,6 +46,7 @@ typedef struct scene_outlet {
     double crack_width; /* metres: a narrower gap is a crack */
     double openings;    /* share of the light that leaves through wider gaps, by a sample */
     bool fronts_only;   /* no ray meets a back but through cracks */
+    bool panes_only;    /* light leaves from panes, and else through cracks; not closed then */
 } scene_outlet;
 
 /* Above this many elements a store keeps the upper triangle A_i F_ij, j > i, in place of rows: half the

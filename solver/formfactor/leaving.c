@@ -2,6 +2,7 @@
 
 #include "solver/formfactor/visibility/openings.h"
 #include "solver/formfactor/visibility/sample.h"
+#include "solver/scene/glass.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,6 +14,12 @@ static double area_mean(const mesh *m, const double *x) {
         total += m->area[i];
     }
     return total > 0 ? sum / total : 0;
+}
+
+/* True for an element whose rays are lost through no gap of a room: one below a body, and a pane, one side of
+ * which looks outside. */
+static bool is_apart(const mesh *m, size_t element) {
+    return mesh_is_buried(m, element) || mesh_is_pane(m, element);
 }
 
 /* Lost rays of each kind that are followed, and rays that are cast at most to find one of them. */
@@ -29,12 +36,20 @@ typedef struct lost_rays {
     double width; /* of a crack */
 } lost_rays;
 
-/* The elements of FOLLOWED rays that are spread evenly over the lost light, sum A_i share_i = light. */
+/* sum A_i share_i of all rays that gaps may have lost. */
+static double lost_light(const lost_rays *l) {
+    double sum = 0;
+    for (size_t i = 0; i < l->m->n; i++)
+        if (!is_apart(l->m, i)) sum += l->m->area[i] * l->share[i];
+    return sum;
+}
+
+/* The elements of FOLLOWED rays that are spread evenly over that light. */
 static void elements_of_lost(const lost_rays *l, double light, uint32_t *element) {
     double passed = 0;
     size_t k = 0, last = 0;
     for (size_t i = 0; i < l->m->n && k < FOLLOWED; i++) {
-        if (!(l->share[i] > 0) || mesh_is_buried(l->m, i)) continue;
+        if (!(l->share[i] > 0) || is_apart(l->m, i)) continue;
         passed += l->m->area[i] * l->share[i];
         last = i;
         for (; k < FOLLOWED && (k + .5) / FOLLOWED * light < passed; k++) element[k] = (uint32_t)i;
@@ -70,7 +85,8 @@ static int follow_one(const lost_rays *l, uint32_t element, size_t first) {
 }
 
 /* The share of the lost light that passes openings; 0 where no ray was found again. */
-static double share_through_openings(const lost_rays *l, double light) {
+static double share_through_openings(const lost_rays *l) {
+    const double light = lost_light(l);
     uint32_t element[FOLLOWED];
     int found[FOLLOWED];
     size_t openings = 0, all = 0;
@@ -86,37 +102,54 @@ static double share_through_openings(const lost_rays *l, double light) {
     return all > 0 ? (double)openings / (double)all : 0;
 }
 
+/* True where light leaves from panes: a part of it that is more than cracks make. */
+static bool has_window(const form_factors *f, const mesh *m) {
+    static const double least = .01;
+    for (size_t i = 0; m->glass != NULL && i < m->n; i++)
+        if (mesh_is_pane(m, i) && f->leaving[i] + f->absorbed[i] > least) return true;
+    return false;
+}
+
 void leaving_measure(form_factors *f, const mesh *m, const visibility *v) {
     lost_rays l = {.m = m,
                    .v = v,
                    .n_rays = f->recipe.rays > 0 ? f->recipe.rays : RAYS_BESIDE_HEMICUBES,
                    .seed = f->recipe.seed,
                    .width = openings_crack_width(m)};
-    double area = 0;
-    for (size_t i = 0; i < m->n; i++) area += m->area[i];
     f->leaving_share = area_mean(m, f->leaving);
     f->absorbed_share = area_mean(m, f->absorbed);
     f->outlet = (scene_outlet){.crack_width = l.width};
     l.share = f->leaving;
-    f->outlet.openings = share_through_openings(&l, area * f->leaving_share);
+    f->outlet.openings = share_through_openings(&l);
     l.share = f->absorbed;
     l.back = true;
-    f->outlet.fronts_only = share_through_openings(&l, area * f->absorbed_share) <= LEAVING_OPEN;
-    f->closed = f->recipe.closure == CLOSURE_MEASURED ? f->outlet.openings <= LEAVING_OPEN
-                                                      : f->recipe.closure == CLOSURE_CLOSED;
+    f->outlet.fronts_only = share_through_openings(&l) <= LEAVING_OPEN;
+    const bool cracks = f->recipe.closure == CLOSURE_MEASURED ? f->outlet.openings <= LEAVING_OPEN
+                                                              : f->recipe.closure == CLOSURE_CLOSED;
+    f->outlet.panes_only = cracks && has_window(f, m);
+    f->closed = cracks && !f->outlet.panes_only;
 }
 
-static double absorbed(const form_factors *f, size_t element) {
-    return f->outlet.fronts_only ? 0 : f->absorbed[element];
+/* True for an element whose row keeps what it loses: nearly empty ones. */
+static bool is_kept(const form_factors *f, const mesh *m, size_t element) {
+    return mesh_is_buried(m, element) || (f->outlet.panes_only && mesh_is_pane(m, element));
+}
+
+static double absorbed(const form_factors *f, const mesh *m, size_t element) {
+    return f->outlet.fronts_only && !is_kept(f, m, element) ? 0 : f->absorbed[element];
 }
 
 bool leaving_nothing(const form_factors *f) {
     return f->closed && f->outlet.fronts_only;
 }
 
+bool leaving_by_panes(const form_factors *f) {
+    return f->outlet.panes_only && f->outlet.fronts_only;
+}
+
 double leaving_outside(const form_factors *f, const mesh *m, size_t element) {
-    if (mesh_is_buried(m, element)) return f->leaving[element] + f->absorbed[element];
-    return (f->closed ? 0 : f->leaving[element]) + absorbed(f, element);
+    const bool sealed = (f->closed || f->outlet.panes_only) && !is_kept(f, m, element);
+    return (sealed ? 0 : f->leaving[element]) + absorbed(f, m, element);
 }
 
 lam_status leaving_to_sky(form_factors *f, const mesh *m, lam_error *error) {
@@ -124,7 +157,7 @@ lam_status leaving_to_sky(form_factors *f, const mesh *m, lam_error *error) {
     double *scale = memory_allocate(n, sizeof *scale, "first bounce of the sky", error);
     if (scale == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) {
-        const double outside = f->leaving[i] + absorbed(f, i);
+        const double outside = f->leaving[i] + absorbed(f, m, i);
         scale[i] =
             f->closed || outside <= 0 || mesh_is_buried(m, i) ? 0 : fmax(0, 1 - f->row_sums[i]) / outside;
     }

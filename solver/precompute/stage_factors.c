@@ -82,14 +82,16 @@ static const double outward_share = .9;
 /* Says why the scene counts as closed or open. */
 static void log_closure(const precompute_job *job, const precompute_factors *factors) {
     const form_factors *f = &factors->f;
-    const char *const way = f->closed ? "closed" : "open", *const other = f->closed ? "=no" : "";
+    const bool panes = f->outlet.panes_only, closed = f->closed || panes;
+    const char *const way = panes ? "closed but for its panes" : closed ? "closed" : "open";
+    const char *const other = closed ? "=no" : "";
     char why[96];
     if (job->options->from_store) return; /* it was decided and said when the form factors were made */
     if (f->recipe.closure != CLOSURE_MEASURED)
-        snprintf(why, sizeof why, "as --closed%s says", f->closed ? "" : "=no");
+        snprintf(why, sizeof why, "as --closed%s says", closed ? "" : "=no");
     else if (!(f->leaving_share > 0))
         snprintf(why, sizeof why, "no ray leaves it");
-    else if (f->closed)
+    else if (closed)
         snprintf(why, sizeof why, "light leaves through cracks narrower than %.2g m", f->outlet.crack_width);
     else
         snprintf(why, sizeof why, "%.0f %% of the light that leaves passes gaps wider than %.2g m",

@@ -2,6 +2,7 @@
 #include "solver/base/clock.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/visibility/openings.h"
+#include "solver/formfactor/visibility/pane_path.h"
 #include "solver/walk/walk_steps.h"
 
 #include <math.h>
@@ -57,7 +58,8 @@ static lam_status look_around(walk_scene *s, scene_closure closure, lam_error *e
         free(area);
         return LAM_ERR_MEMORY;
     }
-    for (size_t i = 0; i < n; i++) area[i] = mesh_is_buried(s->m, i) ? 0 : s->m->area[i];
+    for (size_t i = 0; i < n; i++)
+        area[i] = mesh_is_buried(s->m, i) || mesh_is_pane(s->m, i) ? 0 : s->m->area[i];
     walk_accumulate(n, area, before);
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t part = 0; part < PARTS; part++)
@@ -69,7 +71,9 @@ static lam_status look_around(walk_scene *s, scene_closure closure, lam_error *e
         }
     s->closed = (double)sums[0].openings <= LEAVING_OPEN * (double)sums[0].all;
     s->fronts = (double)sums[1].openings <= LEAVING_OPEN * (double)sums[1].all;
-    if (closure != CLOSURE_MEASURED) s->closed = closure == CLOSURE_CLOSED;
+    /* A ray that leaves may have passed a pane: it is not cast again, whatever closure says. */
+    if (closure == CLOSURE_OPEN) s->closed = false;
+    if (closure == CLOSURE_CLOSED && s->m->glass == NULL) s->closed = true;
     free(before);
     free(area);
     return LAM_OK;

@@ -302,6 +302,37 @@ class Glass(unittest.TestCase):
             np.testing.assert_array_equal(a["mesh/glass"][:], b["mesh/glass"][:])
             self.assertEqual(b["mesh"].attrs["glass_law"], b"angle")
 
+    def test_cracks_of_a_room_with_panes(self):
+        """The outer side of a pane is no gap of the room: cracks of 2 mm stay cracks, which the rows make good, a gap of .3 m does not,
+        and with --closed only the pane's outer rows stay empty, under their sky; nothing is said to coincide."""
+        def room(gap):
+            ceiling, narrow = "v 0 {0:g} 2.5\nv 4 {0:g} 2.5".format(3), "v 0 {0:g} 2.5\nv 4 {0:g} 2.5".format(3 - gap)
+            self.assertIn(ceiling, window_room())
+            return window_room().replace(ceiling, narrow, 1)
+        even = {}
+        for gap, options, closed in ((0, (), True), (.002, (), True), (.3, (), False), (0, ("--closed",), True), (.002, ("--closed=no",), False)):
+            self.write(room(gap), paint(".5 .5 .5"))
+            for source in "rays", "blocks", "auto":
+                store, log = self.precompute("--elements", 150, "--sky", "tregenza", "--probes", 0, "--keep-form-factors",
+                                             "--form-factors", source, *(("--rays", 1024) if source == "rays" else ()), *options)
+                self.assertIn(f"the scene is {'closed but for its panes' if closed else 'open'}: ", log)
+                self.assertNotIn("too much or too little", log)
+                names = self.groups(store)
+                with h5py.File(store) as f:
+                    group, sums, area = f["mesh/group"][:], f["mesh/row_sums"][:], f["mesh/area"][:]
+                    sky = f["sky/first_bounce"][:].sum(0) / np.pi
+                outer, inside = group == names.index("pane"), np.array([names[g] in INSIDE for g in group])
+                np.testing.assert_allclose(sums[outer], 0, atol=1e-6)
+                np.testing.assert_allclose(sky[outer], .5, atol=.02)  # the upper half, before a dark ground
+                if closed:
+                    np.testing.assert_allclose(sums[inside], 1, atol=3e-5, err_msg=f"{gap} {source} {options}")
+                else:
+                    self.assertLess(area[inside] @ sums[inside] / area[inside].sum(), 1 - 1e-4)
+                if gap < .3:
+                    floor = self.means(store, "--sky", "even")["floor"]
+                    self.assertAlmostEqual(floor / even.setdefault("floor", floor), 1, delta=.02, msg=f"{gap} {source} {options}")
+            self.assertNotIn("BROKEN", must("verify", store, "--probes", 0, "--walks", 1024).stdout)
+
     def test_every_client_is_told_and_meshes_read_back(self):
         """`info` and the daemon name panes with T and the law; GET .../mesh and solve -o X.glb have blended materials, which are
         the same panes again: T, both sides, what they reflect, and the light of the floor."""

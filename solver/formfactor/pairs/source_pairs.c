@@ -69,8 +69,9 @@ static lam_status close_pairs(form_factors *f, const mesh *m, const visibility *
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
     leaving_measure(f, m, v);
-    for (size_t i = 0; i < m->n && leaving_nothing(f); i++) outside[i] = leaving_outside(f, m, i);
-    if (!leaving_nothing(f)) find_rests(f, m->area, variance, outside);
+    const bool is_known = leaving_nothing(f) || leaving_by_panes(f);
+    for (size_t i = 0; i < m->n && is_known; i++) outside[i] = leaving_outside(f, m, i);
+    if (!is_known) find_rests(f, m->area, variance, outside);
     TRY(repair_close(&f->upper, m->area, outside, f, error));
 done:
     free(outside);
