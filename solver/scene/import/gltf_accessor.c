@@ -48,6 +48,7 @@ bool gltf_find_values(gltf_file *g, const json_t *accessor, gltf_values *out) {
         !gltf_count(view, "byteOffset", 0, &of_view) || !gltf_count(view, "byteLength", 0, &length) ||
         !gltf_count(view, "byteStride", row, &stride))
         return false;
+    if (stride == 0) stride = row; /* as some programs write it */
     const gltf_buffer b = gltf_read_buffer(g, json_object_get(view, "buffer"), &ignored);
     if (b.bytes == NULL || stride < row || of_view > b.length || length > b.length - of_view) return false;
     if (at > length || (n > 0 && (row > length - at || n - 1 > (length - at - row) / stride))) return false;

@@ -32,6 +32,38 @@ static bool drop_skins(gltf_file *g) {
     return (json_is_object(g->root) && json_object_del(g->root, "skins") == 0) || any;
 }
 
+/* Fails where an accessor has a view, and that has not all of its bytes: the library reads what lies behind
+ * them. Missing buffers, sparse accessors and numbers that are none are the library's to tell. */
+static lam_status check_accessor(gltf_file *g, const json_t *index, const char *what, lam_error *error) {
+    lam_error ignored;
+    gltf_values v;
+    const json_t *accessor = gltf_entry(g, "accessors", index);
+    const json_t *view = gltf_entry(g, "bufferViews", json_object_get(accessor, "bufferView"));
+    if (!json_is_integer(json_object_get(view, "byteLength")) ||
+        json_object_get(accessor, "sparse") != NULL || gltf_find_values(g, accessor, &v) ||
+        gltf_read_buffer(g, json_object_get(view, "buffer"), &ignored).bytes == NULL)
+        return LAM_OK;
+    return status_fail(error, LAM_ERR_FORMAT,
+                       "%s: accessors[%lld], %s of a mesh, reaches beyond the bytes of its bufferView; the "
+                       "file is damaged: export it again",
+                       g->path, (long long)json_integer_value(index), what);
+}
+
+static lam_status check_meshes(gltf_file *g, lam_error *error) {
+    lam_status status = LAM_OK;
+    json_t *of, *primitive;
+    size_t i, k;
+    json_array_foreach(json_object_get(g->root, "meshes"), i, of)
+        json_array_foreach(json_object_get(of, "primitives"), k, primitive) {
+        const json_t *attributes = json_object_get(primitive, "attributes");
+        if (gltf_extension(primitive, "KHR_draco_mesh_compression") != NULL) continue;
+        TRY(check_accessor(g, json_object_get(attributes, "POSITION"), "POSITION", error));
+        TRY(check_accessor(g, json_object_get(primitive, "indices"), "indices", error));
+    }
+done:
+    return status;
+}
+
 static void put_little_endian(char *bytes, size_t x) {
     for (int k = 0; k < 4; k++) bytes[k] = (char)(x >> 8 * k & 255);
 }
@@ -83,6 +115,7 @@ lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, impo
     TRY(gltf_hold_buffers(&g, error));
     TRY(gltf_unpack_views(&g, unpacked, error));
     TRY(gltf_convert_integers(&g, numbers, error));
+    TRY(check_meshes(&g, error));
     TRY(gltf_expand_instances(&g, &changed, error));
     TRY(gltf_tell_left_out(&g, error));
     bones = drop_skins(&g);

@@ -202,6 +202,39 @@ START_TEST(faces_that_are_not_read_are_told_with_their_area) {
 }
 END_TEST
 
+/* The library reads on behind the bytes of a view. */
+START_TEST(vertices_beyond_their_bytes_are_refused) {
+    static const char head[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1}]}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,\"byteLength\":12,\"byteOffset\":24}"
+        "],"
+        "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
+        "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}],\"accessors\":[";
+    static const struct {
+        const char *accessors, *says;
+    } cases[] = {{"{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\",\"byteOffset\":24},"
+                  "{\"bufferView\":0,\"componentType\":5121,\"count\":3,\"type\":\"SCALAR\"}",
+                  "accessors[0], POSITION of a mesh, reaches beyond"},
+                 {"{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"},"
+                  "{\"bufferView\":0,\"componentType\":5121,\"count\":3,\"type\":\"SCALAR\"}",
+                  "accessors[0], POSITION of a mesh, reaches beyond"},
+                 {"{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+                  "{\"bufferView\":1,\"componentType\":5125,\"count\":6,\"type\":\"SCALAR\"}",
+                  "accessors[1], indices of a mesh, reaches beyond"}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        const import_options options = import_plain();
+        char path[256], text[2048];
+        lam_error error = {0};
+        mesh m = {0};
+        snprintf(text, sizeof text, "%s%s]}", head, cases[k].accessors);
+        file_write(folder, "beyond.gltf", text, path);
+        ck_assert_int_eq(scene_import(path, &options, &m, NULL, &error), LAM_ERR_FORMAT);
+        ck_assert_msg(strstr(error.message, cases[k].says) != NULL, "%s", error.message);
+    }
+}
+END_TEST
+
 /* Bones whose matrices are left out, which is allowed, made the library crash; shape keys count by their
  * weights. */
 START_TEST(bones_shapes_and_lines_are_told) {
@@ -240,6 +273,7 @@ int main(void) {
     tcase_add_test(tests, positions_may_be_integers);
     tcase_add_test(tests, extensions_that_are_not_read_are_named_with_their_faces);
     tcase_add_test(tests, faces_that_are_not_read_are_told_with_their_area);
+    tcase_add_test(tests, vertices_beyond_their_bytes_are_refused);
     tcase_add_test(tests, bones_shapes_and_lines_are_told);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
