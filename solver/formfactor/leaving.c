@@ -158,8 +158,8 @@ lam_status leaving_to_sky(form_factors *f, const mesh *m, lam_error *error) {
     if (scale == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) {
         const double outside = f->leaving[i] + absorbed(f, m, i);
-        scale[i] =
-            f->closed || outside <= 0 || mesh_is_buried(m, i) ? 0 : fmax(0, 1 - f->row_sums[i]) / outside;
+        const double opaque = f->row_sums[i] - (f->through != NULL ? f->through[i] : 0);
+        scale[i] = f->closed || outside <= 0 || mesh_is_buried(m, i) ? 0 : fmax(0, 1 - opaque) / outside;
     }
     sky_bounce_close(&f->sky, scale);
     free(scale);

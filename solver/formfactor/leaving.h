@@ -34,8 +34,9 @@ bool leaving_by_panes(const form_factors *f);
  */
 double leaving_outside(const form_factors *f, const mesh *m, size_t element);
 
-/* Turns f->sky from shares of rays into first_bounce: the part 1 - row_sums_i that the repaired row leaves is
- * distributed over the tiles, the ground and back faces as the rays were. Errors: LAM_ERR_MEMORY. */
+/* Turns f->sky from shares of rays into first_bounce: the part that the repaired row leaves, 1 - row_sums_i
+ * with what comes through panes left out, is distributed over the tiles, the ground and back faces as the
+ * rays were. Errors: LAM_ERR_MEMORY. */
 lam_status leaving_to_sky(form_factors *f, const mesh *m, lam_error *error);
 
 #endif

@@ -283,17 +283,23 @@ typedef struct blocks_of_rooms {
 
 static const recipe blocks_recipe = {.source = &source_blocks, .rays = 64, .accuracy = 3e-4, .seed = 5};
 
+static void blocks_find_of(blocks_of_rooms *s, const char *sky) {
+    s->order = calloc(s->m.n, sizeof *s->order);
+    for (uint32_t i = 0; i < s->m.n; i++) s->order[i] = i;
+    recipe r = blocks_recipe;
+    if (sky != NULL) r.rays = 4096;
+    const form_factor_options how = {.recipe = r, .sky = sky};
+    ck_ok(form_factors_tree(&s->m, &s->tree, &error));
+    ck_ok(form_factors_make_blocks(&s->m, s->order, &s->tree, NULL, &how, &s->f, &s->made, &error));
+}
+
 /* Of squares that are halved so many times. */
 static void blocks_setup(int levels, int panes, bool sheet, double faces, blocks_of_rooms *s) {
     const mesh_refinement finer = {.subdivide_levels = levels};
     *s = (blocks_of_rooms){.m = two_rooms(panes, sheet)};
     ck_ok(mesh_refine(&s->m, &finer, &error));
     glaze(&s->m, .78, faces, true);
-    s->order = calloc(s->m.n, sizeof *s->order);
-    for (uint32_t i = 0; i < s->m.n; i++) s->order[i] = i;
-    const form_factor_options how = {.recipe = blocks_recipe};
-    ck_ok(form_factors_tree(&s->m, &s->tree, &error));
-    ck_ok(form_factors_make_blocks(&s->m, s->order, &s->tree, NULL, &how, &s->f, &s->made, &error));
+    blocks_find_of(s, NULL);
 }
 
 static void blocks_teardown(blocks_of_rooms *s) {
@@ -345,6 +351,40 @@ START_TEST(blocks_pass_light_from_room_to_room) {
     ck_assert_double_eq_tol(east_by_west(&s.m, &again), wanted, noise * wanted);
     block_factors_free(&again);
     form_factors_free(&judge);
+    blocks_teardown(&s);
+}
+END_TEST
+
+/* Light of an even sky that comes to a group of elements, W. */
+static double sky_of(const mesh *m, const sky_bounce *sky, const char *name) {
+    const size_t group = group_find(m, name);
+    double sum = 0;
+    for (size_t t = 0; t < sky->tiling.n_tiles; t++)
+        for (size_t i = 0; i < m->n; i++)
+            if (m->group[i] == group) sum += m->area[i] * (double)sky->first_bounce[t * m->n + i];
+    return sum;
+}
+
+/* A room with an open side before a pane, and one behind it: light that the pane passes to elements takes
+ * nothing of the sky's. */
+START_TEST(a_sky_beside_a_pane_is_whole) {
+    static const char *const groups[] = {"floor", "north", "west", "pane"};
+    obj_text w = {.used = 0};
+    put_group(&w, "west", (const double[3]){0, 0, 0}, Y, Z, 6);
+    put_sides(&w, 0, 6);
+    put_sides(&w, 2, 6);
+    put_group(&w, "pane", (const double[3]){2, 0, 0}, Y, Z, 4);
+    blocks_of_rooms s = {.m = obj_text_mesh(&w)};
+    glaze(&s.m, .78, 1, true);
+    blocks_find_of(&s, "tregenza");
+    const form_factors rays = make(&s.m, &recipes[2], "tregenza");
+    for (size_t k = 0; k < sizeof groups / sizeof *groups; k++) {
+        const double wanted = sky_of(&s.m, &rays.sky, groups[k]);
+        ck_assert_double_gt(wanted, 0);
+        ck_assert_double_eq_tol(sky_of(&s.m, &s.f.sky, groups[k]), wanted, noise * wanted);
+    }
+    form_factors again = rays;
+    form_factors_free(&again);
     blocks_teardown(&s);
 }
 END_TEST
@@ -432,6 +472,7 @@ int main(void) {
     tcase_add_test(tests, panes_of_several_faces);
     tcase_add_loop_test(tests, an_even_sky_shines_through, 0, RECIPES + 1);
     tcase_add_loop_test(tests, blocks_pass_light_from_room_to_room, 0, 4);
+    tcase_add_test(tests, a_sky_beside_a_pane_is_whole);
     tcase_add_test(tests, light_of_sources_passes_panes);
     tcase_add_test(tests, reflectance_leaves_room_for_what_passes);
     tcase_add_test(tests, stores_keep_panes);
