@@ -80,7 +80,7 @@ START_TEST(all_of_it_comes_back) {
 END_TEST
 
 START_TEST(files_that_cannot_be_read) {
-    char large[64];
+    char large[256];
     refused(file("none.ies", NULL), LAM_ERR_IO, "none.ies: cannot read: No such file");
     refused(folder, LAM_ERR_IO, "not a file");
     refused("/dev/zero", LAM_ERR_IO, "/dev/zero: not a file");
