@@ -262,7 +262,9 @@ static lam_status choose_set(const char *name, const luminaire_options *options,
     l->set = options->set > 0 ? options->set - 1 : 0;
     l->absolute = l->sets[l->set].number < 0;
     if (options->set == 0 && l->n_sets > 1)
-        luminaire_warn(l, "it has %zu lamp sets; the first is taken, --set N takes another", l->n_sets);
+        luminaire_warn(
+            l, "it has %zu lamp sets; the first is taken; --set N, or lamp_set in a list, takes another",
+            l->n_sets);
     return LAM_OK;
 }
 

@@ -177,18 +177,29 @@ bool luminaire_in_limits(double value, double least, double most, bool above, ch
     return false;
 }
 
-void luminaire_warn(luminaire *l, const char *format, ...) {
+static void add_warning(luminaire_warnings *w, const char *format, va_list arguments) {
     char line[512];
-    const size_t used = strlen(l->warnings.text);
-    va_list arguments;
-    va_start(arguments, format);
+    const size_t used = strlen(w->text);
     const int n = vsnprintf(line, sizeof line, format, arguments);
-    va_end(arguments);
-    if (n < 0 || used + strlen(line) + 2 > sizeof l->warnings.text) {
-        l->warnings.omitted++;
+    if (n < 0 || used + strlen(line) + 2 > sizeof w->text) {
+        w->omitted++;
         return;
     }
-    snprintf(l->warnings.text + used, sizeof l->warnings.text - used, "%s%s", used > 0 ? "\n" : "", line);
+    snprintf(w->text + used, sizeof w->text - used, "%s%s", used > 0 ? "\n" : "", line);
+}
+
+void luminaire_warnings_add(luminaire_warnings *w, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    add_warning(w, format, arguments);
+    va_end(arguments);
+}
+
+void luminaire_warn(luminaire *l, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    add_warning(&l->warnings, format, arguments);
+    va_end(arguments);
 }
 
 lam_status luminaire_add_word(luminaire *l, size_t *capacity, const char *key, const char *begin,

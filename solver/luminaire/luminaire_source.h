@@ -47,7 +47,9 @@ bool luminaire_number(const char *begin, const char *end, bool comma, double *ou
 enum { LUMINAIRE_LIMIT = 64 };
 bool luminaire_in_limits(double value, double least, double most, bool above, char limit[LUMINAIRE_LIMIT]);
 
-/* Adds a line to the warnings. */
+/* Adds a line to warnings. */
+void luminaire_warnings_add(luminaire_warnings *w, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
 void luminaire_warn(luminaire *l, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* Adds a word; those above LUMINAIRE_WORDS_MOST are left out. Errors: LAM_ERR_MEMORY. */

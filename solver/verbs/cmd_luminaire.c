@@ -1,10 +1,12 @@
-/* lambert luminaire: prints what a file of a luminaire says, its intensities and its flux. */
+/* lambert luminaire: prints what a file of a luminaire says, its intensities and its flux; or a list of
+ * placed luminaires. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/file_stem.h"
 #include "solver/base/options/options.h"
 #include "solver/base/terminal.h"
 #include "solver/luminaire/luminaire.h"
 #include "solver/luminaire/polar_curves.h"
+#include "solver/verbs/luminaire_list.h"
 #include "solver/verbs/verbs.h"
 
 #include <jansson.h>
@@ -44,19 +46,23 @@ static const option_row rows[] = {
      .kind = OPTION_TEXT,
      .offset = FIELD(assets),
      .argument = "DIR",
-     .help = "Folder of a file that TILT= of an LM-63 names and that does not lie in its own"},
-    {.name = "json", .kind = OPTION_FLAG, .offset = FIELD(json), .help = "Print JSON, with all of its words"},
+     .help =
+         "Folder of files that a list of luminaires or TILT= of an LM-63 names and that do not lie in its "
+         "own"},
+    {.name = "json", .kind = OPTION_FLAG, .offset = FIELD(json), .help = "Print JSON, with all that it says"},
     {0},
 };
 
 static const option_command verb = {
     .name = "lambert luminaire",
-    .arguments = "FILE.ies|.ldt",
-    .summary = "Print what a luminaire file says: IES LM-63 of 1986 to 2019, or EULUMDAT.",
+    .arguments = "FILE.ies|.ldt|.json|.csv",
+    .summary =
+        "Print what a luminaire file says: IES LM-63 of 1986 to 2019, or EULUMDAT; or a list of luminaires.",
     .notes =
         "Intensities are absolute, in cd, linear in both angles of the file's table and 0 outside of it; "
         "lumens are their integral. C0 is x of the luminaire, C90 is y, gamma 0 is -z. The content of a "
-        "file says its format, not its name.",
+        "file says its format, not its name. A list of luminaires, JSON or CSV, says of each its file, where "
+        "it is (metres), how it is turned (degrees) and how much light it gives.",
     .least_arguments = 1,
     .most_arguments = 1,
 };
@@ -293,6 +299,15 @@ int cmd_luminaire(int argc, char **argv) {
     terminal_open(&term, verb.name, false, false);
     const luminaire_options options = {.set = (size_t)f.set, .assets = f.assets};
     if (f.output != NULL) TRY(atomic_file_check(f.output, &error));
+    if (placed_is_list(path)) {
+        if (f.output != NULL || f.directions.count > 0 || f.set > 0)
+            return options_usage(verb.name, "%s: is a list of luminaires, which %s is not for", path,
+                                 f.output != NULL ? "-o"
+                                 : f.set > 0      ? "--set"
+                                                  : "--candela");
+        TRY(luminaire_list_print(path, f.assets, f.json, &term, &error));
+        goto done;
+    }
     TRY(luminaire_read(path, &options, &l, &error));
     if (f.output != NULL) TRY(write_curves(&l, path, f.output, picture, &error));
     if (f.json) {

@@ -123,8 +123,10 @@ START_TEST(lamp_sets) {
     join(&p, text);
     ck_ok(read_set(text, 0, &l, &error));
     ck_assert_double_eq(luminaire_candela(&l, 0, 0), 50);
-    ck_assert(strstr(l.warnings.text, "it has 2 lamp sets; the first is taken, --set N takes another") !=
-              NULL);
+    ck_assert(
+        strstr(l.warnings.text,
+               "it has 2 lamp sets; the first is taken; --set N, or lamp_set in a list, takes another") !=
+        NULL);
     luminaire_free(&l);
     ck_ok(read_set(text, 1, &l, &error));
     ck_assert(strstr(l.warnings.text, "lamp sets") == NULL && !l.absolute && l.set == 0);

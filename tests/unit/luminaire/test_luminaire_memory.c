@@ -1,5 +1,7 @@
-/* Luminaires that are read with too little memory: the reader says so and keeps nothing. */
+/* Luminaires, and lists of them, that are read with too little memory: the reader says so and keeps nothing.
+ */
 #include "solver/luminaire/luminaire.h"
+#include "solver/luminaire/placed.h"
 #include "solver/luminaire/polar_curves.h"
 #include "support/failing_memory.h"
 #include "support/suite.h"
@@ -43,10 +45,33 @@ START_TEST(reading) {
 }
 END_TEST
 
+static const char *const lists[] = {
+    "{\"luminaires\": [{\"name\": \"a\", \"file\": \"f\", \"at\": [0, 0, 0], \"ignore\": [\"b\"]}]}",
+    "name,file,x,y,z\na,f,1,2,3\nb,g,1,2,3\n"};
+
+START_TEST(lists_of_luminaires) {
+    const placed_options options = {.unit = 1};
+    lam_error error = {0};
+    placed_luminaires p = {.n = 0};
+    long needed = 0;
+    for (;; needed++) {
+        allocations_left = needed;
+        const lam_status status = placed_read_text("a", lists[_i], strlen(lists[_i]), &options, &p, &error);
+        allocations_left = -1;
+        if (status == LAM_OK) break;
+        ck_assert_int_eq(status, LAM_ERR_MEMORY);
+        ck_assert(p.luminaires == NULL && p.files == NULL);
+    }
+    ck_assert_int_ge(needed, 2);
+    placed_free(&p);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("luminaire_memory");
     TCase *tests = tcase_create("all");
     tcase_add_loop_test(tests, reading, 0, sizeof texts / sizeof *texts);
+    tcase_add_loop_test(tests, lists_of_luminaires, 0, sizeof lists / sizeof *lists);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
