@@ -14,7 +14,7 @@ import numpy as np
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
 for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies", "luminaire",
-             "luminaire_reply"):
+             "luminaire_reply", "placed"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -66,6 +66,20 @@ for k, opening in enumerate(("-1 -1 0", "-1 0 0", ".3 1 .1", "-1 2 -1", "0 1 -1"
 
 for k, change in enumerate((b"", b"\x10", b"\0\0x", b"\x08\0\1", b"\xf8\1\xff", b"\0\2\1\0\3\1", b"\x30\2\2\x38\2\2")):
     (folder / "luminaire_reply" / str(k)).write_bytes(change)
+
+# Lists of luminaires; the last byte says the extension of the name, and the unit.
+entry = {"name": "a", "file": "f", "at": [1, 2, 3]}
+row = {"name": "r", "group": "g", "file": "w", "from": [1, 2, 3], "steps": [[1, 0, 0], [0, 1, 0]], "counts": [2, 3]}
+for k, more in enumerate(({}, {"aim": [1, 0, -1], "c0": [0, 1, 0], "cct": 3000}, {"aim_at": [1, 2, 0], "c0": 30, "colour": [1, 2, 3]},
+                          {"turn": {"axis": [1, 2, 3], "degrees": 45}, "dim": .5, "maintenance": .8, "flux": 1000},
+                          {"lamp_set": 2, "opening": "point", "ignore": ["x", "y z"], "aim": [1, 0, 0]})):
+    (folder / "placed" / f"one{k}").write_text(json.dumps({"luminaires": [{**entry, **more}]}) + chr(k))
+    (folder / "placed" / f"row{k}").write_text(
+        json.dumps({"unit": "ft", "files": {"w": "f.ies", "v": "g"}, "luminaires": [entry, {**row, **more}]}) + chr(64 + k))
+for k, mark in enumerate(",;\t"):
+    names = ["name", "file", "x", "y", "z", "aim_x", "aim_y", "aim_z", "c0_degrees", "dim", "group", "ignore", "turn_x", "red"]
+    lines = [names, ["a", '"f ""1"""', *"1231", "0", "-1", "90", "0.5", "g", "x|y"], ["b", "f", *"123"], ["c", "f", *"123", "", "1", "2"]]
+    (folder / "placed" / f"csv{k}").write_text("".join(mark.join(line) + "\r\n" for line in lines) + chr(1 + k))
 
 # Files of emissions: an EMISSION by itself.
 for k, e in enumerate(emissions):

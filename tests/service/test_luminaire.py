@@ -1,5 +1,5 @@
 """`lambert luminaire`: files of makers and files of formulas against an independent reader, faults of files in one line each, texts
-that are safe to print, and polar curves."""
+that are safe to print, polar curves, and lists of placed luminaires."""
 import csv
 import json
 import math
@@ -199,6 +199,100 @@ class Faults(Case):
         self.refused(1, "--set 3: it has 2 lamp sets", "luminaire", FILES / "made" / "two-lamp-sets.ldt", "--set", 3)
         self.refused(1, "No such file", "luminaire", self.path("none.ies"))
         self.refused(1, "not a file", "luminaire", self.folder)
+
+
+class Lists(Case):
+    setUpClass = tearDownClass = classmethod(lambda cls: None)
+
+    def setUp(self):
+        super().setUp()
+        self.made = FILES / "made"
+
+    def listed(self, name, content):
+        path = pathlib.Path(self.path(name))
+        path.write_text(content if isinstance(content, str) else json.dumps(content))
+        return path
+
+    def test_a_list(self):
+        path = self.listed("l.json", {"files": {"even": "lambertian-1000cd-1x1m.ies"}, "luminaires": [
+            {"name": "desk", "group": "near", "file": "even", "at": [1, 2, 3], "aim_at": [4, 2, 0], "dim": .5, "maintenance": .8,
+             "flux": 1000, "cct": 3000, "ignore": ["lid"]},
+            {"name": "row", "file": "two-lamp-sets.ldt", "lamp_set": 2, "opening": "point", "from": [0, 0, 3], "steps": [[2, 0, 0]],
+             "counts": [3], "turn": {"axis": [0, 0, 1], "degrees": 90}},
+            {"name": "alone", "file": "./lambertian-1000cd-1x1m.ies", "at": [0, 0, 3], "dim": 0}]})
+        got = about(path, "--assets", self.made)
+        desk, first, second, third, alone = got["luminaires"]
+        self.assertEqual((desk["name"], desk["group"], desk["at"], desk["ignore"]), ("desk", "near", [1, 2, 3], ["lid"]))
+        for a, b in zip(desk["aim"] + desk["c0"] + desk["c90"], (.5 ** .5, 0, -.5 ** .5, .5 ** .5, 0, .5 ** .5, 0, 1, 0)):
+            self.assertAlmostEqual(a, b, delta=1e-9)
+        self.assertAlmostEqual(desk["lumens"], 400, delta=1e-6)
+        self.assertEqual(desk["opening"], {"shape": "rectangle", "size": [1, 1, 0]})
+        self.assertGreater(desk["colour"][0], desk["colour"][2])
+        self.assertAlmostEqual(sum(w * c for w, c in zip((.2126, .7152, .0722), desk["colour"])), 1, delta=1e-9)
+        self.assertEqual([third["name"], third["group"], third["at"], third["lamp_set"]], ["row.2", "row", [4, 0, 3], 2])
+        self.assertEqual(third["opening"], {"shape": "point", "size": [0, 0, 0]})
+        for a, b in zip(second["c0"], (0, 1, 0)):
+            self.assertAlmostEqual(a, b, delta=1e-9)
+        wanted = about(self.made / "two-lamp-sets.ldt", "--set", 2)["lumens"]
+        self.assertAlmostEqual(first["lumens"], wanted, delta=1e-6)
+        self.assertEqual((alone["group"], alone["lumens"], alone["scale"]), (None, 0, 0))
+        self.assertEqual([(file["file"], file["lamp_set"]) for file in got["files"]],
+                         [("lambertian-1000cd-1x1m.ies", 1), ("two-lamp-sets.ldt", 2)])
+        self.assertEqual([(group["name"], group["luminaires"]) for group in got["groups"]], [("near", 1), ("row", 3)])
+        self.assertAlmostEqual(got["groups"][1]["lumens"], 3 * wanted, delta=1e-5)
+        self.assertAlmostEqual(got["lumens"], 400 + 3 * wanted, delta=1e-5)
+        done = must("luminaire", path, "--assets", self.made)
+        for line in ("l.json: 5 luminaires of 2 files", "gamma 0 to", "0.7071 0 -0.7071", "group row", "of 3 luminaires", "all "):
+            self.assertIn(line, done.stdout)
+        self.assertIn("warning: ", done.stderr)
+
+    def test_csv_says_the_same(self):
+        rows = self.listed("l.csv", "name;file;x;y;z;aim_x;aim_y;aim_z;c0_degrees;dim\na;cos4-2019.ies;1,5;2;3;1;0;-1;30;0,5\n")
+        same = self.listed("l.json", {"luminaires": [{"name": "a", "file": "cos4-2019.ies", "at": [1.5, 2, 3], "aim": [1, 0, -1],
+                                                      "c0": 30, "dim": .5}]})
+        self.assertEqual(about(rows, "--assets", self.made), about(same, "--assets", self.made))
+
+    def test_faults(self):
+        """One line with the place; none of the list is printed."""
+        one = {"name": "a", "file": "cos4-2019.ies", "at": [0, 0, 3]}
+        for more, wanted in (({"dimm": 1}, "luminaires[1] has a member \"dimm\", which is not known: did you mean dim?"),
+                             ({"name": "a"}, "luminaires[1]: name = a, which luminaires[0] has too"),
+                             ({"file": "none.ies"}, "luminaires[1]: file none.ies is not there"),
+                             ({"file": "/etc/passwd"}, "luminaires[1]: file /etc/passwd lies outside of the list's folder"),
+                             ({"dim": -1}, "luminaires[1]: dim = -1, must not be negative"),
+                             ({"aim": [0, 0, 0]}, "luminaires[1]: aim = [0,0,0], must have a length above 0"),
+                             ({"c0": [0, 0, 1]}, "luminaires[1]: c0 = [0,0,1], must not lie along the aim"),
+                             ({"lamp_set": 2}, "luminaires[1]: lamp_set = 2: an IES LM-63 has one lamp set"),
+                             ({"name": "\x1b[2J"}, "luminaires[1]: name = \"\\u001B[2J\", must have no control character")):
+            path = self.listed("l.json", {"luminaires": [one, {**one, "name": "b", **more}]})
+            for form in ((), ("--json",)):
+                done = self.refused(1, f"{path}: {wanted}", "luminaire", path, "--assets", self.made, *form)
+                self.assertEqual(done.stdout, "")
+        path = self.listed("l.csv", "name,file,x,y,z\na,cos4-2019.ies,0,0,x\n")
+        self.refused(1, "l.csv: line 2: z = x, must be a number", "luminaire", path, "--assets", self.made)
+        grid = {"name": "g", "file": "cos4-2019.ies", "from": [0, 0, 3], "steps": [[1, 0, 0], [0, 1, 0]], "counts": [1000, 1000]}
+        self.refused(1, "counts make 1000000 luminaires, must be at most 65536", "luminaire", self.listed("l.json", {"luminaires": [grid]}))
+        self.refused(1, "luminaires = [], must be an array of 1 to 65536", "luminaire", self.listed("l.json", {"luminaires": []}))
+        path = self.listed("l.json", {"luminaires": [one]})
+        for option in (("--set", 1), ("--candela", "0,0"), ("-o", self.path("a.svg"))):
+            self.refused(2, f"is a list of luminaires, which {option[0]} is not for", "luminaire", path, "--assets", self.made, *option)
+
+    def test_large_lists_take_little(self):
+        """A list of many luminaires, and texts that cost a reader of JSON most for their bytes."""
+        many = {"luminaires": [{"name": "g", "file": "cos4-2019.ies", "from": [0, 0, 3], "steps": [[1, 0, 0], [0, 1, 0]],
+                                "counts": [256, 256]}]}
+        for text, wanted in ((json.dumps(many), None), ('{"luminaires": [' + "[]," * 2790000 + "[]]}", "luminaires = ["),
+                             ("[" * 4000000, "luminaire"),
+                             ('{"luminaires": [' + "1," * 60000 + "1]}", "luminaires[0] = 1, must be an object"),
+                             ('{"luminaires": ' + " " * (9 << 20) + "[]}", "more than the 8 MiB that a list of luminaires may have")):
+            path = self.listed("l.json", text)
+            done = subprocess.run([sys.executable, "-c", MEASURED, LAMBERT, "luminaire", str(path), "--assets", str(self.made)],
+                                  capture_output=True, text=True, check=False, env=ENVIRONMENT)
+            self.assertEqual(done.returncode, 0 if wanted is None else 1, done.stderr)
+            self.assertIn(wanted or "", done.stderr)
+            self.assertEqual(done.stderr.count("\n"), 0 if wanted is None else 1, done.stderr)
+            if not SANITIZED:
+                self.assertLess(int(done.stdout), 500 << 10)
 
 
 class Outputs(Case):
