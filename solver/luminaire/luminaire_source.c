@@ -257,8 +257,7 @@ static void warn_of_table(luminaire *l) {
         luminaire_warn(l, "its opening is %.4g x %.4g x %.4g m; is its unit right?", o[0], o[1], o[2]);
 }
 
-/* The format of a text that has no marks of either is that of its name. */
-static bool is_named(const char *name, const char *extension) {
+bool luminaire_is_named(const char *name, const char *extension) {
     const size_t length = strlen(name), tail = strlen(extension);
     return length >= tail && strcasecmp(name + length - tail, extension) == 0;
 }
@@ -270,9 +269,9 @@ lam_status luminaire_read_text(const char *name, const char *text, size_t length
     luminaire l = {.measured_tilt = NAN, .output_ratio = NAN};
     TRY(luminaire_source_open(name, text, length, &s, error));
     const bool is_lm63 = lm63_is_it(&s);
-    if (!is_lm63 && (eulumdat_is_it(&s) || is_named(name, ".ldt"))) {
+    if (!is_lm63 && (eulumdat_is_it(&s) || luminaire_is_named(name, ".ldt"))) {
         TRY(eulumdat_read(&s, options, &l, error));
-    } else if (is_lm63 || is_named(name, ".ies")) {
+    } else if (is_lm63 || luminaire_is_named(name, ".ies")) {
         TRY(lm63_read(&s, options, &l, error));
     } else {
         FAIL(error, LAM_ERR_FORMAT,

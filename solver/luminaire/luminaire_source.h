@@ -74,6 +74,10 @@ lam_status eulumdat_read(const luminaire_source *s, const luminaire_options *opt
 bool lm63_is_it(const luminaire_source *s);
 bool eulumdat_is_it(const luminaire_source *s);
 
+/* True where a name ends in an extension: the format of a text that has no marks of any is that of its name.
+ */
+bool luminaire_is_named(const char *name, const char *extension);
+
 /* The line TILT=VALUE: *begin and *end are those of the value. */
 bool lm63_is_tilt_line(const char **begin, const char **end);
 

@@ -3,6 +3,7 @@
 
 #include "solver/base/asset_files.h"
 #include "solver/base/file_text.h"
+#include "solver/base/length_unit.h"
 #include "solver/luminaire/placed_parts.h"
 
 #include <errno.h>
@@ -10,7 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 void placed_free(placed_luminaires *p) {
@@ -38,11 +38,6 @@ static bool begins_as_json(const luminaire_source *s) {
     return begin < end && *begin == '{';
 }
 
-static bool is_named(const char *name, const char *extension) {
-    const size_t length = strlen(name), tail = strlen(extension);
-    return length >= tail && strcasecmp(name + length - tail, extension) == 0;
-}
-
 bool placed_is_list(const char *path) {
     enum { HEAD = 65536 };
     struct stat about;
@@ -54,7 +49,7 @@ bool placed_is_list(const char *path) {
     const size_t length = file != NULL && head != NULL ? fread(head, 1, HEAD, file) : 0;
     if (file != NULL) fclose(file);
     if (luminaire_source_open(path, head, length, &s, NULL) == LAM_OK && !lm63_is_it(&s)) {
-        const bool named = is_named(path, ".json") || is_named(path, ".csv");
+        const bool named = luminaire_is_named(path, ".json") || luminaire_is_named(path, ".csv");
         is_list = begins_as_json(&s) || placed_csv_is_it(&s) || (named && !eulumdat_is_it(&s));
     }
     free(head);
@@ -64,21 +59,17 @@ bool placed_is_list(const char *path) {
 /* Metres of the unit of the list: its own, or that of the options. */
 static lam_status read_unit(placed_reading *r, const json_t *value, const placed_options *options,
                             lam_error *error) {
-    static const struct {
-        const char *word;
-        double metres;
-    } units[] = {{"mm", .001}, {"cm", .01}, {"m", 1}, {"in", .0254}, {"ft", .3048}};
     char shown[PLACED_SHOWN];
     r->unit = options->unit > 0 ? options->unit : 1;
     if (value == NULL) return LAM_OK;
-    for (size_t k = 0; json_is_string(value) && k < sizeof units / sizeof *units; k++) {
-        if (strcmp(units[k].word, json_string_value(value)) != 0) continue;
-        r->unit = units[k].metres;
+    const length_unit *unit = json_is_string(value) ? length_unit_find(json_string_value(value)) : NULL;
+    if (unit != NULL) {
+        r->unit = unit->metres;
         return LAM_OK;
     }
     placed_shown(value, shown);
-    return status_fail(error, LAM_ERR_ARGUMENT, "%.200s: unit = %s, must be mm, cm, m, in or ft", r->name,
-                       shown);
+    return status_fail(error, LAM_ERR_ARGUMENT, "%.200s: unit = %s, must be one of " LENGTH_UNIT_WORDS,
+                       r->name, shown);
 }
 
 /* "files": words for paths. */
@@ -201,7 +192,7 @@ lam_status placed_read_text(const char *name, const char *text, size_t length, c
     placed_reading r = {.name = name, .out = &p};
     if (length > PLACED_BYTES_MOST) TRY(too_large(name, length, error));
     TRY(luminaire_source_open(name, text, length, &s, error));
-    p.is_csv = !begins_as_json(&s) && (placed_csv_is_it(&s) || !is_named(name, ".json"));
+    p.is_csv = !begins_as_json(&s) && (placed_csv_is_it(&s) || !luminaire_is_named(name, ".json"));
     if (p.is_csv) {
         TRY(read_unit(&r, NULL, options, error));
         TRY(placed_csv(&s, &r, error));

@@ -2,17 +2,8 @@
 #ifndef LAMBERT_SCENE_SIZE_QUESTION_H
 #define LAMBERT_SCENE_SIZE_QUESTION_H
 
+#include "solver/base/length_unit.h"
 #include "solver/scene/mesh.h"
-
-/* A unit of length that --unit takes by name. */
-typedef struct length_unit {
-    const char *word, *name; /* "mm", "millimetres" */
-    double metres;
-} length_unit;
-
-/* The unit of a word, or NULL; the words as "mm|cm|m|in|ft". */
-const length_unit *length_unit_find(const char *word);
-#define LENGTH_UNIT_WORDS "mm|cm|m|in|ft"
 
 /* The unit that the file of a scene is probably in, which was read in metres, by its height and width: a room
  * or a house in millimetres, centimetres or feet. NULL where metres are as likely. O(n_vertices). */

@@ -325,7 +325,7 @@ static const struct {
      ": luminaires[0] has no file: it must name one"},
     {"{\"luminaires\": [{\"name\": \"a\", \"at\": [0, 0, 0], \"file\": \"\"}]}",
      ": file = \"\", must have 1 to"},
-    {"{\"unit\": \"km\", \"luminaires\": []}", ": unit = \"km\", must be mm, cm, m, in or ft"},
+    {"{\"unit\": \"km\", \"luminaires\": []}", ": unit = \"km\", must be one of mm|cm|m|in|ft"},
     {"{\"files\": [], \"luminaires\": []}", ": files = [], must be an object of words and paths"},
     {"{\"files\": {\"x\": 1}, \"luminaires\": []}", ": files.x = 1, must be a path"},
     {"{\"luminaires\": [{\"name\": \"a\", \"file\": \"f\", \"at\": [0, 0, 0]},"
