@@ -2,8 +2,9 @@
  * it gives. A file of them is JSON,
  *     {"unit": "m", "files": {"panel": "panel.ldt"},
  *      "luminaires": [{"name": "desk", "file": "panel", "at": [x, y, z], "aim": [0, 0, -1], ...},
- *                     {"name": "row", "file": "panel", "from": [x, y, z], "steps": [[1.8, 0, 0]], "counts":
- * [4]}]} or CSV with a column for each number. Knows nothing of meshes. */
+ *                     {"name": "row", "file": "panel", "from": [x, y, z],
+ *                      "steps": [[1.8, 0, 0]], "counts": [4]}]}
+ * or CSV with a column for each number. Knows nothing of meshes. */
 #ifndef LAMBERT_LUMINAIRE_PLACED_H
 #define LAMBERT_LUMINAIRE_PLACED_H
 
