@@ -174,6 +174,8 @@ lam_status box_pairs_visit(const mesh *m, const box_pairs *how, bool *cut, lam_e
     double radius;
     const range all = {0, 0, m->n};
     size_t leaves = 1; /* of a tree that is as deep everywhere */
+    *cut = false;
+    if (m->n == 0) return LAM_OK;
     while (leaves * LEAF < m->n) leaves *= 2;
     s.order = memory_allocate(m->n, sizeof *s.order, "boxes of faces", error);
     s.faces = memory_allocate(m->n, sizeof *s.faces, "boxes of faces", error);

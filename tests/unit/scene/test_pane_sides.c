@@ -54,11 +54,27 @@ START_TEST(a_pane_has_a_back_unless_others_are_its_back) {
 }
 END_TEST
 
+/* --glass glass=0 leaves a scene with panes that has no pane. */
+START_TEST(panes_that_are_made_opaque) {
+    const struct group_glass opaque = {0, 1};
+    import_report found;
+    glass_report report;
+    lam_error error;
+    mesh m = obj_good(folder, SQUARE "usemtl glass\nf 1 2 3 4\nf 4 3 2 1\n", &found);
+    ck_assert_ptr_nonnull(m.glass);
+    for (size_t g = 0; g < m.n_groups; g++) ck_assert_int_eq(mesh_set_glass(&m, g, &opaque, &error), LAM_OK);
+    ck_assert_int_eq(mesh_settle_glass(&m, &report, &error), LAM_OK);
+    ck_assert_uint_eq(report.faces, 0);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("pane_sides");
     TCase *tests = tcase_create("pane_sides");
     tcase_add_checked_fixture(tests, setup, teardown);
     tcase_add_test(tests, a_pane_has_a_back_unless_others_are_its_back);
+    tcase_add_test(tests, panes_that_are_made_opaque);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
