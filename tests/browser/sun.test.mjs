@@ -40,6 +40,9 @@ function highPlate() {
     return `mtllib plate.mtl\n${square(0, 10, 0)}${square(3, 7, HIGH)}g floor\nusemtl grey\nf 1 2 3 4\ng plate\nusemtl grey\nf 5 6 7 8\n`;
 }
 
+/** The pane at normal incidence. */
+const PASSES = 0.5;
+
 let daemon;
 before(async () => {
     writeFileSync(inFolder("plate.mtl"), `newmtl grey\nKd ${RHO} ${RHO} ${RHO}\n`);
@@ -135,20 +138,18 @@ for (const [up, hours] of [["z", [9.5, 12, 15]], ["y", [15]], ["x", [15]]]) test
     await page.context().close();
 });
 
-const PASSES = 0.5, law = (c) => Math.min(1, 1.018 * c * (1 + (1 - c * c) ** 1.5));
+const law = (c) => Math.min(1, 1.018 * c * (1 + (1 - c * c) ** 1.5));
 
 /** The plate as a pane: the sun comes through it, dimmed by its angle, and the floor is seen through it. */
 test("light passes panes, and so do looks", async () => {
-    const page = await openFromAbove("pane"), source = new daylight.SkySource();
-    source.take(await daemon.json("/v1/scenes/pane/sky"));
+    const page = await openFromAbove("pane");
     assert.deepEqual(await page.evaluate(() => window.lambert.scene.now.mesh.groups.map(({ name, glass }) => [name, glass?.transmittance ?? 0])),
         [["floor", 0], ["plate", PASSES], ["plate.back", PASSES]]);
     await set(page, { smooth: false, tone: "linear", exposure: EXPOSURE, sharpSun: true }, { ...LIGHT, sun: "spread", hour: 15 });
     await settled(page);
-    const sky = { ...state.skyOff, ...LIGHT, sun: "spread", hour: 15 }, { sun: { direction: [east, north, height] } } = source.sky(sky, false);
-    const parts = source.parts(sky, false, 1);
+    const { sky, tiles, direction: [east, north, height] } = await skyAt("pane", 15);
     const ask = async (radiances, quantity) => (await daemon.json("/v1/scenes/pane/radiosity", { emission: { sky: radiances }, quantity }))[quantity].flat();
-    const [rest, further] = await Promise.all([ask([...parts.sky], "radiosity"), ask([...parts.sun], "indirect")]);
+    const [rest, further] = await Promise.all([ask(sky, "radiosity"), ask(tiles, "indirect")]);
     const direct = RHO * 700 * height, [dx, dy] = [(-2 * east) / height, (-2 * north) / height];
     const floorAt = ([x, y]) => {
         const isBehind = x > 4 + dx && x < 6 + dx && y > 4 + dy && y < 6 + dy, i = Math.floor((x * PARTS) / 10) * PARTS + Math.floor((y * PARTS) / 10);
