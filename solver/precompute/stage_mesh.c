@@ -2,7 +2,6 @@
 #include "solver/adapt/mesh_fit.h"
 #include "solver/base/scene/scene_backs.h"
 #include "solver/formfactor/buried.h"
-#include "solver/formfactor/glass/pane_light.h"
 #include "solver/precompute/black_scene.h"
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
@@ -271,23 +270,6 @@ static double elements_after(const mesh *m, const precompute_options *o) {
     return o->mesh_error > 0 ? n : fmax(n, (double)o->elements);
 }
 
-/* Finds by few rays how much light elements send each other through panes, of which none reflects too much.
- */
-static lam_status look_through_panes(const precompute_job *job, precompute_scene *scene, lam_error *error) {
-    lam_status status = LAM_OK;
-    visibility *v = NULL;
-    double between = 0;
-    if (scene->m.glass == NULL) return LAM_OK;
-    mesh_limit_panes(&scene->m);
-    TRY(visibility_create(&scene->m, &v, error));
-    TRY(pane_light_between(&scene->m, v, &between, error));
-    if (between > 0)
-        terminal_log(job->t, "%.2g %% of the light comes to other elements through panes", 100 * between);
-done:
-    visibility_destroy(v);
-    return status;
-}
-
 lam_status stage_prepare_mesh(const precompute_job *job, precompute_scene *scene, precompute_plan *plan,
                               lam_error *error) {
     lam_status status = LAM_OK;
@@ -296,7 +278,7 @@ lam_status stage_prepare_mesh(const precompute_job *job, precompute_scene *scene
     scene->order = memory_allocate(scene->m.n, sizeof *scene->order, "the order of the elements", error);
     if (scene->order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&scene->m, scene->order, error));
-    TRY(look_through_panes(job, scene, error));
+    mesh_limit_panes(&scene->m);
     TRY(scene_read_importance(job, plan, scene, error));
 done:
     return status;

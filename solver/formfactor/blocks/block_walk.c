@@ -205,7 +205,7 @@ static lam_status add_shaded_pair(block_walk *w, uint32_t a, uint32_t b, double 
     w->report.replaced += (double)effort.replaced;
     w->report.elements_unseen += !(share > 0);
     if (!(share > 0)) return LAM_OK;
-    if (share >= 1 && is_smooth(w, a, b, most, crosses)) return add_linear(w, a, b);
+    if (share >= 1 && !(effort.through > 0) && is_smooth(w, a, b, most, crosses)) return add_linear(w, a, b);
     if (exchange < 0) exchange = exchange_of_pair(w->finder, &two);
     if (effort.through > 0) {
         cluster_block made = {.a = a, .b = b};

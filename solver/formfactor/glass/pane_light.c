@@ -78,14 +78,11 @@ typedef struct pane_row {
     const pane_context *c;
     const portal_aim *aim;
     row_pool *pool;
-    double between; /* share of the element's light that comes to elements through panes */
 } pane_row;
 
 static void meet(void *context, uint32_t element, double weight) {
     pane_row *const row = context;
-    if (!(weight > 0)) return;
-    row->between += weight;
-    if (!row->c->without_rows) row_pool_add(row->pool, element, weight);
+    if (weight > 0 && !row->c->without_rows) row_pool_add(row->pool, element, weight);
 }
 
 /* Casts a packet of directions of length 1, whose lanes with cosine 0 do not count, and follows it. */
@@ -188,36 +185,5 @@ lam_status pane_light_make(const mesh *m, const visibility *v, const uint32_t *o
 done:
     portals_free(&panes);
     free(unused);
-    return status;
-}
-
-/* Elements and rays of each that say if light passes between elements. */
-enum { BETWEEN_ELEMENTS = 4096, BETWEEN_RAYS = 64 };
-static const uint64_t between_seed = 0x70616E6573;
-
-lam_status pane_light_between(const mesh *m, const visibility *v, double *share, lam_error *error) {
-    lam_status status = LAM_OK;
-    portals panes = {.n = 0};
-    double sum = 0, area = 0;
-    *share = 0;
-    if (m->glass == NULL) return LAM_OK;
-    TRY(panes_as_portals(m, v, &panes, error));
-    panes.rays = BETWEEN_RAYS;
-    const size_t step = (m->n + BETWEEN_ELEMENTS - 1) / BETWEEN_ELEMENTS;
-    const pane_context c = {
-        .m = m, .v = v, .panes = &panes, .rays = BETWEEN_RAYS, .seed = between_seed, .without_rows = true};
-#pragma omp parallel for schedule(dynamic, 16) reduction(+ : sum, area)
-    for (size_t i = 0; i < m->n; i += step) {
-        portal_aim aim;
-        pane_row row = {.c = &c, .aim = &aim};
-        area += m->area[i];
-        if (mesh_is_buried(m, i)) continue;
-        portals_aim(&panes, m, v, i, &aim);
-        if (aim.n > 0) trace_row(&row, (uint32_t)i);
-        sum += m->area[i] * row.between;
-    }
-    *share = area > 0 ? sum / area : 0;
-done:
-    portals_free(&panes);
     return status;
 }

@@ -28,9 +28,4 @@ typedef struct pane_light_options {
 lam_status pane_light_make(const mesh *m, const visibility *v, const uint32_t *order,
                            const pane_light_options *options, packed_rows *rows, lam_error *error);
 
-/* The share of the light that leaves all elements and comes to others through panes, by few rays: 0 where
- * elements see only the sky through their panes, or nothing. Cost: some hundred rays for each of at most
- * 4,096 elements. Errors: LAM_ERR_MEMORY. */
-lam_status pane_light_between(const mesh *m, const visibility *v, double *share, lam_error *error);
-
 #endif

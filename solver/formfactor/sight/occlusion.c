@@ -219,44 +219,34 @@ occlusion_verdict occlusion_test(const occlusion *o, segment_list *among, uint32
 }
 
 /* The visible share of two pieces: sum K V / sum K. Segments behind either piece do not count: where few are
- * in front, more are cast. */
-static double visible_share(const occlusion *o, const piece_pair *two, size_t n_segments) {
+ * in front, more are cast. through, unless NULL: V is what panes pass, and *through is set to the part of the
+ * share that comes through them. */
+static double visible_share(const occlusion *o, const piece_pair *two, size_t n_segments, double *through) {
     enum { TIMES_MOST = 32 };
-    double seen = 0, all = 0;
+    double seen = 0, all = 0, crossing = 0;
     size_t facing = 0;
     for (size_t first = 0; facing < n_segments && first < TIMES_MOST * n_segments;) {
         cast_segments s;
+        passed_segments panes;
         const size_t wanted = (n_segments - facing + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET;
         const int packets = wanted < SEGMENT_PACKETS ? (int)wanted : SEGMENT_PACKETS;
-        cast(o, two, first, packets, &s, NULL);
+        cast(o, two, first, packets, &s, through != NULL ? &panes : NULL);
         for (int p = 0; p < packets; p++) {
             facing += (size_t)__builtin_popcount(s.facing[p]);
             for (int k = 0; k < VISIBILITY_PACKET; k++) {
                 all += s.kernel[p][k];
-                if ((s.blocked[p] >> k & 1) == 0) seen += s.kernel[p][k];
+                if (through == NULL) {
+                    if ((s.blocked[p] >> k & 1) == 0) seen += s.kernel[p][k];
+                    continue;
+                }
+                const double part = s.kernel[p][k] * panes.passed[p][k];
+                seen += part;
+                if (panes.crossing[p] >> k & 1) crossing += part;
             }
         }
         first += (size_t)packets * VISIBILITY_PACKET;
     }
-    return all > 0 ? seen / all : 1;
-}
-
-/* The same where light passes panes; *through is the part of the share that does. */
-static double passed_share(const occlusion *o, const piece_pair *two, size_t n_segments, double *through) {
-    double seen = 0, all = 0, crossing = 0;
-    for (size_t first = 0; first < n_segments; first += SEGMENT_PACKETS * VISIBILITY_PACKET) {
-        cast_segments s;
-        passed_segments panes;
-        cast(o, two, first, SEGMENT_PACKETS, &s, &panes);
-        for (int p = 0; p < SEGMENT_PACKETS; p++)
-            for (int k = 0; k < VISIBILITY_PACKET; k++) {
-                const double part = s.kernel[p][k] * panes.passed[p][k];
-                all += s.kernel[p][k];
-                seen += part;
-                if (panes.crossing[p] >> k & 1) crossing += part;
-            }
-    }
-    *through = all > 0 ? crossing / all : 0;
+    if (through != NULL) *through = all > 0 ? crossing / all : 0;
     return all > 0 ? seen / all : 1;
 }
 
@@ -307,11 +297,11 @@ double occlusion_share(const occlusion *o, segment_list *among, uint32_t i, cons
     part_panes(o, &two);
     if (two.panes.count > 0 || (o->glass != NULL && among == NULL)) {
         effort->segments = segments;
-        return passed_share(o, &two, segments, &effort->through);
+        return visible_share(o, &two, segments, &effort->through);
     }
     if (!has_lines(o, &two, effort->error, &lines)) {
         effort->segments = segments;
-        return visible_share(o, &two, segments);
+        return visible_share(o, &two, segments, NULL);
     }
     effort->replaced = segments;
     effort->lines = number_for(effort->error, LINES_ERROR, LINES_POWER, VISIBLE_LINES, LINES_LAST);
@@ -370,7 +360,7 @@ static double visible_exchange(const occlusion *o, const segment_budget *pair, c
     const piece_pair two = piece_pair_of(o->seed + path, pair->among, pair->i, a, pair->j, b);
     const double packets = ceil(g * pair->segments_per_area / VISIBILITY_PACKET);
     if (splits == MOST_SPLITS || packets <= 1 || kernel_is_even(o, &two))
-        return g * visible_share(o, &two, (size_t)packets * VISIBILITY_PACKET);
+        return g * visible_share(o, &two, (size_t)packets * VISIBILITY_PACKET, NULL);
     const bool of_a = a->radius > b->radius;
     polygon halves[2];
     double sum = 0;
@@ -387,7 +377,7 @@ static double segments_wanted(const occlusion *o, segment_list *among, uint32_t 
     const double F = factor_of(o, i, j, g);
     if (F <= large_factor) return segments_of_pair(o, i, j, F, .5);
     const piece_pair two = piece_pair_of(o->seed, among, i, &o->polygons[i], j, &o->polygons[j]);
-    return segments_of_pair(o, i, j, F, visible_share(o, &two, PILOT));
+    return segments_of_pair(o, i, j, F, visible_share(o, &two, PILOT, NULL));
 }
 
 double occlusion_estimate(const occlusion *o, segment_list *among, uint32_t i, uint32_t j, double g) {
