@@ -345,6 +345,7 @@ START_TEST(blocks_pass_light_from_room_to_room) {
     const form_factor_options how = {.recipe = other, .row_sums = s.f.row_sums};
     ck_ok(form_factors_make_blocks(&s.m, s.order, &s.tree, &s.f, &how, &judge, &again, &error));
     ck_assert_double_eq_tol(east_by_west(&s.m, &again), wanted, noise * wanted);
+    for (size_t i = 0; i < s.m.n; i++) ck_assert_double_eq_tol(judge.row_sums[i], 1 + judge.through[i], 2e-3);
     block_factors_free(&again);
     form_factors_free(&judge);
     blocks_teardown(&s);
@@ -381,6 +382,30 @@ START_TEST(a_sky_beside_a_pane_is_whole) {
     }
     form_factors again = rays;
     form_factors_free(&again);
+    blocks_teardown(&s);
+}
+END_TEST
+
+/* Half of the side between the rooms is a pane, the other half a wall in its plane: by blocks as by rays. */
+START_TEST(a_wall_in_the_plane_of_a_pane) {
+    const mesh_refinement finer = {.subdivide_levels = 3};
+    obj_text w = {.used = 0};
+    put_group(&w, "west", (const double[3]){0, 0, 0}, Y, Z, 1);
+    put_sides(&w, 0, 1);
+    put_sides(&w, 2, 1);
+    put_group(&w, "east", (const double[3]){4, 0, 0}, Z, Y, 1);
+    obj_text_put(&w, "v 2 0 0\nv 2 1 0\nv 2 2 0\nv 2 0 2\nv 2 1 2\nv 2 2 2\n");
+    obj_text_put(&w, "o pane\nf -6 -5 -2 -3\no wall\nf -5 -4 -1 -2\nf -2 -1 -4 -5\n");
+    blocks_of_rooms s = {.m = obj_text_mesh(&w)};
+    ck_ok(mesh_refine(&s.m, &finer, &error));
+    glaze(&s.m, .78, 1, true);
+    blocks_find_of(&s, NULL);
+    form_factors rays = make(&s.m, &recipes[2], NULL);
+    const double wanted = share(&s.m, &rays, "west", "east");
+    ck_assert_double_gt(wanted, .01);
+    ck_assert_double_lt(wanted, .04);
+    ck_assert_double_eq_tol(east_by_west(&s.m, &s.made), wanted, noise * wanted);
+    form_factors_free(&rays);
     blocks_teardown(&s);
 }
 END_TEST
@@ -469,6 +494,7 @@ int main(void) {
     tcase_add_loop_test(tests, an_even_sky_shines_through, 0, RECIPES + 1);
     tcase_add_loop_test(tests, blocks_pass_light_from_room_to_room, 0, 5);
     tcase_add_test(tests, a_sky_beside_a_pane_is_whole);
+    tcase_add_test(tests, a_wall_in_the_plane_of_a_pane);
     tcase_add_test(tests, light_of_sources_passes_panes);
     tcase_add_test(tests, reflectance_leaves_room_for_what_passes);
     tcase_add_test(tests, stores_keep_panes);
