@@ -96,11 +96,11 @@ static bool sun_of_request(const sky_request *sky, size_t k, sun_position *sun, 
         *sun = sun_of_angles(sky->azimuth, sky->altitude);
         return true;
     }
-    if (isnan(sky->latitude))
+    if (isnan(sky->place.latitude))
         return refuse(why, PROBLEM_WRONG_MEMBERS, k, "needs its sun: give sun, or place and date or hour");
     if (!find_moment(sky, k, &at, why)) return false;
-    *sun = sun_at(sky->latitude, sky->longitude, sky->zone, isnan(sky->year) ? 2001 : (int)sky->year,
-                  at.month, at.day, at.hour);
+    *sun = sun_at(sky->place.latitude, sky->place.longitude, sky->place.zone,
+                  isnan(sky->year) ? 2001 : (int)sky->year, at.month, at.day, at.hour);
     return true;
 }
 
@@ -121,7 +121,7 @@ static bool model_of_request(const sky_request *sky, size_t k, named_sky *model,
         if (!isnan(sky->direct_horizontal)) model->direct = normal_of(sky->direct_horizontal, sun);
         return true;
     }
-    const bool asks_for_sun = !isnan(sky->azimuth) || !isnan(sky->latitude) || !isnan(sky->hour) ||
+    const bool asks_for_sun = !isnan(sky->azimuth) || !isnan(sky->place.latitude) || !isnan(sky->hour) ||
                               sky->date[0] != '\0' || !isnan(sky->north);
     return !asks_for_sun ||
            refuse(why, PROBLEM_WRONG_MEMBERS, k, "has no sun: leave out sun, place, date, hour and north");

@@ -18,8 +18,8 @@ static void find_positions(const sun_request *request, float *azimuth, float *al
     for (size_t k = 0; k < request->n_hours; k++) {
         /* The end of the year is that of its last day. */
         const moment at = moment_of_hour(fmin(request->hours[k], nextafter(8760, 0)));
-        const sun_position sun = sun_at(request->latitude, request->longitude, request->zone,
-                                        (int)request->year, at.month, at.day, at.hour);
+        const sun_position sun = sun_at(request->place.latitude, request->place.longitude,
+                                        request->place.zone, (int)request->year, at.month, at.day, at.hour);
         azimuth[k] = (float)(sun.azimuth / DEGREE);
         altitude[k] = (float)(sun.altitude / DEGREE);
     }

@@ -79,34 +79,21 @@ static bool read_gradient(parser *p, adjoint_request *request) {
            parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s is empty, must name a gradient", parser_here(p));
 }
 
+enum { COTANGENT, QUANTITY, GRADIENT, EMISSION, N_NAMES };
+
+static bool read_member(parser *p, size_t which, void *to) {
+    adjoint_request *const request = to;
+    if (which == QUANTITY) return parser_read_quantity(p, &request->quantity);
+    if (which == GRADIENT) return read_gradient(p, request);
+    p->request = which == COTANGENT ? &request->cotangent : &request->light;
+    return parser_read_emission(p);
+}
+
 static bool read_body(parser *p, adjoint_request *request) {
     static const char *const names[] = {"cotangent", "quantity", "gradient", "emission"};
-    enum { COTANGENT, QUANTITY, GRADIENT, EMISSION, N_NAMES };
-    unsigned seen = 0;
-    size_t which;
-    json_slice key;
-    if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
-    if (!json_enter_object(&p->r)) return parser_fault(p);
-    while (parser_next_member(p, &key)) {
-        bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
-        if (!good) return false;
-        switch (which) {
-        case COTANGENT:
-        case EMISSION:
-            p->request = which == COTANGENT ? &request->cotangent : &request->light;
-            good = parser_read_emission(p);
-            break;
-        case QUANTITY:
-            good = parser_read_quantity(p, &request->quantity);
-            break;
-        default:
-            good = read_gradient(p, request);
-        }
-        if (!good) return false;
-        p->pointer_length = 0;
-    }
-    if (p->why->status != 0) return false;
-    if (!json_finish(&p->r)) return parser_fault(p);
+    const parser_body body = {names, N_NAMES, read_member, request};
+    unsigned seen;
+    if (!parser_read_body(p, &body, &seen)) return false;
     if ((seen & 1u << COTANGENT) == 0)
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body holds no cotangent");
     for (size_t k = 0; k < request->n_named; k++)

@@ -217,6 +217,21 @@ bool parser_fill_sides(parser *p) {
             radiosity_request_emitters(request, p->scene, &last, p->why));
 }
 
+bool parser_read_body(parser *p, const parser_body *body, unsigned *seen) {
+    size_t which;
+    json_slice key;
+    *seen = 0;
+    if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        if (!parser_known_member(p, &key, body->names, body->count, seen, &which)) return false;
+        if (!body->read(p, which, body->to)) return false;
+        p->pointer_length = 0;
+    }
+    if (p->why->status != 0) return false;
+    return json_finish(&p->r) || parser_fault(p);
+}
+
 bool parser_end(parser *p, bool good) {
     json_end(&p->r);
     if (!good && p->why->status == 422) {

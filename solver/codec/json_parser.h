@@ -93,6 +93,16 @@ bool parser_next_member(parser *p, json_slice *key);
 bool parser_known_member(parser *p, const json_slice *key, const char *const *names, size_t count,
                          unsigned *seen, size_t *which);
 
+/* Reads the object that is a whole body, whose members are known, each by read(p, which, to). seen: a bit for
+ * each that it holds. */
+typedef struct parser_body {
+    const char *const *names;
+    size_t count;
+    bool (*read)(parser *p, size_t which, void *to);
+    void *to;
+} parser_body;
+bool parser_read_body(parser *p, const parser_body *body, unsigned *seen);
+
 /* Appends; values is not NULL then, also for none. 503 when memory is short. */
 bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t count);
 

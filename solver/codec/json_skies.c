@@ -22,9 +22,10 @@ typedef struct member {
 #define FIELD(field) offsetof(sky_request, field)
 static const member sun_members[] = {{"azimuth", MEMBER_NUMBER, FIELD(azimuth), -360, 360, NULL, 0},
                                      {"altitude", MEMBER_NUMBER, FIELD(altitude), -90, 90, NULL, 0}};
-static const member place_members[] = {{"latitude", MEMBER_NUMBER, FIELD(latitude), -90, 90, NULL, 0},
-                                       {"longitude", MEMBER_NUMBER, FIELD(longitude), -180, 180, NULL, 0},
-                                       {"zone", MEMBER_NUMBER, FIELD(zone), -14, 14, NULL, 0}};
+#define IN_PLACE(field) offsetof(request_place, field)
+static const member place_members[] = {{"latitude", MEMBER_NUMBER, IN_PLACE(latitude), -90, 90, NULL, 0},
+                                       {"longitude", MEMBER_NUMBER, IN_PLACE(longitude), -180, 180, NULL, 0},
+                                       {"zone", MEMBER_NUMBER, IN_PLACE(zone), -14, 14, NULL, 0}};
 enum {
     NAME,
     DIRECT,
@@ -51,7 +52,7 @@ static const member sky_members[SKY_MEMBERS] = {
     [DEW_POINT] = {"dew_point", MEMBER_NUMBER, FIELD(dew_point), -100, 100, NULL, 0},
     [LUX_OUTSIDE] = {"lux_outside", MEMBER_NUMBER, FIELD(lux_outside), 1e-6, 1e6, NULL, 0},
     [SUN] = {"sun", MEMBER_OBJECT, 0, 0, 0, sun_members, 2},
-    [PLACE] = {"place", MEMBER_OBJECT, 0, 0, 0, place_members, 3},
+    [PLACE] = {"place", MEMBER_OBJECT, FIELD(place), 0, 0, place_members, 3},
     [DATE] = {"date", MEMBER_TEXT, FIELD(date), 0, 0, NULL, 0},
     [HOUR] = {"hour", MEMBER_NUMBER, FIELD(hour), 0, 8760, NULL, 0},
     [NORTH] = {"north", MEMBER_NUMBER, FIELD(north), -360, 360, NULL, 0},
@@ -174,12 +175,18 @@ static bool read_sky(parser *p, sky_request *sky) {
     bool by_weather = false;
     const size_t mark = p->pointer_length;
     *sky = (sky_request){.sun_in_tiles = true, .photometric = p->scene->lights == LIGHT_PHOTOMETRIC};
-    double *const numbers[] = {&sky->direct,      &sky->direct_horizontal,
-                               &sky->diffuse,     &sky->dew_point,
-                               &sky->lux_outside, &sky->azimuth,
-                               &sky->altitude,    &sky->latitude,
-                               &sky->longitude,   &sky->zone,
-                               &sky->hour,        &sky->north,
+    double *const numbers[] = {&sky->direct,
+                               &sky->direct_horizontal,
+                               &sky->diffuse,
+                               &sky->dew_point,
+                               &sky->lux_outside,
+                               &sky->azimuth,
+                               &sky->altitude,
+                               &sky->place.latitude,
+                               &sky->place.longitude,
+                               &sky->place.zone,
+                               &sky->hour,
+                               &sky->north,
                                &sky->year};
     for (size_t k = 0; k < sizeof numbers / sizeof numbers[0]; k++) *numbers[k] = NAN;
     for (size_t k = 0; k < SKY_MEMBERS; k++) names[k] = sky_members[k].name;
@@ -194,7 +201,7 @@ static bool read_sky(parser *p, sky_request *sky) {
               : m->kind == MEMBER_TEXT   ? read_text(p, to)
               : m->kind == MEMBER_NUMBER ? read_number(p, m, to)
               : m->kind == MEMBER_FLAG   ? read_flag(p, to)
-                                         : read_inside(p, m, sky)))
+                                         : read_inside(p, m, to)))
             return false;
         p->pointer_length = mark;
     }
@@ -217,21 +224,25 @@ static bool read_list(parser *p, sky_request *skies, size_t *n) {
     return *n > 0 || parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s is empty, must hold a sky", parser_here(p));
 }
 
+/* The skies of a body. */
+typedef struct sky_list {
+    sky_request *skies;
+    size_t n;
+} sky_list;
+
+static bool read_skies_member(parser *p, size_t which, void *to) {
+    sky_list *const list = to;
+    list->n = 1;
+    return which == 0 ? read_sky(p, list->skies) : read_list(p, list->skies, &list->n);
+}
+
 static bool read_body(parser *p, sky_request *skies, size_t *n) {
     static const char *const names[] = {"sky", "skies"};
-    unsigned seen = 0;
-    size_t which;
-    json_slice key;
-    if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
-    if (!json_enter_object(&p->r)) return parser_fault(p);
-    while (parser_next_member(p, &key)) {
-        if (!parser_known_member(p, &key, names, 2, &seen, &which)) return false;
-        *n = 1;
-        if (!(which == 0 ? read_sky(p, skies) : read_list(p, skies, n))) return false;
-        p->pointer_length = 0;
-    }
-    if (p->why->status != 0) return false;
-    if (!json_finish(&p->r)) return parser_fault(p);
+    sky_list list = {skies, 0};
+    const parser_body body = {names, 2, read_skies_member, &list};
+    unsigned seen;
+    if (!parser_read_body(p, &body, &seen)) return false;
+    *n = list.n;
     return seen == 1 || seen == 2 ||
            parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body must hold one of sky and skies");
 }
@@ -241,12 +252,6 @@ bool codec_read_skies_json(const codec_scene *scene, const char *text, size_t le
     parser p;
     return parser_end(&p, parser_begin(&p, scene, text, length, NULL, why) && read_body(&p, skies, n_skies));
 }
-
-#define SUN_FIELD(field) offsetof(sun_request, field)
-static const member sun_place_members[] = {
-    {"latitude", MEMBER_NUMBER, SUN_FIELD(latitude), -90, 90, NULL, 0},
-    {"longitude", MEMBER_NUMBER, SUN_FIELD(longitude), -180, 180, NULL, 0},
-    {"zone", MEMBER_NUMBER, SUN_FIELD(zone), -14, 14, NULL, 0}};
 
 static bool read_hours(parser *p, sun_request *out) {
     static const member hour = {"hours", MEMBER_NUMBER, 0, 0, 8760, NULL, 0};
@@ -265,28 +270,22 @@ static bool read_hours(parser *p, sun_request *out) {
     return parser_closed(p);
 }
 
+enum { AT_PLACE, AT_HOURS, AT_YEAR, SUN_BODY };
+
+static bool read_sun_member(parser *p, size_t which, void *to) {
+    sun_request *const out = to;
+    if (which == AT_PLACE) return read_inside(p, &sky_members[PLACE], &out->place);
+    if (which == AT_HOURS) return read_hours(p, out);
+    return read_number(p, &sky_members[YEAR], &out->year) && check_year(p, out->year);
+}
+
 static bool read_sun_body(parser *p, sun_request *out) {
-    enum { AT_PLACE, AT_HOURS, AT_YEAR, SUN_BODY };
     static const char *const names[] = {[AT_PLACE] = "place", [AT_HOURS] = "hours", [AT_YEAR] = "year"};
-    static const member place = {"place", MEMBER_OBJECT, 0, 0, 0, sun_place_members, 3};
-    unsigned seen = 0;
-    size_t which;
-    json_slice key;
-    if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
-    if (!json_enter_object(&p->r)) return parser_fault(p);
-    while (parser_next_member(p, &key)) {
-        if (!parser_known_member(p, &key, names, SUN_BODY, &seen, &which)) return false;
-        if (!(which == AT_PLACE ? read_inside(p, &place, out)
-              : which == AT_HOURS
-                  ? read_hours(p, out)
-                  : read_number(p, &sky_members[YEAR], &out->year) && check_year(p, out->year)))
-            return false;
-        p->pointer_length = 0;
-    }
-    if (p->why->status != 0) return false;
-    if (!json_finish(&p->r)) return parser_fault(p);
-    return (has(seen, AT_PLACE) && has(seen, AT_HOURS)) ||
-           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body must hold place and hours");
+    const parser_body body = {names, SUN_BODY, read_sun_member, out};
+    unsigned seen;
+    return parser_read_body(p, &body, &seen) &&
+           ((has(seen, AT_PLACE) && has(seen, AT_HOURS)) ||
+            parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body must hold place and hours"));
 }
 
 bool codec_read_sun_json(const codec_scene *scene, const char *text, size_t length, sun_request *out,
@@ -310,23 +309,20 @@ static bool read_weather_text(parser *p, weather_request *out) {
     return true;
 }
 
+enum { AT_GAPS, AT_TEXT, WEATHER_BODY };
+
+static bool read_weather_member(parser *p, size_t which, void *to) {
+    weather_request *const out = to;
+    return which == AT_TEXT ? read_weather_text(p, out) : read_text(p, out->gaps);
+}
+
 static bool read_weather_body(parser *p, bool beside, weather_request *out) {
-    enum { AT_GAPS, AT_TEXT, WEATHER_BODY };
     static const char *const names[] = {[AT_GAPS] = "gaps", [AT_TEXT] = "text"};
-    unsigned seen = 0;
-    size_t which;
-    json_slice key;
-    if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
-    if (!json_enter_object(&p->r)) return parser_fault(p);
-    while (parser_next_member(p, &key)) {
-        if (!parser_known_member(p, &key, names, WEATHER_BODY - beside, &seen, &which)) return false;
-        if (!(which == AT_TEXT ? read_weather_text(p, out) : read_text(p, out->gaps))) return false;
-        p->pointer_length = 0;
-    }
-    if (p->why->status != 0) return false;
-    if (!json_finish(&p->r)) return parser_fault(p);
-    return beside || has(seen, AT_TEXT) ||
-           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body lacks text, that of a weather file");
+    const parser_body body = {names, WEATHER_BODY - beside, read_weather_member, out};
+    unsigned seen;
+    return parser_read_body(p, &body, &seen) &&
+           (beside || has(seen, AT_TEXT) ||
+            parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body lacks text, that of a weather file"));
 }
 
 bool codec_read_weather_json(const codec_scene *scene, bool beside, const char *body, size_t length,

@@ -11,13 +11,18 @@ enum { SKY_REQUEST_MOST = 64, SKY_REQUEST_TEXT = 48 };
 /* The member that names a sky: `name`, `diffuse` with or without `direct`, or `weather`. */
 typedef enum sky_source { SKY_BY_NAME, SKY_BY_LIGHT, SKY_BY_WEATHER } sky_source;
 
+/* Degrees, to the north and to the east, and hours ahead of UTC. */
+typedef struct request_place {
+    double latitude, longitude, zone;
+} request_place;
+
 /* One sky. Texts are "" and numbers NAN where they were not given. */
 typedef struct sky_request {
     sky_source source;
     char name[SKY_REQUEST_TEXT], date[SKY_REQUEST_TEXT], gaps[SKY_REQUEST_TEXT];
     double direct, direct_horizontal, diffuse, dew_point, lux_outside; /* at most one of the first two */
     double azimuth, altitude;                                          /* of `sun`, degrees; both or none */
-    double latitude, longitude, zone;                                  /* of `place`; all or none */
+    request_place place;                                               /* all or none */
     double hour, north, year;
     bool photometric, sun_in_tiles; /* as the scene counts light; true */
     bool sun_spread, dark;          /* over tiles near it; a dark sky is answered: both false */
@@ -31,7 +36,8 @@ enum { SUN_REQUEST_MOST = 1 << 17 };
 
 /* Hours of a year, at a place. */
 typedef struct sun_request {
-    double latitude, longitude, zone, year; /* 2001 where none was given */
+    request_place place;
+    double year; /* 2001 where none was given */
     size_t n_hours;
     double *hours; /* [SUN_REQUEST_MOST], the caller's */
 } sun_request;

@@ -38,7 +38,8 @@ START_TEST(members) {
               !skies[0].photometric);
     ck_assert_int_eq(skies[1].source, SKY_BY_NAME);
     ck_assert_str_eq(skies[1].date, "1 May 9:00");
-    ck_assert_double_eq(skies[1].latitude * 100 + skies[1].longitude * 10 + skies[1].zone, 117);
+    ck_assert_double_eq(skies[1].place.latitude * 100 + skies[1].place.longitude * 10 + skies[1].place.zone,
+                        117);
     ck_assert_int_eq(skies[2].source, SKY_BY_LIGHT);
     ck_assert_double_eq(skies[2].direct, 5);
     ck_assert_double_eq(skies[2].diffuse, 6);
@@ -127,7 +128,8 @@ START_TEST(suns) {
     ck_assert_uint_eq(read_sun(text, sizeof text - 1, &out), 0);
     ck_assert_uint_eq(out.n_hours, 3);
     ck_assert(out.hours[0] == 0 && out.hours[1] == 12.5 && out.hours[2] == 8760);
-    ck_assert(out.latitude == 1 && out.longitude == 2 && out.zone == -3 && out.year == 1999);
+    ck_assert(out.place.latitude == 1 && out.place.longitude == 2 && out.place.zone == -3 &&
+              out.year == 1999);
     for (size_t length = 0; length + 1 < sizeof text; length++)
         ck_assert_uint_eq(read_sun(text, length, &out), 400);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
