@@ -270,3 +270,23 @@ bool confined_send(int fd, const void *data, size_t bytes) {
     }
     return true;
 }
+
+lam_status confined_verdict(const confined *c, const confined_limits *limits, int how, const char *path,
+                            const char *who, lam_error *error) {
+    const int number = WIFSIGNALED(how) ? WTERMSIG(how) : 0;
+    if (c->late || number == SIGXCPU)
+        return status_fail(error, LAM_ERR_FORMAT,
+                           "%s: %s took more than its %u s; simplify or repair the file", path, who,
+                           limits->cpu_seconds);
+    if (number == SIGINT || number == SIGTERM || number == SIGHUP)
+        return status_fail(error, LAM_ERR_CANCELLED, "%s: %s was interrupted (signal %d)", path, who, number);
+    if (number == SIGKILL)
+        return status_fail(error, LAM_ERR_MEMORY, "%s: %s was killed (signal 9), perhaps for lack of memory",
+                           path, who);
+    if (number != 0)
+        return status_fail(error, LAM_ERR_FORMAT,
+                           "%s: %s crashed (signal %d); the file is damaged or needs more than %zu MiB", path,
+                           who, number, limits->memory_bytes >> 20);
+    return status_fail(error, LAM_ERR_FORMAT, "%s: %s ended without an answer (exit status %d)", path, who,
+                       WIFEXITED(how) ? WEXITSTATUS(how) : -1);
+}

@@ -49,6 +49,12 @@ bool confined_receive(confined *c, void *out, size_t bytes);
  * Errors: LAM_ERR_IO if the system does not tell the end, as while SIGCHLD is ignored. */
 lam_status confined_end(confined *c, bool answered, const char *path, int *how, lam_error *error);
 
+/* Says in one line how a child ended that was to read path and gave no whole answer; who: "the importer".
+ * Never LAM_OK: LAM_ERR_CANCELLED after a signal that asks to end, LAM_ERR_MEMORY where it was killed, else
+ * LAM_ERR_FORMAT. */
+lam_status confined_verdict(const confined *c, const confined_limits *limits, int how, const char *path,
+                            const char *who, lam_error *error);
+
 /* Writes all bytes to a descriptor; the child calls it. */
 bool confined_send(int fd, const void *data, size_t bytes);
 

@@ -127,20 +127,6 @@ done:
     return status;
 }
 
-/* One line for a child that ended without a whole reply. */
-static lam_status child_verdict(const char *path, bool late, int wait_status, lam_error *error) {
-    const int number = WIFSIGNALED(wait_status) ? WTERMSIG(wait_status) : 0;
-    if (late || number == SIGXCPU)
-        return status_fail(error, LAM_ERR_FORMAT, "%s: its reader took more than its %d s", path,
-                           CHILD_SECONDS);
-    if (number == SIGINT || number == SIGTERM || number == SIGHUP)
-        return status_fail(error, LAM_ERR_CANCELLED, "%s: the reading was interrupted (signal %d)", path,
-                           number);
-    return status_fail(error, LAM_ERR_FORMAT, "%s: its reader ended without an answer (%s %d)", path,
-                       number != 0 ? "signal" : "exit status",
-                       number != 0 ? number : WEXITSTATUS(wait_status));
-}
-
 lam_status luminaire_receive(confined_main *run, void *context, const char *path, luminaire *out,
                              lam_error *error) {
     lam_status status = LAM_OK;
@@ -159,7 +145,7 @@ lam_status luminaire_receive(confined_main *run, void *context, const char *path
     const lam_status ended = confined_end(&child, whole || status != LAM_OK, path, &wait_status, &ending);
     TRY(status);
     if (ended != LAM_OK) FAIL(error, ended, "%s", ending.message);
-    if (!whole) TRY(child_verdict(path, child.late, wait_status, error));
+    if (!whole) TRY(confined_verdict(&child, &limits, wait_status, path, "its reader", error));
     *out = l;
     l = (luminaire){.n_planes = 0};
 done:

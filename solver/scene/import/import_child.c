@@ -264,29 +264,6 @@ done:
     return status;
 }
 
-/* One line for a child that ended without a whole reply. */
-static lam_status child_verdict(const char *path, const child_limits *limits, bool late, int wait_status,
-                                lam_error *error) {
-    const int number = WIFSIGNALED(wait_status) ? WTERMSIG(wait_status) : 0;
-    if (late || number == SIGXCPU)
-        return status_fail(error, LAM_ERR_FORMAT,
-                           "%s: the importer took more than its %u s; simplify or repair the file", path,
-                           limits->cpu_seconds);
-    if (number == SIGINT || number == SIGTERM || number == SIGHUP)
-        return status_fail(error, LAM_ERR_CANCELLED, "%s: the import was interrupted (signal %d)", path,
-                           number);
-    if (number == SIGKILL)
-        return status_fail(error, LAM_ERR_MEMORY,
-                           "%s: the importer was killed (signal 9), perhaps for lack of memory", path);
-    if (number != 0)
-        return status_fail(
-            error, LAM_ERR_FORMAT,
-            "%s: the importer crashed (signal %d); the file is damaged or needs more than %zu MiB", path,
-            number, limits->memory_bytes >> 20);
-    return status_fail(error, LAM_ERR_FORMAT, "%s: the importer ended without an answer (exit status %d)",
-                       path, WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : -1);
-}
-
 lam_status import_in_child(scene_reader *reader, const char *path, const child_limits *limits,
                            imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
@@ -308,7 +285,7 @@ lam_status import_in_child(scene_reader *reader, const char *path, const child_l
     const lam_status ended = confined_end(&child, whole || status != LAM_OK, path, &wait_status, &ending);
     TRY(status);
     if (ended != LAM_OK) FAIL(error, ended, "%s", ending.message);
-    if (!whole) TRY(child_verdict(path, limits, child.late, wait_status, error));
+    if (!whole) TRY(confined_verdict(&child, &confined_to, wait_status, path, "the importer", error));
     imported_faces_free(s);
     *s = received;
     received = (imported_faces){0};
