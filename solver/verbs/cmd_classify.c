@@ -1,5 +1,6 @@
 /* lambert classify: reports the properties of a scene and the operator that suits it. */
 #include "solver/precompute/precompute.h"
+#include "solver/verbs/json_print.h"
 #include "solver/verbs/verbs.h"
 
 #include <jansson.h>
@@ -49,8 +50,7 @@ static json_t *figures_of(const candidate *c) {
 }
 
 static lam_status print_json(const decision *d, double n, size_t rays, lam_error *error) {
-    lam_status status = LAM_OK;
-    char *text = NULL, reason[sizeof d->reason + 32];
+    char reason[sizeof d->reason + 32];
     json_t *root = json_object(), *costs = json_object();
     json_object_set_new(root, "elements", json_integer((json_int_t)n));
     json_object_set_new(root, "density", json_real(d->density));
@@ -64,11 +64,7 @@ static lam_status print_json(const decision *d, double n, size_t rays, lam_error
     json_object_set_new(root, "method", json_string(d->taken->method->name));
     snprintf(reason, sizeof reason, "%s: %s", d->taken->method->name, d->reason);
     json_object_set_new(root, "reason", json_string(reason));
-    text = json_dumps(root, JSON_INDENT(2));
-    if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "the result cannot be written as JSON");
-    puts(text);
-done:
-    free(text);
+    const lam_status status = json_print("--json", root, 0, error);
     json_decref(root);
     return status;
 }

@@ -3,6 +3,7 @@
 #include "solver/base/terminal.h"
 #include "solver/codec/describe.h"
 #include "solver/method/report.h"
+#include "solver/verbs/json_print.h"
 #include "solver/verbs/store_lines.h"
 #include "solver/verbs/verbs.h"
 
@@ -300,13 +301,11 @@ static lam_status info(const char *path, bool as_json, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     json_t *about = NULL;
-    char *text = NULL, lines[STORE_LINES][STORE_LINE_BYTES];
+    char lines[STORE_LINES][STORE_LINE_BYTES];
     TRY(store_open(path, &s, error));
     TRY(describe_store(s, &about, error));
     if (as_json) {
-        text = json_dumps(about, JSON_INDENT(2));
-        if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
-        puts(text);
+        TRY(json_print(path, about, 0, error));
     } else {
         store_lines_make(about, path, 0, lines);
         for (size_t k = 0; k < STORE_LINES; k++) puts(lines[k]);
@@ -314,7 +313,6 @@ static lam_status info(const char *path, bool as_json, lam_error *error) {
         print_text(about);
     }
 done:
-    free(text);
     json_decref(about);
     store_close(s);
     return status;

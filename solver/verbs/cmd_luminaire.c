@@ -6,6 +6,7 @@
 #include "solver/base/terminal.h"
 #include "solver/luminaire/luminaire.h"
 #include "solver/luminaire/polar_curves.h"
+#include "solver/verbs/json_print.h"
 #include "solver/verbs/luminaire_list.h"
 #include "solver/verbs/verbs.h"
 
@@ -165,10 +166,8 @@ static json_t *json_of_candela(const luminaire *l, const fields *f) {
 }
 
 static lam_status print_json(const luminaire *l, const char *path, const fields *f, lam_error *error) {
-    lam_status status = LAM_OK;
     double C = 0, gamma = 0;
     const double peak = luminaire_peak(l, &C, &gamma);
-    char *text = NULL;
     json_t *about = json_pack(
         "{s:s, s:s, s:s, s:o, s:o, s:o, s:f, s:{s:f, s:f, s:f}, s:s, s:I, s:I, s:o, s:I, s:o, s:o, s:f, s:o, "
         "s:o, s:o}",
@@ -182,11 +181,7 @@ static lam_status print_json(const luminaire *l, const char *path, const fields 
         "tilt", json_of_tilt(&l->tilt), "words", json_of_words(l), "warnings", json_of_warnings(l));
     if (about != NULL && f->directions.count > 0)
         json_object_set_new(about, "candela", json_of_candela(l, f));
-    text = about != NULL ? json_dumps(about, JSON_INDENT(2) | JSON_REAL_PRECISION(10)) : NULL;
-    if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
-    puts(text);
-done:
-    free(text);
+    const lam_status status = json_print(path, about, 10, error);
     json_decref(about);
     return status;
 }

@@ -3,6 +3,7 @@
 #include "solver/codec/describe.h"
 #include "solver/method/emitters_options.h"
 #include "solver/precompute/precompute.h"
+#include "solver/verbs/json_print.h"
 #include "solver/verbs/store_lines.h"
 #include "solver/verbs/verbs.h"
 
@@ -48,9 +49,7 @@ static json_t *times_json(const forecast_times *t) {
  * seconds of the main ones as forecast and as taken, and the advice on its errors where there is one. */
 static lam_status print_json(const char *path, const terminal *t, const precompute_result *result,
                              json_t *about, lam_error *error) {
-    lam_status status = LAM_OK;
     json_t *seconds = json_object();
-    char *text = NULL;
     for (size_t k = 0; k < t->n_done; k++)
         json_object_set_new(seconds, t->done[k].name, json_real(t->done[k].seconds));
     json_object_set_new(about, "output", json_string(path));
@@ -59,11 +58,7 @@ static lam_status print_json(const char *path, const terminal *t, const precompu
     if (result->forecast.form_factors + result->forecast.judge > 0)
         json_object_set_new(about, "forecast_processor_seconds", times_json(&result->forecast));
     if (result->advice[0] != '\0') json_object_set_new(about, "advice", json_string(result->advice));
-    text = json_dumps(about, JSON_INDENT(2));
-    if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
-    puts(text);
-done:
-    free(text);
+    const lam_status status = json_print(path, about, 0, error);
     json_decref(seconds);
     return status;
 }

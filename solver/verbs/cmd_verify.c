@@ -1,6 +1,7 @@
 /* lambert verify: checks a store and prints one line for each check. */
 #include "solver/base/photometry.h"
 #include "solver/scene/mesh_options.h"
+#include "solver/verbs/json_print.h"
 #include "solver/verbs/verbs.h"
 #include "solver/verify/verify.h"
 
@@ -107,7 +108,6 @@ static json_t *compared_json(const examination *e) {
 
 static lam_status print_json(const char *path, const check *done, const examination *e, bool broken,
                              lam_error *error) {
-    lam_status status = LAM_OK;
     json_t *list = json_array();
     for (size_t i = 0; i < N_CHECKS; i++)
         json_array_append_new(list, json_pack("{s:s, s:s, s:s}", "name", done[i].name, "result",
@@ -118,11 +118,7 @@ static lam_status print_json(const char *path, const check *done, const examinat
         json_object_set_new(root, "walks", compared_json(e));
         json_object_set_new(root, "unit", json_string(compared_unit(e)));
     }
-    char *text = json_dumps(root, JSON_INDENT(2));
-    if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: the result cannot be written as JSON", path);
-    puts(text);
-done:
-    free(text);
+    const lam_status status = json_print(path, root, 0, error);
     json_decref(root);
     return status;
 }

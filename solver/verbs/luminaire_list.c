@@ -1,4 +1,5 @@
 #include "solver/verbs/luminaire_list.h"
+#include "solver/verbs/json_print.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -110,7 +111,6 @@ static json_t *json_of_warnings(const placed_luminaires *p) {
 
 static lam_status print_json(const placed_luminaires *p, const list_sums *sums, const char *path,
                              lam_error *error) {
-    lam_status status = LAM_OK;
     json_t *luminaires = json_array(), *files = json_array(), *groups = json_array();
     for (size_t k = 0; k < p->n; k++)
         json_array_append_new(luminaires, json_of_luminaire(p, &p->luminaires[k]));
@@ -127,11 +127,7 @@ static lam_status print_json(const placed_luminaires *p, const list_sums *sums, 
                                         (json_int_t)sums->groups[g].count, "lumens", sums->groups[g].lumens));
     json_t *about = json_pack("{s:o, s:o, s:o, s:f, s:o}", "luminaires", luminaires, "files", files, "groups",
                               groups, "lumens", sums->lumens, "warnings", json_of_warnings(p));
-    char *text = about != NULL ? json_dumps(about, JSON_INDENT(2) | JSON_REAL_PRECISION(10)) : NULL;
-    if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
-    puts(text);
-done:
-    free(text);
+    const lam_status status = json_print(path, about, 10, error);
     json_decref(about);
     return status;
 }
