@@ -1,6 +1,6 @@
 /* Luminaires read from files by the process without rights: what it may open, and what comes back. */
 #include "solver/luminaire/luminaire_child.h"
-#include "support/suite.h"
+#include "support/scene.h"
 
 #include <math.h>
 #include <string.h>
@@ -15,8 +15,7 @@ static char folder[64];
 
 static void setup(void) {
     char path[128];
-    snprintf(folder, sizeof folder, "/tmp/test-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
+    folder_make(folder);
     snprintf(path, sizeof path, "%s/a", folder);
     ck_assert_int_eq(mkdir(path, 0700), 0);
     snprintf(path, sizeof path, "%s/b", folder);
@@ -24,20 +23,14 @@ static void setup(void) {
 }
 
 static void teardown(void) {
-    char line[128];
-    snprintf(line, sizeof line, "rm -r %s", folder);
-    ck_assert_int_eq(system(line), 0);
+    folder_remove(folder);
 }
 
 /* The path of a file of the folder, with this content unless that is NULL. */
 static const char *file(const char *name, const char *text) {
     static char path[256];
     snprintf(path, sizeof path, "%s/%s", folder, name);
-    if (text == NULL) return path;
-    FILE *stream = fopen(path, "wb");
-    ck_assert_ptr_nonnull(stream);
-    fputs(text, stream);
-    ck_assert_int_eq(fclose(stream), 0);
+    if (text != NULL) file_write(folder, name, text, path);
     return path;
 }
 

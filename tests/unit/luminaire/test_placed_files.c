@@ -1,6 +1,6 @@
 /* Lists of luminaires and the files that they name. */
 #include "solver/luminaire/placed.h"
-#include "support/suite.h"
+#include "support/scene.h"
 
 #include <math.h>
 #include <string.h>
@@ -10,23 +10,16 @@
 static char folder[64];
 
 static void setup(void) {
-    snprintf(folder, sizeof folder, "/tmp/test-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
+    folder_make(folder);
 }
 
 static void teardown(void) {
-    char line[128];
-    snprintf(line, sizeof line, "rm -r %s", folder);
-    ck_assert_int_eq(system(line), 0);
+    folder_remove(folder);
 }
 
 static const char *file(const char *name, const char *text) {
     static char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *stream = fopen(path, "wb");
-    ck_assert_ptr_nonnull(stream);
-    fputs(text, stream);
-    ck_assert_int_eq(fclose(stream), 0);
+    file_write(folder, name, text, path);
     return path;
 }
 
