@@ -233,6 +233,35 @@ void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float
  * L is [n_rows][m]. */
 void lam_sky_adjoint(const lam_sky *sky, size_t n_rows, const float *g, float *L);
 
+/* The irradiance that the elements of a store receive directly from its luminaires; immutable once open. The
+ * dimmer of a luminaire is 1 at its full light; its colour is a factor of each channel. */
+typedef struct lam_luminaires lam_luminaires;
+
+/* Opens the store at path and loads its luminaires; *luminaires is NULL when it has none. The caller closes
+ * them with lam_luminaires_close. Errors and threads as lam_operator_open. */
+lam_status lam_luminaires_open(const char *path, lam_luminaires **luminaires, lam_error *error);
+
+/* Frees them; NULL is allowed. */
+void lam_luminaires_close(lam_luminaires *luminaires);
+
+/* Luminaires k, channels C and elements n. */
+size_t lam_luminaires_count(const lam_luminaires *luminaires);
+size_t lam_luminaires_channels(const lam_luminaires *luminaires);
+size_t lam_luminaires_elements(const lam_luminaires *luminaires);
+
+/* The name of a luminaire, owned by luminaires, and the dimmer that its list gives it. */
+const char *lam_luminaires_name(const lam_luminaires *luminaires, size_t luminaire);
+double lam_luminaires_dimmer(const lam_luminaires *luminaires, size_t luminaire);
+
+/* Adds their irradiance under dimmers D [n_rhs][C][k] to H0 [n_rhs][C][n], lx in mesh order, zeroed or that
+ * of a sky. Allocates nothing; a vector's bits do not depend on its neighbours. Cost: O(kn) per row, less for
+ * luminaires that are dark. */
+void lam_luminaires_irradiance(const lam_luminaires *luminaires, size_t n_rhs, const float *D, float *H0);
+
+/* The transpose, the gradient of <g, H0> by every dimmer of every channel: g is [n_rhs][C][n], D is
+ * [n_rhs][C][k]. Of a dimmer that all channels share it is the sum over channels. */
+void lam_luminaires_adjoint(const lam_luminaires *luminaires, size_t n_rhs, const float *g, float *D);
+
 #pragma GCC visibility pop
 #ifdef __cplusplus
 }

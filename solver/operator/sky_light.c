@@ -1,61 +1,47 @@
 #include "solver/operator/sky_light.h"
 
+#include "solver/operator/first_rows.h"
 #include "store/groups.h"
 #include "store/status.h"
-#include "store/store_map.h"
 
-#include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 struct lam_sky {
-    size_t n_tiles, n;
-    const float *first_bounce; /* [m][n], sr; in where */
-    store_view where;
+    first_rows rows; /* of first_bounce, sr */
 };
+
+/* Takes over the rows, also on an error. */
+static lam_status make(first_rows *rows, lam_sky **out, lam_error *error) {
+    lam_sky *made = memory_allocate(1, sizeof *made, "the sky", error);
+    if (made == NULL) {
+        first_rows_free(rows);
+        return LAM_ERR_MEMORY;
+    }
+    made->rows = *rows;
+    *out = made;
+    return LAM_OK;
+}
 
 lam_status sky_load(store *s, size_t n, lam_sky **out, lam_error *error) {
     lam_status status = LAM_OK;
-    size_t dims[STORE_MAX_RANK] = {SIZE_MAX, n};
-    store_view view = {.data = NULL};
-    lam_sky *made = NULL;
+    first_rows rows;
     if (!store_has(s, STORE_SKY)) {
         *out = NULL;
         return LAM_OK;
     }
-    TRY(store_read_view(s, STORE_SKY "/first_bounce", STORE_F32, 2, dims, &view, error));
-    const float *values = view.data;
-    if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce has no tiles", store_path(s));
-    /* A mapped array is compared with its checksums later; its writer has checked the values. */
-    for (size_t k = 0; k < dims[0] * n && view.map == NULL; k++)
-        if (!(values[k] >= 0 && isfinite(values[k])))
-            FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce[%zu][%zu] = %g, must be at least 0",
-                 store_path(s), k / n, k % n, (double)values[k]);
-    made = memory_allocate(1, sizeof *made, "the sky", error);
-    if (made == NULL) TRY(LAM_ERR_MEMORY);
-    *made = (lam_sky){.n_tiles = dims[0], .n = n, .first_bounce = values, .where = view};
-    view = (store_view){.data = NULL};
-    *out = made;
+    TRY(first_rows_load(s, STORE_SKY "/first_bounce", "tile", n, &rows, error));
+    TRY(make(&rows, out, error));
 done:
-    store_view_free(&view);
     return status;
 }
 
 lam_status sky_create(size_t n_tiles, size_t n, const float *first_bounce, lam_sky **out, lam_error *error) {
     lam_status status = LAM_OK;
-    lam_sky *made = memory_allocate(1, sizeof *made, "the sky", error);
-    if (made == NULL) TRY(LAM_ERR_MEMORY);
-    made->n_tiles = n_tiles;
-    made->n = n;
-    made->where.memory = memory_allocate(n_tiles, n * sizeof *made->first_bounce, "the sky", error);
-    if (made->where.memory == NULL) TRY(LAM_ERR_MEMORY);
-    memcpy(made->where.memory, first_bounce, n_tiles * n * sizeof *first_bounce);
-    made->first_bounce = made->where.memory;
-    *out = made;
-    made = NULL;
+    first_rows rows;
+    TRY(first_rows_copy(n_tiles, n, first_bounce, &rows, error));
+    TRY(make(&rows, out, error));
 done:
-    lam_sky_close(made);
     return status;
 }
 
@@ -79,60 +65,31 @@ done:
 
 void lam_sky_close(lam_sky *sky) {
     if (sky == NULL) return;
-    store_view_free(&sky->where);
+    first_rows_free(&sky->rows);
     free(sky);
 }
 
 size_t lam_sky_tiles(const lam_sky *sky) {
-    return sky->n_tiles;
+    return sky->rows.m;
 }
 
 size_t lam_sky_elements(const lam_sky *sky) {
-    return sky->n;
+    return sky->rows.n;
 }
 
 const float *sky_first_bounce(const lam_sky *sky) {
-    return sky->first_bounce;
+    return sky->rows.values;
 }
 
 void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float *H0) {
-    enum { BLOCK = 512 }; /* elements whose rows of first_bounce stay in the cache from one row to the next */
-    const size_t m = sky->n_tiles, n = sky->n;
-    for (size_t first = 0; first < n; first += BLOCK) {
-        const size_t count = n - first < BLOCK ? n - first : BLOCK;
-        for (size_t r = 0; r < n_rows; r++) {
-            double sum[BLOCK] = {0};
-            for (size_t t = 0; t < m; t++) {
-                const double radiance = (double)L[r * m + t];
-                const float *row = sky->first_bounce + t * n + first;
-                if (radiance == 0) continue;
-                for (size_t i = 0; i < count; i++) sum[i] += radiance * (double)row[i];
-            }
-            for (size_t i = 0; i < count; i++) H0[r * n + first + i] = (float)sum[i];
-        }
-    }
+    first_rows_apply(&sky->rows, n_rows, L, NULL, false, H0);
 }
 
 void sky_irradiance_double(const lam_sky *sky, size_t n_rows, const double *L, double *H0) {
-    const size_t m = sky->n_tiles, n = sky->n;
-    memset(H0, 0, n_rows * n * sizeof *H0);
-    for (size_t r = 0; r < n_rows; r++)
-        for (size_t t = 0; t < m; t++) {
-            const double radiance = L[r * m + t];
-            const float *row = sky->first_bounce + t * n;
-            double *sum = H0 + r * n;
-            if (radiance == 0) continue;
-            for (size_t i = 0; i < n; i++) sum[i] += radiance * (double)row[i];
-        }
+    memset(H0, 0, n_rows * sky->rows.n * sizeof *H0);
+    first_rows_apply_double(&sky->rows, n_rows, L, NULL, H0);
 }
 
 void lam_sky_adjoint(const lam_sky *sky, size_t n_rows, const float *g, float *L) {
-    const size_t m = sky->n_tiles, n = sky->n;
-    for (size_t r = 0; r < n_rows; r++)
-        for (size_t t = 0; t < m; t++) {
-            const float *row = sky->first_bounce + t * n, *g_r = g + r * n;
-            double sum = 0;
-            for (size_t i = 0; i < n; i++) sum += (double)row[i] * (double)g_r[i];
-            L[r * m + t] = (float)sum;
-        }
+    first_rows_adjoint(&sky->rows, n_rows, g, NULL, L);
 }

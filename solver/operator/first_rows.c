@@ -1,0 +1,89 @@
+#include "solver/operator/first_rows.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+enum { BLOCK = 512 }; /* elements whose sums stay in the cache from one source to the next */
+
+lam_status first_rows_load(store *s, const char *name, const char *source, size_t n, first_rows *out,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t dims[STORE_MAX_RANK] = {SIZE_MAX, n};
+    store_view view = {.data = NULL};
+    TRY(store_read_view(s, name, STORE_F32, 2, dims, &view, error));
+    const float *values = view.data;
+    if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: %s has no %ss", store_path(s), name, source);
+    /* A mapped array is compared with its checksums later; its writer has checked the values. */
+    for (size_t k = 0; k < dims[0] * n && view.map == NULL; k++)
+        if (!(values[k] >= 0 && isfinite(values[k])))
+            FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu][%zu] = %g, must be at least 0", store_path(s), name,
+                 k / n, k % n, (double)values[k]);
+    *out = (first_rows){.m = dims[0], .n = n, .values = values, .where = view};
+    view = (store_view){.data = NULL};
+done:
+    store_view_free(&view);
+    return status;
+}
+
+lam_status first_rows_copy(size_t m, size_t n, const float *values, first_rows *out, lam_error *error) {
+    float *copy = memory_allocate(m, n * sizeof *copy, "direct light", error);
+    if (copy == NULL) return LAM_ERR_MEMORY;
+    memcpy(copy, values, m * n * sizeof *copy);
+    *out = (first_rows){.m = m, .n = n, .values = copy, .where = {.memory = copy}};
+    return LAM_OK;
+}
+
+void first_rows_free(first_rows *r) {
+    store_view_free(&r->where);
+    *r = (first_rows){.m = 0};
+}
+
+static double factor_of(const row_factors *f, size_t row, size_t m, size_t t) {
+    return f == NULL || f->values == NULL ? 1 : f->values[row % f->n_channels * m + t];
+}
+
+void first_rows_apply(const first_rows *r, size_t n_rows, const float *w, const row_factors *f, bool add,
+                      float *H0) {
+    const size_t m = r->m, n = r->n;
+    for (size_t first = 0; first < n; first += BLOCK) {
+        const size_t count = n - first < BLOCK ? n - first : BLOCK;
+        for (size_t q = 0; q < n_rows; q++) {
+            double sum[BLOCK] = {0};
+            float *to = H0 + q * n + first;
+            for (size_t t = 0; t < m; t++) {
+                const double weight = (double)w[q * m + t] * factor_of(f, q, m, t);
+                const float *row = r->values + t * n + first;
+                if (weight == 0) continue;
+                for (size_t i = 0; i < count; i++) sum[i] += weight * (double)row[i];
+            }
+            for (size_t i = 0; i < count; i++) to[i] = (float)(sum[i] + (add ? (double)to[i] : 0));
+        }
+    }
+}
+
+void first_rows_apply_double(const first_rows *r, size_t n_rows, const double *w, const row_factors *f,
+                             double *H0) {
+    const size_t m = r->m, n = r->n;
+    for (size_t q = 0; q < n_rows; q++)
+        for (size_t t = 0; t < m; t++) {
+            const double weight = w[q * m + t] * factor_of(f, q, m, t);
+            const float *row = r->values + t * n;
+            double *sum = H0 + q * n;
+            if (weight == 0) continue;
+            for (size_t i = 0; i < n; i++) sum[i] += weight * (double)row[i];
+        }
+}
+
+void first_rows_adjoint(const first_rows *r, size_t n_rows, const float *g, const row_factors *f, float *w) {
+    const size_t m = r->m, n = r->n;
+    for (size_t q = 0; q < n_rows; q++)
+        for (size_t t = 0; t < m; t++) {
+            const float *row = r->values + t * n, *g_q = g + q * n;
+            double sum = 0;
+            for (size_t i = 0; i < n; i++) sum += (double)row[i] * (double)g_q[i];
+            w[q * m + t] = (float)(sum * factor_of(f, q, m, t));
+        }
+}
