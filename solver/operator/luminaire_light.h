@@ -6,7 +6,7 @@
 
 #define LUMINAIRE_NO_GROUP 0xFFFFFFFFu
 
-/* What people are shown of a luminaire. */
+/* The part of a luminaire that people are shown. */
 typedef struct luminaire_shown {
     const char *name, *group; /* group: NULL where it has none */
     double at[3];             /* the middle of its opening, m */
