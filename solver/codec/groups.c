@@ -74,31 +74,39 @@ double group_index_area(const group_index *index, size_t n_groups, const uint32_
     return sum;
 }
 
-lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam_error *error) {
+lam_status group_index_of_names(size_t count, name_at *name, const void *of, const char *noun,
+                                group_index *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t s = lam_operator_emitters(op);
-    size_t bytes = s * sizeof(char *);
+    size_t bytes = count * sizeof(char *);
     uint32_t *own = NULL;
     *out = (group_index){.n_groups = 0};
-    if (s == 0) return LAM_OK;
-    for (size_t k = 0; k < s; k++) bytes += strlen(lam_operator_emitter_name(op, k)) + 1;
-    char **names = memory_allocate(bytes, 1, "names of emitters", error);
-    own = memory_allocate(s, sizeof *own, "names of emitters", error);
+    if (count == 0) return LAM_OK;
+    for (size_t k = 0; k < count; k++) bytes += strlen(name(of, k)) + 1;
+    char **names = memory_allocate(bytes, 1, noun, error);
+    own = memory_allocate(count, sizeof *own, noun, error);
     if (names == NULL || own == NULL) {
         free(names);
         TRY(LAM_ERR_MEMORY);
     }
-    char *text = (char *)(names + s);
-    for (size_t k = 0; k < s; k++) {
+    char *text = (char *)(names + count);
+    for (size_t k = 0; k < count; k++) {
         own[k] = (uint32_t)k;
         names[k] = text;
-        text = stpcpy(text, lam_operator_emitter_name(op, k)) + 1;
+        text = stpcpy(text, name(of, k)) + 1;
     }
-    TRY(group_index_make(s, 0, own, s, names, out, error));
-    out->noun = "emitter";
+    TRY(group_index_make(count, 0, own, count, names, out, error));
+    out->noun = noun;
 done:
     free(own);
     return status;
+}
+
+static const char *emitter_name(const void *of, size_t k) {
+    return lam_operator_emitter_name(of, k);
+}
+
+lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam_error *error) {
+    return group_index_of_names(lam_operator_emitters(op), emitter_name, op, "emitter", out, error);
 }
 
 void group_index_free(group_index *index) {
@@ -177,11 +185,10 @@ size_t group_index_find(const group_index *index, const char *name, size_t lengt
     return found;
 }
 
-/* The name of a group, or of an object of several materials, that is nearest to word; "" where none is near.
- */
+/* The name of a group, or of an object of several materials, that is nearest to word, if it is nearer than
+ * found, which is "" where none was near. */
 static void find_nearest(const group_index *index, const char *word, char found[NEAREST_LENGTH_MAX + 1]) {
     const char *nearest = NULL;
-    found[0] = '\0';
     for (size_t g = 0; g < index->n_groups; g++) {
         char object[NEAREST_LENGTH_MAX + 1] = "";
         const size_t length = strcspn(index->names[g], ".");
@@ -192,6 +199,11 @@ static void find_nearest(const group_index *index, const char *word, char found[
 }
 
 void group_index_miss(const group_index *index, const char *name, size_t length, char text[GROUP_MISS]) {
+    group_index_miss_beside(index, NULL, name, length, text);
+}
+
+void group_index_miss_beside(const group_index *index, const group_index *beside, const char *name,
+                             size_t length, char text[GROUP_MISS]) {
     enum { SHOWN = 80 };
     const char *cut = length > SHOWN ? "..." : "";
     char word[NEAREST_LENGTH_MAX + 1] = "", nearest[NEAREST_LENGTH_MAX + 1] = "";
@@ -201,6 +213,7 @@ void group_index_miss(const group_index *index, const char *name, size_t length,
     if (length <= NEAREST_LENGTH_MAX) {
         memcpy(word, name, length);
         find_nearest(index, word, nearest);
+        if (beside != NULL) find_nearest(beside, word, nearest);
     }
     if (nearest[0] != '\0') {
         snprintf(text + at, GROUP_MISS - at, "; did you mean \"%s\"?", nearest);

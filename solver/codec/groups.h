@@ -27,8 +27,13 @@ lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, siz
 /* Sums up the areas of the elements that figures take in, of area [n], by group. Errors: LAM_ERR_MEMORY. */
 lam_status group_index_measure(group_index *index, const double *area, lam_error *error);
 
-/* The emitters of an operator of few emitters, by name: emitter k is group k of element k. Of another
- * operator it is empty. Errors: LAM_ERR_MEMORY. */
+/* Things by name: thing k of `count`, whose name is name(of, k), is group k of element k. noun: static. Of
+ * none it is empty. Errors: LAM_ERR_MEMORY. */
+typedef const char *name_at(const void *of, size_t k);
+lam_status group_index_of_names(size_t count, name_at *name, const void *of, const char *noun,
+                                group_index *out, lam_error *error);
+
+/* The emitters of an operator of few emitters; of another operator it is empty. Errors: LAM_ERR_MEMORY. */
 lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam_error *error);
 
 void group_index_free(group_index *index);
@@ -62,5 +67,9 @@ double group_index_area(const group_index *index, size_t n_groups, const uint32_
  * first names there are where none is near. O(g). */
 #define GROUP_MISS 256
 void group_index_miss(const group_index *index, const char *name, size_t length, char text[GROUP_MISS]);
+
+/* The same of a name that might be one of another index too, or with beside NULL not. */
+void group_index_miss_beside(const group_index *index, const group_index *beside, const char *name,
+                             size_t length, char text[GROUP_MISS]);
 
 #endif

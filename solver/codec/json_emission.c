@@ -1,4 +1,4 @@
-/* The emissions of a request: dense, sparse, by group, by sky. */
+/* The emissions of a request: dense, sparse, by group, by sky, by luminaire. */
 #include "solver/base/array_grow.h"
 #include "solver/base/photometry.h"
 #include "solver/codec/json_parser.h"
@@ -260,10 +260,17 @@ static bool read_sky(parser *p) {
     return read_side(p, p->scene->n_tiles, "tile", parser_read_radiance, L);
 }
 
-/* {"pose-1": w, ...} into row [C][s]: the others are 0. */
-static bool read_named_emitters(parser *p, float *row) {
-    const group_index *emitters = p->scene->emitters;
-    const size_t C = p->scene->n_channels, s = p->scene->n_emitters, mark = p->pointer_length;
+/* Sources that have values by name: the numbers of those that a name means, and the name of a number. */
+typedef struct named_sources {
+    const char *one;
+    size_t width;
+    char **names; /* [width] */
+    bool (*find)(parser *p, const json_slice *name, const uint32_t **found, size_t *n_found);
+} named_sources;
+
+/* {"pose-1": w, ...} into row [C][width]: the others are 0. */
+static bool read_by_name(parser *p, const named_sources *of, float *row) {
+    const size_t C = p->scene->n_channels, mark = p->pointer_length;
     json_slice key;
     index_set_clear(&p->seen);
     if (!json_enter_object(&p->r)) return parser_fault(p);
@@ -271,21 +278,24 @@ static bool read_named_emitters(parser *p, float *row) {
         const uint32_t *found = NULL;
         size_t n_found;
         parser_point_key(p, key.bytes, key.length);
-        if (!parser_find_in(p, emitters, &key, &found, &n_found)) return false;
+        if (!of->find(p, &key, &found, &n_found)) return false;
         if (!read_colour(p, p->colour)) return false;
         for (size_t k = 0; k < n_found; k++) {
             const index_set_result added = index_set_add(&p->seen, found[k]);
             if (added == INDEX_SET_KNOWN)
-                return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s: the emitter %s is given twice",
-                                     parser_here(p), emitters->names[found[k]]);
+                return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s: the %s %s is given twice", parser_here(p),
+                                     of->one, of->names[found[k]]);
             if (added == INDEX_SET_NO_MEMORY)
-                return problem_set(p->why, PROBLEM_NO_MEMORY,
-                                   "not enough memory for the weights of emitters");
-            for (size_t c = 0; c < C; c++) row[c * s + found[k]] = p->colour[c];
+                return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for values of %ss", of->one);
+            for (size_t c = 0; c < C; c++) row[c * of->width + found[k]] = p->colour[c];
         }
         p->pointer_length = mark;
     }
     return p->why->status == 0;
+}
+
+static bool find_emitters(parser *p, const json_slice *name, const uint32_t **found, size_t *n_found) {
+    return parser_find_in(p, p->scene->emitters, name, found, n_found);
 }
 
 /* One weight for each emitter, or weights by name. */
@@ -298,12 +308,48 @@ static bool read_emitters(parser *p) {
     if (!named && !parser_expect(p, JSON_ARRAY, "an array of weights, or an object of names and weights"))
         return false;
     if (!radiosity_request_emitters(p->request, p->scene, &W, p->why)) return refused_here(p);
-    return named ? read_named_emitters(p, W) : read_side(p, p->scene->n_emitters, "emitter", read_colour, W);
+    if (!named) return read_side(p, p->scene->n_emitters, "emitter", read_colour, W);
+    const named_sources of = {"emitter", p->scene->n_emitters, p->scene->emitters->names, find_emitters};
+    return read_by_name(p, &of, W);
+}
+
+/* Dimmers by the names of luminaires, or of groups of them. */
+static bool read_luminaires(parser *p) {
+    const codec_scene *scene = p->scene;
+    float *D;
+    if (scene->n_luminaires == 0)
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                             "%s: the store has no luminaires; precompute it with --luminaires",
+                             parser_here(p));
+    if (scene->n_emitters > 0)
+        return parser_refuse(
+            p, PROBLEM_NOT_IN_STORE,
+            "%s: luminaires are answered by other kinds of stores, not by one of few emitters",
+            parser_here(p));
+    if (!parser_expect(p, JSON_OBJECT, "an object of names and dimmers")) return false;
+    if (!radiosity_request_luminaires(p->request, scene, &D, p->why)) return refused_here(p);
+    const named_sources of = {"luminaire", scene->n_luminaires, scene->luminaires->each.names,
+                              parser_find_luminaires};
+    return read_by_name(p, &of, D);
+}
+
+/* The members of an emission that is an object. */
+enum { ELEMENTS, VALUES, GROUPS, SKY, SUN, EMITTERS, LUMINAIRES, N_NAMES };
+
+/* The members that stand beside the emission of elements, and have no sign. */
+static bool read_beside(parser *p, size_t which) {
+    p->in_side = true;
+    const bool good = which == SKY        ? read_sky(p)
+                      : which == SUN      ? parser_read_sun(p)
+                      : which == EMITTERS ? read_emitters(p)
+                                          : read_luminaires(p);
+    p->in_side = false;
+    return good;
 }
 
 static bool read_emission_object(parser *p) {
-    static const char *const names[] = {"elements", "values", "groups", "sky", "sun", "emitters"};
-    enum { ELEMENTS, VALUES, GROUPS, SKY, SUN, EMITTERS, N_NAMES };
+    static const char *const names[] = {"elements", "values",   "groups",    "sky",
+                                        "sun",      "emitters", "luminaires"};
     const size_t C = p->scene->n_channels, mark = p->pointer_length;
     size_t n_values = 0, which;
     unsigned seen = 0;
@@ -326,22 +372,20 @@ static bool read_emission_object(parser *p) {
             good = read_groups(p);
             break;
         default:
-            p->in_side = true;
-            good = which == SKY ? read_sky(p) : which == SUN ? parser_read_sun(p) : read_emitters(p);
-            p->in_side = false;
+            good = read_beside(p, which);
         }
         if (!good) return false;
         p->pointer_length = mark;
     }
     if (p->why->status != 0) return false;
     const bool sparse = (seen & (1u << ELEMENTS | 1u << VALUES)) != 0;
-    const bool groups = (seen & 1u << GROUPS) != 0, sky = (seen & (1u << SKY | 1u << SUN)) != 0;
-    const bool emitters = (seen & 1u << EMITTERS) != 0;
+    const bool groups = (seen & 1u << GROUPS) != 0, emitters = (seen & 1u << EMITTERS) != 0;
+    const bool alone = (seen & (1u << SKY | 1u << SUN | 1u << LUMINAIRES)) != 0;
     const int ways = sparse + groups + emitters;
-    if (ways > 1 || (ways == 0 && !sky))
+    if (ways > 1 || (ways == 0 && !alone))
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
-                             "%s must hold either elements and values or groups or emitters, or a sky or "
-                             "a sun",
+                             "%s must hold either elements and values or groups or emitters, or a sky, a sun "
+                             "or luminaires",
                              parser_here(p));
     if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold both elements and values",

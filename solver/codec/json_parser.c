@@ -184,6 +184,16 @@ bool parser_find_in(parser *p, const group_index *index, const json_slice *name,
     return parser_refuse(p, PROBLEM_UNKNOWN_GROUP, "%s: the scene has %s", parser_here(p), miss);
 }
 
+bool parser_find_luminaires(parser *p, const json_slice *name, const uint32_t **luminaires,
+                            size_t *n_luminaires) {
+    const luminaire_names *names = p->scene->luminaires;
+    char miss[GROUP_MISS];
+    *n_luminaires = luminaire_names_find(names, name->bytes, name->length, luminaires);
+    if (*n_luminaires > 0) return true;
+    luminaire_names_miss(names, name->bytes, name->length, miss);
+    return parser_refuse(p, PROBLEM_UNKNOWN_GROUP, "%s: the scene has %s", parser_here(p), miss);
+}
+
 bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups) {
     return parser_find_in(p, p->scene->groups, name, groups, n_groups);
 }
@@ -214,7 +224,9 @@ bool parser_fill_sides(parser *p) {
     return (request->sky.values == NULL || request->sky.n == request->n_rhs ||
             radiosity_request_sky(request, p->scene, &last, p->why)) &&
            (request->emitters.values == NULL || request->emitters.n == request->n_rhs ||
-            radiosity_request_emitters(request, p->scene, &last, p->why));
+            radiosity_request_emitters(request, p->scene, &last, p->why)) &&
+           (request->luminaires.values == NULL || request->luminaires.n == request->n_rhs ||
+            radiosity_request_luminaires(request, p->scene, &last, p->why));
 }
 
 bool parser_read_body(parser *p, const parser_body *body, unsigned *seen) {

@@ -42,7 +42,7 @@ typedef struct parser {
     char pointer[sizeof((problem *)0)->pointer]; /* of the value being read */
     size_t pointer_length;
     /* Scratch of sparse vectors, kept from one to the next; never larger than the text read so far. */
-    bool in_side; /* in radiances or weights, which have no sign */
+    bool in_side; /* in radiances, weights or dimmers, which have no sign */
     index_list elements;
     float *values; /* [values_capacity][C] */
     size_t values_capacity;
@@ -61,7 +61,7 @@ bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t 
                   radiosity_request *request, problem *why);
 bool parser_end(parser *p, bool good);
 
-/* Adds dark skies and emitters for the vectors behind the last that has any. */
+/* Adds dark skies, emitters and luminaires for the vectors behind the last that has any. */
 bool parser_fill_sides(parser *p);
 
 /* Goes into a member, or an array's element; the caller restores pointer_length. A key that does not
@@ -106,10 +106,12 @@ bool parser_read_body(parser *p, const parser_body *body, unsigned *seen);
 /* Appends; values is not NULL then, also for none. 503 when memory is short. */
 bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t count);
 
-/* The groups that a name means, and those of the text that comes next; name is valid until the next text is
- * read. */
+/* The groups, or luminaires, that a name means, and the groups of the text that comes next; name is valid
+ * until the next text is read. */
 bool parser_find_in(parser *p, const group_index *index, const json_slice *name, const uint32_t **groups,
                     size_t *n_groups);
+bool parser_find_luminaires(parser *p, const json_slice *name, const uint32_t **luminaires,
+                            size_t *n_luminaires);
 bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups);
 bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups);
 
@@ -128,7 +130,7 @@ bool parser_read_radiance(parser *p, float *colour);
 bool parser_read_sun(parser *p);
 
 /* The value of `emission`, and of `emissions`; of `cotangent`, which has neither sky nor sun nor
- * emitters. */
+ * emitters nor luminaires. */
 bool parser_read_emission(parser *p);
 bool parser_read_emissions(parser *p);
 

@@ -93,7 +93,7 @@ bool parser_convert(parser *p) {
     const codec_scene *scene = p->scene;
     radiosity_request *request = p->request;
     const size_t C = scene->n_channels;
-    const bool lamps = request->n_spots + request->n_dense + request->emitters.n > 0;
+    const bool lamps = request->n_spots + request->n_dense + request->emitters.n + request->luminaires.n > 0;
     const bool skies = request->sky.values != NULL;
     const light_kind sky = p->sky_given ? p->sky_lights : scene->lights;
     if (p->sky_given && !skies)
@@ -110,6 +110,8 @@ bool parser_convert(parser *p) {
     bool good = scale(request->E, request->n_dense * C * scene->n, of_lamps);
     good = scale(request->colours, request->n_spots * C, of_lamps) && good;
     good = scale(request->emitters.values, request->emitters.n * C * scene->n_emitters, of_lamps) && good;
+    good =
+        scale(request->luminaires.values, request->luminaires.n * C * scene->n_luminaires, of_lamps) && good;
     good = scale(request->sky.values, request->sky.n * C * scene->n_tiles,
                  factor * light_kind_factor(sky, of)) &&
            good;

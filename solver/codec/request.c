@@ -15,6 +15,7 @@ void radiosity_request_free(radiosity_request *request) {
     free(request->colours);
     free(request->sky.values);
     free(request->emitters.values);
+    free(request->luminaires.values);
     free(request->suns);
     free(request->sunlight);
     free(request->selected);
@@ -154,7 +155,8 @@ bool radiosity_request_has_signs(const radiosity_request *request, const codec_s
         if (request->spots[k].vector == vector && request->colours[k * C + c] < 0) return true;
     return (vector < request->n_dense && is_negative(request->E + (vector * C + c) * scene->n, scene->n)) ||
            side_is_negative(&request->sky, C, scene->n_tiles, vector, c) ||
-           side_is_negative(&request->emitters, C, scene->n_emitters, vector, c);
+           side_is_negative(&request->emitters, C, scene->n_emitters, vector, c) ||
+           side_is_negative(&request->luminaires, C, scene->n_luminaires, vector, c);
 }
 
 static bool add_side(const radiosity_request *request, const codec_scene *scene, side_rows *side,
@@ -180,6 +182,11 @@ bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene,
 bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
                                 problem *why) {
     return add_side(request, scene, &request->emitters, scene->n_emitters, "emitters", row, why);
+}
+
+bool radiosity_request_luminaires(radiosity_request *request, const codec_scene *scene, float **row,
+                                  problem *why) {
+    return add_side(request, scene, &request->luminaires, scene->n_luminaires, "luminaires", row, why);
 }
 
 bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene, const request_sun *sun,

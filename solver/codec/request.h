@@ -8,20 +8,23 @@
 #include "solver/codec/face_means.h"
 #include "solver/codec/group_figures.h"
 #include "solver/codec/groups.h"
+#include "solver/codec/luminaire_names.h"
 #include "solver/codec/problem.h"
 
 /* The scene that a request is about, and the limits of one request. */
 typedef struct codec_scene {
     size_t n;
     size_t n_channels;
-    light_kind lights;           /* of emissions and radiances without a unit */
-    const group_index *groups;   /* measured, where lights may be given as flux */
-    const face_index *faces;     /* of the scene file; NULL or empty: they are not known */
-    size_t n_tiles;              /* of the sky; 0: none */
-    size_t n_emitters;           /* 0: none */
-    const group_index *emitters; /* these by name; NULL: they have none */
-    size_t max_batch;            /* vectors in a request, at most CODEC_BATCH_MOST */
-    size_t max_bytes;            /* of emission vectors in a request */
+    light_kind lights;                 /* of emissions and radiances without a unit */
+    const group_index *groups;         /* measured, where lights may be given as flux */
+    const face_index *faces;           /* of the scene file; NULL or empty: they are not known */
+    size_t n_tiles;                    /* of the sky; 0: none */
+    size_t n_emitters;                 /* 0: none */
+    const group_index *emitters;       /* these by name; NULL: they have none */
+    size_t n_luminaires;               /* 0: none */
+    const luminaire_names *luminaires; /* these by name; not NULL where there are any */
+    size_t max_batch;                  /* vectors in a request, at most CODEC_BATCH_MOST */
+    size_t max_bytes;                  /* of emission vectors in a request */
     /* Asked before memory for emission vectors is allocated, of bytes more than before; false with *why.
      * NULL: max_bytes is the only limit. */
     bool (*take)(void *owner, size_t bytes, problem *why);
@@ -48,7 +51,7 @@ typedef struct emission_spot {
     bool whole_group;
 } emission_spot;
 
-/* Radiances or weights beside the emissions: [n][C][width], for the first n vectors. */
+/* Radiances, weights or dimmers beside the emissions: [n][C][width], for the first n vectors. */
 typedef struct side_rows {
     float *values; /* NULL: no vector has any */
     size_t n, capacity;
@@ -85,6 +88,7 @@ typedef struct radiosity_request {
     side_rows sky;         /* radiances of its tiles */
     bool by_luminance;     /* some are the luminance of a colour, for a store of one channel */
     side_rows emitters;    /* their weights */
+    side_rows luminaires;  /* their dimmers */
     request_sun *suns;     /* [n_suns], by growing vector */
     float *sunlight;       /* [n_suns][C], irradiance of a plane normal to them */
     size_t n_suns, suns_capacity;
@@ -113,7 +117,8 @@ bool codec_read_emissions(const codec_scene *scene, const char *text, size_t len
 bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, radiosity_request *request,
                     problem *why);
 
-/* True where a channel of a vector has an emission, a radiance or a weight below 0. n and C are of the scene.
+/* True where a channel of a vector has an emission, a radiance, a weight or a dimmer below 0. n and C are of
+ * the scene.
  */
 bool radiosity_request_has_signs(const radiosity_request *request, const codec_scene *scene, size_t vector,
                                  size_t c);
@@ -131,11 +136,13 @@ bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene
 /* Puts every vector into E, the spots with it. */
 bool radiosity_request_expand(radiosity_request *request, const codec_scene *scene, problem *why);
 
-/* The sky over the last vector, or the weights of its emitters, zeroed: *row is its [C][m], or [C][s]; so are
- * those of the vectors before it that have none. */
+/* The sky over the last vector, or the weights of its emitters, or the dimmers of its luminaires, zeroed:
+ * *row is its [C][m], [C][s] or [C][k]; so are those of the vectors before it that have none. */
 bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene, float **row, problem *why);
 bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
                                 problem *why);
+bool radiosity_request_luminaires(radiosity_request *request, const codec_scene *scene, float **row,
+                                  problem *why);
 
 /* A sun over the last vector, which is set here; direct is [C]. */
 bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene, const request_sun *sun,
