@@ -53,6 +53,15 @@ lam_status store_set_text(store *s, const char *object, const char *name, const 
 lam_status store_set_number(store *s, const char *object, const char *name, double value, lam_error *error);
 lam_status store_set_integer(store *s, const char *object, const char *name, int64_t value, lam_error *error);
 
+/* True where a copy is to lack an object (attribute NULL; a group then also lacks all that is in it), or an
+ * attribute. */
+typedef bool store_skip(const char *object, const char *attribute);
+
+/* Copies the arrays and attributes of an opened store into one that is written, but for those that sealing
+ * adds and those to skip. Each array is compared with its checksums, and is in memory once. Errors: as
+ * store_read and store_write. */
+lam_status store_copy(store *from, store_skip *skip, store *to, lam_error *error);
+
 /* Adds format, version, created and /checksum, flushes to the disk, renames onto path (replacing an older
  * file as a whole) and frees s in any case; after an error no file is left behind. Errors: LAM_ERR_IO (also a
  * full disk; names path). */

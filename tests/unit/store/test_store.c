@@ -338,6 +338,60 @@ START_TEST(equal_input_gives_equal_bytes) {
 }
 END_TEST
 
+static bool skip_nothing(const char *object, const char *attribute) {
+    (void)object;
+    (void)attribute;
+    return false;
+}
+
+static bool skip_some(const char *object, const char *attribute) {
+    return attribute == NULL ? strcmp(object, "/left") == 0 : strcmp(attribute, "command") == 0;
+}
+
+START_TEST(a_copy_has_all_but_what_is_skipped) {
+    store *from = NULL, *to = NULL;
+    char copy[160], *text = NULL;
+    int64_t integer = 0;
+    double number = 0;
+    const float x[3] = {1, 2, 3};
+    snprintf(copy, sizeof copy, "%s/copy.h5", folder);
+    ck_ok(store_create(path, &to, &error));
+    ck_ok(store_write(to, "/left/x", STORE_F32, 1, (size_t[]){3}, x, &error));
+    ck_ok(store_write(to, "/leftover/x", STORE_F32, 1, (size_t[]){3}, x, &error));
+    ck_ok(store_write_texts(to, "/kept/names", 2, (const char *const[]){"a", "longer"}, &error));
+    ck_ok(store_set_text(to, "/", "command", "old", &error));
+    ck_ok(store_set_number(to, "/kept", "number", 1.5, &error));
+    ck_ok(store_set_integer(to, "/kept", "integer", INT64_MAX, &error));
+    ck_ok(store_set_text(to, "/left", "text", "gone", &error));
+    ck_ok(store_seal(to, &error));
+    ck_ok(store_open(path, &from, &error));
+    ck_ok(store_create(copy, &to, &error));
+    ck_ok(store_copy(from, skip_nothing, to, &error));
+    ck_ok(store_seal(to, &error));
+    ck_ok(store_open(copy, &to, &error));
+    ck_assert_str_eq(store_identity_of(to)->digest, store_identity_of(from)->digest);
+    ck_assert(store_has_attribute(to, "/left", "text"));
+    store_close(to);
+    ck_ok(store_create(copy, &to, &error));
+    ck_ok(store_copy(from, skip_some, to, &error));
+    ck_ok(store_set_text(to, "/", "command", "new", &error));
+    ck_ok(store_seal(to, &error));
+    ck_ok(store_open(copy, &to, &error));
+    ck_assert(!store_has(to, "/left"));
+    ck_assert(store_has(to, "/leftover/x"));
+    ck_assert(store_has(to, "/kept/names"));
+    ck_ok(store_get_text(to, "/", "command", &text, &error));
+    ck_assert_str_eq(text, "new");
+    ck_ok(store_get_number(to, "/kept", "number", &number, &error));
+    ck_ok(store_get_integer(to, "/kept", "integer", &integer, &error));
+    ck_assert_double_eq(number, 1.5);
+    ck_assert_int_eq(integer, INT64_MAX);
+    free(text);
+    store_close(to);
+    store_close(from);
+}
+END_TEST
+
 START_TEST(nothing_is_left_without_a_seal) {
     store *s = NULL;
     ck_ok(store_create(path, &s, &error));
@@ -475,6 +529,7 @@ int main(void) {
     tcase_add_test(tests, an_array_is_written_once);
     tcase_add_test(tests, group_bytes_are_counted);
     tcase_add_test(tests, equal_input_gives_equal_bytes);
+    tcase_add_test(tests, a_copy_has_all_but_what_is_skipped);
     tcase_add_test(tests, nothing_is_left_without_a_seal);
     tcase_add_test(tests, a_seal_replaces_the_older_file_whole);
     tcase_add_test(tests, stores_do_not_lock_each_other);

@@ -1,0 +1,111 @@
+/* Dimmers of a command line, --dim NAME=V, and those of the list of luminaires. */
+#include "solver/light/emission.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DIM_TEXT = 240 };
+
+/* The end of the name of an item, and its values, 1 or several. */
+static lam_status parse_item(const char *item, size_t *length, double *values, size_t most, size_t *n,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    char what[DIM_TEXT];
+    const char *equals = strrchr(item, '=');
+    if (equals == NULL || equals == item)
+        FAIL(error, LAM_ERR_ARGUMENT, "--dim %.200s: must be NAME=V or NAME=V,V,V", item);
+    if (equals[1 + strspn(equals + 1, "0123456789+-.,eE")] != '\0')
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--dim %.200s: must be numbers between commas, without a unit: 1 is the full light of a "
+             "luminaire",
+             item);
+    *length = (size_t)(equals - item);
+    snprintf(what, sizeof what, "--dim %.*s:", (int)(*length < 200 ? *length : 200), item);
+    TRY(option_numbers(what, equals + 1, most, false, values, n, error));
+    for (size_t c = 0; c < *n; c++)
+        if (values[c] < 0 || values[c] > (double)FLT_MAX)
+            FAIL(error, LAM_ERR_ARGUMENT, "--dim %.200s: must be from 0 to %g", item, (double)FLT_MAX);
+done:
+    return status;
+}
+
+enum { CHANNELS_MOST = 3 };
+
+lam_status emission_check_dims(const option_list *items, lam_error *error) {
+    lam_status status = LAM_OK;
+    double values[CHANNELS_MOST];
+    size_t length, n;
+    for (size_t i = 0; i < items->count; i++)
+        TRY(parse_item(items->items[i], &length, values, CHANNELS_MOST, &n, error));
+done:
+    return status;
+}
+
+static lam_status dim_item(const emission_scene *scene, const char *item, float *D, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = scene->m->n_channels, k = lam_luminaires_count(scene->luminaires);
+    double values[CHANNELS_MOST];
+    const uint32_t *found = NULL;
+    size_t length, n;
+    char miss[GROUP_MISS];
+    TRY(parse_item(item, &length, values, CHANNELS_MOST, &n, error));
+    if (n != 1 && n != C)
+        FAIL(error, LAM_ERR_ARGUMENT, "--dim %.200s: %zu values, must be 1 or one for each of %zu channels",
+             item, n, C);
+    const size_t n_found = luminaire_names_find(&scene->names, item, length, &found);
+    if (n_found == 0) {
+        luminaire_names_miss(&scene->names, item, length, miss);
+        FAIL(error, LAM_ERR_ARGUMENT, "--dim %.200s: the store has %s", item, miss);
+    }
+    for (size_t f = 0; f < n_found; f++)
+        for (size_t c = 0; c < C; c++) D[c * k + found[f]] = (float)values[n == 1 ? 0 : c];
+done:
+    return status;
+}
+
+static lam_status reserve(const emission_scene *scene, float **D, lam_error *error) {
+    return emission_allocate("dimmers", scene->m->n_channels, lam_luminaires_count(scene->luminaires), 1, D,
+                             error);
+}
+
+lam_status emission_dim(const emission_scene *scene, const option_list *items, emission *e,
+                        lam_error *error) {
+    lam_status status = LAM_OK;
+    float *D = NULL;
+    if (scene->luminaires == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--dim %.200s: the store has no luminaires; precompute it with --luminaires", items->items[0]);
+    if (e->D != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--dim %.200s: the emission has luminaires of its own",
+             items->items[0]);
+    TRY(reserve(scene, &D, error));
+    for (size_t i = 0; i < items->count; i++) TRY(dim_item(scene, items->items[i], D, error));
+    if (e->n_vectors > 1 && !e->steady) {
+        const size_t row = scene->m->n_channels * lam_luminaires_count(scene->luminaires);
+        TRY(emission_allocate("dimmers", scene->m->n_channels, lam_luminaires_count(scene->luminaires),
+                              e->n_vectors, &e->D, error));
+        for (size_t v = 0; v < e->n_vectors; v++) memcpy(e->D + v * row, D, row * sizeof *D);
+    } else {
+        e->D = D;
+        D = NULL;
+    }
+    e->luminaires = scene->luminaires;
+done:
+    free(D);
+    return status;
+}
+
+lam_status emission_dim_as_listed(const emission_scene *scene, emission *e, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (scene->luminaires == NULL) return LAM_OK;
+    const size_t k = lam_luminaires_count(scene->luminaires);
+    TRY(reserve(scene, &e->D, error));
+    for (size_t c = 0; c < scene->m->n_channels; c++)
+        for (size_t j = 0; j < k; j++) e->D[c * k + j] = (float)lam_luminaires_dimmer(scene->luminaires, j);
+    e->luminaires = scene->luminaires;
+done:
+    return status;
+}
