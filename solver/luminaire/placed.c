@@ -189,7 +189,7 @@ lam_status placed_read_text(const char *name, const char *text, size_t length, c
     lam_status status = LAM_OK;
     luminaire_source s;
     placed_luminaires p = {.n = 0};
-    placed_reading r = {.name = name, .out = &p};
+    placed_reading r = {.name = name, .out = &p, .up = options->up};
     if (length > PLACED_BYTES_MOST) TRY(too_large(name, length, error));
     TRY(luminaire_source_open(name, text, length, &s, error));
     p.is_csv = !begins_as_json(&s) && (placed_csv_is_it(&s) || !luminaire_is_named(name, ".json"));

@@ -53,6 +53,7 @@ typedef struct placed_luminaires {
 
 typedef struct placed_options {
     double unit;        /* metres of a unit of its coordinates where it states none; 0: 1 */
+    char up;            /* axis of the scene that points up: x, y or z; 0: z */
     const char *assets; /* folder of files that do not lie beside the list; NULL: none */
 } placed_options;
 

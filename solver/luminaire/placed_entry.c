@@ -282,7 +282,7 @@ static lam_status read_turn(const entry *e, json_t *turn, placed_luminaire *l, l
     TRY(read_direction(e, "axis of turn", json_object_get(turn, "axis"), axis, error));
     TRY(read_value(e, "degrees of turn", json_object_get(turn, "degrees"), -length_most, length_most, false,
                    &degrees, error));
-    placed_turn(axis, degrees, l);
+    placed_turn(axis, degrees, e->r->up, l);
 done:
     return status;
 }
@@ -293,7 +293,9 @@ static lam_status read_frame(const entry *e, placed_luminaire *l, lam_error *err
     const json_t *aim = json_object_get(e->value, "aim"), *aim_at = json_object_get(e->value, "aim_at"),
                  *c0 = json_object_get(e->value, "c0");
     json_t *turn = json_object_get(e->value, "turn");
-    double direction[3] = {0, 0, -1}, axis[3] = {0}, degrees = 0;
+    double direction[3], axis[3] = {0}, degrees = 0;
+    placed_hang(e->r->up, l);
+    for (int d = 0; d < 3; d++) direction[d] = -l->z[d];
     if ((aim != NULL) + (aim_at != NULL) + (turn != NULL) > 1)
         FAIL(error, LAM_ERR_ARGUMENT, "%s must have one of aim, aim_at and turn, not several", e->place);
     if (turn != NULL && c0 != NULL)
@@ -312,7 +314,7 @@ static lam_status read_frame(const entry *e, placed_luminaire *l, lam_error *err
         TRY(read_direction(e, "c0", c0, axis, error));
     else if (c0 != NULL)
         TRY(wrong(e, "c0", c0, "must be a direction [x, y, z] or a number of degrees", error));
-    if (!placed_aim(direction, json_is_array(c0) ? axis : NULL, degrees, l))
+    if (!placed_aim(direction, json_is_array(c0) ? axis : NULL, degrees, e->r->up, l))
         TRY(wrong(e, "c0", c0, "must not lie along the aim", error));
 done:
     return status;

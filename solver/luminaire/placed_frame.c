@@ -34,14 +34,26 @@ static bool across(const double of[3], const double along[3], double out[3]) {
     return placed_normalize(out);
 }
 
-bool placed_aim(const double aim[3], const double *c0, double degrees, placed_luminaire *l) {
-    double down[3], wanted[3] = {1, 0, 0}, x[3], y[3];
+void placed_hang(char up, placed_luminaire *l) {
+    const double zero[3] = {0, 0, 0};
+    memcpy(l->x, zero, sizeof zero);
+    memcpy(l->z, zero, sizeof zero);
+    l->x[up == 'x' ? 1 : 0] = 1;
+    l->z[up == 'x' ? 0 : up == 'y' ? 1 : 2] = 1;
+    cross3(l->z, l->x, l->y);
+}
+
+bool placed_aim(const double aim[3], const double *c0, double degrees, char up, placed_luminaire *l) {
+    double down[3], wanted[3], x[3], y[3];
+    placed_luminaire hung;
+    placed_hang(up, &hung);
     memcpy(down, aim, sizeof down);
-    if (c0 != NULL) memcpy(wanted, c0, sizeof wanted);
+    memcpy(wanted, c0 != NULL ? c0 : hung.x, sizeof wanted);
     if (!placed_normalize(down) || !placed_normalize(wanted)) return false;
     if (!across(wanted, down, x)) {
-        const double up[3] = {0, 0, down[0] > 0 ? 1 : -1};
-        if (c0 != NULL || !across(up, down, x)) return false;
+        const double side = dot3(down, hung.x) > 0 ? 1 : -1;
+        for (int d = 0; d < 3; d++) wanted[d] = side * hung.z[d];
+        if (c0 != NULL || !across(wanted, down, x)) return false;
     }
     for (int d = 0; d < 3; d++) l->z[d] = -down[d];
     cross3(l->z, x, y);
@@ -61,15 +73,16 @@ static void turned(const double k[3], double c, double s, const double v[3], dou
     for (int d = 0; d < 3; d++) out[d] = c * v[d] + s * side[d] + along * k[d];
 }
 
-void placed_turn(const double axis[3], double degrees, placed_luminaire *l) {
-    static const double own[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+void placed_turn(const double axis[3], double degrees, char up, placed_luminaire *l) {
+    placed_luminaire hung;
     const double angle = remainder(degrees, 360) * (M_PI / 180), c = cos(angle), s = sin(angle);
     double k[3];
     memcpy(k, axis, sizeof k);
     placed_normalize(k);
-    turned(k, c, s, own[0], l->x);
-    turned(k, c, s, own[1], l->y);
-    turned(k, c, s, own[2], l->z);
+    placed_hang(up, &hung);
+    turned(k, c, s, hung.x, l->x);
+    turned(k, c, s, hung.y, l->y);
+    turned(k, c, s, hung.z, l->z);
 }
 
 /* a + u (b + u (c + u d)) */

@@ -11,6 +11,7 @@
 typedef struct placed_reading {
     const char *name; /* of the file, with which messages begin */
     double unit;      /* metres */
+    char up;          /* x, y or z */
     json_t *files;
     placed_luminaires *out;
     size_t capacity, files_capacity, ignored_capacity;
@@ -38,13 +39,17 @@ lam_status placed_csv(const luminaire_source *s, placed_reading *r, lam_error *e
 /* True where the first line names columns of such a file. */
 bool placed_csv_is_it(const luminaire_source *s);
 
-/* The frame of a luminaire that sends gamma 0 along aim, both of any length. Its C0 is the part of c0 across
- * the aim; c0 NULL: that of x, or of z where the aim lies along x, as a luminaire that is tilted to it has
- * C0. Then it is turned about its own z by degrees. False where c0 is along the aim. */
-bool placed_aim(const double aim[3], const double *c0, double degrees, placed_luminaire *l);
+/* The frame of a luminaire that hangs in a scene with this axis upwards: z is up, and x (C0) is east, the
+ * axis x of a scene or, where that is up, y. */
+void placed_hang(char up, placed_luminaire *l);
 
-/* The frame of a luminaire that hung, with axes x, y and z, and was turned about an axis. */
-void placed_turn(const double axis[3], double degrees, placed_luminaire *l);
+/* The frame of one that sends gamma 0 along aim, both of any length. Its C0 is the part of c0 across the aim;
+ * c0 NULL: that of east, or of up where the aim lies along east, as a luminaire that is tilted to it has C0.
+ * Then it is turned about its own z by degrees. False where c0 is along the aim. */
+bool placed_aim(const double aim[3], const double *c0, double degrees, char up, placed_luminaire *l);
+
+/* The frame of one that hung and was turned about an axis. */
+void placed_turn(const double axis[3], double degrees, char up, placed_luminaire *l);
 
 /* Makes the length 1; false where there is none. */
 bool placed_normalize(double v[3]);

@@ -4,12 +4,13 @@
 #include "store/status.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define NO_GROUP 0xFFFFFFFFu
 
-enum { PLACE = 12, OPENING = 4, TABLE = 3 };
+enum { PLACE = 12, OPENING = 8, TABLE = 4 };
 
 /* The groups of luminaires that have one, each name once, and the group of each luminaire. */
 static lam_status save_groups(const placed_luminaires *p, store *s, lam_error *error) {
@@ -71,6 +72,7 @@ static lam_status save_numbers(const placed_luminaires *p, const double *scale, 
         if (l->is_point) continue; /* shape and size 0 are a point */
         opening[k * OPENING] = o->shape;
         memcpy(opening + k * OPENING + 1, o->size, sizeof o->size);
+        memcpy(opening + k * OPENING + 4, o->side, sizeof o->side);
     }
     TRY(store_write(s, STORE_LUMINAIRES "/place", STORE_F64, 2, (size_t[]){n, PLACE}, place, error));
     TRY(store_write(s, STORE_LUMINAIRES "/opening", STORE_F64, 2, (size_t[]){n, OPENING}, opening, error));
@@ -111,8 +113,9 @@ static lam_status save_tables(const placed_luminaires *p, store *s, lam_error *e
         const size_t count = l->n_planes * l->n_angles;
         names[f] = p->files[f].name;
         shape[f * TABLE] = (uint32_t)l->type;
-        shape[f * TABLE + 1] = (uint32_t)l->n_planes;
-        shape[f * TABLE + 2] = (uint32_t)l->n_angles;
+        shape[f * TABLE + 1] = (uint32_t)l->symmetry;
+        shape[f * TABLE + 2] = (uint32_t)l->n_planes;
+        shape[f * TABLE + 3] = (uint32_t)l->n_angles;
         memcpy(C + planes, l->planes, l->n_planes * sizeof *C);
         memcpy(gamma + angles, l->angles, l->n_angles * sizeof *gamma);
         memcpy(I + candela, l->candela, count * sizeof *I);
@@ -121,7 +124,8 @@ static lam_status save_tables(const placed_luminaires *p, store *s, lam_error *e
         candela += count;
     }
     TRY(store_write_texts(s, STORE_LUMINAIRES "/table_names", p->n_files, names, error));
-    TRY(store_write(s, STORE_LUMINAIRES "/tables", STORE_U32, 2, (size_t[]){p->n_files, TABLE}, shape, error));
+    TRY(store_write(s, STORE_LUMINAIRES "/tables", STORE_U32, 2, (size_t[]){p->n_files, TABLE}, shape,
+                    error));
     TRY(store_write(s, STORE_LUMINAIRES "/planes", STORE_F64, 1, &planes, C, error));
     TRY(store_write(s, STORE_LUMINAIRES "/angles", STORE_F64, 1, &angles, gamma, error));
     TRY(store_write(s, STORE_LUMINAIRES "/candela", STORE_F64, 1, &candela, I, error));
@@ -187,10 +191,11 @@ static lam_status read_tables(store *s, tables_read *t, lam_error *error) {
     TRY(read_doubles(s, STORE_LUMINAIRES "/candela", 1, &t->candela, &t->I, error));
     for (size_t f = 0; f < t->n; f++) {
         const uint32_t *row = t->shape + f * TABLE;
-        if (row[0] >= LUMINAIRE_TYPES || !size_multiply(row[1], row[2], &count))
+        if (row[0] >= LUMINAIRE_TYPES || row[1] >= LUMINAIRE_SYMMETRIES ||
+            !size_multiply(row[2], row[3], &count))
             FAIL(error, LAM_ERR_FORMAT, "%s: /luminaires/tables[%zu] is no table", store_path(s), f);
-        planes += row[1];
-        angles += row[2];
+        planes += row[2];
+        angles += row[3];
         candela += count;
     }
     if (t->n == 0 || t->n_names != t->n || planes != t->planes || angles != t->angles ||
@@ -215,16 +220,18 @@ static lam_status make_file(store *s, const tables_read *t, size_t table, const 
     size_t planes = 0, angles = 0, candela = 0;
     luminaire *l = &out->photometry;
     for (size_t f = 0; f < table; f++) {
-        planes += t->shape[f * TABLE + 1];
-        angles += t->shape[f * TABLE + 2];
-        candela += (size_t)t->shape[f * TABLE + 1] * t->shape[f * TABLE + 2];
+        planes += t->shape[f * TABLE + 2];
+        angles += t->shape[f * TABLE + 3];
+        candela += (size_t)t->shape[f * TABLE + 2] * t->shape[f * TABLE + 3];
     }
     l->type = (luminaire_type)t->shape[table * TABLE];
-    l->n_planes = t->shape[table * TABLE + 1];
-    l->n_angles = t->shape[table * TABLE + 2];
+    l->symmetry = (luminaire_symmetry)t->shape[table * TABLE + 1];
+    l->n_planes = t->shape[table * TABLE + 2];
+    l->n_angles = t->shape[table * TABLE + 3];
     l->output_ratio = NAN;
     l->opening.shape = (luminaire_shape)opening[0];
     memcpy(l->opening.size, opening + 1, sizeof l->opening.size);
+    memcpy(l->opening.side, opening + 4, sizeof l->opening.side);
     out->name = strdup(t->names[table]);
     if (out->name == NULL) FAIL(error, LAM_ERR_MEMORY, "not enough memory for luminaires");
     TRY(copy_doubles(l->n_planes, t->C + planes, &l->planes, error));
@@ -234,8 +241,8 @@ static lam_status make_file(store *s, const tables_read *t, size_t table, const 
     l->sets = memory_allocate(1, sizeof *l->sets, "luminaires", error);
     if (l->sets == NULL) TRY(LAM_ERR_MEMORY);
     if (!(opening[0] >= 0 && opening[0] < LUMINAIRE_SHAPES) || !luminaire_is_sound(l))
-        FAIL(error, LAM_ERR_FORMAT, "%s: /luminaires/tables[%zu] or its opening is no luminaire", store_path(s),
-             table);
+        FAIL(error, LAM_ERR_FORMAT, "%s: /luminaires/tables[%zu] or its opening is no luminaire",
+             store_path(s), table);
     out->lumens = luminaire_lumens(l);
 done:
     return status;
@@ -295,9 +302,10 @@ static lam_status find_file(store *s, const tables_read *t, const numbers_read *
         FAIL(error, LAM_ERR_FORMAT, "%s: /luminaires/table[%zu] = %u, must be below %zu", store_path(s), k,
              (unsigned)r->table[k], t->n);
     size_t f = p->n_files;
-    while (f > 0 && (of_file[f - 1] != r->table[k] ||
-                     (double)p->files[f - 1].photometry.opening.shape != opening[0] ||
-                     memcmp(p->files[f - 1].photometry.opening.size, opening + 1, 3 * sizeof *opening) != 0))
+    while (f > 0 &&
+           (of_file[f - 1] != r->table[k] || (double)p->files[f - 1].photometry.opening.shape != opening[0] ||
+            memcmp(p->files[f - 1].photometry.opening.size, opening + 1, 3 * sizeof *opening) != 0 ||
+            memcmp(p->files[f - 1].photometry.opening.side, opening + 4, 4 * sizeof *opening) != 0))
         f--;
     p->luminaires[k].file = f > 0 ? f - 1 : p->n_files;
     if (f > 0) goto done;
@@ -361,8 +369,8 @@ done:
 }
 
 static bool same_table(const luminaire *a, const luminaire *b) {
-    return a->type == b->type && a->n_planes == b->n_planes && a->n_angles == b->n_angles &&
-           memcmp(a->planes, b->planes, a->n_planes * sizeof *a->planes) == 0 &&
+    return a->type == b->type && a->symmetry == b->symmetry && a->n_planes == b->n_planes &&
+           a->n_angles == b->n_angles && memcmp(a->planes, b->planes, a->n_planes * sizeof *a->planes) == 0 &&
            memcmp(a->angles, b->angles, a->n_angles * sizeof *a->angles) == 0 &&
            memcmp(a->candela, b->candela, a->n_planes * a->n_angles * sizeof *a->candela) == 0;
 }
@@ -372,7 +380,8 @@ static bool same_opening(const placed_luminaire *a, const luminaire_opening *of_
     const bool point_a = a->is_point || of_a->shape == OPENING_POINT;
     const bool point_b = b->is_point || of_b->shape == OPENING_POINT;
     if (point_a || point_b) return point_a && point_b;
-    return of_a->shape == of_b->shape && memcmp(of_a->size, of_b->size, sizeof of_a->size) == 0;
+    return of_a->shape == of_b->shape && memcmp(of_a->size, of_b->size, sizeof of_a->size) == 0 &&
+           memcmp(of_a->side, of_b->side, sizeof of_a->side) == 0;
 }
 
 bool placed_lights_alike(const placed_luminaires *a, size_t i, const placed_luminaires *b, size_t j) {

@@ -22,8 +22,8 @@ lam_status placed_save(const placed_luminaires *p, const double *scale, size_t n
 lam_status placed_load(store *s, size_t n_groups, char *const *group_names, placed_luminaires *out,
                        lam_error *error);
 
-/* True where two luminaires light a scene alike at dim 1, but for a factor of all of it: in place, frame,
- * opening, table and ignored groups. */
+/* True where two luminaires light a scene alike at dim 1, but for a factor of all of it, if the same groups
+ * hide them: they have the same place, frame, opening and table. */
 bool placed_lights_alike(const placed_luminaires *a, size_t i, const placed_luminaires *b, size_t j);
 
 #endif
