@@ -109,16 +109,17 @@ static bool any(const float *x, size_t count) {
     return false;
 }
 
-/* The numbers of one vector in E, L and W. */
+/* The numbers of one vector in E, L, W and D. */
 typedef struct widths {
-    size_t E, L, W;
+    size_t E, L, W, D;
 } widths;
 
-static widths widths_of(const lam_operator *op, const lam_sky *sky) {
+static widths widths_of(const emission *light, const lam_operator *op, const lam_sky *sky) {
     const size_t C = lam_operator_channels(op);
     return (widths){.E = C * lam_operator_elements(op),
                     .L = sky != NULL ? C * lam_sky_tiles(sky) : 0,
-                    .W = C * lam_operator_emitters(op)};
+                    .W = C * lam_operator_emitters(op),
+                    .D = light->D != NULL ? C * lam_luminaires_count(light->luminaires) : 0};
 }
 
 static bool is_lit(const emission *light, const widths *width, size_t v) {
@@ -126,7 +127,8 @@ static bool is_lit(const emission *light, const widths *width, size_t v) {
     return any(light->E + one * width->E, width->E) ||
            (light->sun != NULL && sunlight_shines(light->sun, v)) ||
            (light->L != NULL && any(light->L + v * width->L, width->L)) ||
-           (light->W != NULL && any(light->W + one * width->W, width->W));
+           (light->W != NULL && any(light->W + one * width->W, width->W)) ||
+           (light->D != NULL && any(light->D + one * width->D, width->D));
 }
 
 /* The mean of n rows, summed in double; *out is freed with free(), NULL where there are none. */
@@ -150,10 +152,11 @@ done:
 static lam_status mean_of(const emission *light, const widths *width, emission *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = light->steady ? 1 : light->n_vectors;
-    emission e = {.n_vectors = 1};
+    emission e = {.n_vectors = 1, .luminaires = light->luminaires};
     TRY(mean_row(n, width->E, light->E, &e.E, error));
     TRY(mean_row(light->n_vectors, width->L, light->L, &e.L, error));
     TRY(mean_row(n, width->W, light->W, &e.W, error));
+    TRY(mean_row(n, width->D, light->D, &e.D, error));
     *out = e;
     e = (emission){0};
 done:
@@ -170,7 +173,7 @@ void annual_mean_free(annual_mean *m) {
 lam_status annual_mean_find(const emission *light, const lam_operator *op, const lam_sky *sky,
                             const progress *steps, annual_mean *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const widths width = widths_of(op, sky);
+    const widths width = widths_of(light, op, sky);
     *out = (annual_mean){.light = {.n_vectors = 0}};
     TRY(mean_of(light, &width, &out->light, error));
     out->light.limiter = light->limiter;
@@ -336,7 +339,12 @@ static lam_status tile_answers_make(const work *w, const emission *light, tile_a
     for (size_t t = 0; t < m; t++)
         for (size_t c = 0; c < C; c++) units[(t * C + c) * m + t] = 1;
     const emission tiles = {.n_vectors = m, .steady = true, .E = dark, .L = units},
-                   lamps = {.n_vectors = 1, .steady = true, .E = light->E, .L = units + m * C * m};
+                   lamps = {.n_vectors = 1,
+                            .steady = true,
+                            .E = light->E,
+                            .L = units + m * C * m,
+                            .D = light->D,
+                            .luminaires = light->luminaires};
     TRY(add_answers(w, &tiles, m, light->limiter, &a, error));
     TRY(add_answers(w, &lamps, 1, light->limiter, &a, error));
     *out = a;
@@ -458,7 +466,7 @@ lam_status annual_apply(const annual_options *options, const emission *light, co
     lam_status status = LAM_OK;
     const size_t C = options->luminance ? 1 : lam_operator_channels(op), n = lam_operator_elements(op);
     const size_t wanted = selected != NULL ? n_selected : n;
-    const widths width = widths_of(op, sky);
+    const widths width = widths_of(light, op, sky);
     annual_summary sum = {.n = light->n_vectors};
     work w = {.options = options,
               .op = op,

@@ -9,6 +9,7 @@ void emission_free(emission *e) {
     free(e->E);
     free(e->L);
     free(e->W);
+    free(e->D);
     *e = (emission){0};
 }
 
@@ -57,14 +58,20 @@ done:
 void emission_scene_free(emission_scene *scene) {
     group_index_free(&scene->groups);
     group_index_free(&scene->emitters);
+    luminaire_names_free(&scene->names);
     *scene = (emission_scene){0};
 }
 
 lam_status emission_scene_sources(emission_scene *scene, const lam_operator *op, const lam_sky *sky,
-                                  lam_error *error) {
+                                  const lam_luminaires *luminaires, lam_error *error) {
+    lam_status status = LAM_OK;
     scene->n_tiles = sky != NULL ? lam_sky_tiles(sky) : 0;
     scene->n_emitters = lam_operator_emitters(op);
-    return group_index_of_emitters(op, &scene->emitters, error);
+    scene->luminaires = luminaires;
+    TRY(luminaire_names_make(luminaires, &scene->names, error));
+    TRY(group_index_of_emitters(op, &scene->emitters, error));
+done:
+    return status;
 }
 
 lam_status emission_fill_group(const emission_scene *scene, const char *what, const char *name,
@@ -238,13 +245,17 @@ done:
     return status;
 }
 
-lam_status emission_of_scene(const mesh *m, emission *out, lam_error *error) {
+lam_status emission_of_scene(const emission_scene *scene, emission *out, lam_error *error) {
     lam_status status = LAM_OK;
-    float *E = NULL;
-    TRY(one_vector(m, &E, error));
-    memcpy(E, m->emission, m->n * m->n_channels * sizeof *E);
-    *out = (emission){.n_vectors = 1, .E = E};
+    const mesh *m = scene->m;
+    emission made = {.n_vectors = 1};
+    TRY(one_vector(m, &made.E, error));
+    memcpy(made.E, m->emission, m->n * m->n_channels * sizeof *made.E);
+    TRY(emission_dim_as_listed(scene, &made, error));
+    *out = made;
+    made = (emission){0};
 done:
+    emission_free(&made);
     return status;
 }
 
@@ -253,11 +264,11 @@ lam_status emission_choose(const emission_scene *scene, const emission_options *
     lam_status status = LAM_OK;
     emission e = {.n_vectors = 1};
     *own = options->items->count == 0 && options->path == NULL && options->frames == NULL &&
-           options->sky == NULL && !options->other;
+           options->sky == NULL && options->dims->count == 0 && !options->other;
     if (options->frames != NULL)
         TRY(emission_read_frames(options->frames, scene, &e, error));
     else if (*own)
-        TRY(emission_of_scene(scene->m, &e, error));
+        TRY(emission_of_scene(scene, &e, error));
     else if (options->items->count > 0)
         TRY(emission_from_groups(scene, options->items, &e, error));
     else if (options->path != NULL)
@@ -265,6 +276,8 @@ lam_status emission_choose(const emission_scene *scene, const emission_options *
     else
         TRY(one_vector(scene->m, &e.E, error));
     e.lights = scene->m->lights;
+    e.luminaires = scene->luminaires;
+    if (options->dims->count > 0) TRY(emission_dim(scene, options->dims, &e, error));
     if (options->sky != NULL) TRY(emission_add_sky(&e, options->sky, scene, options->photometric, error));
     *out = e;
     e = (emission){0};

@@ -7,23 +7,27 @@
 #include "solver/base/options/options.h"
 #include "solver/base/photometry.h"
 #include "solver/codec/groups.h"
+#include "solver/codec/luminaire_names.h"
 #include "solver/scene/mesh.h"
 
-/* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2 or lm/m^2; NULL: W is all there is. */
+/* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2 or lm/m^2; NULL: W or D is all there is.
+ */
 typedef struct emission {
     size_t n_vectors;
     bool batch;  /* given as a batch (also of one), so answered as one */
-    bool steady; /* E and W are one vector, which goes with every sky of L: a year need not repeat it */
+    bool steady; /* E, W and D are one vector, which goes with every sky of L: a year need not repeat it */
     float *E;
     float *
         L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr) or cd/m^2; NULL: no sky
             */
     float *W; /* [n_vectors][C][s], weights of the store's emitters, beside E and L; NULL: none given */
-    light_kind lights;          /* of all numbers */
-    bool converted;             /* some were given in the other kind */
-    bool efficacies;            /* its sky is solar radiation, by luminous efficacies */
-    bool by_luminance;          /* L is the luminance of a coloured sky, for a grey store */
-    const struct sunlight *sun; /* [n_vectors], on every channel, beside L; borrowed, NULL: none */
+    float *D; /* [n_vectors][C][k], dimmers of luminaires, beside all of these; NULL: all are dark */
+    const lam_luminaires *luminaires; /* of the store, which D is for; borrowed, NULL: it has none */
+    light_kind lights;                /* of all numbers */
+    bool converted;                   /* some were given in the other kind */
+    bool efficacies;                  /* its sky is solar radiation, by luminous efficacies */
+    bool by_luminance;                /* L is the luminance of a coloured sky, for a grey store */
+    const struct sunlight *sun;       /* [n_vectors], on every channel, beside L; borrowed, NULL: none */
     const lam_limiter *limiter; /* of answers below zero; borrowed, NULL: they are those of the linear map */
 } emission;
 
@@ -33,9 +37,11 @@ void emission_free(emission *e);
 typedef struct emission_scene {
     const mesh *m; /* borrowed */
     group_index groups;
-    group_index emitters;       /* by name, once emission_scene_sources was called */
-    size_t n_tiles, n_emitters; /* of the store's sky and operator; 0: none */
-    char tiling[32];            /* of the sky; "": not known */
+    group_index emitters;             /* by name, once emission_scene_sources was called */
+    size_t n_tiles, n_emitters;       /* of the store's sky and operator; 0: none */
+    char tiling[32];                  /* of the sky; "": not known */
+    const lam_luminaires *luminaires; /* borrowed; NULL: the store has none */
+    luminaire_names names;            /* of these */
 } emission_scene;
 
 /* Without sky and emitters; the caller sets them, or emission_scene_sources does. O(n + g log g). Errors:
@@ -43,9 +49,10 @@ typedef struct emission_scene {
 lam_status emission_scene_create(const mesh *m, emission_scene *out, lam_error *error);
 void emission_scene_free(emission_scene *scene);
 
-/* Takes the tiles and emitters of a store's operator and sky, which may be NULL. Errors: LAM_ERR_MEMORY. */
+/* Takes the tiles, emitters and luminaires of a store's operator, its sky and its luminaires, which may be
+ * NULL both and outlive the scene. Errors: LAM_ERR_MEMORY. */
 lam_status emission_scene_sources(emission_scene *scene, const lam_operator *op, const lam_sky *sky,
-                                  lam_error *error);
+                                  const lam_luminaires *luminaires, lam_error *error);
 
 /* Every element of the groups that name means emits values [C], or 1 in every channel where values is NULL;
  * E is [C][n]. LAM_ERR_ARGUMENT for an unknown name: the message begins with what and suggests a name. */
@@ -67,6 +74,15 @@ lam_status emission_read_item(const emission_scene *scene, const char *item, cha
 
 /* Checks the form of every item, which needs no store: an error is wrong usage. */
 lam_status emission_check_items(const option_list *items, lam_error *error);
+
+/* Puts the luminaires of some items beside every vector of e: NAME=V or NAME=V,V,V, one dimmer for each
+ * channel, of a luminaire or a group of them; the others are dark. A later item replaces an earlier one.
+ * Errors: LAM_ERR_ARGUMENT names the item. The form of items alone is checked by emission_check_dims. */
+lam_status emission_dim(const emission_scene *scene, const option_list *items, emission *e, lam_error *error);
+lam_status emission_check_dims(const option_list *items, lam_error *error);
+
+/* Puts all luminaires beside the one vector of e, dimmed as their list says; nothing where there are none. */
+lam_status emission_dim_as_listed(const emission_scene *scene, emission *e, lam_error *error);
 
 /* Reads a file. NPY: <f4 or <f8 of shape (n), (C, n) or a batch (b, C, n), and (b, n) for one channel. JSON:
  * the contract's EMISSION, or an object with one as `emission` or with a batch of them as `emissions`.
@@ -101,12 +117,13 @@ lam_status emission_add_skies(emission *e, const char *path, const mesh *m, size
 lam_status emission_allocate(const char *path, size_t n_channels, size_t width, size_t n_vectors,
                              float **values, lam_error *error);
 
-/* The scene's own emission as one vector. */
-lam_status emission_of_scene(const mesh *m, emission *out, lam_error *error);
+/* The scene's own light as one vector: that of its elements, and of its luminaires as listed. */
+lam_status emission_of_scene(const emission_scene *scene, emission *out, lam_error *error);
 
 /* The options of a command line that are about light. */
 typedef struct emission_options {
     const option_list *items; /* --emit */
+    const option_list *dims;  /* --dim */
     const char *path;         /* --emission, or NULL */
     const char *frames;       /* for emission_read_frames in place of both, or NULL */
     const char *sky;          /* --sky, or NULL */
@@ -115,8 +132,8 @@ typedef struct emission_options {
     bool other;               /* light is added later: the scene's own is not the preset */
 } emission_options;
 
-/* Frames when there are any, else groups when there are items, else the file, else none beside a sky, else
- * the scene's own, which sets *own.
+/* Frames when there are any, else groups when there are items, else the file, else none beside a sky or
+ * luminaires, else the scene's own, which sets *own.
  */
 lam_status emission_choose(const emission_scene *scene, const emission_options *options, emission *out,
                            bool *own, lam_error *error);

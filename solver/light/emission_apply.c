@@ -3,6 +3,7 @@
 #include "solver/light/sunlight.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/limiter.h"
+#include "solver/operator/luminaire_light.h"
 #include "solver/operator/sky_light.h"
 
 #include <math.h>
@@ -18,6 +19,7 @@ void emission_pass_free(emission_pass *p) {
     free(p->L);
     free(p->H0);
     free(p->W);
+    free(p->D);
     free(p->sun);
     free(p->sun_work);
     *p = (emission_pass){0};
@@ -26,6 +28,16 @@ void emission_pass_free(emission_pass *p) {
 static lam_status reserve(size_t rows, size_t width, const char *what, float **out, lam_error *error) {
     *out = memory_allocate(rows, width * sizeof **out, what, error);
     return *out == NULL ? LAM_ERR_MEMORY : LAM_OK;
+}
+
+/* Room for the dimmers of one go, where they stay if they are steady. */
+static lam_status take_dimmers(const emission *light, size_t most, size_t C, float **D, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t row = C * lam_luminaires_count(light->luminaires);
+    TRY(reserve(most, row, "dimmers of luminaires", D, error));
+    for (size_t k = 0; light->steady && k < most; k++) memcpy(*D + k * row, light->D, row * sizeof **D);
+done:
+    return status;
 }
 
 lam_status emission_pass_create(const emission *light, const lam_operator *op, const lam_sky *sky,
@@ -51,10 +63,11 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
     for (size_t k = 0; light->steady && p.E != NULL && k < most; k++)
         memcpy(p.E + k * C * n, light->E, C * n * sizeof *p.E);
     if (light->L != NULL) TRY(reserve(most * C, lam_sky_tiles(sky), "skies", &p.L, error));
+    if (light->D != NULL) TRY(take_dimmers(light, most, C, &p.D, error));
     if (s > 0)
         TRY(reserve(most * C, s, "weights of emitters", &p.W, error));
-    else if (light->L != NULL || light->sun != NULL)
-        TRY(reserve(most * C, n, "the light of the sky", &p.H0, error));
+    else if (light->L != NULL || light->D != NULL || light->sun != NULL)
+        TRY(reserve(most * C, n, "direct light", &p.H0, error));
     if (light->sun != NULL) {
         TRY(reserve(most, n, "the sun", &p.sun, error));
         TRY(reserve(1, sunlight_work(light->sun), "the sun", &p.sun_work, error));
@@ -83,13 +96,14 @@ done:
     return status;
 }
 
-/* H0 [n][C][elements] under the skies and the sun. Rounding must not make a value negative. */
+/* H0 [n][C][elements] under the skies, luminaires and the sun. Rounding must not make a value negative. */
 static void light_directly(emission_pass *p, size_t n, const size_t *vectors) {
     const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
     if (p->L != NULL)
         lam_sky_irradiance(p->sky, n * C, p->L, p->H0);
     else
         memset(p->H0, 0, n * C * n_elements * sizeof *p->H0);
+    if (p->D != NULL) lam_luminaires_irradiance(p->light->luminaires, n, p->D, p->H0);
     if (p->sun == NULL) return;
     sunlight_irradiance(p->light->sun, n, vectors, p->sun, p->sun_work);
     for (size_t row = 0; row < n * C; row++)
@@ -130,6 +144,7 @@ static void take_light(emission_pass *p, size_t n, const size_t *vectors) {
     const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
     if (!e->steady && p->E != NULL) gather(n, vectors, C * n_elements, e->E, p->E);
     if (e->L != NULL) gather(n, vectors, C * lam_sky_tiles(p->sky), e->L, p->L);
+    if (!e->steady && e->D != NULL) gather(n, vectors, C * lam_luminaires_count(e->luminaires), e->D, p->D);
 }
 
 void emission_pass_limit(emission_pass *p, size_t n, const size_t *vectors, float *out) {
@@ -166,9 +181,8 @@ lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors
     lam_status status = LAM_OK;
     const emission *e = p->light;
     const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
-    double *L = NULL;
-    if (!e->steady && p->E != NULL) gather(n, vectors, C * n_elements, e->E, p->E);
-    if (e->L != NULL) gather(n, vectors, C * lam_sky_tiles(p->sky), e->L, p->L);
+    double *L = NULL, *D = NULL;
+    take_light(p, n, vectors);
     *H0_there = p->W != NULL || p->H0 != NULL;
     if (p->W != NULL) {
         if (p->sun != NULL)
@@ -191,6 +205,13 @@ lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors
         for (size_t k = 0; k < count; k++) L[k] = (double)p->L[k];
         sky_irradiance_double(p->sky, n * C, L, H0);
     }
+    if (p->D != NULL) {
+        const size_t count = n * C * lam_luminaires_count(e->luminaires);
+        D = memory_allocate(count, sizeof *D, "dimmers of luminaires", error);
+        if (D == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t k = 0; k < count; k++) D[k] = (double)p->D[k];
+        luminaires_irradiance_double(e->luminaires, n, D, H0);
+    }
     if (p->sun == NULL) goto done;
     sunlight_irradiance(e->sun, n, vectors, p->sun, p->sun_work);
     for (size_t row = 0; row < n * C; row++)
@@ -199,6 +220,7 @@ lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors
                 fmax(H0[row * n_elements + i] + (double)p->sun[row / C * n_elements + i], 0);
 done:
     free(L);
+    free(D);
     return status;
 }
 

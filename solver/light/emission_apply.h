@@ -20,7 +20,7 @@ typedef struct emission_pass {
     void *work, *limiter_work;
     size_t limited[EMISSION_PASS_MOST]; /* of the vectors of the last go: elements that were below zero, in
                                          * all channels */
-    float *E, *L, *H0, *W;              /* of one go; NULL where the operator takes none */
+    float *E, *L, *H0, *W, *D;          /* of one go; NULL where the operator takes none */
     float *sun, *sun_work;              /* [most][elements]; NULL without one */
 } emission_pass;
 

@@ -65,6 +65,8 @@ lam_status emission_read(const char *path, const emission_scene *scene, bool sig
                                .n_tiles = scene->n_tiles,
                                .n_emitters = scene->n_emitters,
                                .emitters = &scene->emitters,
+                               .n_luminaires = luminaire_names_count(&scene->names),
+                               .luminaires = &scene->names,
                                .signs = signs && scene->n_emitters == 0,
                                .no_sun = "a file of emissions has no sun here: lambertd answers one, and "
                                          "--weather or --sky clear has its own"};
@@ -79,8 +81,10 @@ lam_status emission_read(const char *path, const emission_scene *scene, bool sig
                       .L = read.sky.values,
                       .converted = read.told.lights,
                       .by_luminance = read.by_luminance,
-                      .W = read.emitters.values};
-    read.E = read.sky.values = read.emitters.values = NULL;
+                      .W = read.emitters.values,
+                      .D = read.luminaires.values,
+                      .luminaires = scene->luminaires};
+    read.E = read.sky.values = read.emitters.values = read.luminaires.values = NULL;
 done:
     radiosity_request_free(&read);
     return status;

@@ -37,7 +37,7 @@ enum { CHANNELS_MOST = 3 };
 lam_status emission_check_dims(const option_list *items, lam_error *error) {
     lam_status status = LAM_OK;
     double values[CHANNELS_MOST];
-    size_t length, n;
+    size_t length = 0, n = 0;
     for (size_t i = 0; i < items->count; i++)
         TRY(parse_item(items->items[i], &length, values, CHANNELS_MOST, &n, error));
 done:
@@ -49,7 +49,7 @@ static lam_status dim_item(const emission_scene *scene, const char *item, float 
     const size_t C = scene->m->n_channels, k = lam_luminaires_count(scene->luminaires);
     double values[CHANNELS_MOST];
     const uint32_t *found = NULL;
-    size_t length, n;
+    size_t length = 0, n = 0;
     char miss[GROUP_MISS];
     TRY(parse_item(item, &length, values, CHANNELS_MOST, &n, error));
     if (n != 1 && n != C)

@@ -18,7 +18,8 @@ static bool scale(size_t n_vectors, size_t width, double factor, float *x, bool 
 static bool scale_lamps(emission *e, const emission_scene *scene, double factor, bool *any) {
     const size_t C = scene->m->n_channels, n = e->steady ? 1 : e->n_vectors;
     const bool good = scale(n, C * scene->m->n, factor, e->E, any);
-    return scale(n, C * scene->n_emitters, factor, e->W, any) && good;
+    const bool dimmed = e->D == NULL || scale(n, C * lam_luminaires_count(e->luminaires), factor, e->D, any);
+    return scale(n, C * scene->n_emitters, factor, e->W, any) && dimmed && good;
 }
 
 static bool scale_sky(emission *e, const emission_scene *scene, double factor, bool *any) {

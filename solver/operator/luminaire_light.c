@@ -18,7 +18,7 @@ struct lam_luminaires {
     double *dimmers, *lumens;         /* [k] */
     double *colour;                   /* [k][3] */
     double *factors;                  /* [C][k], of the channels */
-    double *place, *opening;          /* [k][12]: at, x, y, z; [k][4]: shape, size */
+    double *place, *opening;          /* [k][12]: at, x, y, z; [k][8]: shape, size, sides */
     size_t n_error_groups;            /* of the scene */
     double *elements_off, *means_off; /* [k][n_error_groups] */
 };
@@ -110,7 +110,7 @@ lam_status luminaires_load(store *s, size_t n, size_t C, lam_luminaires **out, l
     TRY(read_numbers(s, STORE_LUMINAIRES "/lumens", k, 0, false, &l->lumens, error));
     TRY(read_numbers(s, STORE_LUMINAIRES "/colour", k, 3, false, &l->colour, error));
     TRY(read_numbers(s, STORE_LUMINAIRES "/place", k, 12, true, &l->place, error));
-    TRY(read_numbers(s, STORE_LUMINAIRES "/opening", k, 4, false, &l->opening, error));
+    TRY(read_numbers(s, STORE_LUMINAIRES "/opening", k, 8, false, &l->opening, error));
     TRY(read_errors(s, l, error));
     l->factors = memory_allocate(C, k * sizeof *l->factors, "luminaires", error);
     if (l->factors == NULL) TRY(LAM_ERR_MEMORY);
@@ -164,7 +164,7 @@ double lam_luminaires_dimmer(const lam_luminaires *l, size_t luminaire) {
 
 luminaire_shown luminaires_shown(const lam_luminaires *l, size_t luminaire) {
     const uint32_t group = luminaires_group_of(l, luminaire);
-    const double *place = l->place + luminaire * 12, *opening = l->opening + luminaire * 4;
+    const double *place = l->place + luminaire * 12, *opening = l->opening + luminaire * 8;
     luminaire_shown out = {.name = l->names[luminaire],
                            .group = group == LUMINAIRE_NO_GROUP ? NULL : l->group_names[group],
                            .dimmer = l->dimmers[luminaire],

@@ -205,11 +205,13 @@ static lam_status mark_lit(const animation *a, bool *lit, lam_error *error) {
     const emission *all = &a->lit.light;
     const size_t C = a->view.m.n_channels, n = a->view.m.n, steady = all->steady ? 1 : all->n_vectors;
     const size_t m = all->L != NULL ? lam_sky_tiles(a->lit.sky) : 0;
-    emission mean = {.n_vectors = 1, .limiter = all->limiter};
+    emission mean = {.n_vectors = 1, .limiter = all->limiter, .luminaires = all->luminaires};
     float *values = NULL;
     TRY(mean_of(steady, C * n, all->E, &mean.E, error));
     TRY(mean_of(steady, C * lam_operator_emitters(a->lit.op), all->W, &mean.W, error));
     TRY(mean_of(all->n_vectors, C * m, all->L, &mean.L, error));
+    if (all->D != NULL)
+        TRY(mean_of(steady, C * lam_luminaires_count(all->luminaires), all->D, &mean.D, error));
     TRY(emission_apply(&mean, a->lit.op, a->lit.sky, a->quantity, 0, NULL, NULL, &values, NULL, error));
     if (is_dark(C * n, values))
         FAIL(error, LAM_ERR_ARGUMENT, "--animate %s: no frame has any light", a->f->light.frames);

@@ -27,9 +27,13 @@ static const option_command verb = {
     .most_arguments = 1,
 };
 
-static bool is_dark(const emission *light, size_t count) {
+/* True where neither the elements nor the luminaires of a vector give light. */
+static bool is_dark(const emission *light, size_t count, size_t n_channels) {
+    const size_t dimmers = light->D == NULL ? 0 : n_channels * lam_luminaires_count(light->luminaires);
     for (size_t i = 0; i < count; i++)
         if (light->E[i] != 0) return false;
+    for (size_t k = 0; k < dimmers; k++)
+        if (light->D[k] != 0) return false;
     return true;
 }
 
@@ -41,10 +45,10 @@ static void take_error(const stated_errors *stated, const emission *light, size_
     const size_t count = selected != NULL ? n_selected : stated->n;
     const size_t others = stated_errors_others(stated, count, selected);
     const size_t rows = light->E != NULL ? (light->steady ? 1 : light->n_vectors) * out->m->n_channels : 0;
-    const answer_scope scope = {.receivers_only = others == 0,
-                                .strange =
-                                    light->L != NULL || stated_errors_is_strange(stated, rows, light->E),
-                                .sky = light->L != NULL && is_dark(light, rows * stated->n)};
+    const answer_scope scope = {
+        .receivers_only = others == 0,
+        .strange = light->L != NULL || light->D != NULL || stated_errors_is_strange(stated, rows, light->E),
+        .sky = light->L != NULL && is_dark(light, rows * stated->n, out->m->n_channels)};
     stated_errors_note(stated, scope, &notes);
     if (notes.has_error) out->relative = notes.relative_mean;
     if (notes.has_error) out->indirect = notes.indirect_mean;
@@ -331,11 +335,12 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
     if (f->linear) lit.light.limiter = NULL;
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
-    if (lit.own && is_dark(&lit.light, m.n * m.n_channels))
+    if (lit.own && is_dark(&lit.light, m.n * m.n_channels, m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
+             "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s%s", path,
+             lit.luminaires != NULL ? ", --dim NAME=V" : "",
              lit.sky != NULL ? ", --sky FILE or --weather FILE" : "");
-    if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
+    if (lit.own) terminal_log(t, "no --emit, --emission, --dim, --sky or --weather: the scene's own light");
     about = error_scene_of(&m, &lit.scene);
     /* With --reduce only figures are written, also with -o. */
     TRY(reductions_elements(&m, reductions, n_reductions, &n_selected, &selected, error));

@@ -2,6 +2,7 @@
 
 #include "solver/base/photometry.h"
 #include "solver/operator/emitters.h"
+#include "solver/operator/luminaire_light.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/refine/form_factor_rows.h"
 #include "solver/operator/sky_light.h"
@@ -26,6 +27,13 @@ const option_row light_rows[] = {
      .offset = FIELD(emission),
      .argument = "FILE.npy|.json",
      .help = "One emission from a file, or a batch of them for solve"},
+    {.name = "dim",
+     .kind = OPTION_LIST,
+     .offset = FIELD(dim),
+     .argument = "NAME=V[,V,V]",
+     .help = "A luminaire, or a group of them, gives V of its light, one number or one per channel; the "
+             "others are dark. Alone or beside the other light; may be repeated. Without any light all "
+             "luminaires are as dim as their list says"},
     {.name = "sky",
      .kind = OPTION_TEXT,
      .offset = FIELD(sky),
@@ -69,6 +77,7 @@ lam_status light_check(light_options *options, lam_error *error) {
     if (options->emit.count > 0 && options->emission != NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "give --emit or --emission, not both");
     TRY(emission_check_items(&options->emit, error));
+    TRY(emission_check_dims(&options->dim, error));
 done:
     return status;
 }
@@ -80,6 +89,7 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
     form_factor_storage how;
     const char *const named = light_named_sky(options);
     const emission_options given = {.items = &options->emit,
+                                    .dims = &options->dim,
                                     .path = options->emission,
                                     .frames = options->frames,
                                     .sky = named != NULL ? NULL : options->sky,
@@ -88,10 +98,11 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
                                     .other = other || named != NULL};
     TRY(emission_scene_create(m, &out->scene, error));
     TRY(sky_load(s, m->n, &out->sky, error));
+    TRY(luminaires_load(s, m->n, m->n_channels, &out->luminaires, error));
     TRY(operator_load(s, &out->op, error));
     /* A store whose form factors cannot be read is refused whole, as lambertd does. */
     if (store_has(s, STORE_FORM_FACTORS)) TRY(form_factors_storage(s, &how, error));
-    TRY(emission_scene_sources(&out->scene, out->op, out->sky, error));
+    TRY(emission_scene_sources(&out->scene, out->op, out->sky, out->luminaires, error));
     if (out->sky != NULL) TRY(store_get_text(s, STORE_SKY, "tiling", &tiling, error));
     if (tiling != NULL) snprintf(out->scene.tiling, sizeof out->scene.tiling, "%s", tiling);
     TRY(emission_choose(&out->scene, &given, &out->light, &out->own, error));
@@ -121,6 +132,7 @@ void light_close(lit_store *lit) {
     sunlight_free(&lit->sun);
     lam_operator_close(lit->op);
     lam_sky_close(lit->sky);
+    lam_luminaires_close(lit->luminaires);
 }
 
 lam_status light_convert(const light_options *options, sunlight *sun, sun_way *way, lit_store *lit,

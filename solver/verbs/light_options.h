@@ -1,4 +1,4 @@
-/* The light of a command line, for solve and render: --emit, --emission and --sky. */
+/* The light of a command line, for solve and render: --emit, --emission, --dim and --sky. */
 #ifndef LAMBERT_VERBS_LIGHT_OPTIONS_H
 #define LAMBERT_VERBS_LIGHT_OPTIONS_H
 
@@ -12,7 +12,7 @@
 #define LIGHT_HEADING "light (preset: the emission in the scene)"
 
 typedef struct light_options {
-    option_list emit;
+    option_list emit, dim;
     const char *emission, *sky;
     sky_options at;     /* of a named sky, and of weather */
     const char *unit;   /* --unit-out; NULL: that of the light */
@@ -32,10 +32,11 @@ const char *light_named_sky(const light_options *options);
  */
 lam_status light_check(light_options *options, lam_error *error);
 
-/* A store's operator and sky, and the light that options ask for. */
+/* A store's operator, sky and luminaires, and the light that options ask for. */
 typedef struct lit_store {
     lam_operator *op;
-    lam_sky *sky; /* NULL: the store has none */
+    lam_sky *sky;               /* NULL: the store has none */
+    lam_luminaires *luminaires; /* NULL likewise */
     emission_scene scene;
     emission light;
     lam_limiter limiter;   /* of its answers, which borrows from mesh and scene; light has it */

@@ -14,6 +14,7 @@ void own_light_free(own_light *l) {
     free(l->L);
     free(l->L_sent);
     free(l->sent);
+    free(l->lamps);
     free(l->sun);
     free(l->work);
     *l = (own_light){.n_tiles = 0};
@@ -37,9 +38,16 @@ lam_status own_light_make(const lit_store *lit, const error_scene *scene, own_li
     if (light->sun != NULL) {
         l.sun = memory_allocate(1, n * sizeof *l.sun, "the light of an answer", error);
         l.work = memory_allocate(1, sunlight_work(light->sun) * sizeof *l.work, "the sun", error);
-        l.sent = memory_allocate(C, n * sizeof *l.sent, "the light of an answer", error);
         l.L_sent = memory_allocate(C, (l.n_tiles + 1) * sizeof *l.L_sent, "the light of an answer", error);
-        if (l.sun == NULL || l.work == NULL || l.sent == NULL || l.L_sent == NULL) TRY(LAM_ERR_MEMORY);
+        if (l.sun == NULL || l.work == NULL || l.L_sent == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    if (light->D != NULL) {
+        l.lamps = memory_allocate(C, n * sizeof *l.lamps, "the light of an answer", error);
+        if (l.lamps == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    if (light->sun != NULL || light->D != NULL) {
+        l.sent = memory_allocate(C, n * sizeof *l.sent, "the light of an answer", error);
+        if (l.sent == NULL) TRY(LAM_ERR_MEMORY);
     }
     *out = l;
     l = (own_light){.n_tiles = 0};
@@ -69,6 +77,19 @@ done:
     return status;
 }
 
+/* Adds the luminaires of vector v. */
+static void add_luminaires(own_light *l, size_t v) {
+    const emission *light = &l->lit->light;
+    const size_t all = l->scene->n * l->scene->n_channels;
+    const size_t row = l->scene->n_channels * lam_luminaires_count(light->luminaires);
+    memset(l->lamps, 0, all * sizeof *l->lamps);
+    lam_luminaires_irradiance(light->luminaires, 1, light->D + (light->steady ? 0 : v * row), l->lamps);
+    for (size_t k = 0; k < all; k++) {
+        l->H0[k] += l->lamps[k];
+        l->sent[k] += l->scene->reflectance[k] * l->lamps[k];
+    }
+}
+
 /* Adds the sun of vector v. */
 static void add_sun(own_light *l, size_t v) {
     const sunlight *sun = l->lit->light.sun;
@@ -88,7 +109,7 @@ static void add_sun(own_light *l, size_t v) {
             power += flux;
             squares += flux * flux;
             l->H0[c * n + i] += l->sun[i];
-            l->sent[c * n + i] = l->E[c * n + i] + (lost ? 0 : rho[c * n + i] * l->sun[i]);
+            l->sent[c * n + i] += lost ? 0 : rho[c * n + i] * l->sun[i];
         }
         if (lost) l->lost2 += power * power + squares;
         memset(l->L_sent + c * m, 0, m * sizeof *l->L_sent);
@@ -109,6 +130,8 @@ lam_status own_light_take(own_light *l, size_t v, lam_error *error) {
     if (light->L == NULL && l->L != NULL) memset(l->L, 0, all * sizeof *l->L);
     if (light->W != NULL) TRY(add_weights(l, v, error));
     if (l->L != NULL) lam_sky_irradiance(l->lit->sky, l->scene->n_channels, l->L, l->H0);
+    if (l->sent != NULL) memcpy(l->sent, l->E, vector * sizeof *l->sent);
+    if (light->D != NULL) add_luminaires(l, v);
     if (light->sun != NULL) add_sun(l, v);
 done:
     return status;
@@ -118,7 +141,7 @@ void own_light_put(const own_light *l, const error_by_group *by, error_answer *o
     const size_t n = l->scene->n, m = l->n_tiles;
     const float *sent = l->sent != NULL ? l->sent : l->E;
     of->E = l->E;
-    of->H0 = l->L != NULL || l->sun != NULL ? l->H0 : NULL;
+    of->H0 = l->L != NULL || l->sent != NULL ? l->H0 : NULL;
     of->L = l->L;
     of->L_sent = l->L != NULL ? l->L_sent : NULL;
     of->lost2 = l->lost2;

@@ -1,5 +1,6 @@
-/* The light of one vector of a lambert solve, as its error is told by: what elements emit, the sky, the sun,
- * and what elements get of these directly; of a store of few emitters as their weights tell it. */
+/* The light of one vector of a lambert solve, as its error is told by: what elements emit, the sky,
+ * luminaires, the sun, and what elements get of these directly; of a store of few emitters as their weights
+ * tell it. */
 #ifndef LAMBERT_VERBS_OWN_LIGHT_H
 #define LAMBERT_VERBS_OWN_LIGHT_H
 
@@ -10,10 +11,11 @@ typedef struct own_light {
     const lit_store *lit;
     const error_scene *scene;
     size_t n_tiles; /* of the sky that shines; 0: none */
-    float *E, *H0;  /* [C][n], mesh order; H0 with the sun */
+    float *E, *H0;  /* [C][n], mesh order; H0 with luminaires and the sun */
     float *L;       /* [C][n_tiles]; NULL: no sky */
     float *L_sent; /* of a sun in a tile that is sent on as the light of that, and no part of L; NULL: none */
-    float *sent; /* [C][n], E and what the sun alone makes elements send; NULL: no sun, or it is in a tile */
+    float *sent;   /* [C][n], E and what luminaires and the sun make elements send; NULL: neither shines */
+    float *lamps;  /* [C][n], direct light of luminaires; NULL: none shine */
     float *sun, *work;
     double lost2; /* of error_answer */
 } own_light;
@@ -22,7 +24,8 @@ typedef struct own_light {
 lam_status own_light_make(const lit_store *lit, const error_scene *scene, own_light *out, lam_error *error);
 void own_light_free(own_light *l);
 
-/* Takes vector v. An exact sun has no error of its direct light; an operator takes it as what elements send
+/* Takes vector v. An operator takes the direct light of luminaires as what elements send on. An exact sun has
+ * no error of its direct light; an operator takes it as what elements send
  * on, and one of few emitters sends on the light of its tile in its place: what is lost by that is the power
  * of the difference. Errors: LAM_ERR_MEMORY, and those of the weights of emitters. */
 lam_status own_light_take(own_light *l, size_t v, lam_error *error);

@@ -50,7 +50,7 @@ static void write_store(const char *path, size_t k, const float *irradiance, con
         write_numbers(s, "lumens", 0, 2, wrong);
         write_numbers(s, "colour", 3, 3, wrong);
         write_numbers(s, "place", 12, 4, wrong);
-        write_numbers(s, "opening", 4, 5, wrong);
+        write_numbers(s, "opening", 8, 5, wrong);
         write_numbers(s, "elements_off", G, 6, wrong);
         write_numbers(s, "means_off", G, 7, wrong);
     }
