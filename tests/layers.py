@@ -60,6 +60,7 @@ ALLOWED = {
         "solver/formfactor/clusters/ solver/formfactor/exchange/ solver/formfactor/sight/ solver/formfactor/glass/"),
     "solver/formfactor/blocks": (f"{FORMFACTOR} solver/formfactor/visibility/ solver/formfactor/exchange/ solver/formfactor/sight/"),
     "solver/walk": ("lambert/ store/status.h solver/base/ solver/scene/mesh.h solver/formfactor/leaving.h solver/formfactor/visibility/"),
+    "solver/direct": f"{SCENE} solver/luminaire/luminaire.h solver/luminaire/placed.h solver/formfactor/visibility/",
     "solver/method": f"{OPERATOR}",
     "solver/method/*": f"{OPERATOR} {METHOD_SHARED}",
     "solver/light": f"{OPERATOR} solver/codec/ solver/daylight/ solver/shadow/ {SCENE} solver/formfactor/ solver/walk/moving_light.h",

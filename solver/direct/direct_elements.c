@@ -1,0 +1,343 @@
+#include "solver/direct/direct_elements.h"
+
+#include "solver/base/vector3.h"
+#include "solver/direct/element_light.h"
+#include "solver/direct/luminaire_runs.h"
+#include "solver/formfactor/visibility/sample.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Elements between two looks at the progress; segments of each, where the options do not say. */
+enum { ELEMENTS_AT_ONCE = 64, SEGMENTS = 16, MORE_SEGMENTS = 256, SEGMENTS_MOST = 4096 };
+
+/* Panes pass light by its angle: shares that differ by less are one. */
+static const double same_share = .02;
+
+/* The findings of few segments on an element: nothing is hidden, or all, or a part; or it receives no light.
+ */
+enum { UNLIT, CLEAR = 1, DARK = 2, PARTLY = 3 };
+
+/* One luminaire. */
+typedef struct element_run {
+    const mesh *m;
+    const direct_options *options;
+    const luminaire_run *luminaire;
+    size_t segments, more, n_rows;
+    double *open;           /* [n], lx where nothing hides */
+    float *H, *off;         /* [n], lx and its squared error */
+    unsigned char *found;   /* [n]: UNLIT ... */
+    unsigned char *corners; /* [n_vertices]: what elements at a vertex found, CLEAR | DARK */
+} element_run;
+
+/* Sums over segments: of I cos V / d^2, of I cos / d^2, of V, and the number of them; the shares V that
+ * matter are from least to most. */
+typedef struct segment_sums {
+    double seen, open, passed, count, least, most;
+} segment_sums;
+
+/* Adds a packet of places of the element and of the opening. */
+static void add_segments(const element_run *r, const element_sampler *sampler, size_t element,
+                         double place[4][VISIBILITY_PACKET], segment_sums *sums) {
+    const luminaire_run *run = r->luminaire;
+    const placed_source *source = &run->source;
+    const double *centre = visibility_centre(run->sight->v);
+    const float *n = r->m->normal[element];
+    const double normal[3] = {(double)n[0], (double)n[1], (double)n[2]};
+    double own_normal[3], light[VISIBILITY_PACKET], passed[VISIBILITY_PACKET];
+    size_t self[VISIBILITY_PACKET];
+    ray_packet segments;
+    placed_source_turn(source, normal, own_normal);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        float from[3], to[3];
+        double x[3], own[3], towards[3], there[3];
+        opening_cell cell;
+        element_sampler_point(sampler, (float)place[0][i], (float)place[1][i], from);
+        for (int d = 0; d < 3; d++) x[d] = (double)from[d] + centre[d];
+        placed_source_inwards(source, x, own);
+        opening_place(&source->opening, place[2][i], place[3][i], &cell);
+        const double across = placed_source_normal(source, &cell, own, towards);
+        light[i] = across * fmax(0, dot3(towards, own_normal));
+        placed_source_outwards(source, cell.at, there);
+        for (int d = 0; d < 3; d++) there[d] += run->moved[d];
+        luminaire_sight_recentre(run->sight, there, to);
+        for (int d = 0; d < 3; d++) {
+            segments.origin[d][i] = from[d];
+            segments.direction[d][i] = to[d] - from[d];
+        }
+        self[i] = element;
+    }
+    luminaire_sight_passed(run->sight, &segments, VISIBILITY_PACKET, self, passed);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        sums->seen += light[i] * passed[i];
+        sums->open += light[i];
+        sums->passed += passed[i];
+        sums->count += 1;
+        if (!(light[i] > 0)) continue;
+        sums->least = fmin(sums->least, passed[i]);
+        sums->most = fmax(sums->most, passed[i]);
+    }
+}
+
+/* The visible share by half the segments; stream: apart for each half and each number of segments. */
+static segment_sums half_sums(const element_run *r, const element_sampler *sampler, size_t element,
+                              size_t half, uint64_t stream) {
+    segment_sums sums = {.least = INFINITY, .most = -INFINITY};
+    pair_sampler places;
+    pair_sampler_init(&places, r->options->seed + stream, element, r->luminaire->luminaire);
+    for (uint32_t k = 0; k < half; k += VISIBILITY_PACKET) {
+        double place[4][VISIBILITY_PACKET];
+        pair_sampler_packet(&places, k, place);
+        add_segments(r, sampler, element, place, &sums);
+    }
+    return sums;
+}
+
+/* Weighted by light; where no segment carries any, as beside a narrow beam, they count alike. */
+static double share_of(const segment_sums *s) {
+    return s->open > 0 ? s->seen / s->open : s->passed / s->count;
+}
+
+/* H = open (sum f V / sum f) with f = I cos / d^2, and its squared error ((H_1 - H_2) / 2)^2. */
+static void light_seen(const element_run *r, size_t element, size_t segments, uint64_t stream) {
+    element_sampler sampler;
+    element_sampler_init(&sampler, r->m, r->luminaire->sight->v, element, r->options->seed);
+    const segment_sums one = half_sums(r, &sampler, element, segments / 2, stream),
+                       two = half_sums(r, &sampler, element, segments / 2, stream + 1);
+    const segment_sums both = {.seen = one.seen + two.seen,
+                               .open = one.open + two.open,
+                               .passed = one.passed + two.passed,
+                               .count = one.count + two.count};
+    const double least = fmin(one.least, two.least), most = fmax(one.most, two.most),
+                 error = r->open[element] * (share_of(&one) - share_of(&two)) / 2;
+    r->H[element] = (float)(r->open[element] * share_of(&both));
+    r->off[element] = (float)(error * error);
+    r->found[element] = most - least > same_share ? PARTLY : most > 0 ? CLEAR : DARK;
+}
+
+/* All light of an element, and the findings of few segments. */
+static void light_first(const element_run *r, size_t element) {
+    opening_cell cells[OPENING_CELLS];
+    const bool lit = !mesh_is_buried(r->m, element);
+    r->open[element] = lit ? element_light(r->m, element, &r->luminaire->source, cells) : 0;
+    r->H[element] = (float)r->open[element];
+    r->off[element] = 0;
+    r->found[element] = UNLIT;
+    if (r->open[element] > 0 && r->luminaire->sight->v != NULL) light_seen(r, element, r->segments, 0);
+}
+
+/* Elements that are partly hidden, and those that meet both, one that is hidden and one that is not. */
+static void light_again(const element_run *r, size_t element) {
+    bool again = false;
+    for (size_t c = 0; c < mesh_corners(r->m, element); c++)
+        again = again || r->corners[r->m->elements[element][c]] == PARTLY;
+    if (again && r->found[element] != UNLIT) light_seen(r, element, r->more, 2);
+}
+
+/* All elements once; before: the share of the work before it. */
+static lam_status light_all(const element_run *r, void (*light)(const element_run *r, size_t element),
+                            double before, double part, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = r->m->n;
+    size_t done = 0;
+    bool stop = false;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t first = 0; first < n; first += ELEMENTS_AT_ONCE) {
+        bool skip;
+#pragma omp atomic read
+        skip = stop;
+        if (skip) continue;
+        const size_t last = first + ELEMENTS_AT_ONCE < n ? first + ELEMENTS_AT_ONCE : n;
+        for (size_t i = first; i < last; i++) light(r, i);
+#pragma omp critical(luminaire_progress)
+        {
+            done += last - first;
+            progress_report(r->options->progress, r->options->stage,
+                            (before + part * (double)done / (double)n) / (double)r->n_rows);
+            if (progress_cancelled(r->options->progress)) {
+#pragma omp atomic write
+                stop = true;
+            }
+        }
+    }
+    if (stop) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+done:
+    return status;
+}
+
+static void mark_corners(const element_run *r) {
+    memset(r->corners, 0, r->m->n_vertices);
+    for (size_t i = 0; i < r->m->n; i++)
+        for (size_t c = 0; c < mesh_corners(r->m, i); c++) r->corners[r->m->elements[i][c]] |= r->found[i];
+}
+
+/* The errors of groups: elements_off = sum A v / sum A, means_off = sum A^2 v / (sum A)^2, as elements have
+ * samples of their own. */
+static void add_errors(const element_run *r, float *elements_off, float *means_off, double *sums) {
+    const mesh *m = r->m;
+    double *area = sums, *linear = sums + m->n_groups, *square = sums + 2 * m->n_groups;
+    memset(sums, 0, 3 * m->n_groups * sizeof *sums);
+    for (size_t i = 0; i < m->n; i++) {
+        const double A = m->area[i], v = (double)r->off[i];
+        if (mesh_is_buried(m, i)) continue;
+        area[m->group[i]] += A;
+        linear[m->group[i]] += A * v;
+        square[m->group[i]] += A * A * v;
+    }
+    for (size_t g = 0; g < m->n_groups; g++) {
+        elements_off[g] = area[g] > 0 ? (float)(linear[g] / area[g]) : 0;
+        means_off[g] = area[g] > 0 ? (float)(square[g] / (area[g] * area[g])) : 0;
+    }
+}
+
+static lam_status report_luminaire(const mesh *m, const luminaire_run *run, direct_report *out,
+                                   lam_error *error) {
+    const ignored_groups *ignored = run->ignored;
+    out->luminaire = run->luminaire;
+    out->ignored = memory_allocate(ignored->n, sizeof *out->ignored, "ignored groups", error);
+    if (out->ignored == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < ignored->n; k++) out->ignored[k] = ignored->groups[k];
+    out->n_ignored = ignored->n;
+    out->n_named = ignored->n_named;
+    out->near_share = luminaire_sight_near(run->sight, &run->source, run->moved, DIRECT_NEAR);
+    for (size_t i = 0; i < m->n && run->source.opening.n_faces > 0; i++) {
+        double middle[3], own[3];
+        mesh_centroid(m, i, middle);
+        placed_source_inwards(&run->source, middle, own);
+        out->n_inside += !(opening_distance(&run->source.opening, own) > 0);
+    }
+    return LAM_OK;
+}
+
+/* The parts of the light of all luminaires. */
+typedef struct elements_job {
+    element_run elements;
+    double *sums; /* [3][n_groups] */
+    direct_light *out;
+} elements_job;
+
+static lam_status light_luminaire(void *context, const luminaire_run *run, lam_error *error) {
+    lam_status status = LAM_OK;
+    elements_job *job = context;
+    element_run *r = &job->elements;
+    const size_t row = run->row;
+    const double before = (double)run->step;
+    r->luminaire = run;
+    r->H = job->out->H + row * r->m->n;
+    TRY(light_all(r, light_first, before, .7, error));
+    mark_corners(r);
+    TRY(light_all(r, light_again, before + .7, .3, error));
+    add_errors(r, job->out->elements_off + row * r->m->n_groups, job->out->means_off + row * r->m->n_groups,
+               job->sums);
+    TRY(report_luminaire(r->m, run, &job->out->reports[row], error));
+done:
+    return status;
+}
+
+static size_t segments_of(size_t asked, size_t preset) {
+    const size_t wanted = asked > 0 ? asked : preset;
+    size_t n = 2 * VISIBILITY_PACKET;
+    while (n < wanted && n < SEGMENTS_MOST) n *= 2;
+    return n;
+}
+
+static lam_status make_light(const mesh *m, const placed_luminaires *p, const direct_options *o,
+                             elements_job *job, lam_error *error) {
+    lam_status status = LAM_OK;
+    direct_light *out = job->out;
+    element_run *r = &job->elements;
+    size_t size, figures;
+    out->n_luminaires = o->wanted != NULL ? o->n_wanted : p->n;
+    out->n = m->n;
+    out->n_groups = m->n_groups;
+    if (!size_multiply(out->n_luminaires, m->n, &size) ||
+        !size_multiply(out->n_luminaires, m->n_groups, &figures))
+        FAIL(error, LAM_ERR_MEMORY, "light of luminaires: too many elements");
+    out->H = memory_allocate(size, sizeof *out->H, "light of luminaires", error);
+    out->elements_off = memory_allocate(figures, sizeof *out->elements_off, "light of luminaires", error);
+    out->means_off = memory_allocate(figures, sizeof *out->means_off, "light of luminaires", error);
+    out->reports = memory_allocate(out->n_luminaires, sizeof *out->reports, "light of luminaires", error);
+    r->open = memory_allocate(m->n, sizeof *r->open, "light of luminaires", error);
+    r->off = memory_allocate(m->n, sizeof *r->off, "light of luminaires", error);
+    r->found = memory_allocate(m->n, sizeof *r->found, "light of luminaires", error);
+    r->corners = memory_allocate(m->n_vertices, sizeof *r->corners, "light of luminaires", error);
+    job->sums = memory_allocate(3 * m->n_groups, sizeof *job->sums, "light of luminaires", error);
+    if (out->H == NULL || out->elements_off == NULL || out->means_off == NULL || out->reports == NULL ||
+        r->open == NULL || r->off == NULL || r->found == NULL || r->corners == NULL || job->sums == NULL)
+        TRY(LAM_ERR_MEMORY);
+    r->n_rows = out->n_luminaires;
+    TRY(luminaire_runs(m, p, o->n_wanted, o->wanted, light_luminaire, job, error));
+done:
+    return status;
+}
+
+lam_status direct_light_make(const mesh *m, const placed_luminaires *p, const direct_options *o,
+                             direct_light *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    direct_light made = {.n = 0};
+    elements_job job = {.elements = {.m = m,
+                                     .options = o,
+                                     .segments = segments_of(o->segments, SEGMENTS),
+                                     .more = segments_of(o->more_segments, MORE_SEGMENTS)},
+                        .out = &made};
+    TRY(make_light(m, p, o, &job, error));
+    *out = made;
+    made = (direct_light){.n = 0};
+done:
+    free(job.elements.open);
+    free(job.elements.off);
+    free(job.elements.found);
+    free(job.elements.corners);
+    free(job.sums);
+    direct_light_free(&made);
+    return status;
+}
+
+void direct_light_free(direct_light *l) {
+    for (size_t k = 0; k < l->n_luminaires && l->reports != NULL; k++) free(l->reports[k].ignored);
+    free(l->H);
+    free(l->elements_off);
+    free(l->means_off);
+    free(l->reports);
+    *l = (direct_light){.n = 0};
+}
+
+/* Adds text to a line that it is cut to fit. */
+static void add_text(char line[DIRECT_LINE], const char *text) {
+    const size_t length = strlen(line);
+    snprintf(line + length, DIRECT_LINE - length, "%s", text);
+}
+
+void direct_report_line(const mesh *m, const placed_luminaires *p, const direct_report *r,
+                        char line[DIRECT_LINE]) {
+    const double half = .5;
+    char figure[128];
+    line[0] = '\0';
+    if (r->n_ignored > 0) {
+        add_text(line, "not hidden by ");
+        for (size_t k = 0; k < r->n_ignored; k++) {
+            if (k > 0) add_text(line, ", ");
+            add_text(line, m->group_names[r->ignored[k]]);
+        }
+    }
+    if (r->near_share > half) {
+        snprintf(figure, sizeof figure, "%s%.0f %% of its light ends within %g m of it", line[0] ? "; " : "",
+                 100 * r->near_share, DIRECT_NEAR);
+        add_text(line, figure);
+    }
+    if (r->n_inside > 0) {
+        snprintf(figure, sizeof figure, "%s%zu element%s inside its opening", line[0] ? "; " : "",
+                 r->n_inside, r->n_inside == 1 ? " lies" : "s lie");
+        add_text(line, figure);
+    }
+    if (line[0] == '\0') return;
+    char head[PLACED_NAME + 16];
+    snprintf(head, sizeof head, "luminaire %s: ", p->luminaires[r->luminaire].name);
+    const size_t length = strlen(head), kept = strlen(line);
+    const size_t room = DIRECT_LINE - 1 - length;
+    memmove(line + length, line, kept < room ? kept : room);
+    memcpy(line, head, length);
+    line[length + (kept < room ? kept : room)] = '\0';
+}

@@ -1,0 +1,337 @@
+#include "solver/direct/opening_cells.h"
+
+#include "solver/base/vector3.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Cells are as small as for a receiver at this part of the largest extent, however near it is. */
+static const double nearest = 1e-3;
+
+/* The place at (u, w) of a face, and its vector of area for du dw = 1. */
+static void face_at(const opening_face *f, double u, double w, double at[3], double area[3]) {
+    const double c = cos(2 * M_PI * w), s = sin(2 * M_PI * w), z = 2 * u - 1, ring = sqrt(fmax(0, 1 - z * z));
+    double part[3] = {0}, along[3], normals[3][3];
+    switch (f->kind) {
+    case FACE_PLANE:
+        part[0] = z, part[1] = 2 * w - 1;
+        cross3(f->axis[0], f->axis[1], area);
+        for (int d = 0; d < 3; d++) area[d] *= 4;
+        break;
+    case FACE_DISC:
+        part[0] = u * c, part[1] = u * s;
+        cross3(f->axis[0], f->axis[1], area);
+        for (int d = 0; d < 3; d++) area[d] *= 2 * M_PI * u;
+        break;
+    case FACE_TUBE:
+        part[0] = c, part[1] = s, part[2] = z;
+        for (int d = 0; d < 3; d++) along[d] = 4 * M_PI * (c * f->axis[1][d] - s * f->axis[0][d]);
+        cross3(along, f->axis[2], area);
+        break;
+    case FACE_BALL:
+        part[0] = ring * c, part[1] = ring * s, part[2] = z;
+        for (int k = 0; k < 3; k++) cross3(f->axis[(k + 1) % 3], f->axis[(k + 2) % 3], normals[k]);
+        for (int d = 0; d < 3; d++)
+            area[d] =
+                4 * M_PI * (part[0] * normals[0][d] + part[1] * normals[1][d] + part[2] * normals[2][d]);
+        break;
+    }
+    for (int d = 0; d < 3; d++)
+        at[d] = f->middle[d] + part[0] * f->axis[0][d] + part[1] * f->axis[1][d] + part[2] * f->axis[2][d];
+}
+
+static double length3(const double v[3]) {
+    return sqrt(dot3(v, v));
+}
+
+/* The area of a face as a direction sees its front; its axes are at right angles. */
+static double projected_area(const opening_face *f, const double direction[3]) {
+    const double a = length3(f->axis[0]), b = length3(f->axis[1]), c = length3(f->axis[2]);
+    double area[3];
+    cross3(f->axis[0], f->axis[1], area);
+    if (f->kind == FACE_PLANE) return 4 * fmax(0, dot3(area, direction));
+    if (f->kind == FACE_DISC) return M_PI * fmax(0, dot3(area, direction));
+    const double x = a > 0 ? dot3(f->axis[0], direction) / a : 0,
+                 y = b > 0 ? dot3(f->axis[1], direction) / b : 0,
+                 z = c > 0 ? dot3(f->axis[2], direction) / c : 0;
+    if (f->kind == FACE_TUBE) return 4 * c * hypot(b * x, a * y);
+    return M_PI * sqrt(b * b * c * c * x * x + a * a * c * c * y * y + a * a * b * b * z * z);
+}
+
+static void add_face(opening_faces *o, opening_face_kind kind, const double middle[3],
+                     const double axes[3][3]) {
+    opening_face *f = &o->faces[o->n_faces++];
+    f->kind = kind;
+    memcpy(f->middle, middle, sizeof f->middle);
+    memcpy(f->axis, axes, sizeof f->axis);
+}
+
+/* A flat opening, across its smallest extent; a line has one side of no length. */
+static void set_flat(opening_faces *o, opening_face_kind kind) {
+    static const double middle[3] = {0};
+    int across = 2;
+    for (int d = 0; d < 2; d++)
+        if (o->size[d] < o->size[across]) across = d;
+    double axes[3][3] = {{0}};
+    axes[0][(across + 1) % 3] = o->size[(across + 1) % 3] / 2;
+    axes[1][(across + 2) % 3] = o->size[(across + 2) % 3] / 2;
+    o->flat = true;
+    add_face(o, kind, middle, (const double(*)[3])axes);
+}
+
+/* Both ends and the sides. A side is as high as the file says, from the lower face on. */
+static void set_box(opening_faces *o, const double side[4]) {
+    const double half[3] = {o->size[0] / 2, o->size[1] / 2, o->size[2] / 2};
+    for (int end = -1; end <= 1; end += 2) {
+        const double middle[3] = {0, 0, end * half[2]};
+        const double axes[3][3] = {{half[0], 0, 0}, {0, end * half[1], 0}, {0}};
+        add_face(o, FACE_PLANE, middle, axes);
+    }
+    for (int k = 0; k < 4; k++) {
+        if (!(side[k] > 0)) continue;
+        const int out = k % 2, along = 1 - out;
+        const double sign = k < 2 ? 1 : -1, turn = out == 0 ? sign : -sign;
+        double middle[3] = {0, 0, side[k] / 2 - half[2]}, axes[3][3] = {{0}};
+        middle[out] = sign * half[out];
+        axes[0][along] = turn * half[along];
+        axes[1][2] = side[k] / 2;
+        add_face(o, FACE_PLANE, middle, (const double(*)[3])axes);
+    }
+}
+
+/* A tube along an axis of the frame with both its ends. */
+static void set_cylinder(opening_faces *o, int along) {
+    const int x = (along + 1) % 3, y = (along + 2) % 3;
+    static const double centre[3] = {0};
+    double axes[3][3] = {{0}};
+    axes[0][x] = o->size[x] / 2;
+    axes[1][y] = o->size[y] / 2;
+    axes[2][along] = o->size[along] / 2;
+    add_face(o, FACE_TUBE, centre, (const double(*)[3])axes);
+    for (int end = -1; end <= 1; end += 2) {
+        double middle[3] = {0}, radii[3][3] = {{0}};
+        middle[along] = end * o->size[along] / 2;
+        radii[0][x] = o->size[x] / 2;
+        radii[1][y] = end * o->size[y] / 2;
+        add_face(o, FACE_DISC, middle, (const double(*)[3])radii);
+    }
+}
+
+static void set_ball(opening_faces *o) {
+    static const double centre[3] = {0};
+    const double axes[3][3] = {{o->size[0] / 2, 0, 0}, {0, o->size[1] / 2, 0}, {0, 0, o->size[2] / 2}};
+    add_face(o, FACE_BALL, centre, axes);
+}
+
+/* The area of a face, of curved ones that of their projections on six directions, by Cauchy's formula: a
+ * choice among faces needs no more. */
+static double rough_area(const opening_face *f) {
+    double sum = 0;
+    for (int k = 0; k < 6; k++) {
+        double direction[3] = {0};
+        direction[k / 2] = k % 2 == 0 ? 1 : -1;
+        sum += projected_area(f, direction);
+    }
+    return sum;
+}
+
+void opening_faces_set(const luminaire_opening *opening, bool is_point, opening_faces *out) {
+    *out = (opening_faces){.flat = true};
+    double sum = 0;
+    if (is_point || opening->shape == OPENING_POINT) return;
+    memcpy(out->size, opening->size, sizeof out->size);
+    switch (opening->shape) {
+    case OPENING_BOX:
+        set_box(out, opening->side);
+        break;
+    case OPENING_CYLINDER:
+        set_cylinder(out, 2);
+        break;
+    case OPENING_CYLINDER_X:
+    case OPENING_CYLINDER_Y:
+        set_cylinder(out, opening->shape == OPENING_CYLINDER_X ? 0 : 1);
+        break;
+    case OPENING_SPHERE:
+    case OPENING_ELLIPSOID:
+        set_ball(out);
+        break;
+    case OPENING_DISC:
+    case OPENING_ELLIPSE:
+    case OPENING_UPRIGHT_DISC:
+        set_flat(out, FACE_DISC);
+        break;
+    default:
+        set_flat(out, FACE_PLANE);
+    }
+    out->flat = out->n_faces == 1 && out->faces[0].kind <= FACE_DISC;
+    for (size_t k = 0; k < out->n_faces; k++) {
+        sum += rough_area(&out->faces[k]);
+        out->upto[k] = sum;
+    }
+    for (size_t k = 0; k < out->n_faces; k++) out->upto[k] = sum > 0 ? out->upto[k] / sum : 1;
+    out->upto[out->n_faces - 1] = 1;
+}
+
+double opening_distance(const opening_faces *o, const double x[3]) {
+    double square = 0;
+    for (int d = 0; d < 3; d++) {
+        const double off = fmax(0, fabs(x[d]) - o->size[d] / 2);
+        square += off * off;
+    }
+    return sqrt(square);
+}
+
+/* The cells of a face as they are found. */
+typedef struct cell_list {
+    const opening_face *face;
+    const double *x;
+    double step;    /* the length of a pair of cells over their distance from x */
+    double closest; /* m: the least distance that counts */
+    size_t least;   /* pairs along each side of the face */
+    bool is_line;
+    size_t n; /* may be more than there is room for */
+    opening_cell *cells;
+} cell_list;
+
+/* A part of a face: from[0] ... to[0] of u, from[1] ... to[1] of w. */
+typedef struct face_part {
+    double from[2], to[2];
+} face_part;
+
+/* The lengths of a part along u and w, in m, or a little more. */
+static void part_lengths(const opening_face *f, const face_part *p, double length[2]) {
+    const double a = length3(f->axis[0]), b = length3(f->axis[1]), c = length3(f->axis[2]);
+    const double round = fmax(a, b), u = p->to[0] - p->from[0], w = p->to[1] - p->from[1];
+    double ring = 1;
+    switch (f->kind) {
+    case FACE_PLANE:
+        length[0] = 2 * a * u;
+        length[1] = 2 * b * w;
+        return;
+    case FACE_DISC:
+        length[0] = round * u;
+        length[1] = 2 * M_PI * round * p->to[0] * w;
+        return;
+    case FACE_TUBE:
+        length[0] = 2 * c * u;
+        length[1] = 2 * M_PI * round * w;
+        return;
+    case FACE_BALL:
+        if (p->to[0] < .5) ring = 2 * sqrt(p->to[0] * (1 - p->to[0]));
+        if (p->from[0] > .5) ring = 2 * sqrt(p->from[0] * (1 - p->from[0]));
+        length[0] = fmax(round, c) * (acos(2 * p->from[0] - 1) - acos(2 * p->to[0] - 1));
+        length[1] = 2 * M_PI * round * ring * w;
+        return;
+    }
+}
+
+/* The distance of x from a part, or less; of a plane it is exact. */
+static double part_distance(const cell_list *l, const face_part *p, const double length[2]) {
+    const opening_face *f = l->face;
+    double middle[3], area[3], to[3];
+    face_at(f, (p->from[0] + p->to[0]) / 2, (p->from[1] + p->to[1]) / 2, middle, area);
+    subtract3(l->x, middle, to);
+    const double all = dot3(to, to);
+    if (f->kind != FACE_PLANE) return sqrt(all) - hypot(length[0], length[1]) / 2;
+    double across = all, square = 0;
+    for (int k = 0; k < 2; k++) {
+        const double axis = length3(f->axis[k]), along = axis > 0 ? dot3(to, f->axis[k]) / axis : 0,
+                     off = fmax(0, fabs(along) - length[k] / 2);
+        across -= along * along;
+        square += off * off;
+    }
+    return sqrt(fmax(0, across) + square);
+}
+
+static void add_cell(cell_list *l, double u, double w, double du, double dw) {
+    if (l->n++ >= OPENING_CELLS) return;
+    opening_cell *cell = &l->cells[l->n - 1];
+    face_at(l->face, u, w, cell->at, cell->area);
+    for (int d = 0; d < 3; d++) cell->area[d] *= du * dw;
+    cell->share = du * dw * (l->face->kind == FACE_DISC ? 2 * u : 1);
+}
+
+/* Places of n pairs of cells, or of one cell where n is 0, along a side. */
+static double place_along(const face_part *p, int side, size_t n, size_t k) {
+    const double offset = k % 2 == 0 ? -.28867513459481287 : .28867513459481287; /* 1 / (2 sqrt 3) */
+    if (n == 0) return (p->from[side] + p->to[side]) / 2;
+    return p->from[side] + (p->to[side] - p->from[side]) * ((double)(k / 2) + .5 + offset) / (double)n;
+}
+
+static void add_part(cell_list *l, const face_part *p) {
+    double length[2];
+    size_t n[2];
+    part_lengths(l->face, p, length);
+    const double far = part_distance(l, p, length), most = fmax(length[0], length[1]);
+    if (!(far > most / 2) && most > l->closest) {
+        const int side = length[0] >= length[1] ? 0 : 1;
+        face_part half[2] = {*p, *p};
+        half[0].to[side] = half[1].from[side] = (p->from[side] + p->to[side]) / 2;
+        add_part(l, &half[0]);
+        add_part(l, &half[1]);
+        return;
+    }
+    const double step = l->step * fmax(far, l->closest);
+    for (int k = 0; k < 2; k++) {
+        const double whole = p->to[k] - p->from[k];
+        const size_t least = (size_t)ceil((double)l->least * whole - 1e-9);
+        n[k] = length[k] > step / 4 ? (size_t)ceil(length[k] / step) : 0;
+        if (length[k] > 0 && n[k] < least) n[k] = least;
+    }
+    const size_t many[2] = {n[0] > 0 ? 2 * n[0] : 1, n[1] > 0 ? 2 * n[1] : 1};
+    const double du = (p->to[0] - p->from[0]) / (double)many[0],
+                 dw = (p->to[1] - p->from[1]) / (double)many[1];
+    for (size_t i = 0; i < many[0]; i++)
+        for (size_t j = 0; j < many[1]; j++)
+            add_cell(l, place_along(p, 0, n[0], i), place_along(p, 1, n[1], j), du, dw);
+}
+
+size_t opening_cells(const opening_faces *o, const double x[3], size_t least, opening_cell *cells) {
+    const double largest = fmax(fmax(o->size[0], o->size[1]), o->size[2]);
+    cell_list l = {.x = x, .step = .2, .closest = nearest * largest, .cells = cells};
+    if (o->n_faces == 0) {
+        cells[0] = (opening_cell){.share = 1};
+        return 1;
+    }
+    for (;; l.step *= 1.5) {
+        l.n = 0;
+        for (size_t f = 0; f < o->n_faces; f++) {
+            static const face_part whole = {{0, 0}, {1, 1}};
+            double length[2];
+            l.face = &o->faces[f];
+            part_lengths(l.face, &whole, length);
+            const bool is_line = !(length[0] > 0 && length[1] > 0);
+            l.least = least == 1 ? 0 : least == 16 ? (is_line ? 8 : 2) : (is_line ? 128 : 8);
+            add_part(&l, &whole);
+        }
+        if (l.n <= OPENING_CELLS) return l.n;
+    }
+}
+
+void opening_place(const opening_faces *o, double u, double w, opening_cell *out) {
+    if (o->n_faces == 0) {
+        *out = (opening_cell){.share = 1};
+        return;
+    }
+    size_t f = 0;
+    while (f + 1 < o->n_faces && u >= o->upto[f]) f++;
+    const double before = f > 0 ? o->upto[f - 1] : 0, part = o->upto[f] - before;
+    u = part > 0 ? fmin(1, (u - before) / part) : .5;
+    double density = part > 0 ? 1 / part : 0;
+    if (o->faces[f].kind == FACE_DISC) { /* uniform in area: u = r^2 */
+        u = sqrt(u);
+        density /= 2 * fmax(u, 1e-12);
+    }
+    face_at(&o->faces[f], u, w, out->at, out->area);
+    for (int d = 0; d < 3; d++) out->area[d] *= density;
+    out->share = 1;
+}
+
+double opening_part(const opening_faces *o, const opening_cell *cell, const double direction[3]) {
+    if (o->flat) return cell->share;
+    const double own = dot3(cell->area, direction);
+    double all = 0;
+    if (!(own > 0)) return 0;
+    for (size_t f = 0; f < o->n_faces; f++) all += projected_area(&o->faces[f], direction);
+    return all > 0 ? own / all : 0;
+}
