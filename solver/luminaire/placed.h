@@ -8,6 +8,7 @@
 #ifndef LAMBERT_LUMINAIRE_PLACED_H
 #define LAMBERT_LUMINAIRE_PLACED_H
 
+#include "solver/base/scene/punctual_lights.h"
 #include "solver/luminaire/luminaire.h"
 
 enum { PLACED_MOST = 65536, PLACED_FILES_MOST = 1000, PLACED_NAME = 64, PLACED_IGNORED = 256 };
@@ -21,7 +22,7 @@ typedef struct placed_luminaire {
     double at[3];                               /* the middle of its opening, m */
     double x[3], y[3], z[3]; /* its frame in the scene, orthonormal: x is C0, y is C90, -z is gamma 0 */
     double dim, maintenance;
-    double flux;      /* lm before dim and maintenance; NAN: those of its file */
+    double flux;      /* lm before dim and maintenance, 0 of a dark light; NAN: those of its file */
     double scale;     /* the factor of its file's candela: dim * maintenance * flux / lumens of the file */
     double colour[3]; /* factors of red, green and blue, of luminance 1 */
     bool is_point;    /* its light comes from one point, whatever opening its file has */
@@ -31,7 +32,7 @@ typedef struct placed_luminaire {
 
 /* A file of a luminaire, with one lamp set. */
 typedef struct placed_file {
-    char *name, *path; /* as the list names it, and where it was found */
+    char *name, *path; /* as the list names it, and where it was found; NULL: it is a formula */
     size_t set;        /* 0: the first */
     size_t entry;      /* the first that names it */
     double lumens;
@@ -72,6 +73,18 @@ lam_status placed_read(const char *path, const placed_options *options, placed_l
  * factor of the flux. Messages have `name` for the path. */
 lam_status placed_read_text(const char *name, const char *text, size_t length, const placed_options *options,
                             placed_luminaires *out, lam_error *error);
+
+/* Appends the point and spot lights of a scene file to a list that was read, or to an empty one. The
+ * intensity of a light is multiplied by the luminance of its colour, which becomes one of luminance 1; its
+ * file has no path, and a table of 1 cd that lights of the same cone share; C0 is the preset of a list, and
+ * `entry` its place in lights. Light from one direction comes from outside of the scene: it is left out, and
+ * *n_directional is the number of these lights. lights [n] are settled, and have names that differ; `name` is
+ * that of the scene file for messages. *p stays as it is on an error. Cost: O(n log list), and for each light
+ * up to PLACED_FILES_MOST cones. Errors: LAM_ERR_ARGUMENT (a name that the list has, too many),
+ * LAM_ERR_MEMORY.
+ */
+lam_status placed_from_lights(const char *name, size_t n, const punctual_light *lights, placed_luminaires *p,
+                              size_t *n_directional, lam_error *error);
 
 void placed_free(placed_luminaires *p);
 

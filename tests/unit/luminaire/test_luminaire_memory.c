@@ -67,11 +67,38 @@ START_TEST(lists_of_luminaires) {
 }
 END_TEST
 
+/* A list with one luminaire stays as it was. */
+START_TEST(lights_as_luminaires) {
+    const placed_options options = {.unit = 1};
+    const punctual_light lights[] = {
+        {.name = "l", .kind = PUNCTUAL_POINT, .direction = {0, 0, -1}},
+        {.name = "m", .kind = PUNCTUAL_SPOT, .direction = {1, 0, 0}, .outer = 1}};
+    lam_error error = {0};
+    placed_luminaires p = {.n = 0};
+    size_t outside = 0;
+    long needed = 0;
+    ck_ok(placed_read_text("a", lists[0], strlen(lists[0]), &options, &p, &error));
+    for (;; needed++) {
+        const placed_luminaires kept = p;
+        allocations_left = needed;
+        const lam_status status = placed_from_lights("s", 2, lights, &p, &outside, &error);
+        allocations_left = -1;
+        if (status == LAM_OK) break;
+        ck_assert_int_eq(status, LAM_ERR_MEMORY);
+        ck_assert_mem_eq(&p, &kept, sizeof p);
+    }
+    ck_assert_int_ge(needed, 10);
+    ck_assert(p.n == 3 && p.n_files == 3);
+    placed_free(&p);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("luminaire_memory");
     TCase *tests = tcase_create("all");
     tcase_add_loop_test(tests, reading, 0, sizeof texts / sizeof *texts);
     tcase_add_loop_test(tests, lists_of_luminaires, 0, sizeof lists / sizeof *lists);
+    tcase_add_test(tests, lights_as_luminaires);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
