@@ -32,3 +32,12 @@ size_t utf8_of_latin1(const char *text, size_t length, char *out) {
     }
     return n;
 }
+
+bool utf8_is_unfit(const char *at, size_t length) {
+    const unsigned char *b = (const unsigned char *)at;
+    if (length == 1) return b[0] < 0x20 || b[0] == 0x7F;
+    if (length == 2) return b[0] == 0xC2 && b[1] < 0xA0;
+    if (length != 3 || b[0] != 0xE2) return false;
+    return (b[1] == 0x80 && (b[2] == 0x8E || b[2] == 0x8F || (b[2] >= 0xA8 && b[2] <= 0xAE))) ||
+           (b[1] == 0x81 && b[2] >= 0xA6 && b[2] <= 0xA9);
+}

@@ -15,4 +15,8 @@ bool utf8_is_valid(const char *text, size_t length);
  * NUL; returns how many bytes were written. */
 size_t utf8_of_latin1(const char *text, size_t length, char *out);
 
+/* True for a character, of so many bytes, that a line for people may not have: a control, also of U+0080 to
+ * U+009F, an end of a line or paragraph, a mark of the direction of writing. */
+bool utf8_is_unfit(const char *at, size_t length);
+
 #endif

@@ -86,17 +86,6 @@ void luminaire_trim(const char **begin, const char **end) {
     while (*end > *begin && is_blank((*end)[-1])) --*end;
 }
 
-/* Bytes of a character of UTF-8 that a line for people may not have: controls, also those of U+0080 to
- * U+009F, ends of lines and paragraphs, and marks of the direction of writing. */
-static bool is_unfit(const char *at, size_t length) {
-    const unsigned char *b = (const unsigned char *)at;
-    if (length == 1) return b[0] < 0x20 || b[0] == 0x7F;
-    if (length == 2) return b[0] == 0xC2 && b[1] < 0xA0;
-    if (length != 3 || b[0] != 0xE2) return false;
-    return (b[1] == 0x80 && (b[2] == 0x8E || b[2] == 0x8F || (b[2] >= 0xA8 && b[2] <= 0xAE))) ||
-           (b[1] == 0x81 && b[2] >= 0xA6 && b[2] <= 0xA9);
-}
-
 void luminaire_clean(const char *begin, const char *end, char *out, size_t room) {
     size_t n = 0;
     luminaire_trim(&begin, &end);
@@ -107,7 +96,7 @@ void luminaire_clean(const char *begin, const char *end, char *out, size_t room)
         size_t length = latin1 ? utf8_of_latin1(begin, 1, pair) : utf8_sequence(begin, end);
         begin += latin1 ? 1 : length;
         if (latin1) from = pair;
-        if (is_unfit(from, length)) {
+        if (utf8_is_unfit(from, length)) {
             from = *from == '\t' ? " " : "?";
             length = 1;
         }
