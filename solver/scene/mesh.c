@@ -27,6 +27,7 @@ void mesh_free(mesh *m) {
     free(m->buried);
     mesh_textures_release(m);
     free(m->cameras);
+    free(m->punctual);
     mesh_pictures_drop(m);
     *m = (mesh){0};
 }

@@ -4,6 +4,7 @@
 
 #include "solver/base/photometry.h"
 #include "solver/base/progress.h"
+#include "solver/base/scene/punctual_lights.h"
 #include "solver/base/scene/scene_cameras.h"
 #include "solver/base/scene/scene_faces.h"
 #include "store/store.h"
@@ -38,6 +39,8 @@ typedef struct mesh {
     uint32_t *textured_face; /* [n], of textures, or TEXTURE_NONE; NULL: no element has a textured face */
     size_t n_cameras;
     scene_camera *cameras; /* [n_cameras], of the scene file */
+    size_t n_punctual;
+    punctual_light *punctual; /* [n_punctual], lights of the scene file that are no faces; /mesh has none */
     bool *has_back; /* [n]: faces that mesh_make_backs gives a second element; NULL: none, or all are made */
     size_t n_backs;
     bool *buried;   /* [n]: elements between a body and the face that it stands on, which see nothing, are not
@@ -87,8 +90,8 @@ typedef struct mesh_refinement {
  * textures the means over their own areas. */
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
 
-/* The same in another mesh, which has neither cameras nor names of groups until mesh_replace; parent [n of
- * out], or NULL: the face that each element is a part of. The caller frees both. */
+/* The same in another mesh, which has neither cameras, lights nor names of groups until mesh_replace; parent
+ * [n of out], or NULL: the face that each element is a part of. The caller frees both. */
 lam_status mesh_refine_into(const mesh *m, const mesh_refinement *how, mesh *out, uint32_t **parent,
                             lam_error *error);
 

@@ -232,6 +232,9 @@ void mesh_replace(mesh *m, mesh *by) {
     by->n_cameras = m->n_cameras;
     by->cameras = m->cameras;
     m->cameras = NULL;
+    by->n_punctual = m->n_punctual;
+    by->punctual = m->punctual;
+    m->punctual = NULL;
     mesh_free(m);
     *m = *by;
     *by = (mesh){0};

@@ -1,5 +1,5 @@
-/* Materials of a glTF or GLB with the images in it, and the file as the library gets it; files that it names
- * do not exist. */
+/* Materials of a glTF or GLB with the images in it, its lights, and the file as the library gets it; files
+ * that it names do not exist. */
 #include "fuzz/fuzz.h"
 #include "solver/scene/import/imported_faces.h"
 
@@ -23,6 +23,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);
     }
     gltf_materials_free(n, materials);
+    error.message[0] = '\0';
+    if (gltf_read_lights("none/scene.gltf", (const char *)data, size, &s, &error) == LAM_OK)
+        for (size_t k = 0; k < s.n_punctual; k++) FUZZ_CHECK(punctual_light_settle(&s.punctual[k]));
+    else
+        FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);
     char *rewritten = NULL;
     size_t length = 0;
     gltf_numbers unpacked = {.length = 0}, numbers = {.length = 0};

@@ -373,6 +373,7 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     if (a.gltf) TRY(glb_padded(bytes, length, &padded, &padded_length, error));
     if (a.gltf)
         TRY(gltf_read_materials(path, bytes, length, s, &a.gltf_materials, &a.n_gltf_materials, error));
+    if (a.gltf) TRY(gltf_read_lights(path, bytes, length, s, error));
     TRY(ply_check_head(path, bytes, length, error));
     if (strcasecmp(format, "stl") == 0) TRY(stl_normalised(bytes, length, &padded, &padded_length, error));
     scene_files files = {.path = name,

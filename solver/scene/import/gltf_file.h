@@ -95,7 +95,7 @@ lam_status gltf_unpack_views(gltf_file *g, gltf_numbers *unpacked, lam_error *er
  * O(numbers). Errors: LAM_ERR_FORMAT (integers that cannot be read), LAM_ERR_MEMORY. */
 lam_status gltf_convert_integers(gltf_file *g, gltf_numbers *numbers, lam_error *error);
 
-/* Warns of lights, maps, scenes and extensions that are not read, a line for each kind, with the faces that
+/* Warns of maps, scenes and extensions that are not read, a line for each kind, with the faces that
  * each is about and their area: of plain bytes, instances that are nodes, and bones. O(faces) where there are
  * some. Errors: LAM_ERR_MEMORY. */
 lam_status gltf_tell_left_out(gltf_file *g, lam_error *error);

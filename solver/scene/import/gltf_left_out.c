@@ -1,4 +1,4 @@
-/* Parts of a glTF that are not read, for people: lights, maps, extensions with the faces that they are about.
+/* Parts of a glTF that are not read, for people: maps, extensions with the faces that they are about.
  * Runs in the child. */
 #include "solver/scene/import/gltf_amount.h"
 
@@ -168,8 +168,7 @@ static void tell_lines(const gltf_file *g) {
 
 lam_status gltf_tell_left_out(gltf_file *g, lam_error *error) {
     import_warnings *w = &g->s->warnings;
-    static const char punctual[] = "KHR_lights_punctual";
-    size_t i, lights = 0, bumps = 0, alphas = 0, metals = 0;
+    size_t i, bumps = 0, alphas = 0, metals = 0;
     json_t *m;
     json_array_foreach(json_object_get(g->root, "materials"), i, m) {
         const json_t *pbr = json_object_get(m, "pbrMetallicRoughness");
@@ -182,11 +181,6 @@ lam_status gltf_tell_left_out(gltf_file *g, lam_error *error) {
         metals += gltf_number(json_object_get(pbr, "metallicFactor"), 0) > 0 ||
                   json_object_get(pbr, "metallicRoughnessTexture") != NULL;
     }
-    json_array_foreach(json_object_get(g->root, "nodes"), i, m) lights += gltf_extension(m, punctual) != NULL;
-    g->s->punctual = lights;
-    if (lights > 0)
-        import_warn(w, "%s: its %zu light%s (%s) %s left out; only faces emit", g->path, lights,
-                    lights == 1 ? "" : "s", punctual, lights == 1 ? "is" : "are");
     if (alphas > 0)
         import_warn(w, "%s: the alpha of %zu materials (MASK, or in an image) is left out; they are opaque",
                     g->path, alphas);

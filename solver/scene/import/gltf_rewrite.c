@@ -1,6 +1,7 @@
 /* A glTF as the library gets it: with nodes in place of instances, plain bytes in place of compressed ones
- * and floats in place of integers, which it does not know, and with numbers in place of the names of
- * materials, which it tells in the order that meshes use them first. Runs in the child. */
+ * and floats in place of integers, which it does not know, without bones and lights, and with numbers in
+ * place of the names of materials, which it tells in the order that meshes use them first. Runs in the child.
+ */
 #include "solver/scene/import/gltf_file.h"
 
 #include <stdio.h>
@@ -30,6 +31,18 @@ static bool drop_skins(gltf_file *g) {
     json_array_foreach(json_object_get(g->root, "nodes"), i, node) any =
         (json_is_object(node) && json_object_del(node, "skin") == 0) || any;
     return (json_is_object(g->root) && json_object_del(g->root, "skins") == 0) || any;
+}
+
+/* Takes the lights off, which gltf_read_lights has read: the library refuses the file for some of them, which
+ * are read here, and needs none. True where there are any. */
+static bool drop_lights(gltf_file *g) {
+    static const char punctual[] = "KHR_lights_punctual";
+    json_t *node;
+    size_t i;
+    bool any = json_object_del(json_object_get(g->root, "extensions"), punctual) == 0;
+    json_array_foreach(json_object_get(g->root, "nodes"), i, node) any =
+        json_object_del(json_object_get(node, "extensions"), punctual) == 0 || any;
+    return any;
 }
 
 /* Fails where an accessor has a view, and that has not all of its bytes: the library reads what lies behind
@@ -105,7 +118,7 @@ lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, impo
     lam_status status = LAM_OK;
     gltf_file g = {.path = path, .s = s};
     const bool names_instances = memmem(bytes, length, GLTF_INSTANCES, sizeof GLTF_INSTANCES - 1) != NULL;
-    bool changed = false, bones;
+    bool changed = false, bones, lights;
     *out = NULL;
     gltf_parse(&g, bytes, length);
     if (g.root == NULL && names_instances)
@@ -119,7 +132,8 @@ lam_status gltf_rewrite(const char *path, const char *bytes, size_t length, impo
     TRY(gltf_expand_instances(&g, &changed, error));
     TRY(gltf_tell_left_out(&g, error));
     bones = drop_skins(&g);
-    changed = changed || bones || unpacked->length > 0 || numbers->length > 0;
+    lights = drop_lights(&g);
+    changed = changed || bones || lights || unpacked->length > 0 || numbers->length > 0;
     changed = changed || json_array_size(json_object_get(g.root, "materials")) > 0;
     TRY(number_materials(&g, error));
     if (changed) TRY(write_file(&g, bytes, length, out, out_length, error));

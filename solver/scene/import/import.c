@@ -417,6 +417,23 @@ static void take_cameras(imported_faces *s, double unit, mesh *m) {
     }
 }
 
+/* Lights in metres, by the limit of vertices. */
+static lam_status take_lights(imported_faces *s, const char *path, double unit, mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t k = 0; k < s->n_punctual; k++) {
+        punctual_light *l = &s->punctual[k];
+        for (int d = 0; d < 3; d++) l->at[d] *= unit;
+        if (!punctual_light_settle(l))
+            FAIL(error, LAM_ERR_ARGUMENT, "%s: light '%s': a coordinate with --unit %g is too large", path,
+                 l->name, unit);
+    }
+    m->punctual = s->punctual;
+    m->n_punctual = s->n_punctual;
+    s->punctual = NULL;
+done:
+    return status;
+}
+
 /* Formats in single precision lose the shape of a small scene far from the origin; the text of an OBJ does
  * not. */
 static void warn_of_lost_precision(imported_faces *s, const char *path, const mesh *m) {
@@ -472,6 +489,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     if (options->guess_unit) TRY(guess_unit(&made, path, &unit, &found.unit, error));
     made.unit = unit;
     take_cameras(&s, unit, &made);
+    TRY(take_lights(&s, path, unit, &made, error));
     TRY(name_groups(&s, &made, error));
     TRY(apply_materials(&s, path, options, &made, &found, error));
     TRY(lay_textures(&s, path, unit, &made, &found, error));
@@ -484,7 +502,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     TRY(mesh_settle_coincident(&made, options->two_sided, &found.coincident, error));
     mesh_geometry_hash(&made, made.source_hash);
     found.dropped_faces = s.dropped;
-    if (is_gltf(path, options) && found.luminous + s.punctual > 0) made.lights = LIGHT_PHOTOMETRIC;
+    if (is_gltf(path, options) && found.luminous + s.n_punctual > 0) made.lights = LIGHT_PHOTOMETRIC;
     if (s.latin1 > 0)
         import_warn(&s.warnings, "%s: %zu name%s not UTF-8, read as Latin-1", path, s.latin1,
                     s.latin1 == 1 ? " is" : "s are");

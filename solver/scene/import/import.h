@@ -35,8 +35,9 @@ typedef struct import_report {
 /* Reads OBJ+MTL, glTF/GLB, PLY, STL, OFF; path - is standard input, of the given format, as a file of the
  * current folder that is called stdin. m is filled and owned by the caller (mesh_free); faces of double-sided
  * materials of a glTF are marked in has_back. The lights of a glTF that has any, in cd/m2 or cd, make the
- * mesh photometric. Every failure is one line that names the file and the place: unreadable, unknown format,
- * missing MTL, non-finite coordinate, empty scene, a crash, time-out or memory limit of the child. */
+ * mesh photometric; those that are no faces (KHR_lights_punctual) are its punctual ones. Every failure is one
+ * line that names the file and the place: unreadable, unknown format, missing MTL, non-finite coordinate,
+ * empty scene, a crash, time-out or memory limit of the child. */
 lam_status scene_import(const char *path, const import_options *options, mesh *m, import_report *report,
                         lam_error *error);
 

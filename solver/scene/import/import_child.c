@@ -12,15 +12,15 @@
 #include <string.h>
 #include <sys/wait.h>
 
-/* The first bytes that the child sends; points, elements, both name texts, the material values, the cameras,
- * textured faces with their elements, the sizes of images and their pixels follow. */
+/* The first bytes that the child sends; points, elements, both name texts, the material values, the cameras
+ * and lights, textured faces with their elements, the sizes of images and their pixels follow. */
 typedef struct reply_header {
     char magic[8];
     uint64_t status;
     char message[sizeof((lam_error *)0)->message];
     import_warnings warnings;
     uint64_t n_points, n_polygons, n_elements, n_objects, object_bytes, n_materials, material_bytes,
-        n_cameras, dropped, punctual, latin1, n_faces, n_images;
+        n_cameras, n_punctual, dropped, latin1, n_faces, n_images;
 } reply_header;
 
 static const char reply_magic[8] = "lamsoup";
@@ -56,8 +56,8 @@ static void send_reply(lam_status result, const lam_error *error, const imported
     header.n_materials = s->materials.n;
     header.material_bytes = s->materials.text_bytes;
     header.n_cameras = s->n_cameras;
+    header.n_punctual = s->n_punctual;
     header.dropped = s->dropped;
-    header.punctual = s->punctual;
     header.latin1 = s->latin1;
     header.n_faces = s->n_faces;
     header.n_images = s->n_images;
@@ -71,6 +71,7 @@ static void send_reply(lam_status result, const lam_error *error, const imported
                  {s->materials.text, s->materials.text_bytes},
                  {s->values, s->materials.n * sizeof *s->values},
                  {s->cameras, s->n_cameras * sizeof *s->cameras},
+                 {s->punctual, s->n_punctual * sizeof *s->punctual},
                  {s->faces, s->n_faces * sizeof *s->faces},
                  {s->face_elements, s->n_faces * sizeof *s->face_elements}};
     for (size_t k = 0; k < sizeof parts / sizeof *parts; k++)
@@ -151,6 +152,22 @@ static bool cameras_are_sound(imported_faces *s) {
     return true;
 }
 
+/* *sound becomes false where a light has a value that cannot be used, or the name of one before it. */
+static lam_status check_lights(imported_faces *s, bool *sound, lam_error *error) {
+    lam_status status = LAM_OK;
+    name_table names = {.n = 0};
+    for (size_t k = 0; k < s->n_punctual && *sound; k++) {
+        punctual_light *l = &s->punctual[k];
+        uint32_t index;
+        *sound = punctual_light_settle(l);
+        if (*sound) TRY(name_table_add(&names, l->name, sizeof l->name, &index, error));
+        *sound = *sound && names.n == k + 1;
+    }
+done:
+    name_table_free(&names);
+    return status;
+}
+
 /* True where textured faces belong to elements and surfaces that exist, and have usable maps. */
 static bool faces_are_sound(const imported_faces *s, uint64_t n_images) {
     for (size_t f = 0; f < s->n_faces; f++) {
@@ -221,8 +238,8 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
             header.n_points < TABLE_NONE && header.n_polygons < most && header.n_polygons < TABLE_NONE &&
             header.n_elements < TABLE_NONE && header.n_elements > 0 && header.object_bytes < most &&
             header.material_bytes < most && header.n_materials < most &&
-            header.n_cameras <= SCENE_CAMERAS_MOST && header.n_faces <= header.n_elements &&
-            header.n_images < most;
+            header.n_cameras <= SCENE_CAMERAS_MOST && header.n_punctual <= PUNCTUAL_MOST &&
+            header.n_faces <= header.n_elements && header.n_images < most;
     if (!sound) FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
     s->n_polygons = header.n_polygons;
     s->points.points = receive_array(child, header.n_points, sizeof *s->points.points, whole, error);
@@ -240,6 +257,9 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
     s->cameras = receive_array(child, header.n_cameras, sizeof *s->cameras, whole, error);
     if (s->cameras == NULL) TRY(LAM_ERR_MEMORY);
     s->n_cameras = s->camera_capacity = header.n_cameras;
+    s->punctual = receive_array(child, header.n_punctual, sizeof *s->punctual, whole, error);
+    if (s->punctual == NULL) TRY(LAM_ERR_MEMORY);
+    s->n_punctual = s->punctual_capacity = header.n_punctual;
     s->faces = receive_array(child, header.n_faces, sizeof *s->faces, whole, error);
     if (s->faces == NULL) TRY(LAM_ERR_MEMORY);
     s->face_elements = receive_array(child, header.n_faces, sizeof *s->face_elements, whole, error);
@@ -251,12 +271,12 @@ static lam_status receive_reply(confined *child, const char *path, size_t most_b
     TRY(names_of_block(objects, header.object_bytes, header.n_objects, &s->objects, &objects_sound, error));
     TRY(names_of_block(materials, header.material_bytes, header.n_materials, &s->materials, &materials_sound,
                        error));
+    TRY(check_lights(s, &sound, error));
     if (!sound || !objects_sound || !materials_sound || !elements_are_sound(s) || !cameras_are_sound(s) ||
         !faces_are_sound(s, header.n_images))
         FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
     s->warnings = header.warnings;
     s->dropped = header.dropped;
-    s->punctual = header.punctual;
     s->latin1 = header.latin1;
 done:
     free(objects);

@@ -41,6 +41,7 @@ void imported_faces_free(imported_faces *s) {
     free(s->elements);
     free(s->values);
     free(s->cameras);
+    free(s->punctual);
     free(s->skins);
     free(s->skin_corners);
     free(s->faces);

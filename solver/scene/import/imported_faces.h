@@ -3,6 +3,7 @@
 #ifndef LAMBERT_SCENE_IMPORT_IMPORTED_FACES_H
 #define LAMBERT_SCENE_IMPORT_IMPORTED_FACES_H
 
+#include "solver/base/scene/punctual_lights.h"
 #include "solver/base/scene/scene_cameras.h"
 #include "solver/scene/polygon_split.h"
 #include "solver/scene/tables.h"
@@ -84,7 +85,8 @@ typedef struct imported_faces {
     size_t value_capacity;
     scene_camera *cameras; /* in units of the file, settled; names differ */
     size_t n_cameras, camera_capacity;
-    uint64_t punctual;  /* lights of a glTF that are no faces, which are left out */
+    punctual_light *punctual; /* in units of the file, settled; names differ */
+    size_t n_punctual, punctual_capacity;
     size_t latin1;      /* names that were not UTF-8 and were read as Latin-1 */
     const char *assets; /* folder that files of the scene may lie in beside the scene's own; NULL: none */
     const char *source; /* the file that has the bytes of the scene; NULL: its path */
@@ -163,7 +165,8 @@ typedef struct gltf_numbers {
 
 /* Rewrites a glTF or GLB for the library: with a child for each instance of a node (EXT_mesh_gpu_instancing),
  * with plain bytes, in unpacked, in place of compressed ones, with floats, in numbers, in place of integers,
- * and with GLTF_NUMBER and its place in the file for the name of each material; warns of what is left out.
+ * without bones and lights, and with GLTF_NUMBER and its place in the file for the name of each material;
+ * warns of what is left out.
  * *out is a copy of the file, freed by the caller as the bytes of both, or NULL where there is nothing to
  * rewrite. Errors: LAM_ERR_FORMAT (instances, views or integers that cannot be read, or too many),
  * LAM_ERR_MEMORY. */
@@ -183,6 +186,14 @@ void gltf_find_json(const char **bytes, size_t *length);
  * LAM_ERR_MEMORY. */
 lam_status gltf_read_cameras(const char *path, const char *bytes, size_t length, imported_faces *s,
                              lam_error *error);
+
+/* Adds the lights that nodes of the scene have by KHR_lights_punctual, in the order of its tree, in scene
+ * coordinates and by the names of their nodes, made different, NAME-2 and so on; lines say how many there
+ * are, and how many nodes of no scene or another one have. One without a usable place or direction is left
+ * out with a warning. Broken JSON has none. O(n). Errors: LAM_ERR_FORMAT (a light that is not there, or a
+ * value of one that is wrong), LAM_ERR_MEMORY. */
+lam_status gltf_read_lights(const char *path, const char *bytes, size_t length, imported_faces *s,
+                            lam_error *error);
 
 /* Some writers of GLB do not pad chunks to 4 bytes, which the library refuses. *out is a padded copy, freed
  * by the caller, or NULL where the file is not a GLB or is padded. Errors: LAM_ERR_MEMORY. */

@@ -114,6 +114,15 @@ static lam_status lies_about_corners(const char *path, imported_faces *s, lam_er
     return status;
 }
 
+/* Two lights of one name. */
+static lam_status lies_about_lights(const char *path, imported_faces *s, lam_error *error) {
+    const punctual_light light = {.name = "a", .kind = PUNCTUAL_POINT, .intensity = 1};
+    s->punctual = calloc(2, sizeof *s->punctual);
+    s->punctual[s->n_punctual++] = light;
+    s->punctual[s->n_punctual++] = light;
+    return reads_well(path, s, error);
+}
+
 static lam_status run_child(scene_reader *reader, imported_faces *s, lam_error *error) {
     const child_limits limits = {.cpu_seconds = 1, .memory_bytes = (size_t)1 << 30};
     char path[256];
@@ -134,6 +143,7 @@ START_TEST(child_is_survived) {
         {sleeps, LAM_ERR_FORMAT, "more than its 1 s"},
         {babbles, LAM_ERR_INTERNAL, "damaged reply"},
         {lies_about_corners, LAM_ERR_INTERNAL, "damaged reply"},
+        {lies_about_lights, LAM_ERR_INTERNAL, "damaged reply"},
 #ifndef LAMBERT_SANITIZED /* where address space cannot be limited, and a killed write ends in another way   \
                            */
         {hoards, LAM_ERR_MEMORY, "more than its 1024 MiB"},
