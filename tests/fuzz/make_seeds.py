@@ -106,21 +106,24 @@ with tempfile.TemporaryDirectory() as scratch:
     run("precompute", "box.obj", "--mesh", "faces", "--probes", 0, "--quiet", "-o", folder / "store" / "blocks.h5", "--form-factors", "blocks",
         "--epsilon", .99, "--keep-form-factors")
 
-# The reply of the importing process: a header, then points, elements, names, materials, textured faces, images.
+# The reply of the importing process: a header, then points, elements, names, materials, lights, textured faces, images.
 def import_header(status, message, warnings, omitted, *counts):
-    return struct.pack("<8sQ480s2048sQ11Q", b"lamsoup", status, message, warnings, omitted, *counts)
+    return struct.pack("<8sQ480s2048sQ13Q", b"lamsoup", status, message, warnings, omitted, *counts)
 
 
-body = struct.pack("<9d", 0, 0, 0, 1, 0, 0, 0, 1, 0) + struct.pack("<6I", 0, 1, 2, 0xFFFFFFFF, 0, 0) + b"a\0" + b"m\0"
-colours = struct.pack("<6d2Q", .5, .5, .5, 0, 0, 0, 1, 1)
+body = struct.pack("<9d", 0, 0, 0, 1, 0, 0, 0, 1, 0) + struct.pack("<7I", 0, 1, 2, 0xFFFFFFFF, 0, 0, 0) + b"a\0" + b"m\0"
+colours = struct.pack("<6d3Qd", .5, .5, .5, 0, 0, 0, 1, 1, 0, 0)
 plain = struct.pack("<6I6d", *[0] * 6, *[0] * 6)
 tiled = struct.pack("<6I6d", 1, 1, 1, 2, 0, 0, 1, 0, 0, 0, 1, 0)
 face = struct.pack("<3d16f12f2I", 0, 0, 0, *[1] * 28, 0, 0) + struct.pack("<I", 0)
 image = struct.pack("<2Q", 2, 1) + bytes(range(6))
-(folder / "import" / "one").write_bytes(import_header(0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0, 0, 0, 0, 0) + body + colours + plain * 2)
-(folder / "import" / "textured").write_bytes(import_header(0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0, 0, 0, 1, 1)
+(folder / "import" / "one").write_bytes(import_header(0, b"", b"", 0, 3, 1, 1, 1, 2, 1, 2, 0, 0, 0, 0, 0, 0) + body + colours + plain * 2)
+light = struct.pack("<64s2I12d", b"lamp", 1, 1, 1, 2, 3, 0, 0, -1, 100, 1, .5, 0, .25, .5)
+(folder / "import" / "lit").write_bytes(import_header(0, b"", b"", 0, 3, 1, 1, 1, 2, 1, 2, 0, 1, 0, 0, 0, 0)
+                                        + body + colours + plain * 2 + light)
+(folder / "import" / "textured").write_bytes(import_header(0, b"", b"", 0, 3, 1, 1, 1, 2, 1, 2, 0, 0, 0, 0, 1, 1)
                                              + body + colours + tiled + plain + face + image)
-(folder / "import" / "refused").write_bytes(import_header(4, b"no", b"w\nv", 3, *[0] * 11))
+(folder / "import" / "refused").write_bytes(import_header(4, b"no", b"w\nv", 3, *[0] * 13))
 
 
 # Images, and a glTF with one in each place that it may have.
@@ -134,6 +137,9 @@ document = {"asset": {"version": "2.0"}, "buffers": [{}], "bufferViews": [{"buff
             "samplers": [{"wrapS": 33071, "wrapT": 33648}], "accessors": [{"bufferView": 0, "componentType": 5123, "count": 2, "type": "VEC2"}],
             "textures": [{"source": 0, "sampler": 0}, {"source": 1}, {"source": 2}, {"extensions": {"EXT_texture_webp": {"source": 0}}}],
             "meshes": [{"primitives": [{"attributes": {"TEXCOORD_0": 0}, "material": 1}]}], "extensionsUsed": ["KHR_materials_unlit"],
+            "extensions": {"KHR_lights_punctual": {"lights": [{"type": "spot", "color": [1, .5, 0], "intensity": 9, "range": 3, "spot": {
+                "innerConeAngle": .2, "outerConeAngle": .5}}, {"type": "point", "name": "bulb"}]}}, "scenes": [{"nodes": [0, 1]}],
+            "nodes": [{"name": "a", "extensions": {"KHR_lights_punctual": {"light": k}}} for k in range(2)],
             "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": k, "extensions": turned if k == 0 else {}}},
                            "emissiveTexture": {"index": 3}, "alphaMode": "MASK",
                            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 3}}} for k in range(3)]}
