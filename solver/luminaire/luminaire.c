@@ -159,8 +159,8 @@ const char *luminaire_find_word(const luminaire *l, const char *key) {
 }
 
 const char *luminaire_format_name(luminaire_format format) {
-    static const char *const names[LUMINAIRE_FORMATS] = {"LM-63-1986", "LM-63-1991", "LM-63-1995",
-                                                         "LM-63-2002", "LM-63-2019", "EULUMDAT"};
+    static const char *const names[LUMINAIRE_FORMATS] = {
+        "LM-63-1986", "LM-63-1991", "LM-63-1995", "LM-63-2002", "LM-63-2019", "EULUMDAT", "formula"};
     return names[format];
 }
 

@@ -17,6 +17,7 @@ typedef enum luminaire_format {
     LM63_2002,
     LM63_2019,
     EULUMDAT,
+    LUMINAIRE_FORMULA, /* of no file: luminaire_made.h */
     LUMINAIRE_FORMATS
 } luminaire_format;
 
