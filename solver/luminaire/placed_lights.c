@@ -113,7 +113,7 @@ static lam_status add_light(light_list *w, size_t k, lam_error *error) {
     TRY(find_file(w, light, k, &l.file, error));
     memcpy(l.name, light->name, sizeof l.name);
     memcpy(l.at, light->at, sizeof l.at);
-    (void)placed_aim(light->direction, NULL, 0, &l); /* a unit vector has a frame */
+    (void)placed_aim(light->direction, NULL, 0, 'z', &l); /* a unit vector has a frame */
     settle_colour(light, &l);
     l.flux = l.scale * w->made.files[l.file].lumens;
     w->made.luminaires[w->made.n++] = l;
