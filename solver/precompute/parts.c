@@ -32,6 +32,7 @@ static void scene_free(precompute_scene *scene) {
     face_openings_free(&scene->of_faces);
     emitter_list_free(&scene->emitters);
     importance_free(&scene->importance);
+    luminaire_columns_free(&scene->luminaires);
 }
 
 void parts_free(precompute_parts *p) {

@@ -2,11 +2,13 @@
 #ifndef LAMBERT_PRECOMPUTE_PARTS_H
 #define LAMBERT_PRECOMPUTE_PARTS_H
 
+#include "solver/direct/direct_elements.h"
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/pairs_sample.h"
 #include "solver/formfactor/pairs/ray_rows.h"
 #include "solver/formfactor/source.h"
+#include "solver/luminaire/placed_store.h"
 #include "solver/method/judge/judge.h"
 #include "solver/precompute/emitter_list.h"
 #include "solver/precompute/error_advice.h"
@@ -42,6 +44,19 @@ typedef struct precompute_job {
     bool holds;          /* rows of F are needed whatever the method is */
 } precompute_job;
 
+/* Luminaires, and their direct light at dim 1. */
+typedef struct luminaire_columns {
+    placed_luminaires placed;         /* n is 0: there are none */
+    float *H;                         /* [n][elements], lx */
+    double *elements_off, *means_off; /* [n][groups], lx^2, as in direct_light */
+    double *scale;                    /* [n], of candela, with that of TILT */
+    placed_ignoring *ignoring;        /* [n_ignoring] */
+    size_t n_ignoring, ignoring_capacity;
+    placed_luminaires before;     /* of the store that is read */
+    lam_luminaires *light_before; /* theirs; NULL: it has none */
+} luminaire_columns;
+void luminaire_columns_free(luminaire_columns *c);
+
 /* The scene as it is computed with. */
 typedef struct precompute_scene {
     mesh m;
@@ -55,6 +70,7 @@ typedef struct precompute_scene {
     face_openings of_faces;        /* of the faces of the file, or around the groups of --portal */
     const face_openings *openings; /* these; NULL: there is no sky, or only a store's mesh is known */
     size_t sky_tiles;
+    luminaire_columns luminaires;
     emitter_list emitters;
     emitter_source emitting; /* a view of emitters, for methods */
     importance importance;   /* n is 0 where all is read, and may emit */

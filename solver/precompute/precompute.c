@@ -136,6 +136,13 @@ static lam_status run_stages(precompute_parts *p, lam_error *error) {
     log_stage(job, "mesh", started);
     TRY(terminal_check(error));
 
+    if (p->scene.luminaires.placed.n > 0) {
+        started = clock_seconds();
+        TRY(stage_luminaires(job, &p->scene, error));
+        log_stage(job, "luminaires", started);
+        TRY(terminal_check(error));
+    }
+
     TRY(stage_open_scratch(job, &p->plan, &p->factors, error));
     TRY(stage_forecast(job, &p->scene, &p->plan, &p->factors, &p->times, error));
     TRY(run_trials(p, error));

@@ -25,6 +25,9 @@ extern const char precompute_quality_words[];
 /* The light that panes pass: less of it aslant, or the same from every side. */
 typedef enum glass_law { GLASS_BY_ANGLE, GLASS_EVENLY } glass_law;
 
+/* --luminaires: the word for leaving those of a store out. */
+#define LUMINAIRES_NONE "none"
+
 typedef struct precompute_options {
     const char *output;
     uint64_t elements;
@@ -49,6 +52,7 @@ typedef struct precompute_options {
     option_list glass;   /* GROUP=T[,FACES] */
     glass_law glass_law;
     bool keep_form_factors;
+    const char *luminaires;             /* FILE, LUMINAIRES_NONE; or NULL */
     const char *emitters;               /* FILE, group=NAME, sky; or NULL */
     const char *receivers, *importance; /* NAME,NAME; FILE; one of them, or both NULL */
     const char *sources;                /* NAME,NAME; or NULL */
@@ -126,6 +130,7 @@ typedef enum seed_purpose {
     SEED_MESH = 7,          /* the coarse solution of --mesh-error, and its light at points */
     SEED_MESH_ERROR = 8,    /* light at points by which the error of the mesh is stated */
     SEED_POSITIONS = 9,     /* paths of a moving light */
+    SEED_LUMINAIRES = 10,   /* segments towards luminaires */
     SEED_VERIFY_FIRST = 11, /* of verify: its samples, probes and direct illumination */
     SEED_VERIFY_SECOND = 12,
     SEED_VERIFY_PROBES = 13,

@@ -167,6 +167,16 @@ static const option_row mesh_rows[] = {
     OPTION_ROW_REFLECTANCE(FIELD(reflectance),
                            .help = "Grey reflectance of every face, in place of that in the file"),
     OPTION_ROW_ASSETS(FIELD(assets), .settled = fixed_mesh),
+    {.name = "luminaires",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(luminaires),
+     .argument = "FILE.json|.csv",
+     .otherwise = "lights of a glTF; those of a store",
+     .not_with = "positions|path",
+     .help =
+         "Luminaires of the scene, with the files of their light (`lambert luminaire` shows both): their "
+         "direct light is found by geometry, and each has a dimmer. Of a store: in place of those that it "
+         "has; none leaves these out"},
     {.name = "lights",
      .kind = OPTION_CHOICE,
      .offset = FIELD(lights),

@@ -27,6 +27,14 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
 lam_status stage_load_store(const precompute_job *job, precompute_scene *scene, precompute_plan *plan,
                             precompute_factors *factors, lam_error *error);
 
+/* Reads --luminaires and the lights of the scene file; those of a store, or --luminaires in their place.
+ * Finds the direct light of those that a store did not have; writes them: stage_luminaires.c. */
+lam_status scene_take_luminaires(const precompute_job *job, precompute_scene *scene, lam_error *error);
+lam_status scene_load_luminaires(const precompute_job *job, store *s, precompute_scene *scene,
+                                 lam_error *error);
+lam_status stage_luminaires(const precompute_job *job, precompute_scene *scene, lam_error *error);
+lam_status luminaires_save(const luminaire_columns *c, const mesh *m, store *s, lam_error *error);
+
 /* Refines the mesh as asked for; the same where about as many elements fit into memory, orders it, and reads
  * its importance; what it is, in lines of the log: stage_mesh.c. */
 lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_error *error);
