@@ -156,6 +156,10 @@ lam_status precompute_run(const precompute_options *options, const option_result
     lam_status status = LAM_OK;
     precompute_parts p = parts_begin(options, t);
     if (options_given(given, "epsilon")) p.job.kept_epsilon = options->build.epsilon;
+    if (relight_is_asked(options, given)) {
+        TRY(relight_run(&p.job, &p.scene, error));
+        goto done;
+    }
     TRY(emitters_are_positions(emitters_options_of(&options->build))
             ? stage_positions(&p.job, &p.scene, &p.made, &p.walked, error)
             : run_stages(&p, error));

@@ -166,7 +166,7 @@ static const option_row mesh_rows[] = {
              "normals, as clear glass does. none: T at any angle"},
     OPTION_ROW_REFLECTANCE(FIELD(reflectance),
                            .help = "Grey reflectance of every face, in place of that in the file"),
-    OPTION_ROW_ASSETS(FIELD(assets), .settled = fixed_mesh),
+    OPTION_ROW_ASSETS(FIELD(assets)),
     {.name = "luminaires",
      .kind = OPTION_TEXT,
      .offset = FIELD(luminaires),

@@ -35,6 +35,10 @@ lam_status scene_load_luminaires(const precompute_job *job, store *s, precompute
 lam_status stage_luminaires(const precompute_job *job, precompute_scene *scene, lam_error *error);
 lam_status luminaires_save(const luminaire_columns *c, const mesh *m, store *s, lam_error *error);
 
+/* True where a store is to have other luminaires and nothing else; makes that store: relight.c. */
+bool relight_is_asked(const precompute_options *o, const option_result *given);
+lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_error *error);
+
 /* Refines the mesh as asked for; the same where about as many elements fit into memory, orders it, and reads
  * its importance; what it is, in lines of the log: stage_mesh.c. */
 lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_error *error);

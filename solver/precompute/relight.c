@@ -1,0 +1,73 @@
+/* Luminaires of a store in place of those that it has, or beside none: all else is copied, so that a lamp is
+ * moved without making an operator anew. */
+#include "solver/base/clock.h"
+#include "solver/precompute/stages.h"
+#include "store/groups.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Options that do not ask for another operator. */
+static bool is_light_alone(const char *name) {
+    static const char *const names[] = {"output", "luminaires", "assets",   "seed", "threads",
+                                        "quiet",  "verbose",    "progress", "json"};
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++)
+        if (strcmp(name, names[k]) == 0) return true;
+    return false;
+}
+
+bool relight_is_asked(const precompute_options *o, const option_result *given) {
+    bool alone = o->from_store && o->luminaires != NULL;
+    for (size_t i = 0; i < given->n_given; i++) alone = alone && is_light_alone(given->given[i]);
+    return alone;
+}
+
+static bool skip(const char *object, const char *attribute) {
+    return attribute == NULL ? strcmp(object, STORE_LUMINAIRES) == 0
+                             : strcmp(object, STORE_MESH) == 0 && strcmp(attribute, "lights") == 0;
+}
+
+/* A store of few emitters has the light of those alone. */
+static lam_status check_operator(const precompute_job *job, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *kind = NULL;
+    TRY(store_get_text(s, STORE_OPERATOR, "kind", &kind, error));
+    if (strcmp(kind, "emitters") == 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%.200s: answers for the emitters that it was made for; precompute its scene with --luminaires",
+             job->options->input);
+done:
+    free(kind);
+    return status;
+}
+
+lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *from = NULL, *to = NULL;
+    double started = clock_seconds();
+    TRY(store_open(job->options->input, &from, error));
+    TRY(check_operator(job, from, error));
+    TRY(mesh_load(from, &scene->m, NULL, error));
+    TRY(scene_load_luminaires(job, from, scene, error));
+    terminal_log_stage(job->t, "import", clock_seconds() - started);
+    started = clock_seconds();
+    TRY(stage_luminaires(job, scene, error));
+    terminal_log_stage(job->t, "luminaires", clock_seconds() - started);
+    TRY(terminal_check(error));
+    started = clock_seconds();
+    TRY(store_create(job->options->output, &to, error));
+    TRY(store_copy(from, skip, to, error));
+    TRY(store_set_text(to, STORE_MESH, "lights", light_kind_word(scene->m.lights), error));
+    TRY(luminaires_save(&scene->luminaires, &scene->m, to, error));
+    if (scene->luminaires.placed.n > 0)
+        TRY(store_set_text(to, STORE_LUMINAIRES, "command", job->options->command, error));
+    TRY(terminal_check(error));
+    store *sealing = to;
+    to = NULL;
+    TRY(store_seal(sealing, error));
+    terminal_log_stage(job->t, "store", clock_seconds() - started);
+done:
+    store_close(to);
+    store_close(from);
+    return status;
+}
