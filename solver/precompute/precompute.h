@@ -136,6 +136,7 @@ typedef enum seed_purpose {
     SEED_VERIFY_PROBES = 13,
     SEED_VERIFY_FIRST_LIGHT = 14,
     SEED_VERIFY_WALKS = 15,
+    SEED_VERIFY_LUMINAIRES = 16,
     SEED_LINEAR_FIRST = 1, /* emissions that verify adds up: their seeds are counted, not given by a user */
     SEED_LINEAR_SECOND = 2
 } seed_purpose;

@@ -3,6 +3,7 @@
 #include "solver/base/array_grow.h"
 #include "solver/direct/luminaire_sight.h"
 #include "solver/luminaire/placed_store.h"
+#include "solver/method/emitters_options.h"
 #include "solver/operator/luminaire_light.h"
 #include "solver/precompute/stages.h"
 #include "store/groups.h"
@@ -52,6 +53,21 @@ static lam_status settle_lights(const precompute_job *job, mesh *m, lam_error *e
     return LAM_OK;
 }
 
+/* A store of few emitters has the light of these alone: luminaires are refused, lights of a file left out. */
+static lam_status leave_out(const precompute_job *job, const mesh *m, bool *out, lam_error *error) {
+    const precompute_options *o = job->options;
+    *out = o->emitters != NULL || emitters_are_positions(emitters_options_of(&o->build));
+    if (!*out) return LAM_OK;
+    if (o->luminaires != NULL)
+        return status_fail(error, LAM_ERR_ARGUMENT,
+                           "--luminaires: a store of few emitters has no light of luminaires; leave out "
+                           "--emitters, or --luminaires");
+    if (m->n_punctual > 0)
+        terminal_warn(job->t, "%s: its %zu lights are left out: the store answers for its emitters alone",
+                      o->input, m->n_punctual);
+    return LAM_OK;
+}
+
 lam_status scene_take_luminaires(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
@@ -59,7 +75,10 @@ lam_status scene_take_luminaires(const precompute_job *job, precompute_scene *sc
     placed_luminaires *p = &scene->luminaires.placed;
     const placed_options how = {.up = m->up, .assets = o->assets};
     size_t from_list = 0, outside = 0;
+    bool left_out = false;
     if (o->luminaires != NULL && strcmp(o->luminaires, LUMINAIRES_NONE) == 0) return LAM_OK;
+    TRY(leave_out(job, m, &left_out, error));
+    if (left_out) goto done;
     if (o->luminaires != NULL) TRY(placed_read(o->luminaires, &how, p, error));
     from_list = p->n;
     for (size_t f = 0; f < p->n_files; f++) warn(job, &p->files[f].photometry.warnings);
@@ -89,6 +108,9 @@ lam_status scene_load_luminaires(const precompute_job *job, store *s, precompute
     lam_status status = LAM_OK;
     luminaire_columns *c = &scene->luminaires;
     const mesh *m = &scene->m;
+    bool left_out = false;
+    TRY(leave_out(job, m, &left_out, error));
+    if (left_out) goto done;
     TRY(placed_load(s, m->n_groups, m->group_names, &c->before, error));
     TRY(luminaires_load(s, m->n, m->n_channels, &c->light_before, error));
     if (job->options->luminaires != NULL) {

@@ -60,6 +60,7 @@ static const struct {
     {"mesh", verify_mesh},
     {"form factors", verify_form_factors},
     {"sky", verify_sky},
+    {"luminaires", verify_luminaires},
     {"operator", verify_operator},
     {"linearity", verify_linearity},
     {"energy", verify_energy},

@@ -59,8 +59,8 @@ void examination_free(examination *e);
 /* One check: fills verdict and detail, or fails when it could not be made (cancelled, out of memory). */
 typedef lam_status verify_check(examination *e, check *c, lam_error *error);
 
-verify_check verify_checksums, verify_mesh, verify_form_factors, verify_sky, verify_operator,
-    verify_linearity, verify_energy, verify_error, verify_walks, verify_scene;
+verify_check verify_checksums, verify_mesh, verify_form_factors, verify_sky, verify_luminaires,
+    verify_operator, verify_linearity, verify_energy, verify_error, verify_walks, verify_scene;
 
 /* Numbers of one emission: a channel has one for each element, or, of an operator of emitters, a weight each.
  */
