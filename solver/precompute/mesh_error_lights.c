@@ -201,7 +201,7 @@ static lam_status light_group(const precompute_job *job, const precompute_scene 
     if (work == NULL) TRY(LAM_ERR_MEMORY);
     light_up(&scene->m, group, E);
     TRY(mesh_error_answers(scene, made, 1, NULL, E, B, work, bytes, error));
-    TRY(mesh_error(&scene->m, 1, E, B, true, NULL, seed, &job->progress, &found, groups, error));
+    TRY(mesh_error(&scene->m, 1, E, B, true, NULL, NULL, seed, &job->progress, &found, groups, error));
 done:
     free(work);
     return status;

@@ -133,7 +133,8 @@ static lam_status judge_skies(const sky_work *w, size_t n_skies, uint64_t seed, 
     for (size_t s = 0; s < n_skies; s++)
         light[s] = mesh_error_light(m, w->E + s * vector, w->B + s * vector, true);
     memset(w->E, 0, n_skies * vector * sizeof *w->E);
-    TRY(mesh_error(m, n_skies, w->E, w->B, false, &skies, seed, &w->job->progress, found, groups, error));
+    TRY(mesh_error(m, n_skies, w->E, w->B, false, &skies, NULL, seed, &w->job->progress, found, groups,
+                   error));
 done:
     return status;
 }

@@ -2,6 +2,7 @@
 #include "solver/adapt/mesh_error.h"
 #include "solver/precompute/black_scene.h"
 #include "solver/precompute/mesh_error_lights.h"
+#include "solver/precompute/mesh_error_luminaires.h"
 #include "solver/precompute/mesh_error_skies.h"
 #include "solver/precompute/stages.h"
 
@@ -88,7 +89,7 @@ static lam_status find_errors(const precompute_job *job, const precompute_scene 
     if (B == NULL) TRY(LAM_ERR_MEMORY);
     TRY(answer(scene, made, n_lights, &lights, B, error));
     TRY(mesh_error_groups_begin(&scene->m, n_lights, &groups, error));
-    TRY(mesh_error(&scene->m, n_lights, E, B, figures->has_lights, NULL,
+    TRY(mesh_error(&scene->m, n_lights, E, B, figures->has_lights, NULL, NULL,
                    precompute_seed(job->options->seed, SEED_MESH_ERROR), &job->progress, found, &groups,
                    error));
     if (figures->has_lights)
@@ -106,6 +107,7 @@ static lam_status find_errors(const precompute_job *job, const precompute_scene 
     if (figures->has_lights) terminal_log(job->t, "mesh     lights indirect %.3g", figures->lights);
     if (figures->has_even) terminal_log(job->t, "mesh     even indirect %.3g", figures->even);
     TRY(mesh_error_add_others(job, scene, made, error));
+    TRY(mesh_error_add_luminaires(job, scene, made, error));
     TRY(mesh_error_add_skies(job, scene, factors, made, error));
 done:
     mesh_error_groups_free(&groups);

@@ -114,8 +114,10 @@ static void print_receivers(const char *name, const json_t *group) {
 
 /* The error that no accuracy of the operator lowers. */
 static void print_mesh(const json_t *figures) {
-    static const char *const names[] = {"lights", "even", "sky_even", "sky_cloudy", "sky_tile"};
-    static const char *const words[] = {"lights", "even", "even sky", "cloudy sky", "one tile"};
+    static const char *const names[] = {"lights",   "even",       "sky_even", "sky_cloudy",
+                                        "sky_tile", "luminaires", "luminaire"};
+    static const char *const words[] = {"lights",   "even",       "even sky",     "cloudy sky",
+                                        "one tile", "luminaires", "one luminaire"};
     if (json_object_size(figures) == 0) return;
     printf("  mesh   ");
     for (size_t k = 0; k < sizeof names / sizeof *names; k++) {

@@ -135,13 +135,18 @@ static lam_status pass_mesh_numbers(store *s, bool saves, mesh_figures *m, lam_e
                {"single", &m->single, &m->has_single},
                {"groups", &m->groups, &m->has_groups},
                {"sky_tile", &m->sky_tile, &m->has_tiles},
+               {"luminaires", &m->luminaires, &m->has_luminaires},
+               {"luminaire", &m->luminaire, &m->has_luminaire},
+               {"luminaires_number", &m->luminaires_number, NULL},
                {"even_emitters", &m->even_emitters, NULL},
                {"groups_emitters", &m->groups_emitters, NULL},
                {"groups_together", &m->groups_together, NULL},
                {"even_light", m->light_of + MESH_OF_EVEN, NULL},
                {"single_light", m->light_of + MESH_OF_SINGLE, NULL},
                {"sky_even_light", m->light_of + MESH_OF_SKY_EVEN, NULL},
-               {"sky_tile_light", m->light_of + MESH_OF_SKY_TILE, NULL}};
+               {"sky_tile_light", m->light_of + MESH_OF_SKY_TILE, NULL},
+               {"luminaires_light", m->light_of + MESH_OF_LUMINAIRES, NULL},
+               {"luminaire_light", m->light_of + MESH_OF_LUMINAIRE, NULL}};
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
         const double x = saves ? -1 : number_of(s, path, all[k].name);
         const bool has = all[k].has != NULL ? *all[k].has : *all[k].number > 0;
@@ -199,7 +204,9 @@ static lam_status pass_mesh(store *s, bool saves, mesh_figures *m, lam_error *er
         [MESH_OF_SKY_CLOUDY] = {"sky_cloudy_variation", "sky_cloudy_reflected"},
         [MESH_OF_SINGLE] = {"single_variation", "single_reflected"},
         [MESH_OF_GROUPS] = {"groups_variation", "groups_reflected"},
-        [MESH_OF_SKY_TILE] = {"sky_tile_variation", "sky_tile_reflected"}};
+        [MESH_OF_SKY_TILE] = {"sky_tile_variation", "sky_tile_reflected"},
+        [MESH_OF_LUMINAIRES] = {"luminaires_variation", "luminaires_reflected"},
+        [MESH_OF_LUMINAIRE] = {"luminaire_variation", "luminaire_reflected"}};
     lam_status status = LAM_OK;
     const char *const group = figures_groups[MESH_GROUP].path;
     TRY(pass_mesh_numbers(s, saves, m, error));

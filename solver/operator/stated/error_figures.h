@@ -125,7 +125,7 @@ typedef struct error_report {
 
 /* The lights that the error of the mesh is measured for: the scene's lamps or all emitters together, 1 from
  * every element, an even and a cloudy sky, and several lights of one element, of one group and of one tile
- * of the sky each. */
+ * of the sky each; of all luminaires, and of several, each alone, their direct light with it. */
 enum {
     MESH_OF_LAMPS,
     MESH_OF_EVEN,
@@ -134,6 +134,8 @@ enum {
     MESH_OF_SINGLE,
     MESH_OF_GROUPS,
     MESH_OF_SKY_TILE,
+    MESH_OF_LUMINAIRES,
+    MESH_OF_LUMINAIRE,
     MESH_FIGURES
 };
 
@@ -142,12 +144,13 @@ enum {
  * divides by each other: 0 of both where a group was not looked at. Of several lights, each of them scaled to
  * sum A (B - E)^2 = 1, all together. */
 typedef struct mesh_figures {
-    bool has_lights, has_even, has_skies, has_single, has_groups, has_tiles;
-    double lights, even, sky_even, sky_cloudy, single, groups, sky_tile;
+    bool has_lights, has_even, has_skies, has_single, has_groups, has_tiles, has_luminaires, has_luminaire;
+    double lights, even, sky_even, sky_cloudy, single, groups, sky_tile, luminaires, luminaire;
     double even_emitters,
         groups_emitters;           /* effective numbers, of several lights in the middle; 0: not stated */
-    double light_of[MESH_FIGURES]; /* of EVEN, SINGLE, SKY_EVEN and SKY_TILE: sum A (B - E)^2 over the square
-                                      of the power, on average, 1/m^2; 0: not stated */
+    double luminaires_number;      /* the same of luminaires, by their fluxes */
+    double light_of[MESH_FIGURES]; /* of EVEN, SINGLE, SKY_EVEN, SKY_TILE and of luminaires: sum A (B - E)^2
+                                      over the square of the power, on average, 1/m^2; 0: not stated */
     size_t n_groups;
     double *variation[MESH_FIGURES], *reflected[MESH_FIGURES]; /* [n_groups]; NULL: not stated */
     double *lights_power; /* [n_groups], that the scene's lamps emit; NULL: not stated */

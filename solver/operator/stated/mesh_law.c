@@ -90,13 +90,17 @@ lam_status mesh_shares_make(const mesh_figures *from, size_t n_groups, const dou
                            [MESH_OF_SKY_CLOUDY] = {from->has_skies, from->sky_cloudy},
                            [MESH_OF_SINGLE] = {from->has_single, from->single},
                            [MESH_OF_GROUPS] = {from->has_groups, from->groups},
-                           [MESH_OF_SKY_TILE] = {from->has_tiles, from->sky_tile}};
+                           [MESH_OF_SKY_TILE] = {from->has_tiles, from->sky_tile},
+                           [MESH_OF_LUMINAIRES] = {from->has_luminaires, from->luminaires},
+                           [MESH_OF_LUMINAIRE] = {from->has_luminaire, from->luminaire}};
     mesh_shares m = {n_groups,
                      .even_emitters = from->even_emitters,
                      .groups_emitters = from->groups_emitters,
                      .even_tiles = even_tiles,
                      .common_light = common(from, MESH_OF_SINGLE, MESH_OF_EVEN),
-                     .common_sky = common(from, MESH_OF_SKY_TILE, MESH_OF_SKY_EVEN)};
+                     .luminaires_number = from->luminaires_number,
+                     .common_sky = common(from, MESH_OF_SKY_TILE, MESH_OF_SKY_EVEN),
+                     .common_luminaires = common(from, MESH_OF_LUMINAIRE, MESH_OF_LUMINAIRES)};
     *out = (mesh_shares){.n_groups = 0};
     for (int k = 0; k < MESH_FIGURES; k++) {
         const double *variation = from->variation[k], *reflected = from->reflected[k];
@@ -231,12 +235,23 @@ static double of_sky(const mesh_shares *m, const mesh_light *light, size_t group
     return knows_tiles ? of_many(tile[group], all, m->common_sky, light->sky_tiles, m->even_tiles) : all;
 }
 
+static double of_luminaires(const mesh_shares *m, const mesh_light *light, size_t group) {
+    const double *each = m->of[MESH_OF_LUMINAIRE], *all = m->of[MESH_OF_LUMINAIRES];
+    const double *groups = m->of[MESH_OF_GROUPS], *even = m->of[MESH_OF_EVEN];
+    const double q = m->common_luminaires, N = m->luminaires_number;
+    if (light->bounced && even != NULL)
+        return groups != NULL ? of_many(groups[group], even[group], q, light->luminaires, N) : even[group];
+    if (each == NULL || all == NULL) return of_emission(m, light, group);
+    return q > 0 ? of_many(each[group], all[group], q, light->luminaires, N) : fmax(each[group], all[group]);
+}
+
 static double share2(const mesh_shares *m, const mesh_light *light, size_t group) {
-    const double all = light->power + light->sky_power;
+    const double all = light->power + light->sky_power + light->luminaire_power;
     double sum = 0;
     if (!(all > 0)) return 0;
     if (light->power > 0) sum += light->power / all * of_emission(m, light, group);
     if (light->sky_power > 0) sum += light->sky_power / all * of_sky(m, light, group);
+    if (light->luminaire_power > 0) sum += light->luminaire_power / all * of_luminaires(m, light, group);
     return sum;
 }
 

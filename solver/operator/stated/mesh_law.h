@@ -12,7 +12,9 @@ typedef struct mesh_shares {
                                               others; NULL: not stated */
     double even_emitters, groups_emitters; /* effective numbers; 0: not stated */
     double even_tiles;                     /* of an even sky */
-    double common_light, common_sky; /* q below, of elements and of tiles; 0: not stated, of an older store */
+    double luminaires_number;              /* of all luminaires */
+    double common_light, common_sky, common_luminaires; /* q below, of elements, of tiles and of luminaires;
+                                                           0: not stated, of an older store */
     /* [n_groups], of groups that are lit alone: m_g^2 and the light l_g of 1 W. One that was not measured has
      * the share of groups and the mean light of the others. NULL: not stated. */
     double *group_share2, *group_light;
@@ -52,10 +54,10 @@ mesh_whole mesh_whole_of(const mesh_shares *m, size_t n_channels, size_t n_whole
 
 /* The light of an answer: the power that elements emit, the parts of it that come from groups with lamps and
  * from other groups that shine evenly as wholes, the effective number of emitters, that of all but such
- * groups, the power that a sky sends on, and the effective number of its tiles; bounced: the direct light of
- * the sky is no part of it. */
+ * groups, the power that a sky sends on, and the effective number of its tiles, the same of luminaires;
+ * bounced: the direct light of these is no part of it. */
 typedef struct mesh_light {
-    double power, of_lamps, of_whole, emitters, others, sky_power, sky_tiles;
+    double power, of_lamps, of_whole, emitters, others, sky_power, sky_tiles, luminaire_power, luminaires;
     bool bounced;
     mesh_whole whole;
 } mesh_light;
@@ -69,7 +71,8 @@ typedef struct mesh_light {
  * s) q m_e^2) / (s + (1 - s) q),    s = (1/N - 1/N_e) / (1 - 1/N_e). In a maze q is a hundredth, and twenty
  * emitters vary as one does. The same holds of the tiles of a sky, single ones and all, of whose two kinds of
  * skies the larger counts; of their bounced light one tile counts as a group, from where it falls, and all as
- * an even light.
+ * an even light. Luminaires have the same law of single ones and of all together, and their bounced light
+ * too.
  *
  * The mean of a group is off by less: light is sent by elements as if it were even over them. By reciprocity
  * the mean is the product of the light that is sent and of the light of the group where it alone shines, so

@@ -125,8 +125,8 @@ static lam_status add_scene(const bench_run *run, const sky_scene *scene, table 
     if (B == NULL || E == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < all; i++) B[i] = coarse.first[i] + (float)coarse.x[i];
     const gather_sky skies = {.tiling = &coarse.s.f.sky.tiling, .L = coarse.L};
-    TRY(mesh_error(&coarse.s.m, MESH_LIGHTS, E, B, false, &skies, run->seed, run->progress, stated, NULL,
-                   error));
+    TRY(mesh_error(&coarse.s.m, MESH_LIGHTS, E, B, false, &skies, NULL, run->seed, run->progress, stated,
+                   NULL, error));
     for (size_t l = 0; l < MESH_LIGHTS; l++) {
         table_text(out, scene->name);
         table_text(out, sky_names[l]);

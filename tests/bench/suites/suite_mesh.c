@@ -76,7 +76,7 @@ static lam_status state_errors(const bench_run *run, const measured_mesh *m, con
     float *B = memory_allocate(MESH_LIGHTS * vector, sizeof *B, "answers", error);
     if (B == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < MESH_LIGHTS * vector; i++) B[i] = m->E[i] + (float)x[i];
-    TRY(mesh_error(of, MESH_LIGHTS - first, m->E + first * vector, B + first * vector, first == 0, NULL,
+    TRY(mesh_error(of, MESH_LIGHTS - first, m->E + first * vector, B + first * vector, first == 0, NULL, NULL,
                    run->seed, run->progress, stated + first, NULL, error));
 done:
     free(B);

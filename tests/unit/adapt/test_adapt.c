@@ -145,7 +145,7 @@ START_TEST(error_of_a_uniform_mesh) {
     const double off = floor_lamp_error(&m, B);
     double *numbers = calloc(3 * m.n_groups, sizeof *numbers), *area = calloc(m.n_groups, sizeof *area);
     const mesh_error_groups groups = {numbers, numbers + m.n_groups, numbers + 2 * m.n_groups, 0};
-    ck_ok(mesh_error(&m, 1, m.emission, B, true, NULL, 3, NULL, &stated, &groups, &error));
+    ck_ok(mesh_error(&m, 1, m.emission, B, true, NULL, NULL, 3, NULL, &stated, &groups, &error));
     /* The lacks of groups add up to that of the scene. */
     double lacks = 0, light2 = 0;
     for (size_t i = 0; i < m.n; i++) area[m.group[i]] += m.area[i];
@@ -209,7 +209,7 @@ START_TEST(no_error) {
         E[i] = 1, B[i] = 2;
         E[m.n + i] = B[m.n + i] = 0;
     }
-    ck_ok(mesh_error(&m, 2, E, B, false, NULL, 3, NULL, stated, NULL, &error));
+    ck_ok(mesh_error(&m, 2, E, B, false, NULL, NULL, 3, NULL, stated, NULL, &error));
     ck_assert_double_le(stated[0], 1e-6);
     ck_assert(stated[1] == 0);
     free(E);
