@@ -175,21 +175,6 @@ const char *luminaire_symmetry_name(luminaire_symmetry symmetry) {
     return names[symmetry];
 }
 
-const char *luminaire_shape_name(luminaire_shape shape) {
-    static const char *const names[LUMINAIRE_SHAPES] = {"point",
-                                                        "rectangle",
-                                                        "box",
-                                                        "disc",
-                                                        "ellipse",
-                                                        "upright cylinder",
-                                                        "sphere",
-                                                        "ellipsoid",
-                                                        "cylinder along x",
-                                                        "cylinder along y",
-                                                        "upright disc"};
-    return names[shape];
-}
-
 /* True for a text that ends within its room, and is one line of UTF-8. */
 static bool text_is_sound(const char *text, size_t room) {
     const size_t length = strnlen(text, room);

@@ -6,6 +6,7 @@
 #ifndef LAMBERT_LUMINAIRE_LUMINAIRE_H
 #define LAMBERT_LUMINAIRE_LUMINAIRE_H
 
+#include "solver/base/luminaire_shape.h"
 #include "store/status.h"
 
 #include <stdint.h>
@@ -34,21 +35,6 @@ typedef enum luminaire_symmetry {
     SYMMETRY_QUADRANT,
     LUMINAIRE_SYMMETRIES
 } luminaire_symmetry;
-
-typedef enum luminaire_shape {
-    OPENING_POINT,
-    OPENING_RECTANGLE, /* a line where one of its sides is 0 */
-    OPENING_BOX,
-    OPENING_DISC,
-    OPENING_ELLIPSE,
-    OPENING_CYLINDER, /* upright: its ends are discs, or ellipses */
-    OPENING_SPHERE,
-    OPENING_ELLIPSOID,
-    OPENING_CYLINDER_X, /* lying, along x */
-    OPENING_CYLINDER_Y,
-    OPENING_UPRIGHT_DISC, /* facing the horizon */
-    LUMINAIRE_SHAPES
-} luminaire_shape;
 
 /* The luminous opening, in m. */
 typedef struct luminaire_opening {
@@ -145,7 +131,6 @@ const char *luminaire_find_word(const luminaire *l, const char *key);
 const char *luminaire_format_name(luminaire_format format);       /* "LM-63-2002" */
 const char *luminaire_type_name(luminaire_type type);             /* "C" */
 const char *luminaire_symmetry_name(luminaire_symmetry symmetry); /* "about C0-C180" */
-const char *luminaire_shape_name(luminaire_shape shape);          /* "upright cylinder" */
 
 /* True where all that a luminaire holds can be used: for one that came from another process. */
 bool luminaire_is_sound(const luminaire *l);

@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Numbers of an opening: its shape, its size and the heights of its sides. */
+enum { OPENING = 8 };
+
 struct lam_luminaires {
     size_t k, C;
     first_rows rows; /* irradiance, lx */
@@ -76,6 +79,20 @@ done:
     return status;
 }
 
+/* [k][4]: a shape and its size. */
+static lam_status read_opening(store *s, lam_luminaires *l, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(read_numbers(s, STORE_LUMINAIRES "/opening", l->k, OPENING, false, &l->opening, error));
+    for (size_t k = 0; k < l->k; k++) {
+        const double shape = l->opening[k * OPENING];
+        if (!(shape < LUMINAIRE_SHAPES && shape == floor(shape)))
+            FAIL(error, LAM_ERR_FORMAT, "%s: /luminaires/opening[%zu][0] = %g, must be an integer below %d",
+                 store_path(s), k, shape, LUMINAIRE_SHAPES);
+    }
+done:
+    return status;
+}
+
 static lam_status read_errors(store *s, lam_luminaires *l, lam_error *error) {
     lam_status status = LAM_OK;
     size_t dims[STORE_MAX_RANK];
@@ -110,7 +127,7 @@ lam_status luminaires_load(store *s, size_t n, size_t C, lam_luminaires **out, l
     TRY(read_numbers(s, STORE_LUMINAIRES "/lumens", k, 0, false, &l->lumens, error));
     TRY(read_numbers(s, STORE_LUMINAIRES "/colour", k, 3, false, &l->colour, error));
     TRY(read_numbers(s, STORE_LUMINAIRES "/place", k, 12, true, &l->place, error));
-    TRY(read_numbers(s, STORE_LUMINAIRES "/opening", k, 8, false, &l->opening, error));
+    TRY(read_opening(s, l, error));
     TRY(read_errors(s, l, error));
     l->factors = memory_allocate(C, k * sizeof *l->factors, "luminaires", error);
     if (l->factors == NULL) TRY(LAM_ERR_MEMORY);
@@ -164,12 +181,12 @@ double lam_luminaires_dimmer(const lam_luminaires *l, size_t luminaire) {
 
 luminaire_shown luminaires_shown(const lam_luminaires *l, size_t luminaire) {
     const uint32_t group = luminaires_group_of(l, luminaire);
-    const double *place = l->place + luminaire * 12, *opening = l->opening + luminaire * 8;
+    const double *place = l->place + luminaire * 12, *opening = l->opening + luminaire * OPENING;
     luminaire_shown out = {.name = l->names[luminaire],
                            .group = group == LUMINAIRE_NO_GROUP ? NULL : l->group_names[group],
                            .dimmer = l->dimmers[luminaire],
                            .lumens = l->lumens[luminaire],
-                           .shape = (unsigned)opening[0]};
+                           .shape = (luminaire_shape)opening[0]};
     memcpy(out.at, place, sizeof out.at);
     memcpy(out.x, place + 3, sizeof out.x);
     memcpy(out.y, place + 6, sizeof out.y);

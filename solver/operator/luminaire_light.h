@@ -2,6 +2,7 @@
 #ifndef LAMBERT_OPERATOR_LUMINAIRE_LIGHT_H
 #define LAMBERT_OPERATOR_LUMINAIRE_LIGHT_H
 
+#include "solver/base/luminaire_shape.h"
 #include "store/store.h"
 
 #define LUMINAIRE_NO_GROUP 0xFFFFFFFFu
@@ -14,7 +15,7 @@ typedef struct luminaire_shown {
     double dimmer;            /* that its list gives it */
     double lumens;            /* at dimmer 1 */
     double colour[3];         /* factors of the channels, of luminance 1 */
-    unsigned shape;           /* of its opening, a luminaire_shape */
+    luminaire_shape shape;    /* of its opening */
     double size[3];           /* of its opening along x, y and z, m */
 } luminaire_shown;
 

@@ -21,6 +21,8 @@ static void write_numbers(store *s, const char *name, size_t width, uint64_t see
     char path[64];
     double *x = test_allocate(K * 12, sizeof *x);
     for (size_t i = 0; i < K * 12; i++) x[i] = random_lcg_unit(&seed);
+    /* Shapes are numbers of a list. */
+    for (size_t k = 0; strcmp(name, "opening") == 0 && k < K; k++) x[k * 4] = (double)k;
     if (wrong != NULL && strcmp(wrong->array, name) == 0) x[wrong->at] = wrong->value;
     snprintf(path, sizeof path, "/luminaires/%s", name);
     ck_assert_int_eq(store_write(s, path, STORE_F64, width == 0 ? 1 : 2, (size_t[]){K, width}, x, &error),
@@ -131,6 +133,7 @@ START_TEST(words_and_places) {
     ck_assert_str_eq(lam_luminaires_name(l, 2), "b.1");
     ck_assert_ptr_null(luminaires_shown(l, 2).group);
     ck_assert_str_eq(luminaires_shown(l, 1).group, "row");
+    ck_assert_int_eq(luminaires_shown(l, 5).shape, OPENING_CYLINDER);
     ck_assert_uint_eq(luminaires_groups(l), 1);
     ck_assert_uint_eq(luminaires_error_groups(l), G);
     ck_assert_double_gt(lam_luminaires_dimmer(l, 6), 0);
@@ -142,8 +145,9 @@ END_TEST
 
 START_TEST(stores_without_luminaires_and_bad_ones) {
     static const wrong_value wrong[] = {
-        {"dimmers", 2, -1},         {"lumens", 3, NAN},      {"colour", 4, -.5}, {"group", 1, 7},
-        {"elements_off", 3, -1e-3}, {"place", 20, INFINITY}, {"opening", 5, NAN}};
+        {"dimmers", 2, -1},         {"lumens", 3, NAN},      {"colour", 4, -.5},  {"group", 1, 7},
+        {"elements_off", 3, -1e-3}, {"place", 20, INFINITY}, {"opening", 5, NAN}, {"opening", 8, 11},
+        {"opening", 8, .5},         {"opening", 8, 1e300}};
     char path[64];
     lam_error error = {0};
     lam_luminaires *l = (lam_luminaires *)&error;
