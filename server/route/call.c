@@ -1,6 +1,7 @@
 #include "server/route/call.h"
 
 #include "server/scene/adjoint_rows.h"
+#include "server/scene/direct_light.h"
 
 #include <stdarg.h>
 #include <stdint.h>
@@ -60,7 +61,9 @@ codec_scene call_codec_scene(const call *in) {
                          .lights = s->lights,
                          .groups = &s->groups,
                          .faces = &s->faces,
-                         .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
+                         .n_tiles = scene_tiles(s),
+                         .n_luminaires = scene_luminaires(s),
+                         .luminaires = &s->luminaire_names,
                          .n_emitters = s->n_emitters,
                          .signs = s->n_emitters == 0,
                          .emitters = &s->emitters,

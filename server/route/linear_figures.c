@@ -3,6 +3,7 @@
 #include "server/route/radiosity_figures.h"
 #include "server/route/routes.h"
 #include "server/scene/adjoint_rows.h"
+#include "server/scene/direct_light.h"
 #include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
 
@@ -80,8 +81,9 @@ static void limit_means(const scene *s, const radiosity_request *request, double
     const size_t C = s->n_channels;
     const codec_scene about = {.n = s->n,
                                .n_channels = C,
-                               .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
-                               .n_emitters = s->n_emitters};
+                               .n_tiles = scene_tiles(s),
+                               .n_emitters = s->n_emitters,
+                               .n_luminaires = scene_luminaires(s)};
     for (size_t k = 0; !request->linear_map && k < request->n_rhs * C; k++)
         if (means[k] < 0 && !radiosity_request_has_signs(request, &about, k / C, k % C)) means[k] = 0;
 }

@@ -1,7 +1,8 @@
-/* POST /v1/scenes/NAME/adjoint: gradients of J = g . q by emission, reflectance, sky, emitters and groups.
- * gradient.h has the formulas. */
+/* POST /v1/scenes/NAME/adjoint: gradients of J = g . q by emission, reflectance, sky, emitters, groups and
+ * luminaires. gradient.h has the formulas. */
 #include "server/route/routes.h"
 #include "server/route/sun_answer.h"
+#include "server/scene/direct_light.h"
 #include "server/scene/gradient.h"
 #include "solver/base/clock.h"
 #include "solver/codec/adjoint.h"
@@ -16,18 +17,20 @@ typedef struct adjoint_memory {
     sun_answer sun;
     float *narrow;    /* [C][m] of tiles, or [C][s] of emitters */
     float *of_groups; /* [C][g] */
+    float *dimmers;   /* [C][k] of luminaires */
     void *work;
     size_t work_bytes;
 } adjoint_memory;
 
 static size_t narrow_width(const scene *s) {
-    return s->n_emitters > 0 ? s->n_emitters : s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+    return s->n_emitters > 0 ? s->n_emitters : scene_tiles(s);
 }
 
 /* The numbers of a gradient for one channel. */
 static size_t gradient_width(const scene *s, gradient_kind kind) {
     return kind == GRADIENT_EMISSION || kind == GRADIENT_REFLECTANCE ? s->n
            : kind == GRADIENT_GROUPS                                 ? s->groups.n_groups
+           : kind == GRADIENT_LUMINAIRES                             ? scene_luminaires(s)
                                                                      : narrow_width(s);
 }
 
@@ -47,17 +50,22 @@ static size_t answer_most(const call *in, const adjoint_request *request) {
 static bool get_memory(call *in, const adjoint_request *request, adjoint_memory *memory, buffer *b,
                        problem *why) {
     const scene *s = in->scene;
-    const bool by_reflectance = adjoint_wants(request, GRADIENT_REFLECTANCE);
-    const size_t vector = s->n_channels * s->n,
-                 rows[] = {vector,
+    const bool by_reflectance = adjoint_wants(request, GRADIENT_REFLECTANCE),
+               direct = s->sky != NULL || s->luminaires != NULL;
+    const size_t C = s->n_channels, vector = C * s->n;
+    float **const places[] = {&memory->w,      &memory->H,         &memory->H0,     &memory->v,
+                              &memory->narrow, &memory->of_groups, &memory->dimmers};
+    const size_t rows[] = {vector,
                            by_reflectance ? vector : 0,
-                           by_reflectance && s->sky != NULL ? vector : 0,
+                           by_reflectance && direct ? vector : 0,
                            vector,
-                           s->n_channels * narrow_width(s),
-                           adjoint_wants(request, GRADIENT_GROUPS) ? s->n_channels * s->groups.n_groups : 0};
+                           C * narrow_width(s),
+                           adjoint_wants(request, GRADIENT_GROUPS) ? C * s->groups.n_groups : 0,
+                           C * scene_luminaires(s)},
+                 n_rows = sizeof rows / sizeof *rows;
     const size_t most = answer_most(in, request);
     size_t total = 0;
-    for (size_t k = 0; k < 6; k++) total += rows[k];
+    for (size_t k = 0; k < n_rows; k++) total += rows[k];
     memory->work_bytes = lam_operator_work_bytes(s->op, 1);
     memory->work = memory->work_bytes > 0 ? batch_workspace_get(in->workspace, memory->work_bytes) : NULL;
     float *at = call_allocate(in, bytes_times(total, sizeof *at), "a gradient", why);
@@ -65,22 +73,20 @@ static bool get_memory(call *in, const adjoint_request *request, adjoint_memory 
     if (at == NULL || !request_memory_take(in->memory, most, why)) return false;
     if (memory->work == NULL || !buffer_reserve(b, most))
         return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for a gradient");
-    float **const places[] = {&memory->w, &memory->H,      &memory->H0,
-                              &memory->v, &memory->narrow, &memory->of_groups};
-    for (size_t k = 0; k < 6; at += rows[k++]) *places[k] = at;
+    for (size_t k = 0; k < n_rows; at += rows[k++]) *places[k] = at;
     return true;
 }
 
-/* Irradiance H of the emission, its sky and its sun; *H0 is that of these two, NULL without them. */
+/* Irradiance H of the emission, its sky, its luminaires and its sun; *H0 is that of these three, NULL without
+ * them. */
 static bool solve_irradiance(const scene *s, const radiosity_request *light, adjoint_memory *memory,
                              const float **H0, problem *why) {
     lam_error error;
     *H0 = NULL;
-    if (light->sky.values != NULL || light->n_suns > 0) *H0 = memory->H0;
-    if (light->sky.values != NULL)
-        lam_sky_irradiance(s->sky, s->n_channels, light->sky.values, memory->H0);
-    else if (light->n_suns > 0)
-        memset(memory->H0, 0, s->n_channels * s->n * sizeof *memory->H0);
+    if (request_has_direct(light) || light->n_suns > 0) {
+        *H0 = memory->H0;
+        direct_light_find(s, light, 0, 1, memory->H0);
+    }
     if (light->n_suns > 0) sun_answer_add(s, light, &memory->sun, 0, 1, memory->H0);
     return lam_operator_apply_lit(s->op, 1, LAM_IRRADIANCE, light->E, *H0, memory->H, memory->work,
                                   memory->work_bytes, &error) == LAM_OK ||
@@ -88,7 +94,7 @@ static bool solve_irradiance(const scene *s, const radiosity_request *light, adj
 }
 
 /* Computes the gradients asked for: by emission in w, by reflectance in H, by tile or emitter in narrow,
- * by group in of_groups. */
+ * by group in of_groups, by luminaire in dimmers. */
 static bool solve(const scene *s, const adjoint_request *request, adjoint_memory *memory, metrics *m,
                   problem *why) {
     const float *g = request->cotangent.E, *H0;
@@ -104,10 +110,12 @@ static bool solve(const scene *s, const adjoint_request *request, adjoint_memory
         return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
     if (adjoint_wants(request, GRADIENT_GROUPS))
         gradient_of_groups(s->n_channels, s->n, &s->groups, memory->w, memory->of_groups);
-    if (adjoint_wants(request, GRADIENT_SKY)) {
-        gradient_of_sky_irradiance(request->quantity, vector, s->reflectance, g, memory->w, memory->v);
+    if (adjoint_wants(request, GRADIENT_SKY) || adjoint_wants(request, GRADIENT_LUMINAIRES))
+        gradient_of_direct_irradiance(request->quantity, vector, s->reflectance, g, memory->w, memory->v);
+    if (adjoint_wants(request, GRADIENT_SKY))
         lam_sky_adjoint(s->sky, s->n_channels, memory->v, memory->narrow);
-    }
+    if (adjoint_wants(request, GRADIENT_LUMINAIRES))
+        lam_luminaires_adjoint(s->luminaires, 1, memory->v, memory->dimmers);
     if (adjoint_wants(request, GRADIENT_REFLECTANCE)) {
         metrics_pass(m, 1);
         if (!solve_irradiance(s, &request->light, memory, &H0, why)) return false;
@@ -126,6 +134,8 @@ static const float *gradient_values(const scene *s, const adjoint_memory *memory
         return memory->H;
     case GRADIENT_GROUPS:
         return memory->of_groups;
+    case GRADIENT_LUMINAIRES:
+        return memory->dimmers;
     default:
         return memory->narrow;
     }
@@ -175,7 +185,7 @@ static bool read_body(const call *in, adjoint_request *request, problem *why) {
     if (request->n_named > 1)
         return problem_set(why, PROBLEM_NOT_IN_ENCODING,
                            "an NPY answer holds one array; ask for one gradient, or for JSON");
-    request->wanted = 1u << request->named[0]; /* an NPY answer has no gradient by sky */
+    request->wanted = 1u << request->named[0]; /* an NPY answer has none by sky or luminaires */
     return true;
 }
 

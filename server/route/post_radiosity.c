@@ -7,6 +7,7 @@
 #include "server/route/refined_answer.h"
 #include "server/route/routes.h"
 #include "server/route/sun_answer.h"
+#include "server/scene/direct_light.h"
 #include "solver/base/clock.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
@@ -29,7 +30,7 @@ typedef struct radiosity_solve {
     bool means_placed;     /* they are inside `answer` */
     answer_stream *stream; /* of these, until the answer has it */
     bool streams;          /* the values are encoded while the answer is sent */
-    float *H0;             /* [n_rhs][C][n], direct irradiance of sky and sun; NULL if no vector has any */
+    float *H0; /* [n_rhs][C][n], direct irradiance of sky, luminaires and sun; NULL if no vector has any */
     sun_answer sun;
     double *figures; /* of reduce, in place of values; else NULL */
     float *W;        /* [n_rhs][C][s], weights of a store of emitters; else NULL */
@@ -72,26 +73,23 @@ static float *allocate_rows(const call *in, const radiosity_solve *s, size_t wid
         what, why);
 }
 
-/* Computes the direct irradiance of skies, to which passes add that of suns, or, for a store of emitters, the
- * weights of these. */
+/* Computes the direct irradiance of skies and luminaires, to which passes add that of suns, or, for a store
+ * of emitters, the weights of these. */
 static bool find_light(const call *in, radiosity_solve *solve, problem *why) {
     const scene *s = in->scene;
     const radiosity_request *request = &solve->request;
-    const size_t C = s->n_channels, n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+    const size_t C = s->n_channels;
     lam_error error;
     if (s->n_emitters == 0) {
-        if (request->sky.values == NULL && request->n_suns == 0) return true;
-        solve->H0 = allocate_rows(in, solve, s->n, "skies", why);
+        if (!request_has_direct(request) && request->n_suns == 0) return true;
+        solve->H0 = allocate_rows(in, solve, s->n, "direct light", why);
         if (solve->H0 == NULL) return false;
-        if (request->sky.values != NULL)
-            lam_sky_irradiance(s->sky, request->n_rhs * C, request->sky.values, solve->H0);
-        else
-            memset(solve->H0, 0, request->n_rhs * C * s->n * sizeof *solve->H0);
+        direct_light_find(s, request, 0, request->n_rhs, solve->H0);
         return sun_answer_begin(in, request, &solve->sun, why);
     }
     solve->W = allocate_rows(in, solve, s->n_emitters, "the weights of emitters", why);
     if (solve->W == NULL) return false;
-    const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, n_tiles,
+    const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, scene_tiles(s),
                                                    request->sky.values, solve->W, &error);
     if (status != LAM_OK)
         return problem_set(why, status == LAM_ERR_MEMORY ? PROBLEM_NO_MEMORY : PROBLEM_NOT_IN_STORE, "%s",

@@ -2,11 +2,11 @@
 
 #include "server/route/radiosity_figures.h"
 #include "server/route/sun_answer.h"
+#include "server/scene/direct_light.h"
 #include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/refine/refine_watch.h"
-#include "solver/operator/sky_light.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@
 /* Arrays of a pass; NULL if not needed. */
 typedef struct pass_memory {
     double *E, *H0, *out; /* [BATCH_PASS][C][n] */
-    double *L;            /* [BATCH_PASS][C][m] */
+    double *weights;      /* [BATCH_PASS][C][m] of tiles, or [k] of luminaires: direct_light_work */
     sun_answer sun;       /* of all vectors */
     double *some;         /* [BATCH_PASS][C][selected] */
     double *means;        /* [C][n_values], of faces, of one vector */
@@ -46,7 +46,7 @@ static void pass_memory_free(pass_memory *p) {
     free(p->E);
     free(p->H0);
     free(p->out);
-    free(p->L);
+    free(p->weights);
     free(p->some);
     free(p->means);
     free(p->start);
@@ -60,9 +60,9 @@ static size_t vectors_of_pass(const radiosity_request *request) {
 
 /* Bytes of the arrays of a pass, and of those that refining takes beside them. */
 static size_t pass_memory_bytes(const scene *s, const radiosity_request *request, size_t rows) {
-    const bool few = s->n_emitters > 0, sky = request->sky.values != NULL, sun = request->n_suns > 0;
-    const size_t doubles = (size_t)(REFINING_VECTORS + 2 + (few || sky || sun)) * s->n +
-                           (sky ? lam_sky_tiles(s->sky) : 0) + (request->select ? request->n_selected : 0);
+    const bool few = s->n_emitters > 0, lit = request_has_direct(request) || request->n_suns > 0;
+    const size_t doubles = (size_t)(REFINING_VECTORS + 2 + (few || lit)) * s->n +
+                           direct_light_work(s, request) + (request->select ? request->n_selected : 0);
     const size_t means = request->at_faces ? radiosity_request_values(request, s->n, &s->faces) : 0;
     const size_t floats = few ? s->n + s->n_emitters : 0;
     return bytes_plus(bytes_times(rows, doubles * sizeof(double) + floats * sizeof(float)),
@@ -78,13 +78,13 @@ static bool pass_memory_allocate(const scene *s, const radiosity_request *reques
     p->E = memory_allocate(rows, row, "E", NULL);
     p->out = memory_allocate(rows, row, "B", NULL);
     bool good = p->E != NULL && p->out != NULL;
-    if (few || request->sky.values != NULL || request->n_suns > 0) {
+    if (few || request_has_direct(request) || request->n_suns > 0) {
         p->H0 = memory_allocate(rows, row, "H0", NULL);
         good = good && p->H0 != NULL;
     }
-    if (request->sky.values != NULL) {
-        p->L = memory_allocate(rows, lam_sky_tiles(s->sky) * sizeof *p->L, "L", NULL);
-        good = good && p->L != NULL;
+    if (request_has_direct(request)) {
+        p->weights = memory_allocate(rows, direct_light_work(s, request) * sizeof *p->weights, "L", NULL);
+        good = good && p->weights != NULL;
     }
     if (request->select) {
         p->some = memory_allocate(rows, request->n_selected * sizeof *p->some, "B", NULL);
@@ -118,7 +118,7 @@ static bool refuse(const scene *s, lam_status status, const lam_error *error, pr
 static bool light_emitters(const scene *s, const radiosity_request *request, size_t first, size_t count,
                            pass_memory *p, problem *why) {
     const size_t C = s->n_channels, weights = C * s->n_emitters;
-    const size_t n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+    const size_t n_tiles = scene_tiles(s);
     const float *L = request->sky.values;
     lam_status status = LAM_OK;
     lam_error error;
@@ -140,12 +140,7 @@ static bool light_any(call *in, const radiosity_request *request, size_t first, 
     const size_t C = s->n_channels, E_begin = first * C * s->n;
     for (size_t k = 0; k < count * C * s->n; k++) p->E[k] = (double)request->E[E_begin + k];
     if (p->H0 == NULL) return true;
-    memset(p->H0, 0, count * C * s->n * sizeof *p->H0);
-    if (p->L != NULL) {
-        const size_t n_tiles = lam_sky_tiles(s->sky), L_begin = first * C * n_tiles;
-        for (size_t k = 0; k < count * C * n_tiles; k++) p->L[k] = (double)request->sky.values[L_begin + k];
-        sky_irradiance_double(s->sky, count * C, p->L, p->H0);
-    }
+    direct_light_find_double(s, request, first, count, p->weights, p->H0);
     if (p->sun.shares == NULL) return true;
     if (!sun_answer_find(in, request, first, count, &p->sun)) return false;
     sun_answer_add_double(s, request, &p->sun, first, count, p->H0);

@@ -1,7 +1,7 @@
 #include "server/scene/adjoint_rows.h"
 
+#include "server/scene/direct_light.h"
 #include "server/scene/gradient.h"
-#include "server/scene/scene.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,14 +22,10 @@ bool adjoint_rows_find(const scene *s, const radiosity_request *request, adjoint
     return false;
 }
 
-static size_t tiles_of(const scene *s) {
-    return s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
-}
-
 /* True if there are few enough to try all groups and tiles. */
 static bool emitter_weights_worth(const scene *s) {
-    const double C = (double)s->n_channels, count = (double)(s->groups.n_groups + tiles_of(s));
-    return count * C * C * (double)(s->n + tiles_of(s)) <= MOST_WORK &&
+    const double C = (double)s->n_channels, count = (double)(s->groups.n_groups + scene_tiles(s));
+    return count * C * C * (double)(s->n + scene_tiles(s)) <= MOST_WORK &&
            count * C * (double)s->n_emitters <= MOST_WEIGHTS;
 }
 
@@ -38,7 +34,7 @@ static bool emitter_weights_worth(const scene *s) {
 static void find_weights(const scene *s, size_t c, const float *E, const float *L, float *all,
                          float *weights) {
     const size_t n_emitters = s->n_emitters;
-    if (lam_operator_weights(s->op, 1, E, tiles_of(s), L, all, NULL) == LAM_OK)
+    if (lam_operator_weights(s->op, 1, E, scene_tiles(s), L, all, NULL) == LAM_OK)
         memcpy(weights, all + c * n_emitters, n_emitters * sizeof *weights);
     else
         weights[0] = NAN;
@@ -57,7 +53,7 @@ static void find_group_weights(const scene *s, float *E, float *all, float *weig
 }
 
 static void find_tile_weights(const scene *s, float *L, float *all, float *weights) {
-    const size_t m = tiles_of(s);
+    const size_t m = scene_tiles(s);
     for (size_t t = 0; t < m; t++)
         for (size_t c = 0; c < s->n_channels; c++, weights += s->n_emitters) {
             L[c * m + t] = 1;
@@ -68,7 +64,7 @@ static void find_tile_weights(const scene *s, float *L, float *all, float *weigh
 
 /* NULL when memory is short. O(n C) for each group and tile. */
 static emitter_weights *emitter_weights_make(const scene *s) {
-    const size_t C = s->n_channels, row = C * s->n_emitters, m = tiles_of(s);
+    const size_t C = s->n_channels, row = C * s->n_emitters, m = scene_tiles(s);
     emitter_weights *made = memory_allocate(1, sizeof *made, "weights", NULL);
     float *E = memory_allocate(C, (s->n > m ? s->n : m) * sizeof *E, "weights", NULL);
     float *all = memory_allocate(row, sizeof *all, "weights", NULL);
@@ -90,9 +86,10 @@ static emitter_weights *emitter_weights_make(const scene *s) {
 }
 
 static size_t row_bytes(const scene *s) {
-    return sizeof(adjoint_row) +
-           s->n_channels * (s->groups.n_groups * sizeof(double) +
-                            (tiles_of(s) + (s->n_emitters > 0 ? s->n_emitters : s->n)) * sizeof(float));
+    return sizeof(adjoint_row) + s->n_channels * (s->groups.n_groups * sizeof(double) +
+                                                  (scene_tiles(s) + scene_luminaires(s) +
+                                                   (s->n_emitters > 0 ? s->n_emitters : s->n)) *
+                                                      sizeof(float));
 }
 
 /* Bytes of g and w of a pass for `count` rows. */
@@ -122,8 +119,10 @@ static adjoint_row *row_allocate(const scene *s, const reduce_name *name, lam_qu
     *numbers =
         memory_allocate(C, (s->n_emitters > 0 ? s->n_emitters : s->n) * sizeof **numbers, "a row", NULL);
     row->of_group = memory_allocate(C, s->groups.n_groups * sizeof *row->of_group, "a row", NULL);
-    row->tiles = memory_allocate(C, tiles_of(s) * sizeof *row->tiles, "a row", NULL);
-    const bool good = *numbers != NULL && row->of_group != NULL && row->tiles != NULL;
+    row->tiles = memory_allocate(C, scene_tiles(s) * sizeof *row->tiles, "a row", NULL);
+    row->luminaires = memory_allocate(C, scene_luminaires(s) * sizeof *row->luminaires, "a row", NULL);
+    const bool good =
+        *numbers != NULL && row->of_group != NULL && row->tiles != NULL && row->luminaires != NULL;
     if (good) return row;
     adjoint_row_free(row);
     return NULL;
@@ -169,15 +168,16 @@ static void fill_from_elements(const scene *s, const float *w, float *g, adjoint
                 sum += (double)w[c * n + s->groups.elements[e]];
             row->of_group[c * n_groups + h] = sum;
         }
-    if (s->sky == NULL) return;
-    gradient_of_sky_irradiance(row->quantity, C * n, s->reflectance, g, w, g);
-    lam_sky_adjoint(s->sky, C, g, row->tiles);
+    if (s->sky == NULL && s->luminaires == NULL) return;
+    gradient_of_direct_irradiance(row->quantity, C * n, s->reflectance, g, w, g);
+    if (s->sky != NULL) lam_sky_adjoint(s->sky, C, g, row->tiles);
+    if (s->luminaires != NULL) lam_luminaires_adjoint(s->luminaires, 1, g, row->luminaires);
 }
 
 /* w is [C][s]; entries of groups and tiles without weights become NaN. */
 static void fill_from_emitters(const scene *s, const emitter_weights *weights, const float *w,
                                adjoint_row *row) {
-    const size_t n_emitters = s->n_emitters, C = s->n_channels, m = tiles_of(s);
+    const size_t n_emitters = s->n_emitters, C = s->n_channels, m = scene_tiles(s);
     const size_t n_groups = s->groups.n_groups;
     memcpy(row->emitters, w, C * n_emitters * sizeof *w);
     for (size_t c = 0; c < C; c++) {
@@ -201,8 +201,8 @@ static bool get_weights(const scene *s, const emitter_weights **weights) {
     if (s->n_emitters == 0 || !emitter_weights_worth(s)) return true;
     *weights = row_cache_weights(s->rows);
     if (*weights != NULL) return true;
-    const size_t bytes = sizeof(emitter_weights) +
-                         (s->groups.n_groups + tiles_of(s)) * s->n_channels * s->n_emitters * sizeof(float);
+    const size_t bytes = sizeof(emitter_weights) + (s->groups.n_groups + scene_tiles(s)) * s->n_channels *
+                                                       s->n_emitters * sizeof(float);
     if (!memory_ledger_take(s->ledger, bytes)) return true;
     emitter_weights *made = emitter_weights_make(s);
     if (made == NULL) {
@@ -276,12 +276,13 @@ bool adjoint_rows_get(const scene *s, const radiosity_request *request, size_t f
 }
 
 size_t adjoint_row_work(const scene *s, const radiosity_request *request) {
-    return s->n_channels * (request->n_rhs + request->n_spots + request->sky.n * tiles_of(s) +
-                            request->emitters.n * s->n_emitters);
+    return s->n_channels *
+           (request->n_rhs + request->n_spots + request->sky.n * scene_tiles(s) +
+            request->luminaires.n * scene_luminaires(s) + request->emitters.n * s->n_emitters);
 }
 
 bool adjoint_row_suffices(const scene *s, const adjoint_row *row, const radiosity_request *request) {
-    const size_t C = s->n_channels, m = tiles_of(s);
+    const size_t C = s->n_channels, m = scene_tiles(s);
     if (row->emitters == NULL) return true;
     if (request->n_dense > 0) return false;
     for (size_t k = 0; k < request->n_spots; k++)
@@ -296,11 +297,24 @@ bool adjoint_row_suffices(const scene *s, const adjoint_row *row, const radiosit
     return true;
 }
 
-/* means += contributions of spots and skies. A contribution of value 0 is skipped, so that NaN of the row
- * does no harm. */
+/* means += sum_t w_t row_t of the weights of a side and its part [C][width] of a row. */
+static void add_side(size_t n_channels, const side_rows *side, size_t width, const float *row,
+                     double *means) {
+    for (size_t v = 0; v < side->n * n_channels; v++) {
+        double sum = 0;
+        for (size_t t = 0; t < width; t++) {
+            const float weight = side->values[v * width + t];
+            if (weight != 0) sum += (double)weight * (double)row[v % n_channels * width + t];
+        }
+        means[v] += sum;
+    }
+}
+
+/* means += contributions of spots, skies and luminaires. A contribution of value 0 is skipped, so that NaN of
+ * the row does no harm. */
 static void add_spots(const scene *s, const adjoint_row *row, const radiosity_request *request,
                       double *means) {
-    const size_t n = s->n, C = s->n_channels, m = tiles_of(s);
+    const size_t n = s->n, C = s->n_channels;
     for (size_t k = 0; k < request->n_spots; k++) {
         const emission_spot *spot = &request->spots[k];
         for (size_t c = 0; c < C; c++) {
@@ -311,14 +325,8 @@ static void add_spots(const scene *s, const adjoint_row *row, const radiosity_re
                                                : (double)row->w[c * n + spot->where]);
         }
     }
-    for (size_t v = 0; v < request->sky.n * C; v++) {
-        double sum = 0;
-        for (size_t t = 0; t < m; t++) {
-            const float L = request->sky.values[v * m + t];
-            if (L != 0) sum += (double)L * (double)row->tiles[v % C * m + t];
-        }
-        means[v] += sum;
-    }
+    add_side(C, &request->sky, scene_tiles(s), row->tiles, means);
+    add_side(C, &request->luminaires, scene_luminaires(s), row->luminaires, means);
 }
 
 void adjoint_row_evaluate(const scene *s, const adjoint_row *row, const radiosity_request *request,

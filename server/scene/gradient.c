@@ -10,8 +10,8 @@ void gradient_of_reflectance(lam_quantity quantity, size_t count, const float *g
     }
 }
 
-void gradient_of_sky_irradiance(lam_quantity quantity, size_t count, const float *reflectance, const float *g,
-                                const float *w, float *out) {
+void gradient_of_direct_irradiance(lam_quantity quantity, size_t count, const float *reflectance,
+                                   const float *g, const float *w, float *out) {
     for (size_t i = 0; i < count; i++) {
         double sum = (double)reflectance[i] * (double)w[i];
         if (quantity == LAM_IRRADIANCE) sum += (double)g[i];

@@ -20,13 +20,15 @@
 #include "lambert/lambert.h"
 #include "solver/codec/groups.h"
 
-/* dJ/drho [C][n]: H is the irradiance, H0 that of the sky alone (NULL: 0). out may be any of the inputs. */
+/* dJ/drho [C][n]: H is the irradiance, H0 the direct one of sky, luminaires and sun (NULL: 0). out may be any
+ * of the inputs. */
 void gradient_of_reflectance(lam_quantity quantity, size_t count, const float *g, const float *w,
                              const float *H, const float *H0, float *out);
 
-/* dJ/dH0, which the sky's adjoint turns into dJ/dL. out may be any of the inputs. */
-void gradient_of_sky_irradiance(lam_quantity quantity, size_t count, const float *reflectance, const float *g,
-                                const float *w, float *out);
+/* dJ/dH0, which the adjoints of sky and luminaires turn into dJ/dL and dJ/dD. out may be any of the inputs.
+ */
+void gradient_of_direct_irradiance(lam_quantity quantity, size_t count, const float *reflectance,
+                                   const float *g, const float *w, float *out);
 
 /* dJ/dv [C][g] by the emission v that all elements of a group have: sum of w [C][n] over the group. O(C n).
  */

@@ -36,6 +36,7 @@ void adjoint_row_free(adjoint_row *row) {
     free(row->w);
     free(row->of_group);
     free(row->tiles);
+    free(row->luminaires);
     free(row->emitters);
     free(row);
 }

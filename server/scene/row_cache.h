@@ -22,12 +22,13 @@ typedef struct adjoint_row {
     const uint32_t *groups; /* of the mean, as group_index_find gives them */
     size_t n_groups;
     lam_quantity quantity;
-    double area;      /* sum A; 0: the row is 0, and the mean has no value */
-    double buried;    /* share of the area of the groups that buried elements have */
-    float *w;         /* [C][n]; NULL where the store answers for its own emitters only */
-    float *emitters;  /* [C][s], by emitter, in place of w */
-    double *of_group; /* [C][groups of the scene], sum of w over each; NaN: not determined by the emitters */
-    float *tiles;     /* [C][m], by radiance of a sky's tile; NaN likewise */
+    double area;       /* sum A; 0: the row is 0, and the mean has no value */
+    double buried;     /* share of the area of the groups that buried elements have */
+    float *w;          /* [C][n]; NULL where the store answers for its own emitters only */
+    float *emitters;   /* [C][s], by emitter, in place of w */
+    double *of_group;  /* [C][groups of the scene], sum of w over each; NaN: not determined by the emitters */
+    float *tiles;      /* [C][m], by radiance of a sky's tile; NaN likewise */
+    float *luminaires; /* [C][k], by their dimmers */
 } adjoint_row;
 
 void adjoint_row_free(adjoint_row *row);

@@ -1,6 +1,6 @@
 /* A scene is opened from a store, or as a variant of another one, and is freed with its last reference.
- * read_store() forecasts the bytes of operator, sky, mesh and errors before it reads them, and refuses more
- * than options->memory; scene_verify() and scene_damaged() keep the health of mapped arrays. */
+ * read_store() forecasts the bytes of operator, sky, luminaires, mesh and errors before it reads them, and
+ * refuses more than options->memory; scene_verify() and scene_damaged() keep the health of mapped arrays. */
 #include "server/scene/scene.h"
 
 #include "server/queue/batch.h"
@@ -13,6 +13,7 @@
 #include "solver/base/scene/scene_lights.h"
 #include "solver/codec/describe.h"
 #include "solver/operator/emitters.h"
+#include "solver/operator/luminaire_light.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
 #include "store/groups.h"
@@ -259,6 +260,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     made->reflectance = made->op->reflectance;
     lam_operator_set_threads(made->op, threads_of(made->op, options->threads));
     TRY(sky_load(s, made->n, &made->sky, error));
+    TRY(luminaires_load(s, made->n, made->n_channels, &made->luminaires, error));
+    TRY(luminaire_names_make(made->luminaires, &made->luminaire_names, error));
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
     TRY(read_groups(s, made, error));
@@ -346,6 +349,8 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->area = base->area;
     made->limiter = base->limiter;
     made->sky = base->sky;
+    made->luminaires = base->luminaires;
+    made->luminaire_names = base->luminaire_names;
     made->sun = base->sun;
     made->map = base->map;
     made->health = base->health;
@@ -394,6 +399,8 @@ void scene_release(scene *s) {
     if (s->base == NULL) {
         scene_sun_destroy(s->sun);
         lam_sky_close(s->sky);
+        lam_luminaires_close(s->luminaires);
+        luminaire_names_free(&s->luminaire_names);
         weather_file_free(&s->weather);
         group_index_free(&s->groups);
         group_index_free(&s->emitters);

@@ -28,8 +28,8 @@ struct scene {
     char *name; /* as served */
     char *path;
     store_identity identity;
-    scene *base; /* of a variant, held: path, groups, areas, sky, health and factors belong to it. NULL: this
-                    is a store */
+    scene *base; /* of a variant, held: path, groups, areas, sky, luminaires, health and factors belong to it.
+                    NULL: this is a store */
     uint64_t number; /* of a variant, from 1: in the order in which they were made; set by the catalog */
     size_t n;
     size_t n_channels;
@@ -37,15 +37,17 @@ struct scene {
     const float *reflectance; /* [C][n], of op */
     group_index groups;       /* measured */
     light_kind lights;
-    group_index emitters;  /* by name */
-    face_index faces;      /* of the scene file; empty: the store does not know them */
-    double *area;          /* [n], m^2 */
-    lam_limiter limiter;   /* of answers below zero; it borrows groups and areas */
-    lam_sky *sky;          /* NULL: none */
-    char sky_tiling[32];   /* the name of its tiles; "": not known. A variant has none of its own */
-    char sky_up;           /* 'x', 'y' or 'z' */
-    double sky_north;      /* degrees of its model; 0 where it states none */
-    scene_sun *sun;        /* over it; NULL: its tiles are not known. Of a variant that of its store */
+    group_index emitters;            /* by name */
+    face_index faces;                /* of the scene file; empty: the store does not know them */
+    double *area;                    /* [n], m^2 */
+    lam_limiter limiter;             /* of answers below zero; it borrows groups and areas */
+    lam_sky *sky;                    /* NULL: none */
+    char sky_tiling[32];             /* the name of its tiles; "": not known. A variant has none of its own */
+    char sky_up;                     /* 'x', 'y' or 'z' */
+    double sky_north;                /* degrees of its model; 0 where it states none */
+    lam_luminaires *luminaires;      /* NULL: none */
+    luminaire_names luminaire_names; /* these by name */
+    scene_sun *sun;        /* over the sky; NULL: its tiles are not known. Of a variant that of its store */
     weather_file weather;  /* beside the file; its text is in texts. A variant has none of its own */
     size_t n_emitters;     /* 0: the store answers any emission */
     uint64_t bytes;        /* of /operator as stored; of a variant, of the cores alone */

@@ -1,4 +1,5 @@
 /* The errors of answers (scene.h): of their own emission where the store states errors by group. */
+#include "server/scene/direct_light.h"
 #include "server/scene/request_light.h"
 
 #include "solver/operator/emitters.h"
@@ -35,6 +36,8 @@ static bool has_strange_light(const scene *s, const radiosity_request *request) 
     }
     for (size_t k = 0; sky->values != NULL && k < sky->n * C * lam_sky_tiles(s->sky); k++)
         if (sky->values[k] > 0) return true;
+    for (size_t k = 0; k < request->luminaires.n * C * scene_luminaires(s); k++)
+        if (request->luminaires.values[k] > 0) return true;
     for (size_t k = 0; k < request->n_suns * C; k++)
         if (request->sunlight[k] > 0) return true;
     return stated_errors_is_strange(&s->errors, rows, request->E);
@@ -43,8 +46,8 @@ static bool has_strange_light(const scene *s, const radiosity_request *request) 
 void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes) {
     const answer_scope scope = {.receivers_only = asks_receivers(s, request),
                                 .strange = has_strange_light(s, request),
-                                .sky = request->sky.values != NULL && request->E == NULL &&
-                                       request->n_spots == 0};
+                                .sky = request->sky.values != NULL && request->luminaires.values == NULL &&
+                                       request->E == NULL && request->n_spots == 0};
     stated_errors_note(&s->errors, scope, notes);
     if (s->base != NULL)
         notes->head.advice = "errors were measured for the reflectances of the store: precompute with these";
@@ -73,8 +76,8 @@ static bool has_own_error(const scene *s, const radiosity_request *request, cons
     const error_by_group *e = &s->errors.by_group;
     const bool whole = !request->reduce.linear || e->figures.sky_first != NULL;
     const bool sky = request->sky.values != NULL || has_sky_weights(s, request);
-    return e->n_bins > 0 && notes->has_error && s->errors.emitters.figures.s == 0 &&
-           request->tolerance == 0 &&
+    return e->n_bins > 0 && notes->has_error && request->luminaires.values == NULL &&
+           s->errors.emitters.figures.s == 0 && request->tolerance == 0 &&
            (!sky || (whole && s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
 }
 

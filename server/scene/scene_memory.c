@@ -37,6 +37,12 @@ static uint64_t mesh_memory(const store *s) {
            names / (sizeof(char *) + 1) * (2 * sizeof(uint32_t) + sizeof(double));
 }
 
+/* The names of luminaires and of their groups, twice, and an index of both. */
+static uint64_t luminaire_names_memory(const store *s) {
+    return 4 * (store_texts_memory(s, STORE_LUMINAIRES "/names") +
+                store_texts_memory(s, STORE_LUMINAIRES "/group_names"));
+}
+
 lam_status scene_memory_passing(store *s, uint64_t *memory, lam_error *error) {
     lam_status status = LAM_OK;
     uint64_t receivers, sources;
@@ -55,12 +61,14 @@ done:
 lam_status scene_memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error) {
     lam_status status = LAM_OK;
     char *kind = NULL;
-    uint64_t sky, errors;
+    uint64_t sky, luminaires, errors;
     TRY(store_group_bytes(s, STORE_OPERATOR, operator_bytes, error));
     TRY(bytes_below(s, STORE_SKY, &sky, error));
+    TRY(bytes_below(s, STORE_LUMINAIRES, &luminaires, error));
     TRY(bytes_below(s, STORE_ERROR, &errors, error));
     TRY(store_get_text(s, STORE_OPERATOR, "kind", &kind, error));
-    *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky + errors + mesh_memory(s);
+    *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky + luminaires + luminaire_names_memory(s) +
+              errors + mesh_memory(s);
 done:
     free(kind);
     return status;

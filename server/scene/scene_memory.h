@@ -4,8 +4,9 @@
 
 #include "store/store.h"
 
-/* *memory: bytes of the operator in memory, of the sky, of the mesh and of errors, mapped or read;
- * *operator_bytes: those of /operator in the file. Errors: those of store_group_bytes and store_get_text. */
+/* *memory: bytes of the operator in memory, of the sky, of luminaires, of the mesh and of errors, mapped or
+ * read; *operator_bytes: those of /operator in the file. Errors: those of store_group_bytes and
+ * store_get_text. */
 lam_status scene_memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error);
 
 /* The bytes that are read beside that and freed again before the scene is open: of groups by element, the

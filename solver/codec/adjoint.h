@@ -9,14 +9,15 @@ typedef enum gradient_kind {
     GRADIENT_REFLECTANCE,
     GRADIENT_SKY,
     GRADIENT_EMITTERS,
-    GRADIENT_GROUPS, /* by one emission that all elements of a group have */
+    GRADIENT_GROUPS,     /* by one emission that all elements of a group have */
+    GRADIENT_LUMINAIRES, /* by their dimmers */
     GRADIENT_COUNT
 } gradient_kind;
 
 /* Starts zeroed. */
 typedef struct adjoint_request {
     radiosity_request cotangent; /* E is g [C][n] */
-    radiosity_request light;     /* E, and sky, of `emission`; n_rhs is 0 without it */
+    radiosity_request light;     /* E, sky and luminaires of `emission`; n_rhs is 0 without it */
     lam_quantity quantity;
     gradient_kind named[GRADIENT_COUNT];
     size_t n_named;
@@ -32,9 +33,9 @@ static inline bool adjoint_wants(const adjoint_request *request, gradient_kind k
     return (request->wanted & 1u << kind) != 0;
 }
 
-/* Both as codec_read_json. Without `gradient`, emission is meant; with emission a store's sky is, and in a
- * store of few emitters these alone. 422 also for what the store has not, and for reflectance without
- * emission. */
+/* Both as codec_read_json. Without `gradient`, emission is meant; with emission a store's sky is, and its
+ * luminaires, and in a store of few emitters these alone. 422 also for what the store has not, and for
+ * reflectance without emission. */
 bool codec_read_adjoint_json(const codec_scene *scene, const char *text, size_t length,
                              adjoint_request *request, problem *why);
 

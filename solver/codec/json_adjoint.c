@@ -11,7 +11,8 @@ void adjoint_request_free(adjoint_request *request) {
 }
 
 const char *gradient_name(gradient_kind kind) {
-    static const char *const names[GRADIENT_COUNT] = {"emission", "reflectance", "sky", "emitters", "groups"};
+    static const char *const names[GRADIENT_COUNT] = {"emission", "reflectance", "sky",
+                                                      "emitters", "groups",      "luminaires"};
     return names[kind];
 }
 
@@ -30,9 +31,15 @@ static bool check_gradient(parser *p, gradient_kind kind) {
                parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: a store of few emitters has no gradient by groups",
                              parser_here(p));
     case GRADIENT_SKY:
+    case GRADIENT_LUMINAIRES:
         if (scene->n_emitters > 0)
             return parser_refuse(p, PROBLEM_NOT_IN_STORE,
                                  "%s: a store of few emitters has the gradient by emitters only",
+                                 parser_here(p));
+        if (kind == GRADIENT_LUMINAIRES)
+            return scene->n_luminaires > 0 ||
+                   parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                                 "%s: the store has no luminaires; precompute it with --luminaires",
                                  parser_here(p));
         return scene->n_tiles > 0 ||
                parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no sky; precompute it with --sky",
@@ -59,14 +66,15 @@ static bool read_gradient_name(parser *p, adjoint_request *request) {
         return check_gradient(p, (gradient_kind)kind);
     }
     return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
-                         "%s = \"%.*s\", must be emission, reflectance, sky, emitters or groups",
+                         "%s = \"%.*s\", must be emission, reflectance, sky, emitters, groups or luminaires",
                          parser_here(p), text.length > 80 ? 80 : (int)text.length, text.bytes);
 }
 
 /* ["emission", ...] */
 static bool read_gradient(parser *p, adjoint_request *request) {
     const size_t mark = p->pointer_length;
-    if (!parser_expect(p, JSON_ARRAY, "an array of emission, reflectance, sky, emitters or groups"))
+    if (!parser_expect(p, JSON_ARRAY,
+                       "an array of emission, reflectance, sky, emitters, groups or luminaires"))
         return false;
     if (!json_enter_array(&p->r)) return parser_fault(p);
     for (size_t index = 0; json_next_element(&p->r); index++) {
@@ -112,6 +120,8 @@ static void settle(const codec_scene *scene, adjoint_request *request) {
         request->wanted |= 1u << request->named[k];
         if (request->named[k] == GRADIENT_EMISSION && scene->n_tiles > 0)
             request->wanted |= 1u << GRADIENT_SKY;
+        if (request->named[k] == GRADIENT_EMISSION && scene->n_luminaires > 0)
+            request->wanted |= 1u << GRADIENT_LUMINAIRES;
     }
 }
 

@@ -183,6 +183,68 @@ class Scene:
         return self
 
 
+class Luminaires:
+    """The luminaires of a store: names, the group of each (None: it has none), and the irradiance of every element."""
+
+    NAMES = ("desk-1", "desk-2", "row-a.0", "row-a.1", "wall")
+    GROUPS = ("desks", "desks", "row-a", "row-a", None)
+
+    def __init__(self, n, channels=1, seed=1, names=NAMES, groups=GROUPS, mesh_groups=0):
+        rng = np.random.default_rng(seed)
+        k = len(names)
+        self.names, self.groups, self.channels = names, groups, channels
+        self.irradiance = (rng.random((k, n)) * rng.choice([0, 1, 10], (k, n))).astype(np.float32)
+        self.dimmers, self.lumens = rng.random(k), rng.uniform(500, 4000, k)
+        self.colour = rng.uniform(0.5, 1.5, (k, 3))
+        z = rng.normal(size=(k, 3))
+        self.z = z / np.linalg.norm(z, axis=1)[:, None]
+        self.x = np.cross(self.z, np.roll(self.z, 1, axis=1))
+        self.x /= np.linalg.norm(self.x, axis=1)[:, None]
+        self.at = rng.uniform(-5, 5, (k, 3))
+        self.shape, self.size = np.arange(k) % 11, rng.random((k, 3))
+        self.off = rng.random((2, k, mesh_groups)) * 1e-3  # of elements, and of means
+
+    def of(self, **dimmers):
+        """Dimmers [C][k] by the names of luminaires: a number or one for each channel."""
+        D = np.zeros((self.channels, len(self.names)))
+        for name, values in dimmers.items():
+            D[:, self.names.index(name.replace("_", "-"))] = values
+        return D
+
+    def direct(self, D):
+        """H0 [..., C, n] of dimmers [..., C, k]."""
+        colour = self.colour.T if self.channels == 3 else np.ones((self.channels, len(self.names)))
+        return (np.asarray(D, float) * colour) @ self.irradiance.astype(float)
+
+    def add_to(self, path):
+        """Writes /luminaires into a store, which counts in lm then."""
+        k = len(self.names)
+        known = [g for g in dict.fromkeys(self.groups) if g is not None]
+        y = np.cross(self.z, self.x)
+        with h5py.File(path, "r+") as f:
+            f.require_group("luminaires")
+            arrays = {
+                "irradiance": self.irradiance,
+                "dimmers": self.dimmers,
+                "lumens": self.lumens,
+                "colour": self.colour,
+                "place": np.concatenate([self.at, self.x, y, self.z], axis=1),
+                "opening": np.concatenate([self.shape[:, None].astype(float), self.size], axis=1),
+                "names": np.array([name.encode() for name in self.names]),
+            }
+            if known:
+                arrays["group_names"] = np.array([name.encode() for name in known])
+                arrays["group"] = np.array([known.index(g) if g is not None else NO_VERTEX for g in self.groups], np.uint32)
+            if self.off.shape[2]:
+                arrays["elements_off"], arrays["means_off"] = self.off
+            for name, values in arrays.items():
+                f.create_dataset("luminaires/" + name, data=np.ascontiguousarray(values))
+            assert len(arrays["names"]) == k
+            f["mesh"].attrs["lights"] = text("lm")
+            add_checksums(f)
+        return self
+
+
 def set_attributes(group, values):
     for key, value in values.items():
         if isinstance(value, str):

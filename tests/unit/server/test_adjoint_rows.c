@@ -230,7 +230,7 @@ START_TEST(memory_runs_out) {
         adjoint_rows_release(&f.s, 1, &row);
         radiosity_request_free(&request);
     }
-    ck_assert_uint_eq(failed, 5 * 5); /* the pass, a row, its numbers, its groups, its tiles */
+    ck_assert_uint_eq(failed, 5 * 6); /* the pass, a row, its numbers, groups, tiles and luminaires */
     teardown(&f);
 }
 END_TEST

@@ -92,7 +92,7 @@ START_TEST(gradients_are_differences) {
             narrow(p.H0, H0_f);
             narrow(p.rho, rho_f);
             gradient_of_reflectance(quantity, N, g_f, w_f, H_f, sky ? H0_f : NULL, by_rho);
-            gradient_of_sky_irradiance(quantity, N, rho_f, g_f, w_f, by_H0);
+            gradient_of_direct_irradiance(quantity, N, rho_f, g_f, w_f, by_H0);
             for (int i = 0; i < N; i++) {
                 /* Values are below 10, each rounded to 6e-8 of it, three of them in a sum of two products. */
                 ck_assert_double_eq_tol((double)by_rho[i], difference(&p, quantity, &p.rho[i]), 1e-5);
@@ -101,7 +101,7 @@ START_TEST(gradients_are_differences) {
             /* The result may take the place of an argument. */
             gradient_of_reflectance(quantity, N, g_f, w_f, H_f, sky ? H0_f : NULL, H_f);
             ck_assert_mem_eq(H_f, by_rho, sizeof by_rho);
-            gradient_of_sky_irradiance(quantity, N, rho_f, g_f, w_f, g_f);
+            gradient_of_direct_irradiance(quantity, N, rho_f, g_f, w_f, g_f);
             ck_assert_mem_eq(g_f, by_H0, sizeof by_H0);
         }
 }
