@@ -190,7 +190,8 @@ bool quick_radiosity(call *in, answer *out) {
     bool good = request_memory_take(in->memory, QUICK_BYTES, &why) &&
                 codec_read_json(&about, in->body, in->length, &request, &why) &&
                 adjoint_row_work(s, &request) <= QUICK_WORK / request.reduce.n_names &&
-                is_short(s, &request) && adjoint_rows_find(s, &request, rows);
+                (request.luminaires.values == NULL || scene_has_luminaire_sums(s)) && is_short(s, &request) &&
+                adjoint_rows_find(s, &request, rows);
     if (good && !adjoint_row_suffices(s, rows[0], &request)) {
         adjoint_rows_release(s, request.reduce.n_names, rows);
         good = false;

@@ -276,9 +276,10 @@ bool adjoint_rows_get(const scene *s, const radiosity_request *request, size_t f
 }
 
 size_t adjoint_row_work(const scene *s, const radiosity_request *request) {
-    return s->n_channels *
-           (request->n_rhs + request->n_spots + request->sky.n * scene_tiles(s) +
-            request->luminaires.n * scene_luminaires(s) + request->emitters.n * s->n_emitters);
+    /* The size of the light of k luminaires takes k^2 of them. */
+    const size_t k = scene_luminaires(s);
+    return s->n_channels * (request->n_rhs + request->n_spots + request->sky.n * scene_tiles(s) +
+                            request->luminaires.n * (k + 1) * k + request->emitters.n * s->n_emitters);
 }
 
 bool adjoint_row_suffices(const scene *s, const adjoint_row *row, const radiosity_request *request) {

@@ -1,14 +1,23 @@
 #include "server/scene/request_light.h"
 
+#include "server/scene/direct_light.h"
+
 #include "solver/operator/emitters.h"
 #include "solver/operator/stated/whole_law.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 const float *request_sky(const scene *s, const radiosity_request *request, size_t v) {
     const side_rows *sky = &request->sky;
     return sky->values != NULL && v < sky->n ? sky->values + v * s->n_channels * lam_sky_tiles(s->sky) : NULL;
+}
+
+const float *request_dimmers(const scene *s, const radiosity_request *request, size_t v) {
+    const side_rows *side = &request->luminaires;
+    return side->values != NULL && v < side->n ? side->values + v * s->n_channels * scene_luminaires(s)
+                                               : NULL;
 }
 
 /* The light of the weights of emitters that a request has: adds the power and squares of what elements emit,
@@ -124,8 +133,71 @@ static bool find_whole(const scene *s, const radiosity_request *request, double 
     return true;
 }
 
+/* Adds what is reflected of the direct light of luminaires, which is of no lamp and no whole group. */
+static void add_reflected(const scene *s, const radiosity_request *request, mean_errors *to) {
+    const size_t C = s->n_channels;
+    for (size_t v = 0; to->luminaires != NULL && v < request->luminaires.n; v++) {
+        const float *D = request_dimmers(s, request, v);
+        emission_size reflected = {.power2 = 0};
+        for (size_t c = 0; c < C; c++) {
+            double power = 0;
+            luminaire_sums_size(to->luminaires, c, D + c * to->luminaires->k, &power, &reflected.squares);
+            reflected.power2 += power * power;
+        }
+        to->sizes[v] = emission_size_sum(&to->sizes[v], &reflected);
+        to->whole[v].rest = emission_size_sum(&to->whole[v].rest, &reflected);
+    }
+}
+
 bool request_sizes(const scene *s, const radiosity_request *request, mean_errors *to) {
     const size_t rows = request->n_rhs * s->n_channels;
     size_of_spots(s, request, to->emission, to->emission + rows, to->sizes, to);
-    return find_whole(s, request, to->emission, to);
+    if (!find_whole(s, request, to->emission, to)) return false;
+    add_reflected(s, request, to);
+    return true;
+}
+
+void sent_light_free(sent_light *l) {
+    free(l->luminaires);
+    free(l->reflected);
+    free(l->sent);
+}
+
+bool sent_light_allocate(const scene *s, const radiosity_request *request, bool sun, sent_light *out) {
+    const bool luminaires = request->luminaires.values != NULL;
+    *out = (sent_light){.sent = NULL};
+    if (!sun && !luminaires) return true;
+    out->reflected = memory_allocate(s->n, sizeof *out->reflected, "errors", NULL);
+    out->sent = memory_allocate(s->n, sizeof *out->sent, "errors", NULL);
+    if (luminaires)
+        out->luminaires = memory_allocate(s->n_channels, s->n * sizeof *out->luminaires, "errors", NULL);
+    return out->reflected != NULL && out->sent != NULL && (!luminaires || out->luminaires != NULL);
+}
+
+void sent_light_size(const scene *s, const radiosity_request *request, size_t v, const float *E,
+                     const float *sun, sent_light *l, error_answer *of) {
+    const size_t n = s->n, C = s->n_channels;
+    if (l->luminaires != NULL) {
+        memset(l->luminaires, 0, C * n * sizeof *l->luminaires);
+        lam_luminaires_irradiance(s->luminaires, 1, request_dimmers(s, request, v), l->luminaires);
+    }
+    for (size_t c = 0; c < C; c++) {
+        if (l->reflected == NULL) {
+            emission_size_add(&of->size, n, s->area, E + c * n);
+            continue;
+        }
+        memset(l->reflected, 0, n * sizeof *l->reflected);
+        for (size_t k = 0; sun != NULL && k < request->n_suns; k++) {
+            const float direct = request->sunlight[k * C + c], *share = sun + k * n;
+            if (request->suns[k].vector != v) continue;
+            for (size_t i = 0; i < n; i++) l->reflected[i] += direct * share[i];
+        }
+        for (size_t i = 0; i < n; i++) {
+            if (l->luminaires != NULL) l->reflected[i] += l->luminaires[c * n + i];
+            l->reflected[i] *= s->reflectance[c * n + i];
+            l->sent[i] = E[c * n + i] + l->reflected[i];
+        }
+        emission_size_add(&of->size, n, s->area, l->sent);
+        emission_size_add(&of->reflected, n, s->area, l->reflected);
+    }
 }

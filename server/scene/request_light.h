@@ -4,12 +4,32 @@
 #define LAMBERT_SERVER_SCENE_REQUEST_LIGHT_H
 
 #include "server/scene/scene.h"
+#include "solver/codec/answer_error.h"
 
 /* The radiances of the sky of vector v, [C][m]; NULL: it has none. */
 const float *request_sky(const scene *s, const radiosity_request *request, size_t v);
 
+/* The dimmers of the luminaires of vector v, [C][k]; NULL: it has none. */
+const float *request_dimmers(const scene *s, const radiosity_request *request, size_t v);
+
 /* Fills sizes, whole, and of weights of emitters sums and L; emission is work. Cost: as long as the request
  * is, and O(C n) for each vector that is expanded or of emitters. False when memory is short. */
 bool request_sizes(const scene *s, const radiosity_request *request, mean_errors *to);
+
+/* Work for the light that elements send on: vectors [C][n] and [n]. */
+typedef struct sent_light {
+    float *luminaires; /* [C][n], their irradiance; NULL: no vector has any */
+    float *reflected;  /* [n]; NULL: there is neither sun nor luminaire */
+    float *sent;       /* [n] */
+} sent_light;
+
+/* sun: whether the request has any. False when memory is short; freed by sent_light_free also then. */
+bool sent_light_allocate(const scene *s, const radiosity_request *request, bool sun, sent_light *out);
+void sent_light_free(sent_light *l);
+
+/* Fills the sizes of the light that vector v sends on: of its emission E [C][n] with what is reflected of its
+ * suns, of shares sun [n_suns][n] or NULL, and of its luminaires, and of this alone. */
+void sent_light_size(const scene *s, const radiosity_request *request, size_t v, const float *E,
+                     const float *sun, sent_light *l, error_answer *of);
 
 #endif

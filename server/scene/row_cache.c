@@ -11,7 +11,8 @@ struct row_cache {
     uint64_t uses;
     size_t bytes, max_bytes;
     memory_ledger *ledger;
-    emitter_weights *weights; /* once set, for good; NULL: not yet, or not worth it */
+    emitter_weights *weights;   /* once set, for good; NULL: not yet, or not worth it */
+    luminaire_sums *luminaires; /* likewise */
 };
 
 void emitter_weights_free(emitter_weights *weights) {
@@ -47,6 +48,12 @@ static void drop_weights(memory_ledger *ledger, emitter_weights *weights) {
     emitter_weights_free(weights);
 }
 
+static void drop_luminaires(memory_ledger *ledger, luminaire_sums *sums) {
+    if (sums == NULL) return;
+    memory_ledger_give_back(ledger, sums->bytes);
+    luminaire_sums_free(sums);
+}
+
 void row_cache_destroy(row_cache *rows) {
     if (rows == NULL) return;
     for (adjoint_row *row = rows->first, *next; row != NULL; row = next) {
@@ -55,13 +62,15 @@ void row_cache_destroy(row_cache *rows) {
     }
     memory_ledger_give_back(rows->ledger, rows->bytes);
     drop_weights(rows->ledger, rows->weights);
+    drop_luminaires(rows->ledger, rows->luminaires);
     pthread_mutex_destroy(&rows->lock);
     free(rows);
 }
 
 size_t row_cache_held(row_cache *rows) {
     pthread_mutex_lock(&rows->lock);
-    const size_t held = rows->bytes + (rows->weights != NULL ? rows->weights->bytes : 0);
+    const size_t held = rows->bytes + (rows->weights != NULL ? rows->weights->bytes : 0) +
+                        (rows->luminaires != NULL ? rows->luminaires->bytes : 0);
     pthread_mutex_unlock(&rows->lock);
     return held;
 }
@@ -170,4 +179,23 @@ const emitter_weights *row_cache_set_weights(row_cache *rows, emitter_weights *m
     pthread_mutex_unlock(&rows->lock);
     drop_weights(rows->ledger, made);
     return weights;
+}
+
+const luminaire_sums *row_cache_luminaires(row_cache *rows) {
+    pthread_mutex_lock(&rows->lock);
+    const luminaire_sums *sums = rows->luminaires;
+    pthread_mutex_unlock(&rows->lock);
+    return sums;
+}
+
+const luminaire_sums *row_cache_set_luminaires(row_cache *rows, luminaire_sums *made) {
+    pthread_mutex_lock(&rows->lock);
+    if (rows->luminaires == NULL) {
+        rows->luminaires = made;
+        made = NULL;
+    }
+    const luminaire_sums *sums = rows->luminaires;
+    pthread_mutex_unlock(&rows->lock);
+    drop_luminaires(rows->ledger, made);
+    return sums;
 }

@@ -5,6 +5,7 @@
 #define LAMBERT_SERVER_SCENE_ROW_CACHE_H
 
 #include "lambert/lambert.h"
+#include "server/scene/luminaire_sums.h"
 #include "server/scene/memory_ledger.h"
 #include "solver/codec/group_figures.h"
 
@@ -54,7 +55,7 @@ void row_cache_destroy(row_cache *rows);
 /* Drops all rows; those in use are freed by their last user. */
 void row_cache_clear(row_cache *rows);
 
-/* Bytes taken of the ledger, for rows and weights. */
+/* Bytes taken of the ledger, for rows, weights and sums. */
 size_t row_cache_held(row_cache *rows);
 
 /* max_bytes. */
@@ -76,5 +77,9 @@ void row_cache_release(row_cache *rows, size_t count, adjoint_row **released);
  * stays. */
 const emitter_weights *row_cache_weights(row_cache *rows);
 const emitter_weights *row_cache_set_weights(row_cache *rows, emitter_weights *made);
+
+/* The same of the sums of the scene's luminaires. */
+const luminaire_sums *row_cache_luminaires(row_cache *rows);
+const luminaire_sums *row_cache_set_luminaires(row_cache *rows, luminaire_sums *made);
 
 #endif

@@ -131,7 +131,8 @@ typedef struct mean_errors {
     emission_size *sizes; /* [n_rhs] */
     whole_light *whole;   /* [n_vectors], of n_rhs; NULL: nothing of it is known */
     size_t n_vectors;
-    double *emission; /* [2][n_rhs][C], of a store of emitters [C], work */
+    double *emission;                 /* [2][n_rhs][C], of a store of emitters [C], work */
+    const luminaire_sums *luminaires; /* of the scene; NULL: the request has no dimmers */
     /* These are needed where the request has weights of emitters; NULL: it has none. */
     float *E;     /* [C][n], work */
     double *sums; /* [n_rhs][C][n_groups], of A E of groups */

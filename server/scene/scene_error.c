@@ -3,7 +3,7 @@
 #include "server/scene/request_light.h"
 
 #include "solver/operator/emitters.h"
-#include "solver/operator/sky_light.h"
+#include "solver/operator/luminaire_light.h"
 #include "solver/operator/stated/whole_law.h"
 
 #include <math.h>
@@ -76,8 +76,10 @@ static bool has_own_error(const scene *s, const radiosity_request *request, cons
     const error_by_group *e = &s->errors.by_group;
     const bool whole = !request->reduce.linear || e->figures.sky_first != NULL;
     const bool sky = request->sky.values != NULL || has_sky_weights(s, request);
-    return e->n_bins > 0 && notes->has_error && request->luminaires.values == NULL &&
-           s->errors.emitters.figures.s == 0 && request->tolerance == 0 &&
+    const bool known =
+        request->luminaires.values == NULL || luminaires_know_errors(s->luminaires, s->groups.n_groups);
+    return e->n_bins > 0 && notes->has_error && known && s->errors.emitters.figures.s == 0 &&
+           request->tolerance == 0 &&
            (!sky || (whole && s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
 }
 
@@ -151,20 +153,6 @@ static bool light_of_weights(const scene *s, const float *weights, float *own, v
     return true;
 }
 
-/* The light that vector v sends on in channel c: its emission E [C][n], and the reflected part of the sun.
- * sent is [n]. */
-static const float *sent_of(const scene *s, const radiosity_request *request, size_t v, size_t c,
-                            const float *E, const float *sun, float *sent) {
-    const size_t n = s->n, C = s->n_channels;
-    memcpy(sent, E + c * n, n * sizeof *sent);
-    for (size_t k = 0; k < request->n_suns; k++) {
-        const float direct = request->sunlight[k * C + c], *share = sun + k * n;
-        if (request->suns[k].vector != v) continue;
-        for (size_t i = 0; i < n; i++) sent[i] += s->reflectance[c * n + i] * direct * share[i];
-    }
-    return sent;
-}
-
 bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0, const float *sun,
                           const float *W, const float *values, answer_notes *notes, name_error **names) {
     const error_scene about = scene_for_errors(s);
@@ -177,8 +165,8 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     name_error *const kept = memory_allocate(reduce->n_names, 2 * sizeof *kept, "errors", NULL);
     const size_t n_own = W != NULL ? 2 * vector + C * s->errors.by_group.figures.n_tiles : 0;
     float *const own = memory_allocate(n_own, sizeof *own, "errors", NULL);
-    float *const sent = sun != NULL ? memory_allocate(s->n, sizeof *sent, "errors", NULL) : NULL;
-    bool good = kept != NULL && own != NULL && (sun == NULL || sent != NULL);
+    sent_light sent;
+    bool good = sent_light_allocate(s, request, sun != NULL, &sent) && kept != NULL && own != NULL;
     if (good) begin_own(reduce, kept, &made);
     for (size_t v = 0; good && v < request->n_rhs; v++) {
         vector_light light = {request->E + v * vector, H0 != NULL ? H0 + v * vector : NULL,
@@ -192,10 +180,9 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
                            .count = count,
                            .selected = request->select ? request->selected : NULL,
                            .values = values + v * C * count,
-                           .L = light.L};
-        for (size_t c = 0; c < C; c++)
-            emission_size_add(&of.size, s->n, s->area,
-                              sent == NULL ? of.E + c * s->n : sent_of(s, request, v, c, of.E, sun, sent));
+                           .L = light.L,
+                           .luminaires = lit_luminaires_of(s->luminaires, request_dimmers(s, request, v))};
+        sent_light_size(s, request, v, of.E, sun, &sent, &of);
         of.sky = size_of_sky(s, light.L);
         if (reduce->on) {
             good = name_errors_of(&s->errors.by_group, &about, &of, reduce, kept + reduce->n_names);
@@ -211,7 +198,7 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     if (good) *names = kept;
     if (!good) free(kept);
     free(own);
-    free(sent);
+    sent_light_free(&sent);
     return good;
 }
 
@@ -328,23 +315,29 @@ static void emission_of_name(const scene *s, const radiosity_request *request, c
     for (size_t k = 0; all > 0 && k < request->n_rhs * C; k++) emission[k] /= all;
 }
 
-/* direct [n_rhs][C]: means of the direct light of skies over the name. */
+/* direct [n_rhs][C]: means of the direct light of skies and luminaires over the name. */
 static void direct_of_name(const scene *s, const radiosity_request *request, const reduce_name *name,
                            const mean_errors *to, double *direct) {
     const size_t C = s->n_channels;
     const error_by_group *e = &s->errors.by_group;
     const float *L = to->L != NULL ? to->L : request->sky.values;
     const size_t rows = (to->L != NULL ? request->n_rhs : request->sky.n) * C;
+    const luminaire_sums *sums = to->luminaires;
+    const double *f = sums != NULL ? luminaires_factors(s->luminaires) : NULL;
     double all = 0;
     memset(direct, 0, request->n_rhs * C * sizeof *direct);
-    for (size_t g = 0; L != NULL && g < name->n_groups; g++) {
+    for (size_t g = 0; (L != NULL || sums != NULL) && g < name->n_groups; g++) {
         double area = 0;
         for (size_t bin = name->groups[g]; bin < e->n_bins; bin += e->figures.n_groups) area += e->area[bin];
         all += area;
-        for (size_t row = 0; row < rows; row++)
+        for (size_t row = 0; L != NULL && row < rows; row++)
             for (size_t t = 0; t < e->figures.n_tiles; t++)
                 direct[row] += area * e->figures.sky_first[name->groups[g] * e->figures.n_tiles + t] *
                                (double)L[row * e->figures.n_tiles + t];
+        for (size_t row = 0; sums != NULL && row < request->luminaires.n * C; row++)
+            for (size_t k = 0; k < sums->k; k++)
+                direct[row] += area * sums->first[name->groups[g] * sums->k + k] * f[row % C * sums->k + k] *
+                               (double)request->luminaires.values[row * sums->k + k];
     }
     for (size_t k = 0; all > 0 && k < request->n_rhs * C; k++) direct[k] /= all;
 }
@@ -366,6 +359,10 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
         return true;
     }
     if (!has_own_error(s, request, notes)) return true;
+    if (request->luminaires.values != NULL) {
+        if (!scene_luminaire_sums(s, &made.luminaires)) return false;
+        if (made.luminaires == NULL) return true;
+    }
     const size_t rows = request->n_rhs * s->n_channels;
     made.names = memory_allocate(reduce->n_names, sizeof *made.names, "errors", NULL);
     made.sizes = memory_allocate(request->n_rhs, sizeof *made.sizes, "errors", NULL);
@@ -423,6 +420,7 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
         const name_means of = {.quantity = request->quantity,
                                .size = to->sizes[v],
                                .whole = to->whole[v],
+                               .luminaires = lit_luminaires_of(s->luminaires, request_dimmers(s, request, v)),
                                .sky = size_of_sky(s, L),
                                .L = L,
                                .buried = buried,

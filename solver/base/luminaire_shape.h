@@ -2,7 +2,7 @@
 #ifndef LAMBERT_BASE_LUMINAIRE_SHAPE_H
 #define LAMBERT_BASE_LUMINAIRE_SHAPE_H
 
-/* In the order of /luminaires/opening (store/FORMAT.md). */
+/* Stores have these numbers (/luminaires/opening in store/FORMAT.md). */
 typedef enum luminaire_shape {
     OPENING_POINT,
     OPENING_RECTANGLE, /* a line where one of its sides is 0 */

@@ -17,14 +17,19 @@ static double lamps2_of(const error_by_group *e, const error_scene *scene, const
     return sum;
 }
 
-/* The first light of a sun, of which E tells nothing, has the law of its size alone. *sizes owns
- * its whole groups. False when memory is short. */
+/* The first light of a sun or of luminaires, of which E tells nothing, has the law of its size alone. *sizes
+ * owns its whole groups. False when memory is short. */
 static bool sizes_of_answer(const error_by_group *e, const error_scene *scene, const error_answer *of,
                             light_sizes *sizes) {
     *sizes = light_sizes_of(e, of->quantity, &of->size, of->L);
+    if (of->quantity != LAM_INDIRECT) sizes->luminaires = of->luminaires;
     sizes->size.lamps2 = lamps2_of(e, scene, of->E);
     const sky_sizes sent = sky_sizes_of(e, of->L_sent);
-    if (sent.L == NULL) return whole_light_find(e, scene, of->E, &sizes->whole);
+    if (sent.L == NULL) {
+        if (!whole_light_find(e, scene, of->E, &sizes->whole)) return false;
+        sizes->whole.rest = emission_size_sum(&sizes->whole.rest, &of->reflected);
+        return true;
+    }
     if (sizes->sent.L == NULL) sizes->sent.L = sent.L;
     sizes->sent.power2 += sent.power2;
     sizes->sent.spread += sent.spread;
@@ -249,6 +254,7 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
     const size_t n_rows = e->n_bins / e->figures.n_groups;
     light_sizes sizes = light_sizes_of(e, means->quantity, &means->size, means->L);
     sizes.whole = means->whole;
+    if (means->quantity != LAM_INDIRECT) sizes.luminaires = means->luminaires;
     name_sums s = {.area = 0};
     double reflected2 = 0, radiosity2 = 0, light2 = 0, covered = 0;
     for (size_t g = 0; g < name->n_groups; g++)

@@ -7,7 +7,8 @@
 #include "solver/operator/stated/emitters_law.h"
 #include "solver/operator/stated/error_law.h"
 
-/* An answer: its emission, the direct light of its sky, and its values in mesh order or of some elements. */
+/* An answer: its emission, the direct light of its sky, sun and luminaires, and its values in mesh order or
+ * of some elements. */
 typedef struct error_answer {
     lam_quantity quantity;
     const float *E, *H0;      /* [C][n]; NULL: none */
@@ -16,9 +17,12 @@ typedef struct error_answer {
     const float *values;      /* [C][count], or, where they are whole, [C][n] in mesh order */
     bool whole;
     emission_size size, sky; /* of the emission, and of the sky: of tiles in place of elements */
-    const float *L;          /* [C][n_tiles], radiances of the sky; NULL: none */
-    const float *L_sent;     /* [C][n_tiles], of tiles whose bounced light alone is in it; NULL: none */
-    double lost2; /* with L_sent: (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
+    emission_size reflected; /* of the part of size that E has not: what elements send on of the direct light
+                                of sun and luminaires */
+    lit_luminaires luminaires;
+    const float *L;      /* [C][n_tiles], radiances of the sky; NULL: none */
+    const float *L_sent; /* [C][n_tiles], of tiles whose bounced light alone is in it; NULL: none */
+    double lost2;        /* with L_sent: (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
 } error_answer;
 
 /* The parts of the headline (headline.h), over all light that surfaces reflect, |B - E|, the direct light
@@ -59,14 +63,15 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
                     const reduce_request *names, name_error *errors);
 
 /* The same of one name, by its means, [C] each, of the quantity, of the emission, and of the direct light of
- * the sky, of which the last two are over all elements. Cost: O(C groups of the name), and under a sky
- * n_tiles times as much. */
+ * sky and luminaires, of which the last two are over all elements. Cost: O(C groups of the name), and under a
+ * sky n_tiles times as much, under luminaires k times. */
 typedef struct name_means {
     lam_quantity quantity;
     emission_size size, sky;
     whole_light whole; /* of size; a view */
-    const float *L;    /* [C][n_tiles]; NULL: no sky */
-    double buried;     /* share of the area of the name that the value leaves out: no light reaches it */
+    lit_luminaires luminaires;
+    const float *L; /* [C][n_tiles]; NULL: no sky */
+    double buried;  /* share of the area of the name that the value leaves out: no light reaches it */
     const double *value, *emission, *direct;
 } name_means;
 name_error name_error_of_means(const error_by_group *e, const reduce_name *name, const name_means *means);

@@ -227,6 +227,10 @@ void lam_luminaires_adjoint(const lam_luminaires *l, size_t n_rhs, const float *
     first_rows_adjoint(&l->rows, n_rhs * l->C, g, &f, D);
 }
 
+const double *luminaires_factors(const lam_luminaires *l) {
+    return l->factors;
+}
+
 const float *luminaires_irradiance(const lam_luminaires *l) {
     return l->rows.values;
 }

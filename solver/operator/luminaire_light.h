@@ -35,6 +35,9 @@ uint32_t luminaires_group_of(const lam_luminaires *l, size_t luminaire);
 /* lam_luminaires_irradiance for refined answers, in double: likewise added. */
 void luminaires_irradiance_double(const lam_luminaires *l, size_t n_rhs, const double *D, double *H0);
 
+/* Their colours, factors of the irradiance in each channel, [C][k]. */
+const double *luminaires_factors(const lam_luminaires *l);
+
 /* The irradiance of every element at dimmer 1, [k][n], without colours. */
 const float *luminaires_irradiance(const lam_luminaires *l);
 

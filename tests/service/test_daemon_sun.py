@@ -125,6 +125,21 @@ class Sun(unittest.TestCase):
         error = self.post("city", {"emission": {"sun": SUN}}).json()["error"]
         self.assertEqual(error.get("light", "own"), "own")
 
+    def test_what_it_makes_elements_send_has_an_error(self):
+        """That of an emission of the same: both have the same answer, apart from roundings."""
+        must("precompute", self.folder / "cornell.obj", "-o", self.folder / "told.h5x", "--method", "low-rank", "--epsilon", .2,
+             *self.skied, "--probes", 8)
+        with Daemon(f"{self.folder / 'told.h5x'}:told") as daemon:
+            def ask(emission, quantity="radiosity"):
+                return daemon.radiosity("told", {"emission": emission, "quantity": quantity, "limit": False}).json()
+            lit = {"sun": SUN}
+            sun = ask(lit)
+            sent = np.array(sun["radiosity"]) - np.array(ask(lit, "indirect")["indirect"])
+            same = ask(sent.tolist())
+        self.assertGreater(sun["error"]["relative_mean"], 0)
+        for figure in "relative_mean", "indirect_mean", "emitters":
+            self.assertAlmostEqual(sun["error"][figure] / same["error"][figure], 1, delta=1e-4, msg=figure)
+
     def test_refused(self):
         cases = (("few", {"sun": SUN}, "few emitters"), ("dark", {"sun": SUN}, "--sky"),
                  ("city", {"sun": {"azimuth": 1, "altitude": 2}}, "lacks direct"),

@@ -1,8 +1,10 @@
 """Black box: the luminaires of a store, whose direct light H0 is reflected as E' = E + rho H0. Answers are held against the same
 store's answers to the emission rho H0, and against solutions in double of what h5py reads from it alone."""
 
+import copy
 import json
 import pathlib
+import shutil
 import tempfile
 import time
 import unittest
@@ -197,7 +199,8 @@ class Answers(unittest.TestCase):
 
     def test_refusals(self):
         for name, emission, words in (
-                ("grey", {"luminaires": {"desk1": 1}}, 'emission/luminaires/desk1: the scene has no luminaire "desk1"; did you mean "desk-1"?'),
+                ("grey", {"luminaires": {"desk1": 1}},
+                 'emission/luminaires/desk1: the scene has no luminaire "desk1"; did you mean "desk-1"?'),
                 ("grey", {"luminaires": {"desk-1": 1, "desks": 1}}, "emission/luminaires/desks: the luminaire desk-1 is given twice"),
                 ("grey", {"luminaires": {"wall": -1}}, "emission/luminaires/wall = -1, must not be negative"),
                 ("grey", {"luminaires": {"wall": "3600lm"}}, "emission/luminaires/wall must be a number or one for each channel"),
@@ -282,6 +285,84 @@ class Kinds(unittest.TestCase):
                     answer = self.ask(name, {"emission": {"luminaires": of}, "quantity": quantity, "tolerance": tolerance})
                     worst = np.abs(np.reshape(answer[quantity], E.shape) - wanted[quantity]).max()
                     self.assertLessEqual(worst, answer["certificate"] + 1e-13 * wanted[quantity].max(), (name, quantity))
+
+    def error(self, daemon, name, emission, quantity, **members):
+        answer = daemon.radiosity(name, {"emission": emission, "quantity": quantity, "limit": False, **members})
+        self.assertEqual(answer.status, 200, answer)
+        self.assertEqual(answer.json()["error"]["light"], "own")
+        return answer.json()["error"]
+
+    def test_stated_errors_are_those_of_the_emission(self):
+        """Where the direct light is exact, as an emission rho H0 makes the same error; rows and vectors state the same."""
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        path = pathlib.Path(folder.name)
+        for name in "low", "grey":
+            truth, l = self.truth[name], copy.copy(self.lights[name])
+            C, of = truth.C, LIT if truth.C == 3 else GREY
+            D = dimmers(l, of)
+            E = truth.rho * l.direct(D)
+            E = E.tolist() if C == 3 else E[0].tolist()
+            l.off = 0 * l.off
+            shutil.copy(self.stores[name], path / "right.h5")
+            with h5py.File(path / "right.h5", "r+") as f:
+                del f["luminaires"]
+            l.add_to(path / "right.h5")
+            groups = {"groups": ["floor", "south"], "with": ["mean"]}
+            vectors = dict(groups, **{"with": ["mean", "min"]})
+            with Daemon(path / "right.h5", f"{self.stores[name]}:off") as daemon:
+                for quantity in QUANTITIES:
+                    lit = self.error(daemon, "right", {"luminaires": of}, quantity)
+                    same = self.error(daemon, "right", E, quantity)
+                    # Of irradiance the one has H0 in |H|, the other not.
+                    for figure in ["indirect_mean", "emitters"] + ["relative_mean"] * (quantity != "irradiance"):
+                        self.assertAlmostEqual(lit[figure] / same[figure], 1, delta=1e-4, msg=(name, quantity, figure))
+                    self.assertGreater(lit["parts"]["operator"], 0)
+                    same = self.error(daemon, "right", E, quantity, reduce=vectors)["groups"]
+                    # The figures of a row are of the mean reflectance of a group, which is that of its elements here.
+                    for reduce in groups, vectors:
+                        by_group = self.error(daemon, "right", {"luminaires": of}, quantity, reduce=reduce)["groups"]
+                        for group in groups["groups"]:
+                            for figure in "mean", "elements":
+                                self.assertAlmostEqual(by_group[group][figure] / same[group][figure], 1, delta=1e-3)
+                    self.check_direct(daemon, name, D, of, quantity, vectors, same)
+
+    def check_direct(self, daemon, name, D, of, quantity, reduce, right):
+        """Squares of errors of `off` are larger than of the right ones by D = sum rho^2 (d f)^2 off, of irradiance without rho."""
+        truth, l = self.truth[name], self.lights[name]
+        colour = l.colour.T if truth.C == 3 else np.ones_like(D)
+        lit = self.error(daemon, "off", {"luminaires": of}, quantity, reduce=reduce)["groups"]
+        H0 = l.direct(D)
+        body = {"emission": {"luminaires": of}, "quantity": "indirect", "limit": False}
+        B = np.reshape(daemon.radiosity("off", body).json()["indirect"], H0.shape)
+        for group in reduce["groups"]:
+            g = truth.groups.index(group)
+            i = truth.group == g
+            rho = truth.rho[:, i].mean(1)
+            light = (B[:, i] @ truth.area[i]) / truth.area[i].sum() / (rho if quantity == "irradiance" else 1)
+            seen = {"radiosity": rho, "irradiance": 1, "indirect": 0}[quantity]
+            for figure, off in zip(("elements", "mean"), l.off):
+                direct = ((np.broadcast_to(seen, truth.C)[:, None] * D * colour) ** 2 @ off[:, g]).sum()
+
+                def square(x):  # error_ratio of error_law.h, undone
+                    return (light**2).sum() * (x * x / (1 + x * x) if x < 1 else x * x / 2)
+                larger = square(lit[group][figure]) - square(right[group][figure])
+                # Differences of squares lose digits that both have, some 1e-5 of each.
+                slack = 1e-3 * direct + 1e-4 * square(right[group][figure])
+                self.assertAlmostEqual(larger, direct, delta=slack, msg=(quantity, group, figure))
+
+    def test_without_errors_of_luminaires_those_of_the_store_stay(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        path = pathlib.Path(folder.name) / "silent.h5"
+        shutil.copy(self.stores["low"], path)
+        with h5py.File(path, "r+") as f:
+            del f["luminaires/elements_off"], f["luminaires/means_off"]
+            add_checksums(f)
+        with Daemon(path) as daemon:
+            for reduce in {}, {"reduce": {"groups": ["floor"], "with": ["mean"]}}:
+                answer = daemon.radiosity("silent", {"emission": {"luminaires": {"wall": 1}}, **reduce}).json()
+                self.assertEqual(answer["error"]["light"], "lights")
 
     def test_stores_of_few_emitters_refuse_them(self):
         answer = self.daemon.radiosity("few", {"emission": {"luminaires": {"wall": 1}}})

@@ -200,12 +200,17 @@ static double direct_of(const error_by_group *by, const double *weights, const l
     return sum;
 }
 
-/* The part of the direct light of single tiles. */
+/* The part of the direct light of single tiles, and of luminaires. */
 static bin_error error_of_direct(const error_by_group *e, const light_sizes *of, size_t bin) {
-    const size_t group = bin % e->figures.n_groups;
-    if (of->sky.L == NULL) return (bin_error){0, 0};
-    return (bin_error){direct_of(e, e->figures.sky_elements_off, of, group),
-                       direct_of(e, e->figures.sky_means_off, of, group)};
+    const size_t C = e->figures.n_channels, G = e->figures.n_groups, group = bin % G;
+    const lit_luminaires *lit = &of->luminaires;
+    const double *rho = of->quantity == LAM_IRRADIANCE ? NULL : e->reflectance;
+    bin_error sum = {luminaire_law(lit, lit->elements_off, C, G, group, rho),
+                     luminaire_law(lit, lit->means_off, C, G, group, rho)};
+    if (of->sky.L == NULL) return sum;
+    sum.elements2 += direct_of(e, e->figures.sky_elements_off, of, group);
+    sum.mean2 += direct_of(e, e->figures.sky_means_off, of, group);
+    return sum;
 }
 
 /* A law of a sky beside its direct light, whose three figures begin with SKY_MEAN_TILES or SKY_RMS_TILES:

@@ -4,6 +4,7 @@
 #define LAMBERT_OPERATOR_STATED_ERROR_LAW_H
 
 #include "solver/operator/stated/error_figures.h"
+#include "solver/operator/stated/luminaire_law.h"
 #include "solver/operator/stated/mesh_law.h"
 #include "solver/operator/stated/reflecting.h"
 
@@ -83,7 +84,8 @@ typedef struct light_sizes {
     emission_size size;
     whole_light whole; /* of size; a view */
     sky_sizes sky, sent;
-    double lost2; /* (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
+    double lost2;              /* (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
+    lit_luminaires luminaires; /* whose direct light is in the answer; what is reflected of it is in size */
 } light_sizes;
 
 /* Of the light that is reflected the direct light of a sky is no part, nor are errors of it. */

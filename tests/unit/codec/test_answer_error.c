@@ -1,5 +1,6 @@
 /* The error of an answer against the same by plain sums: three elements of two groups, two channels. */
 #include "solver/codec/answer_error.h"
+#include "solver/operator/stated/whole_law.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -297,6 +298,92 @@ START_TEST(reflected_light_has_no_direct_errors) {
 }
 END_TEST
 
+/* Two luminaires under the dimmers d and colours f: D = sum_c rho_c^2 sum_k (d_kc f_kc)^2 off_kg, of
+ * irradiance without rho, and none of light that is bounced, beside the law of the whole size. */
+START_TEST(luminaires_have_errors_of_their_own) {
+    static const float dimmers[C * 2] = {1, 2, 0, 3};
+    static const double factors[C * 2] = {1, .5, 2, 1.5}, off[2 * G] = {.01, .02, .03, .04};
+    static const double mean_off[2 * G] = {.001, .002, .003, .004};
+    const lit_luminaires lit = {
+        .k = 2, .dimmers = dimmers, .factors = factors, .elements_off = off, .means_off = mean_off};
+    const lam_quantity quantity = (lam_quantity[]){LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT}[_i];
+    const bool white = quantity == LAM_IRRADIANCE, sees = quantity != LAM_INDIRECT;
+    /* (d f)^2 is 1 and 1 in the first channel, 0 and 20.25 in the second; rho is .5 of desk in both. */
+    const double D = sees ? (white ? 1 : .25) * (.01 + .03 + 20.25 * .03) : 0,
+                 D_mean = sees ? (white ? 1 : .25) * (.001 + .003 + 20.25 * .003) : 0, rho2 = white ? .25 : 1;
+    const uint32_t desk[] = {0};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}};
+    const reduce_request request = {.on = true, .names = list, .n_names = 1};
+    float values[C * N];
+    name_error found = {.name = "desk"};
+    answer_error all;
+    fill(quantity, true, values);
+    error_answer of = answer_of(quantity, values);
+    of.H0 = H0;
+    of.luminaires = lit;
+    const double number = P2 / A2E2, rms = law(P2, number, .03, .04, .01) / rho2 + D,
+                 mean = law(P2, number, .03, .02, .001) / rho2 + D_mean;
+    const double r0 = (.5 + 2 * .25) / 3 / sqrt(rho2), r1 = (1 + 2 * .5) / 3 / sqrt(rho2);
+    ck_assert(name_errors_of(&stated, &scene, &of, &request, &found));
+    ck_assert_double_eq_tol(found.mean, ratio(mean, r0 * r0 + r1 * r1), 1e-5);
+    ck_assert_double_eq_tol(found.elements, ratio(rms, r0 * r0 + r1 * r1), 1e-4);
+    /* The same of the mean alone, and of all elements selected. */
+    double value[C] = {0}, emission[C] = {0}, direct[C] = {0};
+    for (size_t k = 0; k < C * 2; k++) {
+        const size_t c = k / 2, i = k % 2;
+        value[c] += area[i] * (double)values[c * N + i] / 3;
+        emission[c] += area[i] * (double)E[c * N + i] / 3;
+        direct[c] += area[i] * (double)H0[c * N + i] / 3;
+    }
+    const name_means means = {.quantity = quantity,
+                              .size = of.size,
+                              .luminaires = lit,
+                              .value = value,
+                              .emission = emission,
+                              .direct = direct};
+    const name_error same = name_error_of_means(&stated, &list[0], &means);
+    ck_assert_double_eq_tol(same.mean, found.mean, 1e-6);
+    ck_assert_double_eq_tol(same.elements, found.elements, 1e-5);
+    of.count = 2;
+    of.selected = members;
+    of.whole = true;
+    ck_assert(answer_error_of(&stated, &scene, &of, &all));
+    double reflected = 0;
+    for (size_t k = 0; k < C * 2; k++)
+        reflected += area[k % 2] * r[k / 2 * N + k % 2] * r[k / 2 * N + k % 2] / rho2;
+    ck_assert_double_eq_tol(all.indirect, ratio(3 * rms, reflected), 1e-5);
+}
+END_TEST
+
+/* Where whole groups have errors of their own, what elements send on of a sun or of luminaires, which E has
+ * not, has those of its size. */
+START_TEST(reflected_light_is_no_whole_group) {
+    static uint32_t whole_groups[] = {1}, whole_of[] = {WHOLE_NONE, 0};
+    static double whole_rms[G] = {.0004, .0009}, whole_mean[G] = {.0001, .0004};
+    const float lamp[C * N] = {0, 0, 2, 0, 0, 0}, reflected[C * N] = {.5f, .25f, .75f, .25f, 0, 0};
+    const uint32_t desk[] = {0};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}};
+    const reduce_request request = {.on = true, .names = list, .n_names = 1};
+    float values[C * N];
+    name_error found = {.name = "desk"};
+    error_by_group whole = stated;
+    whole.figures.n_whole = 1;
+    whole.figures.whole_groups = whole_groups;
+    whole.figures.whole_rms = whole_rms;
+    whole.figures.whole_mean = whole_mean;
+    whole.whole_of = whole_of;
+    fill(LAM_INDIRECT, false, values);
+    error_answer of = {.quantity = LAM_INDIRECT, .E = lamp, .count = N, .values = values};
+    for (size_t c = 0; c < C; c++) emission_size_add(&of.reflected, N, area, reflected + c * N);
+    ck_assert(name_errors_of(&whole, &scene, &of, &request, &found));
+    /* P_c is .5 + .5 + 3 and .25; 2^2 / C of what the lamp alone is off by. */
+    const double power2 = 16 + .0625, number = power2 / (.25 + .25 + 9 + .0625);
+    const double rms = .0004 * 4 / C + law(power2, number, .03, .04, .01);
+    const double r0 = (.5 + 2 * .25) / 3, r1 = (1 + 2 * .5) / 3;
+    ck_assert_double_eq_tol(found.elements, ratio(rms, r0 * r0 + r1 * r1), 1e-5);
+}
+END_TEST
+
 /* The figures of a group that reflects nothing are those of its irradiance alone. */
 START_TEST(black_groups_have_errors_of_their_irradiance) {
     static reflecting with_black[] = {{1, 1, true}, {.3125, .3125, false}};
@@ -525,6 +612,8 @@ int main(void) {
     tcase_add_test(cases, single_tiles_have_their_own_errors);
     tcase_add_test(cases, faces_that_count_twice_are_off_by_their_light);
     tcase_add_test(cases, reflected_light_has_no_direct_errors);
+    tcase_add_loop_test(cases, luminaires_have_errors_of_their_own, 0, 3);
+    tcase_add_test(cases, reflected_light_is_no_whole_group);
     tcase_add_test(cases, black_groups_have_errors_of_their_irradiance);
     tcase_add_test(cases, reflectances_of_groups);
     tcase_add_test(cases, unknown_skies_are_left);
