@@ -4,6 +4,7 @@
 #include "server/scene/scene.h"
 
 #include "server/queue/batch.h"
+#include "server/scene/luminaire_places.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/scene_memory.h"
 #include "server/scene/tile_places.h"
@@ -226,14 +227,17 @@ done:
 /* Once the scene is described. */
 static lam_status keep_texts(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
-    buffer tiles = {0};
-    uint64_t memory;
+    buffer tiles = {0}, luminaires = {0};
+    uint64_t memory, of_luminaires;
     TRY(scene_texts_describe(&made->texts, made->description, made->ledger, error));
     TRY(read_tiling(s, made, error));
     if (made->sky != NULL) TRY(tile_places_read(s, lam_sky_tiles(made->sky), &tiles, error));
     TRY(scene_texts_add_sky(&made->texts, &tiles, &made->weather, made->ledger, &memory, error));
-    made->memory += memory;
+    TRY(luminaire_places_write(made->luminaires, &luminaires, error));
+    TRY(scene_texts_add_luminaires(&made->texts, &luminaires, made->ledger, &of_luminaires, error));
+    made->memory += memory + of_luminaires;
 done:
+    buffer_free(&luminaires);
     buffer_free(&tiles);
     return status;
 }

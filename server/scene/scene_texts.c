@@ -46,20 +46,30 @@ done:
     return status;
 }
 
+lam_status scene_texts_add_luminaires(scene_texts *texts, buffer *luminaires, memory_ledger *ledger,
+                                      uint64_t *memory, lam_error *error) {
+    *memory = luminaires->length;
+    return luminaires->length == 0
+               ? LAM_OK
+               : kept_forms_of(luminaires, ledger, "the luminaires of a scene", &texts->luminaires, error);
+}
+
 size_t scene_texts_held(const scene_texts *texts) {
     return kept_forms_held(texts->description) + kept_forms_held(texts->sky) +
-           kept_forms_held(texts->weather);
+           kept_forms_held(texts->luminaires) + kept_forms_held(texts->weather);
 }
 
 void scene_texts_clear(const scene_texts *texts) {
     kept_forms_clear(texts->description);
     kept_forms_clear(texts->sky);
+    kept_forms_clear(texts->luminaires);
     kept_forms_clear(texts->weather);
 }
 
 void scene_texts_free(scene_texts *texts) {
     kept_forms_release(texts->description);
     kept_forms_release(texts->sky);
+    kept_forms_release(texts->luminaires);
     kept_forms_release(texts->weather);
     *texts = (scene_texts){.description = NULL};
 }

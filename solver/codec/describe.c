@@ -1,5 +1,5 @@
 /* The description of a store is one JSON object, put together from the attributes of /, /mesh, /operator,
- * /error, /sky and /form_factors, and from groups, emitters and cameras (store/FORMAT.md;
+ * /error, /sky, /luminaires and /form_factors, and from groups, emitters and cameras (store/FORMAT.md;
  * deploy/docs/api.md). A whole number is written as an integer, and one that is not finite as null. */
 #include "solver/codec/describe.h"
 
@@ -353,6 +353,31 @@ done:
     return status;
 }
 
+/* Their number, and their lumens at dimmers of 1; null where there are none. */
+static lam_status add_luminaires(store *s, json_t *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *lumens = NULL;
+    size_t dims[STORE_MAX_RANK];
+    store_type type;
+    double sum = 0;
+    int rank;
+    const char *const name = STORE_LUMINAIRES "/lumens";
+    if (!store_has(s, STORE_LUMINAIRES)) {
+        json_object_set_new(out, "luminaires", json_null());
+        return LAM_OK;
+    }
+    TRY(store_array_info(s, name, &type, &rank, dims, error));
+    if (rank != 1)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s has %d dimensions, must have 1", store_path(s), name, rank);
+    TRY(store_read(s, name, STORE_F64, 1, dims, &lumens, error));
+    for (size_t k = 0; k < dims[0]; k++) sum += ((const double *)lumens)[k];
+    json_object_set_new(out, "luminaires",
+                        json_pack("{s:I, s:f}", "count", (json_int_t)dims[0], "lumens", sum));
+done:
+    free(lumens);
+    return status;
+}
+
 /* The elements that the operator was built for, and the option that named them; null where it was built for
  * all. */
 static lam_status add_elements(store *s, const char *group, const char *member, json_t *out,
@@ -430,6 +455,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     TRY(add_emitters(s, made, error));
     TRY(add_cameras(s, made, error));
     TRY(add_sky(s, made, error));
+    TRY(add_luminaires(s, made, error));
     TRY(add_elements(s, STORE_IMPORTANCE, "importance", made, error));
     TRY(add_elements(s, STORE_SOURCES, "sources", made, error));
     TRY(add_error(s, made, error));

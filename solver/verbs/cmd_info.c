@@ -259,6 +259,13 @@ static void print_sky(const json_t *sky) {
            json_number_value(json_object_get(sky, "ground_albedo")), turned);
 }
 
+static void print_luminaires(const json_t *luminaires) {
+    if (!json_is_object(luminaires)) return;
+    printf("%-18s%" JSON_INTEGER_FORMAT ", %.5g lm\n", "luminaires",
+           json_integer_value(json_object_get(luminaires, "count")),
+           json_number_value(json_object_get(luminaires, "lumens")));
+}
+
 /* The elements that are read, or that emit, and what others are. */
 static void print_elements(const char *label, const json_t *elements, const char *others) {
     if (!json_is_object(elements)) return;
@@ -282,6 +289,7 @@ static void print_text(const json_t *about) {
     print_emitters(json_object_get(about, "emitters"));
     print_cameras(json_object_get(about, "cameras"));
     print_sky(json_object_get(about, "sky"));
+    print_luminaires(json_object_get(about, "luminaires"));
     print_elements("read", json_object_get(about, "importance"), "the light of others is only roughly right");
     print_elements("emit", json_object_get(about, "sources"),
                    "light that others emit is only roughly right, and no error is stated for it");

@@ -197,6 +197,29 @@ class Answers(unittest.TestCase):
             self.assertEqual(got["unit"], unit)
             self.close(got["irradiance"], plain * factor, unit, SAME)
 
+    def test_the_list(self):
+        for name in "grey", "colour":
+            l = self.lights[name]
+            told = self.daemon.ask("GET", f"/v1/scenes/{name}/luminaires", None, {"Authorization": "Bearer secret"})
+            self.assertEqual((told.status, told.headers["Content-Type"]), (200, "application/json"))
+            told = told.json()
+            self.assertEqual([one["name"] for one in told["luminaires"]], list(l.names))
+            self.assertEqual([one["group"] for one in told["luminaires"]], list(l.groups))
+            for member, wanted in {"at": l.at, "aim": -l.z, "c0": l.x, "dim": l.dimmers, "lumens": l.lumens, "colour": l.colour}.items():
+                np.testing.assert_array_equal([one[member] for one in told["luminaires"]], wanted)
+            self.assertEqual([one["opening"]["shape"] for one in told["luminaires"]], ["point", "rectangle", "box", "disc", "ellipse"])
+            np.testing.assert_array_equal([one["opening"]["size"] for one in told["luminaires"]], l.size)
+            self.assertEqual([(g["name"], g["luminaires"]) for g in told["groups"]], [("desks", 2), ("row-a", 2)])
+            np.testing.assert_allclose([g["lumens"] for g in told["groups"]], [l.lumens[:2].sum(), l.lumens[2:4].sum()], rtol=1e-15)
+            self.assertAlmostEqual(told["lumens"], l.lumens.sum(), delta=1e-9)
+            about = self.daemon.ask("GET", f"/v1/scenes/{name}", None, {"Authorization": "Bearer secret"}).json()
+            self.assertEqual(about["luminaires"]["count"], 5)
+            self.assertAlmostEqual(about["luminaires"]["lumens"], l.lumens.sum(), delta=1e-9)
+            self.assertIn(f"luminaires        5, {l.lumens.sum():.5g} lm\n", must("info", self.folder / f"{name}.h5").stdout)
+        answer = self.daemon.ask("GET", "/v1/scenes/plain/luminaires", None, {"Authorization": "Bearer secret"})
+        self.assertEqual((answer.status, answer.json()["detail"]), (404, "plain: the store has no luminaires"))
+        self.assertIsNone(self.daemon.ask("GET", "/v1/scenes/plain", None, {"Authorization": "Bearer secret"}).json()["luminaires"])
+
     def test_refusals(self):
         for name, emission, words in (
                 ("grey", {"luminaires": {"desk1": 1}},

@@ -210,7 +210,7 @@ class OpenApi(unittest.TestCase):
         own = {"get_healthz": ["get_health.c"], "get_readyz": ["get_health.c"], "get_metrics": ["get_metrics.c"],
                **{f"keeps_{name}": ["kept_answer.c", file] for name, file in (
                    ("scenes", "get_scenes.c"), ("scene", "get_scenes.c"), ("mesh", "get_mesh.c"), ("openapi", "get_documents.c"), ("manual", "get_documents.c"),
-                   ("sky", "get_sky.c"), ("weather", "get_sky.c"))},
+                   ("sky", "get_sky.c"), ("luminaires", "get_sky.c"), ("weather", "get_sky.c"))},
                "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c"], "post_adjoint": ["post_adjoint.c"],
                "post_skies": ["post_skies.c", "weather_source.c"], "post_weather": ["post_weather.c", "weather_source.c"], "post_sun": ["post_sun.c"],
                "put_reflectance": ["reflectance_variants.c"], "delete_reflectance": ["reflectance_variants.c"],
