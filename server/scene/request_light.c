@@ -181,6 +181,12 @@ void sent_light_size(const scene *s, const radiosity_request *request, size_t v,
         memset(l->luminaires, 0, C * n * sizeof *l->luminaires);
         lam_luminaires_irradiance(s->luminaires, 1, request_dimmers(s, request, v), l->luminaires);
     }
+    for (size_t c = 0; c < C && l->luminaires != NULL; c++) {
+        double power = 0;
+        for (size_t i = 0; i < n; i++)
+            power += s->area[i] * (double)(s->reflectance[c * n + i] * l->luminaires[c * n + i]);
+        of->luminaires.power2 += power * power;
+    }
     for (size_t c = 0; c < C; c++) {
         if (l->reflected == NULL) {
             emission_size_add(&of->size, n, s->area, E + c * n);

@@ -392,6 +392,18 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
     return true;
 }
 
+/* sum over channels of (sum A rho H0)^2 of luminaires. */
+static double luminaires_power2(const luminaire_sums *sums, size_t n_channels, const lit_luminaires *lit) {
+    double power2 = 0;
+    for (size_t c = 0; c < n_channels; c++) {
+        double power = 0;
+        for (size_t k = c * lit->k; k < (c + 1) * lit->k; k++)
+            power += (double)lit->dimmers[k] * sums->power[k];
+        power2 += power * power;
+    }
+    return power2;
+}
+
 bool scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, double buried,
                            const double *means, mean_errors *to, answer_notes *notes) {
     const reduce_name *name = &request->reduce.names[k];
@@ -415,12 +427,14 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
     emission_of_name(s, request, name, to, to->emission);
     direct_of_name(s, request, name, to, direct);
     for (size_t v = 0; v < request->n_rhs; v++) {
+        lit_luminaires lit = lit_luminaires_of(s->luminaires, request_dimmers(s, request, v));
+        lit.power2 = luminaires_power2(to->luminaires, C, &lit);
         const float *L =
             to->L != NULL ? to->L + v * C * s->errors.by_group.figures.n_tiles : request_sky(s, request, v);
         const name_means of = {.quantity = request->quantity,
                                .size = to->sizes[v],
                                .whole = to->whole[v],
-                               .luminaires = lit_luminaires_of(s->luminaires, request_dimmers(s, request, v)),
+                               .luminaires = lit,
                                .sky = size_of_sky(s, L),
                                .L = L,
                                .buried = buried,

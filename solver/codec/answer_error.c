@@ -22,7 +22,7 @@ static double lamps2_of(const error_by_group *e, const error_scene *scene, const
 static bool sizes_of_answer(const error_by_group *e, const error_scene *scene, const error_answer *of,
                             light_sizes *sizes) {
     *sizes = light_sizes_of(e, of->quantity, &of->size, of->L);
-    if (of->quantity != LAM_INDIRECT) sizes->luminaires = of->luminaires;
+    sizes->luminaires = of->luminaires;
     sizes->size.lamps2 = lamps2_of(e, scene, of->E);
     const sky_sizes sent = sky_sizes_of(e, of->L_sent);
     if (sent.L == NULL) {
@@ -254,7 +254,7 @@ name_error name_error_of_means(const error_by_group *e, const reduce_name *name,
     const size_t n_rows = e->n_bins / e->figures.n_groups;
     light_sizes sizes = light_sizes_of(e, means->quantity, &means->size, means->L);
     sizes.whole = means->whole;
-    if (means->quantity != LAM_INDIRECT) sizes.luminaires = means->luminaires;
+    sizes.luminaires = means->luminaires;
     name_sums s = {.area = 0};
     double reflected2 = 0, radiosity2 = 0, light2 = 0, covered = 0;
     for (size_t g = 0; g < name->n_groups; g++)

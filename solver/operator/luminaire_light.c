@@ -235,6 +235,10 @@ const float *luminaires_irradiance(const lam_luminaires *l) {
     return l->rows.values;
 }
 
+const double *luminaires_lumens(const lam_luminaires *l) {
+    return l->lumens;
+}
+
 size_t luminaires_error_groups(const lam_luminaires *l) {
     return l->n_error_groups;
 }

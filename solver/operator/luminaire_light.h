@@ -41,6 +41,9 @@ const double *luminaires_factors(const lam_luminaires *l);
 /* The irradiance of every element at dimmer 1, [k][n], without colours. */
 const float *luminaires_irradiance(const lam_luminaires *l);
 
+/* Their fluxes at dimmer 1, [k], lm. */
+const double *luminaires_lumens(const lam_luminaires *l);
+
 /* The mean squared error of it by the scene's groups, of elements (by area) and of the group's mean, lx^2,
  * [k][n_groups] both; n_groups 0: not known. */
 size_t luminaires_error_groups(const lam_luminaires *l);

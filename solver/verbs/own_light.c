@@ -15,6 +15,7 @@ void own_light_free(own_light *l) {
     free(l->L_sent);
     free(l->sent);
     free(l->lamps);
+    free(l->reflected);
     free(l->sun);
     free(l->work);
     *l = (own_light){.n_tiles = 0};
@@ -47,7 +48,8 @@ lam_status own_light_make(const lit_store *lit, const error_scene *scene, own_li
     }
     if (light->sun != NULL || light->D != NULL) {
         l.sent = memory_allocate(C, n * sizeof *l.sent, "the light of an answer", error);
-        if (l.sent == NULL) TRY(LAM_ERR_MEMORY);
+        l.reflected = memory_allocate(1, n * sizeof *l.reflected, "the light of an answer", error);
+        if (l.sent == NULL || l.reflected == NULL) TRY(LAM_ERR_MEMORY);
     }
     *out = l;
     l = (own_light){.n_tiles = 0};
@@ -123,6 +125,7 @@ lam_status own_light_take(own_light *l, size_t v, lam_error *error) {
     lam_status status = LAM_OK;
     const emission *light = &l->lit->light;
     const size_t vector = l->scene->n * l->scene->n_channels, all = l->scene->n_channels * l->n_tiles;
+    l->vector = v;
     memset(l->E, 0, vector * sizeof *l->E);
     memset(l->H0, 0, vector * sizeof *l->H0);
     if (light->E != NULL) memcpy(l->E, light->E + (light->steady ? 0 : v * vector), vector * sizeof *l->E);
@@ -137,16 +140,26 @@ done:
     return status;
 }
 
-void own_light_put(const own_light *l, const error_by_group *by, error_answer *of) {
+void own_light_put(own_light *l, const error_by_group *by, error_answer *of) {
     const size_t n = l->scene->n, m = l->n_tiles;
     const float *sent = l->sent != NULL ? l->sent : l->E;
+    const size_t k = l->lamps != NULL ? lam_luminaires_count(l->lit->light.luminaires) : 0;
+    const float *dimmers =
+        k > 0 ? l->lit->light.D + (l->lit->light.steady ? 0 : l->vector * l->scene->n_channels * k) : NULL;
     of->E = l->E;
     of->H0 = l->L != NULL || l->sent != NULL ? l->H0 : NULL;
     of->L = l->L;
     of->L_sent = l->L != NULL ? l->L_sent : NULL;
     of->lost2 = l->lost2;
+    of->luminaires = lit_luminaires_of(l->lit->light.luminaires, dimmers);
     for (size_t c = 0; c < l->scene->n_channels; c++) {
+        double power = 0;
         emission_size_add(&of->size, n, l->scene->area, sent + c * n);
+        for (size_t i = 0; sent != l->E && i < n; i++) l->reflected[i] = sent[c * n + i] - l->E[c * n + i];
+        if (sent != l->E) emission_size_add(&of->reflected, n, l->scene->area, l->reflected);
+        for (size_t i = 0; l->lamps != NULL && i < n; i++)
+            power += l->scene->area[i] * (double)(l->scene->reflectance[c * n + i] * l->lamps[c * n + i]);
+        of->luminaires.power2 += power * power;
         if (l->L != NULL) emission_size_add(&of->sky, m, by->figures.sky_power + c * m, l->L + c * m);
         if (of->L_sent != NULL)
             emission_size_add(&of->sky, m, by->figures.sky_power + c * m, l->L_sent + c * m);

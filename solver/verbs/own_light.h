@@ -16,6 +16,8 @@ typedef struct own_light {
     float *L_sent; /* of a sun in a tile that is sent on as the light of that, and no part of L; NULL: none */
     float *sent;   /* [C][n], E and what luminaires and the sun make elements send; NULL: neither shines */
     float *lamps;  /* [C][n], direct light of luminaires; NULL: none shine */
+    float *reflected; /* [n], work; with sent */
+    size_t vector;    /* that was taken */
     float *sun, *work;
     double lost2; /* of error_answer */
 } own_light;
@@ -31,6 +33,6 @@ void own_light_free(own_light *l);
 lam_status own_light_take(own_light *l, size_t v, lam_error *error);
 
 /* Fills the light of an answer: E, H0, L and their sizes by the powers of tiles. */
-void own_light_put(const own_light *l, const error_by_group *by, error_answer *of);
+void own_light_put(own_light *l, const error_by_group *by, error_answer *of);
 
 #endif

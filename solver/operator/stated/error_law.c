@@ -203,7 +203,7 @@ static double direct_of(const error_by_group *by, const double *weights, const l
 /* The part of the direct light of single tiles, and of luminaires. */
 static bin_error error_of_direct(const error_by_group *e, const light_sizes *of, size_t bin) {
     const size_t C = e->figures.n_channels, G = e->figures.n_groups, group = bin % G;
-    const lit_luminaires *lit = &of->luminaires;
+    const lit_luminaires *lit = of->quantity == LAM_INDIRECT ? &(lit_luminaires){.k = 0} : &of->luminaires;
     const double *rho = of->quantity == LAM_IRRADIANCE ? NULL : e->reflectance;
     bin_error sum = {luminaire_law(lit, lit->elements_off, C, G, group, rho),
                      luminaire_law(lit, lit->means_off, C, G, group, rho)};
@@ -277,10 +277,12 @@ mesh_lack mesh_lack_of_bin(const error_by_group *e, const light_sizes *of, size_
     const double squares = of->sky.squares + of->sent.squares, power = sqrt(of->size.power2);
     const bool knows_whole = of->whole.weights != NULL;
     const emission_size *others = knows_whole ? &of->whole.rest : &of->size;
-    const double of_lamps = sqrt(of->size.lamps2);
-    const mesh_light light = {.power = power,
+    const double of_lamps = sqrt(of->size.lamps2), of_luminaires = sqrt(of->luminaires.power2);
+    const mesh_light light = {.power = fmax(power - of_luminaires, 0),
                               .of_lamps = of_lamps,
                               .of_whole = knows_whole ? fmax(power - of_lamps - sqrt(others->power2), 0) : 0,
+                              .luminaire_power = of_luminaires,
+                              .luminaires = lit_luminaires_number(&of->luminaires, e->figures.n_channels),
                               .emitters = emission_size_number(&of->size),
                               .others = emission_size_number(others),
                               .sky_power = sqrt(of->sky.power2) + sqrt(of->sent.power2),

@@ -85,7 +85,8 @@ typedef struct light_sizes {
     whole_light whole; /* of size; a view */
     sky_sizes sky, sent;
     double lost2;              /* (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
-    lit_luminaires luminaires; /* whose direct light is in the answer; what is reflected of it is in size */
+    lit_luminaires luminaires; /* their direct light, which is no part of bounced light; what is reflected of
+                                  it is in size */
 } light_sizes;
 
 /* Of the light that is reflected the direct light of a sky is no part, nor are errors of it. */

@@ -8,7 +8,19 @@ lit_luminaires lit_luminaires_of(const lam_luminaires *luminaires, const float *
                             .dimmers = dimmers,
                             .factors = luminaires_factors(luminaires),
                             .elements_off = luminaires_elements_off(luminaires),
-                            .means_off = luminaires_means_off(luminaires)};
+                            .means_off = luminaires_means_off(luminaires),
+                            .lumens = luminaires_lumens(luminaires)};
+}
+
+double lit_luminaires_number(const lit_luminaires *lit, size_t n_channels) {
+    double sum = 0, squares = 0;
+    for (size_t k = 0; k < lit->k; k++) {
+        double P = 0;
+        for (size_t c = 0; c < n_channels; c++) P += (double)lit->dimmers[c * lit->k + k] * lit->lumens[k];
+        sum += P;
+        squares += P * P;
+    }
+    return squares > 0 ? sum * sum / squares : 0;
 }
 
 bool luminaires_know_errors(const lam_luminaires *luminaires, size_t n_groups) {

@@ -15,10 +15,16 @@ typedef struct lit_luminaires {
     const float *dimmers;                   /* [C][k] */
     const double *factors;                  /* [C][k], colours */
     const double *elements_off, *means_off; /* [k][n_groups] */
+    const double *lumens;                   /* [k], at dimmer 1 */
+    double power2; /* sum over channels of (sum A rho H0)^2 of their direct light; set by the caller */
 } lit_luminaires;
 
 /* The luminaires of a store under dimmers [C][k]; NULL: none. Both must outlive it. */
 lit_luminaires lit_luminaires_of(const lam_luminaires *luminaires, const float *dimmers);
+
+/* The effective number of luminaires that shine, (sum P)^2 / sum P^2 of their fluxes, channels added up; 0:
+ * none. */
+double lit_luminaires_number(const lit_luminaires *lit, size_t n_channels);
 
 /* True where the store states their errors for this number of groups. */
 bool luminaires_know_errors(const lam_luminaires *luminaires, size_t n_groups);
