@@ -229,7 +229,7 @@ class Luminaires:
                 "lumens": self.lumens,
                 "colour": self.colour,
                 "place": np.concatenate([self.at, self.x, y, self.z], axis=1),
-                "opening": np.concatenate([self.shape[:, None].astype(float), self.size], axis=1),
+                "opening": np.concatenate([self.shape[:, None].astype(float), self.size, np.zeros((len(self.size), 4))], axis=1),
                 "names": np.array([name.encode() for name in self.names]),
             }
             if known:

@@ -46,7 +46,7 @@ static lam_luminaires *make_luminaires(bool with_groups) {
     write_numbers(s, "lumens", 0);
     write_numbers(s, "colour", 3);
     write_numbers(s, "place", 12);
-    write_numbers(s, "opening", 4);
+    write_numbers(s, "opening", 8);
     ck_assert_int_eq(store_seal(s, &error), LAM_OK);
     ck_assert_msg(lam_luminaires_open(path, &l, &error) == LAM_OK, "%s", error.message);
     unlink(path);

@@ -22,7 +22,7 @@ static void write_numbers(store *s, const char *name, size_t width, uint64_t see
     double *x = test_allocate(K * 12, sizeof *x);
     for (size_t i = 0; i < K * 12; i++) x[i] = random_lcg_unit(&seed);
     /* Shapes are numbers of a list. */
-    for (size_t k = 0; strcmp(name, "opening") == 0 && k < K; k++) x[k * 4] = (double)k;
+    for (size_t k = 0; strcmp(name, "opening") == 0 && k < K; k++) x[k * 8] = (double)k;
     if (wrong != NULL && strcmp(wrong->array, name) == 0) x[wrong->at] = wrong->value;
     snprintf(path, sizeof path, "/luminaires/%s", name);
     ck_assert_int_eq(store_write(s, path, STORE_F64, width == 0 ? 1 : 2, (size_t[]){K, width}, x, &error),
@@ -146,8 +146,8 @@ END_TEST
 START_TEST(stores_without_luminaires_and_bad_ones) {
     static const wrong_value wrong[] = {
         {"dimmers", 2, -1},         {"lumens", 3, NAN},      {"colour", 4, -.5},  {"group", 1, 7},
-        {"elements_off", 3, -1e-3}, {"place", 20, INFINITY}, {"opening", 5, NAN}, {"opening", 8, 11},
-        {"opening", 8, .5},         {"opening", 8, 1e300}};
+        {"elements_off", 3, -1e-3}, {"place", 20, INFINITY}, {"opening", 5, NAN}, {"opening", 16, 11},
+        {"opening", 16, .5},        {"opening", 16, 1e300}};
     char path[64];
     lam_error error = {0};
     lam_luminaires *l = (lam_luminaires *)&error;

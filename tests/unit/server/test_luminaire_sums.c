@@ -21,7 +21,7 @@ static void write_numbers(store *s, const char *name, size_t k, size_t width, ui
     char path[64];
     double *x = calloc(k * width, sizeof *x);
     ck_assert_ptr_nonnull(x);
-    for (size_t i = 0; i < k * width; i++) x[i] = width == 4 ? 0 : random_lcg_unit(seed);
+    for (size_t i = 0; i < k * width; i++) x[i] = width == 8 ? 0 : random_lcg_unit(seed);
     snprintf(path, sizeof path, "/luminaires/%s", name);
     ck_assert_int_eq(store_write(s, path, STORE_F64, width == 1 ? 1 : 2, (size_t[]){k, width}, x, &error),
                      LAM_OK);
@@ -54,7 +54,7 @@ static lam_luminaires *make_luminaires(size_t k) {
     write_numbers(s, "lumens", k, 1, &seed);
     write_numbers(s, "colour", k, 3, &seed);
     write_numbers(s, "place", k, 12, &seed);
-    write_numbers(s, "opening", k, 4, &seed);
+    write_numbers(s, "opening", k, 8, &seed);
     ck_assert_int_eq(store_seal(s, &error), LAM_OK);
     ck_assert_msg(lam_luminaires_open(path, &l, &error) == LAM_OK, "%s", error.message);
     unlink(path);
