@@ -55,6 +55,25 @@ static inline const face_index *fuzz_faces(void) {
     return &faces;
 }
 
+/* Three luminaires, two of which are a group. */
+enum { FUZZ_LUMINAIRES = 3 };
+static inline const luminaire_names *fuzz_luminaires(void) {
+    static char *each[] = {"spot", "row.0", "row.1"}, *groups[] = {"rows"};
+    static uint32_t start[] = {0, 1, 2, 3}, elements[] = {0, 1, 2}, sorted[] = {1, 2, 0}, members[] = {1, 2},
+                    of_group[] = {0, 2};
+    static const luminaire_names names = {
+        .each = {.noun = "luminaire",
+                 .n_groups = FUZZ_LUMINAIRES,
+                 .names = each,
+                 .start = start,
+                 .elements = elements,
+                 .sorted = sorted},
+        .groups = {.n_groups = 1, .names = groups, .start = start, .elements = elements, .sorted = elements},
+        .start = of_group,
+        .members = members};
+    return &names;
+}
+
 /* A small scene; shape says of which kind. The caller frees groups. */
 static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
     static const char *names[] = {"lamp", "wall", "wall.red", "\xc3\xa9t\xc3\xa9"};
@@ -74,6 +93,8 @@ static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
                          .n_tiles = shape & 2 ? 5 : 0,
                          .n_emitters = shape & 4 ? GROUPS : 0,
                          .emitters = groups,
+                         .n_luminaires = shape & 32 ? FUZZ_LUMINAIRES : 0,
+                         .luminaires = fuzz_luminaires(),
                          .max_batch = 4,
                          .max_bytes = 1 << 20,
                          .only_linear = (shape & 24) == 24,

@@ -22,6 +22,14 @@ static void write_back(const codec_scene *scene, const radiosity_request *reques
     buffer_free(&b);
 }
 
+/* Each vector has its dimmers, or none has any. */
+static void check_luminaires(const codec_scene *scene, const radiosity_request *request) {
+    const side_rows *side = &request->luminaires;
+    FUZZ_CHECK(side->values == NULL || (side->n == request->n_rhs && scene->n_emitters == 0));
+    for (size_t i = 0; i < side->n * scene->n_channels * scene->n_luminaires; i++)
+        FUZZ_CHECK(side->values[i] >= 0 && side->values[i] <= FLT_MAX);
+}
+
 /* The text as a file of emissions: every vector is then dense. */
 static void read_file(const codec_scene *scene, const char *text, size_t size) {
     codec_scene about = *scene;
@@ -32,6 +40,7 @@ static void read_file(const codec_scene *scene, const char *text, size_t size) {
     if (codec_read_emissions(&about, text, size, &request, &why)) {
         FUZZ_CHECK(request.n_rhs > 0 && request.n_rhs <= about.max_batch && request.n_dense == request.n_rhs);
         FUZZ_CHECK(!request.select && !request.reduce.on && request.tolerance == 0);
+        check_luminaires(&about, &request);
         for (size_t i = 0; i < request.n_rhs * about.n_channels * about.n; i++)
             FUZZ_CHECK(request.E[i] >= 0 && request.E[i] <= FLT_MAX);
     } else {
@@ -60,6 +69,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         for (size_t k = 0; k < request.n_selected; k++) FUZZ_CHECK(request.selected[k] < scene.n);
         FUZZ_CHECK(!request.at_faces || (scene.faces != NULL && !request.reduce.on));
         for (size_t k = 0; k < request.n_faces; k++) FUZZ_CHECK(request.faces[k] < scene.faces->n_faces);
+        check_luminaires(&scene, &request);
         if (request.E != NULL) write_back(&scene, &request, text);
     } else {
         fuzz_check_problem(&why);

@@ -17,6 +17,13 @@ static void apply(const scene *s) {
     FUZZ_CHECK(E != NULL && out != NULL && work != NULL);
     for (size_t i = 0; i < count; i++) E[i] = 1;
     FUZZ_CHECK(lam_operator_apply(s->op, 1, LAM_RADIOSITY, E, out, work, bytes, &error) == LAM_OK);
+    if (s->luminaires != NULL) {
+        float *D = calloc(lam_luminaires_count(s->luminaires), s->n_channels * sizeof *D);
+        FUZZ_CHECK(D != NULL);
+        lam_luminaires_adjoint(s->luminaires, 1, E, D);
+        lam_luminaires_irradiance(s->luminaires, 1, D, out);
+        free(D);
+    }
     free(E);
     free(out);
     free(work);

@@ -5,12 +5,16 @@ usage: make_seeds.py LAMBERT FOLDER   (the program, and where to put json/ adjoi
 import base64
 import json
 import pathlib
+import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 
 import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "service"))
+from make_store import Luminaires
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
 for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies", "luminaire",
@@ -19,7 +23,8 @@ for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "imag
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
              {"elements": [0], "values": [[1, 2, 3]]}, {"groups": {"lamp": 3, "wall": [1, 2, 3]}}, {"sky": [1, 2, 3, 4, 5]},
-             {"sky": [1, 2, 3, 4, 5], "groups": {"wall.red": 1}}, {"emitters": [1, 0, 2]}]
+             {"sky": [1, 2, 3, 4, 5], "groups": {"wall.red": 1}}, {"emitters": [1, 0, 2]},
+             {"luminaires": {"spot": 1, "rows": 0.5}}, {"luminaires": {"row": [1, 2, 3], "s*": 2}, "sky": [1, 2, 3, 4, 5], "groups": {"lamp": 1}}]
 count = 0
 for e in emissions:
     for body in ({"emission": e}, {"emissions": [e, e], "quantity": "irradiance"},
@@ -29,7 +34,8 @@ for e in emissions:
                  {"emission": e, "select": {"faces": [3, 0]}},
                  {"emission": e, "reduce": {"groups": ["wall"], "with": ["mean", "sum", "min", "max", "uniformity",
                                                                         "variance"]}},
-                 {"cotangent": e, "quantity": "radiosity", "gradient": ["emission", "reflectance"], "emission": e}):
+                 {"cotangent": e, "quantity": "radiosity", "gradient": ["emission", "reflectance"], "emission": e},
+                 {"cotangent": [1] * 7, "gradient": ["luminaires", "groups"], "emission": e}):
         for blank in " \t\n\r":
             for name in ("adjoint",) if "cotangent" in body else ("json",):
                 (folder / name / f"{count:03}").write_text(json.dumps(body) + blank)
@@ -102,6 +108,7 @@ with tempfile.TemporaryDirectory() as scratch:
                              ["hierarchical", "--keep-form-factors"])):
         run("precompute", "box.obj", "--mesh", "faces", "--rays", 64, "--probes", 0, "--quiet", "-o", folder / "store" / f"{k}.h5",
             "--method", *how)
+    Luminaires(6).add_to(shutil.copy(folder / "store" / "0.h5", folder / "store" / "luminaires.h5"))
     run("generate", "box", "--divisions", 3, "-o", "box.obj")
     run("precompute", "box.obj", "--mesh", "faces", "--probes", 0, "--quiet", "-o", folder / "store" / "blocks.h5", "--form-factors", "blocks",
         "--epsilon", .99, "--keep-form-factors")
