@@ -19,7 +19,7 @@ import numpy as np
 from command import must
 from daemon import LAMBERTD, PATIENCE, Daemon
 from daemon_case import TOLERANCE, replaced_under_load
-from make_store import Scene, add_checksums
+from make_store import Luminaires, Scene, add_checksums
 
 N, RANK, TILES = 3000, 100, 100
 BYTES = 4 * N * RANK  # of Y, V, U and first_bounce: 1.14 MiB, which is worth a mapping
@@ -159,6 +159,26 @@ class Mapped(unittest.TestCase):
                 self.check(daemon, "box", self.scene)
                 self.assertEqual(self.gauge(daemon, "scenes_damaged"), 0)
                 self.assertEqual(self.gauge(daemon, "scenes_unverified"), 0)
+
+    def test_luminaires(self):
+        """As many as the store has vectors: mapped, counted, answered, and compared as the operator is."""
+        path = self.store("box")
+        l = Luminaires(N, names=[f"l{k}" for k in range(RANK)], groups=[None] * RANK).add_to(path)
+        with serve_first(path) as daemon:
+            answer = daemon.radiosity("box", {"emission": {"luminaires": {"l1*": 1}}, "quantity": "irradiance"})
+            self.assertEqual(answer.status, 200, answer)
+            H0 = l.direct(l.of(**{name: 1 for name in l.names if name.startswith("l1")}))
+            wanted = self.scene.solve(self.scene.rho * H0, "irradiance") + H0
+            self.assertLessEqual(np.abs(answer.json()["irradiance"] - wanted[0]).max(), TOLERANCE * wanted.max())
+            self.assertEqual(self.gauge(daemon, "mapped_bytes"), 3 * BYTES)  # Y, V, irradiance
+            daemon.wait_for("verified box: ")
+        small = subprocess.run([LAMBERTD, "--listen", "127.0.0.1:0", str(path), "--max-memory", str(2 * BYTES + 100000)],
+                               capture_output=True, text=True, timeout=PATIENCE)
+        self.assertGreater(int(re.search(r": takes (\d+) bytes, ", small.stderr)[1]), 3 * BYTES, small.stderr)
+        self.flip(path, "luminaires/irradiance", BYTES - 1)
+        with serve_first(path, self.store("other")) as daemon:
+            daemon.wait_for("verified other: ")
+            self.check_out_of_service(daemon, "box", path, "/luminaires/irradiance is damaged in MiB 2 of 2")
 
     MEAN = {"emission": {"groups": {"lamp": 1, "floor": 1, "wall": 1, "box": 1}},
             "reduce": {"groups": ["floor"], "with": ["mean"]}}

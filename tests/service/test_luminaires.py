@@ -2,6 +2,7 @@
 store's answers to the emission rho H0, and against solutions in double of what h5py reads from it alone."""
 
 import copy
+import itertools
 import json
 import pathlib
 import shutil
@@ -148,6 +149,8 @@ class Answers(unittest.TestCase):
         while self.post("/v1/scenes/colour@red", {}, "GET").status == 202 and time.monotonic() < deadline:
             time.sleep(.002)
         other = base.relit(red)
+        lists = [self.post(f"/v1/scenes/{name}/luminaires", {}, "GET").json() for name in ("colour", "colour@red")]
+        self.assertEqual(*lists)
         for quantity in QUANTITIES:
             body = {"emission": {"luminaires": LIT}, "quantity": quantity}
             wanted = self.truth("colour", LIT, quantity, scene=other)
@@ -238,6 +241,19 @@ class Answers(unittest.TestCase):
             answer = self.post("/v1/scenes/plain/adjoint", body)
             self.assertEqual((answer.status, answer.json()["detail"]), (422, words))
 
+    def test_stores_for_sources_state_no_error(self):
+        """Luminaires light elements that are no sources; a dark one lights none."""
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        path = pathlib.Path(folder.name) / "some.h5"
+        Scene(60).write(path, "some", sources=range(0, 60, 2))
+        Luminaires(60).add_to(path)
+        with Daemon(path) as daemon:
+            for dimmer, of in (1, "others"), (0, "sources"):
+                error = daemon.radiosity("some", {"emission": {"luminaires": {"wall": dimmer}}}).json()["error"]
+                self.assertEqual(error["from"], of)
+                self.assertEqual(error["stated"] is None, of == "others")
+
     def test_broken_stores_are_refused(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
@@ -286,13 +302,13 @@ class Kinds(unittest.TestCase):
             of = LIT if truth.C == 3 else GREY
             H0 = l.direct(dimmers(l, of))
             E = truth.rho * H0
-            for quantity in QUANTITIES:
-                body = {"quantity": quantity, "limit": False}
+            for quantity, limit in itertools.product(QUANTITIES, (False, True)):
+                body = {"quantity": quantity, "limit": limit}
                 got = np.reshape(self.ask(name, dict(body, emission={"luminaires": of}))[quantity], E.shape)
                 same = np.reshape(self.ask(name, dict(body, emission=E.tolist() if truth.C == 3 else E[0].tolist()))[quantity], E.shape)
                 if quantity == "irradiance":
                     same = same + H0
-                self.assertLessEqual(np.abs(got - same).max(), SAME * np.abs(same).max(), (name, quantity))
+                self.assertLessEqual(np.abs(got - same).max(), SAME * np.abs(same).max(), (name, quantity, limit))
 
     def test_refined_answers(self):
         """Against a dense solution in double, by their certificates; the slack is that of test_tolerance.py."""
