@@ -284,7 +284,7 @@ lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report
     light_scene by = {.g = NULL};
     mesh fine = {0};
     adaptive_report made = {.reached = false};
-    TRY(light_scene_make(m, how->sky, how->seed, how->progress, &by, error));
+    TRY(light_scene_make(m, &how->from, how->seed, how->progress, &by, error));
     TRY(adaptive_refine_by(&by.light, how, &fine, &made, error));
     if (fine.n > m->n) mesh_replace(m, &fine);
     *report = made;

@@ -14,7 +14,7 @@ typedef struct adaptive_options {
     size_t elements; /* at most, both sides counted; where there are more faces, as many as these */
     size_t points;   /* that are looked at, about, at most; 0: as many as it takes */
     bool rough; /* a cell is cut by half as many points: a third of the time, for a tenth more elements */
-    const coarse_sky *sky; /* of adaptive_refine; NULL: none */
+    coarse_sources from; /* of adaptive_refine */
     uint64_t seed;
     const progress *progress;
 } adaptive_options;

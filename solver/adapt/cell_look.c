@@ -27,15 +27,15 @@ static void weigh(const coarse_light *c, double all[COARSE_LIGHTS]) {
     }
 }
 
-lam_status light_scene_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
+lam_status light_scene_make(const mesh *faces, const coarse_sources *from, uint64_t seed, const progress *p,
                             light_scene *out, lam_error *error) {
     lam_status status = LAM_OK;
     *out = (light_scene){.g = NULL};
     coarse_light *const c = &out->coarse;
-    TRY(coarse_light_make(faces, sky, seed, p, c, error));
+    TRY(coarse_light_make(faces, from, seed, p, c, error));
     out->sky = (gather_sky){.tiling = &c->bounce.tiling, .L = c->L};
-    TRY(gather_create(&c->m, c->n_lights, c->B, c->lamps ? c->E : NULL, c->sky ? &out->sky : NULL, &out->g,
-                      error));
+    TRY(gather_create(&c->m, c->n_lights, c->B, c->lamps ? c->E : NULL, c->sky ? &out->sky : NULL,
+                      from->direct, &out->g, error));
     out->light = (cell_light){.m = faces, .coarse = c, .g = out->g};
     weigh(c, out->light.all);
 done:

@@ -34,7 +34,7 @@ typedef struct light_scene {
     gather *g;
     cell_light light;
 } light_scene;
-lam_status light_scene_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
+lam_status light_scene_make(const mesh *faces, const coarse_sources *from, uint64_t seed, const progress *p,
                             light_scene *out, lam_error *error);
 void light_scene_free(light_scene *s);
 

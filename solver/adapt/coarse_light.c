@@ -1,5 +1,6 @@
 #include "solver/adapt/coarse_light.h"
 
+#include "solver/base/random.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/source.h"
 #include "solver/method/reference.h"
@@ -21,6 +22,7 @@ void coarse_light_free(coarse_light *c) {
     free(c->back);
     free(c->E);
     free(c->B);
+    free(c->first_light);
     sky_bounce_free(&c->bounce);
     *c = (coarse_light){.n_lights = 0};
 }
@@ -72,7 +74,41 @@ static double first_of(const coarse_light *c, size_t light, size_t channel, size
     const size_t n = c->m.n, at = channel * n + i;
     if (c->sky && light == c->n_lights - 1)
         return (double)c->m.reflectance[at] * (double)c->bounce.first_bounce[i];
-    return (double)c->E[light * c->m.n_channels * n + at];
+    const double direct =
+        light == 0 && c->first_light != NULL ? (double)c->m.reflectance[at] * (double)c->first_light[at] : 0;
+    return (double)c->E[light * c->m.n_channels * n + at] + direct;
+}
+
+/* The middle of an element, and places half the way to its corners. */
+static size_t place_points(const mesh *m, size_t i, double points[5][3]) {
+    const size_t corners = m->elements[i][3] == MESH_NO_VERTEX ? 3 : 4;
+    mesh_centroid(m, i, points[0]);
+    for (size_t k = 0; k < corners; k++)
+        for (int d = 0; d < 3; d++) points[k + 1][d] = (points[0][d] + m->vertices[m->elements[i][k]][d]) / 2;
+    return corners + 1;
+}
+
+/* The direct light of elements, by a few points of each. */
+static lam_status light_first(const gather_direct *direct, uint64_t seed, coarse_light *c, lam_error *error) {
+    const size_t n = c->m.n, C = c->m.n_channels;
+    if (direct == NULL) return LAM_OK;
+    c->first_light = memory_allocate(C, n * sizeof *c->first_light, "a coarse solution", error);
+    if (c->first_light == NULL) return LAM_ERR_MEMORY;
+#pragma omp parallel for schedule(dynamic, 64)
+    for (size_t i = 0; i < n; i++) {
+        double points[5][3], E[5 * GATHER_HALVES * 3] = {0};
+        const double normal[3] = {(double)c->m.normal[i][0], (double)c->m.normal[i][1],
+                                  (double)c->m.normal[i][2]};
+        const size_t count = place_points(&c->m, i, points), rows = count * GATHER_HALVES;
+        direct->add(direct->context, normal, random_hash(random_hash(seed) ^ random_hash(i + 1)), count,
+                    (const double(*)[3])points, C, E);
+        for (size_t k = 0; k < C; k++) {
+            double sum = 0;
+            for (size_t r = 0; r < rows; r++) sum += E[r * C + k];
+            c->first_light[k * n + i] = (float)(sum / (double)rows);
+        }
+    }
+    return LAM_OK;
 }
 
 static lam_status solve(const form_factors *f, const progress *p, coarse_light *c, lam_error *error) {
@@ -98,13 +134,15 @@ done:
     return status;
 }
 
-static lam_status set_lights(const mesh *faces, const coarse_sky *sky, coarse_light *c, lam_error *error) {
+static lam_status set_lights(const mesh *faces, const coarse_sources *from, coarse_light *c,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->m.n, vector = n * c->m.n_channels;
     uint8_t *light_of = memory_allocate(faces->n_groups, sizeof *light_of, "a coarse solution", error);
     if (light_of == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < vector; i++) c->lamps = c->lamps || c->m.emission[i] > 0;
-    c->sky = sky != NULL;
+    c->lamps = c->lamps || from->direct != NULL;
+    c->sky = from->sky != NULL;
     if (!c->lamps && !c->sky) TRY(lit_groups_find(faces, COARSE_LIT, light_of, &c->n_lit, error));
     c->n_lights = 1 + coarse_light_even(c) + c->sky;
     c->E = memory_allocate(c->n_lights * vector, sizeof *c->E, "a coarse solution", error);
@@ -129,15 +167,17 @@ static void set_radiances(const coarse_sky *sky, coarse_light *c) {
     L[1] = sky->ground_albedo;
 }
 
-lam_status coarse_light_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
+lam_status coarse_light_make(const mesh *faces, const coarse_sources *from, uint64_t seed, const progress *p,
                              coarse_light *out, lam_error *error) {
     lam_status status = LAM_OK;
     coarse_light c = {.n_lights = 0};
     form_factors f = {.row_sums = NULL};
     uint32_t *order = NULL;
+    const coarse_sky *const sky = from->sky;
     TRY(divide(faces, &c, error));
     TRY(make_backs(faces, &c, error));
-    TRY(set_lights(faces, sky, &c, error));
+    TRY(set_lights(faces, from, &c, error));
+    TRY(light_first(from->direct, seed, &c, error));
     order = memory_allocate(c.m.n, sizeof *order, "a coarse mesh", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&c.m, order, error));

@@ -4,6 +4,7 @@
 #ifndef LAMBERT_ADAPT_COARSE_LIGHT_H
 #define LAMBERT_ADAPT_COARSE_LIGHT_H
 
+#include "solver/adapt/gather.h"
 #include "solver/formfactor/sky_bounce.h"
 #include "solver/scene/facet/face_openings.h"
 #include "solver/scene/mesh.h"
@@ -18,12 +19,20 @@ typedef struct coarse_sky {
     const face_openings *openings;
 } coarse_sky;
 
+/* The lights beside those of elements, each NULL where there is none: the sky, and direct light of
+ * luminaires, which is one with the light of lamps. Views. */
+typedef struct coarse_sources {
+    const coarse_sky *sky;
+    const gather_direct *direct;
+} coarse_sources;
+
 typedef struct coarse_light {
     mesh m;          /* with the backs of faces that have one */
     uint32_t *first; /* [faces + 1]: the elements, or fronts, of face f are first[f] ... first[f + 1] - 1 */
     uint32_t *back;  /* [faces]: the first of its backs, in the order of the fronts; NULL: no face has any */
     size_t n_lights; /* of those that there are */
     float *E, *B;    /* [n_lights][C][n]; of the sky E is 0 */
+    float *first_light; /* [C][n], irradiance by direct light, of the light of lamps; NULL: none */
     bool lamps, sky;
     size_t n_lit;      /* lights of groups (lit_groups.h), which come first; 0 beside lamps or a sky */
     sky_bounce bounce; /* of a sky of one tile */
@@ -39,12 +48,12 @@ void coarse_light_free(coarse_light *c);
 
 /* Divides a copy of the faces into at least COARSE_ELEMENTS elements, as few show too little of the light
  * that near ones send each other, of which it finds form factors with 64 to 256 rays each, and the converged
- * solution. sky: NULL: none. Cost: about a second, or 64 rays from each face. Errors: those of
+ * solution. Cost: about a second, or 64 rays from each face. Errors: those of
  * form_factors_make and reference_solve. */
 enum { COARSE_ELEMENTS = 8000 };
 /* The memory that it takes for a number of faces, about, at most. */
 double coarse_light_bytes(size_t faces);
-lam_status coarse_light_make(const mesh *faces, const coarse_sky *sky, uint64_t seed, const progress *p,
+lam_status coarse_light_make(const mesh *faces, const coarse_sources *from, uint64_t seed, const progress *p,
                              coarse_light *out, lam_error *error);
 
 #endif

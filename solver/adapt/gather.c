@@ -15,7 +15,8 @@ struct gather {
     const mesh *m;
     size_t n_lights;
     const float *B;
-    const gather_sky *sky; /* NULL: none */
+    const gather_sky *sky;       /* NULL: none */
+    const gather_direct *direct; /* NULL: none */
     visibility *v;
     lamp_groups lamps;
 };
@@ -41,7 +42,7 @@ void gather_free(gather *g) {
 }
 
 lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps,
-                         const gather_sky *sky, gather **out, lam_error *error) {
+                         const gather_sky *sky, const gather_direct *direct, gather **out, lam_error *error) {
     lam_status status = LAM_OK;
     gather *g = NULL;
     if (n_lights * m->n_channels > GATHER_VALUES_MOST)
@@ -49,7 +50,7 @@ lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const f
              m->n_channels, (int)GATHER_VALUES_MOST);
     g = memory_allocate(1, sizeof *g, "light at points", error);
     if (g == NULL) TRY(LAM_ERR_MEMORY);
-    *g = (gather){.m = m, .n_lights = n_lights, .B = B, .sky = sky};
+    *g = (gather){.m = m, .n_lights = n_lights, .B = B, .sky = sky, .direct = direct};
     TRY(visibility_create(m, &g->v, error));
     TRY(lamp_groups_make(m, g->v, lamps, &g->lamps, error));
     *out = g;
@@ -232,6 +233,10 @@ void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points,
                 add_lamps(g, &s, h, k, element, origin, of);
         }
     }
+    if (g->direct == NULL) return;
+    const float *n = g->m->normal[element];
+    const double normal[3] = {(double)n[0], (double)n[1], (double)n[2]};
+    g->direct->add(g->direct->context, normal, key, n_points, points, values, H);
 }
 
 void gather_hits(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],

@@ -24,12 +24,21 @@ typedef struct gather_sky {
     const double *L;
 } gather_sky;
 
+/* Light that comes to points directly from sources that are no elements, such as luminaires: add adds the
+ * irradiance of points with one normal to E [n_points][GATHER_HALVES][stride], in whose first channels it is,
+ * by samples that the key chooses for all points; the halves are independent. Called by any thread. */
+typedef struct gather_direct {
+    void (*add)(const void *context, const double normal[3], uint64_t key, size_t n_points,
+                const double (*points)[3], size_t stride, double *E);
+    const void *context;
+} gather_direct;
+
 /* The answers that are gathered from: B [n_lights][C][n]. lamps [C][n], or NULL, is the part of the first
  * light that lamps emit, which GATHER_LAMP_SAMPLES samples look for. Rays that leave the scene bring light of
- * a sky, or none where it is NULL. All of these must outlive what is made. Errors: LAM_ERR_ARGUMENT,
- * LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
+ * a sky, or none where it is NULL; direct light, unless NULL, is added to the first light. All of these must
+ * outlive what is made. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
 lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps,
-                         const gather_sky *sky, gather **out, lam_error *error);
+                         const gather_sky *sky, const gather_direct *direct, gather **out, lam_error *error);
 void gather_free(gather *g);
 
 size_t gather_values(const gather *g); /* n_lights C */

@@ -94,7 +94,7 @@ lam_status mesh_error(const mesh *m, size_t n_lights, const float *E, const floa
     const size_t looks = l.first[m->n_groups];
     seen = memory_allocate(looks, n_lights * sizeof *seen, "error of the mesh", error);
     if (seen == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(gather_create(m, n_lights, B, lamps ? E : NULL, sky, &g, error));
+    TRY(gather_create(m, n_lights, B, lamps ? E : NULL, sky, NULL, &g, error));
     if (direct != NULL) TRY(find_direct(g, direct, &l, looks, seed, &H, error));
     const size_t each = QUARTERS * gather_values(g);
 #pragma omp parallel for schedule(dynamic, 8)

@@ -224,7 +224,7 @@ lam_status mesh_fit(mesh *m, const mesh_fit_options *how, mesh_fit_report *repor
     division made = {.parent = NULL};
     mesh_fit_report found = {.way = MESH_FIT_FACES};
     const size_t faces = m->n;
-    TRY(light_scene_make(m, how->sky, how->seed, how->progress, &by, error));
+    TRY(light_scene_make(m, &how->from, how->seed, how->progress, &by, error));
     TRY(look_at(&by.light, m, NULL, how, &found.faces, error));
     found.left = found.faces;
     found.reached = mesh_estimate_most(&found.faces) <= how->error;
@@ -232,7 +232,7 @@ lam_status mesh_fit(mesh *m, const mesh_fit_options *how, mesh_fit_report *repor
         if (how->cut != NULL) TRY(how->cut(how->cut_of, error));
         if (m->n > faces) { /* they are other faces now */
             light_scene_free(&by);
-            TRY(light_scene_make(m, how->sky, how->seed, how->progress, &by, error));
+            TRY(light_scene_make(m, &how->from, how->seed, how->progress, &by, error));
         }
         TRY(divide(&by.light, m, how, &made, &found, error));
         found.left = made.left;

@@ -6,10 +6,10 @@
 #include "solver/adapt/adaptive.h"
 
 typedef struct mesh_fit_options {
-    double error;          /* |error| / |B - E| that constants on elements may leave, for each light */
-    size_t elements;       /* at most, both sides counted, and never fewer than there are faces */
-    double effort;         /* share of the points that a division by the light may look at, at most 1 */
-    const coarse_sky *sky; /* NULL: none lights the scene */
+    double error;        /* |error| / |B - E| that constants on elements may leave, for each light */
+    size_t elements;     /* at most, both sides counted, and never fewer than there are faces */
+    double effort;       /* share of the points that a division by the light may look at, at most 1 */
+    coarse_sources from; /* that light the scene, beside its lamps */
     lam_status (*cut)(void *of,
                       lam_error *error); /* cuts the faces, before they are divided; NULL: nothing does */
     void *cut_of;

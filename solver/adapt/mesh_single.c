@@ -69,7 +69,7 @@ lam_status mesh_single(const mesh *m, uint64_t seed, const progress *p, const me
     const size_t looks = l.first[m->n_groups];
     seen = memory_allocate(looks, VALUES * sizeof *seen, "error of the mesh", error);
     if (seen == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(gather_create(m, 0, NULL, NULL, NULL, &g, error));
+    TRY(gather_create(m, 0, NULL, NULL, NULL, NULL, &g, error));
 #pragma omp parallel for schedule(dynamic, 8)
     for (size_t k = 0; k < looks; k++)
         if (!progress_cancelled(p))

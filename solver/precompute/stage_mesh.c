@@ -3,6 +3,7 @@
 #include "solver/base/scene/scene_backs.h"
 #include "solver/formfactor/buried.h"
 #include "solver/precompute/black_scene.h"
+#include "solver/precompute/mesh_luminaires.h"
 #include "solver/precompute/plan.h"
 #include "solver/precompute/stages.h"
 #include "solver/scene/facet/face_join.h"
@@ -52,13 +53,14 @@ static void describe_left(const mesh_estimate *e, char text[LEFT_BYTES]) {
 
 /* Divides the mesh where light changes, says what that leaves, and warns where it is more than was asked for.
  */
-static lam_status refine_by_error(const precompute_job *job, precompute_scene *scene, lam_error *error) {
+static lam_status refine_by_error(const precompute_job *job, precompute_scene *scene,
+                                  const gather_direct *direct, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = job->options;
     const coarse_sky sky = {.ground_albedo = o->ground_albedo, .openings = scene->openings};
     const adaptive_options how = {.error = o->mesh_error,
                                   .elements = o->elements > 0 ? o->elements : ADAPTIVE_ELEMENTS,
-                                  .sky = o->sky != NULL ? &sky : NULL,
+                                  .from = {.sky = o->sky != NULL ? &sky : NULL, .direct = direct},
                                   .seed = precompute_seed(o->seed, SEED_MESH),
                                   .progress = &job->progress};
     adaptive_report made;
@@ -98,8 +100,8 @@ static lam_status cut_at_walls(void *of, lam_error *error) {
 }
 
 /* The mesh by preset, with a line on what was divided and why. */
-static lam_status fit_to_light(const precompute_job *job, precompute_scene *scene, double edge, bool *divided,
-                               lam_error *error) {
+static lam_status fit_to_light(const precompute_job *job, precompute_scene *scene,
+                               const gather_direct *direct, double edge, bool *divided, lam_error *error) {
     static const char *const ways[] = {"stay as they are", "are divided evenly",
                                        "are divided where light changes"};
     lam_status status = LAM_OK;
@@ -112,7 +114,7 @@ static lam_status fit_to_light(const precompute_job *job, precompute_scene *scen
                                   .elements =
                                       (size_t)(share * fmax(ADAPTIVE_ELEMENTS, fit_of_face * (double)faces)),
                                   .effort = share,
-                                  .sky = o->sky != NULL ? &sky : NULL,
+                                  .from = {.sky = o->sky != NULL ? &sky : NULL, .direct = direct},
                                   .cut = cut_at_walls,
                                   .cut_of = &walls,
                                   .seed = precompute_seed(o->seed, SEED_MESH),
@@ -204,6 +206,7 @@ lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_
     const bool black = black_scene_lighten(&scene->m);
     bool divided = true;
     faces_before before = {.n = 0};
+    mesh_luminaires luminaires = {.sampler = NULL};
     const size_t most = o->elements > 0 ? fronts_of(&scene->m, o->elements) : SIZE_MAX;
     /* --elements counts both sides. */
     const mesh_refinement refinement = {
@@ -211,8 +214,10 @@ lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_
     if (o->mesh_error > 0) TRY(join_faces(job, scene, &before, error));
     if (edge > 0 && !is_fitted(o)) TRY(scene_cut_at_walls(job, scene, edge, most, error));
     if (refinement.max_edge > 0 || refinement.elements > 0) TRY(mesh_refine(&scene->m, &refinement, error));
-    if (o->mesh_error > 0) TRY(refine_by_error(job, scene, error));
-    if (is_fitted(o)) TRY(fit_to_light(job, scene, edge, &divided, error));
+    if (o->mesh_error > 0 || is_fitted(o)) TRY(mesh_luminaires_make(scene, &luminaires, error));
+    const gather_direct *const direct = mesh_luminaires_light(&luminaires);
+    if (o->mesh_error > 0) TRY(refine_by_error(job, scene, direct, error));
+    if (is_fitted(o)) TRY(fit_to_light(job, scene, direct, edge, &divided, error));
     if (edge > 0 && divided) TRY(scene_log_under_walls(job, scene, edge, error));
     TRY(faces_part(&scene->m, &before, error));
     TRY(mesh_make_backs(&scene->m, error));
@@ -221,6 +226,7 @@ lam_status scene_refine(const precompute_job *job, precompute_scene *scene, lam_
     TRY(scene_find_buried(job, scene, error));
 done:
     faces_before_free(&before);
+    mesh_luminaires_free(&luminaires);
     if (black) black_scene_darken(&scene->m);
     return status;
 }

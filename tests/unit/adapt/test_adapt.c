@@ -22,7 +22,7 @@ START_TEST(light_at_points) {
     const float B[2] = {0, 1};
     gather *g = NULL;
     lam_error error = {0};
-    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, NULL, &g, &error));
+    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, NULL, NULL, &g, &error));
     ck_assert_uint_eq(gather_values(g), 1);
     for (int p = 0; p < 3; p++) {
         const double F = floor_lamp_truth(points[p][0], points[p][1]);
@@ -61,7 +61,7 @@ START_TEST(shadow) {
     free(m.group);
     mesh_add_cell(&m, &plate, true);
     mesh_finish(&m, floor_lamp_rho);
-    ck_ok(gather_create(&m, 1, B, lamps, NULL, &g, &error));
+    ck_ok(gather_create(&m, 1, B, lamps, NULL, NULL, &g, &error));
     for (uint64_t key = 0; key < 100; key++) {
         gather_at(g, 0, key, 2, points, H);
         ck_assert(H[0] == 0 && H[1] == 0);
@@ -89,7 +89,7 @@ START_TEST(light_of_skies) {
         for (size_t t = 0; t <= tiling.n_tiles; t++)
             L[l * (tiling.n_tiles + 1) + t] = t < tiling.n_tiles ? 1 + (double)l : 1e9;
     const gather_sky sky = {.tiling = &tiling, .L = L};
-    ck_ok(gather_create(&m, 2, B, NULL, &sky, &g, &error));
+    ck_ok(gather_create(&m, 2, B, NULL, &sky, NULL, &g, &error));
     for (int p = 0; p < 2; p++) {
         const double seen = M_PI * (1 - floor_lamp_truth(points[p][0], points[p][1]));
         double sum = 0, squares = 0;
@@ -122,7 +122,7 @@ START_TEST(furnace) {
     gather *g = NULL;
     lam_error error = {0};
     for (size_t i = 0; i < m.n; i++) B[i] = 1, B[m.n + i] = 2;
-    ck_ok(gather_create(&m, 2, B, NULL, NULL, &g, &error));
+    ck_ok(gather_create(&m, 2, B, NULL, NULL, NULL, &g, &error));
     gather_at(g, 4 * 4, 1, 2, points, H); /* the floor's first element */
     for (size_t k = 0; k < 4; k++) {
         ck_assert_double_eq_tol(H[2 * k], 1, 1e-6);
@@ -232,7 +232,7 @@ START_TEST(looks_at_a_cell) {
     gather *g = NULL;
     lam_error error = {0};
     const mesh_cell whole = mesh_cell_of(&m, 0);
-    ck_ok(gather_create(&m, 1, B, E, NULL, &g, &error));
+    ck_ok(gather_create(&m, 1, B, E, NULL, NULL, &g, &error));
     light.g = g;
     ck_assert(mesh_cell_cut(&whole, (mesh_cut){4, 2 * MESH_CELL_STEPS + 4}, parts));
     const mesh_cell *c = &parts[_i];

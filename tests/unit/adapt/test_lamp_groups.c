@@ -68,7 +68,7 @@ START_TEST(shares_change_no_light) {
     lam_error error = {0};
     for (int by_lamps = 0; by_lamps < 2; by_lamps++) {
         gather *g = NULL;
-        ck_ok(gather_create(&m, 1, m.emission, by_lamps ? m.emission : NULL, NULL, &g, &error));
+        ck_ok(gather_create(&m, 1, m.emission, by_lamps ? m.emission : NULL, NULL, NULL, &g, &error));
         for (uint64_t key = 0; key < KEYS; key++) {
             double H[2 * GATHER_HALVES];
             gather_at(g, FLOOR, key, 2, points, H);

@@ -83,7 +83,7 @@ START_TEST(fit_to_a_sky) {
     mesh dark = floor_lamp_mesh(1);
     for (size_t i = 0; i < dark.n; i++) dark.emission[i] = 0;
     ck_ok(mesh_fit(&dark, &how, &without, &error));
-    how.sky = &sky;
+    how.from.sky = &sky;
     ck_ok(mesh_fit(&m, &how, &with, &error));
     printf("a sky: %g before, %g after, %zu elements\n", with.faces.sky, with.left.sky, m.n);
     ck_assert(with.left.has_sky && !with.left.has_lamps && !without.left.has_sky);
