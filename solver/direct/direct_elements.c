@@ -202,7 +202,7 @@ static lam_status report_luminaire(const mesh *m, const luminaire_run *run, dire
     out->n_ignored = ignored->n;
     out->n_named = ignored->n_named;
     out->near_share = luminaire_sight_near(run->sight, &run->source, run->moved, DIRECT_NEAR);
-    for (size_t i = 0; i < m->n && run->source.opening.n_faces > 0; i++) {
+    for (size_t i = 0; i < m->n && !run->source.opening.flat; i++) {
         double middle[3], own[3];
         mesh_centroid(m, i, middle);
         placed_source_inwards(&run->source, middle, own);

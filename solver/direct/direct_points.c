@@ -33,7 +33,7 @@ static size_t find_beams(const luminaire_run *run, const direct_point *point, si
     float from[3];
     placed_source_inwards(source, point->at, own);
     luminaire_sight_recentre(run->sight, point->at, from);
-    const size_t n = opening_cells(&source->opening, own, least, room->cells);
+    const size_t n = opening_cells(&source->opening, own, least, OPENING_CELLS, room->cells);
     size_t count = 0, lane = 0;
     ray_packet segments = {.origin = {{0}}};
     direct_beam waiting[VISIBILITY_PACKET];

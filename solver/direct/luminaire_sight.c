@@ -85,7 +85,7 @@ lam_status ignored_groups_find(const mesh *m, const double (*boxes)[2][3], const
         found.n_named += !marked[g];
         marked[g] = true;
     }
-    opening_faces_set(&list->files[l->file].photometry.opening, l->is_point, &opening);
+    opening_faces_set(&list->files[l->file].photometry.opening, l->is_point, INFINITY, &opening);
     const double largest = fmax(fmax(opening.size[0], opening.size[1]), opening.size[2]);
     for (size_t g = 0; g < m->n_groups; g++)
         if (wraps(boxes[g], l, fmax(3 * largest, IGNORED_LEAST))) marked[g] = true;

@@ -28,6 +28,7 @@ typedef struct opening_faces {
     opening_face faces[OPENING_FACES];
     double upto[OPENING_FACES]; /* the share of the area of faces 0 ... k, the last 1 */
     double size[3];             /* of the box about it, along x, y and z */
+    double step;                /* the length of a pair of cells over their distance from a receiver */
 } opening_faces;
 
 /* A place of an opening. share: of a flat one, the part of its light; area: of a body, its vector of area,
@@ -36,15 +37,19 @@ typedef struct opening_cell {
     double at[3], area[3], share;
 } opening_cell;
 
-void opening_faces_set(const luminaire_opening *opening, bool is_point, opening_faces *out);
+/* finest: radians in which the intensity may change by half its peak. */
+void opening_faces_set(const luminaire_opening *opening, bool is_point, double finest, opening_faces *out);
 
-/* Cells that one receiver needs at most. */
-enum { OPENING_CELLS = 4096 };
+/* Cells that one receiver has at most. */
+enum { OPENING_CELLS = 1024 };
 
-/* The cells for a receiver at x, at most OPENING_CELLS; their number. In pairs (Gauss's rule of two places,
- * whose weights are equal) they lie no further apart than a tenth of their distance from x, on average; of
- * an extended opening there are at least `least` of them, 1, 16 or 256. Cost: O(cells). */
-size_t opening_cells(const opening_faces *o, const double x[3], size_t least, opening_cell *cells);
+/* The cells for a receiver at x, at most `most` and OPENING_CELLS; their number. They lie in pairs, Gauss's
+ * rule of two places, of a length of a third of the distance from x: they are nearer to the integral, by 2e-4
+ * of it, than cells of a tenth in whose middle the light is taken, by 2e-3. A luminaire of a narrow beam has
+ * shorter ones, and a receiver that is so near that there would be too many has longer ones. Of an extended
+ * opening there are at least `least` cells, 1, 16 or 256. Cost: O(cells). */
+size_t opening_cells(const opening_faces *o, const double x[3], size_t least, size_t most,
+                     opening_cell *cells);
 
 /* A place at (u, w) of the unit square, as a cell: places are as dense as the area, or nearly so. */
 void opening_place(const opening_faces *o, double u, double w, opening_cell *out);

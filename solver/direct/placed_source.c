@@ -5,6 +5,9 @@
 #include <math.h>
 #include <string.h>
 
+/* Cells for a place of an element at most: a panel of 1.2 x .3 m needs 144 of them from .3 m on. */
+enum { CELLS_MOST = 144 };
+
 static const double degrees_of_radian = 180 / M_PI;
 
 static int axis_of(char up) {
@@ -47,6 +50,24 @@ static double finest_angle(const luminaire *l, double peak) {
     return steepest > 0 ? .5 * peak / steepest / degrees_of_radian : INFINITY;
 }
 
+/* True where no direction below the horizon of the luminaire, or above it, has any light. Between two angles
+ * of the table both of them count. */
+static bool is_dark(const luminaire *l, bool above) {
+    if (l->type != LUMINAIRE_C) { /* the angle that is turned, whose tangent has the way down below */
+        const size_t n = l->type == LUMINAIRE_B ? l->n_angles : l->n_planes;
+        const double *turned = l->type == LUMINAIRE_B ? l->angles : l->planes;
+        return above && turned[0] >= -90 && turned[n - 1] <= 90;
+    }
+    for (size_t a = 0; a < l->n_angles; a++) {
+        const double before = l->angles[a > 0 ? a - 1 : 0],
+                     after = l->angles[a + 1 < l->n_angles ? a + 1 : a];
+        if (above ? !(after > 90) : !(before < 90)) continue;
+        for (size_t p = 0; p < l->n_planes; p++)
+            if (l->candela[p * l->n_angles + a] > 0) return false;
+    }
+    return true;
+}
+
 void placed_source_set(const placed_luminaires *list, const placed_luminaire *l, char up,
                        placed_source *out) {
     const placed_file *file = &list->files[l->file];
@@ -61,7 +82,8 @@ void placed_source_set(const placed_luminaires *list, const placed_luminaire *l,
     const double peak = luminaire_peak(&file->photometry, &C, &gamma);
     out->peak = peak * out->factor;
     out->finest = finest_angle(&file->photometry, peak);
-    opening_faces_set(&file->photometry.opening, l->is_point, &out->opening);
+    for (int above = 0; above < 2; above++) out->dark[above] = is_dark(&file->photometry, above);
+    opening_faces_set(&file->photometry.opening, l->is_point, out->finest, &out->opening);
 }
 
 void placed_source_turn(const placed_source *s, const double direction[3], double own[3]) {
@@ -80,8 +102,9 @@ void placed_source_outwards(const placed_source *s, const double own[3], double 
 }
 
 double placed_source_intensity(const placed_source *s, const double direction[3]) {
-    const double across = hypot(direction[0], direction[1]);
-    const double C = across > 0 ? atan2(direction[1], direction[0]) * degrees_of_radian : 0,
+    const double across = sqrt(direction[0] * direction[0] + direction[1] * direction[1]);
+    const bool turns = s->photometry->symmetry != SYMMETRY_ROTATIONAL && across > 0;
+    const double C = turns ? atan2(direction[1], direction[0]) * degrees_of_radian : 0,
                  gamma = atan2(across, -direction[2]) * degrees_of_radian;
     return s->factor * luminaire_candela(s->photometry, C, gamma);
 }
@@ -100,9 +123,15 @@ double placed_source_normal(const placed_source *s, const opening_cell *cell, co
     return part > 0 ? part * placed_source_intensity(s, direction) / square : 0;
 }
 
+bool placed_source_is_dark(const placed_source *s, const double x[3]) {
+    const double half = s->opening.size[2] / 2;
+    return (s->dark[0] && x[2] <= -half) || (s->dark[1] && x[2] >= half);
+}
+
 double placed_source_irradiance(const placed_source *s, const double x[3], const double normal[3],
                                 opening_cell *cells) {
-    const size_t n = opening_cells(&s->opening, x, 1, cells);
+    if (placed_source_is_dark(s, x)) return 0;
+    const size_t n = opening_cells(&s->opening, x, 1, CELLS_MOST, cells);
     double sum = 0;
     for (size_t k = 0; k < n; k++) {
         double to[3], towards[3];

@@ -11,6 +11,7 @@ typedef struct placed_source {
     double at[3], frame[3][3]; /* x, y and z of the luminaire in the scene */
     double factor;             /* of candela: maintenance * flux / lumens of the file * TILT */
     double peak;               /* cd, with the factor */
+    bool dark[2];              /* it sends nothing below, above the plane across its z */
     double finest;             /* radians: the angle in which the intensity may change by half its peak */
     opening_faces opening;
 } placed_source;
@@ -37,6 +38,9 @@ double placed_source_intensity(const placed_source *s, const double direction[3]
  * cell. All in the frame; 0 where x lies on the cell. */
 double placed_source_normal(const placed_source *s, const opening_cell *cell, const double x[3],
                             double towards[3]);
+
+/* True for a point of the frame that no light of the opening goes to: on the dark side of all of it. */
+bool placed_source_is_dark(const placed_source *s, const double x[3]);
 
 /* The irradiance of a surface at x with a normal, both in the frame, that sees all of the opening. cells:
  * room for OPENING_CELLS. */
