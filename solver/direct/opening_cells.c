@@ -189,13 +189,15 @@ double opening_distance(const opening_faces *o, const double x[3]) {
 /* The cells of a face as they are found. */
 typedef struct cell_list {
     const opening_face *face;
+    bool is_flat; /* the opening */
     const double *x;
-    double step;    /* the length of a pair of cells over their distance from x */
-    double apart;   /* the distance of a part from x, at least, over its length */
-    double closest; /* m: the least distance that counts */
-    size_t least;   /* pairs along each side of the face */
-    bool is_line;
-    size_t n, most; /* of cells; n may be more */
+    double step;     /* the length of a pair of cells over their distance from x */
+    double apart;    /* the distance of a part from x, at least, over its length */
+    double closest;  /* m: the least distance that counts */
+    size_t least[2]; /* pairs along each side of the face */
+
+    double whole[2]; /* the part of the map of the face that is seen, along each side */
+    size_t n, most;  /* of cells; n may be more */
     opening_cell *cells;
 } cell_list;
 
@@ -254,12 +256,15 @@ static void add_cell(cell_list *l, double u, double w, double du, double dw) {
     opening_cell *cell = &l->cells[l->n - 1];
     face_at(l->face, u, w, cell->at, cell->area);
     for (int d = 0; d < 3; d++) cell->area[d] *= du * dw;
-    cell->share = du * dw * (l->face->kind == FACE_DISC ? 2 * u : 1);
+    cell->share = l->is_flat ? du * dw * (l->face->kind == FACE_DISC ? 2 * u : 1) : 0;
 }
 
-/* Places of n pairs of cells, or of one cell where n is 0, along a side. */
-static double place_along(const face_part *p, int side, size_t n, size_t k) {
-    const double offset = k % 2 == 0 ? -.28867513459481287 : .28867513459481287; /* 1 / (2 sqrt 3) */
+/* Places of n pairs of cells, or of one cell where n is 0, along a side. Around a whole turn even ones are
+ * best.
+ */
+static double place_along(const face_part *p, int side, size_t n, size_t k, bool turn) {
+    const double apart = turn ? .25 : .28867513459481287 /* 1 / (2 sqrt 3) */,
+                 offset = k % 2 == 0 ? -apart : apart;
     if (n == 0) return (p->from[side] + p->to[side]) / 2;
     return p->from[side] + (p->to[side] - p->from[side]) * ((double)(k / 2) + .5 + offset) / (double)n;
 }
@@ -281,40 +286,105 @@ static void add_part(cell_list *l, const face_part *p) {
     const double step = l->step * fmax(far, l->closest);
     for (int k = 0; k < 2; k++) {
         const double whole = p->to[k] - p->from[k];
-        const size_t least = (size_t)ceil((double)l->least * whole - 1e-9);
+        const size_t least = (size_t)ceil((double)l->least[k] * fmin(1, whole / l->whole[k]) - 1e-9);
         n[k] = length[k] > alone * step ? (size_t)ceil(length[k] / step) : 0;
         if (length[k] > 0 && n[k] < least) n[k] = least;
     }
     const size_t many[2] = {n[0] > 0 ? 2 * n[0] : 1, n[1] > 0 ? 2 * n[1] : 1};
     const double du = (p->to[0] - p->from[0]) / (double)many[0],
                  dw = (p->to[1] - p->from[1]) / (double)many[1];
+    const bool turn = l->face->kind != FACE_PLANE && p->to[1] - p->from[1] >= 1;
     for (size_t i = 0; i < many[0]; i++)
         for (size_t j = 0; j < many[1]; j++)
-            add_cell(l, place_along(p, 0, n[0], i), place_along(p, 1, n[1], j), du, dw);
+            add_cell(l, place_along(p, 0, n[0], i, false), place_along(p, 1, n[1], j, turn), du, dw);
+}
+
+/* The pairs along both sides of a face for so many cells of the opening, 1, 16 or 256. Round faces have
+ * enough of them to stand for a circle, and curved ones for the half of it that is seen. */
+static void least_pairs(const opening_faces *o, const opening_face *f, size_t cells, size_t least[2]) {
+    static const face_part whole = {{0, 0}, {1, 1}};
+    double length[2];
+    part_lengths(f, &whole, length);
+    const bool is_line = !(length[0] > 0 && length[1] > 0), many_faces = o->n_faces > 1;
+    least[0] = cells == 1 ? 0 : cells == 16 ? (many_faces ? 1 : 2) : (many_faces ? 4 : 8);
+    if (is_line) least[0] *= cells == 16 ? 4 : 16;
+    least[1] = least[0];
+    const size_t around = f->kind == FACE_TUBE ? 1 : 2, along = 1;
+    if (f->kind == FACE_PLANE) return;
+    if (least[0] < along) least[0] = along;
+    if (least[1] < around) least[1] = around;
+}
+
+/* The part of a face of a body whose front x sees; false: none. A curved face is turned about itself so that
+ * the part is one of its map, about the way to x: with y = x in units of its axes, of a ball all with n . y >
+ * 1, and of a tube the same across its axis. */
+static bool seen_part(const opening_faces *o, const opening_face *f, const double x[3], opening_face *turned,
+                      face_part *part) {
+    double to[3], area[3], y[3] = {0}, axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    *turned = *f;
+    *part = (face_part){{0, 0}, {1, 1}};
+    if (o->flat) return true;
+    subtract3(x, f->middle, to);
+    if (f->kind == FACE_PLANE || f->kind == FACE_DISC) {
+        cross3(f->axis[0], f->axis[1], area);
+        return dot3(to, area) > 0;
+    }
+    const int n_axes = f->kind == FACE_BALL ? 3 : 2;
+    for (int k = 0; k < n_axes; k++) y[k] = dot3(to, f->axis[k]) / dot3(f->axis[k], f->axis[k]);
+    const double length = length3(y);
+    if (!(length > 1)) return false;
+    for (int k = 0; k < 3; k++) y[k] /= length;
+    if (f->kind == FACE_BALL) {
+        const int least = fabs(y[0]) < .6 ? 0 : 1;
+        double along[3] = {0};
+        along[least] = 1;
+        memcpy(axes[2], y, sizeof y);
+        cross3(y, along, axes[0]);
+        const double across = length3(axes[0]);
+        for (int k = 0; k < 3; k++) axes[0][k] /= across;
+        cross3(y, axes[0], axes[1]);
+        part->from[0] = .5 + .5 / length;
+    } else {
+        memcpy(axes[0], y, sizeof y);
+        axes[1][0] = -y[1], axes[1][1] = y[0];
+        part->to[1] = acos(1 / length) / (2 * M_PI);
+        part->from[1] = -part->to[1];
+    }
+    for (int k = 0; k < 3; k++)
+        for (int d = 0; d < 3; d++)
+            turned->axis[k][d] =
+                axes[k][0] * f->axis[0][d] + axes[k][1] * f->axis[1][d] + axes[k][2] * f->axis[2][d];
+    return true;
 }
 
 size_t opening_cells(const opening_faces *o, const double x[3], size_t least, size_t most,
                      opening_cell *cells) {
     const double largest = fmax(fmax(o->size[0], o->size[1]), o->size[2]);
-    cell_list l = {
-        .x = x, .step = o->step, .apart = .5, .closest = nearest * largest, .most = most, .cells = cells};
-    if (o->n_faces == 0) {
+    cell_list l = {.is_flat = o->flat,
+                   .x = x,
+                   .step = o->step,
+                   .apart = .5,
+                   .closest = nearest * largest,
+                   .most = most,
+                   .cells = cells};
+    if (o->n_faces == 0 || (least == 1 && largest <= alone * o->step * opening_distance(o, x))) {
         cells[0] = (opening_cell){.share = 1};
         return 1;
     }
     for (;; l.step *= 1.5, l.apart /= 1.5, l.closest *= 2) {
         l.n = 0;
         for (size_t f = 0; f < o->n_faces; f++) {
-            static const face_part whole = {{0, 0}, {1, 1}};
-            double length[2];
-            l.face = &o->faces[f];
-            part_lengths(l.face, &whole, length);
-            const bool is_line = !(length[0] > 0 && length[1] > 0);
-            l.least = least == 1 ? 0 : least == 16 ? (is_line ? 8 : 2) : (is_line ? 128 : 8);
-            add_part(&l, &whole);
+            opening_face face;
+            face_part part;
+            if (!seen_part(o, &o->faces[f], x, &face, &part)) continue;
+            l.face = &face;
+            for (int k = 0; k < 2; k++) l.whole[k] = part.to[k] - part.from[k];
+            least_pairs(o, l.face, least, l.least);
+            add_part(&l, &part);
         }
-        if (l.n <= most) return l.n;
+        if (l.n <= most) break;
     }
+    return l.n;
 }
 
 void opening_place(const opening_faces *o, double u, double w, opening_cell *out) {
@@ -333,11 +403,11 @@ void opening_place(const opening_faces *o, double u, double w, opening_cell *out
     }
     face_at(&o->faces[f], u, w, out->at, out->area);
     for (int d = 0; d < 3; d++) out->area[d] *= density;
-    out->share = 1;
+    out->share = o->flat ? 1 : 0;
 }
 
 double opening_part(const opening_faces *o, const opening_cell *cell, const double direction[3]) {
-    if (o->flat) return cell->share;
+    if (o->flat || cell->share > 0) return cell->share;
     const double own = dot3(cell->area, direction);
     double all = 0;
     if (!(own > 0)) return 0;

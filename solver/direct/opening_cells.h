@@ -31,8 +31,8 @@ typedef struct opening_faces {
     double step;                /* the length of a pair of cells over their distance from a receiver */
 } opening_faces;
 
-/* A place of an opening. share: of a flat one, the part of its light; area: of a body, its vector of area,
- * m^2. */
+/* A place of an opening. share: the part of its light, of a flat opening or where one cell stands for all; 0:
+ * the light of a body, by area, its vector of area in m^2. */
 typedef struct opening_cell {
     double at[3], area[3], share;
 } opening_cell;
