@@ -158,7 +158,7 @@ START_TEST(housings_hide_nothing) {
     const double lumens = flux_on(&bare, &open, 0, NULL);
     ck_assert_double_eq_tol(flux_on(&housed, &all, 0, "floor"), flux_on(&bare, &open, 0, "floor"),
                             1e-6 * lumens);
-    ck_assert_double_gt(flux_on(&housed, &all, 0, "shade"), 0); /* what is ignored receives light */
+    ck_assert_double_gt(flux_on(&housed, &all, 0, "shade"), 0); /* it receives light */
     ck_assert_double_lt(flux_on(&housed, &all, 1, "floor"), .9 * flux_on(&bare, &open, 0, "floor"));
     direct_report_line(&housed, &p, &all.reports[0], line);
     ck_assert_str_eq(line, "luminaire a: not hidden by housing, shade");
