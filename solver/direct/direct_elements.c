@@ -32,67 +32,95 @@ typedef struct element_run {
     unsigned char *corners; /* [n_vertices]: what elements at a vertex found, CLEAR | DARK */
 } element_run;
 
+/* The shares V of the light that pass along the segments of an element, in two halves with samples of their
+ * own. */
+typedef struct segment_set {
+    element_sampler sampler;
+    pair_sampler places[2];
+    size_t n;                     /* in both halves */
+    double passed[SEGMENTS_MOST]; /* [2][n / 2] */
+} segment_set;
+
+/* A place of the element and one of the opening for each segment of a packet. In the scene: x; in the frame
+ * of the luminaire: the cell. */
+static void place_segments(const element_run *r, const segment_set *s, int half, uint32_t first,
+                           double x[VISIBILITY_PACKET][3], opening_cell cells[VISIBILITY_PACKET],
+                           float from[VISIBILITY_PACKET][3]) {
+    const double *centre = visibility_centre(r->luminaire->sight->v);
+    double place[4][VISIBILITY_PACKET];
+    pair_sampler_packet(&s->places[half], first, place);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        element_sampler_point(&s->sampler, (float)place[0][i], (float)place[1][i], from[i]);
+        for (int d = 0; d < 3; d++) x[i][d] = (double)from[i][d] + centre[d];
+        opening_place(&r->luminaire->source.opening, place[2][i], place[3][i], &cells[i]);
+    }
+}
+
+static void cast_segments(const element_run *r, segment_set *s, size_t element, int half, uint32_t first) {
+    const luminaire_run *run = r->luminaire;
+    double x[VISIBILITY_PACKET][3];
+    opening_cell cells[VISIBILITY_PACKET];
+    float from[VISIBILITY_PACKET][3];
+    size_t self[VISIBILITY_PACKET];
+    ray_packet segments;
+    place_segments(r, s, half, first, x, cells, from);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        double there[3];
+        float to[3];
+        placed_source_outwards(&run->source, cells[i].at, there);
+        for (int d = 0; d < 3; d++) there[d] += run->moved[d];
+        luminaire_sight_recentre(run->sight, there, to);
+        for (int d = 0; d < 3; d++) {
+            segments.origin[d][i] = from[i][d];
+            segments.direction[d][i] = to[d] - from[i][d];
+        }
+        self[i] = element;
+    }
+    luminaire_sight_passed(run->sight, &segments, VISIBILITY_PACKET, self,
+                           &s->passed[(size_t)half * s->n / 2 + first]);
+}
+
+/* True where all segments pass the same. */
+static bool all_pass(const segment_set *s, double *share) {
+    *share = s->passed[0];
+    for (size_t k = 1; k < s->n; k++)
+        if (s->passed[k] < *share || s->passed[k] > *share) return false;
+    return true;
+}
+
 /* Sums over segments: of I cos V / d^2, of I cos / d^2, of V, and the number of them; the shares V that
  * matter are from least to most. */
 typedef struct segment_sums {
     double seen, open, passed, count, least, most;
 } segment_sums;
 
-/* Adds a packet of places of the element and of the opening. */
-static void add_segments(const element_run *r, const element_sampler *sampler, size_t element,
-                         double place[4][VISIBILITY_PACKET], segment_sums *sums) {
-    const luminaire_run *run = r->luminaire;
-    const placed_source *source = &run->source;
-    const double *centre = visibility_centre(run->sight->v);
+static void weigh_segments(const element_run *r, const segment_set *s, size_t element, int half,
+                           segment_sums *sums) {
+    const placed_source *source = &r->luminaire->source;
     const float *n = r->m->normal[element];
     const double normal[3] = {(double)n[0], (double)n[1], (double)n[2]};
-    double own_normal[3], light[VISIBILITY_PACKET], passed[VISIBILITY_PACKET];
-    size_t self[VISIBILITY_PACKET];
-    ray_packet segments;
+    double own_normal[3];
     placed_source_turn(source, normal, own_normal);
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-        float from[3], to[3];
-        double x[3], own[3], towards[3], there[3];
-        opening_cell cell;
-        element_sampler_point(sampler, (float)place[0][i], (float)place[1][i], from);
-        for (int d = 0; d < 3; d++) x[d] = (double)from[d] + centre[d];
-        placed_source_inwards(source, x, own);
-        opening_place(&source->opening, place[2][i], place[3][i], &cell);
-        const double across = placed_source_normal(source, &cell, own, towards);
-        light[i] = across * fmax(0, dot3(towards, own_normal));
-        placed_source_outwards(source, cell.at, there);
-        for (int d = 0; d < 3; d++) there[d] += run->moved[d];
-        luminaire_sight_recentre(run->sight, there, to);
-        for (int d = 0; d < 3; d++) {
-            segments.origin[d][i] = from[d];
-            segments.direction[d][i] = to[d] - from[d];
+    for (size_t k = 0; k < s->n / 2; k += VISIBILITY_PACKET) {
+        double x[VISIBILITY_PACKET][3];
+        opening_cell cells[VISIBILITY_PACKET];
+        float from[VISIBILITY_PACKET][3];
+        place_segments(r, s, half, (uint32_t)k, x, cells, from);
+        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+            const double passed = s->passed[(size_t)half * s->n / 2 + k + i];
+            double own[3], towards[3];
+            placed_source_inwards(source, x[i], own);
+            const double across = placed_source_normal(source, &cells[i], own, towards),
+                         light = across * fmax(0, dot3(towards, own_normal));
+            sums->seen += light * passed;
+            sums->open += light;
+            sums->passed += passed;
+            sums->count += 1;
+            if (!(light > 0)) continue;
+            sums->least = fmin(sums->least, passed);
+            sums->most = fmax(sums->most, passed);
         }
-        self[i] = element;
     }
-    luminaire_sight_passed(run->sight, &segments, VISIBILITY_PACKET, self, passed);
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-        sums->seen += light[i] * passed[i];
-        sums->open += light[i];
-        sums->passed += passed[i];
-        sums->count += 1;
-        if (!(light[i] > 0)) continue;
-        sums->least = fmin(sums->least, passed[i]);
-        sums->most = fmax(sums->most, passed[i]);
-    }
-}
-
-/* The visible share by half the segments; stream: apart for each half and each number of segments. */
-static segment_sums half_sums(const element_run *r, const element_sampler *sampler, size_t element,
-                              size_t half, uint64_t stream) {
-    segment_sums sums = {.least = INFINITY, .most = -INFINITY};
-    pair_sampler places;
-    pair_sampler_init(&places, r->options->seed + stream, element, r->luminaire->luminaire);
-    for (uint32_t k = 0; k < half; k += VISIBILITY_PACKET) {
-        double place[4][VISIBILITY_PACKET];
-        pair_sampler_packet(&places, k, place);
-        add_segments(r, sampler, element, place, &sums);
-    }
-    return sums;
 }
 
 /* Weighted by light; where no segment carries any, as beside a narrow beam, they count alike. */
@@ -100,18 +128,32 @@ static double share_of(const segment_sums *s) {
     return s->open > 0 ? s->seen / s->open : s->passed / s->count;
 }
 
-/* H = open (sum f V / sum f) with f = I cos / d^2, and its squared error ((H_1 - H_2) / 2)^2. */
+/* H = open (sum f V / sum f) with f = I cos / d^2, and its squared error ((H_1 - H_2) / 2)^2. stream: apart
+ * for each half and each number of segments. */
 static void light_seen(const element_run *r, size_t element, size_t segments, uint64_t stream) {
-    element_sampler sampler;
-    element_sampler_init(&sampler, r->m, r->luminaire->sight->v, element, r->options->seed);
-    const segment_sums one = half_sums(r, &sampler, element, segments / 2, stream),
-                       two = half_sums(r, &sampler, element, segments / 2, stream + 1);
-    const segment_sums both = {.seen = one.seen + two.seen,
-                               .open = one.open + two.open,
-                               .passed = one.passed + two.passed,
-                               .count = one.count + two.count};
-    const double least = fmin(one.least, two.least), most = fmax(one.most, two.most),
-                 error = r->open[element] * (share_of(&one) - share_of(&two)) / 2;
+    segment_set s;
+    double share;
+    s.n = segments;
+    element_sampler_init(&s.sampler, r->m, r->luminaire->sight->v, element, r->options->seed);
+    for (int half = 0; half < 2; half++) {
+        pair_sampler_init(&s.places[half], r->options->seed + stream + (uint64_t)half, element,
+                          r->luminaire->luminaire);
+        for (uint32_t k = 0; k < s.n / 2; k += VISIBILITY_PACKET) cast_segments(r, &s, element, half, k);
+    }
+    r->off[element] = 0;
+    if (all_pass(&s, &share)) { /* as nearly everywhere: the weights do not matter */
+        r->H[element] = (float)(r->open[element] * share);
+        r->found[element] = share > 0 ? CLEAR : DARK;
+        return;
+    }
+    segment_sums half[2] = {{.least = INFINITY, .most = -INFINITY}, {.least = INFINITY, .most = -INFINITY}};
+    for (int h = 0; h < 2; h++) weigh_segments(r, &s, element, h, &half[h]);
+    const segment_sums both = {.seen = half[0].seen + half[1].seen,
+                               .open = half[0].open + half[1].open,
+                               .passed = half[0].passed + half[1].passed,
+                               .count = half[0].count + half[1].count};
+    const double least = fmin(half[0].least, half[1].least), most = fmax(half[0].most, half[1].most),
+                 error = r->open[element] * (share_of(&half[0]) - share_of(&half[1])) / 2;
     r->H[element] = (float)(r->open[element] * share_of(&both));
     r->off[element] = (float)(error * error);
     r->found[element] = most - least > same_share ? PARTLY : most > 0 ? CLEAR : DARK;

@@ -15,7 +15,9 @@ static const double longest_pair = 1. / 3, shortest_pair = .02, alone = .2;
 
 /* The place at (u, w) of a face, and its vector of area for du dw = 1. */
 static void face_at(const opening_face *f, double u, double w, double at[3], double area[3]) {
-    const double c = cos(2 * M_PI * w), s = sin(2 * M_PI * w), z = 2 * u - 1, ring = sqrt(fmax(0, 1 - z * z));
+    const bool is_round = f->kind != FACE_PLANE;
+    const double c = is_round ? cos(2 * M_PI * w) : 0, s = is_round ? sin(2 * M_PI * w) : 0, z = 2 * u - 1,
+                 ring = sqrt(fmax(0, 1 - z * z));
     double part[3] = {0}, along[3], normals[3][3];
     switch (f->kind) {
     case FACE_PLANE:

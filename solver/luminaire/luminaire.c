@@ -31,6 +31,10 @@ void luminaire_free(luminaire *l) {
 static bool locate(size_t n, const double *values, double x, size_t *at, double *share) {
     size_t low = 0, high = n - 1;
     if (!(x >= values[0] - slack && x <= values[n - 1] + slack)) return false;
+    /* Most tables have even steps. */
+    const double guess = (x - values[0]) / (values[n - 1] - values[0]) * (double)(n - 1);
+    const size_t even = guess > 0 ? (size_t)fmin(guess, (double)(n - 2)) : 0;
+    if (values[even] <= x && x < values[even + 1]) low = even, high = even + 1;
     while (high - low > 1) {
         const size_t middle = low + (high - low) / 2;
         if (values[middle] <= x)
