@@ -10,8 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Elements between two looks at the progress; segments of each, where the options do not say. */
-enum { ELEMENTS_AT_ONCE = 64, SEGMENTS = 16, MORE_SEGMENTS = 256, SEGMENTS_MOST = 4096 };
+/* Elements between two looks at the progress; segments of each, where the options do not say, and beside
+ * those that are partly hidden. */
+enum { ELEMENTS_AT_ONCE = 64, SEGMENTS = 16, MORE_SEGMENTS = 256, BESIDE = 64, SEGMENTS_MOST = 4096 };
 
 /* Panes pass light by its angle: shares that differ by less are one. */
 static const double same_share = .02;
@@ -170,12 +171,19 @@ static void light_first(const element_run *r, size_t element) {
     if (r->open[element] > 0 && r->luminaire->sight->v != NULL) light_seen(r, element, r->segments, 0);
 }
 
-/* Elements that are partly hidden, and those that meet both, one that is hidden and one that is not. */
+static size_t fewest(size_t a, size_t b) {
+    return a < b ? a : b;
+}
+
+/* Elements that are partly hidden, and those that meet both, one that is hidden and one that is not: few
+ * segments may have missed a corner of these. */
 static void light_again(const element_run *r, size_t element) {
     bool again = false;
     for (size_t c = 0; c < mesh_corners(r->m, element); c++)
         again = again || r->corners[r->m->elements[element][c]] == PARTLY;
-    if (again && r->found[element] != UNLIT) light_seen(r, element, r->more, 2);
+    if (!again || r->found[element] == UNLIT) return;
+    if (r->found[element] != PARTLY) light_seen(r, element, fewest(r->more, BESIDE), 4);
+    if (r->found[element] == PARTLY) light_seen(r, element, r->more, 2);
 }
 
 /* All elements once; before: the share of the work before it. */
