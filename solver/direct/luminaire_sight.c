@@ -254,25 +254,68 @@ void luminaire_sight_settle(const luminaire_sight *s, const placed_source *sourc
     for (int d = 0; d < 3; d++) moved[d] = clear * way[d];
 }
 
+/* The share of a segment at which its end begins. */
+static double end_of(const luminaire_sight *s, const ray_packet *segments, size_t i) {
+    double square = 0;
+    for (int d = 0; d < 3; d++)
+        square += (double)segments->direction[d][i] * (double)segments->direction[d][i];
+    return square > 0 ? fmax(0, 1 - near_part - 4 * visibility_rounding(s->v) / sqrt(square)) : 0;
+}
+
+/* Segments that begin above their elements, and above all that rises from their planes, and end before the
+ * opening. */
+static void clear_ends(const luminaire_sight *s, const size_t *element, size_t n, ray_packet *segments) {
+    const double rounding = visibility_rounding(s->v);
+    for (size_t i = 0; i < n; i++) {
+        const float end = (float)end_of(s, segments, i);
+        for (int d = 0; d < 3; d++) segments->direction[d][i] *= end;
+        if (element[i] == SIGHT_OPEN) continue;
+        const uint32_t own = s->place != NULL ? s->place[element[i]] : (uint32_t)element[i];
+        const double height = 2 * rounding + (own != VISIBILITY_NOTHING ? visibility_rise(s->v, own) : 0);
+        for (int d = 0; d < 3; d++) {
+            const float up = (float)height * s->m->normal[element[i]][d];
+            segments->origin[d][i] += up;
+            segments->direction[d][i] -= up;
+        }
+    }
+}
+
+/* The light that panes pass of the segments that are blocked. */
+static void pass_panes(const luminaire_sight *s, const ray_packet *segments, size_t n, const size_t *element,
+                       unsigned blocked, double passed[VISIBILITY_PACKET]) {
+    ray_packet cast = {.origin = {{0}}};
+    hit_packet hits;
+    uint32_t self[VISIBILITY_PACKET];
+    size_t lane[VISIBILITY_PACKET], count = 0;
+    double end[VISIBILITY_PACKET], weight[VISIBILITY_PACKET];
+    for (size_t i = 0; i < n; i++) {
+        if (!(blocked >> i & 1)) continue;
+        for (int d = 0; d < 3; d++) {
+            cast.origin[d][count] = segments->origin[d][i];
+            cast.direction[d][count] = segments->direction[d][i];
+        }
+        end[count] = end_of(s, segments, i);
+        weight[count] = 1;
+        self[count] = element[i] == SIGHT_OPEN ? VISIBILITY_NOTHING
+                      : s->place != NULL       ? s->place[element[i]]
+                                               : (uint32_t)element[i];
+        lane[count++] = i;
+    }
+    if (count == 0) return;
+    visibility_cast(s->v, &cast, count, self, VISIBILITY_TOGETHER, &hits);
+    pane_path_reach(s->v, seen_mesh(s), &cast, count, &hits, end, weight);
+    for (size_t k = 0; k < count; k++) passed[lane[k]] = weight[k];
+}
+
 void luminaire_sight_passed(const luminaire_sight *s, const ray_packet *segments, size_t n,
                             const size_t *element, double passed[VISIBILITY_PACKET]) {
     ray_packet cast = *segments;
-    hit_packet hits;
-    uint32_t self[VISIBILITY_PACKET];
-    double end[VISIBILITY_PACKET];
     for (size_t i = 0; i < n; i++) passed[i] = 1;
     if (s->v == NULL) return;
-    const double rounding = visibility_rounding(s->v);
-    for (size_t i = 0; i < n; i++) {
-        double square = 0;
-        for (int d = 0; d < 3; d++) square += (double)cast.direction[d][i] * (double)cast.direction[d][i];
-        end[i] = 1 - near_part - (square > 0 ? 4 * rounding / sqrt(square) : 1);
-        self[i] = element[i] == SIGHT_OPEN ? VISIBILITY_NOTHING
-                  : s->place != NULL       ? s->place[element[i]]
-                                           : (uint32_t)element[i];
-    }
-    visibility_cast(s->v, &cast, n, self, VISIBILITY_TOGETHER, &hits);
-    pane_path_reach(s->v, seen_mesh(s), &cast, n, &hits, end, passed);
+    clear_ends(s, element, n, &cast);
+    const unsigned blocked = visibility_between(s->v, &cast, n);
+    for (size_t i = 0; i < n; i++) passed[i] = blocked >> i & 1 ? 0 : 1;
+    if (s->m->glass != NULL) pass_panes(s, segments, n, element, blocked, passed);
 }
 
 double luminaire_sight_near(const luminaire_sight *s, const placed_source *source, const double moved[3],

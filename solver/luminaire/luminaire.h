@@ -61,11 +61,13 @@ typedef struct luminaire_lamps {
     char type[LUMINAIRE_TEXT], colour[LUMINAIRE_TEXT], rendering[LUMINAIRE_TEXT];
 } luminaire_lamps;
 
-/* TILT: factors of the light by the angle of the lamp, which it is given for the tilt of the luminaire.
- * candela does not contain them. */
+/* TILT: factors of the light by the angle between a lamp and its place while the luminaire is aimed straight
+ * down. candela does not contain them. LM-63 tells lamps that lie apart by what a turn about the axis of its
+ * zero-degree plane, C0 to C180, does to them: those of geometry 2 stay horizontal, as they lie along that
+ * axis, x; those of geometry 3 do not, as they lie across it, along y. */
 typedef struct luminaire_tilt {
     size_t n;     /* 0: none */
-    int geometry; /* 1: the lamp is upright; 2, 3: it lies along C0 or C90 */
+    int geometry; /* 1: the lamp is upright; 2: it lies along C0; 3: along C90 */
     double *angles, *factors;
 } luminaire_tilt;
 
