@@ -262,6 +262,18 @@ static double end_of(const luminaire_sight *s, const ray_packet *segments, size_
     return square > 0 ? fmax(0, 1 - near_part - 4 * visibility_rounding(s->v) / sqrt(square)) : 0;
 }
 
+/* Points that nobody says to lie on a face may do so nevertheless: a segment begins where rounding ends. */
+static void begin_later(const luminaire_sight *s, ray_packet *segments, size_t i) {
+    double square = 0;
+    for (int d = 0; d < 3; d++)
+        square += (double)segments->direction[d][i] * (double)segments->direction[d][i];
+    const float part = square > 0 ? (float)fmin(.5, 4 * visibility_rounding(s->v) / sqrt(square)) : 0;
+    for (int d = 0; d < 3; d++) {
+        segments->origin[d][i] += part * segments->direction[d][i];
+        segments->direction[d][i] *= 1 - part;
+    }
+}
+
 /* Segments that begin above their elements, and above all that rises from their planes, and end before the
  * opening. */
 static void clear_ends(const luminaire_sight *s, const size_t *element, size_t n, ray_packet *segments) {
@@ -309,13 +321,16 @@ static void pass_panes(const luminaire_sight *s, const ray_packet *segments, siz
 
 void luminaire_sight_passed(const luminaire_sight *s, const ray_packet *segments, size_t n,
                             const size_t *element, double passed[VISIBILITY_PACKET]) {
-    ray_packet cast = *segments;
+    ray_packet begun = *segments;
     for (size_t i = 0; i < n; i++) passed[i] = 1;
     if (s->v == NULL) return;
+    for (size_t i = 0; i < n; i++)
+        if (element[i] == SIGHT_OPEN) begin_later(s, &begun, i);
+    ray_packet cast = begun;
     clear_ends(s, element, n, &cast);
     const unsigned blocked = visibility_between(s->v, &cast, n);
     for (size_t i = 0; i < n; i++) passed[i] = blocked >> i & 1 ? 0 : 1;
-    if (s->m->glass != NULL) pass_panes(s, segments, n, element, blocked, passed);
+    if (s->m->glass != NULL) pass_panes(s, &begun, n, element, blocked, passed);
 }
 
 double luminaire_sight_near(const luminaire_sight *s, const placed_source *source, const double moved[3],

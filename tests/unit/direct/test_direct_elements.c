@@ -4,6 +4,8 @@
 #include "solver/scene/glass.h"
 #include "support/placed_list.h"
 
+#include <omp.h>
+
 static lam_error error;
 static const double low[3] = {0, 0, 0}, high[3] = {6, 6, 3};
 
@@ -273,6 +275,26 @@ START_TEST(groups_that_are_not_there_are_refused) {
 }
 END_TEST
 
+/* One thread finds the bits that three find. */
+START_TEST(bits_do_not_depend_on_threads) {
+    const int threads = omp_get_max_threads();
+    mesh m = furnished_room(6);
+    placed_luminaires p = placed_list("%s", three);
+    omp_set_num_threads(1);
+    direct_light one = light_of(&m, &p, 5);
+    omp_set_num_threads(3);
+    direct_light more = light_of(&m, &p, 5);
+    omp_set_num_threads(threads);
+    ck_assert_int_eq(memcmp(one.H, more.H, p.n * m.n * sizeof *one.H), 0);
+    ck_assert_int_eq(memcmp(one.elements_off, more.elements_off, p.n * m.n_groups * sizeof(float)), 0);
+    ck_assert_int_eq(memcmp(one.means_off, more.means_off, p.n * m.n_groups * sizeof(float)), 0);
+    direct_light_free(&one);
+    direct_light_free(&more);
+    placed_free(&p);
+    mesh_free(&m);
+}
+END_TEST
+
 static bool is_cancelled(void *context) {
     (void)context;
     return true;
@@ -302,6 +324,7 @@ int main(void) {
     tcase_add_test(tests, panes_pass_light);
     tcase_add_test(tests, odd_luminaires_are_right);
     tcase_add_test(tests, groups_that_are_not_there_are_refused);
+    tcase_add_test(tests, bits_do_not_depend_on_threads);
     tcase_add_test(tests, work_is_cancelled);
     suite_add_tcase(suite, tests);
     return suite_run_together(suite);

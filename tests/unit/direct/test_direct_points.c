@@ -214,6 +214,71 @@ START_TEST(boxes_follow_the_closed_form) {
 }
 END_TEST
 
+/* The table of tilt-include.ies is 1 at 0, .9 at 45, .88 at 60 and .94 at 90 degrees, and beyond. A lamp of
+ * geometry 2 lies along x, one of geometry 3 along y: it is tilted where that axis is. */
+START_TEST(tilted_lamps_give_less) {
+    static const struct {
+        double aim[3];
+        int geometry;
+        char up;
+        double factor;
+    } cases[] = {{{0, 0, -1}, 1, 'z', 1},
+                 {{1, 0, -1}, 1, 'z', .9},
+                 {{0, 1, -1}, 1, 'z', .9},
+                 {{0, .3, 1}, 1, 'z', .94},
+                 {{0, -1, 0}, 1, 'z', .94},
+                 {{0, -1, 0}, 1, 'y', 1},
+                 {{1, 0, -1}, 2, 'z', .9},
+                 {{0, 1, -1}, 2, 'z', 1},
+                 {{1, 0, -1}, 3, 'z', 1},
+                 {{0, 1, -1}, 3, 'z', .9},
+                 {{1, 0, -.7673269879789604}, 1, 'z', .9 - .02 / 2}}; /* 52.5 degrees */
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        const double *a = cases[k].aim, length = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+        placed_luminaires p = placed_list("{\"name\": \"a\", \"file\": \"" FIXTURES
+                                          "/luminaires/made/tilt-include.ies\", \"at\": [3, 3, 1.5], "
+                                          "\"aim\": [%.17g, %.17g, %.17g]}",
+                                          a[0], a[1], a[2]);
+        mesh m = black_box();
+        m.up = cases[k].up;
+        p.files[0].photometry.tilt.geometry = cases[k].geometry;
+        direct_point point = {.element = DIRECT_OPEN};
+        double normal[1][3];
+        for (int d = 0; d < 3; d++) {
+            point.at[d] = p.luminaires[0].at[d] + a[d] / length;
+            normal[0][d] = -a[d] / length;
+        }
+        float *E = light_of(&m, &p, 1, &point, (const double(*)[3])normal); /* 1000 cd at 1 m */
+        ck_assert_msg(fabs((double)E[0] - 1000 * cases[k].factor) < .01, "%zu: %g", k, (double)E[0]);
+        free(E);
+        placed_free(&p);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
+/* Of a panel behind an edge each point gets what the part of it that the point sees gives: half of it,
+ * straight below the edge. 256 beams in 16 columns are within a column, 1/32 of the whole, of the half. */
+START_TEST(edges_hide_a_part) {
+    static const double up[1][3] = {{0, 0, 1}};
+    obj_text o = {.used = 0};
+    obj_text_room(&o, low, high, 1);
+    mesh open = obj_text_mesh(&o);
+    obj_text_squares(&o, "sheet", (const double[3]){3, 0, 2}, (const double[3]){3, 0, 0},
+                     (const double[3]){0, 6, 0}, 1);
+    mesh m = obj_text_mesh(&o);
+    placed_luminaires p = placed_list("{\"name\": \"a\", \"file\": \"panel.ies\", \"at\": [3, 3, 2.8]}");
+    const direct_point point = {{3, 3, 0}, DIRECT_OPEN};
+    float *E = light_of(&m, &p, 1, &point, up), *all = light_of(&open, &p, 1, &point, up);
+    ck_assert_double_eq_tol((double)E[0], .5 * (double)all[0], (double)all[0] / 32);
+    free(E);
+    free(all);
+    placed_free(&p);
+    mesh_free(&m);
+    mesh_free(&open);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("direct points");
     TCase *tests = tcase_create("direct points");
@@ -222,6 +287,8 @@ int main(void) {
     tcase_add_test(tests, panels_follow_the_closed_form);
     tcase_add_test(tests, spheres_follow_the_closed_form);
     tcase_add_test(tests, boxes_follow_the_closed_form);
+    tcase_add_test(tests, tilted_lamps_give_less);
+    tcase_add_test(tests, edges_hide_a_part);
     suite_add_tcase(suite, tests);
     return suite_run_together(suite);
 }
