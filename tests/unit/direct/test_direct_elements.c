@@ -142,6 +142,44 @@ START_TEST(elements_are_means_of_their_points) {
 }
 END_TEST
 
+/* Large elements that see all of a luminaire, near to it, crossed by edges of its light, and far: within .3 %
+ * of the sum over their points, or of 1e-4 of the brightest. The two rules agree to .8 % of a part
+ * (element_light.c), of which the better one has a third. */
+START_TEST(elements_without_shadows_are_exact) {
+    obj_text o = {.used = 0};
+    size_t elements[54];
+    obj_text_room(&o, low, high, 3);
+    mesh m = obj_text_mesh(&o);
+    placed_luminaires p = placed_list(
+        "{\"name\": \"spot\", \"file\": \"" FIXTURES
+        "/luminaires/made/cos4-2019.ies\", \"at\": [0.3, 3.2, 2.2], "
+        "\"aim\": [-1, 1, -1]},"
+        "{\"name\": \"flood\", \"file\": \"" FIXTURES "/luminaires/made/type-b.ies\", \"at\": [3, 3, 2], "
+        "\"aim\": [1, 0.3, -1]},"
+        "{\"name\": \"uplight\", \"file\": \"" FIXTURES
+        "/luminaires/made/uplight-90-180.ies\", \"at\": [3, 3, 1]},"
+        "{\"name\": \"panel\", \"file\": \"panel.ies\", \"at\": [3.1, 2.8, 0.3]},"
+        "{\"name\": \"box\", \"file\": \"box.ies\", \"at\": [3.1, 2.8, 2.4], \"aim\": [1, 2, -1]}");
+    ck_assert_uint_eq(m.n, 54);
+    for (size_t i = 0; i < m.n; i++) elements[i] = i;
+    double *truth = dense_light(&m, &p, m.n, elements);
+    direct_light light = light_of(&m, &p, 1);
+    for (size_t l = 0; l < p.n; l++) {
+        double brightest = 0;
+        for (size_t i = 0; i < m.n; i++) brightest = fmax(brightest, truth[l * m.n + i]);
+        for (size_t i = 0; i < m.n; i++) {
+            const double found = (double)light.H[l * m.n + i], wanted = truth[l * m.n + i];
+            ck_assert_msg(fabs(found - wanted) <= 3e-3 * wanted + 1e-4 * brightest, "%s %zu: %g for %g",
+                          p.luminaires[l].name, i, found, wanted);
+        }
+    }
+    direct_light_free(&light);
+    free(truth);
+    placed_free(&p);
+    mesh_free(&m);
+}
+END_TEST
+
 /* A luminaire in a housing that is open below gives the room what it gives without it; the line says so. */
 START_TEST(housings_hide_nothing) {
     obj_text o = {.used = 0};
@@ -319,6 +357,7 @@ int main(void) {
     tcase_set_timeout(tests, 300);
     tcase_add_test(tests, rooms_receive_all_light);
     tcase_add_test(tests, elements_are_means_of_their_points);
+    tcase_add_test(tests, elements_without_shadows_are_exact);
     tcase_add_test(tests, housings_hide_nothing);
     tcase_add_test(tests, recessed_luminaires_are_not_hidden);
     tcase_add_test(tests, panes_pass_light);
