@@ -9,7 +9,7 @@
 typedef struct direct_options {
     uint64_t seed;
     size_t segments;          /* of an element and a luminaire: 16, 32 ... 4096; 0: 16 */
-    size_t more_segments;     /* of those that are partly hidden, and of their neighbours; 0: 256 */
+    size_t more_segments;     /* of those that are partly hidden; beside these 64; 0: 256 */
     const progress *progress; /* may be NULL */
     const char *stage;
     size_t n_wanted;

@@ -89,7 +89,9 @@ lam_status ignored_groups_find(const mesh *m, const double (*boxes)[2][3], const
     const double largest = fmax(fmax(opening.size[0], opening.size[1]), opening.size[2]);
     for (size_t g = 0; g < m->n_groups; g++)
         if (wraps(boxes[g], l, fmax(3 * largest, IGNORED_LEAST))) marked[g] = true;
-    mark_backs(m, marked);
+    for (size_t g = 0; g < m->n_groups; g++) found.n += marked[g];
+    if (found.n > 0) mark_backs(m, marked);
+    found.n = 0;
     for (size_t g = 0; g < m->n_groups; g++) found.n += marked[g];
     found.groups = memory_allocate(found.n, sizeof *found.groups, "ignored groups", error);
     if (found.groups == NULL) TRY(LAM_ERR_MEMORY);

@@ -38,6 +38,8 @@ static double of_box(const double direction[3]) {
 
 placed_luminaires placed_list(const char *format, ...) {
     static const placed_options options = {.assets = FIXTURES "/luminaires"};
+    static const char cone[] =
+        "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 10\n0 60\n0\n1000 1000\n";
     char folder[64], entries[8192], text[8300], path[256];
     placed_luminaires p;
     lam_error error = {.message = ""};
@@ -50,6 +52,7 @@ placed_luminaires placed_list(const char *format, ...) {
     write_ies(folder, "panel.ies", ".3 1.2 0", 1, of_panel);
     write_ies(folder, "ball.ies", "-.4 -.4 -.4", 1, of_ball);
     write_ies(folder, "box.ies", ".3 .6 .2", 46, of_box);
+    file_write(folder, "cone.ies", cone, path);
     file_write(folder, "list.json", text, path);
     const lam_status status = placed_read(path, &options, &p, &error);
     folder_remove(folder);

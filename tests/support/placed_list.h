@@ -8,7 +8,8 @@
 /* The luminaires of the entries, a text as printf makes it: {"name": "a", "file": "made/isym3.ldt", ...}.
  * Paths are those of tests/fixtures/luminaires, and these files: "panel.ies" (1000 cos gamma cd below, of 1.2
  * x .3 m: the longer side along x), "ball.ies" (100 cd everywhere, a sphere of .4 m), "box.ies" (a body of
- * one radiance, 1000 cd / m2, .6 x .3 x .2 m: the longer side along x). */
+ * one radiance, 1000 cd / m2, .6 x .3 x .2 m: the longer side along x), "cone.ies" (1000 cd below 60 degrees,
+ * which end with a step, of a point). */
 placed_luminaires placed_list(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* Adds n x n squares of a group from a corner along two edges, whose cross product is the normal. */
