@@ -268,6 +268,15 @@ typedef struct elements_job {
     direct_light *out;
 } elements_job;
 
+/* sum A H over the lumens. */
+static double lit_share(const element_run *r) {
+    const placed_source *source = &r->luminaire->source;
+    const double lumens = source->factor * luminaire_lumens(source->photometry);
+    double sum = 0;
+    for (size_t i = 0; i < r->m->n; i++) sum += r->m->area[i] * (double)r->H[i];
+    return lumens > 0 ? sum / lumens : 1;
+}
+
 static lam_status light_luminaire(void *context, const luminaire_run *run, lam_error *error) {
     lam_status status = LAM_OK;
     elements_job *job = context;
@@ -282,6 +291,7 @@ static lam_status light_luminaire(void *context, const luminaire_run *run, lam_e
     add_errors(r, job->out->elements_off + row * r->m->n_groups, job->out->means_off + row * r->m->n_groups,
                job->sums);
     TRY(report_luminaire(r->m, run, &job->out->reports[row], error));
+    job->out->reports[row].lit_share = lit_share(r);
 done:
     return status;
 }
@@ -362,7 +372,7 @@ static void add_text(char line[DIRECT_LINE], const char *text) {
 
 void direct_report_line(const mesh *m, const placed_luminaires *p, const direct_report *r,
                         char line[DIRECT_LINE]) {
-    const double half = .5;
+    const double half = .5, unlit = .01;
     char figure[128];
     line[0] = '\0';
     if (r->n_ignored > 0) {
@@ -375,6 +385,11 @@ void direct_report_line(const mesh *m, const placed_luminaires *p, const direct_
     if (r->near_share > half) {
         snprintf(figure, sizeof figure, "%s%.0f %% of its light ends within %g m of it", line[0] ? "; " : "",
                  100 * r->near_share, DIRECT_NEAR);
+        add_text(line, figure);
+    }
+    if (r->lit_share < unlit) {
+        snprintf(figure, sizeof figure, "%sless than %g %% of its light reaches a face", line[0] ? "; " : "",
+                 100 * unlit);
         add_text(line, figure);
     }
     if (r->n_inside > 0) {

@@ -26,6 +26,7 @@ typedef struct direct_report {
     uint32_t *ignored; /* [n_ignored], ascending */
     size_t n_named;    /* of them, those that its `ignore` names */
     double near_share; /* of its flux, that ends nearer than DIRECT_NEAR */
+    double lit_share;  /* of its flux, that elements receive; 1 where it has none */
     size_t n_inside;   /* elements whose middle lies in the box about its opening: no number is true there */
 } direct_report;
 

@@ -359,13 +359,14 @@ double luminaire_sight_near(const luminaire_sight *s, const placed_source *sourc
             opening_place(&source->opening, u, w, &cell);
             weight[i] = opening_part(&source->opening, &cell, own) * placed_source_intensity(source, own);
             placed_source_outwards(source, cell.at, place);
-            for (int d = 0; d < 3; d++) place[d] += moved[d];
-            luminaire_sight_recentre(s, place, origin);
             for (int d = 0; d < 3; d++) {
-                rays.origin[d][i] = origin[d];
-                rays.direction[d][i] = (float)(own[0] * source->frame[0][d] + own[1] * source->frame[1][d] +
-                                               own[2] * source->frame[2][d]);
+                const double way = own[0] * source->frame[0][d] + own[1] * source->frame[1][d] +
+                                   own[2] * source->frame[2][d];
+                place[d] += moved[d] + 4 * visibility_rounding(s->v) * way; /* it may lie in a face */
+                rays.direction[d][i] = (float)way;
             }
+            luminaire_sight_recentre(s, place, origin);
+            for (int d = 0; d < 3; d++) rays.origin[d][i] = origin[d];
         }
         visibility_cast(s->v, &rays, VISIBILITY_PACKET, self, 0, &hits);
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {

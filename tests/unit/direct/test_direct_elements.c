@@ -297,6 +297,9 @@ START_TEST(odd_luminaires_are_right) {
     direct_light light = light_of(&m, &p, 3);
     for (size_t k = 0; k < p.n * m.n; k++) ck_assert(isfinite(light.H[k]) && light.H[k] >= 0);
     ck_assert_double_eq(flux_on(&m, &light, 0, NULL), 0);
+    char line[DIRECT_LINE];
+    direct_report_line(&m, &p, &light.reports[0], line);
+    ck_assert_str_eq(line, "luminaire outside: less than 1 % of its light reaches a face");
     ck_assert_double_gt(flux_on(&m, &light, 1, "ceiling"), 1);
     ck_assert_double_gt(flux_on(&m, &light, 2, "floor"), 100);
     ck_assert_double_eq(flux_on(&m, &light, 3, NULL), 0);
