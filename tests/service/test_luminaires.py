@@ -409,5 +409,58 @@ class Kinds(unittest.TestCase):
                          (422, "emission/luminaires: luminaires are answered by other kinds of stores, not by one of few emitters"))
 
 
+class Precomputed(unittest.TestCase):
+    """Of a store that `lambert precompute --luminaires` made: the daemon says and answers what the command line does."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="lambert-luminaires-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = path = pathlib.Path(folder.name)
+        (path / "spot.ies").write_text("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 4 1 1 2 .3 1.2 0\n1 1 30\n0 30 60 90\n0\n1000 850 450 0\n")
+        (path / "lights.json").write_text(json.dumps({"luminaires": [
+            {"name": "row", "file": "spot.ies", "from": [1, 1, 2.8], "steps": [[2, 0, 0]], "counts": [2], "dim": .7},
+            {"name": "desk", "file": "spot.ies", "at": [2, 3, 2.8], "aim": [0, 1, -2], "colour": [1.2, 1, .4]}]}))
+        (path / "yard.obj").write_text(YARD)
+        (path / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
+        must("precompute", path / "yard.obj", "-o", path / "yard.h5", "--elements", 600, "--luminaires", path / "lights.json", "--lights",
+             "lm", "--method", "low-rank", "--epsilon", ".2")
+        cls.daemon = Daemon(path / "yard.h5")
+        cls.addClassCleanup(cls.daemon.__exit__, None, None, None)
+
+    def test_answers_are_those_of_solve(self):
+        for quantity in QUANTITIES:
+            for of in {"row": .4, "desk": 1}, {"row.1": 2}:
+                dims = [word for name, value in of.items() for word in ("--dim", f"{name}={value}")]
+                told = json.loads(must("solve", self.folder / "yard.h5", *dims, "--quantity", quantity, "--json").stdout)
+                must("solve", self.folder / "yard.h5", *dims, "--quantity", quantity, "-o", self.folder / "o.npy")
+                wanted = np.load(self.folder / "o.npy")
+                answer = self.daemon.radiosity("yard", {"emission": {"luminaires": of}, "quantity": quantity}).json()
+                self.assertEqual(answer["unit"], "lx" if quantity == "irradiance" else "lm/m2")
+                got = np.reshape(answer[quantity], wanted.shape)
+                self.assertLessEqual(np.abs(got - wanted).max(), SAME * np.abs(wanted).max(), (quantity, of))
+                self.assertEqual(answer["error"]["light"], "own")
+                stated = told["error"]["stated"] if "stated" in told["error"] else told["error"]
+                self.assertAlmostEqual(answer["error"]["stated"] / stated, 1, delta=1e-4, msg=(quantity, of))
+
+    def test_the_list_is_that_of_the_command_line(self):
+        told = json.loads(must("luminaire", self.folder / "lights.json", "--json").stdout)
+        got = self.daemon.get("/v1/scenes/yard/luminaires").json()
+        for one in told["luminaires"]:
+            one["lumens"] /= one["dim"]  # the list's are as dim as it says
+        self.assertAlmostEqual(got["lumens"], sum(one["lumens"] for one in told["luminaires"]), delta=1e-5)
+        self.assertEqual([(g["name"], g["luminaires"]) for g in got["groups"]], [(g["name"], g["luminaires"]) for g in told["groups"]])
+        self.assertEqual(len(got["luminaires"]), 3)
+        for one, of in zip(got["luminaires"], told["luminaires"]):
+            for member, value in one.items():
+                if isinstance(value, (float, list)):
+                    np.testing.assert_allclose(value, of[member], rtol=1e-9, atol=1e-12, err_msg=member)
+                elif member == "opening":
+                    self.assertEqual(value["shape"], of[member]["shape"])
+                    np.testing.assert_allclose(value["size"], of[member]["size"], rtol=1e-9)
+                else:
+                    self.assertEqual(value, of[member])
+
+
 if __name__ == "__main__":
     unittest.main()
