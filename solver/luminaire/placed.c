@@ -286,19 +286,6 @@ done:
     return status;
 }
 
-static void warn_of_tilt(placed_luminaires *p) {
-    for (size_t k = 0; k < p->n_files; k++) {
-        size_t tilted = 0;
-        for (size_t j = 0; j < p->n; j++)
-            tilted += p->luminaires[j].file == k && p->luminaires[j].z[2] < 1 - 1e-9;
-        if (p->files[k].photometry.tilt.n > 0 && tilted > 0)
-            luminaire_warnings_add(
-                &p->warnings,
-                "factors of TILT in %.200s are not applied, but %zu of its luminaires %s tilted",
-                p->files[k].name, tilted, tilted == 1 ? "is" : "are");
-    }
-}
-
 lam_status placed_read(const char *path, const placed_options *options, placed_luminaires *out,
                        lam_error *error) {
     lam_status status = LAM_OK;
@@ -312,7 +299,6 @@ lam_status placed_read(const char *path, const placed_options *options, placed_l
     TRY(placed_read_text(path, text, length, options, &p, error));
     TRY(read_files(&p, path, options, error));
     TRY(apply_fluxes(&p, path, error));
-    warn_of_tilt(&p);
     *out = p;
     p = (placed_luminaires){.n = 0};
 done:

@@ -90,22 +90,6 @@ START_TEST(files_that_are_wrong) {
 }
 END_TEST
 
-START_TEST(tilted_lamps_are_warned_of) {
-    const placed_options options = {.assets = NULL};
-    lam_error error = {0};
-    placed_luminaires p = {.n = 0};
-    file("t.ies",
-         "IESNA91\nTILT=INCLUDE\n1\n2\n0 90\n1 .5\n1 1000 1 2 1 1 2 0 0 0\n1 1 10\n0 90\n0\n10 10\n");
-    ck_ok(placed_read(file("l.json", ONE("\"file\": \"t.ies\"")), &options, &p, &error));
-    ck_assert_str_eq(p.warnings.text, "");
-    placed_free(&p);
-    ck_ok(placed_read(file("l.json", ONE("\"file\": \"t.ies\", \"aim\": [1, 0, -1]")), &options, &p, &error));
-    ck_assert_str_eq(p.warnings.text,
-                     "factors of TILT in t.ies are not applied, but 1 of its luminaires is tilted");
-    placed_free(&p);
-}
-END_TEST
-
 START_TEST(content_tells_lists_from_luminaires) {
     static const struct {
         const char *name, *text;
@@ -137,7 +121,6 @@ int main(void) {
     tcase_add_checked_fixture(tests, setup, teardown);
     tcase_add_test(tests, files_are_read_once);
     tcase_add_test(tests, files_that_are_wrong);
-    tcase_add_test(tests, tilted_lamps_are_warned_of);
     tcase_add_test(tests, content_tells_lists_from_luminaires);
     tcase_set_timeout(tests, 120);
     suite_add_tcase(suite, tests);
