@@ -118,14 +118,16 @@ void portals_free(portals *p) {
     *p = (portals){.n = 0};
 }
 
-/* An element as it aims. */
+/* An element, or a point, as it aims. */
 typedef struct aiming {
     double centre[3], normal[3], radius;
+    bool all_round; /* it receives light from all sides, alike, and has no normal */
 } aiming;
 
 /* 0 where a point is in the plane of the element, as far as that is plane. */
 static double cosine_to(const aiming *from, const double at[3]) {
     double r[3];
+    if (from->all_round) return 1;
     for (int d = 0; d < 3; d++) r[d] = at[d] - from->centre[d];
     const double length = sqrt(dot3(r, r));
     return dot3(r, from->normal) > plane_flatness * length ? dot3(r, from->normal) / length : 0;
@@ -208,7 +210,7 @@ static double weight_of(const portals *p, const aiming *from, const choice *c) {
             height += ((corner >> d & 1 ? n->high[d] : n->low[d]) - from->centre[d]) * from->normal[d];
         farthest = fmax(farthest, height);
     }
-    if (!(farthest > 0)) return 0;
+    if (!(farthest > 0 || from->all_round)) return 0;
     const double size = size_of(p, from, c, &distance), least = fmax(distance, size);
     return n->power / (M_PI * least * least);
 }
@@ -291,9 +293,27 @@ portal_aim portals_all(const portals *p) {
         .group = {{.count = (uint32_t)p->n, .to = {1, 1}, .share = 1, .area = p->before[p->n]}}};
 }
 
-void portals_aim(const portals *p, const mesh *m, const visibility *v, size_t element, portal_aim *out) {
+static void aim_from(const portals *p, const aiming *from, portal_aim *out) {
     choice of[PORTAL_GROUPS];
     size_t n = 0;
+    if (p->n > 0) {
+        of[0] = (choice){.node = p->node, .to = {1, 1}};
+        weigh(p, from, &of[0]);
+        n = of[0].weight > 0;
+    }
+    for (size_t g; n < PORTAL_GROUPS && (g = widest(n, of)) < n;) {
+        choice half[2];
+        halve(p, &of[g], half);
+        of[g] = of[--n];
+        for (int h = 0; h < 2; h++) {
+            weigh(p, from, &half[h]);
+            if (half[h].weight > 0) of[n++] = half[h];
+        }
+    }
+    share_rays(p, n, of, out);
+}
+
+void portals_aim(const portals *p, const mesh *m, const visibility *v, size_t element, portal_aim *out) {
     aiming from = {.radius = 0};
     mesh_centroid(m, element, from.centre);
     for (size_t c = 0; c < mesh_corners(m, element); c++) {
@@ -308,21 +328,16 @@ void portals_aim(const portals *p, const mesh *m, const visibility *v, size_t el
         from.normal[d] = (double)m->normal[element][d];
         from.centre[d] -= visibility_centre(v)[d];
     }
-    if (p->n > 0) {
-        of[0] = (choice){.node = p->node, .to = {1, 1}};
-        weigh(p, &from, &of[0]);
-        n = of[0].weight > 0;
+    aim_from(p, &from, out);
+}
+
+void portals_aim_at(const portals *p, const double at[3], const double *normal, portal_aim *out) {
+    aiming from = {.all_round = normal == NULL};
+    for (int d = 0; d < 3; d++) {
+        from.centre[d] = at[d];
+        from.normal[d] = normal != NULL ? normal[d] : 0;
     }
-    for (size_t g; n < PORTAL_GROUPS && (g = widest(n, of)) < n;) {
-        choice half[2];
-        halve(p, &of[g], half);
-        of[g] = of[--n];
-        for (int h = 0; h < 2; h++) {
-            weigh(p, &from, &half[h]);
-            if (half[h].weight > 0) of[n++] = half[h];
-        }
-    }
-    share_rays(p, n, of, out);
+    aim_from(p, &from, out);
 }
 
 void portals_point(const portals *p, const portal_aim *aim, double x, double y, double point[3]) {

@@ -69,6 +69,9 @@ portal_aim portals_all(const portals *p);
 /* Chooses the groups of an element by its place, its normal and the strengths. Cost: some microseconds. */
 void portals_aim(const portals *p, const mesh *m, const visibility *v, size_t element, portal_aim *out);
 
+/* The same for a point in recentred coordinates, with a normal or, NULL, with light from all sides alike. */
+void portals_aim_at(const portals *p, const double at[3], const double *normal, portal_aim *out);
+
 /* Weighs the groups of an element by the share of each that is seen as open, [n], by few rays. */
 void portal_aim_weigh(portal_aim *aim, const double *open);
 
