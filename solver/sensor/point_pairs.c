@@ -1,0 +1,201 @@
+/* The pairs of a receiver: w_j = F_j sum_k K_k T_k / sum_k K_k, with the unoccluded factor F_j, samples k on
+ * the element, their kernels K = density cos / r^2 and T what reaches the receiver: 0, 1, or what panes pass.
+ */
+#include "solver/sensor/point_rows.h"
+
+#include "solver/base/random.h"
+#include "solver/base/vector3.h"
+#include "solver/formfactor/visibility/pane_path.h"
+#include "solver/formfactor/visibility/sample.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Segments of a pair, of a half, and of one that is partly hidden. */
+enum { SEGMENTS = 8, MORE_SEGMENTS = 128 };
+
+/* Panes pass light by its angle: shares that differ by less are one. */
+static const double same_share = .02;
+
+/* True where a point of the plane of an element lies in it, or on its rim. */
+static bool is_over(const mesh *m, size_t element, const double at[3], double slack) {
+    const size_t n = mesh_corners(m, element);
+    double normal[3];
+    for (int d = 0; d < 3; d++) normal[d] = (double)m->normal[element][d];
+    for (size_t c = 0; c < n; c++) {
+        const double *a = m->vertices[m->elements[element][c]],
+                     *b = m->vertices[m->elements[element][(c + 1) % n]];
+        double edge[3], way[3], inwards[3];
+        subtract3(b, a, edge);
+        subtract3(at, a, way);
+        cross3(normal, edge, inwards);
+        if (dot3(inwards, way) < -slack * sqrt(dot3(inwards, inwards))) return false;
+    }
+    return true;
+}
+
+void point_place_set(const point_scene *s, const receiver *r, size_t number, point_place *out) {
+    enum { FACES_MOST = 3 };
+    static const double against = -.9; /* cosine: it looks into the face */
+    const mesh *m = s->m;
+    const double rounding = visibility_rounding(s->v);
+    /* rounding = 4 2^-24 radius */
+    const double radius = rounding * 0x1p22, near = fmax(fmin(1e-3, 1e-4 * radius), 4 * rounding);
+    double normals[FACES_MOST][3];
+    size_t n_faces = 0;
+    *out = (point_place){.r = *r, .number = number};
+    for (size_t j = 0; j < m->n && n_faces < FACES_MOST; j++) {
+        const double *ball = s->ball[j];
+        double away[3], normal[3], height = 0;
+        bool apart = mesh_is_buried(m, j);
+        subtract3(out->r.at, ball, away);
+        const double reach = ball[3] + near;
+        if (apart || dot3(away, away) > reach * reach) continue;
+        for (int d = 0; d < 3; d++) normal[d] = (double)m->normal[j][d];
+        height = dot3(away, normal);
+        const double clear = 2 * rounding + visibility_rise(s->v, j);
+        if (!(height >= -near && height < clear) || dot3(normal, r->axis) < against) continue;
+        for (size_t k = 0; k < n_faces; k++) apart = apart || dot3(normals[k], normal) < -.5;
+        if (apart || !is_over(m, j, out->r.at, near)) continue;
+        for (int d = 0; d < 3; d++) out->r.at[d] += (clear - height) * normal[d];
+        memcpy(normals[n_faces++], normal, sizeof normal);
+    }
+    visibility_recentre(s->v, out->r.at, out->origin);
+}
+
+/* The segment to a point of an element, lifted off it; K = density cos / r^2, 0 where either turns away. */
+static double aim(const point_scene *s, const point_place *p, const element_sampler *sampler, uint32_t j,
+                  const pair_sampler *points, uint32_t index, float segment[3]) {
+    const double height = 2 * visibility_rounding(s->v) + visibility_rise(s->v, j);
+    double x[4], way[3];
+    float point[3];
+    pair_sampler_place(points, index, x);
+    element_sampler_point(sampler, (float)x[0], (float)x[1], point);
+    for (int d = 0; d < 3; d++) {
+        way[d] = (double)point[d] - (double)p->origin[d];
+        segment[d] = (float)(way[d] + height * (double)s->m->normal[j][d]);
+    }
+    const double square = dot3(way, way);
+    double cosine = 0;
+    if (!(square > 0)) return 0;
+    for (int d = 0; d < 3; d++) {
+        way[d] /= sqrt(square);
+        cosine -= way[d] * (double)s->m->normal[j][d];
+    }
+    return cosine > 0 ? receiver_density(&p->r, way) * cosine / square : 0;
+}
+
+/* passed[i] of n segments from the receiver: 0, 1, or what panes pass. */
+static void pass(const point_scene *s, const ray_packet *segments, size_t n,
+                 double passed[VISIBILITY_PACKET]) {
+    static const uint32_t self[VISIBILITY_PACKET] = {
+        VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING,
+        VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING};
+    static const double nearly = 1 - 1e-5;
+    const unsigned blocked = visibility_between(s->v, segments, n);
+    ray_packet cast = *segments;
+    hit_packet hits;
+    double end[VISIBILITY_PACKET];
+    for (size_t i = 0; i < n; i++) {
+        passed[i] = 1;
+        end[i] = nearly;
+    }
+    if (blocked != 0 && s->m->glass != NULL) {
+        visibility_cast(s->v, &cast, n, self, VISIBILITY_TOGETHER, &hits);
+        pane_path_reach(s->v, s->m, &cast, n, &hits, end, passed);
+    }
+    for (size_t i = 0; i < n; i++)
+        if ((blocked >> i & 1) == 0)
+            passed[i] = 1;
+        else if (s->m->glass == NULL)
+            passed[i] = 0;
+}
+
+/* Sums of samples of a pair. */
+typedef struct share_sums {
+    double K, passed, least, most;
+    size_t n; /* those with K > 0 */
+} share_sums;
+
+/* Adds samples first ... last-1 of a half. */
+static void add_samples(const point_scene *s, const point_place *p, const element_sampler *sampler,
+                        uint32_t j, const pair_sampler *points, uint32_t first, uint32_t last,
+                        share_sums *sums) {
+    ray_packet segments = {.origin = {{0}}};
+    double K[VISIBILITY_PACKET], passed[VISIBILITY_PACKET];
+    size_t n = 0;
+    for (uint32_t k = first; k < last; k++) {
+        float segment[3];
+        K[n] = aim(s, p, sampler, j, points, k, segment);
+        for (int d = 0; d < 3; d++) {
+            segments.origin[d][n] = p->origin[d];
+            segments.direction[d][n] = segment[d];
+        }
+        n += K[n] > 0;
+        if (n == 0 || (n < VISIBILITY_PACKET && k + 1 < last)) continue;
+        pass(s, &segments, n, passed);
+        sums->n += n;
+        for (size_t i = 0; i < n; i++) {
+            sums->K += K[i];
+            sums->passed += K[i] * passed[i];
+            sums->least = fmin(sums->least, passed[i]);
+            sums->most = fmax(sums->most, passed[i]);
+        }
+        n = 0;
+    }
+}
+
+/* The share of an element's light that reaches the receiver, by both halves. An element of which so little
+ * lies above the receiver's horizon that no sample of a half does has the share of the other half, or 1. */
+static void find_shares(const point_scene *s, const point_place *p, uint32_t j, double share[HALVES]) {
+    element_sampler sampler;
+    pair_sampler points[HALVES];
+    share_sums sums[HALVES];
+    element_sampler_init(&sampler, s->m, s->v, j, s->seed);
+    for (size_t h = 0; h < HALVES; h++) {
+        sums[h] = (share_sums){.least = INFINITY, .most = -INFINITY};
+        pair_sampler_init(&points[h], s->seed + h * RANDOM_STEP, s->m->n + p->number, j);
+        add_samples(s, p, &sampler, j, &points[h], 0, SEGMENTS, &sums[h]);
+    }
+    const bool partly = fmax(sums[0].most, sums[1].most) - fmin(sums[0].least, sums[1].least) > same_share,
+               few = sums[0].n + sums[1].n < SEGMENTS;
+    for (size_t h = 0; h < HALVES && (partly || few); h++)
+        add_samples(s, p, &sampler, j, &points[h], SEGMENTS, MORE_SEGMENTS, &sums[h]);
+    for (size_t h = 0; h < HALVES; h++) {
+        const share_sums *known = sums[h].K > 0 ? &sums[h] : &sums[1 - h];
+        share[h] = known->K > 0 ? known->passed / known->K : 1;
+    }
+}
+
+/* True unless an element is certain to turn its back or to have a smaller factor. */
+static bool may_exceed(const point_scene *s, const receiver *r, size_t j, double least) {
+    const double *ball = s->ball[j];
+    double away[3], height = 0;
+    subtract3(ball, r->at, away);
+    for (int d = 0; d < 3; d++) height -= away[d] * (double)s->m->normal[j][d];
+    if (!(height > 0)) return false;
+    if (r->kind == RECEIVER_PLANE && dot3(away, r->axis) <= -ball[3]) return false;
+    if (s->is_source[j]) return true;
+    /* F <= max density A cos / r^2, with the nearest r of the ball */
+    const double distance = sqrt(dot3(away, away)), nearest = distance - ball[3];
+    if (!(nearest > 0)) return true;
+    const double cosine = fmin(height / nearest, 1);
+    return receiver_density_most(r->kind) * s->m->area[j] * cosine > least * nearest * nearest;
+}
+
+void point_pairs(const point_scene *s, const point_place *p, point_room *room) {
+    const double least = 1. / (double)(HALVES * s->rays);
+    room->n_pairs = 0;
+    for (size_t j = 0; j < s->m->n; j++) {
+        if (!may_exceed(s, &p->r, j, least) || mesh_is_buried(s->m, j)) continue;
+        polygon face;
+        polygon_of_element(s->m, j, &face);
+        const double factor = receiver_factor(&p->r, &face);
+        if (!(factor > least || (s->is_source[j] && factor > 0))) continue;
+        double share[HALVES];
+        find_shares(s, p, (uint32_t)j, share);
+        for (size_t h = 0; h < HALVES; h++) room->factor[room->n_pairs][h] = factor * share[h];
+        room->known[j] |= IS_PAIR;
+        room->pair[room->n_pairs++] = (uint32_t)j;
+    }
+}

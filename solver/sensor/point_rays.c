@@ -1,0 +1,220 @@
+/* The rays of a receiver. N rays of a half have the density of its weight, p = weight / pi, and M are aimed
+ * at openings with the density q; one that leaves the scene counts p / (N p + M q). Rays that meet pairs
+ * count nothing: the factors of these are known. */
+#include "solver/sensor/point_rows.h"
+
+#include "solver/base/random.h"
+#include "solver/base/vector3.h"
+#include "solver/formfactor/visibility/pane_path.h"
+#include "solver/formfactor/visibility/sobol.h"
+
+#include <math.h>
+
+/* Rays of a packet, in double. */
+typedef struct aimed_packet {
+    ray_packet rays;
+    double direction[VISIBILITY_PACKET][3];
+    double density[VISIBILITY_PACKET]; /* p; 0: not cast */
+} aimed_packet;
+
+/* A half of the rays while they are cast. */
+typedef struct half_rays {
+    const point_scene *s;
+    const point_place *p;
+    point_room *room;
+    size_t half;
+    portal_aim aim;
+    double others, backs, left; /* shares: of elements that are no pairs, of backs, of the sky */
+} half_rays;
+
+static void add_met(point_room *room, size_t half, uint32_t j, double weight) {
+    if ((room->known[j] & IS_PAIR) != 0) return;
+    if ((room->known[j] & IS_MET) == 0) room->met[room->n_met++] = j;
+    room->known[j] |= IS_MET;
+    room->sum[j][half] += weight;
+}
+
+/* A pane behind others shows its own light too. */
+typedef struct pane_meeting {
+    point_room *room;
+    size_t half;
+    double weight;
+} pane_meeting;
+
+static void meet_pane(void *context, uint32_t element, double passed) {
+    const pane_meeting *m = context;
+    add_met(m->room, m->half, element, m->weight * passed);
+}
+
+/* p / (N p + M q) of a ray that leaves. */
+static double leaving_weight(const half_rays *h, const double direction[3], double density) {
+    const point_scene *s = h->s;
+    double sum = (double)s->rays * density, origin[3];
+    for (int d = 0; d < 3; d++) origin[d] = (double)h->p->origin[d];
+    if (h->aim.n > 0) sum += (double)s->aimed * portals_density(&s->openings, &h->aim, origin, direction);
+    return sum > 0 ? density / sum : 0;
+}
+
+/* Adds rays that leave the scene to the tiles. */
+static void add_leaving(half_rays *h, const aimed_packet *packet, const hit_packet *hits,
+                        const double passed[VISIBILITY_PACKET]) {
+    uint32_t tile[SKY_PACKET];
+    const sky_bounce *sky = h->s->sky;
+    if (sky != NULL) sky_tiling_find(&sky->tiling, packet->rays.direction, tile);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        if (hits->element[i] != VISIBILITY_NOTHING || !(packet->density[i] > 0)) continue;
+        const double weight = leaving_weight(h, packet->direction[i], packet->density[i]);
+        h->left += weight;
+        if (sky != NULL) h->room->sky[tile[i]][h->half] += weight * passed[i];
+    }
+}
+
+/* Casts a packet; aimed: it looks for the sky alone. */
+static void cast(half_rays *h, aimed_packet *packet, bool aimed) {
+    static const uint32_t self[VISIBILITY_PACKET] = {
+        VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING,
+        VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING};
+    const point_scene *s = h->s;
+    const double each = 1 / (double)s->rays;
+    double passed[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
+    hit_packet hits;
+    const unsigned how = aimed ? VISIBILITY_TOGETHER : 0;
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++)
+        for (int d = 0; d < 3; d++) {
+            packet->rays.origin[d][i] = h->p->origin[d];
+            packet->rays.direction[d][i] = (float)packet->direction[i][d];
+        }
+    visibility_cast(s->v, &packet->rays, VISIBILITY_PACKET, self, how, &hits);
+    if (s->m->glass != NULL) {
+        pane_meeting meeting = {.room = h->room, .half = h->half, .weight = each};
+        const pane_visitor visitor = {.meet = meet_pane, .context = &meeting};
+        for (size_t i = 0; i < VISIBILITY_PACKET && !aimed; i++)
+            if (hits.element[i] != VISIBILITY_NOTHING && !hits.back[i] && mesh_is_pane(s->m, hits.element[i]))
+                meet_pane(&meeting, hits.element[i], 1);
+        pane_path_follow(s->v, s->m, &packet->rays, VISIBILITY_PACKET, &hits, passed,
+                         aimed ? NULL : &visitor);
+    }
+    add_leaving(h, packet, &hits, passed);
+    for (size_t i = 0; i < VISIBILITY_PACKET && !aimed; i++) {
+        if (hits.element[i] == VISIBILITY_NOTHING) continue;
+        if (hits.back[i]) {
+            h->backs += each;
+        } else {
+            if ((h->room->known[hits.element[i]] & IS_PAIR) == 0) h->others += each;
+            add_met(h->room, h->half, hits.element[i], passed[i] * each);
+        }
+    }
+}
+
+/* Coordinates 0 and 1 of point k, or 2 and 3, of Sobol's sequence, moved by random bits. */
+static void place(uint64_t shift, uint32_t k, int first, double x[2]) {
+    x[0] = (double)((uint32_t)shift ^ sobol_coordinate(first, k)) * 0x1p-32;
+    x[1] = (double)((uint32_t)(shift >> 32) ^ sobol_coordinate(first + 1, k)) * 0x1p-32;
+}
+
+static void cast_by_weight(half_rays *h, uint64_t shift) {
+    for (uint32_t first = 0; first < h->s->rays; first += VISIBILITY_PACKET) {
+        aimed_packet packet;
+        for (uint32_t i = 0; i < VISIBILITY_PACKET; i++) {
+            double x[2];
+            place(shift, first + i, 0, x);
+            receiver_direction(&h->p->r, x[0], x[1], packet.direction[i]);
+            packet.density[i] = receiver_density(&h->p->r, packet.direction[i]);
+        }
+        cast(h, &packet, false);
+    }
+}
+
+/* Rays to points of the openings of an aim. */
+static void aim_packet(const half_rays *h, const portal_aim *aim, uint64_t shift, uint32_t first,
+                       aimed_packet *packet) {
+    for (uint32_t i = 0; i < VISIBILITY_PACKET; i++) {
+        double x[2], to[3];
+        place(shift, first + i, 0, x);
+        portals_point(&h->s->openings, aim, x[0], x[1], to);
+        for (int d = 0; d < 3; d++) to[d] -= (double)h->p->origin[d];
+        const double length = sqrt(dot3(to, to));
+        for (int d = 0; d < 3; d++) packet->direction[i][d] = length > 0 ? to[d] / length : d == 2;
+        packet->density[i] = length > 0 ? receiver_density(&h->p->r, packet->direction[i]) : 0;
+    }
+}
+
+/* Weighs the groups of openings by eight rays to each, where there are several. These are others than those
+ * that count, so that the estimate stays without bias. */
+static void try_openings(half_rays *h, uint64_t shift) {
+    double open[PORTAL_GROUPS];
+    if (h->aim.n < 2) return;
+    for (size_t g = 0; g < h->aim.n; g++) {
+        static const uint32_t self[VISIBILITY_PACKET] = {
+            VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING,
+            VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING};
+        portal_aim alone = {.n = 1, .group = {h->aim.group[g]}};
+        aimed_packet packet;
+        hit_packet hits;
+        double passed[VISIBILITY_PACKET], all = 0;
+        alone.group[0].share = 1;
+        aim_packet(h, &alone, random_hash(shift + g), 0, &packet);
+        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+            passed[i] = packet.density[i];
+            all += packet.density[i];
+            for (int d = 0; d < 3; d++) {
+                packet.rays.origin[d][i] = h->p->origin[d];
+                packet.rays.direction[d][i] = (float)packet.direction[i][d];
+            }
+        }
+        visibility_cast(h->s->v, &packet.rays, VISIBILITY_PACKET, self, VISIBILITY_TOGETHER, &hits);
+        pane_path_follow(h->s->v, h->s->m, &packet.rays, VISIBILITY_PACKET, &hits, passed, NULL);
+        open[g] = 0;
+        for (size_t i = 0; i < VISIBILITY_PACKET; i++)
+            if (hits.element[i] == VISIBILITY_NOTHING) open[g] += passed[i];
+        open[g] = all > 0 ? open[g] / all : 0;
+    }
+    portal_aim_weigh(&h->aim, open);
+}
+
+/* In a scene without panes all that a receiver sees at first is a pair, another element, a back or the sky:
+ * the shares sum to 1. The pairs' are known, and the sky's where rays are aimed at it; all others are
+ * scaled to fill the rest. Where a half has met nothing else, its pairs fill all. */
+static void close_half(half_rays *h) {
+    point_room *room = h->room;
+    double pairs = 0;
+    for (size_t k = 0; k < room->n_pairs; k++) pairs += room->factor[k][h->half];
+    const bool sky_is_known = h->aim.n > 0;
+    const double found = h->others + h->backs + (sky_is_known ? 0 : h->left),
+                 rest = fmax(1 - pairs - (sky_is_known ? h->left : 0), 0);
+    if (found > 0) {
+        const double scale = rest / found;
+        for (size_t k = 0; k < room->n_met; k++) room->sum[room->met[k]][h->half] *= scale;
+        for (size_t t = 0; h->s->sky != NULL && !sky_is_known && t <= h->s->sky->tiling.n_tiles; t++)
+            room->sky[t][h->half] *= scale;
+        h->backs *= scale;
+    } else if (h->left == 0 && pairs > .5) {
+        for (size_t k = 0; k < room->n_pairs; k++) room->factor[k][h->half] /= pairs;
+    }
+}
+
+void point_rays(const point_scene *s, const point_place *p, point_room *room) {
+    half_rays both = {.s = s, .p = p, .room = room};
+    const uint64_t own = random_hash(random_hash(s->seed) ^ random_hash(p->number + 1));
+    room->n_met = 0;
+    room->backs = 0;
+    if (s->aimed > 0) {
+        const double *normal = p->r.kind == RECEIVER_PLANE ? p->r.axis : NULL;
+        double at[3];
+        for (int d = 0; d < 3; d++) at[d] = (double)p->origin[d];
+        portals_aim_at(&s->openings, at, normal, &both.aim);
+        try_openings(&both, random_hash(own + 2 * HALVES));
+    }
+    for (size_t half = 0; half < HALVES; half++) {
+        half_rays h = both;
+        h.half = half;
+        cast_by_weight(&h, random_hash(own + half));
+        for (uint32_t k = 0; h.aim.n > 0 && k < s->aimed; k += VISIBILITY_PACKET) {
+            aimed_packet packet;
+            aim_packet(&h, &h.aim, random_hash(own + HALVES + half), k, &packet);
+            cast(&h, &packet, true);
+        }
+        if (s->m->glass == NULL) close_half(&h);
+        room->backs += h.backs / HALVES;
+    }
+}

@@ -1,0 +1,44 @@
+/* Receivers: places at which light is gathered, each with a weight of directions. Its value is
+ *     integral of L(w) weight(w) dw    over all directions w,
+ * and all weights here have the integral pi, so that a radiance of 1 from everywhere gives pi:
+ *     plane          cos, above the plane
+ *     cylinder       sin(e) / pi, e the angle with the axis
+ *     semi-cylinder  sin(e) (1 + cos a) / pi, a the azimuth about the axis from the way that it looks
+ *     sphere         1/4
+ * (EN 12464-1 annex, CIE 191). Must not know what hides light from them. */
+#ifndef LAMBERT_SENSOR_RECEIVER_H
+#define LAMBERT_SENSOR_RECEIVER_H
+
+#include "solver/formfactor/exchange/polygon.h"
+
+typedef enum receiver_kind {
+    RECEIVER_PLANE,
+    RECEIVER_CYLINDER,
+    RECEIVER_SEMICYLINDER,
+    RECEIVER_SPHERE,
+    RECEIVER_KINDS
+} receiver_kind;
+
+typedef struct receiver {
+    receiver_kind kind;
+    double at[3];   /* m */
+    double axis[3]; /* unit: the normal of a plane, the axis of cylinders; 0 of a sphere */
+    double look[3]; /* unit and across the axis: the way that a semi-cylinder looks; 0 of others */
+} receiver;
+
+/* weight / pi in a direction, a unit vector: a density of directions. */
+double receiver_density(const receiver *r, const double direction[3]);
+
+/* Its largest value. */
+double receiver_density_most(receiver_kind kind);
+
+/* The direction at (x, y) of the unit square, which has that density. */
+void receiver_direction(const receiver *r, double x, double y, double direction[3]);
+
+/* The integral of the density over the directions of a convex polygon, of which nothing is hidden; 0 where
+ * its back is towards the receiver. p.normal and p.centre must be set. Planes have a closed form (Lambert's
+ * sum over edges), and so have spheres (the solid angle); others take a quadrature, to about 1e-5 of it.
+ * Cost: .2 us by closed form, else .5 us and more where it is near. */
+double receiver_factor(const receiver *r, const polygon *p);
+
+#endif
