@@ -19,12 +19,18 @@ enum { END_OF_TEXT = 0x1A };
 
 lam_status luminaire_source_open(const char *name, const char *text, size_t length, luminaire_source *out,
                                  lam_error *error) {
+    if (length > LUMINAIRE_BYTES_MOST)
+        return status_fail(error, LAM_ERR_FORMAT,
+                           "%s: has %zu bytes, more than the %zu MiB that a luminaire file may have", name,
+                           length, LUMINAIRE_BYTES_MOST >> 20);
+    return luminaire_source_begin(name, text, length, out, error);
+}
+
+lam_status luminaire_source_begin(const char *name, const char *text, size_t length, luminaire_source *out,
+                                  lam_error *error) {
     lam_status status = LAM_OK;
     luminaire_source s = {.name = name, .text = text, .end = text + length};
     size_t ends = 0, doubled = 0;
-    if (length > LUMINAIRE_BYTES_MOST)
-        FAIL(error, LAM_ERR_FORMAT, "%s: has %zu bytes, more than the %zu MiB that a luminaire file may have",
-             name, length, LUMINAIRE_BYTES_MOST >> 20);
     const bool marked = length >= 2 && (memcmp(text, "\xff\xfe", 2) == 0 || memcmp(text, "\xfe\xff", 2) == 0);
     if (marked || (length >= 4 && (text[0] == '\0') != (text[1] == '\0') &&
                    (text[0] == '\0') == (text[2] == '\0') && (text[1] == '\0') == (text[3] == '\0')))

@@ -1,5 +1,5 @@
-/* The text of a luminaire's file: lines, words, numbers, and where they stand. Private to solver/luminaire.
- */
+/* The text of a luminaire's file, or of a list: lines, words, numbers, and where they stand. Private to
+ * solver/luminaire, and to solver/sensor, whose lists are written alike. */
 #ifndef LAMBERT_LUMINAIRE_SOURCE_H
 #define LAMBERT_LUMINAIRE_SOURCE_H
 
@@ -22,6 +22,10 @@ typedef struct luminaire_source {
 /* Errors: LAM_ERR_FORMAT where the bytes are none, too many, UTF-16, or no text. */
 lam_status luminaire_source_open(const char *name, const char *text, size_t length, luminaire_source *out,
                                  lam_error *error);
+
+/* The same of a text of any length. */
+lam_status luminaire_source_begin(const char *name, const char *text, size_t length, luminaire_source *out,
+                                  lam_error *error);
 
 /* The next line, from *at on, without its end; false at the end of the text. Lines end in CR LF, LF or CR. */
 bool luminaire_source_line(const luminaire_source *s, const char **at, const char **begin, const char **end);

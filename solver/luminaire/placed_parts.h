@@ -1,4 +1,5 @@
-/* The parts of the reader of placed luminaires. Private to solver/luminaire. */
+/* The parts of the reader of placed luminaires. Private to solver/luminaire, and to solver/sensor, which
+ * shows values and checks members as it does. */
 #ifndef LAMBERT_LUMINAIRE_PLACED_PARTS_H
 #define LAMBERT_LUMINAIRE_PLACED_PARTS_H
 
