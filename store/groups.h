@@ -9,6 +9,7 @@
 #define STORE_FORM_FACTORS "/form_factors" /* solver/formfactor, solver/operator/{blocks,refine} */
 #define STORE_SKY "/sky"                   /* solver/formfactor/sky_bounce.c */
 #define STORE_LUMINAIRES "/luminaires"     /* solver/luminaire/placed_store.c, solver/direct */
+#define STORE_SENSORS "/sensors"           /* solver/sensor/sensors_store.c */
 #define STORE_IMPORTANCE "/importance"     /* solver/operator/blocks/importance.c */
 #define STORE_SOURCES "/sources"           /* the same */
 #define STORE_ERROR "/error"               /* solver/operator/stated/error_figures.c */

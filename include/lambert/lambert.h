@@ -262,6 +262,53 @@ void lam_luminaires_irradiance(const lam_luminaires *luminaires, size_t n_rhs, c
  * [n_rhs][C][k]. Of a dimmer that all channels share it is the sum over channels. */
 void lam_luminaires_adjoint(const lam_luminaires *luminaires, size_t n_rhs, const float *g, float *D);
 
+/* The light that comes to sensors of a store: receivers at points, in named sets, and the weights with which
+ * radiosities of elements, radiances of sky tiles and luminaires are gathered at them; immutable once open.
+ * Illuminances of points are free of the mean over an element that the radiosity of one is. */
+typedef struct lam_sensors lam_sensors;
+
+/* Opens the store at path and loads its sensors; *sensors is NULL when it has none. The caller closes them
+ * with lam_sensors_close. Errors and threads as lam_operator_open. */
+lam_status lam_sensors_open(const char *path, lam_sensors **sensors, lam_error *error);
+
+/* Frees sensors; NULL is allowed. */
+void lam_sensors_close(lam_sensors *sensors);
+
+/* Receivers s, channels C, elements n, sky tiles m and luminaires k (0: none), and the number of sets. */
+size_t lam_sensors_count(const lam_sensors *sensors);
+size_t lam_sensors_channels(const lam_sensors *sensors);
+size_t lam_sensors_elements(const lam_sensors *sensors);
+size_t lam_sensors_tiles(const lam_sensors *sensors);
+size_t lam_sensors_luminaires(const lam_sensors *sensors);
+size_t lam_sensors_sets(const lam_sensors *sensors);
+
+/* The name of a set, owned by sensors, its first receiver and their number. */
+const char *lam_sensors_set(const lam_sensors *sensors, size_t set, size_t *first, size_t *count);
+
+/* 0 where a receiver lies in a wall or in a luminaire, so that no value at it is true. */
+int lam_sensors_has_value(const lam_sensors *sensors, size_t receiver);
+
+/* out = rows B + sky^T L + luminaires^T (colour D), the irradiances of receivers (of cylinders and spheres
+ * those that their weights define): B [n_rhs][C][n] are radiosities of an operator of the same store under
+ * the same light, L [n_rhs][C][m] radiances of the sky, D [n_rhs][C][k] dimmers, each of the two NULL for
+ * none; out is [n_rhs][C][s]. Direct light comes to the point itself, so that B must have been lit by L and D
+ * too (lam_operator_apply_lit). Allocates nothing; a vector's bits do not depend on its neighbours. Cost: the
+ * stored weights, m s and k s per row. */
+void lam_sensors_gather(const lam_sensors *sensors, size_t n_rhs, const float *B, const float *L,
+                        const float *D, float *out);
+
+/* The transpose: of g [n_rhs][C][s], the gradients of <g, out> by B [n_rhs][C][n], L [n_rhs][C][m] and D
+ * [n_rhs][C][k], each of which may be NULL. L and D stay as they are where the store has no sky and no
+ * luminaires. */
+void lam_sensors_adjoint(const lam_sensors *sensors, size_t n_rhs, const float *g, float *B, float *L,
+                         float *D);
+
+/* variance [n_rhs][C][s]: estimates of the variance that the sampling of weights gives to values under B and
+ * L, as in lam_sensors_gather. Each has one degree of freedom; the mean over a set is sound, one alone is
+ * not. */
+void lam_sensors_variance(const lam_sensors *sensors, size_t n_rhs, const float *B, const float *L,
+                          float *variance);
+
 #pragma GCC visibility pop
 #ifdef __cplusplus
 }

@@ -1,0 +1,51 @@
+/* The runtime half of sensors: sets of receivers and the rows that gather light at them, of an open store. */
+#ifndef LAMBERT_OPERATOR_SENSOR_LIGHT_H
+#define LAMBERT_OPERATOR_SENSOR_LIGHT_H
+
+#include "store/store.h"
+
+/* Why a receiver has no value: most of its rays meet backs of faces; it lies in the opening of a luminaire.
+ */
+enum { SENSOR_IN_WALL = 1, SENSOR_IN_LUMINAIRE = 2 };
+
+/* A set, as people are shown it. */
+typedef struct sensor_set_shown {
+    const char *name;
+    unsigned kind;        /* as in the store: 0 points, 1 grids ... */
+    size_t first, count;  /* of the receivers */
+    size_t rows, columns; /* of a grid, else 0 */
+    double spacing[2];    /* m, of columns and of rows */
+} sensor_set_shown;
+
+/* A receiver, as people are shown it. */
+typedef struct sensor_shown {
+    unsigned kind;                  /* 0 plane, 1 cylinder, 2 semi-cylinder, 3 sphere */
+    double at[3], axis[3], look[3]; /* m; unit vectors, or 0 where it has none */
+    uint32_t cell;                  /* of its grid, or 0xFFFFFFFF */
+    unsigned flags;                 /* 0: it has a value */
+} sensor_shown;
+
+/* The weights of elements, as rows. */
+typedef struct sensor_weights {
+    const uint64_t *start;   /* [s + 1] */
+    const uint32_t *element; /* [start[s]] */
+    const float *weight;
+} sensor_weights;
+
+/* Loads /sensors for n elements of C channels, or NULL where the store has none; freed by lam_sensors_close.
+ * Errors: LAM_ERR_FORMAT (another shape, an index or a value out of bounds), LAM_ERR_DAMAGED, LAM_ERR_MEMORY.
+ */
+lam_status sensors_load(store *s, size_t n, size_t C, lam_sensors **out, lam_error *error);
+
+/* Texts of it are owned by l. */
+sensor_set_shown sensors_set_shown(const lam_sensors *l, size_t set);
+sensor_shown sensors_shown(const lam_sensors *l, size_t receiver);
+
+/* Owned by l. */
+sensor_weights sensors_weights(const lam_sensors *l);
+
+/* lam_sensors_gather for refined answers, in double. */
+void sensors_gather_double(const lam_sensors *l, size_t n_rhs, const double *B, const double *L,
+                           const double *D, double *out);
+
+#endif
