@@ -61,7 +61,7 @@ ALLOWED = {
     "solver/formfactor/blocks": (f"{FORMFACTOR} solver/formfactor/visibility/ solver/formfactor/exchange/ solver/formfactor/sight/"),
     "solver/walk": ("lambert/ store/status.h solver/base/ solver/scene/mesh.h solver/formfactor/leaving.h solver/formfactor/visibility/"),
     "solver/direct": f"{SCENE} solver/luminaire/luminaire.h solver/luminaire/placed.h solver/formfactor/visibility/",
-    "solver/sensor": (f"{SCENE} solver/daylight/ solver/luminaire/ solver/direct/ solver/formfactor/"),
+    "solver/sensor": f"{SCENE} solver/daylight/ solver/luminaire/ solver/direct/ solver/formfactor/ solver/operator/sensor_light.h",
     "solver/method": f"{OPERATOR}",
     "solver/method/*": f"{OPERATOR} {METHOD_SHARED}",
     "solver/light": f"{OPERATOR} solver/codec/ solver/daylight/ solver/shadow/ {SCENE} solver/formfactor/ solver/walk/moving_light.h",
@@ -99,7 +99,7 @@ HOME = {
     "turbojpeg.h": "solver/scene/import/image_decode.c solver/scene/import/picture_files.c",
     "webp/": "solver/scene/import/image_decode.c",
     "meshoptimizer.h": "solver/scene/import/gltf_meshopt.c",
-    "jansson.h": ("solver/codec/ solver/light/light_path.c solver/luminaire/placed_parts.h solver/sensor/sensors_parts.h solver/scene/import/gltf_file.h "
+    "jansson.h": ("solver/codec/ solver/light/light_path.c solver/luminaire/placed_parts.h solver/scene/import/gltf_file.h "
         "solver/scene/import/gltf_nodes.h solver/verbs/ tests/bench/"),
     "microhttpd.h": "server/http/ tests/bench/ready_server.c",
     "zlib.h": "server/route/content_coding.c",

@@ -17,6 +17,23 @@ enum { SEGMENTS = 8, MORE_SEGMENTS = 128 };
 /* Panes pass light by its angle: shares that differ by less are one. */
 static const double same_share = .02;
 
+lam_status point_balls_make(const mesh *m, double (**out)[4], lam_error *error) {
+    double(*ball)[4] = memory_allocate(m->n, sizeof *ball, "rows of sensors", error);
+    if (ball == NULL) return LAM_ERR_MEMORY;
+    for (size_t j = 0; j < m->n; j++) {
+        double square = 0;
+        mesh_centroid(m, j, ball[j]);
+        for (size_t c = 0; c < mesh_corners(m, j); c++) {
+            double r[3];
+            subtract3(m->vertices[m->elements[j][c]], ball[j], r);
+            square = fmax(square, dot3(r, r));
+        }
+        ball[j][3] = sqrt(square);
+    }
+    *out = ball;
+    return LAM_OK;
+}
+
 /* True where a point of the plane of an element lies in it, or on its rim. */
 static bool is_over(const mesh *m, size_t element, const double at[3], double slack) {
     const size_t n = mesh_corners(m, element);

@@ -40,6 +40,9 @@ typedef struct point_room {
     double backs;          /* share of the rays */
 } point_room;
 
+/* A ball about each element, [n]: centre and radius. The caller frees. Errors: LAM_ERR_MEMORY. */
+lam_status point_balls_make(const mesh *m, double (**out)[4], lam_error *error);
+
 /* Moves a receiver off the faces that it lies on. */
 void point_place_set(const point_scene *s, const receiver *r, size_t number, point_place *out);
 

@@ -173,24 +173,6 @@ done:
     return status;
 }
 
-/* A ball about each element. */
-static lam_status find_balls(const mesh *m, double (**out)[4], lam_error *error) {
-    double(*ball)[4] = memory_allocate(m->n, sizeof *ball, "rows of sensors", error);
-    if (ball == NULL) return LAM_ERR_MEMORY;
-    for (size_t j = 0; j < m->n; j++) {
-        double square = 0;
-        mesh_centroid(m, j, ball[j]);
-        for (size_t c = 0; c < mesh_corners(m, j); c++) {
-            double r[3];
-            subtract3(m->vertices[m->elements[j][c]], ball[j], r);
-            square = fmax(square, dot3(r, r));
-        }
-        ball[j][3] = sqrt(square);
-    }
-    *out = ball;
-    return LAM_OK;
-}
-
 /* The elements of groups that emit or were named. */
 static lam_status find_sources(const mesh *m, const bool *named, bool **out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -259,7 +241,7 @@ lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers, 
     rows_job *job = memory_allocate(1, sizeof *job, "rows of sensors", error);
     if (job == NULL) return LAM_ERR_MEMORY;
     TRY(visibility_create(m, &v, error));
-    TRY(find_balls(m, &ball, error));
+    TRY(point_balls_make(m, &ball, error));
     TRY(find_sources(m, o->sources, &is_source, error));
     *job = (rows_job){.receivers = receivers, .options = o, .out = &made};
     job->scene = (point_scene){.m = m,

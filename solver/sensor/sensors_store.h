@@ -1,0 +1,25 @@
+/* Sensors in a store (/sensors, store/FORMAT.md). */
+#ifndef LAMBERT_SENSOR_SENSORS_STORE_H
+#define LAMBERT_SENSOR_SENSORS_STORE_H
+
+#include "solver/sensor/sensor_rows.h"
+#include "solver/sensor/sensors.h"
+#include "store/store.h"
+
+/* The luminaires of the store, and their light at the receivers. */
+typedef struct sensors_lit {
+    size_t n_luminaires;
+    const float *H;     /* [n_luminaires][n] */
+    const bool *inside; /* [n], receivers in the opening of one; NULL: none */
+} sensors_lit;
+
+/* Writes a list and its rows; receivers of whose rays most meet backs, and those inside of luminaires, are
+ * marked. Errors: those of the store, LAM_ERR_MEMORY. */
+lam_status sensors_save(const sensor_list *l, const sensor_rows *rows, const sensors_lit *lit, store *s,
+                        lam_error *error);
+
+/* Reads the list, so that rows can be found anew; *out is empty where the store has none. Freed by
+ * sensors_free. Errors: LAM_ERR_FORMAT, LAM_ERR_DAMAGED, LAM_ERR_MEMORY. */
+lam_status sensors_load_list(store *s, sensor_list *out, lam_error *error);
+
+#endif
