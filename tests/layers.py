@@ -69,7 +69,7 @@ ALLOWED = {
     "solver/render": f"{OPERATOR} {SCENE} solver/formfactor/visibility/",
     "solver/adapt": f"solver/daylight/ {METHOD} {SCENE} solver/formfactor/",
     "solver/precompute/forecast": f"{METHOD} {SCENE} solver/formfactor/",
-    "solver/precompute": (f"solver/precompute/forecast/ solver/direct/ solver/luminaire/ solver/daylight/ {METHOD} {SCENE} solver/formfactor/ solver/light/ "
+    "solver/precompute": (f"solver/precompute/forecast/ solver/direct/ solver/luminaire/ solver/sensor/ solver/daylight/ {METHOD} {SCENE} solver/formfactor/ solver/light/ "
         "solver/adapt/ solver/walk/"),
     "solver/verify": f"{METHOD} solver/direct/ solver/luminaire/ {SCENE} solver/formfactor/ solver/light/ solver/precompute/ solver/walk/walk.h",
     "solver/verbs": "lambert/ store/ solver/",

@@ -252,8 +252,9 @@ done:
 typedef struct numbers_read {
     size_t n;
     char **names;
-    uint32_t *table, *ignore;
-    size_t n_ignore;
+    uint32_t *table, *ignore, *group;
+    char **group_names;
+    size_t n_ignore, n_groups; /* n_groups: of luminaires */
     double *place, *opening, *colour, *dim, *scale;
 } numbers_read;
 
@@ -261,11 +262,28 @@ static void numbers_free(numbers_read *r) {
     free(r->names);
     free(r->table);
     free(r->ignore);
+    free(r->group);
+    free(r->group_names);
     free(r->place);
     free(r->opening);
     free(r->colour);
     free(r->dim);
     free(r->scale);
+}
+
+static lam_status read_groups(store *s, numbers_read *r, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *data = NULL;
+    if (!store_has(s, STORE_LUMINAIRES "/group_names")) goto done;
+    TRY(store_read_texts(s, STORE_LUMINAIRES "/group_names", &r->n_groups, &r->group_names, error));
+    TRY(store_read(s, STORE_LUMINAIRES "/group", STORE_U32, 1, (size_t[]){r->n}, &data, error));
+    r->group = data;
+    for (size_t k = 0; k < r->n; k++)
+        if (r->group[k] >= r->n_groups && r->group[k] != NO_GROUP)
+            FAIL(error, LAM_ERR_FORMAT, "%s: /luminaires/group[%zu] = %u, must be below %zu", store_path(s),
+                 k, (unsigned)r->group[k], r->n_groups);
+done:
+    return status;
 }
 
 static lam_status read_numbers(store *s, size_t n_groups, numbers_read *r, lam_error *error) {
@@ -279,6 +297,7 @@ static lam_status read_numbers(store *s, size_t n_groups, numbers_read *r, lam_e
     TRY(read_doubles(s, STORE_LUMINAIRES "/colour", 2, (size_t[]){r->n, 3}, &r->colour, error));
     TRY(read_doubles(s, STORE_LUMINAIRES "/dimmers", 1, (size_t[]){r->n}, &r->dim, error));
     TRY(read_doubles(s, STORE_LUMINAIRES "/scale", 1, (size_t[]){r->n}, &r->scale, error));
+    TRY(read_groups(s, r, error));
     if (!store_has(s, STORE_LUMINAIRES "/ignore")) goto done;
     size_t dims[STORE_MAX_RANK] = {SIZE_MAX, 2};
     TRY(store_read(s, STORE_LUMINAIRES "/ignore", STORE_U32, 2, dims, &data, error));
@@ -321,6 +340,8 @@ static void take_luminaire(const numbers_read *r, size_t k, placed_luminaires *p
     double *const parts[] = {l->at, l->x, l->y, l->z};
     for (int v = 0; v < 4; v++) memcpy(parts[v], r->place + k * PLACE + 3 * v, sizeof l->at);
     memcpy(l->colour, r->colour + 3 * k, sizeof l->colour);
+    if (r->group != NULL && r->group[k] != NO_GROUP)
+        snprintf(l->group, sizeof l->group, "%s", r->group_names[r->group[k]]);
     l->dim = r->dim[k];
     l->maintenance = 1;
     l->flux = f->lumens > 0 ? r->scale[k] * f->lumens : (double)NAN;

@@ -33,6 +33,7 @@ static void scene_free(precompute_scene *scene) {
     emitter_list_free(&scene->emitters);
     importance_free(&scene->importance);
     luminaire_columns_free(&scene->luminaires);
+    scene_sensors_free(&scene->sensors);
 }
 
 void parts_free(precompute_parts *p) {

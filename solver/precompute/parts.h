@@ -16,6 +16,8 @@
 #include "solver/precompute/judging.h"
 #include "solver/precompute/precompute.h"
 #include "solver/precompute/trial.h"
+#include "solver/sensor/sensor_rows.h"
+#include "solver/sensor/sensors.h"
 #include "solver/walk/reuse.h"
 
 /* All that a trial of --epsilon makes. */
@@ -57,6 +59,15 @@ typedef struct luminaire_columns {
 } luminaire_columns;
 void luminaire_columns_free(luminaire_columns *c);
 
+/* Sensors, and what comes to them: rows of a store that is copied stay there. */
+typedef struct scene_sensors {
+    sensor_list list; /* n is 0: there are none */
+    sensor_rows rows;
+    float *H;     /* [luminaires][n], lx at dim 1; NULL: no luminaires */
+    bool *inside; /* [n], in the opening of a luminaire; NULL likewise */
+} scene_sensors;
+void scene_sensors_free(scene_sensors *s);
+
 /* The scene as it is computed with. */
 typedef struct precompute_scene {
     mesh m;
@@ -71,6 +82,7 @@ typedef struct precompute_scene {
     const face_openings *openings; /* these; NULL: there is no sky, or only a store's mesh is known */
     size_t sky_tiles;
     luminaire_columns luminaires;
+    scene_sensors sensors;
     emitter_list emitters;
     emitter_source emitting; /* a view of emitters, for methods */
     importance importance;   /* n is 0 where all is read, and may emit */

@@ -146,6 +146,11 @@ static lam_status run_stages(precompute_parts *p, lam_error *error) {
     TRY(stage_open_scratch(job, &p->plan, &p->factors, error));
     TRY(stage_forecast(job, &p->scene, &p->plan, &p->factors, &p->times, error));
     TRY(run_trials(p, error));
+    if (p->scene.sensors.list.n > 0) {
+        started = clock_seconds();
+        TRY(stage_sensors(job, &p->scene, &p->factors.f.sky, true, error));
+        log_stage(job, "sensors", started);
+    }
     if (p->plan.probes > 0) TRY(stage_mesh_error(job, &p->scene, &p->factors, &p->made, error));
 done:
     return status;

@@ -25,8 +25,9 @@ extern const char precompute_quality_words[];
 /* The light that panes pass: less of it aslant, or the same from every side. */
 typedef enum glass_law { GLASS_BY_ANGLE, GLASS_EVENLY } glass_law;
 
-/* --luminaires: the word for leaving those of a store out. */
+/* --luminaires and --sensors: the words for leaving those of a store out. */
 #define LUMINAIRES_NONE "none"
+#define SENSORS_NONE "none"
 
 typedef struct precompute_options {
     const char *output;
@@ -52,7 +53,7 @@ typedef struct precompute_options {
     option_list glass;   /* GROUP=T[,FACES] */
     glass_law glass_law;
     bool keep_form_factors;
-    const char *luminaires;             /* FILE, LUMINAIRES_NONE; or NULL */
+    const char *luminaires, *sensors;   /* FILE, LUMINAIRES_NONE, SENSORS_NONE; or NULL */
     const char *emitters;               /* FILE, group=NAME, sky; or NULL */
     const char *receivers, *importance; /* NAME,NAME; FILE; one of them, or both NULL */
     const char *sources;                /* NAME,NAME; or NULL */
@@ -137,6 +138,7 @@ typedef enum seed_purpose {
     SEED_VERIFY_FIRST_LIGHT = 14,
     SEED_VERIFY_WALKS = 15,
     SEED_VERIFY_LUMINAIRES = 16,
+    SEED_SENSORS = 17,
     SEED_LINEAR_FIRST = 1, /* emissions that verify adds up: their seeds are counted, not given by a user */
     SEED_LINEAR_SECOND = 2
 } seed_purpose;

@@ -177,6 +177,16 @@ static const option_row mesh_rows[] = {
          "Luminaires of the scene, with the files of their light (`lambert luminaire` shows both): their "
          "direct light is found by geometry, and each has a dimmer. Of a store: in place of those that it "
          "has; none leaves these out"},
+    {.name = "sensors",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(sensors),
+     .argument = "FILE.json|.csv|.pts",
+     .otherwise = "those of a store",
+     .not_with = "positions|path",
+     .help =
+         "Points, grids, eyes, cylinders, spheres and cubes at which light is read: it is gathered there, by "
+         "256, 1,024 or 4,096 rays each (--quality) and segments to lamps, luminaires and the sky. Of a "
+         "store: in place of those that it has; none leaves these out"},
     {.name = "lights",
      .kind = OPTION_CHOICE,
      .offset = FIELD(lights),

@@ -1,7 +1,8 @@
-/* Luminaires of a store in place of those that it has, or beside none: all else is copied, so that a lamp is
- * moved without making an operator anew. */
+/* Luminaires and sensors of a store in place of those that it has, or beside none: all else is copied, so
+ * that a lamp or a sensor is moved without making an operator anew. */
 #include "solver/base/clock.h"
 #include "solver/precompute/stages.h"
+#include "solver/sensor/sensors_store.h"
 #include "store/groups.h"
 
 #include <stdlib.h>
@@ -9,22 +10,35 @@
 
 /* Options that do not ask for another operator. */
 static bool is_light_alone(const char *name) {
-    static const char *const names[] = {"output", "luminaires", "assets",   "seed", "threads",
-                                        "quiet",  "verbose",    "progress", "json"};
+    static const char *const names[] = {"output",  "luminaires", "sensors", "assets",   "quality", "seed",
+                                        "threads", "quiet",      "verbose", "progress", "json"};
     for (size_t k = 0; k < sizeof names / sizeof *names; k++)
         if (strcmp(name, names[k]) == 0) return true;
     return false;
 }
 
 bool relight_is_asked(const precompute_options *o, const option_result *given) {
-    bool alone = o->from_store && o->luminaires != NULL;
+    bool alone = o->from_store && (o->luminaires != NULL || o->sensors != NULL);
     for (size_t i = 0; i < given->n_given; i++) alone = alone && is_light_alone(given->given[i]);
     return alone;
 }
 
 static bool skip(const char *object, const char *attribute) {
-    return attribute == NULL ? strcmp(object, STORE_LUMINAIRES) == 0
+    return attribute == NULL ? strcmp(object, STORE_LUMINAIRES) == 0 || sensors_are_lit_by(object)
                              : strcmp(object, STORE_MESH) == 0 && strcmp(attribute, "lights") == 0;
+}
+
+static bool skip_sensors(const char *object, const char *attribute) {
+    return skip(object, attribute) || (attribute == NULL && strcmp(object, STORE_SENSORS) == 0);
+}
+
+/* Writes the sensors anew, or the light of luminaires at those that are copied. */
+static lam_status save_sensors(const precompute_scene *scene, bool rows, store *from, store *to,
+                               lam_error *error) {
+    const scene_sensors *s = &scene->sensors;
+    const sensors_lit lit = {.n_luminaires = scene->luminaires.placed.n, .H = s->H, .inside = s->inside};
+    if (rows) return scene_sensors_save(scene, to, error);
+    return s->list.n > 0 ? sensors_save_lit(from, s->list.n, &lit, to, error) : LAM_OK;
 }
 
 /* A store of few emitters has the light of those alone. */
@@ -43,22 +57,30 @@ done:
 
 lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
+    const bool rows = job->options->sensors != NULL;
+    sky_bounce sky = {.n = 0};
     store *from = NULL, *to = NULL;
     double started = clock_seconds();
     TRY(store_open(job->options->input, &from, error));
     TRY(check_operator(job, from, error));
     TRY(mesh_load(from, &scene->m, NULL, error));
     TRY(scene_load_luminaires(job, from, scene, error));
+    TRY(scene_load_sensors(job, from, scene, error));
+    if (rows && store_has(from, STORE_SKY)) TRY(sky_bounce_load(from, scene->m.n, &sky, error));
     terminal_log_stage(job->t, "import", clock_seconds() - started);
     started = clock_seconds();
     TRY(stage_luminaires(job, scene, error));
-    terminal_log_stage(job->t, "luminaires", clock_seconds() - started);
+    if (scene->luminaires.placed.n > 0) terminal_log_stage(job->t, "luminaires", clock_seconds() - started);
+    started = clock_seconds();
+    TRY(stage_sensors(job, scene, &sky, rows, error));
+    if (scene->sensors.list.n > 0) terminal_log_stage(job->t, "sensors", clock_seconds() - started);
     TRY(terminal_check(error));
     started = clock_seconds();
     TRY(store_create(job->options->output, &to, error));
-    TRY(store_copy(from, skip, to, error));
+    TRY(store_copy(from, rows ? skip_sensors : skip, to, error));
     TRY(store_set_text(to, STORE_MESH, "lights", light_kind_word(scene->m.lights), error));
     TRY(luminaires_save(&scene->luminaires, &scene->m, to, error));
+    TRY(save_sensors(scene, rows, from, to, error));
     if (scene->luminaires.placed.n > 0)
         TRY(store_set_text(to, STORE_LUMINAIRES, "command", job->options->command, error));
     TRY(terminal_check(error));
@@ -69,5 +91,6 @@ lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_e
 done:
     store_close(to);
     store_close(from);
+    sky_bounce_free(&sky);
     return status;
 }

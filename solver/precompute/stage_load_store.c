@@ -54,6 +54,7 @@ lam_status stage_load_store(const precompute_job *job, precompute_scene *scene, 
     TRY(mesh_load(s, &scene->m, &row_sums, error));
     scene_take_lights(job, &scene->m);
     TRY(scene_load_luminaires(job, s, scene, error));
+    TRY(scene_load_sensors(job, s, scene, error));
     TRY(scene_find_buried(job, scene, error));
     if (store_has(s, STORE_FORM_FACTORS)) {
         TRY(form_factors_storage(s, &how, error));

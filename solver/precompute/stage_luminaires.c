@@ -25,7 +25,7 @@ void luminaire_columns_free(luminaire_columns *c) {
     *c = (luminaire_columns){.n_ignoring = 0};
 }
 
-static void warn(const precompute_job *job, const luminaire_warnings *w) {
+void scene_warn(const precompute_job *job, const luminaire_warnings *w) {
     for (const char *line = w->text; *line != '\0';) {
         const size_t length = strcspn(line, "\n");
         terminal_warn(job->t, "%.*s", (int)length, line);
@@ -81,8 +81,8 @@ lam_status scene_take_luminaires(const precompute_job *job, precompute_scene *sc
     if (left_out) goto done;
     if (o->luminaires != NULL) TRY(placed_read(o->luminaires, &how, p, error));
     from_list = p->n;
-    for (size_t f = 0; f < p->n_files; f++) warn(job, &p->files[f].photometry.warnings);
-    warn(job, &p->warnings);
+    for (size_t f = 0; f < p->n_files; f++) scene_warn(job, &p->files[f].photometry.warnings);
+    scene_warn(job, &p->warnings);
     if (m->n_punctual > 0) TRY(placed_from_lights(o->input, m->n_punctual, m->punctual, p, &outside, error));
     if (outside > 0)
         terminal_warn(

@@ -175,6 +175,7 @@ lam_status stage_load_scene(const precompute_job *job, precompute_scene *scene, 
     TRY(scene_take_glass(job, scene, error));
     TRY(count_tiles(job, scene, error));
     TRY(scene_take_luminaires(job, scene, error));
+    TRY(scene_take_sensors(job, scene, error));
 done:
     return status;
 }

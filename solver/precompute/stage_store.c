@@ -97,6 +97,7 @@ lam_status stage_store(const precompute_job *job, const precompute_scene *scene,
     if (!isnan(o->north)) factors->f.sky.north = o->north;
     if (factors->f.sky.first_bounce != NULL) TRY(sky_bounce_save(&factors->f.sky, s, error));
     TRY(luminaires_save(&scene->luminaires, &scene->m, s, error));
+    TRY(scene_sensors_save(scene, s, error));
     TRY(terminal_check(error));
     TRY(operator_save(made->op, s, error));
     if (scene->importance.n > 0) TRY(save_importance(job, scene, s, error));

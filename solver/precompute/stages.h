@@ -35,7 +35,18 @@ lam_status scene_load_luminaires(const precompute_job *job, store *s, precompute
 lam_status stage_luminaires(const precompute_job *job, precompute_scene *scene, lam_error *error);
 lam_status luminaires_save(const luminaire_columns *c, const mesh *m, store *s, lam_error *error);
 
-/* True where a store is to have other luminaires and nothing else; makes that store: relight.c. */
+/* Logs lines as warnings. */
+void scene_warn(const precompute_job *job, const luminaire_warnings *w);
+
+/* Reads --sensors; those of a store, or --sensors in their place. Finds the weights of their rows (rows
+ * false: the store has them) and the light of luminaires there; writes them: stage_sensors.c. */
+lam_status scene_take_sensors(const precompute_job *job, precompute_scene *scene, lam_error *error);
+lam_status scene_load_sensors(const precompute_job *job, store *s, precompute_scene *scene, lam_error *error);
+lam_status stage_sensors(const precompute_job *job, precompute_scene *scene, const sky_bounce *sky, bool rows,
+                         lam_error *error);
+lam_status scene_sensors_save(const precompute_scene *scene, store *s, lam_error *error);
+
+/* True where a store is to have other luminaires or sensors and nothing else; makes that store: relight.c. */
 bool relight_is_asked(const precompute_options *o, const option_result *given);
 lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_error *error);
 

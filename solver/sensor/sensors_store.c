@@ -45,20 +45,32 @@ done:
     return status;
 }
 
+/* [n], freed with free(). */
+static lam_status make_flags(size_t n, const float *backs, const bool *inside, uint32_t **out,
+                             lam_error *error) {
+    uint32_t *flags = memory_allocate(n, sizeof *flags, "sensors", error);
+    if (flags == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < n; k++) {
+        flags[k] = (double)backs[k] > SENSOR_BACKS_MOST ? SENSOR_IN_WALL : 0;
+        if (inside != NULL && inside[k]) flags[k] |= SENSOR_IN_LUMINAIRE;
+    }
+    *out = flags;
+    return LAM_OK;
+}
+
 static lam_status save_receivers(const sensor_list *l, const sensor_rows *rows, const bool *inside, store *s,
                                  lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = l->n;
     uint32_t *kind = memory_allocate(n, sizeof *kind, "sensors", error);
-    uint32_t *flags = memory_allocate(n, sizeof *flags, "sensors", error);
+    uint32_t *flags = NULL;
     double *place = memory_allocate(n, PLACE * sizeof *place, "sensors", error);
-    if (kind == NULL || flags == NULL || place == NULL) TRY(LAM_ERR_MEMORY);
+    if (kind == NULL || place == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(make_flags(n, rows->backs, inside, &flags, error));
     for (size_t k = 0; k < n; k++) {
         const receiver *r = &l->receivers[k];
         const double *const parts[] = {r->at, r->axis, r->look};
         kind[k] = (uint32_t)r->kind;
-        flags[k] = (double)rows->backs[k] > SENSOR_BACKS_MOST ? SENSOR_IN_WALL : 0;
-        if (inside != NULL && inside[k]) flags[k] |= SENSOR_IN_LUMINAIRE;
         for (int p = 0; p < 3; p++) memcpy(place + k * PLACE + 3 * p, parts[p], sizeof r->at);
     }
     TRY(store_write(s, GROUP "/receiver", STORE_U32, 1, (size_t[]){n}, kind, error));
@@ -92,6 +104,26 @@ lam_status sensors_save(const sensor_list *l, const sensor_rows *rows, const sen
         TRY(store_write(s, GROUP "/luminaires", STORE_F32, 2, (size_t[]){lit->n_luminaires, n}, lit->H,
                         error));
 done:
+    return status;
+}
+
+bool sensors_are_lit_by(const char *array) {
+    return strcmp(array, GROUP "/luminaires") == 0 || strcmp(array, GROUP "/flags") == 0;
+}
+
+lam_status sensors_save_lit(store *from, size_t n, const sensors_lit *lit, store *to, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *backs = NULL;
+    uint32_t *flags = NULL;
+    TRY(store_read(from, GROUP "/backs", STORE_F32, 1, &n, &backs, error));
+    TRY(make_flags(n, backs, lit->inside, &flags, error));
+    TRY(store_write(to, GROUP "/flags", STORE_U32, 1, &n, flags, error));
+    if (lit->n_luminaires > 0)
+        TRY(store_write(to, GROUP "/luminaires", STORE_F32, 2, (size_t[]){lit->n_luminaires, n}, lit->H,
+                        error));
+done:
+    free(backs);
+    free(flags);
     return status;
 }
 

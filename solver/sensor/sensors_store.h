@@ -18,6 +18,13 @@ typedef struct sensors_lit {
 lam_status sensors_save(const sensor_list *l, const sensor_rows *rows, const sensors_lit *lit, store *s,
                         lam_error *error);
 
+/* Writes the light of luminaires at the n sensors of the store `from`, of which all else is copied, and their
+ * flags. Errors: those of both stores, LAM_ERR_MEMORY. */
+lam_status sensors_save_lit(store *from, size_t n, const sensors_lit *lit, store *to, lam_error *error);
+
+/* The arrays that it writes are /sensors/luminaires and /sensors/flags. */
+bool sensors_are_lit_by(const char *array);
+
 /* Reads the list, so that rows can be found anew; *out is empty where the store has none. Freed by
  * sensors_free. Errors: LAM_ERR_FORMAT, LAM_ERR_DAMAGED, LAM_ERR_MEMORY. */
 lam_status sensors_load_list(store *s, sensor_list *out, lam_error *error);

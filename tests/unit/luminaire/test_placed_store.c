@@ -72,6 +72,7 @@ START_TEST(the_same_light_comes_back) {
         const placed_luminaire *l = &p.luminaires[k], *m = &q.luminaires[k];
         const luminaire *of_l = &p.files[l->file].photometry, *of_m = &q.files[m->file].photometry;
         ck_assert_str_eq(m->name, l->name);
+        ck_assert_str_eq(m->group, l->group);
         ck_assert(placed_lights_alike(&p, k, &q, k));
         ck_assert(m->dim == l->dim && m->is_point == l->is_point);
         ck_assert_mem_eq(m->colour, l->colour, sizeof l->colour);
