@@ -152,7 +152,7 @@ done:
 static lam_status mean_of(const emission *light, const widths *width, emission *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = light->steady ? 1 : light->n_vectors;
-    emission e = {.n_vectors = 1, .luminaires = light->luminaires};
+    emission e = {.n_vectors = 1, .luminaires = light->luminaires, .sensors = light->sensors};
     TRY(mean_row(n, width->E, light->E, &e.E, error));
     TRY(mean_row(light->n_vectors, width->L, light->L, &e.L, error));
     TRY(mean_row(n, width->W, light->W, &e.W, error));
@@ -314,7 +314,11 @@ static lam_status add_suns(const work *w, const emission *light, tile_answers *a
     a->dark = memory_allocate(C * n, sizeof *a->dark, "answers to suns", error);
     a->sunny = memory_allocate(AT_ONCE, w->row * sizeof *a->sunny, "answers to suns", error);
     if (a->dark == NULL || a->sunny == NULL) TRY(LAM_ERR_MEMORY);
-    a->suns = (emission){.n_vectors = light->n_vectors, .steady = true, .E = a->dark, .sun = light->sun};
+    a->suns = (emission){.n_vectors = light->n_vectors,
+                         .steady = true,
+                         .E = a->dark,
+                         .sun = light->sun,
+                         .sensors = light->sensors};
     TRY(emission_pass_create(&a->suns, w->op, w->sky, w->quantity, w->n_selected, w->selected, AT_ONCE,
                              &a->by_suns, error));
     a->below_zero = light->limiter != NULL;
@@ -338,13 +342,14 @@ static lam_status tile_answers_make(const work *w, const emission *light, tile_a
         TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < m; t++)
         for (size_t c = 0; c < C; c++) units[(t * C + c) * m + t] = 1;
-    const emission tiles = {.n_vectors = m, .steady = true, .E = dark, .L = units},
+    const emission tiles = {.n_vectors = m, .steady = true, .E = dark, .L = units, .sensors = light->sensors},
                    lamps = {.n_vectors = 1,
                             .steady = true,
                             .E = light->E,
                             .L = units + m * C * m,
                             .D = light->D,
-                            .luminaires = light->luminaires};
+                            .luminaires = light->luminaires,
+                            .sensors = light->sensors};
     TRY(add_answers(w, &tiles, m, light->limiter, &a, error));
     TRY(add_answers(w, &lamps, 1, light->limiter, &a, error));
     *out = a;
@@ -464,7 +469,7 @@ lam_status annual_apply(const annual_options *options, const emission *light, co
                         const uint32_t *selected, const progress *steps, float **values,
                         annual_summary *summary, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t C = options->luminance ? 1 : lam_operator_channels(op), n = lam_operator_elements(op);
+    const size_t C = options->luminance ? 1 : lam_operator_channels(op), n = emission_width(light, op);
     const size_t wanted = selected != NULL ? n_selected : n;
     const widths width = widths_of(light, op, sky);
     annual_summary sum = {.n = light->n_vectors};

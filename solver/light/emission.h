@@ -29,6 +29,7 @@ typedef struct emission {
     bool by_luminance;                /* L is the luminance of a coloured sky, for a grey store */
     const struct sunlight *sun;       /* [n_vectors], on every channel, beside L; borrowed, NULL: none */
     const lam_limiter *limiter; /* of answers below zero; borrowed, NULL: they are those of the linear map */
+    const lam_sensors *sensors; /* answers are irradiances at these; borrowed, NULL: they are of elements */
 } emission;
 
 void emission_free(emission *e);

@@ -20,6 +20,7 @@ void emission_pass_free(emission_pass *p) {
     free(p->H0);
     free(p->W);
     free(p->D);
+    free(p->B);
     free(p->sun);
     free(p->sun_work);
     *p = (emission_pass){0};
@@ -28,6 +29,22 @@ void emission_pass_free(emission_pass *p) {
 static lam_status reserve(size_t rows, size_t width, const char *what, float **out, lam_error *error) {
     *out = memory_allocate(rows, width * sizeof **out, what, error);
     return *out == NULL ? LAM_ERR_MEMORY : LAM_OK;
+}
+
+size_t emission_width(const emission *light, const lam_operator *op) {
+    return light->sensors != NULL ? lam_sensors_count(light->sensors) : lam_operator_elements(op);
+}
+
+static lam_status check_sensors(const emission *light, const lam_operator *op, lam_error *error) {
+    if (light->sensors == NULL) return LAM_OK;
+    if (lam_operator_emitters(op) > 0)
+        return status_fail(
+            error, LAM_ERR_UNSUPPORTED,
+            "sensors of a store of few emitters have no values; use a store of another method");
+    if (light->sun != NULL)
+        return status_fail(error, LAM_ERR_UNSUPPORTED,
+                           "an exact sun at sensors is not supported; --sun tiles takes it from its tile");
+    return LAM_OK;
 }
 
 /* Room for the dimmers of one go, where they stay if they are steady. */
@@ -53,6 +70,11 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
                        .selected = selected,
                        .most = most,
                        .work_bytes = lam_operator_work_bytes(op, most)};
+    TRY(check_sensors(light, op, error));
+    if (light->sensors != NULL) {
+        p.quantity = LAM_RADIOSITY;
+        TRY(reserve(most * C, n, "radiosity", &p.B, error));
+    }
     p.work = memory_allocate(p.work_bytes, 1, "the work area of a solve", error);
     if (p.work == NULL) TRY(LAM_ERR_MEMORY);
     if (light->limiter != NULL) {
@@ -147,7 +169,22 @@ static void take_light(emission_pass *p, size_t n, const size_t *vectors) {
     if (!e->steady && e->D != NULL) gather(n, vectors, C * lam_luminaires_count(e->luminaires), e->D, p->D);
 }
 
+/* Raises values of sensors to zero. */
+static void limit_sensors(emission_pass *p, size_t n, float *out) {
+    const size_t row = lam_operator_channels(p->op) * lam_sensors_count(p->light->sensors);
+    memset(p->limited, 0, sizeof p->limited);
+    for (size_t k = 0; p->light->limiter != NULL && k < n * row; k++)
+        if (out[k] < 0) {
+            out[k] = 0;
+            p->limited[k / row]++;
+        }
+}
+
 void emission_pass_limit(emission_pass *p, size_t n, const size_t *vectors, float *out) {
+    if (p->light->sensors != NULL) {
+        limit_sensors(p, n, out);
+        return;
+    }
     take_light(p, n, vectors);
     if (p->H0 != NULL) light_directly(p, n, vectors);
     limit(p, n, out);
@@ -166,6 +203,12 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
         goto done;
     }
     if (p->H0 != NULL) light_directly(p, n, vectors);
+    if (p->B != NULL) {
+        TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, p->B, p->work, p->work_bytes, error));
+        limit(p, n, p->B);
+        lam_sensors_gather(p->light->sensors, n, p->B, p->L, p->D, out);
+        goto done;
+    }
     if (p->selected != NULL)
         TRY(lam_operator_apply_selected(p->op, n, p->quantity, p->E, p->H0, p->n_selected, p->selected, out,
                                         p->work, p->work_bytes, error));
@@ -236,7 +279,7 @@ lam_status emission_apply(const emission *e, const lam_operator *op, const lam_s
                           lam_error *error) {
     lam_status status = LAM_OK;
     emission_pass p = {0};
-    const size_t C = lam_operator_channels(op), n = lam_operator_elements(op);
+    const size_t C = lam_operator_channels(op), n = emission_width(e, op);
     const size_t most = e->n_vectors < AT_ONCE ? e->n_vectors : AT_ONCE;
     float *made = NULL, *some = NULL;
     size_t count, vectors[AT_ONCE];

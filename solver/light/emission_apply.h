@@ -21,18 +21,24 @@ typedef struct emission_pass {
     size_t limited[EMISSION_PASS_MOST]; /* of the vectors of the last go: elements that were below zero, in
                                          * all channels */
     float *E, *L, *H0, *W, *D;          /* of one go; NULL where the operator takes none */
+    float *B;                           /* [most][C][elements], radiosity behind that of sensors; else NULL */
     float *sun, *sun_work;              /* [most][elements]; NULL without one */
 } emission_pass;
 
+/* Numbers of an answer in a channel: of elements, or of sensors. */
+size_t emission_width(const emission *light, const lam_operator *op);
+
 /* Allocates for passes of at most `most` vectors. With selected only these elements are answered, which is
- * less work; they must be all elements of some groups where the emission has a limiter. Freed by
- * emission_pass_free. Errors: LAM_ERR_MEMORY. */
+ * less work; they must be all elements of some groups where the emission has a limiter. Of sensors the
+ * quantity is irradiance, and all elements are answered. Freed by emission_pass_free. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_UNSUPPORTED (sensors under an exact sun, or of an operator of few emitters). */
 lam_status emission_pass_create(const emission *light, const lam_operator *op, const lam_sky *sky,
                                 lam_quantity quantity, size_t n_selected, const uint32_t *selected,
                                 size_t most, emission_pass *out, lam_error *error);
 void emission_pass_free(emission_pass *p);
 
-/* Answers the n vectors of these numbers, at most `most`: out is [n][C][elements], or [n][C][n_selected].
+/* Answers the n vectors of these numbers, at most `most`: out is [n][C][elements], [n][C][n_selected] or, of
+ * sensors, [n][C][sensors].
  * Errors: LAM_ERR_ARGUMENT (an emission that is not a sum of the store's emitters), LAM_ERR_MEMORY. */
 lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors, float *out,
                                lam_error *error);
@@ -41,10 +47,10 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
  * limited; not of an operator of few emitters. Cost: the light of the sky, and of suns. */
 void emission_pass_limit(emission_pass *p, size_t n, const size_t *vectors, float *out);
 
-/* *values is [n_vectors][C][n], freed with free(): the answer to each vector under its sky; with selected
- * (not NULL) of these elements only, and 0 elsewhere. limited [n_vectors], unless NULL, gets the elements of
- * each that were below zero. stop, which may be NULL, is asked between passes and ends the work with its
- * status. */
+/* *values is [n_vectors][C][n], or [sensors] for n, freed with free(): the answer to each vector under its
+ * sky; with selected (not NULL) of these elements only, and 0 elsewhere. limited [n_vectors], unless NULL,
+ * gets the elements of each that were below zero. stop, which may be NULL, is asked between passes and ends
+ * the work with its status. */
 lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
                           lam_quantity quantity, size_t n_selected, const uint32_t *selected,
                           lam_status (*stop)(lam_error *error), float **values, size_t *limited,

@@ -10,6 +10,7 @@
 #include "solver/verbs/own_error.h"
 #include "solver/verbs/solve_faces.h"
 #include "solver/verbs/solve_options.h"
+#include "solver/verbs/solve_sensors.h"
 #include "solver/verbs/verbs.h"
 #include "solver/verbs/year_error.h"
 
@@ -285,8 +286,7 @@ static void show_luminance(mesh *view, solution *out) {
 }
 
 /* The answers in three channels become their luminance. */
-static void take_luminance(answers *made, mesh *view, solution *out) {
-    const size_t n = output_width(out);
+static void take_luminance(size_t n, answers *made, mesh *view, solution *out) {
     if (made->values != NULL) answer_luminance(out->n_vectors, n, made->values);
     if (made->corners != NULL) answer_luminance(out->n_vectors, 4 * n, made->corners);
     if (made->refined.values != NULL)
@@ -327,6 +327,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     mesh one_channel;
     answer_words words;
     annual_options figures = *year;
+    sensor_choice sensors = {.all = NULL};
     if (f->output != NULL) TRY(atomic_file_check(f->output, error));
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
@@ -334,6 +335,8 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     if (f->at == AT_FACES) TRY(solve_faces_find(path, &m, &faces, error));
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
     if (f->linear) lit.light.limiter = NULL;
+    if (f->sensors != NULL) TRY(sensor_choice_open(s, &m, f->sensors, &sensors, error));
+    lit.light.sensors = sensors.all;
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
     if (lit.own && is_dark(&lit.light, m.n * m.n_channels, m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
@@ -377,22 +380,26 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
                     .n_reductions = n_reductions};
     hours = hours_of(&span);
     if (f->weather != NULL) out.hours = &hours;
-    if (f->tolerance == 0) take_error(&stated, &lit.light, n_selected, selected, t, &out);
+    if (f->tolerance == 0 && sensors.all == NULL)
+        take_error(&stated, &lit.light, n_selected, selected, t, &out);
     take_words(year, f->figure, &lit.told, &words, &out);
     TRY(find_answers(path, f, &figures, &lit, n_selected, selected, t, &out, &made, error));
     if (figures.luminance) show_luminance(&one_channel, &out);
-    if (made.values != NULL && year->n_figures == 0)
+    if (made.values != NULL && year->n_figures == 0 && sensors.all == NULL)
         TRY(own_error_take(&stated, &about, &lit, n_selected, selected, &out, &made.name_errors, error));
-    if (is_sum(year))
+    if (is_sum(year) && sensors.all == NULL)
         TRY(year_error_take(&stated, &about, &lit, &made.mean.light, &way,
                             (double)lit.light.n_vectors * figures.hours / 1000, n_selected, selected, &out,
                             &made.name_errors, error));
     if (f->smooth) TRY(find_corners(&out, &lit.light, &made.corners, error));
     out.corners = made.corners;
     if (f->at == AT_FACES) TRY(solve_faces_take(&faces, &made.values, &made.refined, &out, error));
-    if (lit.told.luminance && !figures.luminance) take_luminance(&made, &one_channel, &out);
+    if (lit.told.luminance && !figures.luminance)
+        take_luminance(sensors.all != NULL ? lam_sensors_count(sensors.all) : output_width(&out), &made,
+                       &one_channel, &out);
     TRY(reductions_fill(&out, error));
-    TRY(put_out(&out, f, error));
+    TRY(sensors.all != NULL ? solve_sensors_put(&sensors, &out, f->output, f->json, error)
+                            : put_out(&out, f, error));
 done:
     free(scene);
     free(selected);
@@ -403,6 +410,7 @@ done:
     sun_way_free(&way);
     weather_span_free(&span);
     light_close(&lit);
+    sensor_choice_free(&sensors);
     mesh_free(&m);
     store_close(s);
     return status;

@@ -1,5 +1,7 @@
 #include "solver/verbs/solve_options.h"
 
+#include "solver/verbs/solve_sensors.h"
+
 #include "solver/output/output.h"
 
 #include <stdlib.h>
@@ -64,6 +66,14 @@ const option_row solve_answer_rows[] = {
      .help = "The places of values. faces: means by area over the fronts of each face of the scene file, in "
              "its order (.npy: NaN, .json: null, .csv: nothing for a face without an element), into "
              ".npy, .json, .csv, or as a table"},
+    {.name = "sensors",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(sensors),
+     .argument = "NAME,...|all",
+     .not_with = "reduce|at|smooth|tolerance",
+     .help = "Irradiance at sets of sensors of the store, gathered at each point, in place of elements: a "
+             "table of "
+             "each set, or .csv, .json, .npy"},
     {.name = "smooth",
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),
@@ -195,7 +205,12 @@ lam_status solve_options_check(solve_options *f, const option_result *given, ann
                                    : f->at == AT_FACES   ? OUTPUT_FACES
                                    : f->reduce.count > 0 ? OUTPUT_GROUPS
                                                          : OUTPUT_ELEMENTS;
-    if (f->output != NULL) TRY(output_check(f->output, content, error));
+    if (f->output != NULL)
+        TRY(f->sensors != NULL ? solve_sensors_check(f->output, error)
+                               : output_check(f->output, content, error));
+    if (f->sensors != NULL && f->quantity == NULL) f->quantity = "irradiance";
+    if (f->sensors != NULL && strcmp(f->quantity, "irradiance") != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--sensors: receive irradiance, not %s", f->quantity);
     TRY(read_year(f, year, error));
     /* Studies of daylight ask for the light that a place receives. */
     if (f->quantity == NULL) f->quantity = year->n_figures > 0 ? "irradiance" : "radiosity";

@@ -15,7 +15,7 @@ typedef enum place_asked { AT_ELEMENTS, AT_FACES } place_asked;
 typedef struct solve_options {
     light_options light;
     option_list reduce, annual;
-    const char *weather, *quantity, *output, *occupied, *figure;
+    const char *weather, *quantity, *output, *occupied, *figure, *sensors;
     double hours, tolerance;
     sun_asked sun;
     place_asked at;

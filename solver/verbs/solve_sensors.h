@@ -1,0 +1,35 @@
+/* The answers of `lambert solve` at sensors, --sensors: a table of sets, CSV, JSON or NPY. */
+#ifndef LAMBERT_VERBS_SOLVE_SENSORS_H
+#define LAMBERT_VERBS_SOLVE_SENSORS_H
+
+#include "solver/base/options/options.h"
+#include "solver/output/output.h"
+#include "store/store.h"
+
+/* The sensors of a store, and the sets of them that are asked for, in this order. Freed by
+ * sensor_choice_free. */
+typedef struct sensor_choice {
+    lam_sensors *all; /* NULL: none are asked for */
+    size_t n_sets, n; /* of the sets chosen, and of their receivers */
+    size_t *sets;     /* [n_sets] */
+} sensor_choice;
+
+/* The word for all sets. */
+#define SENSORS_ALL "all"
+
+/* names: NAME,NAME or SENSORS_ALL. Errors: LAM_ERR_ARGUMENT (a store without sensors, an unknown name), those
+ * of the store, LAM_ERR_MEMORY. */
+lam_status sensor_choice_open(store *s, const mesh *m, const char *names, sensor_choice *out,
+                              lam_error *error);
+void sensor_choice_free(sensor_choice *c);
+
+/* Checks the extension of a file: .csv, .json or .npy. Errors: LAM_ERR_ARGUMENT. */
+lam_status solve_sensors_check(const char *path, lam_error *error);
+
+/* Writes irradiances s->values [n_vectors][C][sensors of the store]: to path, or, where that is NULL, to
+ * standard output, as a table or as JSON. A receiver without a value is NaN in NPY, null in JSON, empty in
+ * CSV and left out of figures. Errors: LAM_ERR_IO, LAM_ERR_MEMORY. */
+lam_status solve_sensors_put(const sensor_choice *c, const solution *s, const char *path, bool as_json,
+                             lam_error *error);
+
+#endif
