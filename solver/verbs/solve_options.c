@@ -72,8 +72,7 @@ const option_row solve_answer_rows[] = {
      .argument = "NAME,...|all",
      .not_with = "reduce|at|smooth|tolerance",
      .help = "Irradiance at sets of sensors of the store, gathered at each point, in place of elements: a "
-             "table of "
-             "each set, or .csv, .json, .npy"},
+             "table of each set, or .csv, .json, .npy. The sun is that of its tile (--sun tiles)"},
     {.name = "smooth",
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),
@@ -209,6 +208,10 @@ lam_status solve_options_check(solve_options *f, const option_result *given, ann
         TRY(f->sensors != NULL ? solve_sensors_check(f->output, error)
                                : output_check(f->output, content, error));
     if (f->sensors != NULL && f->quantity == NULL) f->quantity = "irradiance";
+    if (f->sensors != NULL && !f->sun_given) { /* no sun itself comes to sensors yet */
+        f->sun = SUN_TILES;
+        f->light.at.sun_in_tiles = true;
+    }
     if (f->sensors != NULL && strcmp(f->quantity, "irradiance") != 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--sensors: receive irradiance, not %s", f->quantity);
     TRY(read_year(f, year, error));
