@@ -18,7 +18,7 @@ from make_store import Luminaires
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
 for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies", "luminaire",
-             "luminaire_reply", "placed"):
+             "luminaire_reply", "placed", "sensors"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -86,6 +86,21 @@ for k, mark in enumerate(",;\t"):
     names = ["name", "file", "x", "y", "z", "aim_x", "aim_y", "aim_z", "c0_degrees", "dim", "group", "ignore", "turn_x", "red"]
     lines = [names, ["a", '"f ""1"""', *"1231", "0", "-1", "90", "0.5", "g", "x|y"], ["b", "f", *"123"], ["c", "f", *"123", "", "1", "2"]]
     (folder / "placed" / f"csv{k}").write_text("".join(mark.join(line) + "\r\n" for line in lines) + chr(1 + k))
+
+# Lists of sensors; the last byte says the extension of the name, the unit, the axis that points up, and if there is a scene.
+area = {"polygon": [[0, 0, 0], [4, 0, 0], [4, 3, 0], [1, 1, 0], [0, 3, 0]], "height": .8, "spacing": .5, "border": .1}
+sets = [("points", {"at": [1, 2, 3]}), ("points", {"at": [[1, 2, 3], [2, 2, 3]], "normal": [[0, 1, 0], [1, 1, 1]]}), ("grids", area),
+        ("grids", {"over": "floor", "spacing": "en12464"}), ("eyes", {"at": [1, 2, 3], "view": [0, 1, 0]}), ("cubes", area),
+        ("cylinders", {"over": "rest", "height": 1.2, "spacing": 1}), ("semicylinders", {"at": [1, 2, 3], "look": [1, 0, 0]}),
+        ("spheres", {"at": [[1, 2, 3]]})]
+for k, (kind, members) in enumerate(sets):
+    (folder / "sensors" / f"one{k}").write_text(json.dumps({kind: [{"name": "a", **members}]}) + chr(4 * k))
+    (folder / "sensors" / f"two{k}").write_text(
+        json.dumps({"unit": "ft", kind: [{"name": "a", **members}, {"name": "b", **members}]}) + chr(32 + k))
+for k, mark in enumerate(",;\t"):
+    lines = [["name", "x", "y", "z", "nx", "ny", "nz"], ["a", *"123001"], ["a", *"123", "", "", ""], ['"b"', "1.5", "-1e1", *"30101"]]
+    (folder / "sensors" / f"csv{k}").write_text("".join(mark.join(line) + "\r\n" for line in lines) + chr(1))
+(folder / "sensors" / "pts").write_text("# x\n1 2 3 0 0 1\n\t1,2 .5e1 0 1 0\n\2")
 
 # Files of emissions: an EMISSION by itself.
 for k, e in enumerate(emissions):

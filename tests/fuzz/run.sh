@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Fuzzes every parser of bytes from outside, by libFuzzer under AddressSanitizer and UndefinedBehaviourSanitizer.
 # usage: tests/fuzz/run.sh [SECONDS [NAME ...]]     seconds for each (60); json adjoint npy store import index head image gltf
-#        weather skies luminaire luminaire_reply placed
+#        weather skies luminaire luminaire_reply placed sensors
 # What it finds is left in build/fuzz/found/NAME: give it a name and put it into tests/fuzz/found/NAME, where the
 # tests replay it for ever.
 set -euo pipefail
