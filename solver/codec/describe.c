@@ -1,6 +1,7 @@
 /* The description of a store is one JSON object, put together from the attributes of /, /mesh, /operator,
- * /error, /sky, /luminaires and /form_factors, and from groups, emitters and cameras (store/FORMAT.md;
- * deploy/docs/api.md). A whole number is written as an integer, and one that is not finite as null. */
+ * /error, /sky, /luminaires, /sensors and /form_factors, and from groups, emitters and cameras
+ * (store/FORMAT.md; deploy/docs/api.md). A whole number is written as an integer, and one that is not finite
+ * as null. */
 #include "solver/codec/describe.h"
 
 #include "solver/base/scene/scene_buried.h"
@@ -353,28 +354,54 @@ done:
     return status;
 }
 
+/* The length of an array of one dimension. */
+static lam_status length_of(store *s, const char *name, size_t *length, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t dims[STORE_MAX_RANK];
+    store_type type;
+    int rank;
+    TRY(store_array_info(s, name, &type, &rank, dims, error));
+    if (rank != 1)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s has %d dimensions, must have 1", store_path(s), name, rank);
+    *length = dims[0];
+done:
+    return status;
+}
+
 /* Their number, and their lumens at dimmers of 1; null where there are none. */
 static lam_status add_luminaires(store *s, json_t *out, lam_error *error) {
     lam_status status = LAM_OK;
     void *lumens = NULL;
-    size_t dims[STORE_MAX_RANK];
-    store_type type;
+    size_t n = 0;
     double sum = 0;
-    int rank;
     const char *const name = STORE_LUMINAIRES "/lumens";
     if (!store_has(s, STORE_LUMINAIRES)) {
         json_object_set_new(out, "luminaires", json_null());
         return LAM_OK;
     }
-    TRY(store_array_info(s, name, &type, &rank, dims, error));
-    if (rank != 1)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s has %d dimensions, must have 1", store_path(s), name, rank);
-    TRY(store_read(s, name, STORE_F64, 1, dims, &lumens, error));
-    for (size_t k = 0; k < dims[0]; k++) sum += ((const double *)lumens)[k];
-    json_object_set_new(out, "luminaires",
-                        json_pack("{s:I, s:f}", "count", (json_int_t)dims[0], "lumens", sum));
+    TRY(length_of(s, name, &n, error));
+    TRY(store_read(s, name, STORE_F64, 1, &n, &lumens, error));
+    for (size_t k = 0; k < n; k++) sum += ((const double *)lumens)[k];
+    json_object_set_new(out, "luminaires", json_pack("{s:I, s:f}", "count", (json_int_t)n, "lumens", sum));
 done:
     free(lumens);
+    return status;
+}
+
+/* Sets of sensors and receivers in them; null where there are none. */
+static lam_status add_sensors(store *s, json_t *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t sets = 0, receivers = 0;
+    if (!store_has(s, STORE_SENSORS)) {
+        json_object_set_new(out, "sensors", json_null());
+        return LAM_OK;
+    }
+    TRY(length_of(s, STORE_SENSORS "/kind", &sets, error));
+    TRY(length_of(s, STORE_SENSORS "/receiver", &receivers, error));
+    json_object_set_new(
+        out, "sensors",
+        json_pack("{s:I, s:I}", "sets", (json_int_t)sets, "receivers", (json_int_t)receivers));
+done:
     return status;
 }
 
@@ -456,6 +483,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     TRY(add_cameras(s, made, error));
     TRY(add_sky(s, made, error));
     TRY(add_luminaires(s, made, error));
+    TRY(add_sensors(s, made, error));
     TRY(add_elements(s, STORE_IMPORTANCE, "importance", made, error));
     TRY(add_elements(s, STORE_SOURCES, "sources", made, error));
     TRY(add_error(s, made, error));

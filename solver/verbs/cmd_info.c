@@ -266,6 +266,13 @@ static void print_luminaires(const json_t *luminaires) {
            json_number_value(json_object_get(luminaires, "lumens")));
 }
 
+static void print_sensors(const json_t *sensors) {
+    if (!json_is_object(sensors)) return;
+    printf("%-18s%" JSON_INTEGER_FORMAT " in %" JSON_INTEGER_FORMAT " sets\n", "sensors",
+           json_integer_value(json_object_get(sensors, "receivers")),
+           json_integer_value(json_object_get(sensors, "sets")));
+}
+
 /* The elements that are read, or that emit, and what others are. */
 static void print_elements(const char *label, const json_t *elements, const char *others) {
     if (!json_is_object(elements)) return;
@@ -290,6 +297,7 @@ static void print_text(const json_t *about) {
     print_cameras(json_object_get(about, "cameras"));
     print_sky(json_object_get(about, "sky"));
     print_luminaires(json_object_get(about, "luminaires"));
+    print_sensors(json_object_get(about, "sensors"));
     print_elements("read", json_object_get(about, "importance"), "the light of others is only roughly right");
     print_elements("emit", json_object_get(about, "sources"),
                    "light that others emit is only roughly right, and no error is stated for it");
