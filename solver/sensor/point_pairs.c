@@ -12,7 +12,7 @@
 #include <string.h>
 
 /* Segments of a pair, of a half, and of one that is partly hidden. */
-enum { SEGMENTS = 8, MORE_SEGMENTS = 128 };
+enum { SEGMENTS = 16, MORE_SEGMENTS = 128 };
 
 /* Panes pass light by its angle: shares that differ by less are one. */
 static const double same_share = .02;

@@ -98,7 +98,8 @@ static bool make_row(const rows_job *job, size_t k, point_room *room, made_row *
     point_place_set(&job->scene, &job->receivers[k], k, &place);
     point_pairs(&job->scene, &place, room);
     point_rays(&job->scene, &place, room);
-    row_entry *entries = malloc((room->n_pairs + room->n_met + 1) * sizeof *entries);
+    row_entry *entries =
+        memory_allocate(room->n_pairs + room->n_met, sizeof *entries, "rows of sensors", NULL);
     size_t n = 0;
     for (size_t i = 0; i < room->n_pairs && entries != NULL; i++)
         if (room->factor[i][0] + room->factor[i][1] > 0)

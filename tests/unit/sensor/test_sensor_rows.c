@@ -128,6 +128,34 @@ START_TEST(even_sky) {
 }
 END_TEST
 
+static bool always(void *context) {
+    (void)context;
+    return true;
+}
+
+/* No receiver, one that is far away, one in a corner of a cell; and work that is cancelled. */
+START_TEST(odd_cases) {
+    lam_error error = {0};
+    mesh m = box_mesh(room, 2, .5f);
+    const receiver r[] = {{.at = {1e9, 0, 0}, .axis = {1, 0, 0}},
+                          {.at = {1e9, 0, 0}, .axis = {-1, 0, 0}},
+                          {.at = {2, 1.5, 0}, .axis = {0, 0, 1}},
+                          {.at = {4, 3, 2.5}, .kind = RECEIVER_SPHERE}};
+    sensor_rows rows = rows_of(&m, 0, r, &(sensor_rows_options){.rays = 64});
+    ck_assert_uint_eq(rows.start[0], 0);
+    sensor_rows_free(&rows);
+    rows = rows_of(&m, 4, r, &(sensor_rows_options){.rays = 64});
+    ck_assert_uint_eq(rows.start[2], 0);
+    for (size_t k = 2; k < 4; k++) ck_assert_double_eq_tol(row_sum(&rows, k), 1, 1e-6);
+    sensor_rows_free(&rows);
+    const progress p = {.cancelled = always};
+    ck_assert_int_eq(sensor_rows_make(&m, 4, r, &(sensor_rows_options){.progress = &p}, &rows, &error),
+                     LAM_ERR_CANCELLED);
+    ck_assert_ptr_null(rows.start);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *s = suite_create("rows of sensors");
     TCase *c = tcase_create("all");
@@ -136,6 +164,7 @@ int main(void) {
     tcase_add_test(c, pairs_are_exact);
     tcase_add_test(c, in_a_wall);
     tcase_add_test(c, even_sky);
+    tcase_add_test(c, odd_cases);
     suite_add_tcase(s, c);
     return suite_run(s);
 }
