@@ -21,7 +21,7 @@ function makePage() {
         },
     };
     const api = { radiosity: async (_, { emission: { sky: [value] } }) => ({ values: { data: new Uint16Array([await later(`values ${value}`)]), shape: [1, 1] }, solveMs: null }) };
-    const scene = { now: { description, mesh: { elements: 1 } }, fields: [null, null], sky, tell() {}, show: (side, field) => shown.push(field.bits[0]) };
+    const scene = { now: { description, mesh: { elements: 1 }, luminaires: null }, fields: [null, null], sky, tell() {}, show: (side, field) => shown.push(field.bits[0]) };
     const asking = new Asking(api, store, scene, { get: () => undefined }, { answered() {}, fail: (reason) => told.push(reason.message) });
     const settle = () => new Promise(setImmediate);
     return { asked, shown, told, asking, settle,

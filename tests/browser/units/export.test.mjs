@@ -4,8 +4,8 @@ import { execFileSync } from "node:child_process";
 import { test } from "node:test";
 import { sourceOf } from "../source.mjs";
 
-const [half, csv, snippets, changes, variants, request] = await Promise.all(
-    ["base/half", "base/csv", "state/snippets", "picture/changes", "state/variants", "state/request"].map(sourceOf));
+const [half, csv, snippets, changes, variants, request, state] = await Promise.all(
+    ["base/half", "base/csv", "state/snippets", "picture/changes", "state/variants", "state/request", "state/state"].map(sourceOf));
 const run = (program, args, options = {}) => execFileSync(program, args, { encoding: "utf8", ...options });
 
 test("a number has the nearest half", () => {
@@ -44,14 +44,14 @@ test("shells and Python read what was written for them", () => {
 });
 
 test("of a sun only the light is scaled, and scaled back", () => {
-    const lighting = { groups: {}, emitters: {}, dim: 1, solo: null };
+    const lighting = state.firstLighting;
     const sun = { azimuth: 100, altitude: 30, direct: [800, 700, 600] };
-    const wanted = request.wantedFor("s", "radiosity", lighting, { channels: 3, groups: [], emitters: 0, sky: [[1, 2, 400], [0, 0, 0]], sun });
+    const wanted = request.wantedFor("s", "radiosity", lighting, { channels: 3, groups: [], emitters: 0, luminaires: null, sky: [[1, 2, 400], [0, 0, 0]], sun });
     assert.equal(wanted.scale, 800);
     assert.deepEqual(wanted.emission.sun, { azimuth: 100, altitude: 30, direct: [1, 0.875, 0.75] });
     const { body } = snippets.plainRequest(wanted, null);
     assert.deepEqual(body.emission, { sky: [[1, 2, 400], [0, 0, 0]], sun: { azimuth: 100, altitude: 30, direct: [800, 700, 600] } });
-    assert.equal(request.wantedFor("s", "radiosity", lighting, { channels: 1, groups: [], emitters: 0, sky: null, sun: { ...sun, direct: 0 } }).emission, null);
+    assert.equal(request.wantedFor("s", "radiosity", lighting, { channels: 1, groups: [], emitters: 0, luminaires: null, sky: null, sun: { ...sun, direct: 0 } }).emission, null);
 });
 
 test("ends of the scale of differences are round", () => {

@@ -14,6 +14,11 @@ test("the headline has the part of the mesh, of the kind of light that shines", 
     assert.equal(headlineOf(made, { groups: {} }).coarse, false);
     assert.equal(headlineOf(made, { sky: [1] }).coarse, true);
     close(headlineOf(made, { sky: [1] }).stated, Math.hypot(0.04, 0.12), 1e-9, "of skies, over all that is reflected");
+    // Beside lamps the larger of both; the mesh of even light is none of luminaires.
+    const lit = { random: figures(0.03, 0.01), mesh: { even: 1e-9, luminaires: 0.04 } };
+    close(headlineOf(lit, { luminaires: {} }).stated, 0.05, 1e-9, "of luminaires");
+    close(headlineOf({ ...lit, mesh: { ...lit.mesh, lights: 0.12 } }, { groups: {}, luminaires: {} }).mesh, 0.12, 1e-9, "of lamps and luminaires");
+    close(headlineOf({ random: figures(0.03, 0.01), mesh: { even: 0.04 } }, { luminaires: {} }).mesh, 0.04, 1e-9, "of luminaires without a figure of theirs");
     close(headlineOf({ random: figures(0.03, 0.01), mesh: { even: 0.04 } }, null).stated, 0.05, 1e-9, "without lamps");
     close(headlineOf({ lights: figures(0.03, 0.01) }, null).stated, 0.03, 1e-9, "without a mesh");
     assert.equal(headlineOf({ mesh: { even: 0.1 } }, null), null);

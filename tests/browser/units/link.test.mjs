@@ -10,13 +10,14 @@ const noMoment = () => null;
 
 const moment = { day: 80, hour: 9.25, year: 1997, direct: 500, isHorizontal: true, diffuse: 90, dewPoint: null };
 const lighting = {
-    groups: { "lamp “é”": { on: false, power: 12.5, colour: [1.5, 0.9, 0.4], kelvin: 2700 } }, dim: 0.25, solo: "lamp “é”", emitters: { 0: 1, 17: 0.5 },
+    groups: { "lamp “é”": { on: false, power: 12.5, colour: [1.5, 0.9, 0.4], kelvin: 2700 } }, dim: 0.25, solo: "lamp “é”", soloLuminaire: null, emitters: { 0: 1, 17: 0.5 },
+    luminaires: { "row “é”": { on: false, dim: 1.5, tint: [1.2, 1, 0.5], kelvin: 2700 } },
     sky: { ...skyOff, model: "clear", sun: "tile", tinted: true, hour: 9.25, day: 80, latitude: -33 },
 };
 const state = {
     ...firstState, scene: "a@b “ü”", lighting, pins: [3, 0, 99], tolerance: 1e-5,
     view: { ...firstView, picture: "false", quantity: "indirect", palette: "turbo", tone: "linear", unit: "lx", exposure: -3.5, range: [0, 77], isoLines: 7,
-        threshold: 300, judged: "floor", uniformity: 0.4, sharpSun: true, camera: [1, 2, 3, 4, 5, 6, 50, 0, 1, 0] },
+        threshold: 300, judged: "floor", uniformity: 0.4, sharpSun: true, openings: false, camera: [1, 2, 3, 4, 5, 6, 50, 0, 1, 0] },
     presets: [{ name: "evening", lighting }], views: [{ name: "door", camera: [1, 2, 3, 4, 5, 6] }],
     compare: { how: "difference", scene: "other", lighting, split: 0.25 },
 };
@@ -45,6 +46,11 @@ test("names and numbers that there are not are held to those that there are", ()
     assert.deepEqual(spoilt.lighting.sky, { ...skyOff, latitude: 90, hour: 0 });
     const dazzling = fromFragment(linkOf({ lighting: { dim: 1e300, groups: { lamp: { power: 1e300, colour: [1, -2, "x"] }, bad: 5 }, emitters: { 0: 1e300, 1: -1 } } }));
     assert.deepEqual(dazzling.lighting, { ...firstLighting, dim: 1e12, groups: { lamp: { on: true, power: 1e12, colour: [1, 0, 1], kelvin: null } }, emitters: { 0: 1e12, 1: 0 } });
+    const dimmed = fromFragment(linkOf({ lighting: { soloLuminaire: "row", luminaires: { row: { dim: 1e300, tint: [1, -2] }, desk: { on: false, dim: "x", tint: [2, -2, 1], kelvin: "x" }, bad: 5 } } }));
+    assert.deepEqual(dimmed.lighting, { ...firstLighting, soloLuminaire: "row", luminaires: { row: { on: true, dim: 1e12, tint: [1, 1, 1], kelvin: null },
+        desk: { on: false, dim: 0, tint: [2, 0, 1], kelvin: null } } });
+    // One of the two shines alone.
+    assert.equal(fromFragment(linkOf({ lighting: { solo: "lamp", soloLuminaire: "row" } })).lighting.soloLuminaire, null);
     assert.deepEqual(fromFragment(linkOf({ pins: [1, -1, 0.5, "x", 7], views: [{ name: "x", camera: [1] }, null], compare: { scene: 5 }, scene: {}, stranger: 1 })),
         { ...firstState, pins: [1, 7], compare: { how: "difference", scene: null, lighting: firstLighting, split: 0.5 } });
 });

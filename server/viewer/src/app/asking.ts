@@ -4,6 +4,7 @@ import type { SkyShare } from "../daylight/scene_sky.ts";
 import { Newest } from "../daemon/newest.ts";
 import { Field } from "../picture/field.ts";
 import type { Comparable } from "../state/comparable.ts";
+import type { SceneLuminaires } from "../state/luminaires.ts";
 import { wantedFor, type Wanted } from "../state/request.ts";
 import { quantityShown, type Lighting } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
@@ -18,6 +19,8 @@ interface Plan {
     of: Description;
     quantity: Quantity;
     lighting: Lighting;
+    /** Scenes that are compared have the same ones. */
+    luminaires: SceneLuminaires | null;
 }
 
 /** What becomes of requests. */
@@ -64,7 +67,9 @@ export class Asking {
         const lighting = (side === 1 ? now.compare?.lighting : null) ?? now.lighting;
         const other = side === 1 ? now.compare?.scene ?? null : null,
             of = other === null ? scene.description : this.comparable.get(other);
-        return of === undefined ? null : { of, quantity: quantityShown(now.view), lighting };
+        return of === undefined
+            ? null
+            : { of, quantity: quantityShown(now.view), lighting, luminaires: scene.luminaires };
     }
 
     /** Asks for what is to be shown, if that has changed. */
@@ -120,8 +125,9 @@ export class Asking {
     }
 }
 
-function wantedOf({ of, quantity, lighting }: Plan, sky: SkyShare): Wanted {
-    return wantedFor(of.name, quantity, lighting, { ...abilitiesOf(of), emitters: of.emitters?.length ?? 0, ...sky });
+function wantedOf({ of, quantity, lighting, luminaires }: Plan, sky: SkyShare): Wanted {
+    return wantedFor(of.name, quantity, lighting, { ...abilitiesOf(of), emitters: of.emitters?.length ?? 0, luminaires,
+        ...sky });
 }
 
 /** The channels and groups that a store takes emission of. */

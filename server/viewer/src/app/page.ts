@@ -6,8 +6,10 @@ import type { SceneSky } from "../daylight/scene_sky.ts";
 import type { Cameras } from "../picture/cameras.ts";
 import type { Field } from "../picture/field.ts";
 import type { SceneMesh } from "../picture/glb.ts";
+import type { Openings } from "../picture/openings.ts";
 import type { Picker } from "../picture/pick.ts";
 import type { Stage } from "../picture/stage.ts";
+import type { SceneLuminaires } from "../state/luminaires.ts";
 import type { Wanted } from "../state/request.ts";
 import type { Lighting, State } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
@@ -28,6 +30,9 @@ export interface OpenScene {
     readonly description: Description;
     readonly mesh: SceneMesh;
     readonly picker: Picker;
+    /** Of its luminaires; null: the store has none. */
+    readonly openings: Openings | null;
+    readonly luminaires: SceneLuminaires | null;
     /** Lighting that the scene comes with. */
     readonly defaultLighting: Lighting;
 }
@@ -54,6 +59,8 @@ export type SceneEvents = {
     field: [];
     timing: [Timing];
     hover: [];
+    /** A luminaire was picked in the picture. */
+    picked: [string];
     /** The page around the picture became dark or light. */
     theme: [];
     /** The name of the scene that is on its way; null: none is any more. */
@@ -79,6 +86,7 @@ export interface Scene extends Observable<SceneEvents> {
     readonly cameras: Cameras;
     readonly exposure: Exposure;
     hover(element: number | null): void;
+    pick(luminaire: string): void;
     /** Shows refined values in place of those of the same request. */
     certify(field: Field, certificate: Certificate): void;
     setBackground(colour: string): void;

@@ -22,7 +22,7 @@ export class Requests implements Ask {
     {
         const fail = (reason: unknown): void => outcome.fail(reason);
         this.comparable = new Comparable((name) => api.describe(name),
-            (description) => scene.sky.prepareOther(description));
+            (description) => scene.sky.prepareOther(description), (name) => api.luminaires(name));
         this.asking = new Asking(api, store, scene, this.comparable, outcome);
         this.sharp = new SharpSun(store, scene, (wanted) => this.asking.solve(wanted), fail);
         this.opening = new Opening(api, store, scene, (opened) => this.take(opened));

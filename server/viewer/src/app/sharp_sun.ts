@@ -6,6 +6,7 @@ import type { Description } from "../daemon/api.ts";
 import type { SunParts } from "../daylight/made_sky.ts";
 import { Field } from "../picture/field.ts";
 import { turned } from "../picture/glb.ts";
+import type { SceneLuminaires } from "../state/luminaires.ts";
 import { wantedFor, type Wanted } from "../state/request.ts";
 import type { Lighting } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
@@ -15,6 +16,7 @@ import type { Shown } from "./shown.ts";
 interface WantedSharp {
     of: Description;
     lighting: Lighting;
+    luminaires: SceneLuminaires | null;
 }
 
 interface Sharp {
@@ -84,17 +86,19 @@ export class SharpSun {
         const { description: of } = scene;
         if ((of.emitters?.length ?? 0) > 0) return null;
         const known = sky.knownSky(lighting, of);
-        return known === undefined || (known?.parts(of.channels) ?? null) !== null ? { of, lighting } : null;
+        return known === undefined || (known?.parts(of.channels) ?? null) !== null
+            ? { of, lighting, luminaires: scene.luminaires }
+            : null;
     }
 
     /** Null: no sun shines. */
-    private async sum({ of, lighting }: WantedSharp): Promise<Sharp | null> {
+    private async sum({ of, lighting, luminaires }: WantedSharp): Promise<Sharp | null> {
         const sky = await this.scene.sky.askSky(lighting, of), parts = sky?.parts(of.channels) ?? null;
         if (sky === null || parts === null) return null;
-        const can = { ...abilitiesOf(of), emitters: 0 },
+        const can = { ...abilitiesOf(of), emitters: 0, luminaires: null },
             exact = lighting.sky.sun === "exact" ? sky.exact(of.channels) : null;
         // Radiosity without the sun, and what the sun's light gives further.
-        const rest = wantedFor(of.name, "radiosity", lighting, { ...can, sky: parts.sky });
+        const rest = wantedFor(of.name, "radiosity", lighting, { ...can, luminaires, sky: parts.sky });
         const further = wantedFor(of.name, "indirect", { ...lighting, groups: {} }, { ...can,
             ...(exact === null ? { sky: parts.sun } : { sky: null, sun: exact.sun }) });
         const [one, other] = await Promise.all([this.solve(rest), this.solve(further)]);

@@ -75,6 +75,10 @@ export class Shown extends Events<SceneEvents> implements Scene {
         this.tell("hover");
     }
 
+    pick(luminaire: string): void {
+        this.tell("picked", luminaire);
+    }
+
     setBackground(colour: string): void {
         this.stage.background = colour;
         this.tell("theme");
@@ -102,6 +106,7 @@ export class Shown extends Events<SceneEvents> implements Scene {
             log: view.log,
             isoLines: view.isoLines,
             threshold: view.threshold,
+            openings: view.openings,
             marked: view.judged !== null,
             compare: compare === null || this.fields[1] === null ? "none" : compare.how,
             split: compare?.split ?? 0.5,

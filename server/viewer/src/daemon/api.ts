@@ -40,12 +40,34 @@ export interface Description {
     /** In the axes of the store, metres; the field of view is that of the height, in degrees. */
     cameras?: { name: string; eye: Vector; direction: Vector; up: Vector; fov: number }[];
     sky: { tiling: string; tiles: number; ground_albedo: number } | null;
+    /** Null: the store has none. */
+    luminaires: { count: number; lumens: number } | null;
     error: { [light: string]: ErrorFigures | GroupErrors[] | number | string | boolean } & {
         [light in "single" | "lights" | "random" | "sky"]?: ErrorFigures;
     } | null;
     provenance?: { [name: string]: unknown };
     /** What the method reported; paths and reuse are of a lamp in many positions. */
     report?: { [name: string]: unknown };
+}
+
+/** In the axes of the store, metres; directions are unit vectors. */
+export interface Luminaire {
+    name: string;
+    /** Those that are dimmed together have one. */
+    group: string | null;
+    /** The middle of its opening. */
+    at: Vector;
+    /** Direction of gamma 0. */
+    aim: Vector;
+    c0: Vector;
+    /** The dimmer that its list gives it. */
+    dim: number;
+    /** At dimmer 1. */
+    lumens: number;
+    /** Red, green and blue, of luminance 1. */
+    colour: Vector;
+    /** The size is along C0, along C90 and against the aim. */
+    opening: { shape: string; size: Vector };
 }
 
 /** A body for POST …/radiosity; EMISSION of the contract. */
@@ -136,6 +158,12 @@ export class Api {
 
     async sky(scene: string): Promise<SkyTiles> {
         return (await (await this.ask(Api.path(scene, "/sky"))).json()) as SkyTiles;
+    }
+
+    /** In the order of their gradients. */
+    async luminaires(scene: string): Promise<Luminaire[]> {
+        return ((await (await this.ask(Api.path(scene, "/luminaires"))).json()) as { luminaires: Luminaire[] })
+            .luminaires;
     }
 
     /** Radiances of the tiles of a scene. */

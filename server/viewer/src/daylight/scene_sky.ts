@@ -3,7 +3,7 @@
 import { Problem, type Api, type Description } from "../daemon/api.ts";
 import type { Gaps, SkyTiles, WeatherRows } from "../daemon/daylight.ts";
 import type { ExactSun } from "../state/request.ts";
-import type { Lighting, SkyLight } from "../state/state.ts";
+import { isSolo, type Lighting, type SkyLight } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
 import { placeOf } from "./sky_request.ts";
 import type { Radiances, Sky, SunParts } from "./made_sky.ts";
@@ -120,7 +120,7 @@ export class SceneSky {
 
     private isLit(lighting: Lighting, of: Description): boolean {
         const { source } = this, hasTiles = of === this.open ? source.tiles !== null : source.knows(of.name);
-        return of.sky !== null && lighting.solo === null && hasTiles;
+        return of.sky !== null && !isSolo(lighting) && hasTiles;
     }
 
     private async fetch({ name, sky }: Description): Promise<Fetched> {

@@ -2,13 +2,14 @@
 import { fromHex, luminance, ofTemperature, toHex, type Rgb } from "../base/colour.ts";
 import { button, choice, fill, make, tick, unique } from "../base/dom.ts";
 import type { Page } from "../app/page.ts";
-import { unitOf, type GroupLight, type Lighting, type Preset } from "../state/state.ts";
+import { isSolo, unitOf, type GroupLight, type Lighting, type Preset } from "../state/state.ts";
+import { luminaireList } from "./luminaires.ts";
 import type { Panel } from "./panel.ts";
 import { slider, type Slider } from "./slider.ts";
 
 interface Row {
     element: HTMLElement;
-    update(light: GroupLight, solo: string | null): void;
+    update(light: GroupLight, lighting: Lighting): void;
 }
 
 /** So many rows are drawn; a filter, which is there from so many lamps on, finds the others. */
@@ -56,7 +57,8 @@ export function lightsPanel(page: Page): Panel {
         filter.hidden = shining().length < FILTER_FROM;
         rows.clear();
         fill(list, ...names.map((name) => {
-            const row = lightRow(page, name, lighting.groups[name], changeGroup, (solo) => change({ solo }, null));
+            const row = lightRow(page, name, lighting.groups[name], changeGroup,
+                (solo) => change({ solo, soloLuminaire: null }, null));
             rows.set(name, row);
             return row.element;
         }));
@@ -65,7 +67,7 @@ export function lightsPanel(page: Page): Panel {
                 make("p", { class: "hint" }, `${all.length - names.length} more: name a part of theirs above.`),
             );
         if (scene.now?.mesh.groups.every((group) => group.emission === null) && scene.now.description.sky === null
-            && names.length > 0)
+            && scene.now.luminaires === null && names.length > 0)
             list.append(make("p", { class: "hint" }, "No group of this scene emits light: these do it in its place."));
         if (hasEmitters())
             list.append(
@@ -86,7 +88,7 @@ export function lightsPanel(page: Page): Panel {
         dim.set(lighting.dim);
         const known = found().slice(0, ROWS_MOST);
         if (known.length !== rows.size || known.some((name) => !rows.has(name))) draw();
-        for (const [name, row] of rows) row.update(lighting.groups[name], lighting.solo);
+        for (const [name, row] of rows) row.update(lighting.groups[name], lighting);
     };
     scene.on("scene", () => {
         filter.value = "";
@@ -101,7 +103,7 @@ export function lightsPanel(page: Page): Panel {
         if (scene.now !== null) store.change({ ...store.now, lighting: scene.now.defaultLighting });
     });
     return { id: "lights", title: "Lights",
-        element: make("div", {}, dim.element, several, list, more, reset, presets) };
+        element: make("div", {}, dim.element, several, list, more, luminaireList(page), reset, presets) };
 }
 
 function lightRow({ store, scene }: Page, name: string, light: GroupLight,
@@ -143,17 +145,17 @@ function lightRow({ store, scene }: Page, name: string, light: GroupLight,
     });
     const element = make("section", { class: "light", "aria-labelledby": id },
         make("div", { class: "row" }, on, coloured && swatch, alone), power.element, coloured && kelvin.element);
-    const update = (now: GroupLight, soloed: string | null): void => {
+    const update = (now: GroupLight, lighting: Lighting): void => {
         (on.querySelector("input") as HTMLInputElement).checked = now.on;
         power.set(now.power);
         const largest = Math.max(...now.colour, 1e-9);
         if (document.activeElement !== swatch) swatch.value = toHex(now.colour.map((v) => v / largest));
         if (now.kelvin === null) kelvin.unset("own");
         else kelvin.set(now.kelvin);
-        alone.setAttribute("aria-pressed", String(soloed === name));
-        element.classList.toggle("dark", !now.on || (soloed !== null && soloed !== name));
+        alone.setAttribute("aria-pressed", String(lighting.solo === name));
+        element.classList.toggle("dark", !now.on || (isSolo(lighting) && lighting.solo !== name));
     };
-    update(light, store.now.lighting.solo);
+    update(light, store.now.lighting);
     return { element, update };
 }
 

@@ -19,11 +19,16 @@ export class Picker {
 
     /** The element at (x, y), each from −1 to 1, or null. Only fronts are met, as only they are drawn. */
     at(x: number, y: number, camera: Camera): number | null {
+        return this.meet(x, y, camera)?.element ?? null;
+    }
+
+    /** The same, with its distance from the eye, m. */
+    meet(x: number, y: number, camera: Camera): { element: number; distance: number } | null {
         this.prepare();
         this.caster.setFromCamera(new Vector2(x, y), camera);
         const hit = (this.tree as MeshBVH).raycastFirst(this.caster.ray, FrontSide);
         if (hit === null || hit.faceIndex === undefined || hit.faceIndex === null) return null;
-        return this.mesh.elementOf[this.mesh.index[3 * hit.faceIndex]];
+        return { element: this.mesh.elementOf[this.mesh.index[3 * hit.faceIndex]], distance: hit.distance };
     }
 
     /** The height of the lowest front that is met from above at x and z, or null. */

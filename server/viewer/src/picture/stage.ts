@@ -8,6 +8,7 @@ import type { Field } from "./field.ts";
 import { channelWeights } from "./field.ts";
 import type { SceneMesh } from "./glb.ts";
 import { findNodes } from "./nodes.ts";
+import type { Openings } from "./openings.ts";
 import { splitEdges, type Drawn } from "./split_edges.ts";
 import { Sunlight } from "./sunlight.ts";
 import { makeUniforms, nodesMaterial, paneMaterial, sceneMaterial, type Uniforms } from "./material.ts";
@@ -28,6 +29,8 @@ export interface Display {
     textured: boolean;
     /** In the unit of the values; null: no marks. */
     threshold: number | null;
+    /** Openings of luminaires are drawn where there are any. */
+    openings: boolean;
     /** The judged elements are shown as such without a threshold, too. */
     marked: boolean;
     compare: "none" | "split" | "difference";
@@ -58,6 +61,7 @@ export class Stage {
     private nodes: WebGLRenderTarget | null = null;
     private nodesAreOld = false;
     private body: Mesh | null = null;
+    private openings: Openings | null = null;
     private hasImages = false;
     private images: Texture[] = [];
     private paletteName: Palette | null = null;
@@ -97,8 +101,10 @@ export class Stage {
             || this.renderer.extensions.has("EXT_color_buffer_half_float");
     }
 
-    show(mesh: SceneMesh, channels: number): void {
+    show(mesh: SceneMesh, channels: number, openings: Openings | null): void {
         this.clear();
+        this.openings = openings;
+        if (openings !== null) this.scene.add(openings.lines);
         const nodes = findNodes(mesh), drawn = splitEdges(mesh, nodes), vertices = drawn.elementOf.length,
             ids = new Uint32Array(2 * vertices);
         for (let v = 0; v < vertices; v++) {
@@ -232,6 +238,7 @@ export class Stage {
             this.paletteName = display.palette;
             u.palette.value = paletteTexture(display.palette);
         }
+        if (this.openings !== null) this.openings.lines.visible = display.openings;
         this.placeSplit();
         this.invalidate();
     }
@@ -408,12 +415,14 @@ export class Stage {
             textures = Object.values(uniforms).map(({ value }) => value as { dispose?: () => void } | null);
         for (const one of [...materials, ...textures, geometry, nodes, nodesPlane.geometry, nodesPlane.material, white,
             ...images]) one?.dispose?.();
+        this.openings?.dispose();
         sunlight?.release();
     }
 
     private clear(): void {
         this.scene.clear();
         this.geometry?.dispose();
+        this.openings?.dispose();
         this.values?.forEach((texture) => texture.dispose());
         this.nodes?.dispose();
         this.images.forEach((texture) => texture.dispose());

@@ -1,12 +1,15 @@
 // The scenes that can be compared with the open one: those that take the same lighting on as many elements. Nothing is
 // asked of any other.
 import { count } from "../base/numbers.ts";
-import { Problem, type Description } from "../daemon/api.ts";
+import { Problem, type Description, type Luminaire } from "../daemon/api.ts";
 
 const namesOf = (list: readonly { name: string }[]): string => JSON.stringify(list.map((group) => group.name).sort());
 
-/** Why b cannot be compared with a, as a sentence; null: it can. Skies may have other tiles, for which they are made
- * anew. */
+const namesIn = (luminaires: readonly Luminaire[]): string =>
+    JSON.stringify(luminaires.map(({ name, group }) => JSON.stringify([name, group])).sort());
+
+/** Why b cannot be compared with a, as a sentence, as far as their descriptions tell; null: it can. Skies may have
+ * other tiles, for which they are made anew. */
 export function whyIncomparable(a: Description, b: Description): string | null {
     if (b.elements !== a.elements)
         return `${b.name} has ${count(b.elements)} elements and ${a.name} ${
@@ -20,6 +23,8 @@ export function whyIncomparable(a: Description, b: Description): string | null {
         return `Only one of ${a.name} and ${b.name} has a sky, so they cannot be lit alike.`;
     const hasTiles = (of: Description): boolean => of.sky !== null && of.emitters?.length === of.sky.tiles;
     const emitters = (of: Description): string => (hasTiles(of) ? "tiles" : JSON.stringify(of.emitters ?? []));
+    if ((b.luminaires?.count ?? 0) !== (a.luminaires?.count ?? 0))
+        return `${b.name} has other luminaires than ${a.name}, so it cannot be lit alike.`;
     if (emitters(b) !== emitters(a)) return `${b.name} has other emitters than ${a.name}, so it cannot be lit alike.`;
     return null;
 }
@@ -31,7 +36,8 @@ export class Comparable {
 
     constructor(private readonly describe: (name: string) => Promise<Description>,
         /** Fetches what the lighting of a scene needs. */
-        private readonly prepare: (description: Description) => Promise<void>)
+        private readonly prepare: (description: Description) => Promise<void>,
+        private readonly luminairesOf: (name: string) => Promise<Luminaire[]>)
     {}
 
     /** Another scene is open. */
@@ -53,6 +59,11 @@ export class Comparable {
         return name !== null;
     }
 
+    private async haveSameLuminaires(a: Description, b: Description): Promise<boolean> {
+        const [one, other] = await Promise.all([a, b].map(async (of) => namesIn(await this.luminairesOf(of.name))));
+        return one === other;
+    }
+
     /** Why a scene cannot be compared with the open one, as a sentence; null: it is admitted. */
     async admit(name: string): Promise<string | null> {
         const { open } = this;
@@ -60,6 +71,8 @@ export class Comparable {
         try {
             const there = await this.describe(name), why = whyIncomparable(open, there);
             if (why !== null) return why;
+            if (open.luminaires !== null && !(await this.haveSameLuminaires(open, there)))
+                return `${name} has other luminaires than ${open.name}, so it cannot be lit alike.`;
             await this.prepare(there);
             if (open === this.open) this.admitted.set(name, there);
             return null;

@@ -11,7 +11,7 @@ const LUX_OUTSIDE = 10000;
 export function defaultLightingOf(mesh: SceneMesh, description: Description): Lighting {
     const groups: { [name: string]: GroupLight } = {};
     for (const group of mesh.groups) if (group.emission !== null) groups[group.name] = lightOf(group.emission);
-    const isDark = Object.keys(groups).length === 0 && description.sky === null
+    const isDark = Object.keys(groups).length === 0 && description.sky === null && description.luminaires === null
         && (description.emitters ?? []).length === 0;
     if (isDark) groups[ceilingOf(mesh)] = lightOf([1, 1, 1]);
     const emitters: { [index: string]: number } = {};

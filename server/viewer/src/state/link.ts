@@ -1,7 +1,8 @@
 // The state as the fragment of a link: #1.BASE64URL of JSON, only what differs from the first state.
 import { QUANTITIES } from "../daemon/api.ts";
-import { firstLighting, firstState, firstView, PALETTES, SKY_MODELS, skyOff, TONES, UNITS, type Lighting, type Moment,
-    type Place, type SkyLight, type State, type View } from "./state.ts";
+import type { Rgb } from "../base/colour.ts";
+import { firstLighting, firstState, firstView, PALETTES, SKY_MODELS, skyOff, TONES, UNITS, type Lighting,
+    type LuminaireLight, type Moment, type Place, type SkyLight, type State, type View } from "./state.ts";
 
 /** Of powers and weights: products of two of them are still numbers of single precision. */
 const LIGHT_MOST = 1e12;
@@ -82,27 +83,48 @@ function restoreSky(given: unknown): SkyLight {
 function restoreLighting(given: unknown): Lighting {
     // A link without lights asks for those that the scene comes with.
     if (given === undefined) return firstLighting;
-    const out = restore(firstLighting, given, ["solo"]);
+    const out = restore(firstLighting, given, ["solo", "soloLuminaire"]);
     const groups: Lighting["groups"] = {};
     for (const [name, light] of Object.entries(out.groups)) {
         if (!isPlain(light)) continue;
-        const colour = Array.isArray(light.colour) && light.colour.length === 3 ? light.colour : [1, 1, 1];
         groups[name] = {
             on: light.on !== false,
             power: held(light.power as number, 0, 0, LIGHT_MOST),
-            colour: [0, 1, 2].map((i) => Math.max(0, number(colour[i], 1))) as [number, number, number],
+            colour: restoreColour(light.colour),
             kelvin: typeof light.kelvin === "number" ? light.kelvin : null,
         };
     }
     const emitters: Lighting["emitters"] = {};
     for (const [index, weight] of Object.entries(out.emitters)) emitters[index] = held(weight, 0, 0, LIGHT_MOST);
+    const solo = typeof out.solo === "string" ? out.solo : null;
     return {
         groups,
         emitters,
+        luminaires: restoreLuminaires(out.luminaires),
         dim: held(out.dim, 1, 0, LIGHT_MOST),
         sky: restoreSky(out.sky),
-        solo: typeof out.solo === "string" ? out.solo : null,
+        solo,
+        soloLuminaire: solo === null && typeof out.soloLuminaire === "string" ? out.soloLuminaire : null,
     };
+}
+
+function restoreLuminaires(given: { readonly [name: string]: unknown }): Lighting["luminaires"] {
+    const lights = Object.entries(given).flatMap(([name, light]): [string, LuminaireLight][] =>
+        isPlain(light)
+            ? [[name, {
+                on: light.on !== false,
+                dim: held(light.dim as number, 0, 0, LIGHT_MOST),
+                tint: restoreColour(light.tint),
+                kelvin: typeof light.kelvin === "number" ? light.kelvin : null,
+            }]]
+            : []
+    );
+    return Object.fromEntries(lights);
+}
+
+function restoreColour(given: unknown): Rgb {
+    const colour: unknown[] = Array.isArray(given) && given.length === 3 ? given : [1, 1, 1];
+    return colour.map((v) => Math.max(0, number(v, 1))) as Rgb;
 }
 
 function isPlace(value: unknown): value is Place {

@@ -1,6 +1,7 @@
 // The body of the request for a lighting. Emission is sent scaled to at most 1, so that answers in half precision keep
 // their digits whatever the unit; the field gets the scale back.
 import type { Quantity } from "../daemon/api.ts";
+import { dimmersOf, meanLightOf, type SceneLuminaires } from "./luminaires.ts";
 import { emissionOf, type Lighting } from "./state.ts";
 
 export interface Wanted {
@@ -16,6 +17,8 @@ export interface Abilities {
     channels: number;
     groups: readonly string[];
     emitters: number;
+    /** Null: the store has none, or they are dark. */
+    luminaires: SceneLuminaires | null;
     /** One radiance per tile of the sky in the store's unit; null: no sky, or dark. */
     sky: readonly (number | number[])[] | null;
     /** The sun itself beside that, which is then without it. */
@@ -29,6 +32,9 @@ export interface ExactSun {
     direct: number | number[];
 }
 
+/** Close to a luminaire there is so much more light than on average: halves end at 65,504. */
+const ABOVE_MEAN = 64;
+
 export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting, can: Abilities): Wanted {
     // Lamps of the scene are not in the answers of a store of few emitters, nor in what these are scaled by.
     const groups = can.emitters > 0
@@ -38,6 +44,8 @@ export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting,
     const weights = Object.entries(lighting.emitters).filter(([index, weight]) =>
         weight > 0 && Number(index) < can.emitters
     );
+    const dimmers = can.luminaires === null ? {} : dimmersOf(can.luminaires.rows, lighting, can.channels),
+        meanLight = can.luminaires === null ? 0 : meanLightOf(can.luminaires, lighting);
     const largest = (values: Iterable<number>): number => {
         let most = 0;
         for (const value of values) if (value > most) most = value;
@@ -45,7 +53,7 @@ export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting,
     };
     const most = Math.max(largest(groups.flatMap(([, v]) => [v].flat())),
         largest((sky ?? []).flatMap((v) => [v].flat())), largest([can.sun?.direct ?? 0].flat()),
-        lighting.dim * largest(weights.map(([, weight]) => weight)));
+        lighting.dim * largest(weights.map(([, weight]) => weight)), ABOVE_MEAN * meanLight);
     if (most <= 0 || !Number.isFinite(most)) return { scene, quantity, emission: null, scale: 1 };
     const scaled = <T extends number | number[]>(value: T): T =>
         (typeof value === "number" ? value / most : value.map((v) => v / most)) as T;
@@ -58,6 +66,8 @@ export function wantedFor(scene: string, quantity: Quantity, lighting: Lighting,
     } else if (groups.length > 0) {
         emission.groups = Object.fromEntries(groups.map(([name, value]) => [name, scaled(value)]));
     }
+    if (meanLight > 0)
+        emission.luminaires = Object.fromEntries(Object.entries(dimmers).map(([name, value]) => [name, scaled(value)]));
     if (sky !== null) emission.sky = sky.map(scaled);
     // Both are turned by the north of the store.
     if (can.sun !== undefined && can.sun !== null) emission.sun = { ...can.sun, direct: scaled(can.sun.direct) };

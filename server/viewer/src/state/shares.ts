@@ -1,5 +1,7 @@
 // Which lamp lights a point: J is a quantity at one element, by luminance, and linear in all that shines. The daemon's
-// adjoint gives dJ/dv of every group, tile and emitter once; every lighting then is a sum of products.
+// adjoint gives dJ/dv of every group, luminaire, tile and emitter once; every lighting then is a sum of products.
+import type { Luminaire } from "../daemon/api.ts";
+import { dimmerOf } from "./luminaires.ts";
 import { emissionOf, type Lighting } from "./state.ts";
 
 /** The gradient of an adjoint answer: [width], or [C][width] for more channels. */
@@ -7,6 +9,7 @@ export interface Gradient {
     groups?: number[] | number[][];
     sky?: number[] | number[][];
     emitters?: number[] | number[][];
+    luminaires?: number[] | number[][];
 }
 
 export interface Part {
@@ -25,10 +28,11 @@ function product(rows: number[] | number[][], k: number, value: number | readonl
     return sum;
 }
 
-/** What each group that shines, the sky and each emitter give; the largest first. `groups` and `emitters` are names in
- * the order of the store. */
+/** What each group that shines, each luminaire, the sky and each emitter give; the largest first. `groups` and
+ * `emitters` are names in the order of the store, and luminaires are in that order. */
 export function partsOf(gradient: Gradient, lighting: Lighting, channels: number, groups: readonly string[],
-    emitters: readonly string[], sky: readonly (number | readonly number[])[] | null): Part[]
+    emitters: readonly string[], luminaires: readonly Luminaire[],
+    sky: readonly (number | readonly number[])[] | null): Part[]
 {
     const parts: Part[] = [];
     if (gradient.groups !== undefined) {
@@ -43,6 +47,13 @@ export function partsOf(gradient: Gradient, lighting: Lighting, channels: number
             if (weight > 0 && k < emitters.length)
                 parts.push({ name: emitters[k], value: product(gradient.emitters, k, weight * lighting.dim) });
         }
+    }
+    const { luminaires: dimmed } = gradient;
+    if (dimmed !== undefined) {
+        luminaires.forEach((one, k) => {
+            const dimmer = dimmerOf(one, lighting, channels);
+            if (dimmer !== 0) parts.push({ name: one.name, value: product(dimmed, k, dimmer) });
+        });
     }
     // A store of the tiles of a sky has these as its emitters.
     const rows = gradient.sky

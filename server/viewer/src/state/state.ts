@@ -11,6 +11,17 @@ export interface GroupLight {
     kelvin: number | null;
 }
 
+/** What a person made of a luminaire, or of a group of them. */
+export interface LuminaireLight {
+    on: boolean;
+    /** 1 is the full light. */
+    dim: number;
+    /** Factors of red, green and blue. */
+    tint: Rgb;
+    /** The colour temperature that the tint was chosen by, or null. */
+    kelvin: number | null;
+}
+
 /** The weather of one hour of a file that was picked, which a link holds in place of the file. */
 export interface Moment {
     /** The time that it is of: those of SkyLight. */
@@ -59,11 +70,16 @@ export interface SkyLight {
 
 export interface Lighting {
     groups: { [name: string]: GroupLight };
+    /** Of all lamps, luminaires and emitters. */
     dim: number;
+    /** The group, and the luminaire or group of luminaires, that shines alone: at most one of the two. */
     solo: string | null;
+    soloLuminaire: string | null;
     sky: SkyLight;
     /** Weights of precomputed emitters; those that are absent are 0. */
     emitters: { [index: string]: number };
+    /** By names of luminaires or of groups of them; those that are absent are as their list says. */
+    luminaires: { [name: string]: LuminaireLight };
 }
 
 /** Eye and target in metres, y up; and, where they are not those of the page, the angle of view (of the height, in
@@ -106,6 +122,8 @@ export interface View {
     walk: boolean;
     /** Null: the whole scene. */
     camera: Place | null;
+    /** The openings of luminaires are drawn. */
+    openings: boolean;
 }
 
 export interface Preset {
@@ -176,9 +194,11 @@ export const firstView: View = {
     uniformity: 0.6,
     walk: false,
     camera: null,
+    openings: true,
 };
 
-export const firstLighting: Lighting = { groups: {}, dim: 1, solo: null, sky: skyOff, emitters: {} };
+export const firstLighting: Lighting = { groups: {}, dim: 1, solo: null, soloLuminaire: null, sky: skyOff, emitters: {},
+    luminaires: {} };
 
 export const firstState: State = {
     scene: "",
@@ -207,12 +227,17 @@ export function unitShown(view: View): string {
     return unitOf(view, quantityShown(view));
 }
 
+/** A lamp or a luminaire shines alone, without the sky. */
+export function isSolo({ solo, soloLuminaire }: Lighting): boolean {
+    return solo !== null || soloLuminaire !== null;
+}
+
 /** Emission of each group under a lighting, per channel, in the store's unit; groups that are dark are absent. */
 export function emissionOf(lighting: Lighting, channels: number): { [name: string]: number | number[] } {
     const out: { [name: string]: number | number[] } = {};
     for (const [name, light] of Object.entries(lighting.groups)) {
         const power = light.power * lighting.dim;
-        if (!light.on || power <= 0 || (lighting.solo !== null && lighting.solo !== name)) continue;
+        if (!light.on || power <= 0 || (isSolo(lighting) && lighting.solo !== name)) continue;
         out[name] = channels === 3 ? light.colour.map((c) => c * power) : power;
     }
     return out;

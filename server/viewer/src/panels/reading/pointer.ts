@@ -2,6 +2,8 @@
 import { button, make } from "../../base/dom.ts";
 import { clamp, numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
+import type { Luminaire } from "../../daemon/api.ts";
+import { lumensOf } from "../../state/luminaires.ts";
 import { pinsAfter } from "../../state/shares.ts";
 import { unitShown } from "../../state/state.ts";
 
@@ -24,6 +26,7 @@ export class Pointer {
     private down: [number, number, number] | null = null;
     private isWaiting = false;
     private element: number | null = null;
+    private luminaire: Luminaire | null = null;
 
     constructor(private readonly page: Page, /** True while the panel is seen: then elements are marked and pinned. */
         private readonly isReading: () => boolean)
@@ -103,12 +106,15 @@ export class Pointer {
     private release(event: PointerEvent): void {
         const { down } = this;
         this.down = null;
-        if (down === null || event.pointerId !== down[2] || event.target !== this.canvas || !this.isReading()) return;
+        if (down === null || event.pointerId !== down[2] || event.target !== this.canvas) return;
         if (Math.hypot(event.clientX - down[0], event.clientY - down[1]) > CLICK_PX) return;
+        const { scene } = this.page;
+        if (!this.isReading() && scene.now?.openings === null) return;
         const box = this.canvas.getBoundingClientRect();
         this.place = [event.clientX - box.left, event.clientY - box.top];
         this.look();
-        this.pin(event.shiftKey);
+        if (this.isReading()) this.pin(event.shiftKey);
+        else if (this.luminaire !== null) scene.pick(this.luminaire.name);
     }
 
     private pin(isMore: boolean): void {
@@ -120,7 +126,7 @@ export class Pointer {
 
     private leave(): void {
         this.place = null;
-        this.element = null;
+        this.element = this.luminaire = null;
         this.tip.hidden = true;
         this.page.scene.hover(null);
     }
@@ -137,31 +143,40 @@ export class Pointer {
     }
 
     private look(): void {
-        const { page: { scene: { now: scene, cameras } }, place } = this;
+        const { page: { scene: { now: scene, cameras: { camera } }, store: { now: { view } } }, place } = this;
         if (scene === null || place === null) return;
-        cameras.camera.updateMatrixWorld();
-        this.element = scene.picker.at((2 * place[0]) / this.canvas.clientWidth - 1,
-            1 - (2 * place[1]) / this.canvas.clientHeight, cameras.camera);
+        camera.updateMatrixWorld();
+        const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+        const [x, y] = [(2 * place[0]) / width - 1, 1 - (2 * place[1]) / height], met = scene.picker.meet(x, y, camera);
+        this.element = met?.element ?? null;
+        this.luminaire = view.openings ? scene.openings?.at(x, y, camera, height, met?.distance ?? null) ?? null : null;
         this.page.scene.hover(this.isReading() || this.isByKeys ? this.element : null);
         this.showNumber();
     }
 
     /** The number beside the pointer: what the picture shows there. */
     private showNumber(): void {
-        const { page: { scene: { now: scene, fields: [field] }, store: { now: { view } } }, place, element } = this;
+        const { page: { scene: { now: scene, fields: [field] }, store: { now: { view, lighting } } }, place, element,
+            luminaire } = this;
         if (place === null) return;
         this.cross.style.left = `${place[0]}px`;
         this.cross.style.top = `${place[1]}px`;
-        this.tip.hidden = element === null || field === null || scene === null;
-        if (element === null || field === null || scene === null) {
+        this.tip.hidden = (element === null && luminaire === null) || field === null || scene === null;
+        if (this.tip.hidden || field === null || scene === null) {
             if (this.isByKeys) this.told.textContent = "nothing";
             return;
         }
-        const text = `${numberText(field.values[element])} ${unitShown(view)} · ${
-            scene.mesh.groups[scene.mesh.groupOf[element]]?.name ?? ""
-        }`;
+        const lamp = luminaire === null
+            ? ""
+            : `${luminaire.name}, ${numberText(lumensOf({ members: [luminaire] }, lighting))} lm`;
+        const surface = element === null
+            ? ""
+            : `${numberText(field.values[element])} ${unitShown(view)} · ${
+                scene.mesh.groups[scene.mesh.groupOf[element]]?.name ?? ""
+            }`;
+        const text = [lamp, surface].filter((part) => part !== "").join(" · ");
         this.tip.textContent = text;
-        if (this.isByKeys) this.told.textContent = `${text}, element ${element}`;
+        if (this.isByKeys) this.told.textContent = element === null ? text : `${text}, element ${element}`;
         // It stays within the picture, and beside the pointer.
         const right = place[0] > this.frame.clientWidth - this.tip.offsetWidth - 24;
         const below = place[1] < this.tip.offsetHeight + 24;

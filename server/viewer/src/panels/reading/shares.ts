@@ -59,9 +59,8 @@ export class Shares {
         const { description } = this.page.scene.now as OpenScene, { channels } = description;
         const gradient = (description.emitters?.length ?? 0) > 0
             ? ["emitters"]
-            : description.sky === null
-            ? ["groups"]
-            : ["groups", "sky"];
+            : ["groups", ...(description.sky === null ? [] : ["sky"]),
+                ...(description.luminaires === null ? [] : ["luminaires"])];
         const weights = channelWeights(channels);
         const answer = await this.page.ask.api.adjoint(asked.scene, {
             cotangent: { elements: [asked.element], values: [channels === 1 ? 1 : weights] },
@@ -95,11 +94,11 @@ export class Shares {
             this.wanted = key;
             return;
         }
-        const { description, mesh } = scene;
+        const { description, mesh, luminaires } = scene;
         // It is drawn with the picture of a sky that is on its way.
         if (sky.known(now.lighting, description) === undefined) return;
         const parts = partsOf(gradient, now.lighting, description.channels,
-            description.groups.map((group) => group.name), description.emitters ?? [],
+            description.groups.map((group) => group.name), description.emitters ?? [], luminaires?.list ?? [],
             description.sky === null ? null : sky.radiances(now.lighting, description));
         const total = parts.reduce((sum, part) => sum + part.value, 0);
         const group = mesh.groups[mesh.groupOf[asked.element]]?.name ?? "";
