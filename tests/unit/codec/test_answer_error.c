@@ -304,8 +304,13 @@ START_TEST(luminaires_have_errors_of_their_own) {
     static const float dimmers[C * 2] = {1, 2, 0, 3};
     static const double factors[C * 2] = {1, .5, 2, 1.5}, off[2 * G] = {.01, .02, .03, .04};
     static const double mean_off[2 * G] = {.001, .002, .003, .004};
-    const lit_luminaires lit = {
-        .k = 2, .dimmers = dimmers, .factors = factors, .elements_off = off, .means_off = mean_off};
+    static const double lumens[2] = {100, 300};
+    const lit_luminaires lit = {.k = 2,
+                                .dimmers = dimmers,
+                                .factors = factors,
+                                .elements_off = off,
+                                .means_off = mean_off,
+                                .lumens = lumens};
     const lam_quantity quantity = (lam_quantity[]){LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT}[_i];
     const bool white = quantity == LAM_IRRADIANCE, sees = quantity != LAM_INDIRECT;
     /* (d f)^2 is 1 and 1 in the first channel, 0 and 20.25 in the second; rho is .5 of desk in both. */
@@ -341,6 +346,8 @@ START_TEST(luminaires_have_errors_of_their_own) {
                               .value = value,
                               .emission = emission,
                               .direct = direct};
+    /* (100 + 5 300)^2 / (100^2 + (5 300)^2), dimmers of both channels together. */
+    ck_assert_double_eq_tol(lit_luminaires_number(&lit, C), 2560000. / 2260000., 1e-12);
     const name_error same = name_error_of_means(&stated, &list[0], &means);
     ck_assert_double_eq_tol(same.mean, found.mean, 1e-6);
     ck_assert_double_eq_tol(same.elements, found.elements, 1e-5);
