@@ -4,13 +4,15 @@ import csv
 import json
 import math
 import os
+import subprocess
+import sys
 import unittest
 
 import h5py
 import numpy as np
 
 from case import Case
-from command import lambert, must
+from command import EXAMPLES, example, lambert, must
 
 ASSETS = ("--assets", os.path.join(os.environ["FIXTURES"], "luminaires"))
 LUMINAIRES = {"luminaires": [{"name": "a", "file": "made/lambertian-1000cd.ies", "at": [3, 3, 2.5]},
@@ -84,6 +86,20 @@ class Sensors(Case):
         with open(self.path("r.json"), encoding="utf-8") as file:
             self.assertEqual([s["name"] for s in json.load(file)["sensors"]], ["desk", "room"])
         self.assertIn("min/mean", must("solve", self.grey, "--sensors", "room").stdout)
+
+    def test_a_program_of_one_s_own_reads_them(self):
+        must("solve", self.grey, "-o", self.path("B.npy"))
+        gather = example("read_sensors.py", self.grey)["gather"]
+        for one in self.answer(self.grey)["sensors"]:
+            found, wanted = gather(self.grey, np.load(self.path("B.npy")))[one["name"]][0], np.array(one["values"], float)
+            # single precision of values, and the limiter, which solve uses for both
+            np.testing.assert_allclose(found, wanted, rtol=1e-5)
+            self.assertEqual(np.isnan(found).all(), one["name"] == "out")
+        printed = subprocess.run([sys.executable, EXAMPLES / "read_sensors.py", self.grey, self.path("B.npy")], check=True, text=True,
+                                 stdout=subprocess.PIPE).stdout
+        self.assertEqual([line.split()[0] for line in printed.splitlines()].count("desk"), 1)
+        for one in self.answer(self.black)["sensors"]:
+            np.testing.assert_allclose(gather(self.black)[one["name"]][0], np.array(one["values"], float), rtol=1e-5)
 
     def test_points_outside_have_no_value(self):
         told = must("precompute", self.grey, "--sensors", self.kept("s.json"), "-o", self.path("again.h5")).stderr
