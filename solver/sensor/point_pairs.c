@@ -71,11 +71,17 @@ void point_place_set(const point_scene *s, const receiver *r, size_t number, poi
         for (int d = 0; d < 3; d++) normal[d] = (double)m->normal[j][d];
         height = dot3(away, normal);
         const double clear = 2 * rounding + visibility_rise(s->v, j);
-        if (!(height >= -near && height < clear) || dot3(normal, r->axis) < against) continue;
-        for (size_t k = 0; k < n_faces; k++) apart = apart || dot3(normals[k], normal) < -.5;
+        /* One that looks into a face goes behind it: it is in a body, or sees what is below a sheet. */
+        const bool behind = dot3(normal, r->axis) < against;
+        if (!(height >= (behind ? -clear : -near) && height < clear)) continue;
+        for (size_t k = 0; k < n_faces; k++)
+            apart = apart || (behind ? -1 : 1) * dot3(normals[k], normal) < -.5;
         if (apart || !is_over(m, j, out->r.at, near)) continue;
-        for (int d = 0; d < 3; d++) out->r.at[d] += (clear - height) * normal[d];
-        memcpy(normals[n_faces++], normal, sizeof normal);
+        for (int d = 0; d < 3; d++) {
+            out->r.at[d] += ((behind ? -clear : clear) - height) * normal[d];
+            normals[n_faces][d] = (behind ? -1 : 1) * normal[d];
+        }
+        n_faces++;
     }
     visibility_recentre(s->v, out->r.at, out->origin);
 }

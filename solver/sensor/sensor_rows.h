@@ -42,10 +42,11 @@ typedef struct sensor_rows {
 #define SENSOR_BACKS_MOST .5
 
 /* Finds the rows. A receiver on the front of an element, or behind it by no more than a millimetre or a
- * ten-thousandth of the scene, lies on it. In a closed scene without panes a row's sum is 1. The bits depend
- * on seed and place in the list, not on threads. Freed by sensor_rows_free. Errors: LAM_ERR_MEMORY,
- * LAM_ERR_CANCELLED, LAM_ERR_INTERNAL. Cost: for a receiver the rays, a quarter as many towards openings, 32
- * segments for each pair and 256 where it is partly hidden, and .01 us for each element. */
+ * ten-thousandth of the scene, lies on it; a plane in that of an element into whose front it looks lies
+ * behind it. In a closed scene without panes a row's sum is 1. The bits depend on seed and place in the list,
+ * not on threads. Freed by sensor_rows_free. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, LAM_ERR_INTERNAL.
+ * Cost: for a receiver the rays, a quarter as many towards openings, 32 segments for each pair and 256 where
+ * it is partly hidden, and .01 us for each element. */
 lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers,
                             const sensor_rows_options *options, sensor_rows *out, lam_error *error);
 void sensor_rows_free(sensor_rows *r);

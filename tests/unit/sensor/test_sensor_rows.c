@@ -88,15 +88,36 @@ START_TEST(in_a_wall) {
     const receiver r[] = {{.at = {2.1, 1.5, 1.2}, .axis = {1, 0, 0}},
                           {.at = {2.1, 1.5, 1.2}, .kind = RECEIVER_SPHERE},
                           {.at = {1.9, 1.5, 1.2}, .axis = {1, 0, 0}},
-                          {.at = {2, 1.5, 1.2}, .axis = {-1, 0, 0}}};
-    sensor_rows rows = rows_of(&m, 4, r, &(sensor_rows_options){.rays = 256});
+                          {.at = {2, 1.5, 1.2}, .axis = {-1, 0, 0}},
+                          {.at = {2, 1.5, 1.2}, .axis = {1, 0, 0}}};
+    sensor_rows rows = rows_of(&m, 5, r, &(sensor_rows_options){.rays = 256});
     ck_assert_double_gt((double)rows.backs[0], SENSOR_BACKS_MOST);
     ck_assert_double_gt((double)rows.backs[1], SENSOR_BACKS_MOST);
     ck_assert_double_eq((double)rows.backs[2], 0);
     ck_assert_double_eq((double)rows.backs[3], 0);
+    ck_assert_double_gt((double)rows.backs[4], SENSOR_BACKS_MOST); /* on the wall, it looks into it */
     ck_assert_uint_eq(rows.start[1], 0);
     ck_assert_double_gt(row_entry_of(&rows, 2, 0), .9);
     ck_assert_uint_eq(rows.start[4], rows.start[3]); /* on the wall, it looks into the open */
+    sensor_rows_free(&rows);
+    mesh_free(&m);
+}
+END_TEST
+
+/* A sheet without a back lies a metre above a floor: a receiver in its plane that looks up lies on it, and
+ * one that looks down sees the floor, with the factor of a square of 4 x 4 m a metre below its middle. */
+START_TEST(on_both_sides_of_a_sheet) {
+    mesh m = {0};
+    mesh_add_cell(&m, &(box_cell){.axis = 2, .level = 1, .from = {1, 1, 1}, .to = {3, 3, 1}}, true);
+    mesh_add_cell(&m, &(box_cell){.axis = 2, .from = {0, 0, 0}, .to = {4, 4, 0}}, true);
+    mesh_finish(&m, .5f);
+    const receiver r[] = {{.at = {2, 2, 1}, .axis = {0, 0, 1}}, {.at = {2, 2, 1}, .axis = {0, 0, -1}}};
+    sensor_rows rows = rows_of(&m, 2, r, &(sensor_rows_options){.rays = 256});
+    ck_assert_uint_eq(rows.start[1], 0);
+    ck_assert_uint_eq(rows.start[2], 1);
+    ck_assert_uint_eq(rows.element[0], 1);
+    const double side = 2 / sqrt(5), factor = 4 * side * atan(side) / M_PI;
+    ck_assert_double_eq_tol((double)rows.weight[0], factor, 1e-6);
     sensor_rows_free(&rows);
     mesh_free(&m);
 }
@@ -163,6 +184,7 @@ int main(void) {
     tcase_add_test(c, furnace);
     tcase_add_test(c, pairs_are_exact);
     tcase_add_test(c, in_a_wall);
+    tcase_add_test(c, on_both_sides_of_a_sheet);
     tcase_add_test(c, even_sky);
     tcase_add_test(c, odd_cases);
     suite_add_tcase(s, c);
