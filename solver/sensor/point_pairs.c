@@ -14,6 +14,11 @@
 /* Segments of a pair, of a half, and of one that is partly hidden. */
 enum { SEGMENTS = 16, MORE_SEGMENTS = 128 };
 
+/* So few sources are pairs wherever they are, and have all of these segments; of more of them, those that are
+ * pairs have larger factors, up to that of a ray where there are SOURCES_MOST, and fewer segments: a row has
+ * at most about 2,600 pairs of sources, and what is left of a large light is seen by many rays. */
+enum { SOURCES_WHOLE = 256, SOURCES_MOST = 4096, SOURCE_SEGMENTS_LEAST = 4 };
+
 /* Panes pass light by its angle: shares that differ by less are one. */
 static const double same_share = .02;
 
@@ -168,22 +173,36 @@ static void add_samples(const point_scene *s, const point_place *p, const elemen
     }
 }
 
+static uint32_t segments_of(const point_scene *s, uint32_t j) {
+    if (!s->is_source[j] || s->n_sources <= SOURCES_WHOLE) return SEGMENTS;
+    const size_t n = SEGMENTS * SOURCES_WHOLE / s->n_sources;
+    return n > SOURCE_SEGMENTS_LEAST ? (uint32_t)n : SOURCE_SEGMENTS_LEAST;
+}
+
+/* The factor from which on an element is a pair. */
+static double least_factor(const point_scene *s, size_t j) {
+    const double of_ray = 1. / (double)(HALVES * s->rays), part = (double)s->n_sources / SOURCES_MOST;
+    if (!s->is_source[j]) return of_ray;
+    return s->n_sources <= SOURCES_WHOLE ? 0 : of_ray * fmin(part * part, 1);
+}
+
 /* The share of an element's light that reaches the receiver, by both halves. An element of which so little
  * lies above the receiver's horizon that no sample of a half does has the share of the other half, or 1. */
 static void find_shares(const point_scene *s, const point_place *p, uint32_t j, double share[HALVES]) {
     element_sampler sampler;
     pair_sampler points[HALVES];
     share_sums sums[HALVES];
+    const uint32_t segments = segments_of(s, j);
     element_sampler_init(&sampler, s->m, s->v, j, s->seed);
     for (size_t h = 0; h < HALVES; h++) {
         sums[h] = (share_sums){.least = INFINITY, .most = -INFINITY};
         pair_sampler_init(&points[h], s->seed + h * RANDOM_STEP, s->m->n + p->number, j);
-        add_samples(s, p, &sampler, j, &points[h], 0, SEGMENTS, &sums[h]);
+        add_samples(s, p, &sampler, j, &points[h], 0, segments, &sums[h]);
     }
     const bool partly = fmax(sums[0].most, sums[1].most) - fmin(sums[0].least, sums[1].least) > same_share,
-               few = sums[0].n + sums[1].n < SEGMENTS;
+               few = sums[0].n + sums[1].n < segments;
     for (size_t h = 0; h < HALVES && (partly || few); h++)
-        add_samples(s, p, &sampler, j, &points[h], SEGMENTS, MORE_SEGMENTS, &sums[h]);
+        add_samples(s, p, &sampler, j, &points[h], segments, MORE_SEGMENTS, &sums[h]);
     for (size_t h = 0; h < HALVES; h++) {
         const share_sums *known = sums[h].K > 0 ? &sums[h] : &sums[1 - h];
         share[h] = known->K > 0 ? known->passed / known->K : 1;
@@ -198,7 +217,6 @@ static bool may_exceed(const point_scene *s, const receiver *r, size_t j, double
     for (int d = 0; d < 3; d++) height -= away[d] * (double)s->m->normal[j][d];
     if (!(height > 0)) return false;
     if (r->kind == RECEIVER_PLANE && dot3(away, r->axis) <= -ball[3]) return false;
-    if (s->is_source[j]) return true;
     /* F <= max density A cos / r^2, with the nearest r of the ball */
     const double distance = sqrt(dot3(away, away)), nearest = distance - ball[3];
     if (!(nearest > 0)) return true;
@@ -207,14 +225,14 @@ static bool may_exceed(const point_scene *s, const receiver *r, size_t j, double
 }
 
 void point_pairs(const point_scene *s, const point_place *p, point_room *room) {
-    const double least = 1. / (double)(HALVES * s->rays);
     room->n_pairs = 0;
     for (size_t j = 0; j < s->m->n; j++) {
+        const double least = least_factor(s, j);
         if (!may_exceed(s, &p->r, j, least) || mesh_is_buried(s->m, j)) continue;
         polygon face;
         polygon_of_element(s->m, j, &face);
         const double factor = receiver_factor(&p->r, &face);
-        if (!(factor > least || (s->is_source[j] && factor > 0))) continue;
+        if (!(factor > least)) continue;
         double share[HALVES];
         find_shares(s, p, (uint32_t)j, share);
         for (size_t h = 0; h < HALVES; h++) room->factor[room->n_pairs][h] = factor * share[h];

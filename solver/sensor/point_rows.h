@@ -13,7 +13,8 @@ typedef struct point_scene {
     const mesh *m;
     const visibility *v;
     double (*ball)[4];     /* [n]: centre and radius of each element */
-    const bool *is_source; /* [n], elements that are pairs wherever they are */
+    const bool *is_source; /* [n], elements that give light */
+    size_t n_sources;
     const sky_bounce *sky; /* NULL: none */
     portals openings;      /* n 0: none */
     size_t rays;           /* of a half */

@@ -245,10 +245,13 @@ lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers, 
     TRY(point_balls_make(m, &ball, error));
     TRY(find_sources(m, o->sources, &is_source, error));
     *job = (rows_job){.receivers = receivers, .options = o, .out = &made};
+    size_t n_sources = 0;
+    for (size_t j = 0; j < m->n; j++) n_sources += is_source[j];
     job->scene = (point_scene){.m = m,
                                .v = v,
                                .ball = ball,
                                .is_source = is_source,
+                               .n_sources = n_sources,
                                .sky = o->sky,
                                .rays = (o->rays > 0 ? o->rays : SENSOR_RAYS) / HALVES,
                                .seed = o->seed};

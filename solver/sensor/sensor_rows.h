@@ -1,9 +1,10 @@
 /* Rows of sensors: the weights with which radiosities, and radiances of the sky, come to receivers,
  *     value_s = sum_j weight_sj B_j + sum_t sky_ts L_t,
  * in lx, or in W/m^2 as B has it. An element whose unoccluded factor exceeds the share of one ray, and each
- * element of a group that gives light, has its exact factor times the share of it that nothing hides, by
- * segments; all others are found by rays. Rays for the sky are aimed at openings too, and weighed by the
- * balance heuristic (Veach and Guibas 1995). Knows neither names nor stores. */
+ * element of groups that give light, up to 256 of these and the larger factors of more, has its exact factor
+ * times the share of it that nothing hides, by segments; all others are found by rays. Rays for the sky are
+ * aimed at openings too, and weighed by the balance heuristic (Veach and Guibas 1995). Knows neither names
+ * nor stores. */
 #ifndef LAMBERT_SENSOR_SENSOR_ROWS_H
 #define LAMBERT_SENSOR_SENSOR_ROWS_H
 

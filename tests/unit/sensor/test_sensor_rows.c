@@ -77,6 +77,37 @@ START_TEST(pairs_are_exact) {
 }
 END_TEST
 
+/* A lamp of 1 m^2, 3 m above and 2 m beside a receiver, of 22 x 22 elements, each far below the share of a
+ * ray: its light is exact; of 70 x 70 it is seen by rays, some 17 of 1,024, four deviations of a binomial of
+ * them. */
+START_TEST(lamps_of_many_elements) {
+    static const int cells[] = {22, 70};
+    const receiver r = {.at = {2.5, .5, 0}, .axis = {0, 0, 1}};
+    polygon whole = {.n = 4, .corner = {{0, 0, 3}, {0, 1, 3}, {1, 1, 3}, {1, 0, 3}}};
+    polygon_measure(&whole);
+    const double F = receiver_factor(&r, &whole);
+    for (int k = 0; k < 2; k++) {
+        const int n = cells[k];
+        mesh m = {0};
+        for (int i = 0; i < n * n; i++) {
+            const double x = i % n, y = i / n;
+            const box_cell cell = {
+                .axis = 2, .level = 3, .from = {x / n, y / n, 3}, .to = {(x + 1) / n, (y + 1) / n, 3}};
+            mesh_add_cell(&m, &cell, false);
+        }
+        mesh_finish(&m, .5f);
+        m.n_groups = 1;
+        for (size_t j = 0; j < m.n; j++) m.emission[j] = 1;
+        sensor_rows rows = rows_of(&m, 1, &r, &(sensor_rows_options){.seed = 1});
+        ck_assert_double_eq_tol(row_sum(&rows, 0), F, k == 0 ? 1e-6 * F : 4 * sqrt(F / SENSOR_RAYS));
+        for (uint64_t i = 0; i < rows.start[1] && k == 0; i++) ck_assert_double_eq((double)rows.off[i], 0);
+        ck_assert_uint_le(rows.start[1], 484);
+        sensor_rows_free(&rows);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
 /* Faces of a wall of 20 cm: a receiver within it meets backs only. */
 START_TEST(in_a_wall) {
     mesh m = {0};
@@ -183,6 +214,7 @@ int main(void) {
     tcase_set_timeout(c, 300);
     tcase_add_test(c, furnace);
     tcase_add_test(c, pairs_are_exact);
+    tcase_add_test(c, lamps_of_many_elements);
     tcase_add_test(c, in_a_wall);
     tcase_add_test(c, on_both_sides_of_a_sheet);
     tcase_add_test(c, even_sky);
