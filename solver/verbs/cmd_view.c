@@ -32,7 +32,7 @@ static const char announced[] = "listening on ";
 
 typedef struct view_options {
     bool no_browser;
-    option_list emit;
+    option_list emit, dim;
 } view_options;
 
 static const option_row rows[] = {
@@ -43,6 +43,12 @@ static const option_row rows[] = {
      .otherwise = "the emission in the scene",
      .help = "The page begins with the first store lit by these groups alone, as the address says, with "
              "units as `lambert solve` has them; may be repeated"},
+    {.name = "dim",
+     .kind = OPTION_LIST,
+     .offset = offsetof(view_options, dim),
+     .argument = "NAME=V[,V,V]",
+     .otherwise = "as their list says",
+     .help = "The same of luminaires and groups of them, as `lambert solve` has it; alone or beside --emit"},
     {.name = "no-browser",
      .kind = OPTION_FLAG,
      .offset = offsetof(view_options, no_browser),
@@ -73,7 +79,7 @@ typedef struct viewing {
     size_t length;
     bool told; /* the daemon was asked to end */
     const view_options *options;
-    const char *fragment; /* of the address: the lights of --emit, or "" */
+    const char *fragment; /* of the address: the lights of --emit and --dim, or "" */
 } viewing;
 
 /* Becomes the daemon, in a process group of its own: Ctrl-C on a terminal comes to `lambert view` alone,
@@ -211,10 +217,11 @@ int cmd_view(int argc, char **argv) {
     const option_table tables[] = {{NULL, rows, &options}, {0}};
     const int go = options_parse(&verb, tables, argc, argv, &result);
     if (go != OPTIONS_GO) return go;
-    if (emission_check_items(&options.emit, &error) != LAM_OK)
+    if (emission_check_items(&options.emit, &error) != LAM_OK ||
+        emission_check_dims(&options.dim, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);
     terminal_open(&t, verb.name, false, false);
-    if (view_link(result.arguments[0], &options.emit, &fragment, &error) == LAM_OK &&
+    if (view_link(result.arguments[0], &options.emit, &options.dim, &fragment, &error) == LAM_OK &&
         start_daemon(&v, result.arguments, result.n_arguments, &error) == LAM_OK) {
         v.fragment = fragment;
         code = stay(&v, &t);

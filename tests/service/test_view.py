@@ -138,6 +138,51 @@ class View(unittest.TestCase):
             self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (status, "", 1), done.stderr)
             self.assertIn(words, done.stderr)
 
+    def link_of(self, *options):
+        process, address, _ = self.start(*options, "--no-browser")
+        process.terminate()
+        process.communicate(timeout=PATIENCE)
+        code = address.split("#1.")[1]
+        return json.loads(base64.urlsafe_b64decode(code + "=" * (-len(code) % 4)))["lighting"]
+
+    def test_lamps_without_a_name_are_dark(self):
+        groups = self.link_of(self.path("box.h5"), "--emit", "floor=.5")["groups"]
+        self.assertEqual(({name: light["on"] for name, light in groups.items()}, groups["floor"]["power"]),
+                         ({"floor": True, "lamp": False}, .5))
+        self.assertGreater(groups["lamp"]["power"], 1)
+
+    def test_luminaires(self):
+        with open(self.path("spot.ies"), "w", encoding="ascii") as file:
+            file.write("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n10 0\n")
+        spot = {"file": "spot.ies", "at": [.3, .3, .4]}
+        spots = [dict(spot, name="desk", dim=.25), dict(spot, name="a", group="row"), dict(spot, name="b", group="row")]
+        with open(self.path("spots.json"), "w", encoding="ascii") as file:
+            json.dump({"luminaires": spots}, file)
+        store = self.path("spots.h5")
+        must("precompute", self.path("box.obj"), "-o", store, "--rays", 64, "--probes", 0, "--quiet", "--lights", "lm",
+             "--luminaires", self.path("spots.json"))
+        dark = {"on": False, "dim": .25, "tint": [1, 1, 1], "kelvin": None}
+        lighting = self.link_of(store, "--dim", "row=1,.5,0")
+        # Luminaires of a group that are alike stand in the link as their group; lamps are dark beside them.
+        self.assertEqual((sorted(lighting["luminaires"]), lighting["luminaires"]["desk"]), (["desk", "row"], dark))
+        self.assertFalse(lighting["groups"]["lamp"]["on"])
+        row, luminance = lighting["luminaires"]["row"], .2126 + .7152 * .5
+        self.assertTrue(row["on"])
+        self.assertAlmostEqual(row["dim"], luminance, 9)
+        for part, value in zip(row["tint"], (1, .5, 0)):
+            self.assertAlmostEqual(part * luminance, value, 9)
+        lighting = self.link_of(store, "--emit", "lamp=3", "--dim", "a=.5")
+        self.assertEqual({name: (light["on"], light["dim"]) for name, light in lighting["luminaires"].items()},
+                         {"desk": (False, .25), "a": (True, .5), "b": (False, 1)})
+        self.assertEqual((lighting["groups"]["lamp"]["on"], lighting["groups"]["lamp"]["power"]), (True, 3))
+        # Lamps alone: luminaires are dark.
+        self.assertEqual({light["on"] for light in self.link_of(store, "--emit", "lamp=3")["luminaires"].values()}, {False})
+        for status, words, path, item in ((1, 'no luminaire "gone"', store, "gone=1"), (2, "--dim", store, "desk"), (2, "--dim", store, "desk=-1"),
+                                          (1, "2 values", store, "desk=1,2"), (1, "has no luminaires", self.path("box.h5"), "desk=1")):
+            done = lambert("view", path, "--no-browser", "--dim", item)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (status, "", 1), done.stderr)
+            self.assertIn(words, done.stderr)
+
     def test_terminated(self):
         process, _, daemon = self.start(self.path("box.h5"), "--no-browser")
         process.terminate()
