@@ -177,8 +177,9 @@ class View(unittest.TestCase):
         self.assertEqual((lighting["groups"]["lamp"]["on"], lighting["groups"]["lamp"]["power"]), (True, 3))
         # Lamps alone: luminaires are dark.
         self.assertEqual({light["on"] for light in self.link_of(store, "--emit", "lamp=3")["luminaires"].values()}, {False})
-        for status, words, path, item in ((1, 'no luminaire "gone"', store, "gone=1"), (2, "--dim", store, "desk"), (2, "--dim", store, "desk=-1"),
-                                          (1, "2 values", store, "desk=1,2"), (1, "has no luminaires", self.path("box.h5"), "desk=1")):
+        for status, words, path, item in ((1, 'no luminaire "gone"', store, "gone=1"), (2, "--dim", store, "desk"),
+                                          (2, "--dim", store, "desk=-1"), (1, "2 values", store, "desk=1,2"),
+                                          (1, "has no luminaires", self.path("box.h5"), "desk=1")):
             done = lambert("view", path, "--no-browser", "--dim", item)
             self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (status, "", 1), done.stderr)
             self.assertIn(words, done.stderr)
