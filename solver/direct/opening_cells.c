@@ -272,7 +272,7 @@ static double place_along(const face_part *p, int side, size_t n, size_t k, bool
 }
 
 static void add_part(cell_list *l, const face_part *p) {
-    double length[2];
+    double length[2] = {0};
     size_t n[2];
     if (l->n > l->most) return;
     part_lengths(l->face, p, length);
@@ -305,7 +305,7 @@ static void add_part(cell_list *l, const face_part *p) {
  * enough of them to stand for a circle, and curved ones for the half of it that is seen. */
 static void least_pairs(const opening_faces *o, const opening_face *f, size_t cells, size_t least[2]) {
     static const face_part whole = {{0, 0}, {1, 1}};
-    double length[2];
+    double length[2] = {0};
     part_lengths(f, &whole, length);
     const bool is_line = !(length[0] > 0 && length[1] > 0), many_faces = o->n_faces > 1;
     least[0] = cells == 1 ? 0 : cells == 16 ? (many_faces ? 1 : 2) : (many_faces ? 4 : 8);

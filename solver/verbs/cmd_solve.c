@@ -306,6 +306,27 @@ static error_scene error_scene_of(const mesh *m, const emission_scene *scene) {
                          .buried = scene->groups.buried};
 }
 
+/* Says that the scene's own light was taken; fails where it has none. */
+static lam_status check_own(const char *path, const lit_store *lit, terminal *t, lam_error *error) {
+    const mesh *m = lit->scene.m;
+    if (!lit->own) return LAM_OK;
+    if (is_dark(&lit->light, m->n * m->n_channels, m->n_channels))
+        return status_fail(error, LAM_ERR_ARGUMENT,
+                           "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s%s",
+                           path, lit->luminaires != NULL ? ", --dim NAME=V" : "",
+                           lit->sky != NULL ? ", --sky FILE or --weather FILE" : "");
+    terminal_log(t, "no --emit, --emission, --dim, --sky or --weather: the scene's own light");
+    return LAM_OK;
+}
+
+/* A year needs more than one light. */
+static lam_status check_batch(const annual_options *year, const emission *light, lam_error *error) {
+    if (year->n_figures == 0 || light->batch) return LAM_OK;
+    return status_fail(error, LAM_ERR_ARGUMENT,
+                       "--annual is of a batch, one vector an hour, and this is one light; give --sky "
+                       "[hours][tiles] or --weather");
+}
+
 static lam_status solve(const char *path, const solve_options *f, const annual_options *year,
                         reduction *reductions, size_t n_reductions, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
@@ -338,12 +359,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     if (f->sensors != NULL) TRY(sensor_choice_open(s, &m, f->sensors, &sensors, error));
     lit.light.sensors = sensors.all;
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
-    if (lit.own && is_dark(&lit.light, m.n * m.n_channels, m.n_channels))
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s%s", path,
-             lit.luminaires != NULL ? ", --dim NAME=V" : "",
-             lit.sky != NULL ? ", --sky FILE or --weather FILE" : "");
-    if (lit.own) terminal_log(t, "no --emit, --emission, --dim, --sky or --weather: the scene's own light");
+    TRY(check_own(path, &lit, t, error));
     about = error_scene_of(&m, &lit.scene);
     /* With --reduce only figures are written, also with -o. */
     TRY(reductions_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
@@ -360,10 +376,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     TRY(light_convert(&f->light, f->weather != NULL ? &sun : &lit.sun, &way, &lit, error));
     light_log(&lit, t);
     figures.luminance = lit.told.luminance && year->n_figures > 0 && !is_sum(year);
-    if (year->n_figures > 0 && !lit.light.batch)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "--annual is of a batch, one vector an hour, and this is one light; give --sky [hours][tiles] "
-             "or --weather");
+    TRY(check_batch(year, &lit.light, error));
     TRY(terminal_check(error));
     codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
     solution out = {.m = &m,

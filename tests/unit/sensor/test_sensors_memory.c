@@ -8,8 +8,8 @@
 #include <omp.h>
 
 static const char *const lists[] = {
-    "{\"grids\": [{\"name\": \"a\", \"polygon\": [[0,0,0],[1,0,0],[1,1,0]], \"spacing\": 0.3}],"
-    "\"cubes\": [{\"name\": \"b\", \"at\": [0,0,0]}]}",
+    ("{\"grids\": [{\"name\": \"a\", \"polygon\": [[0,0,0],[1,0,0],[1,1,0]], \"spacing\": 0.3}],"
+     "\"cubes\": [{\"name\": \"b\", \"at\": [0,0,0]}]}"),
     "name,x,y,z\na,1,2,3\nb,1,2,3\n", "1 2 3 0 0 1\n",
     "{\"grids\": [{\"name\": \"a\", \"over\": \"floor\"}]}"};
 
