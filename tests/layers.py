@@ -99,7 +99,7 @@ HOME = {
     "turbojpeg.h": "solver/scene/import/image_decode.c solver/scene/import/picture_files.c",
     "webp/": "solver/scene/import/image_decode.c",
     "meshoptimizer.h": "solver/scene/import/gltf_meshopt.c",
-    "jansson.h": ("solver/codec/ solver/light/light_path.c solver/luminaire/placed_parts.h solver/scene/import/gltf_file.h "
+    "jansson.h": ("solver/codec/ solver/light/light_path.c solver/luminaire/list_values.h solver/scene/import/gltf_file.h "
         "solver/scene/import/gltf_nodes.h solver/verbs/ tests/bench/"),
     "microhttpd.h": "server/http/ tests/bench/ready_server.c",
     "zlib.h": "server/route/content_coding.c",

@@ -3,7 +3,6 @@
 
 #include "solver/base/asset_files.h"
 #include "solver/base/file_text.h"
-#include "solver/base/length_unit.h"
 #include "solver/luminaire/placed_parts.h"
 
 #include <errno.h>
@@ -56,38 +55,22 @@ bool placed_is_list(const char *path) {
     return is_list;
 }
 
-/* Metres of the unit of the list: its own, or that of the options. */
-static lam_status read_unit(placed_reading *r, const json_t *value, const placed_options *options,
-                            lam_error *error) {
-    char shown[PLACED_SHOWN];
-    r->unit = options->unit > 0 ? options->unit : 1;
-    if (value == NULL) return LAM_OK;
-    const length_unit *unit = json_is_string(value) ? length_unit_find(json_string_value(value)) : NULL;
-    if (unit != NULL) {
-        r->unit = unit->metres;
-        return LAM_OK;
-    }
-    placed_shown(value, shown);
-    return status_fail(error, LAM_ERR_ARGUMENT, "%.200s: unit = %s, must be one of " LENGTH_UNIT_WORDS,
-                       r->name, shown);
-}
-
 /* "files": words for paths. */
 static lam_status check_files(placed_reading *r, json_t *files, lam_error *error) {
     lam_status status = LAM_OK;
-    char shown[PLACED_SHOWN], word[PLACED_SHOWN];
+    char shown[LIST_SHOWN], word[LIST_SHOWN];
     const char *key;
     json_t *value;
     r->files = files;
     if (files == NULL) return LAM_OK;
     if (!json_is_object(files)) {
-        placed_shown(files, shown);
+        list_shown(files, shown);
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: files = %s, must be an object of words and paths", r->name,
              shown);
     }
     json_object_foreach(files, key, value) {
         if (json_is_string(value) && json_string_length(value) > 0) continue;
-        placed_shown(value, shown);
+        list_shown(value, shown);
         luminaire_clean(key, key + strlen(key), word, sizeof word);
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: files.%s = %s, must be a path", r->name, word, shown);
     }
@@ -97,7 +80,7 @@ done:
 
 /* A word of "files" that no luminaire has may be misspelt in one. */
 static void warn_of_files(const placed_reading *r) {
-    char shown[PLACED_SHOWN];
+    char shown[LIST_SHOWN];
     const char *key;
     json_t *value;
     json_object_foreach(r->files, key, value) {
@@ -109,24 +92,20 @@ static void warn_of_files(const placed_reading *r) {
     }
 }
 
-static lam_status read_json(const luminaire_source *s, placed_reading *r, const placed_options *options,
-                            lam_error *error) {
+static lam_status read_json(const luminaire_source *s, placed_reading *r, lam_error *error) {
     static const char *const words[] = {"unit", "files", "luminaires"};
     lam_status status = LAM_OK;
-    char shown[PLACED_SHOWN], place[PLACED_PLACE];
-    json_error_t where;
-    json_t *root = json_loadb(s->text, (size_t)(s->end - s->text), JSON_REJECT_DUPLICATES, &where);
-    if (root == NULL)
-        FAIL(error, json_error_code(&where) == json_error_out_of_memory ? LAM_ERR_MEMORY : LAM_ERR_FORMAT,
-             "%.200s: line %d, column %d: %.160s", s->name, where.line, where.column, where.text);
+    char shown[LIST_SHOWN], place[PLACED_PLACE];
+    json_t *root = NULL;
+    TRY(list_open(s, &root, error));
     snprintf(place, sizeof place, "%.200s: the file", s->name);
-    TRY(placed_members(root, sizeof words / sizeof *words, words, place, error));
-    TRY(read_unit(r, json_object_get(root, "unit"), options, error));
+    TRY(list_members(root, sizeof words / sizeof *words, words, place, error));
+    TRY(list_unit(r->name, json_object_get(root, "unit"), &r->unit, error));
     TRY(check_files(r, json_object_get(root, "files"), error));
     const json_t *list = json_object_get(root, "luminaires");
     const size_t n = json_array_size(list);
     if (n == 0 || n > PLACED_MOST) {
-        placed_shown(list, shown);
+        list_shown(list, shown);
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: luminaires = %s, must be an array of 1 to %d luminaires",
              s->name, shown, PLACED_MOST);
     }
@@ -189,15 +168,15 @@ lam_status placed_read_text(const char *name, const char *text, size_t length, c
     lam_status status = LAM_OK;
     luminaire_source s;
     placed_luminaires p = {.n = 0};
-    placed_reading r = {.name = name, .out = &p, .up = options->up};
+    placed_reading r = {
+        .name = name, .out = &p, .up = options->up, .unit = options->unit > 0 ? options->unit : 1};
     if (length > PLACED_BYTES_MOST) TRY(too_large(name, length, error));
     TRY(luminaire_source_open(name, text, length, &s, error));
     p.is_csv = !begins_as_json(&s) && (placed_csv_is_it(&s) || !luminaire_is_named(name, ".json"));
     if (p.is_csv) {
-        TRY(read_unit(&r, NULL, options, error));
         TRY(placed_csv(&s, &r, error));
     } else {
-        TRY(read_json(&s, &r, options, error));
+        TRY(read_json(&s, &r, error));
     }
     if (p.n == 0)
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: has no luminaire, must have 1 to %d", name, PLACED_MOST);

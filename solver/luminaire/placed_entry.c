@@ -2,16 +2,12 @@
 #include "solver/luminaire/placed_parts.h"
 
 #include "solver/base/array_grow.h"
-#include "solver/base/nearest.h"
 #include "solver/base/photometry.h"
-#include "solver/base/vector3.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const double length_most = 1e9; /* of a coordinate; with it, all sums are finite */
 
 enum { DIMENSIONS = 3, TEXT_MOST = 1000 }; /* TEXT_MOST: bytes of a path */
 
@@ -29,78 +25,11 @@ void placed_place(const char *name, bool is_csv, size_t k, char out[PLACED_PLACE
     snprintf(out, PLACED_PLACE, is_csv ? "%.200s: line %zu" : "%.200s: luminaires[%zu]", name, k);
 }
 
-void placed_shown(const json_t *value, char out[PLACED_SHOWN]) {
-    char *text =
-        value != NULL ? json_dumps(value, JSON_ENCODE_ANY | JSON_COMPACT | JSON_REAL_PRECISION(10)) : NULL;
-    const char *begin = text != NULL ? text : "nothing";
-    luminaire_clean(begin, begin + strlen(begin), out, PLACED_SHOWN);
-    free(text);
-}
-
-lam_status placed_members(json_t *object, size_t n, const char *const *words, const char *place,
-                          lam_error *error) {
-    lam_status status = LAM_OK;
-    char shown[PLACED_SHOWN], advice[256];
-    if (!json_is_object(object)) {
-        placed_shown(object, shown);
-        FAIL(error, LAM_ERR_ARGUMENT, "%s = %s, must be an object {...}", place, shown);
-    }
-    for (void *at = json_object_iter(object); at != NULL; at = json_object_iter_next(object, at)) {
-        const char *key = json_object_iter_key(at);
-        bool known = false;
-        for (size_t k = 0; k < n; k++) known = known || strcmp(words[k], key) == 0;
-        if (known) continue;
-        nearest_advice(key, n, words, advice, sizeof advice);
-        luminaire_clean(key, key + strlen(key), shown, sizeof shown);
-        FAIL(error, LAM_ERR_ARGUMENT, "%s has a member \"%s\", which is not known: %s", place, shown, advice);
-    }
-done:
-    return status;
-}
-
-static lam_status wrong(const entry *e, const char *what, const json_t *value, const char *limit,
-                        lam_error *error) {
-    char shown[PLACED_SHOWN];
-    placed_shown(value, shown);
-    return status_fail(error, LAM_ERR_ARGUMENT, "%s: %s = %s, %s", e->place, what, shown, limit);
-}
-
-static lam_status read_value(const entry *e, const char *what, const json_t *value, double least, double most,
-                             bool above, double *out, lam_error *error) {
-    char limit[LUMINAIRE_LIMIT];
-    if (!json_is_number(value)) return wrong(e, what, value, "must be a number", error);
-    const double number = json_number_value(value);
-    if (!luminaire_in_limits(number, least, most, above, limit)) return wrong(e, what, value, limit, error);
-    *out = number;
-    return LAM_OK;
-}
-
 /* The number of a member that may be left out. */
 static lam_status read_number(const entry *e, const char *key, double least, double most, bool above,
                               double *out, lam_error *error) {
     const json_t *value = json_object_get(e->value, key);
-    return value == NULL ? LAM_OK : read_value(e, key, value, least, most, above, out, error);
-}
-
-static lam_status read_vector(const entry *e, const char *what, const json_t *value, double out[3],
-                              lam_error *error) {
-    lam_status status = LAM_OK;
-    if (!json_is_array(value) || json_array_size(value) != 3)
-        return wrong(e, what, value, "must be an array of three numbers", error);
-    for (size_t d = 0; d < 3; d++)
-        TRY(read_value(e, what, json_array_get(value, d), -length_most, length_most, false, &out[d], error));
-done:
-    return status;
-}
-
-/* A direction: its length does not matter, but it must have one. */
-static lam_status read_direction(const entry *e, const char *what, const json_t *value, double out[3],
-                                 lam_error *error) {
-    double unit[3];
-    const lam_status status = read_vector(e, what, value, out, error);
-    if (status != LAM_OK) return status;
-    memcpy(unit, out, sizeof unit);
-    return placed_normalize(unit) ? LAM_OK : wrong(e, what, value, "must have a length above 0", error);
+    return value == NULL ? LAM_OK : list_number(e->place, key, value, least, most, above, out, error);
 }
 
 /* A text of one line without control characters, marks of the direction of writing, blanks at its ends, or
@@ -109,15 +38,16 @@ static lam_status read_text(const entry *e, const char *key, const json_t *value
                             size_t room, char *out, lam_error *error) {
     char limit[96], clean[TEXT_MOST + 1];
     const char *text = json_string_value(value);
-    if (text == NULL) return wrong(e, key, value, "must be a text", error);
+    if (text == NULL) return list_wrong(e->place, key, value, "must be a text", error);
     const size_t length = json_string_length(value);
     snprintf(limit, sizeof limit, "must have 1 to %zu bytes, none of them 0", room - 1);
-    if (length == 0 || length >= room || strlen(text) != length) return wrong(e, key, value, limit, error);
+    if (length == 0 || length >= room || strlen(text) != length)
+        return list_wrong(e->place, key, value, limit, error);
     luminaire_clean(text, text + length, clean, sizeof clean);
     if (strcmp(clean, text) != 0 || strpbrk(text, marks) != NULL) {
         snprintf(limit, sizeof limit, "must have no control character, no blank at its ends%s",
                  marks[0] != '\0' ? ", no '=' and no ','" : "");
-        return wrong(e, key, value, limit, error);
+        return list_wrong(e->place, key, value, limit, error);
     }
     memcpy(out, text, length + 1);
     return LAM_OK;
@@ -133,7 +63,8 @@ static lam_status read_set(const entry *e, size_t *set, lam_error *error) {
     const json_t *value = json_object_get(e->value, "lamp_set");
     double number = 0;
     TRY(read_number(e, "lamp_set", 1, LUMINAIRE_SETS_MOST, false, &number, error));
-    if (number != floor(number)) TRY(wrong(e, "lamp_set", value, "must be a whole number", error));
+    if (number != floor(number))
+        TRY(list_wrong(e->place, "lamp_set", value, "must be a whole number", error));
     *set = (size_t)number;
 done:
     return status;
@@ -182,10 +113,10 @@ static lam_status read_light(entry *e, lam_error *error) {
         FAIL(error, LAM_ERR_ARGUMENT, "%s has cct and colour; it must have one of them", e->place);
     if (cct != NULL) placed_planck(kelvin, l->colour);
     if (colour != NULL) {
-        TRY(read_vector(e, "colour", colour, l->colour, error));
+        TRY(list_vector(e->place, "colour", colour, l->colour, error));
         const double luminance = luminance_of(l->colour[0], l->colour[1], l->colour[2]);
         if (!(fmin(fmin(l->colour[0], l->colour[1]), l->colour[2]) >= 0) || !(luminance > 0))
-            TRY(wrong(e, "colour", colour, "must have no number below 0, and one above", error));
+            TRY(list_wrong(e->place, "colour", colour, "must have no number below 0, and one above", error));
         for (int c = 0; c < 3; c++) l->colour[c] /= luminance;
     }
     l->scale = l->dim * l->maintenance;
@@ -202,10 +133,10 @@ static lam_status read_opening(entry *e, lam_error *error) {
         const char *word = json_is_string(opening) ? json_string_value(opening) : "";
         e->made.is_point = strcmp(word, "point") == 0;
         if (!e->made.is_point && strcmp(word, "file") != 0)
-            TRY(wrong(e, "opening", opening, "must be \"file\" or \"point\"", error));
+            TRY(list_wrong(e->place, "opening", opening, "must be \"file\" or \"point\"", error));
     }
     if (ignore != NULL && !json_is_array(ignore))
-        TRY(wrong(e, "ignore", ignore, "must be an array of names of groups", error));
+        TRY(list_wrong(e->place, "ignore", ignore, "must be an array of names of groups", error));
     const size_t n = json_array_size(ignore);
     if (n > PLACED_MOST - out->n_ignored)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: with it ignore has %zu names in all, must have at most %d",
@@ -231,16 +162,19 @@ static lam_status read_steps(entry *e, lam_error *error) {
     if (steps == NULL || counts == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "%s has from; then it must have steps and counts too", e->place);
     if (n < 1 || n > DIMENSIONS)
-        TRY(wrong(e, "steps", steps, "must be an array of 1 to 3 steps [x, y, z]", error));
+        TRY(list_wrong(e->place, "steps", steps, "must be an array of 1 to 3 steps [x, y, z]", error));
     if (json_array_size(counts) != n)
-        TRY(wrong(e, "counts", counts, "must be an array of a number for each step", error));
+        TRY(list_wrong(e->place, "counts", counts, "must be an array of a number for each step", error));
     for (size_t k = 0; k < n; k++) {
-        TRY(read_vector(e, "a step", json_array_get(steps, k), e->steps[k], error));
-        TRY(read_value(e, "a count", json_array_get(counts, k), 1, PLACED_MOST, false, &count, error));
-        if (count != floor(count)) TRY(wrong(e, "counts", counts, "must be whole numbers", error));
+        TRY(list_vector(e->place, "a step", json_array_get(steps, k), e->steps[k], error));
+        TRY(list_number(e->place, "a count", json_array_get(counts, k), 1, PLACED_MOST, false, &count,
+                        error));
+        if (count != floor(count))
+            TRY(list_wrong(e->place, "counts", counts, "must be whole numbers", error));
         const double *step = e->steps[k];
         if (count > 1 && step[0] == 0 && step[1] == 0 && step[2] == 0)
-            TRY(wrong(e, "steps", steps, "must have a length above 0 where there is more than one", error));
+            TRY(list_wrong(e->place, "steps", steps,
+                           "must have a length above 0 where there is more than one", error));
         for (int d = 0; d < 3; d++) e->steps[k][d] *= e->r->unit;
         e->counts[k] = (size_t)count;
         all *= count;
@@ -260,7 +194,7 @@ static lam_status read_place(entry *e, lam_error *error) {
     if ((at == NULL) == (from == NULL))
         FAIL(error, LAM_ERR_ARGUMENT, "%s must have at, the place of one, or from, the first of a row",
              e->place);
-    TRY(read_vector(e, at != NULL ? "at" : "from", at != NULL ? at : from, e->from, error));
+    TRY(list_vector(e->place, at != NULL ? "at" : "from", at != NULL ? at : from, e->from, error));
     for (int d = 0; d < 3; d++) e->from[d] *= e->r->unit;
     e->n = 1;
     if (from != NULL)
@@ -278,10 +212,10 @@ static lam_status read_turn(const entry *e, json_t *turn, placed_luminaire *l, l
     char inside[PLACED_PLACE + 8];
     double axis[3], degrees = 0;
     snprintf(inside, sizeof inside, "%s: turn", e->place);
-    TRY(placed_members(turn, 2, words, inside, error));
-    TRY(read_direction(e, "axis of turn", json_object_get(turn, "axis"), axis, error));
-    TRY(read_value(e, "degrees of turn", json_object_get(turn, "degrees"), -length_most, length_most, false,
-                   &degrees, error));
+    TRY(list_members(turn, 2, words, inside, error));
+    TRY(list_direction(e->place, "axis of turn", json_object_get(turn, "axis"), axis, error));
+    TRY(list_number(e->place, "degrees of turn", json_object_get(turn, "degrees"), -LIST_LENGTH_MOST,
+                    LIST_LENGTH_MOST, false, &degrees, error));
     placed_turn(axis, degrees, e->r->up, l);
 done:
     return status;
@@ -301,21 +235,21 @@ static lam_status read_frame(const entry *e, placed_luminaire *l, lam_error *err
     if (turn != NULL && c0 != NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "%s has turn, which turns C0 too; then it must have no c0", e->place);
     if (turn != NULL) return read_turn(e, turn, l, error);
-    if (aim != NULL) TRY(read_direction(e, "aim", aim, direction, error));
+    if (aim != NULL) TRY(list_direction(e->place, "aim", aim, direction, error));
     if (aim_at != NULL) {
-        TRY(read_vector(e, "aim_at", aim_at, direction, error));
+        TRY(list_vector(e->place, "aim_at", aim_at, direction, error));
         for (int d = 0; d < 3; d++) direction[d] = direction[d] * e->r->unit - l->at[d];
-        if (!placed_normalize(direction))
-            TRY(wrong(e, "aim_at", aim_at, "must be another place than its own", error));
+        if (!list_normalize(direction))
+            TRY(list_wrong(e->place, "aim_at", aim_at, "must be another place than its own", error));
     }
     if (json_is_number(c0))
-        TRY(read_value(e, "c0", c0, -length_most, length_most, false, &degrees, error));
+        TRY(list_number(e->place, "c0", c0, -LIST_LENGTH_MOST, LIST_LENGTH_MOST, false, &degrees, error));
     else if (json_is_array(c0))
-        TRY(read_direction(e, "c0", c0, axis, error));
+        TRY(list_direction(e->place, "c0", c0, axis, error));
     else if (c0 != NULL)
-        TRY(wrong(e, "c0", c0, "must be a direction [x, y, z] or a number of degrees", error));
+        TRY(list_wrong(e->place, "c0", c0, "must be a direction [x, y, z] or a number of degrees", error));
     if (!placed_aim(direction, json_is_array(c0) ? axis : NULL, degrees, e->r->up, l))
-        TRY(wrong(e, "c0", c0, "must not lie along the aim", error));
+        TRY(list_wrong(e->place, "c0", c0, "must not lie along the aim", error));
 done:
     return status;
 }
@@ -354,7 +288,7 @@ lam_status placed_entry(placed_reading *r, json_t *value, size_t k, lam_error *e
     e.made = (placed_luminaire){
         .dim = 1, .maintenance = 1, .flux = NAN, .scale = 1, .colour = {1, 1, 1}, .entry = k};
     placed_place(r->name, r->out->is_csv, k, e.place);
-    TRY(placed_members(value, sizeof words / sizeof *words, words, e.place, error));
+    TRY(list_members(value, sizeof words / sizeof *words, words, e.place, error));
     if (json_object_get(value, "name") == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "%s has no name: it must have one", e.place);
     TRY(read_name(&e, "name", name, error));

@@ -12,26 +12,16 @@
 /* The sine of the angle between two directions below which they count as one. */
 static const double parallel = 1e-6;
 
-bool placed_normalize(double v[3]) {
-    /* The largest component is divided out first, so that no square overflows or vanishes. */
-    const double most = fmax(fmax(fabs(v[0]), fabs(v[1])), fabs(v[2]));
-    if (!(most > 0) || !isfinite(most)) return false;
-    for (int d = 0; d < 3; d++) v[d] /= most;
-    const double length = sqrt(dot3(v, v));
-    for (int d = 0; d < 3; d++) v[d] /= length;
-    return true;
-}
-
 /* The part of a unit vector across another, of length 1; false where there is none. */
 static bool across(const double of[3], const double along[3], double out[3]) {
     const double part = dot3(of, along);
     for (int d = 0; d < 3; d++) out[d] = of[d] - part * along[d];
     if (!(dot3(out, out) > parallel * parallel)) return false;
-    placed_normalize(out);
+    list_normalize(out);
     /* Once more, as much of the first difference may be rounding. */
     const double rest = dot3(out, along);
     for (int d = 0; d < 3; d++) out[d] -= rest * along[d];
-    return placed_normalize(out);
+    return list_normalize(out);
 }
 
 void placed_hang(char up, placed_luminaire *l) {
@@ -49,7 +39,7 @@ bool placed_aim(const double aim[3], const double *c0, double degrees, char up, 
     placed_hang(up, &hung);
     memcpy(down, aim, sizeof down);
     memcpy(wanted, c0 != NULL ? c0 : hung.x, sizeof wanted);
-    if (!placed_normalize(down) || !placed_normalize(wanted)) return false;
+    if (!list_normalize(down) || !list_normalize(wanted)) return false;
     if (!across(wanted, down, x)) {
         const double side = dot3(down, hung.x) > 0 ? 1 : -1;
         for (int d = 0; d < 3; d++) wanted[d] = side * hung.z[d];
@@ -78,7 +68,7 @@ void placed_turn(const double axis[3], double degrees, char up, placed_luminaire
     const double angle = remainder(degrees, 360) * (M_PI / 180), c = cos(angle), s = sin(angle);
     double k[3];
     memcpy(k, axis, sizeof k);
-    placed_normalize(k);
+    list_normalize(k);
     placed_hang(up, &hung);
     turned(k, c, s, hung.x, l->x);
     turned(k, c, s, hung.y, l->y);

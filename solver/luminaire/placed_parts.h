@@ -1,12 +1,9 @@
-/* The parts of the reader of placed luminaires. Private to solver/luminaire, and to solver/sensor, which
- * shows values and checks members as it does. */
+/* The parts of the reader of placed luminaires. Private to solver/luminaire. */
 #ifndef LAMBERT_LUMINAIRE_PLACED_PARTS_H
 #define LAMBERT_LUMINAIRE_PLACED_PARTS_H
 
-#include "solver/luminaire/luminaire_source.h"
+#include "solver/luminaire/list_values.h"
 #include "solver/luminaire/placed.h"
-
-#include <jansson.h>
 
 /* The list that is read. */
 typedef struct placed_reading {
@@ -26,14 +23,6 @@ lam_status placed_entry(placed_reading *r, json_t *value, size_t entry, lam_erro
 enum { PLACED_PLACE = 320 };
 void placed_place(const char *name, bool is_csv, size_t entry, char out[PLACED_PLACE]);
 
-/* A value as messages show it. */
-enum { PLACED_SHOWN = 64 };
-void placed_shown(const json_t *value, char out[PLACED_SHOWN]);
-
-/* Fails for a member of an object that is none of the words. */
-lam_status placed_members(json_t *object, size_t n, const char *const *words, const char *place,
-                          lam_error *error);
-
 /* Adds the entries of a CSV file, of which each line becomes an object as those of JSON are. */
 lam_status placed_csv(const luminaire_source *s, placed_reading *r, lam_error *error);
 
@@ -51,9 +40,6 @@ bool placed_aim(const double aim[3], const double *c0, double degrees, char up, 
 
 /* The frame of one that hung and was turned about an axis. */
 void placed_turn(const double axis[3], double degrees, char up, placed_luminaire *l);
-
-/* Makes the length 1; false where there is none. */
-bool placed_normalize(double v[3]);
 
 /* The limits of placed_planck, in K. */
 #define PLACED_KELVIN_LEAST 1667

@@ -35,60 +35,23 @@ typedef struct entry {
     bool is_turned; /* it has one */
 } entry;
 
-static lam_status wrong(const entry *e, const char *what, const json_t *value, const char *limit,
-                        lam_error *error) {
-    char shown[PLACED_SHOWN];
-    placed_shown(value, shown);
-    return status_fail(error, LAM_ERR_ARGUMENT, "%s: %s = %s, %s", e->place, what, shown, limit);
-}
-
-static lam_status read_value(const entry *e, const char *what, const json_t *value, double least, double most,
-                             bool above, double *out, lam_error *error) {
-    char limit[LUMINAIRE_LIMIT];
-    if (!json_is_number(value)) return wrong(e, what, value, "must be a number", error);
-    const double number = json_number_value(value);
-    if (!luminaire_in_limits(number, least, most, above, limit)) return wrong(e, what, value, limit, error);
-    *out = number;
-    return LAM_OK;
-}
-
-static lam_status read_vector(const entry *e, const char *what, const json_t *value, double out[3],
-                              lam_error *error) {
-    lam_status status = LAM_OK;
-    if (!json_is_array(value) || json_array_size(value) != 3)
-        return wrong(e, what, value, "must be an array of three numbers", error);
-    for (size_t d = 0; d < 3; d++)
-        TRY(read_value(e, what, json_array_get(value, d), -SENSORS_LENGTH_MOST, SENSORS_LENGTH_MOST, false,
-                       &out[d], error));
-done:
-    return status;
-}
-
 static lam_status read_point(const entry *e, const char *what, const json_t *value, double out[3],
                              lam_error *error) {
-    const lam_status status = read_vector(e, what, value, out, error);
+    const lam_status status = list_vector(e->place, what, value, out, error);
     for (int d = 0; d < 3 && status == LAM_OK; d++) out[d] *= e->r->unit;
     return status;
-}
-
-/* A direction of length 1. */
-static lam_status read_direction(const entry *e, const char *what, const json_t *value, double out[3],
-                                 lam_error *error) {
-    const lam_status status = read_vector(e, what, value, out, error);
-    if (status != LAM_OK) return status;
-    return placed_normalize(out) ? LAM_OK : wrong(e, what, value, "must have a length above 0", error);
 }
 
 /* The way that a semi-cylinder looks, across its axis. */
 static lam_status turn_look(const entry *e, receiver *one, lam_error *error) {
     const json_t *value = json_object_get(e->value, "look");
-    lam_status status = read_direction(e, "look", value, one->look, error);
+    lam_status status = list_direction(e->place, "look", value, one->look, error);
     if (status != LAM_OK) return status;
     const double along = dot3(one->look, one->axis);
     for (int d = 0; d < 3; d++) one->look[d] -= along * one->axis[d];
     if (!(dot3(one->look, one->look) > 1e-12))
-        return wrong(e, "look", value, "must not lie along the axis", error);
-    (void)placed_normalize(one->look);
+        return list_wrong(e->place, "look", value, "must not lie along the axis", error);
+    (void)list_normalize(one->look);
     return LAM_OK;
 }
 
@@ -103,7 +66,7 @@ static lam_status set_receiver(const entry *e, const double at[3], const double 
     if (out->kind == RECEIVER_SPHERE) return LAM_OK;
     memcpy(out->axis, preset, sizeof out->axis);
     if (json_is_array(json_array_get(value, 0))) value = json_array_get(value, number);
-    if (value != NULL) TRY(read_direction(e, word, value, out->axis, error));
+    if (value != NULL) TRY(list_direction(e->place, word, value, out->axis, error));
     if (out->kind == RECEIVER_SEMICYLINDER) TRY(turn_look(e, out, error));
 done:
     return status;
@@ -121,7 +84,7 @@ static lam_status read_points(entry *e, const json_t *at, lam_error *error) {
     if (json_is_array(json_array_get(direction, 0)) && json_array_size(direction) != n) {
         char limit[96];
         snprintf(limit, sizeof limit, "must be one direction, or %zu, as many as points", n);
-        TRY(wrong(e, word, direction, limit, error));
+        TRY(list_wrong(e->place, word, direction, limit, error));
     }
     TRY(sensors_begin(e->r, &e->set, e->place, error));
     for (size_t k = 0; k < n; k++) {
@@ -142,7 +105,7 @@ static lam_status read_polygon(const entry *e, const json_t *value, double (**ou
     double(*corner)[3] = NULL;
     char limit[64];
     snprintf(limit, sizeof limit, "must be an array of 3 to %d corners [x, y, z]", SENSOR_CORNERS_MOST);
-    if (n < 3 || n > SENSOR_CORNERS_MOST) TRY(wrong(e, "polygon", value, limit, error));
+    if (n < 3 || n > SENSOR_CORNERS_MOST) TRY(list_wrong(e->place, "polygon", value, limit, error));
     corner = memory_allocate(n, sizeof *corner, e->r->name, error);
     if (corner == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < n; k++)
@@ -162,14 +125,14 @@ static lam_status read_sizes(const entry *e, sensors_area *area, lam_error *erro
                  *spacing = json_object_get(e->value, "spacing");
     const bool by_standard = json_is_string(spacing) && strcmp(json_string_value(spacing), "en12464") == 0;
     if (height != NULL)
-        TRY(read_value(e, "height", height, -SENSORS_LENGTH_MOST, SENSORS_LENGTH_MOST, false, &area->height,
-                       error));
+        TRY(list_number(e->place, "height", height, -LIST_LENGTH_MOST, LIST_LENGTH_MOST, false, &area->height,
+                        error));
     if (border != NULL)
-        TRY(read_value(e, "border", border, 0, SENSORS_LENGTH_MOST, false, &area->border, error));
+        TRY(list_number(e->place, "border", border, 0, LIST_LENGTH_MOST, false, &area->border, error));
     if (json_is_string(spacing) && !by_standard)
-        TRY(wrong(e, "spacing", spacing, "must be a length above 0 or \"en12464\"", error));
+        TRY(list_wrong(e->place, "spacing", spacing, "must be a length above 0 or \"en12464\"", error));
     if (spacing != NULL && !by_standard)
-        TRY(read_value(e, "spacing", spacing, 0, SENSORS_LENGTH_MOST, true, &area->spacing, error));
+        TRY(list_number(e->place, "spacing", spacing, 0, LIST_LENGTH_MOST, true, &area->spacing, error));
     area->height *= e->r->unit;
     area->border *= e->r->unit;
     area->spacing *= e->r->unit;
@@ -184,7 +147,7 @@ static lam_status read_area(entry *e, const json_t *over, const json_t *corners,
     sensors_cells cells = {.n = 0};
     double(*corner)[3] = NULL;
     if (over != NULL && area.group == NULL)
-        TRY(wrong(e, "over", over, "must be the name of a group of the scene", error));
+        TRY(list_wrong(e->place, "over", over, "must be the name of a group of the scene", error));
     if (corners != NULL) TRY(read_polygon(e, corners, &corner, &area.n_corners, error));
     area.corner = (const double(*)[3])corner;
     TRY(read_sizes(e, &area, error));
@@ -225,7 +188,7 @@ static lam_status read_place(entry *e, lam_error *error) {
     } else {
         const json_t *direction = kind->direction != NULL ? json_object_get(e->value, kind->direction) : NULL;
         if (json_is_array(json_array_get(direction, 0)))
-            TRY(wrong(e, kind->direction, direction, "must be one direction", error));
+            TRY(list_wrong(e->place, kind->direction, direction, "must be one direction", error));
         TRY(read_area(e, over, corners, error));
     }
 done:
@@ -244,12 +207,12 @@ static lam_status read_set(entry *e, lam_error *error) {
     }
     if (e->kind->direction != NULL) members[n++] = e->kind->direction;
     if (e->kind->receiver == RECEIVER_SEMICYLINDER) members[n++] = "look";
-    TRY(placed_members(e->value, n, members, e->place, error));
+    TRY(list_members(e->value, n, members, e->place, error));
     const json_t *name = json_object_get(e->value, "name");
     if (name == NULL) FAIL(error, LAM_ERR_ARGUMENT, "%s has no name: it must have one", e->place);
-    if (!json_is_string(name)) TRY(wrong(e, "name", name, "must be a text", error));
+    if (!json_is_string(name)) TRY(list_wrong(e->place, "name", name, "must be a text", error));
     if (!sensors_is_name(json_string_value(name), json_string_length(name), &limit))
-        TRY(wrong(e, "name", name, limit, error));
+        TRY(list_wrong(e->place, "name", name, limit, error));
     memcpy(e->set.name, json_string_value(name), json_string_length(name) + 1);
     if (e->kind->needs_direction && json_object_get(e->value, e->kind->direction) == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "%s has no %s: it must have one", e->place, e->kind->direction);
@@ -260,10 +223,10 @@ done:
 
 lam_status sensors_array(sensors_reading *r, sensor_set_kind kind, const json_t *array, lam_error *error) {
     lam_status status = LAM_OK;
-    char shown[PLACED_SHOWN];
+    char shown[LIST_SHOWN];
     if (array == NULL) return LAM_OK;
     if (!json_is_array(array)) {
-        placed_shown(array, shown);
+        list_shown(array, shown);
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: %s = %s, must be an array", r->name, sensor_set_word(kind),
              shown);
     }

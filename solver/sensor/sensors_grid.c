@@ -91,7 +91,7 @@ static bool main_plane(const mesh *m, size_t group, const double up[3], double r
             plane_of_group *p = &planes[n++];
             *p = (plane_of_group){.area = 0};
             for (int d = 0; d < 3; d++) p->normal[d] = (double)m->normal[j][d];
-            (void)placed_normalize(p->normal);
+            (void)list_normalize(p->normal);
             p->offset = dot3(m->vertices[m->elements[j][0]], p->normal);
         }
         planes[k].area += m->area[j];
@@ -159,7 +159,7 @@ static lam_status take_polygon(const sensors_reading *r, const sensors_area *are
         extent = fmax(extent, sqrt(fmax(dot3(one, one), dot3(other, other))));
         for (int d = 0; d < 3; d++) twice[d] += cross[d];
     }
-    if (!(sqrt(dot3(twice, twice)) > 1e-9 * extent * extent) || !placed_normalize(twice))
+    if (!(sqrt(dot3(twice, twice)) > 1e-9 * extent * extent) || !list_normalize(twice))
         FAIL(error, LAM_ERR_ARGUMENT, "%s: polygon has no area", area->place);
     memcpy(a->normal, twice, sizeof twice);
     a->offset = dot3(area->corner[0], a->normal);

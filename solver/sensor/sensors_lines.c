@@ -97,13 +97,13 @@ static lam_status add_point(lines *t, const double number[6], lam_error *error) 
     receiver one = {.kind = RECEIVER_PLANE};
     snprintf(place, sizeof place, "%.200s: line %zu", t->s->name, t->line);
     for (int d = 0; d < 6; d++)
-        if (!luminaire_in_limits(number[d], -SENSORS_LENGTH_MOST, SENSORS_LENGTH_MOST, false, limit))
+        if (!luminaire_in_limits(number[d], -LIST_LENGTH_MOST, LIST_LENGTH_MOST, false, limit))
             FAIL(error, LAM_ERR_ARGUMENT, "%s: %s = %g, %s", place, columns[d + 1], number[d], limit);
     for (int d = 0; d < 3; d++) {
         one.at[d] = number[d] * t->r->unit;
         one.axis[d] = number[3 + d];
     }
-    if (!placed_normalize(one.axis))
+    if (!list_normalize(one.axis))
         FAIL(error, LAM_ERR_ARGUMENT, "%s: the normal %g %g %g must have a length above 0", place, number[3],
              number[4], number[5]);
     TRY(sensors_add(t->r, &one, SENSOR_NO_CELL, place, error));

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_SENSOR_SENSORS_PARTS_H
 #define LAMBERT_SENSOR_SENSORS_PARTS_H
 
-#include "solver/luminaire/placed_parts.h"
+#include "solver/luminaire/list_values.h"
 #include "solver/sensor/sensors.h"
 
 /* The list that is read. */
@@ -16,9 +16,6 @@ typedef struct sensors_reading {
 } sensors_reading;
 
 enum { SENSORS_PLACE = 320 };
-
-/* A coordinate is below it in any unit, so that all sums are finite. */
-#define SENSORS_LENGTH_MOST 1e9
 
 /* Adds the sets of an array of JSON, of one kind. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
 lam_status sensors_array(sensors_reading *r, sensor_set_kind kind, const json_t *array, lam_error *error);

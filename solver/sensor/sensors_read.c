@@ -2,7 +2,6 @@
 #include "solver/base/array_grow.h"
 #include "solver/base/file_stem.h"
 #include "solver/base/file_text.h"
-#include "solver/base/length_unit.h"
 #include "solver/base/utf8.h"
 #include "solver/sensor/sensors_parts.h"
 
@@ -81,33 +80,17 @@ done:
     return status;
 }
 
-static lam_status read_unit(sensors_reading *r, const json_t *value, lam_error *error) {
-    char shown[PLACED_SHOWN];
-    if (value == NULL) return LAM_OK;
-    const length_unit *unit = json_is_string(value) ? length_unit_find(json_string_value(value)) : NULL;
-    if (unit != NULL) {
-        r->unit = unit->metres;
-        return LAM_OK;
-    }
-    placed_shown(value, shown);
-    return status_fail(error, LAM_ERR_ARGUMENT, "%.200s: unit = %s, must be one of " LENGTH_UNIT_WORDS,
-                       r->name, shown);
-}
-
 static lam_status read_json(const luminaire_source *s, sensors_reading *r, lam_error *error) {
     lam_status status = LAM_OK;
     const char *members[SENSOR_SET_KINDS + 1];
     char place[SENSORS_PLACE];
-    json_error_t where;
-    json_t *root = json_loadb(s->text, (size_t)(s->end - s->text), JSON_REJECT_DUPLICATES, &where);
-    if (root == NULL)
-        FAIL(error, json_error_code(&where) == json_error_out_of_memory ? LAM_ERR_MEMORY : LAM_ERR_FORMAT,
-             "%.200s: line %d, column %d: %.160s", s->name, where.line, where.column, where.text);
+    json_t *root = NULL;
+    TRY(list_open(s, &root, error));
     memcpy(members, words, sizeof words);
     members[SENSOR_SET_KINDS] = "unit";
     snprintf(place, sizeof place, "%.200s: the file", s->name);
-    TRY(placed_members(root, SENSOR_SET_KINDS + 1, members, place, error));
-    TRY(read_unit(r, json_object_get(root, "unit"), error));
+    TRY(list_members(root, SENSOR_SET_KINDS + 1, members, place, error));
+    TRY(list_unit(r->name, json_object_get(root, "unit"), &r->unit, error));
     for (int kind = 0; kind < SENSOR_SET_KINDS; kind++)
         TRY(sensors_array(r, (sensor_set_kind)kind, json_object_get(root, words[kind]), error));
 done:
