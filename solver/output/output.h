@@ -104,6 +104,10 @@ lam_status output_array(FILE *stream, size_t rank, const size_t *shape, const fl
 #define OUTPUT_COLUMN 64
 void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]);
 
+/* The first line of a table: these columns, then one for each vector and channel, with the unit of its values
+ * in brackets. */
+void output_csv_header(const solution *s, const char *first, FILE *stream);
+
 /* The unit of the values of a vector, or "". */
 static inline const char *output_unit(const solution *s, size_t vector) {
     return s->units != NULL ? s->units[vector] : s->unit;

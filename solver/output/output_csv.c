@@ -5,8 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-/* A column has the unit of its values in brackets; sums of figures are in that times m2. */
-static void header(const solution *s, const char *first, FILE *stream) {
+void output_csv_header(const solution *s, const char *first, FILE *stream) {
     char name[OUTPUT_COLUMN];
     fputs(first, stream);
     for (size_t v = 0; v < s->n_vectors; v++)
@@ -20,7 +19,7 @@ static void header(const solution *s, const char *first, FILE *stream) {
 
 static void elements(const solution *s, FILE *stream) {
     const mesh *m = s->m;
-    header(s, "element,group,area", stream);
+    output_csv_header(s, "element,group,area", stream);
     for (size_t i = 0; i < m->n; i++) {
         fprintf(stream, "%zu,", i);
         csv_text(m->group_names[m->group[i]], stream);
@@ -34,7 +33,7 @@ static void elements(const solution *s, FILE *stream) {
 /* A value that is missing, of a face without an element, is empty. */
 static void faces(const solution *s, FILE *stream) {
     const size_t n = output_width(s);
-    header(s, "face,group,area", stream);
+    output_csv_header(s, "face,group,area", stream);
     for (size_t f = 0; f < n; f++) {
         double area;
         const char *group = output_face_group(s, f, &area);
@@ -54,7 +53,7 @@ static void faces(const solution *s, FILE *stream) {
 
 static void figures(const solution *s, FILE *stream) {
     const mesh *m = s->m;
-    header(s, "group,statistic", stream);
+    output_csv_header(s, "group,statistic", stream);
     for (size_t r = 0; r < s->n_reductions; r++) {
         const reduction *of = &s->reductions[r];
         for (size_t k = 0; k < of->request.n_with; k++) {

@@ -105,21 +105,8 @@ static set_figures figures_of(const sensor_choice *c, const solution *s, size_t 
     return f;
 }
 
-/* The heads of columns: the answer, its vector and channel, and the unit. */
-static void put_columns(const solution *s, FILE *stream) {
-    char name[OUTPUT_COLUMN];
-    for (size_t v = 0; v < s->n_vectors; v++)
-        for (size_t c = 0; c < s->m->n_channels; c++) {
-            const char *unit = output_unit(s, v);
-            output_column(s, v, c, name);
-            fprintf(stream, unit[0] != '\0' ? ",%s [%s]" : ",%s", name, unit);
-        }
-    fputs("\n", stream);
-}
-
 static void put_csv(const sensor_choice *c, const solution *s, FILE *stream) {
-    fputs("sensors,x [m],y [m],z [m],nx,ny,nz", stream);
-    put_columns(s, stream);
+    output_csv_header(s, "sensors,x [m],y [m],z [m],nx,ny,nz", stream);
     for (size_t k = 0; k < c->n_sets; k++) {
         size_t first, count;
         const char *name = lam_sensors_set(c->all, c->sets[k], &first, &count);
