@@ -1,5 +1,6 @@
 #include "solver/direct/direct_elements.h"
 
+#include "solver/base/parallel_reported.h"
 #include "solver/base/vector3.h"
 #include "solver/direct/element_light.h"
 #include "solver/direct/luminaire_runs.h"
@@ -186,35 +187,22 @@ static void light_again(const element_run *r, size_t element) {
     if (r->found[element] == PARTLY) light_seen(r, element, r->more, 2);
 }
 
-/* All elements once; before: the share of the work before it. */
-static lam_status light_all(const element_run *r, void (*light)(const element_run *r, size_t element),
-                            double before, double part, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = r->m->n;
-    size_t done = 0;
-    bool stop = false;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t first = 0; first < n; first += ELEMENTS_AT_ONCE) {
-        bool skip;
-#pragma omp atomic read
-        skip = stop;
-        if (skip) continue;
-        const size_t last = first + ELEMENTS_AT_ONCE < n ? first + ELEMENTS_AT_ONCE : n;
-        for (size_t i = first; i < last; i++) light(r, i);
-#pragma omp critical(luminaire_progress)
-        {
-            done += last - first;
-            progress_report(r->options->progress, r->options->stage,
-                            (before + part * (double)done / (double)n) / (double)r->n_rows);
-            if (progress_cancelled(r->options->progress)) {
-#pragma omp atomic write
-                stop = true;
-            }
-        }
-    }
-    if (stop) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-done:
-    return status;
+static void light_some_first(const void *job, size_t first, size_t last) {
+    for (size_t i = first; i < last; i++) light_first(job, i);
+}
+
+static void light_some_again(const void *job, size_t first, size_t last) {
+    for (size_t i = first; i < last; i++) light_again(job, i);
+}
+
+/* All elements once; before: the share of the work of the luminaires before it. */
+static lam_status light_all(const element_run *r, reported_pieces *light, double before, double part,
+                            lam_error *error) {
+    const reported_loop loop = {.progress = r->options->progress,
+                                .stage = r->options->stage,
+                                .before = before / (double)r->n_rows,
+                                .part = part / (double)r->n_rows};
+    return parallel_reported(&loop, r->m->n, ELEMENTS_AT_ONCE, light, r, error);
 }
 
 static void mark_corners(const element_run *r) {
@@ -285,9 +273,9 @@ static lam_status light_luminaire(void *context, const luminaire_run *run, lam_e
     const double before = (double)run->step;
     r->luminaire = run;
     r->H = job->out->H + row * r->m->n;
-    TRY(light_all(r, light_first, before, .7, error));
+    TRY(light_all(r, light_some_first, before, .7, error));
     mark_corners(r);
-    TRY(light_all(r, light_again, before + .7, .3, error));
+    TRY(light_all(r, light_some_again, before + .7, .3, error));
     add_errors(r, job->out->elements_off + row * r->m->n_groups, job->out->means_off + row * r->m->n_groups,
                job->sums);
     TRY(report_luminaire(r->m, run, &job->out->reports[row], error));

@@ -1,5 +1,6 @@
 #include "solver/direct/direct_points.h"
 
+#include "solver/base/parallel_reported.h"
 #include "solver/base/vector3.h"
 #include "solver/direct/luminaire_runs.h"
 
@@ -72,42 +73,31 @@ static size_t find_beams(const luminaire_run *run, const direct_point *point, si
     return count;
 }
 
-static void visit_point(const points_job *job, const luminaire_run *run, size_t point, beam_room *room) {
-    bool partly;
-    size_t count = find_beams(run, &job->points[point], BEAMS, room, &partly);
-    if (partly) count = find_beams(run, &job->points[point], MORE_BEAMS, room, &partly);
-    job->visit(job->context, run->row, point, count, room->beams);
+/* The points of a luminaire. */
+typedef struct points_run {
+    const points_job *job;
+    const luminaire_run *run;
+} points_run;
+
+static void visit_some(const void *of, size_t first, size_t last) {
+    const points_run *r = of;
+    beam_room room;
+    for (size_t point = first; point < last; point++) {
+        bool partly;
+        size_t count = find_beams(r->run, &r->job->points[point], BEAMS, &room, &partly);
+        if (partly) count = find_beams(r->run, &r->job->points[point], MORE_BEAMS, &room, &partly);
+        r->job->visit(r->job->context, r->run->row, point, count, room.beams);
+    }
 }
 
 static lam_status visit_points(void *context, const luminaire_run *run, lam_error *error) {
-    lam_status status = LAM_OK;
     const points_job *job = context;
-    const direct_options *o = job->options;
-    size_t done = 0;
-    bool stop = false;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t first = 0; first < job->n; first += POINTS_AT_ONCE) {
-        bool skip;
-#pragma omp atomic read
-        skip = stop;
-        if (skip) continue;
-        const size_t last = first + POINTS_AT_ONCE < job->n ? first + POINTS_AT_ONCE : job->n;
-        beam_room room;
-        for (size_t k = first; k < last; k++) visit_point(job, run, k, &room);
-#pragma omp critical(luminaire_progress)
-        {
-            done += last - first;
-            progress_report(o->progress, o->stage,
-                            ((double)run->step + (double)done / (double)job->n) / (double)job->n_rows);
-            if (progress_cancelled(o->progress)) {
-#pragma omp atomic write
-                stop = true;
-            }
-        }
-    }
-    if (stop) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-done:
-    return status;
+    const points_run points = {.job = job, .run = run};
+    const reported_loop loop = {.progress = job->options->progress,
+                                .stage = job->options->stage,
+                                .before = (double)run->step / (double)job->n_rows,
+                                .part = 1 / (double)job->n_rows};
+    return parallel_reported(&loop, job->n, POINTS_AT_ONCE, visit_some, &points, error);
 }
 
 lam_status direct_points_visit(const mesh *m, const placed_luminaires *p, const direct_options *o, size_t n,

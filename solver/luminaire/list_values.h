@@ -25,7 +25,7 @@ void list_shown(const json_t *value, char out[LIST_SHOWN]);
 lam_status list_members(json_t *object, size_t n, const char *const *words, const char *place,
                         lam_error *error);
 
-/* Fails with the line "PLACE: WHAT = VALUE, LIMIT". */
+/* Fails with the place of the entry, the member, its value and the limit in one line. */
 lam_status list_wrong(const char *place, const char *what, const json_t *value, const char *limit,
                       lam_error *error);
 

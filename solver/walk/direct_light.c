@@ -1,5 +1,6 @@
 #include "solver/walk/direct_light.h"
 
+#include "solver/base/parallel_reported.h"
 #include "solver/base/vector3.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/walk/spherical_triangle.h"
@@ -250,36 +251,28 @@ static lam_status place_lights(direct_run *r, lam_error *error) {
     return LAM_OK;
 }
 
+/* Light of elements, and where it goes. */
+typedef struct direct_result {
+    const direct_run *run;
+    float *F, *variance;
+} direct_result;
+
+static void light_some(const void *of, size_t first, size_t last) {
+    const direct_result *to = of;
+    const size_t positions = to->run->problem->light->n;
+    for (size_t i = first; i < last; i++)
+        light_element(to->run, i, to->F + i * positions, to->variance + i * positions);
+}
+
 /* All elements once. */
 static lam_status light_all(const direct_run *r, float *F, float *variance, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = r->scene->m->n, positions = r->problem->light->n;
-    const double before = r->all == NULL ? 0 : .25;
-    size_t done = 0;
-    bool stop = false;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t first = 0; first < n; first += ELEMENTS_AT_ONCE) {
-        bool skip;
-#pragma omp atomic read
-        skip = stop;
-        if (skip) continue;
-        const size_t last = first + ELEMENTS_AT_ONCE < n ? first + ELEMENTS_AT_ONCE : n;
-        for (size_t i = first; i < last; i++)
-            light_element(r, i, F + i * positions, variance + i * positions);
-#pragma omp critical(direct_progress)
-        {
-            done += last - first;
-            progress_report(r->problem->progress, r->problem->stage,
-                            before + (r->all == NULL ? .25 : .75) * (double)done / (double)n);
-            if (progress_cancelled(r->problem->progress)) {
-#pragma omp atomic write
-                stop = true;
-            }
-        }
-    }
-    if (stop) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-done:
-    return status;
+    const bool is_first = r->all == NULL;
+    const direct_result to = {.run = r, .F = F, .variance = variance};
+    const reported_loop loop = {.progress = r->problem->progress,
+                                .stage = r->problem->stage,
+                                .before = is_first ? 0 : .25,
+                                .part = is_first ? .25 : .75};
+    return parallel_reported(&loop, r->scene->m->n, ELEMENTS_AT_ONCE, light_some, &to, error);
 }
 
 /* all [s]: with N_l = |F_l| the squared errors over N_l^2 of all positions are least in sum if a position's
