@@ -8,6 +8,12 @@ void *test_allocate(size_t count, size_t size) {
     return memory;
 }
 
+float *test_random_positive(size_t count, uint64_t seed) {
+    float *x = test_allocate(count, sizeof *x);
+    for (size_t i = 0; i < count; i++) x[i] = (float)random_lcg_unit(&seed);
+    return x;
+}
+
 void invert(size_t n, double *X) {
     double *inverse = test_allocate(n * n, sizeof *inverse);
     for (size_t i = 0; i < n; i++) inverse[i * n + i] = 1;

@@ -12,6 +12,9 @@
 
 void *test_allocate(size_t count, size_t size);
 
+/* Random numbers of [0, 1), by a seed; freed with free(). */
+float *test_random_positive(size_t count, uint64_t seed);
+
 /* X := X^-1, [n][n], by Gauss-Jordan with row pivots. */
 void invert(size_t n, double *X);
 

@@ -64,21 +64,15 @@ static void name_store(char path[64]) {
     snprintf(path, 64, "/tmp/lambert-luminaire-light-%d.h5", (int)getpid());
 }
 
-static float *random_positive(size_t count, uint64_t seed) {
-    float *x = test_allocate(count, sizeof *x);
-    for (size_t i = 0; i < count; i++) x[i] = (float)random_lcg_unit(&seed);
-    return x;
-}
-
 /* Against sums in double, added to a sky; the transpose is one. */
 START_TEST(irradiance) {
     char path[64];
     lam_error error = {0};
     lam_luminaires *l = NULL;
     enum { RHS = 3, ROWS = RHS * C };
-    float *values = random_positive((size_t)K * N, 1), *D = random_positive(ROWS * K, 2);
-    float *H0 = random_positive((size_t)ROWS * N, 3), *sky = random_positive((size_t)ROWS * N, 3);
-    float *one = random_positive((size_t)C * N, 3), *g = random_positive((size_t)ROWS * N, 4);
+    float *values = test_random_positive((size_t)K * N, 1), *D = test_random_positive(ROWS * K, 2);
+    float *H0 = test_random_positive((size_t)ROWS * N, 3), *sky = test_random_positive((size_t)ROWS * N, 3);
+    float *one = test_random_positive((size_t)C * N, 3), *g = test_random_positive((size_t)ROWS * N, 4);
     float *w = test_allocate(ROWS * K, sizeof *w);
     double *twice = test_allocate(ROWS * N, sizeof *twice), *D2 = test_allocate(ROWS * K, sizeof *D2);
     name_store(path);
@@ -126,7 +120,7 @@ START_TEST(words_and_places) {
     char path[64];
     lam_error error = {0};
     lam_luminaires *l = NULL;
-    float *values = random_positive((size_t)K * N, 1);
+    float *values = test_random_positive((size_t)K * N, 1);
     name_store(path);
     write_store(path, K, values, NULL);
     ck_assert_msg(lam_luminaires_open(path, &l, &error) == LAM_OK, "%s", error.message);
@@ -151,7 +145,7 @@ START_TEST(stores_without_luminaires_and_bad_ones) {
     char path[64];
     lam_error error = {0};
     lam_luminaires *l = (lam_luminaires *)&error;
-    float *values = random_positive((size_t)K * N, 1);
+    float *values = test_random_positive((size_t)K * N, 1);
     name_store(path);
     write_store(path, 0, NULL, NULL);
     ck_assert_int_eq(lam_luminaires_open(path, &l, &error), LAM_OK);

@@ -27,19 +27,13 @@ static void name_store(char path[64]) {
     snprintf(path, 64, "/tmp/lambert-sky-light-%d.h5", (int)getpid());
 }
 
-static float *random_positive(size_t count, uint64_t seed) {
-    float *x = test_allocate(count, sizeof *x);
-    for (size_t i = 0; i < count; i++) x[i] = (float)random_lcg_unit(&seed);
-    return x;
-}
-
 /* Against sums in double; a batch gives each row its own bits. */
 START_TEST(irradiance) {
     char path[64];
     lam_error error = {0};
     lam_sky *sky = NULL;
     enum { ROWS = 5 };
-    float *first_bounce = random_positive((size_t)M * N, 1), *L = random_positive(ROWS * M, 2);
+    float *first_bounce = test_random_positive((size_t)M * N, 1), *L = test_random_positive(ROWS * M, 2);
     float *H0 = test_allocate(ROWS * N, sizeof *H0), *one = test_allocate(N, sizeof *one);
     for (size_t t = 0; t < M; t++) L[2 * M + t] = t == 20 ? 1 : 0; /* one tile alone */
     name_store(path);
@@ -72,7 +66,7 @@ START_TEST(stores_without_a_sky_and_bad_ones) {
     char path[64];
     lam_error error = {0};
     lam_sky *sky = (lam_sky *)&error;
-    float *first_bounce = random_positive((size_t)M * N, 1);
+    float *first_bounce = test_random_positive((size_t)M * N, 1);
     name_store(path);
     write_store(path, 0, 0, NULL);
     ck_assert_int_eq(lam_sky_open(path, &sky, &error), LAM_OK);
