@@ -5,6 +5,7 @@
 #include "solver/sensor/sensors_store.h"
 #include "store/groups.h"
 
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,13 +24,37 @@ bool relight_is_asked(const precompute_options *o, const option_result *given) {
     return alone;
 }
 
-static bool skip(const char *object, const char *attribute) {
+/* All that luminaires give is written anew, what sensors are in their other parts is not. */
+static bool skip_light(const char *object, const char *attribute) {
     return attribute == NULL ? strcmp(object, STORE_LUMINAIRES) == 0 || sensors_are_lit_by(object)
                              : strcmp(object, STORE_MESH) == 0 && strcmp(attribute, "lights") == 0;
 }
 
+static bool skip_luminaires(const char *object, const char *attribute) {
+    return skip_light(object, attribute) || mesh_figure_is_of_luminaires(object, attribute);
+}
+
 static bool skip_sensors(const char *object, const char *attribute) {
-    return skip(object, attribute) || (attribute == NULL && strcmp(object, STORE_SENSORS) == 0);
+    return skip_light(object, attribute) || (attribute == NULL && strcmp(object, STORE_SENSORS) == 0);
+}
+
+static bool skip_both(const char *object, const char *attribute) {
+    return skip_luminaires(object, attribute) || skip_sensors(object, attribute);
+}
+
+/* The part of the mesh of stated errors for the luminaires that are there now, where the store states errors.
+ */
+static lam_status find_mesh_error(const precompute_job *job, const precompute_scene *scene, store *from,
+                                  made_operator *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double started = clock_seconds();
+    if (scene->luminaires.placed.n == 0 || !mesh_figures_are_stated(from)) return LAM_OK;
+    TRY(operator_load(from, &made->op, error));
+    lam_operator_set_threads(made->op, (size_t)omp_get_max_threads());
+    TRY(stage_mesh_error_of_luminaires(job, scene, made, error));
+    terminal_log_stage(job->t, "mesh error", clock_seconds() - started);
+done:
+    return status;
 }
 
 /* Writes the sensors anew, or the light of luminaires at those that are copied. */
@@ -57,7 +82,9 @@ done:
 
 lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
-    const bool rows = job->options->sensors != NULL;
+    const bool rows = job->options->sensors != NULL, lights = job->options->luminaires != NULL;
+    store_skip *const skip = lights ? rows ? skip_both : skip_luminaires : skip_sensors;
+    made_operator made = {.op = NULL};
     sky_bounce sky = {.n = 0};
     store *from = NULL, *to = NULL;
     double started = clock_seconds();
@@ -74,13 +101,15 @@ lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_e
     started = clock_seconds();
     TRY(stage_sensors(job, scene, &sky, rows, error));
     if (scene->sensors.list.n > 0) terminal_log_stage(job->t, "sensors", clock_seconds() - started);
+    if (lights) TRY(find_mesh_error(job, scene, from, &made, error));
     TRY(terminal_check(error));
     started = clock_seconds();
     TRY(store_create(job->options->output, &to, error));
-    TRY(store_copy(from, rows ? skip_sensors : skip, to, error));
+    TRY(store_copy(from, skip, to, error));
     TRY(store_set_text(to, STORE_MESH, "lights", light_kind_word(scene->m.lights), error));
     TRY(luminaires_save(&scene->luminaires, &scene->m, to, error));
     TRY(save_sensors(scene, rows, from, to, error));
+    TRY(stated_figures_save(&(stated_figures){.mesh = made.errors_of_mesh}, to, error));
     if (scene->luminaires.placed.n > 0)
         TRY(store_set_text(to, STORE_LUMINAIRES, "command", job->options->command, error));
     TRY(terminal_check(error));
@@ -92,5 +121,7 @@ done:
     store_close(to);
     store_close(from);
     sky_bounce_free(&sky);
+    mesh_figures_free(&made.errors_of_mesh);
+    lam_operator_close(made.op);
     return status;
 }

@@ -117,19 +117,35 @@ done:
     return status;
 }
 
-lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *scene,
-                            const precompute_factors *factors, made_operator *made, lam_error *error) {
-    lam_status status = LAM_OK;
+/* A view of a scene, whose reflectances are a copy: lightened where it reflects nothing. */
+static lam_status lighten(const precompute_scene *scene, precompute_scene *out, lam_error *error) {
     const mesh *m = &scene->m;
-    precompute_scene lighter = *scene;
     float *reflectance =
         memory_allocate(m->n, m->n_channels * sizeof *reflectance, "the error of the mesh", error);
     if (reflectance == NULL) return LAM_ERR_MEMORY;
     memcpy(reflectance, m->reflectance, m->n * m->n_channels * sizeof *reflectance);
-    lighter.m.reflectance = reflectance;
-    lighter.lightened = black_scene_lighten(&lighter.m);
-    TRY(find_errors(job, &lighter, factors, made, error));
-done:
-    free(reflectance);
+    *out = *scene;
+    out->m.reflectance = reflectance;
+    out->lightened = black_scene_lighten(&out->m);
+    return LAM_OK;
+}
+
+lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *scene,
+                            const precompute_factors *factors, made_operator *made, lam_error *error) {
+    precompute_scene lighter;
+    lam_status status = lighten(scene, &lighter, error);
+    if (status != LAM_OK) return status;
+    status = find_errors(job, &lighter, factors, made, error);
+    free(lighter.m.reflectance);
+    return status;
+}
+
+lam_status stage_mesh_error_of_luminaires(const precompute_job *job, const precompute_scene *scene,
+                                          made_operator *made, lam_error *error) {
+    precompute_scene lighter;
+    lam_status status = lighten(scene, &lighter, error);
+    if (status != LAM_OK) return status;
+    status = mesh_error_add_luminaires(job, &lighter, made, error);
+    free(lighter.m.reflectance);
     return status;
 }

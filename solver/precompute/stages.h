@@ -86,6 +86,10 @@ lam_status walked_save(const walked_light *walked, store *s, lam_error *error);
 lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *scene,
                             const precompute_factors *factors, made_operator *made, lam_error *error);
 
+/* That of the light of luminaires alone, beside what made has. */
+lam_status stage_mesh_error_of_luminaires(const precompute_job *job, const precompute_scene *scene,
+                                          made_operator *made, lam_error *error);
+
 /* Adds what overlapping faces and the repair of row sums are to all stated errors: overlap_error.c. */
 void made_add_overlap(const precompute_job *job, const precompute_scene *scene, const precompute_plan *plan,
                       const precompute_factors *factors, made_operator *made);

@@ -112,6 +112,14 @@ class Lit(Case):
                     if isinstance(a[group][name], h5py.Dataset):
                         np.testing.assert_array_equal(a[group][name][()], b[group][name][()])
                 self.assertEqual(dict(a[group].attrs), dict(b[group].attrs))
+        # The error of the mesh is stated for the lamps that are there now.
+        must("precompute", self.kept("lit.obj"), "--luminaires", self.path("moved.json"), *ASSETS, "--elements", 700, "--reflectance",
+             .5, "--method", "exact", "-o", self.path("fresh.h5"))
+        with h5py.File(self.kept("lit.h5")) as a, h5py.File(self.path("moved.h5")) as b, h5py.File(self.path("fresh.h5")) as c:
+            old, new, fresh = (file["error/mesh"] for file in (a, b, c))
+            self.assertEqual(dict(new.attrs), dict(fresh.attrs))
+            self.assertNotEqual(new.attrs["luminaire"], old.attrs["luminaire"])
+            np.testing.assert_array_equal(new["luminaire_variation"][()], fresh["luminaire_variation"][()])
         must("precompute", self.kept("lit.h5"), "--luminaires", "none", "-o", self.path("none.h5"))
         with h5py.File(self.path("none.h5")) as file:
             self.assertNotIn("luminaires", file)

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define BY_GROUP STORE_ERROR "/by_group"
 #define EMITTERS STORE_ERROR "/emitters"
@@ -425,6 +426,19 @@ lam_status stated_figures_save(const stated_figures *of, store *s, lam_error *er
     TRY(pass_by_group(s, true, &f.by_group, error));
 done:
     return status;
+}
+
+bool mesh_figure_is_of_luminaires(const char *object, const char *named) {
+    static const char word[] = "luminaire"; /* and luminaires */
+    const char *group = figures_groups[MESH_GROUP].path;
+    const size_t length = strlen(group);
+    if (strncmp(object, group, length) != 0) return false;
+    const char *name = named != NULL ? named : object + length + (object[length] == '/');
+    return (named == NULL || object[length] == '\0') && strncmp(name, word, strlen(word)) == 0;
+}
+
+bool mesh_figures_are_stated(store *s) {
+    return store_has(s, figures_groups[MESH_GROUP].path);
 }
 
 lam_status stated_figures_load(store *s, const figures_shape *shape, stated_figures *out, lam_error *error) {

@@ -185,6 +185,11 @@ void stated_figures_free(stated_figures *f);
 /* Writes those that are known. */
 lam_status stated_figures_save(const stated_figures *f, store *s, lam_error *error);
 
+/* True for an object or an attribute (NULL: none) of a store that is a figure of luminaires: those of a store
+ * whose luminaires are others are found anew. mesh_figures_are_stated: the store has figures of the mesh. */
+bool mesh_figure_is_of_luminaires(const char *object, const char *attribute);
+bool mesh_figures_are_stated(store *s);
+
 /* The shape of a scene; n_emitters 0: figures of emitters are not read. */
 typedef struct figures_shape {
     size_t n_groups, n_channels, n_emitters;
