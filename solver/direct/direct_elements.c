@@ -238,7 +238,6 @@ static lam_status report_luminaire(const mesh *m, const luminaire_run *run, dire
     if (out->ignored == NULL) return LAM_ERR_MEMORY;
     for (size_t k = 0; k < ignored->n; k++) out->ignored[k] = ignored->groups[k];
     out->n_ignored = ignored->n;
-    out->n_named = ignored->n_named;
     out->near_share = luminaire_sight_near(run->sight, &run->source, run->moved, DIRECT_NEAR);
     for (size_t i = 0; i < m->n && !run->source.opening.flat; i++) {
         double middle[3], own[3];

@@ -24,7 +24,6 @@ typedef struct direct_report {
     size_t luminaire;  /* of the list */
     size_t n_ignored;  /* groups that hide nothing from it */
     uint32_t *ignored; /* [n_ignored], ascending */
-    size_t n_named;    /* of them, those that its `ignore` names */
     double near_share; /* of its flux, that ends nearer than DIRECT_NEAR */
     double lit_share;  /* of its flux, that elements receive; 1 where it has none */
     size_t n_inside;   /* elements whose middle lies in the box about its opening: no number is true there */

@@ -35,14 +35,23 @@ lam_status group_boxes_make(const mesh *m, double (**out)[2][3], lam_error *erro
     return LAM_OK;
 }
 
-/* True for a group that wraps the opening. */
-static bool wraps(const double box[2][3], const placed_luminaire *l, double longest) {
-    double edge = 0;
+/* The longest edges of a housing, along the axes of the scene. */
+static void housing_most(const placed_luminaire *l, const double size[3], double most[3]) {
+    const double *const frame[3] = {l->x, l->y, l->z}, largest = fmax(fmax(size[0], size[1]), size[2]);
     for (int d = 0; d < 3; d++) {
-        if (!(l->at[d] >= box[0][d] - covered && l->at[d] <= box[1][d] + covered)) return false;
-        edge = fmax(edge, box[1][d] - box[0][d]);
+        double extent = 0;
+        for (int k = 0; k < 3; k++) extent += size[k] * fabs(frame[k][d]);
+        most[d] = fmax(fmax(3 * extent, largest), IGNORED_LEAST);
     }
-    return edge <= longest;
+}
+
+/* True for a group that wraps the opening. */
+static bool wraps(const double box[2][3], const placed_luminaire *l, const double most[3]) {
+    for (int d = 0; d < 3; d++)
+        if (!(l->at[d] >= box[0][d] - covered && l->at[d] <= box[1][d] + covered) ||
+            box[1][d] - box[0][d] > most[d])
+            return false;
+    return true;
 }
 
 /* The place of a group in names, or n_groups. */
@@ -82,16 +91,17 @@ lam_status ignored_groups_find(const mesh *m, const double (*boxes)[2][3], const
             FAIL(error, LAM_ERR_ARGUMENT, "luminaire %s: ignore = %s, which is no group of the scene; %s",
                  l->name, name, advice);
         }
-        found.n_named += !marked[g];
         marked[g] = true;
     }
     opening_faces_set(&list->files[l->file].photometry.opening, l->is_point, INFINITY, &opening);
-    const double largest = fmax(fmax(opening.size[0], opening.size[1]), opening.size[2]);
-    for (size_t g = 0; g < m->n_groups; g++)
-        if (wraps(boxes[g], l, fmax(3 * largest, IGNORED_LEAST))) marked[g] = true;
-    for (size_t g = 0; g < m->n_groups; g++) found.n += marked[g];
-    if (found.n > 0) mark_backs(m, marked);
-    found.n = 0;
+    double most[3];
+    housing_most(l, opening.size, most);
+    bool any = false;
+    for (size_t g = 0; g < m->n_groups; g++) {
+        marked[g] = marked[g] || wraps(boxes[g], l, most);
+        any = any || marked[g];
+    }
+    if (any) mark_backs(m, marked);
     for (size_t g = 0; g < m->n_groups; g++) found.n += marked[g];
     found.groups = memory_allocate(found.n, sizeof *found.groups, "ignored groups", error);
     if (found.groups == NULL) TRY(LAM_ERR_MEMORY);

@@ -13,16 +13,15 @@
 typedef struct ignored_groups {
     size_t n;
     uint32_t *groups; /* [n] */
-    size_t n_named;   /* of them, those that the list of luminaires names, backs not counted */
 } ignored_groups;
 
 /* The boxes of all groups, [n_groups][2][3]. The caller frees them. */
 lam_status group_boxes_make(const mesh *m, double (**out)[2][3], lam_error *error);
 
 /* The groups that the luminaire names in `ignore`, and those that wrap its opening: their boxes hold its
- * middle, and their longest edge is at most three times that of the opening, and of small ones and points
- * IGNORED_LEAST. The caller frees out->groups. Errors: LAM_ERR_ARGUMENT for a name that no group has, with
- * the nearest one; LAM_ERR_MEMORY. */
+ * middle, and along each axis of the scene they extend over at most three times as much as the opening, or as
+ * much as its longest side, or IGNORED_LEAST: a small room is none. The caller frees out->groups. Errors:
+ * LAM_ERR_ARGUMENT for a name that no group has, with the nearest one; LAM_ERR_MEMORY. */
 #define IGNORED_LEAST .5
 lam_status ignored_groups_find(const mesh *m, const double (*boxes)[2][3], const placed_luminaires *list,
                                const placed_luminaire *l, ignored_groups *out, lam_error *error);

@@ -229,6 +229,23 @@ START_TEST(housings_hide_nothing) {
 }
 END_TEST
 
+/* A small room of one group in a larger one, 3 m wide as a housing of a panel of 1.2 m would be along it,
+ * lets nothing out: it is wider than a housing across the panel, and higher. */
+START_TEST(a_small_room_is_no_housing) {
+    obj_text o = {.used = 0};
+    obj_text_room(&o, low, high, 4);
+    obj_text_block(&o, "walls", (const double[3]){1.5, 1.5, .1}, (const double[3]){4.5, 4.5, 2.9}, 1);
+    mesh m = obj_text_mesh(&o);
+    placed_luminaires p = placed_list("{\"name\": \"a\", \"file\": \"panel.ies\", \"at\": [3, 3, 2.6]}");
+    direct_light light = light_of(&m, &p, 1);
+    ck_assert_uint_eq(light.reports[0].n_ignored, 0);
+    ck_assert_double_eq(flux_on(&m, &light, 0, NULL), 0);
+    direct_light_free(&light);
+    placed_free(&p);
+    mesh_free(&m);
+}
+END_TEST
+
 /* Recessed at the ceiling's plane, and 3 mm above and below it by rounding: all of the light comes into the
  * room, and none to the ceiling. 3 mm move it by less than .3 % of any distance from 1 m on. */
 START_TEST(recessed_luminaires_are_not_hidden) {
@@ -379,6 +396,7 @@ int main(void) {
     tcase_add_test(tests, elements_without_shadows_are_exact);
     tcase_add_test(tests, steps_of_light_are_found);
     tcase_add_test(tests, housings_hide_nothing);
+    tcase_add_test(tests, a_small_room_is_no_housing);
     tcase_add_test(tests, recessed_luminaires_are_not_hidden);
     tcase_add_test(tests, panes_pass_light);
     tcase_add_test(tests, odd_luminaires_are_right);
