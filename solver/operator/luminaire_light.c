@@ -59,6 +59,25 @@ done:
     return status;
 }
 
+static int by_text(const void *a, const void *b) {
+    return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+/* A name stands for one luminaire. */
+static lam_status check_names(store *s, const lam_luminaires *l, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char **sorted = memory_allocate(l->k, sizeof *sorted, "luminaires", error);
+    if (sorted == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < l->k; k++) sorted[k] = l->names[k];
+    qsort(sorted, l->k, sizeof *sorted, by_text);
+    for (size_t k = 1; k < l->k; k++)
+        if (strcmp(sorted[k - 1], sorted[k]) == 0)
+            FAIL(error, LAM_ERR_FORMAT, "%s: /luminaires/names has %.60s twice", store_path(s), sorted[k]);
+done:
+    free(sorted);
+    return status;
+}
+
 static lam_status read_names(store *s, lam_luminaires *l, lam_error *error) {
     lam_status status = LAM_OK;
     size_t count = 0;
@@ -67,6 +86,7 @@ static lam_status read_names(store *s, lam_luminaires *l, lam_error *error) {
     if (count != l->k)
         FAIL(error, LAM_ERR_FORMAT, "%s: /luminaires/names has %zu names, must have %zu, as the irradiance",
              store_path(s), count, l->k);
+    TRY(check_names(s, l, error));
     if (!store_has(s, STORE_LUMINAIRES "/group_names")) goto done;
     TRY(store_read_texts(s, STORE_LUMINAIRES "/group_names", &l->n_groups, &l->group_names, error));
     TRY(store_read(s, STORE_LUMINAIRES "/group", STORE_U32, 1, (size_t[]){l->k}, &data, error));
@@ -79,7 +99,7 @@ done:
     return status;
 }
 
-/* [k][4]: a shape and its size. */
+/* [k][OPENING], of which the first is a shape. */
 static lam_status read_opening(store *s, lam_luminaires *l, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(read_numbers(s, STORE_LUMINAIRES "/opening", l->k, OPENING, false, &l->opening, error));

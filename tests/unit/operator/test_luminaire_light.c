@@ -31,11 +31,13 @@ static void write_numbers(store *s, const char *name, size_t width, uint64_t see
 }
 
 static void write_store(const char *path, size_t k, const float *irradiance, const wrong_value *wrong) {
-    static const char *const names[K] = {"a", "b.0", "b.1", "c", "d", "e", "f"}, *const groups[] = {"row"};
+    static const char *const groups[] = {"row"};
+    const char *names[K] = {"a", "b.0", "b.1", "c", "d", "e", "f"};
     uint32_t group[K] = {0, 0, LUMINAIRE_NO_GROUP, 0, 0, 0, 0};
     lam_error error = {0};
     store *s = NULL;
     float *reflectance = test_allocate(C * N, sizeof *reflectance);
+    if (wrong != NULL && strcmp(wrong->array, "names") == 0) names[wrong->at] = names[(size_t)wrong->value];
     if (wrong != NULL && strcmp(wrong->array, "group") == 0) group[wrong->at] = (uint32_t)wrong->value;
     ck_assert_int_eq(store_create(path, &s, &error), LAM_OK);
     ck_assert_int_eq(store_write(s, "/mesh/reflectance", STORE_F32, 2, (size_t[]){C, N}, reflectance, &error),
@@ -141,7 +143,7 @@ START_TEST(stores_without_luminaires_and_bad_ones) {
     static const wrong_value wrong[] = {
         {"dimmers", 2, -1},         {"lumens", 3, NAN},      {"colour", 4, -.5},  {"group", 1, 7},
         {"elements_off", 3, -1e-3}, {"place", 20, INFINITY}, {"opening", 5, NAN}, {"opening", 16, 11},
-        {"opening", 16, .5},        {"opening", 16, 1e300}};
+        {"opening", 16, .5},        {"opening", 16, 1e300},  {"names", 5, 0}};
     char path[64];
     lam_error error = {0};
     lam_luminaires *l = (lam_luminaires *)&error;
