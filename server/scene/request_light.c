@@ -159,51 +159,38 @@ bool request_sizes(const scene *s, const radiosity_request *request, mean_errors
 
 void sent_light_free(sent_light *l) {
     free(l->luminaires);
-    free(l->reflected);
-    free(l->sent);
+    free(l->H);
+    free(l->work);
 }
 
 bool sent_light_allocate(const scene *s, const radiosity_request *request, bool sun, sent_light *out) {
     const bool luminaires = request->luminaires.values != NULL;
-    *out = (sent_light){.sent = NULL};
+    *out = (sent_light){.H = NULL};
     if (!sun && !luminaires) return true;
-    out->reflected = memory_allocate(s->n, sizeof *out->reflected, "errors", NULL);
-    out->sent = memory_allocate(s->n, sizeof *out->sent, "errors", NULL);
+    out->H = memory_allocate(s->n, sizeof *out->H, "errors", NULL);
+    out->work = memory_allocate(s->n, 2 * sizeof *out->work, "errors", NULL);
     if (luminaires)
         out->luminaires = memory_allocate(s->n_channels, s->n * sizeof *out->luminaires, "errors", NULL);
-    return out->reflected != NULL && out->sent != NULL && (!luminaires || out->luminaires != NULL);
+    return out->H != NULL && out->work != NULL && (!luminaires || out->luminaires != NULL);
 }
 
 void sent_light_size(const scene *s, const radiosity_request *request, size_t v, const float *E,
                      const float *sun, sent_light *l, error_answer *of) {
     const size_t n = s->n, C = s->n_channels;
+    const error_scene about = scene_for_errors(s);
     if (l->luminaires != NULL) {
         memset(l->luminaires, 0, C * n * sizeof *l->luminaires);
         lam_luminaires_irradiance(s->luminaires, 1, request_dimmers(s, request, v), l->luminaires);
     }
-    for (size_t c = 0; c < C && l->luminaires != NULL; c++) {
-        double power = 0;
-        for (size_t i = 0; i < n; i++)
-            power += s->area[i] * (double)(s->reflectance[c * n + i] * l->luminaires[c * n + i]);
-        of->luminaires.power2 += power * power;
-    }
     for (size_t c = 0; c < C; c++) {
-        if (l->reflected == NULL) {
-            emission_size_add(&of->size, n, s->area, E + c * n);
-            continue;
-        }
-        memset(l->reflected, 0, n * sizeof *l->reflected);
+        const float *lamps = l->luminaires != NULL ? l->luminaires + c * n : NULL;
+        if (l->H != NULL) memset(l->H, 0, n * sizeof *l->H);
         for (size_t k = 0; sun != NULL && k < request->n_suns; k++) {
             const float direct = request->sunlight[k * C + c], *share = sun + k * n;
             if (request->suns[k].vector != v) continue;
-            for (size_t i = 0; i < n; i++) l->reflected[i] += direct * share[i];
+            for (size_t i = 0; i < n; i++) l->H[i] += direct * share[i];
         }
-        for (size_t i = 0; i < n; i++) {
-            if (l->luminaires != NULL) l->reflected[i] += l->luminaires[c * n + i];
-            l->reflected[i] *= s->reflectance[c * n + i];
-            l->sent[i] = E[c * n + i] + l->reflected[i];
-        }
-        emission_size_add(&of->size, n, s->area, l->sent);
-        emission_size_add(&of->reflected, n, s->area, l->reflected);
+        for (size_t i = 0; lamps != NULL && i < n; i++) l->H[i] += lamps[i];
+        error_answer_add_channel(of, &about, c, E + c * n, l->H, lamps, l->work);
     }
 }

@@ -19,8 +19,8 @@ bool request_sizes(const scene *s, const radiosity_request *request, mean_errors
 /* Work for the light that elements send on: vectors [C][n] and [n]. */
 typedef struct sent_light {
     float *luminaires; /* [C][n], their irradiance; NULL: no vector has any */
-    float *reflected;  /* [n]; NULL: there is neither sun nor luminaire */
-    float *sent;       /* [n] */
+    float *H;          /* [n], of suns and luminaires; NULL: there is neither */
+    float *work;       /* [2][n] */
 } sent_light;
 
 /* sun: whether the request has any. False when memory is short; freed by sent_light_free also then. */

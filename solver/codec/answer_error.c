@@ -5,6 +5,26 @@
 #include <math.h>
 #include <stdlib.h>
 
+void error_answer_add_channel(error_answer *of, const error_scene *scene, size_t c, const float *E,
+                              const float *H, const float *lamps, float *work) {
+    const size_t n = scene->n;
+    const float *rho = scene->reflectance + c * n;
+    float *reflected = work, *sent = work + n;
+    double power = 0; /* sum A rho H of luminaires */
+    if (H == NULL) {
+        emission_size_add(&of->size, n, scene->area, E);
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        reflected[i] = rho[i] * H[i];
+        sent[i] = E[i] + reflected[i];
+        if (lamps != NULL) power += scene->area[i] * (double)(rho[i] * lamps[i]);
+    }
+    emission_size_add(&of->size, n, scene->area, sent);
+    emission_size_add(&of->reflected, n, scene->area, reflected);
+    of->luminaires.power2 += power * power;
+}
+
 /* P^2 of the part of an emission that groups with lamps emit. */
 static double lamps2_of(const error_by_group *e, const error_scene *scene, const float *E) {
     double sum = 0;

@@ -25,6 +25,11 @@ typedef struct error_answer {
     double lost2;        /* with L_sent: (sum A E)^2 + sum (A E)^2 of light that is lost by that; 0: none */
 } error_answer;
 
+/* Adds channel c to the sizes: of what elements emit, E [n], and send on of direct light H [n], W/m^2 (NULL:
+ * of none); and to the power of luminaires, whose part in H is lamps [n] (NULL: none). work: [2][n]. */
+void error_answer_add_channel(error_answer *of, const error_scene *scene, size_t c, const float *E,
+                              const float *H, const float *lamps, float *work);
+
 /* The parts of the headline (headline.h), over all light that surfaces reflect, |B - E|, the direct light
  * of a sky with it, of irradiance over |H|, of the indirect light over itself. The direct light of positions
  * is known and left out. */

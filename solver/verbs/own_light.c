@@ -15,7 +15,6 @@ void own_light_free(own_light *l) {
     free(l->L_sent);
     free(l->sent);
     free(l->lamps);
-    free(l->reflected);
     free(l->sun);
     free(l->work);
     *l = (own_light){.n_tiles = 0};
@@ -47,9 +46,8 @@ lam_status own_light_make(const lit_store *lit, const error_scene *scene, own_li
         if (l.lamps == NULL) TRY(LAM_ERR_MEMORY);
     }
     if (light->sun != NULL || light->D != NULL) {
-        l.sent = memory_allocate(C, n * sizeof *l.sent, "the light of an answer", error);
-        l.reflected = memory_allocate(1, n * sizeof *l.reflected, "the light of an answer", error);
-        if (l.sent == NULL || l.reflected == NULL) TRY(LAM_ERR_MEMORY);
+        l.sent = memory_allocate(C + 2, n * sizeof *l.sent, "the light of an answer", error);
+        if (l.sent == NULL) TRY(LAM_ERR_MEMORY);
     }
     *out = l;
     l = (own_light){.n_tiles = 0};
@@ -88,7 +86,7 @@ static void add_luminaires(own_light *l, size_t v) {
     lam_luminaires_irradiance(light->luminaires, 1, light->D + (light->steady ? 0 : v * row), l->lamps);
     for (size_t k = 0; k < all; k++) {
         l->H0[k] += l->lamps[k];
-        l->sent[k] += l->scene->reflectance[k] * l->lamps[k];
+        l->sent[k] += l->lamps[k];
     }
 }
 
@@ -111,7 +109,7 @@ static void add_sun(own_light *l, size_t v) {
             power += flux;
             squares += flux * flux;
             l->H0[c * n + i] += l->sun[i];
-            l->sent[c * n + i] += lost ? 0 : rho[c * n + i] * l->sun[i];
+            l->sent[c * n + i] += lost ? 0 : l->sun[i];
         }
         if (lost) l->lost2 += power * power + squares;
         memset(l->L_sent + c * m, 0, m * sizeof *l->L_sent);
@@ -133,7 +131,7 @@ lam_status own_light_take(own_light *l, size_t v, lam_error *error) {
     if (light->L == NULL && l->L != NULL) memset(l->L, 0, all * sizeof *l->L);
     if (light->W != NULL) TRY(add_weights(l, v, error));
     if (l->L != NULL) lam_sky_irradiance(l->lit->sky, l->scene->n_channels, l->L, l->H0);
-    if (l->sent != NULL) memcpy(l->sent, l->E, vector * sizeof *l->sent);
+    if (l->sent != NULL) memset(l->sent, 0, vector * sizeof *l->sent);
     if (light->D != NULL) add_luminaires(l, v);
     if (light->sun != NULL) add_sun(l, v);
 done:
@@ -141,25 +139,18 @@ done:
 }
 
 void own_light_put(own_light *l, const error_by_group *by, error_answer *of) {
-    const size_t n = l->scene->n, m = l->n_tiles;
-    const float *sent = l->sent != NULL ? l->sent : l->E;
+    const size_t n = l->scene->n, C = l->scene->n_channels, m = l->n_tiles;
     const size_t k = l->lamps != NULL ? lam_luminaires_count(l->lit->light.luminaires) : 0;
-    const float *dimmers =
-        k > 0 ? l->lit->light.D + (l->lit->light.steady ? 0 : l->vector * l->scene->n_channels * k) : NULL;
+    const float *dimmers = k > 0 ? l->lit->light.D + (l->lit->light.steady ? 0 : l->vector * C * k) : NULL;
     of->E = l->E;
     of->H0 = l->L != NULL || l->sent != NULL ? l->H0 : NULL;
     of->L = l->L;
     of->L_sent = l->L != NULL ? l->L_sent : NULL;
     of->lost2 = l->lost2;
     of->luminaires = lit_luminaires_of(l->lit->light.luminaires, dimmers);
-    for (size_t c = 0; c < l->scene->n_channels; c++) {
-        double power = 0;
-        emission_size_add(&of->size, n, l->scene->area, sent + c * n);
-        for (size_t i = 0; sent != l->E && i < n; i++) l->reflected[i] = sent[c * n + i] - l->E[c * n + i];
-        if (sent != l->E) emission_size_add(&of->reflected, n, l->scene->area, l->reflected);
-        for (size_t i = 0; l->lamps != NULL && i < n; i++)
-            power += l->scene->area[i] * (double)(l->scene->reflectance[c * n + i] * l->lamps[c * n + i]);
-        of->luminaires.power2 += power * power;
+    for (size_t c = 0; c < C; c++) {
+        error_answer_add_channel(of, l->scene, c, l->E + c * n, l->sent != NULL ? l->sent + c * n : NULL,
+                                 l->lamps != NULL ? l->lamps + c * n : NULL, l->sent + C * n);
         if (l->L != NULL) emission_size_add(&of->sky, m, by->figures.sky_power + c * m, l->L + c * m);
         if (of->L_sent != NULL)
             emission_size_add(&of->sky, m, by->figures.sky_power + c * m, l->L_sent + c * m);

@@ -14,10 +14,10 @@ typedef struct own_light {
     float *E, *H0;  /* [C][n], mesh order; H0 with luminaires and the sun */
     float *L;       /* [C][n_tiles]; NULL: no sky */
     float *L_sent; /* of a sun in a tile that is sent on as the light of that, and no part of L; NULL: none */
-    float *sent;   /* [C][n], E and what luminaires and the sun make elements send; NULL: neither shines */
+    float *sent;   /* [C][n], the part of H0 that elements send on, of luminaires and the sun, and [2][n] of
+                      work; NULL: neither shines */
     float *lamps;  /* [C][n], direct light of luminaires; NULL: none shine */
-    float *reflected; /* [n], work; with sent */
-    size_t vector;    /* that was taken */
+    size_t vector; /* that was taken */
     float *sun, *work;
     double lost2; /* of error_answer */
 } own_light;
