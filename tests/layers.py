@@ -70,7 +70,7 @@ ALLOWED = {
     "solver/adapt": f"solver/daylight/ {METHOD} {SCENE} solver/formfactor/",
     "solver/precompute/forecast": f"{METHOD} {SCENE} solver/formfactor/",
     "solver/precompute": (f"solver/precompute/forecast/ solver/direct/ solver/luminaire/ solver/sensor/ solver/daylight/ {METHOD} {SCENE} solver/formfactor/ solver/light/ "
-        "solver/adapt/ solver/walk/"),
+        "solver/codec/answer_error.h solver/adapt/ solver/walk/"),
     "solver/verify": f"{METHOD} solver/direct/ solver/luminaire/ {SCENE} solver/formfactor/ solver/light/ solver/precompute/ solver/walk/walk.h",
     "solver/verbs": "lambert/ store/ solver/",
     "solver": "lambert/ store/ solver/",

@@ -220,12 +220,14 @@ static lam_status add_emitter_errors(store *s, json_t *figures, lam_error *error
 static void add_headline(store *s, json_t *figures) {
     error_report report;
     mesh_figures mesh;
+    own_figures own;
     headline_part parts[HEADLINE_PARTS];
     const char *light;
     size_t largest;
     error_report_load(s, &report);
     mesh_figures_load_shown(s, &mesh);
-    const headline head = stated_headline(&report, &mesh, &light);
+    own_figures_load(s, &own);
+    const headline head = stated_headline(&report, &mesh, &own, &light);
     if (!head.known) return;
     json_object_set_new(figures, "stated", describe_number(headline_stated(&head)));
     json_object_set_new(figures, "light", json_string(light));

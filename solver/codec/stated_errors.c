@@ -2,6 +2,7 @@
 
 #include "solver/operator/blocks/importance.h"
 #include "store/groups.h"
+#include "store/status.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -58,7 +59,8 @@ static double mesh_of_skies(const mesh_figures *m) {
 
 static const char *const probes_advice = "precompute without --probes 0 measures it";
 
-headline stated_headline(const error_report *report, const mesh_figures *mesh, const char **light) {
+headline stated_headline(const error_report *report, const mesh_figures *mesh, const own_figures *own,
+                         const char **light) {
     const stated_error lights = error_of_group(&report->lights, false, "lights"), sky = error_of_sky(report),
                        groups = error_of_group(&report->whole, false, "groups"),
                        random = error_of_group(&report->random, false, "random");
@@ -68,6 +70,12 @@ headline stated_headline(const error_report *report, const mesh_figures *mesh, c
     const stated_error *e = lights.known ? &lights : sky.known ? &sky : by_groups ? &groups : &random;
     headline h = {.known = e->known, .share = e->share, .advice = e->known ? NULL : probes_advice};
     *light = e->light;
+    if (own->known) {
+        *light = "lights";
+        return (headline){.known = true,
+                          .parts = {.rest = own->rest, .mesh = own->mesh},
+                          .share = error_of(report, false).share};
+    }
     if (!h.known) return h;
     /* Of a sky the light is B, as nothing is emitted. */
     h.parts.rest = e == &sky ? e->relative : e->indirect;
@@ -94,6 +102,7 @@ lam_status stated_errors_read(store *s, const error_scene *scene, const lam_oper
     const size_t n = scene->n;
     const figures_shape shape = {scene->n_groups, scene->n_channels, emitters_error_count(op)};
     error_scene about = *scene;
+    double *overlap = NULL;
     importance weights = {.n = 0};
     stated_figures figures = {.repair = 0};
     stated_errors made = {.n = n};
@@ -109,11 +118,13 @@ lam_status stated_errors_read(store *s, const error_scene *scene, const lam_oper
     if (made.read != NULL) made.receivers = error_of(&figures.report, true);
     about.read = made.read;
     about.emits = made.emits;
-    TRY(error_by_group_make(s, &about, &figures, &made.by_group, error));
+    if (figures.by_group.n_rows > 0) TRY(error_overlap_load(s, scene->n_groups, &overlap, error));
+    TRY(error_by_group_make(&about, overlap, &figures, &made.by_group, error));
     TRY(emitters_error_make(&about, op, &figures, &made.emitters, error));
     *out = made;
     made = (stated_errors){.n = 0};
 done:
+    free(overlap);
     importance_free(&weights);
     stated_figures_free(&figures);
     stated_errors_free(&made);

@@ -61,9 +61,10 @@ typedef struct answer_scope {
  * receivers stands in no other answer, and no error in a strange one. */
 void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes *notes);
 
-/* The headline of a store, of the scene's own lights, else of a sky, else of one group that is lit alone,
- * else, of a scene of one group, of light that all elements emit: *light is "lights", "sky", "groups" or
- * "random". Not known where nothing was measured. */
-headline stated_headline(const error_report *report, const mesh_figures *mesh, const char **light);
+/* The headline of a store, of the scene's own lights and luminaires, else of a sky, else of one group that is
+ * lit alone, else, of a scene of one group, of light that all elements emit: *light is "lights", "sky",
+ * "groups" or "random". Not known where nothing was measured. */
+headline stated_headline(const error_report *report, const mesh_figures *mesh, const own_figures *own,
+                         const char **light);
 
 #endif

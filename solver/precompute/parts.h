@@ -125,7 +125,8 @@ typedef struct made_operator {
     error_report errors;
     mesh_figures errors_of_mesh;
     group_errors by_group;
-    double repair; /* relative error of reflected light by faces that count twice; 0: none */
+    own_figures own; /* own_error.h */
+    double repair;   /* relative error of reflected light by faces that count twice; 0: none */
     char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
 } made_operator;
 

@@ -151,7 +151,10 @@ static lam_status run_stages(precompute_parts *p, lam_error *error) {
         TRY(stage_sensors(job, &p->scene, &p->factors.f.sky, true, error));
         log_stage(job, "sensors", started);
     }
-    if (p->plan.probes > 0) TRY(stage_mesh_error(job, &p->scene, &p->factors, &p->made, error));
+    if (p->plan.probes > 0) {
+        TRY(stage_mesh_error(job, &p->scene, &p->factors, &p->made, error));
+        TRY(stage_own_error(&p->scene, &p->made, error));
+    }
 done:
     return status;
 }

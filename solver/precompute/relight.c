@@ -1,6 +1,8 @@
 /* Luminaires and sensors of a store in place of those that it has, or beside none: all else is copied, so
  * that a lamp or a sensor is moved without making an operator anew. */
 #include "solver/base/clock.h"
+#include "solver/operator/stated/error_law.h"
+#include "solver/precompute/own_error.h"
 #include "solver/precompute/stages.h"
 #include "solver/sensor/sensors_store.h"
 #include "store/groups.h"
@@ -31,7 +33,7 @@ static bool skip_light(const char *object, const char *attribute) {
 }
 
 static bool skip_luminaires(const char *object, const char *attribute) {
-    return skip_light(object, attribute) || mesh_figure_is_of_luminaires(object, attribute);
+    return skip_light(object, attribute) || figure_is_of_luminaires(object, attribute);
 }
 
 static bool skip_sensors(const char *object, const char *attribute) {
@@ -42,16 +44,47 @@ static bool skip_both(const char *object, const char *attribute) {
     return skip_luminaires(object, attribute) || skip_sensors(object, attribute);
 }
 
-/* The part of the mesh of stated errors for the luminaires that are there now, where the store states errors.
- */
-static lam_status find_mesh_error(const precompute_job *job, const precompute_scene *scene, store *from,
-                                  made_operator *made, lam_error *error) {
+/* The error of the answer for the luminaires that are there now, by what the store states of all other light,
+ * and of the mesh for theirs. */
+static lam_status find_own_error(precompute_scene *scene, store *from, made_operator *made,
+                                 lam_error *error) {
+    static const int of_luminaires[] = {MESH_OF_LUMINAIRES, MESH_OF_LUMINAIRE};
+    lam_status status = LAM_OK;
+    const mesh_figures *own = &made->errors_of_mesh;
+    const figures_shape shape = {.n_groups = scene->m.n_groups, .n_channels = scene->m.n_channels};
+    stated_figures loaded = {.repair = 0};
+    TRY(stated_figures_load(from, &shape, &loaded, error));
+    TRY(error_overlap_load(from, scene->m.n_groups, &scene->m.overlap, error));
+    TRY(importance_load(from, scene->m.n, &scene->importance, error));
+    stated_figures view = loaded;
+    for (int k = 0; k < 2; k++) {
+        const int of = of_luminaires[k];
+        view.mesh.variation[of] = own->variation[of];
+        view.mesh.reflected[of] = own->reflected[of];
+        view.mesh.light_of[of] = own->light_of[of];
+    }
+    view.mesh.has_luminaires = own->has_luminaires;
+    view.mesh.luminaires = own->luminaires;
+    view.mesh.luminaires_number = own->luminaires_number;
+    view.mesh.has_luminaire = own->has_luminaire;
+    view.mesh.luminaire = own->luminaire;
+    status = own_error_find(scene, made->op, &view, &made->own, error);
+    loaded.by_group = view.by_group;
+done:
+    stated_figures_free(&loaded);
+    return status;
+}
+
+/* The stated errors for the luminaires that are there now, where the store states errors. */
+static lam_status find_errors(const precompute_job *job, precompute_scene *scene, store *from,
+                              made_operator *made, lam_error *error) {
     lam_status status = LAM_OK;
     const double started = clock_seconds();
     if (scene->luminaires.placed.n == 0 || !mesh_figures_are_stated(from)) return LAM_OK;
     TRY(operator_load(from, &made->op, error));
     lam_operator_set_threads(made->op, (size_t)omp_get_max_threads());
     TRY(stage_mesh_error_of_luminaires(job, scene, made, error));
+    TRY(find_own_error(scene, from, made, error));
     terminal_log_stage(job->t, "mesh error", clock_seconds() - started);
 done:
     return status;
@@ -101,7 +134,7 @@ lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_e
     started = clock_seconds();
     TRY(stage_sensors(job, scene, &sky, rows, error));
     if (scene->sensors.list.n > 0) terminal_log_stage(job->t, "sensors", clock_seconds() - started);
-    if (lights) TRY(find_mesh_error(job, scene, from, &made, error));
+    if (lights) TRY(find_errors(job, scene, from, &made, error));
     TRY(terminal_check(error));
     started = clock_seconds();
     TRY(store_create(job->options->output, &to, error));
@@ -109,7 +142,7 @@ lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_e
     TRY(store_set_text(to, STORE_MESH, "lights", light_kind_word(scene->m.lights), error));
     TRY(luminaires_save(&scene->luminaires, &scene->m, to, error));
     TRY(save_sensors(scene, rows, from, to, error));
-    TRY(stated_figures_save(&(stated_figures){.mesh = made.errors_of_mesh}, to, error));
+    TRY(stated_figures_save(&(stated_figures){.mesh = made.errors_of_mesh, .own = made.own}, to, error));
     if (scene->luminaires.placed.n > 0)
         TRY(store_set_text(to, STORE_LUMINAIRES, "command", job->options->command, error));
     TRY(terminal_check(error));

@@ -56,7 +56,7 @@ static lam_status save_errors(const precompute_scene *scene, const precompute_pl
                               const made_operator *made, const walked_light *walked, store *s,
                               lam_error *error) {
     const reuse_estimates *e = &walked->paths;
-    stated_figures all = {.mesh = made->errors_of_mesh};
+    stated_figures all = {.mesh = made->errors_of_mesh, .own = made->own};
     if (walked->light.n > 0)
         all.emitters = (emitter_figures){.s = e->n_positions,
                                          .n_groups = scene->m.n_groups,

@@ -90,6 +90,10 @@ lam_status stage_mesh_error(const precompute_job *job, const precompute_scene *s
 lam_status stage_mesh_error_of_luminaires(const precompute_job *job, const precompute_scene *scene,
                                           made_operator *made, lam_error *error);
 
+/* The error of the answer for the scene's own lights and luminaires, by all other errors of made:
+ * own_error.c. */
+lam_status stage_own_error(const precompute_scene *scene, made_operator *made, lam_error *error);
+
 /* Adds what overlapping faces and the repair of row sums are to all stated errors: overlap_error.c. */
 void made_add_overlap(const precompute_job *job, const precompute_scene *scene, const precompute_plan *plan,
                       const precompute_factors *factors, made_operator *made);

@@ -120,9 +120,30 @@ class Lit(Case):
             self.assertEqual(dict(new.attrs), dict(fresh.attrs))
             self.assertNotEqual(new.attrs["luminaire"], old.attrs["luminaire"])
             np.testing.assert_array_equal(new["luminaire_variation"][()], fresh["luminaire_variation"][()])
+            self.assertEqual(dict(b["error/own"].attrs), dict(c["error/own"].attrs))
+            self.assertNotEqual(dict(a["error/own"].attrs), dict(b["error/own"].attrs))
         must("precompute", self.kept("lit.h5"), "--luminaires", "none", "-o", self.path("none.h5"))
         with h5py.File(self.path("none.h5")) as file:
             self.assertNotIn("luminaires", file)
+            self.assertNotIn("own", file["error"])
+
+    def test_the_headline_is_of_the_scene_s_own_light(self):
+        """Of its lamps and luminaires, by the laws of answers: the error of direct light behind boxes is in it."""
+        must("generate", "cornell", "--elements", 300, "-o", self.path("boxes.obj"))
+        lights = {"luminaires": [{"name": "a", "file": "made/lambertian-1000cd.ies", "at": [.3, .5, .3], "aim": [1, 0, 0]}]}
+        must("precompute", self.path("boxes.obj"), "--mesh", "faces", "--lights", "lm", "--luminaires", self.write("boxes.json", lights), *ASSETS,
+             "-o", self.path("boxes.h5"))
+        must("precompute", self.path("boxes.h5"), "--luminaires", self.path("boxes.json"), *ASSETS, "-o", self.path("again.h5"))
+        with h5py.File(self.path("boxes.h5")) as first, h5py.File(self.path("again.h5")) as again:
+            self.assertGreater(first["luminaires/elements_off"][()].max(), 0)
+            self.assertEqual(dict(first["error/own"].attrs), dict(again["error/own"].attrs))
+        told = json.loads(must("info", self.path("boxes.h5"), "--json").stdout)["error"]
+        must("solve", self.path("boxes.h5"), "--linear", "-o", self.path("own.json"))
+        answer = json.loads(pathlib.Path(self.path("own.json")).read_text(encoding="utf-8"))["error"]
+        self.assertEqual(told["light"], "lights")
+        for name, value in answer["parts"].items():
+            self.assertAlmostEqual(told["parts"][name], value, delta=1e-5 * answer["stated"])
+        self.assertAlmostEqual(told["own"]["indirect"], answer["indirect_mean"], delta=1e-5 * answer["indirect_mean"])
 
     def test_verify_sees_a_wrong_column(self):
         self.assertIn("3, the light of 3 of them was found again", must("verify", self.kept("lit.h5")).stdout)

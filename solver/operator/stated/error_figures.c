@@ -12,7 +12,7 @@
 #define BY_GROUP STORE_ERROR "/by_group"
 #define EMITTERS STORE_ERROR "/emitters"
 
-enum { PATH_BYTES = 64, REPORT_GROUPS = 5, MESH_GROUP = REPORT_GROUPS };
+enum { PATH_BYTES = 64, REPORT_GROUPS = 5, MESH_GROUP = REPORT_GROUPS, OWN_GROUP };
 
 const figures_group figures_groups[] = {{"single", STORE_ERROR "/single"},
                                         {"lights", STORE_ERROR "/lights"},
@@ -20,6 +20,7 @@ const figures_group figures_groups[] = {{"single", STORE_ERROR "/single"},
                                         {"whole", STORE_ERROR "/whole"},
                                         {"sky", STORE_ERROR "/sky"},
                                         [MESH_GROUP] = {"mesh", STORE_ERROR "/mesh"},
+                                        [OWN_GROUP] = {"own", STORE_ERROR "/own"},
                                         {NULL, NULL}};
 
 /* The groups of a report in that order. */
@@ -413,6 +414,18 @@ void stated_figures_free(stated_figures *f) {
     *f = (stated_figures){.repair = 0};
 }
 
+static lam_status save_own(const own_figures *of, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *const path = figures_groups[OWN_GROUP].path;
+    if (!of->known) return LAM_OK;
+    TRY(store_set_number(s, path, "relative", of->relative, error));
+    TRY(store_set_number(s, path, "indirect", of->indirect, error));
+    TRY(store_set_number(s, path, "rest", of->rest, error));
+    if (of->mesh >= 0) TRY(store_set_number(s, path, "mesh", of->mesh, error));
+done:
+    return status;
+}
+
 lam_status stated_figures_save(const stated_figures *of, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     stated_figures f = *of;
@@ -422,15 +435,28 @@ lam_status stated_figures_save(const stated_figures *of, store *s, lam_error *er
         TRY(save_group(s, figures_groups[k].path, groups[k], f.report.has_total, error));
     if (f.emitters.s > 0) TRY(pass_emitters(s, true, &f.emitters, error));
     TRY(pass_mesh(s, true, &f.mesh, error));
+    TRY(save_own(&f.own, s, error));
     if (f.repair > 0) TRY(store_set_number(s, STORE_ERROR, "repair", f.repair, error));
     TRY(pass_by_group(s, true, &f.by_group, error));
 done:
     return status;
 }
 
-bool mesh_figure_is_of_luminaires(const char *object, const char *named) {
+void own_figures_load(store *s, own_figures *out) {
+    const char *const path = figures_groups[OWN_GROUP].path;
+    *out = (own_figures){.known = store_has(s, path)};
+    if (!out->known) return;
+    out->relative = number_of(s, path, "relative");
+    out->indirect = number_of(s, path, "indirect");
+    out->rest = number_of(s, path, "rest");
+    out->mesh = number_of(s, path, "mesh");
+    out->known = out->rest >= 0;
+}
+
+bool figure_is_of_luminaires(const char *object, const char *named) {
     static const char word[] = "luminaire"; /* and luminaires */
     const char *group = figures_groups[MESH_GROUP].path;
+    if (strcmp(object, figures_groups[OWN_GROUP].path) == 0) return true;
     const size_t length = strlen(group);
     if (strncmp(object, group, length) != 0) return false;
     const char *name = named != NULL ? named : object + length + (object[length] == '/');

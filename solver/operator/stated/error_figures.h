@@ -161,6 +161,15 @@ typedef struct mesh_figures {
 } mesh_figures;
 void mesh_figures_free(mesh_figures *m);
 
+/* The error of the answer for the scene's own lights and luminaires, as dim as these are listed, by the laws
+ * of all other figures: members of answer_error and its parts (solver/codec/answer_error.h). Stated of scenes
+ * with luminaires, whose light no probe is. */
+typedef struct own_figures {
+    bool known;
+    double relative, indirect;
+    double rest, mesh; /* shares of the light that surfaces reflect; mesh negative: not stated */
+} own_figures;
+
 /* Weights w of emitters have the mean squared error w' K w of B, channels stacked, of all elements (K, with
  * areas), of those of a group (K_g), and of the mean of a group (M_g); of a group that reflects nothing,
  * which has no part in K unless all are so, of H. */
@@ -177,6 +186,7 @@ typedef struct stated_figures {
     error_report report;
     emitter_figures emitters; /* s is 0 where none are stated */
     mesh_figures mesh;
+    own_figures own;       /* not loaded */
     double repair;         /* relative error of reflected light by faces that count twice; 0: none */
     group_errors by_group; /* n_rows is 0 where none are stated */
 } stated_figures;
@@ -187,7 +197,7 @@ lam_status stated_figures_save(const stated_figures *f, store *s, lam_error *err
 
 /* True for an object or an attribute (NULL: none) of a store that is a figure of luminaires: those of a store
  * whose luminaires are others are found anew. mesh_figures_are_stated: the store has figures of the mesh. */
-bool mesh_figure_is_of_luminaires(const char *object, const char *attribute);
+bool figure_is_of_luminaires(const char *object, const char *attribute);
 bool mesh_figures_are_stated(store *s);
 
 /* The shape of a scene; n_emitters 0: figures of emitters are not read. */
@@ -204,6 +214,7 @@ void error_report_load(store *s, error_report *out);
 
 /* The attributes of the mesh alone, without arrays. */
 void mesh_figures_load_shown(store *s, mesh_figures *out);
+void own_figures_load(store *s, own_figures *out);
 
 /* For descriptions. The groups of /error whose attributes are figures; a name of NULL ends the list. */
 typedef struct figures_group {

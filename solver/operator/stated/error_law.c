@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 void error_by_group_free(error_by_group *e) {
     group_errors_free(&e->figures);
@@ -63,19 +64,22 @@ static lam_status find_whole(error_by_group *e, lam_error *error) {
     return LAM_OK;
 }
 
-/* The share of each group that overlaps others. */
-static lam_status read_overlap(store *s, error_by_group *e, lam_error *error) {
+lam_status error_overlap_load(store *s, size_t n_groups, double **out, lam_error *error) {
     lam_status status = LAM_OK;
     void *data = NULL;
-    size_t n_groups = e->figures.n_groups;
+    double *overlap = NULL;
+    *out = NULL;
     if (!store_has(s, STORE_MESH "/overlap")) return LAM_OK;
     TRY(store_read(s, STORE_MESH "/overlap", STORE_F64, 1, &n_groups, &data, error));
-    e->overlap = data;
+    overlap = data;
     for (size_t g = 0; g < n_groups; g++)
-        if (!(e->overlap[g] >= 0 && e->overlap[g] <= 1))
+        if (!(overlap[g] >= 0 && overlap[g] <= 1))
             FAIL(error, LAM_ERR_FORMAT, "%s: " STORE_MESH "/overlap[%zu] = %g, must be from 0 to 1",
-                 store_path(s), g, e->overlap[g]);
+                 store_path(s), g, overlap[g]);
+    *out = overlap;
+    data = NULL;
 done:
+    free(data);
     return status;
 }
 
@@ -94,8 +98,8 @@ static double even_tiles(const group_errors *e) {
     return squares > 0 ? power2 / squares : 0;
 }
 
-lam_status error_by_group_make(store *s, const error_scene *scene, stated_figures *from, error_by_group *out,
-                               lam_error *error) {
+lam_status error_by_group_make(const error_scene *scene, const double *overlap, stated_figures *from,
+                               error_by_group *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t G = scene->n_groups;
     double *group_area = NULL;
@@ -104,7 +108,12 @@ lam_status error_by_group_make(store *s, const error_scene *scene, stated_figure
     *out = (error_by_group){.n_bins = 0};
     if (e.n_bins == 0) return LAM_OK;
     from->by_group = (group_errors){.n_rows = 0};
-    TRY(read_overlap(s, &e, error));
+    e.figures.n_channels = scene->n_channels; /* of a judge without a sky it is 0 */
+    if (overlap != NULL) {
+        e.overlap = memory_allocate(G, sizeof *e.overlap, "errors of groups", error);
+        if (e.overlap == NULL) TRY(LAM_ERR_MEMORY);
+        memcpy(e.overlap, overlap, G * sizeof *overlap);
+    }
     e.area = memory_allocate(e.n_bins, sizeof *e.area, "errors of groups", error);
     e.squares = memory_allocate(G, sizeof *e.squares, "errors of groups", error);
     e.reflectance = memory_allocate(G, scene->n_channels * sizeof *e.reflectance, "errors of groups", error);

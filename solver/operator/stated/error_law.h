@@ -42,10 +42,14 @@ typedef struct error_by_group {
 
 void error_by_group_free(error_by_group *e);
 
-/* Takes over by_group of figures that were loaded from the store s. *out is zeroed where that has none.
- * Errors: LAM_ERR_FORMAT, LAM_ERR_MEMORY. */
-lam_status error_by_group_make(store *s, const error_scene *scene, stated_figures *from, error_by_group *out,
-                               lam_error *error);
+/* The share of each group that overlaps others, [n_groups], freed with free(); NULL: none does. Errors:
+ * LAM_ERR_FORMAT, LAM_ERR_MEMORY. */
+lam_status error_overlap_load(store *s, size_t n_groups, double **out, lam_error *error);
+
+/* Takes over by_group of figures; overlap [n_groups] is copied, NULL: none. *out is zeroed where by_group has
+ * no rows. Errors: LAM_ERR_MEMORY. */
+lam_status error_by_group_make(const error_scene *scene, const double *overlap, stated_figures *from,
+                               error_by_group *out, lam_error *error);
 
 /* The size of an emission, channels stacked: P^2 = sum (sum A E)^2 and sum A^2 E^2; and P^2 of that part
  * which groups with lamps of the scene emit (mesh_law.h), which emission_size_add leaves. */
