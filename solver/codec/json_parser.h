@@ -126,6 +126,17 @@ bool parser_read_quantity(parser *p, lam_quantity *quantity);
  * which count by their luminance. colour is [C]. */
 bool parser_read_radiance(parser *p, float *colour);
 
+/* The values of `select` and `at`; and, once the whole body is read, the faces of an answer of faces and
+ * their elements. */
+bool parser_read_select(parser *p);
+bool parser_read_at(parser *p);
+bool parser_settle_places(parser *p);
+
+/* The value of `reduce`; and the elements of a reduction that adjoint rows do not answer, 503 when memory is
+ * short. */
+bool parser_read_reduce(parser *p);
+bool parser_select_reduced(const codec_scene *scene, radiosity_request *request, problem *why);
+
 /* The value of `sun` in an emission, of its vector. */
 bool parser_read_sun(parser *p);
 
