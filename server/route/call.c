@@ -2,6 +2,7 @@
 
 #include "server/scene/adjoint_rows.h"
 #include "server/scene/direct_light.h"
+#include "server/scene/sensor_answer.h"
 
 #include <stdarg.h>
 #include <stdint.h>
@@ -64,6 +65,7 @@ codec_scene call_codec_scene(const call *in) {
                          .n_tiles = scene_tiles(s),
                          .n_luminaires = scene_luminaires(s),
                          .luminaires = &s->luminaire_names,
+                         .sensors = &s->sensor_sets,
                          .n_emitters = s->n_emitters,
                          .signs = s->n_emitters == 0,
                          .emitters = &s->emitters,
@@ -78,9 +80,11 @@ codec_scene call_codec_scene(const call *in) {
 size_t call_parse_bytes(const call *in) {
     const scene *s = in->scene;
     if (in->body_type != MEDIA_JSON) return 0;
-    /* Indices and values of one sparse vector, the set of those seen, and a list of selected elements or
-     * faces; each takes a letter of the text at least, and there are as many as elements or faces at most. */
-    const size_t most = s->faces.n_faces > s->n ? s->faces.n_faces : s->n;
+    /* Indices and values of one sparse vector, the set of those seen, and a list of selected elements,
+     * faces or sensors; each takes a letter of the text at least, and there are as many as elements or faces
+     * at most. */
+    const size_t elements = s->faces.n_faces > s->n ? s->faces.n_faces : s->n, sensors = scene_sensors(s),
+                 most = elements > sensors ? elements : sensors;
     const size_t numbers = in->length < most ? in->length : most;
     return bytes_times(numbers, 32 + 6 * s->n_channels);
 }

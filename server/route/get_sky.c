@@ -1,9 +1,10 @@
 /* GET /v1/scenes/NAME/sky: where the tiles of the sky of a store are.
  * GET /v1/scenes/NAME/luminaires: its luminaires, in the order of their dimmers.
+ * GET /v1/scenes/NAME/sensors: its sensors, in the order of their values.
  * GET /v1/scenes/NAME/weather: the weather file beside the store, as it is. */
 #include "server/route/kept_answer.h"
 
-/* Variants have the sky, the luminaires and the weather of their store. */
+/* Variants have the sky, the luminaires, the sensors and the weather of their store. */
 static const scene *store_of(const call *in) {
     return in->scene->base != NULL ? in->scene->base : in->scene;
 }
@@ -26,6 +27,16 @@ bool keeps_luminaires(const call *in, kept_source *from, answer *out) {
         return false;
     }
     *from = kept_text(s->texts.luminaires, "application/json");
+    return true;
+}
+
+bool keeps_sensors(const call *in, kept_source *from, answer *out) {
+    const scene *s = store_of(in);
+    if (s->texts.sensors == NULL) {
+        answer_refuse(out, PROBLEM_NOT_FOUND, "%.120s: the store has no sensors", in->scene->name);
+        return false;
+    }
+    *from = kept_text(s->texts.sensors, "application/json");
     return true;
 }
 

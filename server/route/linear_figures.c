@@ -2,6 +2,7 @@
 
 #include "server/route/radiosity_figures.h"
 #include "server/route/routes.h"
+#include "server/route/sensor_figures.h"
 #include "server/scene/adjoint_rows.h"
 #include "server/scene/direct_light.h"
 #include "solver/base/clock.h"
@@ -169,9 +170,33 @@ static bool is_short(const scene *s, const radiosity_request *request) {
     return of_name <= QUICK_NUMBERS / request->reduce.n_names;
 }
 
+/* Answers a reduction of groups by rows that are there. */
+static bool answer_groups(call *in, radiosity_request *request, answer_notes *notes, buffer *b) {
+    const scene *s = in->scene;
+    adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
+    linear_figures f = {.figures = NULL};
+    problem why = {0};
+    bool done = false;
+    if (adjoint_row_work(s, request) > QUICK_WORK / request->reduce.n_names ||
+        (request->luminaires.values != NULL && !scene_has_luminaire_sums(s)) || !is_short(s, request) ||
+        !adjoint_rows_find(s, request, rows))
+        return false;
+    bool good = adjoint_row_suffices(s, rows[0], request);
+    if (good) {
+        const double start = clock_ms();
+        scene_note_error(s, request, notes);
+        good = figures_allocate(in, request, &f, notes, &why) &&
+               evaluate(s, request, 0, request->reduce.n_names, rows, &f, notes, &why);
+        notes->solve_ms = clock_ms() - start;
+        good = good && figures_write(s, request, f.figures, INFINITY, &f.text, notes, b, &done, &why);
+        figures_clear(&f);
+    }
+    adjoint_rows_release(s, request->reduce.n_names, rows);
+    return good;
+}
+
 bool quick_radiosity(call *in, answer *out) {
     static const char word[] = "\"reduce\"";
-    const scene *s = in->scene;
     if (in->body_type != MEDIA_JSON || in->accept.type != MEDIA_JSON || in->length > QUICK_BODY ||
         memmem(in->body, in->length, word, sizeof word - 1) == NULL)
         return false;
@@ -184,37 +209,22 @@ bool quick_radiosity(call *in, answer *out) {
     problem why = {0};
     buffer b = {0};
     char converted[LIGHT_CONVERSION_TEXT];
-    adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
     const size_t held = in->memory->held;
     const double start = clock_ms();
     bool good = request_memory_take(in->memory, QUICK_BYTES, &why) &&
-                codec_read_json(&about, in->body, in->length, &request, &why) &&
-                adjoint_row_work(s, &request) <= QUICK_WORK / request.reduce.n_names &&
-                (request.luminaires.values == NULL || scene_has_luminaire_sums(s)) && is_short(s, &request) &&
-                adjoint_rows_find(s, &request, rows);
-    if (good && !adjoint_row_suffices(s, rows[0], &request)) {
-        adjoint_rows_release(s, request.reduce.n_names, rows);
-        good = false;
+                codec_read_json(&about, in->body, in->length, &request, &why);
+    if (good) {
+        notes.parse_ms = clock_ms() - start;
+        notes.quantity = radiosity_request_told(&request);
+        notes.at = request.at_sensors ? "sensors" : NULL;
+        answer_note_unit(&request.told, notes.quantity, converted, &notes);
+        in->n_rhs = request.n_rhs;
+        good = request.at_sensors ? sensor_figures_quick(in, &request, &notes, &b)
+                                  : answer_groups(in, &request, &notes, &b);
     }
     if (good) {
-        const double parsed = clock_ms();
-        linear_figures f = {.figures = NULL};
-        bool done = false;
-        notes.parse_ms = parsed - start;
-        notes.quantity = request.quantity;
-        answer_note_unit(&request.told, request.quantity, converted, &notes);
-        scene_note_error(s, &request, &notes);
-        in->n_rhs = request.n_rhs;
-        good = figures_allocate(in, &request, &f, &notes, &why) &&
-               evaluate(s, &request, 0, request.reduce.n_names, rows, &f, &notes, &why);
-        notes.solve_ms = clock_ms() - parsed;
-        good = good && figures_write(s, &request, f.figures, INFINITY, &f.text, &notes, &b, &done, &why);
-        figures_clear(&f);
-        adjoint_rows_release(s, request.reduce.n_names, rows);
-        if (good) {
-            answer_json(out, &b, true);
-            answer_set_times(out, &notes);
-        }
+        answer_json(out, &b, true);
+        answer_set_times(out, &notes);
     }
     if (in->memory->held > held) request_memory_give_back(in->memory, in->memory->held - held);
     buffer_free(&b);

@@ -6,8 +6,10 @@
 #include "server/route/radiosity_figures.h"
 #include "server/route/refined_answer.h"
 #include "server/route/routes.h"
+#include "server/route/sensor_figures.h"
 #include "server/route/sun_answer.h"
 #include "server/scene/direct_light.h"
+#include "server/scene/sensor_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
@@ -26,8 +28,10 @@ typedef struct radiosity_solve {
     buffer answer;
     float *out;            /* [n_rhs][C][n_computed]: inside `answer` if its encoding allows, else own */
     float *own;            /* or NULL */
-    float *means;          /* [n_rhs][C][n_values] of faces, a part of `answer` or allocated; else NULL */
-    bool means_placed;     /* they are inside `answer` */
+    float *places;         /* [n_rhs][C][n_values] of faces or sensors, a part of `answer` or allocated; of a
+                              reduction of sensors that of a pass; else NULL */
+    bool placed;           /* they are inside `answer` */
+    float *gathered;       /* [C][receivers], work; else NULL */
     answer_stream *stream; /* of these, until the answer has it */
     bool streams;          /* the values are encoded while the answer is sent */
     float *H0; /* [n_rhs][C][n], direct irradiance of sky, luminaires and sun; NULL if no vector has any */
@@ -39,6 +43,7 @@ typedef struct radiosity_solve {
     refined_solve *refined;                /* for a request with a tolerance; else NULL */
     limited_solve limit;                   /* of light below zero */
     linear_figures *linear;                /* for a linear reduction, which computes no vectors; else NULL */
+    sensor_figures *columns;               /* likewise of sensors */
     figures_text text;                     /* of figures */
     bool judged;                           /* the error of figures was found */
     name_error *errors;                    /* of names that are reduced, or NULL */
@@ -46,16 +51,18 @@ typedef struct radiosity_solve {
     bool failed;
 } radiosity_solve;
 
-static void solve_free(radiosity_solve *s) {
+static void solve_free(const scene *of, radiosity_solve *s) {
     radiosity_request_free(&s->request);
     buffer_free(&s->answer);
     answer_stream_free(s->stream);
     refined_free(s->refined, &s->notes);
     linear_figures_free(s->linear);
+    sensor_figures_free(of, s->columns);
     limited_free(&s->limit);
     sun_answer_free(&s->sun);
     free(s->own);
-    if (!s->means_placed) free(s->means);
+    if (!s->placed) free(s->places);
+    free(s->gathered);
     free(s->figures);
     free(s->H0);
     free(s->W);
@@ -99,6 +106,19 @@ static bool find_light(const call *in, radiosity_solve *solve, problem *why) {
     return true;
 }
 
+/* Room to gather at sensors, for a reduction that of a pass. */
+static bool find_gathered(const call *in, radiosity_solve *s, problem *why) {
+    const scene *of = in->scene;
+    const radiosity_request *request = &s->request;
+    if (!request->at_sensors) return true;
+    const size_t work = bytes_times(of->n_channels * sizeof *s->gathered, scene_sensors(of)),
+                 pass = request->n_rhs < BATCH_PASS ? request->n_rhs : BATCH_PASS;
+    s->gathered = call_allocate(in, work, "sensors", why);
+    if (s->gathered == NULL || !request->reduce.on) return s->gathered != NULL;
+    s->places = call_allocate(in, bytes_times(pass, work), "sensors to reduce", why);
+    return s->places != NULL;
+}
+
 /* Allocates the values of the answer, if possible inside the body that is sent. With reduce the values are
  * scratch for the figures. */
 static bool find_room(call *in, radiosity_solve *s, problem *why) {
@@ -109,10 +129,10 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
             return false;
         s->figures = reduce_figures(reduce, s->shape.n_rhs, s->shape.n_channels);
         s->out = s->own = allocate_rows(in, s, s->n_computed, "values to reduce", why);
-        if (s->own == NULL) return false;
+        if (s->own == NULL || !find_gathered(in, s, why)) return false;
+        const size_t width = s->request.at_sensors ? scene_sensors(in->scene) : s->n_computed;
         if (s->request.told.luminance)
-            s->one =
-                call_allocate(in, 3 * bytes_times(s->n_computed, sizeof *s->one), "values to reduce", why);
+            s->one = call_allocate(in, 3 * bytes_times(width, sizeof *s->one), "values to reduce", why);
         return (s->one != NULL || !s->request.told.luminance) &&
                (s->figures != NULL || problem_set(why, PROBLEM_NO_MEMORY,
                                                   "not enough memory to reduce %zu vectors", s->shape.n_rhs));
@@ -129,26 +149,28 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
     const bool inside = values != NULL;
     if (!inside) values = allocate_rows(in, s, s->shape.n_values, "values", why);
     if (values == NULL) return false;
-    if (!s->request.at_faces) {
+    if (!s->request.at_faces && !s->request.at_sensors) {
         s->out = values;
         s->own = inside ? NULL : values;
         return true;
     }
-    s->means = values;
-    s->means_placed = inside;
-    s->out = s->own = allocate_rows(in, s, s->n_computed, "the elements of faces", why);
-    return s->own != NULL;
+    s->places = values;
+    s->placed = inside;
+    s->out = s->own = allocate_rows(in, s, s->n_computed,
+                                    s->request.at_faces ? "the elements of faces" : "radiosities", why);
+    return s->own != NULL && find_gathered(in, s, why);
 }
 
-/* Puts the means of faces in the place of the values of elements. */
-static void take_means(const call *in, radiosity_solve *s) {
+/* Puts the means of faces, or the values of sensors, in the place of the values of elements. */
+static void take_places(const call *in, radiosity_solve *s) {
     const face_index *faces = &in->scene->faces;
     const face_choice chosen = radiosity_request_faces(&s->request, faces);
-    if (s->means == NULL) return;
-    face_means_floats(faces, &chosen, s->shape.n_rhs * in->scene->n_channels, s->out, s->means);
+    if (s->places == NULL) return;
+    if (s->request.at_faces)
+        face_means_floats(faces, &chosen, s->shape.n_rhs * in->scene->n_channels, s->out, s->places);
     free(s->own);
-    s->own = s->means_placed ? NULL : s->means;
-    s->means = NULL;
+    s->own = s->placed ? NULL : s->places;
+    s->places = NULL;
 }
 
 /* Takes room for the lists of a text, which are freed before it returns, and reads it. */
@@ -168,7 +190,7 @@ static bool read_body(const call *in, radiosity_request *request, problem *why) 
 
 /* The vectors that passes compute. Figures take one pass more, or several: each a step of their text. */
 static size_t vectors_of(const radiosity_solve *s) {
-    return s->linear != NULL ? 0 : s->request.n_rhs;
+    return s->linear != NULL || s->columns != NULL ? 0 : s->request.n_rhs;
 }
 
 /* True if requests should have passes of their own: these take no longer than one of all, and one could not
@@ -176,6 +198,26 @@ static size_t vectors_of(const radiosity_solve *s) {
 static bool passes_apart(const call *in) {
     const lam_operator *op = in->scene->op;
     return operator_vectors_apart(op) && op->n_threads < batch_threads(in->service->queue);
+}
+
+/* Columns for a reduction of sensors; where they do not answer it, its vectors are expanded. */
+static bool begin_columns(call *in, radiosity_solve *s, problem *why) {
+    const codec_scene about = call_codec_scene(in);
+    if (!sensor_figures_begin(in, &s->request, &s->columns, why)) return false;
+    s->request.reduce.linear = s->columns != NULL;
+    return s->columns != NULL || radiosity_request_expand(&s->request, &about, why);
+}
+
+/* Begins what the request asks for: figures by columns or by adjoint rows, refined vectors, or vectors. */
+static bool begin_kind(call *in, radiosity_solve *s, problem *why) {
+    radiosity_request *request = &s->request;
+    if (request->reduce.linear && !request->at_sensors)
+        return linear_figures_begin(in, request, &s->notes, &s->linear, why);
+    if (request->reduce.linear && !begin_columns(in, s, why)) return false;
+    if (s->columns != NULL) return true;
+    if (request->tolerance > 0) return refined_begin(in, request, &s->notes, &s->refined, why);
+    return find_light(in, s, why) && limited_begin(in, request, &s->limit, &s->notes, why) &&
+           find_room(in, s, why);
 }
 
 static bool begin(call *in, answer *out) {
@@ -190,29 +232,25 @@ static bool begin(call *in, answer *out) {
     bool good = read_body(in, &s->request, &why);
     const radiosity_request *request = &s->request;
     s->notes = call_notes(in);
-    s->notes.quantity = request->quantity;
+    s->notes.quantity = radiosity_request_told(request);
     s->notes.by_luminance = request->by_luminance;
-    s->notes.at_faces = request->at_faces;
-    answer_note_unit(&request->told, request->quantity, s->converted, &s->notes);
+    s->notes.at = request->at_sensors ? "sensors" : request->at_faces ? "faces" : NULL;
+    answer_note_unit(&request->told, s->notes.quantity, s->converted, &s->notes);
     s->notes.parse_ms = clock_ms() - start;
     s->shape = (answer_shape){.n = of->n,
                               .n_channels = radiosity_request_channels(request, of->n_channels),
                               .n_rhs = request->n_rhs,
                               .batch = request->batch,
                               .n_values = radiosity_request_values(request, of->n, &of->faces),
-                              .at_faces = request->at_faces};
+                              .gaps = request->at_faces || request->at_sensors};
     s->n_computed = request->select ? request->n_selected : of->n;
     in->n_rhs = request->n_rhs;
-    if (good) scene_note_error(of, request, &s->notes);
+    if (good && !request->at_sensors) scene_note_error(of, request, &s->notes);
     good = good && figures_acceptable(in, request, &why);
-    const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;
-    good = linear   ? linear_figures_begin(in, &s->request, &s->notes, &s->linear, &why)
-           : refine ? refined_begin(in, request, &s->notes, &s->refined, &why)
-                    : good && find_light(in, s, &why) &&
-                          limited_begin(in, request, &s->limit, &s->notes, &why) && find_room(in, s, &why);
+    good = good && begin_kind(in, s, &why);
     if (!good) {
         answer_problem(out, &why);
-        solve_free(s);
+        solve_free(in->scene, s);
         return false;
     }
     in->state = s;
@@ -222,10 +260,9 @@ static bool begin(call *in, answer *out) {
     /* Answers for all elements share passes. Answers for selected elements, figures, and answers of emitters
      * have passes of their own. Refined answers take many times as long: one common key lets one such pass
      * run at a time, and leaves the other threads to other requests. */
-    in->refines = refine;
-    in->job.key = refine ? (const void *)in->service->queue
-                  : linear || request->select || of->n_emitters > 0 || passes_apart(in) ? (const void *)in
-                                                                                        : of->op;
+    in->refines = s->refined != NULL;
+    const bool alone = vectors_of(s) == 0 || request->select || of->n_emitters > 0 || passes_apart(in);
+    in->job.key = in->refines ? (const void *)in->service->queue : alone ? (const void *)in : of->op;
     return true;
 }
 
@@ -270,10 +307,13 @@ static bool judge(const call *in, radiosity_solve *s) {
  * were a vector. */
 static void pass_figures(call *in, radiosity_solve *s, size_t computed, batch_workspace *workspace) {
     bool done = false;
-    if (s->linear != NULL)
+    if (s->columns != NULL)
+        s->failed = s->failed || !sensor_figures_step(in, &s->request, s->columns, workspace, &s->notes,
+                                                      &s->answer, &done, &s->why);
+    else if (s->linear != NULL)
         s->failed = s->failed || !linear_figures_step(in, &s->request, s->linear, workspace, &s->notes,
                                                       &s->answer, &done, &s->why);
-    else if (s->refined == NULL && !s->judged)
+    else if (s->refined == NULL && !s->judged && !s->request.at_sensors)
         s->failed = s->failed || !judge(in, s);
     else
         s->failed = s->failed || !figures_write(in->scene, &s->request,
@@ -284,9 +324,18 @@ static void pass_figures(call *in, radiosity_solve *s, size_t computed, batch_wo
 }
 
 static bool add_figures(const scene *of, radiosity_solve *s, const batch_part *part) {
-    const float *x = s->own + part->first * of->n_channels * s->n_computed;
+    const float *x =
+        s->request.at_sensors ? s->places : s->own + part->first * of->n_channels * s->n_computed;
     return s->figures == NULL ||
            figures_add(of, &s->request, part->first, part->count, x, s->one, s->figures, &s->why);
+}
+
+/* Gathers the vectors of a part at sensors. */
+static void gather(const scene *of, radiosity_solve *s, const batch_part *part) {
+    const size_t C = of->n_channels, first = part->first;
+    if (!s->request.at_sensors) return;
+    float *to = s->figures != NULL ? s->places : s->places + first * C * s->shape.n_values;
+    sensor_values_find(of, &s->request, first, part->count, s->out + first * C * of->n, s->gathered, to);
 }
 
 static void pass_refined(const batch_part *parts, size_t n_parts) {
@@ -346,6 +395,7 @@ static void pass_vectors(const batch_part *parts, size_t n_parts, batch_workspac
             const radiosity_solve *solve = call_of(parts[p].job)->state;
             limited_finish(s, &solve->limit, &solve->request, parts[p].first, parts[p].count, solve->H0,
                            solve->W, shared[p].out, work);
+            gather(s, call_of(parts[p].job)->state, &parts[p]);
         }
     }
     metrics_pass(first->service->metrics, count);
@@ -403,8 +453,8 @@ static bool write_answer(call *in, radiosity_solve *s) {
     bool good = !s->failed;
     if (s->request.reduce.on) return good;
     if (s->refined != NULL) return good && refined_end(s->refined, &s->notes, &s->answer, &s->why);
-    if (good && in->accept.type == MEDIA_JSON) good = judge(in, s);
-    if (good) take_means(in, s);
+    if (good && in->accept.type == MEDIA_JSON && !s->request.at_sensors) good = judge(in, s);
+    if (good) take_places(in, s);
     if (good && s->request.told.luminance) answer_luminance(s->shape.n_rhs, s->shape.n_values, s->own);
     if (s->streams) return good && make_stream(in, s);
     good = good && (s->own == NULL
@@ -431,11 +481,11 @@ static void end(call *in, answer *out) {
         answer_problem(out, &s->why);
     }
     in->state = NULL;
-    solve_free(s);
+    solve_free(in->scene, s);
 }
 
 static void drop(call *in) {
-    solve_free(in->state);
+    solve_free(in->scene, in->state);
     in->state = NULL;
 }
 

@@ -1,6 +1,7 @@
 #include "server/route/radiosity_figures.h"
 
 #include "server/route/routes.h"
+#include "server/scene/sensor_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/group_figures.h"
@@ -24,36 +25,52 @@ size_t figures_bytes(const radiosity_request *request, size_t n_channels) {
     const size_t of_name = bytes_times(bytes_times(request->n_rhs, n_channels), r->n_with);
     /* A name stands twice in the text, with two figures of its error, in escapes of up to six letters; the
      * last summand is for the means of a name and its errors. */
-    return bytes_plus(bytes_plus(bytes_times(bytes_times(r->n_names, of_name), sizeof(double) + DOUBLE_TEXT),
-                                 bytes_times(12, r->texts.length) + (r->n_names + 4) * 8 * DOUBLE_TEXT),
-                      bytes_times(bytes_times(request->n_rhs, n_channels), 8 * sizeof(double)));
+    /* Each share has its limit beside it. */
+    return bytes_plus(
+        bytes_plus(bytes_times(bytes_times(r->n_names, of_name), sizeof(double) + DOUBLE_TEXT),
+                   bytes_times(12, r->texts.length) + (r->n_names + 4) * (8 + r->n_with) * DOUBLE_TEXT),
+        bytes_times(bytes_times(request->n_rhs, n_channels), 8 * sizeof(double)));
+}
+
+/* Values of a vector in a channel, of which those of sensors are of all. */
+static size_t width_of(const scene *s, const radiosity_request *request) {
+    return request->reduce.of_sensors ? scene_sensors(s) : request->n_selected;
+}
+
+bool figures_reduce(const scene *s, const radiosity_request *request, size_t n_channels, size_t first,
+                    size_t count, reduce_values x, double *figures) {
+    const reduce_request *r = &request->reduce;
+    x.whole = r->of_sensors;
+    return reduce_vectors(r, r->of_sensors ? &s->sensor_sets : &s->groups, r->of_sensors ? NULL : s->area,
+                          n_channels, request->n_rhs, first, count, x, figures);
 }
 
 /* The vectors one by one, by their luminance. */
 static bool add_luminance(const scene *s, const radiosity_request *request, size_t first, size_t count,
                           const float *x, float *one, double *figures) {
-    const size_t row = s->n_channels * request->n_selected;
+    const size_t width = width_of(s, request), row = s->n_channels * width;
     bool good = true;
     for (size_t v = 0; good && v < count; v++) {
         memcpy(one, x + v * row, row * sizeof *one);
-        answer_luminance(1, request->n_selected, one);
-        good = reduce_vectors(&request->reduce, &s->groups, s->area, 1, request->n_rhs, first + v, 1,
-                              (reduce_values){.floats = one}, figures);
+        answer_luminance(1, width, one);
+        good = figures_reduce(s, request, 1, first + v, 1, (reduce_values){.floats = one}, figures);
     }
     return good;
 }
 
 bool figures_add(const scene *s, const radiosity_request *request, size_t first, size_t count, const float *x,
                  float *one, double *figures, problem *why) {
-    const size_t n_values = count * s->n_channels * request->n_selected;
+    const size_t n_values = count * s->n_channels * width_of(s, request);
     int bad = 0;
-    for (size_t i = 0; i < n_values; i++) bad |= !(fabsf(x[i]) <= FLT_MAX);
+    /* A receiver without a value is NaN. */
+    for (size_t i = 0; i < n_values; i++)
+        bad |= !(fabsf(x[i]) <= FLT_MAX) && !(request->reduce.of_sensors && isnan(x[i]));
     if (bad)
         return problem_set(why, PROBLEM_NOT_IN_ENCODING,
                            "the answer passes the range of single precision (3.4e38); scale the emission");
     return (one != NULL ? add_luminance(s, request, first, count, x, one, figures)
-                        : reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs,
-                                         first, count, (reduce_values){.floats = x}, figures)) ||
+                        : figures_reduce(s, request, s->n_channels, first, count,
+                                         (reduce_values){.floats = x}, figures)) ||
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
 }
 
@@ -84,7 +101,8 @@ bool figures_write(const scene *s, const radiosity_request *request, const doubl
     const size_t all = reduce_vectors_written(r, request->n_rhs);
     const size_t C = radiosity_request_channels(request, s->n_channels);
     const double start = clock_ms();
-    bool written = at->begun || (answer_head(b, s->n, C, notes) && buffer_append_text(b, ",\"groups\":{"));
+    bool written = at->begun || (answer_head(b, s->n, C, notes) &&
+                                 buffer_append_text(b, r->of_sensors ? ",\"sensors\":{" : ",\"groups\":{"));
     at->begun = true;
     *done = false;
     while (written && at->next < all && clock_ms() < until) {

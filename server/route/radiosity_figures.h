@@ -11,11 +11,16 @@ bool figures_acceptable(const call *in, const radiosity_request *request, proble
 /* Bytes that figures take until they are written, and their text, at most. */
 size_t figures_bytes(const radiosity_request *request, size_t n_channels);
 
-/* Adds vectors first ... first + count, x [count][C][n_selected], to figures of reduce_figures, which of a
- * luminance have one channel: one [C][n_selected] is work then, else NULL. 422 for a value beyond single
+/* Adds vectors first ... first + count, x [count][C][n_selected], or of all
+ * receivers, to figures of reduce_figures, which of a
+ * luminance have one channel: one [C][values] is work then, else NULL. 422 for a value beyond single
  * precision. */
 bool figures_add(const scene *s, const radiosity_request *request, size_t first, size_t count, const float *x,
                  float *one, double *figures, problem *why);
+
+/* reduce_vectors of groups, or of sets of sensors, of which x has all receivers. */
+bool figures_reduce(const scene *s, const radiosity_request *request, size_t n_channels, size_t first,
+                    size_t count, reduce_values x, double *figures);
 
 /* Refuses the figure of name k that is not finite. */
 bool figures_refuse(const reduce_request *r, size_t k, size_t statistic, problem *why);

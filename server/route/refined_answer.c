@@ -3,6 +3,7 @@
 #include "server/route/radiosity_figures.h"
 #include "server/route/sun_answer.h"
 #include "server/scene/direct_light.h"
+#include "server/scene/sensor_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
 #include "solver/operator/emitters.h"
@@ -25,6 +26,7 @@ typedef struct pass_memory {
     sun_answer sun;       /* of all vectors */
     double *some;         /* [BATCH_PASS][C][selected] */
     double *means;        /* [C][n_values], of faces, of one vector */
+    double *gathered;     /* [C][sensor_values_work], work of sensors, whose values are in some */
     float *start; /* [BATCH_PASS][C][n], of a store of emitters: its own answer, the start of the iteration */
     float *W;     /* [BATCH_PASS][C][s], weights of emitters */
     void *work;
@@ -49,6 +51,7 @@ static void pass_memory_free(pass_memory *p) {
     free(p->weights);
     free(p->some);
     free(p->means);
+    free(p->gathered);
     free(p->start);
     free(p->W);
     free(p->work);
@@ -58,15 +61,21 @@ static size_t vectors_of_pass(const radiosity_request *request) {
     return request->n_rhs < BATCH_PASS ? request->n_rhs : BATCH_PASS;
 }
 
+/* Elements that are selected, or sensors; 0: all elements. */
+static size_t width_of_some(const scene *s, const radiosity_request *request) {
+    return request->at_sensors ? sensor_values(s, request) : request->select ? request->n_selected : 0;
+}
+
 /* Bytes of the arrays of a pass, and of those that refining takes beside them. */
 static size_t pass_memory_bytes(const scene *s, const radiosity_request *request, size_t rows) {
     const bool few = s->n_emitters > 0, lit = request_has_direct(request) || request->n_suns > 0;
     const size_t doubles = (size_t)(REFINING_VECTORS + 2 + (few || lit)) * s->n +
-                           direct_light_work(s, request) + (request->select ? request->n_selected : 0);
+                           direct_light_work(s, request) + width_of_some(s, request);
     const size_t means = request->at_faces ? radiosity_request_values(request, s->n, &s->faces) : 0;
+    const size_t gathered = request->at_sensors ? sensor_values_work(s) : 0;
     const size_t floats = few ? s->n + s->n_emitters : 0;
     return bytes_plus(bytes_times(rows, doubles * sizeof(double) + floats * sizeof(float)),
-                      bytes_plus(bytes_times(s->n_channels, means * sizeof(double)),
+                      bytes_plus(bytes_times(s->n_channels, (means + gathered) * sizeof(double)),
                                  few ? lam_operator_work_bytes(s->op, rows / s->n_channels) : 0));
 }
 
@@ -86,9 +95,13 @@ static bool pass_memory_allocate(const scene *s, const radiosity_request *reques
         p->weights = memory_allocate(rows, direct_light_work(s, request) * sizeof *p->weights, "L", NULL);
         good = good && p->weights != NULL;
     }
-    if (request->select) {
-        p->some = memory_allocate(rows, request->n_selected * sizeof *p->some, "B", NULL);
+    if (request->select || request->at_sensors) {
+        p->some = memory_allocate(rows, width_of_some(s, request) * sizeof *p->some, "B", NULL);
         good = good && p->some != NULL;
+    }
+    if (request->at_sensors) {
+        p->gathered = memory_allocate(s->n_channels, sensor_values_work(s) * sizeof *p->gathered, "B", NULL);
+        good = good && p->gathered != NULL;
     }
     if (request->at_faces) {
         const size_t n_values = radiosity_request_values(request, s->n, &s->faces);
@@ -168,6 +181,10 @@ static double *refine(call *in, const lam_refiner *refiner, const radiosity_requ
         refuse(s, status, &error, why);
         return NULL;
     }
+    if (request->at_sensors) {
+        sensor_values_find_double(s, request, first, count, p->out, p->gathered, p->some, certificates);
+        return p->some;
+    }
     if (!request->select) return p->out;
     for (size_t row = 0; row < count * s->n_channels; row++)
         for (size_t k = 0; k < request->n_selected; k++)
@@ -198,7 +215,7 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
                               .n_rhs = request->n_rhs,
                               .batch = request->batch,
                               .n_values = radiosity_request_values(request, s->n, &s->faces),
-                              .at_faces = request->at_faces};
+                              .gaps = request->at_faces || request->at_sensors};
     *out = r;
     /* The memory of the pass is included, as what waits for memory must not have begun. */
     const size_t of_pass = pass_memory_bytes(s, request, vectors_of_pass(request) * s->n_channels);
@@ -245,7 +262,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     const scene *s = in->scene;
     const lam_refiner *refiner = NULL;
     const double begin = clock_ms();
-    const size_t width = request->select ? request->n_selected : s->n;
+    const size_t width = request->select || request->at_sensors ? width_of_some(s, request) : s->n;
     bool good = find_refiner(s, &refiner, why);
     if (good && !r->made) {
         r->made = true;
@@ -260,8 +277,8 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     good = x != NULL;
     if (good && request->told.luminance) answer_luminance_double(count, width, x, r->certificates + first);
     if (good && r->figures != NULL)
-        good = reduce_vectors(&request->reduce, &s->groups, s->area, r->shape.n_channels, request->n_rhs,
-                              first, count, (reduce_values){.doubles = x}, r->figures) ||
+        good = figures_reduce(s, request, r->shape.n_channels, first, count, (reduce_values){.doubles = x},
+                              r->figures) ||
                problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
     for (size_t v = 0; good && r->figures == NULL && v < count; v++) {
         /* One by one: each vector has its own rounding errors, which count in its certificate. */

@@ -21,6 +21,7 @@ static const route routes[] = {
     {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", KEPT(keeps_mesh)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/sky", KEPT(keeps_sky)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/luminaires", KEPT(keeps_luminaires)},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/sensors", KEPT(keeps_sensors)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/weather", KEPT(keeps_weather)},
     {.method = "POST", .pattern = "/v1/scenes/{name}/weather", .handle = post_weather, .with_body = true},
     {.method = "POST",

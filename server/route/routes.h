@@ -61,8 +61,8 @@ route_handler get_healthz, get_readyz, get_metrics, post_adjoint, post_skies, po
     put_reflectance, delete_reflectance, delete_scene, get_viewer_page, get_viewer_script, get_viewer_style,
     get_viewer_icon, get_viewer_licences;
 route_shortcut quick_radiosity, quick_kept;
-route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_sky, keeps_luminaires, keeps_weather, keeps_openapi,
-    keeps_manual;
+route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_sky, keeps_luminaires, keeps_sensors, keeps_weather,
+    keeps_openapi, keeps_manual;
 extern const solve_steps post_radiosity, send_kept;
 
 /* The description of the routes, for service.openapi. Errors: LAM_ERR_MEMORY. */

@@ -1,12 +1,15 @@
 /* A scene is opened from a store, or as a variant of another one, and is freed with its last reference.
- * read_store() forecasts the bytes of operator, sky, luminaires, mesh and errors before it reads them, and
- * refuses more than options->memory; scene_verify() and scene_damaged() keep the health of mapped arrays. */
+ * read_store() forecasts the bytes of operator, sky, luminaires, sensors, mesh and errors before it reads
+ * them, and refuses more than options->memory; scene_verify() and scene_damaged() keep the health of mapped
+ * arrays. */
 #include "server/scene/scene.h"
 
 #include "server/queue/batch.h"
 #include "server/scene/luminaire_places.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/scene_memory.h"
+#include "server/scene/sensor_answer.h"
+#include "server/scene/sensor_places.h"
 #include "server/scene/tile_places.h"
 #include "solver/base/clock.h"
 #include "solver/base/scene/scene_backs.h"
@@ -16,6 +19,7 @@
 #include "solver/operator/emitters.h"
 #include "solver/operator/luminaire_light.h"
 #include "solver/operator/operator.h"
+#include "solver/operator/sensor_light.h"
 #include "solver/operator/sky_light.h"
 #include "store/groups.h"
 #include "store/store.h"
@@ -27,6 +31,7 @@
 
 /* Limit of the adjoint rows of a scene. */
 #define ADJOINT_ROWS_BYTES ((size_t)256 << 20)
+#define SENSOR_COLUMNS_BYTES ((size_t)256 << 20)
 
 enum { HEALTH_UNKNOWN, HEALTH_SOUND, HEALTH_DAMAGED };
 
@@ -227,19 +232,30 @@ done:
 /* Once the scene is described. */
 static lam_status keep_texts(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
-    buffer tiles = {0}, luminaires = {0};
-    uint64_t memory, of_luminaires;
+    buffer tiles = {0}, luminaires = {0}, sensors = {0};
+    uint64_t memory, of_luminaires, of_sensors;
     TRY(scene_texts_describe(&made->texts, made->description, made->ledger, error));
     TRY(read_tiling(s, made, error));
     if (made->sky != NULL) TRY(tile_places_read(s, lam_sky_tiles(made->sky), &tiles, error));
     TRY(scene_texts_add_sky(&made->texts, &tiles, &made->weather, made->ledger, &memory, error));
     TRY(luminaire_places_write(made->luminaires, &luminaires, error));
     TRY(scene_texts_add_luminaires(&made->texts, &luminaires, made->ledger, &of_luminaires, error));
-    made->memory += memory + of_luminaires;
+    TRY(sensor_places_write(made->sensors, &sensors, error));
+    TRY(scene_texts_add_sensors(&made->texts, &sensors, made->ledger, &of_sensors, error));
+    made->memory += memory + of_luminaires + of_sensors;
 done:
+    buffer_free(&sensors);
     buffer_free(&luminaires);
     buffer_free(&tiles);
     return status;
+}
+
+/* Room for the columns of sensors. */
+static lam_status make_columns(scene *made, lam_error *error) {
+    const sensor_lights lights = scene_sensor_lights(made);
+    if (made->sensors == NULL) return LAM_OK;
+    return sensor_columns_create(sensor_lights_count(&lights), made->n_channels * scene_sensors(made),
+                                 SENSOR_COLUMNS_BYTES, made->ledger, &made->columns, error);
 }
 
 static lam_status read_store(store *s, const scene_options *options, scene *made, lam_error *error) {
@@ -266,6 +282,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(sky_load(s, made->n, &made->sky, error));
     TRY(luminaires_load(s, made->n, made->n_channels, &made->luminaires, error));
     TRY(luminaire_names_make(made->luminaires, &made->luminaire_names, error));
+    TRY(sensors_load(s, made->n, made->n_channels, &made->sensors, error));
+    TRY(sensor_names_make(made->sensors, &made->sensor_sets, error));
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
     TRY(read_groups(s, made, error));
@@ -278,6 +296,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     made->work_bytes = pass_work_bytes(made);
     made->ledger = options->ledger;
     TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
+    TRY(make_columns(made, error));
     TRY(refined_create(s, made->op, made->ledger, &made->refined, error));
     TRY(read_errors(s, made, error));
     TRY(describe_scene(s, made, &made->description, error));
@@ -355,6 +374,8 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->sky = base->sky;
     made->luminaires = base->luminaires;
     made->luminaire_names = base->luminaire_names;
+    made->sensors = base->sensors;
+    made->sensor_sets = base->sensor_sets;
     made->sun = base->sun;
     made->map = base->map;
     made->health = base->health;
@@ -365,6 +386,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->memory = made->bytes;
     made->ledger = base->ledger;
     TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
+    TRY(make_columns(made, error));
     TRY(refined_create_variant(base->refined, op, &made->refined, error));
     TRY(describe_variant(made, groups, &made->description, error));
     TRY(scene_texts_describe(&made->texts, made->description, made->ledger, error));
@@ -377,13 +399,14 @@ done:
 }
 
 uint64_t scene_grown(const scene *s) {
-    return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) +
+    return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) + sensor_columns_held(s->columns) +
            kept_forms_held(scene_mesh_forms(s->mesh)) + scene_texts_held(&s->texts) +
            (s->base == NULL ? scene_sun_held(s->sun) : 0);
 }
 
 void scene_drop_computed(const scene *s) {
     row_cache_clear(s->rows);
+    sensor_columns_clear(s->columns);
     kept_forms_clear(scene_mesh_forms(s->mesh));
     scene_texts_clear(&s->texts);
 }
@@ -398,6 +421,7 @@ void scene_release(scene *s) {
     refined_destroy(s->refined);
     lam_operator_close(s->op);
     row_cache_destroy(s->rows);
+    sensor_columns_destroy(s->columns);
     scene_mesh_destroy(s->mesh);
     scene_texts_free(&s->texts);
     if (s->base == NULL) {
@@ -405,6 +429,8 @@ void scene_release(scene *s) {
         lam_sky_close(s->sky);
         lam_luminaires_close(s->luminaires);
         luminaire_names_free(&s->luminaire_names);
+        lam_sensors_close(s->sensors);
+        group_index_free(&s->sensor_sets);
         weather_file_free(&s->weather);
         group_index_free(&s->groups);
         group_index_free(&s->emitters);

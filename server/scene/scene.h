@@ -9,8 +9,10 @@
 #include "server/scene/scene_mesh.h"
 #include "server/scene/scene_sun.h"
 #include "server/scene/scene_texts.h"
+#include "server/scene/sensor_columns.h"
 #include "solver/codec/groups.h"
 #include "solver/codec/request.h"
+#include "solver/codec/sensor_names.h"
 #include "solver/codec/stated_errors.h"
 #include "solver/operator/limiter.h"
 #include "store/store_map.h"
@@ -28,8 +30,8 @@ struct scene {
     char *name; /* as served */
     char *path;
     store_identity identity;
-    scene *base; /* of a variant, held: path, groups, areas, sky, luminaires, health and factors belong to it.
-                    NULL: this is a store */
+    scene *base;     /* of a variant, held: path, groups, areas, sky, luminaires, sensors, health and factors
+                        belong to     it.     NULL: this is a store */
     uint64_t number; /* of a variant, from 1: in the order in which they were made; set by the catalog */
     size_t n;
     size_t n_channels;
@@ -47,6 +49,8 @@ struct scene {
     double sky_north;                /* degrees of its model; 0 where it states none */
     lam_luminaires *luminaires;      /* NULL: none */
     luminaire_names luminaire_names; /* these by name */
+    lam_sensors *sensors;            /* NULL: none */
+    group_index sensor_sets;         /* these by name */
     scene_sun *sun;        /* over the sky; NULL: its tiles are not known. Of a variant that of its store */
     weather_file weather;  /* beside the file; its text is in texts. A variant has none of its own */
     size_t n_emitters;     /* 0: the store answers any emission */
@@ -60,9 +64,10 @@ struct scene {
     bool *group_emits;     /* [n_groups]: all its elements are sources; NULL where any emission is answered */
     memory_ledger *ledger; /* of memory taken later; or NULL */
     row_cache *rows;       /* adjoint rows for linear reductions; any thread */
-    refined *refined;      /* the refiner of its answers, made when first needed */
-    scene_mesh *mesh;      /* its elements as glTF, made when first asked for */
-    store_map *map;        /* held; NULL: nothing is mapped */
+    sensor_columns *columns; /* of its sensors; NULL without them */
+    refined *refined;        /* the refiner of its answers, made when first needed */
+    scene_mesh *mesh;        /* its elements as glTF, made when first asked for */
+    store_map *map;          /* held; NULL: nothing is mapped */
     scene_health *health;
     scene *next_to_verify; /* private to verifier.c, as the next one */
     bool to_verify;

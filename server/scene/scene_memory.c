@@ -1,6 +1,7 @@
 #include "server/scene/scene_memory.h"
 
 #include "solver/codec/face_means.h"
+#include "solver/codec/sensor_names.h"
 #include "solver/operator/operator.h"
 #include "store/groups.h"
 #include "store/status.h"
@@ -43,6 +44,12 @@ static uint64_t luminaire_names_memory(const store *s) {
                 store_texts_memory(s, STORE_LUMINAIRES "/group_names"));
 }
 
+/* The index of sets of sensors, whose names are held twice. */
+static uint64_t sensor_names_memory(const store *s) {
+    return 3 * store_texts_memory(s, STORE_SENSORS "/names") +
+           sensor_names_bytes(store_array_bytes(s, STORE_SENSORS "/flags") / sizeof(uint32_t));
+}
+
 lam_status scene_memory_passing(store *s, uint64_t *memory, lam_error *error) {
     lam_status status = LAM_OK;
     uint64_t receivers, sources;
@@ -61,14 +68,15 @@ done:
 lam_status scene_memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error) {
     lam_status status = LAM_OK;
     char *kind = NULL;
-    uint64_t sky, luminaires, errors;
+    uint64_t sky, luminaires, sensors, errors;
     TRY(store_group_bytes(s, STORE_OPERATOR, operator_bytes, error));
     TRY(bytes_below(s, STORE_SKY, &sky, error));
     TRY(bytes_below(s, STORE_LUMINAIRES, &luminaires, error));
+    TRY(bytes_below(s, STORE_SENSORS, &sensors, error));
     TRY(bytes_below(s, STORE_ERROR, &errors, error));
     TRY(store_get_text(s, STORE_OPERATOR, "kind", &kind, error));
     *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky + luminaires + luminaire_names_memory(s) +
-              errors + mesh_memory(s);
+              sensors + sensor_names_memory(s) + errors + mesh_memory(s);
 done:
     free(kind);
     return status;

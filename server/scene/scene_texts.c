@@ -54,15 +54,25 @@ lam_status scene_texts_add_luminaires(scene_texts *texts, buffer *luminaires, me
                : kept_forms_of(luminaires, ledger, "the luminaires of a scene", &texts->luminaires, error);
 }
 
+lam_status scene_texts_add_sensors(scene_texts *texts, buffer *sensors, memory_ledger *ledger,
+                                   uint64_t *memory, lam_error *error) {
+    *memory = sensors->length;
+    return sensors->length == 0
+               ? LAM_OK
+               : kept_forms_of(sensors, ledger, "the sensors of a scene", &texts->sensors, error);
+}
+
 size_t scene_texts_held(const scene_texts *texts) {
     return kept_forms_held(texts->description) + kept_forms_held(texts->sky) +
-           kept_forms_held(texts->luminaires) + kept_forms_held(texts->weather);
+           kept_forms_held(texts->luminaires) + kept_forms_held(texts->sensors) +
+           kept_forms_held(texts->weather);
 }
 
 void scene_texts_clear(const scene_texts *texts) {
     kept_forms_clear(texts->description);
     kept_forms_clear(texts->sky);
     kept_forms_clear(texts->luminaires);
+    kept_forms_clear(texts->sensors);
     kept_forms_clear(texts->weather);
 }
 
@@ -70,6 +80,7 @@ void scene_texts_free(scene_texts *texts) {
     kept_forms_release(texts->description);
     kept_forms_release(texts->sky);
     kept_forms_release(texts->luminaires);
+    kept_forms_release(texts->sensors);
     kept_forms_release(texts->weather);
     *texts = (scene_texts){.description = NULL};
 }

@@ -17,8 +17,9 @@ static bool no_memory(problem *why) {
 bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes) {
     const char *by = notes->converted_by;
     return buffer_append_text(b, "{\"scene\":") && json_write_text(b, notes->scene) &&
-           buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\"%s", n, n_channels,
-                         codec_quantity_name(notes->quantity), notes->at_faces ? ",\"at\":\"faces\"" : "") &&
+           buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\"", n, n_channels,
+                         codec_quantity_name(notes->quantity)) &&
+           (notes->at == NULL || buffer_printf(b, ",\"at\":\"%s\"", notes->at)) &&
            (notes->unit == NULL || buffer_printf(b, ",\"unit\":\"%s\"", notes->unit)) &&
            (notes->sum_unit == NULL || buffer_printf(b, ",\"sum_unit\":\"%s\"", notes->sum_unit)) &&
            (by == NULL || by[0] == '\0' || buffer_printf(b, ",\"converted_by\":\"%s\"", by));
@@ -159,7 +160,7 @@ bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, si
     const size_t C = shape->n_channels, n = shape->n_values;
     for (size_t r = 0; r < count; r++) {
         if (as->type == MEDIA_JSON && first + r > 0 && !buffer_append(b, ",", 1)) return no_memory(why);
-        if (!answer_rows(b, as, C, n, shape->at_faces, x + r * C * n, why)) return false;
+        if (!answer_rows(b, as, C, n, shape->gaps, x + r * C * n, why)) return false;
     }
     return true;
 }
@@ -183,7 +184,7 @@ float *answer_place(buffer *b, const answer_shape *shape, const media_accept *as
 bool answer_placed(buffer *b, const answer_shape *shape, problem *why) {
     const size_t count = count_values(shape);
     const float *x = (const float *)(const void *)(b->bytes + b->length);
-    if (!check_range(x, count, shape->at_faces, FLT_MAX, why)) return false;
+    if (!check_range(x, count, shape->gaps, FLT_MAX, why)) return false;
     b->length += count * sizeof(float);
     b->bytes[b->length] = '\0';
     return true;
@@ -207,7 +208,7 @@ bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept
                          : as->npy == NPY_F4       ? (double)FLT_MAX
                                                    : (double)HALF_MAX;
     for (size_t i = 0; i < count * C * n; i++)
-        if (!(fabs(x[i]) <= limit) && !(shape->at_faces && isnan(x[i]))) return refuse_range(limit, why);
+        if (!(fabs(x[i]) <= limit) && !(shape->gaps && isnan(x[i]))) return refuse_range(limit, why);
     for (size_t row = 0; row < count * C; row++) {
         const double *values = x + row * n;
         const bool written = json ? before_row(b, shape, first + row / C, row % C) &&

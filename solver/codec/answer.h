@@ -14,8 +14,9 @@ typedef struct answer_shape {
     size_t n_channels;
     size_t n_rhs;
     bool batch;
-    size_t n_values; /* numbers of a vector in a channel: of all elements or faces, or of those selected */
-    bool at_faces;   /* NaN stands for a face without an element: null in JSON */
+    size_t n_values; /* numbers of a vector in a channel: of all elements or faces, or of those selected, or
+                        of sensors */
+    bool gaps;       /* NaN stands for a number that there is none of: null in JSON */
 } answer_shape;
 
 /* The members of a JSON answer beside its vectors. */
@@ -37,8 +38,9 @@ typedef struct answer_notes {
                              for receivers; NULL: it was built for all */
     const char *error_from; /* "sources" where a store was built for these and they alone emit; "others": not
                                they alone, and no error is stated; NULL: it was built for any emission */
-    bool at_faces;          /* numbers are of faces of the scene file */
-    bool by_luminance;      /* a coloured sky lights a store of one channel by its luminance */
+    const char
+        *at; /* the word for the places of numbers, "faces" of the scene file or "sensors"; NULL: elements */
+    bool by_luminance; /* a coloured sky lights a store of one channel by its luminance */
     bool has_time;
     double parse_ms, solve_ms, encode_ms;
     /* [n_rhs] of a refined answer, in place of the store's error, else NULL: the bound on the error of every

@@ -154,7 +154,7 @@ size_t answer_stream_look(const answer_stream *s, char *to, size_t room) {
 }
 
 bool answer_check_encoding(const answer_shape *shape, const media_accept *as, const float *x, problem *why) {
-    return answer_check_as(x, count_of(shape), shape->at_faces, as, why);
+    return answer_check_as(x, count_of(shape), shape->gaps, as, why);
 }
 
 uint64_t answer_stream_most(const answer_stream *s) {

@@ -14,7 +14,7 @@ void reduce_request_free(reduce_request *r) {
 }
 
 const char *reduce_statistic_name(reduce_statistic statistic) {
-    static const char *const names[REDUCE_COUNT] = {"mean", "sum", "min", "max", "uniformity", "variance"};
+    static const char *const names[] = {"mean", "sum", "min", "max", "uniformity", "variance", "share"};
     return names[statistic];
 }
 
@@ -34,6 +34,17 @@ bool reduce_request_with(reduce_request *r, const char *word, size_t length, pro
                        "\"%.*s\" must be one of: mean, sum, min, max, uniformity, variance", shown, word);
 }
 
+void reduce_request_shares(reduce_request *r, size_t at, size_t n_limits, const double *limits) {
+    memmove(r->with + at + n_limits, r->with + at, (r->n_with - at) * sizeof *r->with);
+    memmove(r->at_least + at + n_limits, r->at_least + at, (r->n_with - at) * sizeof *r->at_least);
+    for (size_t k = 0; k < n_limits; k++) {
+        r->with[at + k] = REDUCE_SHARE;
+        r->at_least[at + k] = limits[k];
+    }
+    r->n_with += n_limits;
+    r->linear = false;
+}
+
 const char *reduce_text(const reduce_request *r, size_t k) {
     return r->texts.bytes + r->names[k].text;
 }
@@ -42,7 +53,7 @@ bool reduce_request_add(reduce_request *r, const char *name, size_t length, cons
                         size_t n_groups, problem *why) {
     for (size_t k = 0; k < r->n_names; k++)
         if (strlen(reduce_text(r, k)) == length && memcmp(reduce_text(r, k), name, length) == 0)
-            return problem_set(why, PROBLEM_GIVEN_TWICE, "the group %.80s is given twice", reduce_text(r, k));
+            return problem_set(why, PROBLEM_GIVEN_TWICE, "%.80s is given twice", reduce_text(r, k));
     if (r->n_names == REDUCE_NAMES_MAX)
         return problem_set(why, PROBLEM_TOO_MUCH, "more than %d groups; send several requests",
                            REDUCE_NAMES_MAX);
@@ -100,19 +111,34 @@ static double value_at(reduce_values x, size_t i) {
     return x.doubles != NULL ? x.doubles[i] : (double)x.floats[i];
 }
 
-/* Every statistic of the elements of some groups. The values of group g stand from begin[g] on; where begin
- * is NULL, x is in mesh order. */
-static void figures_of(size_t n_named, const uint32_t *named, const group_index *groups,
-                       const uint32_t *begin, const double *area, reduce_values x, size_t x_begin,
-                       double out[REDUCE_COUNT]) {
+/* One vector and channel of values: those of group g stand from begin[g] on; where begin is NULL, they are in
+ * mesh order. */
+typedef struct value_row {
+    const uint32_t *begin;
+    reduce_values x;
+    size_t first;
+} value_row;
+
+static double value_of(const value_row *row, uint32_t g, size_t e, const uint32_t *elements) {
+    return value_at(row->x, row->first + (row->begin != NULL ? row->begin[g] + e : elements[e]));
+}
+
+/* area NULL: all are 1. */
+static double area_of(const double *area, uint32_t element) {
+    return area != NULL ? area[element] : 1;
+}
+
+/* Every statistic of the elements of some groups. */
+static void figures_of(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
+                       const value_row *row, double out[REDUCE_COUNT]) {
     double total = 0, sum = 0, squares = 0, low = INFINITY, high = -INFINITY;
     for (size_t m = 0; m < n_named; m++) {
         const uint32_t g = named[m], *elements = groups->elements + groups->start[g];
         for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            const double value = value_at(x, x_begin + (begin != NULL ? begin[g] + e : elements[e]));
+            const double value = value_of(row, g, e, elements), A = area_of(area, elements[e]);
             if (!group_index_counts(groups, elements[e])) continue;
-            total += area[elements[e]];
-            sum += area[elements[e]] * value;
+            total += A;
+            sum += A * value;
             low = fmin(low, value);
             high = fmax(high, value);
         }
@@ -121,9 +147,9 @@ static void figures_of(size_t n_named, const uint32_t *named, const group_index 
     for (size_t m = 0; m < n_named; m++) {
         const uint32_t g = named[m], *elements = groups->elements + groups->start[g];
         for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            const double off = value_at(x, x_begin + (begin != NULL ? begin[g] + e : elements[e])) - mean;
+            const double off = value_of(row, g, e, elements) - mean;
             if (!group_index_counts(groups, elements[e])) continue;
-            squares += area[elements[e]] * off * off;
+            squares += area_of(area, elements[e]) * off * off;
         }
     }
     const bool any = total > 0;
@@ -135,9 +161,24 @@ static void figures_of(size_t n_named, const uint32_t *named, const group_index 
     out[REDUCE_VARIANCE] = any ? squares / total : NAN;
 }
 
+/* sum A [x >= limit] / sum A. */
+static double share_of(const reduce_name *name, const group_index *groups, const double *area,
+                       const value_row *row, double limit) {
+    double total = 0, reached = 0;
+    for (size_t m = 0; m < name->n_groups; m++) {
+        const uint32_t g = name->groups[m], *elements = groups->elements + groups->start[g];
+        for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
+            if (!group_index_counts(groups, elements[e])) continue;
+            total += area_of(area, elements[e]);
+            if (value_of(row, g, e, elements) >= limit) reached += area_of(area, elements[e]);
+        }
+    }
+    return total > 0 ? reached / total : NAN;
+}
+
 void reduce_groups(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
                    reduce_values x, double out[REDUCE_COUNT]) {
-    figures_of(n_named, named, groups, NULL, area, x, 0, out);
+    figures_of(n_named, named, groups, area, &(value_row){.x = x}, out);
 }
 
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
@@ -149,10 +190,13 @@ bool reduce_vectors(const reduce_request *r, const group_index *groups, const do
         for (size_t c = 0; c < n_channels; c++)
             for (size_t k = 0; k < r->n_names; k++) {
                 double of_name[REDUCE_COUNT];
-                figures_of(r->names[k].n_groups, r->names[k].groups, groups, begin, area, x,
-                           (v * n_channels + c) * n_values, of_name);
+                const reduce_name *name = &r->names[k];
+                const value_row row = {begin, x, (v * n_channels + c) * n_values};
+                figures_of(name->n_groups, name->groups, groups, area, &row, of_name);
                 for (size_t s = 0; s < r->n_with; s++)
-                    *reduce_figure(r, k, s, n_rhs, first + v, n_channels, c, figures) = of_name[r->with[s]];
+                    *reduce_figure(r, k, s, n_rhs, first + v, n_channels, c, figures) =
+                        r->with[s] == REDUCE_SHARE ? share_of(name, groups, area, &row, r->at_least[s])
+                                                   : of_name[r->with[s]];
             }
     free(begin);
     return true;
@@ -181,6 +225,20 @@ size_t reduce_vectors_written(const reduce_request *r, size_t n_rhs) {
     return r->n_names * r->n_with * n_rhs;
 }
 
+/* "mean":, or of the first share "share":{"300":, of a further one "500":. */
+static bool begin_figure(const reduce_request *r, size_t s, buffer *b) {
+    const char *name = reduce_statistic_name(r->with[s]);
+    if (r->with[s] != REDUCE_SHARE) return buffer_printf(b, "\"%s\":", name);
+    return (s > 0 && r->with[s - 1] == REDUCE_SHARE ? buffer_append(b, "\"", 1)
+                                                    : buffer_printf(b, "\"%s\":{\"", name)) &&
+           json_write_double(b, r->at_least[s]) && buffer_append(b, "\":", 2);
+}
+
+/* True of the last share. */
+static bool ends_shares(const reduce_request *r, size_t s) {
+    return r->with[s] == REDUCE_SHARE && (s + 1 == r->n_with || r->with[s + 1] != REDUCE_SHARE);
+}
+
 bool reduce_write_some(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
                        const double *figures, size_t first, size_t count, buffer *b) {
     bool written = true;
@@ -190,11 +248,12 @@ bool reduce_write_some(const reduce_request *r, size_t n_channels, size_t n_rhs,
             written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, reduce_text(r, k)) &&
                       buffer_append(b, ":{", 2);
         if (v == 0)
-            written = written && buffer_printf(b, "%s\"%s\":%s", s == 0 ? "" : ",",
-                                               reduce_statistic_name(r->with[s]), batch ? "[" : "");
+            written = written && buffer_append_text(b, s == 0 ? "" : ",") && begin_figure(r, s, b) &&
+                      buffer_append_text(b, batch ? "[" : "");
         written = written && (v == 0 || buffer_append(b, ",", 1)) &&
                   reduce_write_channels(b, figures + at * n_channels, n_channels);
         if (v + 1 == n_rhs && batch) written = written && buffer_append(b, "]", 1);
+        if (v + 1 == n_rhs && ends_shares(r, s)) written = written && buffer_append(b, "}", 1);
         if (v + 1 == n_rhs && s + 1 == r->n_with) written = written && buffer_append(b, "}", 1);
     }
     return written;

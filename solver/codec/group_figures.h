@@ -1,6 +1,7 @@
 /* Figures over groups of elements, in place of vectors: mean = sum A x / sum A, sum = sum A x, min, max,
- * uniformity = min / mean, variance = sum A (x - mean)^2 / sum A. Buried elements, which no light reaches,
- * have no part in them. No I/O. */
+ * uniformity = min / mean, variance = sum A (x - mean)^2 / sum A, share = sum A [x >= limit] / sum A. Buried
+ * elements, which no light reaches, have no part in them. Over sets of sensors all A are 1, and receivers
+ * without a value have no part. No I/O. */
 #ifndef LAMBERT_CODEC_GROUP_FIGURES_H
 #define LAMBERT_CODEC_GROUP_FIGURES_H
 
@@ -8,7 +9,8 @@
 #include "solver/codec/groups.h"
 #include "solver/codec/problem.h"
 
-#define REDUCE_NAMES_MAX 1024 /* groups in one request */
+#define REDUCE_NAMES_MAX 1024    /* groups in one request */
+enum { REDUCE_LIMITS_MAX = 16 }; /* of shares */
 
 typedef enum reduce_statistic {
     REDUCE_MEAN,
@@ -17,7 +19,8 @@ typedef enum reduce_statistic {
     REDUCE_MAX,
     REDUCE_UNIFORMITY,
     REDUCE_VARIANCE,
-    REDUCE_COUNT
+    REDUCE_COUNT,
+    REDUCE_SHARE = REDUCE_COUNT /* of a limit, which those before need not */
 } reduce_statistic;
 
 /* A name in a request, and the groups of the scene that it means (group_index_find). */
@@ -30,12 +33,15 @@ typedef struct reduce_name {
 /* Starts zeroed; freed by reduce_request_free. */
 typedef struct reduce_request {
     bool on;
-    bool linear; /* means and sums alone: adjoint rows answer it */
+    bool linear; /* means and sums of groups alone, which adjoint rows answer; or of sensors, by columns */
     buffer texts;
     reduce_name *names;
     size_t n_names, names_capacity;
-    reduce_statistic with[REDUCE_COUNT]; /* in the order asked */
+    reduce_statistic
+        with[REDUCE_COUNT + REDUCE_LIMITS_MAX];        /* in the order asked, one share for each limit */
+    double at_least[REDUCE_COUNT + REDUCE_LIMITS_MAX]; /* of each the limit of a share, else 0 */
     size_t n_with;
+    bool of_sensors; /* names are of sets of sensors */
 } reduce_request;
 
 void reduce_request_free(reduce_request *r);
@@ -45,6 +51,10 @@ const char *reduce_statistic_name(reduce_statistic statistic);
 
 /* Adds the statistic of a word. 422: an unknown word, or one given twice. */
 bool reduce_request_with(reduce_request *r, const char *word, size_t length, problem *why);
+
+/* Adds a share for each limit, n_limits of them from 1 to REDUCE_LIMITS_MAX, before statistic `at` of those
+ * added. */
+void reduce_request_shares(reduce_request *r, size_t at, size_t n_limits, const double *limits);
 
 /* Adds a name and the groups that it means. 422: a name given twice, or too many; 503. */
 bool reduce_request_add(reduce_request *r, const char *name, size_t length, const uint32_t *groups,
@@ -73,7 +83,8 @@ typedef struct reduce_values {
 } reduce_values;
 
 /* Fills the figures of vectors first ... first + count of n_rhs. x is [count][C][n_values]; area [n] in mesh
- * order. NaN where a figure has no value: no area, or a mean of 0. False when memory is short. */
+ * order, or NULL for 1 of each. NaN where a figure has no value: no area, or a mean of 0. False when memory
+ * is short. */
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
                     size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures);
 

@@ -53,6 +53,7 @@ static bool read_body(parser *p) {
             good = parser_read_select(p);
             break;
         case QUANTITY:
+            p->quantity_given = true;
             good = parser_read_quantity(p, &p->request->quantity);
             break;
         case REDUCE:
@@ -83,13 +84,20 @@ static bool read_body(parser *p) {
                                  "the body holds both select and reduce, must hold one of them");
         if (p->request->reduce.on && p->at == AT_FACES)
             return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
-                                 "the body holds both reduce, whose figures are of groups, and at faces; "
+                                 "the body holds both reduce, whose figures are not of faces, and at faces; "
                                  "leave one of them out");
     }
     if (p->why->status != 0) return false;
     if (!json_finish(&p->r)) return parser_fault(p);
     return (seen & EITHER) != 0 ||
            parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body holds neither emission nor emissions");
+}
+
+/* True where all light is that of whole groups, of luminaires and of tiles: sensors know each by a column. */
+static bool is_of_columns(const radiosity_request *request) {
+    bool whole = request->n_dense == 0;
+    for (size_t k = 0; whole && k < request->n_spots; k++) whole = request->spots[k].whole_group;
+    return whole;
 }
 
 bool codec_read_json(const codec_scene *scene, const char *text, size_t length, radiosity_request *request,
@@ -99,10 +107,13 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
     bool good = parser_begin(&p, scene, text, length, request, why) && read_body(&p) &&
                 parser_settle_places(&p) && parser_convert(&p) && parser_fill_sides(&p);
     if (!parser_end(&p, good)) return false;
-    if (request->tolerance > 0 || request->n_suns > 0 || reduce->n_names > scene->max_rows)
+    if (reduce->of_sensors)
+        reduce->linear = request->tolerance == 0 && is_of_columns(request);
+    else if (request->tolerance > 0 || request->n_suns > 0 || reduce->n_names > scene->max_rows)
         reduce->linear = false;
     if (scene->only_linear && !reduce->linear) return parser_not_linear(&p);
-    if (reduce->on && !reduce->linear && !parser_select_reduced(scene, request, why)) return false;
+    if (reduce->on && !reduce->linear && !reduce->of_sensors && !parser_select_reduced(scene, request, why))
+        return false;
     return (reduce->linear && request->n_dense == 0) || radiosity_request_expand(request, scene, why);
 }
 

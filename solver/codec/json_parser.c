@@ -175,6 +175,24 @@ bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, siz
     return parser_find_group(p, name, groups, n_groups);
 }
 
+bool parser_knows_sensors(parser *p) {
+    const group_index *sets = p->scene->sensors;
+    if (p->scene->n_emitters > 0)
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                             "%s: sensors of a store of few emitters have no values; use a store of another "
+                             "method",
+                             parser_here(p));
+    return (sets != NULL && sets->n_groups > 0) ||
+           parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                         "%s: the store has no sensors; precompute it with --sensors", parser_here(p));
+}
+
+bool parser_read_sensors(parser *p, json_slice *name, const uint32_t **sets, size_t *n_sets) {
+    if (!parser_expect(p, JSON_TEXT, "the name of a set of sensors")) return false;
+    if (!json_read_text(&p->r, name)) return parser_fault(p);
+    return parser_find_in(p, p->scene->sensors, name, sets, n_sets);
+}
+
 bool parser_find_in(parser *p, const group_index *index, const json_slice *name, const uint32_t **groups,
                     size_t *n_groups) {
     char miss[GROUP_MISS];

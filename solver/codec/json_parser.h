@@ -32,7 +32,13 @@ typedef struct index_list {
 
 /* The word of `at`, and the member of `select`. */
 typedef enum place_word { AT_UNSAID, AT_ELEMENTS, AT_FACES } place_word;
-typedef enum select_word { SELECT_ELEMENTS, SELECT_GROUPS, SELECT_FACES, SELECT_WORDS } select_word;
+typedef enum select_word {
+    SELECT_ELEMENTS,
+    SELECT_GROUPS,
+    SELECT_FACES,
+    SELECT_SENSORS,
+    SELECT_WORDS
+} select_word;
 
 typedef struct parser {
     json_reader r;
@@ -49,6 +55,7 @@ typedef struct parser {
     float *colour;  /* [C] */
     index_set seen; /* elements, groups or faces */
     place_word at;
+    bool quantity_given;
     bool sky_given; /* the request says what its radiances are: */
     light_kind sky_lights;
     select_word selects;      /* with select */
@@ -114,6 +121,10 @@ bool parser_find_luminaires(parser *p, const json_slice *name, const uint32_t **
                             size_t *n_luminaires);
 bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups);
 bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups);
+
+/* Refuses a place for sensors where the store has none; and the sets of the text that comes next. */
+bool parser_knows_sensors(parser *p);
+bool parser_read_sensors(parser *p, json_slice *name, const uint32_t **sets, size_t *n_sets);
 
 /* [...] of indices of the scene, no more than it has elements, or faces; with once each only once. */
 typedef enum index_kind { INDEX_ELEMENTS, INDEX_FACES } index_kind;

@@ -39,19 +39,48 @@ static bool knows_faces(parser *p) {
                          parser_here(p));
 }
 
+/* ["room", ...]: the receivers of the first set, then of the next. */
+static bool read_selected_sensors(parser *p, index_list *selected) {
+    const group_index *sets = p->scene->sensors;
+    const size_t mark = p->pointer_length;
+    size_t most, index = 0;
+    if (!parser_expect(p, JSON_ARRAY, "an array of names of sets") || !parser_knows_sensors(p)) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    most = sets->start[sets->n_groups];
+    for (; json_next_element(&p->r); index++) {
+        json_slice name;
+        const uint32_t *found = NULL;
+        size_t n_found;
+        parser_point_index(p, index);
+        if (!parser_read_sensors(p, &name, &found, &n_found)) return false;
+        for (size_t k = 0; k < n_found; k++) {
+            const uint32_t first = sets->start[found[k]], count = sets->start[found[k] + 1] - first;
+            if (count > most - selected->count)
+                return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s: more than the %zu sensors of the scene",
+                                     parser_here(p), most);
+            if (!parser_append(p, selected, sets->elements + first, count)) return false;
+        }
+        p->pointer_length = mark;
+    }
+    return parser_closed(p);
+}
+
 static bool read_selected(parser *p, select_word which, index_list *selected) {
+    if (which == SELECT_SENSORS) return read_selected_sensors(p, selected);
     if (which == SELECT_ELEMENTS) return parser_read_indices(p, INDEX_ELEMENTS, false, selected);
     if (which == SELECT_GROUPS) return read_selected_groups(p, selected);
     return knows_faces(p) && parser_read_indices(p, INDEX_FACES, true, &p->faces);
 }
 
 static bool read_select_members(parser *p, index_list *selected) {
-    static const char *const names[] = {
-        [SELECT_ELEMENTS] = "elements", [SELECT_GROUPS] = "groups", [SELECT_FACES] = "faces"};
+    static const char *const names[] = {[SELECT_ELEMENTS] = "elements",
+                                        [SELECT_GROUPS] = "groups",
+                                        [SELECT_FACES] = "faces",
+                                        [SELECT_SENSORS] = "sensors"};
     size_t mark = p->pointer_length, which, count = 0;
     unsigned seen = 0;
     json_slice key;
-    if (!parser_expect(p, JSON_OBJECT, "an object with elements, groups or faces")) return false;
+    if (!parser_expect(p, JSON_OBJECT, "an object with elements, groups, faces or sensors")) return false;
     if (!json_enter_object(&p->r)) return parser_fault(p);
     while (count < 2 && parser_next_member(p, &key)) {
         if (!parser_known_member(p, &key, names, SELECT_WORDS, &seen, &which)) return false;
@@ -62,8 +91,9 @@ static bool read_select_members(parser *p, index_list *selected) {
     }
     if (p->why->status != 0) return false;
     p->pointer_length = mark;
-    return count == 1 || parser_refuse(p, PROBLEM_WRONG_MEMBERS,
-                                       "%s must hold one of elements, groups and faces", parser_here(p));
+    return count == 1 ||
+           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold one of elements, groups, faces and sensors",
+                         parser_here(p));
 }
 
 bool parser_read_select(parser *p) {
@@ -121,9 +151,40 @@ static bool find_faces(parser *p) {
     return true;
 }
 
+/* Sensors receive irradiance, which is gathered from the radiosity of all elements. */
+static bool settle_sensors(parser *p) {
+    radiosity_request *request = p->request;
+    const char *member = request->reduce.on ? "reduce" : "select";
+    if (p->at != AT_UNSAID)
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                             "the body holds both at and %s of sensors; leave at out", member);
+    if (p->quantity_given && request->quantity != LAM_IRRADIANCE) {
+        parser_point_key(p, "quantity", 8);
+        return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
+                             "%s is %s, and sensors receive irradiance alone; leave it out", parser_here(p),
+                             codec_quantity_name(request->quantity));
+    }
+    if (request->n_suns > 0)
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                             "the body holds an exact sun and sensors, to which none comes; leave the sun to "
+                             "the tiles of the sky");
+    request->quantity = LAM_RADIOSITY;
+    request->at_sensors = true;
+    if (!request->select) return true;
+    request->select = false;
+    request->receivers = request->selected;
+    request->n_receivers = request->n_selected;
+    request->selected = NULL;
+    request->n_selected = 0;
+    return true;
+}
+
 bool parser_settle_places(parser *p) {
     radiosity_request *request = p->request;
     const bool selects = request->select && p->selects == SELECT_FACES;
+    p->pointer_length = 0;
+    if (request->reduce.of_sensors || (request->select && p->selects == SELECT_SENSORS))
+        return settle_sensors(p);
     parser_point_key(p, "select", 6);
     if (selects && p->at == AT_ELEMENTS)
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS,

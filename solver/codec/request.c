@@ -20,6 +20,7 @@ void radiosity_request_free(radiosity_request *request) {
     free(request->sunlight);
     free(request->selected);
     free(request->faces);
+    free(request->receivers);
     reduce_request_free(&request->reduce);
     *request = (radiosity_request){0};
 }
@@ -30,6 +31,7 @@ face_choice radiosity_request_faces(const radiosity_request *request, const face
 }
 
 size_t radiosity_request_values(const radiosity_request *request, size_t n, const face_index *faces) {
+    if (request->at_sensors) return request->n_receivers;
     if (request->at_faces) return radiosity_request_faces(request, faces).n;
     return request->select ? request->n_selected : n;
 }

@@ -23,6 +23,7 @@ typedef struct codec_scene {
     const group_index *emitters;       /* these by name; NULL: they have none */
     size_t n_luminaires;               /* 0: none */
     const luminaire_names *luminaires; /* these by name; not NULL where there are any */
+    const group_index *sensors;        /* sets of receivers by name; NULL or empty: none */
     size_t max_batch;                  /* vectors in a request, at most CODEC_BATCH_MOST */
     size_t max_bytes;                  /* of emission vectors in a request */
     /* Asked before memory for emission vectors is allocated, of bytes more than before; false with *why.
@@ -79,6 +80,11 @@ typedef struct radiosity_request {
     bool at_faces;   /* the answer is of faces, with select of some, of which `selected` has the elements */
     uint32_t *faces; /* [n_faces], these; NULL: all */
     size_t n_faces;
+    /* Numbers or figures of receivers, which have irradiance: `quantity` is what is gathered from, radiosity,
+     * and `select` is off. */
+    bool at_sensors;
+    uint32_t *receivers; /* [n_receivers], those selected; NULL with reduce */
+    size_t n_receivers;
     lam_quantity quantity;
     light_conversion told; /* of the answer; once read, the light above is in its unit */
     bool linear_map;       /* "limit": false: light below zero stays */
@@ -102,8 +108,8 @@ void radiosity_request_free(radiosity_request *request);
 /* All three return false with *why filled; request must be freed either way.
  * text[length] must be NUL. 400: not JSON, or not NPY; 422: what the contract lists.
  * E then holds every vector, but for a linear reduction of sparse vectors, which stay spots, so that reading
- * it costs no more than the text is long. For any other reduction, select names the elements of its groups.
- */
+ * it costs no more than the text is long; that of sensors is linear where sparse vectors are of whole groups.
+ * For any other reduction of groups, select names their elements. */
 bool codec_read_json(const codec_scene *scene, const char *text, size_t length, radiosity_request *request,
                      problem *why);
 
@@ -151,6 +157,11 @@ bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene,
 /* The faces of an answer of faces, and the numbers of an answer to one vector in one channel. */
 face_choice radiosity_request_faces(const radiosity_request *request, const face_index *faces);
 size_t radiosity_request_values(const radiosity_request *request, size_t n, const face_index *faces);
+
+/* The quantity of the numbers of the answer. */
+static inline lam_quantity radiosity_request_told(const radiosity_request *request) {
+    return request->at_sensors ? LAM_IRRADIANCE : request->quantity;
+}
 
 /* Channels of the answer, of C of the scene: 1 where it is of their luminance. */
 static inline size_t radiosity_request_channels(const radiosity_request *request, size_t n_channels) {

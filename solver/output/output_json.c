@@ -155,7 +155,7 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .n_rhs = s->n_vectors,
                                 .batch = s->batch,
                                 .n_values = output_width(s),
-                                .at_faces = s->faces != NULL};
+                                .gaps = s->faces != NULL};
     const answer_notes notes = {.scene = s->scene,
                                 .quantity = s->quantity,
                                 .unit = s->unit,
@@ -168,7 +168,7 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .error_of = s->error_of,
                                 .error_from = s->error_from,
                                 .error_light = s->error_light,
-                                .at_faces = s->faces != NULL,
+                                .at = s->faces != NULL ? "faces" : NULL,
                                 .by_luminance = s->by_luminance,
                                 .emitters = s->emitters,
                                 .n_name_errors = s->name_errors != NULL ? s->n_reductions : 0,

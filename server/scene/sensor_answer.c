@@ -1,0 +1,88 @@
+#include "server/scene/sensor_answer.h"
+
+#include "server/scene/direct_light.h"
+#include "solver/operator/sensor_light.h"
+
+#include <math.h>
+
+size_t scene_sensors(const scene *s) {
+    return s->sensors != NULL ? lam_sensors_count(s->sensors) : 0;
+}
+
+size_t sensor_values(const scene *s, const radiosity_request *request) {
+    return request->reduce.on ? scene_sensors(s) : request->n_receivers;
+}
+
+/* The receiver of value k. */
+static size_t receiver_of(const radiosity_request *request, size_t k) {
+    return request->reduce.on ? k : request->receivers[k];
+}
+
+/* The row of a vector of a side; NULL: it has none. */
+static const float *side_of(const side_rows *side, size_t vector, size_t n_channels, size_t width) {
+    return vector < side->n && side->values != NULL ? side->values + vector * n_channels * width : NULL;
+}
+
+void sensor_values_find(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                        const float *B, float *work, float *out) {
+    const size_t C = s->n_channels, all = scene_sensors(s), width = sensor_values(s, request);
+    for (size_t v = 0; v < count; v++) {
+        lam_sensors_gather(s->sensors, 1, B + v * C * s->n,
+                           side_of(&request->sky, first + v, C, scene_tiles(s)),
+                           side_of(&request->luminaires, first + v, C, scene_luminaires(s)), work);
+        for (size_t c = 0; c < C; c++)
+            for (size_t k = 0; k < width; k++) {
+                const size_t r = receiver_of(request, k);
+                out[(v * C + c) * width + k] = lam_sensors_has_value(s->sensors, r) ? work[c * all + r] : NAN;
+            }
+    }
+}
+
+size_t sensor_values_work(const scene *s) {
+    return scene_sensors(s) + scene_tiles(s) + scene_luminaires(s);
+}
+
+/* A row in double; NULL for NULL. */
+static const double *widen(const float *row, size_t count, double *to) {
+    for (size_t k = 0; row != NULL && k < count; k++) to[k] = (double)row[k];
+    return row != NULL ? to : NULL;
+}
+
+/* The largest sum of a row's weights, of those whose values are asked for. */
+static double largest_sum(const scene *s, const radiosity_request *request) {
+    const sensor_weights rows = sensors_weights(s->sensors);
+    double largest = 0;
+    for (size_t k = 0; k < sensor_values(s, request); k++) {
+        const size_t r = receiver_of(request, k);
+        double sum = 0;
+        for (uint64_t i = rows.start[r]; i < rows.start[r + 1]; i++) sum += fabs((double)rows.weight[i]);
+        largest = fmax(largest, sum);
+    }
+    return largest;
+}
+
+void sensor_values_find_double(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                               const double *B, double *work, double *out, double *certificates) {
+    const size_t C = s->n_channels, all = scene_sensors(s), width = sensor_values(s, request),
+                 m = scene_tiles(s), q = scene_luminaires(s);
+    double *L = work + C * all, *D = L + C * m;
+    const double most = largest_sum(s, request);
+    for (size_t v = 0; v < count; v++) {
+        double largest = 0;
+        for (size_t i = 0; i < C * s->n; i++) largest = fmax(largest, fabs(B[v * C * s->n + i]));
+        largest *= most;
+        sensors_gather_double(s->sensors, 1, B + v * C * s->n,
+                              widen(side_of(&request->sky, first + v, C, m), C * m, L),
+                              widen(side_of(&request->luminaires, first + v, C, q), C * q, D), work);
+        for (size_t c = 0; c < C; c++)
+            for (size_t k = 0; k < width; k++) {
+                const size_t r = receiver_of(request, k);
+                const bool has = lam_sensors_has_value(s->sensors, r);
+                if (has) largest = fmax(largest, fabs(work[c * all + r]));
+                out[(v * C + c) * width + k] = has ? work[c * all + r] : NAN;
+            }
+        /* A sum of N terms is rounded by less than N eps of the sum of their sizes; direct light has one
+         * sign. */
+        certificates[v] = certificates[v] * most + (double)(s->n + m + q) * 0x1p-53 * largest;
+    }
+}

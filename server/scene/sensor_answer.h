@@ -1,0 +1,24 @@
+/* The answers of a request at the sensors of its scene, gathered from radiosities of all elements. */
+#ifndef LAMBERT_SERVER_SCENE_SENSOR_ANSWER_H
+#define LAMBERT_SERVER_SCENE_SENSOR_ANSWER_H
+
+#include "server/scene/scene.h"
+
+/* Receivers of the scene; 0: it has none. */
+size_t scene_sensors(const scene *s);
+
+/* Numbers of a vector in a channel: of those selected, or with reduce of all receivers of the scene. */
+size_t sensor_values(const scene *s, const radiosity_request *request);
+
+/* out [count][C][sensor_values] of B [count][C][n], the radiosities of vectors first ... first + count - 1.
+ * NaN where a receiver has no value. work is [C][receivers]. */
+void sensor_values_find(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                        const float *B, float *work, float *out);
+
+/* The same of a refined answer, whose certificates [count] become those of these values: an error of B of at
+ * most e is one of at most e times the largest sum of a row. work is [C][receivers + tiles + luminaires]. */
+void sensor_values_find_double(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                               const double *B, double *work, double *out, double *certificates);
+size_t sensor_values_work(const scene *s);
+
+#endif

@@ -1,0 +1,185 @@
+#include "server/scene/sensor_columns.h"
+
+#include "server/scene/direct_light.h"
+#include "server/scene/sensor_answer.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct column_table {
+    size_t references; /* with the lock of its owner */
+    size_t bytes;      /* of columns; likewise */
+    size_t n;
+    _Atomic(const float *) at[];
+};
+
+struct sensor_columns {
+    pthread_mutex_t lock;
+    memory_ledger *ledger;
+    size_t width, max_bytes;
+    column_table *now;
+};
+
+static column_table *table_allocate(size_t n, lam_error *error) {
+    column_table *t = memory_allocate(1, sizeof *t + n * sizeof *t->at, "columns of sensors", error);
+    if (t == NULL) return NULL;
+    t->references = 1;
+    t->n = n;
+    for (size_t k = 0; k < n; k++) atomic_init(&t->at[k], NULL);
+    return t;
+}
+
+lam_status sensor_columns_create(size_t n_columns, size_t width, size_t max_bytes, memory_ledger *ledger,
+                                 sensor_columns **out, lam_error *error) {
+    sensor_columns *c = memory_allocate(1, sizeof *c, "columns of sensors", error);
+    if (c == NULL) return LAM_ERR_MEMORY;
+    *c = (sensor_columns){.ledger = ledger, .width = width, .max_bytes = max_bytes};
+    c->now = table_allocate(n_columns, error);
+    if (c->now == NULL) {
+        free(c);
+        return LAM_ERR_MEMORY;
+    }
+    pthread_mutex_init(&c->lock, NULL);
+    *out = c;
+    return LAM_OK;
+}
+
+/* The caller holds the lock. */
+static void release_locked(sensor_columns *c, column_table *t) {
+    if (--t->references > 0) return;
+    for (size_t k = 0; k < t->n; k++) free((void *)(uintptr_t)atomic_load(&t->at[k]));
+    memory_ledger_give_back(c->ledger, t->bytes);
+    free(t);
+}
+
+void sensor_columns_destroy(sensor_columns *c) {
+    if (c == NULL) return;
+    release_locked(c, c->now);
+    pthread_mutex_destroy(&c->lock);
+    free(c);
+}
+
+void sensor_columns_clear(sensor_columns *c) {
+    if (c == NULL) return;
+    column_table *fresh = table_allocate(c->now->n, NULL);
+    if (fresh == NULL) return;
+    pthread_mutex_lock(&c->lock);
+    release_locked(c, c->now);
+    c->now = fresh;
+    pthread_mutex_unlock(&c->lock);
+}
+
+size_t sensor_columns_held(sensor_columns *c) {
+    if (c == NULL) return 0;
+    pthread_mutex_lock(&c->lock);
+    const size_t bytes = c->now->bytes;
+    pthread_mutex_unlock(&c->lock);
+    return bytes;
+}
+
+column_table *sensor_columns_acquire(sensor_columns *c) {
+    pthread_mutex_lock(&c->lock);
+    column_table *t = c->now;
+    t->references++;
+    pthread_mutex_unlock(&c->lock);
+    return t;
+}
+
+void sensor_columns_release(sensor_columns *c, column_table *t) {
+    if (t == NULL) return;
+    pthread_mutex_lock(&c->lock);
+    release_locked(c, t);
+    pthread_mutex_unlock(&c->lock);
+}
+
+const float *column_table_get(const column_table *t, size_t k) {
+    return atomic_load_explicit(&t->at[k], memory_order_acquire);
+}
+
+void sensor_columns_put(sensor_columns *c, column_table *t, size_t k, const float *column) {
+    const size_t bytes = c->width * sizeof *column;
+    float *kept = NULL;
+    pthread_mutex_lock(&c->lock);
+    const bool wanted = atomic_load(&t->at[k]) == NULL && t->bytes + bytes <= c->max_bytes;
+    if (wanted && memory_ledger_take(c->ledger, bytes)) {
+        kept = malloc(bytes > 0 ? bytes : 1);
+        if (kept == NULL) {
+            memory_ledger_give_back(c->ledger, bytes);
+        } else {
+            memcpy(kept, column, bytes);
+            t->bytes += bytes;
+            atomic_store_explicit(&t->at[k], kept, memory_order_release);
+        }
+    }
+    pthread_mutex_unlock(&c->lock);
+}
+
+sensor_lights scene_sensor_lights(const scene *s) {
+    return (sensor_lights){s->groups.n_groups, scene_luminaires(s), scene_tiles(s)};
+}
+
+/* Arrays of a pass: E and B are [count][C][n], H0 too; L and D, of one light, [C][m] and [C][k]. */
+typedef struct column_work {
+    float *E, *H0, *B, *L, *D;
+} column_work;
+
+size_t sensor_columns_work(const scene *s, size_t count) {
+    return s->n_channels * (3 * count * s->n + scene_tiles(s) + scene_luminaires(s));
+}
+
+static column_work split_work(const scene *s, size_t count, float *work) {
+    const size_t C = s->n_channels, vectors = count * C * s->n;
+    return (column_work){work, work + vectors, work + 2 * vectors, work + 3 * vectors,
+                         work + 3 * vectors + C * scene_tiles(s)};
+}
+
+/* Sets every channel of light k of a row of `width` to 1, and all others to 0. */
+static void set_unit(size_t n_channels, size_t width, size_t k, float *row) {
+    memset(row, 0, n_channels * width * sizeof *row);
+    for (size_t c = 0; c < n_channels; c++) row[c * width + k] = 1;
+}
+
+/* The light `which`: E, or H0 of L or D, whose pointers are set, or NULL. */
+static void take_light(const scene *s, size_t which, const column_work *w, float *E, float *H0,
+                       const float **L, const float **D) {
+    const size_t C = s->n_channels;
+    const sensor_lights lights = scene_sensor_lights(s);
+    memset(E, 0, C * s->n * sizeof *E);
+    memset(H0, 0, C * s->n * sizeof *H0);
+    *L = *D = NULL;
+    if (which < lights.groups) {
+        for (uint32_t k = s->groups.start[which]; k < s->groups.start[which + 1]; k++)
+            for (size_t c = 0; c < C; c++) E[c * s->n + s->groups.elements[k]] = 1;
+    } else if (which < lights.groups + lights.luminaires) {
+        set_unit(C, lights.luminaires, which - lights.groups, w->D);
+        lam_luminaires_irradiance(s->luminaires, 1, w->D, H0);
+        *D = w->D;
+    } else {
+        set_unit(C, lights.tiles, which - lights.groups - lights.luminaires, w->L);
+        lam_sky_irradiance(s->sky, C, w->L, H0);
+        *L = w->L;
+    }
+}
+
+bool sensor_columns_make(const scene *s, size_t count, const uint32_t *which, batch_workspace *workspace,
+                         float *work, float *out, problem *why) {
+    const size_t vector = s->n_channels * s->n, width = s->n_channels * scene_sensors(s);
+    const size_t bytes = lam_operator_work_bytes(s->op, count);
+    const column_work w = split_work(s, count, work);
+    const float *L, *D;
+    lam_error error;
+    void *room = bytes > 0 ? batch_workspace_get(workspace, bytes) : NULL;
+    if (room == NULL)
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for %zu lights", count);
+    for (size_t k = 0; k < count; k++)
+        take_light(s, which[k], &w, w.E + k * vector, w.H0 + k * vector, &L, &D);
+    if (lam_operator_apply_lit(s->op, count, LAM_RADIOSITY, w.E, w.H0, w.B, room, bytes, &error) != LAM_OK)
+        return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+    for (size_t k = 0; k < count; k++) {
+        take_light(s, which[k], &w, w.E, w.H0, &L, &D);
+        lam_sensors_gather(s->sensors, 1, w.B + k * vector, L, D, out + k * width);
+    }
+    return true;
+}
