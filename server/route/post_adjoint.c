@@ -4,6 +4,7 @@
 #include "server/route/sun_answer.h"
 #include "server/scene/direct_light.h"
 #include "server/scene/gradient.h"
+#include "server/scene/sensor_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/adjoint.h"
 #include "solver/codec/answer.h"
@@ -18,6 +19,7 @@ typedef struct adjoint_memory {
     float *narrow;    /* [C][m] of tiles, or [C][s] of emitters */
     float *of_groups; /* [C][g] */
     float *dimmers;   /* [C][k] of luminaires */
+    float *direct;    /* [C][m] and [C][k]: what comes to sensors directly */
     void *work;
     size_t work_bytes;
 } adjoint_memory;
@@ -53,15 +55,16 @@ static bool get_memory(call *in, const adjoint_request *request, adjoint_memory 
     const bool by_reflectance = adjoint_wants(request, GRADIENT_REFLECTANCE),
                direct = s->sky != NULL || s->luminaires != NULL;
     const size_t C = s->n_channels, vector = C * s->n;
-    float **const places[] = {&memory->w,      &memory->H,         &memory->H0,     &memory->v,
-                              &memory->narrow, &memory->of_groups, &memory->dimmers};
+    float **const places[] = {&memory->w,      &memory->H,         &memory->H0,      &memory->v,
+                              &memory->narrow, &memory->of_groups, &memory->dimmers, &memory->direct};
     const size_t rows[] = {vector,
                            by_reflectance ? vector : 0,
                            by_reflectance && direct ? vector : 0,
                            vector,
                            C * narrow_width(s),
                            adjoint_wants(request, GRADIENT_GROUPS) ? C * s->groups.n_groups : 0,
-                           C * scene_luminaires(s)},
+                           C * scene_luminaires(s),
+                           request->cotangent.at_sensors ? C * (scene_tiles(s) + scene_luminaires(s)) : 0},
                  n_rows = sizeof rows / sizeof *rows;
     const size_t most = answer_most(in, request);
     size_t total = 0;
@@ -93,6 +96,22 @@ static bool solve_irradiance(const scene *s, const radiosity_request *light, adj
            problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
 }
 
+/* Puts the cotangent of sensors into that of elements, and the gradients by light that comes to sensors
+ * directly into `direct`. Receivers without a value have no part. */
+static void take_sensors(const scene *s, adjoint_request *request, adjoint_memory *memory) {
+    const size_t C = s->n_channels, all = scene_sensors(s);
+    float *g = request->cotangent.sensors.values;
+    for (size_t c = 0; c < C; c++)
+        for (size_t k = 0; k < all; k++)
+            if (!lam_sensors_has_value(s->sensors, k)) g[c * all + k] = 0;
+    lam_sensors_adjoint(s->sensors, 1, g, request->cotangent.E, memory->direct,
+                        memory->direct + C * scene_tiles(s));
+}
+
+static void add(size_t count, const float *x, float *to) {
+    for (size_t k = 0; k < count; k++) to[k] += x[k];
+}
+
 /* Computes the gradients asked for: by emission in w, by reflectance in H, by tile or emitter in narrow,
  * by group in of_groups, by luminaire in dimmers. */
 static bool solve(const scene *s, const adjoint_request *request, adjoint_memory *memory, metrics *m,
@@ -116,6 +135,11 @@ static bool solve(const scene *s, const adjoint_request *request, adjoint_memory
         lam_sky_adjoint(s->sky, s->n_channels, memory->v, memory->narrow);
     if (adjoint_wants(request, GRADIENT_LUMINAIRES))
         lam_luminaires_adjoint(s->luminaires, 1, memory->v, memory->dimmers);
+    if (request->cotangent.at_sensors && adjoint_wants(request, GRADIENT_SKY))
+        add(s->n_channels * scene_tiles(s), memory->direct, memory->narrow);
+    if (request->cotangent.at_sensors && adjoint_wants(request, GRADIENT_LUMINAIRES))
+        add(s->n_channels * scene_luminaires(s), memory->direct + s->n_channels * scene_tiles(s),
+            memory->dimmers);
     if (adjoint_wants(request, GRADIENT_REFLECTANCE)) {
         metrics_pass(m, 1);
         if (!solve_irradiance(s, &request->light, memory, &H0, why)) return false;
@@ -203,11 +227,13 @@ void post_adjoint(call *in, answer *out) {
                  problem_set(&why, PROBLEM_UNAVAILABLE, "nobody waits for the answer any more"));
     const double parsed = clock_ms();
     notes.parse_ms = parsed - start;
-    notes.quantity = request.quantity;
+    notes.quantity = request.cotangent.at_sensors ? LAM_IRRADIANCE : request.quantity;
+    notes.at = request.cotangent.at_sensors ? "sensors" : NULL;
     notes.by_luminance = request.light.by_luminance;
     light_conversion_text(&request.light.told, converted);
     notes.converted_by = converted;
     in->n_rhs = 1;
+    if (good && request.cotangent.at_sensors) take_sensors(in->scene, &request, &memory);
     good = good && solve(in->scene, &request, &memory, in->service->metrics, &why);
     notes.solve_ms = clock_ms() - parsed;
     if (good && (in->accept.type == MEDIA_NPY ? write_npy(in, &request, &memory, &notes, &b, &why)

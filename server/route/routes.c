@@ -30,6 +30,7 @@ static const route routes[] = {
      .shortcut = quick_radiosity,
      .with_body = true},
     {.method = "POST", .pattern = "/v1/scenes/{name}/adjoint", .handle = post_adjoint, .with_body = true},
+    {.method = "POST", .pattern = "/v1/scenes/{name}/jacobian", .steps = &post_jacobian, .with_body = true},
     {.method = "POST", .pattern = "/v1/scenes/{name}/skies", .handle = post_skies, .with_body = true},
     {.method = "PUT",
      .pattern = "/v1/scenes/{name}/reflectance",

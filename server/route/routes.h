@@ -63,7 +63,7 @@ route_handler get_healthz, get_readyz, get_metrics, post_adjoint, post_skies, po
 route_shortcut quick_radiosity, quick_kept;
 route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_sky, keeps_luminaires, keeps_sensors, keeps_weather,
     keeps_openapi, keeps_manual;
-extern const solve_steps post_radiosity, send_kept;
+extern const solve_steps post_radiosity, post_jacobian, send_kept;
 
 /* The description of the routes, for service.openapi. Errors: LAM_ERR_MEMORY. */
 lam_status openapi_keep(kept_forms **out, lam_error *error);

@@ -17,6 +17,7 @@
 struct sensor_figures {
     double *figures;    /* of reduce_figures */
     double *values;     /* [C][receivers] of a vector, work; those of sets that are not reduced stay 0 */
+    bool *reduced;      /* [sets]: of some name */
     uint32_t *lights;   /* [n_lights], ascending */
     float **own;        /* [n_lights]: columns that the scene has no room for; NULL: it keeps the column */
     float *made, *work; /* of a pass; NULL until the first */
@@ -31,6 +32,7 @@ void sensor_figures_free(const scene *s, sensor_figures *f) {
     sensor_columns_release(s->columns, f->table);
     free(f->figures);
     free(f->values);
+    free(f->reduced);
     free(f->lights);
     free(f->own);
     free(f->made);
@@ -68,11 +70,16 @@ static bool find_lights(const scene *s, const radiosity_request *request, uint32
 /* Allocates all but what passes need. */
 static bool allocate(const scene *s, const radiosity_request *request, sensor_figures *f) {
     const size_t C = s->n_channels;
+    const reduce_request *r = &request->reduce;
     f->figures = reduce_figures(&request->reduce, request->n_rhs, radiosity_request_channels(request, C));
     f->values = memory_allocate(C, scene_sensors(s) * sizeof *f->values, "sensors", NULL);
+    f->reduced = memory_allocate(s->sensor_sets.n_groups, sizeof *f->reduced, "sensors", NULL);
     f->own = memory_allocate(f->n_lights, sizeof *f->own, "sensors", NULL);
     f->table = sensor_columns_acquire(s->columns);
-    return f->figures != NULL && f->values != NULL && f->own != NULL;
+    if (f->figures == NULL || f->values == NULL || f->own == NULL || f->reduced == NULL) return false;
+    for (size_t k = 0; k < r->n_names; k++)
+        for (size_t g = 0; g < r->names[k].n_groups; g++) f->reduced[r->names[k].groups[g]] = true;
+    return true;
 }
 
 /* Lights whose columns are not there. */
@@ -88,11 +95,11 @@ bool sensor_figures_begin(call *in, const radiosity_request *request, sensor_fig
     const sensor_lights of = scene_sensor_lights(s);
     const size_t width = s->n_channels * scene_sensors(s);
     *out = NULL;
-    if (!request_memory_take(
-            in->memory,
-            bytes_plus(figures_bytes(request, s->n_channels),
-                       sensor_lights_count(&of) * (sizeof(uint32_t) + sizeof(bool)) + width * sizeof(double)),
-            why))
+    if (!request_memory_take(in->memory,
+                             bytes_plus(figures_bytes(request, s->n_channels),
+                                        sensor_lights_count(&of) * (sizeof(uint32_t) + sizeof(bool)) +
+                                            s->sensor_sets.n_groups * sizeof(bool) + width * sizeof(double)),
+                             why))
         return false;
     sensor_figures *f = memory_allocate(1, sizeof *f, "figures", NULL);
     if (f == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "%s", short_of);
@@ -157,17 +164,13 @@ static double weight_of(const scene *s, const radiosity_request *request, size_t
 }
 
 /* values += weight column, of the receivers of the sets that are reduced. */
-static void add_column(const scene *s, const reduce_request *r, size_t c, double weight, const float *column,
-                       double *values) {
+static void add_column(const scene *s, const sensor_figures *f, size_t c, double weight,
+                       const float *column) {
     const group_index *sets = &s->sensor_sets;
-    const size_t all = scene_sensors(s);
-    if (weight == 0) return;
-    for (size_t k = 0; k < r->n_names; k++)
-        for (size_t g = 0; g < r->names[k].n_groups; g++) {
-            const uint32_t set = r->names[k].groups[g];
-            for (uint32_t e = sets->start[set]; e < sets->start[set + 1]; e++)
-                values[c * all + sets->elements[e]] += weight * (double)column[c * all + sets->elements[e]];
-        }
+    const size_t begin = c * scene_sensors(s);
+    for (size_t set = 0; weight != 0 && set < sets->n_groups; set++)
+        for (uint32_t e = sets->start[set]; f->reduced[set] && e < sets->start[set + 1]; e++)
+            f->values[begin + sets->elements[e]] += weight * (double)column[begin + sets->elements[e]];
 }
 
 static const float *column_of(const sensor_figures *f, size_t k) {
@@ -190,7 +193,6 @@ static size_t place_of(const sensor_figures *f, uint32_t light) {
 /* Fills the figures of a vector. */
 static bool add_vector(const scene *s, const radiosity_request *request, size_t v, sensor_figures *f,
                        problem *why) {
-    const reduce_request *r = &request->reduce;
     const size_t C = s->n_channels, all = scene_sensors(s);
     const sensor_lights of = scene_sensor_lights(s);
     const codec_scene about = {
@@ -199,11 +201,11 @@ static bool add_vector(const scene *s, const radiosity_request *request, size_t 
     for (size_t c = 0; c < C; c++) {
         for (size_t k = 0; k < request->n_spots; k++)
             if (request->spots[k].vector == v)
-                add_column(s, r, c, (double)request->colours[k * C + c],
-                           column_of(f, place_of(f, request->spots[k].where)), f->values);
+                add_column(s, f, c, (double)request->colours[k * C + c],
+                           column_of(f, place_of(f, request->spots[k].where)));
         for (size_t k = 0; k < f->n_lights; k++)
             if (f->lights[k] >= of.groups)
-                add_column(s, r, c, weight_of(s, request, f->lights[k], v, c), column_of(f, k), f->values);
+                add_column(s, f, c, weight_of(s, request, f->lights[k], v, c), column_of(f, k));
         const bool limits = !request->linear_map && !radiosity_request_has_signs(request, &about, v, c);
         for (size_t k = c * all; limits && k < (c + 1) * all; k++) f->values[k] = fmax(f->values[k], 0);
     }
@@ -236,7 +238,8 @@ static size_t work_of(const scene *s, const radiosity_request *request, size_t n
             receivers +=
                 s->sensor_sets.start[r->names[k].groups[g] + 1] - s->sensor_sets.start[r->names[k].groups[g]];
     /* Beside the lights, figures look at each receiver some times. */
-    return bytes_times(request->n_rhs * s->n_channels, scene_sensors(s) + receivers * (n_lights + 4));
+    return bytes_times(request->n_rhs * s->n_channels,
+                       scene_sensors(s) + s->sensor_sets.n_groups * n_lights + receivers * (n_lights + 4));
 }
 
 bool sensor_figures_quick(call *in, const radiosity_request *request, answer_notes *notes, buffer *b) {

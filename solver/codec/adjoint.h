@@ -16,7 +16,8 @@ typedef enum gradient_kind {
 
 /* Starts zeroed. */
 typedef struct adjoint_request {
-    radiosity_request cotangent; /* E is g [C][n] */
+    radiosity_request cotangent; /* E is g [C][n]; at_sensors: its `sensors` are g [C][s] in place of that,
+                                    and the quantity is what they are gathered from, radiosity */
     radiosity_request light;     /* E, sky and luminaires of `emission`; n_rhs is 0 without it */
     lam_quantity quantity;
     gradient_kind named[GRADIENT_COUNT];

@@ -91,7 +91,10 @@ enum { COTANGENT, QUANTITY, GRADIENT, EMISSION, N_NAMES };
 
 static bool read_member(parser *p, size_t which, void *to) {
     adjoint_request *const request = to;
-    if (which == QUANTITY) return parser_read_quantity(p, &request->quantity);
+    if (which == QUANTITY) {
+        p->quantity_given = true;
+        return parser_read_quantity(p, &request->quantity);
+    }
     if (which == GRADIENT) return read_gradient(p, request);
     p->request = which == COTANGENT ? &request->cotangent : &request->light;
     return parser_read_emission(p);
@@ -125,13 +128,34 @@ static void settle(const codec_scene *scene, adjoint_request *request) {
     }
 }
 
+/* Sensors receive irradiance, which is gathered from the radiosity of all elements. */
+static bool settle_sensors(parser *p, adjoint_request *request) {
+    request->cotangent.at_sensors = request->cotangent.sensors.values != NULL;
+    if (!request->cotangent.at_sensors) return true;
+    p->pointer_length = 0;
+    if (p->quantity_given && request->quantity != LAM_IRRADIANCE) {
+        parser_point_key(p, "quantity", 8);
+        return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
+                             "%s is %s, and sensors receive irradiance alone; leave it out", parser_here(p),
+                             codec_quantity_name(request->quantity));
+    }
+    if (request->light.n_suns > 0)
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                             "the body holds an exact sun and sensors, to which none comes; leave the sun to "
+                             "the tiles of the sky");
+    request->quantity = LAM_RADIOSITY;
+    return true;
+}
+
 bool codec_read_adjoint_json(const codec_scene *scene, const char *text, size_t length,
                              adjoint_request *request, problem *why) {
     parser p;
     request->cotangent.any_sign = true;
     const bool good =
         parser_begin(&p, scene, text, length, &request->cotangent, why) && read_body(&p, request);
-    if (!parser_end(&p, good) || !radiosity_request_expand(&request->cotangent, scene, why)) return false;
+    if (!parser_end(&p, good && settle_sensors(&p, request)) ||
+        !radiosity_request_expand(&request->cotangent, scene, why))
+        return false;
     settle(scene, request);
     return !adjoint_wants(request, GRADIENT_REFLECTANCE) ||
            radiosity_request_expand(&request->light, scene, why);

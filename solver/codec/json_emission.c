@@ -30,8 +30,7 @@ static inline bool read_value(parser *p, float *value) {
     return (*value >= least_value(p) && *value <= FLT_MAX) || bad_value(p, *value);
 }
 
-/* Inside an array that was entered: count values, then its end. */
-static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of_what) {
+bool parser_read_rest_of_row(parser *p, float *row, size_t count, const char *of_what) {
     const float least = least_value(p);
     size_t i = json_read_plain_floats(&p->r, row, count);
     for (; json_next_element(&p->r); i++, i += json_read_plain_floats(&p->r, row + i, count - i)) {
@@ -54,12 +53,11 @@ static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of
                          parser_here(p), i, count, of_what);
 }
 
-/* A number for all channels, or one each. */
-static bool read_colour(parser *p, float *colour) {
+bool parser_read_colour(parser *p, float *colour) {
     size_t C = p->scene->n_channels;
     if (json_peek(&p->r) == JSON_ARRAY) {
         if (!json_enter_array(&p->r)) return parser_fault(p);
-        return read_rest_of_row(p, colour, C, "channel");
+        return parser_read_rest_of_row(p, colour, C, "channel");
     }
     if (json_peek(&p->r) != JSON_NUMBER)
         return parser_expect(p, JSON_NUMBER, "a number or one for each channel");
@@ -123,7 +121,7 @@ static bool read_dense(parser *p, float *E) {
     size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length, rows = 0;
     if (!json_enter_array(&p->r)) return parser_fault(p);
     if (json_look(&p->r) != JSON_ARRAY) {
-        if (!read_rest_of_row(p, E, n, "element")) return false;
+        if (!parser_read_rest_of_row(p, E, n, "element")) return false;
         for (size_t c = 1; c < C; c++) memcpy(E + c * n, E, n * sizeof *E);
         return true;
     }
@@ -134,7 +132,7 @@ static bool read_dense(parser *p, float *E) {
         parser_point_index(p, rows);
         if (!parser_expect(p, JSON_ARRAY, "an array of numbers")) return false;
         if (!json_enter_array(&p->r)) return parser_fault(p);
-        if (!read_rest_of_row(p, E + rows * n, n, "element")) return false;
+        if (!parser_read_rest_of_row(p, E + rows * n, n, "element")) return false;
         p->pointer_length = mark;
         rows++;
     }
@@ -158,7 +156,7 @@ static bool read_values(parser *p, size_t *count) {
                                                        C * sizeof *p->values, "values", NULL) != LAM_OK)
             return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
         parser_point_index(p, *count);
-        if (!read_colour(p, p->values + *count * C)) return false;
+        if (!parser_read_colour(p, p->values + *count * C)) return false;
         p->pointer_length = mark;
         (*count)++;
     }
@@ -186,7 +184,7 @@ static bool read_groups(parser *p) {
         size_t n_found;
         if (!parser_find_group(p, &key, &found, &n_found)) return false;
         const bool light = !p->request->any_sign && json_peek(&p->r) == JSON_TEXT;
-        if (!(light ? parser_read_light(p, n_found, found, p->colour) : read_colour(p, p->colour)))
+        if (!(light ? parser_read_light(p, n_found, found, p->colour) : parser_read_colour(p, p->colour)))
             return false;
         for (size_t k = 0; k < n_found; k++) {
             const index_set_result added = index_set_add(&p->seen, found[k]);
@@ -207,7 +205,7 @@ bool parser_read_radiance(parser *p, float *colour) {
     const size_t mark = p->pointer_length;
     float rgb[3] = {0};
     size_t k = 0;
-    if (p->scene->n_channels != 1 || json_peek(&p->r) != JSON_ARRAY) return read_colour(p, colour);
+    if (p->scene->n_channels != 1 || json_peek(&p->r) != JSON_ARRAY) return parser_read_colour(p, colour);
     if (!json_enter_array(&p->r)) return parser_fault(p);
     for (; json_next_element(&p->r); k++) {
         if (k == 3)
@@ -279,7 +277,7 @@ static bool read_by_name(parser *p, const named_sources *of, float *row) {
         size_t n_found;
         parser_point_key(p, key.bytes, key.length);
         if (!of->find(p, &key, &found, &n_found)) return false;
-        if (!read_colour(p, p->colour)) return false;
+        if (!parser_read_colour(p, p->colour)) return false;
         for (size_t k = 0; k < n_found; k++) {
             const index_set_result added = index_set_add(&p->seen, found[k]);
             if (added == INDEX_SET_KNOWN)
@@ -308,7 +306,7 @@ static bool read_emitters(parser *p) {
     if (!named && !parser_expect(p, JSON_ARRAY, "an array of weights, or an object of names and weights"))
         return false;
     if (!radiosity_request_emitters(p->request, p->scene, &W, p->why)) return refused_here(p);
-    if (!named) return read_side(p, p->scene->n_emitters, "emitter", read_colour, W);
+    if (!named) return read_side(p, p->scene->n_emitters, "emitter", parser_read_colour, W);
     const named_sources of = {"emitter", p->scene->n_emitters, p->scene->emitters->names, find_emitters};
     return read_by_name(p, &of, W);
 }
@@ -334,7 +332,7 @@ static bool read_luminaires(parser *p) {
 }
 
 /* The members of an emission that is an object. */
-enum { ELEMENTS, VALUES, GROUPS, SKY, SUN, EMITTERS, LUMINAIRES, N_NAMES };
+enum { ELEMENTS, VALUES, GROUPS, SKY, SUN, EMITTERS, LUMINAIRES, SENSORS, N_NAMES };
 
 /* The members that stand beside the emission of elements, and have no sign. */
 static bool read_beside(parser *p, size_t which) {
@@ -348,8 +346,8 @@ static bool read_beside(parser *p, size_t which) {
 }
 
 static bool read_emission_object(parser *p) {
-    static const char *const names[] = {"elements", "values",   "groups",    "sky",
-                                        "sun",      "emitters", "luminaires"};
+    static const char *const names[] = {"elements", "values",   "groups",     "sky",
+                                        "sun",      "emitters", "luminaires", "sensors"};
     const size_t C = p->scene->n_channels, mark = p->pointer_length;
     size_t n_values = 0, which;
     unsigned seen = 0;
@@ -358,8 +356,12 @@ static bool read_emission_object(parser *p) {
     while (parser_next_member(p, &key)) {
         bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
         if (!good) return false;
-        if (p->request->any_sign && which >= SKY)
-            return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s: a cotangent is of elements or groups",
+        if (p->request->any_sign && which >= SKY && which != SENSORS)
+            return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                                 "%s: a cotangent is of elements, groups or sensors", parser_here(p));
+        if (!p->request->any_sign && which == SENSORS)
+            return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                                 "%s: sensors receive light and emit none; select or reduce names them",
                                  parser_here(p));
         switch (which) {
         case ELEMENTS:
@@ -371,6 +373,9 @@ static bool read_emission_object(parser *p) {
         case GROUPS:
             good = read_groups(p);
             break;
+        case SENSORS:
+            good = parser_read_sensor_weights(p);
+            break;
         default:
             good = read_beside(p, which);
         }
@@ -381,7 +386,12 @@ static bool read_emission_object(parser *p) {
     const bool sparse = (seen & (1u << ELEMENTS | 1u << VALUES)) != 0;
     const bool groups = (seen & 1u << GROUPS) != 0, emitters = (seen & 1u << EMITTERS) != 0;
     const bool alone = (seen & (1u << SKY | 1u << SUN | 1u << LUMINAIRES)) != 0;
-    const int ways = sparse + groups + emitters;
+    const bool sensors = (seen & 1u << SENSORS) != 0;
+    const int ways = sparse + groups + emitters + sensors;
+    if (p->request->any_sign && ways != 1)
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                             "%s must hold either elements and values, or groups, or sensors",
+                             parser_here(p));
     if (ways > 1 || (ways == 0 && !alone))
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
                              "%s must hold either elements and values or groups or emitters, or a sky, a sun "

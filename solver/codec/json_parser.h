@@ -133,6 +133,17 @@ bool parser_read_indices(parser *p, index_kind kind, bool once, index_list *indi
 /* The value of `quantity`. */
 bool parser_read_quantity(parser *p, lam_quantity *quantity);
 
+/* A number for all channels, or one each, into colour [C]; and, inside an array that was entered, count
+ * numbers and its end. Numbers are within single precision, and below 0 where the request allows that. */
+bool parser_read_colour(parser *p, float *colour);
+bool parser_read_rest_of_row(parser *p, float *row, size_t count, const char *of_what);
+
+/* The weights of sensors in a cotangent. */
+bool parser_read_sensor_weights(parser *p);
+
+/* [NAME, ...] of sets of sensors: their receivers, and the names in reduce. */
+bool parser_read_sensor_sets(parser *p);
+
 /* A number for all channels or one each, of which none is below 0; of one channel also red, green and blue,
  * which count by their luminance. colour is [C]. */
 bool parser_read_radiance(parser *p, float *colour);

@@ -32,6 +32,23 @@ static bool read_reduced(parser *p, bool sensors) {
                          sensors ? "set of sensors" : "group");
 }
 
+bool parser_read_sensor_sets(parser *p) {
+    const group_index *sets = p->scene->sensors;
+    const reduce_request *reduce = &p->request->reduce;
+    index_list receivers = {0};
+    if (!read_reduced(p, true)) return false;
+    bool good = parser_append(p, &receivers, NULL, 0);
+    for (size_t k = 0; good && k < reduce->n_names; k++)
+        for (size_t g = 0; good && g < reduce->names[k].n_groups; g++) {
+            const uint32_t set = reduce->names[k].groups[g], count = sets->start[set + 1] - sets->start[set];
+            good = parser_append(p, &receivers, sets->elements + sets->start[set], count);
+        }
+    p->request->receivers = receivers.values;
+    p->request->n_receivers = receivers.count;
+    p->request->at_sensors = true;
+    return good;
+}
+
 /* The word of shares, which have limits of their own. */
 static bool is_share(const json_slice *word) {
     const char *name = reduce_statistic_name(REDUCE_SHARE);

@@ -16,6 +16,7 @@ void radiosity_request_free(radiosity_request *request) {
     free(request->sky.values);
     free(request->emitters.values);
     free(request->luminaires.values);
+    free(request->sensors.values);
     free(request->suns);
     free(request->sunlight);
     free(request->selected);
@@ -189,6 +190,12 @@ bool radiosity_request_emitters(radiosity_request *request, const codec_scene *s
 bool radiosity_request_luminaires(radiosity_request *request, const codec_scene *scene, float **row,
                                   problem *why) {
     return add_side(request, scene, &request->luminaires, scene->n_luminaires, "luminaires", row, why);
+}
+
+bool radiosity_request_sensors(radiosity_request *request, const codec_scene *scene, float **row,
+                               problem *why) {
+    return add_side(request, scene, &request->sensors, scene->sensors->start[scene->sensors->n_groups],
+                    "sensors", row, why);
 }
 
 bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene, const request_sun *sun,

@@ -95,6 +95,7 @@ typedef struct radiosity_request {
     bool by_luminance;     /* some are the luminance of a colour, for a store of one channel */
     side_rows emitters;    /* their weights */
     side_rows luminaires;  /* their dimmers */
+    side_rows sensors;     /* of a cotangent, of their values */
     request_sun *suns;     /* [n_suns], by growing vector */
     float *sunlight;       /* [n_suns][C], irradiance of a plane normal to them */
     size_t n_suns, suns_capacity;
@@ -149,6 +150,10 @@ bool radiosity_request_emitters(radiosity_request *request, const codec_scene *s
                                 problem *why);
 bool radiosity_request_luminaires(radiosity_request *request, const codec_scene *scene, float **row,
                                   problem *why);
+
+/* The same of the cotangent of sensors, [C][receivers]. */
+bool radiosity_request_sensors(radiosity_request *request, const codec_scene *scene, float **row,
+                               problem *why);
 
 /* A sun over the last vector, which is set here; direct is [C]. */
 bool radiosity_request_sun(radiosity_request *request, const codec_scene *scene, const request_sun *sun,

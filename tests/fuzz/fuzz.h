@@ -74,6 +74,22 @@ static inline const luminaire_names *fuzz_luminaires(void) {
     return &names;
 }
 
+/* Sets of 2 and of 3 sensors, the last of which has no value. */
+enum { FUZZ_SENSORS = 5 };
+static inline const group_index *fuzz_sensors(void) {
+    static char *names[] = {"room.a", "room.b"};
+    static uint32_t start[] = {0, 2, FUZZ_SENSORS}, elements[] = {0, 1, 2, 3, 4}, sorted[] = {0, 1};
+    static bool without[] = {false, false, false, false, true};
+    static const group_index sets = {.noun = "set of sensors",
+                                     .n_groups = 2,
+                                     .names = names,
+                                     .start = start,
+                                     .elements = elements,
+                                     .sorted = sorted,
+                                     .buried = without};
+    return &sets;
+}
+
 /* A small scene; shape says of which kind. The caller frees groups. */
 static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
     static const char *names[] = {"lamp", "wall", "wall.red", "\xc3\xa9t\xc3\xa9"};
@@ -95,6 +111,7 @@ static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
                          .emitters = groups,
                          .n_luminaires = shape & 32 ? FUZZ_LUMINAIRES : 0,
                          .luminaires = fuzz_luminaires(),
+                         .sensors = shape & 8 ? fuzz_sensors() : NULL,
                          .max_batch = 4,
                          .max_bytes = 1 << 20,
                          .only_linear = (shape & 24) == 24,

@@ -1,9 +1,25 @@
 /* Adjoint requests as a client may send them. */
 #include "fuzz/fuzz.h"
 #include "solver/codec/adjoint.h"
+#include "solver/codec/jacobian.h"
 
 #include <float.h>
 #include <math.h>
+
+/* The text as a request for derivatives. */
+static void read_jacobian(const codec_scene *scene, const char *text, size_t size) {
+    jacobian_request request = {.n_by = 0};
+    problem why = {0};
+    if (codec_read_jacobian_json(scene, text, size, &request, &why)) {
+        FUZZ_CHECK(scene->sensors != NULL && request.n_by > 0 && request.n_by <= JACOBIAN_KINDS);
+        FUZZ_CHECK(request.of.n_receivers > 0 && request.of.reduce.n_names > 0);
+        for (size_t k = 0; k < request.of.n_receivers; k++)
+            FUZZ_CHECK(request.of.receivers[k] < FUZZ_SENSORS);
+    } else {
+        fuzz_check_problem(&why);
+    }
+    jacobian_request_free(&request);
+}
 
 /* The last byte says what scene it is. */
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -19,6 +35,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                      : codec_read_adjoint_npy(&scene, text, size, &request, &why)) {
             FUZZ_CHECK(request.cotangent.n_rhs == 1 && request.light.n_rhs <= 1 && request.wanted != 0);
             for (size_t i = 0; i < values; i++) FUZZ_CHECK(fabsf(request.cotangent.E[i]) <= FLT_MAX);
+            const side_rows *sensors = &request.cotangent.sensors;
+            FUZZ_CHECK(request.cotangent.at_sensors == (sensors->n == 1));
+            for (size_t i = 0; i < sensors->n * scene.n_channels * FUZZ_SENSORS; i++)
+                FUZZ_CHECK(fabsf(sensors->values[i]) <= FLT_MAX);
             /* Light that no gradient wants stays as it was written. */
             const bool lit = request.light.n_rhs == 1 && adjoint_wants(&request, GRADIENT_REFLECTANCE);
             for (size_t i = 0; i < values && lit; i++)
@@ -28,6 +48,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         }
         adjoint_request_free(&request);
     }
+    read_jacobian(&scene, text, size);
     group_index_free(&groups);
     free(text);
     return 0;

@@ -30,6 +30,28 @@ static void check_luminaires(const codec_scene *scene, const radiosity_request *
         FUZZ_CHECK(side->values[i] >= 0 && side->values[i] <= FLT_MAX);
 }
 
+/* Figures or numbers of sensors are gathered from radiosities of all elements. */
+static void check_sensors(const codec_scene *scene, const radiosity_request *request) {
+    const reduce_request *r = &request->reduce;
+    FUZZ_CHECK(request->n_receivers == 0 || request->at_sensors);
+    FUZZ_CHECK(r->n_with <= REDUCE_COUNT + REDUCE_LIMITS_MAX);
+    if (!request->at_sensors) return;
+    FUZZ_CHECK(scene->sensors != NULL && !request->select && request->quantity == LAM_RADIOSITY);
+    FUZZ_CHECK(request->n_suns == 0 && scene->n_emitters == 0 && r->of_sensors == r->on);
+    for (size_t k = 0; k < request->n_receivers; k++) FUZZ_CHECK(request->receivers[k] < FUZZ_SENSORS);
+    double *figures = reduce_figures(r, request->n_rhs, scene->n_channels);
+    float *x = calloc(request->n_rhs * scene->n_channels, FUZZ_SENSORS * sizeof *x);
+    FUZZ_CHECK(figures != NULL && x != NULL);
+    FUZZ_CHECK(!r->on ||
+               reduce_vectors(r, scene->sensors, NULL, scene->n_channels, request->n_rhs, 0, request->n_rhs,
+                              (reduce_values){.floats = x, .whole = true}, figures));
+    buffer b = {0};
+    FUZZ_CHECK(reduce_write(r, scene->n_channels, request->n_rhs, request->batch, figures, &b));
+    buffer_free(&b);
+    free(figures);
+    free(x);
+}
+
 /* The text as a file of emissions: every vector is then dense. */
 static void read_file(const codec_scene *scene, const char *text, size_t size) {
     codec_scene about = *scene;
@@ -70,6 +92,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         FUZZ_CHECK(!request.at_faces || (scene.faces != NULL && !request.reduce.on));
         for (size_t k = 0; k < request.n_faces; k++) FUZZ_CHECK(request.faces[k] < scene.faces->n_faces);
         check_luminaires(&scene, &request);
+        check_sensors(&scene, &request);
         if (request.E != NULL) write_back(&scene, &request, text);
     } else {
         fuzz_check_problem(&why);

@@ -34,12 +34,19 @@ for e in emissions:
                  {"emission": e, "select": {"faces": [3, 0]}},
                  {"emission": e, "reduce": {"groups": ["wall"], "with": ["mean", "sum", "min", "max", "uniformity",
                                                                         "variance"]}},
+                 {"emission": e, "select": {"sensors": ["room"]}},
+                 {"emission": e, "reduce": {"sensors": ["room.b", "room"], "with": ["mean", "share", "min"], "at_least": [1, 300]}},
+                 {"cotangent": {"sensors": {"room.a": {"values": [1, -2]}, "room.b": 3}}, "emission": e, "gradient": ["reflectance"]},
                  {"cotangent": e, "quantity": "radiosity", "gradient": ["emission", "reflectance"], "emission": e},
                  {"cotangent": [1] * 7, "gradient": ["luminaires", "groups"], "emission": e}):
         for blank in " \t\n\r":
             for name in ("adjoint",) if "cotangent" in body else ("json",):
                 (folder / name / f"{count:03}").write_text(json.dumps(body) + blank)
             count += 1
+
+for k, blank in enumerate(" \t\n\r"):
+    (folder / "adjoint" / f"by{k}").write_text(json.dumps({"of": {"sensors": ["room"]}, "by": ["groups", "sky"]}) + blank)
+    (folder / "adjoint" / f"all{k}").write_text(json.dumps({"of": {"sensors": ["room.b", "room.a"]}}) + blank)
 
 # Skies, and small weather of both formats; the last byte says the format and what becomes of gaps.
 for k, sky in enumerate(["even", {"name": "clear", "place": {"latitude": 1, "longitude": 2, "zone": 3}, "date": "1 May 9:00"},

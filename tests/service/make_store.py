@@ -245,6 +245,70 @@ class Luminaires:
         return self
 
 
+class Sensors:
+    """The sensors of a store: two sets of points, one of cylinders, one receiver of which lies in a wall."""
+
+    NAMES, COUNTS, DARK = ("room.a", "room.b", "faces"), (5, 9, 4), 7
+
+    def __init__(self, n, channels=1, tiles=0, lights=None, seed=1):
+        rng = np.random.default_rng(seed)
+        self.n, self.C, self.lights = n, channels, lights
+        self.s = sum(self.COUNTS)
+        self.first = np.concatenate([[0], np.cumsum(self.COUNTS)])
+        self.weights = (rng.random((self.s, n)) * (rng.random((self.s, n)) < .6) / n).astype(np.float32)
+        self.off = (rng.normal(size=(self.s, n)) * 1e-2 * self.weights).astype(np.float32)
+        self.sky = rng.random((tiles, self.s)).astype(np.float32)
+        self.luminaires = (rng.random((len(lights.names), self.s)) * 9).astype(np.float32) if lights is not None else None
+        self.place = rng.uniform(-1, 1, (self.s, 9))
+
+    def rows(self, names):
+        """The receivers of some sets, those of the first before those of the next."""
+        return np.concatenate([np.arange(self.first[k], self.first[k + 1]) for k in map(self.NAMES.index, names)])
+
+    def values(self, B, L=None, D=None):
+        """[C][s] of radiosities [C][n], radiances [C][tiles] and dimmers [C][luminaires], in double."""
+        out = B @ self.weights.T.astype(float)
+        if L is not None:
+            out = out + L @ self.sky.astype(float)
+        if D is not None:
+            colour = self.lights.colour.T if self.C == 3 else np.ones((1, len(self.lights.names)))
+            out = out + (np.asarray(D, float) * colour) @ self.luminaires.astype(float)
+        out[:, self.DARK] = np.nan
+        return out
+
+    def add_to(self, path):
+        """Writes /sensors into a store."""
+        there = self.weights > 0
+        flags = np.zeros(self.s, np.uint32)
+        flags[self.DARK] = 1
+        k = len(self.NAMES)
+        arrays = {
+            "names": np.array([name.encode() for name in self.NAMES]),
+            "kind": np.array([0, 0, 3], np.uint32),
+            "first": self.first.astype(np.uint64),
+            "grid": np.zeros((k, 2), np.uint32),
+            "spacing": np.zeros((k, 2)),
+            "receiver": np.repeat(np.array([0, 0, 1], np.uint32), self.COUNTS),
+            "place": self.place,
+            "cell": np.full(self.s, 0xFFFFFFFF, np.uint32),
+            "flags": flags,
+            "backs": flags.astype(np.float32),
+            "indptr": np.concatenate([[0], np.cumsum(there.sum(1))]).astype(np.uint64),
+            "indices": np.nonzero(there)[1].astype(np.uint32),
+            "weights": self.weights[there],
+            "weights_off": self.off[there],
+        }
+        if len(self.sky):
+            arrays["sky"], arrays["sky_off"] = self.sky, (self.sky * 1e-2).astype(np.float32)
+        if self.luminaires is not None:
+            arrays["luminaires"] = self.luminaires
+        with h5py.File(path, "r+") as f:
+            for name, values in arrays.items():
+                f.create_dataset("sensors/" + name, data=values)
+            add_checksums(f)
+        return self
+
+
 def set_attributes(group, values):
     for key, value in values.items():
         if isinstance(value, str):

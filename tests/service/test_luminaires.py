@@ -235,7 +235,7 @@ class Answers(unittest.TestCase):
                  "emission/luminaires: the store has no luminaires; precompute it with --luminaires")):
             answer = self.post(f"/v1/scenes/{name}/radiosity", {"emission": emission})
             self.assertEqual((answer.status, answer.json()["detail"]), (422, words))
-        for body, words in (({"cotangent": {"luminaires": {"wall": 1}}}, "cotangent/luminaires: a cotangent is of elements or groups"),
+        for body, words in (({"cotangent": {"luminaires": {"wall": 1}}}, "cotangent/luminaires: a cotangent is of elements, groups or sensors"),
                             ({"cotangent": {"groups": {"wall": 1}}, "gradient": ["luminaires"]},
                              "gradient/0: the store has no luminaires; precompute it with --luminaires")):
             answer = self.post("/v1/scenes/plain/adjoint", body)

@@ -206,12 +206,15 @@ class OpenApi(unittest.TestCase):
 
     def test_every_status_that_the_code_can_give(self):
         """A problem that the sources of a route name is described there, and no other one is."""
-        body = [f"solver/codec/{name}.c" for name in "answer group_figures json json_adjoint json_emission json_parser json_skies npy request".split()]
+        names = ("answer group_figures json json_adjoint json_emission json_jacobian json_parser json_reduce json_select json_sensors "
+                 "json_skies npy request")
+        body = [f"solver/codec/{name}.c" for name in names.split()]
         own = {"get_healthz": ["get_health.c"], "get_readyz": ["get_health.c"], "get_metrics": ["get_metrics.c"],
                **{f"keeps_{name}": ["kept_answer.c", file] for name, file in (
                    ("scenes", "get_scenes.c"), ("scene", "get_scenes.c"), ("mesh", "get_mesh.c"), ("openapi", "get_documents.c"), ("manual", "get_documents.c"),
-                   ("sky", "get_sky.c"), ("luminaires", "get_sky.c"), ("weather", "get_sky.c"))},
-               "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c"], "post_adjoint": ["post_adjoint.c"],
+                   ("sky", "get_sky.c"), ("luminaires", "get_sky.c"), ("sensors", "get_sky.c"), ("weather", "get_sky.c"))},
+               "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c", "sensor_figures.c"],
+               "post_adjoint": ["post_adjoint.c"], "post_jacobian": ["post_jacobian.c"],
                "post_skies": ["post_skies.c", "weather_source.c"], "post_weather": ["post_weather.c", "weather_source.c"], "post_sun": ["post_sun.c"],
                "put_reflectance": ["reflectance_variants.c"], "delete_reflectance": ["reflectance_variants.c"],
                "delete_scene": ["reflectance_variants.c"],

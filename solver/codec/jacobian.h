@@ -1,0 +1,28 @@
+/* Request bytes to the receivers and the lights of a matrix of derivatives. No I/O. */
+#ifndef LAMBERT_CODEC_JACOBIAN_H
+#define LAMBERT_CODEC_JACOBIAN_H
+
+#include "solver/codec/request.h"
+
+/* The kinds of columns: dimmers of luminaires, emissions that all elements of a group have, radiances of
+ * tiles. */
+typedef enum jacobian_by { JACOBIAN_LUMINAIRES, JACOBIAN_GROUPS, JACOBIAN_SKY, JACOBIAN_KINDS } jacobian_by;
+
+/* The word of a kind in requests and answers. */
+const char *jacobian_name(jacobian_by kind);
+
+/* Starts zeroed; freed by jacobian_request_free. */
+typedef struct jacobian_request {
+    radiosity_request of;           /* its receivers; with names of sets in the order asked in reduce */
+    jacobian_by by[JACOBIAN_KINDS]; /* in the order asked */
+    size_t n_by;
+} jacobian_request;
+
+void jacobian_request_free(jacobian_request *request);
+
+/* Reads {"of": {"sensors": [NAME, ...]}, "by": [WORD, ...]}. Without `by` all that the store has. False with
+ * *why; 422 for what the store has not. */
+bool codec_read_jacobian_json(const codec_scene *scene, const char *text, size_t length,
+                              jacobian_request *request, problem *why);
+
+#endif
