@@ -245,7 +245,7 @@ static bool begin(call *in, answer *out) {
                               .gaps = request->at_faces || request->at_sensors};
     s->n_computed = request->select ? request->n_selected : of->n;
     in->n_rhs = request->n_rhs;
-    if (good && !request->at_sensors) scene_note_error(of, request, &s->notes);
+    if (good) scene_note_error(of, request, &s->notes);
     good = good && figures_acceptable(in, request, &why);
     good = good && begin_kind(in, s, &why);
     if (!good) {
@@ -296,6 +296,9 @@ static lam_status pass_alone(const scene *s, const radiosity_solve *solve, const
 /* Finds the error of the answer's own emission, which JSON states. */
 static bool judge(const call *in, radiosity_solve *s) {
     s->judged = true;
+    if (s->request.at_sensors)
+        return scene_note_sensor_error(in->scene, &s->request, s->H0, s->out, &s->notes, &s->errors) ||
+               problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
     return (in->scene->errors.emitters.figures.s > 0
                 ? scene_note_emitters_error(in->scene, &s->request, s->W, s->out, &s->notes, &s->errors)
                 : scene_note_own_error(in->scene, &s->request, s->H0, s->sun.shares, s->W, s->out, &s->notes,
@@ -313,7 +316,7 @@ static void pass_figures(call *in, radiosity_solve *s, size_t computed, batch_wo
     else if (s->linear != NULL)
         s->failed = s->failed || !linear_figures_step(in, &s->request, s->linear, workspace, &s->notes,
                                                       &s->answer, &done, &s->why);
-    else if (s->refined == NULL && !s->judged && !s->request.at_sensors)
+    else if (s->refined == NULL && !s->judged)
         s->failed = s->failed || !judge(in, s);
     else
         s->failed = s->failed || !figures_write(in->scene, &s->request,
@@ -453,7 +456,7 @@ static bool write_answer(call *in, radiosity_solve *s) {
     bool good = !s->failed;
     if (s->request.reduce.on) return good;
     if (s->refined != NULL) return good && refined_end(s->refined, &s->notes, &s->answer, &s->why);
-    if (good && in->accept.type == MEDIA_JSON && !s->request.at_sensors) good = judge(in, s);
+    if (good && in->accept.type == MEDIA_JSON) good = judge(in, s);
     if (good) take_places(in, s);
     if (good && s->request.told.luminance) answer_luminance(s->shape.n_rhs, s->shape.n_values, s->own);
     if (s->streams) return good && make_stream(in, s);

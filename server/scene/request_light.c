@@ -3,6 +3,7 @@
 #include "server/scene/direct_light.h"
 
 #include "solver/operator/emitters.h"
+#include "solver/operator/luminaire_light.h"
 #include "solver/operator/stated/whole_law.h"
 
 #include <math.h>
@@ -18,6 +19,30 @@ const float *request_dimmers(const scene *s, const radiosity_request *request, s
     const side_rows *side = &request->luminaires;
     return side->values != NULL && v < side->n ? side->values + v * s->n_channels * scene_luminaires(s)
                                                : NULL;
+}
+
+bool request_has_sky_weights(const scene *s, const radiosity_request *request) {
+    return request->emitters.values != NULL && s->n_emitters > 0 && operator_emitters_of(s->op)->a.L != NULL;
+}
+
+bool request_has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes) {
+    const error_by_group *e = &s->errors.by_group;
+    const bool whole = !request->reduce.linear || e->figures.sky_first != NULL;
+    const bool sky = request->sky.values != NULL || request_has_sky_weights(s, request);
+    const bool known =
+        request->luminaires.values == NULL || luminaires_know_errors(s->luminaires, s->groups.n_groups);
+    return e->n_bins > 0 && notes->has_error && known && s->errors.emitters.figures.s == 0 &&
+           request->tolerance == 0 &&
+           (!sky || (whole && s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
+}
+
+emission_size request_sky_size(const scene *s, const float *L) {
+    const error_by_group *e = &s->errors.by_group;
+    const size_t C = s->n_channels, m = e->figures.n_tiles;
+    emission_size size = {.power2 = 0};
+    for (size_t c = 0; L != NULL && c < C; c++)
+        emission_size_add(&size, m, e->figures.sky_power + c * m, L + c * m);
+    return size;
 }
 
 /* The light of the weights of emitters that a request has: adds the power and squares of what elements emit,

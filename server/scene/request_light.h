@@ -16,6 +16,16 @@ const float *request_dimmers(const scene *s, const radiosity_request *request, s
  * is, and O(C n) for each vector that is expanded or of emitters. False when memory is short. */
 bool request_sizes(const scene *s, const radiosity_request *request, mean_errors *to);
 
+/* True where weights of emitters are given, some of which may be of the sky. */
+bool request_has_sky_weights(const scene *s, const radiosity_request *request);
+
+/* True where the error of the answer's own emission can be told: the store states errors by group, of the
+ * light that it has. */
+bool request_has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes);
+
+/* The size of the sky L [C][m]; NULL: there is none. */
+emission_size request_sky_size(const scene *s, const float *L);
+
 /* Work for the light that elements send on: vectors [C][n] and [n]. */
 typedef struct sent_light {
     float *luminaires; /* [C][n], their irradiance; NULL: no vector has any */

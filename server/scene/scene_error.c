@@ -13,7 +13,8 @@
 /* True where the store was built for receivers and the request asks for nothing else. */
 static bool asks_receivers(const scene *s, const radiosity_request *request) {
     const reduce_request *r = &request->reduce;
-    if (s->errors.read == NULL) return false;
+    /* Sensors gather from all elements. */
+    if (s->errors.read == NULL || request->at_sensors) return false;
     if (!r->on)
         return stated_errors_others(&s->errors, request->select ? request->n_selected : s->n,
                                     request->select ? request->selected : NULL) == 0;
@@ -64,33 +65,6 @@ error_scene scene_for_errors(const scene *s) {
                          .read = s->errors.read,
                          .emits = s->errors.emits,
                          .buried = s->groups.buried};
-}
-
-/* True where weights of emitters are given, some of which may be of the sky. */
-static bool has_sky_weights(const scene *s, const radiosity_request *request) {
-    return request->emitters.values != NULL && s->n_emitters > 0 && operator_emitters_of(s->op)->a.L != NULL;
-}
-
-/* True where the error of the answer's own emission can be told. */
-static bool has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes) {
-    const error_by_group *e = &s->errors.by_group;
-    const bool whole = !request->reduce.linear || e->figures.sky_first != NULL;
-    const bool sky = request->sky.values != NULL || has_sky_weights(s, request);
-    const bool known =
-        request->luminaires.values == NULL || luminaires_know_errors(s->luminaires, s->groups.n_groups);
-    return e->n_bins > 0 && notes->has_error && known && s->errors.emitters.figures.s == 0 &&
-           request->tolerance == 0 &&
-           (!sky || (whole && s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
-}
-
-/* The size of the sky L [C][m]; NULL: there is none. */
-static emission_size size_of_sky(const scene *s, const float *L) {
-    const error_by_group *e = &s->errors.by_group;
-    const size_t C = s->n_channels, m = e->figures.n_tiles;
-    emission_size size = {.power2 = 0};
-    for (size_t c = 0; L != NULL && c < C; c++)
-        emission_size_add(&size, m, e->figures.sky_power + c * m, L + c * m);
-    return size;
 }
 
 static bool is_larger(double a, double b) {
@@ -161,7 +135,7 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     const size_t count = request->select ? request->n_selected : s->n;
     answer_notes made = *notes;
     *names = NULL;
-    if (!has_own_error(s, request, notes)) return true;
+    if (!request_has_own_error(s, request, notes)) return true;
     name_error *const kept = memory_allocate(reduce->n_names, 2 * sizeof *kept, "errors", NULL);
     const size_t n_own = W != NULL ? 2 * vector + C * s->errors.by_group.figures.n_tiles : 0;
     float *const own = memory_allocate(n_own, sizeof *own, "errors", NULL);
@@ -183,7 +157,7 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
                            .L = light.L,
                            .luminaires = lit_luminaires_of(s->luminaires, request_dimmers(s, request, v))};
         sent_light_size(s, request, v, of.E, sun, &sent, &of);
-        of.sky = size_of_sky(s, light.L);
+        of.sky = request_sky_size(s, light.L);
         if (reduce->on) {
             good = name_errors_of(&s->errors.by_group, &about, &of, reduce, kept + reduce->n_names);
             const emission_size both = emission_size_sum(&of.size, &of.sky);
@@ -358,7 +332,7 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
         *out = made;
         return true;
     }
-    if (!has_own_error(s, request, notes)) return true;
+    if (!request_has_own_error(s, request, notes)) return true;
     if (request->luminaires.values != NULL) {
         if (!scene_luminaire_sums(s, &made.luminaires)) return false;
         if (made.luminaires == NULL) return true;
@@ -371,7 +345,7 @@ bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, a
     made.n_vectors = request->n_rhs;
     bool good = made.names != NULL && made.sizes != NULL && made.emission != NULL && made.whole != NULL;
     if (request->emitters.values != NULL && s->n_emitters > 0) {
-        const bool sky = has_sky_weights(s, request);
+        const bool sky = request_has_sky_weights(s, request);
         made.E = memory_allocate(s->n_channels, s->n * sizeof *made.E, "errors", NULL);
         made.sums = memory_allocate(rows, s->groups.n_groups * sizeof *made.sums, "errors", NULL);
         if (sky)
@@ -435,7 +409,7 @@ bool scene_mean_errors_add(const scene *s, const radiosity_request *request, siz
                                .size = to->sizes[v],
                                .whole = to->whole[v],
                                .luminaires = lit,
-                               .sky = size_of_sky(s, L),
+                               .sky = request_sky_size(s, L),
                                .L = L,
                                .buried = buried,
                                .value = means + v * C,

@@ -74,6 +74,19 @@ static bool write_light(buffer *b, const answer_notes *notes) {
     return written && buffer_append(b, "}", 1);
 }
 
+/* Of sensors there are the parts of the headline alone, of all and of each name. */
+static bool write_sensors_error(buffer *b, const answer_notes *notes) {
+    bool written = buffer_append_text(b, ",\"error\":{") && headline_write(b, &notes->head) &&
+                   buffer_printf(b, ",\"light\":\"%s\",\"sensors\":{", notes->error_light);
+    for (size_t k = 0; written && k < notes->n_name_errors; k++) {
+        const name_error *one = &notes->name_errors[k];
+        const headline head = {.known = true, .parts = one->parts, .share = notes->head.share};
+        written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, one->name) &&
+                  buffer_append(b, ":{", 2) && headline_write(b, &head) && buffer_append(b, "}", 1);
+    }
+    return written && buffer_append(b, "}}", 2);
+}
+
 /* The figures, and the elements that they are of; without figures a word on why there are none. */
 static bool write_error(buffer *b, const answer_notes *notes) {
     const char *of = notes->error_of, *from = notes->error_from;
@@ -82,6 +95,7 @@ static bool write_error(buffer *b, const answer_notes *notes) {
         return head->advice == NULL ||
                (buffer_append_text(b, ",\"error\":{") && headline_write(b, head) &&
                 (from == NULL || buffer_printf(b, ",\"from\":\"%s\"", from)) && buffer_append(b, "}", 1));
+    if (notes->of_sensors) return write_sensors_error(b, notes);
     return buffer_append_text(b, ",\"error\":{") && headline_write(b, head) &&
            buffer_append_text(b, ",\"relative_mean\":") && json_write_double(b, notes->relative_mean) &&
            buffer_append_text(b, ",\"indirect_mean\":") && json_write_double(b, notes->indirect_mean) &&

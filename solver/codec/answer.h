@@ -34,6 +34,7 @@ typedef struct answer_notes {
     double emitters;         /* effective number, of "own" */
     size_t n_name_errors;
     const name_error *name_errors; /* of "own": of the names that are reduced */
+    bool of_sensors;               /* of "own": that error is of sensors, and so are its names */
     const char *error_of; /* the elements that the error is of, "receivers" or "all", where a store was built
                              for receivers; NULL: it was built for all */
     const char *error_from; /* "sources" where a store was built for these and they alone emit; "others": not

@@ -39,8 +39,8 @@ static double lamps2_of(const error_by_group *e, const error_scene *scene, const
 
 /* The first light of a sun or of luminaires, of which E tells nothing, has the law of its size alone. *sizes
  * owns its whole groups. False when memory is short. */
-static bool sizes_of_answer(const error_by_group *e, const error_scene *scene, const error_answer *of,
-                            light_sizes *sizes) {
+bool answer_sizes_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
+                     light_sizes *sizes) {
     *sizes = light_sizes_of(e, of->quantity, &of->size, of->L);
     sizes->luminaires = of->luminaires;
     sizes->size.lamps2 = lamps2_of(e, scene, of->E);
@@ -153,7 +153,7 @@ bool answer_error_of(const error_by_group *e, const error_scene *scene, const er
     double off = 0, reflected = 0, radiosity = 0, light = 0, mesh = 0;
     const emission_size both = emission_size_sum(&of->size, &of->sky);
     light_sizes sizes;
-    value_sums *sums = sizes_of_answer(e, scene, of, &sizes) ? sum_values(e, scene, of, false) : NULL;
+    value_sums *sums = answer_sizes_of(e, scene, of, &sizes) ? sum_values(e, scene, of, false) : NULL;
     if (sums == NULL) {
         whole_light_free(&sizes.whole);
         return false;
@@ -223,7 +223,7 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
                     const reduce_request *names, name_error *errors) {
     const size_t n_rows = e->n_bins / e->figures.n_groups;
     light_sizes sizes;
-    value_sums *sums = sizes_of_answer(e, scene, of, &sizes) ? sum_values(e, scene, of, true) : NULL;
+    value_sums *sums = answer_sizes_of(e, scene, of, &sizes) ? sum_values(e, scene, of, true) : NULL;
     if (sums == NULL) {
         whole_light_free(&sizes.whole);
         return false;

@@ -38,6 +38,7 @@ typedef struct stated_parts {
                     is 0, too */
     double mesh; /* of constants on elements; negative: not stated */
     double sun;  /* of the way in which an answer takes the sun of a year; 0: it takes none */
+    double rows; /* of the sampling of the rows of sensors; 0: of elements */
 } stated_parts;
 
 /* The root of the mean squared error over the light that is left where that error is taken out of the light
@@ -48,6 +49,11 @@ typedef struct answer_error {
     double emitters; /* effective number */
     stated_parts parts;
 } answer_error;
+
+/* The sizes of the light of an answer; whole of it is freed by the caller with whole_light_free, also when
+ * memory is short: false. */
+bool answer_sizes_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
+                     light_sizes *sizes);
 
 /* The error of all values. Cost: O(C count), and under a sky C n_tiles for each group of them. False when
  * memory is short. */

@@ -13,7 +13,7 @@ static const char *verb_of(const headline_part *part) {
 }
 
 double headline_stated(const headline *h) {
-    return hypot(hypot(h->parts.rest, fmax(h->parts.mesh, 0)), h->parts.sun);
+    return hypot(hypot(h->parts.rest, fmax(h->parts.mesh, 0)), hypot(h->parts.sun, h->parts.rows));
 }
 
 bool headline_has_light(const stated_parts *parts) {
@@ -35,6 +35,8 @@ size_t headline_parts(const headline *h, headline_part out[HEADLINE_PARTS], size
     }
     if (h->parts.mesh >= 0) out[n++] = (headline_part){"mesh", "mesh", "--mesh-error .05", h->parts.mesh};
     if (h->parts.sun > 0) out[n++] = (headline_part){"sun", "sun", sun_option, h->parts.sun};
+    if (h->parts.rows > 0)
+        out[n++] = (headline_part){"rows", "rows of sensors", "--quality high", h->parts.rows};
     *largest = 0;
     for (size_t k = 1; k < n; k++)
         if (out[k].error > out[*largest].error) *largest = k;

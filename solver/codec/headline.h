@@ -1,5 +1,6 @@
 /* The headline: one stated error of an answer or of a store, the root of the sum of squares of operator, form
- * factors, mesh and sun, and how it is told. It must not know where its parts come from (answer_error.h). */
+ * factors, mesh, sun and rows of sensors, and how it is told. It must not know where its parts come from
+ * (answer_error.h). */
 #ifndef LAMBERT_CODEC_HEADLINE_H
 #define LAMBERT_CODEC_HEADLINE_H
 
@@ -30,7 +31,7 @@ typedef struct headline_part {
     const char *option; /* of precompute, that lowers it, or, of the sun, of solve */
     double error;
 } headline_part;
-enum { HEADLINE_PARTS = 4 };
+enum { HEADLINE_PARTS = 5 };
 size_t headline_parts(const headline *h, headline_part out[HEADLINE_PARTS], size_t *largest);
 
 /* Takes other parts where their sum is larger, as of another vector of a batch. */

@@ -108,7 +108,7 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
                 parser_settle_places(&p) && parser_convert(&p) && parser_fill_sides(&p);
     if (!parser_end(&p, good)) return false;
     if (reduce->of_sensors)
-        reduce->linear = request->tolerance == 0 && is_of_columns(request);
+        reduce->linear = reduce->on && request->tolerance == 0 && is_of_columns(request);
     else if (request->tolerance > 0 || request->n_suns > 0 || reduce->n_names > scene->max_rows)
         reduce->linear = false;
     if (scene->only_linear && !reduce->linear) return parser_not_linear(&p);

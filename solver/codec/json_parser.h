@@ -141,7 +141,7 @@ bool parser_read_rest_of_row(parser *p, float *row, size_t count, const char *of
 /* The weights of sensors in a cotangent. */
 bool parser_read_sensor_weights(parser *p);
 
-/* [NAME, ...] of sets of sensors: their receivers, and the names in reduce. */
+/* [NAME, ...] of sets of sensors, each once: their receivers, and the names in reduce, which stays off. */
 bool parser_read_sensor_sets(parser *p);
 
 /* A number for all channels or one each, of which none is below 0; of one channel also red, green and blue,

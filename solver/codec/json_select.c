@@ -39,34 +39,8 @@ static bool knows_faces(parser *p) {
                          parser_here(p));
 }
 
-/* ["room", ...]: the receivers of the first set, then of the next. */
-static bool read_selected_sensors(parser *p, index_list *selected) {
-    const group_index *sets = p->scene->sensors;
-    const size_t mark = p->pointer_length;
-    size_t most, index = 0;
-    if (!parser_expect(p, JSON_ARRAY, "an array of names of sets") || !parser_knows_sensors(p)) return false;
-    if (!json_enter_array(&p->r)) return parser_fault(p);
-    most = sets->start[sets->n_groups];
-    for (; json_next_element(&p->r); index++) {
-        json_slice name;
-        const uint32_t *found = NULL;
-        size_t n_found;
-        parser_point_index(p, index);
-        if (!parser_read_sensors(p, &name, &found, &n_found)) return false;
-        for (size_t k = 0; k < n_found; k++) {
-            const uint32_t first = sets->start[found[k]], count = sets->start[found[k] + 1] - first;
-            if (count > most - selected->count)
-                return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s: more than the %zu sensors of the scene",
-                                     parser_here(p), most);
-            if (!parser_append(p, selected, sets->elements + first, count)) return false;
-        }
-        p->pointer_length = mark;
-    }
-    return parser_closed(p);
-}
-
 static bool read_selected(parser *p, select_word which, index_list *selected) {
-    if (which == SELECT_SENSORS) return read_selected_sensors(p, selected);
+    if (which == SELECT_SENSORS) return parser_read_sensor_sets(p);
     if (which == SELECT_ELEMENTS) return parser_read_indices(p, INDEX_ELEMENTS, false, selected);
     if (which == SELECT_GROUPS) return read_selected_groups(p, selected);
     return knows_faces(p) && parser_read_indices(p, INDEX_FACES, true, &p->faces);
@@ -170,12 +144,7 @@ static bool settle_sensors(parser *p) {
                              "the tiles of the sky");
     request->quantity = LAM_RADIOSITY;
     request->at_sensors = true;
-    if (!request->select) return true;
     request->select = false;
-    request->receivers = request->selected;
-    request->n_receivers = request->n_selected;
-    request->selected = NULL;
-    request->n_selected = 0;
     return true;
 }
 
@@ -183,8 +152,7 @@ bool parser_settle_places(parser *p) {
     radiosity_request *request = p->request;
     const bool selects = request->select && p->selects == SELECT_FACES;
     p->pointer_length = 0;
-    if (request->reduce.of_sensors || (request->select && p->selects == SELECT_SENSORS))
-        return settle_sensors(p);
+    if (request->reduce.of_sensors) return settle_sensors(p);
     parser_point_key(p, "select", 6);
     if (selects && p->at == AT_ELEMENTS)
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS,

@@ -266,5 +266,6 @@ mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t gro
                           : groups != NULL                               ? groups[m->n_groups]
                                                                          : sent2;
     const double one2 = single != NULL ? single[m->n_groups] : sent2;
-    return (mesh_lack){own2 + factor2_of_elements * sent2 * one2, factor2_of_means * sent2 * whole2};
+    const double point2 = factor2_of_elements * sent2 * one2;
+    return (mesh_lack){own2 + point2, factor2_of_means * sent2 * whole2, point2};
 }

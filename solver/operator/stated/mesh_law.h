@@ -83,6 +83,7 @@ typedef struct mesh_light {
  * where nothing is stated; stores without s have m in its place. group n_groups is all of them together. */
 typedef struct mesh_lack {
     double elements2, mean2;
+    double point2; /* c^2 alone, of a point that gathers from the group: it is no element that varies */
 } mesh_lack;
 mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t group);
 

@@ -1,0 +1,40 @@
+/* The errors of answers at sensors, by what a store states of its elements. Value s is
+ *     v_s = sum_j w_sj B_j + direct light,
+ * so that it is off by three things. The rows w are sampled: their variance is known of each answer. The
+ * elements are off by operator and form factors: a sensor gathers means over groups, W_sg the sum of w over
+ * group g, and is off by sum_g W_sg e_g, e_g the error of the mean of g, of one sign at worst. And light is
+ * constant on elements: by reciprocity a point is a single small light, so that it is off by the product of
+ * both variations, as in mesh_lack.point2 (operator/stated/mesh_law.h), of the light that is reflected to it.
+ * Direct light comes to the point itself, and is free of these. No I/O. */
+#ifndef LAMBERT_CODEC_SENSOR_ERROR_H
+#define LAMBERT_CODEC_SENSOR_ERROR_H
+
+#include "solver/codec/answer_error.h"
+
+/* Squares of a set, sums over its receivers that have a value, and over channels. */
+typedef struct sensor_squares {
+    double light2;      /* of values */
+    double rows2, off2; /* of errors by rows, and by operator and form factors */
+    double mesh2;       /* negative: not stated */
+} sensor_squares;
+
+/* One vector at the sensors of its store: `of` has its light and the radiosities of all elements, L [C][m]
+ * its sky or NULL, values [C][s]. */
+typedef struct sensor_answer {
+    const lam_sensors *sensors;
+    const error_answer *of;
+    const float *L, *values;
+} sensor_answer;
+
+/* squares [n_sets]: those of each set named, by its number. Cost: the stored weights, and n_bins for each
+ * receiver. False when memory is short. */
+bool sensor_squares_of(const error_by_group *e, const error_scene *scene, const sensor_answer *answer,
+                       size_t n_sets, const uint32_t *sets, sensor_squares *squares);
+
+/* Adds b to a: of several sets together. */
+void sensor_squares_add(sensor_squares *a, const sensor_squares *b);
+
+/* The parts of the headline of a set, over the root mean square of its values. */
+stated_parts sensor_parts(const sensor_squares *squares);
+
+#endif
