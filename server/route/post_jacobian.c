@@ -21,7 +21,7 @@ typedef struct jacobian_solve {
     answer_notes notes;
     size_t n_columns;
     float *values; /* of each kind after the other: [C][receivers asked for][columns of the kind] */
-    float *made;   /* [BATCH_PASS][C][receivers], of a pass */
+    float *made;   /* [BATCH_PASS][sensor_column_width], of a pass */
     float *work;   /* sensor_columns_work */
     problem why;
     bool failed;
@@ -85,7 +85,7 @@ static bool find_room(call *in, jacobian_solve *s, problem *why) {
                               names_bytes(of) + 8 * s->request.of.reduce.texts.length + 4096));
     s->values = call_allocate(in, bytes_times(numbers, sizeof *s->values), "a matrix of derivatives", why);
     if (s->values == NULL) return false;
-    s->made = call_allocate(in, bytes_times(pass * C, scene_sensors(of) * sizeof *s->made), "sensors", why);
+    s->made = call_allocate(in, bytes_times(pass, sensor_column_width(of) * sizeof *s->made), "sensors", why);
     if (s->made == NULL) return false;
     s->work = call_allocate(in, sensor_columns_work(of, pass) * sizeof *s->work, "solving for lights", why);
     return s->work != NULL && request_memory_take(in->memory, text, why);
@@ -135,7 +135,7 @@ static bool begin(call *in, answer *out) {
     return true;
 }
 
-/* Puts a column [C][receivers] into the matrix; NaN where a receiver has no value. */
+/* Puts the values of a column into the matrix; NaN where a receiver has no value. */
 static void put(const scene *of, jacobian_solve *s, size_t number, const float *column) {
     const column_place at = place_of(of, &s->request, number);
     const size_t C = of->n_channels, R = s->request.of.n_receivers, all = scene_sensors(of);
@@ -150,7 +150,7 @@ static void put(const scene *of, jacobian_solve *s, size_t number, const float *
 /* Columns first ... first + count: those that the scene keeps, and the others by one pass. */
 static void pass_part(call *in, jacobian_solve *s, size_t first, size_t count, batch_workspace *workspace) {
     const scene *of = in->scene;
-    const size_t width = of->n_channels * scene_sensors(of);
+    const size_t width = sensor_column_width(of);
     column_table *table = sensor_columns_acquire(of->columns);
     uint32_t which[BATCH_PASS];
     size_t missing[BATCH_PASS], n_missing = 0;

@@ -203,7 +203,7 @@ static bool passes_apart(const call *in) {
 /* Columns for a reduction of sensors; where they do not answer it, its vectors are expanded. */
 static bool begin_columns(call *in, radiosity_solve *s, problem *why) {
     const codec_scene about = call_codec_scene(in);
-    if (!sensor_figures_begin(in, &s->request, &s->columns, why)) return false;
+    if (!sensor_figures_begin(in, &s->request, &s->notes, &s->columns, why)) return false;
     s->request.reduce.linear = s->columns != NULL;
     return s->columns != NULL || radiosity_request_expand(&s->request, &about, why);
 }

@@ -4,6 +4,7 @@
 #include "server/scene/direct_light.h"
 #include "server/scene/sensor_answer.h"
 #include "server/scene/sensor_columns.h"
+#include "server/scene/sensor_errors.h"
 #include "solver/base/clock.h"
 
 #include <math.h>
@@ -15,8 +16,11 @@
 #define QUICK_NUMBERS ((size_t)400)
 
 struct sensor_figures {
-    double *figures;    /* of reduce_figures */
-    double *values;     /* [C][receivers] of a vector, work; those of sets that are not reduced stay 0 */
+    double *figures;     /* of reduce_figures */
+    double *values;      /* [C][receivers] of a vector, work; those of sets that are not reduced stay 0 */
+    double *off;         /* [C][receivers], by the halves of rows; likewise */
+    double *rest, *mesh; /* [C][sets], what values are off by (column_view); likewise */
+    sensor_errors errors;
     bool *reduced;      /* [sets]: of some name */
     uint32_t *lights;   /* [n_lights], ascending */
     float **own;        /* [n_lights]: columns that the scene has no room for; NULL: it keeps the column */
@@ -32,6 +36,10 @@ void sensor_figures_free(const scene *s, sensor_figures *f) {
     sensor_columns_release(s->columns, f->table);
     free(f->figures);
     free(f->values);
+    free(f->off);
+    free(f->rest);
+    free(f->mesh);
+    sensor_errors_free(&f->errors);
     free(f->reduced);
     free(f->lights);
     free(f->own);
@@ -68,7 +76,8 @@ static bool find_lights(const scene *s, const radiosity_request *request, uint32
 }
 
 /* Allocates all but what passes need. */
-static bool allocate(const scene *s, const radiosity_request *request, sensor_figures *f) {
+static bool allocate(const scene *s, const radiosity_request *request, answer_notes *notes,
+                     sensor_figures *f) {
     const size_t C = s->n_channels;
     const reduce_request *r = &request->reduce;
     f->figures = reduce_figures(&request->reduce, request->n_rhs, radiosity_request_channels(request, C));
@@ -76,10 +85,15 @@ static bool allocate(const scene *s, const radiosity_request *request, sensor_fi
     f->reduced = memory_allocate(s->sensor_sets.n_groups, sizeof *f->reduced, "sensors", NULL);
     f->own = memory_allocate(f->n_lights, sizeof *f->own, "sensors", NULL);
     f->table = sensor_columns_acquire(s->columns);
-    if (f->figures == NULL || f->values == NULL || f->own == NULL || f->reduced == NULL) return false;
+    f->off = memory_allocate(C, scene_sensors(s) * sizeof *f->off, "sensors", NULL);
+    f->rest = memory_allocate(C, s->sensor_sets.n_groups * sizeof *f->rest, "sensors", NULL);
+    f->mesh = memory_allocate(C, s->sensor_sets.n_groups * sizeof *f->mesh, "sensors", NULL);
+    if (f->off == NULL || f->rest == NULL || f->mesh == NULL || f->figures == NULL || f->values == NULL ||
+        f->own == NULL || f->reduced == NULL)
+        return false;
     for (size_t k = 0; k < r->n_names; k++)
         for (size_t g = 0; g < r->names[k].n_groups; g++) f->reduced[r->names[k].groups[g]] = true;
-    return true;
+    return sensor_errors_begin(s, request, notes, &f->errors);
 }
 
 /* Lights whose columns are not there. */
@@ -89,16 +103,18 @@ static size_t count_missing(const sensor_figures *f) {
     return missing;
 }
 
-bool sensor_figures_begin(call *in, const radiosity_request *request, sensor_figures **out, problem *why) {
+bool sensor_figures_begin(call *in, const radiosity_request *request, answer_notes *notes,
+                          sensor_figures **out, problem *why) {
     static const char short_of[] = "not enough memory to reduce sensors; ask for fewer vectors or sets";
     const scene *s = in->scene;
     const sensor_lights of = scene_sensor_lights(s);
-    const size_t width = s->n_channels * scene_sensors(s);
+    const size_t width = sensor_column_width(s);
     *out = NULL;
     if (!request_memory_take(in->memory,
                              bytes_plus(figures_bytes(request, s->n_channels),
                                         sensor_lights_count(&of) * (sizeof(uint32_t) + sizeof(bool)) +
-                                            s->sensor_sets.n_groups * sizeof(bool) + width * sizeof(double)),
+                                            s->sensor_sets.n_groups * sizeof(bool) +
+                                            width * 2 * sizeof(double)),
                              why))
         return false;
     sensor_figures *f = memory_allocate(1, sizeof *f, "figures", NULL);
@@ -112,7 +128,7 @@ bool sensor_figures_begin(call *in, const radiosity_request *request, sensor_fig
         return true;
     }
     *out = f;
-    if (!allocate(s, request, f)) return problem_set(why, PROBLEM_NO_MEMORY, "%s", short_of);
+    if (!allocate(s, request, notes, f)) return problem_set(why, PROBLEM_NO_MEMORY, "%s", short_of);
     const size_t missing = count_missing(f), pass = missing < BATCH_PASS ? missing : BATCH_PASS;
     /* Columns that the scene may not keep, and the arrays of a pass. */
     return missing == 0 ||
@@ -123,7 +139,7 @@ bool sensor_figures_begin(call *in, const radiosity_request *request, sensor_fig
 /* Makes the next columns that are missing, as many as a pass has. */
 static bool make_columns(call *in, sensor_figures *f, batch_workspace *workspace, problem *why) {
     const scene *s = in->scene;
-    const size_t width = s->n_channels * scene_sensors(s);
+    const size_t width = sensor_column_width(s);
     size_t count = 0, places[BATCH_PASS];
     uint32_t which[BATCH_PASS];
     for (; f->next < f->n_lights && count < BATCH_PASS; f->next++) {
@@ -163,14 +179,22 @@ static double weight_of(const scene *s, const radiosity_request *request, size_t
     return side->values != NULL && vector < side->n ? (double)side->values[(vector * C + c) * width + k] : 0;
 }
 
-/* values += weight column, of the receivers of the sets that are reduced. */
-static void add_column(const scene *s, const sensor_figures *f, size_t c, double weight,
-                       const float *column) {
+/* values += weight column, and their halves likewise, of the receivers of the sets that are reduced, and what
+ * these are off by. */
+static void add_column(const scene *s, sensor_figures *f, size_t c, double weight, const float *column) {
     const group_index *sets = &s->sensor_sets;
     const size_t begin = c * scene_sensors(s);
-    for (size_t set = 0; weight != 0 && set < sets->n_groups; set++)
-        for (uint32_t e = sets->start[set]; f->reduced[set] && e < sets->start[set + 1]; e++)
-            f->values[begin + sets->elements[e]] += weight * (double)column[begin + sets->elements[e]];
+    const column_view view = sensor_column_view(s, column);
+    for (size_t set = 0; weight != 0 && set < sets->n_groups; set++) {
+        if (!f->reduced[set]) continue;
+        for (uint32_t e = sets->start[set]; e < sets->start[set + 1]; e++) {
+            const size_t k = begin + sets->elements[e];
+            f->values[k] += weight * (double)view.values[k];
+            f->off[k] += weight * (double)view.off[k];
+        }
+        f->rest[c * sets->n_groups + set] += fabs(weight) * (double)view.rest[set];
+        f->mesh[c * sets->n_groups + set] += fabs(weight) * (double)view.mesh[set];
+    }
 }
 
 static const float *column_of(const sensor_figures *f, size_t k) {
@@ -190,14 +214,43 @@ static size_t place_of(const sensor_figures *f, uint32_t light) {
     return low;
 }
 
+/* Adds up values and what sampling puts them off by, of each set that is reduced. */
+static void take_errors(const scene *s, const radiosity_request *request, sensor_figures *f,
+                        answer_notes *notes) {
+    const group_index *sets = &s->sensor_sets;
+    const size_t all = scene_sensors(s);
+    for (size_t k = 0; k < f->errors.n_sets; k++) {
+        const uint32_t set = f->errors.sets[k];
+        sensor_squares *const to = &f->errors.squares[set];
+        for (size_t e = sets->start[set]; e < sets->start[set + 1]; e++)
+            for (size_t c = 0; group_index_counts(sets, sets->elements[e]) && c < s->n_channels; c++) {
+                const double value = f->values[c * all + sets->elements[e]],
+                             off = f->off[c * all + sets->elements[e]];
+                to->light2 += value * value;
+                to->rows2 += off * off;
+            }
+        for (size_t c = 0; c < s->n_channels; c++) {
+            const double rest = f->rest[c * sets->n_groups + set], mesh = f->mesh[c * sets->n_groups + set];
+            to->off2 += rest * rest;
+            to->mesh2 = mesh < 0 || to->mesh2 < 0 ? -1 : to->mesh2 + mesh * mesh;
+        }
+    }
+    if (f->errors.names != NULL) sensor_errors_take(request, &f->errors, notes);
+}
+
 /* Fills the figures of a vector. */
 static bool add_vector(const scene *s, const radiosity_request *request, size_t v, sensor_figures *f,
-                       problem *why) {
+                       answer_notes *notes, problem *why) {
     const size_t C = s->n_channels, all = scene_sensors(s);
     const sensor_lights of = scene_sensor_lights(s);
     const codec_scene about = {
         .n = s->n, .n_channels = C, .n_tiles = of.tiles, .n_luminaires = of.luminaires};
     memset(f->values, 0, C * all * sizeof *f->values);
+    memset(f->off, 0, C * all * sizeof *f->off);
+    memset(f->rest, 0, C * s->sensor_sets.n_groups * sizeof *f->rest);
+    memset(f->mesh, 0, C * s->sensor_sets.n_groups * sizeof *f->mesh);
+    for (size_t k = 0; k < f->errors.n_sets; k++)
+        f->errors.squares[f->errors.sets[k]] = (sensor_squares){.light2 = 0};
     for (size_t c = 0; c < C; c++) {
         for (size_t k = 0; k < request->n_spots; k++)
             if (request->spots[k].vector == v)
@@ -209,6 +262,7 @@ static bool add_vector(const scene *s, const radiosity_request *request, size_t 
         const bool limits = !request->linear_map && !radiosity_request_has_signs(request, &about, v, c);
         for (size_t k = c * all; limits && k < (c + 1) * all; k++) f->values[k] = fmax(f->values[k], 0);
     }
+    take_errors(s, request, f, notes);
     if (request->told.luminance) answer_luminance_double(1, all, f->values, NULL);
     return figures_reduce(s, request, radiosity_request_channels(request, C), v, 1,
                           (reduce_values){.doubles = f->values}, f->figures) ||
@@ -223,7 +277,7 @@ bool sensor_figures_step(call *in, const radiosity_request *request, sensor_figu
     *done = false;
     while (good && f->next < f->n_lights && clock_ms() < until) good = make_columns(in, f, workspace, why);
     while (good && f->next == f->n_lights && f->vector < request->n_rhs && clock_ms() < until)
-        good = add_vector(in->scene, request, f->vector++, f, why);
+        good = add_vector(in->scene, request, f->vector++, f, notes, why);
     notes->solve_ms += clock_ms() - start;
     if (!good || f->vector < request->n_rhs) return good;
     return figures_write(in->scene, request, f->figures, until, &f->text, notes, b, done, why);
@@ -238,7 +292,7 @@ static size_t work_of(const scene *s, const radiosity_request *request, size_t n
             receivers +=
                 s->sensor_sets.start[r->names[k].groups[g] + 1] - s->sensor_sets.start[r->names[k].groups[g]];
     /* Beside the lights, figures look at each receiver some times. */
-    return bytes_times(request->n_rhs * s->n_channels,
+    return bytes_times(2 * request->n_rhs * s->n_channels,
                        scene_sensors(s) + s->sensor_sets.n_groups * n_lights + receivers * (n_lights + 4));
 }
 
@@ -248,13 +302,14 @@ bool sensor_figures_quick(call *in, const radiosity_request *request, answer_not
     problem why = {0};
     bool done = false;
     const double start = clock_ms();
-    if (!sensor_figures_begin(in, request, &f, &why) || f == NULL) {
+    scene_note_error(s, request, notes);
+    if (!sensor_figures_begin(in, request, notes, &f, &why) || f == NULL) {
         sensor_figures_free(s, f);
         return false;
     }
     bool good = count_missing(f) == 0 && work_of(s, request, f->n_lights) <= QUICK_WORK &&
                 reduce_vectors_written(&request->reduce, request->n_rhs) * s->n_channels <= QUICK_NUMBERS;
-    for (size_t v = 0; good && v < request->n_rhs; v++) good = add_vector(s, request, v, f, &why);
+    for (size_t v = 0; good && v < request->n_rhs; v++) good = add_vector(s, request, v, f, notes, &why);
     notes->solve_ms = clock_ms() - start;
     good = good && figures_write(s, request, f->figures, INFINITY, &f->text, notes, b, &done, &why);
     sensor_figures_free(s, f);

@@ -14,8 +14,9 @@ enum { SENSOR_LIGHTS_MOST = 1024 };
 
 /* *out is NULL where columns do not answer a request: its vectors do then. That follows from scene and
  * request alone, so that an answer has the same bits whatever is kept. False with *why; freed by
- * sensor_figures_free also then. */
-bool sensor_figures_begin(call *in, const radiosity_request *request, sensor_figures **out, problem *why);
+ * sensor_figures_free also then. Notes begin as those of the store (scene_note_error), and refer to *out. */
+bool sensor_figures_begin(call *in, const radiosity_request *request, answer_notes *notes,
+                          sensor_figures **out, problem *why);
 
 /* A step of some milliseconds: columns that are missing, then vectors, then the text; *done once that is
  * whole. False with *why. */

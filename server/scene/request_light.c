@@ -25,15 +25,19 @@ bool request_has_sky_weights(const scene *s, const radiosity_request *request) {
     return request->emitters.values != NULL && s->n_emitters > 0 && operator_emitters_of(s->op)->a.L != NULL;
 }
 
-bool request_has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes) {
+bool scene_states_errors(const scene *s, bool sky, bool luminaires) {
     const error_by_group *e = &s->errors.by_group;
-    const bool whole = !request->reduce.linear || e->figures.sky_first != NULL;
+    return e->n_bins > 0 && s->errors.emitters.figures.s == 0 &&
+           (!luminaires || luminaires_know_errors(s->luminaires, s->groups.n_groups)) &&
+           (!sky || (s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
+}
+
+bool request_has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes) {
+    const bool whole =
+        !request->reduce.linear || request->at_sensors || s->errors.by_group.figures.sky_first != NULL;
     const bool sky = request->sky.values != NULL || request_has_sky_weights(s, request);
-    const bool known =
-        request->luminaires.values == NULL || luminaires_know_errors(s->luminaires, s->groups.n_groups);
-    return e->n_bins > 0 && notes->has_error && known && s->errors.emitters.figures.s == 0 &&
-           request->tolerance == 0 &&
-           (!sky || (whole && s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
+    return notes->has_error && request->tolerance == 0 && (!sky || whole) &&
+           scene_states_errors(s, sky, request->luminaires.values != NULL);
 }
 
 emission_size request_sky_size(const scene *s, const float *L) {

@@ -23,6 +23,10 @@ bool request_has_sky_weights(const scene *s, const radiosity_request *request);
  * light that it has. */
 bool request_has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes);
 
+/* The same of the store alone: whether the laws of its errors hold of light with a sky, or with luminaires.
+ */
+bool scene_states_errors(const scene *s, bool sky, bool luminaires);
+
 /* The size of the sky L [C][m]; NULL: there is none. */
 emission_size request_sky_size(const scene *s, const float *L);
 

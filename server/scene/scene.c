@@ -254,7 +254,7 @@ done:
 static lam_status make_columns(scene *made, lam_error *error) {
     const sensor_lights lights = scene_sensor_lights(made);
     if (made->sensors == NULL) return LAM_OK;
-    return sensor_columns_create(sensor_lights_count(&lights), made->n_channels * scene_sensors(made),
+    return sensor_columns_create(sensor_lights_count(&lights), sensor_column_width(made),
                                  SENSOR_COLUMNS_BYTES, made->ledger, &made->columns, error);
 }
 

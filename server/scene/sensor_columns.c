@@ -1,8 +1,12 @@
 #include "server/scene/sensor_columns.h"
 
 #include "server/scene/direct_light.h"
+#include "server/scene/request_light.h"
 #include "server/scene/sensor_answer.h"
+#include "solver/codec/sensor_error.h"
+#include "solver/operator/sensor_light.h"
 
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -120,19 +124,34 @@ sensor_lights scene_sensor_lights(const scene *s) {
     return (sensor_lights){s->groups.n_groups, scene_luminaires(s), scene_tiles(s)};
 }
 
-/* Arrays of a pass: E and B are [count][C][n], H0 too; L and D, of one light, [C][m] and [C][k]. */
+size_t sensor_column_width(const scene *s) {
+    return 2 * (s->n_channels * scene_sensors(s) + s->sensor_sets.n_groups);
+}
+
+column_view sensor_column_view(const scene *s, const float *column) {
+    const size_t values = s->n_channels * scene_sensors(s);
+    return (column_view){column, column + values, column + 2 * values,
+                         column + 2 * values + s->sensor_sets.n_groups};
+}
+
+/* Arrays of a pass: E and B are [count][C][n], H0 too; L and D, of one light, [C][m] and [C][k]; sent is
+ * [2][n]. */
 typedef struct column_work {
-    float *E, *H0, *B, *L, *D;
+    float *E, *H0, *B, *L, *D, *sent;
 } column_work;
 
 size_t sensor_columns_work(const scene *s, size_t count) {
-    return s->n_channels * (3 * count * s->n + scene_tiles(s) + scene_luminaires(s));
+    return s->n_channels * (3 * count * s->n + scene_tiles(s) + scene_luminaires(s)) + 2 * s->n;
 }
 
 static column_work split_work(const scene *s, size_t count, float *work) {
     const size_t C = s->n_channels, vectors = count * C * s->n;
-    return (column_work){work, work + vectors, work + 2 * vectors, work + 3 * vectors,
-                         work + 3 * vectors + C * scene_tiles(s)};
+    return (column_work){work,
+                         work + vectors,
+                         work + 2 * vectors,
+                         work + 3 * vectors,
+                         work + 3 * vectors + C * scene_tiles(s),
+                         work + 3 * vectors + C * (scene_tiles(s) + scene_luminaires(s))};
 }
 
 /* Sets every channel of light k of a row of `width` to 1, and all others to 0. */
@@ -163,9 +182,47 @@ static void take_light(const scene *s, size_t which, const column_work *w, float
     }
 }
 
+/* The errors of every set, of the light of a column alone, as sensor_column_view has them. False when memory
+ * is short. */
+static bool add_errors(const scene *s, const column_work *w, const float *B, const float *L, const float *D,
+                       float *column) {
+    const size_t C = s->n_channels, n = s->n, n_sets = s->sensor_sets.n_groups;
+    const column_view view = sensor_column_view(s, column);
+    float *rest = column + (view.rest - column), *mesh = column + (view.mesh - column);
+    const error_scene about = scene_for_errors(s);
+    error_answer of = {.quantity = LAM_RADIOSITY,
+                       .E = w->E,
+                       .H0 = w->H0,
+                       .count = n,
+                       .values = B,
+                       .L = L,
+                       .luminaires = lit_luminaires_of(s->luminaires, D)};
+    memset(rest, 0, n_sets * sizeof *rest);
+    memset(mesh, 0, n_sets * sizeof *mesh);
+    if (!scene_states_errors(s, L != NULL, D != NULL)) return true;
+    for (size_t c = 0; c < C; c++) {
+        const float *lamps = D != NULL ? w->H0 + c * n : NULL;
+        error_answer_add_channel(&of, &about, c, w->E + c * n, lamps, lamps, w->sent);
+    }
+    of.sky = request_sky_size(s, L);
+    const sensor_answer answer = {s->sensors, &of, L, view.values};
+    uint32_t *sets = memory_allocate(n_sets, sizeof *sets, "errors", NULL);
+    sensor_squares *squares = memory_allocate(n_sets, sizeof *squares, "errors", NULL);
+    for (size_t k = 0; sets != NULL && k < n_sets; k++) sets[k] = (uint32_t)k;
+    const bool good = sets != NULL && squares != NULL &&
+                      sensor_squares_of(&s->errors.by_group, &about, &answer, n_sets, sets, squares);
+    for (size_t k = 0; good && k < n_sets; k++) {
+        rest[k] = (float)sqrt(squares[k].off2 / (double)C);
+        mesh[k] = squares[k].mesh2 < 0 ? -1 : (float)sqrt(squares[k].mesh2 / (double)C);
+    }
+    free(sets);
+    free(squares);
+    return good;
+}
+
 bool sensor_columns_make(const scene *s, size_t count, const uint32_t *which, batch_workspace *workspace,
                          float *work, float *out, problem *why) {
-    const size_t vector = s->n_channels * s->n, width = s->n_channels * scene_sensors(s);
+    const size_t vector = s->n_channels * s->n, width = sensor_column_width(s);
     const size_t bytes = lam_operator_work_bytes(s->op, count);
     const column_work w = split_work(s, count, work);
     const float *L, *D;
@@ -179,7 +236,13 @@ bool sensor_columns_make(const scene *s, size_t count, const uint32_t *which, ba
         return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
     for (size_t k = 0; k < count; k++) {
         take_light(s, which[k], &w, w.E, w.H0, &L, &D);
-        lam_sensors_gather(s->sensors, 1, w.B + k * vector, L, D, out + k * width);
+        float *column = out + k * width;
+        const column_view view = sensor_column_view(s, column);
+        lam_sensors_gather(s->sensors, 1, w.B + k * vector, L, D, column);
+        sensors_gather_off(s->sensors, 1, w.B + k * vector, L, column + (view.off - column));
+        if (!add_errors(s, &w, w.B + k * vector, L, D, column))
+            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the errors of %zu lights",
+                               count);
     }
     return true;
 }

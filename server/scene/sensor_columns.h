@@ -26,6 +26,17 @@ static inline size_t sensor_lights_count(const sensor_lights *l) {
     return l->groups + l->luminaires + l->tiles;
 }
 
+/* A column: the values, and their halves' differences by sampling (sensor_weights.off), of which the latter
+ * give the variance of any mixture; and by set the roots of the sums of squares that values are off by in a
+ * channel, of operator and form factors, and by the mesh (negative: not stated), which of a mixture have one
+ * sign at worst. Where nothing is stated of errors these are 0. */
+typedef struct column_view {
+    const float *values, *off; /* [C][receivers] */
+    const float *rest, *mesh;  /* [sets] */
+} column_view;
+column_view sensor_column_view(const scene *s, const float *column);
+size_t sensor_column_width(const scene *s);
+
 /* The columns that a scene keeps, until it drops them all at once. */
 typedef struct sensor_columns sensor_columns;
 
@@ -44,14 +55,15 @@ size_t sensor_columns_held(sensor_columns *c);
 column_table *sensor_columns_acquire(sensor_columns *c);
 void sensor_columns_release(sensor_columns *c, column_table *table);
 
-/* Column k, [C][receivers]; NULL: it is not there. */
+/* Column k, of sensor_column_width numbers; NULL: it is not there. */
 const float *column_table_get(const column_table *table, size_t k);
 
 /* Keeps a copy of a column unless there is no room, or another thread has put it there. */
 void sensor_columns_put(sensor_columns *c, column_table *table, size_t k, const float *column);
 
-/* out [count][C][receivers]: the columns of these lights, at most BATCH_PASS, by one pass over the operator.
- * work is sensor_columns_work(s, count) floats. Their bits do not depend on each other. False with *why. */
+/* out [count][sensor_column_width]: the columns of these lights, at most BATCH_PASS, by one pass over the
+ * operator. work is sensor_columns_work(s, count) floats. Their bits do not depend on each other. False with
+ * *why. */
 bool sensor_columns_make(const scene *s, size_t count, const uint32_t *which, batch_workspace *workspace,
                          float *work, float *out, problem *why);
 size_t sensor_columns_work(const scene *s, size_t count);

@@ -31,18 +31,34 @@ static void sum_row(const error_by_group *e, const sensor_answer *a, size_t n, s
     }
 }
 
-/* Adds a value of a receiver: sum_b W_b e_b, and sum_b R_b m_b, of one sign at worst. */
-static void add_value(const error_by_group *e, const bin_off *off, const bin_sum *sums, double value,
-                      double variance, sensor_squares *to) {
-    double rest = 0, mesh = 0;
-    for (size_t b = 0; b < e->n_bins; b++) {
-        rest += fabs(sums[b].weight) * off[b].mean;
-        mesh += fabs(sums[b].reflected) * off[b].mesh;
+/* sum_b W_b e_b of a receiver, of one sign at worst. e_b are of all channels together. */
+static double off_of(const error_by_group *e, const bin_off *off, const bin_sum *sums) {
+    double sum = 0;
+    for (size_t b = 0; b < e->n_bins; b++) sum += fabs(sums[b].weight) * off[b].mean;
+    return sum;
+}
+
+/* sum_b R_b m_b of a receiver and channel, likewise. */
+static double mesh_of(const error_by_group *e, const bin_off *off, const bin_sum *sums) {
+    double sum = 0;
+    for (size_t b = 0; b < e->n_bins; b++) sum += fabs(sums[b].reflected) * off[b].mesh;
+    return sum;
+}
+
+/* Adds a receiver in all channels. */
+static void add_receiver(const error_by_group *e, const error_scene *scene, const sensor_answer *a,
+                         const bin_off *off, const float *variance, size_t s, bin_sum *sums,
+                         sensor_squares *to) {
+    const size_t all = lam_sensors_count(a->sensors);
+    for (size_t c = 0; c < scene->n_channels; c++) {
+        const double value = (double)a->values[c * all + s];
+        sum_row(e, a, scene->n, c, s, sums);
+        const double mesh = mesh_of(e, off, sums), rest = c == 0 ? off_of(e, off, sums) : 0;
+        to->light2 += value * value;
+        to->rows2 += (double)variance[c * all + s];
+        to->off2 += rest * rest;
+        to->mesh2 += mesh * mesh;
     }
-    to->light2 += value * value;
-    to->rows2 += variance;
-    to->off2 += rest * rest;
-    to->mesh2 += mesh * mesh;
 }
 
 /* Errors of every bin, [n_bins]; freed with free(). */
@@ -70,14 +86,11 @@ bool sensor_squares_of(const error_by_group *e, const error_scene *scene, const 
     for (size_t k = 0; good && k < n_sets; k++) {
         size_t first, count;
         lam_sensors_set(a->sensors, sets[k], &first, &count);
-        squares[k] = (sensor_squares){.light2 = 0};
+        sensor_squares *const to = &squares[sets[k]];
+        *to = (sensor_squares){.light2 = 0};
         for (size_t s = first; s < first + count; s++)
-            for (size_t c = 0; lam_sensors_has_value(a->sensors, s) && c < C; c++) {
-                sum_row(e, a, scene->n, c, s, sums);
-                add_value(e, off, sums, (double)a->values[c * all + s], (double)variance[c * all + s],
-                          &squares[k]);
-            }
-        if (!mesh_is_stated(e)) squares[k].mesh2 = -1;
+            if (lam_sensors_has_value(a->sensors, s)) add_receiver(e, scene, a, off, variance, s, sums, to);
+        if (!mesh_is_stated(e)) to->mesh2 = -1;
     }
     free(off);
     free(sums);

@@ -26,8 +26,8 @@ typedef struct sensor_answer {
     const float *L, *values;
 } sensor_answer;
 
-/* squares [n_sets]: those of each set named, by its number. Cost: the stored weights, and n_bins for each
- * receiver. False when memory is short. */
+/* Fills squares [sets of the store] at the numbers of the sets named, each of which stands once. Cost: the
+ * stored weights, and n_bins for each receiver. False when memory is short. */
 bool sensor_squares_of(const error_by_group *e, const error_scene *scene, const sensor_answer *answer,
                        size_t n_sets, const uint32_t *sets, sensor_squares *squares);
 

@@ -323,8 +323,7 @@ void lam_sensors_adjoint(const lam_sensors *l, size_t n_rhs, const float *g, flo
     if (D != NULL && l->luminaires.m > 0) first_rows_adjoint(&l->luminaires, rows, g, &colour, D);
 }
 
-void lam_sensors_variance(const lam_sensors *l, size_t n_rhs, const float *B, const float *L,
-                          float *variance) {
+void sensors_gather_off(const lam_sensors *l, size_t n_rhs, const float *B, const float *L, float *out) {
     const size_t rows = n_rhs * l->C, m = l->sky.m;
     for (size_t q = 0; q < rows; q++)
         for (size_t k = 0; k < l->count; k++) {
@@ -333,6 +332,12 @@ void lam_sensors_variance(const lam_sensors *l, size_t n_rhs, const float *B, co
                 sum += (double)l->off[i] * (double)B[q * l->n + l->element[i]];
             for (size_t t = 0; L != NULL && t < m; t++)
                 sum += (double)l->sky_off[t * l->count + k] * (double)L[q * m + t];
-            variance[q * l->count + k] = (float)(sum * sum);
+            out[q * l->count + k] = (float)sum;
         }
+}
+
+void lam_sensors_variance(const lam_sensors *l, size_t n_rhs, const float *B, const float *L,
+                          float *variance) {
+    sensors_gather_off(l, n_rhs, B, L, variance);
+    for (size_t k = 0; k < n_rhs * l->C * l->count; k++) variance[k] *= variance[k];
 }

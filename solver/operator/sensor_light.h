@@ -48,4 +48,8 @@ sensor_weights sensors_weights(const lam_sensors *l);
 void sensors_gather_double(const lam_sensors *l, size_t n_rhs, const double *B, const double *L,
                            const double *D, double *out);
 
+/* out [n_rhs][C][s]: half of the difference of what the two halves of samples gather, of B and L, as
+ * lam_sensors_variance takes the square of it. */
+void sensors_gather_off(const lam_sensors *l, size_t n_rhs, const float *B, const float *L, float *out);
+
 #endif

@@ -328,6 +328,12 @@ class Kinds(Case):
             cls.truth[name] = t = Truth(cls.stores[name])
             cls.lights[name] = Luminaires(t.n, t.C, seed=7).add_to(cls.stores[name])
             cls.sensors[name] = Sensors(t.n, t.C, 12, cls.lights[name], seed=7).add_to(cls.stores[name])
+        cls.stores["stated"] = path / "stated.h5"
+        must("precompute", path / "yard.obj", "-o", cls.stores["stated"], "--elements", 120, "--rays", 1024, "--probes", 16,
+             "--sky", "grid:4x3", "--keep-form-factors", *KINDS["low"])
+        t = cls.truth["stated"] = Truth(cls.stores["stated"])
+        cls.lights["stated"] = Luminaires(t.n, t.C, seed=7, mesh_groups=len(t.groups)).add_to(cls.stores["stated"])
+        cls.sensors["stated"] = Sensors(t.n, t.C, 12, cls.lights["stated"], seed=7).add_to(cls.stores["stated"])
         cls.daemon = Daemon(*cls.stores.values())
         cls.addClassCleanup(cls.daemon.__exit__, None, None, None)
 
@@ -372,6 +378,39 @@ class Kinds(Case):
                 figures = self.ask(name, dict(body, reduce={"sensors": ["faces"], "with": ["mean"]}))
                 worst = np.abs(np.ravel(figures["sensors"]["faces"]["mean"]) - wanted[:, s.rows(["faces"])].mean(1)).max()
                 self.assertLessEqual(worst, figures["certificate"] + 1e-13 * np.nanmax(wanted), (name, tolerance))
+
+    def test_errors_are_stated_by_set(self):
+        """By vectors and, of the same light, by columns; the part of the rows is known from their halves."""
+        truth, s, name = self.truth["stated"], self.sensors["stated"], "stated"
+        emission, of, L = self.lit(name)
+        B = np.reshape(self.ask(name, {"emission": emission, "limit": False})["radiosity"], (truth.C, -1)).astype(float)
+        values = s.values(B, L, dimmers(self.lights[name], of))
+        off = B @ (s.off * (s.weights > 0)).T.astype(float) + L @ (s.sky * 1e-2).astype(np.float32).astype(float)
+        answer = self.ask(name, {"emission": emission, "limit": False, "select": {"sensors": SETS}})["error"]
+        self.assertEqual((answer["light"], list(answer["sensors"])), ("own", SETS))
+        for key in SETS:
+            rows = s.rows([key])
+            wanted = np.sqrt((off[:, rows] ** 2).sum() / (values[:, rows] ** 2).sum())
+            parts = answer["sensors"][key]["parts"]
+            self.assertAlmostEqual(parts["rows"], wanted, delta=1e-3 * wanted)
+            self.assertGreater(min(parts["operator"], parts["mesh"]), 0)
+            self.assertAlmostEqual(answer["sensors"][key]["stated"], np.sqrt(sum(x ** 2 for x in parts.values())), places=9)
+        reduced = {"reduce": {"sensors": SETS, "with": ["mean"]}, "limit": False}
+        for light in {"luminaires": {"wall": 2}}, {"groups": {"lamp": 3}}, {"sky": np.eye(12)[3].tolist()}:
+            by_vectors = self.ask(name, {"emission": light, "limit": False, "select": {"sensors": SETS}})["error"]
+            by_columns = self.ask(name, {"emission": light, **reduced})["error"]
+            for key in SETS:
+                pair = [one["sensors"][key]["parts"] for one in (by_vectors, by_columns)]
+                for parts in ("rows",), ("mesh",), ("operator", "form_factors"):
+                    value, other = (np.hypot.reduce([of[part] for part in parts]) for of in pair)
+                    self.assertAlmostEqual(value, other, delta=1e-4 * value, msg=(light, key, parts))
+        mixed = self.ask(name, {"emission": emission, **reduced})["error"]
+        for key in SETS:
+            self.assertAlmostEqual(mixed["sensors"][key]["parts"]["rows"], answer["sensors"][key]["parts"]["rows"], delta=1e-6)
+            share = mixed["sensors"][key]["parts"]["mesh"] / answer["sensors"][key]["parts"]["mesh"]
+            self.assertTrue(.5 < share < 2, share)
+        unknown = self.ask("low", {"emission": emission, "select": {"sensors": SETS}})["error"]
+        self.assertEqual((unknown["stated"], unknown["advice"]), (None, "precompute without --probes 0 measures it"))
 
     def test_few_emitters_are_refused(self):
         for body in {"select": {"sensors": SETS}}, {"reduce": {"sensors": SETS, "with": ["mean"]}}:

@@ -259,6 +259,11 @@ static double share2(const mesh_shares *m, const mesh_light *light, size_t group
  * what is stated, in each of ten scenes; with 1 and 1, 94 % in an atrium (honesty.py mesh). */
 static const double factor2_of_means = 2, factor2_of_elements = .5;
 
+/* Light that varies by more than this share inside elements is that of few of them, beside lamps, and what a
+ * point has of these is as good as even: errors of sensors are then below the product of both variations, a
+ * tenth of it where the light varies by all it has (deploy/docs/errors.md, "At sensors"). */
+static const double many2 = .04;
+
 mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t group) {
     const double *groups = m->of[MESH_OF_GROUPS], *single = m->of[MESH_OF_SINGLE];
     const double own2 = share2(m, light, group), sent2 = fmax(own2, share2(m, light, m->n_groups));
@@ -266,6 +271,6 @@ mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t gro
                           : groups != NULL                               ? groups[m->n_groups]
                                                                          : sent2;
     const double one2 = single != NULL ? single[m->n_groups] : sent2;
-    const double point2 = factor2_of_elements * sent2 * one2;
-    return (mesh_lack){own2 + point2, factor2_of_means * sent2 * whole2, point2};
+    const double c2 = factor2_of_elements * sent2 * one2;
+    return (mesh_lack){own2 + c2, factor2_of_means * sent2 * whole2, c2 / (1 + sent2 / many2)};
 }
