@@ -39,7 +39,7 @@ ALLOWED = {
     "solver/operator/blocks": f"{BELOW_OPERATOR}",
     "solver/operator/refine": f"{OPERATOR}",
     "solver/operator/stated": f"{OPERATOR}",
-    "solver/codec": f"{BELOW_LINALG} solver/operator/operator.h solver/operator/luminaire_light.h solver/operator/blocks/importance.h solver/operator/stated/",
+    "solver/codec": f"{BELOW_LINALG} solver/operator/operator.h solver/operator/luminaire_light.h solver/operator/sensor_light.h solver/operator/blocks/importance.h solver/operator/stated/",
     "solver/codec/gltf": "lambert/ store/ solver/base/ solver/codec/",
     "solver/daylight": f"{BELOW_LINALG}",
     "solver/luminaire": f"{BELOW_LINALG}",

@@ -11,7 +11,7 @@ typedef struct bin_off {
     double mean, mesh;
 } bin_off;
 
-/* What one receiver gathers from a bin in a channel. */
+/* The sums of one receiver over a bin, in a channel. */
 typedef struct bin_sum {
     double weight, reflected;
 } bin_sum;
