@@ -179,21 +179,24 @@ static double weight_of(const scene *s, const radiosity_request *request, size_t
     return side->values != NULL && vector < side->n ? (double)side->values[(vector * C + c) * width + k] : 0;
 }
 
+/* to += weight x */
+static void add_scaled(size_t count, double weight, const float *restrict x, double *restrict to) {
+    for (size_t k = 0; k < count; k++) to[k] += weight * (double)x[k];
+}
+
 /* values += weight column, and their halves likewise, of the receivers of the sets that are reduced, and what
- * these are off by. */
+ * these are off by. The receivers of a set follow each other. */
 static void add_column(const scene *s, sensor_figures *f, size_t c, double weight, const float *column) {
-    const group_index *sets = &s->sensor_sets;
-    const size_t begin = c * scene_sensors(s);
+    const size_t begin = c * scene_sensors(s), n_sets = s->sensor_sets.n_groups;
     const column_view view = sensor_column_view(s, column);
-    for (size_t set = 0; weight != 0 && set < sets->n_groups; set++) {
+    for (size_t set = 0; weight != 0 && set < n_sets; set++) {
+        size_t first, count;
         if (!f->reduced[set]) continue;
-        for (uint32_t e = sets->start[set]; e < sets->start[set + 1]; e++) {
-            const size_t k = begin + sets->elements[e];
-            f->values[k] += weight * (double)view.values[k];
-            f->off[k] += weight * (double)view.off[k];
-        }
-        f->rest[c * sets->n_groups + set] += fabs(weight) * (double)view.rest[set];
-        f->mesh[c * sets->n_groups + set] += fabs(weight) * (double)view.mesh[set];
+        lam_sensors_set(s->sensors, set, &first, &count);
+        add_scaled(count, weight, view.values + begin + first, f->values + begin + first);
+        add_scaled(count, weight, view.off + begin + first, f->off + begin + first);
+        f->rest[c * n_sets + set] += fabs(weight) * (double)view.rest[set];
+        f->mesh[c * n_sets + set] += fabs(weight) * (double)view.mesh[set];
     }
 }
 

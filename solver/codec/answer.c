@@ -74,15 +74,16 @@ static bool write_light(buffer *b, const answer_notes *notes) {
     return written && buffer_append(b, "}", 1);
 }
 
-/* Of sensors there are the parts of the headline alone, of all and of each name. */
+/* Of sensors there are the headline and its parts, of all together, and the one figure of each name. */
 static bool write_sensors_error(buffer *b, const answer_notes *notes) {
     bool written = buffer_append_text(b, ",\"error\":{") && headline_write(b, &notes->head) &&
                    buffer_printf(b, ",\"light\":\"%s\",\"sensors\":{", notes->error_light);
     for (size_t k = 0; written && k < notes->n_name_errors; k++) {
         const name_error *one = &notes->name_errors[k];
-        const headline head = {.known = true, .parts = one->parts, .share = notes->head.share};
+        const headline head = {.known = true, .parts = one->parts};
         written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, one->name) &&
-                  buffer_append(b, ":{", 2) && headline_write(b, &head) && buffer_append(b, "}", 1);
+                  buffer_append_text(b, ":{\"stated\":") && json_write_double(b, headline_stated(&head)) &&
+                  buffer_append(b, "}", 1);
     }
     return written && buffer_append(b, "}}", 2);
 }

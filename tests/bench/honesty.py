@@ -10,7 +10,8 @@ factors pair by pair at high quality, with other seeds, whose mean is the refere
 requests: groups, elements, random emission, the scene's own light and skies, of which all elements, groups or single
 elements are selected, or groups reduced. The same requests then go to a store of elements 16 times smaller, which has
 the error of the mesh in it: the headline of each answer stands beside the distance of the light of the smaller elements
-to that of those that they are parts of. lambert-bench reads standard output: one JSON object a line, as of service.py.
+to that of those that they are parts of. There a lamp on a pole and two panels light the scene too, and sensors at random
+places are asked: points that look up and anywhere, and cylinders. lambert-bench reads standard output: one JSON object a line, as of service.py.
 """
 
 import csv
@@ -44,7 +45,13 @@ QUICK = "cornell", "closed cornell"
 SUFFIXES = ".obj", ".gltf", ".glb", ".ply", ".stl", ".off"
 EMISSIONS = "group", "groups", "element", "elements", "random", "own"
 SKIES = "even sky", "cloudy sky", "sun"
+LUMINAIRES = "luminaire", "luminaires"
 TARGETS = "all", "group", "elements", "reduce"
+SENSORS = "sensors", "sensors' means"
+# Sensors of each of the three sets, and the panels and the lamp, whose candela fall with the angle.
+PLACES = 40
+PANEL = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 4 1 1 2 .3 .6 0\n1 1 30\n0 30 60 90\n0\n1000 850 450 0\n"
+LAMP = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 3 1 1 2 0 0 0\n1 1 30\n0 90 180\n0\n200 300 100\n"
 DARK = 1e-6  # of all light: reflected light below this share is rounding of both stores
 LIMITS = 2, .2  # of the true error over the stated one: hardly ever above, mostly above
 WANTED = .95, .5
@@ -186,14 +193,19 @@ class Requests:
             return {"sky": [1] * self.tiles}
         if kind == "cloudy sky":
             return {"sky": [r.uniform(.2, 1) for _ in range(self.tiles)]}
+        if kind in LUMINAIRES:
+            names = [f"panel.{k}" for k in range(2)] + ["lamp"]
+            chosen = r.sample(names, 1 if kind == "luminaire" else r.randint(2, len(names)))
+            return {"luminaires": {name: r.uniform(.1, 1) for name in chosen}}
         sun = [.05] * self.tiles
         sun[r.randrange(self.tiles)] = 50
         return {"sky": sun}
 
-    def draw(self):
+    def draw(self, placed=False):
+        """placed: luminaires and sensors are among them."""
         kinds = [kind for kind in EMISSIONS if kind != "own" or self.own is not None]
-        kind = self.random.choice(kinds + list(SKIES) * (self.tiles > 0))
-        target = self.random.choice(TARGETS)
+        kind = self.random.choice(kinds + list(SKIES) * (self.tiles > 0) + list(LUMINAIRES) * placed)
+        target = self.random.choice(TARGETS + SENSORS * placed)
         request = {"emission": self.emission(kind)}
         if target == "group":
             request["select"] = {"groups": [self.random.choice(self.names)]}
@@ -202,6 +214,10 @@ class Requests:
         elif target == "reduce":
             chosen = self.random.sample(self.names, min(len(self.names), self.random.randint(1, 3)))
             request["reduce"] = {"groups": chosen, "with": self.random.choice([["mean"], ["mean", "min", "max"]])}
+        elif target in SENSORS:
+            request["select" if target == "sensors" else "reduce"] = {"sensors": [self.random.choice(["up", "any", "faces"])]}
+            if target != "sensors":
+                request["reduce"]["with"] = ["mean"]
         return kind, target, request
 
 
@@ -216,15 +232,42 @@ class Scene:
         Program("lambert", self.bench.folder, self.bench.programs / "lambert", "precompute", self.path, "-o", store,
                 "--quiet", *mesh, "--sky", "tregenza", *options).finish(SECONDS)
 
+    def place(self):
+        """Options for luminaires and sensors at random places of the box about the scene."""
+        with open(self.path, "rb") as file:  # an OBJ, as `lambert generate` writes it; of other files they would need a reader
+            corners = np.array([line.split()[1:4] for line in file if line.startswith(b"v ")], dtype=float)
+        if not len(corners):
+            return ()
+        r, folder = random.Random(self.bench.seed + 3), self.bench.folder
+        low, high = corners.min(axis=0), corners.max(axis=0)
+
+        def anywhere(margin):
+            return [float(a + (b - a) * r.uniform(margin, 1 - margin)) for a, b in zip(low, high)]
+
+        def direction():
+            way = np.array([r.gauss(0, 1) for _ in range(3)])
+            return (way / np.linalg.norm(way)).tolist()
+
+        (folder / "panel.ies").write_text(PANEL, encoding="utf-8")
+        (folder / "lamp.ies").write_text(LAMP, encoding="utf-8")
+        lights = [{"name": f"panel.{k}", "file": "panel.ies", "at": anywhere(.2)} for k in range(2)]
+        lights.append({"name": "lamp", "file": "lamp.ies", "at": anywhere(.2)})
+        (folder / "lights.json").write_text(json.dumps({"luminaires": lights}), encoding="utf-8")
+        (folder / "sensors.json").write_text(json.dumps({
+            "points": [{"name": "up", "at": [anywhere(.05) for _ in range(PLACES)], "normal": [0, 0, 1]},
+                       *({"name": f"any.{k}", "at": [anywhere(.05)], "normal": direction()} for k in range(PLACES))],
+            "cylinders": [{"name": "faces", "at": [anywhere(.05) for _ in range(PLACES)]}]}), encoding="utf-8")
+        return "--lights", "lm", "--luminaires", folder / "lights.json", "--sensors", folder / "sensors.json"
+
     def measure_mesh(self):
         """Pairs of the true error and the headline of answers, with the mesh in them."""
         stores = [self.bench.folder / name for name in ("asked.h5", "finer.h5")]
-        served = []
+        served, placed = [], self.place()
         try:
-            self.precompute(stores[0])
+            self.precompute(stores[0], *placed)
             self.read_elements(stores[0])
             words = ("--epsilon", FINE_EPSILON, "--method", "hierarchical", "--probes", "0")
-            self.precompute(stores[1], "--seed", str(self.bench.seed + 2000), *words,
+            self.precompute(stores[1], "--seed", str(self.bench.seed + 2000), *words, *placed,
                             mesh=("--elements", str(FINER * len(self.groups))))
             for store in stores:
                 served.append(Store(self.bench.folder, self.bench.programs, store, "lambertd"))
@@ -232,7 +275,7 @@ class Scene:
             tiles = self.lit_tiles(asked)
             requests, found = Requests(asked.about(), self.groups, self.own_emission(), tiles, self.bench.seed + 1), []
             for _ in range(self.n_requests):
-                kind, target, request = requests.draw()
+                kind, target, request = requests.draw(bool(placed))
                 found += [(kind, target, true, stated) for true, stated in self.mesh_error(target, request, asked, finer)]
             return found
         finally:
@@ -244,6 +287,8 @@ class Scene:
     def mesh_error(self, target, request, asked, finer):
         """Pairs as of error, of the headline of what is asked."""
         answer = asked.ask(request)
+        if target in SENSORS:
+            return self.sensor_error(request, asked, finer)
         radiosity, reflected = finer.light(request)
         stated = self.infinite(answer.get("error", {}))
         names = np.array(self.groups)[finer.parent]
@@ -268,6 +313,18 @@ class Scene:
         light = self.norm(reflected[:, part], finer.area[part])
         dark = DARK * self.norm(radiosity[:, part], finer.area[part])
         return [(self.norm(off, finer.area[part]) / light, stated.get("stated"))] if light > dark else []
+
+    def sensor_error(self, request, asked, finer):
+        """The root of the mean square error of a set over that of its values, and the stated one. A reduction states
+        that of its set, too, so that its set is selected for the truth."""
+        answer, name = asked.ask(request), (request.get("select") or request["reduce"])["sensors"][0]
+        select = {"sensors": [name]}
+        found, right = (np.array(store.ask({"emission": emission, "select": select})["irradiance"], dtype=float)
+                        for store, emission in ((asked, request["emission"]), (finer.store, finer.emission(request["emission"]))))
+        known = np.isfinite(found) & np.isfinite(right)
+        light = np.linalg.norm(right[known])
+        stated = self.infinite(answer.get("error", {})).get("sensors", {}).get(name, {}).get("stated")
+        return [(float(np.linalg.norm(found[known] - right[known]) / light), stated)] if light > 0 else []
 
     def measure(self):
         folder = self.bench.folder
@@ -424,7 +481,8 @@ class Bench:
         rows = [[name, float(n), *self.summary(found)] for name, (n, found) in of_scenes.items()]
         table(*by_scene, (("scene", None, "name, or all"), ("elements", "", "n"), *COUNTS),
               [*rows, ["all", None, *self.summary(everything)]])
-        kinds = [("emission", kind, 0) for kind in EMISSIONS + SKIES] + [("target", kind, 1) for kind in TARGETS]
+        kinds = [("emission", kind, 0) for kind in EMISSIONS + SKIES + LUMINAIRES]
+        kinds += [("target", kind, 1) for kind in TARGETS + SENSORS]
         table(*by_kind, (("by", None, "emission or target"), ("kind", None, "of it"), *COUNTS),
               [[by, kind, *self.summary([pair for pair in everything if pair[place] == kind])] for by, kind, place in kinds])
 

@@ -386,29 +386,29 @@ class Kinds(Case):
         B = np.reshape(self.ask(name, {"emission": emission, "limit": False})["radiosity"], (truth.C, -1)).astype(float)
         values = s.values(B, L, dimmers(self.lights[name], of))
         off = B @ (s.off * (s.weights > 0)).T.astype(float) + L @ (s.sky * 1e-2).astype(np.float32).astype(float)
-        answer = self.ask(name, {"emission": emission, "limit": False, "select": {"sensors": SETS}})["error"]
-        self.assertEqual((answer["light"], list(answer["sensors"])), ("own", SETS))
+        body = {"emission": emission, "limit": False}
+        both = self.ask(name, dict(body, select={"sensors": SETS}))["error"]
+        self.assertEqual((both["light"], list(both["sensors"])), ("own", SETS))
         for key in SETS:
             rows = s.rows([key])
+            answer = self.ask(name, dict(body, select={"sensors": [key]}))["error"]
             wanted = np.sqrt((off[:, rows] ** 2).sum() / (values[:, rows] ** 2).sum())
-            parts = answer["sensors"][key]["parts"]
+            parts = answer["parts"]
             self.assertAlmostEqual(parts["rows"], wanted, delta=1e-3 * wanted)
             self.assertGreater(min(parts["operator"], parts["mesh"]), 0)
-            self.assertAlmostEqual(answer["sensors"][key]["stated"], np.sqrt(sum(x ** 2 for x in parts.values())), places=9)
-        reduced = {"reduce": {"sensors": SETS, "with": ["mean"]}, "limit": False}
-        for light in {"luminaires": {"wall": 2}}, {"groups": {"lamp": 3}}, {"sky": np.eye(12)[3].tolist()}:
-            by_vectors = self.ask(name, {"emission": light, "limit": False, "select": {"sensors": SETS}})["error"]
-            by_columns = self.ask(name, {"emission": light, **reduced})["error"]
-            for key in SETS:
-                pair = [one["sensors"][key]["parts"] for one in (by_vectors, by_columns)]
-                for parts in ("rows",), ("mesh",), ("operator", "form_factors"):
-                    value, other = (np.hypot.reduce([of[part] for part in parts]) for of in pair)
-                    self.assertAlmostEqual(value, other, delta=1e-4 * value, msg=(light, key, parts))
-        mixed = self.ask(name, {"emission": emission, **reduced})["error"]
-        for key in SETS:
-            self.assertAlmostEqual(mixed["sensors"][key]["parts"]["rows"], answer["sensors"][key]["parts"]["rows"], delta=1e-6)
-            share = mixed["sensors"][key]["parts"]["mesh"] / answer["sensors"][key]["parts"]["mesh"]
-            self.assertTrue(.5 < share < 2, share)
+            self.assertAlmostEqual(answer["stated"], np.sqrt(sum(x ** 2 for x in parts.values())), places=9)
+            self.assertEqual(answer["sensors"], {key: {"stated": answer["stated"]}})
+            self.assertEqual(both["sensors"][key], answer["sensors"][key])
+            reduced = {"reduce": {"sensors": [key], "with": ["mean"]}, "limit": False}
+            for light in {"luminaires": {"wall": 2}}, {"groups": {"lamp": 3}}, {"sky": np.eye(12)[3].tolist()}:
+                pair = [self.ask(name, {"emission": light, "limit": False, **more})["error"]["parts"]
+                        for more in ({"select": {"sensors": [key]}}, reduced)]
+                for some in ("rows",), ("mesh",), ("operator", "form_factors"):
+                    value, other = (np.hypot.reduce([of[part] for part in some]) for of in pair)
+                    self.assertAlmostEqual(value, other, delta=1e-4 * value, msg=(light, key, some))
+            mixed = self.ask(name, {"emission": emission, **reduced})["error"]["parts"]
+            self.assertAlmostEqual(mixed["rows"], parts["rows"], delta=1e-6)
+            self.assertTrue(.5 < mixed["mesh"] / parts["mesh"] < 2, (mixed, parts))
         unknown = self.ask("low", {"emission": emission, "select": {"sensors": SETS}})["error"]
         self.assertEqual((unknown["stated"], unknown["advice"]), (None, "precompute without --probes 0 measures it"))
 
