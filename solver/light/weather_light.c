@@ -1,6 +1,7 @@
 #include "solver/light/weather_light.h"
 
 #include "solver/daylight/weather.h"
+#include "solver/daylight/weather_times.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -8,6 +9,7 @@
 
 void weather_span_free(weather_span *s) {
     free(s->middle);
+    free(s->begins);
     *s = (weather_span){0};
 }
 
@@ -90,6 +92,18 @@ static void log_year(terminal *t, const year_summary *sum, double step, bool pho
                       (double)sum->sunless * step, sum->left_out);
 }
 
+/* The days of a year that has no 29 February are one fewer from March on. */
+static void take_times(const weather *w, weather_span *span) {
+    const int march = weather_day(3, 1);
+    bool leap = false;
+    for (size_t i = 0; i < w->n; i++) leap = leap || (w->hours[i].month == 2 && w->hours[i].day == 29);
+    for (size_t i = 0; i < w->n; i++) {
+        const int day = weather_day(w->hours[i].month, w->hours[i].day);
+        span->middle[i] = w->hours[i].hour;
+        span->begins[i] = 24. * (day - (!leap && day >= march)) + w->hours[i].hour - w->step / 2;
+    }
+}
+
 lam_status weather_skies_read(const char *path, weather_gaps gaps, const moment *at, const sky_tiling *tiling,
                               const year_options *options, terminal *t, weather_skies *out,
                               lam_error *error) {
@@ -108,8 +122,10 @@ lam_status weather_skies_read(const char *path, weather_gaps gaps, const moment 
     made.suns = memory_allocate(w.n, sizeof *made.suns, "the suns", error);
     made.span = (weather_span){.n = w.n, .step = w.step, .apart = w.apart, .mended = w.mended};
     made.span.middle = memory_allocate(w.n, sizeof *made.span.middle, "the times of weather", error);
-    if (made.L == NULL || made.suns == NULL || made.span.middle == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < w.n; i++) made.span.middle[i] = w.hours[i].hour;
+    made.span.begins = memory_allocate(w.n, sizeof *made.span.begins, "the times of weather", error);
+    if (made.L == NULL || made.suns == NULL || made.span.middle == NULL || made.span.begins == NULL)
+        TRY(LAM_ERR_MEMORY);
+    take_times(&w, &made.span);
     TRY(year_skies(&w, tiling, options, &steps, made.L, made.suns, &sum, error));
     if (sum.lit == 0 && at != NULL) {
         char name[MOMENT_BYTES];

@@ -15,6 +15,8 @@ typedef struct weather_span {
     double step;    /* h, that each row stands for */
     bool apart;     /* no two rows are neighbours, so that an hour is but assumed */
     double *middle; /* [n], of each row: hour of the day, standard time */
+    double *begins; /* [n], of each row: hours from the beginning of the year, which has a 29 February where
+                       the file has one */
     weather_mended mended;
 } weather_span;
 

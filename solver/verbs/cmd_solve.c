@@ -8,6 +8,7 @@
 #include "solver/output/output.h"
 #include "solver/render/smooth.h"
 #include "solver/verbs/own_error.h"
+#include "solver/verbs/sensor_files.h"
 #include "solver/verbs/solve_faces.h"
 #include "solver/verbs/solve_options.h"
 #include "solver/verbs/solve_sensors.h"
@@ -349,7 +350,9 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     answer_words words;
     annual_options figures = *year;
     sensor_choice sensors = {.all = NULL};
-    if (f->output != NULL) TRY(atomic_file_check(f->output, error));
+    if (f->output != NULL)
+        TRY(f->sensors != NULL && sensor_results_named(f->output) ? sensor_results_check(f->output, error)
+                                                                  : atomic_file_check(f->output, error));
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, NULL, error));
@@ -372,6 +375,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
         TRY(add_weather(f, s, &m, some ? n_selected : 0, some ? selected : NULL, t, &lit, &sun,
                         is_sum(year) ? &way : NULL, &span, error));
         TRY(take_span(&span, f->weather, f->hours, &figures, error));
+        sensors.begins = span.begins;
     }
     TRY(light_convert(&f->light, f->weather != NULL ? &sun : &lit.sun, &way, &lit, error));
     light_log(&lit, t);

@@ -1,6 +1,6 @@
 #include "solver/verbs/solve_options.h"
 
-#include "solver/verbs/solve_sensors.h"
+#include "solver/verbs/sensor_files.h"
 
 #include "solver/output/output.h"
 
@@ -72,7 +72,9 @@ const option_row solve_answer_rows[] = {
      .argument = "NAME,...|all",
      .not_with = "reduce|at|smooth|tolerance",
      .help = "Irradiance at sets of sensors of the store, gathered at each point, in place of elements: a "
-             "table of each set, or .csv, .json, .npy. The sun is that of its tile (--sun tiles)"},
+             "table of each set, or .csv, .json, .npy, .vtu, or a folder, NAME/, as Honeybee reads results: "
+             ".ill and sun-up-hours.txt of --weather, .res of one light. The sun is that of its tile (--sun "
+             "tiles)"},
     {.name = "smooth",
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),
@@ -204,6 +206,9 @@ lam_status solve_options_check(solve_options *f, const option_result *given, ann
                                    : f->at == AT_FACES   ? OUTPUT_FACES
                                    : f->reduce.count > 0 ? OUTPUT_GROUPS
                                                          : OUTPUT_ELEMENTS;
+    if (f->sensors != NULL && f->output != NULL && sensor_results_named(f->output) && f->annual.count > 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "-o %s: results are of hours: figures of --annual go into .csv, .json, .npy or .vtu", f->output);
     if (f->output != NULL)
         TRY(f->sensors != NULL ? solve_sensors_check(f->output, error)
                                : output_check(f->output, content, error));

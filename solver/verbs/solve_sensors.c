@@ -4,6 +4,7 @@
 #include "solver/base/csv_text.h"
 #include "solver/operator/sensor_light.h"
 #include "solver/verbs/json_print.h"
+#include "solver/verbs/sensor_files.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -72,13 +73,16 @@ done:
 lam_status solve_sensors_check(const char *path, lam_error *error) {
     char extension[16];
     atomic_file_extension(path, extension);
-    if (strcmp(extension, "csv") == 0 || strcmp(extension, "json") == 0 || strcmp(extension, "npy") == 0)
-        return LAM_OK;
-    return status_fail(error, LAM_ERR_ARGUMENT, "-o %s: --sensors goes into .csv, .json or .npy only", path);
+    static const char *const known[] = {"csv", "json", "npy", "vtu"};
+    for (size_t k = 0; k < sizeof known / sizeof *known; k++)
+        if (strcmp(extension, known[k]) == 0) return LAM_OK;
+    if (sensor_results_named(path)) return LAM_OK;
+    return status_fail(error, LAM_ERR_ARGUMENT,
+                       "-o %s: --sensors goes into .csv, .json, .npy or .vtu, or into a folder, NAME/, only",
+                       path);
 }
 
-/* The value of a vector and channel at a receiver; NaN where it has none. */
-static double value_at(const sensor_choice *c, const solution *s, size_t row, size_t receiver) {
+double sensor_value(const sensor_choice *c, const solution *s, size_t row, size_t receiver) {
     if (!lam_sensors_has_value(c->all, receiver)) return NAN;
     return (double)s->values[row * lam_sensors_count(c->all) + receiver];
 }
@@ -93,7 +97,7 @@ static set_figures figures_of(const sensor_choice *c, const solution *s, size_t 
                               size_t count) {
     set_figures f = {.mean = 0, .min = INFINITY, .max = -INFINITY};
     for (size_t i = first; i < first + count; i++) {
-        const double x = value_at(c, s, row, i);
+        const double x = sensor_value(c, s, row, i);
         if (isnan(x)) continue;
         f.n++;
         f.mean += x;
@@ -116,7 +120,7 @@ static void put_csv(const sensor_choice *c, const solution *s, FILE *stream) {
             for (int d = 0; d < 3; d++) fprintf(stream, ",%.9g", at.at[d]);
             for (int d = 0; d < 3; d++) fprintf(stream, ",%.9g", at.axis[d]);
             for (size_t row = 0; row < s->n_vectors * s->m->n_channels; row++) {
-                const double x = value_at(c, s, row, i);
+                const double x = sensor_value(c, s, row, i);
                 if (isnan(x))
                     fputc(',', stream);
                 else
@@ -166,7 +170,7 @@ static json_t *set_json(const sensor_choice *c, const solution *s, size_t set) {
         const set_figures f = figures_of(c, s, row, first, count);
         json_t *values = json_array();
         for (size_t i = first; i < first + count; i++)
-            json_array_append_new(values, number(value_at(c, s, row, i)));
+            json_array_append_new(values, number(sensor_value(c, s, row, i)));
         json_array_append_new(vectors, values);
         json_array_append_new(figures, json_pack("{s:o, s:o, s:o}", "mean", number(f.mean), "min",
                                                  number(f.min), "max", number(f.max)));
@@ -205,7 +209,7 @@ static lam_status put_npy(const sensor_choice *c, const solution *s, FILE *strea
         for (size_t k = 0; k < c->n_sets; k++) {
             size_t first, count;
             lam_sensors_set(c->all, c->sets[k], &first, &count);
-            for (size_t i = first; i < first + count; i++) values[at++] = (float)value_at(c, s, row, i);
+            for (size_t i = first; i < first + count; i++) values[at++] = (float)sensor_value(c, s, row, i);
         }
     const lam_status status = output_array(stream, rank, shape, values, NULL, error);
     free(values);
@@ -222,6 +226,7 @@ lam_status solve_sensors_put(const sensor_choice *c, const solution *s, const ch
         put_table(c, s);
         return LAM_OK;
     }
+    if (path != NULL && sensor_results_named(path)) return sensor_results_write(c, s, path, error);
     if (path != NULL) {
         atomic_file_extension(path, extension);
         TRY(atomic_file_open(path, &file, error));
@@ -234,6 +239,8 @@ lam_status solve_sensors_put(const sensor_choice *c, const solution *s, const ch
             FAIL(error, LAM_ERR_MEMORY, "not enough memory for JSON");
     } else if (strcmp(extension, "csv") == 0) {
         put_csv(c, s, file.stream);
+    } else if (strcmp(extension, "vtu") == 0) {
+        sensor_points_vtu(c, s, file.stream);
     } else {
         TRY(put_npy(c, s, file.stream, error));
     }

@@ -1,4 +1,5 @@
-/* The answers of `lambert solve` at sensors, --sensors: a table of sets, CSV, JSON or NPY. */
+/* The answers of `lambert solve` at sensors, --sensors: a table of sets, CSV, JSON, NPY, and what
+ * sensor_files.h has. */
 #ifndef LAMBERT_VERBS_SOLVE_SENSORS_H
 #define LAMBERT_VERBS_SOLVE_SENSORS_H
 
@@ -9,9 +10,11 @@
 /* The sensors of a store, and the sets of them that are asked for, in this order. Freed by
  * sensor_choice_free. */
 typedef struct sensor_choice {
-    lam_sensors *all; /* NULL: none are asked for */
-    size_t n_sets, n; /* of the sets chosen, and of their receivers */
-    size_t *sets;     /* [n_sets] */
+    lam_sensors *all;     /* NULL: none are asked for */
+    size_t n_sets, n;     /* of the sets chosen, and of their receivers */
+    size_t *sets;         /* [n_sets] */
+    const double *begins; /* [vectors]: hours from the beginning of the year, where each vector is one;
+                             borrowed, NULL: they are not known */
 } sensor_choice;
 
 /* The word for all sets. */
@@ -23,7 +26,11 @@ lam_status sensor_choice_open(store *s, const mesh *m, const char *names, sensor
                               lam_error *error);
 void sensor_choice_free(sensor_choice *c);
 
-/* Checks the extension of a file: .csv, .json or .npy. Errors: LAM_ERR_ARGUMENT. */
+/* The value of a vector and channel, row = v C + c, at a receiver; NaN where it has none. */
+double sensor_value(const sensor_choice *c, const solution *s, size_t row, size_t receiver);
+
+/* Checks the extension of a file: .csv, .json, .npy or .vtu, or a folder, whose name ends in '/'. Errors:
+ * LAM_ERR_ARGUMENT. */
 lam_status solve_sensors_check(const char *path, lam_error *error);
 
 /* Writes irradiances s->values [n_vectors][C][sensors of the store]: to path, or, where that is NULL, to

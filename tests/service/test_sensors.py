@@ -152,7 +152,7 @@ class Sensors(Case):
         self.refused(1, "no such set; it has", "solve", self.grey, "--sensors", "rom")
         self.refused(1, "the store has no sensors", "solve", self.store, "--sensors", "all")
         self.refused(2, "receive irradiance", "solve", self.grey, "--sensors", "all", "--quantity", "radiosity")
-        self.refused(2, ".csv, .json or .npy", "solve", self.grey, "--sensors", "all", "-o", "x.ply")
+        self.refused(2, ".csv, .json, .npy or .vtu", "solve", self.grey, "--sensors", "all", "-o", "x.ply")
         self.refused(2, "--reduce", "solve", self.grey, "--sensors", "all", "--reduce", "floor=mean")
         out = ("-o", self.path("refused.h5"))
         for text, words in (('{"points": [{"name": "a"}]}', "at"), ('{"points": [{"name": "a", "at": [[1, 2]]}]}', "three numbers"),
