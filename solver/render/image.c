@@ -76,22 +76,33 @@ static void on_png_flush(png_structp png) {
     (void)png;
 }
 
+/* Values of 8 bits, which are sRGB, or of 16. */
+typedef struct png_content {
+    size_t width, height, channels;
+    const uint8_t *shallow;
+    const uint16_t *deep;
+} png_content;
+
 /* A function of its own for setjmp: it changes no variable afterwards. */
-static bool encode(png_structp png, png_infop info, const image *picture) {
+static bool encode(png_structp png, png_infop info, const png_content *p) {
+    static const uint16_t one = 1;
+    const size_t row = p->width * p->channels;
     if (setjmp(png_jmpbuf(png)) != 0) return false;
-    png_set_IHDR(png, info, (png_uint_32)picture->width, (png_uint_32)picture->height, 8,
-                 picture->channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+    png_set_IHDR(png, info, (png_uint_32)p->width, (png_uint_32)p->height, p->deep != NULL ? 16 : 8,
+                 p->channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
     png_set_compression_level(png, COMPRESSION);
-    png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+    if (p->deep == NULL) png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
     png_write_info(png, info);
-    for (size_t y = 0; y < picture->height; y++)
-        png_write_row(png, picture->pixels + y * picture->width * picture->channels);
+    /* The format has the high byte first. */
+    if (p->deep != NULL && *(const uint8_t *)&one == 1) png_set_swap(png);
+    for (size_t y = 0; y < p->height; y++)
+        png_write_row(png, p->deep != NULL ? (png_const_bytep)(p->deep + y * row) : p->shallow + y * row);
     png_write_end(png, info);
     return true;
 }
 
-static lam_status encode_to(FILE *file, const image *picture, const char *path, lam_error *error) {
+static lam_status encode_to(FILE *file, const png_content *picture, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
     png_writer writer = {.file = file};
     png_infop info = NULL;
@@ -109,11 +120,36 @@ done:
     return status;
 }
 
+lam_status image_encode_deep(size_t width, size_t height, size_t channels, const uint16_t *values,
+                             unsigned char **bytes, size_t *length, lam_error *error) {
+    lam_status status = LAM_OK;
+    const png_content content = {.width = width, .height = height, .channels = channels, .deep = values};
+    char *made = NULL;
+    size_t made_length = 0;
+    FILE *stream = open_memstream(&made, &made_length);
+    if (stream == NULL) return status_fail(error, LAM_ERR_MEMORY, "not enough memory for a picture");
+    status = encode_to(stream, &content, "a picture in memory", error);
+    if (fclose(stream) != 0 && status == LAM_OK)
+        status = status_fail(error, LAM_ERR_MEMORY, "not enough memory for a picture");
+    if (status == LAM_ERR_IO) status = LAM_ERR_MEMORY; /* a stream in memory lacks nothing else */
+    if (status == LAM_OK) {
+        *bytes = (unsigned char *)made;
+        *length = made_length;
+        made = NULL;
+    }
+    free(made);
+    return status;
+}
+
 lam_status image_write_png(const image *picture, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
     atomic_file out = {0};
+    const png_content content = {.width = picture->width,
+                                 .height = picture->height,
+                                 .channels = picture->channels,
+                                 .shallow = picture->pixels};
     TRY(atomic_file_open(path, &out, error));
-    TRY(encode_to(out.stream, picture, path, error));
+    TRY(encode_to(out.stream, &content, path, error));
     TRY(atomic_file_commit(&out, error));
 done:
     atomic_file_abort(&out);
