@@ -28,6 +28,17 @@ typedef struct gltf_light {
                      mean of the first C */
 } gltf_light;
 
+/* A map of light over a scene: an image, and the places of corners in it. */
+typedef struct gltf_lightmap {
+    const float (*texcoord)[4][2]; /* [n], v downwards */
+    const unsigned char *png;      /* the file of the image */
+    size_t png_bytes;
+    bool emissive;    /* the image is the light that leaves, as sRGB; else the irradiance, linear */
+    double intensity; /* of an irradiance, by MOZ_lightmap: what the image is multiplied by */
+    double white;     /* the value of the image's 1, in the unit of the light */
+    const char *unit; /* "lx" */
+} gltf_lightmap;
+
 /* A scene as it is stored (store/FORMAT.md, /mesh). Every index is below its bound, every number finite. */
 typedef struct gltf_mesh {
     const char *name, *kind; /* of the scene and of its operator; kind NULL: it is left out */
@@ -43,6 +54,7 @@ typedef struct gltf_mesh {
     const scene_glass *glass;       /* with panes, by group; or NULL */
     const gltf_light *light;        /* or NULL */
     const scene_pictures *pictures; /* or NULL; not beside light, of 1 channel (grey images) or 3 */
+    const gltf_lightmap *lightmap;  /* or NULL; not beside light, emissive not beside pictures */
     char up;                        /* 'x', 'y' or 'z' */
 } gltf_mesh;
 
@@ -64,6 +76,9 @@ typedef struct gltf_mesh {
  *   - A group whose elements all have one image (pictures) has TEXCOORD_0, _REFLECTANCE (three floats, that
  * of the element) and a material of the image and its factor in place of the mean. The JPEG files stand in
  * the file.
+ *   - With a lightmap TEXCOORD_1 is the place in it, and TEXCOORD_0 too where a group has no image. Materials
+ *     have MOZ_lightmap {index, texCoord, intensity}; of an emissive one they are black and have its image
+ *     as emissiveTexture. extras of the file say "lightmap": {"quantity", "unit", "white", "encoding"}.
  *   - extras of the file and of the root node: {"lambert":{"name","elements","channels","up","kind"}}, `up`
  *     being the axis that was turned into y; of the node of a group: {"group","elements"}, and "buried", the
  *     numbers of elements that figures of groups leave out, where there are any; of that of a pane "glass":
