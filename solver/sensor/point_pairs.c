@@ -182,7 +182,7 @@ static uint32_t segments_of(const point_scene *s, uint32_t j) {
 /* The factor from which on an element is a pair. */
 static double least_factor(const point_scene *s, size_t j) {
     const double of_ray = 1. / (double)(HALVES * s->rays), part = (double)s->n_sources / SOURCES_MOST;
-    if (!s->is_source[j]) return of_ray;
+    if (!s->is_source[j]) return s->pair_factor > 0 ? s->pair_factor : of_ray;
     return s->n_sources <= SOURCES_WHOLE ? 0 : of_ray * fmin(part * part, 1);
 }
 

@@ -18,6 +18,7 @@ typedef struct point_scene {
     const sky_bounce *sky; /* NULL: none */
     portals openings;      /* n 0: none */
     size_t rays;           /* of a half */
+    double pair_factor;    /* of sensor_rows_options */
     size_t aimed;          /* of a half; 0 without openings */
     uint64_t seed;
 } point_scene;

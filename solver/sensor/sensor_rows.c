@@ -254,6 +254,7 @@ lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers, 
                                .n_sources = n_sources,
                                .sky = o->sky,
                                .rays = (o->rays > 0 ? o->rays : SENSOR_RAYS) / HALVES,
+                               .pair_factor = o->pair_factor,
                                .seed = o->seed};
     if (o->sky != NULL) {
         made.n_tiles = o->sky->tiling.n_tiles;

@@ -17,7 +17,8 @@
 enum { SENSOR_RAYS_LEAST = 64, SENSOR_RAYS = 1024, SENSOR_RAYS_MOST = 65536 };
 
 typedef struct sensor_rows_options {
-    size_t rays; /* 0: SENSOR_RAYS */
+    size_t rays;        /* 0: SENSOR_RAYS */
+    double pair_factor; /* an element of a larger one is a pair; 0: the share of a ray */
     uint64_t seed;
     const bool *sources;           /* [n_groups], those that give light beside groups that emit; NULL: none */
     const sky_bounce *sky;         /* its tiling and the albedo of its ground; NULL: no sky */
