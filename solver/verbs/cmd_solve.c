@@ -12,6 +12,7 @@
 #include "solver/verbs/solve_faces.h"
 #include "solver/verbs/solve_options.h"
 #include "solver/verbs/solve_sensors.h"
+#include "solver/verbs/solve_texels.h"
 #include "solver/verbs/verbs.h"
 #include "solver/verbs/year_error.h"
 
@@ -397,9 +398,13 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
                     .n_reductions = n_reductions};
     hours = hours_of(&span);
     if (f->weather != NULL) out.hours = &hours;
-    if (f->tolerance == 0 && sensors.all == NULL)
+    if (f->tolerance == 0 && sensors.all == NULL && f->at != AT_TEXELS)
         take_error(&stated, &lit.light, n_selected, selected, t, &out);
     take_words(year, f->figure, &lit.told, &words, &out);
+    if (f->at == AT_TEXELS) {
+        TRY(solve_texels(s, &m, &lit, f->texel, f->output, &out, t, error));
+        goto done;
+    }
     TRY(find_answers(path, f, &figures, &lit, n_selected, selected, t, &out, &made, error));
     if (figures.luminance) show_luminance(&one_channel, &out);
     if (made.values != NULL && year->n_figures == 0 && sensors.all == NULL)

@@ -1,6 +1,8 @@
 #include "solver/verbs/solve_options.h"
 
+#include "solver/base/atomic_file.h"
 #include "solver/verbs/sensor_files.h"
+#include "solver/verbs/solve_texels.h"
 
 #include "solver/output/output.h"
 
@@ -61,11 +63,28 @@ const option_row solve_answer_rows[] = {
     {.name = "at",
      .kind = OPTION_WORD,
      .offset = FIELD(at),
-     .choices = "elements|faces",
+     .choices = "elements|faces|texels",
      .preset = "elements",
      .help = "The places of values. faces: means by area over the fronts of each face of the scene file, in "
              "its order (.npy: NaN, .json: null, .csv: nothing for a face without an element), into "
-             ".npy, .json, .csv, or as a table"},
+             ".npy, .json, .csv, or as a table. texels: a lightmap of irradiance, each texel gathered at its "
+             "point as at a sensor, into .glb (MOZ_lightmap) or .exr; one light, with the sun of its tile"},
+    {.name = "texel",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(texel),
+     .argument = "X",
+     .unit = "m",
+     .otherwise = "half the root of the mean area of elements, or longer where that makes more than 65536 "
+                  "texels",
+     .least = 0,
+     .above = true,
+     .help = "--at texels: the longest side of a texel; a lightmap has at most 4194304, borders included. "
+             "Each takes .1 to .5 ms of a processor"},
+    {.name = "emissive",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(emissive),
+     .help = "--at texels: into .glb as emissive texture of black surfaces, which every viewer shows: the "
+             "radiosity, in place of the irradiance"},
     {.name = "sensors",
      .kind = OPTION_TEXT,
      .offset = FIELD(sensors),
@@ -149,6 +168,41 @@ done:
     return status;
 }
 
+/* Checks the options of --at texels; they and sensors take no sun itself, but that of its tile. */
+static lam_status check_places(solve_options *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    const bool texels = f->at == AT_TEXELS;
+    if (!texels && (f->texel > 0 || f->emissive))
+        FAIL(error, LAM_ERR_ARGUMENT, "--%s is for --at texels", f->texel > 0 ? "texel" : "emissive");
+    if (texels && f->output == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--at texels is for -o FILE.glb or FILE.exr");
+    if (texels && (f->reduce.count > 0 || f->smooth || f->tolerance > 0 || f->annual.count > 0 || f->linear))
+        FAIL(error, LAM_ERR_ARGUMENT, "--at texels is of single texels of one light: leave out --%s",
+             f->reduce.count > 0   ? "reduce"
+             : f->smooth           ? "smooth"
+             : f->tolerance > 0    ? "tolerance"
+             : f->annual.count > 0 ? "annual"
+                                   : "linear");
+    if (texels && f->quantity == NULL) f->quantity = f->emissive ? "radiosity" : "irradiance";
+    if (texels && strcmp(f->quantity, "indirect") == 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--at texels: texels have irradiance or radiosity, not indirect light");
+    char extension[16] = "";
+    if (texels) atomic_file_extension(f->output, extension);
+    if (strcmp(extension, "glb") == 0 && f->emissive != (strcmp(f->quantity, "radiosity") == 0))
+        FAIL(error, LAM_ERR_ARGUMENT, "-o %s: %s", f->output,
+             f->emissive ? "--emissive shows --quantity radiosity"
+                         : "radiosity goes into a .glb by --emissive, or into .exr");
+    if (f->sensors != NULL && f->quantity == NULL) f->quantity = "irradiance";
+    if ((f->sensors != NULL || texels) && !f->sun_given) { /* no sun itself comes to points yet */
+        f->sun = SUN_TILES;
+        f->light.at.sun_in_tiles = true;
+    }
+    if (f->sensors != NULL && strcmp(f->quantity, "irradiance") != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--sensors: receive irradiance, not %s", f->quantity);
+done:
+    return status;
+}
+
 /* Checks the light of the sky, and its sun. */
 static lam_status check_sky(solve_options *f, const option_result *given, lam_error *error) {
     lam_status status = LAM_OK;
@@ -210,15 +264,10 @@ lam_status solve_options_check(solve_options *f, const option_result *given, ann
         FAIL(error, LAM_ERR_ARGUMENT,
              "-o %s: results are of hours: figures of --annual go into .csv, .json, .npy or .vtu", f->output);
     if (f->output != NULL)
-        TRY(f->sensors != NULL ? solve_sensors_check(f->output, error)
-                               : output_check(f->output, content, error));
-    if (f->sensors != NULL && f->quantity == NULL) f->quantity = "irradiance";
-    if (f->sensors != NULL && !f->sun_given) { /* no sun itself comes to sensors yet */
-        f->sun = SUN_TILES;
-        f->light.at.sun_in_tiles = true;
-    }
-    if (f->sensors != NULL && strcmp(f->quantity, "irradiance") != 0)
-        FAIL(error, LAM_ERR_ARGUMENT, "--sensors: receive irradiance, not %s", f->quantity);
+        TRY(f->sensors != NULL   ? solve_sensors_check(f->output, error)
+            : f->at == AT_TEXELS ? solve_texels_check(f->output, error)
+                                 : output_check(f->output, content, error));
+    TRY(check_places(f, error));
     TRY(read_year(f, year, error));
     /* Studies of daylight ask for the light that a place receives. */
     if (f->quantity == NULL) f->quantity = year->n_figures > 0 ? "irradiance" : "radiosity";

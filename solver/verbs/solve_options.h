@@ -10,18 +10,18 @@
 typedef enum sun_asked { SUN_TILES, SUN_EXACT } sun_asked;
 
 /* --at: the places of the values. */
-typedef enum place_asked { AT_ELEMENTS, AT_FACES } place_asked;
+typedef enum place_asked { AT_ELEMENTS, AT_FACES, AT_TEXELS } place_asked;
 
 typedef struct solve_options {
     light_options light;
     option_list reduce, annual;
     const char *weather, *quantity, *output, *occupied, *figure, *sensors;
-    double hours, tolerance;
+    double hours, tolerance, texel;
     sun_asked sun;
     place_asked at;
     uint64_t sun_points;
     weather_gaps gaps;
-    bool json, verbose, smooth, linear;
+    bool json, verbose, smooth, linear, emissive;
     bool sun_given; /* --sun was */
 } solve_options;
 
