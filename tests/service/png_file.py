@@ -7,9 +7,13 @@ import numpy
 
 
 def decode_png(path):
-    """A PNG of 8 bits a channel as an array [height][width][channels], by the specification alone."""
+    """A PNG of 8 or 16 bits a channel as an array [height][width][channels], by the specification alone."""
     with open(path, "rb") as file:
-        data = file.read()
+        return decode_png_bytes(file.read(), path)
+
+
+def decode_png_bytes(data, path):
+    """The same of its bytes."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n", path
     place, packed = 8, b""
     while place < len(data):
@@ -19,11 +23,11 @@ def decode_png(path):
         place += 12 + length
         if kind == b"IHDR":
             width, height, depth, colour = struct.unpack(">IIBB", body[:10])
-            assert depth == 8
+            assert depth in (8, 16)
         elif kind == b"IDAT":
             packed += body
     assert kind == b"IEND"
-    channels = {0: 1, 2: 3}[colour]
+    channels = {0: 1, 2: 3}[colour] * depth // 8  # bytes: filters know no more
     rows = numpy.frombuffer(zlib.decompress(packed), numpy.uint8).reshape(height, 1 + width * channels)
     pixels = numpy.zeros((height, width, channels), int)
     above = numpy.zeros((width, channels), int)
@@ -48,4 +52,4 @@ def decode_png(path):
                 row[x] = (row[x] + guess) & 255
                 left, corner = row[x], up
         pixels[y] = above = row
-    return pixels
+    return pixels if depth == 8 else 256 * pixels[..., ::2] + pixels[..., 1::2]

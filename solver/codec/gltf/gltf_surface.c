@@ -38,13 +38,13 @@ static bool say_extensions(const gltf_surface *s, buffer *b) {
     return good && buffer_append_text(b, "}");
 }
 
-/* A black surface that shows the light of a map. */
+/* A black surface that shows the light of a map, by TEXCOORD_0, which is all that some programs know. */
 static bool say_shining(const gltf_surface *s, buffer *b) {
     const double black[4] = {0, 0, 0, 1 - s->passes};
     return say_numbers(b, ",\"pbrMetallicRoughness\":{\"baseColorFactor\":", 4, black) &&
            buffer_printf(b,
                          ",\"metallicFactor\":0,\"roughnessFactor\":1},\"doubleSided\":false,"
-                         "\"emissiveFactor\":[1,1,1],\"emissiveTexture\":{\"index\":%u,\"texCoord\":1}",
+                         "\"emissiveFactor\":[1,1,1],\"emissiveTexture\":{\"index\":%u}",
                          s->lightmap_texture);
 }
 
