@@ -106,7 +106,7 @@ class Lightmap(Case):
         for material in self.glb.json["materials"]:
             lightmap = material["extensions"]["MOZ_lightmap"]
             self.assertEqual((lightmap["index"], lightmap["texCoord"]), (0, 1))
-            # what leaves a white surface under four means of the irradiance is shown as 1
+            # a white surface under four means of the irradiance is shown as 1
             self.assertAlmostEqual(lightmap["intensity"] * self.glb.white ** -1 / np.pi,
                                    1 / (4 * self.mean_irradiance()), delta=.03 / (4 * self.mean_irradiance()))
 

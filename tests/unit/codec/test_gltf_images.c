@@ -156,11 +156,65 @@ START_TEST(without_a_group_of_one_image_there_is_none) {
 }
 END_TEST
 
+/* Places in the map are TEXCOORD_1, and TEXCOORD_0 too of a group without an image; the map is the last image
+ * and texture. An emissive one stands alone. */
+START_TEST(a_lightmap_is_the_last_image) {
+    static const uint32_t members[3][2] = {{0, 2}, {1, 3}, {4, 4}};
+    static const unsigned char png[] = "a map";
+    float places[5][4][2];
+    size_t count;
+    strip s = {.area = {0}};
+    fill(&s);
+    for (int i = 0; i < 5; i++)
+        for (int k = 0; k < 4; k++) memcpy(places[i][k], (float[2]){.1f * (float)i, .2f * (float)k}, 8);
+    gltf_lightmap map = {.texcoord = (const float(*)[4][2])places,
+                         .png = png,
+                         .png_bytes = 5,
+                         .intensity = 6.5,
+                         .white = 250,
+                         .unit = "lx"};
+    s.m.lightmap = &map;
+    for (int emissive = 0; emissive < 2; emissive++) {
+        map.emissive = emissive == 1;
+        s.m.pictures = map.emissive ? NULL : &s.pictures;
+        gltf_file l = gltf_load(&s.m);
+        const size_t before = map.emissive ? 0 : 2;
+        for (size_t g = 0; g < 3; g++) {
+            const gltf_primitive p = gltf_primitive_of(&l, 1 + g);
+            const size_t own = gltf_number(p.attributes, "TEXCOORD_1");
+            const char *uv = gltf_accessor(&l, own, "VEC2", 5126, 8, &count);
+            ck_assert_uint_eq(count, p.n_vertices);
+            for (size_t v = 0; v < count; v++)
+                for (size_t d = 0; d < 2; d++)
+                    ck_assert(gltf_float(uv + 8 * v + 4 * d) == places[members[g][v / 3]][v % 3][d]);
+            ck_assert_int_eq(gltf_number(p.attributes, "TEXCOORD_0") == own, map.emissive || g == 1);
+            const json_t *extension =
+                json_object_get(json_object_get(p.material, "extensions"), "MOZ_lightmap");
+            const json_t *texture = map.emissive ? json_object_get(p.material, "emissiveTexture") : extension;
+            ck_assert_uint_eq(gltf_number(texture, "index"), before);
+            ck_assert(map.emissive == (extension == NULL));
+            if (extension != NULL)
+                ck_assert(json_number_value(json_object_get(extension, "intensity")) == 6.5);
+        }
+        const json_t *texture = gltf_item(l.root, "textures", before),
+                     *image = gltf_item(l.root, "images", gltf_number(texture, "source")),
+                     *view = gltf_item(l.root, "bufferViews", gltf_number(image, "bufferView"));
+        ck_assert_str_eq(json_string_value(json_object_get(image, "mimeType")), "image/png");
+        ck_assert_uint_eq(gltf_number(view, "byteLength"), 5);
+        ck_assert_mem_eq(l.binary + gltf_number(view, "byteOffset"), png, 5);
+        ck_assert_uint_eq(json_array_size(json_object_get(l.root, "textures")), before + 1);
+        gltf_unload(&l);
+    }
+    group_index_free(&s.groups);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("gltf_images");
     TCase *tests = tcase_create("images");
     tcase_add_test(tests, groups_of_one_image_have_it);
     tcase_add_test(tests, one_channel_has_images_too);
+    tcase_add_test(tests, a_lightmap_is_the_last_image);
     tcase_add_test(tests, without_a_group_of_one_image_there_is_none);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
