@@ -40,7 +40,7 @@ typedef struct lightmap {
  * neighbours, those near lit ones first. A texel whose rays mostly meet backs of faces, or that lies in the
  * opening of a luminaire, has no value of its own. One that no light at all reaches is black but within
  * LIGHTMAP_BORDER texels of lit ones: it is mostly covered by a body, whose rim would be dark. The bits do
- * not depend on threads. Freed by lightmap_free. Cost: 1,024 rays of a sensor for each texel, .5 to 2 ms.
+ * not depend on threads. Freed by lightmap_free. Cost: 1,024 rays of a sensor for each texel, .5 to 3 ms.
  * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, LAM_ERR_INTERNAL. */
 lam_status lightmap_make(const mesh *m, const lightmap_charts *c, const lightmap_texels *t,
                          const lightmap_light *light, const progress *steps, lightmap *out, lam_error *error);

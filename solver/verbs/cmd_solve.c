@@ -446,7 +446,8 @@ int cmd_solve(int argc, char **argv) {
     annual_options year = {.hours = 1, .from = 0, .to = 24};
     char formats[OUTPUT_FORMATS], output_help[2 * OUTPUT_FORMATS];
     output_formats(OUTPUT_ELEMENTS, formats);
-    snprintf(output_help, sizeof output_help, "%s; without it the mean of every group is printed", formats);
+    snprintf(output_help, sizeof output_help,
+             "%s, or .exr of --at texels; without it the mean of every group is printed", formats);
     const option_row output_rows[] = {
         OPTION_ROW_OUTPUT(offsetof(solve_options, output), "FILE", .help = output_help), {0}};
     const option_table tables[] = {

@@ -79,7 +79,7 @@ const option_row solve_answer_rows[] = {
      .least = 0,
      .above = true,
      .help = "--at texels: the longest side of a texel; a lightmap has at most 4194304, borders included. "
-             "Each takes .1 to .5 ms of a processor"},
+             "Each takes .5 to 3 ms of a processor"},
     {.name = "emissive",
      .kind = OPTION_FLAG,
      .offset = FIELD(emissive),
