@@ -1,9 +1,8 @@
 #include "solver/lightmap/lightmap_charts.h"
 
-#include "solver/base/union_find.h"
 #include "solver/base/vector3.h"
+#include "solver/lightmap/plane_parts.h"
 #include "solver/lightmap/rectangle_pack.h"
-#include "solver/scene/facet/facets.h"
 #include "solver/scene/plane.h"
 
 #include <math.h>
@@ -34,40 +33,13 @@ void lightmap_point(const lightmap_chart *c, const double place[2], double at[3]
     }
 }
 
-/* Joins elements of one number, group and side to the one before; first: room for each number, which is below
- * n. Elements of no number, UINT32_MAX, stay as they are. */
-static void join_by(const mesh *m, const uint32_t *number, size_t n, uint32_t *first, uint32_t *parent) {
-    for (size_t k = 0; k < n; k++) first[k] = UINT32_MAX;
-    for (uint32_t i = 0; i < m->n; i++) {
-        if (number[i] >= n) continue;
-        uint32_t *known = &first[number[i]];
-        double cosine = 0;
-        for (int d = 0; d < 3 && *known != UINT32_MAX; d++)
-            cosine += (double)m->normal[i][d] * (double)m->normal[*known][d];
-        if (*known != UINT32_MAX && m->group[i] == m->group[*known] && cosine > plane_parallel)
-            union_find_join(parent, i, *known);
-        else
-            *known = i;
-    }
-}
-
-/* Lists the elements by charts: those of one facet, and those of one face where a facet joins none of them.
- */
+/* Lists the elements by charts. */
 static lam_status list_charts(const mesh *m, lightmap_charts *out, lam_error *error) {
     lam_status status = LAM_OK;
-    double centre[3], radius;
-    facets f = {.n = 0};
-    const size_t n_faces = m->faces.of != NULL ? m->faces.n_faces : 0, most = n_faces > m->n ? n_faces : m->n;
-    uint32_t *first = memory_allocate(most, sizeof *first, what, error);
     out->chart_of = memory_allocate(m->n, sizeof *out->chart_of, what, error);
     out->elements = memory_allocate(m->n, sizeof *out->elements, what, error);
-    if (first == NULL || out->elements == NULL || out->chart_of == NULL) TRY(LAM_ERR_MEMORY);
-    mesh_bounds(m, centre, &radius);
-    TRY(facets_join(m, m->n, plane_same_place * radius, &f, error));
-    for (uint32_t i = 0; i < m->n; i++) out->chart_of[i] = i;
-    join_by(m, f.of_element, f.n, first, out->chart_of);
-    if (n_faces > 0) join_by(m, m->faces.of, n_faces, first, out->chart_of);
-    out->n = union_find_number(out->chart_of, m->n);
+    if (out->elements == NULL || out->chart_of == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(plane_parts_find(m, out->chart_of, &out->n, error));
     out->charts = memory_allocate(out->n, sizeof *out->charts, what, error);
     if (out->charts == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++) out->charts[out->chart_of[i]].count++;
@@ -79,8 +51,6 @@ static lam_status list_charts(const mesh *m, lightmap_charts *out, lam_error *er
         out->elements[c->first + c->count++] = i;
     }
 done:
-    facets_free(&f);
-    free(first);
     return status;
 }
 

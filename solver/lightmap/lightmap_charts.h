@@ -1,6 +1,5 @@
-/* The charts of a lightmap: each is a rectangle of texels around the elements of one facet, or of one face,
- * and one group, and all of them are packed into one map with a border of LIGHTMAP_BORDER texels around each.
- * Knows no light. */
+/* The charts of a lightmap: each is a rectangle of texels around a plane part of a group, and all of them are
+ * packed into one map with a border of LIGHTMAP_BORDER texels around each. Knows no light. */
 #ifndef LAMBERT_LIGHTMAP_CHARTS_H
 #define LAMBERT_LIGHTMAP_CHARTS_H
 
