@@ -2,6 +2,7 @@
  * those of elements, and texels have their limit. */
 #include "solver/base/vector3.h"
 #include "solver/lightmap/lightmap_texels.h"
+#include "solver/lightmap/plane_parts.h"
 #include "support/box.h"
 #include "support/suite.h"
 
@@ -108,6 +109,36 @@ START_TEST(slanting_ones_and_slivers_are_covered) {
 }
 END_TEST
 
+/* A row of strips that turn by less than the flatness of a face each, and by 5 degrees in all, is one part
+ * for each; unturned they are one. */
+START_TEST(what_bends_is_not_plane) {
+    enum { N = 200 };
+    lam_error error = {0};
+    uint32_t part[N];
+    size_t n_parts;
+    for (int bends = 0; bends < 2; bends++) {
+        mesh m = {0};
+        double x = 0, z = 0, angle = 0;
+        for (int k = 0; k < N; k++) {
+            const double next_x = x + .01 * cos(angle), next_z = z + .01 * sin(angle);
+            mesh_add_quad(
+                &m, (const double[4][3]){{x, 0, z}, {next_x, 0, next_z}, {next_x, 1, next_z}, {x, 1, z}});
+            x = next_x;
+            z = next_z;
+            if (bends) angle += .0004;
+        }
+        mesh_finish(&m, .5f);
+        ck_ok(plane_parts_find(&m, part, &n_parts, &error));
+        ck_assert_uint_eq(n_parts, bends ? N : 1);
+        /* Groups are parts of their own. */
+        for (int k = 0; k < N; k++) m.group[k] = k % 2;
+        ck_ok(plane_parts_find(&m, part, &n_parts, &error));
+        ck_assert_uint_eq(n_parts, N);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
 START_TEST(texels_have_a_limit) {
     const double size[3] = {4, 3, 2};
     lam_error error = {0};
@@ -131,6 +162,7 @@ int main(void) {
     TCase *c = tcase_create("all");
     tcase_add_test(c, a_box_has_six);
     tcase_add_test(c, slanting_ones_and_slivers_are_covered);
+    tcase_add_test(c, what_bends_is_not_plane);
     tcase_add_test(c, texels_have_a_limit);
     suite_add_tcase(s, c);
     return suite_run(s);
