@@ -103,6 +103,9 @@ lam_status solve_texels(store *s, const mesh *m, lit_store *lit, double texel, c
                                .seed = 1};
     TRY(lightmap_make(m, &charts, &texels, &of, &steps, &map, error));
     terminal_clear(t);
+    if (!isfinite(map.mean) || !isfinite(map.most))
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: the light of texels is beyond single precision: give less light",
+             path);
     if (map.hidden > 0)
         terminal_log(t, "%zu texels lie in a body or in a luminaire: they have the light beside them",
                      map.hidden);

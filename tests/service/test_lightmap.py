@@ -247,6 +247,8 @@ class Lightmap(Case):
         self.refused(2, "by --emissive, or into .exr", *texels, "--quantity", "radiosity", "-o", self.path("x.glb"))
         self.refused(2, "shows --quantity radiosity", *texels, "--quantity", "irradiance", "--emissive", "-o", self.path("x.glb"))
         self.refused(2, "not indirect light", *texels, "--quantity", "indirect", "-o", self.path("x.exr"))
+        self.failed("beyond single precision", *texels, "--texel", 1, "--emit", "lamp=3e38", "--emit", "floor=3e38", "-o",
+                    self.path("x.glb"))
         self.failed("4194304 texels that a lightmap may have at most; give 0.0", *texels, "--texel", 1e-4, "-o", self.path("x.exr"))
         np.save(self.path("E.npy"), np.ones((2, h5py.File(self.cornell)["mesh/group"].shape[0]), "<f4"))
         with open(self.path("b.json"), "w", encoding="utf-8") as file:
