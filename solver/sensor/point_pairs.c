@@ -1,6 +1,7 @@
-/* The pairs of a receiver: w_j = F_j sum_k K_k T_k / sum_k K_k, with the unoccluded factor F_j, samples k on
- * the element, their kernels K = density cos / r^2 and T what reaches the receiver: 0, 1, or what panes pass.
- */
+/* The pairs of a point: w_j = F_j V with V = sum_k K_k T_k / sum_k K_k, the unoccluded factor F_j, samples k
+ * on the element, their kernels K = d cos / r^2 and T what reaches the point: 0, 1, or what panes pass. The
+ * part of an element that is seen lies in other directions than its whole, so that for a row of the ratio q,
+ *     w_j = F_j V + F sum_k K_k q_k (T_k - V) / sum_k K_k,    F the factor of the density d. */
 #include "solver/sensor/point_rows.h"
 
 #include "solver/base/random.h"
@@ -65,7 +66,12 @@ void point_place_set(const point_scene *s, const receiver *r, size_t number, poi
     const double radius = rounding * 0x1p22, near = fmax(fmin(1e-3, 1e-4 * radius), 4 * rounding);
     double normals[FACES_MOST][3];
     size_t n_faces = 0;
-    *out = (point_place){.r = *r, .number = number};
+    *out = (point_place){.r = *r, .n_rows = 1, .number = number};
+    if (r->kind >= RECEIVER_HARMONIC) {
+        out->probe = *r;
+        out->n_rows = HARMONICS;
+        out->r = (receiver){.kind = RECEIVER_SPHERE, .at = {r->at[0], r->at[1], r->at[2]}};
+    }
     for (size_t j = 0; j < m->n && n_faces < FACES_MOST; j++) {
         const double *ball = s->ball[j];
         double away[3], normal[3], height = 0;
@@ -77,7 +83,7 @@ void point_place_set(const point_scene *s, const receiver *r, size_t number, poi
         height = dot3(away, normal);
         const double clear = 2 * rounding + visibility_rise(s->v, j);
         /* One that looks into a face goes behind it: it is in a body, or sees what is below a sheet. */
-        const bool behind = dot3(normal, r->axis) < against;
+        const bool behind = dot3(normal, out->r.axis) < against;
         if (!(height >= (behind ? -clear : -near) && height < clear)) continue;
         for (size_t k = 0; k < n_faces; k++)
             apart = apart || (behind ? -1 : 1) * dot3(normals[k], normal) < -.5;
@@ -88,14 +94,16 @@ void point_place_set(const point_scene *s, const receiver *r, size_t number, poi
         }
         n_faces++;
     }
+    memcpy(out->probe.at, out->r.at, sizeof out->probe.at);
     visibility_recentre(s->v, out->r.at, out->origin);
 }
 
-/* The segment to a point of an element, lifted off it; K = density cos / r^2, 0 where either turns away. */
+/* The segment to a point of an element, lifted off it, and its direction; K = d cos / r^2, 0 where either
+ * turns away. */
 static double aim(const point_scene *s, const point_place *p, const element_sampler *sampler, uint32_t j,
-                  const pair_sampler *points, uint32_t index, float segment[3]) {
+                  const pair_sampler *points, uint32_t index, float segment[3], double way[3]) {
     const double height = 2 * visibility_rounding(s->v) + visibility_rise(s->v, j);
-    double x[4], way[3];
+    double x[4];
     float point[3];
     pair_sampler_place(points, index, x);
     element_sampler_point(sampler, (float)x[0], (float)x[1], point);
@@ -142,19 +150,35 @@ static void pass(const point_scene *s, const ray_packet *segments, size_t n,
 /* Sums of samples of a pair. */
 typedef struct share_sums {
     double K, passed, least, most;
-    size_t n; /* those with K > 0 */
+    double Kq[HARMONICS], passed_q[HARMONICS]; /* times ratios */
+    size_t n;                                  /* those with K > 0 */
 } share_sums;
+
+static void add_sample(const point_place *p, const double way[3], double K, double passed, share_sums *sums) {
+    double ratio[HARMONICS];
+    sums->n++;
+    sums->K += K;
+    sums->passed += K * passed;
+    sums->least = fmin(sums->least, passed);
+    sums->most = fmax(sums->most, passed);
+    if (p->n_rows == 1) return;
+    point_ratios(p, way, ratio);
+    for (size_t w = 0; w < p->n_rows; w++) {
+        sums->Kq[w] += K * ratio[w];
+        sums->passed_q[w] += K * ratio[w] * passed;
+    }
+}
 
 /* Adds samples first ... last-1 of a half. */
 static void add_samples(const point_scene *s, const point_place *p, const element_sampler *sampler,
                         uint32_t j, const pair_sampler *points, uint32_t first, uint32_t last,
                         share_sums *sums) {
     ray_packet segments = {.origin = {{0}}};
-    double K[VISIBILITY_PACKET], passed[VISIBILITY_PACKET];
+    double K[VISIBILITY_PACKET], passed[VISIBILITY_PACKET], way[VISIBILITY_PACKET][3];
     size_t n = 0;
     for (uint32_t k = first; k < last; k++) {
         float segment[3];
-        K[n] = aim(s, p, sampler, j, points, k, segment);
+        K[n] = aim(s, p, sampler, j, points, k, segment, way[n]);
         for (int d = 0; d < 3; d++) {
             segments.origin[d][n] = p->origin[d];
             segments.direction[d][n] = segment[d];
@@ -162,13 +186,7 @@ static void add_samples(const point_scene *s, const point_place *p, const elemen
         n += K[n] > 0;
         if (n == 0 || (n < VISIBILITY_PACKET && k + 1 < last)) continue;
         pass(s, &segments, n, passed);
-        sums->n += n;
-        for (size_t i = 0; i < n; i++) {
-            sums->K += K[i];
-            sums->passed += K[i] * passed[i];
-            sums->least = fmin(sums->least, passed[i]);
-            sums->most = fmax(sums->most, passed[i]);
-        }
+        for (size_t i = 0; i < n; i++) add_sample(p, way[i], K[i], passed[i], sums);
         n = 0;
     }
 }
@@ -186,9 +204,11 @@ static double least_factor(const point_scene *s, size_t j) {
     return s->n_sources <= SOURCES_WHOLE ? 0 : of_ray * fmin(part * part, 1);
 }
 
-/* The share of an element's light that reaches the receiver, by both halves. An element of which so little
- * lies above the receiver's horizon that no sample of a half does has the share of the other half, or 1. */
-static void find_shares(const point_scene *s, const point_place *p, uint32_t j, double share[HALVES]) {
+/* The factors of an element by both halves, F of the density. An element of which so little lies above the
+ * receiver's horizon that no sample of a half does has the share V of the other half, or 1. */
+static void find_factors(const point_scene *s, const point_place *p, uint32_t j, const polygon *face,
+                         double F, point_share *out) {
+    double whole[HARMONICS] = {F};
     element_sampler sampler;
     pair_sampler points[HALVES];
     share_sums sums[HALVES];
@@ -203,9 +223,12 @@ static void find_shares(const point_scene *s, const point_place *p, uint32_t j, 
                few = sums[0].n + sums[1].n < segments;
     for (size_t h = 0; h < HALVES && (partly || few); h++)
         add_samples(s, p, &sampler, j, &points[h], segments, MORE_SEGMENTS, &sums[h]);
+    if (p->n_rows > 1) receiver_factors(&p->probe, face, whole);
     for (size_t h = 0; h < HALVES; h++) {
         const share_sums *known = sums[h].K > 0 ? &sums[h] : &sums[1 - h];
-        share[h] = known->K > 0 ? known->passed / known->K : 1;
+        const double V = known->K > 0 ? known->passed / known->K : 1, each = known->K > 0 ? F / known->K : 0;
+        for (size_t w = 0; w < p->n_rows; w++)
+            out[w][h] = whole[w] * V + each * (known->passed_q[w] - V * known->Kq[w]);
     }
 }
 
@@ -233,9 +256,7 @@ void point_pairs(const point_scene *s, const point_place *p, point_room *room) {
         polygon_of_element(s->m, j, &face);
         const double factor = receiver_factor(&p->r, &face);
         if (!(factor > least)) continue;
-        double share[HALVES];
-        find_shares(s, p, (uint32_t)j, share);
-        for (size_t h = 0; h < HALVES; h++) room->factor[room->n_pairs][h] = factor * share[h];
+        find_factors(s, p, (uint32_t)j, &face, factor, room->factor + room->n_pairs * p->n_rows);
         room->known[j] |= IS_PAIR;
         room->pair[room->n_pairs++] = (uint32_t)j;
     }

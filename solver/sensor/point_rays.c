@@ -1,6 +1,6 @@
-/* The rays of a receiver. N rays of a half have the density of its weight, p = weight / pi, and M are aimed
- * at openings with the density q; one that leaves the scene counts p / (N p + M q). Rays that meet pairs
- * count nothing: the factors of these are known. */
+/* The rays of a point. N rays of a half have the density of its weight, p = weight / pi, and M are aimed at
+ * openings with the density q; one that leaves the scene counts p / (N p + M q). Rays that meet pairs count
+ * nothing: the factors of these are known. For a row of a probe the counts are multiplied by its ratio. */
 #include "solver/sensor/point_rows.h"
 
 #include "solver/base/random.h"
@@ -15,6 +15,7 @@ typedef struct aimed_packet {
     ray_packet rays;
     double direction[VISIBILITY_PACKET][3];
     double density[VISIBILITY_PACKET]; /* p; 0: not cast */
+    double ratio[VISIBILITY_PACKET][HARMONICS];
 } aimed_packet;
 
 /* A half of the rays while they are cast. */
@@ -24,26 +25,16 @@ typedef struct half_rays {
     point_room *room;
     size_t half;
     portal_aim aim;
-    double others, backs, left; /* shares: of elements that are no pairs, of backs, of the sky */
+    point_found found;
 } half_rays;
 
-static void add_met(point_room *room, size_t half, uint32_t j, double weight) {
+static void add_met(const half_rays *h, uint32_t j, double weight, const double ratio[HARMONICS]) {
+    point_room *room = h->room;
+    const size_t n_rows = h->p->n_rows;
     if ((room->known[j] & IS_PAIR) != 0) return;
     if ((room->known[j] & IS_MET) == 0) room->met[room->n_met++] = j;
     room->known[j] |= IS_MET;
-    room->sum[j][half] += weight;
-}
-
-/* A pane behind others shows its own light too. */
-typedef struct pane_meeting {
-    point_room *room;
-    size_t half;
-    double weight;
-} pane_meeting;
-
-static void meet_pane(void *context, uint32_t element, double passed) {
-    const pane_meeting *m = context;
-    add_met(m->room, m->half, element, m->weight * passed);
+    for (size_t w = 0; w < n_rows; w++) room->sum[j * n_rows + w][h->half] += weight * ratio[w];
 }
 
 /* p / (N p + M q) of a ray that leaves. */
@@ -55,18 +46,54 @@ static double leaving_weight(const half_rays *h, const double direction[3], doub
     return sum > 0 ? density / sum : 0;
 }
 
+/* Adds a ray to a sum of shares, and to that of products. */
+static void add_alone(half_rays *h, const double ratio[HARMONICS], double weight, double sum[HARMONICS]) {
+    for (size_t k = 0; k < h->p->n_rows; k++) {
+        sum[k] += weight * ratio[k];
+        for (size_t l = 0; l <= k; l++) h->found.products[k][l] += weight * ratio[k] * ratio[l] / ratio[0];
+    }
+}
+
 /* Adds rays that leave the scene to the tiles. */
 static void add_leaving(half_rays *h, const aimed_packet *packet, const hit_packet *hits,
                         const double passed[VISIBILITY_PACKET]) {
     uint32_t tile[SKY_PACKET];
     const sky_bounce *sky = h->s->sky;
+    const size_t n_rows = h->p->n_rows;
     if (sky != NULL) sky_tiling_find(&sky->tiling, packet->rays.direction, tile);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         if (hits->element[i] != VISIBILITY_NOTHING || !(packet->density[i] > 0)) continue;
         const double weight = leaving_weight(h, packet->direction[i], packet->density[i]);
-        h->left += weight;
-        if (sky != NULL) h->room->sky[tile[i]][h->half] += weight * passed[i];
+        if (sky == NULL) add_alone(h, packet->ratio[i], weight, h->found.left);
+        for (size_t w = 0; w < n_rows && sky != NULL; w++) {
+            const double share = weight * packet->ratio[i][w];
+            h->found.left[w] += share;
+            h->room->sky[tile[i] * n_rows + w][h->half] += share * passed[i];
+        }
     }
+}
+
+/* A pane behind others shows its own light too. */
+typedef struct pane_meeting {
+    const half_rays *h;
+    const aimed_packet *packet;
+} pane_meeting;
+
+static void meet_pane(void *context, size_t i, uint32_t element, double passed) {
+    const pane_meeting *m = context;
+    add_met(m->h, element, passed / (double)m->h->s->rays, m->packet->ratio[i]);
+}
+
+/* Takes rays on behind the panes that they meet. */
+static void follow_panes(const half_rays *h, aimed_packet *packet, bool aimed, hit_packet *hits,
+                         double passed[VISIBILITY_PACKET]) {
+    const mesh *m = h->s->m;
+    pane_meeting meeting = {.h = h, .packet = packet};
+    const pane_visitor visitor = {.meet = meet_pane, .context = &meeting};
+    for (size_t i = 0; i < VISIBILITY_PACKET && !aimed; i++)
+        if (hits->element[i] != VISIBILITY_NOTHING && !hits->back[i] && mesh_is_pane(m, hits->element[i]))
+            meet_pane(&meeting, i, hits->element[i], 1);
+    pane_path_follow(h->s->v, m, &packet->rays, VISIBILITY_PACKET, hits, passed, aimed ? NULL : &visitor);
 }
 
 /* Casts a packet; aimed: it looks for the sky alone. */
@@ -79,30 +106,22 @@ static void cast(half_rays *h, aimed_packet *packet, bool aimed) {
     double passed[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
     hit_packet hits;
     const unsigned how = aimed ? VISIBILITY_TOGETHER : 0;
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++)
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         for (int d = 0; d < 3; d++) {
             packet->rays.origin[d][i] = h->p->origin[d];
             packet->rays.direction[d][i] = (float)packet->direction[i][d];
         }
-    visibility_cast(s->v, &packet->rays, VISIBILITY_PACKET, self, how, &hits);
-    if (s->m->glass != NULL) {
-        pane_meeting meeting = {.room = h->room, .half = h->half, .weight = each};
-        const pane_visitor visitor = {.meet = meet_pane, .context = &meeting};
-        for (size_t i = 0; i < VISIBILITY_PACKET && !aimed; i++)
-            if (hits.element[i] != VISIBILITY_NOTHING && !hits.back[i] && mesh_is_pane(s->m, hits.element[i]))
-                meet_pane(&meeting, hits.element[i], 1);
-        pane_path_follow(s->v, s->m, &packet->rays, VISIBILITY_PACKET, &hits, passed,
-                         aimed ? NULL : &visitor);
+        point_ratios(h->p, packet->direction[i], packet->ratio[i]);
     }
+    visibility_cast(s->v, &packet->rays, VISIBILITY_PACKET, self, how, &hits);
+    if (s->m->glass != NULL) follow_panes(h, packet, aimed, &hits, passed);
     add_leaving(h, packet, &hits, passed);
     for (size_t i = 0; i < VISIBILITY_PACKET && !aimed; i++) {
         if (hits.element[i] == VISIBILITY_NOTHING) continue;
-        if (hits.back[i]) {
-            h->backs += each;
-        } else {
-            if ((h->room->known[hits.element[i]] & IS_PAIR) == 0) h->others += each;
-            add_met(h->room, h->half, hits.element[i], passed[i] * each);
-        }
+        if (hits.back[i])
+            add_alone(h, packet->ratio[i], each, h->found.backs);
+        else
+            add_met(h, hits.element[i], passed[i] * each, packet->ratio[i]);
     }
 }
 
@@ -172,27 +191,6 @@ static void try_openings(half_rays *h, uint64_t shift) {
     portal_aim_weigh(&h->aim, open);
 }
 
-/* In a scene without panes all that a receiver sees at first is a pair, another element, a back or the sky:
- * the shares sum to 1. The pairs' are known, and the sky's where rays are aimed at it; all others are
- * scaled to fill the rest. Where a half has met nothing else, its pairs fill all. */
-static void close_half(half_rays *h) {
-    point_room *room = h->room;
-    double pairs = 0;
-    for (size_t k = 0; k < room->n_pairs; k++) pairs += room->factor[k][h->half];
-    const bool sky_is_known = h->aim.n > 0;
-    const double found = h->others + h->backs + (sky_is_known ? 0 : h->left),
-                 rest = fmax(1 - pairs - (sky_is_known ? h->left : 0), 0);
-    if (found > 0) {
-        const double scale = rest / found;
-        for (size_t k = 0; k < room->n_met; k++) room->sum[room->met[k]][h->half] *= scale;
-        for (size_t t = 0; h->s->sky != NULL && !sky_is_known && t <= h->s->sky->tiling.n_tiles; t++)
-            room->sky[t][h->half] *= scale;
-        h->backs *= scale;
-    } else if (h->left == 0 && pairs > .5) {
-        for (size_t k = 0; k < room->n_pairs; k++) room->factor[k][h->half] /= pairs;
-    }
-}
-
 void point_rays(const point_scene *s, const point_place *p, point_room *room) {
     half_rays both = {.s = s, .p = p, .room = room};
     const uint64_t own = random_hash(random_hash(s->seed) ^ random_hash(p->number + 1));
@@ -214,7 +212,8 @@ void point_rays(const point_scene *s, const point_place *p, point_room *room) {
             aim_packet(&h, &h.aim, random_hash(own + HALVES + half), k, &packet);
             cast(&h, &packet, true);
         }
-        if (s->m->glass == NULL) close_half(&h);
-        room->backs += h.backs / HALVES;
+        double backs = h.found.backs[0] / (p->n_rows > 1 ? M_2_SQRTPI : 1);
+        if (s->m->glass == NULL) point_close(s, p, room, half, h.aim.n > 0, &h.found, &backs);
+        room->backs += backs / HALVES;
     }
 }

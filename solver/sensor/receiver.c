@@ -3,11 +3,33 @@
 #include "solver/base/vector3.h"
 #include "solver/scene/plane.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
+/* A vector in the frame of a probe: x = look, y = axis x look, z = axis. */
+static void turn_to_probe(const receiver *harmonic, const double v[3], double out[3]) {
+    double across[3];
+    cross3(harmonic->axis, harmonic->look, across);
+    out[0] = dot3(v, harmonic->look);
+    out[1] = dot3(v, across);
+    out[2] = dot3(v, harmonic->axis);
+}
+
+void receiver_densities(const receiver *harmonic, const double direction[3], double out[HARMONICS]) {
+    double own[3];
+    turn_to_probe(harmonic, direction, own);
+    harmonics_at(own, out);
+    for (int k = 0; k < HARMONICS; k++) out[k] /= M_PI;
+}
+
 double receiver_density(const receiver *r, const double direction[3]) {
     const double along = dot3(direction, r->axis), sine = sqrt(fmax(0, 1 - along * along));
+    if (r->kind >= RECEIVER_HARMONIC) {
+        double all[HARMONICS];
+        receiver_densities(r, direction, all);
+        return all[r->kind - RECEIVER_HARMONIC];
+    }
     switch (r->kind) {
     case RECEIVER_PLANE:
         return fmax(along, 0) / M_PI;
@@ -22,10 +44,11 @@ double receiver_density(const receiver *r, const double direction[3]) {
 }
 
 double receiver_density_most(receiver_kind kind) {
-    static const double most[RECEIVER_KINDS] = {[RECEIVER_PLANE] = 1 / M_PI,
-                                                [RECEIVER_CYLINDER] = 1 / (M_PI * M_PI),
-                                                [RECEIVER_SEMICYLINDER] = 2 / (M_PI * M_PI),
-                                                [RECEIVER_SPHERE] = 1 / (4 * M_PI)};
+    static const double most[RECEIVER_DENSITIES] = {[RECEIVER_PLANE] = 1 / M_PI,
+                                                    [RECEIVER_CYLINDER] = 1 / (M_PI * M_PI),
+                                                    [RECEIVER_SEMICYLINDER] = 2 / (M_PI * M_PI),
+                                                    [RECEIVER_SPHERE] = 1 / (4 * M_PI)};
+    assert(kind < RECEIVER_DENSITIES);
     return most[kind];
 }
 
@@ -172,10 +195,32 @@ static double quadrature(const receiver *r, const polygon *p, int depth) {
     return sum;
 }
 
-double receiver_factor(const receiver *r, const polygon *p) {
+/* True where a polygon has its front towards a receiver. */
+static bool is_turned_to(const receiver *r, const polygon *p) {
     double away[3];
     subtract3(r->at, p->centre, away);
-    if (!(dot3(away, p->normal) > 0)) return 0;
+    return dot3(away, p->normal) > 0;
+}
+
+void receiver_factors(const receiver *harmonic, const polygon *p, double out[HARMONICS]) {
+    double corner[POLYGON_CORNERS][3], away[3];
+    memset(out, 0, HARMONICS * sizeof *out);
+    if (!is_turned_to(harmonic, p)) return;
+    for (int c = 0; c < p->n; c++) {
+        subtract3(p->corner[c], harmonic->at, away);
+        turn_to_probe(harmonic, away, corner[c]);
+    }
+    harmonics_of_polygon(p->n, (const double(*)[3])corner, 4 * M_PI * sphere_factor(harmonic, p), out);
+    for (int k = 0; k < HARMONICS; k++) out[k] /= M_PI;
+}
+
+double receiver_factor(const receiver *r, const polygon *p) {
+    if (!is_turned_to(r, p)) return 0;
+    if (r->kind >= RECEIVER_HARMONIC) {
+        double all[HARMONICS];
+        receiver_factors(r, p, all);
+        return all[r->kind - RECEIVER_HARMONIC];
+    }
     switch (r->kind) {
     case RECEIVER_PLANE:
         return plane_factor(r, p);

@@ -7,19 +7,28 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* The nine receivers of a probe are one point. */
 typedef struct light_job {
     size_t n;
     const receiver *receivers;
+    const size_t *first; /* [points], the receiver of each, or the first one of a probe */
     float *H;
 } light_job;
 
 /* sum irradiance weight(direction) */
 static void add_light(void *context, size_t row, size_t point, size_t n, const direct_beam *beams) {
     const light_job *job = context;
-    double sum = 0;
-    for (size_t k = 0; k < n; k++)
-        sum += beams[k].irradiance * M_PI * receiver_density(&job->receivers[point], beams[k].direction);
-    job->H[row * job->n + point] = (float)sum;
+    const receiver *r = &job->receivers[job->first[point]];
+    const size_t rows = r->kind >= RECEIVER_HARMONIC ? HARMONICS : 1;
+    double sum[HARMONICS] = {0}, density[HARMONICS];
+    for (size_t k = 0; k < n; k++) {
+        if (rows > 1)
+            receiver_densities(r, beams[k].direction, density);
+        else
+            density[0] = receiver_density(r, beams[k].direction);
+        for (size_t w = 0; w < rows; w++) sum[w] += beams[k].irradiance * M_PI * density[w];
+    }
+    for (size_t w = 0; w < rows; w++) job->H[row * job->n + job->first[point] + w] = (float)sum[w];
 }
 
 static void find_inside(const mesh *m, const placed_luminaires *p, size_t n, const receiver *receivers,
@@ -41,24 +50,29 @@ lam_status sensor_luminaires_make(const mesh *m, const placed_luminaires *p, con
     lam_status status = LAM_OK;
     point_scene scene = {.m = m};
     visibility *v = NULL;
-    light_job job = {.n = n, .receivers = receivers, .H = H};
+    size_t n_points = 0;
     direct_point *points = memory_allocate(n, sizeof *points, "light of luminaires at sensors", error);
-    if (points == NULL) TRY(LAM_ERR_MEMORY);
+    size_t *first = memory_allocate(n, sizeof *first, "light of luminaires at sensors", error);
+    light_job job = {.n = n, .receivers = receivers, .first = first, .H = H};
+    if (points == NULL || first == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < n; k++)
+        if (!receiver_follows(&receivers[k])) first[n_points++] = k;
     TRY(visibility_create(m, &v, error));
     TRY(point_balls_make(m, &scene.ball, error));
     scene.v = v;
 #pragma omp parallel for schedule(dynamic, 64)
-    for (size_t k = 0; k < n; k++) {
+    for (size_t k = 0; k < n_points; k++) {
         point_place place;
-        point_place_set(&scene, &receivers[k], k, &place);
+        point_place_set(&scene, &receivers[first[k]], first[k], &place);
         points[k].element = DIRECT_OPEN;
         memcpy(points[k].at, place.r.at, sizeof points[k].at);
     }
-    TRY(direct_points_visit(m, p, o, n, points, add_light, &job, error));
+    TRY(direct_points_visit(m, p, o, n_points, points, add_light, &job, error));
     if (inside != NULL) find_inside(m, p, n, receivers, inside);
 done:
     visibility_destroy(v);
     free(scene.ball);
     free(points);
+    free(first);
     return status;
 }

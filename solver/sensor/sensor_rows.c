@@ -30,6 +30,7 @@ typedef struct rows_job {
     const receiver *receivers;
     const sensor_rows_options *options;
     sensor_rows *out;
+    bool has_probes;
     size_t capacity;
     made_row rows[ROWS_AT_ONCE];
 } rows_job;
@@ -54,16 +55,18 @@ static void room_free(point_room *room) {
     free(room->sky);
 }
 
-static lam_status room_make(const point_scene *s, point_room *room, lam_error *error) {
+static lam_status room_make(const rows_job *job, point_room *room, lam_error *error) {
     static const char what[] = "rows of sensors";
+    const point_scene *s = &job->scene;
     const size_t n = s->m->n, tiles = s->sky != NULL ? s->sky->tiling.n_tiles : 0;
+    const size_t most = job->has_probes ? HARMONICS : 1;
     *room = (point_room){.n_pairs = 0};
     room->pair = memory_allocate(n, sizeof *room->pair, what, error);
-    room->factor = memory_allocate(n, sizeof *room->factor, what, error);
+    room->factor = memory_allocate(n, most * sizeof *room->factor, what, error);
     room->known = memory_allocate(n, sizeof *room->known, what, error);
-    room->sum = memory_allocate(n, sizeof *room->sum, what, error);
+    room->sum = memory_allocate(n, most * sizeof *room->sum, what, error);
     room->met = memory_allocate(n, sizeof *room->met, what, error);
-    room->sky = memory_allocate(tiles + 1, sizeof *room->sky, what, error);
+    room->sky = memory_allocate(tiles + 1, most * sizeof *room->sky, what, error);
     const bool enough = room->pair != NULL && room->factor != NULL && room->known != NULL &&
                         room->sum != NULL && room->met != NULL && room->sky != NULL;
     return enough ? LAM_OK : LAM_ERR_MEMORY;
@@ -74,52 +77,62 @@ static int by_element(const void *a, const void *b) {
     return (first->element > second->element) - (first->element < second->element);
 }
 
-static row_entry entry_of(uint32_t element, const double halves[HALVES]) {
-    return (row_entry){element, (float)(.5 * (halves[0] + halves[1])), (float)(.5 * (halves[0] - halves[1]))};
+/* Adds an entry unless it is 0. */
+static void add_entry(uint32_t element, const point_share share, made_row *row) {
+    if (share[0] != 0 || share[1] != 0)
+        row->entries[row->n++] =
+            (row_entry){element, (float)(.5 * (share[0] + share[1])), (float)(.5 * (share[0] - share[1]))};
 }
 
 /* pi (F_t + F_g a c_t / pi), as sky_bounce_close has it, of both halves. */
-static void put_sky(const rows_job *job, size_t k, const point_room *room) {
+static void put_sky(const rows_job *job, size_t k, size_t n_rows, const point_room *room) {
     const sky_bounce *sky = job->scene.sky;
     const size_t tiles = sky->tiling.n_tiles, n = job->out->n_receivers;
     for (size_t t = 0; t < tiles; t++) {
         const double reflected = sky->ground_albedo * sky->tiling.tiles[t].cosine * M_1_PI;
-        double halves[HALVES];
-        for (size_t h = 0; h < HALVES; h++)
-            halves[h] = M_PI * (room->sky[t][h] + reflected * room->sky[tiles][h]);
-        job->out->sky[t * n + k] = (float)(.5 * (halves[0] + halves[1]));
-        job->out->sky_off[t * n + k] = (float)(.5 * (halves[0] - halves[1]));
+        for (size_t w = 0; w < n_rows; w++) {
+            const double *seen = room->sky[t * n_rows + w], *ground = room->sky[tiles * n_rows + w];
+            point_share share;
+            for (size_t h = 0; h < HALVES; h++) share[h] = M_PI * (seen[h] + reflected * ground[h]);
+            job->out->sky[t * n + k + w] = (float)(.5 * (share[0] + share[1]));
+            job->out->sky_off[t * n + k + w] = (float)(.5 * (share[0] - share[1]));
+        }
     }
 }
 
-/* Finds row k; false where memory is short. */
-static bool make_row(const rows_job *job, size_t k, point_room *room, made_row *out) {
-    point_place place;
-    point_place_set(&job->scene, &job->receivers[k], k, &place);
-    point_pairs(&job->scene, &place, room);
-    point_rays(&job->scene, &place, room);
+/* Row w of a point; false where memory is short. */
+static bool take_row(const point_room *room, size_t n_rows, size_t w, made_row *out) {
     row_entry *entries =
         memory_allocate(room->n_pairs + room->n_met, sizeof *entries, "rows of sensors", NULL);
-    size_t n = 0;
-    for (size_t i = 0; i < room->n_pairs && entries != NULL; i++)
-        if (room->factor[i][0] + room->factor[i][1] > 0)
-            entries[n++] = entry_of(room->pair[i], room->factor[i]);
-    for (size_t i = 0; i < room->n_met && entries != NULL; i++)
-        if (room->sum[room->met[i]][0] + room->sum[room->met[i]][1] > 0)
-            entries[n++] = entry_of(room->met[i], room->sum[room->met[i]]);
-    if (entries != NULL) qsort(entries, n, sizeof *entries, by_element);
+    *out = (made_row){.entries = entries};
+    if (entries == NULL) return false;
+    for (size_t i = 0; i < room->n_pairs; i++) add_entry(room->pair[i], room->factor[i * n_rows + w], out);
+    for (size_t i = 0; i < room->n_met; i++)
+        add_entry(room->met[i], room->sum[room->met[i] * n_rows + w], out);
+    qsort(entries, out->n, sizeof *entries, by_element);
+    return true;
+}
+
+/* Finds the rows of the point of receiver k; false where memory is short. */
+static bool make_rows(const rows_job *job, size_t k, point_room *room, made_row *out) {
+    point_place place;
+    bool enough = true;
+    point_place_set(&job->scene, &job->receivers[k], k, &place);
+    const size_t n_rows = place.n_rows;
+    point_pairs(&job->scene, &place, room);
+    point_rays(&job->scene, &place, room);
+    for (size_t w = 0; w < n_rows && enough; w++) enough = take_row(room, n_rows, w, &out[w]);
     if (job->scene.sky != NULL) {
-        put_sky(job, k, room);
-        memset(room->sky, 0, (job->scene.sky->tiling.n_tiles + 1) * sizeof *room->sky);
+        put_sky(job, k, n_rows, room);
+        memset(room->sky, 0, (job->scene.sky->tiling.n_tiles + 1) * n_rows * sizeof *room->sky);
     }
-    job->out->backs[k] = (float)fmin(room->backs, 1);
+    for (size_t w = 0; w < n_rows; w++) job->out->backs[k + w] = (float)fmin(room->backs, 1);
     for (size_t i = 0; i < room->n_pairs; i++) room->known[room->pair[i]] = 0;
     for (size_t i = 0; i < room->n_met; i++) {
         room->known[room->met[i]] = 0;
-        memset(room->sum[room->met[i]], 0, sizeof *room->sum);
+        memset(room->sum + room->met[i] * n_rows, 0, n_rows * sizeof *room->sum);
     }
-    *out = (made_row){n, entries};
-    return entries != NULL;
+    return enough;
 }
 
 /* Appends rows first ... first + count - 1. */
@@ -156,10 +169,11 @@ static lam_status make_some(rows_job *job, size_t first, size_t count, lam_error
     {
         point_room room;
         lam_error why;
-        bool short_of = room_make(&job->scene, &room, &why) != LAM_OK;
+        bool short_of = room_make(job, &room, &why) != LAM_OK;
 #pragma omp for schedule(dynamic, 1)
         for (size_t k = 0; k < count; k++)
-            if (!short_of) short_of = !make_row(job, first + k, &room, &job->rows[k]);
+            if (!short_of && !receiver_follows(&job->receivers[first + k]))
+                short_of = !make_rows(job, first + k, &room, &job->rows[k]);
         if (short_of) {
 #pragma omp atomic write
             fails = true;
@@ -245,6 +259,7 @@ lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers, 
     TRY(point_balls_make(m, &ball, error));
     TRY(find_sources(m, o->sources, &is_source, error));
     *job = (rows_job){.receivers = receivers, .options = o, .out = &made};
+    for (size_t k = 0; k < n; k++) job->has_probes |= receivers[k].kind >= RECEIVER_HARMONIC;
     size_t n_sources = 0;
     for (size_t j = 0; j < m->n; j++) n_sources += is_source[j];
     job->scene = (point_scene){.m = m,
@@ -268,8 +283,9 @@ lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers, 
     made.sky_off = memory_allocate(sky, sizeof *made.sky_off, "the sky of sensors", error);
     if (made.start == NULL || made.backs == NULL || made.sky == NULL || made.sky_off == NULL)
         TRY(LAM_ERR_MEMORY);
-    for (size_t first = 0; first < n; first += ROWS_AT_ONCE) {
-        const size_t count = n - first < ROWS_AT_ONCE ? n - first : ROWS_AT_ONCE;
+    for (size_t first = 0, count; first < n; first += count) {
+        count = n - first < ROWS_AT_ONCE ? n - first : ROWS_AT_ONCE;
+        while (first + count < n && receiver_follows(&receivers[first + count])) count--;
         if (progress_cancelled(o->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         TRY(make_some(job, first, count, error));
         progress_report(o->progress, o->stage, (double)(first + count) / (double)n);

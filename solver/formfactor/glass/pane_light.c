@@ -80,8 +80,9 @@ typedef struct pane_row {
     row_pool *pool;
 } pane_row;
 
-static void meet(void *context, uint32_t element, double weight) {
+static void meet(void *context, size_t i, uint32_t element, double weight) {
     pane_row *const row = context;
+    (void)i;
     if (weight > 0 && !row->c->without_rows) row_pool_add(row->pool, element, weight);
 }
 
@@ -116,7 +117,7 @@ static void cast(pane_row *row, uint32_t element, ray_packet *rays, const double
         if (hits.element[i] == VISIBILITY_NOTHING)
             leaving |= 1u << i;
         else if (!hits.back[i])
-            meet(row, hits.element[i], weight[i]);
+            meet(row, (size_t)i, hits.element[i], weight[i]);
     }
     if (c->sky != NULL) row_pool_leave(row->pool, c->sky, rays, leaving, weight);
 }

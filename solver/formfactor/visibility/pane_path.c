@@ -68,7 +68,7 @@ static void follow(const visibility *v, const mesh *m, ray_packet *rays, size_t 
             if (element == VISIBILITY_NOTHING || !mesh_is_pane(m, element)) continue;
             if (left != NULL && !((double)hits->distance[i] < left[i])) continue;
             if (crossed > 0 && visitor != NULL && !hits->back[i])
-                visitor->meet(visitor->context, element, weight[i]);
+                visitor->meet(visitor->context, i, element, weight[i]);
             weight[i] *= crossed < PANES_MOST ? pane_path_passes(m, element, rays, i) : 0;
             if (left != NULL) left[i] -= (double)hits->distance[i];
             ahead[i] = any = true;

@@ -5,9 +5,10 @@
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/scene/glass.h"
 
-/* Called where a ray comes to the front of a pane with the light that the panes before it have passed. */
+/* Called where ray i of a packet comes to the front of a pane with the light that the panes before it have
+ * passed. */
 typedef struct pane_visitor {
-    void (*meet)(void *context, uint32_t element, double weight);
+    void (*meet)(void *context, size_t i, uint32_t element, double weight);
     void *context;
 } pane_visitor;
 

@@ -9,9 +9,9 @@
 static const double box_size[3] = {3, 2, 1.5};
 
 /* One of each kind, askew, at a place. */
-static void receivers_at(const double at[3], receiver r[RECEIVER_KINDS]) {
+static void receivers_at(const double at[3], receiver r[RECEIVER_DENSITIES]) {
     static const double axis[3] = {.48, .6, .64}, look[3] = {.8, 0, -.6};
-    for (int k = 0; k < RECEIVER_KINDS; k++) {
+    for (int k = 0; k < RECEIVER_DENSITIES; k++) {
         r[k] = (receiver){.kind = (receiver_kind)k, .at = {at[0], at[1], at[2]}};
         if (k != RECEIVER_SPHERE) memcpy(r[k].axis, axis, sizeof axis);
         if (k == RECEIVER_SEMICYLINDER) memcpy(r[k].look, look, sizeof look);
@@ -45,9 +45,9 @@ START_TEST(rectangle_above_a_plane) {
     /* Its back gives nothing. */
     polygon back = {.n = 4, .corner = {{0, 0, 2}, {1, 0, 2}, {1, 1, 2}, {0, 1, 2}}};
     polygon_measure(&back);
-    receiver r[RECEIVER_KINDS];
+    receiver r[RECEIVER_DENSITIES];
     receivers_at((double[3]){.5, .5, 1}, r);
-    for (int k = 0; k < RECEIVER_KINDS; k++) ck_assert_double_eq(receiver_factor(&r[k], &back), 0);
+    for (int k = 0; k < RECEIVER_DENSITIES; k++) ck_assert_double_eq(receiver_factor(&r[k], &back), 0);
 }
 END_TEST
 
@@ -70,14 +70,14 @@ START_TEST(small_source) {
                     2 * way[d] + .005 * ((square[c][0] - off[0]) * u[d] + (square[c][1] - off[1]) * w[d]);
         polygon_measure(&p);
         const double omega = polygon_area(&p) / 4;
-        const receiver of[RECEIVER_KINDS] = {
+        const receiver of[RECEIVER_DENSITIES] = {
             {.kind = RECEIVER_PLANE, .axis = {0, 0, 1}},
             {.kind = RECEIVER_CYLINDER, .axis = {0, 0, 1}},
             {.kind = RECEIVER_SEMICYLINDER, .axis = {0, 0, 1}, .look = {0, 1, 0}},
             {.kind = RECEIVER_SPHERE}};
-        const double expected[RECEIVER_KINDS] = {fmax(z, 0) * omega, level / M_PI * omega,
-                                                 level * (1 + sin(turn)) / M_PI * omega, omega / 4};
-        for (int r = 0; r < RECEIVER_KINDS; r++)
+        const double expected[RECEIVER_DENSITIES] = {fmax(z, 0) * omega, level / M_PI * omega,
+                                                     level * (1 + sin(turn)) / M_PI * omega, omega / 4};
+        for (int r = 0; r < RECEIVER_DENSITIES; r++)
             /* 1e-3 as luminaires ask for; where a weight is near 0 it is off by the source's half width */
             ck_assert_double_eq_tol(M_PI * receiver_factor(&of[r], &p), expected[r],
                                     1e-3 * expected[r] + .0025 * omega * (expected[r] < .01 * omega));
@@ -91,9 +91,9 @@ START_TEST(furnace) {
     static const double places[][3] = {{1.1, .7, .6}, {2.9, 1.9, 1.4}, {1.1, .7, 1e-4}, {1e-9, 1e-9, 1e-9}};
     mesh m = box_mesh(box_size, 5, .5f);
     for (size_t k = 0; k < sizeof places / sizeof *places; k++) {
-        receiver r[RECEIVER_KINDS];
+        receiver r[RECEIVER_DENSITIES];
         receivers_at(places[k], r);
-        for (int kind = 0; kind < RECEIVER_KINDS; kind++) {
+        for (int kind = 0; kind < RECEIVER_DENSITIES; kind++) {
             double sum = 0;
             for (size_t j = 0; j < m.n; j++) {
                 polygon p;
@@ -112,9 +112,9 @@ END_TEST
 START_TEST(directions) {
     enum { SIDE = 200, FACES = 6 };
     mesh m = box_mesh(box_size, 1, .5f);
-    receiver r[RECEIVER_KINDS];
+    receiver r[RECEIVER_DENSITIES];
     receivers_at((double[3]){1.1, .7, .6}, r);
-    for (int kind = 0; kind < RECEIVER_KINDS; kind++) {
+    for (int kind = 0; kind < RECEIVER_DENSITIES; kind++) {
         double share[FACES] = {0};
         uint64_t seed = 1;
         for (int i = 0; i < SIDE * SIDE; i++) {

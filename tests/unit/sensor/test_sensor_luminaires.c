@@ -18,7 +18,7 @@ static void have_group(mesh *m) {
 /* A point of 100 cd, 2 m above the floor, and receivers of all kinds beside it and on the floor below: I
  * w(direction) / d^2, within 1e-3. */
 START_TEST(point_of_light) {
-    enum { KINDS = RECEIVER_KINDS, N = KINDS + 2 };
+    enum { KINDS = RECEIVER_DENSITIES, N = KINDS + 2 };
     const punctual_light lights[] = {{.name = "a",
                                       .kind = PUNCTUAL_POINT,
                                       .at = {0, 0, 2},
@@ -73,6 +73,46 @@ START_TEST(point_of_light) {
 }
 END_TEST
 
+/* 100 cd, 2 m straight above a probe between two other receivers, and 1.5 m beside another one: I Y / d^2. */
+START_TEST(point_of_light_at_probes) {
+    enum { N = 2 + 2 * HARMONICS };
+    static const double ways[2][3] = {{0, 0, 1}, {-.6, 0, .8}};
+    const punctual_light lights[] = {{.name = "a",
+                                      .kind = PUNCTUAL_POINT,
+                                      .at = {0, 0, 2},
+                                      .direction = {0, 0, -1},
+                                      .intensity = 100,
+                                      .colour = {1, 1, 1}}};
+    lam_error error = {0};
+    placed_luminaires p = {.n = 0};
+    size_t outside = 0;
+    mesh m = {0};
+    mesh_add_cell(&m, &(box_cell){.axis = 2, .from = {-3, -3, -1}, .level = -1, .to = {3, 3, -1}}, true);
+    mesh_finish(&m, .5f);
+    have_group(&m);
+    receiver r[N] = {{.kind = RECEIVER_SPHERE}};
+    r[N - 1] = r[0];
+    for (int k = 0; k < 2 * HARMONICS; k++)
+        r[k + 1] = (receiver){.kind = (receiver_kind)(RECEIVER_HARMONIC + k % HARMONICS),
+                              .at = {k < HARMONICS ? 0 : 1.5, 0, 0},
+                              .axis = {0, 0, 1},
+                              .look = {1, 0, 0}};
+    ck_ok(placed_from_lights("s", 1, lights, &p, &outside, &error));
+    float H[N];
+    ck_ok(sensor_luminaires_make(&m, &p, &(direct_options){.seed = 1}, N, r, H, NULL, &error));
+    ck_assert_double_eq_tol((double)H[0], 100 / 4. / 4, 1e-3);
+    ck_assert_double_eq((double)H[N - 1], (double)H[0]);
+    for (int k = 0; k < 2 * HARMONICS; k++) {
+        const double square = k < HARMONICS ? 4 : 6.25;
+        double Y[HARMONICS];
+        harmonics_at(ways[k / HARMONICS], Y);
+        ck_assert_double_eq_tol((double)H[k + 1], 100 / square * Y[k % HARMONICS], 1e-4);
+    }
+    placed_free(&p);
+    mesh_free(&m);
+}
+END_TEST
+
 /* CIE 171:2006, case 5.3: a luminaire of 1 x 1 m and 1,000 cd in the middle of the ceiling of a black room.
  * Its file is that of the fixtures; .2 % is what the issue of luminaires allows for case 5.3 at presets. */
 START_TEST(area_source) {
@@ -117,6 +157,7 @@ int main(void) {
     Suite *s = suite_create("light of luminaires at sensors");
     TCase *c = tcase_create("all");
     tcase_add_test(c, point_of_light);
+    tcase_add_test(c, point_of_light_at_probes);
     tcase_add_test(c, area_source);
     suite_add_tcase(s, c);
     return suite_run(s);

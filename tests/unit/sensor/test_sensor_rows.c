@@ -29,14 +29,14 @@ static double row_entry_of(const sensor_rows *rows, size_t k, uint32_t j) {
 /* In a closed box every kind has the sum 1, in the open and on faces; only rounding to single precision is
  * left: 2^-24 of each of up to 1,500 weights, whose sum is 1. */
 START_TEST(furnace) {
-    enum { PLACES = 5, N = PLACES * RECEIVER_KINDS };
+    enum { PLACES = 5, N = PLACES * RECEIVER_DENSITIES };
     static const double places[PLACES][3] = {
         {1.3, 1.1, .8}, {1.3, 1.1, 0}, {0, 1.1, .8}, {0, 0, 0}, {1.3, 1.1, -2e-4}};
     mesh m = box_mesh(room, 12, .5f);
     receiver r[N] = {{.kind = RECEIVER_PLANE}};
     for (size_t k = 0; k < N; k++) {
-        r[k] = (receiver){.kind = (receiver_kind)(k % RECEIVER_KINDS), .axis = {0, 0, 1}};
-        memcpy(r[k].at, places[k / RECEIVER_KINDS], sizeof r[k].at);
+        r[k] = (receiver){.kind = (receiver_kind)(k % RECEIVER_DENSITIES), .axis = {0, 0, 1}};
+        memcpy(r[k].at, places[k / RECEIVER_DENSITIES], sizeof r[k].at);
         if (r[k].kind == RECEIVER_SPHERE) r[k].axis[2] = 0;
         if (r[k].kind == RECEIVER_SEMICYLINDER) r[k].look[0] = 1;
     }
