@@ -4,6 +4,7 @@
 #include "solver/operator/emitters.h"
 #include "solver/operator/limiter.h"
 #include "solver/operator/luminaire_light.h"
+#include "solver/operator/sensor_light.h"
 #include "solver/operator/sky_light.h"
 
 #include <math.h>
@@ -169,12 +170,12 @@ static void take_light(emission_pass *p, size_t n, const size_t *vectors) {
     if (!e->steady && e->D != NULL) gather(n, vectors, C * lam_luminaires_count(e->luminaires), e->D, p->D);
 }
 
-/* Raises values of sensors to zero. */
+/* Raises values of sensors to zero, but coefficients of probes of either sign. */
 static void limit_sensors(emission_pass *p, size_t n, float *out) {
-    const size_t row = lam_operator_channels(p->op) * lam_sensors_count(p->light->sensors);
+    const size_t count = lam_sensors_count(p->light->sensors), row = lam_operator_channels(p->op) * count;
     memset(p->limited, 0, sizeof p->limited);
     for (size_t k = 0; p->light->limiter != NULL && k < n * row; k++)
-        if (out[k] < 0) {
+        if (out[k] < 0 && !sensors_is_signed(p->light->sensors, k % count)) {
             out[k] = 0;
             p->limited[k / row]++;
         }

@@ -8,8 +8,8 @@
 
 enum { BLOCK = 512 }; /* elements whose sums stay in the cache from one source to the next */
 
-lam_status first_rows_load(store *s, const char *name, const char *source, size_t n, first_rows *out,
-                           lam_error *error) {
+lam_status first_rows_load(store *s, const char *name, const char *source, size_t n, const bool *is_signed,
+                           first_rows *out, lam_error *error) {
     lam_status status = LAM_OK;
     size_t dims[STORE_MAX_RANK] = {SIZE_MAX, n};
     store_view view = {.data = NULL};
@@ -17,10 +17,12 @@ lam_status first_rows_load(store *s, const char *name, const char *source, size_
     const float *values = view.data;
     if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: %s has no %ss", store_path(s), name, source);
     /* A mapped array is compared with its checksums later; its writer has checked the values. */
-    for (size_t k = 0; k < dims[0] * n && view.map == NULL; k++)
-        if (!(values[k] >= 0 && isfinite(values[k])))
-            FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu][%zu] = %g, must be at least 0", store_path(s), name,
-                 k / n, k % n, (double)values[k]);
+    for (size_t k = 0; k < dims[0] * n && view.map == NULL; k++) {
+        const bool any_sign = is_signed != NULL && is_signed[k % n];
+        if (!isfinite(values[k]) || (values[k] < 0 && !any_sign))
+            FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu][%zu] = %g, must be %s", store_path(s), name, k / n,
+                 k % n, (double)values[k], any_sign ? "a number" : "at least 0");
+    }
     *out = (first_rows){.m = dims[0], .n = n, .values = values, .where = view};
     view = (store_view){.data = NULL};
 done:

@@ -1,5 +1,5 @@
-/* Light that comes to elements directly from m sources that are no elements: tiles of a sky, luminaires. Row
- * t of the matrix is the irradiance of every element by source t. */
+/* Light that comes to elements, or to receivers, directly from m sources that are no elements: tiles of a
+ * sky, luminaires. Row t of the matrix is the irradiance of every element by source t. */
 #ifndef LAMBERT_OPERATOR_FIRST_ROWS_H
 #define LAMBERT_OPERATOR_FIRST_ROWS_H
 
@@ -17,10 +17,11 @@ typedef struct row_factors {
     const double *values;
 } row_factors;
 
-/* Reads the array of this name, [m][n] with m at least 1, in place where the store is mapped. Errors:
- * LAM_ERR_FORMAT (another shape, a value that is negative or not finite), LAM_ERR_DAMAGED, LAM_ERR_MEMORY. */
-lam_status first_rows_load(store *s, const char *name, const char *source, size_t n, first_rows *out,
-                           lam_error *error);
+/* Reads the array of this name, [m][n] with m at least 1, in place where the store is mapped. is_signed [n]:
+ * elements whose values may be negative, NULL: none. Errors: LAM_ERR_FORMAT (another shape, a value that is
+ * negative or not finite), LAM_ERR_DAMAGED, LAM_ERR_MEMORY. */
+lam_status first_rows_load(store *s, const char *name, const char *source, size_t n, const bool *is_signed,
+                           first_rows *out, lam_error *error);
 
 /* Copies values [m][n]. Errors: LAM_ERR_MEMORY. */
 lam_status first_rows_copy(size_t m, size_t n, const float *values, first_rows *out, lam_error *error);

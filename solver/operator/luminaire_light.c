@@ -139,7 +139,7 @@ lam_status luminaires_load(store *s, size_t n, size_t C, lam_luminaires **out, l
     }
     l = memory_allocate(1, sizeof *l, "luminaires", error);
     if (l == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(first_rows_load(s, STORE_LUMINAIRES "/irradiance", "luminaire", n, &l->rows, error));
+    TRY(first_rows_load(s, STORE_LUMINAIRES "/irradiance", "luminaire", n, NULL, &l->rows, error));
     const size_t k = l->k = l->rows.m;
     l->C = C;
     TRY(read_names(s, l, error));

@@ -10,7 +10,11 @@
 #include <string.h>
 
 /* Kinds of sets and of receivers (store/FORMAT.md), and the bits of flags. */
-enum { SET_KINDS = 7, RECEIVERS = 4, FLAGS = SENSOR_IN_WALL | SENSOR_IN_LUMINAIRE };
+enum {
+    SET_KINDS = SENSOR_SET_PROBES + 1,
+    RECEIVERS = SENSOR_HARMONIC + SENSOR_HARMONICS,
+    FLAGS = SENSOR_IN_WALL | SENSOR_IN_LUMINAIRE
+};
 
 static const char *const arrays[] = {"kind", "receiver", "cell", "flags"};
 enum { ARRAY_KIND, ARRAY_RECEIVER, ARRAY_CELL, ARRAY_FLAGS, ARRAYS };
@@ -20,6 +24,7 @@ struct lam_sensors {
     char **names;            /* [n_sets], one block */
     uint64_t *first;         /* [n_sets + 1] */
     uint32_t *array[ARRAYS]; /* [n_sets], then [count] each */
+    bool *is_signed;         /* [count] */
     uint32_t *grid;          /* [n_sets][2] */
     double *spacing;         /* [n_sets][2] */
     double *place;           /* [count][9]: at, axis, look */
@@ -37,6 +42,7 @@ void lam_sensors_close(lam_sensors *l) {
     free(l->names);
     free(l->first);
     for (int a = 0; a < ARRAYS; a++) free(l->array[a]);
+    free(l->is_signed);
     free(l->grid);
     free(l->spacing);
     free(l->place);
@@ -143,10 +149,42 @@ static lam_status read_rows(store *s, lam_sensors *l, lam_error *error) {
     TRY(check_below(s, STORE_SENSORS "/indices", l->element, dims[0], l->n, false, error));
     TRY(store_read(s, STORE_SENSORS "/weights", STORE_F32, 1, dims, &data, error));
     l->weight = data;
-    TRY(check_finite(s, STORE_SENSORS "/weights", l->weight, dims[0], true, error));
+    TRY(check_finite(s, STORE_SENSORS "/weights", l->weight, dims[0], false, error));
     TRY(store_read(s, STORE_SENSORS "/weights_off", STORE_F32, 1, dims, &data, error));
     l->off = data;
     TRY(check_finite(s, STORE_SENSORS "/weights_off", l->off, dims[0], false, error));
+done:
+    return status;
+}
+
+/* Checks that probes have nine harmonics each, and that weights of other receivers are not negative. */
+static lam_status check_kinds(const store *s, lam_sensors *l, lam_error *error) {
+    lam_status status = LAM_OK;
+    const uint32_t *receiver = l->array[ARRAY_RECEIVER];
+    l->is_signed = memory_allocate(l->count, sizeof *l->is_signed, "sensors", error);
+    if (l->is_signed == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t set = 0; set < l->n_sets; set++) {
+        const size_t first = (size_t)l->first[set], last = (size_t)l->first[set + 1];
+        const bool probes = l->array[ARRAY_KIND][set] == SENSOR_SET_PROBES;
+        if (probes && (last - first) % SENSOR_HARMONICS != 0)
+            FAIL(error, LAM_ERR_FORMAT,
+                 "%s: /sensors/kind[%zu] is of probes, of %zu receivers, must be of a "
+                 "multiple of %d",
+                 store_path(s), set, last - first, SENSOR_HARMONICS);
+        for (size_t k = first; k < last; k++) {
+            const size_t harmonic = SENSOR_HARMONIC + (k - first) % SENSOR_HARMONICS;
+            if (probes ? receiver[k] != harmonic : receiver[k] >= SENSOR_HARMONIC)
+                FAIL(error, LAM_ERR_FORMAT, "%s: /sensors/receiver[%zu] = %u, must be %s%zu", store_path(s),
+                     k, (unsigned)receiver[k], probes ? "" : "below ",
+                     probes ? harmonic : (size_t)SENSOR_HARMONIC);
+            l->is_signed[k] = receiver[k] > SENSOR_HARMONIC;
+        }
+    }
+    for (size_t k = 0; k < l->count; k++)
+        for (uint64_t i = l->start[k]; i < l->start[k + 1] && !l->is_signed[k]; i++)
+            if (l->weight[i] < 0)
+                FAIL(error, LAM_ERR_FORMAT, "%s: /sensors/weights[%zu] = %g, must be at least 0",
+                     store_path(s), (size_t)i, (double)l->weight[i]);
 done:
     return status;
 }
@@ -156,14 +194,15 @@ static lam_status read_direct(store *s, lam_sensors *l, lam_error *error) {
     lam_status status = LAM_OK;
     void *data = NULL;
     if (store_has(s, STORE_SENSORS "/sky")) {
-        TRY(first_rows_load(s, STORE_SENSORS "/sky", "tile", l->count, &l->sky, error));
+        TRY(first_rows_load(s, STORE_SENSORS "/sky", "tile", l->count, l->is_signed, &l->sky, error));
         TRY(store_read(s, STORE_SENSORS "/sky_off", STORE_F32, 2, (size_t[]){l->sky.m, l->count}, &data,
                        error));
         l->sky_off = data;
         TRY(check_finite(s, STORE_SENSORS "/sky_off", l->sky_off, l->sky.m * l->count, false, error));
     }
     if (store_has(s, STORE_SENSORS "/luminaires")) {
-        TRY(first_rows_load(s, STORE_SENSORS "/luminaires", "luminaire", l->count, &l->luminaires, error));
+        TRY(first_rows_load(s, STORE_SENSORS "/luminaires", "luminaire", l->count, l->is_signed,
+                            &l->luminaires, error));
         const size_t k = l->luminaires.m;
         TRY(store_read(s, STORE_LUMINAIRES "/colour", STORE_F64, 2, (size_t[]){k, 3}, &data, error));
         const double *colour = data;
@@ -191,6 +230,7 @@ lam_status sensors_load(store *s, size_t n, size_t C, lam_sensors **out, lam_err
     TRY(read_sets(s, l, error));
     TRY(read_receivers(s, l, error));
     TRY(read_rows(s, l, error));
+    TRY(check_kinds(s, l, error));
     TRY(read_direct(s, l, error));
     *out = l;
     l = NULL;
@@ -250,6 +290,10 @@ const char *lam_sensors_set(const lam_sensors *l, size_t set, size_t *first, siz
 
 int lam_sensors_has_value(const lam_sensors *l, size_t receiver) {
     return l->array[ARRAY_FLAGS][receiver] == 0;
+}
+
+bool sensors_is_signed(const lam_sensors *l, size_t receiver) {
+    return l->is_signed[receiver];
 }
 
 sensor_set_shown sensors_set_shown(const lam_sensors *l, size_t set) {

@@ -8,6 +8,9 @@
  */
 enum { SENSOR_IN_WALL = 1, SENSOR_IN_LUMINAIRE = 2 };
 
+/* Kinds in the store: sets of probes, whose receivers are the spherical harmonics, each of this many. */
+enum { SENSOR_SET_PROBES = 7, SENSOR_HARMONIC = 4, SENSOR_HARMONICS = 9 };
+
 /* A set, as people are shown it. */
 typedef struct sensor_set_shown {
     const char *name;
@@ -19,7 +22,7 @@ typedef struct sensor_set_shown {
 
 /* A receiver, as people are shown it. */
 typedef struct sensor_shown {
-    unsigned kind;                  /* 0 plane, 1 cylinder, 2 semi-cylinder, 3 sphere */
+    unsigned kind;                  /* 0 plane, 1 cylinder, 2 semi-cylinder, 3 sphere, 4 ... 12 harmonics */
     double at[3], axis[3], look[3]; /* m; unit vectors, or 0 where it has none */
     uint32_t cell;                  /* of its grid, or 0xFFFFFFFF */
     unsigned flags;                 /* 0: it has a value */
@@ -40,6 +43,9 @@ lam_status sensors_load(store *s, size_t n, size_t C, lam_sensors **out, lam_err
 /* Texts of it are owned by l. */
 sensor_set_shown sensors_set_shown(const lam_sensors *l, size_t set);
 sensor_shown sensors_shown(const lam_sensors *l, size_t receiver);
+
+/* True for receivers whose values may be negative: harmonics of a probe but the first. */
+bool sensors_is_signed(const lam_sensors *l, size_t receiver);
 
 /* Owned by l. */
 sensor_weights sensors_weights(const lam_sensors *l);

@@ -30,7 +30,7 @@ lam_status sky_load(store *s, size_t n, lam_sky **out, lam_error *error) {
         *out = NULL;
         return LAM_OK;
     }
-    TRY(first_rows_load(s, STORE_SKY "/first_bounce", "tile", n, &rows, error));
+    TRY(first_rows_load(s, STORE_SKY "/first_bounce", "tile", n, NULL, &rows, error));
     TRY(make(&rows, out, error));
 done:
     return status;

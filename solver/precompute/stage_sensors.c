@@ -25,7 +25,9 @@ lam_status scene_take_sensors(const precompute_job *job, precompute_scene *scene
     if (path == NULL || strcmp(path, SENSORS_NONE) == 0) return LAM_OK;
     TRY(sensors_read(path, &how, list, error));
     scene_warn(job, &list->warnings);
-    terminal_log(job->t, "%zu sensor%s in %zu set%s", list->n, list->n == 1 ? "" : "s", list->n_sets,
+    size_t n = 0; /* a probe is one of them */
+    for (size_t k = 0; k < list->n; k++) n += !receiver_follows(&list->receivers[k]);
+    terminal_log(job->t, "%zu sensor%s in %zu set%s", n, n == 1 ? "" : "s", list->n_sets,
                  list->n_sets == 1 ? "" : "s");
 done:
     return status;
@@ -52,8 +54,10 @@ static lam_status find_sources(const precompute_scene *scene, bool **out, lam_er
 static void log_flags(const precompute_job *job, const scene_sensors *s, bool rows) {
     for (size_t k = 0; k < s->list.n_sets; k++) {
         const sensor_set *set = &s->list.sets[k];
-        size_t walls = 0, inside = 0;
+        size_t walls = 0, inside = 0, all = 0;
         for (size_t i = set->first; i < set->first + set->count; i++) {
+            if (receiver_follows(&s->list.receivers[i])) continue;
+            all++;
             walls += rows && (double)s->rows.backs[i] > SENSOR_BACKS_MOST;
             inside += s->inside != NULL && s->inside[i];
         }
@@ -62,11 +66,11 @@ static void log_flags(const precompute_job *job, const scene_sensors *s, bool ro
                 job->t,
                 "sensors %s: %zu of %zu lie in a wall or outside of the scene, as most of their rays "
                 "meet backs of faces: they have no value",
-                set->name, walls, set->count);
+                set->name, walls, all);
         if (inside > 0)
             terminal_warn(job->t,
                           "sensors %s: %zu of %zu lie in the opening of a luminaire: they have no value",
-                          set->name, inside, set->count);
+                          set->name, inside, all);
     }
 }
 

@@ -68,14 +68,32 @@ static double q_of_pair(const point_scene *s, const point_place *p, const point_
     return p->n_rows == 1 ? 0 : s->is_source[room->pair[i]] ? q_sources : q_pairs;
 }
 
-/* Rays have met nothing but pairs, which fill all. */
-static void close_pairs(const point_place *p, point_room *room, size_t half, const double whole[HARMONICS],
-                        double ridge) {
+/* Rays have met nothing but pairs, which take what is missing: elements that no ray has met, and rounding of
+ * visible shares, leave it. Pairs of sources stay, as they are exact and all light may come from them, unless
+ * there is little else. */
+static void close_pairs(const point_scene *s, const point_place *p, point_room *room, size_t half,
+                        const double whole[HARMONICS], double ridge) {
+    static const double enough = .1; /* share of the others that may be missing */
     closing c = {.n_rows = p->n_rows, .half = half};
-    for (size_t i = 0; i < room->n_pairs; i++) add_shares(&c, 1, room->factor + i * p->n_rows);
-    if (!(c.sum[0] > .5 * whole[0])) return;
-    solve(&c, whole, ridge);
-    for (size_t i = 0; i < room->n_pairs; i++) scale_shares(&c, 1, room->factor + i * p->n_rows);
+    double others = 0, all = 0;
+    for (size_t i = 0; i < room->n_pairs; i++) {
+        const double share = room->factor[i * p->n_rows][half];
+        all += share;
+        if (!s->is_source[room->pair[i]]) others += share;
+    }
+    if (!(all > .5 * whole[0])) return;
+    const bool spared = fabs(whole[0] - all) < enough * others;
+    const double q_spared = p->n_rows == 1 ? 0 : q_sources / q_pairs;
+    for (int pass = 0; pass < 2; pass++) {
+        for (size_t i = 0; i < room->n_pairs; i++) {
+            const double q = spared && s->is_source[room->pair[i]] ? q_spared : 1;
+            if (pass == 0)
+                add_shares(&c, q, room->factor + i * p->n_rows);
+            else
+                scale_shares(&c, q, room->factor + i * p->n_rows);
+        }
+        if (pass == 0) solve(&c, whole, ridge);
+    }
 }
 
 void point_close(const point_scene *s, const point_place *p, point_room *room, size_t half, bool sky_is_known,
@@ -93,7 +111,7 @@ void point_close(const point_scene *s, const point_place *p, point_room *room, s
         for (size_t l = 0; l <= k; l++) c.G[k][l] += found->products[k][l];
     }
     if (!(c.sum[0] > 0)) {
-        if (found->left[0] == 0) close_pairs(p, room, half, whole, ridge);
+        if (found->left[0] == 0) close_pairs(s, p, room, half, whole, ridge);
         return;
     }
     for (size_t k = 0; k < n_rows && sky_is_known; k++) c.sum[k] += found->left[k];

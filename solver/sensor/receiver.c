@@ -7,18 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-/* A vector in the frame of a probe: x = look, y = axis x look, z = axis. */
-static void turn_to_probe(const receiver *harmonic, const double v[3], double out[3]) {
-    double across[3];
-    cross3(harmonic->axis, harmonic->look, across);
-    out[0] = dot3(v, harmonic->look);
-    out[1] = dot3(v, across);
-    out[2] = dot3(v, harmonic->axis);
-}
-
 void receiver_densities(const receiver *harmonic, const double direction[3], double out[HARMONICS]) {
     double own[3];
-    turn_to_probe(harmonic, direction, own);
+    harmonics_turn(harmonic->axis, harmonic->look, direction, own);
     harmonics_at(own, out);
     for (int k = 0; k < HARMONICS; k++) out[k] /= M_PI;
 }
@@ -208,7 +199,7 @@ void receiver_factors(const receiver *harmonic, const polygon *p, double out[HAR
     if (!is_turned_to(harmonic, p)) return;
     for (int c = 0; c < p->n; c++) {
         subtract3(p->corner[c], harmonic->at, away);
-        turn_to_probe(harmonic, away, corner[c]);
+        harmonics_turn(harmonic->axis, harmonic->look, away, corner[c]);
     }
     harmonics_of_polygon(p->n, (const double(*)[3])corner, 4 * M_PI * sphere_factor(harmonic, p), out);
     for (int k = 0; k < HARMONICS; k++) out[k] /= M_PI;

@@ -11,8 +11,8 @@
 #ifndef LAMBERT_SENSOR_RECEIVER_H
 #define LAMBERT_SENSOR_RECEIVER_H
 
+#include "solver/base/harmonics.h"
 #include "solver/formfactor/exchange/polygon.h"
-#include "solver/sensor/harmonics.h"
 
 typedef enum receiver_kind {
     RECEIVER_PLANE,

@@ -3,7 +3,8 @@
  *      "points": [{"name": "desk", "at": [[1, 1, .75]], "normal": [0, 0, 1]}],
  *      "grids": [{"name": "room", "over": "floor", "height": .85, "spacing": "en12464", "border": .5}],
  *      "eyes": [{"name": "seat", "at": [2, 3, 1.2], "view": [0, 1, 0]}],
- *      "cylinders": [...], "semicylinders": [...], "spheres": [...], "cubes": [...]}
+ *      "cylinders": [...], "semicylinders": [...], "spheres": [...], "cubes": [...],
+ *      "probes": [{"name": "hall", "from": [1, 1, 1], "steps": [[2, 0, 0], [0, 2, 0]], "counts": [4, 3]}]}
  * or CSV with the columns name, x, y, z, nx, ny, nz, or points as Radiance has them, .pts: six numbers a
  * line. Must not know what light comes to them. */
 #ifndef LAMBERT_SENSOR_SENSORS_H
@@ -18,7 +19,8 @@ enum { SENSORS_MOST = 1000000, SENSOR_SETS_MOST = 100000, SENSOR_NAME = 64, SENS
 /* Bytes of a file of sensors. */
 #define SENSORS_BYTES_MOST ((size_t)64 << 20)
 
-/* The kinds of sets. A cube is six planes, which look along +x, -x, +y, -y, +z and -z. */
+/* The kinds of sets. A cube is six planes, which look along +x, -x, +y, -y, +z and -z; a probe is nine
+ * spherical harmonics. */
 typedef enum sensor_set_kind {
     SENSOR_POINTS,
     SENSOR_GRIDS,
@@ -27,6 +29,7 @@ typedef enum sensor_set_kind {
     SENSOR_SEMICYLINDERS,
     SENSOR_SPHERES,
     SENSOR_CUBES,
+    SENSOR_PROBES,
     SENSOR_SET_KINDS
 } sensor_set_kind;
 
@@ -69,5 +72,9 @@ lam_status sensors_read_text(const char *name, const char *text, size_t length,
                              const sensors_options *options, sensor_list *out, lam_error *error);
 
 void sensors_free(sensor_list *l);
+
+/* The first harmonic of a probe at the origin, in the axes of the scene or, y_up, in those of glTF, three.js
+ * and Godot, into which the axis of the scene that points up, `up`, is turned. */
+receiver sensors_probe(bool y_up, char up);
 
 #endif

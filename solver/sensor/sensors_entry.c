@@ -195,9 +195,22 @@ done:
     return status;
 }
 
+lam_status sensors_set_name(const json_t *value, const char *place, sensor_set *set, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *limit;
+    const json_t *name = json_object_get(value, "name");
+    if (name == NULL) FAIL(error, LAM_ERR_ARGUMENT, "%s has no name: it must have one", place);
+    if (!json_is_string(name)) TRY(list_wrong(place, "name", name, "must be a text", error));
+    if (!sensors_is_name(json_string_value(name), json_string_length(name), &limit))
+        TRY(list_wrong(place, "name", name, limit, error));
+    memcpy(set->name, json_string_value(name), json_string_length(name) + 1);
+done:
+    return status;
+}
+
 static lam_status read_set(entry *e, lam_error *error) {
     lam_status status = LAM_OK;
-    const char *members[9], *limit;
+    const char *members[9];
     size_t n = 0;
     members[n++] = "name";
     if (e->kind->at_points) members[n++] = "at";
@@ -208,12 +221,7 @@ static lam_status read_set(entry *e, lam_error *error) {
     if (e->kind->direction != NULL) members[n++] = e->kind->direction;
     if (e->kind->receiver == RECEIVER_SEMICYLINDER) members[n++] = "look";
     TRY(list_members(e->value, n, members, e->place, error));
-    const json_t *name = json_object_get(e->value, "name");
-    if (name == NULL) FAIL(error, LAM_ERR_ARGUMENT, "%s has no name: it must have one", e->place);
-    if (!json_is_string(name)) TRY(list_wrong(e->place, "name", name, "must be a text", error));
-    if (!sensors_is_name(json_string_value(name), json_string_length(name), &limit))
-        TRY(list_wrong(e->place, "name", name, limit, error));
-    memcpy(e->set.name, json_string_value(name), json_string_length(name) + 1);
+    TRY(sensors_set_name(e->value, e->place, &e->set, error));
     if (e->kind->needs_direction && json_object_get(e->value, e->kind->direction) == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "%s has no %s: it must have one", e->place, e->kind->direction);
     TRY(read_place(e, error));
@@ -236,7 +244,8 @@ lam_status sensors_array(sensors_reading *r, sensor_set_kind kind, const json_t 
                    .kind = &kinds[kind],
                    .set = {.kind = kind, .entry = k}};
         snprintf(e.place, sizeof e.place, "%.200s: %s[%zu]", r->name, sensor_set_word(kind), k);
-        TRY(read_set(&e, error));
+        TRY(kind == SENSOR_PROBES ? sensors_probe_set(r, e.value, e.place, &e.set, error)
+                                  : read_set(&e, error));
     }
 done:
     return status;

@@ -23,10 +23,17 @@ lam_status sensors_array(sensors_reading *r, sensor_set_kind kind, const json_t 
 /* The unit vector upwards. */
 void sensors_up(char up, double out[3]);
 
+/* Reads a set of probes; set: its kind and entry. */
+lam_status sensors_probe_set(sensors_reading *r, json_t *value, const char *place, sensor_set *set,
+                             lam_error *error);
+
+/* Reads the name of a set. */
+lam_status sensors_set_name(const json_t *value, const char *place, sensor_set *set, lam_error *error);
+
 /* Begins a set, to which sensors_add adds receivers. place begins messages. */
 lam_status sensors_begin(sensors_reading *r, const sensor_set *set, const char *place, lam_error *error);
 
-/* Adds a receiver to the last set; of a cube, its six. */
+/* Adds a receiver to the last set; of a cube, its six, of a probe, its nine. */
 lam_status sensors_add(sensors_reading *r, const receiver *one, uint32_t cell, const char *place,
                        lam_error *error);
 

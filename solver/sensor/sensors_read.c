@@ -13,7 +13,7 @@
 static const char *const words[SENSOR_SET_KINDS] = {
     [SENSOR_POINTS] = "points",       [SENSOR_GRIDS] = "grids",     [SENSOR_EYES] = "eyes",
     [SENSOR_CYLINDERS] = "cylinders", [SENSOR_SPHERES] = "spheres", [SENSOR_SEMICYLINDERS] = "semicylinders",
-    [SENSOR_CUBES] = "cubes"};
+    [SENSOR_CUBES] = "cubes",         [SENSOR_PROBES] = "probes"};
 
 const char *sensor_set_word(sensor_set_kind kind) {
     return words[kind];
@@ -69,9 +69,15 @@ done:
 
 lam_status sensors_add(sensors_reading *r, const receiver *one, uint32_t cell, const char *place,
                        lam_error *error) {
-    if (r->out->sets[r->out->n_sets - 1].kind != SENSOR_CUBES) return add_one(r, one, cell, place, error);
     lam_status status = LAM_OK;
-    for (int face = 0; face < 6; face++) {
+    const sensor_set_kind kind = r->out->sets[r->out->n_sets - 1].kind;
+    if (kind != SENSOR_CUBES && kind != SENSOR_PROBES) return add_one(r, one, cell, place, error);
+    for (int k = 0; k < HARMONICS && kind == SENSOR_PROBES; k++) {
+        receiver harmonic = *one;
+        harmonic.kind = (receiver_kind)(RECEIVER_HARMONIC + k);
+        TRY(add_one(r, &harmonic, cell, place, error));
+    }
+    for (int face = 0; face < 6 && kind == SENSOR_CUBES; face++) {
         receiver side = *one;
         for (int d = 0; d < 3; d++) side.axis[d] = d == face / 2 ? (face % 2 == 0 ? 1 : -1) : 0;
         TRY(add_one(r, &side, cell, place, error));

@@ -136,7 +136,7 @@ static bool set_receiver(const sensor_shown *shown, receiver *out) {
     memcpy(out->axis, shown->axis, sizeof out->axis);
     memcpy(out->look, shown->look, sizeof out->look);
     return fabs(length - turned) < 1e-6 &&
-           (shown->kind != RECEIVER_SEMICYLINDER ||
+           ((shown->kind != RECEIVER_SEMICYLINDER && shown->kind < RECEIVER_HARMONIC) ||
             (fabs(look - 1) < 1e-6 && fabs(dot3(shown->look, shown->axis)) < 1e-6));
 }
 

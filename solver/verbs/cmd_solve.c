@@ -11,6 +11,7 @@
 #include "solver/verbs/sensor_files.h"
 #include "solver/verbs/solve_faces.h"
 #include "solver/verbs/solve_options.h"
+#include "solver/verbs/solve_probes.h"
 #include "solver/verbs/solve_sensors.h"
 #include "solver/verbs/solve_texels.h"
 #include "solver/verbs/verbs.h"
@@ -360,7 +361,11 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     if (f->at == AT_FACES) TRY(solve_faces_find(path, &m, &faces, error));
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
     if (f->linear) lit.light.limiter = NULL;
-    if (f->sensors != NULL) TRY(sensor_choice_open(s, &m, f->sensors, &sensors, error));
+    if (f->sensors != NULL) {
+        TRY(sensor_choice_open(s, &m, f->sensors, &sensors, error));
+        const bool linear = f->figure == NULL && (year->n_figures == 0 || is_sum(year));
+        TRY(solve_probes_check(&sensors, linear, f->output, error));
+    }
     lit.light.sensors = sensors.all;
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
     TRY(check_own(path, &lit, t, error));

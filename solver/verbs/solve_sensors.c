@@ -5,6 +5,7 @@
 #include "solver/operator/sensor_light.h"
 #include "solver/verbs/json_print.h"
 #include "solver/verbs/sensor_files.h"
+#include "solver/verbs/solve_probes.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -135,8 +136,10 @@ static void put_table(const sensor_choice *c, const solution *s) {
     char name[OUTPUT_COLUMN];
     printf("%-24s %8s %-24s %10s %10s %10s %10s\n", "sensors", "points", "of", "mean", "min", "max",
            "min/mean");
-    for (size_t k = 0; k < c->n_sets; k++)
-        for (size_t row = 0; row < s->n_vectors * s->m->n_channels; row++) {
+    for (size_t k = 0; k < c->n_sets; k++) {
+        const bool probes = solve_probes_are(c->all, c->sets[k]);
+        if (probes) solve_probes_print(c, s, c->sets[k]);
+        for (size_t row = 0; row < s->n_vectors * s->m->n_channels && !probes; row++) {
             size_t first, count;
             const char *set = lam_sensors_set(c->all, c->sets[k], &first, &count);
             const set_figures f = figures_of(c, s, row, first, count);
@@ -147,6 +150,7 @@ static void put_table(const sensor_choice *c, const solution *s) {
             printf("%-24s %8zu %-24s %10.6g %10.6g %10.6g %10.3g\n", set, f.n, of, f.mean, f.min, f.max,
                    f.mean > 0 ? f.min / f.mean : (double)NAN);
         }
+    }
 }
 
 static json_t *number(double x) {
@@ -186,7 +190,11 @@ static json_t *set_json(const sensor_choice *c, const solution *s, size_t set) {
 
 static json_t *answer_json(const sensor_choice *c, const solution *s) {
     json_t *sets = json_array(), *names = json_array();
-    for (size_t k = 0; k < c->n_sets; k++) json_array_append_new(sets, set_json(c, s, c->sets[k]));
+    for (size_t k = 0; k < c->n_sets; k++) {
+        const size_t set = c->sets[k];
+        json_array_append_new(sets, solve_probes_are(c->all, set) ? solve_probes_json(c, s, set)
+                                                                  : set_json(c, s, set));
+    }
     for (size_t v = 0; s->names != NULL && v < s->n_vectors; v++)
         json_array_append_new(names, json_string(s->names[v]));
     json_t *out = json_pack("{s:s, s:s, s:s, s:o}", "scene", s->scene, "quantity", "irradiance", "unit",
@@ -242,7 +250,8 @@ lam_status solve_sensors_put(const sensor_choice *c, const solution *s, const ch
     } else if (strcmp(extension, "vtu") == 0) {
         sensor_points_vtu(c, s, file.stream);
     } else {
-        TRY(put_npy(c, s, file.stream, error));
+        TRY(solve_probes_are(c->all, c->sets[0]) ? solve_probes_npy(c, s, file.stream, error)
+                                                 : put_npy(c, s, file.stream, error));
     }
     if (path != NULL) TRY(atomic_file_commit(&file, error));
 done:

@@ -57,6 +57,41 @@ START_TEST(all_kinds) {
 }
 END_TEST
 
+/* A grid of steps, whose last one is the fastest, and points; in the axes of the scene and with y up. */
+START_TEST(probes) {
+    const char *text =
+        "{\"unit\":\"cm\",\"probes\":[{\"name\":\"hall\",\"from\":[100,0,50],\"steps\":[[0,200,0],"
+        "[0,0,150]],\"counts\":[3,2]},{\"name\":\"one\",\"at\":[1,2,3],\"axes\":\"y-up\"},"
+        "{\"name\":\"two\",\"at\":[[0,0,0],[100,0,0]],\"axes\":\"scene\"}]}";
+    static const double x[] = {1, 0, 0}, z[] = {0, 0, 1}, back[] = {0, -1, 0};
+    sensor_list l = good("a.json", text, NULL);
+    ck_assert_uint_eq(l.n_sets, 3);
+    ck_assert_uint_eq(l.n, 9 * (6 + 1 + 2));
+    ck_assert_int_eq(l.sets[0].kind, SENSOR_PROBES);
+    ck_assert_uint_eq(l.sets[0].count, 9 * 6);
+    for (size_t k = 0; k < l.n; k++) {
+        ck_assert_int_eq(l.receivers[k].kind, RECEIVER_HARMONIC + k % 9);
+        ck_assert_mem_eq(l.receivers[k].axis, k / 9 == 6 ? back : z, sizeof z);
+        ck_assert_mem_eq(l.receivers[k].look, x, sizeof x);
+        ck_assert_uint_eq(l.cell[k], SENSOR_NO_CELL);
+    }
+    same_point(l.receivers[0].at, 1, 0, .5);
+    same_point(l.receivers[17].at, 1, 0, 2);
+    same_point(l.receivers[18].at, 1, 2, .5);
+    same_point(l.receivers[9 * 6].at, .01, .02, .03);
+    same_point(l.receivers[9 * 8].at, 1, 0, 0);
+    sensors_free(&l);
+    /* Where y or x points up, as glTF files are turned. */
+    l = good("a.json", text, &(sensors_options){.up = 'y'});
+    ck_assert_mem_eq(l.receivers[9 * 6].axis, z, sizeof z);
+    sensors_free(&l);
+    l = good("a.json", text, &(sensors_options){.up = 'x'});
+    ck_assert_mem_eq(l.receivers[9 * 6].axis, z, sizeof z);
+    ck_assert_mem_eq(l.receivers[9 * 6].look, back, sizeof back);
+    sensors_free(&l);
+}
+END_TEST
+
 START_TEST(lines) {
     sensor_list l = good(
         "a.csv", "name,x,y,z,nx,ny,nz\r\na,1,2,3,0,0,2\r\na,2,2,3,,,\r\n\r\n\"b\",0,0,1,1,0,0\r\n", NULL);
@@ -214,6 +249,23 @@ START_TEST(faults) {
          "a.json: semicylinders[0]: look = nothing, must be an array of three numbers"},
         {"a.json", "{\"cubes\":[{\"name\":\"a\",\"at\":[0,0,1],\"spacing\":1}]}",
          "a.json: cubes[0] has at; spacing is for one over a group or polygon"},
+        {"a.json", "{\"probes\":[{\"name\":\"a\"}]}",
+         "a.json: probes[0] must have at, its points, or from, the first of a row or a grid"},
+        {"a.json", "{\"probes\":[{\"name\":\"a\",\"at\":[0,0,1],\"counts\":[2]}]}",
+         "a.json: probes[0] has at; steps and counts are for a row, which has from"},
+        {"a.json", "{\"probes\":[{\"name\":\"a\",\"from\":[0,0,1],\"counts\":[2]}]}",
+         "a.json: probes[0] has from; then it must have steps and counts too"},
+        {"a.json", "{\"probes\":[{\"name\":\"a\",\"from\":[0,0,1],\"steps\":[[1,0,0]],\"counts\":[1.5]}]}",
+         "a.json: probes[0]: counts = [1.5], must be whole numbers"},
+        {"a.json", "{\"probes\":[{\"name\":\"a\",\"from\":[0,0,1],\"steps\":[[0,0,0]],\"counts\":[2]}]}",
+         "a.json: probes[0]: steps = [[0,0,0]], must have a length above 0 where there is more than one"},
+        {"a.json",
+         "{\"probes\":[{\"name\":\"a\",\"from\":[0,0,1],\"steps\":[[1,0,0],[0,1,0]],\"counts\":[999,999]}]}",
+         "a.json: probes[0]: counts make 998001 probes, must be at most 111111"},
+        {"a.json", "{\"probes\":[{\"name\":\"a\",\"at\":[0,0,1],\"axes\":\"z-up\"}]}",
+         "a.json: probes[0]: axes = \"z-up\", must be \"scene\" or \"y-up\""},
+        {"a.json", "{\"probes\":[{\"name\":\"a\",\"at\":[0,0,1],\"normal\":[0,0,1]}]}",
+         "a.json: probes[0] has a member \"normal\", which is not known"},
         {"a.csv", "name,x,y,q\n", "a.csv: line 1: column 4, \"q\", is not known: "},
         {"a.csv", "name,x,y\na,1,2\n", "a.csv: line 1 has no column z: name, x, y and z must be there"},
         {"a.csv", "name,x,y,z,x\n", "a.csv: line 1 has the column x twice"},
@@ -260,6 +312,7 @@ int main(void) {
     Suite *s = suite_create("lists of sensors");
     TCase *c = tcase_create("all");
     tcase_add_test(c, all_kinds);
+    tcase_add_test(c, probes);
     tcase_add_test(c, lines);
     tcase_add_test(c, spacing_of_the_standard);
     tcase_add_test(c, grid_over_a_group);

@@ -9,7 +9,7 @@
 
 #include <unistd.h>
 
-enum { N = 50, S = 9, SETS = 3, NNZ = 40, M = 5, K = 3, C = 3, RHS = 2, ROWS = RHS * C };
+enum { N = 50, S = 27, SETS = 4, NNZ = 120, M = 5, K = 3, C = 3, RHS = 2, ROWS = RHS * C };
 
 /* Sensors with made-up rows. */
 typedef struct sample {
@@ -26,6 +26,15 @@ static float unit(uint64_t *seed) {
     return (float)random_unit(seed);
 }
 
+/* Harmonics of a probe but the first, whose numbers have either sign. */
+static bool is_signed(size_t k) {
+    return k > 9 && (k - 9) % 9 > 0;
+}
+
+static float number(size_t k, uint64_t *seed) {
+    return unit(seed) - (is_signed(k) ? .5f : 0);
+}
+
 static void fill(sample *a) {
     uint64_t seed = 1;
     *a = (sample){.sets = {{.name = "desk", .count = 2},
@@ -36,27 +45,30 @@ static void fill(sample *a) {
                             .rows = 2,
                             .columns = 3,
                             .spacing = {.5, .6}},
-                           {.name = "faces", .kind = SENSOR_SEMICYLINDERS, .first = 6, .count = 3}}};
+                           {.name = "faces", .kind = SENSOR_SEMICYLINDERS, .first = 6, .count = 3},
+                           {.name = "game", .kind = SENSOR_PROBES, .first = 9, .count = 18}}};
     for (size_t k = 0; k < S; k++) {
         a->receivers[k] = (receiver){.kind = k < 6 ? RECEIVER_PLANE : RECEIVER_SEMICYLINDER,
                                      .at = {(double)k, .1, .2},
                                      .axis = {0, 0, 1}};
         if (k >= 6) a->receivers[k].look[1] = 1;
+        if (k >= 9) a->receivers[k].kind = (receiver_kind)(RECEIVER_HARMONIC + k % 9);
         a->cell[k] = k >= 2 && k < 6 ? (uint32_t)k : SENSOR_NO_CELL;
         a->start[k + 1] = k == 3 ? a->start[k] : NNZ * (k + 1) / S; /* an empty row, and others */
         a->backs[k] = k == 5 ? .75f : 0;
         a->inside[k] = k == 7;
     }
-    for (size_t k = 0; k < NNZ; k++) {
+    for (size_t k = 0, row = 0; k < NNZ; k++) {
+        while (k >= a->start[row + 1]) row++;
         a->element[k] = (uint32_t)(k % N);
-        a->weight[k] = unit(&seed);
+        a->weight[k] = number(row, &seed);
         a->off[k] = unit(&seed) - .5f;
     }
     for (size_t k = 0; k < M * S; k++) {
-        a->sky[k] = unit(&seed);
+        a->sky[k] = number(k % S, &seed);
         a->sky_off[k] = unit(&seed) - .5f;
     }
-    for (size_t k = 0; k < K * S; k++) a->H[k] = unit(&seed);
+    for (size_t k = 0; k < K * S; k++) a->H[k] = number(k % S, &seed);
     for (size_t k = 0; k < K * 3; k++) a->colour[k] = random_unit(&seed);
 }
 
@@ -174,6 +186,7 @@ START_TEST(sets_and_receivers) {
     ck_assert_uint_eq(sensors_shown(l, 5).flags, SENSOR_IN_WALL);
     ck_assert_uint_eq(sensors_shown(l, 7).flags, SENSOR_IN_LUMINAIRE);
     ck_assert_uint_eq(sensors_set_shown(l, 1).columns, 3);
+    for (size_t k = 0; k < S; k++) ck_assert(sensors_is_signed(l, k) == is_signed(k));
     lam_sensors_close(l);
     ck_ok(store_open(path, &s, &error));
     ck_ok(sensors_load_list(s, &list, &error));
@@ -222,7 +235,7 @@ START_TEST(wrong_values) {
     a->element[5] = N;
     refused(a, "/sensors/indices[5] = 50, must be below 50");
     a->start[2] = a->start[1] - 1;
-    refused(a, "/sensors/indptr[2] = 3, must rise from 0 to 40");
+    refused(a, "/sensors/indptr[2] = 3, must rise from 0 to 120");
     a->sky[7] = -1;
     refused(a, "/sensors/sky[0][7] = -1, must be at least 0");
     a->receivers[2].kind = (receiver_kind)9;
@@ -230,9 +243,20 @@ START_TEST(wrong_values) {
     a->receivers[2].at[1] = INFINITY;
     refused(a, "/sensors/place[2][1] is no number");
     a->sets[0].kind = (sensor_set_kind)12;
-    refused(a, "/sensors/kind[0] = 12, must be below 7");
+    refused(a, "/sensors/kind[0] = 12, must be below 8");
+    a->receivers[12].kind = RECEIVER_HARMONIC;
+    refused(a, "/sensors/receiver[12] = 4, must be 7");
+    a->sets[3].kind = SENSOR_CUBES;
+    refused(a, "/sensors/receiver[9] = 4, must be below 4");
+    a->sets[2].count = 4;
+    refused(a, "/sensors/receiver[9] = 4, must be below 4");
+    a->sets[2].count = 2;
+    a->sets[2].kind = SENSOR_PROBES;
+    refused(a, "/sensors/kind[2] is of probes, of 2 receivers, must be of a multiple of 9");
+    a->weight[a->start[9]] = -1;
+    refused(a, "must be at least 0");
     a->sets[0].count = 50;
-    refused(a, "/sensors/first[1] = 50, must rise from 0 to 9");
+    refused(a, "/sensors/first[1] = 50, must rise from 0 to 27");
     a->sets[1].spacing[0] = -1;
     refused(a, "/sensors/spacing[2] = -1, must be at least 0");
     free(a);

@@ -1,4 +1,4 @@
-#include "solver/sensor/harmonics.h"
+#include "solver/base/harmonics.h"
 
 #include "solver/base/vector3.h"
 
@@ -26,6 +26,14 @@ void harmonics_at(const double direction[3], double Y[HARMONICS]) {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) ww[i][j] = direction[i] * direction[j];
     combine(1, direction, ww, Y);
+}
+
+void harmonics_turn(const double axis[3], const double look[3], const double v[3], double out[3]) {
+    double across[3];
+    cross3(axis, look, across);
+    out[0] = dot3(v, look);
+    out[1] = dot3(v, across);
+    out[2] = dot3(v, axis);
 }
 
 /* With the outward normal m of an edge's plane, and t its angle from the unit vector a on,
