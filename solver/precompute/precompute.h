@@ -54,6 +54,8 @@ typedef struct precompute_options {
     glass_law glass_law;
     bool keep_form_factors;
     const char *luminaires, *sensors;   /* FILE, LUMINAIRES_NONE, SENSORS_NONE; or NULL */
+    double probes_grid;                 /* m, the spacing of a set of probes; 0: none */
+    bool probes_y_up;                   /* their axes */
     const char *emitters;               /* FILE, group=NAME, sky; or NULL */
     const char *receivers, *importance; /* NAME,NAME; FILE; one of them, or both NULL */
     const char *sources;                /* NAME,NAME; or NULL */

@@ -184,9 +184,26 @@ static const option_row mesh_rows[] = {
      .otherwise = "those of a store",
      .not_with = "positions|path",
      .help =
-         "Points, grids, eyes, cylinders, spheres and cubes at which light is read: it is gathered there, by "
-         "256, 1,024 or 4,096 rays each (--quality) and segments to lamps, luminaires and the sky. Of a "
-         "store: in place of those that it has; none leaves these out"},
+         "Points, grids, eyes, cylinders, spheres, cubes and probes at which light is read: it is gathered "
+         "there, by 256, 1,024 or 4,096 rays each (--quality) and segments to lamps, luminaires and the sky. "
+         "Of a store: in place of those that it has; none leaves these out"},
+    {.name = "probes-grid",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(probes_grid),
+     .argument = "SPACING",
+     .otherwise = "none",
+     .unit = "m",
+     .above = true,
+     .most = 1e9,
+     .not_with = "positions|path",
+     .help = "A set of sensors of the name probes over the free space of the scene, with this spacing: light "
+             "probes of games, nine coefficients of the radiance at each. Points in walls are left out. It "
+             "stands beside other sensors"},
+    {.name = "probes-y-up",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(probes_y_up),
+     .help = "Probes of --probes-grid are in the axes of glTF, three.js and Godot, which have y up, in place "
+             "of those of the scene"},
     {.name = "lights",
      .kind = OPTION_CHOICE,
      .offset = FIELD(lights),

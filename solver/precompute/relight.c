@@ -13,15 +13,21 @@
 
 /* Options that do not ask for another operator. */
 static bool is_light_alone(const char *name) {
-    static const char *const names[] = {"output",  "luminaires", "sensors", "assets",   "quality", "seed",
-                                        "threads", "quiet",      "verbose", "progress", "json"};
+    static const char *const names[] = {"output",  "luminaires", "sensors", "probes-grid", "probes-y-up",
+                                        "assets",  "quality",    "seed",    "threads",     "quiet",
+                                        "verbose", "progress",   "json"};
     for (size_t k = 0; k < sizeof names / sizeof *names; k++)
         if (strcmp(name, names[k]) == 0) return true;
     return false;
 }
 
+/* True where rows of sensors are to be found; else those of the store stay. */
+static bool sensors_are_new(const precompute_options *o) {
+    return o->sensors != NULL || o->probes_grid > 0;
+}
+
 bool relight_is_asked(const precompute_options *o, const option_result *given) {
-    bool alone = o->from_store && (o->luminaires != NULL || o->sensors != NULL);
+    bool alone = o->from_store && (o->luminaires != NULL || sensors_are_new(o));
     for (size_t i = 0; i < given->n_given; i++) alone = alone && is_light_alone(given->given[i]);
     return alone;
 }
@@ -115,7 +121,7 @@ done:
 
 lam_status relight_run(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
-    const bool rows = job->options->sensors != NULL, lights = job->options->luminaires != NULL;
+    const bool rows = sensors_are_new(job->options), lights = job->options->luminaires != NULL;
     store_skip *const skip = lights ? rows ? skip_both : skip_luminaires : skip_sensors;
     made_operator made = {.op = NULL};
     sky_bounce sky = {.n = 0};

@@ -1,5 +1,6 @@
 /* Sensors of --sensors or of a store: the weights with which light comes to them, and that of luminaires. */
 #include "solver/precompute/stages.h"
+#include "solver/sensor/probe_grid.h"
 #include "solver/sensor/sensor_luminaires.h"
 #include "solver/sensor/sensors_store.h"
 
@@ -17,26 +18,53 @@ void scene_sensors_free(scene_sensors *s) {
     *s = (scene_sensors){.H = NULL};
 }
 
+/* Adds the probes of --probes-grid, and says how many sensors there are. */
+static lam_status add_probes(const precompute_job *job, precompute_scene *scene, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = job->options;
+    const probe_grid grid = {.spacing = o->probes_grid, .y_up = o->probes_y_up};
+    sensor_list *list = &scene->sensors.list;
+    size_t left_out = 0;
+    if (o->probes_y_up && !(o->probes_grid > 0))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--probes-y-up is for --probes-grid; sets of a file have \"axes\": \"y-up\"");
+    if (o->probes_grid > 0) {
+        TRY(probe_grid_add(&scene->m, &grid, list, &left_out, error));
+        const size_t n = list->sets[list->n_sets - 1].count / HARMONICS;
+        terminal_log(job->t, "probes at %zu of %zu points of the grid; others lie in walls or outside", n,
+                     n + left_out);
+    }
+    size_t n = 0; /* a probe is one of them */
+    for (size_t k = 0; k < list->n; k++) n += !receiver_follows(&list->receivers[k]);
+    if (n > 0)
+        terminal_log(job->t, "%zu sensor%s in %zu set%s", n, n == 1 ? "" : "s", list->n_sets,
+                     list->n_sets == 1 ? "" : "s");
+done:
+    return status;
+}
+
 lam_status scene_take_sensors(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     const char *path = job->options->sensors;
     const sensors_options how = {.up = scene->m.up, .m = &scene->m};
     sensor_list *list = &scene->sensors.list;
-    if (path == NULL || strcmp(path, SENSORS_NONE) == 0) return LAM_OK;
-    TRY(sensors_read(path, &how, list, error));
-    scene_warn(job, &list->warnings);
-    size_t n = 0; /* a probe is one of them */
-    for (size_t k = 0; k < list->n; k++) n += !receiver_follows(&list->receivers[k]);
-    terminal_log(job->t, "%zu sensor%s in %zu set%s", n, n == 1 ? "" : "s", list->n_sets,
-                 list->n_sets == 1 ? "" : "s");
+    if (path != NULL && strcmp(path, SENSORS_NONE) != 0) {
+        TRY(sensors_read(path, &how, list, error));
+        scene_warn(job, &list->warnings);
+    }
+    TRY(add_probes(job, scene, error));
 done:
     return status;
 }
 
 lam_status scene_load_sensors(const precompute_job *job, store *s, precompute_scene *scene,
                               lam_error *error) {
-    return job->options->sensors != NULL ? scene_take_sensors(job, scene, error)
-                                         : sensors_load_list(s, &scene->sensors.list, error);
+    lam_status status = LAM_OK;
+    if (job->options->sensors != NULL) return scene_take_sensors(job, scene, error);
+    TRY(sensors_load_list(s, &scene->sensors.list, error));
+    if (job->options->probes_grid > 0 || job->options->probes_y_up) TRY(add_probes(job, scene, error));
+done:
+    return status;
 }
 
 /* [n_groups]: groups of elements that --sources names; NULL where there are none. */

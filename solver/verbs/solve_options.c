@@ -92,8 +92,8 @@ const option_row solve_answer_rows[] = {
      .not_with = "reduce|at|smooth|tolerance",
      .help = "Irradiance at sets of sensors of the store, gathered at each point, in place of elements: a "
              "table of each set, or .csv, .json, .npy, .vtu, or a folder, NAME/, as Honeybee reads results: "
-             ".ill and sun-up-hours.txt of --weather, .res of one light. The sun is that of its tile (--sun "
-             "tiles)"},
+             ".ill and sun-up-hours.txt of --weather, .res of one light; of probes nine coefficients of the "
+             "radiance (.json, .npy). The sun is that of its tile (--sun tiles)"},
     {.name = "smooth",
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),
