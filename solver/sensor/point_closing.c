@@ -9,9 +9,12 @@
 #include <math.h>
 
 /* q of pairs, beside 1 of rays. In a probe they take what its rays cannot, which may have met little on one
- * side of it: in a box of some hundreds of elements rays alone left up to 1e-2. Pairs that give light of
- * their own are hardly changed. */
-static const double q_pairs = .03, q_sources = .001;
+ * side of it: in a box of some hundreds of elements rays alone left up to 1e-2. */
+static const double q_pairs = .03;
+
+/* Pairs of sources stay as they are, as they are exact and all light may come from them, unless others are
+ * less than this share of all that is seen. */
+static const double enough = .1;
 
 /* The diagonal of G has so many rays more, but in the first row, where all shares are positive: without it
  * rays on one side would be changed beyond measure where there are no pairs. */
@@ -63,37 +66,33 @@ static void solve(closing *c, const double whole[HARMONICS], double ridge) {
     }
 }
 
-/* The q of pair i; those of a single row stay as they are. */
-static double q_of_pair(const point_scene *s, const point_place *p, const point_room *room, size_t i) {
-    return p->n_rows == 1 ? 0 : s->is_source[room->pair[i]] ? q_sources : q_pairs;
+/* The pairs of a single row stay as they are. */
+static double q_of_pair(const point_scene *s, const point_place *p, uint32_t pair, bool spared) {
+    return p->n_rows == 1 || (spared && s->is_source[pair]) ? 0 : q_pairs;
+}
+
+/* Pairs that are no sources, in the first row. */
+static double sum_others(const point_scene *s, const point_place *p, const point_room *room, size_t half) {
+    double sum = 0;
+    for (size_t i = 0; i < room->n_pairs; i++)
+        if (!s->is_source[room->pair[i]]) sum += room->factor[i * p->n_rows][half];
+    return sum;
 }
 
 /* Rays have met nothing but pairs, which take what is missing: elements that no ray has met, and rounding of
- * visible shares, leave it. Pairs of sources stay, as they are exact and all light may come from them, unless
- * there is little else. */
+ * visible shares, leave it. */
 static void close_pairs(const point_scene *s, const point_place *p, point_room *room, size_t half,
                         const double whole[HARMONICS], double ridge) {
-    static const double enough = .1; /* share of the others that may be missing */
     closing c = {.n_rows = p->n_rows, .half = half};
-    double others = 0, all = 0;
-    for (size_t i = 0; i < room->n_pairs; i++) {
-        const double share = room->factor[i * p->n_rows][half];
-        all += share;
-        if (!s->is_source[room->pair[i]]) others += share;
-    }
+    double all = 0;
+    for (size_t i = 0; i < room->n_pairs; i++) all += room->factor[i * p->n_rows][half];
     if (!(all > .5 * whole[0])) return;
-    const bool spared = fabs(whole[0] - all) < enough * others;
-    const double q_spared = p->n_rows == 1 ? 0 : q_sources / q_pairs;
-    for (int pass = 0; pass < 2; pass++) {
-        for (size_t i = 0; i < room->n_pairs; i++) {
-            const double q = spared && s->is_source[room->pair[i]] ? q_spared : 1;
-            if (pass == 0)
-                add_shares(&c, q, room->factor + i * p->n_rows);
-            else
-                scale_shares(&c, q, room->factor + i * p->n_rows);
-        }
-        if (pass == 0) solve(&c, whole, ridge);
-    }
+    const bool spared = fabs(whole[0] - all) < enough * sum_others(s, p, room, half);
+    for (size_t i = 0; i < room->n_pairs; i++)
+        add_shares(&c, spared && s->is_source[room->pair[i]] ? 0 : 1, room->factor + i * p->n_rows);
+    solve(&c, whole, ridge);
+    for (size_t i = 0; i < room->n_pairs; i++)
+        scale_shares(&c, spared && s->is_source[room->pair[i]] ? 0 : 1, room->factor + i * p->n_rows);
 }
 
 void point_close(const point_scene *s, const point_place *p, point_room *room, size_t half, bool sky_is_known,
@@ -114,14 +113,15 @@ void point_close(const point_scene *s, const point_place *p, point_room *room, s
         if (found->left[0] == 0) close_pairs(s, p, room, half, whole, ridge);
         return;
     }
+    const bool spared = c.sum[0] + sum_others(s, p, room, half) > enough * whole[0];
     for (size_t k = 0; k < n_rows && sky_is_known; k++) c.sum[k] += found->left[k];
     for (size_t i = 0; i < room->n_pairs; i++)
-        add_shares(&c, q_of_pair(s, p, room, i), room->factor + i * n_rows);
+        add_shares(&c, q_of_pair(s, p, room->pair[i], spared), room->factor + i * n_rows);
     solve(&c, whole, ridge);
     for (size_t i = 0; i < room->n_met; i++) scale_shares(&c, 1, room->sum + room->met[i] * n_rows);
     for (size_t t = 0; t < tiles; t++) scale_shares(&c, 1, room->sky + t * n_rows);
     for (size_t i = 0; i < room->n_pairs; i++)
-        scale_shares(&c, q_of_pair(s, p, room, i), room->factor + i * n_rows);
+        scale_shares(&c, q_of_pair(s, p, room->pair[i], spared), room->factor + i * n_rows);
     double scale = 1;
     for (size_t l = 0; l < n_rows && found->backs[0] > 0; l++)
         scale += c.a[l] * found->backs[l] / found->backs[0];

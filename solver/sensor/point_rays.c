@@ -212,8 +212,10 @@ void point_rays(const point_scene *s, const point_place *p, point_room *room) {
             aim_packet(&h, &h.aim, random_hash(own + HALVES + half), k, &packet);
             cast(&h, &packet, true);
         }
-        double backs = h.found.backs[0] / (p->n_rows > 1 ? M_2_SQRTPI : 1);
+        double backs = h.found.backs[0];
         if (s->m->glass == NULL) point_close(s, p, room, half, h.aim.n > 0, &h.found, &backs);
+        /* A probe outside of a room sees backs on one side only: of its rays those count that meet faces. */
+        if (p->n_rows > 1) backs = h.found.backs[0] / fmax(M_2_SQRTPI - h.found.left[0], 1e-6);
         room->backs += backs / HALVES;
     }
 }

@@ -63,14 +63,14 @@ static void spread(double directions[RAYS][3]) {
     }
 }
 
-/* True unless most rays of a point meet backs, behind panes too. */
+/* True unless most rays of a point that meet faces meet backs, behind panes too. */
 static bool is_free(const mesh *m, const visibility *v, const double directions[RAYS][3],
                     const double at[3]) {
     static const uint32_t self[VISIBILITY_PACKET] = {
         VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING,
         VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING};
     float origin[3];
-    size_t backs = 0;
+    size_t backs = 0, met = 0;
     visibility_recentre(v, at, origin);
     for (size_t first = 0; first < RAYS; first += VISIBILITY_PACKET) {
         ray_packet rays;
@@ -83,10 +83,12 @@ static bool is_free(const mesh *m, const visibility *v, const double directions[
             }
         visibility_cast(v, &rays, VISIBILITY_PACKET, self, 0, &hits);
         pane_path_follow(v, m, &rays, VISIBILITY_PACKET, &hits, passed, NULL);
-        for (size_t i = 0; i < VISIBILITY_PACKET; i++)
+        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+            met += hits.element[i] != VISIBILITY_NOTHING;
             backs += hits.element[i] != VISIBILITY_NOTHING && hits.back[i];
+        }
     }
-    return (double)backs <= SENSOR_BACKS_MOST * RAYS;
+    return (double)backs <= SENSOR_BACKS_MOST * (double)met;
 }
 
 /* Takes a set out of a list. */

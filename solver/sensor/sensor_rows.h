@@ -37,7 +37,8 @@ typedef struct sensor_rows {
     uint32_t *element;              /* [start[n_receivers]], ascending in a row */
     float *weight, *off;            /* likewise */
     float *sky, *sky_off;           /* [n_tiles][n_receivers], sr: with the light that the ground reflects */
-    float *backs;                   /* [n_receivers], the share of rays that meet backs of faces */
+    float *backs; /* [n_receivers], the share of rays that meet backs of faces; of a probe, of the rays that
+                     meet faces */
 } sensor_rows;
 
 /* A receiver of whose rays more than this share meet backs lies in a wall, or outside of the scene. */

@@ -30,7 +30,7 @@ static void check_receiver(const receiver *r) {
     FUZZ_CHECK(r->kind < RECEIVER_KINDS);
     for (int d = 0; d < 3; d++) FUZZ_CHECK(isfinite(r->at[d]));
     FUZZ_CHECK(fabs(dot3(r->axis, r->axis) - (r->kind != RECEIVER_SPHERE)) < 1e-9);
-    if (r->kind == RECEIVER_SEMICYLINDER)
+    if (r->kind == RECEIVER_SEMICYLINDER || r->kind >= RECEIVER_HARMONIC)
         FUZZ_CHECK(fabs(dot3(r->look, r->look) - 1) < 1e-9 && fabs(dot3(r->look, r->axis)) < 1e-6);
 }
 
@@ -53,6 +53,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
             FUZZ_CHECK(s->name[0] != '\0' && memchr(s->name, '\0', SENSOR_NAME) != NULL);
             for (size_t i = first; i < first + s->count && s->rows > 0; i++)
                 FUZZ_CHECK(l.cell[i] < s->rows * s->columns);
+            for (size_t i = 0; i < s->count && s->kind == SENSOR_PROBES; i++)
+                FUZZ_CHECK(l.receivers[first + i].kind == RECEIVER_HARMONIC + i % HARMONICS &&
+                           s->count % HARMONICS == 0);
             first += s->count;
         }
         FUZZ_CHECK(first == l.n);

@@ -99,7 +99,8 @@ area = {"polygon": [[0, 0, 0], [4, 0, 0], [4, 3, 0], [1, 1, 0], [0, 3, 0]], "hei
 sets = [("points", {"at": [1, 2, 3]}), ("points", {"at": [[1, 2, 3], [2, 2, 3]], "normal": [[0, 1, 0], [1, 1, 1]]}), ("grids", area),
         ("grids", {"over": "floor", "spacing": "en12464"}), ("eyes", {"at": [1, 2, 3], "view": [0, 1, 0]}), ("cubes", area),
         ("cylinders", {"over": "rest", "height": 1.2, "spacing": 1}), ("semicylinders", {"at": [1, 2, 3], "look": [1, 0, 0]}),
-        ("spheres", {"at": [[1, 2, 3]]})]
+        ("spheres", {"at": [[1, 2, 3]]}), ("probes", {"at": [[1, 2, 3], [2, 2, 3]], "axes": "y-up"}),
+        ("probes", {"from": [0, 0, 1], "steps": [[1, 0, 0], [0, .5, 0]], "counts": [3, 2], "axes": "scene"})]
 for k, (kind, members) in enumerate(sets):
     (folder / "sensors" / f"one{k}").write_text(json.dumps({kind: [{"name": "a", **members}]}) + chr(4 * k))
     (folder / "sensors" / f"two{k}").write_text(

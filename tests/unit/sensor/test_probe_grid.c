@@ -59,6 +59,34 @@ START_TEST(free_space) {
 }
 END_TEST
 
+/* A room in the form of an L, whose other quarter is open to above and outside: 3 x 3 of 6 x 6 columns are
+ * not in it, and of the 5 points of each none. */
+START_TEST(outside_of_a_room) {
+    static const double rim[6][2] = {{0, 0}, {3, 0}, {3, 1.5}, {1.5, 1.5}, {1.5, 3}, {0, 3}},
+                        floors[2][4] = {{0, 0, 3, 1.5}, {0, 1.5, 1.5, 3}};
+    lam_error error = {0};
+    mesh m = {0};
+    sensor_list l = {.n = 0};
+    size_t left_out = 0;
+    for (int k = 0; k < 6; k++) {
+        const double *a = rim[k], *b = rim[(k + 1) % 6];
+        const double wall[4][3] = {{b[0], b[1], 0}, {a[0], a[1], 0}, {a[0], a[1], 2.5}, {b[0], b[1], 2.5}};
+        mesh_add_quad(&m, wall);
+    }
+    for (int k = 0; k < 4; k++) {
+        const double *f = floors[k / 2], z = k % 2 == 0 ? 0 : 2.5;
+        const box_cell cell = {.axis = 2, .level = z, .from = {f[0], f[1], z}, .to = {f[2], f[3], z}};
+        mesh_add_cell(&m, &cell, k % 2 == 0);
+    }
+    mesh_finish(&m, .5f);
+    ck_ok(probe_grid_add(&m, &(probe_grid){.spacing = .5}, &l, &left_out, &error));
+    ck_assert_uint_eq(left_out, 3 * 3 * 5);
+    for (size_t k = 0; k < l.n; k++) ck_assert(l.receivers[k].at[0] < 1.5 || l.receivers[k].at[1] < 1.5);
+    sensors_free(&l);
+    mesh_free(&m);
+}
+END_TEST
+
 /* Sets before and behind it in the list stay as they are. */
 START_TEST(beside_other_sets) {
     static const char text[] = "{\"points\":[{\"name\":\"a\",\"at\":[1,2,0.5]}],"
@@ -121,6 +149,7 @@ int main(void) {
     Suite *s = suite_create("grids of probes");
     TCase *c = tcase_create("all");
     tcase_add_test(c, free_space);
+    tcase_add_test(c, outside_of_a_room);
     tcase_add_test(c, beside_other_sets);
     tcase_add_test(c, refusals);
     suite_add_tcase(s, c);

@@ -181,6 +181,23 @@ START_TEST(even_sky) {
 }
 END_TEST
 
+/* Beside a closed box, at some distance and just below its floor, all faces that are met turn their backs,
+ * and no light comes from them. */
+START_TEST(outside) {
+    receiver r[3 * HARMONICS];
+    mesh m = box_mesh(room, 8, .5f);
+    probe_at((double[3]){2, 1.5, -.1}, z_axis, x_axis, r);
+    probe_at((double[3]){12, 1.5, 1}, z_axis, x_axis, r + HARMONICS);
+    probe_at((double[3]){1, 1.5, 1}, z_axis, x_axis, r + 2 * HARMONICS);
+    sensor_rows rows = rows_of(&m, 3 * HARMONICS, r, &(sensor_rows_options){.rays = 256});
+    ck_assert_uint_eq(rows.start[2 * HARMONICS], 0);
+    for (size_t k = 0; k < 3 * HARMONICS; k++)
+        ck_assert_double_eq_tol((double)rows.backs[k], k < 2 * HARMONICS, 1e-6);
+    sensor_rows_free(&rows);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *s = suite_create("rows of probes");
     TCase *c = tcase_create("all");
@@ -190,6 +207,7 @@ int main(void) {
     tcase_add_test(c, axes);
     tcase_add_test(c, half_a_lamp);
     tcase_add_test(c, even_sky);
+    tcase_add_test(c, outside);
     suite_add_tcase(s, c);
     return suite_run(s);
 }
