@@ -67,6 +67,24 @@ START_TEST(furnace) {
 }
 END_TEST
 
+/* Rows are found in runs of 256, none of which ends within a probe: here one would, with a receiver in front.
+ */
+START_TEST(many) {
+    enum { N = 1 + 60 * HARMONICS };
+    receiver r[N] = {{.kind = RECEIVER_SPHERE, .at = {1, 1, 1}}};
+    mesh m = box_mesh(room, 8, .5f);
+    for (size_t k = 0; k < 60; k++)
+        probe_at((double[3]){.1 + .06 * (double)k, 1, 1}, z_axis, x_axis, r + 1 + k * HARMONICS);
+    sensor_rows rows = rows_of(&m, N, r, &(sensor_rows_options){.rays = 256});
+    for (size_t k = 1; k < N; k++) {
+        const bool first = (k - 1) % HARMONICS == 0;
+        ck_assert_double_eq_tol(value_of(&rows, k, NULL), first ? M_2_SQRTPI : 0, first ? 1e-6 : 1e-3);
+    }
+    sensor_rows_free(&rows);
+    mesh_free(&m);
+}
+END_TEST
+
 /* The walls above half the height and the ceiling give the radiance L: 1.772454 L, 1.534990 L for z, and 0
  * for others and all of second order. They are the sources, so that all are pairs and only single precision
  * is left. */
@@ -203,6 +221,7 @@ int main(void) {
     TCase *c = tcase_create("all");
     tcase_set_timeout(c, 300);
     tcase_add_test(c, furnace);
+    tcase_add_test(c, many);
     tcase_add_test(c, upper_half);
     tcase_add_test(c, axes);
     tcase_add_test(c, half_a_lamp);
