@@ -289,7 +289,8 @@ const char *lam_sensors_set(const lam_sensors *sensors, size_t set, size_t *firs
 int lam_sensors_has_value(const lam_sensors *sensors, size_t receiver);
 
 /* out = rows B + sky^T L + luminaires^T (colour D), the irradiances of receivers (of cylinders and spheres
- * those that their weights define): B [n_rhs][C][n] are radiosities of an operator of the same store under
+ * those that their weights define; of probes, nine receivers each, coefficients of the radiance, which have
+ * either sign): B [n_rhs][C][n] are radiosities of an operator of the same store under
  * the same light, L [n_rhs][C][m] radiances of the sky, D [n_rhs][C][k] dimmers, each of the two NULL for
  * none; out is [n_rhs][C][s]. Direct light comes to the point itself, so that B must have been lit by L and D
  * too (lam_operator_apply_lit). Allocates nothing; a vector's bits do not depend on its neighbours. Cost: the

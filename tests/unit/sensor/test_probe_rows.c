@@ -68,7 +68,7 @@ START_TEST(furnace) {
 END_TEST
 
 /* Rows are found in runs of 256, none of which ends within a probe: here one would, with a receiver in front.
- */
+ * First rows are exact. Rays miss up to .04 of others, of which .1 / 128 over .03 is left. */
 START_TEST(many) {
     enum { N = 1 + 60 * HARMONICS };
     receiver r[N] = {{.kind = RECEIVER_SPHERE, .at = {1, 1, 1}}};
