@@ -156,6 +156,7 @@ const bench_suite bench_suites[] = {
     {.name = "mesh", .run = bench_mesh},
     {.name = "reuse", .run = bench_reuse},
     {.name = "honesty", .script = "honesty.py"},
+    {.name = "cie171", .script = "cie171.py"},
     {.name = NULL},
 };
 

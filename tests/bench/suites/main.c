@@ -27,7 +27,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { SUITES_MOST = 9 };
+enum { SUITES_MOST = 10 };
 
 typedef struct fields {
     const char *output, *scene;
@@ -76,8 +76,9 @@ static const option_command command = {
         "hierarchical (this kind of operator beside all others at equal error, and its growth), mesh "
         "(the error of values that are constant on elements, on uniform and adaptive meshes), reuse "
         "(light of 30 positions of a lamp by paths that serve all of them, beside the tables of the "
-        "paper), honesty (the errors that answers state beside the true ones, by random requests). Each "
-        "suite writes its tables as CSV and JSON, and its plots as SVG and PNG where matplotlib is "
+        "paper), honesty (the errors that answers state beside the true ones, by random requests), cie171 "
+        "(luminaires, sensors and skies beside the analytic cases of CIE 171:2006). Each suite writes its "
+        "tables as CSV and JSON, and its plots as SVG and PNG where matplotlib is "
         "installed.",
     .least_arguments = 1,
     .most_arguments = SUITES_MOST,
@@ -220,7 +221,9 @@ done:
     return status;
 }
 
-/* {"name", "title", "columns": [[name, unit or null, text]...], "rows": [[cell...]...]} */
+/* {"name", "title", "columns": [[name, unit or null, text]...], "rows": [[cell...]...], "printed": preset
+ * true}
+ */
 static lam_status take_table(const bench_run *run, const json_t *of, lam_error *error) {
     lam_status status = LAM_OK;
     const json_t *const head = json_object_get(of, "columns"), *const body = json_object_get(of, "rows");
@@ -228,7 +231,7 @@ static lam_status take_table(const bench_run *run, const json_t *of, lam_error *
     table t = {.name = json_string_value(json_object_get(of, "name")),
                .title = json_string_value(json_object_get(of, "title")),
                .n_columns = n,
-               .printed = true};
+               .printed = !json_is_false(json_object_get(of, "printed"))};
     table_column *columns = memory_allocate(n, sizeof *columns, "a table", error);
     if (columns == NULL) TRY(LAM_ERR_MEMORY);
     t.columns = columns;
