@@ -1,6 +1,8 @@
-/* The rays of a point. N rays of a half have the density of its weight, p = weight / pi, and M are aimed at
- * openings with the density q; one that leaves the scene counts p / (N p + M q). Rays that meet pairs count
- * nothing: the factors of these are known. For a row of a probe the counts are multiplied by its ratio. */
+/* The rays of a receiver. N rays of a half have the density of its weight, p = weight / pi, and M are aimed
+ * at openings with the density q. In a direction in which N p > M q those by the weight count p / (N p) where
+ * they leave the scene, and the others nothing; elsewhere those that are aimed count p / (M q). Rays that
+ * meet pairs count nothing: the factors of these are known. For a row of a probe the counts are multiplied by
+ * its ratio. */
 #include "solver/sensor/point_rows.h"
 
 #include "solver/base/random.h"
@@ -37,13 +39,16 @@ static void add_met(const half_rays *h, uint32_t j, double weight, const double 
     for (size_t w = 0; w < n_rows; w++) room->sum[j * n_rows + w][h->half] += weight * ratio[w];
 }
 
-/* p / (N p + M q) of a ray that leaves. */
-static double leaving_weight(const half_rays *h, const double direction[3], double density) {
+/* p / (N p) or p / (M q) of a ray that leaves, by whichever of the two ways finds more rays there; 0 of a ray
+ * of the other way. */
+static double leaving_weight(const half_rays *h, const double direction[3], double density, bool aimed) {
     const point_scene *s = h->s;
-    double sum = (double)s->rays * density, origin[3];
+    const double by_weight = (double)s->rays * density;
+    double by_aim = 0, origin[3];
     for (int d = 0; d < 3; d++) origin[d] = (double)h->p->origin[d];
-    if (h->aim.n > 0) sum += (double)s->aimed * portals_density(&s->openings, &h->aim, origin, direction);
-    return sum > 0 ? density / sum : 0;
+    if (h->aim.n > 0) by_aim = (double)s->aimed * portals_density(&s->openings, &h->aim, origin, direction);
+    if ((by_aim > by_weight) != aimed) return 0;
+    return density / fmax(by_aim, by_weight);
 }
 
 /* Adds a ray to a sum of shares, and to that of products. */
@@ -55,7 +60,7 @@ static void add_alone(half_rays *h, const double ratio[HARMONICS], double weight
 }
 
 /* Adds rays that leave the scene to the tiles. */
-static void add_leaving(half_rays *h, const aimed_packet *packet, const hit_packet *hits,
+static void add_leaving(half_rays *h, const aimed_packet *packet, bool aimed, const hit_packet *hits,
                         const double passed[VISIBILITY_PACKET]) {
     uint32_t tile[SKY_PACKET];
     const sky_bounce *sky = h->s->sky;
@@ -63,7 +68,7 @@ static void add_leaving(half_rays *h, const aimed_packet *packet, const hit_pack
     if (sky != NULL) sky_tiling_find(&sky->tiling, packet->rays.direction, tile);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         if (hits->element[i] != VISIBILITY_NOTHING || !(packet->density[i] > 0)) continue;
-        const double weight = leaving_weight(h, packet->direction[i], packet->density[i]);
+        const double weight = leaving_weight(h, packet->direction[i], packet->density[i], aimed);
         if (sky == NULL) add_alone(h, packet->ratio[i], weight, h->found.left);
         for (size_t w = 0; w < n_rows && sky != NULL; w++) {
             const double share = weight * packet->ratio[i][w];
@@ -115,7 +120,7 @@ static void cast(half_rays *h, aimed_packet *packet, bool aimed) {
     }
     visibility_cast(s->v, &packet->rays, VISIBILITY_PACKET, self, how, &hits);
     if (s->m->glass != NULL) follow_panes(h, packet, aimed, &hits, passed);
-    add_leaving(h, packet, &hits, passed);
+    add_leaving(h, packet, aimed, &hits, passed);
     for (size_t i = 0; i < VISIBILITY_PACKET && !aimed; i++) {
         if (hits.element[i] == VISIBILITY_NOTHING) continue;
         if (hits.back[i])

@@ -11,6 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Rays towards openings for each by the weight. They meet less, and light of the sky is often the most. */
+enum { AIMED = 4 };
+
 /* Rows that are made before they are joined with those before them. */
 enum { ROWS_AT_ONCE = 256 };
 
@@ -229,8 +232,7 @@ static lam_status find_openings(point_scene *s, const face_openings *given, lam_
     lam_status status = LAM_OK;
     portals found = {.n = 0};
     size_t n = 0, panes = 0;
-    const size_t aimed = HALVES * s->rays / 4;
-    TRY(portals_find(s->m, s->v, s->seed, aimed, given, &found, error));
+    TRY(portals_find(s->m, s->v, s->seed, AIMED * s->rays, given, true, &found, error));
     for (size_t j = 0; j < s->m->n - s->m->n_backs; j++) panes += mesh_is_pane(s->m, j);
     portal *array = memory_allocate(found.n + 2 * panes, sizeof *array, "openings", error);
     if (array == NULL) TRY(LAM_ERR_MEMORY);
@@ -238,8 +240,7 @@ static lam_status find_openings(point_scene *s, const face_openings *given, lam_
     add_panes(s->m, s->v, array, &n);
     /* It takes the array over, also on an error. */
     TRY(portals_build(array, n, &s->openings, error));
-    if (n > 0) s->aimed = (fmax(aimed, found.rays) + 2 * VISIBILITY_PACKET - 1) / (2 * VISIBILITY_PACKET);
-    s->aimed *= VISIBILITY_PACKET;
+    s->aimed = n > 0 ? AIMED * s->rays : 0;
 done:
     portals_free(&found);
     return status;

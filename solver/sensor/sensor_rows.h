@@ -3,8 +3,10 @@
  * in lx, or in W/m^2 as B has it. An element whose unoccluded factor exceeds the share of one ray, and each
  * element of groups that give light, up to 256 of these and the larger factors of more, has its exact factor
  * times the share of it that nothing hides, by segments; all others are found by rays. Rays for the sky are
- * aimed at openings too, and weighed by the balance heuristic (Veach and Guibas 1995). The nine rows of a
- * probe have one set of pairs and rays, and weights of either sign. Knows neither names nor stores. */
+ * aimed at openings too, and in each direction those of the way that has more of them count (the maximum
+ * heuristic: Veach and Guibas 1995): the sky through an opening is then seen by rays that all go there, whose
+ * number is no matter of chance. The nine rows of a probe have one set of pairs and rays, and weights of
+ * either sign. Knows neither names nor stores. */
 #ifndef LAMBERT_SENSOR_SENSOR_ROWS_H
 #define LAMBERT_SENSOR_SENSOR_ROWS_H
 
@@ -49,7 +51,7 @@ typedef struct sensor_rows {
  * behind it. In a closed scene without panes a row's sum is 1; those of a probe 2 / sqrt(pi)
  * and eight times nearly 0. The nine harmonics of a probe follow each other. The bits depend on seed and
  * place in the list, not on threads. Freed by sensor_rows_free. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED,
- * LAM_ERR_INTERNAL. Cost: for a receiver the rays, a quarter as many towards openings, 32 segments for each
+ * LAM_ERR_INTERNAL. Cost: for a receiver the rays, four times as many towards openings, 32 segments for each
  * pair and 256 where it is partly hidden, and .01 us for each element. */
 lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers,
                             const sensor_rows_options *options, sensor_rows *out, lam_error *error);

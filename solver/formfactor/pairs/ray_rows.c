@@ -113,7 +113,7 @@ lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ra
         TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, n, &r->f.sky, error));
     TRY(visibility_create(m, &r->v, error));
     if (options->sky != NULL)
-        TRY(portals_find(m, r->v, options->recipe.seed, options->recipe.rays / 4, options->openings,
+        TRY(portals_find(m, r->v, options->recipe.seed, options->recipe.rays / 4, options->openings, false,
                          &r->aimed, error));
     r->f.n_aimed = r->aimed.n_openings;
     r->noise_share = find_noise_share(r);

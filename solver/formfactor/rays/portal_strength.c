@@ -159,7 +159,8 @@ static bool is_open_behind(const mesh *m, const visibility *v, uint64_t seed, co
 }
 
 static lam_status measure_one(const mesh *m, const visibility *v, uint64_t seed, const plane_patch *patches,
-                              size_t n, double strength[2], seen_through seen[2], lam_error *error) {
+                              size_t n, bool of_open, double strength[2], seen_through seen[2],
+                              lam_error *error) {
     lam_status status = LAM_OK;
     portals p = {.n = 0};
     pair_sampler points;
@@ -183,7 +184,7 @@ static lam_status measure_one(const mesh *m, const visibility *v, uint64_t seed,
             add_lines(v, (const double(*)[3])origin, (const double(*)[3])direction, sides, s, &seen[s]);
     }
     for (int s = 0; s < 2; s++) {
-        if (seen[s].n > 0 && is_open_behind(m, v, seed, &seen[s])) seen[s].n_lines = 0;
+        if (!of_open && seen[s].n > 0 && is_open_behind(m, v, seed, &seen[s])) seen[s].n_lines = 0;
         strength[s] = (double)seen[s].n_lines / LINES;
     }
 done:
@@ -262,7 +263,7 @@ done:
 }
 
 lam_status portals_measure(const mesh *m, const visibility *v, uint64_t seed, const face_openings *openings,
-                           double (*strength)[2], bool *doubled, lam_error *error) {
+                           bool of_open, double (*strength)[2], bool *doubled, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = openings->n;
     size_t *first = memory_allocate(n + 1, sizeof *first, "portals", error);
@@ -273,7 +274,7 @@ lam_status portals_measure(const mesh *m, const visibility *v, uint64_t seed, co
     for (size_t o = 0; o < n; o++) {
         lam_error own = {.message = ""};
         const lam_status one = measure_one(m, v, seed, openings->patches + first[o], first[o + 1] - first[o],
-                                           strength[o], seen[o], &own);
+                                           of_open, strength[o], seen[o], &own);
         if (one == LAM_OK) continue;
 #pragma omp critical(portal_strength)
         {

@@ -100,7 +100,7 @@ void portals_cast(const ray_context *c, const element_sampler *sampler, size_t e
 enum { RAYS_INTO_REVEALS = 4 };
 
 lam_status portals_find(const mesh *m, const visibility *v, uint64_t seed, size_t rays,
-                        const face_openings *openings, portals *out, lam_error *error) {
+                        const face_openings *openings, bool of_open, portals *out, lam_error *error) {
     lam_status status = LAM_OK;
     face_openings own = {.n = 0};
     portals made = {.n = 0};
@@ -116,7 +116,7 @@ lam_status portals_find(const mesh *m, const visibility *v, uint64_t seed, size_
     strength = memory_allocate(openings->n + 1, sizeof *strength, "portals", error);
     if (array == NULL || strength == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t o = 0; o < openings->n; o++) strength[o][0] = strength[o][1] = 1;
-    if (!openings->given) TRY(portals_measure(m, v, seed, openings, strength, &doubled, error));
+    if (!openings->given) TRY(portals_measure(m, v, seed, openings, of_open, strength, &doubled, error));
     for (size_t k = 0; k < openings->n_patches; k++) {
         const uint32_t opening = openings->patches[k].opening;
         if (!(strength[opening][0] + strength[opening][1] > 0)) continue;

@@ -12,11 +12,12 @@
 /* The openings that rays are aimed at: those given, as they are, and of others (openings; NULL: those of the
  * mesh itself, face_openings_find) those with lines through them along which an element on one side gets
  * light of the sky from the other side, as far as some rays show, unless more than a tenth of the light in
- * the space on that side leaves the scene: rays find the sky from there by themselves. rays is the number
+ * the space on that side leaves the scene: rays find the sky from there by themselves, and of_open takes such
+ * openings too. rays is the number
  * that an element aims. Freed by portals_free. The same for any number of threads. Cost: some hundred rays
  * for each opening. Errors: LAM_ERR_MEMORY. */
 lam_status portals_find(const mesh *m, const visibility *v, uint64_t seed, size_t rays,
-                        const face_openings *openings, portals *out, lam_error *error);
+                        const face_openings *openings, bool of_open, portals *out, lam_error *error);
 
 /* Changes the shares of the groups of the present element by eight rays to each, where there are several.
  * The rays of portals_cast are others, so that they stay without bias. */

@@ -106,7 +106,7 @@ lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
     portals aimed = {.n = 0};
     const size_t n_rays = options->recipe.rays;
     if (options->bounce != NULL)
-        TRY(portals_find(m, v, options->recipe.seed, n_rays / 4, options->openings, &aimed, error));
+        TRY(portals_find(m, v, options->recipe.seed, n_rays / 4, options->openings, false, &aimed, error));
     if (options->n_aimed != NULL) *options->n_aimed = aimed.n_openings;
     const count_context context = {.rays = {.m = m,
                                             .v = v,

@@ -78,7 +78,7 @@ static portals find(const mesh *m) {
     lam_error error = {0};
     portals p = {.n = 0};
     ck_ok(visibility_create(m, &v, &error));
-    ck_ok(portals_find(m, v, 1, 1000, NULL, &p, &error));
+    ck_ok(portals_find(m, v, 1, 1000, NULL, false, &p, &error));
     visibility_destroy(v);
     return p;
 }

@@ -183,10 +183,8 @@ START_TEST(room_with_blocks) {
 }
 END_TEST
 
-/* A room of 4 x 4 x 3 m with an opening of 1 m^2 in the middle of its ceiling, or a pane there; walls of
- * cells x cells. */
-static mesh room_with_skylight(int cells, bool pane) {
-    mesh m = {0};
+/* Floor and walls of a room of 4 x 4 x 3 m, of cells x cells each. */
+static void add_walls(mesh *m, int cells) {
     const double size[3] = {4, 4, 3};
     for (int axis = 0; axis < 3; axis++)
         for (int side = 0; side < 2; side++) {
@@ -199,9 +197,15 @@ static mesh room_with_skylight(int cells, bool pane) {
                     to[u] = size[u] * (i + 1) / cells;
                     from[w] = size[w] * j / cells;
                     to[w] = size[w] * (j + 1) / cells;
-                    add_face(&m, axis, side * size[axis], from, to, side == 0);
+                    add_face(m, axis, side * size[axis], from, to, side == 0);
                 }
         }
+}
+
+/* Its ceiling has an opening of 1 m^2 in the middle, or a pane there. */
+static mesh room_with_skylight(int cells, bool pane) {
+    mesh m = {0};
+    add_walls(&m, cells);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             static const double cuts[] = {0, 1.5, 2.5, 4};
@@ -254,6 +258,43 @@ START_TEST(skylight) {
         ck_assert_double_gt(sqrt(stated[k]), deviation / 2);
         /* four standard errors of the mean, and rounding of cases.json */
         ck_assert_double_eq_tol(sum[k], expected[k] / 1000, 4 * deviation / sqrt(SEEDS) + 1e-5);
+    }
+    sky_bounce_free(&sky);
+    mesh_free(&m);
+}
+END_TEST
+
+/* A room without a ceiling is open, and rays are aimed at its opening all the same: an even sky gives the
+ * factor of the opening. Of 4,096 rays there, near points spread over sixteen parts of it, .2 % are left; by
+ * the 1,024 of the weight alone, of which the opening gets 130 to 450, up to 3 %. */
+START_TEST(open_side) {
+    enum { N = 14, ON_WALL = 6, SEEDS = 4 };
+    lam_error error = {0};
+    sky_bounce sky;
+    mesh m = {0};
+    receiver r[N] = {{.kind = RECEIVER_PLANE}};
+    polygon opening = {.n = 4, .corner = {{0, 0, 3}, {0, 4, 3}, {4, 4, 3}, {4, 0, 3}}};
+    polygon_measure(&opening);
+    add_walls(&m, 12);
+    mesh_finish(&m, .5f);
+    for (int k = 0; k < N; k++) { /* those of CIE 171, case 5.9 */
+        const bool on_wall = k < ON_WALL;
+        r[k].axis[on_wall ? 1 : 2] = 1;
+        r[k].at[0] = 2;
+        r[k].at[on_wall ? 2 : 1] = on_wall ? 2.75 - .5 * k : .25 + .5 * (k - ON_WALL);
+    }
+    ck_ok(sky_bounce_create("tregenza", 'z', 0, 1, &sky, &error));
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+        sensor_rows rows = rows_of(&m, N, r, &(sensor_rows_options){.seed = seed, .sky = &sky});
+        for (size_t k = 0; k < N; k++) {
+            const double expected = M_PI * receiver_factor(&r[k], &opening);
+            double value = 0;
+            for (size_t t = 0; t < rows.n_tiles; t++) value += (double)rows.sky[t * N + k];
+            ck_assert_double_gt(expected, .3);
+            ck_assert_msg(fabs(value - expected) < .005 * expected, "point %zu: %.5f, must be %.5f", k, value,
+                          expected);
+        }
+        sensor_rows_free(&rows);
     }
     sky_bounce_free(&sky);
     mesh_free(&m);
@@ -417,6 +458,7 @@ int main(void) {
     tcase_add_test(c, wall_behind_a_box);
     tcase_add_test(c, room_with_blocks);
     tcase_add_test(c, skylight);
+    tcase_add_test(c, open_side);
     tcase_add_test(c, pane_in_a_skylight);
     tcase_add_test(c, plate_behind_a_pane);
     tcase_add_test(c, variance_is_stated);
