@@ -1,5 +1,6 @@
 #include "solver/sensor/receiver.h"
 
+#include "solver/base/receiver_weight.h"
 #include "solver/base/vector3.h"
 #include "solver/scene/plane.h"
 
@@ -15,23 +16,7 @@ void receiver_densities(const receiver *harmonic, const double direction[3], dou
 }
 
 double receiver_density(const receiver *r, const double direction[3]) {
-    const double along = dot3(direction, r->axis), sine = sqrt(fmax(0, 1 - along * along));
-    if (r->kind >= RECEIVER_HARMONIC) {
-        double all[HARMONICS];
-        receiver_densities(r, direction, all);
-        return all[r->kind - RECEIVER_HARMONIC];
-    }
-    switch (r->kind) {
-    case RECEIVER_PLANE:
-        return fmax(along, 0) / M_PI;
-    case RECEIVER_CYLINDER:
-        return sine / (M_PI * M_PI);
-    /* sin(e) cos(a) = direction . look */
-    case RECEIVER_SEMICYLINDER:
-        return fmax(sine + dot3(direction, r->look), 0) / (M_PI * M_PI);
-    default:
-        return 1 / (4 * M_PI);
-    }
+    return receiver_weight_density((unsigned)r->kind, r->axis, r->look, direction);
 }
 
 double receiver_density_most(receiver_kind kind) {

@@ -27,6 +27,7 @@ typedef struct shadow_panes {
 
 struct shadow_tree {
     size_t n, n_pieces, n_nodes;
+    double middle[3];       /* of the scene */
     float rounding;         /* m: 4 roundings of single precision of a point of the scene */
     float (*corners)[4][3]; /* [n]; a triangle has its third corner twice */
     float (*normal)[3];     /* [n] */

@@ -90,14 +90,13 @@ static shadow_shape shape_of(const shadow_faces *f, size_t element) {
 lam_status shadow_tree_create(const shadow_faces *faces, shadow_tree **out, lam_error *error) {
     lam_status status = LAM_OK;
     static const char what[] = "the shadows of a scene";
-    double middle[3];
     shadow_tree *t = memory_allocate(1, sizeof *t, what, error);
     if (t == NULL) return LAM_ERR_MEMORY;
     if (faces->n_fronts > MOST_FRONTS)
         FAIL(error, LAM_ERR_ARGUMENT, "shadows of %zu elements: there can be %u", faces->n_fronts,
              MOST_FRONTS);
     t->n = faces->n;
-    t->rounding = 4 * 0x1p-24f * (float)find_middle(faces, middle);
+    t->rounding = 4 * 0x1p-24f * (float)find_middle(faces, t->middle);
     t->corners = memory_allocate(t->n, sizeof *t->corners, what, error);
     t->normal = memory_allocate(t->n, sizeof *t->normal, what, error);
     t->shape = memory_allocate(t->n, sizeof *t->shape, what, error);
@@ -110,7 +109,8 @@ lam_status shadow_tree_create(const shadow_faces *faces, shadow_tree **out, lam_
         for (int c = 0; c < 4; c++)
             for (int d = 0; d < 3; d++)
                 t->corners[i][c][d] =
-                    (float)(faces->vertices[faces->elements[i][triangle && c == 3 ? 2 : c]][d] - middle[d]);
+                    (float)(faces->vertices[faces->elements[i][triangle && c == 3 ? 2 : c]][d] -
+                            t->middle[d]);
     }
     TRY(shadow_panes_make(t, faces, error));
     for (size_t i = 0; i < faces->n_fronts; i++) {
@@ -174,7 +174,7 @@ unsigned shadow_tree_open(const shadow_tree *t, size_t element, const float dire
     static find *const table[] = CPU_TABLE(find_open_portable, find_open_avx2, find_open_avx512);
     shadow_way way;
     for (int d = 0; d < 3; d++) {
-        const float lift = 2 * t->rounding * t->normal[element][d];
+        const float lift = element != SHADOW_NO_ELEMENT ? 2 * t->rounding * t->normal[element][d] : 0;
         way.direction[d] = direction[d];
         way.inverse[d] = fabsf(direction[d]) > LEAST_COMPONENT ? 1 / direction[d] : 1 / LEAST_COMPONENT;
         for (size_t k = 0; k < rays->n; k++) rays->at[d][k] += lift;

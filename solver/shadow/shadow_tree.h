@@ -57,6 +57,9 @@ typedef struct shadow_rays {
     float at[3][SHADOW_PACKET];
 } shadow_rays;
 
+/* In place of an element: rays begin where they are, and all faces block them. */
+#define SHADOW_NO_ELEMENT SIZE_MAX
+
 /* Bit k of the result: ray k in this direction, a unit vector in front of the element, meets nothing but
  * panes. Rays are lifted above the element by 2 roundings of single precision, which changes `at`; faces in
  * its own plane (solver/scene/plane.h) block none of them, as a file's decimals may put these before it.
