@@ -6,6 +6,7 @@
 #include "solver/light/annual.h"
 
 #include "solver/codec/answer.h"
+#include "solver/light/annual_sun.h"
 #include "solver/light/sunlight.h"
 #include "solver/linalg/dense.h"
 
@@ -39,8 +40,11 @@ lam_status annual_add(annual_options *w, const char *item, lam_error *error) {
         if (!(f.low >= 0 && f.low < f.high))
             FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be LOW,HIGH with 0 <= LOW < HIGH", item);
         snprintf(f.name, sizeof f.name, "useful_%g_%g", f.low, f.high);
+    } else if (strncmp(item, "sun=", 4) == 0) {
+        TRY(annual_sun_read(item, &f, error));
     } else {
-        FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be sum, autonomy=X or useful=LOW,HIGH", item);
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--annual %s: must be sum, autonomy=X, useful=LOW,HIGH, sun=X or sun=X,HOURS", item);
     }
     for (size_t k = 0; k < w->n_figures; k++)
         if (strcmp(w->figures[k].name, f.name) == 0)
@@ -66,9 +70,19 @@ done:
     return status;
 }
 
+static bool is_share(const annual_figure *f) {
+    return !f->is_sum && !f->is_sun;
+}
+
 bool annual_has_shares(const annual_options *w) {
     for (size_t k = 0; k < w->n_figures; k++)
-        if (!w->figures[k].is_sum) return true;
+        if (is_share(&w->figures[k])) return true;
+    return false;
+}
+
+bool annual_has_sun(const annual_options *w) {
+    for (size_t k = 0; k < w->n_figures; k++)
+        if (w->figures[k].is_sun) return true;
     return false;
 }
 
@@ -372,7 +386,7 @@ static void count_hours(const annual_figure *f, size_t n, size_t width, const fl
 
 static void count_all(const work *w, size_t n, size_t width, const float *x, uint32_t *count) {
     for (size_t k = 0; k < w->options->n_figures; k++)
-        if (!w->options->figures[k].is_sum)
+        if (is_share(&w->options->figures[k]))
             count_hours(&w->options->figures[k], n, width, x, count + k * w->told);
 }
 
@@ -452,7 +466,7 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
     for (size_t k = 0; k < n_figures; k++) {
         const annual_figure *f = &w->options->figures[k];
         const size_t always = f->low <= 0 ? dark : 0; /* hours of exactly 0 */
-        for (size_t i = 0; i < w->told && !f->is_sum; i++)
+        for (size_t i = 0; i < w->told && is_share(f); i++)
             w->made[k * w->told + i] =
                 (float)((double)(count[k * w->told + i] + always) / (double)sum->counted);
     }
@@ -499,6 +513,8 @@ lam_status annual_apply(const annual_options *options, const emission *light, co
              options->from, options->to, options->hours);
     TRY(make_sums(&w, light, error));
     if (annual_has_shares(options)) TRY(make_shares(&w, light, lit, n_lit, &sum, error));
+    if (annual_has_sun(options))
+        TRY(annual_sun_find(options, light->sun, n_lit, lit, wanted, selected, C, steps, w.made, error));
     if (selected != NULL) {
         whole = memory_allocate(options->n_figures * C, n * sizeof *whole, "figures of the year", error);
         if (whole == NULL) TRY(LAM_ERR_MEMORY);

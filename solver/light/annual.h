@@ -13,11 +13,16 @@ enum { ANNUAL_MOST = 16, ANNUAL_NAME = 40 };
  *   sum              sum_h x_h hours / 1000, over all of them: kWh/m2 of W/m2, klx h of lx
  *   autonomy=X       share of the counted hours in which x >= X
  *   useful=LOW,HIGH  share of the counted hours in which LOW <= x <= HIGH, both bounds within
+ *   sun=X            the counted hours, h, in which the irradiance by the sun itself, without sky, ground and
+ *                    bounces, is above X
+ *   sun=X,H          1 where these are more than H hours, else 0: the mean over points is the share of them
  * Sources: daylight autonomy: Reinhart, Mardaljevic, Rogers 2006, Leukos 3(1):7-31; useful daylight
- * illuminance: Nabil, Mardaljevic 2005, Lighting Research and Technology 37(1):41-59. */
+ * illuminance: Nabil, Mardaljevic 2005, Lighting Research and Technology 37(1):41-59; sun=1000,250 of 8 to 18
+ * h is the condition of ASE (IES LM-83). */
 typedef struct annual_figure {
-    bool is_sum;
-    double low, high; /* of the others; autonomy: high is infinite */
+    bool is_sum, is_sun; /* neither: a share */
+    double low, high;    /* of shares; autonomy: high is infinite; of sun low is X */
+    double most;         /* of sun: H; below 0: the hours themselves are wanted */
     char name[ANNUAL_NAME];
 } annual_figure;
 
@@ -31,14 +36,18 @@ typedef struct annual_options {
     const emission *mean; /* of annual_mean_find; NULL: it is found where sums need it */
 } annual_options;
 
-/* Adds the figure of an item: sum, autonomy=X or useful=LOW,HIGH. LAM_ERR_ARGUMENT names the item. */
+/* Adds the figure of an item: sum, autonomy=X, useful=LOW,HIGH, sun=X or sun=X,H. LAM_ERR_ARGUMENT names the
+ * item. */
 lam_status annual_add(annual_options *w, const char *item, lam_error *error);
 
 /* Reads FROM-TO, whole hours from 0 to 24. */
 lam_status annual_parse_occupied(const char *text, annual_options *w, lam_error *error);
 
-/* True when a figure is a share of the hours, not a sum. */
+/* True when a figure is a share of the hours. */
 bool annual_has_shares(const annual_options *w);
+
+/* True when a figure is of the sun itself. */
+bool annual_has_sun(const annual_options *w);
 
 /* True when a figure is a sum. */
 bool annual_has_sum(const annual_options *w);
@@ -69,8 +78,8 @@ typedef struct annual_summary {
  * tiles and of one answer to their sun where it is exact, limited as one. Cost: one answer for sums;
  * for shares one a lit and counted vector, or one a tile and an exact sun and a product of [tiles][n] a
  * vector, two where answers are below zero; memory O(n), or O(n tiles) of at most 1 GiB. Errors:
- * LAM_ERR_ARGUMENT (not whole days, where hours of the day are asked for), LAM_ERR_CANCELLED, LAM_ERR_MEMORY.
- */
+ * LAM_ERR_ARGUMENT (not whole days, where hours of the day are asked for; figures of the sun where the light
+ * has no exact one), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. */
 lam_status annual_apply(const annual_options *w, const emission *light, const lam_operator *op,
                         const lam_sky *sky, lam_quantity quantity, size_t n_selected,
                         const uint32_t *selected, const progress *steps, float **values,

@@ -24,6 +24,7 @@ void emission_pass_free(emission_pass *p) {
     free(p->B);
     free(p->sun);
     free(p->sun_work);
+    free(p->sun_at);
     *p = (emission_pass){0};
 }
 
@@ -42,10 +43,16 @@ static lam_status check_sensors(const emission *light, const lam_operator *op, l
         return status_fail(
             error, LAM_ERR_UNSUPPORTED,
             "sensors of a store of few emitters have no values; use a store of another method");
-    if (light->sun != NULL)
-        return status_fail(error, LAM_ERR_UNSUPPORTED,
-                           "an exact sun at sensors is not supported; --sun tiles takes it from its tile");
     return LAM_OK;
+}
+
+/* True where nothing but the sun at sensors gives light: elements have none. */
+static bool sun_is_all(const emission *light, const lam_operator *op) {
+    const size_t count = lam_operator_channels(op) * lam_operator_elements(op);
+    if (light->sun == NULL || !light->sun->sensors_alone || !light->steady) return false;
+    for (size_t i = 0; light->E != NULL && i < count; i++)
+        if (light->E[i] != 0) return false;
+    return light->L == NULL && light->D == NULL;
 }
 
 /* Room for the dimmers of one go, where they stay if they are steady. */
@@ -63,6 +70,7 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
                                 size_t most, emission_pass *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = lam_operator_elements(op), C = lam_operator_channels(op), s = lam_operator_emitters(op);
+    const bool on_elements = light->sun != NULL && !light->sun->sensors_alone;
     emission_pass p = {.light = light,
                        .op = op,
                        .sky = sky,
@@ -74,7 +82,10 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
     TRY(check_sensors(light, op, error));
     if (light->sensors != NULL) {
         p.quantity = LAM_RADIOSITY;
+        p.sun_is_all = sun_is_all(light, op);
         TRY(reserve(most * C, n, "radiosity", &p.B, error));
+        if (light->sun != NULL)
+            TRY(reserve(most, lam_sensors_count(light->sensors), "the sun", &p.sun_at, error));
     }
     p.work = memory_allocate(p.work_bytes, 1, "the work area of a solve", error);
     if (p.work == NULL) TRY(LAM_ERR_MEMORY);
@@ -89,9 +100,9 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
     if (light->D != NULL) TRY(take_dimmers(light, most, C, &p.D, error));
     if (s > 0)
         TRY(reserve(most * C, s, "weights of emitters", &p.W, error));
-    else if (light->L != NULL || light->D != NULL || light->sun != NULL)
+    else if (light->L != NULL || light->D != NULL || on_elements)
         TRY(reserve(most * C, n, "direct light", &p.H0, error));
-    if (light->sun != NULL) {
+    if (on_elements) {
         TRY(reserve(most, n, "the sun", &p.sun, error));
         TRY(reserve(1, sunlight_work(light->sun), "the sun", &p.sun_work, error));
     }
@@ -191,6 +202,30 @@ void emission_pass_limit(emission_pass *p, size_t n, const size_t *vectors, floa
     limit(p, n, out);
 }
 
+/* The answers of n vectors at sensors. */
+static lam_status answer_at_sensors(emission_pass *p, size_t n, const size_t *vectors, float *out,
+                                    lam_error *error) {
+    lam_status status = LAM_OK;
+    const emission *e = p->light;
+    const size_t C = lam_operator_channels(p->op), count = lam_sensors_count(e->sensors);
+    if (p->sun_is_all) {
+        memset(out, 0, n * C * count * sizeof *out);
+    } else {
+        TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, p->B, p->work, p->work_bytes, error));
+        limit(p, n, p->B);
+        lam_sensors_gather(e->sensors, n, p->B, p->L, p->D, out);
+    }
+    if (e->sun == NULL) goto done;
+    sunlight_sensors(e->sun, n, vectors, p->sun_at);
+    for (size_t row = 0; row < n * C; row++)
+        for (size_t i = 0; i < count; i++) out[row * count + i] += p->sun_at[row / C * count + i];
+    /* Where the sun takes the place of its tile, rounding must not make a value negative. */
+    for (size_t k = 0; e->limiter != NULL && p->L != NULL && k < n * C * count; k++)
+        out[k] = fmaxf(out[k], 0);
+done:
+    return status;
+}
+
 lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors, float *out,
                                lam_error *error) {
     lam_status status = LAM_OK;
@@ -205,9 +240,7 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
     }
     if (p->H0 != NULL) light_directly(p, n, vectors);
     if (p->B != NULL) {
-        TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, p->B, p->work, p->work_bytes, error));
-        limit(p, n, p->B);
-        lam_sensors_gather(p->light->sensors, n, p->B, p->L, p->D, out);
+        TRY(answer_at_sensors(p, n, vectors, out, error));
         goto done;
     }
     if (p->selected != NULL)

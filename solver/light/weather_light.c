@@ -176,12 +176,14 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
     weather_skies made = {0};
     /* Few emitters answer nothing but their tiles: the sun bounces from those. */
     const bool few = lam_operator_emitters(op) > 0, batch = e->batch;
+    const bool alone = options->at_sensors && !few, by_tile = few || alone;
     if (sky == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "--weather %s: the store has no sky; precompute it with --sky",
              options->path);
     TRY(weather_tiling_load(s, sky, &tiling, error));
-    const year_options year = {
-        .photometric = options->photometric, .sun_in_tiles = few || !options->exact, .north = options->north};
+    const year_options year = {.photometric = options->photometric,
+                               .sun_in_tiles = by_tile || !options->exact,
+                               .north = options->north};
     TRY(weather_skies_read(options->path, options->gaps, options->at, &tiling, &year, t, &made, error));
     TRY(emission_add_skies(e, options->path, m, tiling.n_tiles, made.n, made.L, error));
     e->efficacies = options->photometric;
@@ -192,16 +194,20 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
     made.span = (weather_span){0};
     if (options->way != NULL) {
         const progress steps = terminal_progress(t);
-        TRY(sun_way_measure(s, m, sky, made.suns, made.n, options->exact ? options->sun_points : 0,
+        TRY(sun_way_measure(s, m, sky, made.suns, made.n, options->exact && !alone ? options->sun_points : 0,
                             n_selected, selected, &steps, options->way, error));
         terminal_clear(t);
     }
     if (!options->exact) goto done;
     year_sun *suns = made.suns;
     made.suns = NULL;
-    TRY(sunlight_create(s, m, suns, made.n, options->sun_points, few ? n_selected : 0, few ? selected : NULL,
-                        few ? sky : NULL, sun, error));
+    TRY(sunlight_create(s, m, suns, made.n, alone ? 0 : options->sun_points, few ? n_selected : 0,
+                        few ? selected : NULL, by_tile ? sky : NULL, sun, error));
     e->sun = sun;
+    if (alone)
+        terminal_log(t, "the sun: a ray per sensor and hour; its reflected light is that of its tile, unless "
+                        "--sun exact is given");
+    if (alone) goto done;
     terminal_log(t,
                  few ? "the sun: %zu rays per element and hour; its reflected light is that of its tile, "
                        "because the store has few emitters"

@@ -59,9 +59,11 @@ lam_status weather_skies_read(const char *path, weather_gaps gaps, const moment 
 
 /* The options of a command line about weather. */
 typedef struct weather_options {
-    const char *path;  /* --weather */
-    bool photometric;  /* --photometric */
-    bool exact;        /* --sun exact */
+    const char *path; /* --weather */
+    bool photometric; /* --photometric */
+    bool exact;       /* --sun exact */
+    bool
+        at_sensors; /* with exact: at sensors alone; elements have the light of the tile that holds the sun */
     size_t sun_points; /* --sun-points */
     weather_gaps gaps; /* --gaps */
     const moment *at;  /* --date or --hour; NULL: all rows, a batch */

@@ -320,6 +320,24 @@ sensor_weights sensors_weights(const lam_sensors *l) {
     return (sensor_weights){l->start, l->element, l->weight};
 }
 
+const float *sensors_sky(const lam_sensors *l) {
+    return l->sky.m > 0 ? l->sky.values : NULL;
+}
+
+lam_status sensors_receivers(const lam_sensors *l, placed_receiver **out, lam_error *error) {
+    placed_receiver *made = memory_allocate(l->count, sizeof *made, "sensors", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < l->count; k++) {
+        const double *place = l->place + 9 * k;
+        made[k].kind = l->array[ARRAY_RECEIVER][k];
+        memcpy(made[k].at, place, sizeof made[k].at);
+        memcpy(made[k].axis, place + 3, sizeof made[k].axis);
+        memcpy(made[k].look, place + 6, sizeof made[k].look);
+    }
+    *out = made;
+    return LAM_OK;
+}
+
 void lam_sensors_gather(const lam_sensors *l, size_t n_rhs, const float *B, const float *L, const float *D,
                         float *out) {
     const row_factors colour = {.n_channels = l->C, .values = l->colour};

@@ -2,6 +2,7 @@
 #ifndef LAMBERT_OPERATOR_SENSOR_LIGHT_H
 #define LAMBERT_OPERATOR_SENSOR_LIGHT_H
 
+#include "solver/base/receiver_weight.h"
 #include "store/store.h"
 
 /* Why a receiver has no value: most of its rays meet backs of faces; it lies in the opening of a luminaire.
@@ -49,6 +50,12 @@ bool sensors_is_signed(const lam_sensors *l, size_t receiver);
 
 /* Owned by l. */
 sensor_weights sensors_weights(const lam_sensors *l);
+
+/* The weights of the tiles of the sky [tiles][s], owned by l; NULL: it has none. */
+const float *sensors_sky(const lam_sensors *l);
+
+/* All receivers of l, in their order; the caller frees. Errors: LAM_ERR_MEMORY. */
+lam_status sensors_receivers(const lam_sensors *l, placed_receiver **out, lam_error *error);
 
 /* lam_sensors_gather for refined answers, in double. */
 void sensors_gather_double(const lam_sensors *l, size_t n_rhs, const double *B, const double *L,

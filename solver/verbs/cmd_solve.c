@@ -82,7 +82,8 @@ static lam_status solve_year(const annual_options *annual, const emission *light
                      error));
     terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light", codec_quantity_name(out->quantity),
                  sum.n, annual->hours, sum.lit);
-    if (annual_has_shares(annual)) terminal_log(t, "shares are of %zu vectors", sum.counted);
+    if (annual_has_shares(annual) || annual_has_sun(annual))
+        terminal_log(t, "shares are of %zu vectors", sum.counted);
     if (annual->middle == NULL && (double)sum.n * annual->hours > A_LEAP_YEAR)
         terminal_warn(t, "%zu vectors of %g h are %.4g days; --hours-per-vector says how long each lasts",
                       sum.n, annual->hours, (double)sum.n * annual->hours / 24);
@@ -168,6 +169,7 @@ static lam_status add_weather(const solve_options *f, store *s, const mesh *m, s
     const weather_options hours = {.path = f->weather,
                                    .photometric = kind == LIGHT_PHOTOMETRIC,
                                    .exact = f->sun == SUN_EXACT && !in_tiles,
+                                   .at_sensors = f->sensors != NULL && !f->sun_given && f->annual.count > 0,
                                    .sun_points = f->sun_points > 0     ? (size_t)f->sun_points
                                                  : f->annual.count > 0 ? SUN_POINTS_YEAR
                                                                        : SUN_POINTS,
@@ -268,7 +270,9 @@ static void take_words(const annual_options *year, const char *figure, const lig
     if (annual_has_sum(year)) out->sum_unit = light_conversion_year(told, leaves);
     for (size_t k = 0; k < year->n_figures; k++) {
         words->names[k] = year->figures[k].name;
-        words->units[k] = year->figures[k].is_sum ? out->sum_unit : "";
+        words->units[k] = year->figures[k].is_sum                                ? out->sum_unit
+                          : year->figures[k].is_sun && year->figures[k].most < 0 ? "h"
+                                                                                 : "";
     }
     if (figure != NULL) {
         words->names[0] = "daylight_factor";
@@ -379,11 +383,13 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
         /* The error of an answer is told by all that the sun shines on. */
         const bool some = year->n_figures > 0;
         TRY(add_weather(f, s, &m, some ? n_selected : 0, some ? selected : NULL, t, &lit, &sun,
-                        is_sum(year) ? &way : NULL, &span, error));
+                        is_sum(year) && sensors.all == NULL ? &way : NULL, &span, error));
         TRY(take_span(&span, f->weather, f->hours, &figures, error));
         sensors.begins = span.begins;
     }
     TRY(light_convert(&f->light, f->weather != NULL ? &sun : &lit.sun, &way, &lit, error));
+    if (sensors.all != NULL && lit.light.sun != NULL)
+        TRY(sunlight_at_sensors(f->weather != NULL ? &sun : &lit.sun, s, &m, sensors.all, error));
     light_log(&lit, t);
     figures.luminance = lit.told.luminance && year->n_figures > 0 && !is_sum(year);
     TRY(check_batch(year, &lit.light, error));

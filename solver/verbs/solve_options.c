@@ -93,7 +93,8 @@ const option_row solve_answer_rows[] = {
      .help = "Irradiance at sets of sensors of the store, gathered at each point, in place of elements: a "
              "table of each set, or .csv, .json, .npy, .vtu, or a folder, NAME/, as Honeybee reads results: "
              ".ill and sun-up-hours.txt of --weather, .res of one light; of probes nine coefficients of the "
-             "radiance (.json, .npy). The sun is that of its tile (--sun tiles)"},
+             "radiance (.json, .npy). The sun itself comes to each point (--sun tiles: that of its tile); "
+             "with --annual its reflected light is that of its tile, unless --sun exact is given"},
     {.name = "smooth",
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),
@@ -128,11 +129,13 @@ const option_row solve_year_rows[] = {
      .kind = OPTION_LIST,
      .offset = FIELD(annual),
      .argument = "FIGURE",
-     .help =
-         "sum: over all hours, in 1000 h (kWh/m2 from W/m2, klx h from lx); autonomy=X: share of the "
-         "hours (0 to 1) with at least X; useful=LOW,HIGH: share of the hours with LOW to HIGH, both "
-         "included (100,2000 lx); may be repeated. X, LOW and HIGH are in the unit of the answer: lx with "
-         "--photometric, --unit-out lx or a store in lm"},
+     .help = "sum: over all hours, in 1000 h (kWh/m2 from W/m2, klx h from lx); autonomy=X: share of the "
+             "hours (0 to 1) with at least X; useful=LOW,HIGH: share of the hours with LOW to HIGH, both "
+             "included (100,2000 lx); sun=X: hours with more than X by the sun itself; sun=X,HOURS: 1 where "
+             "these are "
+             "more than so many (sun=1000,250), else 0; may be repeated. X, LOW and HIGH are in the unit of "
+             "the answer: lx with "
+             "--photometric, --unit-out lx or a store in lm"},
     {.name = "occupied",
      .kind = OPTION_TEXT,
      .offset = FIELD(occupied),
@@ -160,15 +163,17 @@ static lam_status read_year(const solve_options *f, annual_options *year, lam_er
     for (size_t i = 0; i < f->annual.count; i++) TRY(annual_add(year, f->annual.items[i], error));
     if (f->annual.count == 0 && f->hours > 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--hours-per-vector is for --annual");
-    if (!annual_has_shares(year) && f->occupied != NULL)
-        FAIL(error, LAM_ERR_ARGUMENT, "--occupied is for --annual autonomy=X and useful=LOW,HIGH");
+    if (!annual_has_shares(year) && !annual_has_sun(year) && f->occupied != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--occupied is for --annual autonomy=X, useful=LOW,HIGH and sun=X");
+    if (annual_has_sun(year) && f->quantity != NULL && strcmp(f->quantity, "irradiance") != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--annual sun=X: the sun gives irradiance, not %s", f->quantity);
     if (f->hours > 0) year->hours = f->hours;
     if (f->occupied != NULL) TRY(annual_parse_occupied(f->occupied, year, error));
 done:
     return status;
 }
 
-/* Checks the options of --at texels; they and sensors take no sun itself, but that of its tile. */
+/* Checks the options of --at texels, which take no sun itself but that of its tile, and of sensors. */
 static lam_status check_places(solve_options *f, lam_error *error) {
     lam_status status = LAM_OK;
     const bool texels = f->at == AT_TEXELS;
@@ -193,7 +198,7 @@ static lam_status check_places(solve_options *f, lam_error *error) {
              f->emissive ? "--emissive shows --quantity radiosity"
                          : "radiosity goes into a .glb by --emissive, or into .exr");
     if (f->sensors != NULL && f->quantity == NULL) f->quantity = "irradiance";
-    if ((f->sensors != NULL || texels) && !f->sun_given) { /* no sun itself comes to points yet */
+    if (texels && !f->sun_given) { /* no sun itself comes to texels yet */
         f->sun = SUN_TILES;
         f->light.at.sun_in_tiles = true;
     }
