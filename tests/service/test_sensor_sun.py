@@ -117,6 +117,32 @@ class SensorSun(Case):
             np.testing.assert_array_equal(many, hours > 20)
             self.assertTrue(0 < many.mean() < 1)
 
+    def test_ground(self):
+        """A ground of .3 in the open lights what looks down by .3 E_h, walls by half and spheres by a half of that; hours of sun leave
+        it out. What elements have is the same, but that they have no weights of their own."""
+        faces = Quads()
+        faces.grid("far", 2, -50, 1, [90, 91], [90, 91])
+        faces.write(self.path("open.obj"), 0)
+        rows = {"up": (0, 0, 1), "down": (0, 0, -1), "north": (0, 1, 0)}
+        with open(self.path("open.json"), "w", encoding="ascii") as file:
+            json.dump({"points": [{"name": name, "at": [[0, 0, 0]], "normal": normal} for name, normal in rows.items()],
+                       "spheres": [{"name": "ball", "at": [[0, 0, 0]]}]}, file)
+        must("precompute", self.path("open.obj"), "--mesh", "faces", "--sky", "tregenza", "--ground-albedo", .3, "--sensors",
+             self.path("open.json"), "--probes", 0, "-o", self.path("open.h5"))
+        up, down, north, ball = self.hours(self.path("open.h5")).T
+        toward = suns()
+        high = toward[:, 2] > .05
+        for found, cosine, share in ((up, toward[:, 2], 0), (down, 0, 1), (north, np.maximum(toward[:, 1], 0), .5), (ball, .25, .5)):
+            # The share of the ground is that of rays: to 1 % of 1,024 by the weight.
+            np.testing.assert_allclose(found[high], DIRECT * (cosine + .3 * share * toward[:, 2])[high],
+                                       atol=DIRECT * (3e-4 + .003 * share))
+        hours = self.year(self.path("open.h5"), "sun=1")[0]
+        self.assertEqual(hours[0], (up > 1).sum())
+        self.assertEqual(hours[1], 0)
+        for more in (), ("--sun", "exact"):
+            total = self.year(self.path("open.h5"), "sum", more=more)[0]
+            np.testing.assert_allclose(total, np.array([x.sum() for x in (up, down, north, ball)]) / 1000, rtol=2e-4)
+
     def test_hours_of_sun_have_no_bounces(self):
         """They are the same in a grey room, on elements too, and --occupied leaves hours out."""
         black, grey = (self.year(store, "sun=1")[0] for store in (self.black, self.grey))
