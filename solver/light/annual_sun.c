@@ -1,30 +1,7 @@
 #include "solver/light/annual_sun.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-lam_status annual_sun_read(const char *item, annual_figure *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    annual_figure f = {.is_sun = true, .most = -1};
-    const char *const text = item + strlen("sun=");
-    if (strchr(text, ',') == NULL) {
-        TRY(option_number("--annual sun:", text, &f.low, error));
-        snprintf(f.name, sizeof f.name, "sun_%g", f.low);
-    } else {
-        double given[2];
-        TRY(option_numbers("--annual sun:", text, 2, true, given, NULL, error));
-        f.low = given[0];
-        f.most = given[1];
-        snprintf(f.name, sizeof f.name, "sun_%g_%g", f.low, f.most);
-        if (f.most < 0) FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: hours must be at least 0", item);
-    }
-    if (f.low < 0)
-        FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be at least 0, in the unit of the answer", item);
-    *out = f;
-done:
-    return status;
-}
 
 /* Counts the vectors in which H [n][all] is above the bound of a figure. */
 static void count_above(const annual_figure *f, size_t n, size_t all, const float *H, size_t width,

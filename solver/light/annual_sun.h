@@ -4,9 +4,6 @@
 
 #include "solver/light/annual.h"
 
-/* Reads sun=X or sun=X,H. Errors: LAM_ERR_ARGUMENT names the item. */
-lam_status annual_sun_read(const char *item, annual_figure *out, lam_error *error);
-
 /* Fills the figures of the sun in made [n_figures][C][width] and leaves the others alone: of the vectors of
  * these numbers, at the sensors that the sun is wanted at, else on elements, of which width are selected
  * (NULL: all). Errors: LAM_ERR_ARGUMENT (sun is NULL), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. Cost: the rays of
