@@ -144,23 +144,16 @@ typedef struct casting {
     float *const *seen;
 } casting;
 
-/* The rays of a packet, and whose they are. */
-typedef struct packet {
-    shadow_rays rays;
-    size_t of[SHADOW_PACKET];
-} packet;
-
-/* Scales the weights of the receivers of a packet by what comes through, and empties it. */
-static void cast_packet(const shadow_tree *t, const float direction[3], packet *p, uint32_t *last,
-                        float *seen) {
+/* The part of the sun that comes to a place. Each ray goes by itself: those of a packet meet all boxes that
+ * the box of their origins does, which in a room of sensors is most of them. */
+static double passed_to(const shadow_tree *t, const float at[3], const float direction[3], uint32_t *last) {
+    shadow_rays rays = {.n = 1};
     double passed[SHADOW_PACKET];
-    const size_t n = p->rays.n;
-    if (n == 0) return;
-    const unsigned open = shadow_tree_open(t, SHADOW_NO_ELEMENT, direction, &p->rays, last);
-    shadow_tree_pass(t, direction, &p->rays, open, passed);
-    for (size_t k = 0; k < n; k++)
-        seen[p->of[k]] = open >> k & 1 ? (float)((double)seen[p->of[k]] * passed[k]) : 0;
-    p->rays.n = 0;
+    for (int d = 0; d < 3; d++) rays.at[d][0] = at[d];
+    const unsigned open = shadow_tree_open(t, SHADOW_NO_ELEMENT, direction, &rays, last);
+    if (open == 0) return 0;
+    shadow_tree_pass(t, direction, &rays, open, passed);
+    return passed[0];
 }
 
 /* A piece is a block of receivers in one direction. */
@@ -174,18 +167,12 @@ static void cast(const void *job, size_t thread, size_t first, size_t end) {
         float *seen = c->seen[piece / c->n_blocks];
         const size_t from = piece % c->n_blocks * TOGETHER,
                      to = from + TOGETHER < p->n ? from + TOGETHER : p->n;
-        packet waiting = {.rays = {.n = 0}};
         uint32_t last = 0;
         for (size_t i = from; i < to; i++) {
             const placed_receiver *r = &p->receivers[i];
-            const double density = receiver_weight_density(r->kind, r->axis, r->look, d);
-            seen[i] = (float)(M_PI * density);
-            if (!(density > 0)) continue;
-            for (int axis = 0; axis < 3; axis++) waiting.rays.at[axis][waiting.rays.n] = p->at[i][axis];
-            waiting.of[waiting.rays.n++] = i;
-            if (waiting.rays.n == SHADOW_PACKET) cast_packet(c->tree, direction, &waiting, &last, seen);
+            const double weight = M_PI * receiver_weight_density(r->kind, r->axis, r->look, d);
+            seen[i] = weight > 0 ? (float)(weight * passed_to(c->tree, p->at[i], direction, &last)) : 0;
         }
-        cast_packet(c->tree, direction, &waiting, &last, seen);
     }
 }
 

@@ -26,7 +26,7 @@ size_t sun_places_bytes(size_t n);
  * times what comes through there: 0, 1, or what panes pass. Times the irradiance of a plane normal to the sun
  * it is that of the receiver. Rows seen[k] are [receivers]. t is the tree that places were made for. At most
  * n_threads threads take part (solver/base/parallel.h). The bits depend neither on threads nor on the other
- * directions. Cost: some 5 million rays a second and thread. */
+ * directions. Cost: about a microsecond for a ray. */
 void sun_places_find(const sun_places *p, const shadow_tree *t, size_t n_threads, size_t n_directions,
                      const double (*direction)[3], float *const *seen);
 
