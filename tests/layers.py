@@ -60,8 +60,9 @@ ALLOWED = {
         "solver/formfactor/clusters/ solver/formfactor/exchange/ solver/formfactor/sight/ solver/formfactor/glass/"),
     "solver/formfactor/blocks": (f"{FORMFACTOR} solver/formfactor/visibility/ solver/formfactor/exchange/ solver/formfactor/sight/"),
     "solver/walk": ("lambert/ store/status.h solver/base/ solver/scene/mesh.h solver/formfactor/leaving.h solver/formfactor/visibility/"),
+    "solver/figures": f"{BELOW_LINALG}",
     "solver/direct": f"{SCENE} solver/luminaire/luminaire.h solver/luminaire/placed.h solver/formfactor/visibility/",
-    "solver/sensor": f"{SCENE} solver/daylight/ solver/luminaire/ solver/direct/ solver/formfactor/ solver/operator/sensor_light.h",
+    "solver/sensor": f"{SCENE} solver/daylight/ solver/luminaire/ solver/figures/ solver/direct/ solver/formfactor/ solver/operator/sensor_light.h",
     "solver/lightmap": (f"{SCENE} solver/operator/luminaire_light.h solver/sensor/ solver/direct/ solver/luminaire/ solver/daylight/ solver/formfactor/ "
         "solver/codec/ solver/render/exr.h solver/render/picture.h solver/render/image.h"),
     "solver/method": f"{OPERATOR}",
@@ -71,7 +72,7 @@ ALLOWED = {
     "solver/render": f"{OPERATOR} {SCENE} solver/formfactor/visibility/",
     "solver/adapt": f"solver/daylight/ {METHOD} {SCENE} solver/formfactor/",
     "solver/precompute/forecast": f"{METHOD} {SCENE} solver/formfactor/",
-    "solver/precompute": (f"solver/precompute/forecast/ solver/direct/ solver/luminaire/ solver/sensor/ solver/daylight/ {METHOD} {SCENE} solver/formfactor/ solver/light/ "
+    "solver/precompute": (f"solver/precompute/forecast/ solver/figures/ solver/direct/ solver/luminaire/ solver/sensor/ solver/daylight/ {METHOD} {SCENE} solver/formfactor/ solver/light/ "
         "solver/codec/answer_error.h solver/adapt/ solver/walk/"),
     "solver/verify": f"{METHOD} solver/direct/ solver/luminaire/ {SCENE} solver/formfactor/ solver/light/ solver/precompute/ solver/walk/walk.h",
     "solver/verbs": "lambert/ store/ solver/",
@@ -79,7 +80,7 @@ ALLOWED = {
     "server/net": f"{BELOW_LINALG} solver/codec/",
     "server/queue": f"{BELOW_LINALG} solver/codec/",
     "server/scene": f"{OPERATOR} solver/codec/ solver/daylight/ solver/shadow/ server/queue/ server/config.h",
-    "server/route": f"{OPERATOR} solver/codec/ solver/daylight/ server/net/ server/queue/ server/scene/ server/config.h",
+    "server/route": f"{OPERATOR} solver/codec/ solver/daylight/ solver/figures/ server/net/ server/queue/ server/scene/ server/config.h",
     "server/http": f"{OPERATOR} solver/codec/ server/net/ server/queue/ server/scene/ server/route/ server/config.h",
     "server": f"{OPERATOR} solver/codec/ solver/waits.h server/",
     "tests/bench": "lambert/ store/ solver/ server/ support/ tests/bench/suites/stats.h tests/bench/suites/mesh_truths.h",
