@@ -65,6 +65,7 @@ static size_t find_beams(const luminaire_run *run, const direct_point *point, si
             least_passed = fmin(least_passed, passed[i]);
             most_passed = fmax(most_passed, passed[i]);
             waiting[i].irradiance *= passed[i];
+            waiting[i].passed = passed[i];
             if (passed[i] > 0) room->beams[count++] = waiting[i];
         }
         lane = 0;

@@ -15,9 +15,9 @@ typedef struct direct_point {
 } direct_point;
 
 /* The light of a cell of an opening. direction: the unit vector from the point towards it, in the scene;
- * irradiance: I V / d^2, lx at dim 1, across that direction. */
+ * irradiance: I V / d^2, lx at dim 1, across that direction; passed: V, 1 or what panes pass. */
 typedef struct direct_beam {
-    double direction[3], irradiance;
+    double direction[3], irradiance, passed;
 } direct_beam;
 
 /* Is given the beams of a luminaire that reach a point, of which there may be none; row: of the luminaire

@@ -408,11 +408,20 @@ void opening_place(const opening_faces *o, double u, double w, opening_cell *out
     out->share = o->flat ? 1 : 0;
 }
 
+double opening_projected(const opening_faces *o, const double direction[3]) {
+    const double against[3] = {-direction[0], -direction[1], -direction[2]};
+    double sum = 0;
+    for (size_t f = 0; f < o->n_faces; f++) {
+        const double front = projected_area(&o->faces[f], direction);
+        sum += o->flat ? fmax(front, projected_area(&o->faces[f], against)) : front;
+    }
+    return sum;
+}
+
 double opening_part(const opening_faces *o, const opening_cell *cell, const double direction[3]) {
     if (o->flat || cell->share > 0) return cell->share;
     const double own = dot3(cell->area, direction);
-    double all = 0;
     if (!(own > 0)) return 0;
-    for (size_t f = 0; f < o->n_faces; f++) all += projected_area(&o->faces[f], direction);
+    const double all = opening_projected(o, direction);
     return all > 0 ? own / all : 0;
 }

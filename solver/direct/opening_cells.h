@@ -57,6 +57,10 @@ void opening_place(const opening_faces *o, double u, double w, opening_cell *out
 /* The part of the intensity that a cell sends into a direction, a unit vector. */
 double opening_part(const opening_faces *o, const opening_cell *cell, const double direction[3]);
 
+/* The area of the opening as a direction, a unit vector, sees it, m^2: of a flat one either side, of a body
+ * the fronts of its faces. 0 of a point and of a line. */
+double opening_projected(const opening_faces *o, const double direction[3]);
+
 /* The distance of x from the box about the opening, 0 inside. */
 double opening_distance(const opening_faces *o, const double x[3]);
 

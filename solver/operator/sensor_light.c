@@ -35,6 +35,9 @@ struct lam_sensors {
     float *sky_off;        /* [m][count] */
     first_rows luminaires; /* [k][count]; m 0: none */
     double *colour;        /* [C][k] */
+    size_t n_eyes;
+    uint32_t *eyes; /* [n_eyes] */
+    float *seen;    /* [k][n_eyes][SENSOR_SEEN] */
 };
 
 void lam_sensors_close(lam_sensors *l) {
@@ -54,6 +57,8 @@ void lam_sensors_close(lam_sensors *l) {
     free(l->sky_off);
     if (l->luminaires.m > 0) first_rows_free(&l->luminaires);
     free(l->colour);
+    free(l->eyes);
+    free(l->seen);
     free(l);
 }
 
@@ -216,6 +221,38 @@ done:
     return status;
 }
 
+/* Luminaires that eyes see; none in stores without eyes. */
+static lam_status read_eyes(store *s, lam_sensors *l, lam_error *error) {
+    static const size_t position = 3, passed = 4;
+    lam_status status = LAM_OK;
+    size_t dims[STORE_MAX_RANK] = {SIZE_MAX};
+    void *data = NULL;
+    if (l->luminaires.m == 0 || !store_has(s, STORE_SENSORS "/eyes")) return LAM_OK;
+    TRY(store_read(s, STORE_SENSORS "/eyes", STORE_U32, 1, dims, &data, error));
+    l->eyes = data;
+    TRY(check_below(s, STORE_SENSORS "/eyes", l->eyes, dims[0], l->count, false, error));
+    for (size_t k = 1; k < dims[0]; k++)
+        if (l->eyes[k] <= l->eyes[k - 1])
+            FAIL(error, LAM_ERR_FORMAT, "%s: /sensors/eyes[%zu] = %u, must be above %u", store_path(s), k,
+                 (unsigned)l->eyes[k], (unsigned)l->eyes[k - 1]);
+    size_t shape[] = {l->luminaires.m, dims[0], SENSOR_SEEN};
+    TRY(store_read(s, STORE_SENSORS "/seen", STORE_F32, 3, shape, &data, error));
+    l->seen = data;
+    const size_t count = shape[0] * shape[1] * SENSOR_SEEN;
+    TRY(check_finite(s, STORE_SENSORS "/seen", l->seen, count, true, error));
+    for (size_t k = 0; k < count; k += SENSOR_SEEN) {
+        const float p = l->seen[k + position], t = l->seen[k + passed];
+        if (t > 1 || (p > 0 && p < 1))
+            FAIL(error, LAM_ERR_FORMAT,
+                 "%s: /sensors/seen[%zu][%zu] has a position of %g, must be 0 or at least 1, and passes %g, "
+                 "must be at most 1",
+                 store_path(s), k / SENSOR_SEEN / dims[0], k / SENSOR_SEEN % dims[0], (double)p, (double)t);
+    }
+    l->n_eyes = dims[0];
+done:
+    return status;
+}
+
 lam_status sensors_load(store *s, size_t n, size_t C, lam_sensors **out, lam_error *error) {
     lam_status status = LAM_OK;
     lam_sensors *l = NULL;
@@ -232,6 +269,7 @@ lam_status sensors_load(store *s, size_t n, size_t C, lam_sensors **out, lam_err
     TRY(read_rows(s, l, error));
     TRY(check_kinds(s, l, error));
     TRY(read_direct(s, l, error));
+    TRY(read_eyes(s, l, error));
     *out = l;
     l = NULL;
 done:
@@ -336,6 +374,17 @@ lam_status sensors_receivers(const lam_sensors *l, placed_receiver **out, lam_er
     }
     *out = made;
     return LAM_OK;
+}
+
+sensor_eyes sensors_eyes(const lam_sensors *l) {
+    return (sensor_eyes){l->n_eyes, l->eyes, l->seen, l->colour};
+}
+
+void sensors_direct(const lam_sensors *l, size_t n_rhs, const float *D, float *out) {
+    const row_factors colour = {.n_channels = l->C, .values = l->colour};
+    const size_t rows = n_rhs * l->C;
+    memset(out, 0, rows * l->count * sizeof *out);
+    if (D != NULL && l->luminaires.m > 0) first_rows_apply(&l->luminaires, rows, D, &colour, true, out);
 }
 
 void lam_sensors_gather(const lam_sensors *l, size_t n_rhs, const float *B, const float *L, const float *D,

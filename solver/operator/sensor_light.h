@@ -12,6 +12,9 @@ enum { SENSOR_IN_WALL = 1, SENSOR_IN_LUMINAIRE = 2 };
 /* Kinds in the store: sets of probes, whose receivers are the spherical harmonics, each of this many. */
 enum { SENSOR_SET_PROBES = 7, SENSOR_HARMONIC = 4, SENSOR_HARMONICS = 9 };
 
+/* Kinds in the store that figures ask for: of sets, and of receivers. */
+enum { SENSOR_SET_EYES = 2, RECEIVER_KIND_PLANE = 0, RECEIVER_KIND_CYLINDER = 1 };
+
 /* A set, as people are shown it. */
 typedef struct sensor_set_shown {
     const char *name;
@@ -36,6 +39,16 @@ typedef struct sensor_weights {
     const float *weight;
 } sensor_weights;
 
+/* Luminaires as eyes see them: intensity at dimmer 1 (cd), projected area of the opening (m^2), distance (m),
+ * Guth's index of its position, and the mean of the square of what is passed of it (store/FORMAT.md). */
+enum { SENSOR_SEEN = 5 };
+typedef struct sensor_eyes {
+    size_t n;              /* 0: there are none, or no luminaires */
+    const uint32_t *eyes;  /* [n], receivers, ascending */
+    const float *seen;     /* [luminaires][n][SENSOR_SEEN] */
+    const double *colours; /* [C][luminaires], factors of the light in each channel */
+} sensor_eyes;
+
 /* Loads /sensors for n elements of C channels, or NULL where the store has none; freed by lam_sensors_close.
  * Errors: LAM_ERR_FORMAT (another shape, an index or a value out of bounds), LAM_ERR_DAMAGED, LAM_ERR_MEMORY.
  */
@@ -56,6 +69,13 @@ const float *sensors_sky(const lam_sensors *l);
 
 /* All receivers of l, in their order; the caller frees. Errors: LAM_ERR_MEMORY. */
 lam_status sensors_receivers(const lam_sensors *l, placed_receiver **out, lam_error *error);
+
+/* Owned by l. */
+sensor_eyes sensors_eyes(const lam_sensors *l);
+
+/* The part of lam_sensors_gather that comes from luminaires directly, out [n_rhs][C][receivers]; 0 where the
+ * store has none or D is NULL. */
+void sensors_direct(const lam_sensors *l, size_t n_rhs, const float *D, float *out);
 
 /* lam_sensors_gather for refined answers, in double. */
 void sensors_gather_double(const lam_sensors *l, size_t n_rhs, const double *B, const double *L,

@@ -3,6 +3,7 @@
 #define LAMBERT_PRECOMPUTE_PARTS_H
 
 #include "solver/direct/direct_elements.h"
+#include "solver/figures/glare.h"
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/pairs_sample.h"
@@ -65,6 +66,9 @@ typedef struct scene_sensors {
     sensor_rows rows;
     float *H;     /* [luminaires][n], lx at dim 1; NULL: no luminaires */
     bool *inside; /* [n], in the opening of a luminaire; NULL likewise */
+    size_t n_eyes;
+    uint32_t *eyes;     /* [n_eyes], of the receivers; NULL likewise */
+    glare_source *seen; /* [luminaires][n_eyes] */
 } scene_sensors;
 void scene_sensors_free(scene_sensors *s);
 

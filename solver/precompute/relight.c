@@ -100,7 +100,7 @@ done:
 static lam_status save_sensors(const precompute_scene *scene, bool rows, store *from, store *to,
                                lam_error *error) {
     const scene_sensors *s = &scene->sensors;
-    const sensors_lit lit = {.n_luminaires = scene->luminaires.placed.n, .H = s->H, .inside = s->inside};
+    const sensors_lit lit = scene_sensors_lit(scene);
     if (rows) return scene_sensors_save(scene, to, error);
     return s->list.n > 0 ? sensors_save_lit(from, s->list.n, &lit, to, error) : LAM_OK;
 }

@@ -1,6 +1,7 @@
 /* Sensors of --sensors or of a store: the weights with which light comes to them, and that of luminaires. */
 #include "solver/precompute/stages.h"
 #include "solver/sensor/probe_grid.h"
+#include "solver/sensor/eye_luminaires.h"
 #include "solver/sensor/sensor_luminaires.h"
 #include "solver/sensor/sensors_store.h"
 
@@ -15,6 +16,8 @@ void scene_sensors_free(scene_sensors *s) {
     sensor_rows_free(&s->rows);
     free(s->H);
     free(s->inside);
+    free(s->eyes);
+    free(s->seen);
     *s = (scene_sensors){.H = NULL};
 }
 
@@ -102,6 +105,24 @@ static void log_flags(const precompute_job *job, const scene_sensors *s, bool ro
     }
 }
 
+/* All luminaires as the eyes among the sensors see them. */
+static lam_status find_seen(precompute_scene *scene, const direct_options *how, lam_error *error) {
+    lam_status status = LAM_OK;
+    scene_sensors *s = &scene->sensors;
+    const placed_luminaires *placed = &scene->luminaires.placed;
+    size_t size;
+    TRY(eyes_find(&s->list, &s->n_eyes, &s->eyes, error));
+    if (s->n_eyes == 0) return LAM_OK;
+    if (!size_multiply(placed->n, s->n_eyes, &size))
+        FAIL(error, LAM_ERR_MEMORY, "%zu luminaires for %zu eyes are too many for memory", placed->n,
+             s->n_eyes);
+    s->seen = memory_allocate(size, sizeof *s->seen, "luminaires that eyes see", error);
+    if (s->seen == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(eye_luminaires_make(&scene->m, placed, how, s->list.receivers, s->n_eyes, s->eyes, s->seen, error));
+done:
+    return status;
+}
+
 /* The direct light of all luminaires at the sensors. */
 static lam_status find_luminaires(const precompute_job *job, precompute_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
@@ -120,6 +141,7 @@ static lam_status find_luminaires(const precompute_job *job, precompute_scene *s
     if (s->H == NULL || s->inside == NULL) TRY(LAM_ERR_MEMORY);
     TRY(sensor_luminaires_make(&scene->m, placed, &how, s->list.n, s->list.receivers, s->H, s->inside,
                                error));
+    TRY(find_seen(scene, &how, error));
 done:
     return status;
 }
@@ -148,10 +170,19 @@ done:
     return status;
 }
 
+sensors_lit scene_sensors_lit(const precompute_scene *scene) {
+    const scene_sensors *s = &scene->sensors;
+    return (sensors_lit){.n_luminaires = scene->luminaires.placed.n,
+                         .H = s->H,
+                         .inside = s->inside,
+                         .n_eyes = s->n_eyes,
+                         .eyes = s->eyes,
+                         .seen = s->seen};
+}
+
 lam_status scene_sensors_save(const precompute_scene *scene, store *s, lam_error *error) {
     const scene_sensors *sensors = &scene->sensors;
-    const sensors_lit lit = {
-        .n_luminaires = scene->luminaires.placed.n, .H = sensors->H, .inside = sensors->inside};
+    const sensors_lit lit = scene_sensors_lit(scene);
     if (sensors->list.n == 0) return LAM_OK;
     return sensors_save(&sensors->list, &sensors->rows, &lit, s, error);
 }

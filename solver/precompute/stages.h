@@ -3,6 +3,7 @@
 #define LAMBERT_PRECOMPUTE_STAGES_H
 
 #include "solver/precompute/parts.h"
+#include "solver/sensor/sensors_store.h"
 
 /* stage_forecast.c. Measures the rates of the machine, once (cast: that of rays in the scene, too); and anew
  * the processors that the run has had so far. Logs the forecast, and fails where the disks have no room. Logs
@@ -44,6 +45,9 @@ lam_status scene_take_sensors(const precompute_job *job, precompute_scene *scene
 lam_status scene_load_sensors(const precompute_job *job, store *s, precompute_scene *scene, lam_error *error);
 lam_status stage_sensors(const precompute_job *job, precompute_scene *scene, const sky_bounce *sky, bool rows,
                          lam_error *error);
+
+/* The light of luminaires at sensors, a view. */
+sensors_lit scene_sensors_lit(const precompute_scene *scene);
 lam_status scene_sensors_save(const precompute_scene *scene, store *s, lam_error *error);
 
 /* True where a store is to have other luminaires or sensors and nothing else; makes that store: relight.c. */

@@ -85,6 +85,29 @@ done:
     return status;
 }
 
+/* The light of luminaires, and how eyes see them. */
+static lam_status save_luminaires(const sensors_lit *lit, size_t n, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t k = lit->n_luminaires, count = k * lit->n_eyes;
+    float *seen = NULL;
+    if (k == 0) return LAM_OK;
+    TRY(store_write(s, GROUP "/luminaires", STORE_F32, 2, (size_t[]){k, n}, lit->H, error));
+    if (lit->n_eyes == 0) return LAM_OK;
+    seen = memory_allocate(count, GLARE_NUMBERS * sizeof *seen, "luminaires that eyes see", error);
+    if (seen == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < count; i++) {
+        const glare_source *one = &lit->seen[i];
+        const double numbers[GLARE_NUMBERS] = {one->intensity, one->area, one->distance, one->position,
+                                               one->seen};
+        for (int d = 0; d < GLARE_NUMBERS; d++) seen[i * GLARE_NUMBERS + d] = (float)numbers[d];
+    }
+    TRY(store_write(s, GROUP "/eyes", STORE_U32, 1, &lit->n_eyes, lit->eyes, error));
+    TRY(store_write(s, GROUP "/seen", STORE_F32, 3, (size_t[]){k, lit->n_eyes, GLARE_NUMBERS}, seen, error));
+done:
+    free(seen);
+    return status;
+}
+
 lam_status sensors_save(const sensor_list *l, const sensor_rows *rows, const sensors_lit *lit, store *s,
                         lam_error *error) {
     lam_status status = LAM_OK;
@@ -100,15 +123,16 @@ lam_status sensors_save(const sensor_list *l, const sensor_rows *rows, const sen
         TRY(store_write(s, GROUP "/sky", STORE_F32, 2, dims, rows->sky, error));
         TRY(store_write(s, GROUP "/sky_off", STORE_F32, 2, dims, rows->sky_off, error));
     }
-    if (lit != NULL && lit->n_luminaires > 0)
-        TRY(store_write(s, GROUP "/luminaires", STORE_F32, 2, (size_t[]){lit->n_luminaires, n}, lit->H,
-                        error));
+    if (lit != NULL) TRY(save_luminaires(lit, n, s, error));
 done:
     return status;
 }
 
 bool sensors_are_lit_by(const char *array) {
-    return strcmp(array, GROUP "/luminaires") == 0 || strcmp(array, GROUP "/flags") == 0;
+    static const char *const arrays[] = {GROUP "/luminaires", GROUP "/flags", GROUP "/eyes", GROUP "/seen"};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
+        if (strcmp(array, arrays[k]) == 0) return true;
+    return false;
 }
 
 lam_status sensors_save_lit(store *from, size_t n, const sensors_lit *lit, store *to, lam_error *error) {
@@ -118,9 +142,7 @@ lam_status sensors_save_lit(store *from, size_t n, const sensors_lit *lit, store
     TRY(store_read(from, GROUP "/backs", STORE_F32, 1, &n, &backs, error));
     TRY(make_flags(n, backs, lit->inside, &flags, error));
     TRY(store_write(to, GROUP "/flags", STORE_U32, 1, &n, flags, error));
-    if (lit->n_luminaires > 0)
-        TRY(store_write(to, GROUP "/luminaires", STORE_F32, 2, (size_t[]){lit->n_luminaires, n}, lit->H,
-                        error));
+    TRY(save_luminaires(lit, n, to, error));
 done:
     free(backs);
     free(flags);

@@ -9,7 +9,7 @@
 
 #include <unistd.h>
 
-enum { N = 50, S = 27, SETS = 4, NNZ = 120, M = 5, K = 3, C = 3, RHS = 2, ROWS = RHS * C };
+enum { N = 50, S = 27, SETS = 4, NNZ = 120, M = 5, K = 3, C = 3, RHS = 2, ROWS = RHS * C, EYES = 2 };
 
 /* Sensors with made-up rows. */
 typedef struct sample {
@@ -20,6 +20,8 @@ typedef struct sample {
     float weight[NNZ], off[NNZ], sky[M * S], sky_off[M * S], backs[S], H[K * S];
     bool inside[S];
     double colour[K * 3];
+    uint32_t eyes[EYES];
+    glare_source seen[K * EYES];
 } sample;
 
 static float unit(uint64_t *seed) {
@@ -70,6 +72,13 @@ static void fill(sample *a) {
     }
     for (size_t k = 0; k < K * S; k++) a->H[k] = number(k % S, &seed);
     for (size_t k = 0; k < K * 3; k++) a->colour[k] = random_unit(&seed);
+    for (size_t k = 0; k < K * EYES; k++) {
+        glare_source *one = &a->seen[k];
+        *one = (glare_source){
+            .intensity = 100. * (double)k, .area = .5, .distance = 3, .position = 2, .seen = 1};
+        one->seen /= 1 << k;
+    }
+    a->eyes[0] = 1, a->eyes[1] = 4;
 }
 
 static void save(sample *a, bool lit, char path[64]) {
@@ -88,7 +97,8 @@ static void save(sample *a, bool lit, char path[64]) {
                               .sky = a->sky,
                               .sky_off = a->sky_off,
                               .backs = a->backs};
-    const sensors_lit light = {.n_luminaires = K, .H = a->H, .inside = a->inside};
+    const sensors_lit light = {
+        .n_luminaires = K, .H = a->H, .inside = a->inside, .n_eyes = EYES, .eyes = a->eyes, .seen = a->seen};
     snprintf(path, 64, "/tmp/lambert-sensors-%d.h5", (int)getpid());
     ck_ok(store_create(path, &s, &error));
     ck_ok(store_write(s, "/mesh/reflectance", STORE_F32, 2, (size_t[]){C, N}, reflectance, &error));
@@ -163,6 +173,48 @@ START_TEST(values_and_their_transpose) {
     for (size_t k = 0; k < sizeof floats / sizeof *floats; k++) free(floats[k]);
     free(B2);
     free(out2);
+    free(a);
+}
+END_TEST
+
+/* The direct part is what luminaires add, to three roundings of sums below 10. */
+START_TEST(light_and_sight_of_luminaires) {
+    char path[64];
+    lam_error error = {0};
+    lam_sensors *l = NULL;
+    sample *a = test_allocate(1, sizeof *a);
+    float *B = random_values(ROWS * N, 2), *D = random_values(ROWS * K, 4);
+    float *with = test_allocate(ROWS * S, sizeof *with), *without = test_allocate(ROWS * S, sizeof *without),
+          *direct = test_allocate(ROWS * S, sizeof *direct);
+    fill(a);
+    save(a, true, path);
+    ck_ok(lam_sensors_open(path, &l, &error));
+    lam_sensors_gather(l, RHS, B, NULL, D, with);
+    lam_sensors_gather(l, RHS, B, NULL, NULL, without);
+    sensors_direct(l, RHS, D, direct);
+    for (size_t i = 0; i < ROWS * S; i++)
+        ck_assert_double_eq_tol((double)with[i], (double)without[i] + (double)direct[i], 3e-6);
+    ck_assert_double_gt((double)direct[0], 0);
+    sensors_direct(l, RHS, NULL, direct);
+    for (size_t i = 0; i < ROWS * S; i++) ck_assert_double_eq((double)direct[i], 0);
+    const sensor_eyes eyes = sensors_eyes(l);
+    ck_assert_uint_eq(eyes.n, EYES);
+    ck_assert_uint_eq(eyes.eyes[1], 4);
+    for (size_t k = 0; k < K * EYES; k++) {
+        const float *x = eyes.seen + k * SENSOR_SEEN;
+        const double numbers[SENSOR_SEEN] = {a->seen[k].intensity, a->seen[k].area, a->seen[k].distance,
+                                             a->seen[k].position, a->seen[k].seen};
+        for (int d = 0; d < SENSOR_SEEN; d++) ck_assert_double_eq((double)x[d], numbers[d]);
+    }
+    ck_assert_double_eq(eyes.colours[K + 2], a->colour[2 * 3 + 1]);
+    lam_sensors_close(l);
+    save(a, false, path);
+    ck_ok(lam_sensors_open(path, &l, &error));
+    ck_assert_uint_eq(sensors_eyes(l).n, 0);
+    lam_sensors_close(l);
+    unlink(path);
+    float *const floats[] = {B, D, with, without, direct};
+    for (size_t k = 0; k < sizeof floats / sizeof *floats; k++) free(floats[k]);
     free(a);
 }
 END_TEST
@@ -259,6 +311,17 @@ START_TEST(wrong_values) {
     refused(a, "/sensors/first[1] = 50, must rise from 0 to 27");
     a->sets[1].spacing[0] = -1;
     refused(a, "/sensors/spacing[2] = -1, must be at least 0");
+    a->eyes[1] = S;
+    refused(a, "/sensors/eyes[1] = 27, must be below 27");
+    a->eyes[1] = a->eyes[0];
+    refused(a, "/sensors/eyes[1] = 1, must be above 1");
+    a->seen[3].area = -1;
+    refused(a, "/sensors/seen[16] = -1, must be at least 0");
+    a->seen[3].position = .5;
+    refused(a, "/sensors/seen[1][1] has a position of 0.5, must be 0 or at least 1");
+    a->seen[2].seen = 1.5;
+    refused(a, "/sensors/seen[1][0] has a position of 2, must be 0 or at least 1, and passes 1.5, must be at "
+               "most 1");
     free(a);
 }
 END_TEST
@@ -290,6 +353,7 @@ int main(void) {
     Suite *s = suite_create("sensors in a store");
     TCase *c = tcase_create("all");
     tcase_add_test(c, values_and_their_transpose);
+    tcase_add_test(c, light_and_sight_of_luminaires);
     tcase_add_test(c, sets_and_receivers);
     tcase_add_test(c, wrong_values);
     tcase_add_test(c, stores_without_sensors);
