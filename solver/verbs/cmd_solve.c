@@ -370,6 +370,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
         const bool linear = f->figure == NULL && (year->n_figures == 0 || is_sum(year));
         TRY(solve_probes_check(&sensors, linear, f->output, error));
     }
+    if (f->at_least != NULL) TRY(sensor_choice_least(f->at_least, &sensors, error));
     lit.light.sensors = sensors.all;
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
     TRY(check_own(path, &lit, t, error));
@@ -431,7 +432,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
         take_luminance(sensors.all != NULL ? lam_sensors_count(sensors.all) : output_width(&out), &made,
                        &one_channel, &out);
     TRY(reductions_fill(&out, error));
-    TRY(sensors.all != NULL ? solve_sensors_put(&sensors, &out, f->output, f->json, error)
+    TRY(sensors.all != NULL ? solve_sensors_put(&sensors, &out, &lit.light, f->output, f->json, error)
                             : put_out(&out, f, error));
 done:
     free(scene);

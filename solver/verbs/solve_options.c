@@ -95,6 +95,12 @@ const option_row solve_answer_rows[] = {
              ".ill and sun-up-hours.txt of --weather, .res of one light; of probes nine coefficients of the "
              "radiance (.json, .npy). The sun itself comes to each point (--sun tiles: that of its tile); "
              "with --annual its reflected light is that of its tile, unless --sun exact is given"},
+    {.name = "at-least",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(at_least),
+     .argument = "X,...",
+     .help = "--sensors: the share of the points of each set with at least X, in the unit of the answer "
+             "(300,500 lx; of figures of a year their own, 0.5)"},
     {.name = "smooth",
      .kind = OPTION_FLAG,
      .offset = FIELD(smooth),
@@ -272,6 +278,11 @@ lam_status solve_options_check(solve_options *f, const option_result *given, ann
         TRY(f->sensors != NULL   ? solve_sensors_check(f->output, error)
             : f->at == AT_TEXELS ? solve_texels_check(f->output, error)
                                  : output_check(f->output, content, error));
+    if (f->at_least != NULL) {
+        sensor_choice read;
+        if (f->sensors == NULL) FAIL(error, LAM_ERR_ARGUMENT, "--at-least is for --sensors");
+        TRY(sensor_choice_least(f->at_least, &read, error));
+    }
     TRY(check_places(f, error));
     TRY(read_year(f, year, error));
     /* Studies of daylight ask for the light that a place receives. */

@@ -15,7 +15,7 @@ typedef enum place_asked { AT_ELEMENTS, AT_FACES, AT_TEXELS } place_asked;
 typedef struct solve_options {
     light_options light;
     option_list reduce, annual;
-    const char *weather, *quantity, *output, *occupied, *figure, *sensors;
+    const char *weather, *quantity, *output, *occupied, *figure, *sensors, *at_least;
     double hours, tolerance, texel;
     sun_asked sun;
     place_asked at;

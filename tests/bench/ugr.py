@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "service"))
-from ugr_rooms import REFLECTANCES, ROOMS, eyes_of, table  # noqa: E402
+from ugr_rooms import REFLECTANCES, ROOMS, ROUND, eyes_of, table  # noqa: E402
 
 LIMIT = .5
 
@@ -29,7 +29,7 @@ def main(program, samples="02,07,09", which=""):
         wanted, apart = table(sample), []
         for floor in floors:
             # Lamps along the longer side and along the shorter one: each gives a view of two rooms, or both of a square.
-            for sides in sorted({floor, floor[::-1]}):
+            for sides in sorted({floor, floor[::-1]})[: 1 if sample in ROUND else 2]:
                 for reflectances in sets:
                     with tempfile.TemporaryDirectory() as folder:
                         eyes = eyes_of(run, folder, sample, sides, reflectances)
