@@ -1,8 +1,8 @@
 /* A sum over the year is n hours / 1000 times the answer to the mean vector, as answers are linear. A share
  * is (hours with low <= x <= high) / (hours that count), the daylight autonomy or useful daylight of
- * annual.h; with fewer tiles than hours, x_h = x_E + sum_t L_ht x_t + x_h,sun from one answer x_t for each
- * tile, and one x_h,sun for each hour with an exact sun; the sum is limited, not its parts, as an answer to
- * the hour would be. */
+ * annual.h, or / (half of all hours) where it is of daylight; with fewer tiles than hours, x_h = x_E + sum_t
+ * L_ht x_t + x_h,sun from one answer x_t for each tile, and one x_h,sun for each hour with an exact sun; the
+ * sum is limited, not its parts, as an answer to the hour would be. */
 #include "solver/light/annual.h"
 
 #include "solver/codec/answer.h"
@@ -64,6 +64,23 @@ static lam_status check_days(const annual_options *w, size_t n, lam_error *error
              n, w->hours, (size_t)round(a_day));
 done:
     return status;
+}
+
+/* Daylight is half of the hours of a year, not of a part of it. */
+static lam_status check_year(const annual_options *w, size_t n, lam_error *error) {
+    const double hours = (double)n * w->hours;
+    for (size_t k = 0; k < w->n_figures; k++) {
+        if (!w->figures[k].of_daylight) continue;
+        if (!all_count(w))
+            return status_fail(error, LAM_ERR_ARGUMENT,
+                               "--annual daylit: is of all hours of a year, without --occupied");
+        if (!(hours > 364.5 * 24 && hours < 366.5 * 24))
+            return status_fail(
+                error, LAM_ERR_ARGUMENT,
+                "--annual daylit: is of a whole year; these are %zu vectors of %g h, %.4g days", n, w->hours,
+                hours / 24);
+    }
+    return LAM_OK;
 }
 
 static bool any(const float *x, size_t count) {
@@ -415,9 +432,9 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
     for (size_t k = 0; k < n_figures; k++) {
         const annual_figure *f = &w->options->figures[k];
         const size_t always = f->low <= 0 ? dark : 0; /* hours of exactly 0 */
+        const double of = f->of_daylight ? .5 * (double)sum->n : (double)sum->counted;
         for (size_t i = 0; i < w->told && is_share(f); i++)
-            w->made[k * w->told + i] =
-                (float)((double)(count[k * w->told + i] + always) / (double)sum->counted);
+            w->made[k * w->told + i] = (float)fmin((double)(count[k * w->told + i] + always) / of, 1);
     }
 done:
     emission_pass_free(&p);
@@ -448,6 +465,7 @@ lam_status annual_apply(const annual_options *options, const emission *light, co
     size_t *lit = NULL, n_lit = 0; /* vectors that are lit and count */
     float *whole = NULL;
     TRY(check_days(options, light->n_vectors, error));
+    TRY(check_year(options, light->n_vectors, error));
     lit = memory_allocate(light->n_vectors, sizeof *lit, "hours", error);
     w.made = memory_allocate(options->n_figures, w.told * sizeof *w.made, "figures of the year", error);
     if (lit == NULL || w.made == NULL) TRY(LAM_ERR_MEMORY);

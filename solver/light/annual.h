@@ -13,6 +13,8 @@ enum { ANNUAL_MOST = 16, ANNUAL_NAME = 40 };
  *   sum              sum_h x_h hours / 1000, over all of them: kWh/m2 of W/m2, klx h of lx
  *   autonomy=X       share of the counted hours in which x >= X
  *   useful=LOW,HIGH  share of the counted hours in which LOW <= x <= HIGH, both bounds within
+ *   daylit=X         hours in which x >= X over the hours of daylight, half of those of a whole year
+ *                    (EN 17037: 4,380 of 8,760), at most 1
  *   sun=X            the counted hours, h, in which the irradiance by the sun itself, without sky, ground and
  *                    bounces, is above X
  *   sun=X,H          1 where these are more than H hours, else 0: the mean over points is the share of them
@@ -20,9 +22,9 @@ enum { ANNUAL_MOST = 16, ANNUAL_NAME = 40 };
  * illuminance: Nabil, Mardaljevic 2005, Lighting Research and Technology 37(1):41-59; sun=1000,250 of 8 to 18
  * h is the condition of ASE (IES LM-83). */
 typedef struct annual_figure {
-    bool is_sum, is_sun; /* neither: a share */
-    double low, high;    /* of shares; autonomy: high is infinite; of sun low is X */
-    double most;         /* of sun: H; below 0: the hours themselves are wanted */
+    bool is_sum, is_sun, of_daylight; /* neither of the first two: a share */
+    double low, high;                 /* of shares; autonomy: high is infinite; of sun low is X */
+    double most;                      /* of sun: H; below 0: the hours themselves are wanted */
     char name[ANNUAL_NAME];
 } annual_figure;
 
@@ -36,8 +38,8 @@ typedef struct annual_options {
     const emission *mean; /* of annual_mean_find; NULL: it is found where sums need it */
 } annual_options;
 
-/* Adds the figure of an item: sum, autonomy=X, useful=LOW,HIGH, sun=X or sun=X,H. LAM_ERR_ARGUMENT names the
- * item. */
+/* Adds the figure of an item: sum, autonomy=X, useful=LOW,HIGH, daylit=X, sun=X or sun=X,H. LAM_ERR_ARGUMENT
+ * names the item. */
 lam_status annual_add(annual_options *w, const char *item, lam_error *error);
 
 /* Reads FROM-TO, whole hours from 0 to 24. */
@@ -78,8 +80,8 @@ typedef struct annual_summary {
  * tiles and of one answer to their sun where it is exact, limited as one. Cost: one answer for sums;
  * for shares one a lit and counted vector, or one a tile and an exact sun and a product of [tiles][n] a
  * vector, two where answers are below zero; memory O(n), or O(n tiles) of at most 1 GiB. Errors:
- * LAM_ERR_ARGUMENT (not whole days, where hours of the day are asked for; figures of the sun where the light
- * has no exact one), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. */
+ * LAM_ERR_ARGUMENT (not whole days, where hours of the day are asked for; no whole year for daylit; figures
+ * of the sun where the light has no exact one), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. */
 lam_status annual_apply(const annual_options *w, const emission *light, const lam_operator *op,
                         const lam_sky *sky, lam_quantity quantity, size_t n_selected,
                         const uint32_t *selected, const progress *steps, float **values,

@@ -40,6 +40,12 @@ lam_status annual_add(annual_options *w, const char *item, lam_error *error) {
         if (f.low <= 0)
             FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be above 0, in the unit of the answer", item);
         snprintf(f.name, sizeof f.name, "autonomy_%g", f.low);
+    } else if (strncmp(item, "daylit=", 7) == 0) {
+        TRY(option_number("--annual daylit:", item + 7, &f.low, error));
+        if (f.low <= 0)
+            FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be above 0, in the unit of the answer", item);
+        f.of_daylight = true;
+        snprintf(f.name, sizeof f.name, "daylit_%g", f.low);
     } else if (strncmp(item, "useful=", 7) == 0) {
         double bounds[2];
         TRY(option_numbers("--annual useful:", item + 7, 2, true, bounds, NULL, error));
@@ -52,7 +58,7 @@ lam_status annual_add(annual_options *w, const char *item, lam_error *error) {
         TRY(read_sun(item, &f, error));
     } else {
         FAIL(error, LAM_ERR_ARGUMENT,
-             "--annual %s: must be sum, autonomy=X, useful=LOW,HIGH, sun=X or sun=X,HOURS", item);
+             "--annual %s: must be sum, autonomy=X, useful=LOW,HIGH, daylit=X, sun=X or sun=X,HOURS", item);
     }
     for (size_t k = 0; k < w->n_figures; k++)
         if (strcmp(w->figures[k].name, f.name) == 0)

@@ -10,6 +10,7 @@
 void weather_span_free(weather_span *s) {
     free(s->middle);
     free(s->begins);
+    free(s->suns);
     *s = (weather_span){0};
 }
 
@@ -168,6 +169,18 @@ done:
     return status;
 }
 
+/* The ways to the suns of weather, in the axes of a tiling; the caller frees. */
+static lam_status take_suns(const weather_skies *w, const sky_tiling *tiling, double (**out)[3],
+                            lam_error *error) {
+    double(*suns)[3] = memory_allocate(w->n, sizeof *suns, "the suns", error);
+    if (suns == NULL) return LAM_ERR_MEMORY;
+    for (size_t v = 0; v < w->n; v++)
+        for (int d = 0; d < 3 && w->suns[v].horizontal > 0; d++)
+            suns[v][tiling->axis[d]] = (double)tiling->sign[d] * w->suns[v].direction[d];
+    *out = suns;
+    return LAM_OK;
+}
+
 lam_status weather_light_add(const weather_options *options, store *s, const mesh *m, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
                              emission *e, sunlight *sun, weather_span *span, lam_error *error) {
@@ -192,6 +205,7 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
         FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", options->path, e->n_vectors);
     *span = made.span;
     made.span = (weather_span){0};
+    TRY(take_suns(&made, &tiling, &span->suns, error));
     if (options->way != NULL) {
         const progress steps = terminal_progress(t);
         TRY(sun_way_measure(s, m, sky, made.suns, made.n, options->exact && !alone ? options->sun_points : 0,

@@ -17,6 +17,7 @@ typedef struct weather_span {
     double *middle; /* [n], of each row: hour of the day, standard time */
     double *begins; /* [n], of each row: hours from the beginning of the year, which has a 29 February where
                        the file has one */
+    double (*suns)[3]; /* [n], the way to the sun in the axes of the scene, 0 without; NULL: not known */
     weather_mended mended;
 } weather_span;
 

@@ -432,7 +432,8 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
         take_luminance(sensors.all != NULL ? lam_sensors_count(sensors.all) : output_width(&out), &made,
                        &one_channel, &out);
     TRY(reductions_fill(&out, error));
-    TRY(sensors.all != NULL ? solve_sensors_put(&sensors, &out, &lit.light, f->output, f->json, error)
+    TRY(sensors.all != NULL ? solve_sensors_put(&sensors, &out, &lit.light, (const double(*)[3])span.suns,
+                                                f->output, f->json, error)
                             : put_out(&out, f, error));
 done:
     free(scene);

@@ -20,6 +20,7 @@ bool eyes_are_rated(const solution *s) {
 }
 
 void eyes_free(eyes_asked *e) {
+    eye_sun_free(e->sight);
     free(e->direct);
     free(e->dimmer);
 }
@@ -46,14 +47,22 @@ static void take_vector(eyes_asked *e, size_t vector) {
     e->vector = vector;
 }
 
-lam_status eyes_open(const lam_sensors *all, const emission *light, eyes_asked *out, lam_error *error) {
-    eyes_asked e = {
-        .all = all, .light = light, .n_luminaires = lam_sensors_luminaires(all), .vector = SIZE_MAX};
-    e.direct = memory_allocate(lam_sensors_channels(all), lam_sensors_count(all) * sizeof *e.direct,
-                               "figures of eyes", error);
-    e.dimmer = memory_allocate(e.n_luminaires, sizeof *e.dimmer, "figures of eyes", error);
-    *out = e;
-    return e.direct != NULL && e.dimmer != NULL ? LAM_OK : LAM_ERR_MEMORY;
+lam_status eyes_open(const lam_sensors *all, const mesh *m, const emission *light, const double (*suns)[3],
+                     eyes_asked *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    eyes_asked *e = out;
+    *e = (eyes_asked){.all = all,
+                      .light = light,
+                      .suns = suns,
+                      .n_luminaires = lam_sensors_luminaires(all),
+                      .vector = SIZE_MAX};
+    e->direct = memory_allocate(lam_sensors_channels(all), lam_sensors_count(all) * sizeof *e->direct,
+                                "figures of eyes", error);
+    e->dimmer = memory_allocate(e->n_luminaires, sizeof *e->dimmer, "figures of eyes", error);
+    if (e->direct == NULL || e->dimmer == NULL) TRY(LAM_ERR_MEMORY);
+    if (suns != NULL) TRY(eye_sun_create(m, &e->sight, error));
+done:
+    return status;
 }
 
 /* The place of a receiver among the eyes, or their number. */
@@ -112,6 +121,10 @@ eye_figures eyes_rate(eyes_asked *e, const solution *s, size_t vector, size_t re
     const double others = all - direct > no_light * all ? all - direct : 0;
     out.background = others / M_PI;
     if (e->light->L != NULL) out.dgps = glare_simplified(all);
+    if (e->suns != NULL) {
+        const sensor_shown at = sensors_shown(e->all, receiver);
+        out.sun = eye_sun_is_seen(e->sight, at.at, at.axis, e->suns[vector]);
+    }
     out.reason = e->light->D == NULL || eye == eyes.n ? UGR_NO_LUMINAIRE : UGR_RATED;
     if (out.reason != UGR_RATED) return out;
     const double sum = sum_glare(e, eye, &out);
@@ -206,6 +219,7 @@ json_t *eyes_json(eyes_asked *e, const solution *s, size_t vector, size_t receiv
     json_t *out = json_pack("{s:o, s:o}", "ugr", number(f.ugr), "background", number(f.background));
     if (f.reason != UGR_RATED) json_object_set_new(out, "why", json_string(why));
     if (e->light->L != NULL) json_object_set_new(out, "dgps", number(f.dgps));
+    if (e->suns != NULL) json_object_set_new(out, "sun_seen", json_boolean(f.sun));
     if (parts && f.reason == UGR_RATED) json_object_set_new(out, "luminaires", parts_json(e, receiver));
     return out;
 }
@@ -238,7 +252,8 @@ void eyes_print(eyes_asked *e, const solution *s, const char *name, size_t first
                 printf(" %10.4g %10.4g", f.ugr, f.background);
             else
                 printf(" %10s %10.4g", "none", f.background);
-            if (e->light->L != NULL) printf(" %10.4g", f.dgps);
+            if (e->light->L != NULL)
+                printf(" %10.4g%s", f.dgps, e->suns == NULL ? "" : f.sun ? " sun" : "    ");
             if (f.reason != UGR_RATED)
                 printf("  %s", why);
             else if (!s->batch)

@@ -3,6 +3,7 @@
 #define LAMBERT_VERBS_SOLVE_EYES_H
 
 #include "solver/light/emission.h"
+#include "solver/sensor/eye_sun.h"
 #include "solver/verbs/solve_sensors.h"
 
 #include <jansson.h>
@@ -25,12 +26,15 @@ typedef struct eye_figures {
     double ugr;        /* NAN without */
     double background; /* L_b, cd/m2; NAN where the eye has no value */
     double dgps;       /* NAN where there is no sky */
+    bool sun;          /* its disc is seen */
 } eye_figures;
 
 /* The light by which eyes are rated. */
 typedef struct eyes_asked {
     const lam_sensors *all;
     const emission *light;
+    const double (*suns)[3]; /* [n_vectors], the way to the sun; NULL: it is not known */
+    eye_sun *sight;          /* beside it */
     size_t n_luminaires;
     float *direct;  /* [C][receivers], lx: of luminaires, in the vector below */
     double *dimmer; /* [luminaires], of luminance */
@@ -40,14 +44,17 @@ typedef struct eyes_asked {
 /* True where an answer has figures of eyes: in lx, of no year. */
 bool eyes_are_rated(const solution *s);
 
-/* Freed by eyes_free. Errors: LAM_ERR_MEMORY. */
-lam_status eyes_open(const lam_sensors *all, const emission *light, eyes_asked *out, lam_error *error);
+/* m: the scene; suns [n_vectors]: the ways to the sun in its axes, 0 without, or NULL. Freed by eyes_free,
+ * also after an error. Errors: LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
+lam_status eyes_open(const lam_sensors *all, const mesh *m, const emission *light, const double (*suns)[3],
+                     eyes_asked *out, lam_error *error);
 void eyes_free(eyes_asked *e);
 
 /* Rates an eye, a receiver, in the answer to a vector. */
 eye_figures eyes_rate(eyes_asked *e, const solution *s, size_t vector, size_t receiver);
 
-/* {"ugr", "background", "dgps"} of an eye, with "why" in place of a number, and with parts "luminaires":
+/* {"ugr", "background", "dgps", "sun_seen"} of an eye, with "why" in place of a number, and with parts
+ * "luminaires":
  * [{"name", "part", ...}], those that count, the largest first. NULL: not enough memory. */
 json_t *eyes_json(eyes_asked *e, const solution *s, size_t vector, size_t receiver, bool parts);
 

@@ -137,11 +137,10 @@ const option_row solve_year_rows[] = {
      .argument = "FIGURE",
      .help = "sum: over all hours, in 1000 h (kWh/m2 from W/m2, klx h from lx); autonomy=X: share of the "
              "hours (0 to 1) with at least X; useful=LOW,HIGH: share of the hours with LOW to HIGH, both "
-             "included (100,2000 lx); sun=X: hours with more than X by the sun itself; sun=X,HOURS: 1 where "
-             "these are "
-             "more than so many (sun=1000,250), else 0; may be repeated. X, LOW and HIGH are in the unit of "
-             "the answer: lx with "
-             "--photometric, --unit-out lx or a store in lm"},
+             "included (100,2000 lx); daylit=X: of a whole year, hours with at least X over those of "
+             "daylight, half of the year; sun=X: hours with more than X by the sun itself; sun=X,HOURS: 1 "
+             "where these are more than so many (sun=1000,250), else 0; may be repeated. X, LOW and HIGH are "
+             "in the unit of the answer: lx with --photometric, --unit-out lx or a store in lm"},
     {.name = "occupied",
      .kind = OPTION_TEXT,
      .offset = FIELD(occupied),

@@ -183,13 +183,13 @@ static void work_free(figures_work *w) {
 }
 
 static lam_status work_open(const sensor_choice *c, const solution *s, const emission *light,
-                            figures_work *out, lam_error *error) {
+                            const double (*suns)[3], figures_work *out, lam_error *error) {
     const size_t most = largest_set(c);
     *out = (figures_work){.c = c, .s = s, .rated = eyes_are_rated(s)};
     out->x = memory_allocate(most, sizeof *out->x, "figures of sensors", error);
     out->y = memory_allocate(most, sizeof *out->y, "figures of sensors", error);
     if (out->x == NULL || out->y == NULL) return LAM_ERR_MEMORY;
-    return eyes_open(c->all, light, &out->eyes, error);
+    return eyes_open(c->all, s->m, light, out->rated ? suns : NULL, &out->eyes, error);
 }
 
 /* "name, unit" of a vector and channel. */
@@ -240,13 +240,14 @@ static void print_modelling(const figures_work *w, size_t set, bool *begun) {
 }
 
 static void print_eyes(figures_work *w) {
+    const char *daylight = w->eyes.light->L == NULL ? "" : "       DGPs";
     bool begun = false;
     for (size_t k = 0; w->rated && k < w->c->n_sets; k++) {
         const sensor_set_shown set = sensors_set_shown(w->c->all, w->c->sets[k]);
         if (set.kind != SENSOR_SET_EYES) continue;
         if (!begun)
-            printf("\n%-24s %8s %-24s %10s %10s%s  %s\n", "eyes", "place", "of", "UGR", "cd/m2 back",
-                   w->eyes.light->L != NULL ? "       DGPs" : "", "parts of luminaires in UGR");
+            printf("\n%-24s %8s %-24s %10s %10s%s%s  %s\n", "eyes", "place", "of", "UGR", "L_b, cd/m2",
+                   daylight, w->eyes.suns != NULL ? "    " : "", "parts of luminaires in UGR");
         begun = true;
         eyes_print(&w->eyes, w->s, set.name, set.first, set.count);
     }
@@ -388,13 +389,13 @@ static lam_status put_npy(const sensor_choice *c, const solution *s, FILE *strea
 }
 
 lam_status solve_sensors_put(const sensor_choice *c, const solution *s, const emission *light,
-                             const char *path, bool as_json, lam_error *error) {
+                             const double (*suns)[3], const char *path, bool as_json, lam_error *error) {
     lam_status status = LAM_OK;
     atomic_file file = {0};
     char extension[16] = "";
     json_t *answer = NULL;
     figures_work work;
-    TRY(work_open(c, s, light, &work, error));
+    TRY(work_open(c, s, light, suns, &work, error));
     if (path == NULL && !as_json) {
         put_table(&work);
         goto done;

@@ -43,10 +43,11 @@ lam_status sensor_choice_least(const char *text, sensor_choice *out, lam_error *
 lam_status solve_sensors_check(const char *path, lam_error *error);
 
 /* Writes irradiances s->values [n_vectors][C][sensors of the store], the answers to a light: to path, or,
- * where that is NULL, to standard output, as a table or as JSON, both with figures of sets and of eyes. A
+ * where that is NULL, to standard output, as a table or as JSON, both with figures of sets and of eyes. suns
+ * [n_vectors]: the ways to the sun in the axes of the scene, 0 where none shines; NULL: not known. A
  * receiver without a value is NaN in NPY, null in JSON, empty in CSV and left out of figures. Errors:
  * LAM_ERR_IO, LAM_ERR_MEMORY. */
 lam_status solve_sensors_put(const sensor_choice *c, const solution *s, const emission *light,
-                             const char *path, bool as_json, lam_error *error);
+                             const double (*suns)[3], const char *path, bool as_json, lam_error *error);
 
 #endif

@@ -11,6 +11,7 @@ import numpy as np
 from case import Case
 from command import SMALL, must
 from ugr_rooms import FIXTURES, REFLECTANCES, eyes_of, table
+from weather import a_year, sun, wea
 
 ASSETS = ("--assets", FIXTURES)
 LUMINAIRES = {"luminaires": [
@@ -151,6 +152,69 @@ class Figures(Case):
         self.refused(2, "--at-least is for --sensors", "solve", self.room, "--at-least", "3")
         for text in ("", "3,", "x", "nan", ",".join("1" * 17)):
             self.refused(2, "--at-least", "solve", self.room, "--sensors", "all", "--at-least", text)
+
+    def test_daylight(self):
+        # A paved yard with a wall along its south; x is east and y north. Eyes look south into the wall, above it, and north.
+        with open(self.path("yard.obj"), "w", encoding="utf-8") as file:
+            file.write("v -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nv -9 -9 4\nv 9 -9 4\nf 1 2 3 4\nf 2 1 5 6\nf 1 2 6 5\n")
+        eyes = {"wall": ([0, -8.9, 1], [0, -1, 0]), "south": ([0, 0, 6], [0, -1, 0]), "north": ([0, 0, 6], [0, 1, 0])}
+        views = {name: np.array(view) for name, (_, view) in eyes.items()}
+        with open(self.path("s.json"), "w", encoding="utf-8") as file:
+            json.dump({"eyes": [{"name": name, "at": at, "view": view} for name, (at, view) in eyes.items()],
+                       "points": [{"name": "plane", "at": [[x, y, .8] for x in (-4, 0, 4) for y in (-8, 0, 8)]}]}, file)
+        must("precompute", self.path("yard.obj"), "--elements", 100, "--fix", "--reflectance", .3, "--sky", "tregenza", "--sensors",
+             self.path("s.json"), "--probes", 0, "-o", self.path("yard.h5"))
+        year = list(a_year())
+        with open(self.path("year.wea"), "w", encoding="utf-8") as file:
+            file.write(wea(year))
+        weather = ("--weather", self.path("year.wea"), "--photometric")
+        done = self.answer("--sensors", "all", *weather, store=self.path("yard.h5"))
+        found = {one["name"]: one for one in done["sensors"]}
+        suns = np.array([sun(2001, m, d, h) for m, d, h, _, _ in year])
+        shines = np.array([direct > 10 for *_, direct, _ in year]) & (suns[:, 2] > .02)
+        for name, view in views.items():
+            eye = [one[0] for one in found[name]["eyes"]]
+            values = np.array(found[name]["values"])[:, 0]
+            np.testing.assert_allclose([one["dgps"] for one in eye], 6.22e-5 * values + .184, rtol=1e-6)
+            seen, ahead = np.array([one["sun_seen"] for one in eye]), suns @ view
+            if name == "wall":
+                # From .1 m before it the wall is in the way, 3 m above and 9 m beside the eye: .1 / 3 of ahead.
+                self.assertFalse(seen[abs(ahead) > .04].any())
+                continue
+            clear = shines & (abs(ahead) > .02)
+            np.testing.assert_array_equal(seen[clear], ahead[clear] > 0)
+            self.assertFalse(seen[suns[:, 2] < -.02].any())
+            self.assertTrue(seen.any())
+        self.assertIn(" sun", must("solve", self.path("yard.h5"), "--sensors", "south", "--date", "21 Jun 12:00", *weather).stdout)
+        hours = np.array(found["plane"]["values"])
+        shares = json.loads(must("solve", self.path("yard.h5"), "--sensors", "plane", "--json", *weather, "--annual", "daylit=30000",
+                                 "--annual", "daylit=100", "--at-least", ".25,.5").stdout)["sensors"][0]
+        limits = (30000, 100)
+        for k, limit in enumerate(limits):
+            wanted = np.minimum((hours >= limit).sum(0) / (len(hours) / 2), 1)
+            np.testing.assert_allclose(shares["values"][k], wanted, atol=2 / len(hours))
+            np.testing.assert_allclose(shares["figures"][k]["share"],
+                                       [(np.array(shares["values"][k]) >= least).mean() for least in (.25, .5)])
+        self.assertTrue(0 < np.mean(shares["values"][0]) < 1)
+        self.failed("without --occupied", "solve", self.path("yard.h5"), "--sensors", "plane", *weather, "--annual", "daylit=300",
+                     "--occupied", "8-18")
+
+    def test_daylight_factor(self):
+        # Under an open overcast sky of CIE a horizontal plane has all of it; a vertical one has the sky's half and no ground.
+        with open(self.path("p.json"), "w", encoding="utf-8") as file:
+            json.dump({"points": [{"name": "up", "at": [0, 0, 1]}], "eyes": [{"name": "seat", "at": [0, 0, 1], "view": [0, 1, 0]}]},
+                      file)
+        with open(self.path("tile.obj"), "w", encoding="utf-8") as file:
+            file.write("v -.1 -.1 0\nv .1 -.1 0\nv .1 .1 0\nv -.1 .1 0\nf 1 2 3 4\n")
+        must("precompute", self.path("tile.obj"), "--elements", 4, "--fix", "--reflectance", 0, "--sky", "reinhart:4", "--ground-albedo", 0,
+             "--sensors", self.path("p.json"), "--probes", 0, "-o", self.path("tile.h5"))
+        done = self.answer("--figure", "daylight-factor", store=self.path("tile.h5"))
+        up, seat = done["sensors"]
+        self.assertEqual(done["unit"], "%")
+        # Of a sky (1 + 2 sin a) / 3 a vertical plane has (pi/2 + 4/3) / 3 over 7 pi / 9; 1,024 rays over 2,305 tiles leave 1 %.
+        self.assertAlmostEqual(up["values"][0], 100, delta=1)
+        self.assertAlmostEqual(seat["values"][0], 100 * (math.pi / 2 + 4 / 3) / 3 / (7 * math.pi / 9), delta=.5)
+        self.assertNotIn("eyes", seat)
 
     @unittest.skipIf(SMALL, "512 luminaires in a room take minutes under sanitizers")
     def test_a_room_of_cie_190(self):

@@ -158,6 +158,36 @@ START_TEST(bounds) {
 }
 END_TEST
 
+/* Half of the hours of a year are those of daylight: 3 of 6 months here, of which a place has 2 and 6 with so
+ * much; 6 of 3 are all. */
+START_TEST(hours_of_daylight) {
+    annual_options wish = {.hours = 1460, .from = 0, .to = 24};
+    lam_error error = {0};
+    lam_operator *op = NULL;
+    annual_summary sum = {0};
+    const float reflectance[1] = {.5f};
+    float light[] = {0, 100, 2000, 2001, 99, 1}, *values = NULL;
+    const emission e = {.n_vectors = 6, .batch = true, .E = light};
+    float *P = calloc(1, sizeof *P);
+    ck_assert_int_eq(operator_exact_create(1, 1, reflectance, P, &op, &error), LAM_OK);
+    static const char *const items[] = {"daylit=300", "daylit=1"};
+    for (size_t k = 0; k < 2; k++) ck_assert_int_eq(annual_add(&wish, items[k], &error), LAM_OK);
+    ck_assert_int_eq(annual_apply(&wish, &e, op, NULL, LAM_RADIOSITY, 0, NULL, NULL, &values, &sum, &error),
+                     LAM_OK);
+    ck_assert_float_eq(values[0], 2.f / 3);
+    ck_assert_float_eq(values[1], 1);
+    free(values);
+    wish.hours = 1;
+    ck_assert_int_eq(annual_apply(&wish, &e, op, NULL, LAM_RADIOSITY, 0, NULL, NULL, &values, &sum, &error),
+                     LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "6 vectors of 1 h, 0.25 days"));
+    wish.hours = 1460, wish.from = 8;
+    ck_assert_int_eq(annual_apply(&wish, &e, op, NULL, LAM_RADIOSITY, 0, NULL, NULL, &values, &sum, &error),
+                     LAM_ERR_ARGUMENT);
+    lam_operator_close(op);
+}
+END_TEST
+
 static bool stopped(void *context) {
     size_t *asked = context;
     return (*asked)++ == 1;
@@ -213,10 +243,10 @@ START_TEST(wrong) {
     annual_summary sum;
     float *values = NULL;
     static const char *const items[] = {
-        "",           "sums",         "sum=1",      "autonomy",     "autonomy=",
-        "autonomy=0", "autonomy=-1",  "autonomy=x", "autonomy=1,2", "autonomy=nan",
-        "useful=100", "useful=1,2,3", "useful=2,1", "useful=2,2",   "useful=-1,2",
-        "useful=1;2"};
+        "daylit",     "daylit=0",     "daylit=x",     "",           "sums",
+        "sum=1",      "autonomy",     "autonomy=",    "autonomy=0", "autonomy=-1",
+        "autonomy=x", "autonomy=1,2", "autonomy=nan", "useful=100", "useful=1,2,3",
+        "useful=2,1", "useful=2,2",   "useful=-1,2",  "useful=1;2"};
     static const char *const hours[] = {"",     "8",     "8-",    "-8",    "8-8",   "18-8", "0-25",
                                         "8:18", "8-18x", "8.5-9", " 8-18", "8--18", "8-180"};
     for (size_t k = 0; k < sizeof items / sizeof items[0]; k++)
@@ -262,6 +292,7 @@ int main(void) {
     tcase_set_timeout(c, 120);
     tcase_add_loop_test(c, figures, 0, 8);
     tcase_add_test(c, bounds);
+    tcase_add_test(c, hours_of_daylight);
     tcase_add_test(c, ctrl_c);
     tcase_add_test(c, no_memory);
     tcase_add_test(c, wrong);
