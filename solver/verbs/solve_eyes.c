@@ -15,8 +15,13 @@ static const double no_light = 1e-5;
 enum { NAMED = 4 };
 
 bool eyes_are_rated(const solution *s) {
+    return s->names == NULL;
+}
+
+/* True where values are illuminances, or channels of them. */
+static bool is_in_lux(const solution *s) {
     const size_t C = s->m->n_channels;
-    return s->names == NULL && (C == 1 || C == 3) && strcmp(output_unit(s, 0), "lx") == 0;
+    return (C == 1 || C == 3) && strcmp(output_unit(s, 0), "lx") == 0;
 }
 
 void eyes_free(eyes_asked *e) {
@@ -107,12 +112,14 @@ static double sum_glare(const eyes_asked *e, size_t eye, eye_figures *out) {
 }
 
 eye_figures eyes_rate(eyes_asked *e, const solution *s, size_t vector, size_t receiver) {
-    eye_figures out = {
-        .reason = UGR_NO_VALUE, .ugr = (double)NAN, .background = (double)NAN, .dgps = (double)NAN};
+    eye_figures out = {.reason = is_in_lux(s) ? UGR_NO_VALUE : UGR_NO_LUX,
+                       .ugr = (double)NAN,
+                       .background = (double)NAN,
+                       .dgps = (double)NAN};
     const size_t C = s->m->n_channels, count = lam_sensors_count(e->all);
     const sensor_eyes eyes = sensors_eyes(e->all);
     const size_t eye = eye_of(&eyes, receiver);
-    if (!lam_sensors_has_value(e->all, receiver)) return out;
+    if (out.reason == UGR_NO_LUX || !lam_sensors_has_value(e->all, receiver)) return out;
     take_vector(e, vector);
     const double all = luminance(C, s->values + vector * C * count + receiver, count),
                  direct = e->light->D != NULL
@@ -138,6 +145,7 @@ enum { WHY = 256 };
 static void reason_text(const eyes_asked *e, const eye_figures *f, size_t receiver, char text[WHY]) {
     static const char *const words[UGR_REASONS] = {
         [UGR_RATED] = "",
+        [UGR_NO_LUX] = "the answer is not in lx",
         [UGR_NO_VALUE] = "the eye lies in a wall or in a luminaire",
         [UGR_NO_LUMINAIRE] = "no luminaire of the store is lit",
         [UGR_NONE_COUNTS] = "no luminaire that is lit is seen at 3e-4 sr or more",
@@ -241,11 +249,11 @@ static void print_parts(const eyes_asked *e, size_t receiver) {
 }
 
 void eyes_print(eyes_asked *e, const solution *s, const char *name, size_t first, size_t count) {
-    char of[OUTPUT_COLUMN], why[WHY];
+    char of[32] = "", why[WHY];
     for (size_t vector = 0; vector < s->n_vectors; vector++)
         for (size_t i = first; i < first + count; i++) {
             const eye_figures f = eyes_rate(e, s, vector, i);
-            output_column(s, vector, 0, of);
+            if (s->batch) snprintf(of, sizeof of, "%zu", vector);
             reason_text(e, &f, i, why);
             printf("%-24s %8zu %-24s", name, i - first, of);
             if (f.reason == UGR_RATED)

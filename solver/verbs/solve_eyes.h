@@ -11,6 +11,7 @@
 /* Why an eye has no UGR. */
 typedef enum ugr_reason {
     UGR_RATED,
+    UGR_NO_LUX,        /* the answer is in another unit, or its channels have no luminance */
     UGR_NO_VALUE,      /* the eye has none */
     UGR_NO_LUMINAIRE,  /* none gives light, or the store does not say how eyes see them */
     UGR_FORBIDDEN,     /* one of them has no opening, or is too large for the formula */
@@ -41,7 +42,7 @@ typedef struct eyes_asked {
     size_t vector;
 } eyes_asked;
 
-/* True where an answer has figures of eyes: in lx, of no year. */
+/* True where an answer may have figures of eyes: it is one of lights, not of a year. */
 bool eyes_are_rated(const solution *s);
 
 /* m: the scene; suns [n_vectors]: the ways to the sun in its axes, 0 without, or NULL. Freed by eyes_free,

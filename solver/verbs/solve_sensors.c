@@ -246,8 +246,9 @@ static void print_eyes(figures_work *w) {
         const sensor_set_shown set = sensors_set_shown(w->c->all, w->c->sets[k]);
         if (set.kind != SENSOR_SET_EYES) continue;
         if (!begun)
-            printf("\n%-24s %8s %-24s %10s %10s%s%s  %s\n", "eyes", "place", "of", "UGR", "L_b, cd/m2",
-                   daylight, w->eyes.suns != NULL ? "    " : "", "parts of luminaires in UGR");
+            printf("\n%-24s %8s %-24s %10s %10s%s%s  %s\n", "eyes", "place", w->s->batch ? "vector" : "",
+                   "UGR", "L_b, cd/m2", daylight, w->eyes.suns != NULL ? "    " : "",
+                   "parts of luminaires in UGR");
         begun = true;
         eyes_print(&w->eyes, w->s, set.name, set.first, set.count);
     }
