@@ -190,7 +190,7 @@ class Annual(unittest.TestCase):
     def test_wrong_usage(self):
         store, light = self.stores["exact"], ["--sky", self.folder / "sky.npy"]
         for wanted, more in (
-                ("--annual total: must be sum, autonomy=X, useful=LOW,HIGH, sun=X or sun=X,HOURS", ["--annual", "total"]),
+                ("--annual total: must be sum, autonomy=X, useful=LOW,HIGH, daylit=X, sun=X or sun=X,HOURS", ["--annual", "total"]),
                 ("must be above 0", ["--annual", "autonomy=0"]),
                 ("must be LOW,HIGH with 0 <= LOW < HIGH", ["--annual", "useful=2000,100"]),
                 ("needs 2", ["--annual", "useful=2000"]),
