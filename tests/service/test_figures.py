@@ -217,6 +217,10 @@ class Figures(Case):
             np.testing.assert_allclose(shares["figures"][k]["share"],
                                        [(np.array(shares["values"][k]) >= least).mean() for least in (.25, .5)])
         self.assertTrue(0 < np.mean(shares["values"][0]) < 1)
+        others = json.loads(must("solve", self.path("yard.h5"), "--sensors", "plane", "--json", *weather, "--annual", "sum", "--annual",
+                                 "useful=100,2000").stdout)["sensors"][0]["values"]
+        np.testing.assert_allclose(others[0], hours.sum(0) / 1000, rtol=1e-4)  # sums of 8,760 in single precision
+        np.testing.assert_allclose(others[1], ((hours >= 100) & (hours <= 2000)).mean(0), atol=2 / len(hours))
         self.failed("without --occupied", "solve", self.path("yard.h5"), "--sensors", "plane", *weather, "--annual", "daylit=300",
                      "--occupied", "8-18")
 
