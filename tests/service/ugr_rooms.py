@@ -12,7 +12,7 @@ ROOMS = [(x, y) for x, lengths in ((2, (2, 3, 4, 6, 8, 12)), (4, (2, 3, 4, 6, 8,
          for y in lengths]
 REFLECTANCES = [(.7, .5, .2), (.7, .3, .2), (.5, .5, .2), (.5, .3, .2), (.3, .3, .2)]  # of ceiling, walls and floor
 VIEWS = ("across", "along")  # the lamps
-UPWARDS = {"09": .25}  # metres below the ceiling of luminaires with light upwards, which tables let fall on the ceiling
+UPWARDS = {"09": .05}  # metres below the ceiling of luminaires with light upwards, which tables let fall on the ceiling
 ROUND = ("09",)  # the same across and along
 
 
