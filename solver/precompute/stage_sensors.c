@@ -1,7 +1,7 @@
 /* Sensors of --sensors or of a store: the weights with which light comes to them, and that of luminaires. */
 #include "solver/precompute/stages.h"
-#include "solver/sensor/probe_grid.h"
 #include "solver/sensor/eye_luminaires.h"
+#include "solver/sensor/probe_grid.h"
 #include "solver/sensor/sensor_luminaires.h"
 #include "solver/sensor/sensors_store.h"
 

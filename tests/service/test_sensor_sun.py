@@ -119,7 +119,7 @@ class SensorSun(Case):
 
     def test_ground(self):
         """A ground of .3 in the open lights what looks down by .3 E_h, walls by half and spheres by a half of that; hours of sun leave
-        it out. What elements have is the same, but that they have no weights of their own."""
+        it out. Elements have the same, without weights of their own."""
         faces = Quads()
         faces.grid("far", 2, -50, 1, [90, 91], [90, 91])
         faces.write(self.path("open.obj"), 0)

@@ -277,7 +277,7 @@ START_TEST(open_side) {
     polygon_measure(&opening);
     add_walls(&m, 12);
     mesh_finish(&m, .5f);
-    for (int k = 0; k < N; k++) { /* those of CIE 171, case 5.9 */
+    for (int k = 0; k < N; k++) { /* The points are those of CIE 171, case 5.9. */
         const bool on_wall = k < ON_WALL;
         r[k].axis[on_wall ? 1 : 2] = 1;
         r[k].at[0] = 2;
