@@ -115,12 +115,13 @@ lam_status lam_operator_apply_parts(const lam_operator *op, size_t n_parts, cons
  * lam_operator_apply_emitters and lam_operator_adjoint_emitters take their place. */
 size_t lam_operator_emitters(const lam_operator *op);
 
-/* The name of emitter k; owned by the operator. */
+/* The name of emitter k; owned by the operator. The store's luminaires are the last emitters of one that has
+ * luminaires, in their order; weights of them are dimmers. */
 const char *lam_operator_emitter_name(const lam_operator *op, size_t k);
 
 /* The weights W [n_rhs][C][s] whose emitters together are the emissions E [n_rhs][C][n] and the sky of
- * radiances L [n_rhs][C][n_tiles]; either may be NULL, for none. Errors: LAM_ERR_ARGUMENT names an element or
- * a tile whose light no weights give (to 1e-5 of it), LAM_ERR_MEMORY. */
+ * radiances L [n_rhs][C][n_tiles]; either may be NULL, for none. The weights of luminaires are 0. Errors:
+ * LAM_ERR_ARGUMENT names an element or a tile whose light no weights give (to 1e-5 of it), LAM_ERR_MEMORY. */
 lam_status lam_operator_weights(const lam_operator *op, size_t n_rhs, const float *E, size_t n_tiles,
                                 const float *L, float *W, lam_error *error);
 

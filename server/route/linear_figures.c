@@ -7,6 +7,7 @@
 #include "server/scene/direct_light.h"
 #include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
+#include "solver/operator/emitters.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -54,6 +55,8 @@ static bool weights_of(const call *in, radiosity_request *request, float **weigh
         return problem_set(why, status == LAM_ERR_MEMORY ? PROBLEM_NO_MEMORY : PROBLEM_NOT_IN_STORE, "%s",
                            error.message);
     for (size_t k = 0; k < request->emitters.n * row; k++) (*weights)[k] += request->emitters.values[k];
+    if (request->luminaires.values != NULL)
+        operator_emitters_dim(s->op, request->luminaires.n, request->luminaires.values, *weights);
     return true;
 }
 

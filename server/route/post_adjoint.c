@@ -112,6 +112,13 @@ static void add(size_t count, const float *x, float *to) {
     for (size_t k = 0; k < count; k++) to[k] += x[k];
 }
 
+/* D [C][k], those of the last of the emitters W [C][s]. */
+static void take_luminaires(const scene *s, const float *W, float *D) {
+    const size_t k = scene_luminaires(s);
+    for (size_t c = 0; c < s->n_channels; c++)
+        memcpy(D + c * k, W + (c + 1) * s->n_emitters - k, k * sizeof *D);
+}
+
 /* Computes the gradients asked for: by emission in w, by reflectance in H, by tile or emitter in narrow,
  * by group in of_groups, by luminaire in dimmers. */
 static bool solve(const scene *s, const adjoint_request *request, adjoint_memory *memory, metrics *m,
@@ -120,10 +127,13 @@ static bool solve(const scene *s, const adjoint_request *request, adjoint_memory
     const size_t vector = s->n_channels * s->n;
     lam_error error;
     metrics_pass(m, 1);
-    if (s->n_emitters > 0)
-        return lam_operator_adjoint_emitters(s->op, 1, request->quantity, g, memory->narrow, memory->work,
-                                             memory->work_bytes, &error) == LAM_OK ||
-               problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+    if (s->n_emitters > 0) {
+        if (lam_operator_adjoint_emitters(s->op, 1, request->quantity, g, memory->narrow, memory->work,
+                                          memory->work_bytes, &error) != LAM_OK)
+            return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+        take_luminaires(s, memory->narrow, memory->dimmers);
+        return true;
+    }
     if (lam_operator_apply_adjoint(s->op, 1, request->quantity, g, memory->w, memory->work,
                                    memory->work_bytes, &error) != LAM_OK)
         return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);

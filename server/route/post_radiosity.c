@@ -13,6 +13,7 @@
 #include "solver/base/clock.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
+#include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
 
 #include <math.h>
@@ -103,6 +104,8 @@ static bool find_light(const call *in, radiosity_solve *solve, problem *why) {
                            error.message);
     for (size_t k = 0; request->emitters.values != NULL && k < request->n_rhs * C * s->n_emitters; k++)
         solve->W[k] += request->emitters.values[k];
+    if (request->luminaires.values != NULL)
+        operator_emitters_dim(s->op, request->n_rhs, request->luminaires.values, solve->W);
     return true;
 }
 

@@ -139,6 +139,9 @@ static bool light_emitters(const scene *s, const radiosity_request *request, siz
     TRY(lam_operator_weights(s->op, count, request->E + first * C * s->n, n_tiles, L, p->W, &error));
     for (size_t k = 0; request->emitters.values != NULL && k < count * weights; k++)
         p->W[k] += request->emitters.values[first * weights + k];
+    if (request->luminaires.values != NULL)
+        operator_emitters_dim(s->op, count, request->luminaires.values + first * C * scene_luminaires(s),
+                              p->W);
     TRY(operator_emitters_light_double(s->op, count, p->W, p->E, p->H0, &error));
     TRY(lam_operator_apply_emitters(s->op, count, LAM_INDIRECT, p->W, s->n, NULL, p->start, p->work,
                                     p->work_bytes, &error));

@@ -177,8 +177,10 @@ static void fill_from_elements(const scene *s, const float *w, float *g, adjoint
 /* w is [C][s]; entries of groups and tiles without weights become NaN. */
 static void fill_from_emitters(const scene *s, const emitter_weights *weights, const float *w,
                                adjoint_row *row) {
-    const size_t n_emitters = s->n_emitters, C = s->n_channels, m = scene_tiles(s);
+    const size_t n_emitters = s->n_emitters, C = s->n_channels, m = scene_tiles(s), k = scene_luminaires(s);
     const size_t n_groups = s->groups.n_groups;
+    for (size_t c = 0; c < C; c++) /* which are the last emitters */
+        memcpy(row->luminaires + c * k, w + (c + 1) * n_emitters - k, k * sizeof *w);
     memcpy(row->emitters, w, C * n_emitters * sizeof *w);
     for (size_t c = 0; c < C; c++) {
         for (size_t h = 0; h < n_groups; h++)

@@ -120,10 +120,10 @@ typedef struct vector_light {
  * when memory is short. */
 static bool light_of_weights(const scene *s, const float *weights, float *own, vector_light *out) {
     const size_t vector = s->n_channels * s->n;
-    const bool sky = operator_emitters_of(s->op)->a.L != NULL;
+    const bool sky = operator_emitters_of(s->op)->a.L != NULL, direct = sky || s->luminaires != NULL;
     if (operator_emitters_light(s->op, 1, weights, own, own + vector, NULL) != LAM_OK) return false;
     if (sky) operator_emitters_radiances(s->op, 1, weights, own + 2 * vector);
-    *out = (vector_light){own, sky ? own + vector : NULL, sky ? own + 2 * vector : NULL};
+    *out = (vector_light){own, direct ? own + vector : NULL, sky ? own + 2 * vector : NULL};
     return true;
 }
 

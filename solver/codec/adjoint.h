@@ -35,8 +35,8 @@ static inline bool adjoint_wants(const adjoint_request *request, gradient_kind k
 }
 
 /* Both as codec_read_json. Without `gradient`, emission is meant; with emission a store's sky is, and its
- * luminaires, and in a store of few emitters these alone. 422 also for what the store has not, and for
- * reflectance without emission. */
+ * luminaires, and in a store of few emitters that by these and luminaires. 422 also for what the store has
+ * not, and for reflectance without emission. */
 bool codec_read_adjoint_json(const codec_scene *scene, const char *text, size_t length,
                              adjoint_request *request, problem *why);
 

@@ -32,10 +32,11 @@ static bool check_gradient(parser *p, gradient_kind kind) {
                              parser_here(p));
     case GRADIENT_SKY:
     case GRADIENT_LUMINAIRES:
-        if (scene->n_emitters > 0)
-            return parser_refuse(p, PROBLEM_NOT_IN_STORE,
-                                 "%s: a store of few emitters has the gradient by emitters only",
-                                 parser_here(p));
+        if (scene->n_emitters > 0 && kind == GRADIENT_SKY)
+            return parser_refuse(
+                p, PROBLEM_NOT_IN_STORE,
+                "%s: a store of few emitters has the gradients by emitters and luminaires only",
+                parser_here(p));
         if (kind == GRADIENT_LUMINAIRES)
             return scene->n_luminaires > 0 ||
                    parser_refuse(p, PROBLEM_NOT_IN_STORE,
@@ -118,13 +119,11 @@ static bool read_body(parser *p, adjoint_request *request) {
 static void settle(const codec_scene *scene, adjoint_request *request) {
     if (request->n_named == 0) request->named[request->n_named++] = GRADIENT_EMISSION;
     for (size_t k = 0; k < request->n_named; k++) {
-        if (request->named[k] == GRADIENT_EMISSION && scene->n_emitters > 0)
-            request->named[k] = GRADIENT_EMITTERS;
+        const bool emission = request->named[k] == GRADIENT_EMISSION;
+        if (emission && scene->n_emitters > 0) request->named[k] = GRADIENT_EMITTERS;
         request->wanted |= 1u << request->named[k];
-        if (request->named[k] == GRADIENT_EMISSION && scene->n_tiles > 0)
-            request->wanted |= 1u << GRADIENT_SKY;
-        if (request->named[k] == GRADIENT_EMISSION && scene->n_luminaires > 0)
-            request->wanted |= 1u << GRADIENT_LUMINAIRES;
+        if (emission && scene->n_emitters == 0 && scene->n_tiles > 0) request->wanted |= 1u << GRADIENT_SKY;
+        if (emission && scene->n_luminaires > 0) request->wanted |= 1u << GRADIENT_LUMINAIRES;
     }
 }
 

@@ -319,16 +319,29 @@ static bool read_luminaires(parser *p) {
         return parser_refuse(p, PROBLEM_NOT_IN_STORE,
                              "%s: the store has no luminaires; precompute it with --luminaires",
                              parser_here(p));
-    if (scene->n_emitters > 0)
-        return parser_refuse(
-            p, PROBLEM_NOT_IN_STORE,
-            "%s: luminaires are answered by other kinds of stores, not by one of few emitters",
-            parser_here(p));
     if (!parser_expect(p, JSON_OBJECT, "an object of names and dimmers")) return false;
     if (!radiosity_request_luminaires(p->request, scene, &D, p->why)) return refused_here(p);
     const named_sources of = {"luminaire", scene->n_luminaires, scene->luminaires->each.names,
                               parser_find_luminaires};
     return read_by_name(p, &of, D);
+}
+
+/* Weights of emitters that are luminaires become dimmers, beside those that are given as such. */
+static bool part_luminaires(parser *p) {
+    const codec_scene *scene = p->scene;
+    const size_t s = scene->n_emitters, k = scene->n_luminaires;
+    float *W, *D;
+    bool any = false;
+    if (!radiosity_request_emitters(p->request, scene, &W, p->why)) return refused_here(p);
+    for (size_t w = 0; w < scene->n_channels * s; w++) any = any || (w % s >= s - k && W[w] != 0);
+    if (!any) return true;
+    if (!radiosity_request_luminaires(p->request, scene, &D, p->why)) return refused_here(p);
+    for (size_t c = 0; c < scene->n_channels; c++)
+        for (size_t j = 0; j < k; j++) {
+            D[c * k + j] += W[c * s + s - k + j];
+            W[c * s + s - k + j] = 0;
+        }
+    return true;
 }
 
 /* The members of an emission that is an object. */
@@ -397,6 +410,7 @@ static bool read_emission_object(parser *p) {
                              "%s must hold either elements and values or groups or emitters, or a sky, a sun "
                              "or luminaires",
                              parser_here(p));
+    if (emitters && !part_luminaires(p)) return false;
     if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold both elements and values",
                              parser_here(p));

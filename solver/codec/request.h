@@ -19,7 +19,7 @@ typedef struct codec_scene {
     const group_index *groups;         /* measured, where lights may be given as flux */
     const face_index *faces;           /* of the scene file; NULL or empty: they are not known */
     size_t n_tiles;                    /* of the sky; 0: none */
-    size_t n_emitters;                 /* 0: none */
+    size_t n_emitters;                 /* 0: none; the last of them are the luminaires */
     const group_index *emitters;       /* these by name; NULL: they have none */
     size_t n_luminaires;               /* 0: none */
     const luminaire_names *luminaires; /* these by name; not NULL where there are any */

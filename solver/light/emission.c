@@ -279,6 +279,7 @@ lam_status emission_choose(const emission_scene *scene, const emission_options *
     e.luminaires = scene->luminaires;
     if (options->dims->count > 0) TRY(emission_dim(scene, options->dims, &e, error));
     if (options->sky != NULL) TRY(emission_add_sky(&e, options->sky, scene, options->photometric, error));
+    TRY(emission_part_luminaires(scene, &e, error));
     *out = e;
     e = (emission){0};
 done:

@@ -39,7 +39,8 @@ typedef struct emission_scene {
     const mesh *m; /* borrowed */
     group_index groups;
     group_index emitters;             /* by name, once emission_scene_sources was called */
-    size_t n_tiles, n_emitters;       /* of the store's sky and operator; 0: none */
+    size_t n_tiles, n_emitters;       /* of the store's sky and operator; 0: none. The last emitters are the
+                                         luminaires */
     char tiling[32];                  /* of the sky; "": not known */
     const lam_luminaires *luminaires; /* borrowed; NULL: the store has none */
     luminaire_names names;            /* of these */
@@ -84,6 +85,10 @@ lam_status emission_check_dims(const option_list *items, lam_error *error);
 
 /* Puts all luminaires beside the one vector of e, dimmed as their list says; nothing where there are none. */
 lam_status emission_dim_as_listed(const emission_scene *scene, emission *e, lam_error *error);
+
+/* Weights of emitters that are luminaires become dimmers, beside those that e has; of other emitters they
+ * stay weights. Errors: LAM_ERR_MEMORY. */
+lam_status emission_part_luminaires(const emission_scene *scene, emission *e, lam_error *error);
 
 /* Reads a file. NPY: <f4 or <f8 of shape (n), (C, n) or a batch (b, C, n), and (b, n) for one channel. JSON:
  * the contract's EMISSION, or an object with one as `emission` or with a batch of them as `emissions`.

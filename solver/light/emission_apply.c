@@ -118,7 +118,7 @@ static void gather(size_t n, const size_t *vectors, size_t width, const float *f
     for (size_t k = 0; k < n; k++) memcpy(to + k * width, from + vectors[k] * width, width * sizeof *to);
 }
 
-/* The weights of the emitters: those given, and those found from E and L. */
+/* The weights of the emitters: those given, those found from E and L, and the dimmers of luminaires. */
 static lam_status find_weights(emission_pass *p, size_t n, const size_t *vectors, lam_error *error) {
     lam_status status = LAM_OK;
     const emission *e = p->light;
@@ -126,6 +126,7 @@ static lam_status find_weights(emission_pass *p, size_t n, const size_t *vectors
     TRY(lam_operator_weights(p->op, n, p->E, p->sky != NULL ? lam_sky_tiles(p->sky) : 0, p->L, p->W, error));
     for (size_t k = 0; e->W != NULL && k < n * row; k++)
         p->W[k] += e->W[(e->steady ? 0 : vectors[k / row] * row) + k % row];
+    if (p->D != NULL) operator_emitters_dim(p->op, n, p->D, p->W);
 done:
     return status;
 }

@@ -98,6 +98,24 @@ done:
     return status;
 }
 
+lam_status emission_part_luminaires(const emission_scene *scene, emission *e, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t s = scene->n_emitters, k = luminaire_names_count(&scene->names), C = scene->m->n_channels;
+    const size_t rows = (e->steady ? 1 : e->n_vectors) * C;
+    bool any = false;
+    for (size_t w = 0; e->W != NULL && w < rows * s; w++) any = any || (w % s >= s - k && e->W[w] != 0);
+    if (!any) return LAM_OK;
+    if (e->D == NULL) TRY(emission_allocate("dimmers", C, k, rows / C, &e->D, error));
+    for (size_t row = 0; row < rows; row++)
+        for (size_t j = 0; j < k; j++) {
+            e->D[row * k + j] += e->W[row * s + s - k + j];
+            e->W[row * s + s - k + j] = 0;
+        }
+    e->luminaires = scene->luminaires;
+done:
+    return status;
+}
+
 lam_status emission_dim_as_listed(const emission_scene *scene, emission *e, lam_error *error) {
     lam_status status = LAM_OK;
     if (scene->luminaires == NULL) return LAM_OK;

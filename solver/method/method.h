@@ -21,7 +21,17 @@ typedef struct emitter_source {
     size_t n_tiles;            /* of the sky; 0: none */
     const float *L;            /* [s][C][m], radiances of its tiles; NULL: no emitter is of the sky */
     const float *first_bounce; /* [m][n], sr */
+    /* Luminaires, which are emitters behind these. */
+    size_t n_luminaires;
+    const char *const *luminaires; /* [n_luminaires], names */
+    const float *H;                /* [n_luminaires][n], lx at dimmer 1 */
+    const double *factors;         /* [C][n_luminaires], their colours */
 } emitter_source;
+
+/* All emitters, luminaires with them. */
+static inline size_t emitter_source_count(const emitter_source *from) {
+    return from->s + from->n_luminaires;
+}
 
 /* The input of every method. All in mesh order; order[position] = element is the Z-order. */
 typedef struct build_problem {

@@ -1,6 +1,7 @@
 /* emitters: where only a few things can shine, the light of each of them is all there is to know (Aguerre
  * 2016, section 4.4.3). */
 #include "solver/operator/emitters.h"
+#include "solver/operator/luminaire_light.h"
 
 #include "solver/base/clock.h"
 #include "solver/method/choice.h"
@@ -21,9 +22,10 @@ static const option_row rows[] = {
     {.name = "emitters",
      .kind = OPTION_TEXT,
      .offset = offsetof(emitters_options, emitters),
-     .argument = "FILE|group=NAME|sky",
+     .argument = "FILE|group=NAME|sky|luminaires",
      .help = "The emissions that the store answers: each of a .json or .npy file, each of the groups "
-             "NAME,NAME, or every tile of --sky; --method auto then takes emitters"},
+             "NAME,NAME, every tile of --sky, or luminaires alone, which come beside all others too; "
+             "--method auto then takes emitters"},
     {.name = "positions",
      .kind = OPTION_TEXT,
      .offset = offsetof(emitters_options, positions),
@@ -66,25 +68,35 @@ static const option_row rows[] = {
     {0},
 };
 
-static const char missing[] =
-    "--method emitters: give --emitters FILE, group=NAME or sky, or --positions FILE, or --path FILE";
+static const char missing[] = "--method emitters: give --emitters FILE, group=NAME, sky or luminaires, or "
+                              "--positions FILE, or --path FILE";
 
 /* Residual at which the light of an emitter counts as converged: a few units of single precision. */
 static const double tolerance = 1e-6;
 
+/* Names of emitters, and those of luminaires behind them. */
+static lam_status gather_names(const emitter_source *from, emitter_arrays *a, lam_error *error) {
+    const char **all = memory_allocate(a->s, sizeof *all, "names of emitters", error);
+    if (all == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < a->s; k++) all[k] = k < from->s ? from->names[k] : from->luminaires[k - from->s];
+    const lam_status status = emitter_names_copy(a->s, all, &a->names, error);
+    free(all);
+    return status;
+}
+
 /* The emission of the elements themselves, without the zeros. */
 static lam_status gather_emission(const build_problem *problem, emitter_arrays *a, lam_error *error) {
-    const size_t n = problem->n, C = problem->n_channels, s = a->s;
+    const size_t n = problem->n, C = problem->n_channels, s = a->s, n_sent = problem->emitters->s;
     const float *E = problem->emitters->E;
     uint64_t entries = 0, at = 0;
-    for (size_t k = 0; k < s * C * n; k++) entries += E[k] > 0;
+    for (size_t k = 0; k < n_sent * C * n; k++) entries += E[k] > 0;
     a->ends = memory_allocate(C * s + 1, sizeof *a->ends, "emissions", error);
     a->elements = memory_allocate((size_t)entries, sizeof *a->elements, "emissions", error);
     a->values = memory_allocate((size_t)entries, sizeof *a->values, "emissions", error);
     if (a->ends == NULL || a->elements == NULL || a->values == NULL) return LAM_ERR_MEMORY;
     for (size_t row = 0; row < C * s; row++) {
         const float *of_one = E + (row % s * C + row / s) * n;
-        for (size_t i = 0; i < n; i++) {
+        for (size_t i = 0; row % s < n_sent && i < n; i++) {
             if (!(of_one[i] > 0)) continue;
             a->elements[at] = (uint32_t)i;
             a->values[at++] = of_one[i];
@@ -102,18 +114,27 @@ static lam_status gather_sky(const build_problem *problem, emitter_arrays *a, la
     a->n_tiles = m;
     a->L = memory_allocate(C * s, m * sizeof *a->L, "radiances", error);
     if (a->L == NULL) return LAM_ERR_MEMORY;
-    for (size_t row = 0; row < C * s; row++)
-        memcpy(a->L + row * m, from->L + (row % s * C + row / s) * m, m * sizeof *a->L);
+    for (size_t row = 0; row < C * s; row++) /* the radiances of luminaires stay 0 */
+        if (row % s < from->s)
+            memcpy(a->L + row * m, from->L + (row % s * C + row / s) * m, m * sizeof *a->L);
     return sky_create(m, problem->n, from->first_bounce, &a->sky, error);
 }
 
-/* Two arrays [s][n] of one channel: what is emitted, and what the sky gives directly. */
+/* Two arrays [s][n] of one channel: what is emitted, and what the sky and luminaires give directly. */
 static void light_of_channel(const build_problem *problem, const emitter_arrays *a, size_t c, float *E,
                              float *H0) {
+    const emitter_source *from = problem->emitters;
     const size_t n = problem->n, s = a->s;
-    for (size_t k = 0; k < s; k++)
-        memcpy(E + k * n, problem->emitters->E + (k * problem->n_channels + c) * n, n * sizeof *E);
-    if (H0 != NULL) lam_sky_irradiance(a->sky, s, a->L + c * s * a->n_tiles, H0);
+    memset(E, 0, s * n * sizeof *E);
+    for (size_t k = 0; k < from->s; k++)
+        memcpy(E + k * n, from->E + (k * problem->n_channels + c) * n, n * sizeof *E);
+    if (H0 == NULL) return;
+    memset(H0, 0, s * n * sizeof *H0);
+    if (a->L != NULL) lam_sky_irradiance(a->sky, s, a->L + c * s * a->n_tiles, H0);
+    for (size_t k = 0; k < from->n_luminaires; k++)
+        for (size_t i = 0; i < n; i++)
+            H0[(from->s + k) * n + i] =
+                (float)(from->factors[c * from->n_luminaires + k] * (double)from->H[k * n + i]);
 }
 
 static lam_status build(const build_problem *problem, const build_options *options, const void *own,
@@ -127,15 +148,18 @@ static lam_status build(const build_problem *problem, const build_options *optio
     size_t sweeps = 0;
     (void)own;
     if (problem->emitters == NULL) FAIL(error, LAM_ERR_ARGUMENT, "%s", missing);
-    const size_t s = a.s = problem->emitters->s;
-    TRY(emitter_names_copy(s, problem->emitters->names, &a.names, error));
+    const emitter_source *from = problem->emitters;
+    const size_t s = a.s = emitter_source_count(from);
+    TRY(gather_names(from, &a, error));
     TRY(gather_emission(problem, &a, error));
     TRY(gather_sky(problem, &a, error));
+    if (from->n_luminaires > 0)
+        TRY(luminaires_create(from->n_luminaires, n, C, from->H, from->factors, &a.luminaires, error));
     a.T = memory_allocate(C * s, n * sizeof *a.T, "light of emitters", error);
     E = memory_allocate(s, n * sizeof *E, "emissions", error);
     if (a.T == NULL || E == NULL) TRY(LAM_ERR_MEMORY);
-    if (a.L != NULL) {
-        H0 = memory_allocate(s, n * sizeof *H0, "light of the sky", error);
+    if (a.L != NULL || a.luminaires != NULL) {
+        H0 = memory_allocate(s, n * sizeof *H0, "direct light", error);
         if (H0 == NULL) TRY(LAM_ERR_MEMORY);
     }
     for (size_t c = 0; c < C; c++) {
@@ -159,7 +183,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     report_count(report, "sweeps", (double)sweeps);
     report_step_add(report, "invert", clock_seconds() - started);
     snprintf(report->detail, sizeof report->detail,
-             "%zu asked for by --emitters, each converged to %.2g in %zu sweeps", s, residual, sweeps);
+             "%zu asked for by --emitters%s, each converged to %.2g in %zu sweeps", s,
+             from->n_luminaires > 0 ? " and --luminaires" : "", residual, sweeps);
 done:
     emitter_arrays_free(&a);
     free(E);
@@ -195,8 +220,13 @@ static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_e
     if (p->emitters == NULL && o->emitters == NULL && !emitters_are_positions(o)) return LAM_OK;
     out->claim = CLAIM_INPUT;
     if (p->emitters == NULL) return LAM_OK;
-    out->cost = (double)p->n * (double)p->emitters->s;
-    snprintf(out->found, sizeof out->found, "--emitters names %zu", p->emitters->s);
+    const size_t s = emitter_source_count(p->emitters);
+    out->cost = (double)p->n * (double)s;
+    if (p->emitters->n_luminaires > 0)
+        snprintf(out->found, sizeof out->found, "--emitters names %zu, with %zu luminaires", s,
+                 p->emitters->n_luminaires);
+    else
+        snprintf(out->found, sizeof out->found, "--emitters names %zu", s);
     return LAM_OK;
 }
 

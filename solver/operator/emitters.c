@@ -4,6 +4,7 @@
 
 #include "solver/base/work_area.h"
 #include "solver/linalg/csr.h"
+#include "solver/operator/luminaire_light.h"
 #include "solver/operator/sky_light.h"
 #include "store/groups.h"
 
@@ -35,6 +36,7 @@ void emitter_arrays_free(emitter_arrays *a) {
     lam_sky_close(a->sky);
     free(a->direct);
     free(a->exitance);
+    lam_luminaires_close(a->luminaires);
     *a = (emitter_arrays){.s = 0};
 }
 
@@ -77,6 +79,11 @@ static lam_status check_light(const emitter_arrays *a, size_t n, size_t n_channe
     if (a->L != NULL &&
         (a->sky == NULL || lam_sky_tiles(a->sky) != a->n_tiles || lam_sky_elements(a->sky) != n))
         FAIL(error, LAM_ERR_FORMAT, STORE_OPERATOR "/L is of %zu tiles, the store's sky is not", a->n_tiles);
+    if (a->luminaires != NULL &&
+        (emitters_luminaires(a) > a->s || lam_luminaires_elements(a->luminaires) != n ||
+         lam_luminaires_channels(a->luminaires) != n_channels))
+        FAIL(error, LAM_ERR_FORMAT, STORE_OPERATOR "/names: %zu luminaires do not fit %zu emitters",
+             emitters_luminaires(a), a->s);
     for (size_t k = 0; a->direct != NULL && k < a->s * n; k++)
         if (!(a->direct[k] >= 0 && isfinite(a->direct[k])))
             FAIL(error, LAM_ERR_NUMERIC, STORE_OPERATOR "/direct[%zu] = %g, must be at least 0", k,
@@ -185,6 +192,28 @@ static lam_status load_emission(store *s, size_t rows, emitter_arrays *a, lam_er
     return LAM_OK;
 }
 
+/* The last emitters are the store's luminaires, as an attribute says. */
+static lam_status load_luminaires(store *s, size_t n, size_t n_channels, emitter_arrays *a,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    int64_t count = 0;
+    if (store_has_attribute(s, STORE_OPERATOR, "luminaires"))
+        TRY(store_get_integer(s, STORE_OPERATOR, "luminaires", &count, error));
+    TRY(luminaires_load(s, n, n_channels, &a->luminaires, error));
+    const size_t k = emitters_luminaires(a);
+    if (count < 0 || (size_t)count != k || k > a->s)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: " STORE_OPERATOR " counts %lld luminaires among %zu emitters, " STORE_LUMINAIRES " has %zu",
+             store_path(s), (long long)count, a->s, k);
+    for (size_t j = 0; j < k; j++)
+        if (strcmp(lam_luminaires_name(a->luminaires, j), a->names[a->s - k + j]) != 0)
+            FAIL(error, LAM_ERR_FORMAT,
+                 "%s: emitter %zu is %.60s, and luminaire %zu is %.60s, must be the same", store_path(s),
+                 a->s - k + j, a->names[a->s - k + j], j, lam_luminaires_name(a->luminaires, j));
+done:
+    return status;
+}
+
 static lam_status emitters_load(store *s, size_t n, size_t n_channels, const float *reflectance,
                                 lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
@@ -217,6 +246,7 @@ static lam_status emitters_load(store *s, size_t n, size_t n_channels, const flo
         a.exitance = data;
         data = NULL;
     }
+    TRY(load_luminaires(s, n, n_channels, &a, error));
     TRY(operator_emitters_create(n, n_channels, reflectance, &a, op, error));
 done:
     free(data);
@@ -250,6 +280,8 @@ static lam_status emitters_save(const lam_operator *op, store *s, lam_error *err
         TRY(store_write(s, STORE_OPERATOR "/direct", STORE_F32, 2, dims + 1, a->direct, error));
         TRY(store_write(s, STORE_OPERATOR "/exitance", STORE_F32, 1, dims, a->exitance, error));
     }
+    if (a->luminaires != NULL)
+        TRY(store_set_integer(s, STORE_OPERATOR, "luminaires", (int64_t)emitters_luminaires(a), error));
 done:
     free(B);
     free(by_row);

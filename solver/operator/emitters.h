@@ -19,6 +19,7 @@ typedef struct emitter_arrays {
     float *direct;   /* [s][n], the irradiance that each gives directly where 1 W/m^2 leaves it, of emitters
                         that are no part of the mesh; NULL: there are none */
     float *exitance; /* [C], with direct: W/m^2 of such an emitter of weight 1 */
+    lam_luminaires *luminaires; /* the last of s are these, in their order; NULL: none is one */
 } emitter_arrays;
 
 /* Copies s names into one block, freed by one free(). Errors: LAM_ERR_MEMORY. */
@@ -44,11 +45,17 @@ typedef struct emitters {
 
 #define EMITTERS_NONE UINT32_MAX
 
+/* The last emitters, that are luminaires; their weights are dimmers. */
+size_t emitters_luminaires(const emitter_arrays *a);
+
+/* Adds dimmers D [n_rhs][C][k] of the luminaires among the emitters to weights W [n_rhs][C][s]. */
+void operator_emitters_dim(const lam_operator *op, size_t n_rhs, const float *D, float *W);
+
 /* The same operator seen from inside; NULL of another kind. */
 const emitters *operator_emitters_of(const lam_operator *op);
 
 /* The emission E [n_rhs][C][n] of elements that weights [n_rhs][C][s] stand for, and H0, the direct
- * irradiance of their sky, in the same shape. Errors: LAM_ERR_MEMORY. */
+ * irradiance of their sky, luminaires and positions, in the same shape. Errors: LAM_ERR_MEMORY. */
 lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const float *W, float *E, float *H0,
                                    lam_error *error);
 

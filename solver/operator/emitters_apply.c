@@ -2,6 +2,7 @@
 #include "solver/base/work_area.h"
 #include "solver/operator/emitters.h"
 
+#include "solver/operator/luminaire_light.h"
 #include "solver/operator/sky_light.h"
 
 #include <math.h>
@@ -20,6 +21,17 @@ size_t lam_operator_emitters(const lam_operator *op) {
 
 const char *lam_operator_emitter_name(const lam_operator *op, size_t k) {
     return operator_emitters_of(op)->a.names[k];
+}
+
+size_t emitters_luminaires(const emitter_arrays *a) {
+    return a->luminaires != NULL ? lam_luminaires_count(a->luminaires) : 0;
+}
+
+void operator_emitters_dim(const lam_operator *op, size_t n_rhs, const float *D, float *W) {
+    const emitter_arrays *a = &operator_emitters_of(op)->a;
+    const size_t k = emitters_luminaires(a), first = a->s - k;
+    for (size_t row = 0; row < n_rhs * op->n_channels; row++)
+        for (size_t j = 0; j < k; j++) W[row * a->s + first + j] += D[row * k + j];
 }
 
 /* E [n] += what the elements themselves send out, of one channel. */
@@ -41,14 +53,34 @@ static void sum_tiles(const emitters *self, size_t c, const float *W, float *L) 
             L[t] += W[k] * a->L[(c * a->s + k) * a->n_tiles + t];
 }
 
+/* The irradiance H0 = power H that an emitter outside the mesh, of weight 1, gives directly in a channel; H
+ * is [n], NULL: the emitter is of the mesh or of the sky. */
+typedef struct direct_row {
+    const float *H;
+    double power;
+} direct_row;
+
+static direct_row direct_of(const emitters *self, size_t c, size_t k) {
+    const emitter_arrays *a = &self->a;
+    const size_t n = self->base.n, n_luminaires = emitters_luminaires(a), first = a->s - n_luminaires;
+    if (a->direct != NULL) return (direct_row){a->direct + k * n, (double)a->exitance[c]};
+    if (k < first) return (direct_row){NULL, 0};
+    return (direct_row){luminaires_irradiance(a->luminaires) + (k - first) * n,
+                        luminaires_factors(a->luminaires)[c * n_luminaires + k - first]};
+}
+
 /* H0 [n] += the light that comes straight from emitters outside the mesh. */
 static void add_direct(const emitters *self, size_t c, const float *W, float *H0) {
-    const emitter_arrays *a = &self->a;
-    const size_t n = self->base.n;
-    for (size_t k = 0; a->direct != NULL && k < a->s; k++) {
-        const float power = W[k] * a->exitance[c];
-        for (size_t i = 0; power != 0 && i < n; i++) H0[i] += power * a->direct[k * n + i];
+    for (size_t k = 0; k < self->a.s; k++) {
+        const direct_row of = direct_of(self, c, k);
+        const float power = of.H != NULL ? W[k] * (float)of.power : 0;
+        for (size_t i = 0; power != 0 && i < self->base.n; i++) H0[i] += power * of.H[i];
     }
+}
+
+/* True where some emitters give an irradiance that no element sent. */
+static bool has_direct(const emitter_arrays *a) {
+    return a->L != NULL || a->direct != NULL || a->luminaires != NULL;
 }
 
 static bool is_close(float x, float y) {
@@ -67,6 +99,7 @@ static lam_status weights_of_one(const emitters *self, size_t c, const float *E,
                                  float *W, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = self->base.n, s = self->a.s, m = self->a.n_tiles;
+    const size_t first_luminaire = s - emitters_luminaires(&self->a);
     const char *const what = s == 1 ? "emitter does" : "emitters do";
     if (all_dark(E, n) && all_dark(L, m)) {
         memset(W, 0, s * sizeof *W);
@@ -80,6 +113,10 @@ static lam_status weights_of_one(const emitters *self, size_t c, const float *E,
                  "weight "
                  "each or by name, such as \"%.40s\"",
                  self->a.names[k]);
+        if (k >= first_luminaire) { /* no emission of elements or tiles is one */
+            W[k] = 0;
+            continue;
+        }
         if (at == EMITTERS_NONE)
             FAIL(error, LAM_ERR_ARGUMENT,
                  "emitter %zu (%.40s) shares every place with another one, so an emission does not show its "
@@ -185,10 +222,11 @@ lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, 
             for (size_t t = 0; a->L != NULL && t < m; t++) L[t] += w * (double)a->L[of * m + t];
         }
         if (a->L != NULL) sky_irradiance_double(a->sky, 1, L, H0 + row * n);
-        for (size_t k = 0; a->direct != NULL && k < s; k++) {
-            const double power = (double)W[row * s + k] * (double)a->exitance[row % C];
-            for (size_t i = 0; power != 0 && i < n; i++)
-                H0[row * n + i] += power * (double)a->direct[k * n + i];
+        for (size_t k = 0; k < s; k++) {
+            const direct_row of = direct_of(self, row % C, k);
+            const double power = (double)W[row * s + k] * of.power;
+            for (size_t i = 0; of.H != NULL && power != 0 && i < n; i++)
+                H0[row * n + i] += power * (double)of.H[i];
         }
     }
     free(L);
@@ -255,7 +293,7 @@ lam_status lam_operator_apply_emitters(const lam_operator *op, size_t n_rhs, lam
             else
                 panel_expand(&self->T[c], m, w + c * s, C * s, to + c * count, C * count, rest);
         for (size_t row = 0; row < m * C; row++) {
-            const bool direct = quantity == LAM_INDIRECT && (self->a.L != NULL || self->a.direct != NULL);
+            const bool direct = quantity == LAM_INDIRECT && has_direct(&self->a);
             if (quantity == LAM_RADIOSITY || direct) memset(other, 0, n * sizeof *other);
             if (quantity == LAM_RADIOSITY) add_emission(self, row % C, w + row * s, other);
             if (direct && self->a.L != NULL) {
@@ -297,10 +335,11 @@ static void adjoint_of_light(const lam_operator *op, size_t c, lam_quantity quan
     }
     if (quantity != LAM_INDIRECT) return;
     for (size_t i = 0; i < op->n; i++) other[i] = rho[i] * g[i];
-    for (size_t k = 0; a->direct != NULL && k < a->s; k++) {
+    for (size_t k = 0; k < a->s; k++) {
+        const direct_row of = direct_of(self, c, k);
         double sum = 0;
-        for (size_t i = 0; i < op->n; i++) sum += (double)other[i] * (double)a->direct[k * op->n + i];
-        w[k] -= (float)(sum * (double)a->exitance[c]);
+        for (size_t i = 0; of.H != NULL && i < op->n; i++) sum += (double)other[i] * (double)of.H[i];
+        w[k] -= (float)(sum * of.power);
     }
     if (a->L == NULL) return;
     lam_sky_adjoint(a->sky, 1, other, L);

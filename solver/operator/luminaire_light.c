@@ -160,6 +160,24 @@ done:
     return status;
 }
 
+lam_status luminaires_create(size_t k, size_t n, size_t C, const float *irradiance, const double *factors,
+                             lam_luminaires **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_luminaires *l = memory_allocate(1, sizeof *l, "luminaires", error);
+    if (l == NULL) TRY(LAM_ERR_MEMORY);
+    l->k = k;
+    l->C = C;
+    TRY(first_rows_copy(k, n, irradiance, &l->rows, error));
+    l->factors = memory_allocate(C, k * sizeof *l->factors, "luminaires", error);
+    if (l->factors == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(l->factors, factors, C * k * sizeof *factors);
+    *out = l;
+    l = NULL;
+done:
+    lam_luminaires_close(l);
+    return status;
+}
+
 lam_status lam_luminaires_open(const char *path, lam_luminaires **luminaires, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;

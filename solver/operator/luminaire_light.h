@@ -24,6 +24,11 @@ typedef struct luminaire_shown {
  * LAM_ERR_DAMAGED, LAM_ERR_MEMORY. */
 lam_status luminaires_load(store *s, size_t n, size_t C, lam_luminaires **out, lam_error *error);
 
+/* Luminaires of which the light alone is known: copies irradiance [k][n] at dimmer 1 and their colours,
+ * factors [C][k]. Errors: LAM_ERR_MEMORY. */
+lam_status luminaires_create(size_t k, size_t n, size_t C, const float *irradiance, const double *factors,
+                             lam_luminaires **out, lam_error *error);
+
 /* Texts of it are owned by l. */
 luminaire_shown luminaires_shown(const lam_luminaires *l, size_t luminaire);
 

@@ -1,5 +1,5 @@
-/* Emitters are read from a file of emissions, made of groups that shine evenly, or are the tiles of the sky.
- */
+/* Emitters are read from a file of emissions, made of groups that shine evenly, or are the tiles of the sky;
+ * luminaires come behind them. */
 #include "solver/precompute/emitter_list.h"
 
 #include <stdio.h>
@@ -9,6 +9,8 @@
 void emitter_list_free(emitter_list *list) {
     free(list->names);
     emission_free(&list->light);
+    free(list->luminaires);
+    free(list->factors);
     *list = (emitter_list){.s = 0};
 }
 
@@ -75,14 +77,42 @@ static bool is_lit(const emission *e, size_t k, size_t vector, size_t tiles) {
     return false;
 }
 
-lam_status emitter_list_read(const char *text, const mesh *m, size_t n_tiles, emitter_list *out,
-                             lam_error *error) {
+static lam_status add_luminaires(size_t n_channels, const placed_luminaires *placed, emitter_list *list,
+                                 lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t k = placed->n;
+    if (k == 0) return LAM_OK;
+    list->luminaires = memory_allocate(k, sizeof *list->luminaires, "names of emitters", error);
+    list->factors = memory_allocate(n_channels, k * sizeof *list->factors, "names of emitters", error);
+    if (list->luminaires == NULL || list->factors == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t j = 0; j < k; j++) {
+        const placed_luminaire *l = &placed->luminaires[j];
+        list->luminaires[j] = l->name;
+        for (size_t c = 0; c < n_channels; c++) list->factors[c * k + j] = n_channels == 1 ? 1 : l->colour[c];
+        for (size_t e = 0; e < list->s; e++)
+            if (strcmp(list->names[e], l->name) == 0)
+                FAIL(error, LAM_ERR_ARGUMENT,
+                     "--emitters: %.100s is the name of an emitter and of a luminaire, which are emitters "
+                     "too; rename one of them, or leave out luminaires by --luminaires none",
+                     l->name);
+    }
+    list->n_luminaires = k;
+done:
+    return status;
+}
+
+lam_status emitter_list_read(const char *text, const mesh *m, size_t n_tiles, const placed_luminaires *placed,
+                             emitter_list *out, lam_error *error) {
     lam_status status = LAM_OK;
     emitter_list made = {.s = 0};
     emission_scene scene = {0};
     TRY(emission_scene_create(m, &scene, error));
     scene.n_tiles = n_tiles;
-    if (strcmp(text, "sky") == 0) {
+    if (strcmp(text, EMITTERS_LUMINAIRES) == 0) {
+        if (placed->n == 0)
+            FAIL(error, LAM_ERR_ARGUMENT,
+                 "--emitters luminaires: there are none; give --luminaires FILE too");
+    } else if (strcmp(text, "sky") == 0) {
         TRY(read_sky(m, n_tiles, &made, error));
     } else if (strncmp(text, "group=", 6) == 0) {
         TRY(read_groups(text + 6, &scene, &made, error));
@@ -93,6 +123,7 @@ lam_status emitter_list_read(const char *text, const mesh *m, size_t n_tiles, em
     for (size_t k = 0; k < made.s; k++)
         if (!is_lit(&made.light, k, m->n * m->n_channels, n_tiles * m->n_channels))
             FAIL(error, LAM_ERR_ARGUMENT, "--emitters %.200s: emitter %zu sends nothing out", text, k);
+    TRY(add_luminaires(m->n_channels, placed, &made, error));
     *out = made;
     made = (emitter_list){.s = 0};
 done:

@@ -270,7 +270,7 @@ lam_status mesh_error_add_others(const precompute_job *job, const precompute_sce
                                  made_operator *made, lam_error *error) {
     lam_status status = LAM_OK;
     mesh_figures *figures = &made->errors_of_mesh;
-    if (scene->emitters.s > 0 || scene->importance.emits != NULL) return LAM_OK;
+    if (emitter_list_count(&scene->emitters) > 0 || scene->importance.emits != NULL) return LAM_OK;
     TRY(add_single(job, scene, figures, error));
     TRY(add_groups(job, scene, made, error));
     terminal_log(job->t, "mesh     single elements %.3g, groups %.3g", figures->single, figures->groups);

@@ -61,6 +61,7 @@ done:
 /* Arrays of n_lights lights at most. */
 typedef struct luminaire_answers {
     float *E, *H0, *rho_H0, *B; /* [n_lights][C][n]; E is 0 */
+    float *W;                   /* [n_lights][C][s], of few emitters; NULL: any light is answered */
     void *work;
     size_t bytes;
 } luminaire_answers;
@@ -70,20 +71,34 @@ static void answers_free(luminaire_answers *a) {
     free(a->H0);
     free(a->rho_H0);
     free(a->B);
+    free(a->W);
     free(a->work);
 }
 
 static lam_status answers_begin(const mesh *m, const lam_operator *op, size_t n_lights, luminaire_answers *a,
                                 lam_error *error) {
-    const size_t vector = m->n * m->n_channels;
+    const size_t vector = m->n * m->n_channels, s = lam_operator_emitters(op);
     float **const arrays[] = {&a->E, &a->H0, &a->rho_H0, &a->B};
     for (int k = 0; k < 4; k++) {
         *arrays[k] = memory_allocate(n_lights, vector * sizeof **arrays[k], "the error of the mesh", error);
         if (*arrays[k] == NULL) return LAM_ERR_MEMORY;
     }
+    if (s > 0) {
+        a->W = memory_allocate(n_lights, m->n_channels * s * sizeof *a->W, "the error of the mesh", error);
+        if (a->W == NULL) return LAM_ERR_MEMORY;
+    }
     a->bytes = lam_operator_work_bytes(op, n_lights);
     a->work = memory_allocate(a->bytes, 1, "the error of the mesh", error);
     return a->work == NULL ? LAM_ERR_MEMORY : LAM_OK;
+}
+
+/* The weights of lights, of emitters of which the luminaires are the last. */
+static void weigh_emitters(const luminaire_lights *l, size_t s, float *W) {
+    const size_t C = l->scene->m.n_channels, first = s - l->scene->luminaires.placed.n;
+    memset(W, 0, l->n_lights * C * s * sizeof *W);
+    for (size_t row = 0; row < l->n_lights * C; row++)
+        for (size_t j = 0; j < l->n_chosen; j++)
+            W[row * s + first + l->chosen[j]] = (float)l->weights[row / C * l->n_chosen + j];
 }
 
 /* B of the lights, of a lightened scene (black_scene.h) rho H0, as its operator reflects nothing. */
@@ -102,11 +117,18 @@ static lam_status answer(const luminaire_lights *l, const made_operator *made, l
             a->H0[light * vector + k] = (float)H;
             a->rho_H0[light * vector + k] = (float)(H * (double)m->reflectance[k]);
         }
-    if (l->scene->lightened)
+    if (l->scene->lightened) {
         memcpy(a->B, a->rho_H0, l->n_lights * vector * sizeof *a->B);
-    else
+        goto done;
+    }
+    if (a->W != NULL) {
+        weigh_emitters(l, lam_operator_emitters(made->op), a->W);
+        TRY(lam_operator_apply_emitters(made->op, l->n_lights, LAM_RADIOSITY, a->W, 0, NULL, a->B, a->work,
+                                        a->bytes, error));
+    } else {
         TRY(lam_operator_apply_lit(made->op, l->n_lights, LAM_RADIOSITY, a->E, a->H0, a->B, a->work, a->bytes,
                                    error));
+    }
 done:
     return status;
 }

@@ -26,7 +26,8 @@ typedef struct sky_work {
     size_t row;   /* n_tiles + 1 */
     double *L;    /* [n_skies][row], radiances of tiles, and of the ground that they light */
     float *E, *B; /* [n_skies][C][n] */
-    float *W;     /* [n_skies][C][n_tiles], of emitters that are the tiles; NULL: the operator answers E */
+    float *W;     /* [n_skies][C][s], of emitters, the first of which are the tiles; NULL: the operator
+                     answers E */
     double *H0;   /* [n] */
     void *work;   /* of the operator, bytes */
     size_t bytes;
@@ -51,9 +52,10 @@ static lam_status sky_work_begin(size_t n_skies, sky_work *w, lam_error *error) 
     w->work = memory_allocate(w->bytes, 1, "the error of the mesh", error);
     if (w->L == NULL || w->E == NULL || w->B == NULL || w->H0 == NULL || w->work == NULL)
         return LAM_ERR_MEMORY;
-    if (w->scene->emitters.s == 0) return LAM_OK;
-    w->W = memory_allocate(n_skies, w->scene->m.n_channels * (w->row - 1) * sizeof *w->W,
-                           "the error of the mesh", error);
+    const size_t s = emitter_list_count(&w->scene->emitters);
+    if (s == 0) return LAM_OK;
+    w->W =
+        memory_allocate(n_skies, w->scene->m.n_channels * s * sizeof *w->W, "the error of the mesh", error);
     return w->W == NULL ? LAM_ERR_MEMORY : LAM_OK;
 }
 
@@ -72,8 +74,9 @@ static bool emitters_are_tiles(const precompute_scene *scene, size_t n_tiles) {
 /* B of the skies of radiances w->L. */
 static lam_status answer_skies(const sky_work *w, size_t n_skies, lam_error *error) {
     const size_t tiles = w->row - 1, C = w->scene->m.n_channels;
-    for (size_t k = 0; w->W != NULL && k < n_skies * C * tiles; k++)
-        w->W[k] = (float)w->L[k / (C * tiles) * w->row + k % tiles];
+    const size_t s = emitter_list_count(&w->scene->emitters);
+    for (size_t k = 0; w->W != NULL && k < n_skies * C * tiles; k++) /* luminaires behind them are dark */
+        w->W[k / tiles * s + k % tiles] = (float)w->L[k / (C * tiles) * w->row + k % tiles];
     const float *E = w->W != NULL ? NULL : w->E;
     return mesh_error_answers(w->scene, w->made, n_skies, w->W, E, w->B, w->work, w->bytes, error);
 }
@@ -216,7 +219,8 @@ lam_status mesh_error_add_skies(const precompute_job *job, const precompute_scen
     const size_t at_once = most < TILES_AT_ONCE ? most : TILES_AT_ONCE;
     sky_work w = {.job = job, .scene = scene, .sky = sky, .made = made, .row = sky->tiling.n_tiles + 1};
     if (sky->first_bounce == NULL || factors->f.closed) return LAM_OK;
-    if (scene->emitters.s > 0 && !emitters_are_tiles(scene, sky->tiling.n_tiles)) return LAM_OK;
+    if (emitter_list_count(&scene->emitters) > 0 && !emitters_are_tiles(scene, sky->tiling.n_tiles))
+        return LAM_OK;
     TRY(sky_work_begin(at_once > SKIES ? at_once : SKIES, &w, error));
     TRY(add_wide(&w, seed, figures, error));
     if (!figures->has_skies) goto done;

@@ -2,6 +2,7 @@
 
 #include "solver/codec/answer_error.h"
 #include "solver/light/emission.h"
+#include "solver/operator/emitters.h"
 #include "solver/precompute/stages.h"
 
 #include <math.h>
@@ -73,6 +74,22 @@ static void take_light(const precompute_scene *scene, own_answer *a) {
     }
 }
 
+/* B of few emitters, unless these cannot give the emission of the scene. */
+static lam_status answer_few(const precompute_scene *scene, const lam_operator *op, size_t bytes,
+                             own_answer *a, bool *can, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t s = lam_operator_emitters(op);
+    float *W = memory_allocate(scene->m.n_channels, s * sizeof *W, "the error of luminaires", error);
+    if (W == NULL) return LAM_ERR_MEMORY;
+    *can = lam_operator_weights(op, 1, a->E, 0, NULL, W, NULL) == LAM_OK;
+    if (!*can) goto done;
+    operator_emitters_dim(op, 1, a->dimmers, W);
+    TRY(lam_operator_apply_emitters(op, 1, LAM_RADIOSITY, W, 0, NULL, a->B, a->operator_work, bytes, error));
+done:
+    free(W);
+    return status;
+}
+
 static lam_status find_error(const precompute_scene *scene, const error_scene *about, const own_answer *a,
                              stated_figures *figures, answer_error *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -109,7 +126,7 @@ lam_status own_error_find(const precompute_scene *scene, const lam_operator *op,
     own_answer a = {.E = NULL};
     emission_scene groups = {.m = NULL};
     answer_error found;
-    bool any = false;
+    bool any = false, can = true;
     *out = (own_figures){.known = false};
     if (scene->luminaires.placed.n == 0 || figures->by_group.n_rows == 0 ||
         (scene->importance.n > 0 && scene->importance.emits != NULL))
@@ -117,7 +134,11 @@ lam_status own_error_find(const precompute_scene *scene, const lam_operator *op,
     TRY(emission_scene_create(m, &groups, error));
     TRY(own_answer_begin(scene, bytes, &a, error));
     take_light(scene, &a);
-    TRY(lam_operator_apply_lit(op, 1, LAM_RADIOSITY, a.E, a.H0, a.B, a.operator_work, bytes, error));
+    if (lam_operator_emitters(op) > 0)
+        TRY(answer_few(scene, op, bytes, &a, &can, error));
+    else
+        TRY(lam_operator_apply_lit(op, 1, LAM_RADIOSITY, a.E, a.H0, a.B, a.operator_work, bytes, error));
+    if (!can) goto done;
     for (size_t k = 0; k < m->n * m->n_channels; k++) any = any || a.B[k] > a.E[k];
     if (!any) goto done;
     const error_scene about = {.n = m->n,

@@ -36,7 +36,7 @@ forecast plan_forecast(const precompute_job *job, const precompute_scene *scene,
                       .large = plan->large,
                       .keep = o->keep_form_factors,
                       .streamed = plan->streamed,
-                      .emitters = scene->emitters.s,
+                      .emitters = emitter_list_count(&scene->emitters),
                       .method = plan->method,
                       .build = &o->build,
                       .precision = precision};

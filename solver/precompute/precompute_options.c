@@ -289,7 +289,10 @@ static const option_row form_factor_rows[] = {
 
 /* The help of these stands with the methods. */
 static const option_row of_methods[] = {
-    {.name = "emitters", .kind = OPTION_TEXT, .offset = FIELD(emitters), .argument = "FILE|group=NAME|sky"},
+    {.name = "emitters",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(emitters),
+     .argument = "FILE|group=NAME|sky|luminaires"},
     {.name = "receivers", .kind = OPTION_TEXT, .offset = FIELD(receivers), .argument = "GROUP,..."},
     {.name = "importance", .kind = OPTION_TEXT, .offset = FIELD(importance), .argument = "FILE"},
     {.name = "sources", .kind = OPTION_TEXT, .offset = FIELD(sources), .argument = "GROUP,..."},

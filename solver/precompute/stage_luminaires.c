@@ -53,17 +53,18 @@ static lam_status settle_lights(const precompute_job *job, mesh *m, lam_error *e
     return LAM_OK;
 }
 
-/* A store of few emitters has the light of these alone: luminaires are refused, lights of a file left out. */
+/* A store of positions of a light has the light of these alone, as it is found by walks: luminaires are
+ * refused, lights of a file left out. */
 static lam_status leave_out(const precompute_job *job, const mesh *m, bool *out, lam_error *error) {
     const precompute_options *o = job->options;
-    *out = o->emitters != NULL || emitters_are_positions(emitters_options_of(&o->build));
+    *out = emitters_are_positions(emitters_options_of(&o->build));
     if (!*out) return LAM_OK;
     if (o->luminaires != NULL)
         return status_fail(error, LAM_ERR_ARGUMENT,
-                           "--luminaires: a store of few emitters has no light of luminaires; leave out "
-                           "--emitters, or --luminaires");
+                           "--luminaires: a store of positions of a light has no light of luminaires; leave "
+                           "out --positions or --path, or --luminaires");
     if (m->n_punctual > 0)
-        terminal_warn(job->t, "%s: its %zu lights are left out: the store answers for its emitters alone",
+        terminal_warn(job->t, "%s: its %zu lights are left out: the store answers for its positions alone",
                       o->input, m->n_punctual);
     return LAM_OK;
 }

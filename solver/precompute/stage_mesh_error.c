@@ -19,16 +19,17 @@ typedef struct chosen_lights {
 static void add_emitters(const precompute_scene *scene, chosen_lights *to) {
     const emission *light = &scene->emitters.light;
     const size_t s = scene->emitters.s, C = scene->m.n_channels, vector = scene->m.n * C;
+    const size_t all = emitter_list_count(&scene->emitters);
     for (size_t t = 0; light->L != NULL && t < s * C * scene->sky_tiles; t++)
         if (light->L[t] != 0) return;
     for (size_t k = 0; light->E != NULL && k < s * vector; k++) to->E[k % vector] += light->E[k];
-    for (size_t k = 0; k < s * C; k++) to->W[k] = 1;
+    for (size_t k = 0; k < s * C; k++) to->W[k / s * all + k % s] = 1;
 }
 
 static lam_status choose_lights(const precompute_scene *scene, made_operator *made, chosen_lights *out,
                                 lam_error *error) {
     const mesh *m = &scene->m;
-    const size_t vector = m->n * m->n_channels, s = scene->emitters.s;
+    const size_t vector = m->n * m->n_channels, s = emitter_list_count(&scene->emitters);
     mesh_figures *figures = &made->errors_of_mesh;
     out->E = memory_allocate(2 * vector, sizeof *out->E, "the error of the mesh", error);
     if (out->E == NULL) return LAM_ERR_MEMORY;
@@ -81,7 +82,8 @@ static lam_status find_errors(const precompute_job *job, const precompute_scene 
     TRY(choose_lights(scene, made, &lights, error));
     const float *const E = lights.E;
     const size_t n_lights = (size_t)figures->has_lights + figures->has_even;
-    if (n_lights == 0) { /* of few emitters, tiles of a sky */
+    if (n_lights == 0) { /* of few emitters, tiles of a sky or luminaires */
+        TRY(mesh_error_add_luminaires(job, scene, made, error));
         TRY(mesh_error_add_skies(job, scene, factors, made, error));
         goto done;
     }

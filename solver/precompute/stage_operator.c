@@ -34,8 +34,12 @@ lam_status problem_of(precompute_scene *scene, precompute_factors *factors, unsi
                                        .E = scene->emitters.light.E,
                                        .n_tiles = f->sky.tiling.n_tiles,
                                        .L = scene->emitters.light.L,
-                                       .first_bounce = f->sky.first_bounce};
-    *problem = (build_problem){.emitters = scene->emitters.s > 0 ? &scene->emitting : NULL,
+                                       .first_bounce = f->sky.first_bounce,
+                                       .n_luminaires = scene->emitters.n_luminaires,
+                                       .luminaires = scene->emitters.luminaires,
+                                       .H = scene->luminaires.H,
+                                       .factors = scene->emitters.factors};
+    *problem = (build_problem){.emitters = emitter_list_count(&scene->emitters) > 0 ? &scene->emitting : NULL,
                                .n = scene->m.n,
                                .n_channels = scene->m.n_channels,
                                .area = scene->m.area,

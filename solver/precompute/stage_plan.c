@@ -25,7 +25,8 @@ lam_status stage_choose_plan(const precompute_job *job, precompute_scene *scene,
              "both, or give --form-factors rays",
              scene->importance.read != NULL ? "receivers" : "sources");
     if (o->emitters != NULL) {
-        TRY(emitter_list_read(o->emitters, &scene->m, scene->sky_tiles, &scene->emitters, error));
+        TRY(emitter_list_read(o->emitters, &scene->m, scene->sky_tiles, &scene->luminaires.placed,
+                              &scene->emitters, error));
         TRY(plan_check_rows(job, scene, plan, error));
     }
     scene_log_mesh(job, scene);

@@ -282,7 +282,7 @@ class Kinds(unittest.TestCase):
         (path / "yard.obj").write_text(YARD)
         (path / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
         cls.stores, cls.lights, cls.truth = {}, {}, {}
-        for name, options in {**KINDS, "few": ["--emitters", "sky"]}.items():
+        for name, options in KINDS.items():
             cls.stores[name] = path / f"{name}.h5"
             must("precompute", path / "yard.obj", "-o", cls.stores[name], "--elements", 120, "--rays", 1024, "--probes", 8,
                  "--sky", "grid:4x3", "--keep-form-factors", *options)
@@ -402,11 +402,6 @@ class Kinds(unittest.TestCase):
             for reduce in {}, {"reduce": {"groups": ["floor"], "with": ["mean"]}}:
                 answer = daemon.radiosity("silent", {"emission": {"luminaires": {"wall": 1}}, **reduce}).json()
                 self.assertEqual(answer["error"]["light"], "lights")
-
-    def test_stores_of_few_emitters_refuse_them(self):
-        answer = self.daemon.radiosity("few", {"emission": {"luminaires": {"wall": 1}}})
-        self.assertEqual((answer.status, answer.json()["detail"]),
-                         (422, "emission/luminaires: luminaires are answered by other kinds of stores, not by one of few emitters"))
 
 
 class Precomputed(unittest.TestCase):

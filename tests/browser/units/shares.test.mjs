@@ -35,6 +35,10 @@ test("a store of emitters has the shares of these, or that of the sky whose tile
     assert.deepEqual(partsOf({ emitters: [5, 7, 11] }, lighting, 1, [], ["x", "y", "z"], [], null), [{ name: "y", value: 42 }]);
     assert.deepEqual(partsOf({ emitters: [5, 7] }, firstLighting, 1, [], ["x", "y"], [], [2, 3]), [{ name: "sky", value: 31 }]);
     assert.deepEqual(partsOf({ emitters: [5, 7] }, firstLighting, 1, [], ["x", "y"], [], [2]), []);
+    // Luminaires are the last of its emitters, and do not shine twice.
+    const desk = [{ name: "desk", group: null, dim: 1 }];
+    assert.deepEqual(partsOf({ emitters: [5, 7, 40], luminaires: [40] }, firstLighting, 1, [], ["x", "y"], desk, [2, 3]),
+        [{ name: "desk", value: 40 }, { name: "sky", value: 31 }]);
 });
 
 test("a luminaire has the share of its own dimmer and tint", () => {

@@ -50,6 +50,11 @@ export interface Description {
     report?: { [name: string]: unknown };
 }
 
+/** The names of the emitters of a store of few but for its luminaires, which are the last of them. */
+export function emittersOf({ emitters, luminaires }: Pick<Description, "emitters" | "luminaires">): readonly string[] {
+    return emitters?.slice(0, emitters.length - (luminaires?.count ?? 0)) ?? [];
+}
+
 /** In the axes of the store, metres; directions are unit vectors. */
 export interface Luminaire {
     name: string;

@@ -2,6 +2,7 @@
 import type { Page } from "../app/page.ts";
 import { button, fill, make } from "../base/dom.ts";
 import { count, numberText } from "../base/numbers.ts";
+import { emittersOf } from "../daemon/api.ts";
 import { alongOf, positionOf, type Weights } from "../state/path.ts";
 import type { Panel } from "./panel.ts";
 import { player } from "./player.ts";
@@ -11,7 +12,7 @@ import { slider, type Slider } from "./slider.ts";
 const ROWS_MOST = 40;
 
 export function emittersPanel({ store, scene }: Page): Panel {
-    const names = (): readonly string[] => scene.now?.description.emitters ?? [];
+    const names = (): readonly string[] => scene.now === null ? [] : emittersOf(scene.now.description);
     const isPath = (): boolean => scene.now?.description.report?.paths !== undefined;
     const change = (emitters: Weights, tag: string | null = null): void => {
         const { now } = store;

@@ -2,6 +2,7 @@
 import { fromHex, luminance, ofTemperature, toHex, type Rgb } from "../base/colour.ts";
 import { button, choice, fill, make, tick, unique } from "../base/dom.ts";
 import type { Page } from "../app/page.ts";
+import { emittersOf } from "../daemon/api.ts";
 import { isSolo, unitOf, type GroupLight, type Lighting, type Preset } from "../state/state.ts";
 import { luminaireList } from "./luminaires.ts";
 import type { Panel } from "./panel.ts";
@@ -69,7 +70,7 @@ export function lightsPanel(page: Page): Panel {
         if (scene.now?.mesh.groups.every((group) => group.emission === null) && scene.now.description.sky === null
             && scene.now.luminaires === null && names.length > 0)
             list.append(make("p", { class: "hint" }, "No group of this scene emits light: these do it in its place."));
-        if (hasEmitters())
+        if (scene.now !== null && emittersOf(scene.now.description).length > 0)
             list.append(
                 make("p", { class: "hint" }, "This store answers its own emitters alone: see the panel Emitters."),
             );

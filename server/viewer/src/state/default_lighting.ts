@@ -1,6 +1,6 @@
 // The lighting that a scene comes with: its lamps, or what shines first where it has none.
 import { luminance, type Rgb } from "../base/colour.ts";
-import type { Description } from "../daemon/api.ts";
+import { emittersOf, type Description } from "../daemon/api.ts";
 import type { SceneMesh } from "../picture/glb.ts";
 import { firstState, type GroupLight, type Lighting } from "./state.ts";
 
@@ -17,7 +17,7 @@ export function defaultLightingOf(mesh: SceneMesh, description: Description): Li
     const emitters: { [index: string]: number } = {};
     // A lamp begins at its first position; tiles of a sky shine as the panel of skies says.
     const shine = description.sky !== null ? 0 : description.report?.paths !== undefined ? 1 : Infinity;
-    description.emitters?.forEach((_, index) => {
+    emittersOf(description).forEach((_, index) => {
         if (index < shine) emitters[index] = 1;
     });
     const sky = description.sky === null

@@ -48,7 +48,7 @@ export function partsOf(gradient: Gradient, lighting: Lighting, channels: number
                 parts.push({ name: emitters[k], value: product(gradient.emitters, k, weight * lighting.dim) });
         }
     }
-    const { luminaires: dimmed } = gradient;
+    const isWeighted = parts.length > 0, { luminaires: dimmed } = gradient;
     if (dimmed !== undefined) {
         luminaires.forEach((one, k) => {
             const dimmer = dimmerOf(one, lighting, channels);
@@ -57,7 +57,7 @@ export function partsOf(gradient: Gradient, lighting: Lighting, channels: number
     }
     // A store of the tiles of a sky has these as its emitters.
     const rows = gradient.sky
-        ?? (parts.length === 0 && sky !== null && sky.length === emitters.length ? gradient.emitters : undefined);
+        ?? (!isWeighted && sky !== null && sky.length === emitters.length ? gradient.emitters : undefined);
     if (rows !== undefined && sky !== null) {
         const value = sky.reduce((sum: number, radiance, tile) => sum + product(rows, tile, radiance), 0);
         if (value !== 0) parts.push({ name: "sky", value });

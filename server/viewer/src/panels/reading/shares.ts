@@ -2,7 +2,7 @@
 import { fill, make } from "../../base/dom.ts";
 import { count, percent, numberText } from "../../base/numbers.ts";
 import type { OpenScene, Page } from "../../app/page.ts";
-import type { Quantity } from "../../daemon/api.ts";
+import { emittersOf, type Quantity } from "../../daemon/api.ts";
 import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { partsOf, type Gradient } from "../../state/shares.ts";
@@ -58,7 +58,7 @@ export class Shares {
         if (there !== undefined) return there;
         const { description } = this.page.scene.now as OpenScene, { channels } = description;
         const gradient = (description.emitters?.length ?? 0) > 0
-            ? ["emitters"]
+            ? ["emitters", ...(description.luminaires === null ? [] : ["luminaires"])]
             : ["groups", ...(description.sky === null ? [] : ["sky"]),
                 ...(description.luminaires === null ? [] : ["luminaires"])];
         const weights = channelWeights(channels);
@@ -98,7 +98,7 @@ export class Shares {
         // It is drawn with the picture of a sky that is on its way.
         if (sky.known(now.lighting, description) === undefined) return;
         const parts = partsOf(gradient, now.lighting, description.channels,
-            description.groups.map((group) => group.name), description.emitters ?? [], luminaires?.list ?? [],
+            description.groups.map((group) => group.name), emittersOf(description), luminaires?.list ?? [],
             description.sky === null ? null : sky.radiances(now.lighting, description));
         const total = parts.reduce((sum, part) => sum + part.value, 0);
         const group = mesh.groups[mesh.groupOf[asked.element]]?.name ?? "";
