@@ -37,7 +37,7 @@ static bool has_strange_light(const scene *s, const radiosity_request *request) 
     }
     for (size_t k = 0; sky->values != NULL && k < sky->n * C * lam_sky_tiles(s->sky); k++)
         if (sky->values[k] > 0) return true;
-    for (size_t k = 0; k < request->luminaires.n * C * scene_luminaires(s); k++)
+    for (size_t k = 0; !s->errors.luminaires && k < request->luminaires.n * C * scene_luminaires(s); k++)
         if (request->luminaires.values[k] > 0) return true;
     for (size_t k = 0; k < request->n_suns * C; k++)
         if (request->sunlight[k] > 0) return true;

@@ -115,6 +115,7 @@ lam_status stated_errors_read(store *s, const error_scene *scene, const lam_oper
     TRY(importance_load(s, n, &weights, error));
     TRY(find_members(weights.read, n, &made.read, error));
     TRY(find_members(weights.emits, n, &made.emits, error));
+    made.luminaires = weights.luminaires;
     if (made.read != NULL) made.receivers = error_of(&figures.report, true);
     about.read = made.read;
     about.emits = made.emits;

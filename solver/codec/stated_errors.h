@@ -24,7 +24,8 @@ typedef struct stated_errors {
     double mesh_of_skies;   /* the same of skies, the larger of an even and a cloudy one; likewise */
     stated_error receivers; /* of the light of receivers; known only where the store was built for them */
     bool *read;             /* [n], true of receivers; NULL: the store was built for all elements */
-    bool *emits; /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */
+    bool *emits;     /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */
+    bool luminaires; /* some of these are sources by the light of luminaires that they reflect */
     error_by_group by_group; /* n_bins is 0 where the store states none */
     emitters_error emitters; /* figures.s is 0 where the store states none */
     size_t n;
@@ -53,7 +54,7 @@ bool stated_errors_is_strange(const stated_errors *e, size_t n_rows, const float
 /* The elements of an answer, beside those that a store was built for. */
 typedef struct answer_scope {
     bool receivers_only; /* nothing but the light of receivers is in the answer */
-    bool strange;        /* an element emits that is no source, or a sky */
+    bool strange;        /* an element emits that is no source, or a sky, or luminaires where they are none */
     bool sky;            /* a sky alone shines */
 } answer_scope;
 

@@ -13,7 +13,7 @@
 typedef struct own_answer {
     float *E, *H0, *B, *work;
     void *operator_work;
-    bool *read; /* [n], receivers; NULL: all is read */
+    bool *read, *emits; /* [n], receivers and sources; NULL: all is read, all may emit */
     /* Of the luminaires: dimmers and factors [C][k], lumens [k] at dimmer 1. */
     float *dimmers;
     double *factors, *lumens;
@@ -26,6 +26,7 @@ static void own_answer_free(own_answer *a) {
     free(a->work);
     free(a->operator_work);
     free(a->read);
+    free(a->emits);
     free(a->dimmers);
     free(a->factors);
     free(a->lumens);
@@ -35,7 +36,7 @@ static lam_status own_answer_begin(const precompute_scene *scene, size_t operato
                                    lam_error *error) {
     static const char what[] = "the error of luminaires";
     const size_t n = scene->m.n, C = scene->m.n_channels, k = scene->luminaires.placed.n;
-    const float *weights = scene->importance.n > 0 ? scene->importance.read : NULL;
+    const bool any = scene->importance.n > 0;
     a->E = memory_allocate(C, n * sizeof *a->E, what, error);
     a->H0 = memory_allocate(C, n * sizeof *a->H0, what, error);
     a->B = memory_allocate(C, n * sizeof *a->B, what, error);
@@ -47,10 +48,15 @@ static lam_status own_answer_begin(const precompute_scene *scene, size_t operato
     if (a->E == NULL || a->H0 == NULL || a->B == NULL || a->work == NULL || a->operator_work == NULL ||
         a->dimmers == NULL || a->factors == NULL || a->lumens == NULL)
         return LAM_ERR_MEMORY;
-    if (weights == NULL) return LAM_OK;
-    a->read = memory_allocate(n, sizeof *a->read, what, error);
-    if (a->read == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < n; i++) a->read[i] = weights[i] > 0;
+    const float *const weights[] = {any ? scene->importance.read : NULL,
+                                    any ? scene->importance.emits : NULL};
+    bool **const members[] = {&a->read, &a->emits};
+    for (int w = 0; w < 2; w++) {
+        if (weights[w] == NULL) continue;
+        *members[w] = memory_allocate(n, sizeof **members[w], what, error);
+        if (*members[w] == NULL) return LAM_ERR_MEMORY;
+        for (size_t i = 0; i < n; i++) (*members[w])[i] = weights[w][i] > 0;
+    }
     return LAM_OK;
 }
 
@@ -118,6 +124,16 @@ done:
     return status;
 }
 
+/* True where luminaires are no sources of the store, or lamps of the scene are none. */
+static bool has_other_lamps(const precompute_scene *scene) {
+    const mesh *m = &scene->m;
+    const importance *of = &scene->importance;
+    if (of->n == 0 || of->emits == NULL) return false;
+    for (size_t k = 0; k < m->n * m->n_channels; k++)
+        if (m->emission[k] > 0 && !(of->emits[k % m->n] > 0)) return true;
+    return !of->luminaires;
+}
+
 lam_status own_error_find(const precompute_scene *scene, const lam_operator *op, stated_figures *figures,
                           own_figures *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -128,8 +144,7 @@ lam_status own_error_find(const precompute_scene *scene, const lam_operator *op,
     answer_error found;
     bool any = false, can = true;
     *out = (own_figures){.known = false};
-    if (scene->luminaires.placed.n == 0 || figures->by_group.n_rows == 0 ||
-        (scene->importance.n > 0 && scene->importance.emits != NULL))
+    if (scene->luminaires.placed.n == 0 || figures->by_group.n_rows == 0 || has_other_lamps(scene))
         return LAM_OK;
     TRY(emission_scene_create(m, &groups, error));
     TRY(own_answer_begin(scene, bytes, &a, error));
@@ -149,6 +164,7 @@ lam_status own_error_find(const precompute_scene *scene, const lam_operator *op,
                                .start = groups.groups.start,
                                .members = groups.groups.elements,
                                .read = a.read,
+                               .emits = a.emits,
                                .buried = groups.groups.buried};
     TRY(find_error(scene, &about, &a, figures, &found, error));
     *out = (own_figures){.known = isfinite(found.parts.rest),

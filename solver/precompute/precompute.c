@@ -115,6 +115,19 @@ done:
     return status;
 }
 
+/* The direct light of luminaires, once the mesh is made. */
+static lam_status run_luminaires(precompute_parts *p, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double started = clock_seconds();
+    if (p->scene.luminaires.placed.n == 0) return LAM_OK;
+    TRY(stage_luminaires(&p->job, &p->scene, error));
+    TRY(scene_light_sources(&p->job, &p->scene, error));
+    log_stage(&p->job, "luminaires", started);
+    TRY(terminal_check(error));
+done:
+    return status;
+}
+
 /* All from the input to an operator and its errors, by form factors. */
 static lam_status run_stages(precompute_parts *p, lam_error *error) {
     lam_status status = LAM_OK;
@@ -127,6 +140,9 @@ static lam_status run_stages(precompute_parts *p, lam_error *error) {
 
     started = clock_seconds();
     TRY(stage_prepare_mesh(job, &p->scene, &p->plan, error));
+    /* The way in which form factors are found may depend on sources, which are then found first. */
+    const bool by_luminaires = p->scene.importance.luminaires;
+    if (by_luminaires) TRY(run_luminaires(p, error));
     if (job->options->time > 0) {
         TRY(plan_within_time(job, &p->scene, &p->plan, &p->times, &p->chosen, error));
         job->options = &p->chosen;
@@ -136,13 +152,7 @@ static lam_status run_stages(precompute_parts *p, lam_error *error) {
     log_stage(job, "mesh", started);
     TRY(terminal_check(error));
 
-    if (p->scene.luminaires.placed.n > 0) {
-        started = clock_seconds();
-        TRY(stage_luminaires(job, &p->scene, error));
-        log_stage(job, "luminaires", started);
-        TRY(terminal_check(error));
-    }
-
+    if (!by_luminaires) TRY(run_luminaires(p, error));
     TRY(stage_open_scratch(job, &p->plan, &p->factors, error));
     TRY(stage_forecast(job, &p->scene, &p->plan, &p->factors, &p->times, error));
     TRY(run_trials(p, error));

@@ -27,6 +27,9 @@ typedef enum glass_law { GLASS_BY_ANGLE, GLASS_EVENLY } glass_law;
 
 /* --luminaires and --sensors: the words for leaving those of a store out. */
 #define LUMINAIRES_NONE "none"
+
+/* The word of --sources for what luminaires light. */
+#define SOURCES_LUMINAIRES "luminaires"
 #define SENSORS_NONE "none"
 
 typedef struct precompute_options {

@@ -295,7 +295,7 @@ static const option_row of_methods[] = {
      .argument = "FILE|group=NAME|sky|luminaires"},
     {.name = "receivers", .kind = OPTION_TEXT, .offset = FIELD(receivers), .argument = "GROUP,..."},
     {.name = "importance", .kind = OPTION_TEXT, .offset = FIELD(importance), .argument = "FILE"},
-    {.name = "sources", .kind = OPTION_TEXT, .offset = FIELD(sources), .argument = "GROUP,..."},
+    {.name = "sources", .kind = OPTION_TEXT, .offset = FIELD(sources), .argument = "GROUP|luminaires,..."},
     {0},
 };
 

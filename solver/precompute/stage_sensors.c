@@ -70,14 +70,17 @@ done:
     return status;
 }
 
-/* [n_groups]: groups of elements that --sources names; NULL where there are none. */
+/* [n_groups]: groups of elements that --sources names, all of whose elements are whole sources; elements that
+ * luminaires light are mostly parts of one. NULL where there are none. */
 static lam_status find_sources(const precompute_scene *scene, bool **out, lam_error *error) {
     const float *emits = scene->importance.emits;
     *out = NULL;
     if (emits == NULL) return LAM_OK;
     *out = memory_allocate(scene->m.n_groups, sizeof **out, "sensors", error);
     if (*out == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < scene->m.n; i++) (*out)[scene->m.group[i]] |= emits[i] > 0;
+    for (size_t g = 0; g < scene->m.n_groups; g++) (*out)[g] = true;
+    for (size_t i = 0; i < scene->m.n; i++)
+        if (emits[i] < 1) (*out)[scene->m.group[i]] = false;
     return LAM_OK;
 }
 

@@ -36,6 +36,10 @@ lam_status scene_load_luminaires(const precompute_job *job, store *s, precompute
 lam_status stage_luminaires(const precompute_job *job, precompute_scene *scene, lam_error *error);
 lam_status luminaires_save(const luminaire_columns *c, const mesh *m, store *s, lam_error *error);
 
+/* Makes sources of the elements that luminaires light, where these are named as sources: by the light of each
+ * that an element reflects, over the mean of all that it lights, at most 1: stage_importance.c. */
+lam_status scene_light_sources(const precompute_job *job, precompute_scene *scene, lam_error *error);
+
 /* Logs lines as warnings. */
 void scene_warn(const precompute_job *job, const luminaire_warnings *w);
 

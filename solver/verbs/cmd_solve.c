@@ -49,10 +49,11 @@ static void take_error(const stated_errors *stated, const emission *light, size_
     const size_t count = selected != NULL ? n_selected : stated->n;
     const size_t others = stated_errors_others(stated, count, selected);
     const size_t rows = light->E != NULL ? (light->steady ? 1 : light->n_vectors) * out->m->n_channels : 0;
-    const answer_scope scope = {
-        .receivers_only = others == 0,
-        .strange = light->L != NULL || light->D != NULL || stated_errors_is_strange(stated, rows, light->E),
-        .sky = light->L != NULL && is_dark(light, rows * stated->n, out->m->n_channels)};
+    const answer_scope scope = {.receivers_only = others == 0,
+                                .strange = light->L != NULL || (light->D != NULL && !stated->luminaires) ||
+                                           stated_errors_is_strange(stated, rows, light->E),
+                                .sky =
+                                    light->L != NULL && is_dark(light, rows * stated->n, out->m->n_channels)};
     stated_errors_note(stated, scope, &notes);
     if (notes.has_error) out->relative = notes.relative_mean;
     if (notes.has_error) out->indirect = notes.indirect_mean;

@@ -147,6 +147,44 @@ class Lit(Case):
             self.assertAlmostEqual(told["parts"][name], value, delta=1e-5 * answer["stated"])
         self.assertAlmostEqual(told["own"]["indirect"], answer["indirect_mean"], delta=1e-5 * answer["indirect_mean"])
 
+    def test_luminaires_as_sources(self):
+        """Their light is kept where it comes from the elements that they light; the error that is stated covers it, and other light has
+        none."""
+        own = ("--luminaires", self.kept("list.json"), *ASSETS, "--elements", 3000, "--reflectance", .5, "--method", "hierarchical",
+               "--epsilon", .3, "--trials", 1)
+        for name, options in ("all", ()), ("lit", ("--sources", "luminaires")), ("both", ("--sources", "ceiling,luminaires")):
+            must("precompute", self.kept("lit.obj"), *own, *options, "-o", self.path(name + ".h5"))
+        must("precompute", self.kept("lit.obj"), "--luminaires", self.kept("list.json"), *ASSETS, "--elements", 3000, "--reflectance", .5,
+             "--method", "exact", "--probes", 0, "-o", self.path("exact.h5"))
+        with h5py.File(self.path("lit.h5")) as lit, h5py.File(self.path("both.h5")) as both, h5py.File(self.path("all.h5")) as every:
+            x = 0.5 * lit["luminaires/irradiance"][()].astype(float)
+            area = lit["mesh/area"][()]
+            s = np.max([np.minimum(h / (h @ area / area[h > 0].sum()), 1) for h in x], axis=0)
+            np.testing.assert_array_equal(lit["sources/elements"][()], np.flatnonzero(s >= 1 / 16))
+            np.testing.assert_allclose(lit["sources/weights"][()], s[s >= 1 / 16], rtol=1e-6)
+            self.assertEqual(lit["sources"].attrs["luminaires"], 1)
+            ceiling = np.flatnonzero(lit["mesh/group"][()] == [n.decode() for n in lit["mesh/group_names"]].index("ceiling"))
+            self.assertFalse(np.isin(ceiling, lit["sources/elements"][()]).all())
+            self.assertTrue(np.isin(ceiling, both["sources/elements"][()]).all())
+            self.assertEqual(dict(lit["error/own"].attrs).keys(), dict(every["error/own"].attrs).keys())
+        truth = self.solve(self.path("exact.h5"), "--linear")
+        for name in "lit", "both":
+            must("solve", self.path(name + ".h5"), "--linear", "-o", self.path("o.json"))
+            answer = json.loads(pathlib.Path(self.path("o.json")).read_text(encoding="utf-8"))
+            self.assertEqual(answer["error"]["from"], "sources")
+            off = np.array(answer["radiosity"], float).ravel() - truth.ravel()
+            indirect = self.solve(self.path("exact.h5"), "--quantity", "indirect", "--linear").ravel()
+            error = math.sqrt((area * off**2).sum() / (area * indirect**2).sum())
+            # The figure is a mean over probes and has the noise of eight of them.
+            self.assertLess(error, 2 * answer["error"]["indirect_mean"], name)
+        must("solve", self.path("lit.h5"), "--emit", "ceiling=1", "-o", self.path("o.json"))
+        self.assertEqual(json.loads(pathlib.Path(self.path("o.json")).read_text(encoding="utf-8"))["error"]["from"], "others")
+        self.failed("was built for the light of the luminaires that it has", "precompute", self.path("lit.h5"), "--luminaires", "none", "-o",
+                    self.path("no.h5"))
+        self.failed("--sources luminaires: there are none", "precompute", self.kept("lit.obj"), "--sources", "luminaires", "-o",
+                    self.path("no.h5"))
+        self.assertIn("3, the light of 3 of them", must("verify", self.path("lit.h5")).stdout)
+
     def test_verify_sees_a_wrong_column(self):
         self.assertIn("3, the light of 3 of them was found again", must("verify", self.kept("lit.h5")).stdout)
         data = pathlib.Path(self.kept("lit.h5")).read_bytes()

@@ -51,9 +51,9 @@ static const option_row rows[] = {
     {.name = "sources",
      .kind = OPTION_TEXT,
      .offset = offsetof(hierarchical_options, sources),
-     .argument = "GROUP,...",
-     .help = "The groups that alone are going to emit, in any way: errors are kept small, and stated, for "
-             "such emissions; answers to others are only roughly right; --method auto then takes "
+     .argument = "GROUP|luminaires,...",
+     .help = "The groups that alone are going to emit, in any way, or the luminaires: errors are kept small, "
+             "and stated, for such light; answers to others are only roughly right; --method auto then takes "
              "hierarchical"},
     {0},
 };

@@ -124,7 +124,8 @@ lam_status importance_even_out(const importance *i, importance *out, lam_error *
     importance made = {.n = i->n,
                        .share_of_bounds = fmin(fmax(i->share_of_bounds, reference_least),
                                                reference_times * i->share_of_bounds),
-                       .share_of_thresholds = i->share_of_thresholds};
+                       .share_of_thresholds = i->share_of_thresholds,
+                       .luminaires = i->luminaires};
     TRY(copy(i->read, i->n, false, &made.read, error));
     TRY(copy(i->emits, i->n, false, &made.emits, error));
     TRY(copy(i->of, i->n, true, &made.of, error));
@@ -165,8 +166,10 @@ lam_status importance_save(const importance *i, const char *option, const char *
         TRY(store_set_text(s, GROUP, "option", option, error));
     }
     if (i->emits != NULL) {
-        TRY(save_elements(i->emits, i->n, SOURCES "/elements", NULL, s, error));
+        TRY(save_elements(i->emits, i->n, SOURCES "/elements", i->luminaires ? SOURCES "/weights" : NULL, s,
+                          error));
         TRY(store_set_text(s, SOURCES, "option", sources, error));
+        if (i->luminaires) TRY(store_set_integer(s, SOURCES, "luminaires", 1, error));
     }
 done:
     return status;
@@ -213,7 +216,8 @@ lam_status importance_load(store *s, size_t n, importance *out, lam_error *error
     importance made = {.n = n};
     *out = (importance){.n = 0};
     TRY(load_elements(s, GROUP, true, n, &made.read, error));
-    TRY(load_elements(s, SOURCES, false, n, &made.emits, error));
+    made.luminaires = store_has(s, SOURCES) && store_has_attribute(s, SOURCES, "luminaires");
+    TRY(load_elements(s, SOURCES, made.luminaires, n, &made.emits, error));
     if (made.read == NULL && made.emits == NULL) goto done;
     *out = made;
     made = (importance){.n = 0};

@@ -12,12 +12,15 @@
 #include "solver/operator/blocks/plane_tree.h"
 #include "store/store.h"
 
+#include <stdbool.h>
+
 typedef struct importance {
-    size_t n;     /* 0: none is known, all is read and may emit */
-    float *read;  /* [n] by element: w over its largest value; NULL: all is read */
-    float *emits; /* [n] by element: s, 1 of the sources, else 0; NULL: any element may emit */
-    float *of;    /* [n] by element: y, between importance_least and 1; NULL before it is found: 1 */
-    float *lit;   /* [n] by element: z, likewise */
+    size_t n;        /* 0: none is known, all is read and may emit */
+    float *read;     /* [n] by element: w over its largest value; NULL: all is read */
+    float *emits;    /* [n] by element: s, at most 1 of the sources, else 0; NULL: any element may emit */
+    bool luminaires; /* some are sources by the light of luminaires that they reflect */
+    float *of;       /* [n] by element: y, between importance_least and 1; NULL before it is found: 1 */
+    float *lit;      /* [n] by element: z, likewise */
     double share_of_bounds, share_of_thresholds; /* found with them: importance.c says how */
 } importance;
 
@@ -43,11 +46,11 @@ bool importance_is_found(const importance *i);
  * LAM_ERR_MEMORY. */
 lam_status importance_even_out(const importance *i, importance *out, lam_error *error);
 
-/* /importance of a store: the elements with a weight and their weights; /sources: the elements that emit. The
- * options say in the words of the command line where these are from; one that is not needed may be NULL.
- * Loading leaves y and z NULL, and n at 0 where the store has neither. Errors: those of the store;
- * LAM_ERR_FORMAT where an element is not below n, a weight not above 0 and at most 1, or no element emits;
- * LAM_ERR_MEMORY. */
+/* /importance of a store: the elements with a weight and their weights; /sources: the elements that emit, and
+ * their s where luminaires are among the sources, else it is 1. The options say in the words of
+ * the command line where these are from; one that is not needed may be NULL. Loading leaves y and z NULL, and
+ * n at 0 where the store has neither. Errors: those of the store; LAM_ERR_FORMAT where an element is not
+ * below n, a weight not above 0 and at most 1, or no element emits; LAM_ERR_MEMORY. */
 lam_status importance_save(const importance *i, const char *option, const char *sources, store *s,
                            lam_error *error);
 lam_status importance_load(store *s, size_t n, importance *out, lam_error *error);
