@@ -74,7 +74,7 @@ ALLOWED = {
     "solver/precompute/forecast": f"{METHOD} {SCENE} solver/formfactor/",
     "solver/precompute": (f"solver/precompute/forecast/ solver/figures/ solver/direct/ solver/luminaire/ solver/sensor/ solver/daylight/ {METHOD} {SCENE} solver/formfactor/ solver/light/ "
         "solver/codec/answer_error.h solver/adapt/ solver/walk/"),
-    "solver/verify": f"{METHOD} solver/direct/ solver/luminaire/ {SCENE} solver/formfactor/ solver/light/ solver/precompute/ solver/walk/walk.h",
+    "solver/verify": f"{METHOD} solver/direct/ solver/luminaire/ solver/sensor/ {SCENE} solver/formfactor/ solver/light/ solver/precompute/ solver/walk/walk.h",
     "solver/verbs": "lambert/ store/ solver/",
     "solver": "lambert/ store/ solver/",
     "server/net": f"{BELOW_LINALG} solver/codec/",

@@ -144,6 +144,7 @@ typedef enum seed_purpose {
     SEED_VERIFY_WALKS = 15,
     SEED_VERIFY_LUMINAIRES = 16,
     SEED_SENSORS = 17,
+    SEED_VERIFY_SENSORS = 18,
     SEED_LINEAR_FIRST = 1, /* emissions that verify adds up: their seeds are counted, not given by a user */
     SEED_LINEAR_SECOND = 2
 } seed_purpose;

@@ -252,7 +252,7 @@ lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers, 
     visibility *v = NULL;
     bool *is_source = NULL;
     double(*ball)[4] = NULL;
-    sensor_rows made = {.n = m->n, .n_receivers = n};
+    sensor_rows made = {.n = m->n, .n_receivers = n, .rays = o->rays > 0 ? o->rays : SENSOR_RAYS};
     size_t sky = 0;
     rows_job *job = memory_allocate(1, sizeof *job, "rows of sensors", error);
     if (job == NULL) return LAM_ERR_MEMORY;
@@ -269,7 +269,7 @@ lam_status sensor_rows_make(const mesh *m, size_t n, const receiver *receivers, 
                                .is_source = is_source,
                                .n_sources = n_sources,
                                .sky = o->sky,
-                               .rays = (o->rays > 0 ? o->rays : SENSOR_RAYS) / HALVES,
+                               .rays = made.rays / HALVES,
                                .pair_factor = o->pair_factor,
                                .seed = o->seed};
     if (o->sky != NULL) {

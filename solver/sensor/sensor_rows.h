@@ -35,6 +35,7 @@ typedef struct sensor_rows_options {
  * sound. A variance for each row and group would need to know how uneven the light of a group is. */
 typedef struct sensor_rows {
     size_t n, n_receivers, n_tiles; /* n: elements */
+    size_t rays;                    /* of a receiver */
     uint64_t *start;                /* [n_receivers + 1] */
     uint32_t *element;              /* [start[n_receivers]], ascending in a row */
     float *weight, *off;            /* likewise */

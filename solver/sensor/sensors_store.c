@@ -114,6 +114,7 @@ lam_status sensors_save(const sensor_list *l, const sensor_rows *rows, const sen
     const size_t n = l->n, nnz = (size_t)rows->start[n];
     TRY(save_sets(l, s, error));
     TRY(save_receivers(l, rows, lit != NULL ? lit->inside : NULL, s, error));
+    TRY(store_set_integer(s, GROUP, "rays", (int64_t)rows->rays, error));
     TRY(store_write(s, GROUP "/indptr", STORE_U64, 1, (size_t[]){n + 1}, rows->start, error));
     TRY(store_write(s, GROUP "/indices", STORE_U32, 1, (size_t[]){nnz}, rows->element, error));
     TRY(store_write(s, GROUP "/weights", STORE_F32, 1, (size_t[]){nnz}, rows->weight, error));

@@ -61,6 +61,7 @@ static const struct {
     {"form factors", verify_form_factors},
     {"sky", verify_sky},
     {"luminaires", verify_luminaires},
+    {"sensors", verify_sensors},
     {"operator", verify_operator},
     {"linearity", verify_linearity},
     {"energy", verify_energy},

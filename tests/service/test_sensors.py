@@ -13,6 +13,7 @@ import numpy as np
 
 from case import Case
 from command import EXAMPLES, example, lambert, must
+from make_store import add_checksums
 
 ASSETS = ("--assets", os.path.join(os.environ["FIXTURES"], "luminaires"))
 LUMINAIRES = {"luminaires": [{"name": "a", "file": "made/lambertian-1000cd.ies", "at": [3, 3, 2.5]},
@@ -147,6 +148,62 @@ class Sensors(Case):
         # Hours within rounding of the limit may fall to either side.
         self.assertLessEqual(abs(year - (hours >= limit).mean(0)).max(), 2 / 200)
         self.assertGreater(year.std(), 0)
+
+    def test_verify_sees_wrong_rows(self):
+        """All receivers that have a value are found again, as these are no more than the check takes."""
+        few = {"points": [{"name": "p", "at": [[1 + x, 1 + y, 0.75] for x in range(5) for y in range(4)], "normal": [0, 0, 1]},
+                          {"name": "out", "at": [[3, 3, -1]], "normal": [0, 0, 1]}],
+               "grids": [{"name": "g", "over": "floor", "height": 1, "spacing": 2}]}
+        with open(self.path("few.json"), "w", encoding="utf-8") as file:
+            json.dump(few, file)
+        must("precompute", self.grey, "--sensors", self.path("few.json"), "-o", self.path("few.h5"))
+        self.assertIn("30 in 3 sets, the rows of 29 of them were found again, as stated", must("verify", self.path("few.h5")).stdout)
+        with h5py.File(self.path("few.h5")) as file:
+            rows, flags, first = (file["sensors"][name][()] for name in ("indptr", "flags", "first"))
+            grid = int(first[[n.decode() for n in file["sensors/names"][()]].index("g")])
+        out = int(np.flatnonzero(flags)[0])
+
+        def scale(factor, row):
+            def change(sensors):
+                for name in "weights", "weights_off":
+                    sensors[name][int(rows[row]):int(rows[row + 1])] *= np.float32(factor)
+            return change
+
+        def put(name, place, value):
+            def change(sensors):
+                sensors[name][place] = value
+            return change
+
+        for words, change in (("times the weights that their places give", scale(.95, 0)),
+                              ("receiver 29: elements", scale(.95, 29)),
+                              ("add up to 1.05", scale(1.05, 0)),
+                              ("halves of a weight differ", put("weights_off", 5, .5)),
+                              ("times the light that its place and table do", put("luminaires", 1, 0)),
+                              (f"receiver {out}: flags 0", put("flags", out, 0)),
+                              ("receiver 3: flags 1", put("flags", 3, 1)),
+                              ("flags 2 beside", None),
+                              ("cell 9, which is none of its own", put("cell", grid, 9)),
+                              ("in cell 0, which is none", put("cell", grid + 1, 0)),
+                              ("in cell 4", put("cell", 0, 4)),
+                              ("receiver 0: elements that nothing hides", None)):
+            with self.subTest(words):
+                with open(self.path("few.h5"), "rb") as good, open(self.path("bad.h5"), "wb") as bad:
+                    bad.write(good.read())
+                with h5py.File(self.path("bad.h5"), "r+") as file:
+                    if change is not None:
+                        change(file["sensors"])
+                    elif words.startswith("receiver 0"):  # the row of a receiver that looks elsewhere
+                        file["sensors/place"][0, 3:6] = [0, 0, -1]
+                        file["sensors/place"][0, 2] = 2.5
+                    else:
+                        file["sensors/flags"][2] = 2
+                        del file["sensors/luminaires"], file["luminaires"]
+                    add_checksums(file)
+                result = lambert("verify", self.path("bad.h5"))
+                self.assertNotEqual(result.returncode, 0)
+                line = next(line for line in result.stdout.splitlines() if "sensors" in line)
+                self.assertTrue(line.startswith("BROKEN"), line)
+                self.assertIn(words, line)
 
     def test_refusals(self):
         self.refused(1, "no such set; it has", "solve", self.grey, "--sensors", "rom")
