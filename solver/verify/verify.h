@@ -60,7 +60,8 @@ void examination_free(examination *e);
 typedef lam_status verify_check(examination *e, check *c, lam_error *error);
 
 verify_check verify_checksums, verify_mesh, verify_form_factors, verify_sky, verify_luminaires,
-    verify_sensors, verify_operator, verify_linearity, verify_energy, verify_error, verify_walks, verify_scene;
+    verify_sensors, verify_operator, verify_linearity, verify_energy, verify_error, verify_walks,
+    verify_scene;
 
 /* Numbers of one emission: a channel has one for each element, or, of an operator of emitters, a weight each.
  */
