@@ -162,10 +162,9 @@ static void light_seen(const element_run *r, size_t element, size_t segments, ui
 }
 
 /* All light of an element, and the findings of few segments. */
-static void light_first(const element_run *r, size_t element) {
-    opening_cell cells[OPENING_CELLS];
+static void light_first(const element_run *r, size_t element, kept_cells *kept) {
     const bool lit = !mesh_is_buried(r->m, element);
-    r->open[element] = lit ? element_light(r->m, element, &r->luminaire->source, cells) : 0;
+    r->open[element] = lit ? element_light(r->m, element, &r->luminaire->source, kept) : 0;
     r->H[element] = (float)r->open[element];
     r->off[element] = 0;
     r->found[element] = UNLIT;
@@ -188,7 +187,9 @@ static void light_again(const element_run *r, size_t element) {
 }
 
 static void light_some_first(const void *job, size_t first, size_t last) {
-    for (size_t i = first; i < last; i++) light_first(job, i);
+    kept_cells kept;
+    kept.of = NULL;
+    for (size_t i = first; i < last; i++) light_first(job, i, &kept);
 }
 
 static void light_some_again(const void *job, size_t first, size_t last) {

@@ -28,7 +28,7 @@ typedef struct part_of_element {
 
 typedef struct element_sum {
     const placed_source *source;
-    opening_cell *cells;
+    kept_cells *kept;
     double normal[3]; /* in the frame */
     double flux;      /* lm so far */
     double dimmest;   /* lm that matter to nobody */
@@ -36,7 +36,7 @@ typedef struct element_sum {
 } element_sum;
 
 static double irradiance(const element_sum *s, const double x[3]) {
-    return placed_source_irradiance(s->source, x, s->normal, s->cells);
+    return placed_source_irradiance(s->source, x, s->normal, s->kept);
 }
 
 static double triangle_size(const double a[3], const double b[3], const double c[3]) {
@@ -163,10 +163,10 @@ bool element_faces_away(const mesh *m, size_t element, const placed_source *s) {
     return dot3(to, normal) + reach <= 0;
 }
 
-double element_light(const mesh *m, size_t element, const placed_source *s, opening_cell *cells) {
+double element_light(const mesh *m, size_t element, const placed_source *s, kept_cells *kept) {
     const float *n = m->normal[element];
     const double normal[3] = {(double)n[0], (double)n[1], (double)n[2]}, area = m->area[element];
-    element_sum sum = {.source = s, .cells = cells, .widest = fmin(widest, fmax(narrowest, s->finest))};
+    element_sum sum = {.source = s, .kept = kept, .widest = fmin(widest, fmax(narrowest, s->finest))};
     part_of_element whole = {.n = (int)mesh_corners(m, element)};
     double middle[3] = {0};
     if (!(s->peak > 0) || element_faces_away(m, element, s)) return 0;

@@ -271,26 +271,34 @@ static double place_along(const face_part *p, int side, size_t n, size_t k, bool
     return p->from[side] + (p->to[side] - p->from[side]) * ((double)(k / 2) + .5 + offset) / (double)n;
 }
 
-static void add_part(cell_list *l, const face_part *p) {
+/* The pairs of cells along both sides of a part, 0 for one cell alone; false, with the longer side, where it
+ * is so near that it is divided first. */
+static bool count_pairs(const cell_list *l, const face_part *p, size_t n[2], int *side) {
     double length[2] = {0};
-    size_t n[2];
-    if (l->n > l->most) return;
     part_lengths(l->face, p, length);
     const double far = part_distance(l, p, length), most = fmax(length[0], length[1]);
-    if (!(far > most * l->apart) && most > l->closest) {
-        const int side = length[0] >= length[1] ? 0 : 1;
-        face_part half[2] = {*p, *p};
-        half[0].to[side] = half[1].from[side] = (p->from[side] + p->to[side]) / 2;
-        add_part(l, &half[0]);
-        add_part(l, &half[1]);
-        return;
-    }
+    *side = length[0] >= length[1] ? 0 : 1;
+    if (!(far > most * l->apart) && most > l->closest) return false;
     const double step = l->step * fmax(far, l->closest);
     for (int k = 0; k < 2; k++) {
         const double whole = p->to[k] - p->from[k];
         const size_t least = (size_t)ceil((double)l->least[k] * fmin(1, whole / l->whole[k]) - 1e-9);
         n[k] = length[k] > alone * step ? (size_t)ceil(length[k] / step) : 0;
         if (length[k] > 0 && n[k] < least) n[k] = least;
+    }
+    return true;
+}
+
+static void add_part(cell_list *l, const face_part *p) {
+    size_t n[2];
+    int side;
+    if (l->n > l->most) return;
+    if (!count_pairs(l, p, n, &side)) {
+        face_part half[2] = {*p, *p};
+        half[0].to[side] = half[1].from[side] = (p->from[side] + p->to[side]) / 2;
+        add_part(l, &half[0]);
+        add_part(l, &half[1]);
+        return;
     }
     const size_t many[2] = {n[0] > 0 ? 2 * n[0] : 1, n[1] > 0 ? 2 * n[1] : 1};
     const double du = (p->to[0] - p->from[0]) / (double)many[0],
@@ -359,17 +367,27 @@ static bool seen_part(const opening_faces *o, const opening_face *f, const doubl
     return true;
 }
 
+/* True where one cell stands for all of the opening. */
+static bool is_small(const opening_faces *o, const double x[3]) {
+    const double largest = fmax(fmax(o->size[0], o->size[1]), o->size[2]);
+    return o->n_faces == 0 || largest <= alone * o->step * opening_distance(o, x);
+}
+
+static cell_list list_begin(const opening_faces *o, const double x[3], size_t most, opening_cell *cells) {
+    const double largest = fmax(fmax(o->size[0], o->size[1]), o->size[2]);
+    return (cell_list){.is_flat = o->flat,
+                       .x = x,
+                       .step = o->step,
+                       .apart = .5,
+                       .closest = nearest * largest,
+                       .most = most,
+                       .cells = cells};
+}
+
 size_t opening_cells(const opening_faces *o, const double x[3], size_t least, size_t most,
                      opening_cell *cells) {
-    const double largest = fmax(fmax(o->size[0], o->size[1]), o->size[2]);
-    cell_list l = {.is_flat = o->flat,
-                   .x = x,
-                   .step = o->step,
-                   .apart = .5,
-                   .closest = nearest * largest,
-                   .most = most,
-                   .cells = cells};
-    if (o->n_faces == 0 || (least == 1 && largest <= alone * o->step * opening_distance(o, x))) {
+    cell_list l = list_begin(o, x, most, cells);
+    if (o->n_faces == 0 || (least == 1 && is_small(o, x))) {
         cells[0] = (opening_cell){.share = 1};
         return 1;
     }
@@ -387,6 +405,27 @@ size_t opening_cells(const opening_faces *o, const double x[3], size_t least, si
         if (l.n <= most) break;
     }
     return l.n;
+}
+
+size_t opening_cells_keep(const opening_faces *o, const double x[3], size_t most, kept_cells *k) {
+    static const face_part whole = {{0, 0}, {1, 1}};
+    cell_list l = list_begin(o, x, most, k->cells);
+    size_t pairs[2];
+    int side;
+    if (o->flat && !is_small(o, x)) {
+        l.face = &o->faces[0];
+        l.whole[0] = l.whole[1] = 1;
+        least_pairs(o, l.face, 1, l.least);
+        if (count_pairs(&l, &whole, pairs, &side)) {
+            if (k->of == o && memcmp(k->pairs, pairs, sizeof pairs) == 0) return k->n;
+            k->n = opening_cells(o, x, 1, most, k->cells);
+            k->of = k->n == (pairs[0] > 0 ? 2 * pairs[0] : 1) * (pairs[1] > 0 ? 2 * pairs[1] : 1) ? o : NULL;
+            memcpy(k->pairs, pairs, sizeof pairs);
+            return k->n;
+        }
+    }
+    k->of = NULL;
+    return opening_cells(o, x, 1, most, k->cells);
 }
 
 void opening_place(const opening_faces *o, double u, double w, opening_cell *out) {

@@ -51,6 +51,17 @@ enum { OPENING_CELLS = 1024 };
 size_t opening_cells(const opening_faces *o, const double x[3], size_t least, size_t most,
                      opening_cell *cells);
 
+/* The cells of the last receiver. A flat opening that is far enough away to stay whole has cells that depend
+ * on their number along both sides alone, so that receivers side by side mostly share them. */
+typedef struct kept_cells {
+    const opening_faces *of; /* NULL: there are none yet */
+    size_t n, pairs[2];
+    opening_cell cells[OPENING_CELLS];
+} kept_cells;
+
+/* opening_cells with a least of 1 into k->cells, bit for bit; k->of is NULL at first, and outlives k. */
+size_t opening_cells_keep(const opening_faces *o, const double x[3], size_t most, kept_cells *k);
+
 /* A place at (u, w) of the unit square, as a cell: places are as dense as the area, or nearly so. */
 void opening_place(const opening_faces *o, double u, double w, opening_cell *out);
 

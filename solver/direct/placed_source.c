@@ -129,9 +129,10 @@ bool placed_source_is_dark(const placed_source *s, const double x[3]) {
 }
 
 double placed_source_irradiance(const placed_source *s, const double x[3], const double normal[3],
-                                opening_cell *cells) {
+                                kept_cells *kept) {
     if (placed_source_is_dark(s, x)) return 0;
-    const size_t n = opening_cells(&s->opening, x, 1, CELLS_MOST, cells);
+    const size_t n = opening_cells_keep(&s->opening, x, CELLS_MOST, kept);
+    const opening_cell *cells = kept->cells;
     double sum = 0;
     for (size_t k = 0; k < n; k++) {
         double to[3], towards[3];

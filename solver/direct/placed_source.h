@@ -42,9 +42,9 @@ double placed_source_normal(const placed_source *s, const opening_cell *cell, co
 /* True for a point of the frame that no light of the opening goes to: on the dark side of all of it. */
 bool placed_source_is_dark(const placed_source *s, const double x[3]);
 
-/* The irradiance of a surface at x with a normal, both in the frame, that sees all of the opening. cells:
- * room for OPENING_CELLS. */
+/* The irradiance of a surface at x with a normal, both in the frame, that sees all of the opening. kept:
+ * for points side by side. */
 double placed_source_irradiance(const placed_source *s, const double x[3], const double normal[3],
-                                opening_cell *cells);
+                                kept_cells *kept);
 
 #endif
