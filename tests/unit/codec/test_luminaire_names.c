@@ -214,18 +214,35 @@ START_TEST(faults_of_dimmers) {
 }
 END_TEST
 
+/* They are the last emitters of a store of few, whose weights are read as dimmers; both add up. */
+START_TEST(weights_of_emitters_are_dimmers) {
+    static const char text[] = "{\"emissions\":[{\"emitters\":[[5,6,7],0,0,0,0,0,0,0,[1,2,3]],\"luminaires\":"
+                               "{\"wall\":0.5,\"b\":4}},"
+                               "{\"luminaires\":{\"spot\":1}},{\"emitters\":[0,1,0,0,0,0,0,0,0]}]}";
+    fixture f = make_scene(C);
+    radiosity_request request = {0};
+    problem why;
+    f.base.scene.n_emitters = 2 + K;
+    ck_assert_msg(read_request(&f, text, &request, &why), "%s", why.detail);
+    ck_assert_uint_eq(request.emitters.n, 3);
+    ck_assert_uint_eq(request.luminaires.n, 3);
+    for (size_t c = 0; c < C; c++) {
+        const float *W = request.emitters.values + c * (2 + K), *D = request.luminaires.values + c * K;
+        ck_assert(W[0] == (float)(5 + c) && D[6] == (float)(1 + c) + .5f && D[3] == 4);
+        for (size_t k = 1; k < 2 + K; k++) ck_assert(W[k] == 0);
+        ck_assert(D[C * K] == 1 && W[C * (2 + K)] == 0 && W[2 * C * (2 + K) + 1] == 1);
+        for (size_t k = 0; k < K; k++) ck_assert(D[2 * C * K + k] == 0);
+    }
+    radiosity_request_free(&request);
+    free_scene(&f);
+}
+END_TEST
+
 START_TEST(stores_that_do_not_answer_them) {
     static const char text[] = "{\"emission\":{\"luminaires\":{\"spot\":1}}}";
     fixture f = make_scene(C);
     radiosity_request request = {0};
     problem why;
-    f.base.scene.n_emitters = 2;
-    ck_assert(!read_request(&f, text, &request, &why));
-    ck_assert_str_eq(
-        why.detail,
-        "emission/luminaires: luminaires are answered by other kinds of stores, not by one of few "
-        "emitters");
-    radiosity_request_free(&request);
     f.base.scene.n_emitters = f.base.scene.n_luminaires = 0;
     ck_assert(!read_request(&f, text, &request, &why));
     ck_assert_str_eq(why.detail,
@@ -267,6 +284,7 @@ int main(void) {
     tcase_add_test(c, dimmers_are_read);
     tcase_add_test(c, units_are_those_of_the_answer);
     tcase_add_test(c, faults_of_dimmers);
+    tcase_add_test(c, weights_of_emitters_are_dimmers);
     tcase_add_test(c, stores_that_do_not_answer_them);
     tcase_add_test(c, files_and_limits);
     suite_add_tcase(s, c);
