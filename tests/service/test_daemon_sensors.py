@@ -326,8 +326,9 @@ class Kinds(Case):
             must("precompute", path / "yard.obj", "-o", cls.stores[name], "--elements", 120, "--rays", 1024, "--probes", 0,
                  "--sky", "grid:4x3", "--keep-form-factors", *options)
             cls.truth[name] = t = Truth(cls.stores[name])
-            cls.lights[name] = Luminaires(t.n, t.C, seed=7).add_to(cls.stores[name])
-            cls.sensors[name] = Sensors(t.n, t.C, 12, cls.lights[name], seed=7).add_to(cls.stores[name])
+            if name != "few":
+                cls.lights[name] = Luminaires(t.n, t.C, seed=7).add_to(cls.stores[name])
+            cls.sensors[name] = Sensors(t.n, t.C, 12, cls.lights.get(name), seed=7).add_to(cls.stores[name])
         cls.stores["stated"] = path / "stated.h5"
         must("precompute", path / "yard.obj", "-o", cls.stores["stated"], "--elements", 120, "--rays", 1024, "--probes", 16,
              "--sky", "grid:4x3", "--keep-form-factors", *KINDS["low"])
