@@ -5,6 +5,7 @@
 #include "server/route/sensor_figures.h"
 #include "server/scene/adjoint_rows.h"
 #include "server/scene/direct_light.h"
+#include "server/scene/sensor_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
 #include "solver/operator/emitters.h"
@@ -219,11 +220,12 @@ bool quick_radiosity(call *in, answer *out) {
     if (good) {
         notes.parse_ms = clock_ms() - start;
         notes.quantity = radiosity_request_told(&request);
-        notes.at = request.at_sensors ? "sensors" : NULL;
+        notes.at = request.at_sensors ? sensor_places_word(&request) : NULL;
         answer_note_unit(&request.told, notes.quantity, converted, &notes);
         in->n_rhs = request.n_rhs;
-        good = request.at_sensors ? sensor_figures_quick(in, &request, &notes, &b)
-                                  : answer_groups(in, &request, &notes, &b);
+        good = sensor_request_check(in->scene, &request, notes.unit, &why) &&
+               (request.at_sensors ? sensor_figures_quick(in, &request, &notes, &b)
+                                   : answer_groups(in, &request, &notes, &b));
     }
     if (good) {
         answer_json(out, &b, true);

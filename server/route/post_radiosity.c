@@ -237,8 +237,10 @@ static bool begin(call *in, answer *out) {
     s->notes = call_notes(in);
     s->notes.quantity = radiosity_request_told(request);
     s->notes.by_luminance = request->by_luminance;
-    s->notes.at = request->at_sensors ? "sensors" : request->at_faces ? "faces" : NULL;
+    s->notes.at = request->at_sensors ? sensor_places_word(request) : request->at_faces ? "faces" : NULL;
     answer_note_unit(&request->told, s->notes.quantity, s->converted, &s->notes);
+    good = good && sensor_request_check(of, request, s->notes.unit, &why);
+    if (good && request->at_probes) s->notes.unit = probe_unit(s->notes.unit);
     s->notes.parse_ms = clock_ms() - start;
     s->shape = (answer_shape){.n = of->n,
                               .n_channels = radiosity_request_channels(request, of->n_channels),

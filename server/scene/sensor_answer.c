@@ -4,6 +4,7 @@
 #include "solver/operator/sensor_light.h"
 
 #include <math.h>
+#include <string.h>
 
 size_t scene_sensors(const scene *s) {
     return s->sensors != NULL ? lam_sensors_count(s->sensors) : 0;
@@ -11,6 +12,37 @@ size_t scene_sensors(const scene *s) {
 
 size_t sensor_values(const scene *s, const radiosity_request *request) {
     return request->reduce.on ? scene_sensors(s) : request->n_receivers;
+}
+
+const char *sensor_places_word(const radiosity_request *request) {
+    return request->at_probes ? "probes" : "sensors";
+}
+
+/* lx is lm/m2, and lm/sr is cd. */
+const char *probe_unit(const char *unit) {
+    return strcmp(unit, "lx") == 0 ? "cd/m2" : strcmp(unit, "W/m2") == 0 ? "W/(m2 sr)" : NULL;
+}
+
+bool sensor_request_check(const scene *s, const radiosity_request *request, const char *unit, problem *why) {
+    const reduce_request *r = &request->reduce;
+    if (!request->at_sensors) return true;
+    for (size_t k = 0; k < r->n_names; k++)
+        for (size_t g = 0; g < r->names[k].n_groups; g++) {
+            const sensor_set_shown set = sensors_set_shown(s->sensors, r->names[k].groups[g]);
+            const bool probes = set.kind == SENSOR_SET_PROBES;
+            if (probes && r->on)
+                return problem_set(why, PROBLEM_NOT_IN_STORE,
+                                   "reduce: %.100s is a set of probes, whose coefficients have no figures; "
+                                   "select it as probes",
+                                   set.name);
+            if (probes != request->at_probes)
+                return problem_set(why, PROBLEM_NOT_IN_STORE, "select: %.100s is a set of %s", set.name,
+                                   probes ? "probes; select it as probes" : "sensors; select it as sensors");
+        }
+    return !request->at_probes || probe_unit(unit) != NULL ||
+           problem_set(why, PROBLEM_UNKNOWN_WORD,
+                       "unit is %s, and coefficients of probes are in cd/m2 or W/(m2 sr); ask for lx or W/m2",
+                       unit);
 }
 
 /* The receiver of value k. */
@@ -81,8 +113,8 @@ void sensor_values_find_double(const scene *s, const radiosity_request *request,
                 if (has) largest = fmax(largest, fabs(work[c * all + r]));
                 out[(v * C + c) * width + k] = has ? work[c * all + r] : NAN;
             }
-        /* A sum of N terms is rounded by less than N eps of the sum of their sizes; direct light has one
-         * sign. */
-        certificates[v] = certificates[v] * most + (double)(s->n + m + q) * 0x1p-53 * largest;
+        /* A sum of N terms is rounded by less than N eps of the sum of their sizes. Direct light has one
+         * sign, or, of a probe, at most four times the size of its first coefficient. */
+        certificates[v] = certificates[v] * most + 4 * (double)(s->n + m + q) * 0x1p-53 * largest;
     }
 }

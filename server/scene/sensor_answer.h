@@ -7,6 +7,15 @@
 /* Receivers of the scene; 0: it has none. */
 size_t scene_sensors(const scene *s);
 
+/* The word for the places of a request at sensors, "sensors" or "probes". */
+const char *sensor_places_word(const radiosity_request *request);
+
+/* The unit of coefficients of probes, by that of irradiance; NULL: they have none in it. */
+const char *probe_unit(const char *unit);
+
+/* False with *why for probes among sensors, or these among probes, and for figures of probes. */
+bool sensor_request_check(const scene *s, const radiosity_request *request, const char *unit, problem *why);
+
 /* Numbers of a vector in a channel: of those selected, or with reduce of all receivers of the scene. */
 size_t sensor_values(const scene *s, const radiosity_request *request);
 

@@ -7,13 +7,18 @@
 #include <string.h>
 
 /* The words of sets, as lists of sensors have them, and of weights (store/FORMAT.md). */
-static const char *const kinds[] = {"points",        "grids",   "eyes", "cylinders",
-                                    "semicylinders", "spheres", "cubes"};
-static const char *const weights[] = {"plane", "cylinder", "semicylinder", "sphere"};
+static const char *const kinds[] = {"points",        "grids",   "eyes",  "cylinders",
+                                    "semicylinders", "spheres", "cubes", "probes"};
+static const char *const weights[] = {"plane", "cylinder", "semicylinder", "sphere", "harmonics"};
 
 /* Appends the word of a number; one that has none here as the number. */
 static bool write_word(buffer *b, const char *const *words, size_t n_words, unsigned number) {
     return number < n_words ? buffer_printf(b, "\"%s\"", words[number]) : buffer_printf(b, "%u", number);
+}
+
+/* Receivers of a place: of a probe all nine harmonics. */
+static size_t receivers_of_place(const sensor_set_shown *set) {
+    return set->kind == SENSOR_SET_PROBES ? SENSOR_HARMONICS : 1;
 }
 
 /* The vectors of a receiver. */
@@ -30,7 +35,8 @@ static bool write_vectors(buffer *b, const lam_sensors *l, const sensor_set_show
     bool shared = which != PLACE_AT && set->count > 0;
     const sensor_shown one = sensors_shown(l, set->count > 0 ? set->first : 0);
     const double *first = vector_of(&one, which);
-    for (size_t k = 1; shared && k < set->count; k++) {
+    const size_t step = receivers_of_place(set);
+    for (size_t k = step; shared && k < set->count; k += step) {
         const sensor_shown r = sensors_shown(l, set->first + k);
         shared = memcmp(vector_of(&r, which), first, sizeof zero) == 0;
     }
@@ -38,7 +44,7 @@ static bool write_vectors(buffer *b, const lam_sensors *l, const sensor_set_show
     if (shared && memcmp(first, zero, sizeof zero) == 0) return buffer_append_text(b, "null");
     if (shared) return json_write_doubles(b, first, 3);
     bool written = buffer_append(b, "[", 1);
-    for (size_t k = 0; written && k < set->count; k++) {
+    for (size_t k = 0; written && k < set->count; k += step) {
         const sensor_shown r = sensors_shown(l, set->first + k);
         written = (k == 0 || buffer_append(b, ",", 1)) && json_write_doubles(b, vector_of(&r, which), 3);
     }
@@ -48,10 +54,11 @@ static bool write_vectors(buffer *b, const lam_sensors *l, const sensor_set_show
 /* The places in the set of receivers that have this flag. */
 static bool write_flagged(buffer *b, const lam_sensors *l, const sensor_set_shown *set, const char *name,
                           unsigned flag) {
+    const size_t step = receivers_of_place(set);
     bool written = buffer_printf(b, ",\"%s\":[", name);
-    for (size_t k = 0, count = 0; written && k < set->count; k++)
+    for (size_t k = 0, count = 0; written && k < set->count; k += step)
         if ((sensors_shown(l, set->first + k).flags & flag) != 0)
-            written = buffer_printf(b, count++ > 0 ? ",%zu" : "%zu", k);
+            written = buffer_printf(b, count++ > 0 ? ",%zu" : "%zu", k / step);
     return written && buffer_append(b, "]", 1);
 }
 

@@ -14,11 +14,17 @@ static bool no_memory(problem *why) {
                        "not enough memory for the answer; ask for fewer vectors or select elements");
 }
 
+/* The word of the quantity. */
+static const char *quantity_of(const answer_notes *notes) {
+    return notes->at != NULL && strcmp(notes->at, "probes") == 0 ? "radiance"
+                                                                 : codec_quantity_name(notes->quantity);
+}
+
 bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes) {
     const char *by = notes->converted_by;
     return buffer_append_text(b, "{\"scene\":") && json_write_text(b, notes->scene) &&
            buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\"", n, n_channels,
-                         codec_quantity_name(notes->quantity)) &&
+                         quantity_of(notes)) &&
            (notes->at == NULL || buffer_printf(b, ",\"at\":\"%s\"", notes->at)) &&
            (notes->unit == NULL || buffer_printf(b, ",\"unit\":\"%s\"", notes->unit)) &&
            (notes->sum_unit == NULL || buffer_printf(b, ",\"sum_unit\":\"%s\"", notes->sum_unit)) &&
@@ -125,7 +131,7 @@ bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, 
         return npy_write_header(b, as->npy, rank, dims) || no_memory(why);
     }
     return (answer_head(b, shape->n, shape->n_channels, notes) &&
-            buffer_printf(b, ",\"%s\":%s", codec_quantity_name(notes->quantity), shape->batch ? "[" : "")) ||
+            buffer_printf(b, ",\"%s\":%s", quantity_of(notes), shape->batch ? "[" : "")) ||
            no_memory(why);
 }
 

@@ -37,6 +37,7 @@ typedef enum select_word {
     SELECT_GROUPS,
     SELECT_FACES,
     SELECT_SENSORS,
+    SELECT_PROBES,
     SELECT_WORDS
 } select_word;
 

@@ -40,7 +40,10 @@ static bool knows_faces(parser *p) {
 }
 
 static bool read_selected(parser *p, select_word which, index_list *selected) {
-    if (which == SELECT_SENSORS) return parser_read_sensor_sets(p);
+    if (which == SELECT_SENSORS || which == SELECT_PROBES) {
+        p->request->at_probes = which == SELECT_PROBES;
+        return parser_read_sensor_sets(p);
+    }
     if (which == SELECT_ELEMENTS) return parser_read_indices(p, INDEX_ELEMENTS, false, selected);
     if (which == SELECT_GROUPS) return read_selected_groups(p, selected);
     return knows_faces(p) && parser_read_indices(p, INDEX_FACES, true, &p->faces);
@@ -50,11 +53,13 @@ static bool read_select_members(parser *p, index_list *selected) {
     static const char *const names[] = {[SELECT_ELEMENTS] = "elements",
                                         [SELECT_GROUPS] = "groups",
                                         [SELECT_FACES] = "faces",
-                                        [SELECT_SENSORS] = "sensors"};
+                                        [SELECT_SENSORS] = "sensors",
+                                        [SELECT_PROBES] = "probes"};
     size_t mark = p->pointer_length, which, count = 0;
     unsigned seen = 0;
     json_slice key;
-    if (!parser_expect(p, JSON_OBJECT, "an object with elements, groups, faces or sensors")) return false;
+    if (!parser_expect(p, JSON_OBJECT, "an object with elements, groups, faces, sensors or probes"))
+        return false;
     if (!json_enter_object(&p->r)) return parser_fault(p);
     while (count < 2 && parser_next_member(p, &key)) {
         if (!parser_known_member(p, &key, names, SELECT_WORDS, &seen, &which)) return false;
@@ -66,8 +71,8 @@ static bool read_select_members(parser *p, index_list *selected) {
     if (p->why->status != 0) return false;
     p->pointer_length = mark;
     return count == 1 ||
-           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold one of elements, groups, faces and sensors",
-                         parser_here(p));
+           parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                         "%s must hold one of elements, groups, faces, sensors and probes", parser_here(p));
 }
 
 bool parser_read_select(parser *p) {
@@ -128,20 +133,23 @@ static bool find_faces(parser *p) {
 /* Sensors receive irradiance, which is gathered from the radiosity of all elements. */
 static bool settle_sensors(parser *p) {
     radiosity_request *request = p->request;
-    const char *member = request->reduce.on ? "reduce" : "select";
+    const char *member = request->reduce.on ? "reduce" : "select",
+               *what = request->at_probes ? "probes" : "sensors";
     if (p->at != AT_UNSAID)
-        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
-                             "the body holds both at and %s of sensors; leave at out", member);
-    if (p->quantity_given && request->quantity != LAM_IRRADIANCE) {
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body holds both at and %s of %s; leave at out",
+                             member, what);
+    if (p->quantity_given && (request->at_probes || request->quantity != LAM_IRRADIANCE)) {
         parser_point_key(p, "quantity", 8);
-        return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
-                             "%s is %s, and sensors receive irradiance alone; leave it out", parser_here(p),
-                             codec_quantity_name(request->quantity));
+        return parser_refuse(p, PROBLEM_UNKNOWN_WORD, "%s is %s, and %s alone; leave it out", parser_here(p),
+                             codec_quantity_name(request->quantity),
+                             request->at_probes ? "probes have coefficients of radiance"
+                                                : "sensors receive irradiance");
     }
     if (request->n_suns > 0)
         return parser_refuse(p, PROBLEM_NOT_IN_STORE,
-                             "the body holds an exact sun and sensors, to which none comes; leave the sun to "
-                             "the tiles of the sky");
+                             "the body holds an exact sun and %s, to which none comes; leave the sun to "
+                             "the tiles of the sky",
+                             what);
     request->quantity = LAM_RADIOSITY;
     request->at_sensors = true;
     request->select = false;

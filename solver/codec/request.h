@@ -83,8 +83,8 @@ typedef struct radiosity_request {
     /* Numbers or figures of receivers, which have irradiance: `quantity` is what is gathered from, radiosity,
      * and `select` is off. */
     bool at_sensors;
-    uint32_t
-        *receivers; /* [n_receivers], those selected, whose sets are the names of reduce; NULL with reduce */
+    bool at_probes;      /* they are probes, of which each has nine numbers: coefficients of radiance */
+    uint32_t *receivers; /* [n_receivers], those selected, of the sets that reduce names; NULL with reduce */
     size_t n_receivers;
     lam_quantity quantity;
     light_conversion told; /* of the answer; once read, the light above is in its unit */

@@ -294,6 +294,47 @@ class Answers(Case):
             answer = self.post(f"/v1/scenes/{name}/{to}", sent)
             self.assertEqual((answer.status, answer.json()["detail"]), (422, words), sent)
 
+    def test_probes(self):
+        """Nine numbers of each, as `lambert solve` has them; a furnace is even."""
+        folder = self.folder / "probes"
+        folder.mkdir()
+        (folder / "p.json").write_text(json.dumps({"probes": [{"name": "hall", "from": [.3, .3, .5], "steps": [[.4, 0, 0]], "counts": [2]}],
+                                                   "points": [{"name": "up", "at": [[.5, .5, .5]], "normal": [0, 0, 1]}]}))
+        must("generate", "furnace", "-o", folder / "f.obj")
+        must("precompute", folder / "f.obj", "--sensors", folder / "p.json", "--elements", 200, "--probes", 0, "--keep-form-factors",
+             "-o", folder / "hot.h5")
+        told = json.loads(must("solve", folder / "hot.h5", "--sensors", "hall", "--emit", "*=1", "--json").stdout)["sensors"][0]
+        wanted = np.transpose(told["coefficients"], (2, 0, 1))
+        self.assertGreater(wanted[0, 0, 0], 1)
+        with Daemon(folder / "hot.h5") as daemon:
+            emission = {"groups": dict.fromkeys((g["name"] for g in daemon.get("/v1/scenes/hot").json()["groups"]), 1)}
+
+            def ask(body):
+                return daemon.radiosity("hot", {"emission": emission, **body})
+
+            got = ask({"select": {"probes": ["hall"]}}).json()
+            self.assertEqual((got["quantity"], got["at"], got["unit"]), ("radiance", "probes", "W/(m2 sr)"))
+            values = numbers(got, "radiance").reshape(-1, 2, 9)
+            even = values[0, 0, 0]
+            np.testing.assert_allclose(values[:, :, 0], even, rtol=1e-4)
+            self.assertLess(np.abs(values[:, :, 1:]).max(), 1e-3 * even)
+            np.testing.assert_allclose(values / even, wanted / wanted[0, 0, 0], atol=1e-4)
+            refined = ask({"select": {"probes": ["hall"]}, "tolerance": 1e-6}).json()
+            self.assertLess(np.abs(numbers(refined, "radiance").reshape(values.shape) - values).max(), 1e-3 * even)
+            listed = daemon.get("/v1/scenes/hot/sensors").json()["sets"]
+            self.assertEqual([(one["kind"], one["weight"], len(one["at"])) for one in listed],
+                             [("points", "plane", 1), ("probes", "harmonics", 2)])
+            for body, words in (({"select": {"sensors": ["hall"]}}, "select: hall is a set of probes; select it as probes"),
+                                ({"select": {"probes": ["up"]}}, "select: up is a set of sensors; select it as sensors"),
+                                ({"reduce": {"sensors": ["hall"], "with": ["mean"]}},
+                                 "reduce: hall is a set of probes, whose coefficients have no figures; select it as probes"),
+                                ({"select": {"probes": ["hall"]}, "unit": "fc"},
+                                 "unit is fc, and coefficients of probes are in cd/m2 or W/(m2 sr); ask for lx or W/m2"),
+                                ({"select": {"probes": ["hall"]}, "quantity": "irradiance"},
+                                 "quantity is irradiance, and probes have coefficients of radiance alone; leave it out")):
+                answer = ask(body)
+                self.assertEqual((answer.status, answer.json()["detail"]), (422, words))
+
     def test_broken_stores_are_refused(self):
         path = self.folder / "broken.h5"
         for array, place, value, words in (("weights", 2, np.inf, "/sensors/weights[2] = inf"),
