@@ -139,6 +139,10 @@ const char *output_face_group(const solution *s, size_t face, double *area);
 /* Writes on standard output: the reductions, the values of faces, or the mean of every group. */
 void output_print(const solution *s);
 
+/* The last of its lines, "stated error of this answer, of the light of receivers, emitted by sources, 4
+ * emitters: 0.012, most of it by the mesh", with the parts where these are wanted; or why none is stated. */
+void output_print_error(const solution *s);
+
 /* Writes the same as JSON on standard output, those of faces as output_json. Errors: LAM_ERR_MEMORY;
  * LAM_ERR_ARGUMENT for a value that is too large for a float. */
 lam_status output_print_json(const solution *s, lam_error *error);

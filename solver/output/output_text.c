@@ -120,9 +120,7 @@ static void print_dark_names(const solution *s) {
     if (n > 0) puts(", which no light reaches");
 }
 
-/* "stated error of this answer, of the light of receivers, emitted by sources, 4 emitters: 0.012, most of it
- * by the mesh", and its parts where these are wanted. */
-static void print_error(const solution *s) {
+void output_print_error(const solution *s) {
     const bool own = s->error_light != NULL && strcmp(s->error_light, "own") == 0;
     char text[HEADLINE_BYTES];
     if (!s->head.known && s->head.advice == NULL) return;
@@ -158,5 +156,5 @@ void output_print(const solution *s) {
     else
         print_means(s);
     print_buried(s);
-    print_error(s);
+    output_print_error(s);
 }

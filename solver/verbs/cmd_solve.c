@@ -9,6 +9,7 @@
 #include "solver/render/smooth.h"
 #include "solver/verbs/own_error.h"
 #include "solver/verbs/sensor_files.h"
+#include "solver/verbs/sensor_own_error.h"
 #include "solver/verbs/solve_faces.h"
 #include "solver/verbs/solve_options.h"
 #include "solver/verbs/solve_probes.h"
@@ -335,6 +336,65 @@ static lam_status check_batch(const annual_options *year, const emission *light,
                        "[hours][tiles] or --weather");
 }
 
+/* Checks that the file or the folder of the answer can be written. */
+static lam_status check_output(const solve_options *f, lam_error *error) {
+    if (f->output == NULL) return LAM_OK;
+    return f->sensors != NULL && sensor_results_named(f->output) ? sensor_results_check(f->output, error)
+                                                                 : atomic_file_check(f->output, error);
+}
+
+/* What the error of an answer is told by. */
+typedef struct error_asked {
+    const stated_errors *stated;
+    const error_scene *about;
+    const lit_store *lit;
+    const annual_options *year;
+    const sun_way *way;
+    size_t n_selected;
+    const uint32_t *selected;
+} error_asked;
+
+/* The error of the light that was asked for, in place of that of the store: of one light or of a batch at
+ * elements or sensors, or of the sum of a year at elements. */
+static lam_status take_own_error(const error_asked *of, sensor_choice *sensors, solution *out, answers *made,
+                                 lam_error *error) {
+    const bool at_sensors = sensors->all != NULL;
+    if (made->values != NULL && of->year->n_figures == 0)
+        return at_sensors ? sensor_error_take(of->stated, of->about, of->lit, sensors, out, error)
+                          : own_error_take(of->stated, of->about, of->lit, of->n_selected, of->selected, out,
+                                           &made->name_errors, error);
+    if (!is_sum(of->year) || at_sensors) return LAM_OK;
+    return year_error_take(of->stated, of->about, of->lit, &made->mean.light, of->way,
+                           (double)of->lit->light.n_vectors * of->year->hours / 1000, of->n_selected,
+                           of->selected, out, &made->name_errors, error);
+}
+
+static lam_status open_sensors(store *s, const mesh *m, const solve_options *f, const annual_options *year,
+                               sensor_choice *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const bool linear = f->figure == NULL && (year->n_figures == 0 || is_sum(year));
+    TRY(sensor_choice_open(s, m, f->sensors, out, error));
+    TRY(solve_probes_check(out, linear, f->output, error));
+    if (f->at_least != NULL) TRY(sensor_choice_least(f->at_least, out, error));
+done:
+    return status;
+}
+
+/* An answer of which no error is known yet. */
+static solution solution_of(const mesh *m, const lit_store *lit, const char *scene, lam_quantity quantity,
+                            bool tells_parts) {
+    return (solution){.m = m,
+                      .by_luminance = lit->light.by_luminance,
+                      .groups = &lit->scene.groups,
+                      .scene = scene,
+                      .quantity = quantity,
+                      .n_vectors = lit->light.n_vectors,
+                      .batch = lit->light.batch,
+                      .relative = -1,
+                      .indirect = -1,
+                      .tells_parts = tells_parts};
+}
+
 static lam_status solve(const char *path, const solve_options *f, const annual_options *year,
                         reduction *reductions, size_t n_reductions, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
@@ -357,21 +417,14 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     answer_words words;
     annual_options figures = *year;
     sensor_choice sensors = {.all = NULL};
-    if (f->output != NULL)
-        TRY(f->sensors != NULL && sensor_results_named(f->output) ? sensor_results_check(f->output, error)
-                                                                  : atomic_file_check(f->output, error));
+    TRY(check_output(f, error));
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, NULL, error));
     if (f->at == AT_FACES) TRY(solve_faces_find(path, &m, &faces, error));
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
     if (f->linear) lit.light.limiter = NULL;
-    if (f->sensors != NULL) {
-        TRY(sensor_choice_open(s, &m, f->sensors, &sensors, error));
-        const bool linear = f->figure == NULL && (year->n_figures == 0 || is_sum(year));
-        TRY(solve_probes_check(&sensors, linear, f->output, error));
-    }
-    if (f->at_least != NULL) TRY(sensor_choice_least(f->at_least, &sensors, error));
+    if (f->sensors != NULL) TRY(open_sensors(s, &m, f, year, &sensors, error));
     lit.light.sensors = sensors.all;
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
     TRY(check_own(path, &lit, t, error));
@@ -397,21 +450,12 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     TRY(check_batch(year, &lit.light, error));
     TRY(terminal_check(error));
     codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
-    solution out = {.m = &m,
-                    .by_luminance = lit.light.by_luminance,
-                    .groups = &lit.scene.groups,
-                    .scene = scene,
-                    .quantity = quantity,
-                    .n_vectors = lit.light.n_vectors,
-                    .batch = lit.light.batch,
-                    .relative = -1,
-                    .indirect = -1,
-                    .tells_parts = f->verbose,
-                    .reductions = reductions,
-                    .n_reductions = n_reductions};
+    solution out = solution_of(&m, &lit, scene, quantity, f->verbose);
+    out.reductions = reductions;
+    out.n_reductions = n_reductions;
     hours = hours_of(&span);
     if (f->weather != NULL) out.hours = &hours;
-    if (f->tolerance == 0 && sensors.all == NULL && f->at != AT_TEXELS)
+    if (f->tolerance == 0 && (sensors.all == NULL || year->n_figures == 0) && f->at != AT_TEXELS)
         take_error(&stated, &lit.light, n_selected, selected, t, &out);
     take_words(year, f->figure, &lit.told, &words, &out);
     if (f->at == AT_TEXELS) {
@@ -420,22 +464,17 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     }
     TRY(find_answers(path, f, &figures, &lit, n_selected, selected, t, &out, &made, error));
     if (figures.luminance) show_luminance(&one_channel, &out);
-    if (made.values != NULL && year->n_figures == 0 && sensors.all == NULL)
-        TRY(own_error_take(&stated, &about, &lit, n_selected, selected, &out, &made.name_errors, error));
-    if (is_sum(year) && sensors.all == NULL)
-        TRY(year_error_take(&stated, &about, &lit, &made.mean.light, &way,
-                            (double)lit.light.n_vectors * figures.hours / 1000, n_selected, selected, &out,
-                            &made.name_errors, error));
+    TRY(take_own_error(&(error_asked){&stated, &about, &lit, &figures, &way, n_selected, selected}, &sensors,
+                       &out, &made, error));
     if (f->smooth) TRY(find_corners(&out, &lit.light, &made.corners, error));
     out.corners = made.corners;
     if (f->at == AT_FACES) TRY(solve_faces_take(&faces, &made.values, &made.refined, &out, error));
-    if (lit.told.luminance && !figures.luminance)
-        take_luminance(sensors.all != NULL ? lam_sensors_count(sensors.all) : output_width(&out), &made,
-                       &one_channel, &out);
+    const size_t width = sensors.all != NULL ? lam_sensors_count(sensors.all) : output_width(&out);
+    if (lit.told.luminance && !figures.luminance) take_luminance(width, &made, &one_channel, &out);
     TRY(reductions_fill(&out, error));
-    TRY(sensors.all != NULL ? solve_sensors_put(&sensors, &out, &lit.light, (const double(*)[3])span.suns,
-                                                f->output, f->json, error)
-                            : put_out(&out, f, error));
+    TRY(sensors.all == NULL ? put_out(&out, f, error)
+                            : solve_sensors_put(&sensors, &out, &lit.light, (const double(*)[3])span.suns,
+                                                f->output, f->json, error));
 done:
     free(scene);
     free(selected);

@@ -16,6 +16,7 @@
 void sensor_choice_free(sensor_choice *c) {
     lam_sensors_close(c->all);
     free(c->sets);
+    free(c->stated);
     *c = (sensor_choice){.all = NULL};
 }
 
@@ -356,14 +357,16 @@ static json_t *answer_json(figures_work *w) {
     json_t *sets = json_array(), *names = json_array();
     for (size_t k = 0; k < c->n_sets; k++) {
         const size_t set = c->sets[k];
-        json_array_append_new(sets, solve_probes_are(c->all, set) ? solve_probes_json(c, s, set)
-                                                                  : set_json(w, set));
+        json_t *one = solve_probes_are(c->all, set) ? solve_probes_json(c, s, set) : set_json(w, set);
+        if (c->stated != NULL) json_object_set_new(one, "error", number(c->stated[k]));
+        json_array_append_new(sets, one);
     }
     for (size_t v = 0; s->names != NULL && v < s->n_vectors; v++)
         json_array_append_new(names, json_string(s->names[v]));
     json_t *out = json_pack("{s:s, s:s, s:s, s:o}", "scene", s->scene, "quantity", "irradiance", "unit",
                             output_unit(s, 0), "sensors", sets);
     if (s->names != NULL) json_object_set(out, "vectors", names);
+    if (c->stated != NULL) json_object_set_new(out, "error", number(headline_stated(&s->head)));
     if (c->n_least > 0) json_object_set_new(out, "at_least", numbers_json(c->n_least, c->least));
     json_decref(names);
     return out;
@@ -399,6 +402,7 @@ lam_status solve_sensors_put(const sensor_choice *c, const solution *s, const em
     TRY(work_open(c, s, light, suns, &work, error));
     if (path == NULL && !as_json) {
         put_table(&work);
+        output_print_error(s);
         goto done;
     }
     if (path != NULL && sensor_results_named(path)) {

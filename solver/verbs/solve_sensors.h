@@ -21,6 +21,7 @@ typedef struct sensor_choice {
                              borrowed, NULL: they are not known */
     size_t n_least;       /* thresholds of --at-least */
     double least[SENSOR_LEAST_MOST];
+    double *stated; /* [n_sets], the stated error of each; NULL: none is stated */
 } sensor_choice;
 
 /* The word for all sets. */

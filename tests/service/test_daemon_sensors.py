@@ -451,6 +451,10 @@ class Kinds(Case):
             mixed = self.ask(name, {"emission": emission, **reduced})["error"]["parts"]
             self.assertAlmostEqual(mixed["rows"], parts["rows"], delta=1e-6)
             self.assertTrue(.5 < mixed["mesh"] / parts["mesh"] < 2, (mixed, parts))
+            lamp = self.ask(name, {"emission": {"groups": {"lamp": 3}}, "select": {"sensors": [key]}})["error"]["stated"]
+            solved = json.loads(must("solve", self.stores[name], "--emit", "lamp=3", "--sensors", key, "--dim", "*=0", "--json").stdout)
+            self.assertAlmostEqual(solved["error"], lamp, delta=1e-3 * lamp)  # the daemon has raised light below zero
+            self.assertEqual(solved["error"], solved["sensors"][0]["error"])
         unknown = self.ask("low", {"emission": emission, "select": {"sensors": SETS}})["error"]
         self.assertEqual((unknown["stated"], unknown["advice"]), (None, "precompute without --probes 0 measures it"))
 
