@@ -302,7 +302,8 @@ static lam_status pass_alone(const scene *s, const radiosity_solve *solve, const
 static bool judge(const call *in, radiosity_solve *s) {
     s->judged = true;
     if (s->request.at_sensors)
-        return scene_note_sensor_error(in->scene, &s->request, s->H0, s->out, &s->notes, &s->errors) ||
+        return scene_note_sensor_error(in->scene, &s->request, s->H0, s->sun.shares, s->sun.at_sensors,
+                                       s->out, &s->notes, &s->errors) ||
                problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
     return (in->scene->errors.emitters.figures.s > 0
                 ? scene_note_emitters_error(in->scene, &s->request, s->W, s->out, &s->notes, &s->errors)
@@ -343,7 +344,8 @@ static void gather(const scene *of, radiosity_solve *s, const batch_part *part) 
     const size_t C = of->n_channels, first = part->first;
     if (!s->request.at_sensors) return;
     float *to = s->figures != NULL ? s->places : s->places + first * C * s->shape.n_values;
-    sensor_values_find(of, &s->request, first, part->count, s->out + first * C * of->n, s->gathered, to);
+    sensor_values_find(of, &s->request, first, part->count, s->out + first * C * of->n, s->sun.at_sensors,
+                       s->gathered, to);
 }
 
 static void pass_refined(const batch_part *parts, size_t n_parts) {

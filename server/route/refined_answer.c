@@ -185,7 +185,8 @@ static double *refine(call *in, const lam_refiner *refiner, const radiosity_requ
         return NULL;
     }
     if (request->at_sensors) {
-        sensor_values_find_double(s, request, first, count, p->out, p->gathered, p->some, certificates);
+        sensor_values_find_double(s, request, first, count, p->out, p->sun.at_sensors, p->gathered, p->some,
+                                  certificates);
         return p->some;
     }
     if (!request->select) return p->out;

@@ -1,5 +1,7 @@
 #include "server/route/sun_answer.h"
 
+#include "server/scene/sensor_answer.h"
+
 #include <stdlib.h>
 
 /* Seconds, roughly, for the rays of an element. */
@@ -16,12 +18,17 @@ bool sun_answer_begin(const call *in, const radiosity_request *request, sun_answ
             "%.100s: %s", s->name, scene_message(s, error.message));
     out->shares = call_allocate(in, bytes_times(request->n_suns, bytes_times(s->n, sizeof *out->shares)),
                                 "the sun", why);
-    return out->shares != NULL;
+    if (out->shares == NULL || !request->at_sensors) return out->shares != NULL;
+    out->at_sensors = call_allocate(
+        in, bytes_times(request->n_suns, bytes_times(scene_sensors(s), sizeof *out->at_sensors)), "the sun",
+        why);
+    return out->at_sensors != NULL;
 }
 
 void sun_answer_free(sun_answer *s) {
     free(s->shares);
-    s->shares = NULL;
+    free(s->at_sensors);
+    *s = (sun_answer){.shares = NULL};
 }
 
 /* The first sun of a vector from `first` on. */
@@ -37,6 +44,8 @@ bool sun_answer_find(call *in, const radiosity_request *request, size_t first, s
          k++) {
         if (!in->is_wanted(in)) return false;
         scene_sun_shares(of->sun, &request->suns[k], s->shares + k * of->n);
+        if (s->at_sensors != NULL)
+            scene_sun_at_sensors(of->sun, &request->suns[k], s->at_sensors + k * scene_sensors(of));
     }
     return true;
 }

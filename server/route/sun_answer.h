@@ -6,7 +6,8 @@
 
 /* Shares are irradiances, of that of a plane normal to the sun. Starts zeroed. */
 typedef struct sun_answer {
-    float *shares; /* [n_suns][n]; NULL: no sun shines */
+    float *shares;     /* [n_suns][n]; NULL: no sun shines */
+    float *at_sensors; /* [n_suns][receivers], of a request at sensors; else NULL */
 } sun_answer;
 
 /* Makes the rays of the scene if a sun is asked for, and room for its shares. False with *why. */

@@ -1,12 +1,15 @@
 #include "server/scene/scene_sun.h"
 
 #include "server/scene/scene.h"
+#include "server/scene/sensor_answer.h"
 #include "solver/base/parallel.h"
 #include "solver/base/scene/scene_backs.h"
 #include "solver/daylight/sky_tiles.h"
 #include "solver/daylight/sun.h"
+#include "solver/operator/sensor_light.h"
 #include "solver/operator/sky_light.h"
 #include "solver/shadow/sun_ground.h"
+#include "solver/shadow/sun_places.h"
 #include "solver/shadow/sun_shares.h"
 #include "store/groups.h"
 
@@ -23,8 +26,10 @@ struct scene_sun {
     pthread_mutex_t lock; /* of those below while they are made */
     shadow_tree *tree;    /* NULL until then */
     sky_tiling tiling;
-    float *ground; /* [n], of the irradiance of the ground */
-    float *last;   /* [n], the shares of the last sun: clients change lamps under one that stands still */
+    float *ground;      /* [n], of the irradiance of the ground */
+    sun_places *places; /* of the sensors, and what the ground gives them, [receivers]; NULL without */
+    float *places_ground;
+    float *last; /* [n], the shares of the last sun: clients change lamps under one that stands still */
     request_sun last_of;
     bool has_last; /* with `last` and its sun under the lock */
     atomic_size_t held;
@@ -64,6 +69,8 @@ void scene_sun_destroy(scene_sun *sun) {
     sky_tiling_free(&sun->tiling);
     free(sun->ground);
     free(sun->last);
+    sun_places_free(sun->places);
+    free(sun->places_ground);
     pthread_mutex_destroy(&sun->lock);
     free(sun);
 }
@@ -127,6 +134,30 @@ static size_t array_bytes(const scene_sun *sun) {
            sun->of->groups.n_groups * sizeof(struct group_glass);
 }
 
+/* Rays from the sensors, once there is a tree. */
+static lam_status make_places(scene_sun *sun, const shadow_tree *tree, lam_error *error) {
+    lam_status status = LAM_OK;
+    const scene *of = sun->of;
+    placed_receiver *receivers = NULL;
+    const size_t s = scene_sensors(of);
+    if (s == 0 || sun->places != NULL) return LAM_OK;
+    TRY(sensors_receivers(of->sensors, &receivers, error));
+    sun->places_ground = memory_allocate(s, sizeof *sun->places_ground, "the sun at sensors", error);
+    if (sun->places_ground == NULL) TRY(LAM_ERR_MEMORY);
+    if (sensors_sky(of->sensors) != NULL)
+        sun_ground_at(&sun->tiling, sun->ground_albedo, sensors_sky(of->sensors), s, receivers,
+                      sun->places_ground);
+    TRY(sun_places_create(tree, s, receivers, &sun->places, error));
+done:
+    free(receivers);
+    return status;
+}
+
+static size_t places_bytes(const scene_sun *sun) {
+    const size_t s = scene_sensors(sun->of);
+    return s > 0 ? sun_places_bytes(s) + s * sizeof *sun->places_ground : 0;
+}
+
 static lam_status make(scene_sun *sun, lam_error *error) {
     lam_status status = LAM_OK;
     const scene *of = sun->of;
@@ -156,9 +187,12 @@ static lam_status make(scene_sun *sun, lam_error *error) {
     sun_ground_find(&sun->tiling, sun->ground_albedo, sky_first_bounce(of->sky), of->n, faces.normal,
                     sun->ground);
     TRY(shadow_tree_create(&faces, &tree, error));
+    TRY(make_places(sun, tree, error));
     sun->tree = tree;
+    tree = NULL;
 done:
     store_close(s);
+    shadow_tree_free(tree);
     free(a.vertices);
     free(a.elements);
     free(a.normal);
@@ -170,9 +204,10 @@ done:
 /* The same within the memory that the ledger has. */
 static lam_status take(scene_sun *sun, lam_error *error) {
     const scene *of = sun->of;
-    const size_t stays = 2 * of->n * sizeof *sun->ground, most = shadow_tree_bytes_most(of->n);
+    const size_t stays = 2 * of->n * sizeof *sun->ground + places_bytes(sun),
+                 passing = scene_sensors(of) * sizeof(placed_receiver), most = shadow_tree_bytes_most(of->n);
     size_t wanted;
-    if (__builtin_add_overflow(most, stays + array_bytes(sun), &wanted) ||
+    if (__builtin_add_overflow(most, stays + array_bytes(sun) + passing, &wanted) ||
         !memory_ledger_take(of->ledger, wanted))
         return status_fail(error, LAM_ERR_MEMORY,
                            "%s: the rays to the sun take %zu bytes to make, more than --max-memory leaves",
@@ -192,10 +227,15 @@ lam_status scene_sun_make(scene_sun *sun, lam_error *error) {
     return status;
 }
 
-static void cast(const scene_sun *sun, const sun_position *at, float *shares) {
-    double direction[3];
+/* The way to the sun in the axes of the scene. */
+static void turn_to_scene(const scene_sun *sun, const sun_position *at, double direction[3]) {
     for (int d = 0; d < 3; d++)
         direction[sun->tiling.axis[d]] = (double)sun->tiling.sign[d] * at->direction[d];
+}
+
+static void cast(const scene_sun *sun, const sun_position *at, float *shares) {
+    double direction[3];
+    turn_to_scene(sun, at, direction);
     sun_shares_find(sun->tree, parallel_threads(), 1, (const double(*)[3])direction, &shares);
     for (size_t i = 0; i < sun->of->n; i++) shares[i] += sun->ground[i] * (float)at->direction[2];
 }
@@ -223,6 +263,18 @@ void scene_sun_shares(scene_sun *sun, const request_sun *of, float *shares) {
     sun->last_of = wanted;
     sun->has_last = true;
     pthread_mutex_unlock(&sun->lock);
+}
+
+void scene_sun_at_sensors(const scene_sun *sun, const request_sun *of, float *shares) {
+    const double north = isnan(of->north) ? sun->of->sky_north : of->north;
+    const sun_position at = sun_turned(sun_of_angles(of->azimuth, of->altitude), north);
+    const size_t s = scene_sensors(sun->of);
+    double direction[3];
+    memset(shares, 0, s * sizeof *shares);
+    if (!(at.direction[2] > 0)) return;
+    turn_to_scene(sun, &at, direction);
+    sun_places_find(sun->places, sun->tree, parallel_threads(), 1, (const double(*)[3])direction, &shares);
+    for (size_t i = 0; i < s; i++) shares[i] += sun->places_ground[i] * (float)at.direction[2];
 }
 
 size_t scene_sun_held(const scene_sun *sun) {

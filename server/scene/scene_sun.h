@@ -31,6 +31,10 @@ lam_status scene_sun_make(scene_sun *sun, lam_error *error);
  * last call. */
 void scene_sun_shares(scene_sun *sun, const request_sun *of, float *shares);
 
+/* The same of the receivers of its sensors, shares [receivers], by rays from each of them. Of a scene with
+ * sensors. Cost: about a microsecond for each. */
+void scene_sun_at_sensors(const scene_sun *sun, const request_sun *of, float *shares);
+
 /* Bytes taken of the ledger. Does not wait. */
 size_t scene_sun_held(const scene_sun *sun);
 

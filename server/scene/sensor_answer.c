@@ -55,13 +55,23 @@ static const float *side_of(const side_rows *side, size_t vector, size_t n_chann
     return vector < side->n && side->values != NULL ? side->values + vector * n_channels * width : NULL;
 }
 
+void sensor_values_add_suns(const scene *s, const radiosity_request *request, size_t v, const float *sun,
+                            float *values) {
+    const size_t C = s->n_channels, all = scene_sensors(s);
+    for (size_t k = 0; sun != NULL && k < request->n_suns; k++)
+        for (size_t c = 0; request->suns[k].vector == v && c < C; c++)
+            for (size_t r = 0; r < all; r++)
+                values[c * all + r] += request->sunlight[k * C + c] * sun[k * all + r];
+}
+
 void sensor_values_find(const scene *s, const radiosity_request *request, size_t first, size_t count,
-                        const float *B, float *work, float *out) {
+                        const float *B, const float *sun, float *work, float *out) {
     const size_t C = s->n_channels, all = scene_sensors(s), width = sensor_values(s, request);
     for (size_t v = 0; v < count; v++) {
         lam_sensors_gather(s->sensors, 1, B + v * C * s->n,
                            side_of(&request->sky, first + v, C, scene_tiles(s)),
                            side_of(&request->luminaires, first + v, C, scene_luminaires(s)), work);
+        sensor_values_add_suns(s, request, first + v, sun, work);
         for (size_t c = 0; c < C; c++)
             for (size_t k = 0; k < width; k++) {
                 const size_t r = receiver_of(request, k);
@@ -94,7 +104,8 @@ static double largest_sum(const scene *s, const radiosity_request *request) {
 }
 
 void sensor_values_find_double(const scene *s, const radiosity_request *request, size_t first, size_t count,
-                               const double *B, double *work, double *out, double *certificates) {
+                               const double *B, const float *sun, double *work, double *out,
+                               double *certificates) {
     const size_t C = s->n_channels, all = scene_sensors(s), width = sensor_values(s, request),
                  m = scene_tiles(s), q = scene_luminaires(s);
     double *L = work + C * all, *D = L + C * m;
@@ -106,6 +117,9 @@ void sensor_values_find_double(const scene *s, const radiosity_request *request,
         sensors_gather_double(s->sensors, 1, B + v * C * s->n,
                               widen(side_of(&request->sky, first + v, C, m), C * m, L),
                               widen(side_of(&request->luminaires, first + v, C, q), C * q, D), work);
+        for (size_t k = 0; sun != NULL && k < request->n_suns; k++)
+            for (size_t r = 0; request->suns[k].vector == first + v && r < C * all; r++)
+                work[r] += (double)request->sunlight[k * C + r / all] * (double)sun[k * all + r % all];
         for (size_t c = 0; c < C; c++)
             for (size_t k = 0; k < width; k++) {
                 const size_t r = receiver_of(request, k);

@@ -72,8 +72,9 @@ void sensor_errors_take(const radiosity_request *request, sensor_errors *e, answ
 }
 
 /* Squares of the sets for vector v; values [C][receivers] is work. */
-static bool square_vector(const scene *s, const radiosity_request *request, const float *H0, const float *B,
-                          size_t v, sent_light *sent, float *values, sensor_errors *e) {
+static bool square_vector(const scene *s, const radiosity_request *request, const float *H0, const float *sun,
+                          const float *at_sensors, const float *B, size_t v, sent_light *sent, float *values,
+                          sensor_errors *e) {
     const size_t vector = s->n_channels * s->n;
     const error_scene about = scene_for_errors(s);
     const float *L = request_sky(s, request, v), *D = request_dimmers(s, request, v);
@@ -85,23 +86,25 @@ static bool square_vector(const scene *s, const radiosity_request *request, cons
                        .L = L,
                        .luminaires = lit_luminaires_of(s->luminaires, D)};
     const sensor_answer answer = {s->sensors, &of, L, values};
-    sent_light_size(s, request, v, of.E, NULL, sent, &of);
+    sent_light_size(s, request, v, of.E, sun, sent, &of);
     of.sky = request_sky_size(s, L);
     lam_sensors_gather(s->sensors, 1, of.values, L, D, values);
+    sensor_values_add_suns(s, request, v, at_sensors, values);
     return sensor_squares_of(&s->errors.by_group, &about, &answer, e->n_sets, e->sets, e->squares);
 }
 
 bool scene_note_sensor_error(const scene *s, const radiosity_request *request, const float *H0,
-                             const float *B, answer_notes *notes, name_error **names) {
+                             const float *sun, const float *at_sensors, const float *B, answer_notes *notes,
+                             name_error **names) {
     sensor_errors e;
     sent_light sent = {.luminaires = NULL};
     *names = NULL;
     if (!sensor_errors_begin(s, request, notes, &e)) return false;
     if (e.names == NULL) return true;
     float *values = memory_allocate(s->n_channels, scene_sensors(s) * sizeof *values, "errors", NULL);
-    bool good = values != NULL && sent_light_allocate(s, request, false, &sent);
+    bool good = values != NULL && sent_light_allocate(s, request, sun != NULL, &sent);
     for (size_t v = 0; good && v < request->n_rhs; v++) {
-        good = square_vector(s, request, H0, B, v, &sent, values, &e);
+        good = square_vector(s, request, H0, sun, at_sensors, B, v, &sent, values, &e);
         if (good) sensor_errors_take(request, &e, notes);
     }
     *names = e.names; /* which the notes have */

@@ -8,12 +8,16 @@
 /* Harmonic 0 to 8 of a probe is the kind from this on. */
 enum { KIND_HARMONIC = 4 };
 
+unsigned receiver_weight_order(unsigned kind) {
+    return kind >= KIND_HARMONIC ? (kind - KIND_HARMONIC) % HARMONICS : 0;
+}
+
 /* Y in the axes of a probe. */
 static double harmonic(unsigned kind, const double axis[3], const double look[3], const double direction[3]) {
     double own[3], Y[HARMONICS];
     harmonics_turn(axis, look, direction, own);
     harmonics_at(own, Y);
-    return Y[(kind - KIND_HARMONIC) % HARMONICS];
+    return Y[receiver_weight_order(kind)];
 }
 
 double receiver_weight_density(unsigned kind, const double axis[3], const double look[3],
@@ -36,7 +40,7 @@ double receiver_weight_density(unsigned kind, const double axis[3], const double
 /* Over a half of all directions the integral of 1 is 2 pi, that of the direction -pi up, and those of second
  * order are 0. */
 static double harmonic_below(const placed_receiver *r, const double up[3]) {
-    const unsigned order = (r->kind - KIND_HARMONIC) % HARMONICS;
+    const unsigned order = receiver_weight_order(r->kind);
     const double Y = harmonic(r->kind, r->axis, r->look, up);
     return order == 0 ? 2 * Y : order < 4 ? -Y : 0;
 }

@@ -16,6 +16,9 @@ typedef struct placed_receiver {
 double receiver_weight_density(unsigned kind, const double axis[3], const double look[3],
                                const double direction[3]);
 
+/* The place of a kind among the nine harmonics of a probe, which follow each other; 0 of others. */
+unsigned receiver_weight_order(unsigned kind);
+
 /* The integral of that density over the directions below the horizon of `up`, a unit vector: the share of the
  * ground, of which nothing is hidden. */
 double receiver_weight_below(const placed_receiver *r, const double up[3]);

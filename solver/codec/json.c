@@ -95,7 +95,7 @@ static bool read_body(parser *p) {
 
 /* True where all light is that of whole groups, of luminaires and of tiles: sensors know each by a column. */
 static bool is_of_columns(const radiosity_request *request) {
-    bool whole = request->n_dense == 0;
+    bool whole = request->n_dense == 0 && request->n_suns == 0;
     for (size_t k = 0; whole && k < request->n_spots; k++) whole = request->spots[k].whole_group;
     return whole;
 }

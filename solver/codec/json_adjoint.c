@@ -138,10 +138,6 @@ static bool settle_sensors(parser *p, adjoint_request *request) {
                              "%s is %s, and sensors receive irradiance alone; leave it out", parser_here(p),
                              codec_quantity_name(request->quantity));
     }
-    if (request->light.n_suns > 0)
-        return parser_refuse(p, PROBLEM_NOT_IN_STORE,
-                             "the body holds an exact sun and sensors, to which none comes; leave the sun to "
-                             "the tiles of the sky");
     request->quantity = LAM_RADIOSITY;
     return true;
 }

@@ -145,11 +145,6 @@ static bool settle_sensors(parser *p) {
                              request->at_probes ? "probes have coefficients of radiance"
                                                 : "sensors receive irradiance");
     }
-    if (request->n_suns > 0)
-        return parser_refuse(p, PROBLEM_NOT_IN_STORE,
-                             "the body holds an exact sun and %s, to which none comes; leave the sun to "
-                             "the tiles of the sky",
-                             what);
     request->quantity = LAM_RADIOSITY;
     request->at_sensors = true;
     request->select = false;

@@ -18,9 +18,13 @@ void sun_ground_at(const sky_tiling *tiling, double albedo, const float *sky, si
     double up[3] = {0, 0, 0};
     up[tiling->axis[2]] = (double)tiling->sign[2];
     for (size_t i = 0; i < n; i++) {
-        double least = albedo * receiver_weight_below(&receivers[i], up);
+        /* The nine harmonics of a probe, which have either sign, see as much of the ground as the first of
+         * them does, which has none. */
+        const size_t of = i - receiver_weight_order(receivers[i].kind);
+        const double open = receiver_weight_below(&receivers[of], up);
+        double least = albedo * open;
         for (size_t t = 0; t < tiling->n_tiles; t++)
-            least = fmin(least, (double)sky[t * n + i] / tiling->tiles[t].cosine);
-        ground[i] = (float)least;
+            least = fmin(least, (double)sky[t * n + of] / tiling->tiles[t].cosine);
+        ground[i] = (float)(open > 0 ? least * receiver_weight_below(&receivers[i], up) / open : 0);
     }
 }

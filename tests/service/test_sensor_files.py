@@ -45,9 +45,10 @@ class SensorFiles(Case):
         cls.of_year = ("solve", cls.yard, "--weather", cls.kept / "year.wea", "--sensors", "all")
 
     def test_the_hours_of_a_year_have_its_autonomy(self):
-        must(*self.of_year, "-o", self.path("year/"))
+        exact = "--sun", "exact", "--sun-points", 64  # the same rays for hours and for the year
+        must(*self.of_year, *exact, "-o", self.path("year/"))
         found = autonomy(self.path("year"), 5000)
-        must(*self.of_year, "--annual", "autonomy=5000", "-o", self.path("year.json"))
+        must(*self.of_year, *exact, "--annual", "autonomy=5000", "-o", self.path("year.json"))
         with open(self.path("year.json"), encoding="utf-8") as file:
             sets = json.load(file)["sensors"]
         self.assertEqual([one["name"] for one in sets], list(found))

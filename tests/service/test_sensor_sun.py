@@ -8,6 +8,7 @@ import numpy as np
 
 from case import Case
 from command import lambert, must
+from daemon import Daemon
 from quads import Quads
 from weather import sun, wea
 
@@ -69,10 +70,10 @@ class SensorSun(Case):
         must("solve", store, "--weather", self.kept("june.wea"), "--sensors", "all", *asked, *more, "-o", self.path("y.npy"))
         return np.load(self.path("y.npy")).astype(float)
 
-    def expected(self):
+    def expected(self, toward=None):
         """E_n cos where a ray passes the opening, [hours][sensors], and where none is near its rim: positions of the sun differ by
         .01 degrees, .7 mm over 4 m."""
-        toward, margin = suns(), .003
+        toward, margin = suns() if toward is None else toward, .003
         z0, z1, x0, x1 = OPENING
         with np.errstate(divide="ignore", invalid="ignore"):
             far = -self.places[None, :, 1] / toward[:, 1, None]
@@ -178,6 +179,27 @@ class SensorSun(Case):
         beside = np.array(exact[:60])[patch] - 600.3  # the window's part of 103.5 W/m2 of sky
         self.assertTrue(((beside > 0) & (beside < 103.5)).all(), beside)
         self.assertGreater(np.abs(np.array(exact) - tiles).max(), 100 * math.cos(up))
+
+    def test_daemon(self):
+        """The sun of a request comes to sensors as to a named sky of `lambert solve`, by values, figures and to a tolerance."""
+        must("precompute", self.kept("grey.obj"), "--sensors", self.kept("s.csv"), "--method", "exact", "--mesh", "faces", "--sky",
+             "tregenza", "--probes", 0, "--keep-form-factors", "-o", self.kept("sunny.h5"))
+        with Daemon(self.kept("black.h5"), self.kept("sunny.h5")) as daemon:
+            for azimuth, altitude in (180, 40), (150, 25), (200, 60), (0, 30):
+                lit = {"sun": {"azimuth": azimuth, "altitude": altitude, "direct": DIRECT}}
+                body = {"emission": lit, "select": {"sensors": ["all"]}}
+                found = np.array(daemon.radiosity("black", body).json()["irradiance"])
+                a, h = math.radians(azimuth), math.radians(altitude)
+                toward = np.array([math.sin(a) * math.cos(h), math.cos(a) * math.cos(h), math.sin(h)])
+                wanted, sure = (of[0] for of in self.expected(toward[None]))
+                np.testing.assert_allclose(found[sure], wanted[sure], rtol=1e-5, atol=1e-3)
+                grey = np.array(daemon.radiosity("sunny", body).json()["irradiance"])
+                self.assertTrue((grey >= found - 1e-3).all())
+                reduced = daemon.radiosity("sunny", {"emission": lit, "reduce": {"sensors": ["all"], "with": ["mean", "max"]}}).json()
+                self.assertAlmostEqual(reduced["sensors"]["all"]["mean"], grey.mean(), delta=1e-5 * grey.mean())
+                self.assertAlmostEqual(reduced["sensors"]["all"]["max"], grey.max(), delta=1e-5 * grey.max())
+                refined = daemon.radiosity("sunny", {**body, "tolerance": 1e-6}).json()
+                self.assertLessEqual(np.abs(np.array(refined["irradiance"]) - grey).max(), 1e-4 * grey.max())
 
     def test_refusals(self):
         for wanted, *words in (("must be at least 0", "sun=-1"), ("not numbers", "sun=1,x"), ("hours must be at least 0", "sun=1,-2"),
