@@ -22,7 +22,7 @@ struct column_table {
 struct sensor_columns {
     pthread_mutex_t lock;
     memory_ledger *ledger;
-    size_t width, max_bytes;
+    size_t n, width, max_bytes;
     column_table *now;
 };
 
@@ -39,7 +39,7 @@ lam_status sensor_columns_create(size_t n_columns, size_t width, size_t max_byte
                                  sensor_columns **out, lam_error *error) {
     sensor_columns *c = memory_allocate(1, sizeof *c, "columns of sensors", error);
     if (c == NULL) return LAM_ERR_MEMORY;
-    *c = (sensor_columns){.ledger = ledger, .width = width, .max_bytes = max_bytes};
+    *c = (sensor_columns){.ledger = ledger, .n = n_columns, .width = width, .max_bytes = max_bytes};
     c->now = table_allocate(n_columns, error);
     if (c->now == NULL) {
         free(c);
@@ -67,7 +67,7 @@ void sensor_columns_destroy(sensor_columns *c) {
 
 void sensor_columns_clear(sensor_columns *c) {
     if (c == NULL) return;
-    column_table *fresh = table_allocate(c->now->n, NULL);
+    column_table *fresh = table_allocate(c->n, NULL);
     if (fresh == NULL) return;
     pthread_mutex_lock(&c->lock);
     release_locked(c, c->now);

@@ -1,6 +1,7 @@
 """Black box: the sensors of a store over HTTP. Values, figures, derivatives and gradients are held against sums in double of what h5py
 would read, and of every kind of operator against the daemon's own radiosities."""
 
+import concurrent.futures
 import io
 import json
 import pathlib
@@ -399,6 +400,21 @@ class Kinds(Case):
                 figures = self.ask(name, {"emission": emission, "limit": False, "reduce": {"sensors": SETS, "with": ["mean"]}})
                 for key in SETS:
                     self.close(figures["sensors"][key]["mean"], s.values(B, L, D)[:, s.rows([key])].mean(1), name, SAME)
+
+    def test_clients_at_once(self):
+        """Columns that several requests make and keep at the same time have the bits of those of one."""
+        with Daemon(self.stores["hierarchical"], self.stores["low"], "--threads", 2) as daemon:
+            bodies = [(name, {"emission": {"luminaires": {"desk-1": k / 4, "row-a": 1}, "sky": np.eye(12)[k % 12].tolist()},
+                              "reduce": {"sensors": SETS, "with": ["mean", "max"]}}) for k in range(24) for name in ("hierarchical", "low")]
+
+            def ask(one):
+                answer = daemon.radiosity(*one)
+                return answer.status, answer.json().get("sensors")
+
+            with concurrent.futures.ThreadPoolExecutor(8) as pool:
+                found = list(pool.map(ask, bodies))
+            self.assertEqual({status for status, _ in found}, {200})
+            self.assertEqual(found, [ask(one) for one in bodies])
 
     def test_certificates_hold(self):
         """Against a dense solution in double; the slack is that of test_tolerance.py."""
