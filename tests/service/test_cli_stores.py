@@ -358,7 +358,7 @@ class Stores(Case):
     def test_verify(self):
         done = must("verify", self.store, self.box, "--probes", 6)
         self.assertEqual([line.split()[0] for line in done.stdout.splitlines()],
-                         ["ok"] * 3 + ["skipped"] * 2 + ["ok"] * 4 + ["skipped", "ok"])  # no sky, no luminaires, no walks
+                         ["ok"] * 3 + ["skipped"] * 3 + ["ok"] * 4 + ["skipped", "ok"])  # no sky, luminaires, sensors, walks
         answer = json.loads(must("verify", self.store, "--probes", 0, "--json").stdout)
         self.assertTrue(answer["ok"])
         self.assertEqual({check["name"]: check["result"] for check in answer["checks"]}["scene"], "skipped")

@@ -310,9 +310,9 @@ class Reduce(unittest.TestCase):
         good = {"groups": ["lamp"], "with": ["mean"]}
         for value in 3, None, [], "lamp", True:
             self.refuse(value, 422, "object", pointer="/reduce")
-        self.refuse({}, 422, "both groups and with", pointer="/reduce")
-        self.refuse({"groups": ["lamp"]}, 422, "both groups and with", pointer="/reduce")
-        self.refuse({"with": ["mean"]}, 422, "both groups and with", pointer="/reduce")
+        self.refuse({}, 422, "with, and groups or sensors", pointer="/reduce")
+        self.refuse({"groups": ["lamp"]}, 422, "with, and groups or sensors", pointer="/reduce")
+        self.refuse({"with": ["mean"]}, 422, "with, and groups or sensors", pointer="/reduce")
         self.refuse(dict(good, elements=[1]), 422, "elements", pointer="/reduce/elements")
         self.refuse(dict(good, groups=[]), 422, "empty", pointer="/reduce/groups")
         self.refuse(dict(good, groups="lamp"), 422, "array", pointer="/reduce/groups")
