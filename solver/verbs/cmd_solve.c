@@ -343,7 +343,7 @@ static lam_status check_output(const solve_options *f, lam_error *error) {
                                                                  : atomic_file_check(f->output, error);
 }
 
-/* What the error of an answer is told by. */
+/* The parts of a solve that tell the error of its answer. */
 typedef struct error_asked {
     const stated_errors *stated;
     const error_scene *about;
