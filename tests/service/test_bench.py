@@ -206,10 +206,14 @@ class Honesty(unittest.TestCase):
         rows = self.tables["kinds"]
         self.assertEqual(list(rows[0]), ["by", "kind", *self.COUNTS])
         whole = self.tables["scenes"][-1]
-        for by, kinds in (("emission", {"group", "groups", "element", "elements", "random", "own", "even sky", "cloudy sky", "sun"}),
-                          ("target", {"all", "group", "elements", "reduce"})):
+        for by, kinds, beside in (
+                ("emission", {"group", "groups", "element", "elements", "random", "own", "even sky", "cloudy sky", "sun"},
+                 {"luminaire", "luminaires"}),
+                ("target", {"all", "group", "elements", "reduce"}, {"sensors", "sensors' means"})):
             of = [row for row in rows if row["by"] == by]
-            self.assertEqual({row["kind"] for row in of}, kinds)
+            # Luminaires and sensors are asked for beside finer elements alone.
+            self.assertEqual({row["kind"] for row in of}, kinds | beside)
+            self.assertEqual({float(row["requests"]) for row in of if row["kind"] in beside}, {0})
             for name, place in (("below", 0), ("above", 1)):
                 counted = sum(float(row["requests"]) * self.shares(row)[place] for row in of if float(row["requests"]) > 0)
                 self.assertAlmostEqual(counted, float(whole["requests"]) * float(whole[name]), delta=.5)
