@@ -19,7 +19,7 @@ import numpy as np
 
 from command import must
 from daemon import PATIENCE, Daemon
-from make_store import Scene
+from make_store import Luminaires, Scene, Sensors
 
 N, TOKEN = 60, "s3cret"
 NPY, JSON = "application/x-npy", "application/json"
@@ -89,6 +89,14 @@ def each_request(n):
                  {"cotangent": {"groups": {"lamp": 1}}, "gradient": ["emission"]}):
         yield "POST", adjoint, {"Content-Type": JSON}, json.dumps(body)
     yield "POST", adjoint, {"Content-Type": NPY, "Accept": NPY}, array(dense)
+    lit, sets = {"luminaires": {"desk-1": 1, "row-a": .5}, "groups": {"lamp": 2}}, {"sensors": ["room", "faces"]}
+    for body in ({"emission": lit, "select": sets}, {"emission": dense, "reduce": {**sets, "with": ["mean"]}},
+                 {"emission": lit, "reduce": {**sets, "with": ["mean", "share"], "at_least": [1]}}):
+        yield "POST", solve, {"Content-Type": JSON}, json.dumps(body)
+    yield "POST", solve, {"Content-Type": JSON, "Accept": NPY}, json.dumps({"emission": lit, "select": sets})
+    yield "POST", adjoint, {"Content-Type": JSON}, json.dumps({"cotangent": {"sensors": {"room": 1}}, "gradient": ["luminaires"]})
+    yield "POST", "/v1/scenes/grey/jacobian", {"Content-Type": JSON}, json.dumps({"of": sets})
+    yield "GET", "/v1/scenes/grey/sensors", {}, None
     light = {"emission": {"elements": [3], "values": [1]}}
     for more in ({"tolerance": 1e-4}, {"at": "faces"}, {"at": "faces", "select": {"groups": ["floor"]}},
                  {"select": {"faces": [7, 3]}, "tolerance": 1e-4}):
@@ -117,6 +125,7 @@ class Faults(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
         Scene(N).write(self.folder / "grey.h5", "grey", keep_factors=True)
+        Sensors(N, lights=Luminaires(N).add_to(self.folder / "grey.h5")).add_to(self.folder / "grey.h5")
         (self.folder / "token").write_text(TOKEN)
         (self.folder / "token").chmod(0o600)
 
