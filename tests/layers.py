@@ -64,7 +64,7 @@ ALLOWED = {
     "solver/direct": f"{SCENE} solver/luminaire/luminaire.h solver/luminaire/placed.h solver/formfactor/visibility/",
     "solver/sensor": f"{SCENE} solver/daylight/ solver/luminaire/ solver/figures/ solver/direct/ solver/formfactor/ solver/operator/sensor_light.h",
     "solver/lightmap": (f"{SCENE} solver/operator/luminaire_light.h solver/sensor/ solver/direct/ solver/luminaire/ solver/daylight/ solver/formfactor/ "
-        "solver/codec/ solver/render/exr.h solver/render/picture.h solver/render/image.h"),
+        "solver/codec/ solver/output/mesh_gltf.h solver/render/exr.h solver/render/picture.h solver/render/image.h"),
     "solver/method": f"{OPERATOR}",
     "solver/method/*": f"{OPERATOR} {METHOD_SHARED}",
     "solver/light": f"{OPERATOR} solver/codec/ solver/daylight/ solver/shadow/ {SCENE} solver/formfactor/ solver/walk/moving_light.h",

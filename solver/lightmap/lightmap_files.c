@@ -1,7 +1,7 @@
 #include "solver/lightmap/lightmap_files.h"
 
 #include "solver/base/atomic_file.h"
-#include "solver/codec/gltf/gltf.h"
+#include "solver/output/mesh_gltf.h"
 #include "solver/render/exr.h"
 #include "solver/render/image.h"
 
@@ -78,23 +78,10 @@ lam_status lightmap_write_glb(const mesh *m, const lightmap_charts *c, const lig
     TRY(find_places(m, c, &places, error));
     shown.png = png;
     shown.texcoord = (const float(*)[4][2])places;
-    const scene_glass glass = {.of = m->glass, .by_angle = m->glass_by_angle};
-    const gltf_mesh of = {.name = words->scene,
-                          .n_vertices = m->n_vertices,
-                          .n = m->n,
-                          .n_channels = m->n_channels,
-                          .vertices = (const double(*)[3])m->vertices,
-                          .elements = (const uint32_t(*)[4])m->elements,
-                          .normal = (const float(*)[3])m->normal,
-                          .area = m->area,
-                          .reflectance = m->reflectance,
-                          .emission = m->emission,
-                          .face = m->faces.of,
-                          .groups = words->groups,
-                          .glass = m->glass != NULL ? &glass : NULL,
-                          .pictures = words->radiosity ? NULL : m->pictures,
-                          .lightmap = &shown,
-                          .up = m->up};
+    scene_glass glass;
+    gltf_mesh of = mesh_gltf(m, words->scene, words->groups, &glass);
+    of.pictures = words->radiosity ? NULL : m->pictures;
+    of.lightmap = &shown;
     TRY(gltf_write(&of, &b, error));
     TRY(atomic_file_open(path, &file, error));
     fwrite(b.bytes, 1, b.length, file.stream);

@@ -1,14 +1,12 @@
 /* A solution on its mesh as binary glTF, for viewers that know no values: the light of the first vector as
  * colour, all of it as attributes of vertices. */
-#include "solver/codec/gltf/gltf.h"
+#include "solver/output/mesh_gltf.h"
 #include "solver/output/output.h"
 
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-_Static_assert(MESH_NO_VERTEX == GLTF_NO_VERTEX, "triangles are marked alike");
 
 /* The value that is shown white, in means of the scene: what a lamp emits may be cut. */
 #define WHITE_IN_MEANS 4
@@ -48,7 +46,7 @@ static lam_status name_columns(const solution *s, size_t count, char ***names, l
 
 lam_status output_glb(const solution *s, FILE *stream, lam_error *error) {
     lam_status status = LAM_OK;
-    const mesh *m = s->m, *coloured = s->materials != NULL ? s->materials : m;
+    const mesh *m = s->m;
     char **names = NULL;
     buffer b = {0};
     const double mean = mean_of(s);
@@ -58,22 +56,9 @@ lam_status output_glb(const solution *s, FILE *stream, lam_error *error) {
                         .white = mean > 0 && isfinite(mean) ? WHITE_IN_MEANS * mean : 1};
     TRY(name_columns(s, light.n_columns, &names, error));
     light.columns = (const char *const *)names;
-    const scene_glass glass = {.of = m->glass, .by_angle = m->glass_by_angle};
-    const gltf_mesh of = {.name = s->scene,
-                          .n_vertices = m->n_vertices,
-                          .n = m->n,
-                          .n_channels = coloured->n_channels,
-                          .vertices = (const double(*)[3])m->vertices,
-                          .elements = (const uint32_t(*)[4])m->elements,
-                          .normal = (const float(*)[3])m->normal,
-                          .area = m->area,
-                          .reflectance = m->reflectance,
-                          .emission = m->emission,
-                          .face = m->faces.of,
-                          .groups = s->groups,
-                          .glass = m->glass != NULL ? &glass : NULL,
-                          .light = &light,
-                          .up = m->up};
+    scene_glass glass;
+    gltf_mesh of = mesh_gltf(s->materials != NULL ? s->materials : m, s->scene, s->groups, &glass);
+    of.light = &light;
     TRY(gltf_write(&of, &b, error));
     fwrite(b.bytes, 1, b.length, stream);
 done:
