@@ -53,6 +53,30 @@ bool parser_read_rest_of_row(parser *p, float *row, size_t count, const char *of
                          parser_here(p), i, count, of_what);
 }
 
+bool parser_read_rows(parser *p, float *rows, size_t count, size_t stride, const char *of_what) {
+    const size_t C = p->scene->n_channels, mark = p->pointer_length;
+    size_t c = 0;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    if (json_look(&p->r) != JSON_ARRAY) {
+        if (!parser_read_rest_of_row(p, rows, count, of_what)) return false;
+        for (c = 1; c < C; c++) memcpy(rows + c * stride, rows, count * sizeof *rows);
+        return true;
+    }
+    for (; json_next_element(&p->r); c++, p->pointer_length = mark) {
+        if (c == C)
+            return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more than %zu rows, one for each channel",
+                                 parser_here(p), C);
+        parser_point_index(p, c);
+        if (!parser_expect(p, JSON_ARRAY, "an array of numbers")) return false;
+        if (!json_enter_array(&p->r)) return parser_fault(p);
+        if (!parser_read_rest_of_row(p, rows + c * stride, count, of_what)) return false;
+    }
+    if (!parser_closed(p)) return false;
+    return c == C ||
+           parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds %zu rows, must be %zu, one for each channel",
+                         parser_here(p), c, C);
+}
+
 bool parser_read_colour(parser *p, float *colour) {
     size_t C = p->scene->n_channels;
     if (json_peek(&p->r) == JSON_ARRAY) {
@@ -114,32 +138,6 @@ bool parser_read_indices(parser *p, index_kind kind, bool once, index_list *indi
         p->pointer_length = mark;
     }
     return parser_closed(p);
-}
-
-/* [e0, e1, ...] or C rows of it. */
-static bool read_dense(parser *p, float *E) {
-    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length, rows = 0;
-    if (!json_enter_array(&p->r)) return parser_fault(p);
-    if (json_look(&p->r) != JSON_ARRAY) {
-        if (!parser_read_rest_of_row(p, E, n, "element")) return false;
-        for (size_t c = 1; c < C; c++) memcpy(E + c * n, E, n * sizeof *E);
-        return true;
-    }
-    while (json_next_element(&p->r)) {
-        if (rows == C)
-            return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more than %zu rows, one for each channel",
-                                 parser_here(p), C);
-        parser_point_index(p, rows);
-        if (!parser_expect(p, JSON_ARRAY, "an array of numbers")) return false;
-        if (!json_enter_array(&p->r)) return parser_fault(p);
-        if (!parser_read_rest_of_row(p, E + rows * n, n, "element")) return false;
-        p->pointer_length = mark;
-        rows++;
-    }
-    if (!parser_closed(p)) return false;
-    return rows == C ||
-           parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds %zu rows, must be %zu, one for each channel",
-                         parser_here(p), rows, C);
 }
 
 /* [v...] of the sparse form: each a number or C of them. */
@@ -436,7 +434,7 @@ bool parser_read_emission(parser *p) {
     if (kind == JSON_OBJECT) return read_emission_object(p);
     if (p->scene->only_linear) return parser_not_linear(p);
     if (!radiosity_request_dense(p->request, p->scene, &E, p->why)) return refused_here(p);
-    return read_dense(p, E);
+    return parser_read_rows(p, E, p->scene->n, p->scene->n, "element");
 }
 
 bool parser_read_emissions(parser *p) {

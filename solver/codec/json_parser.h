@@ -139,6 +139,9 @@ bool parser_read_quantity(parser *p, lam_quantity *quantity);
 bool parser_read_colour(parser *p, float *colour);
 bool parser_read_rest_of_row(parser *p, float *row, size_t count, const char *of_what);
 
+/* [v0, v1, ...] for all channels or a row for each, into the rows of C, `stride` apart, of count numbers. */
+bool parser_read_rows(parser *p, float *rows, size_t count, size_t stride, const char *of_what);
+
 /* The weights of sensors in a cotangent. */
 bool parser_read_sensor_weights(parser *p);
 

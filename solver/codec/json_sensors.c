@@ -4,34 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* [v0, v1, ...] for the receivers of one set from `first` on, or C rows of it, into row [C][s]. */
-static bool read_each(parser *p, size_t first, size_t count, float *row) {
-    const size_t C = p->scene->n_channels, s = p->scene->sensors->start[p->scene->sensors->n_groups],
-                 mark = p->pointer_length;
-    size_t rows = 0;
-    if (!parser_expect(p, JSON_ARRAY, "an array of numbers, one for each sensor")) return false;
-    if (!json_enter_array(&p->r)) return parser_fault(p);
-    if (json_look(&p->r) != JSON_ARRAY) {
-        if (!parser_read_rest_of_row(p, row + first, count, "sensor")) return false;
-        for (size_t c = 1; c < C; c++) memcpy(row + c * s + first, row + first, count * sizeof *row);
-        return true;
-    }
-    for (; json_next_element(&p->r); rows++, p->pointer_length = mark) {
-        if (rows == C)
-            return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more than %zu rows, one for each channel",
-                                 parser_here(p), C);
-        parser_point_index(p, rows);
-        if (!parser_expect(p, JSON_ARRAY, "an array of numbers")) return false;
-        if (!json_enter_array(&p->r)) return parser_fault(p);
-        if (!parser_read_rest_of_row(p, row + rows * s + first, count, "sensor")) return false;
-    }
-    if (!parser_closed(p)) return false;
-    return rows == C ||
-           parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds %zu rows, must be %zu, one for each channel",
-                         parser_here(p), rows, C);
-}
-
-/* {"values": [...]} of one set. */
+/* {"values": [...]} of one set, into row [C][s]. */
 static bool read_values(parser *p, size_t n_found, const uint32_t *found, float *row) {
     static const char *const names[] = {"values"};
     const group_index *sets = p->scene->sensors;
@@ -46,7 +19,9 @@ static bool read_values(parser *p, size_t n_found, const uint32_t *found, float 
     if (!json_enter_object(&p->r)) return parser_fault(p);
     while (parser_next_member(p, &key)) {
         if (!parser_known_member(p, &key, names, 1, &seen, &which)) return false;
-        if (!read_each(p, sets->start[*found], sets->start[*found + 1] - sets->start[*found], row))
+        const size_t first = sets->start[*found], count = sets->start[*found + 1] - first;
+        if (!parser_expect(p, JSON_ARRAY, "an array of numbers, one for each sensor") ||
+            !parser_read_rows(p, row + first, count, sets->start[sets->n_groups], "sensor"))
             return false;
         p->pointer_length = mark;
     }
