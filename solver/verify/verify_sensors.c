@@ -43,23 +43,13 @@ typedef struct weight_row {
 
 /* The arrays of /sensors that are compared. */
 typedef struct stored_rows {
-    uint64_t *start;
-    uint32_t *element;
-    float *weight, *off, *backs;
-    float *sky, *sky_off; /* [n_tiles][n], NULL without a sky */
-    float *lit;           /* [luminaires][n], NULL without any */
-    size_t n, n_tiles, n_luminaires;
-    double rays; /* of a row */
+    sensor_rows rows;
+    float *lit; /* [n_luminaires][n_receivers], NULL without any */
+    size_t n_luminaires;
 } stored_rows;
 
 static void stored_rows_free(stored_rows *r) {
-    free(r->start);
-    free(r->element);
-    free(r->weight);
-    free(r->off);
-    free(r->backs);
-    free(r->sky);
-    free(r->sky_off);
+    sensor_rows_free(&r->rows);
     free(r->lit);
 }
 
@@ -74,18 +64,19 @@ static lam_status read_array(store *s, const char *name, store_type type, int ra
 }
 
 /* Shapes, ranges and order of these were checked as they were loaded (sensors_load). */
-static lam_status read_rows(store *s, size_t n, stored_rows *r, lam_error *error) {
+static lam_status read_rows(store *s, size_t n, stored_rows *stored, lam_error *error) {
     lam_status status = LAM_OK;
+    sensor_rows *r = &stored->rows;
+    double rays = rays_least;
     size_t entries[STORE_MAX_RANK] = {SIZE_MAX}, sky[STORE_MAX_RANK] = {SIZE_MAX, n},
            lit[STORE_MAX_RANK] = {SIZE_MAX, n};
-    r->n = n;
-    r->rays = rays_least;
     if (store_has_attribute(s, STORE_SENSORS, "rays"))
-        TRY(store_get_number(s, STORE_SENSORS, "rays", &r->rays, error));
-    if (!(r->rays >= SENSOR_RAYS_LEAST && r->rays <= SENSOR_RAYS_MOST) ||
-        exp2(round(log2(r->rays))) != r->rays)
+        TRY(store_get_number(s, STORE_SENSORS, "rays", &rays, error));
+    if (!(rays >= SENSOR_RAYS_LEAST && rays <= SENSOR_RAYS_MOST) || exp2(round(log2(rays))) != rays)
         FAIL(error, LAM_ERR_FORMAT, "%s: " STORE_SENSORS " has %g rays, must be a power of two from %d to %d",
-             store_path(s), r->rays, SENSOR_RAYS_LEAST, SENSOR_RAYS_MOST);
+             store_path(s), rays, SENSOR_RAYS_LEAST, SENSOR_RAYS_MOST);
+    r->n_receivers = n;
+    r->rays = (size_t)rays;
     TRY(read_array(s, "indptr", STORE_U64, 1, (size_t[]){n + 1}, &r->start, error));
     TRY(read_array(s, "indices", STORE_U32, 1, entries, &r->element, error));
     TRY(read_array(s, "weights", STORE_F32, 1, entries, &r->weight, error));
@@ -97,38 +88,28 @@ static lam_status read_rows(store *s, size_t n, stored_rows *r, lam_error *error
         r->n_tiles = sky[0];
     }
     if (store_has(s, STORE_SENSORS "/luminaires")) {
-        TRY(read_array(s, "luminaires", STORE_F32, 2, lit, &r->lit, error));
-        r->n_luminaires = lit[0];
+        TRY(read_array(s, "luminaires", STORE_F32, 2, lit, &stored->lit, error));
+        stored->n_luminaires = lit[0];
     }
 done:
     return status;
 }
 
-static void add_sky(const float *sky, const float *off, size_t n_tiles, size_t n, size_t i, weight_row *to) {
-    for (size_t t = 0; sky != NULL && t < n_tiles; t++) {
-        to->sky += (double)sky[t * n + i] / M_PI;
-        to->sky_off += (double)off[t * n + i] / M_PI;
+static weight_row row_of(const sensor_rows *r, size_t i) {
+    const size_t first = (size_t)r->start[i];
+    weight_row out = {
+        (size_t)r->start[i + 1] - first, r->element + first, r->weight + first, r->off + first, 0, 0};
+    for (size_t t = 0; r->sky != NULL && t < r->n_tiles; t++) {
+        out.sky += (double)r->sky[t * r->n_receivers + i] / M_PI;
+        out.sky_off += (double)r->sky_off[t * r->n_receivers + i] / M_PI;
     }
-}
-
-static weight_row row_of(const stored_rows *r, size_t i) {
-    const size_t first = (size_t)r->start[i];
-    weight_row out = {
-        (size_t)r->start[i + 1] - first, r->element + first, r->weight + first, r->off + first, 0, 0};
-    add_sky(r->sky, r->sky_off, r->n_tiles, r->n, i, &out);
-    return out;
-}
-
-static weight_row row_again(const sensor_rows *r, size_t i) {
-    const size_t first = (size_t)r->start[i];
-    weight_row out = {
-        (size_t)r->start[i + 1] - first, r->element + first, r->weight + first, r->off + first, 0, 0};
-    add_sky(r->sky, r->sky_off, r->n_tiles, r->n_receivers, i, &out);
     return out;
 }
 
 /* Flags, cells of grids, and rows: 0 <= |off| <= weight, and no sum above 1. */
-static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const stored_rows *r, check *c) {
+static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const stored_rows *stored,
+                         check *c) {
+    const sensor_rows *r = &stored->rows;
     for (size_t k = 0; k < l->n_sets; k++) {
         const sensor_set *set = &l->sets[k];
         for (size_t i = set->first; i < set->first + set->count && c->verdict == VERDICT_OK; i++) {
@@ -140,7 +121,7 @@ static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const 
                           set->name, i - set->first, (unsigned)l->cell[i]);
         }
     }
-    for (size_t i = 0; i < r->n && c->verdict == VERDICT_OK; i++) {
+    for (size_t i = 0; i < r->n_receivers && c->verdict == VERDICT_OK; i++) {
         const unsigned flags = sensors_shown(loaded, i).flags;
         const bool wall = (double)r->backs[i] > SENSOR_BACKS_MOST;
         const weight_row row = row_of(r, i);
@@ -151,7 +132,7 @@ static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const 
             even = even && fabs((double)row.off[k]) <= (1 + rounding) * (double)row.weight[k];
         }
         if (!(r->backs[i] >= 0 && r->backs[i] <= 1) || ((flags & SENSOR_IN_WALL) != 0) != wall ||
-            ((flags & SENSOR_IN_LUMINAIRE) != 0 && r->n_luminaires == 0))
+            ((flags & SENSOR_IN_LUMINAIRE) != 0 && stored->n_luminaires == 0))
             check_say(c, VERDICT_BROKEN, "receiver %zu: flags %u beside %.3g of rays that meet backs", i,
                       flags, (double)r->backs[i]);
         else if (!even)
@@ -242,21 +223,21 @@ static lam_status compare_rows(examination *e, const stored_rows *stored, size_t
     const mesh *m = &e->m;
     sensor_rows again = {.n = 0};
     sky_bounce sky = {.n = 0};
-    const size_t rays = MORE_RAYS * (size_t)stored->rays;
+    const size_t rays = MORE_RAYS * stored->rows.rays;
     double *sums = memory_allocate(4, (m->n_groups + 1) * sizeof *sums, "rows of sensors", error);
     if (sums == NULL) TRY(LAM_ERR_MEMORY);
-    row_sums s = {.rays = stored->rays,
+    row_sums s = {.rays = stored->rows.rays,
                   .sum = {sums, sums + m->n_groups + 1},
                   .off = {sums + 2 * (m->n_groups + 1), sums + 3 * (m->n_groups + 1)}};
-    if (stored->sky != NULL) TRY(sky_bounce_load(e->s, m->n, &sky, error));
+    if (stored->rows.sky != NULL) TRY(sky_bounce_load(e->s, m->n, &sky, error));
     const sensor_rows_options how = {.rays = rays < SENSOR_RAYS_MOST ? rays : SENSOR_RAYS_MOST,
                                      .seed = precompute_seed(0, SEED_VERIFY_SENSORS),
-                                     .sky = stored->sky != NULL ? &sky : NULL,
+                                     .sky = stored->rows.sky != NULL ? &sky : NULL,
                                      .progress = e->progress,
                                      .stage = "sensors"};
     TRY(sensor_rows_make(m, n, at, &how, &again, error));
     for (size_t k = 0; k < n && c->verdict == VERDICT_OK; k++)
-        compare_row(m, chosen[k], (weight_row[]){row_of(stored, chosen[k]), row_again(&again, k)}, &s, c);
+        compare_row(m, chosen[k], (weight_row[]){row_of(&stored->rows, chosen[k]), row_of(&again, k)}, &s, c);
 done:
     free(sums);
     sensor_rows_free(&again);
@@ -308,7 +289,7 @@ static lam_status compare_luminaires(examination *e, const stored_rows *stored, 
                                 .wanted = wanted};
     TRY(sensor_luminaires_make(m, &p, &how, n, at, again, NULL, error));
     for (size_t k = 0; k < n_wanted && c->verdict == VERDICT_OK; k++) {
-        for (size_t i = 0; i < n; i++) lit[i] = stored->lit[wanted[k] * stored->n + chosen[i]];
+        for (size_t i = 0; i < n; i++) lit[i] = stored->lit[wanted[k] * stored->rows.n_receivers + chosen[i]];
         compare_luminaire(p.luminaires[wanted[k]].name, n, lit, again + k * n, c);
     }
 done:
@@ -322,7 +303,7 @@ lam_status verify_sensors(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     sensor_list l = {.n = 0};
     lam_sensors *loaded = NULL;
-    stored_rows stored = {.n = 0};
+    stored_rows stored = {.lit = NULL};
     receiver at[ROWS_AGAIN];
     size_t chosen[ROWS_AGAIN];
     if (!e->has_mesh || !store_has(e->s, STORE_SENSORS)) {
