@@ -65,6 +65,14 @@ void mesh_finish(mesh *m, float reflectance) {
     m->up = 'z';
 }
 
+void mesh_name_room(mesh *m) {
+    m->up = 'z';
+    m->n_groups = 1;
+    m->group_names = calloc(1, sizeof *m->group_names + 8);
+    ck_assert_ptr_nonnull(m->group_names);
+    m->group_names[0] = strcpy((char *)(m->group_names + 1), "room");
+}
+
 mesh box_mesh(const double size[3], unsigned divisions, float reflectance) {
     mesh m = {0};
     for (size_t i = 0; i < 6 * (size_t)divisions * divisions; i++) {

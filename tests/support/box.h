@@ -29,6 +29,9 @@ void mesh_add_cell(mesh *m, const box_cell *cell, bool positive);
 /* Measures a hand-made mesh and gives it one group and one grey material. */
 void mesh_finish(mesh *m, float reflectance);
 
+/* Names the group "room" and the axis z up: what places luminaires finds no housing in it. */
+void mesh_name_room(mesh *m);
+
 mesh box_mesh(const double size[3], unsigned divisions, float reflectance);
 
 /* The exchange area A1 F12 of two cells of the inside of a box. */

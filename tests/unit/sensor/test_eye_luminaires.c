@@ -7,14 +7,6 @@
 
 #include <unistd.h>
 
-static void have_group(mesh *m) {
-    m->up = 'z';
-    m->n_groups = 1;
-    m->group_names = calloc(1, sizeof *m->group_names + 8);
-    ck_assert_ptr_nonnull(m->group_names);
-    m->group_names[0] = strcpy((char *)(m->group_names + 1), "room");
-}
-
 enum { EYES = 3, LUMINAIRES = 2 };
 
 /* A panel of 1 x 1 m and 1,000 cos gamma cd at 3 m, and the same as a point. */
@@ -63,7 +55,7 @@ static mesh plate_upto(double y) {
     mesh m = {0};
     mesh_add_cell(&m, &(box_cell){.axis = 2, .level = 1.5, .from = {-3, -3, 1.5}, .to = {3, y, 1.5}}, true);
     mesh_finish(&m, .5f);
-    have_group(&m);
+    mesh_name_room(&m);
     return m;
 }
 

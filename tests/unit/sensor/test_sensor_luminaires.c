@@ -6,15 +6,6 @@
 
 #include <unistd.h>
 
-/* All faces are of one group, which is no housing: it is too large for one. */
-static void have_group(mesh *m) {
-    m->up = 'z';
-    m->n_groups = 1;
-    m->group_names = calloc(1, sizeof *m->group_names + 8);
-    ck_assert_ptr_nonnull(m->group_names);
-    m->group_names[0] = strcpy((char *)(m->group_names + 1), "room");
-}
-
 /* A point of 100 cd, 2 m above the floor, and receivers of all kinds beside it and on the floor below: I
  * w(direction) / d^2, within 1e-3. */
 START_TEST(point_of_light) {
@@ -32,7 +23,7 @@ START_TEST(point_of_light) {
     mesh m = {0};
     mesh_add_cell(&m, &(box_cell){.axis = 2, .from = {-3, -3, 0}, .to = {3, 3, 0}}, true);
     mesh_finish(&m, .5f);
-    have_group(&m);
+    mesh_name_room(&m);
     receiver r[N] = {{.kind = RECEIVER_PLANE}};
     for (int k = 0; k < N; k++) {
         r[k] = (receiver){.kind = k < KINDS ? (receiver_kind)k : RECEIVER_PLANE,
@@ -64,7 +55,7 @@ START_TEST(point_of_light) {
     mesh_add_cell(&plate, &(box_cell){.axis = 2, .level = 1.5, .from = {-3, -3, 1.5}, .to = {3, 3, 1.5}},
                   true);
     mesh_finish(&plate, .5f);
-    have_group(&plate);
+    mesh_name_room(&plate);
     ck_ok(sensor_luminaires_make(&plate, &p, &(direct_options){.seed = 1}, N, r, H, NULL, &error));
     for (int k = 0; k < N; k++) ck_assert_double_eq((double)H[k], 0);
     placed_free(&p);
@@ -89,7 +80,7 @@ START_TEST(point_of_light_at_probes) {
     mesh m = {0};
     mesh_add_cell(&m, &(box_cell){.axis = 2, .from = {-3, -3, -1}, .level = -1, .to = {3, 3, -1}}, true);
     mesh_finish(&m, .5f);
-    have_group(&m);
+    mesh_name_room(&m);
     receiver r[N] = {{.kind = RECEIVER_SPHERE}};
     r[N - 1] = r[0];
     for (int k = 0; k < 2 * HARMONICS; k++)
@@ -128,7 +119,7 @@ START_TEST(area_source) {
     char path[256];
     mesh m = box_mesh(size, 2, .5f);
     receiver r[N] = {{.kind = RECEIVER_PLANE}};
-    have_group(&m);
+    mesh_name_room(&m);
     for (int k = 0; k < N; k++) {
         r[k].axis[k < 3 ? 1 : 2] = 1;
         memcpy(r[k].at, at[k], sizeof r[k].at);
