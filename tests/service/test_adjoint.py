@@ -15,7 +15,7 @@ import numpy as np
 from command import must
 from daemon import Daemon, npy
 from make_store import Scene
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, write_yard
 
 QUANTITIES = "radiosity", "irradiance", "indirect"
 # Some hundred terms in single precision, of either sign: of the sum of their magnitudes.
@@ -103,8 +103,6 @@ class Gradients(Both):
             "exact3": SmallScene(20, channels=3, seed=5).write(path / "exact3.h5", "exact3", kind="exact", sky=5),
         }
         cls.skies = {"grey": 6, "colour": 4, "exact3": 5}
-        scene = cls.folder / "yard.obj"
-        scene.write_text(YARD)
         cls.approximate = []
         for name, floor, options in (
             ("yard", "0.5 0.5 0.5", ["--method", "exact"]),
@@ -114,8 +112,7 @@ class Gradients(Both):
             ("sparse", "0.7 0.4 0.2", ["--method", "sparse"]),
             ("hierarchical", "0.7 0.4 0.2", ["--method", "hierarchical"]),
         ):
-            (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor=floor))
-            must("precompute", scene, "-o", cls.folder / (name + ".h5"), "--elements", 80, "--rays", 256, "--probes", 0,
+            must("precompute", write_yard(cls.folder, floor), "-o", cls.folder / (name + ".h5"), "--elements", 80, "--rays", 256, "--probes", 0,
                  "--keep-form-factors", "--sky", "grid:4x3", *options)
             truth = cls.scenes[name] = Yard(cls.folder / (name + ".h5"))
             cls.skies[name] = len(truth.tiles)
@@ -348,12 +345,9 @@ class Emitters(Both):
         folder = tempfile.TemporaryDirectory(prefix="lambert-adjoint-")
         cls.addClassCleanup(folder.cleanup)
         folder = pathlib.Path(folder.name)
-        scene = folder / "yard.obj"
-        scene.write_text(YARD)
         cls.truth = {}
         for name, floor, emitters in (("lights", "0.7 0.4 0.2", "group=lamp,south"), ("tiles", "0.5 0.5 0.5", "sky")):
-            (folder / "yard.mtl").write_text(MATERIALS.format(floor=floor))
-            must("precompute", scene, "-o", folder / (name + ".h5"), "--elements", 80, "--rays", 256, "--probes", 0,
+            must("precompute", write_yard(folder, floor), "-o", folder / (name + ".h5"), "--elements", 80, "--rays", 256, "--probes", 0,
                  "--keep-form-factors", "--sky", "grid:4x3", "--emitters", emitters)
             cls.truth[name] = Truth(folder / (name + ".h5"))
         cls.daemon = Daemon(*(f"{folder / name}.h5:{name}" for name in cls.truth))

@@ -19,7 +19,7 @@ import numpy as np
 from command import ENVIRONMENT, LAMBERT, lambert, must
 from exr_file import decode_exr
 from png_file import decode_png
-from yard import MATERIALS, YARD
+from yard import write_yard
 from patience import PATIENCE
 
 # Joins the frames that its options name, and keeps its options beside itself. A video called refused.mp4 fails.
@@ -159,8 +159,7 @@ class Animate(unittest.TestCase):
             self.assertLessEqual(np.abs(decode_png(self.at / "one.png") - decode_png(self.at / "other.png")).max(), 1)
 
     def test_skies(self):
-        (self.at / "yard.obj").write_text(YARD)
-        (self.at / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
+        write_yard(self.at)
         store = self.at / "yard.h5"
         must("precompute", self.at / "yard.obj", "-o", store, "--elements", 150, "--rays", 256, "--probes", 0,
              "--sky", "grid:4x3", "--quiet", "--method", "exact")

@@ -15,7 +15,7 @@ import numpy as np
 
 from command import ENVIRONMENT, LAMBERT, lambert, must
 from weather import a_year, epw, parts, sine_of_altitude, wea
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, write_yard
 from patience import PATIENCE
 
 DAYS = 3
@@ -37,8 +37,7 @@ class Annual(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="lambert-annual-")
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
-        (cls.folder / "yard.obj").write_text(YARD)
-        (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
+        write_yard(cls.folder)
         (cls.folder / "square.obj").write_text(SQUARE)
         (cls.folder / "square.mtl").write_text("newmtl grey\nKd 0.5 0.5 0.5\n")
         kept = cls.folder / "kept.h5"

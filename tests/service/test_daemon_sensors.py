@@ -16,7 +16,7 @@ from command import must
 from daemon import PATIENCE, Daemon
 from make_store import Luminaires, Scene, Sensors, add_checksums
 from test_luminaires import GREY, KINDS, LIT, TOLERANCE, dimmers
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, precompute_yard
 
 # As SAME of test_luminaires.py: sums in single precision of numbers whose last bits differ.
 SAME = 2e-6
@@ -360,20 +360,14 @@ class Kinds(Case):
         folder = tempfile.TemporaryDirectory(prefix="lambert-sensors-")
         cls.addClassCleanup(folder.cleanup)
         path = pathlib.Path(folder.name)
-        (path / "yard.obj").write_text(YARD)
-        (path / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
         cls.stores, cls.lights, cls.sensors, cls.truth = {}, {}, {}, {}
         for name, options in {**KINDS, "few": ["--emitters", "sky"]}.items():
-            cls.stores[name] = path / f"{name}.h5"
-            must("precompute", path / "yard.obj", "-o", cls.stores[name], "--elements", 120, "--rays", 1024, "--probes", 0,
-                 "--sky", "grid:4x3", "--keep-form-factors", *options)
+            cls.stores[name] = precompute_yard(path, name, *options)
             cls.truth[name] = t = Truth(cls.stores[name])
             if name != "few":
                 cls.lights[name] = Luminaires(t.n, t.C, seed=7).add_to(cls.stores[name])
             cls.sensors[name] = Sensors(t.n, t.C, 12, cls.lights.get(name), seed=7).add_to(cls.stores[name])
-        cls.stores["stated"] = path / "stated.h5"
-        must("precompute", path / "yard.obj", "-o", cls.stores["stated"], "--elements", 120, "--rays", 1024, "--probes", 16,
-             "--sky", "grid:4x3", "--keep-form-factors", *KINDS["low"])
+        cls.stores["stated"] = precompute_yard(path, "stated", *KINDS["low"], probes=16)
         t = cls.truth["stated"] = Truth(cls.stores["stated"])
         cls.lights["stated"] = Luminaires(t.n, t.C, seed=7, mesh_groups=len(t.groups)).add_to(cls.stores["stated"])
         cls.sensors["stated"] = Sensors(t.n, t.C, 12, cls.lights["stated"], seed=7).add_to(cls.stores["stated"])

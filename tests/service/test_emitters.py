@@ -10,7 +10,7 @@ import numpy as np
 
 from command import lambert, must
 from daemon import Daemon
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, write_yard
 
 QUANTITIES = "radiosity", "irradiance", "indirect"
 # Of a lamp and the sky together, of elements, and of a group in one colour only.
@@ -25,9 +25,7 @@ class Emitters(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="lambert-emitters-")
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
-        cls.scene = cls.folder / "yard.obj"
-        cls.scene.write_text(YARD)
-        (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
+        cls.scene = write_yard(cls.folder)
         (cls.folder / "some.json").write_text(json.dumps({"emissions": EMISSIONS}))
         cls.rng = np.random.default_rng(5)
         cls.stores, cls.truth = {}, {}

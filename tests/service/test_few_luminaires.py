@@ -14,7 +14,7 @@ import numpy as np
 from command import lambert, must
 from daemon import Daemon
 from make_store import Luminaires, add_checksums
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, write_yard
 
 QUANTITIES = "radiosity", "irradiance", "indirect"
 # The light of an emitter is converged to 1e-6 in the norm over the scene, and kept in single precision.
@@ -36,8 +36,7 @@ class Few(unittest.TestCase):
         cls.folder = path = pathlib.Path(folder.name)
         (path / "spot.ies").write_text(SPOT)
         (path / "list.json").write_text(json.dumps(LIST))
-        (path / "yard.obj").write_text(YARD)
-        (path / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
+        write_yard(path)
         must("precompute", path / "yard.obj", "-o", path / "all.h5", "--elements", 120, "--rays", 1024, "--probes", 0, "--sky", "grid:4x3",
              "--luminaires", path / "list.json", "--lights", "lm", "--method", "exact", "--keep-form-factors")
         cls.stores = {"all": path / "all.h5"}

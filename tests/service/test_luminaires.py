@@ -16,7 +16,7 @@ import numpy as np
 from command import must
 from daemon import PATIENCE, Daemon
 from make_store import Luminaires, Scene, add_checksums
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, precompute_yard, write_yard
 
 QUANTITIES = "radiosity", "irradiance", "indirect"
 TOLERANCE = 1e-5  # as in test_daemon_answers.py: single precision, sums of some 100 products
@@ -279,13 +279,9 @@ class Kinds(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="lambert-luminaires-")
         cls.addClassCleanup(folder.cleanup)
         path = pathlib.Path(folder.name)
-        (path / "yard.obj").write_text(YARD)
-        (path / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
         cls.stores, cls.lights, cls.truth = {}, {}, {}
         for name, options in KINDS.items():
-            cls.stores[name] = path / f"{name}.h5"
-            must("precompute", path / "yard.obj", "-o", cls.stores[name], "--elements", 120, "--rays", 1024, "--probes", 8,
-                 "--sky", "grid:4x3", "--keep-form-factors", *options)
+            cls.stores[name] = precompute_yard(path, name, *options, probes=8)
             cls.truth[name] = t = Truth(cls.stores[name])
             cls.lights[name] = Luminaires(t.n, t.C, seed=7, mesh_groups=len(t.groups)).add_to(cls.stores[name])
         cls.daemon = Daemon(*cls.stores.values())
@@ -416,8 +412,7 @@ class Precomputed(unittest.TestCase):
         (path / "lights.json").write_text(json.dumps({"luminaires": [
             {"name": "row", "file": "spot.ies", "from": [1, 1, 2.8], "steps": [[2, 0, 0]], "counts": [2], "dim": .7},
             {"name": "desk", "file": "spot.ies", "at": [2, 3, 2.8], "aim": [0, 1, -2], "colour": [1.2, 1, .4]}]}))
-        (path / "yard.obj").write_text(YARD)
-        (path / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
+        write_yard(path)
         must("precompute", path / "yard.obj", "-o", path / "yard.h5", "--elements", 600, "--luminaires", path / "lights.json", "--lights",
              "lm", "--method", "low-rank", "--epsilon", ".2")
         cls.daemon = Daemon(path / "yard.h5")

@@ -12,7 +12,7 @@ import numpy as np
 from command import must
 from daemon import Daemon
 from make_store import Scene
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, write_yard
 
 QUANTITIES = "radiosity", "irradiance", "indirect"
 FIGURES = "mean", "sum", "min", "max", "uniformity", "variance"
@@ -355,8 +355,6 @@ class KindsThatAreMade(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="lambert-reduce-")
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
-        scene = cls.folder / "yard.obj"
-        scene.write_text(YARD)
         (cls.folder / "some.json").write_text(json.dumps({"emissions": [
             {"groups": {"lamp": [1, 2, 3]}, "sky": [[1, .5, .2]] + [0] * 11},
             {"elements": [3, 8, 40], "values": [1, 4, [0, 2, 1]]}, {"groups": {"east": 2}}]}))
@@ -369,8 +367,7 @@ class KindsThatAreMade(unittest.TestCase):
             ("tiles", "0.5 0.5 0.5", ["--emitters", "sky"]),
             ("mixed", "0.7 0.4 0.2", ["--emitters", cls.folder / "some.json"]),
         ):
-            (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor=floor))
-            must("precompute", scene, "-o", cls.folder / (name + ".h5"), "--elements", 150, "--rays", 256, "--probes", 4,
+            must("precompute", write_yard(cls.folder, floor), "-o", cls.folder / (name + ".h5"), "--elements", 150, "--rays", 256, "--probes", 4,
                  "--keep-form-factors", "--sky", "grid:4x3", *options)
             cls.truth[name] = Truth(cls.folder / (name + ".h5"))
         cls.daemon = Daemon(*(f"{cls.folder / name}.h5:{name}" for name in cls.truth))

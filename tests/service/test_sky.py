@@ -14,7 +14,7 @@ import numpy as np
 from command import lambert as run
 from daemon import Daemon
 from make_store import add_checksums
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, write_yard
 
 
 class Sky(unittest.TestCase):
@@ -23,8 +23,6 @@ class Sky(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
-        cls.scene = cls.folder / "yard.obj"
-        cls.scene.write_text(YARD)
         cls.rng = np.random.default_rng(5)
         cls.stores, cls.truth = {}, {}
         for name, floor, options in (
@@ -32,7 +30,7 @@ class Sky(unittest.TestCase):
             ("colour", "0.7 0.4 0.2", ["--method", "low-rank", "--rank", "150", "--sky", "grid:12x11"]),
             ("folded", "0.5 0.5 0.5", ["--method", "low-rank", "--rank", "150", "--sky", "reinhart:2"]),
         ):
-            (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor=floor))
+            cls.scene = write_yard(cls.folder, floor)
             path = cls.folder / (name + ".h5")
             done = run("precompute", cls.scene, "-o", path, "--elements", 150, "--rays", 1024, "--probes", 4,
                        "--keep-form-factors", *options)

@@ -13,7 +13,7 @@ from command import REFERENCE, SMALL, lambert, must
 from daemon import Daemon
 from quads import Quads
 from weather import wea
-from yard import MATERIALS, YARD
+from yard import write_yard
 
 QUANTITIES = "radiosity", "irradiance", "indirect"
 TILES = 145
@@ -73,8 +73,7 @@ class EveryLight(Answers):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        (cls.folder / "yard.obj").write_text(YARD)
-        (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
+        write_yard(cls.folder)
         (cls.folder / "all.json").write_text(json.dumps({"emissions": list(LIGHTS.values())}))
         (cls.folder / "noon.wea").write_text(wea([(6, 21, 12.5, 800, 80)]))
         common = "--elements", 150, "--sky", "tregenza", "--form-factors", "rays"

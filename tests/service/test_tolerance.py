@@ -17,7 +17,7 @@ import numpy as np
 from command import lambert, must
 from daemon import Daemon
 from make_store import add_checksums, text
-from yard import MATERIALS, YARD, Truth
+from yard import Truth, write_yard
 
 QUANTITIES = "radiosity", "irradiance", "indirect"
 # The truth is a solution of 300 equations in double, of a condition below 10, and sums of 300 products: far below
@@ -68,9 +68,7 @@ class Tolerance(unittest.TestCase):
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
         (cls.folder / "served").mkdir()
-        scene = cls.folder / "yard.obj"
-        scene.write_text(YARD)
-        (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor="0.7 0.4 0.2"))
+        scene = write_yard(cls.folder)
         common = ["--elements", 120, "--rays", 1024, "--probes", 0, "--sky", "grid:4x3"]
         cls.stores = {}
 

@@ -3,6 +3,8 @@
 import h5py
 import numpy as np
 
+from command import must
+
 
 # A courtyard: a floor, two walls and a lamp that lies on the floor; one wall is black. The fronts look inwards.
 YARD = """mtllib yard.mtl
@@ -40,6 +42,21 @@ newmtl lamp
 Kd 0.3 0.3 0.3
 Ke 5 5 5
 """
+
+
+def write_yard(folder, floor="0.7 0.4 0.2"):
+    """Writes the scene into a folder; returns its path."""
+    (folder / "yard.mtl").write_text(MATERIALS.format(floor=floor))
+    (folder / "yard.obj").write_text(YARD)
+    return folder / "yard.obj"
+
+
+def precompute_yard(folder, name, *options, probes=0):
+    """A store of the yard that keeps what Truth needs; returns its path."""
+    path = folder / f"{name}.h5"
+    must("precompute", write_yard(folder), "-o", path, "--elements", 120, "--rays", 1024, "--probes", probes, "--sky", "grid:4x3",
+         "--keep-form-factors", *options)
+    return path
 
 
 class Truth:
