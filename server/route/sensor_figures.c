@@ -248,6 +248,7 @@ static bool add_vector(const scene *s, const radiosity_request *request, size_t 
     const sensor_lights of = scene_sensor_lights(s);
     const codec_scene about = {
         .n = s->n, .n_channels = C, .n_tiles = of.tiles, .n_luminaires = of.luminaires};
+    const size_t first = radiosity_request_spots(request, v), end = radiosity_request_spots(request, v + 1);
     memset(f->values, 0, C * all * sizeof *f->values);
     memset(f->off, 0, C * all * sizeof *f->off);
     memset(f->rest, 0, C * s->sensor_sets.n_groups * sizeof *f->rest);
@@ -255,10 +256,9 @@ static bool add_vector(const scene *s, const radiosity_request *request, size_t 
     for (size_t k = 0; k < f->errors.n_sets; k++)
         f->errors.squares[f->errors.sets[k]] = (sensor_squares){.light2 = 0};
     for (size_t c = 0; c < C; c++) {
-        for (size_t k = 0; k < request->n_spots; k++)
-            if (request->spots[k].vector == v)
-                add_column(s, f, c, (double)request->colours[k * C + c],
-                           column_of(f, place_of(f, request->spots[k].where)));
+        for (size_t k = first; k < end; k++)
+            add_column(s, f, c, (double)request->colours[k * C + c],
+                       column_of(f, place_of(f, request->spots[k].where)));
         for (size_t k = 0; k < f->n_lights; k++)
             if (f->lights[k] >= of.groups)
                 add_column(s, f, c, weight_of(s, request, f->lights[k], v, c), column_of(f, k));

@@ -151,11 +151,24 @@ static bool side_is_negative(const side_rows *side, size_t n_channels, size_t wi
     return vector < side->n && is_negative(side->values + (vector * n_channels + c) * width, width);
 }
 
+size_t radiosity_request_spots(const radiosity_request *request, size_t vector) {
+    size_t low = 0, high = request->n_spots;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (request->spots[middle].vector < vector)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
 bool radiosity_request_has_signs(const radiosity_request *request, const codec_scene *scene, size_t vector,
                                  size_t c) {
     const size_t C = scene->n_channels;
-    for (size_t k = 0; k < request->n_spots; k++)
-        if (request->spots[k].vector == vector && request->colours[k * C + c] < 0) return true;
+    const size_t end = radiosity_request_spots(request, vector + 1);
+    for (size_t k = radiosity_request_spots(request, vector); k < end; k++)
+        if (request->colours[k * C + c] < 0) return true;
     return (vector < request->n_dense && is_negative(request->E + (vector * C + c) * scene->n, scene->n)) ||
            side_is_negative(&request->sky, C, scene->n_tiles, vector, c) ||
            side_is_negative(&request->emitters, C, scene->n_emitters, vector, c) ||

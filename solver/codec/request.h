@@ -71,7 +71,7 @@ typedef struct radiosity_request {
     bool batch;           /* the answer is one level deeper, also for one vector */
     bool any_sign;        /* values may be negative: a cotangent */
     float *E;             /* [n_rhs][C][n], mesh order; NULL: the spots are all there is */
-    emission_spot *spots; /* of sparse vectors that are not in E yet */
+    emission_spot *spots; /* of sparse vectors that are not in E yet, ascending by vector */
     float *colours;       /* [n_spots][C] */
     size_t n_spots;
     bool select; /* only these elements, in this order */
@@ -124,6 +124,9 @@ bool codec_read_emissions(const codec_scene *scene, const char *text, size_t len
  * or [m][1][n]; for more channels [n] (all alike), [C][n], or a batch [m][C][n]. */
 bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, radiosity_request *request,
                     problem *why);
+
+/* The first spot of the vectors from this one on; n_spots where these have none. O(log spots). */
+size_t radiosity_request_spots(const radiosity_request *request, size_t vector);
 
 /* True where a channel of a vector has an emission, a radiance, a weight or a dimmer below 0. n and C are of
  * the scene.
