@@ -101,24 +101,27 @@ static void follow_panes(const half_rays *h, aimed_packet *packet, bool aimed, h
     pane_path_follow(h->s->v, m, &packet->rays, VISIBILITY_PACKET, hits, passed, aimed ? NULL : &visitor);
 }
 
-/* Casts a packet; aimed: it looks for the sky alone. */
-static void cast(half_rays *h, aimed_packet *packet, bool aimed) {
+/* What the rays of a packet meet, in its directions from the receiver, which is no element. */
+static void meet(const half_rays *h, aimed_packet *packet, unsigned how, hit_packet *hits) {
     static const uint32_t self[VISIBILITY_PACKET] = {
         VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING,
         VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING};
-    const point_scene *s = h->s;
-    const double each = 1 / (double)s->rays;
-    double passed[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
-    hit_packet hits;
-    const unsigned how = aimed ? VISIBILITY_TOGETHER : 0;
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++)
         for (int d = 0; d < 3; d++) {
             packet->rays.origin[d][i] = h->p->origin[d];
             packet->rays.direction[d][i] = (float)packet->direction[i][d];
         }
-        point_ratios(h->p, packet->direction[i], packet->ratio[i]);
-    }
-    visibility_cast(s->v, &packet->rays, VISIBILITY_PACKET, self, how, &hits);
+    visibility_cast(h->s->v, &packet->rays, VISIBILITY_PACKET, self, how, hits);
+}
+
+/* Casts a packet; aimed: it looks for the sky alone. */
+static void cast(half_rays *h, aimed_packet *packet, bool aimed) {
+    const point_scene *s = h->s;
+    const double each = 1 / (double)s->rays;
+    double passed[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
+    hit_packet hits;
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) point_ratios(h->p, packet->direction[i], packet->ratio[i]);
+    meet(h, packet, aimed ? VISIBILITY_TOGETHER : 0, &hits);
     if (s->m->glass != NULL) follow_panes(h, packet, aimed, &hits, passed);
     add_leaving(h, packet, aimed, &hits, passed);
     for (size_t i = 0; i < VISIBILITY_PACKET && !aimed; i++) {
@@ -169,9 +172,6 @@ static void try_openings(half_rays *h, uint64_t shift) {
     double open[PORTAL_GROUPS];
     if (h->aim.n < 2) return;
     for (size_t g = 0; g < h->aim.n; g++) {
-        static const uint32_t self[VISIBILITY_PACKET] = {
-            VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING,
-            VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING};
         portal_aim alone = {.n = 1, .group = {h->aim.group[g]}};
         aimed_packet packet;
         hit_packet hits;
@@ -181,12 +181,8 @@ static void try_openings(half_rays *h, uint64_t shift) {
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
             passed[i] = packet.density[i];
             all += packet.density[i];
-            for (int d = 0; d < 3; d++) {
-                packet.rays.origin[d][i] = h->p->origin[d];
-                packet.rays.direction[d][i] = (float)packet.direction[i][d];
-            }
         }
-        visibility_cast(h->s->v, &packet.rays, VISIBILITY_PACKET, self, VISIBILITY_TOGETHER, &hits);
+        meet(h, &packet, VISIBILITY_TOGETHER, &hits);
         pane_path_follow(h->s->v, h->s->m, &packet.rays, VISIBILITY_PACKET, &hits, passed, NULL);
         open[g] = 0;
         for (size_t i = 0; i < VISIBILITY_PACKET; i++)
