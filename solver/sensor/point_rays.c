@@ -101,7 +101,7 @@ static void follow_panes(const half_rays *h, aimed_packet *packet, bool aimed, h
     pane_path_follow(h->s->v, m, &packet->rays, VISIBILITY_PACKET, hits, passed, aimed ? NULL : &visitor);
 }
 
-/* What the rays of a packet meet, in its directions from the receiver, which is no element. */
+/* Finds what rays in the directions of a packet meet; they start at the receiver, which is no element. */
 static void meet(const half_rays *h, aimed_packet *packet, unsigned how, hit_packet *hits) {
     static const uint32_t self[VISIBILITY_PACKET] = {
         VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING, VISIBILITY_NOTHING,
