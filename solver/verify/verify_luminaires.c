@@ -3,6 +3,7 @@
 #include "solver/luminaire/placed_store.h"
 #include "solver/operator/luminaire_light.h"
 #include "solver/precompute/precompute.h"
+#include "solver/scene/glass.h"
 #include "solver/verify/verify.h"
 #include "store/groups.h"
 
@@ -18,17 +19,20 @@ static const double integral = .005;
 /* Differences of more standard errors than this are none of chance. */
 static const double certain = 5;
 
-/* A luminaire gives elements no more than its flux: sum A H <= lumens. */
+/* A luminaire gives elements no more than its flux: sum A H <= lumens, and a pane passes on a part of what it
+ * gets (mesh_row_most). */
 static void check_fluxes(const examination *e, const lam_luminaires *l, check *c) {
     const size_t n = e->m.n;
+    const double most = mesh_row_most(&e->m);
     for (size_t k = 0; k < lam_luminaires_count(l) && c->verdict == VERDICT_OK; k++) {
         const float *H = luminaires_irradiance(l) + k * n;
         const double lumens = luminaires_shown(l, k).lumens;
         double flux = 0;
         for (size_t i = 0; i < n; i++) flux += e->m.area[i] * (double)H[i];
-        if (flux > (1 + integral) * lumens)
-            check_say(c, VERDICT_BROKEN, "elements receive %.6g lm of luminaire %s, which has %.6g lm", flux,
-                      lam_luminaires_name(l, k), lumens);
+        if (flux > (1 + integral) * most * lumens)
+            check_say(c, VERDICT_BROKEN,
+                      "elements receive %.6g lm of luminaire %s, which gives them at most %.6g lm", flux,
+                      lam_luminaires_name(l, k), most * lumens);
     }
 }
 

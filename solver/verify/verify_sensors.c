@@ -6,6 +6,7 @@
 #include "solver/operator/luminaire_light.h"
 #include "solver/operator/sensor_light.h"
 #include "solver/precompute/precompute.h"
+#include "solver/scene/glass.h"
 #include "solver/sensor/sensor_luminaires.h"
 #include "solver/sensor/sensors_store.h"
 #include "solver/verify/verify.h"
@@ -106,9 +107,10 @@ static weight_row row_of(const sensor_rows *r, size_t i) {
     return out;
 }
 
-/* Flags, cells of grids, and rows: 0 <= |off| <= weight, and no sum above 1. */
+/* Flags, cells of grids, and rows: 0 <= |off| <= weight, and no sum above `most`, which is 1 without panes
+ * (mesh_row_most). */
 static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const stored_rows *stored,
-                         check *c) {
+                         double most, check *c) {
     const sensor_rows *r = &stored->rows;
     for (size_t k = 0; k < l->n_sets; k++) {
         const sensor_set *set = &l->sets[k];
@@ -137,9 +139,9 @@ static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const 
                       flags, (double)r->backs[i]);
         else if (!even)
             check_say(c, VERDICT_BROKEN, "receiver %zu: halves of a weight differ by more than it", i);
-        else if (!(sum <= 1 + rounding))
-            check_say(c, VERDICT_BROKEN, "receiver %zu: its weights add up to %.6g, must be at most 1", i,
-                      sum);
+        else if (!(sum <= most + rounding))
+            check_say(c, VERDICT_BROKEN, "receiver %zu: its weights add up to %.6g, must be at most %g", i,
+                      sum, most);
     }
 }
 
@@ -158,6 +160,7 @@ static size_t choose(const lam_sensors *loaded, size_t chosen[ROWS_AGAIN]) {
  */
 typedef struct row_sums {
     double rays;             /* of a row */
+    double most;             /* that a ray counts (mesh_row_most) */
     double *sum[2], *off[2]; /* [n_groups + 1] */
     double exact[2];
 } row_sums;
@@ -192,10 +195,11 @@ static void add_exact(const weight_row rows[2], double rays, double sum[2]) {
     }
 }
 
-/* The standard error of a share p by rays is no more than (p (1 - p) / rays)^1/2; p is the mean of both. */
+/* The standard error of a share p by rays that count 0 to `most` is no more than
+ * (p (most - p) / rays)^1/2 (Bhatia, Davis 2000); p is the mean of both. */
 static double noise_of(const row_sums *s, size_t g) {
-    const double p = fmin(fmax((s->sum[0][g] + s->sum[1][g]) / 2, 0), 1);
-    return fmax(hypot(s->off[0][g], s->off[1][g]), sqrt(2 * p * (1 - p) / s->rays));
+    const double p = fmin(fmax((s->sum[0][g] + s->sum[1][g]) / 2, 0), s->most);
+    return fmax(hypot(s->off[0][g], s->off[1][g]), sqrt(2 * p * (s->most - p) / s->rays));
 }
 
 static void compare_row(const mesh *m, size_t i, const weight_row rows[2], row_sums *s, check *c) {
@@ -227,6 +231,7 @@ static lam_status compare_rows(examination *e, const stored_rows *stored, size_t
     double *sums = memory_allocate(4, (m->n_groups + 1) * sizeof *sums, "rows of sensors", error);
     if (sums == NULL) TRY(LAM_ERR_MEMORY);
     row_sums s = {.rays = stored->rows.rays,
+                  .most = mesh_row_most(m),
                   .sum = {sums, sums + m->n_groups + 1},
                   .off = {sums + 2 * (m->n_groups + 1), sums + 3 * (m->n_groups + 1)}};
     if (stored->rows.sky != NULL) TRY(sky_bounce_load(e->s, m->n, &sky, error));
@@ -317,7 +322,7 @@ lam_status verify_sensors(examination *e, check *c, lam_error *error) {
     for (size_t k = 0; k < n; k++) at[k] = l.receivers[chosen[k]];
     check_say(c, VERDICT_OK, "%zu in %zu set%s, the rows of %zu of them were found again, as stated", l.n,
               l.n_sets, l.n_sets == 1 ? "" : "s", n);
-    check_ranges(&l, loaded, &stored, c);
+    check_ranges(&l, loaded, &stored, mesh_row_most(&e->m), c);
     if (c->verdict == VERDICT_OK && n > 0) TRY(compare_rows(e, &stored, n, chosen, at, c, error));
     if (c->verdict == VERDICT_OK && n > 0) TRY(compare_luminaires(e, &stored, n, chosen, at, c, error));
 done:

@@ -2,6 +2,7 @@
 through a pane by every source and kind, the walks that judge them, and what is refused."""
 
 import json
+import os
 import pathlib
 import tempfile
 import unittest
@@ -12,9 +13,11 @@ import numpy as np
 import glb
 from command import lambert, must
 from daemon import Daemon
+from make_store import add_checksums
 from weather import sun, wea
 
 TAU = .78
+FIXTURES = pathlib.Path(os.environ["FIXTURES"])
 
 
 def law(cosine):
@@ -246,6 +249,27 @@ class Glass(unittest.TestCase):
                 area = f["mesh/area"][:]
             # The way out of the room, and the sky of the store, do not count: walls are black and the sky is dark.
             np.testing.assert_allclose(H[:, inside] @ area[inside], wanted, rtol=.01)
+
+    def test_luminaires_and_sensors_beside_a_pane(self):
+        """What a pane lets pass lights the faces behind it too: more than the luminaire has, and rows sum to more than 1."""
+        self.write(two_rooms(), paint(".5 .5 .5"))
+        lamp = {"name": "lamp", "file": str(FIXTURES / "luminaires/made/lambertian-1000cd-1x1m.ies"), "at": [2.5, 1, 1.9], "flux": 1000}
+        seats = {"points": [{"name": "seats", "at": [[2.1, 1, .2 * k] for k in range(1, 9)], "normal": [-1, 0, 0]}]}
+        (self.folder / "lum.json").write_text(json.dumps({"luminaires": [lamp]}))
+        (self.folder / "sen.json").write_text(json.dumps(seats))
+        store, _ = self.precompute("--luminaires", self.folder / "lum.json", "--sensors", self.folder / "sen.json", "--lights", "lm",
+                                   "--elements", 300, "--assets", FIXTURES)
+        with h5py.File(store) as f:
+            self.assertGreater((f["luminaires/irradiance"][()] @ f["mesh/area"][()]).max(), 1010)
+            self.assertGreater(np.add.reduceat(f["sensors/weights"][()], f["sensors/indptr"][:-1].astype(int)).min(), 1.5)
+        said = must("verify", store).stdout
+        self.assertIn("1, the light of 1 of them was found again", said)
+        self.assertIn("8 in 1 set, the rows of 8 of them were found again", said)
+        with h5py.File(store, "r+") as f:
+            f["sensors/weights"][...] *= 1.05
+            f["sensors/weights_off"][...] *= 1.05
+            add_checksums(f)
+        self.assertIn("BROKEN  sensors       receiver 0", lambert("verify", store).stdout)
 
     def test_a_thick_pane_and_names_on_the_command_line(self):
         o = Obj()
