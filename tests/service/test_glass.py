@@ -251,7 +251,7 @@ class Glass(unittest.TestCase):
             np.testing.assert_allclose(H[:, inside] @ area[inside], wanted, rtol=.01)
 
     def test_luminaires_and_sensors_beside_a_pane(self):
-        """What a pane lets pass lights the faces behind it too: more than the luminaire has, and rows sum to more than 1."""
+        """A pane lets light pass to the faces behind it: more flux than the luminaire has, and rows that sum to more than 1."""
         self.write(two_rooms(), paint(".5 .5 .5"))
         lamp = {"name": "lamp", "file": str(FIXTURES / "luminaires/made/lambertian-1000cd-1x1m.ies"), "at": [2.5, 1, 1.9], "flux": 1000}
         seats = {"points": [{"name": "seats", "at": [[2.1, 1, .2 * k] for k in range(1, 9)], "normal": [-1, 0, 0]}]}
