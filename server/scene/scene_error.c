@@ -13,8 +13,9 @@
 /* True where the store was built for receivers and the request asks for nothing else. */
 static bool asks_receivers(const scene *s, const radiosity_request *request) {
     const reduce_request *r = &request->reduce;
-    /* Sensors gather from all elements. */
-    if (s->errors.read == NULL || request->at_sensors) return false;
+    if (s->errors.read == NULL) return false;
+    /* Sensors gather from all elements that they see. */
+    if (request->at_sensors) return s->errors.sensors;
     if (!r->on)
         return stated_errors_others(&s->errors, request->select ? request->n_selected : s->n,
                                     request->select ? request->selected : NULL) == 0;

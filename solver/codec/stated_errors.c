@@ -115,6 +115,7 @@ lam_status stated_errors_read(store *s, const error_scene *scene, const lam_oper
     TRY(importance_load(s, n, &weights, error));
     TRY(find_members(weights.read, n, &made.read, error));
     TRY(find_members(weights.emits, n, &made.emits, error));
+    made.sensors = weights.sensors;
     made.luminaires = weights.luminaires;
     if (made.read != NULL) made.receivers = error_of(&figures.report, true);
     about.read = made.read;
@@ -141,6 +142,10 @@ static size_t count_others(const bool *members, size_t count, const uint32_t *se
 
 size_t stated_errors_others(const stated_errors *e, size_t count, const uint32_t *selected) {
     return count_others(e->read, count, selected);
+}
+
+size_t stated_errors_others_of_sensors(const stated_errors *e) {
+    return e->sensors ? 0 : count_others(e->read, e->n, NULL);
 }
 
 size_t stated_errors_strangers(const stated_errors *e, size_t count, const uint32_t *selected) {

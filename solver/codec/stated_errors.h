@@ -24,6 +24,7 @@ typedef struct stated_errors {
     double mesh_of_skies;   /* the same of skies, the larger of an even and a cloudy one; likewise */
     stated_error receivers; /* of the light of receivers; known only where the store was built for them */
     bool *read;             /* [n], true of receivers; NULL: the store was built for all elements */
+    bool sensors;           /* receivers are read by the light that they send to sensors, too */
     bool *emits;     /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */
     bool luminaires; /* some of these are sources by the light of luminaires that they reflect */
     error_by_group by_group; /* n_bins is 0 where the store states none */
@@ -42,6 +43,10 @@ lam_status stated_errors_read(store *s, const error_scene *scene, const lam_oper
 /* The number among count elements that are no receivers; selected NULL: the first count elements. 0 where
  * the store was built for all. O(count). */
 size_t stated_errors_others(const stated_errors *e, size_t count, const uint32_t *selected);
+
+/* The number of elements whose light at sensors is only roughly right: 0 where the store was built for these,
+ * or for all; else all that are no receivers. O(n). */
+size_t stated_errors_others_of_sensors(const stated_errors *e);
 
 /* The number among count elements that are no sources; selected NULL: the first count elements. 0 where the
  * store was built for any emission. O(count). */

@@ -126,6 +126,10 @@ lam_status emission_allocate(const char *path, size_t n_channels, size_t width, 
 /* The scene's own light as one vector: that of its elements, and of its luminaires as listed. */
 lam_status emission_of_scene(const emission_scene *scene, emission *out, lam_error *error);
 
+/* True where neither the elements of the first n_vectors vectors nor the luminaires of the first give light;
+ * n: elements. */
+bool emission_is_dark(const emission *e, size_t n, size_t n_channels, size_t n_vectors);
+
 /* The options of a command line that are about light. */
 typedef struct emission_options {
     const option_list *items; /* --emit */

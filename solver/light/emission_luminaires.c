@@ -127,3 +127,12 @@ lam_status emission_dim_as_listed(const emission_scene *scene, emission *e, lam_
 done:
     return status;
 }
+
+bool emission_is_dark(const emission *e, size_t n, size_t n_channels, size_t n_vectors) {
+    const size_t dimmers = e->D == NULL ? 0 : n_channels * lam_luminaires_count(e->luminaires);
+    for (size_t i = 0; i < n_vectors * n_channels * n; i++)
+        if (e->E[i] != 0) return false;
+    for (size_t k = 0; k < dimmers; k++)
+        if (e->D[k] != 0) return false;
+    return true;
+}

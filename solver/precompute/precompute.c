@@ -140,6 +140,7 @@ static lam_status run_stages(precompute_parts *p, lam_error *error) {
 
     started = clock_seconds();
     TRY(stage_prepare_mesh(job, &p->scene, &p->plan, error));
+    TRY(scene_read_at_sensors(job, &p->scene, error));
     /* The way in which form factors are found may depend on sources, which are then found first. */
     const bool by_luminaires = p->scene.importance.luminaires;
     if (by_luminaires) TRY(run_luminaires(p, error));

@@ -20,18 +20,20 @@ typedef enum mesh_asked { MESH_OF_LIGHT, MESH_OF_FACES } mesh_asked;
 typedef enum factor_quality { QUALITY_DRAFT, QUALITY_NORMAL, QUALITY_HIGH } factor_quality;
 extern const char precompute_quality_words[];
 
-/* The options, as the rows of precompute_tables_make fill them; texts point into argv. The members after
- * progress belong to the verb. */
 /* The light that panes pass: less of it aslant, or the same from every side. */
 typedef enum glass_law { GLASS_BY_ANGLE, GLASS_EVENLY } glass_law;
 
 /* --luminaires and --sensors: the words for leaving those of a store out. */
 #define LUMINAIRES_NONE "none"
 
-/* The word of --sources for what luminaires light. */
-#define SOURCES_LUMINAIRES "luminaires"
 #define SENSORS_NONE "none"
 
+/* The word of --sources for all that luminaires light, and that of --receivers for all that sensors see. */
+#define SOURCES_LUMINAIRES "luminaires"
+#define RECEIVERS_SENSORS "sensors"
+
+/* The options, as the rows of precompute_tables_make fill them; texts point into argv. The members after
+ * progress belong to the verb. */
 typedef struct precompute_options {
     const char *output;
     uint64_t elements;

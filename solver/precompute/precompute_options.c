@@ -293,7 +293,7 @@ static const option_row of_methods[] = {
      .kind = OPTION_TEXT,
      .offset = FIELD(emitters),
      .argument = "FILE|group=NAME|sky|luminaires"},
-    {.name = "receivers", .kind = OPTION_TEXT, .offset = FIELD(receivers), .argument = "GROUP,..."},
+    {.name = "receivers", .kind = OPTION_TEXT, .offset = FIELD(receivers), .argument = "GROUP|sensors,..."},
     {.name = "importance", .kind = OPTION_TEXT, .offset = FIELD(importance), .argument = "FILE"},
     {.name = "sources", .kind = OPTION_TEXT, .offset = FIELD(sources), .argument = "GROUP|luminaires,..."},
     {0},

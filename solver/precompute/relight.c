@@ -105,10 +105,17 @@ static lam_status save_sensors(const precompute_scene *scene, bool rows, store *
     return s->list.n > 0 ? sensors_save_lit(from, s->list.n, &lit, to, error) : LAM_OK;
 }
 
-/* A store of few emitters has the light of those alone, and one for luminaires as sources that of its own. */
+/* A store of few emitters has the light of those alone, and one for luminaires as sources, or for sensors as
+ * receivers, that of its own. */
 static lam_status check_operator(const precompute_job *job, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     char *kind = NULL;
+    if (sensors_are_new(job->options) && store_has(s, STORE_IMPORTANCE) &&
+        store_has_attribute(s, STORE_IMPORTANCE, "sensors"))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%.200s: was built for the light at the sensors that it has (--receivers); precompute its scene "
+             "with --sensors",
+             job->options->input);
     if (job->options->luminaires != NULL && store_has(s, STORE_SOURCES) &&
         store_has_attribute(s, STORE_SOURCES, "luminaires"))
         FAIL(

@@ -40,6 +40,12 @@ lam_status luminaires_save(const luminaire_columns *c, const mesh *m, store *s, 
  * that an element reflects, over the mean of all that it lights, at most 1: stage_importance.c. */
 lam_status scene_light_sources(const precompute_job *job, precompute_scene *scene, lam_error *error);
 
+/* Makes receivers of the elements that light comes from to sensors, where these are named as receivers: by
+ * the weight of an element in the rows of a set, over its area, over the mean of all that the set sees, at
+ * most 1. Rays without the sky tell them, 8 of a set for each element, or for some that follow each other in
+ * the order of the mesh where a set has less: stage_importance.c. */
+lam_status scene_read_at_sensors(const precompute_job *job, precompute_scene *scene, lam_error *error);
+
 /* Logs lines as warnings. */
 void scene_warn(const precompute_job *job, const luminaire_warnings *w);
 

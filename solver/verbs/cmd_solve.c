@@ -1,7 +1,6 @@
 /* lambert solve: lights a store and writes the answer. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/terminal.h"
-#include "solver/codec/answer.h"
 #include "solver/codec/request.h"
 #include "solver/codec/stated_errors.h"
 #include "solver/light/emission_refine.h"
@@ -15,6 +14,7 @@
 #include "solver/verbs/solve_probes.h"
 #include "solver/verbs/solve_sensors.h"
 #include "solver/verbs/solve_texels.h"
+#include "solver/verbs/store_error.h"
 #include "solver/verbs/verbs.h"
 #include "solver/verbs/year_error.h"
 
@@ -31,47 +31,6 @@ static const option_command verb = {
     .least_arguments = 1,
     .most_arguments = 1,
 };
-
-/* True where neither the elements nor the luminaires of a vector give light. */
-static bool is_dark(const emission *light, size_t count, size_t n_channels) {
-    const size_t dimmers = light->D == NULL ? 0 : n_channels * lam_luminaires_count(light->luminaires);
-    for (size_t i = 0; i < count; i++)
-        if (light->E[i] != 0) return false;
-    for (size_t k = 0; k < dimmers; k++)
-        if (light->D[k] != 0) return false;
-    return true;
-}
-
-/* Takes the error that the store states for the elements that are wanted and the light; warns where it was
- * built for receivers and others are wanted, or for sources and others emit. */
-static void take_error(const stated_errors *stated, const emission *light, size_t n_selected,
-                       const uint32_t *selected, terminal *t, solution *out) {
-    answer_notes notes = {.has_error = false};
-    const size_t count = selected != NULL ? n_selected : stated->n;
-    const size_t others = stated_errors_others(stated, count, selected);
-    const size_t rows = light->E != NULL ? (light->steady ? 1 : light->n_vectors) * out->m->n_channels : 0;
-    const answer_scope scope = {.receivers_only = others == 0,
-                                .strange = light->L != NULL || (light->D != NULL && !stated->luminaires) ||
-                                           stated_errors_is_strange(stated, rows, light->E),
-                                .sky =
-                                    light->L != NULL && is_dark(light, rows * stated->n, out->m->n_channels)};
-    stated_errors_note(stated, scope, &notes);
-    if (notes.has_error) out->relative = notes.relative_mean;
-    if (notes.has_error) out->indirect = notes.indirect_mean;
-    out->head = notes.head;
-    if (notes.has_error) out->error_light = notes.error_light;
-    out->error_of = notes.error_of;
-    out->error_from = notes.error_from;
-    if (others > 0)
-        terminal_warn(
-            t,
-            "%zu of %zu elements are no receivers, which the store was built for: their light is only "
-            "roughly right",
-            others, count);
-    if (stated->emits != NULL && scope.strange)
-        terminal_warn(t, "there is light from elsewhere than the sources, which the store was built for: the "
-                         "answer is only roughly right, and no error is stated for it");
-}
 
 /* Replaces the batch by figures of the year; *values is freed with free(). */
 static lam_status solve_year(const annual_options *annual, const emission *light, const lam_operator *op,
@@ -319,7 +278,7 @@ static error_scene error_scene_of(const mesh *m, const emission_scene *scene) {
 static lam_status check_own(const char *path, const lit_store *lit, terminal *t, lam_error *error) {
     const mesh *m = lit->scene.m;
     if (!lit->own) return LAM_OK;
-    if (is_dark(&lit->light, m->n * m->n_channels, m->n_channels))
+    if (emission_is_dark(&lit->light, m->n, m->n_channels, 1))
         return status_fail(error, LAM_ERR_ARGUMENT,
                            "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s%s",
                            path, lit->luminaires != NULL ? ", --dim NAME=V" : "",
@@ -456,7 +415,7 @@ static lam_status solve(const char *path, const solve_options *f, const annual_o
     hours = hours_of(&span);
     if (f->weather != NULL) out.hours = &hours;
     if (f->tolerance == 0 && (sensors.all == NULL || year->n_figures == 0) && f->at != AT_TEXELS)
-        take_error(&stated, &lit.light, n_selected, selected, t, &out);
+        store_error_take(&stated, &lit.light, sensors.all != NULL, n_selected, selected, t, &out);
     take_words(year, f->figure, &lit.told, &words, &out);
     if (f->at == AT_TEXELS) {
         TRY(solve_texels(s, &m, &lit, f->texel, f->output, &out, t, error));

@@ -119,6 +119,49 @@ class Importance(Case):
         self.assertEqual((error["of"], error["from"]), ("receivers", "sources"))
         self.assertRegex(must("verify", out, "--probes", 4).stdout, r"\nok +error ")
 
+    def test_sensors_as_receivers(self):
+        """In six rooms the light at four points of one of them needs half of the coefficients, and errs as much."""
+        scene, sensors, stores, values = self.path("rooms.obj"), self.path("s.json"), {}, {}
+        must("generate", "rooms", "--elements", 1500 if SMALL else 4000, "-o", scene)
+        with open(sensors, "w", encoding="ascii") as file:
+            json.dump({"points": [{"name": "desk", "at": [[3, 3, .8], [3.4, 3, .8], [3, 3.5, .8], [3.5, 3.5, .8]], "normal": [0, 0, 1]}]},
+                      file)
+        for name, options in (("fine", ("--epsilon", .005)), ("all", ()), ("some", ("--receivers", "sensors"))):
+            store = stores[name] = self.path(name + ".h5")
+            must("precompute", scene, "--mesh", "faces", "-o", store, "--sensors", sensors, "--method", "hierarchical", *HOW, "--probes",
+                 8 if name == "some" else 0, *options, "--quiet")
+        with h5py.File(stores["some"]) as some, h5py.File(stores["all"]) as every:
+            read = some["importance/elements"][()]
+            self.assertEqual(some["importance"].attrs["sensors"], 1)
+            self.assertEqual(some["importance"].attrs["option"], b"--receivers sensors")
+            self.assertLess(some["operator"].attrs["density"], .7 * every["operator"].attrs["density"])
+            self.assertGreater(some["error/lights"].attrs["receivers_indirect"], 0)
+            # Receivers send nearly all of the light that comes to the points.
+            of_read = numpy.isin(some["sensors/indices"][()], read)
+            self.assertGreater(some["sensors/weights"][()][of_read].sum(), .95 * some["sensors/weights"][()].sum())
+            n = len(some["mesh/area"])
+            self.assertLess(len(read), .5 * n)
+        rng = numpy.random.default_rng(5)
+        light = numpy.zeros((64, n), "f4")
+        light[range(64), rng.integers(n, size=64)] = 1
+        numpy.save(self.path("e.npy"), light)
+        for name, store in stores.items():
+            done = must("solve", store, "--emission", self.path("e.npy"), "--sensors", "all", "-o", self.path("v.npy"))
+            self.assertNotIn("receivers", done.stderr)
+            values[name] = numpy.load(self.path("v.npy")).astype("f8")
+        off = {name: numpy.linalg.norm(values[name] - values["fine"]) for name in ("all", "some")}
+        self.assertLess(off["some"], 1.5 * off["all"])
+        self.assertIn("are no receivers", must("solve", stores["some"]).stderr)
+        # Weights are those of these sensors, so that others are refused, and each store says which receivers it has.
+        done = lambert("precompute", stores["some"], "--sensors", sensors, "-o", self.path("x.h5"))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("was built for the light at the sensors that it has (--receivers)", done.stderr)
+        must("precompute", self.store, "--sensors", sensors, "-o", self.path("lamp.h5"))
+        self.assertIn("the store was built for other receivers than sensors", must("solve", self.path("lamp.h5"), "--sensors", "all").stderr)
+        done = lambert("precompute", self.room, "--receivers", "sensors", "-o", self.path("x.h5"))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("--receivers sensors: there are none; give --sensors FILE too", done.stderr)
+
     def test_the_store_says_what_it_is_for(self):
         read, _ = self.is_read()
         with h5py.File(self.store) as file:

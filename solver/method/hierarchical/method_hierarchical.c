@@ -38,10 +38,10 @@ static const option_row rows[] = {
     {.name = "receivers",
      .kind = OPTION_TEXT,
      .offset = offsetof(hierarchical_options, receivers),
-     .argument = "GROUP,...",
+     .argument = "GROUP|sensors,...",
      .not_with = "importance",
-     .help = "The groups whose light is going to be read: errors are kept small there, and stated for it; "
-             "light elsewhere is only roughly right; --method auto then takes hierarchical"},
+     .help = "The groups whose light is going to be read, or all sensors: errors are kept small there, and "
+             "stated for it; light elsewhere is only roughly right; --method auto then takes hierarchical"},
     {.name = "importance",
      .kind = OPTION_TEXT,
      .offset = offsetof(hierarchical_options, importance),

@@ -125,6 +125,7 @@ lam_status importance_even_out(const importance *i, importance *out, lam_error *
                        .share_of_bounds = fmin(fmax(i->share_of_bounds, reference_least),
                                                reference_times * i->share_of_bounds),
                        .share_of_thresholds = i->share_of_thresholds,
+                       .sensors = i->sensors,
                        .luminaires = i->luminaires};
     TRY(copy(i->read, i->n, false, &made.read, error));
     TRY(copy(i->emits, i->n, false, &made.emits, error));
@@ -164,6 +165,7 @@ lam_status importance_save(const importance *i, const char *option, const char *
     if (i->read != NULL) {
         TRY(save_elements(i->read, i->n, GROUP "/elements", GROUP "/weights", s, error));
         TRY(store_set_text(s, GROUP, "option", option, error));
+        if (i->sensors) TRY(store_set_integer(s, GROUP, "sensors", 1, error));
     }
     if (i->emits != NULL) {
         TRY(save_elements(i->emits, i->n, SOURCES "/elements", i->luminaires ? SOURCES "/weights" : NULL, s,
@@ -216,6 +218,7 @@ lam_status importance_load(store *s, size_t n, importance *out, lam_error *error
     importance made = {.n = n};
     *out = (importance){.n = 0};
     TRY(load_elements(s, GROUP, true, n, &made.read, error));
+    made.sensors = made.read != NULL && store_has_attribute(s, GROUP, "sensors");
     made.luminaires = store_has(s, SOURCES) && store_has_attribute(s, SOURCES, "luminaires");
     TRY(load_elements(s, SOURCES, made.luminaires, n, &made.emits, error));
     if (made.read == NULL && made.emits == NULL) goto done;

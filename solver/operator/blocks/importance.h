@@ -18,6 +18,7 @@ typedef struct importance {
     size_t n;        /* 0: none is known, all is read and may emit */
     float *read;     /* [n] by element: w over its largest value; NULL: all is read */
     float *emits;    /* [n] by element: s, at most 1 of the sources, else 0; NULL: any element may emit */
+    bool sensors;    /* some are read by the light that they send to sensors */
     bool luminaires; /* some are sources by the light of luminaires that they reflect */
     float *of;       /* [n] by element: y, between importance_least and 1; NULL before it is found: 1 */
     float *lit;      /* [n] by element: z, likewise */
@@ -47,7 +48,8 @@ bool importance_is_found(const importance *i);
 lam_status importance_even_out(const importance *i, importance *out, lam_error *error);
 
 /* /importance of a store: the elements with a weight and their weights; /sources: the elements that emit, and
- * their s where luminaires are among the sources, else it is 1. The options say in the words of
+ * their s where luminaires are among the sources, else it is 1; both groups say where sensors, or luminaires,
+ * are among those that were named. The options say in the words of
  * the command line where these are from; one that is not needed may be NULL. Loading leaves y and z NULL, and
  * n at 0 where the store has neither. Errors: those of the store; LAM_ERR_FORMAT where an element is not
  * below n, a weight not above 0 and at most 1, or no element emits; LAM_ERR_MEMORY. */
