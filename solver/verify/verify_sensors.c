@@ -107,6 +107,12 @@ static weight_row row_of(const sensor_rows *r, size_t i) {
     return out;
 }
 
+/* True for a receiver whose weights are shares of its rays. Those of probes are not, and the rows of all nine
+ * harmonics of one are made together. */
+static bool has_shares(const lam_sensors *loaded, size_t i) {
+    return sensors_shown(loaded, i).kind < SENSOR_HARMONIC;
+}
+
 /* Flags, cells of grids, and rows: 0 <= |off| <= weight, and no sum above `most`, which is 1 without panes
  * (mesh_row_most). */
 static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const stored_rows *stored,
@@ -128,8 +134,9 @@ static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const 
         const bool wall = (double)r->backs[i] > SENSOR_BACKS_MOST;
         const weight_row row = row_of(r, i);
         double sum = row.sky;
+        const bool shares = has_shares(loaded, i);
         bool even = true;
-        for (size_t k = 0; k < row.n; k++) {
+        for (size_t k = 0; k < row.n && shares; k++) {
             sum += (double)row.weight[k];
             even = even && fabs((double)row.off[k]) <= (1 + rounding) * (double)row.weight[k];
         }
@@ -139,20 +146,24 @@ static void check_ranges(const sensor_list *l, const lam_sensors *loaded, const 
                       flags, (double)r->backs[i]);
         else if (!even)
             check_say(c, VERDICT_BROKEN, "receiver %zu: halves of a weight differ by more than it", i);
-        else if (!(sum <= most + rounding))
+        else if (shares && !(sum <= most + rounding))
             check_say(c, VERDICT_BROKEN, "receiver %zu: its weights add up to %.6g, must be at most %g", i,
                       sum, most);
     }
 }
 
-/* The receivers that are found again, at equal steps of those that have a value. */
+static bool is_found_again(const lam_sensors *loaded, size_t i) {
+    return lam_sensors_has_value(loaded, i) != 0 && has_shares(loaded, i);
+}
+
+/* The receivers that are found again, at equal steps of those that have shares and a value. */
 static size_t choose(const lam_sensors *loaded, size_t chosen[ROWS_AGAIN]) {
     const size_t n = lam_sensors_count(loaded);
     size_t count = 0, seen = 0, place = 0;
-    for (size_t i = 0; i < n; i++) count += lam_sensors_has_value(loaded, i) != 0;
+    for (size_t i = 0; i < n; i++) count += is_found_again(loaded, i);
     const size_t wanted = count < ROWS_AGAIN ? count : ROWS_AGAIN;
     for (size_t i = 0; i < n && place < wanted; i++)
-        if (lam_sensors_has_value(loaded, i) && seen++ == place * count / wanted) chosen[place++] = i;
+        if (is_found_again(loaded, i) && seen++ == place * count / wanted) chosen[place++] = i;
     return place;
 }
 

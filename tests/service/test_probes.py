@@ -129,6 +129,10 @@ class Probes(Case):
         self.assertEqual((sets["probes"]["axes"], len(sets["probes"]["at"])), ("scene", 4))
         self.assertEqual(self.sets(self.path("a.h5"))["probes"]["at"][0], [.5, .5, -.5])
 
+    def test_verify(self):
+        """Coefficients of either sign are no shares of rays: the row of the one point is found again."""
+        self.assertRegex(must("verify", self.box).stdout, r"ok +sensors +28 in 3 sets, the rows of 1 of them were found again, as stated")
+
     def test_refusals(self):
         self.refused(1, "go into .json or .npy", "solve", self.box, "--sensors", "all", "-o", self.path("x.csv"))
         self.refused(1, "floor is not", "solve", self.box, "--sensors", "game,floor", "-o", self.path("x.npy"))
