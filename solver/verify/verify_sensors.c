@@ -107,8 +107,8 @@ static weight_row row_of(const sensor_rows *r, size_t i) {
     return out;
 }
 
-/* True for a receiver whose weights are shares of its rays. Those of probes are not, and the rows of all nine
- * harmonics of one are made together. */
+/* True for a receiver whose weights are shares of its rays. Weights of probes are none, and the rows of all
+ * nine harmonics of one are made together. */
 static bool has_shares(const lam_sensors *loaded, size_t i) {
     return sensors_shown(loaded, i).kind < SENSOR_HARMONIC;
 }
