@@ -3,6 +3,7 @@
 #include "server/scene/adjoint_rows.h"
 #include "server/scene/direct_light.h"
 #include "server/scene/sensor_answer.h"
+#include "solver/operator/emitters.h"
 
 #include <stdarg.h>
 #include <stdint.h>
@@ -74,7 +75,8 @@ codec_scene call_codec_scene(const call *in) {
                          .take = request_memory_take_of,
                          .owner = in->memory,
                          .max_rows = adjoint_rows_capacity(s),
-                         .no_sun = scene_sun_why_not(s)};
+                         .no_sun = scene_sun_why_not(s),
+                         .no_sensors = operator_points_why_not(s->op)};
 }
 
 size_t call_parse_bytes(const call *in) {

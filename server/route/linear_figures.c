@@ -1,5 +1,6 @@
 #include "server/route/linear_figures.h"
 
+#include "server/route/light_weights.h"
 #include "server/route/radiosity_figures.h"
 #include "server/route/routes.h"
 #include "server/route/sensor_figures.h"
@@ -8,7 +9,6 @@
 #include "server/scene/sensor_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
-#include "solver/operator/emitters.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -41,24 +41,13 @@ static bool check_means(const scene *s, const radiosity_request *request, size_t
 /* *weights [n_rhs][C][s]: the whole emission of each vector as weights of emitters; NULL if not needed. */
 static bool weights_of(const call *in, radiosity_request *request, float **weights, problem *why) {
     const scene *s = in->scene;
-    const size_t row = s->n_channels * s->n_emitters;
     const codec_scene about = call_codec_scene(in);
-    lam_error error;
     *weights = NULL;
     if (s->n_emitters == 0 || (request->n_spots == 0 && request->n_dense == 0 && request->sky.values == NULL))
         return true;
     if (!radiosity_request_expand(request, &about, why)) return false;
-    *weights = call_allocate(in, bytes_times(request->n_rhs, row * sizeof **weights), "weights", why);
-    if (*weights == NULL) return false;
-    const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, about.n_tiles,
-                                                   request->sky.values, *weights, &error);
-    if (status != LAM_OK)
-        return problem_set(why, status == LAM_ERR_MEMORY ? PROBLEM_NO_MEMORY : PROBLEM_NOT_IN_STORE, "%s",
-                           error.message);
-    for (size_t k = 0; k < request->emitters.n * row; k++) (*weights)[k] += request->emitters.values[k];
-    if (request->luminaires.values != NULL)
-        operator_emitters_dim(s->op, request->luminaires.n, request->luminaires.values, *weights);
-    return true;
+    *weights = light_weights_find(in, request, why);
+    return *weights != NULL;
 }
 
 /* Allocates; freed by figures_clear, also where it fails. */

@@ -8,6 +8,7 @@
 #include "solver/base/clock.h"
 #include "solver/codec/adjoint.h"
 #include "solver/codec/answer.h"
+#include "solver/operator/emitters.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -104,12 +105,21 @@ static void take_sensors(const scene *s, adjoint_request *request, adjoint_memor
     for (size_t c = 0; c < C; c++)
         for (size_t k = 0; k < all; k++)
             if (!lam_sensors_has_value(s->sensors, k)) g[c * all + k] = 0;
+    /* Sensors without rows of a sky or of luminaires leave these as they are. */
+    memset(memory->direct, 0, C * (scene_tiles(s) + scene_luminaires(s)) * sizeof *memory->direct);
     lam_sensors_adjoint(s->sensors, 1, g, request->cotangent.E, memory->direct,
                         memory->direct + C * scene_tiles(s));
 }
 
 static void add(size_t count, const float *x, float *to) {
     for (size_t k = 0; k < count; k++) to[k] += x[k];
+}
+
+/* Adds gradients by the light that comes to sensors directly, direct [C][m] and [C][k], to those by weights W
+ * [C][s] of few emitters. */
+static void add_direct(const scene *s, const float *direct, float *W) {
+    operator_emitters_adjoint_radiances(s->op, 1, direct, W);
+    if (s->luminaires != NULL) operator_emitters_dim(s->op, 1, direct + s->n_channels * scene_tiles(s), W);
 }
 
 /* D [C][k], those of the last of the emitters W [C][s]. */
@@ -131,6 +141,7 @@ static bool solve(const scene *s, const adjoint_request *request, adjoint_memory
         if (lam_operator_adjoint_emitters(s->op, 1, request->quantity, g, memory->narrow, memory->work,
                                           memory->work_bytes, &error) != LAM_OK)
             return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+        if (request->cotangent.at_sensors) add_direct(s, memory->direct, memory->narrow);
         take_luminaires(s, memory->narrow, memory->dimmers);
         return true;
     }

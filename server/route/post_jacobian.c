@@ -1,6 +1,7 @@
 /* POST /v1/scenes/NAME/jacobian: the matrix of derivatives of irradiances at sensors by dimmers of
- * luminaires, by emissions of groups and by radiances of tiles. Its columns are those of
- * server/scene/sensor_columns.h: begin reads the body, each vector of a pass is a column, end writes. */
+ * luminaires, by emissions of groups and by radiances of tiles, or by weights of few emitters. Its columns
+ * are those of server/scene/sensor_columns.h: begin reads the body, each vector of a pass is a column, end
+ * writes. */
 #include "server/route/routes.h"
 #include "server/scene/direct_light.h"
 #include "server/scene/sensor_answer.h"
@@ -38,6 +39,10 @@ static void solve_free(jacobian_solve *s) {
 /* The first light of a kind, and how many it has. */
 static size_t lights_of(const scene *s, jacobian_by kind, size_t *first) {
     const sensor_lights l = scene_sensor_lights(s);
+    if (kind == JACOBIAN_EMITTERS) {
+        *first = 0;
+        return s->n_emitters;
+    }
     *first = kind == JACOBIAN_GROUPS ? 0 : kind == JACOBIAN_LUMINAIRES ? l.groups : l.groups + l.luminaires;
     return kind == JACOBIAN_GROUPS ? l.groups : kind == JACOBIAN_LUMINAIRES ? l.luminaires : l.tiles;
 }
@@ -70,6 +75,7 @@ static size_t names_bytes(const scene *s) {
     for (size_t g = 0; g < s->groups.n_groups; g++) bytes += 6 * strlen(s->groups.names[g]) + 3;
     for (size_t k = 0; k < scene_luminaires(s); k++)
         bytes += 6 * strlen(lam_luminaires_name(s->luminaires, k)) + 3;
+    for (size_t k = 0; k < s->n_emitters; k++) bytes += 6 * strlen(lam_operator_emitter_name(s->op, k)) + 3;
     return bytes;
 }
 
@@ -185,7 +191,13 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     }
 }
 
-/* ["desk-1", ...] of luminaires and groups; the number of tiles. */
+static const char *name_of(const scene *s, jacobian_by kind, size_t k) {
+    return kind == JACOBIAN_GROUPS     ? s->groups.names[k]
+           : kind == JACOBIAN_EMITTERS ? lam_operator_emitter_name(s->op, k)
+                                       : lam_luminaires_name(s->luminaires, k);
+}
+
+/* ["desk-1", ...] of luminaires, groups and emitters; the number of tiles. */
 static bool write_columns(const scene *s, jacobian_by kind, buffer *b) {
     size_t first;
     const size_t count = lights_of(s, kind, &first);
@@ -193,9 +205,7 @@ static bool write_columns(const scene *s, jacobian_by kind, buffer *b) {
     if (kind == JACOBIAN_SKY) return written && buffer_printf(b, "%zu", count);
     written = written && buffer_append(b, "[", 1);
     for (size_t k = 0; written && k < count; k++)
-        written = (k == 0 || buffer_append(b, ",", 1)) &&
-                  json_write_text(b, kind == JACOBIAN_GROUPS ? s->groups.names[k]
-                                                             : lam_luminaires_name(s->luminaires, k));
+        written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, name_of(s, kind, k));
     return written && buffer_append(b, "]", 1);
 }
 

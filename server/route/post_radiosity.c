@@ -1,6 +1,7 @@
 /* POST /v1/scenes/NAME/radiosity: emission in, radiosity out. begin reads the body, pass computes vectors
  * together with those of other clients, or goes on with figures, end writes the answer; each on any thread.
  */
+#include "server/route/light_weights.h"
 #include "server/route/limited_answer.h"
 #include "server/route/linear_figures.h"
 #include "server/route/radiosity_figures.h"
@@ -13,7 +14,6 @@
 #include "solver/base/clock.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
-#include "solver/operator/emitters.h"
 #include "solver/operator/operator.h"
 
 #include <math.h>
@@ -86,8 +86,6 @@ static float *allocate_rows(const call *in, const radiosity_solve *s, size_t wid
 static bool find_light(const call *in, radiosity_solve *solve, problem *why) {
     const scene *s = in->scene;
     const radiosity_request *request = &solve->request;
-    const size_t C = s->n_channels;
-    lam_error error;
     if (s->n_emitters == 0) {
         if (!request_has_direct(request) && request->n_suns == 0) return true;
         solve->H0 = allocate_rows(in, solve, s->n, "direct light", why);
@@ -95,18 +93,8 @@ static bool find_light(const call *in, radiosity_solve *solve, problem *why) {
         direct_light_find(s, request, 0, request->n_rhs, solve->H0);
         return sun_answer_begin(in, request, &solve->sun, why);
     }
-    solve->W = allocate_rows(in, solve, s->n_emitters, "the weights of emitters", why);
-    if (solve->W == NULL) return false;
-    const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, scene_tiles(s),
-                                                   request->sky.values, solve->W, &error);
-    if (status != LAM_OK)
-        return problem_set(why, status == LAM_ERR_MEMORY ? PROBLEM_NO_MEMORY : PROBLEM_NOT_IN_STORE, "%s",
-                           error.message);
-    for (size_t k = 0; request->emitters.values != NULL && k < request->n_rhs * C * s->n_emitters; k++)
-        solve->W[k] += request->emitters.values[k];
-    if (request->luminaires.values != NULL)
-        operator_emitters_dim(s->op, request->n_rhs, request->luminaires.values, solve->W);
-    return true;
+    solve->W = light_weights_find(in, request, why);
+    return solve->W != NULL;
 }
 
 /* Room to gather at sensors, for a reduction that of a pass. */
@@ -218,6 +206,7 @@ static bool begin_kind(call *in, radiosity_solve *s, problem *why) {
         return linear_figures_begin(in, request, &s->notes, &s->linear, why);
     if (request->reduce.linear && !begin_columns(in, s, why)) return false;
     if (s->columns != NULL) return true;
+    if (request->at_sensors && !light_weights_see_sky(in, request, why)) return false;
     if (request->tolerance > 0) return refined_begin(in, request, &s->notes, &s->refined, why);
     return find_light(in, s, why) && limited_begin(in, request, &s->limit, &s->notes, why) &&
            find_room(in, s, why);
@@ -302,7 +291,7 @@ static lam_status pass_alone(const scene *s, const radiosity_solve *solve, const
 static bool judge(const call *in, radiosity_solve *s) {
     s->judged = true;
     if (s->request.at_sensors)
-        return scene_note_sensor_error(in->scene, &s->request, s->H0, s->sun.shares, s->sun.at_sensors,
+        return scene_note_sensor_error(in->scene, &s->request, s->H0, s->sun.shares, s->sun.at_sensors, s->W,
                                        s->out, &s->notes, &s->errors) ||
                problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
     return (in->scene->errors.emitters.figures.s > 0

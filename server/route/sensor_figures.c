@@ -1,5 +1,6 @@
 #include "server/route/sensor_figures.h"
 
+#include "server/route/light_weights.h"
 #include "server/route/radiosity_figures.h"
 #include "server/scene/direct_light.h"
 #include "server/scene/sensor_answer.h"
@@ -23,6 +24,7 @@ struct sensor_figures {
     sensor_errors errors;
     bool *reduced;      /* [sets]: of some name */
     uint32_t *lights;   /* [n_lights], ascending */
+    float *weights;     /* [n_rhs][C][s] of a store of emitters, whose lights these are; else NULL */
     float **own;        /* [n_lights]: columns that the scene has no room for; NULL: it keeps the column */
     float *made, *work; /* of a pass; NULL until the first */
     size_t n_lights, next, vector;
@@ -42,6 +44,7 @@ void sensor_figures_free(const scene *s, sensor_figures *f) {
     sensor_errors_free(&f->errors);
     free(f->reduced);
     free(f->lights);
+    free(f->weights);
     free(f->own);
     free(f->made);
     free(f->work);
@@ -54,25 +57,36 @@ static void mark_side(const side_rows *side, size_t n_channels, size_t width, bo
         for (size_t k = 0; k < width; k++) lit[k] = lit[k] || side->values[row * width + k] != 0;
 }
 
-/* The lights that a request has, ascending, in *lights (the caller frees). False when memory is short. */
-static bool find_lights(const scene *s, const radiosity_request *request, uint32_t **lights, size_t *count) {
+/* The lights that a request has, ascending. False when memory is short. */
+static bool find_lights(const scene *s, const radiosity_request *request, sensor_figures *f) {
     const sensor_lights of = scene_sensor_lights(s);
     const size_t all = sensor_lights_count(&of), C = s->n_channels;
     bool *lit = memory_allocate(all, sizeof *lit, "lights", NULL);
-    uint32_t *found = memory_allocate(all, sizeof *found, "lights", NULL);
-    *count = 0;
-    *lights = found;
-    if (lit == NULL || found == NULL) {
+    f->lights = memory_allocate(all, sizeof *f->lights, "lights", NULL);
+    if (lit == NULL || f->lights == NULL) {
         free(lit);
         return false;
     }
-    for (size_t k = 0; k < request->n_spots; k++) lit[request->spots[k].where] = true;
-    mark_side(&request->luminaires, C, of.luminaires, lit + of.groups);
-    mark_side(&request->sky, C, of.tiles, lit + of.groups + of.luminaires);
+    if (f->weights != NULL) {
+        mark_side(&(side_rows){.values = f->weights, .n = request->n_rhs}, C, all, lit);
+    } else {
+        for (size_t k = 0; k < request->n_spots; k++) lit[request->spots[k].where] = true;
+        mark_side(&request->luminaires, C, of.luminaires, lit + of.groups);
+        mark_side(&request->sky, C, of.tiles, lit + of.groups + of.luminaires);
+    }
     for (size_t k = 0; k < all; k++)
-        if (lit[k]) found[(*count)++] = (uint32_t)k;
+        if (lit[k]) f->lights[f->n_lights++] = (uint32_t)k;
     free(lit);
     return true;
+}
+
+/* The lights of a store of few emitters are told by the weights of all that a request has. */
+static bool find_weights(const call *in, radiosity_request *request, sensor_figures *f, problem *why) {
+    const codec_scene about = call_codec_scene(in);
+    if (in->scene->n_emitters == 0) return true;
+    if (request->n_spots > 0 && !radiosity_request_expand(request, &about, why)) return false;
+    f->weights = light_weights_find(in, request, why);
+    return f->weights != NULL;
 }
 
 /* Allocates all but what passes need. */
@@ -103,8 +117,8 @@ static size_t count_missing(const sensor_figures *f) {
     return missing;
 }
 
-bool sensor_figures_begin(call *in, const radiosity_request *request, answer_notes *notes,
-                          sensor_figures **out, problem *why) {
+bool sensor_figures_begin(call *in, radiosity_request *request, answer_notes *notes, sensor_figures **out,
+                          problem *why) {
     static const char short_of[] = "not enough memory to reduce sensors; ask for fewer vectors or sets";
     const scene *s = in->scene;
     const sensor_lights of = scene_sensor_lights(s);
@@ -119,7 +133,11 @@ bool sensor_figures_begin(call *in, const radiosity_request *request, answer_not
         return false;
     sensor_figures *f = memory_allocate(1, sizeof *f, "figures", NULL);
     if (f == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "%s", short_of);
-    if (!find_lights(s, request, &f->lights, &f->n_lights)) {
+    if (!find_weights(in, request, f, why)) {
+        sensor_figures_free(s, f);
+        return false;
+    }
+    if (!find_lights(s, request, f)) {
         sensor_figures_free(s, f);
         return problem_set(why, PROBLEM_NO_MEMORY, "%s", short_of);
     }
@@ -168,10 +186,11 @@ static bool make_columns(call *in, sensor_figures *f, batch_workspace *workspace
 }
 
 /* The weight of a light in a vector and channel. Groups are looked up in the vector's spots. */
-static double weight_of(const scene *s, const radiosity_request *request, size_t light, size_t vector,
-                        size_t c) {
+static double weight_of(const scene *s, const radiosity_request *request, const sensor_figures *f,
+                        size_t light, size_t vector, size_t c) {
     const sensor_lights of = scene_sensor_lights(s);
     const size_t C = s->n_channels;
+    if (f->weights != NULL) return (double)f->weights[(vector * C + c) * s->n_emitters + light];
     const bool luminaire = light < of.groups + of.luminaires;
     const side_rows *side = luminaire ? &request->luminaires : &request->sky;
     const size_t width = luminaire ? of.luminaires : of.tiles,
@@ -246,8 +265,11 @@ static bool add_vector(const scene *s, const radiosity_request *request, size_t 
                        answer_notes *notes, problem *why) {
     const size_t C = s->n_channels, all = scene_sensors(s);
     const sensor_lights of = scene_sensor_lights(s);
-    const codec_scene about = {
-        .n = s->n, .n_channels = C, .n_tiles = of.tiles, .n_luminaires = of.luminaires};
+    const codec_scene about = {.n = s->n,
+                               .n_channels = C,
+                               .n_tiles = scene_tiles(s),
+                               .n_luminaires = of.luminaires,
+                               .n_emitters = s->n_emitters};
     const size_t first = radiosity_request_spots(request, v), end = radiosity_request_spots(request, v + 1);
     memset(f->values, 0, C * all * sizeof *f->values);
     memset(f->off, 0, C * all * sizeof *f->off);
@@ -260,8 +282,8 @@ static bool add_vector(const scene *s, const radiosity_request *request, size_t 
             add_column(s, f, c, (double)request->colours[k * C + c],
                        column_of(f, place_of(f, request->spots[k].where)));
         for (size_t k = 0; k < f->n_lights; k++)
-            if (f->lights[k] >= of.groups)
-                add_column(s, f, c, weight_of(s, request, f->lights[k], v, c), column_of(f, k));
+            if (f->weights != NULL || f->lights[k] >= of.groups)
+                add_column(s, f, c, weight_of(s, request, f, f->lights[k], v, c), column_of(f, k));
         const bool limits = !request->linear_map && !radiosity_request_has_signs(request, &about, v, c);
         for (size_t k = c * all; limits && k < (c + 1) * all; k++) f->values[k] = fmax(f->values[k], 0);
     }
@@ -299,12 +321,14 @@ static size_t work_of(const scene *s, const radiosity_request *request, size_t n
                        scene_sensors(s) + s->sensor_sets.n_groups * n_lights + receivers * (n_lights + 4));
 }
 
-bool sensor_figures_quick(call *in, const radiosity_request *request, answer_notes *notes, buffer *b) {
+bool sensor_figures_quick(call *in, radiosity_request *request, answer_notes *notes, buffer *b) {
     const scene *s = in->scene;
     sensor_figures *f = NULL;
     problem why = {0};
     bool done = false;
     const double start = clock_ms();
+    /* The weights of emissions and skies take a look at every element. */
+    if (s->n_emitters > 0 && (request->n_spots > 0 || request->sky.values != NULL)) return false;
     scene_note_error(s, request, notes);
     if (!sensor_figures_begin(in, request, notes, &f, &why) || f == NULL) {
         sensor_figures_free(s, f);

@@ -15,6 +15,12 @@ const float *request_sky(const scene *s, const radiosity_request *request, size_
     return sky->values != NULL && v < sky->n ? sky->values + v * s->n_channels * lam_sky_tiles(s->sky) : NULL;
 }
 
+const float *request_sky_seen(const scene *s, const radiosity_request *request, size_t v) {
+    const side_rows *seen = &request->seen_sky;
+    if (seen->values == NULL) return request_sky(s, request, v);
+    return seen->values + v * s->n_channels * lam_sky_tiles(s->sky);
+}
+
 const float *request_dimmers(const scene *s, const radiosity_request *request, size_t v) {
     const side_rows *side = &request->luminaires;
     return side->values != NULL && v < side->n ? side->values + v * s->n_channels * scene_luminaires(s)
@@ -23,6 +29,19 @@ const float *request_dimmers(const scene *s, const radiosity_request *request, s
 
 bool request_has_sky_weights(const scene *s, const radiosity_request *request) {
     return request->emitters.values != NULL && s->n_emitters > 0 && operator_emitters_of(s->op)->a.L != NULL;
+}
+
+bool light_of_weights(const scene *s, const float *weights, float *own, vector_light *out) {
+    const size_t vector = s->n_channels * s->n;
+    const bool sky = operator_emitters_of(s->op)->a.L != NULL, direct = sky || s->luminaires != NULL;
+    if (operator_emitters_light(s->op, 1, weights, own, own + vector, NULL) != LAM_OK) return false;
+    if (sky) operator_emitters_radiances(s->op, 1, weights, own + 2 * vector);
+    *out = (vector_light){own, direct ? own + vector : NULL, sky ? own + 2 * vector : NULL};
+    return true;
+}
+
+size_t light_of_weights_room(const scene *s) {
+    return s->n_channels * (2 * s->n + operator_emitters_of(s->op)->a.n_tiles);
 }
 
 bool scene_states_errors(const scene *s, bool sky, bool luminaires) {

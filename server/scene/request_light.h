@@ -9,6 +9,10 @@
 /* The radiances of the sky of vector v, [C][m]; NULL: it has none. */
 const float *request_sky(const scene *s, const radiosity_request *request, size_t v);
 
+/* The same of the sky as sensors see it, with that of weights of emitters, once seen_sky of the request is
+ * filled (server/route/light_weights.h). */
+const float *request_sky_seen(const scene *s, const radiosity_request *request, size_t v);
+
 /* The dimmers of the luminaires of vector v, [C][k]; NULL: it has none. */
 const float *request_dimmers(const scene *s, const radiosity_request *request, size_t v);
 
@@ -26,6 +30,18 @@ bool request_has_own_error(const scene *s, const radiosity_request *request, con
 /* The same of the store alone: whether the laws of its errors hold of light with a sky, or with luminaires.
  */
 bool scene_states_errors(const scene *s, bool sky, bool luminaires);
+
+/* The light of one vector of an answer. */
+typedef struct vector_light {
+    const float *E, *H0, *L; /* [C][n], [C][m]; NULL: none */
+} vector_light;
+
+/* Writes the light of few emitters, by weights [C][s], into own, which is [2][C][n] and then [C][m]. False
+ * when memory is short. */
+bool light_of_weights(const scene *s, const float *weights, float *own, vector_light *out);
+
+/* Floats that light_of_weights writes, of a scene that states errors by group. */
+size_t light_of_weights_room(const scene *s);
 
 /* The size of the sky L [C][m]; NULL: there is none. */
 emission_size request_sky_size(const scene *s, const float *L);

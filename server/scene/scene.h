@@ -126,14 +126,14 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
 
 /* The error of an answer at sensors, of the receivers of all its names and of those of each, in place of that
  * of the store: of a batch the largest. B are radiosities [n_rhs][C][n], sun [n_suns][n] and at_sensors
- * [n_suns][receivers] what suns give directly, or NULL. *names as in scene_note_own_error.
+ * [n_suns][receivers] what suns give directly, or NULL. W and *names as in scene_note_own_error.
  * Where nothing is stated the notes say why. O(n_rhs C (n + stored weights)). False when memory is short. */
 bool scene_note_sensor_error(const scene *s, const radiosity_request *request, const float *H0,
-                             const float *sun, const float *at_sensors, const float *B, answer_notes *notes,
-                             name_error **names);
+                             const float *sun, const float *at_sensors, const float *W, const float *B,
+                             answer_notes *notes, name_error **names);
 
-/* The same of a store of emitters that states their covariance, for weights W [n_rhs][C][s]. O(n_rhs (C n s +
- * g s^2)). False when memory is short. */
+/* The error of an answer of a store of emitters that states their covariance, for weights W [n_rhs][C][s].
+ * O(n_rhs (C n s + g s^2)). False when memory is short. */
 bool scene_note_emitters_error(const scene *s, const radiosity_request *request, const float *W,
                                const float *values, answer_notes *notes, name_error **names);
 

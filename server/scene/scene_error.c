@@ -112,22 +112,6 @@ static void begin_own(const reduce_request *reduce, name_error *names, answer_no
         names[k] = (name_error){.name = reduce_text(reduce, k), .parts = {.mesh = -1}};
 }
 
-/* The light of one vector of an answer. */
-typedef struct vector_light {
-    const float *E, *H0, *L; /* [C][n], [C][m]; NULL: none */
-} vector_light;
-
-/* Writes the light of few emitters, by weights [C][s], into own, which is [2][C][n] and then [C][m]. False
- * when memory is short. */
-static bool light_of_weights(const scene *s, const float *weights, float *own, vector_light *out) {
-    const size_t vector = s->n_channels * s->n;
-    const bool sky = operator_emitters_of(s->op)->a.L != NULL, direct = sky || s->luminaires != NULL;
-    if (operator_emitters_light(s->op, 1, weights, own, own + vector, NULL) != LAM_OK) return false;
-    if (sky) operator_emitters_radiances(s->op, 1, weights, own + 2 * vector);
-    *out = (vector_light){own, direct ? own + vector : NULL, sky ? own + 2 * vector : NULL};
-    return true;
-}
-
 bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0, const float *sun,
                           const float *W, const float *values, answer_notes *notes, name_error **names) {
     const error_scene about = scene_for_errors(s);
@@ -138,8 +122,7 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
     *names = NULL;
     if (!request_has_own_error(s, request, notes)) return true;
     name_error *const kept = memory_allocate(reduce->n_names, 2 * sizeof *kept, "errors", NULL);
-    const size_t n_own = W != NULL ? 2 * vector + C * s->errors.by_group.figures.n_tiles : 0;
-    float *const own = memory_allocate(n_own, sizeof *own, "errors", NULL);
+    float *const own = memory_allocate(W != NULL ? light_of_weights_room(s) : 0, sizeof *own, "errors", NULL);
     sent_light sent;
     bool good = sent_light_allocate(s, request, sun != NULL, &sent) && kept != NULL && own != NULL;
     if (good) begin_own(reduce, kept, &made);

@@ -1,6 +1,7 @@
 #include "server/scene/sensor_answer.h"
 
 #include "server/scene/direct_light.h"
+#include "server/scene/request_light.h"
 #include "solver/operator/sensor_light.h"
 
 #include <math.h>
@@ -50,11 +51,6 @@ static size_t receiver_of(const radiosity_request *request, size_t k) {
     return request->reduce.on ? k : request->receivers[k];
 }
 
-/* The row of a vector of a side; NULL: it has none. */
-static const float *side_of(const side_rows *side, size_t vector, size_t n_channels, size_t width) {
-    return vector < side->n && side->values != NULL ? side->values + vector * n_channels * width : NULL;
-}
-
 void sensor_values_add_suns(const scene *s, const radiosity_request *request, size_t v, const float *sun,
                             float *values) {
     const size_t C = s->n_channels, all = scene_sensors(s);
@@ -68,9 +64,8 @@ void sensor_values_find(const scene *s, const radiosity_request *request, size_t
                         const float *B, const float *sun, float *work, float *out) {
     const size_t C = s->n_channels, all = scene_sensors(s), width = sensor_values(s, request);
     for (size_t v = 0; v < count; v++) {
-        lam_sensors_gather(s->sensors, 1, B + v * C * s->n,
-                           side_of(&request->sky, first + v, C, scene_tiles(s)),
-                           side_of(&request->luminaires, first + v, C, scene_luminaires(s)), work);
+        lam_sensors_gather(s->sensors, 1, B + v * C * s->n, request_sky_seen(s, request, first + v),
+                           request_dimmers(s, request, first + v), work);
         sensor_values_add_suns(s, request, first + v, sun, work);
         for (size_t c = 0; c < C; c++)
             for (size_t k = 0; k < width; k++) {
@@ -115,8 +110,8 @@ void sensor_values_find_double(const scene *s, const radiosity_request *request,
         for (size_t i = 0; i < C * s->n; i++) largest = fmax(largest, fabs(B[v * C * s->n + i]));
         largest *= most;
         sensors_gather_double(s->sensors, 1, B + v * C * s->n,
-                              widen(side_of(&request->sky, first + v, C, m), C * m, L),
-                              widen(side_of(&request->luminaires, first + v, C, q), C * q, D), work);
+                              widen(request_sky_seen(s, request, first + v), C * m, L),
+                              widen(request_dimmers(s, request, first + v), C * q, D), work);
         for (size_t k = 0; sun != NULL && k < request->n_suns; k++)
             for (size_t r = 0; request->suns[k].vector == first + v && r < C * all; r++)
                 work[r] += (double)request->sunlight[k * C + r / all] * (double)sun[k * all + r % all];

@@ -4,6 +4,7 @@
 #include "server/scene/request_light.h"
 #include "server/scene/sensor_answer.h"
 #include "solver/codec/sensor_error.h"
+#include "solver/operator/emitters.h"
 #include "solver/operator/sensor_light.h"
 
 #include <math.h>
@@ -121,7 +122,9 @@ void sensor_columns_put(sensor_columns *c, column_table *t, size_t k, const floa
 }
 
 sensor_lights scene_sensor_lights(const scene *s) {
-    return (sensor_lights){s->groups.n_groups, scene_luminaires(s), scene_tiles(s)};
+    const size_t k = scene_luminaires(s);
+    if (s->n_emitters > 0) return (sensor_lights){s->n_emitters - k, k, 0};
+    return (sensor_lights){s->groups.n_groups, k, scene_tiles(s)};
 }
 
 size_t sensor_column_width(const scene *s) {
@@ -135,13 +138,14 @@ column_view sensor_column_view(const scene *s, const float *column) {
 }
 
 /* Arrays of a pass: E and B are [count][C][n], H0 too; L and D, of one light, [C][m] and [C][k]; sent is
- * [2][n]. */
+ * [2][n]; W are weights [count][C][s] of a store of emitters. */
 typedef struct column_work {
-    float *E, *H0, *B, *L, *D, *sent;
+    float *E, *H0, *B, *L, *D, *sent, *W;
 } column_work;
 
 size_t sensor_columns_work(const scene *s, size_t count) {
-    return s->n_channels * (3 * count * s->n + scene_tiles(s) + scene_luminaires(s)) + 2 * s->n;
+    return s->n_channels * (count * (3 * s->n + s->n_emitters) + scene_tiles(s) + scene_luminaires(s)) +
+           2 * s->n;
 }
 
 static column_work split_work(const scene *s, size_t count, float *work) {
@@ -151,7 +155,8 @@ static column_work split_work(const scene *s, size_t count, float *work) {
                          work + 2 * vectors,
                          work + 3 * vectors,
                          work + 3 * vectors + C * scene_tiles(s),
-                         work + 3 * vectors + C * (scene_tiles(s) + scene_luminaires(s))};
+                         work + 3 * vectors + C * (scene_tiles(s) + scene_luminaires(s)),
+                         work + 3 * vectors + C * (scene_tiles(s) + scene_luminaires(s)) + 2 * s->n};
 }
 
 /* Sets every channel of light k of a row of `width` to 1, and all others to 0. */
@@ -160,14 +165,34 @@ static void set_unit(size_t n_channels, size_t width, size_t k, float *row) {
     for (size_t c = 0; c < n_channels; c++) row[c * width + k] = 1;
 }
 
-/* The light `which`: E, or H0 of L or D, whose pointers are set, or NULL. */
-static void take_light(const scene *s, size_t which, const column_work *w, float *E, float *H0,
-                       const float **L, const float **D) {
+/* An emitter of a store of few, of which W [C][s] is set too. False when memory is short. */
+static bool take_emitter(const scene *s, size_t which, const column_work *w, float *W, float *E, float *H0,
+                         const float **L, const float **D) {
     const size_t C = s->n_channels;
     const sensor_lights lights = scene_sensor_lights(s);
+    const bool sky = operator_emitters_of(s->op)->a.L != NULL;
+    set_unit(C, s->n_emitters, which, W);
+    if (which >= lights.groups) {
+        set_unit(C, lights.luminaires, which - lights.groups, w->D);
+        *D = w->D;
+    } else if (sky) {
+        operator_emitters_radiances(s->op, 1, W, w->L);
+        *L = w->L;
+    }
+    return operator_emitters_light(s->op, 1, W, E, H0, NULL) == LAM_OK;
+}
+
+/* The light `which`, number `at` of a pass: E, or H0 of L or D, whose pointers are set, or NULL. False when
+ * memory is short. */
+static bool take_light(const scene *s, size_t which, size_t at, const column_work *w, const float **L,
+                       const float **D) {
+    const size_t C = s->n_channels;
+    const sensor_lights lights = scene_sensor_lights(s);
+    float *E = w->E + at * C * s->n, *H0 = w->H0 + at * C * s->n;
+    *L = *D = NULL;
+    if (s->n_emitters > 0) return take_emitter(s, which, w, w->W + at * C * s->n_emitters, E, H0, L, D);
     memset(E, 0, C * s->n * sizeof *E);
     memset(H0, 0, C * s->n * sizeof *H0);
-    *L = *D = NULL;
     if (which < lights.groups) {
         for (uint32_t k = s->groups.start[which]; k < s->groups.start[which + 1]; k++)
             for (size_t c = 0; c < C; c++) E[c * s->n + s->groups.elements[k]] = 1;
@@ -180,6 +205,7 @@ static void take_light(const scene *s, size_t which, const column_work *w, float
         lam_sky_irradiance(s->sky, C, w->L, H0);
         *L = w->L;
     }
+    return true;
 }
 
 /* The errors of every set, of the light of a column alone, as sensor_column_view has them. False when memory
@@ -228,14 +254,17 @@ bool sensor_columns_make(const scene *s, size_t count, const uint32_t *which, ba
     const float *L, *D;
     lam_error error;
     void *room = bytes > 0 ? batch_workspace_get(workspace, bytes) : NULL;
-    if (room == NULL)
-        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for %zu lights", count);
-    for (size_t k = 0; k < count; k++)
-        take_light(s, which[k], &w, w.E + k * vector, w.H0 + k * vector, &L, &D);
-    if (lam_operator_apply_lit(s->op, count, LAM_RADIOSITY, w.E, w.H0, w.B, room, bytes, &error) != LAM_OK)
+    bool lit = room != NULL;
+    for (size_t k = 0; lit && k < count; k++) lit = take_light(s, which[k], k, &w, &L, &D);
+    if (!lit) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for %zu lights", count);
+    if ((s->n_emitters > 0 ? lam_operator_apply_emitters(s->op, count, LAM_RADIOSITY, w.W, s->n, NULL, w.B,
+                                                         room, bytes, &error)
+                           : lam_operator_apply_lit(s->op, count, LAM_RADIOSITY, w.E, w.H0, w.B, room, bytes,
+                                                    &error)) != LAM_OK)
         return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
     for (size_t k = 0; k < count; k++) {
-        take_light(s, which[k], &w, w.E, w.H0, &L, &D);
+        if (!take_light(s, which[k], 0, &w, &L, &D))
+            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for %zu lights", count);
         float *column = out + k * width;
         const column_view view = sensor_column_view(s, column);
         lam_sensors_gather(s->sensors, 1, w.B + k * vector, L, D, column);

@@ -1,5 +1,6 @@
 /* Columns of sensors: what comes to every receiver of a scene from one light alone, a group of which all
- * elements emit 1 in every channel, a luminaire at dimmer 1, or a tile of radiance 1. Answers are linear in
+ * elements emit 1 in every channel, a luminaire at dimmer 1, or a tile of radiance 1; of a store of few
+ * emitters each of these with weight 1. Answers are linear in
  * these lights, so that columns, computed when first needed, give each of them
  *     value_s = sum_k weight_k column_ks
  * without a vector of elements, and are the derivatives by these weights. They are those of the linear map,
@@ -16,7 +17,8 @@
 
 typedef struct scene scene;
 
-/* The lights of a scene by number: groups first, then luminaires, then tiles. */
+/* The lights of a scene by number: groups first, then luminaires, then tiles. A store of few emitters
+ * has these in their order: its emitters but luminaires stand in the place of groups, and it has no tiles. */
 typedef struct sensor_lights {
     size_t groups, luminaires, tiles;
 } sensor_lights;

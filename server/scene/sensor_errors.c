@@ -71,42 +71,47 @@ void sensor_errors_take(const radiosity_request *request, sensor_errors *e, answ
     headline_raise(&notes->head, &parts);
 }
 
-/* Squares of the sets for vector v; values [C][receivers] is work. */
-static bool square_vector(const scene *s, const radiosity_request *request, const float *H0, const float *sun,
-                          const float *at_sensors, const float *B, size_t v, sent_light *sent, float *values,
-                          sensor_errors *e) {
-    const size_t vector = s->n_channels * s->n;
+/* Squares of the sets for vector v with this light, B [C][n]; values [C][receivers] is work. */
+static bool square_vector(const scene *s, const radiosity_request *request, const vector_light *light,
+                          const float *sun, const float *at_sensors, const float *B, size_t v,
+                          sent_light *sent, float *values, sensor_errors *e) {
     const error_scene about = scene_for_errors(s);
-    const float *L = request_sky(s, request, v), *D = request_dimmers(s, request, v);
+    const float *D = request_dimmers(s, request, v);
     error_answer of = {.quantity = LAM_RADIOSITY,
-                       .E = request->E + v * vector,
-                       .H0 = H0 != NULL ? H0 + v * vector : NULL,
+                       .E = light->E,
+                       .H0 = light->H0,
                        .count = s->n,
-                       .values = B + v * vector,
-                       .L = L,
+                       .values = B,
+                       .L = light->L,
                        .luminaires = lit_luminaires_of(s->luminaires, D)};
-    const sensor_answer answer = {s->sensors, &of, L, values};
+    const sensor_answer answer = {s->sensors, &of, light->L, values};
     sent_light_size(s, request, v, of.E, sun, sent, &of);
-    of.sky = request_sky_size(s, L);
-    lam_sensors_gather(s->sensors, 1, of.values, L, D, values);
+    of.sky = request_sky_size(s, light->L);
+    lam_sensors_gather(s->sensors, 1, of.values, light->L, D, values);
     sensor_values_add_suns(s, request, v, at_sensors, values);
     return sensor_squares_of(&s->errors.by_group, &about, &answer, e->n_sets, e->sets, e->squares);
 }
 
 bool scene_note_sensor_error(const scene *s, const radiosity_request *request, const float *H0,
-                             const float *sun, const float *at_sensors, const float *B, answer_notes *notes,
-                             name_error **names) {
+                             const float *sun, const float *at_sensors, const float *W, const float *B,
+                             answer_notes *notes, name_error **names) {
+    const size_t vector = s->n_channels * s->n;
     sensor_errors e;
     sent_light sent = {.luminaires = NULL};
     *names = NULL;
     if (!sensor_errors_begin(s, request, notes, &e)) return false;
     if (e.names == NULL) return true;
     float *values = memory_allocate(s->n_channels, scene_sensors(s) * sizeof *values, "errors", NULL);
-    bool good = values != NULL && sent_light_allocate(s, request, sun != NULL, &sent);
+    float *own = memory_allocate(W != NULL ? light_of_weights_room(s) : 0, sizeof *own, "errors", NULL);
+    bool good = values != NULL && own != NULL && sent_light_allocate(s, request, sun != NULL, &sent);
     for (size_t v = 0; good && v < request->n_rhs; v++) {
-        good = square_vector(s, request, H0, sun, at_sensors, B, v, &sent, values, &e);
+        vector_light light = {request->E + v * vector, H0 != NULL ? H0 + v * vector : NULL,
+                              request_sky(s, request, v)};
+        good = (W == NULL || light_of_weights(s, W + v * s->n_channels * s->n_emitters, own, &light)) &&
+               square_vector(s, request, &light, sun, at_sensors, B + v * vector, v, &sent, values, &e);
         if (good) sensor_errors_take(request, &e, notes);
     }
+    free(own);
     *names = e.names; /* which the notes have */
     e.names = NULL;
     sensor_errors_free(&e);

@@ -5,8 +5,14 @@
 #include "solver/codec/request.h"
 
 /* The kinds of columns: dimmers of luminaires, emissions that all elements of a group have, radiances of
- * tiles. */
-typedef enum jacobian_by { JACOBIAN_LUMINAIRES, JACOBIAN_GROUPS, JACOBIAN_SKY, JACOBIAN_KINDS } jacobian_by;
+ * tiles; or, of a store of few emitters, their weights, of which those of luminaires are the last. */
+typedef enum jacobian_by {
+    JACOBIAN_LUMINAIRES,
+    JACOBIAN_GROUPS,
+    JACOBIAN_SKY,
+    JACOBIAN_EMITTERS,
+    JACOBIAN_KINDS
+} jacobian_by;
 
 /* The word of a kind in requests and answers. */
 const char *jacobian_name(jacobian_by kind);

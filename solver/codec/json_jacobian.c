@@ -10,20 +10,33 @@ void jacobian_request_free(jacobian_request *request) {
 }
 
 const char *jacobian_name(jacobian_by kind) {
-    static const char *const names[JACOBIAN_KINDS] = {"luminaires", "groups", "sky"};
+    static const char *const names[JACOBIAN_KINDS] = {"luminaires", "groups", "sky", "emitters"};
     return names[kind];
 }
 
 /* Lights of a kind that the store has. */
 static size_t lights_of(const codec_scene *scene, jacobian_by kind) {
-    return kind == JACOBIAN_LUMINAIRES ? scene->n_luminaires
-           : kind == JACOBIAN_GROUPS   ? scene->groups->n_groups
-                                       : scene->n_tiles;
+    if (kind == JACOBIAN_LUMINAIRES) return scene->n_luminaires;
+    if (kind == JACOBIAN_EMITTERS) return scene->n_emitters;
+    if (scene->n_emitters > 0) return 0;
+    return kind == JACOBIAN_GROUPS ? scene->groups->n_groups : scene->n_tiles;
+}
+
+static bool refuse_kind(parser *p, jacobian_by kind) {
+    if (kind == JACOBIAN_EMITTERS)
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no precomputed emitters",
+                             parser_here(p));
+    if (p->scene->n_emitters > 0 && kind != JACOBIAN_LUMINAIRES)
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                             "%s: a store of few emitters has derivatives by emitters and luminaires only",
+                             parser_here(p));
+    return parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no %s; precompute it with --%s",
+                         parser_here(p), jacobian_name(kind), jacobian_name(kind));
 }
 
 static bool read_by_name(parser *p, jacobian_request *request) {
     json_slice text;
-    if (!parser_expect(p, JSON_TEXT, "luminaires, groups or sky")) return false;
+    if (!parser_expect(p, JSON_TEXT, "luminaires, groups, sky or emitters")) return false;
     if (!json_read_text(&p->r, &text)) return parser_fault(p);
     for (int kind = 0; kind < JACOBIAN_KINDS; kind++) {
         const char *name = jacobian_name((jacobian_by)kind);
@@ -32,20 +45,19 @@ static bool read_by_name(parser *p, jacobian_request *request) {
             if (request->by[k] == (jacobian_by)kind)
                 return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s = \"%s\", which was listed before",
                                      parser_here(p), name);
-        if (lights_of(p->scene, (jacobian_by)kind) == 0)
-            return parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no %s; precompute it with --%s",
-                                 parser_here(p), name, name);
+        if (lights_of(p->scene, (jacobian_by)kind) == 0) return refuse_kind(p, (jacobian_by)kind);
         request->by[request->n_by++] = (jacobian_by)kind;
         return true;
     }
-    return parser_refuse(p, PROBLEM_UNKNOWN_WORD, "%s = \"%.*s\", must be luminaires, groups or sky",
-                         parser_here(p), text.length > 80 ? 80 : (int)text.length, text.bytes);
+    return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
+                         "%s = \"%.*s\", must be luminaires, groups, sky or emitters", parser_here(p),
+                         text.length > 80 ? 80 : (int)text.length, text.bytes);
 }
 
 /* ["luminaires", ...] */
 static bool read_by(parser *p, jacobian_request *request) {
     const size_t mark = p->pointer_length;
-    if (!parser_expect(p, JSON_ARRAY, "an array of luminaires, groups or sky")) return false;
+    if (!parser_expect(p, JSON_ARRAY, "an array of luminaires, groups, sky or emitters")) return false;
     if (!json_enter_array(&p->r)) return parser_fault(p);
     for (size_t index = 0; json_next_element(&p->r); index++) {
         parser_point_index(p, index);
@@ -54,8 +66,8 @@ static bool read_by(parser *p, jacobian_request *request) {
     }
     return parser_closed(p) &&
            (request->n_by > 0 ||
-            parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s is empty, must hold luminaires, groups or sky",
-                          parser_here(p)));
+            parser_refuse(p, PROBLEM_WRONG_LENGTH,
+                          "%s is empty, must hold luminaires, groups, sky or emitters", parser_here(p)));
 }
 
 /* {"sensors": [...]} */

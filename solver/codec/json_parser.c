@@ -177,11 +177,9 @@ bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, siz
 
 bool parser_knows_sensors(parser *p) {
     const group_index *sets = p->scene->sensors;
-    if (p->scene->n_emitters > 0)
-        return parser_refuse(p, PROBLEM_NOT_IN_STORE,
-                             "%s: sensors of a store of few emitters have no values; use a store of another "
-                             "method",
-                             parser_here(p));
+    if (p->scene->no_sensors != NULL)
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: sensors have no values: %s", parser_here(p),
+                             p->scene->no_sensors);
     return (sets != NULL && sets->n_groups > 0) ||
            parser_refuse(p, PROBLEM_NOT_IN_STORE,
                          "%s: the store has no sensors; precompute it with --sensors", parser_here(p));

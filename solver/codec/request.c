@@ -17,6 +17,7 @@ void radiosity_request_free(radiosity_request *request) {
     free(request->emitters.values);
     free(request->luminaires.values);
     free(request->sensors.values);
+    free(request->seen_sky.values);
     free(request->suns);
     free(request->sunlight);
     free(request->selected);

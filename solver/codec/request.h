@@ -34,10 +34,11 @@ typedef struct codec_scene {
                          more than its text */
     size_t max_rows;  /* adjoint rows that the scene keeps: at most so many groups are reduced by them */
     bool signs;       /* emissions may be negative: radiosity is linear in them. Skies and weights may not */
-    const char *source; /* the word for the bytes in messages; NULL: "the body" */
-    const char *item;   /* the word for one of the n values of an NPY row; NULL: "element" */
-    const char *no_sun; /* why a sun is not answered; NULL: it is */
-    bool frames;        /* an array of two axes is always a batch, of vectors that all channels share */
+    const char *source;     /* the word for the bytes in messages; NULL: "the body" */
+    const char *item;       /* the word for one of the n values of an NPY row; NULL: "element" */
+    const char *no_sun;     /* why a sun is not answered; NULL: it is */
+    const char *no_sensors; /* why sensors have no values; NULL: they have */
+    bool frames;            /* an array of two axes is always a batch, of vectors that all channels share */
 } codec_scene;
 
 #define CODEC_BATCH_MOST ((size_t)UINT32_MAX)
@@ -97,6 +98,8 @@ typedef struct radiosity_request {
     side_rows emitters;    /* their weights */
     side_rows luminaires;  /* their dimmers */
     side_rows sensors;     /* of a cotangent, of their values */
+    side_rows seen_sky;    /* at sensors: `sky` with the radiances that weights of emitters stand for; the
+                              reader leaves it empty */
     request_sun *suns;     /* [n_suns], by growing vector */
     float *sunlight;       /* [n_suns][C], irradiance of a plane normal to them */
     size_t n_suns, suns_capacity;

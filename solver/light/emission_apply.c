@@ -22,6 +22,7 @@ void emission_pass_free(emission_pass *p) {
     free(p->W);
     free(p->D);
     free(p->B);
+    free(p->seen);
     free(p->sun);
     free(p->sun_work);
     free(p->sun_at);
@@ -38,12 +39,9 @@ size_t emission_width(const emission *light, const lam_operator *op) {
 }
 
 static lam_status check_sensors(const emission *light, const lam_operator *op, lam_error *error) {
-    if (light->sensors == NULL) return LAM_OK;
-    if (lam_operator_emitters(op) > 0)
-        return status_fail(
-            error, LAM_ERR_UNSUPPORTED,
-            "sensors of a store of few emitters have no values; use a store of another method");
-    return LAM_OK;
+    const char *why = operator_points_why_not(op);
+    if (light->sensors == NULL || why == NULL) return LAM_OK;
+    return status_fail(error, LAM_ERR_UNSUPPORTED, "sensors have no values: %s", why);
 }
 
 /* True where nothing but the sun at sensors gives light: elements have none. */
@@ -52,7 +50,7 @@ static bool sun_is_all(const emission *light, const lam_operator *op) {
     if (light->sun == NULL || !light->sun->sensors_alone || !light->steady) return false;
     for (size_t i = 0; light->E != NULL && i < count; i++)
         if (light->E[i] != 0) return false;
-    return light->L == NULL && light->D == NULL;
+    return light->L == NULL && light->D == NULL && light->W == NULL;
 }
 
 /* Room for the dimmers of one go, where they stay if they are steady. */
@@ -61,6 +59,18 @@ static lam_status take_dimmers(const emission *light, size_t most, size_t C, flo
     const size_t row = C * lam_luminaires_count(light->luminaires);
     TRY(reserve(most, row, "dimmers of luminaires", D, error));
     for (size_t k = 0; light->steady && k < most; k++) memcpy(*D + k * row, light->D, row * sizeof **D);
+done:
+    return status;
+}
+
+/* Room for the weights of few emitters of one go, and for what sensors see of their sky. */
+static lam_status take_weights(const emission *light, const lam_operator *op, size_t most, emission_pass *p,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    const emitter_arrays *a = &operator_emitters_of(op)->a;
+    const size_t rows = most * lam_operator_channels(op);
+    TRY(reserve(rows, a->s, "weights of emitters", &p->W, error));
+    if (light->sensors != NULL && a->L != NULL) TRY(reserve(rows, a->n_tiles, "skies", &p->seen, error));
 done:
     return status;
 }
@@ -99,7 +109,7 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
     if (light->L != NULL) TRY(reserve(most * C, lam_sky_tiles(sky), "skies", &p.L, error));
     if (light->D != NULL) TRY(take_dimmers(light, most, C, &p.D, error));
     if (s > 0)
-        TRY(reserve(most * C, s, "weights of emitters", &p.W, error));
+        TRY(take_weights(light, op, most, &p, error));
     else if (light->L != NULL || light->D != NULL || on_elements)
         TRY(reserve(most * C, n, "direct light", &p.H0, error));
     if (on_elements) {
@@ -203,6 +213,26 @@ void emission_pass_limit(emission_pass *p, size_t n, const size_t *vectors, floa
     limit(p, n, out);
 }
 
+/* The answers of n vectors on elements, those selected or all; H0 is there. */
+static lam_status answer_elements(emission_pass *p, size_t n, const size_t *vectors, float *out,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    if (p->W != NULL) {
+        TRY(find_weights(p, n, vectors, error));
+        TRY(lam_operator_apply_emitters(p->op, n, p->quantity, p->W, p->n_selected, p->selected, out, p->work,
+                                        p->work_bytes, error));
+    } else if (p->selected != NULL) {
+        TRY(lam_operator_apply_selected(p->op, n, p->quantity, p->E, p->H0, p->n_selected, p->selected, out,
+                                        p->work, p->work_bytes, error));
+    } else {
+        TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, out, p->work, p->work_bytes, error));
+    }
+    limit(p, n, out);
+    if (p->W != NULL) light_answers(p, n, vectors, out);
+done:
+    return status;
+}
+
 /* The answers of n vectors at sensors. */
 static lam_status answer_at_sensors(emission_pass *p, size_t n, const size_t *vectors, float *out,
                                     lam_error *error) {
@@ -212,9 +242,9 @@ static lam_status answer_at_sensors(emission_pass *p, size_t n, const size_t *ve
     if (p->sun_is_all) {
         memset(out, 0, n * C * count * sizeof *out);
     } else {
-        TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, p->B, p->work, p->work_bytes, error));
-        limit(p, n, p->B);
-        lam_sensors_gather(e->sensors, n, p->B, p->L, p->D, out);
+        TRY(answer_elements(p, n, vectors, p->B, error));
+        if (p->seen != NULL) operator_emitters_radiances(p->op, n, p->W, p->seen);
+        lam_sensors_gather(e->sensors, n, p->B, p->W != NULL ? p->seen : p->L, p->D, out);
     }
     if (e->sun == NULL) goto done;
     sunlight_sensors(e->sun, n, vectors, p->sun_at);
@@ -231,25 +261,9 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
                                lam_error *error) {
     lam_status status = LAM_OK;
     take_light(p, n, vectors);
-    if (p->W != NULL) {
-        TRY(find_weights(p, n, vectors, error));
-        TRY(lam_operator_apply_emitters(p->op, n, p->quantity, p->W, p->n_selected, p->selected, out, p->work,
-                                        p->work_bytes, error));
-        limit(p, n, out);
-        light_answers(p, n, vectors, out);
-        goto done;
-    }
     if (p->H0 != NULL) light_directly(p, n, vectors);
-    if (p->B != NULL) {
-        TRY(answer_at_sensors(p, n, vectors, out, error));
-        goto done;
-    }
-    if (p->selected != NULL)
-        TRY(lam_operator_apply_selected(p->op, n, p->quantity, p->E, p->H0, p->n_selected, p->selected, out,
-                                        p->work, p->work_bytes, error));
-    else
-        TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, out, p->work, p->work_bytes, error));
-    limit(p, n, out);
+    TRY(p->B != NULL ? answer_at_sensors(p, n, vectors, out, error)
+                     : answer_elements(p, n, vectors, out, error));
 done:
     return status;
 }

@@ -22,9 +22,10 @@ typedef struct emission_pass {
                                          * all channels */
     float *E, *L, *H0, *W, *D;          /* of one go; NULL where the operator takes none */
     float *B;                           /* [most][C][elements], radiosity behind that of sensors; else NULL */
-    float *sun, *sun_work;              /* [most][elements]; NULL without one on elements */
-    float *sun_at;                      /* [most][sensors]; NULL without one at sensors */
-    bool sun_is_all;                    /* nothing but the sun at sensors gives light */
+    float *seen; /* [most][C][tiles], the sky of few emitters at sensors; NULL where none is of the sky */
+    float *sun, *sun_work; /* [most][elements]; NULL without one on elements */
+    float *sun_at;         /* [most][sensors]; NULL without one at sensors */
+    bool sun_is_all;       /* nothing but the sun at sensors gives light */
 } emission_pass;
 
 /* Numbers of an answer in a channel: of elements, or of sensors. */
@@ -33,7 +34,7 @@ size_t emission_width(const emission *light, const lam_operator *op);
 /* Allocates for passes of at most `most` vectors. With selected only these elements are answered, which is
  * less work; they must be all elements of some groups where the emission has a limiter. Of sensors the
  * quantity is irradiance, and all elements are answered. Freed by emission_pass_free. Errors: LAM_ERR_MEMORY,
- * LAM_ERR_UNSUPPORTED (sensors of an operator of few emitters). Sensors under an exact sun need
+ * LAM_ERR_UNSUPPORTED (sensors of an operator that knows no light there). Sensors under an exact sun need
  * sunlight_at_sensors. */
 lam_status emission_pass_create(const emission *light, const lam_operator *op, const lam_sky *sky,
                                 lam_quantity quantity, size_t n_selected, const uint32_t *selected,

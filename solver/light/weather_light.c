@@ -189,7 +189,7 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
     weather_skies made = {0};
     /* Few emitters answer nothing but their tiles: the sun bounces from those. */
     const bool few = lam_operator_emitters(op) > 0, batch = e->batch;
-    const bool alone = options->at_sensors && !few, by_tile = few || alone;
+    const bool alone = options->at_sensors, by_tile = few || alone;
     if (sky == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "--weather %s: the store has no sky; precompute it with --sky",
              options->path);

@@ -65,6 +65,14 @@ void operator_emitters_emission(const lam_operator *op, size_t n_rhs, const floa
 /* The radiances L [n_rhs][C][m] of the tiles that the weights stand for: m is n_tiles of the arrays. */
 void operator_emitters_radiances(const lam_operator *op, size_t n_rhs, const float *W, float *L);
 
+/* The transpose, added to W [n_rhs][C][s]: w_k += sum_t L_kt g_t of g [n_rhs][C][m]. Nothing where no emitter
+ * is of the sky. */
+void operator_emitters_adjoint_radiances(const lam_operator *op, size_t n_rhs, const float *g, float *W);
+
+/* The reason, in one line, for which answers of an operator of any kind have no values at points between its
+ * elements: light that comes to these directly is not known there. NULL: they have values. */
+const char *operator_points_why_not(const lam_operator *op);
+
 /* E and H0 in double, for refined answers. */
 lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, const float *W, double *E,
                                           double *H0, lam_error *error);

@@ -202,6 +202,24 @@ void operator_emitters_radiances(const lam_operator *op, size_t n_rhs, const flo
         sum_tiles(self, row % op->n_channels, W + row * s, L + row * m);
 }
 
+void operator_emitters_adjoint_radiances(const lam_operator *op, size_t n_rhs, const float *g, float *W) {
+    const emitter_arrays *a = &operator_emitters_of(op)->a;
+    for (size_t row = 0; a->L != NULL && row < n_rhs * op->n_channels; row++)
+        for (size_t k = 0; k < a->s; k++) {
+            const float *L = a->L + (row % op->n_channels * a->s + k) * a->n_tiles;
+            double sum = 0;
+            for (size_t t = 0; t < a->n_tiles; t++) sum += (double)L[t] * (double)g[row * a->n_tiles + t];
+            W[row * a->s + k] += (float)sum;
+        }
+}
+
+const char *operator_points_why_not(const lam_operator *op) {
+    const emitters *self = operator_emitters_of(op);
+    return self == NULL || self->a.direct == NULL
+               ? NULL
+               : "the store is of positions of a light, whose direct light is known on elements alone";
+}
+
 lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, const float *W, double *E,
                                           double *H0, lam_error *error) {
     const emitters *self = operator_emitters_of(op);

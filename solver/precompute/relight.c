@@ -106,7 +106,7 @@ static lam_status save_sensors(const precompute_scene *scene, bool rows, store *
 }
 
 /* A store of few emitters has the light of those alone, and one for luminaires as sources, or for sensors as
- * receivers, that of its own. */
+ * receivers, that of its own. Positions of a light have none at sensors. */
 static lam_status check_operator(const precompute_job *job, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     char *kind = NULL;
@@ -124,7 +124,12 @@ static lam_status check_operator(const precompute_job *job, store *s, lam_error 
             "with --luminaires",
             job->options->input);
     TRY(store_get_text(s, STORE_OPERATOR, "kind", &kind, error));
-    if (strcmp(kind, "emitters") == 0)
+    if (sensors_are_new(job->options) && store_has(s, STORE_OPERATOR "/direct"))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%.200s: is of positions of a light, whose direct light is known on elements alone: it has no "
+             "values at sensors",
+             job->options->input);
+    if (strcmp(kind, "emitters") == 0 && job->options->luminaires != NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
              "%.200s: answers for the emitters that it was made for; precompute its scene with --luminaires",
              job->options->input);

@@ -7,6 +7,7 @@
 #include "solver/lightmap/lightmap_files.h"
 #include "solver/luminaire/placed_store.h"
 #include "solver/operator/emitters.h"
+#include "solver/verbs/own_light.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -24,9 +25,8 @@ static lam_status check_light(const lit_store *lit, lam_error *error) {
     if (lit->light.n_vectors != 1)
         FAIL(error, LAM_ERR_ARGUMENT, "--at texels: a lightmap is of one light, and this is a batch of %zu",
              lit->light.n_vectors);
-    if (lam_operator_emitters(lit->op) > 0)
-        FAIL(error, LAM_ERR_UNSUPPORTED,
-             "--at texels: texels of a store of few emitters have no values; use a store of another method");
+    const char *why = operator_points_why_not(lit->op);
+    if (why != NULL) FAIL(error, LAM_ERR_UNSUPPORTED, "--at texels: texels have no values: %s", why);
     if (lit->light.sun != NULL)
         FAIL(error, LAM_ERR_UNSUPPORTED,
              "--at texels: an exact sun is not supported; --sun tiles takes it from its tile");
@@ -81,21 +81,28 @@ lam_status solve_texels(store *s, const mesh *m, lit_store *lit, double texel, c
     lightmap map = {.values = NULL};
     sky_bounce sky = {.n = 0};
     placed_luminaires placed = {.n = 0};
+    const error_scene about = {.n = m->n, .n_channels = m->n_channels};
+    own_light own = {.n_tiles = 0};
     float *B = NULL;
     TRY(check_light(lit, error));
+    if (light->W != NULL) { /* weights of few emitters stand for elements and a sky */
+        TRY(own_light_make(lit, &about, &own, error));
+        TRY(own_light_take(&own, 0, error));
+    }
+    const float *E = light->W != NULL ? own.E : light->E, *L = light->W != NULL ? own.L : light->L;
     TRY(lightmap_charts_make(m, texel, &charts, error));
     TRY(lightmap_texels_find(m, &charts, &texels, error));
     terminal_log(t, "a lightmap of %zu x %zu: %zu texels of %.3g m in %zu chart%s%s", charts.width,
                  charts.height, texels.n, charts.texel, charts.n, charts.n == 1 ? "" : "s",
                  charts.enlarged ? "; --texel may be shorter" : "");
     TRY(emission_apply(light, lit->op, lit->sky, LAM_RADIOSITY, 0, NULL, terminal_check, &B, NULL, error));
-    if (light->L != NULL) TRY(sky_bounce_load(s, m->n, &sky, error));
+    if (L != NULL) TRY(sky_bounce_load(s, m->n, &sky, error));
     if (light->D != NULL) TRY(placed_load(s, m->n_groups, m->group_names, &placed, error));
     const lightmap_light of = {.n_channels = m->n_channels,
                                .B = B,
-                               .E = light->E,
+                               .E = E,
                                .sky = &sky,
-                               .L = light->L,
+                               .L = L,
                                .placed = &placed,
                                .luminaires = lit->luminaires,
                                .D = light->D,
@@ -117,6 +124,7 @@ done:
     lightmap_free(&map);
     sky_bounce_free(&sky);
     placed_free(&placed);
+    own_light_free(&own);
     free(B);
     return status;
 }
