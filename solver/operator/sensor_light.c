@@ -380,11 +380,23 @@ sensor_eyes sensors_eyes(const lam_sensors *l) {
     return (sensor_eyes){l->n_eyes, l->eyes, l->seen, l->colour};
 }
 
-void sensors_direct(const lam_sensors *l, size_t n_rhs, const float *D, float *out) {
-    const row_factors colour = {.n_channels = l->C, .values = l->colour};
-    const size_t rows = n_rhs * l->C;
-    memset(out, 0, rows * l->count * sizeof *out);
-    if (D != NULL && l->luminaires.m > 0) first_rows_apply(&l->luminaires, rows, D, &colour, true, out);
+const float *sensors_seen(const lam_sensors *l, size_t receiver) {
+    size_t low = 0, high = l->n_eyes;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (l->eyes[middle] < receiver)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < l->n_eyes && l->eyes[low] == receiver ? l->seen + low * SENSOR_SEEN : NULL;
+}
+
+double sensors_direct(const lam_sensors *l, const double *dimmer, size_t receiver) {
+    double sum = 0;
+    for (size_t k = 0; k < l->luminaires.m; k++)
+        sum += dimmer[k] * (double)l->luminaires.values[k * l->count + receiver];
+    return sum;
 }
 
 void lam_sensors_gather(const lam_sensors *l, size_t n_rhs, const float *B, const float *L, const float *D,

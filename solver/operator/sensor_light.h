@@ -73,9 +73,13 @@ lam_status sensors_receivers(const lam_sensors *l, placed_receiver **out, lam_er
 /* Owned by l. */
 sensor_eyes sensors_eyes(const lam_sensors *l);
 
-/* The part of lam_sensors_gather that comes from luminaires directly, out [n_rhs][C][receivers]; 0 where the
- * store has none or D is NULL. */
-void sensors_direct(const lam_sensors *l, size_t n_rhs, const float *D, float *out);
+/* The numbers of the first luminaire as a receiver sees it, of which the next one has its own eyes.n *
+ * SENSOR_SEEN further on; NULL: the receiver is no eye, or nothing is known of what it sees. O(log eyes). */
+const float *sensors_seen(const lam_sensors *l, size_t receiver);
+
+/* The light of luminaires that comes to a receiver directly, without their colours, at these dimmers
+ * [luminaires]; 0 where the store has none. */
+double sensors_direct(const lam_sensors *l, const double *dimmer, size_t receiver);
 
 /* lam_sensors_gather for refined answers, in double. */
 void sensors_gather_double(const lam_sensors *l, size_t n_rhs, const double *B, const double *L,

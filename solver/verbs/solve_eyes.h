@@ -2,32 +2,18 @@
 #ifndef LAMBERT_VERBS_SOLVE_EYES_H
 #define LAMBERT_VERBS_SOLVE_EYES_H
 
+#include "solver/figures/eye_rating.h"
 #include "solver/light/emission.h"
 #include "solver/sensor/eye_sun.h"
 #include "solver/verbs/solve_sensors.h"
 
 #include <jansson.h>
 
-/* Why an eye has no UGR. */
-typedef enum ugr_reason {
-    UGR_RATED,
-    UGR_NO_LUX,        /* the answer is in another unit, or its channels have no luminance */
-    UGR_NO_VALUE,      /* the eye has none */
-    UGR_NO_LUMINAIRE,  /* none gives light, or the store does not say how eyes see them */
-    UGR_FORBIDDEN,     /* one of them has no opening, or is too large for the formula */
-    UGR_NONE_COUNTS,   /* all are hidden, outside of the field of view or too small */
-    UGR_NO_BACKGROUND, /* no other light comes to the eye */
-    UGR_REASONS
-} ugr_reason;
-
 /* An eye under one light. */
 typedef struct eye_figures {
-    ugr_reason reason;
-    size_t luminaire;  /* that forbids it */
-    double ugr;        /* NAN without */
-    double background; /* L_b, cd/m2; NAN where the eye has no value */
-    double dgps;       /* NAN where there is no sky */
-    bool sun;          /* its disc is seen */
+    eye_rating rating;
+    double dgps; /* NAN where there is no sky */
+    bool sun;    /* its disc is seen */
 } eye_figures;
 
 /* The light by which eyes are rated. */
@@ -37,8 +23,7 @@ typedef struct eyes_asked {
     const double (*suns)[3]; /* [n_vectors], the way to the sun; NULL: it is not known */
     eye_sun *sight;          /* beside it */
     size_t n_luminaires;
-    float *direct;  /* [C][receivers], lx: of luminaires, in the vector below */
-    double *dimmer; /* [luminaires], of luminance */
+    double *dimmer; /* [luminaires], of luminance, in the vector below */
     size_t vector;
 } eyes_asked;
 

@@ -184,20 +184,20 @@ START_TEST(light_and_sight_of_luminaires) {
     lam_sensors *l = NULL;
     sample *a = test_allocate(1, sizeof *a);
     float *B = random_values(ROWS * N, 2), *D = random_values(ROWS * K, 4);
-    float *with = test_allocate(ROWS * S, sizeof *with), *without = test_allocate(ROWS * S, sizeof *without),
-          *direct = test_allocate(ROWS * S, sizeof *direct);
+    float *with = test_allocate(ROWS * S, sizeof *with), *without = test_allocate(ROWS * S, sizeof *without);
+    const float *seen;
+    double dimmer[K];
     fill(a);
     save(a, true, path);
     ck_ok(lam_sensors_open(path, &l, &error));
     lam_sensors_gather(l, RHS, B, NULL, D, with);
     lam_sensors_gather(l, RHS, B, NULL, NULL, without);
-    sensors_direct(l, RHS, D, direct);
-    for (size_t i = 0; i < ROWS * S; i++)
-        ck_assert_double_eq_tol((double)with[i], (double)without[i] + (double)direct[i], 3e-6);
-    ck_assert_double_gt((double)direct[0], 0);
-    sensors_direct(l, RHS, NULL, direct);
-    for (size_t i = 0; i < ROWS * S; i++) ck_assert_double_eq((double)direct[i], 0);
     const sensor_eyes eyes = sensors_eyes(l);
+    for (size_t i = 0; i < ROWS * S; i++) {
+        for (size_t k = 0; k < K; k++) dimmer[k] = (double)D[i / S * K + k] * eyes.colours[i / S % C * K + k];
+        ck_assert_double_eq_tol((double)with[i], (double)without[i] + sensors_direct(l, dimmer, i % S), 3e-6);
+    }
+    ck_assert_double_gt(sensors_direct(l, dimmer, 0), 0);
     ck_assert_uint_eq(eyes.n, EYES);
     ck_assert_uint_eq(eyes.eyes[1], 4);
     for (size_t k = 0; k < K * EYES; k++) {
@@ -206,14 +206,20 @@ START_TEST(light_and_sight_of_luminaires) {
                                              a->seen[k].position, a->seen[k].seen};
         for (int d = 0; d < SENSOR_SEEN; d++) ck_assert_double_eq((double)x[d], numbers[d]);
     }
+    for (size_t k = 0, eye = 0; k < S; k++) {
+        const bool is_eye = eye < EYES && eyes.eyes[eye] == k;
+        seen = is_eye ? eyes.seen + eye++ * SENSOR_SEEN : NULL;
+        ck_assert_ptr_eq(sensors_seen(l, k), seen);
+    }
     ck_assert_double_eq(eyes.colours[K + 2], a->colour[2 * 3 + 1]);
     lam_sensors_close(l);
     save(a, false, path);
     ck_ok(lam_sensors_open(path, &l, &error));
     ck_assert_uint_eq(sensors_eyes(l).n, 0);
+    ck_assert_ptr_null(sensors_seen(l, 4));
     lam_sensors_close(l);
     unlink(path);
-    float *const floats[] = {B, D, with, without, direct};
+    float *const floats[] = {B, D, with, without};
     for (size_t k = 0; k < sizeof floats / sizeof *floats; k++) free(floats[k]);
     free(a);
 }
