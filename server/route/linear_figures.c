@@ -22,9 +22,9 @@
 #define QUICK_NUMBERS ((size_t)400)
 
 struct linear_figures {
-    double *figures; /* of reduce_figures */
-    double *means;   /* [n_rhs][C] of a name, work */
-    float *weights;  /* [n_rhs][C][s] of a store of emitters that needs them; else NULL */
+    kept_figures figures;
+    double *means;  /* [n_rhs][C] of a name, work */
+    float *weights; /* [n_rhs][C][s] of a store of emitters that needs them; else NULL */
     mean_errors errors;
     size_t next; /* name to evaluate */
     figures_text text;
@@ -50,22 +50,20 @@ static bool weights_of(const call *in, radiosity_request *request, float **weigh
     return *weights != NULL;
 }
 
-/* Allocates; freed by figures_clear, also where it fails. */
-static bool figures_allocate(const call *in, radiosity_request *request, linear_figures *f,
-                             answer_notes *notes, problem *why) {
+/* Allocates; freed by linear_clear, also where it fails. */
+static bool linear_allocate(const call *in, radiosity_request *request, linear_figures *f,
+                            answer_notes *notes, problem *why) {
     const scene *s = in->scene;
-    f->figures =
-        reduce_figures(&request->reduce, request->n_rhs, radiosity_request_channels(request, s->n_channels));
     f->means = memory_allocate(request->n_rhs, s->n_channels * sizeof *f->means, "means", NULL);
-    return (f->figures != NULL && f->means != NULL &&
+    return (figures_allocate(s, request, &f->figures) && f->means != NULL &&
             scene_mean_errors_begin(s, request, notes, &f->errors)) ||
            problem_set(why, PROBLEM_NO_MEMORY,
                        "not enough memory for the answer; ask for fewer vectors or groups");
 }
 
-static void figures_clear(linear_figures *f) {
+static void linear_clear(linear_figures *f) {
     mean_errors_free(&f->errors);
-    free(f->figures);
+    figures_free(&f->figures);
     free(f->means);
     free(f->weights);
 }
@@ -95,7 +93,7 @@ static bool evaluate(const scene *s, const radiosity_request *request, size_t fi
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
         if (request->told.luminance) answer_luminance_double(request->n_rhs, 1, f->means, NULL);
         reduce_means(r, first + k, radiosity_request_channels(request, s->n_channels), request->n_rhs,
-                     row->area, f->means, f->figures);
+                     row->area, f->means, f->figures.numbers);
     }
     return true;
 }
@@ -113,14 +111,14 @@ static bool find_weights(call *in, radiosity_request *request, linear_figures *f
 bool linear_figures_begin(call *in, radiosity_request *request, answer_notes *notes, linear_figures **out,
                           problem *why) {
     adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
-    if (!request_memory_take(in->memory, figures_bytes(request, in->scene->n_channels), why)) return false;
+    if (!request_memory_take(in->memory, figures_bytes(in->scene, request), why)) return false;
     const bool known = adjoint_rows_find(in->scene, request, rows);
     if (known) adjoint_rows_release(in->scene, request->reduce.n_names, rows);
     /* Rows that the scene has no room to keep are this request's alone. */
     if (!known && !request_memory_take(in->memory, adjoint_rows_bytes(in->scene, request), why)) return false;
     linear_figures *f = memory_allocate(1, sizeof *f, "figures", NULL);
     if (f == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the figures");
-    if (!figures_allocate(in, request, f, notes, why) || !find_weights(in, request, f, why)) {
+    if (!linear_allocate(in, request, f, notes, why) || !find_weights(in, request, f, why)) {
         linear_figures_free(f);
         return false;
     }
@@ -148,12 +146,12 @@ bool linear_figures_step(call *in, radiosity_request *request, linear_figures *f
     }
     notes->solve_ms += clock_ms() - start;
     if (!good || f->next < n_names) return good;
-    return figures_write(s, request, f->figures, until, &f->text, notes, b, done, why);
+    return figures_write(s, request, &f->figures, until, &f->text, notes, b, done, why);
 }
 
 void linear_figures_free(linear_figures *f) {
     if (f == NULL) return;
-    figures_clear(f);
+    linear_clear(f);
     free(f);
 }
 
@@ -167,7 +165,7 @@ static bool is_short(const scene *s, const radiosity_request *request) {
 static bool answer_groups(call *in, radiosity_request *request, answer_notes *notes, buffer *b) {
     const scene *s = in->scene;
     adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
-    linear_figures f = {.figures = NULL};
+    linear_figures f = {.means = NULL};
     problem why = {0};
     bool done = false;
     if (adjoint_row_work(s, request) > QUICK_WORK / request->reduce.n_names ||
@@ -178,11 +176,11 @@ static bool answer_groups(call *in, radiosity_request *request, answer_notes *no
     if (good) {
         const double start = clock_ms();
         scene_note_error(s, request, notes);
-        good = figures_allocate(in, request, &f, notes, &why) &&
+        good = linear_allocate(in, request, &f, notes, &why) &&
                evaluate(s, request, 0, request->reduce.n_names, rows, &f, notes, &why);
         notes->solve_ms = clock_ms() - start;
-        good = good && figures_write(s, request, f.figures, INFINITY, &f.text, notes, b, &done, &why);
-        figures_clear(&f);
+        good = good && figures_write(s, request, &f.figures, INFINITY, &f.text, notes, b, &done, &why);
+        linear_clear(&f);
     }
     adjoint_rows_release(s, request->reduce.n_names, rows);
     return good;

@@ -37,9 +37,9 @@ typedef struct radiosity_solve {
     bool streams;          /* the values are encoded while the answer is sent */
     float *H0; /* [n_rhs][C][n], direct irradiance of sky, luminaires and sun; NULL if no vector has any */
     sun_answer sun;
-    double *figures; /* of reduce, in place of values; else NULL */
-    float *W;        /* [n_rhs][C][s], weights of a store of emitters; else NULL */
-    float *one;      /* [C][n_computed], work: a vector that is reduced by its luminance; else NULL */
+    kept_figures figures; /* of reduce, in place of values */
+    float *W;             /* [n_rhs][C][s], weights of a store of emitters; else NULL */
+    float *one;           /* [C][n_computed], work: a vector that is reduced by its luminance; else NULL */
     char converted[LIGHT_CONVERSION_TEXT]; /* of notes */
     refined_solve *refined;                /* for a request with a tolerance; else NULL */
     limited_solve limit;                   /* of light below zero */
@@ -64,7 +64,7 @@ static void solve_free(const scene *of, radiosity_solve *s) {
     free(s->own);
     if (!s->placed) free(s->places);
     free(s->gathered);
-    free(s->figures);
+    figures_free(&s->figures);
     free(s->H0);
     free(s->W);
     free(s->one);
@@ -116,17 +116,16 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
     const reduce_request *reduce = &s->request.reduce;
     const size_t most = answer_bytes_most(&s->shape, &in->accept);
     if (reduce->on) {
-        if (!request_memory_take(in->memory, figures_bytes(&s->request, s->shape.n_channels), why))
-            return false;
-        s->figures = reduce_figures(reduce, s->shape.n_rhs, s->shape.n_channels);
+        if (!request_memory_take(in->memory, figures_bytes(in->scene, &s->request), why)) return false;
+        const bool allocated = figures_allocate(in->scene, &s->request, &s->figures);
         s->out = s->own = allocate_rows(in, s, s->n_computed, "values to reduce", why);
         if (s->own == NULL || !find_gathered(in, s, why)) return false;
         const size_t width = s->request.at_sensors ? scene_sensors(in->scene) : s->n_computed;
         if (s->request.told.luminance)
             s->one = call_allocate(in, 3 * bytes_times(width, sizeof *s->one), "values to reduce", why);
         return (s->one != NULL || !s->request.told.luminance) &&
-               (s->figures != NULL || problem_set(why, PROBLEM_NO_MEMORY,
-                                                  "not enough memory to reduce %zu vectors", s->shape.n_rhs));
+               (allocated || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors",
+                                         s->shape.n_rhs));
     }
     const bool placed =
         in->accept.type == MEDIA_NPY && in->accept.npy == NPY_F4 && !s->request.told.luminance;
@@ -314,25 +313,26 @@ static void pass_figures(call *in, radiosity_solve *s, size_t computed, batch_wo
     else if (s->refined == NULL && !s->judged)
         s->failed = s->failed || !judge(in, s);
     else
-        s->failed = s->failed || !figures_write(in->scene, &s->request,
-                                                s->refined != NULL ? refined_figures(s->refined) : s->figures,
-                                                clock_ms() + FIGURES_STEP_MS, &s->text, &s->notes, &s->answer,
-                                                &done, &s->why);
+        s->failed =
+            s->failed ||
+            !figures_write(in->scene, &s->request,
+                           s->refined != NULL ? refined_figures(s->refined) : &s->figures,
+                           clock_ms() + FIGURES_STEP_MS, &s->text, &s->notes, &s->answer, &done, &s->why);
     in->job.n_vectors = computed + (!s->failed && !done);
 }
 
 static bool add_figures(const scene *of, radiosity_solve *s, const batch_part *part) {
     const float *x =
         s->request.at_sensors ? s->places : s->own + part->first * of->n_channels * s->n_computed;
-    return s->figures == NULL ||
-           figures_add(of, &s->request, part->first, part->count, x, s->one, s->figures, &s->why);
+    return s->figures.numbers == NULL ||
+           figures_add(of, &s->request, part->first, part->count, x, s->one, &s->figures, &s->why);
 }
 
 /* Gathers the vectors of a part at sensors. */
 static void gather(const scene *of, radiosity_solve *s, const batch_part *part) {
     const size_t C = of->n_channels, first = part->first;
     if (!s->request.at_sensors) return;
-    float *to = s->figures != NULL ? s->places : s->places + first * C * s->shape.n_values;
+    float *to = s->figures.numbers != NULL ? s->places : s->places + first * C * s->shape.n_values;
     sensor_values_find(of, &s->request, first, part->count, s->out + first * C * of->n, s->sun.at_sensors,
                        s->gathered, to);
 }

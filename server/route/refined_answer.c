@@ -38,7 +38,7 @@ struct refined_solve {
     media_accept as;
     double *certificates; /* [n_rhs] */
     size_t *iterations;   /* [n_rhs] */
-    double *figures;      /* of reduce, in place of the values; else NULL */
+    kept_figures figures; /* of reduce, in place of the values */
     bool made;            /* p is allocated */
     pass_memory p;
 };
@@ -201,7 +201,7 @@ static size_t bytes_needed(const call *in, const radiosity_request *request, con
                            const media_accept *as) {
     const size_t certificates =
         bytes_times(request->n_rhs, sizeof(double) + sizeof(size_t) + 2 * DOUBLE_TEXT);
-    if (request->reduce.on) return bytes_plus(certificates, figures_bytes(request, in->scene->n_channels));
+    if (request->reduce.on) return bytes_plus(certificates, figures_bytes(in->scene, request));
     /* The text of a double is longer than that of the float that answer_bytes_most counts. */
     return bytes_plus(certificates,
                       bytes_times(as->type == MEDIA_JSON ? 2 : 1, answer_bytes_most(shape, as)));
@@ -231,10 +231,8 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
     r->iterations = memory_allocate(request->n_rhs, sizeof *r->iterations, "certificates", NULL);
     notes->certificates = r->certificates;
     notes->iterations = r->iterations;
-    if (request->reduce.on)
-        r->figures = reduce_figures(&request->reduce, request->n_rhs, r->shape.n_channels);
     return (r->certificates != NULL && r->iterations != NULL &&
-            (r->figures != NULL || !request->reduce.on)) ||
+            (!request->reduce.on || figures_allocate(s, request, &r->figures))) ||
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu certificates", request->n_rhs);
 }
 
@@ -271,7 +269,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     if (good && !r->made) {
         r->made = true;
         good = pass_memory_allocate(s, request, &r->p, why) &&
-               (r->figures != NULL || answer_begin(b, &r->shape, &r->as, notes, why));
+               (request->reduce.on || answer_begin(b, &r->shape, &r->as, notes, why));
     }
     double *x = good ? refine(in, refiner, request, first, count, &r->p, r->certificates + first,
                               r->iterations + first, why)
@@ -280,11 +278,11 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     notes->solve_ms += solved - begin;
     good = x != NULL;
     if (good && request->told.luminance) answer_luminance_double(count, width, x, r->certificates + first);
-    if (good && r->figures != NULL)
+    if (good && request->reduce.on)
         good = figures_reduce(s, request, r->shape.n_channels, first, count, (reduce_values){.doubles = x},
-                              r->figures) ||
+                              &r->figures) ||
                problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
-    for (size_t v = 0; good && r->figures == NULL && v < count; v++) {
+    for (size_t v = 0; good && !request->reduce.on && v < count; v++) {
         /* One by one: each vector has its own rounding errors, which count in its certificate. */
         double rounding = 0, of_means = 0;
         const double *values = x + v * r->shape.n_channels * width;
@@ -301,8 +299,8 @@ bool refined_end(const refined_solve *r, const answer_notes *notes, buffer *b, p
     return answer_end(b, &r->shape, &r->as, notes, why);
 }
 
-const double *refined_figures(const refined_solve *r) {
-    return r->figures;
+kept_figures *refined_figures(refined_solve *r) {
+    return &r->figures;
 }
 
 void refined_free(refined_solve *r, answer_notes *notes) {
@@ -311,7 +309,7 @@ void refined_free(refined_solve *r, answer_notes *notes) {
     if (r == NULL) return;
     free(r->certificates);
     free(r->iterations);
-    free(r->figures);
+    figures_free(&r->figures);
     pass_memory_free(&r->p);
     free(r);
 }

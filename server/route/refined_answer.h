@@ -2,7 +2,7 @@
 #ifndef LAMBERT_SERVER_ROUTE_REFINED_ANSWER_H
 #define LAMBERT_SERVER_ROUTE_REFINED_ANSWER_H
 
-#include "server/route/call.h"
+#include "server/route/radiosity_figures.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
 
@@ -23,8 +23,8 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
 /* Writes the end of an answer that has the vectors themselves. */
 bool refined_end(const refined_solve *r, const answer_notes *notes, buffer *b, problem *why);
 
-/* The figures of the vectors that were refined, in place of these; NULL without reduce. */
-const double *refined_figures(const refined_solve *r);
+/* The figures of the vectors that were refined, in place of these. */
+kept_figures *refined_figures(refined_solve *r);
 
 /* r may be NULL. */
 void refined_free(refined_solve *r, answer_notes *notes);

@@ -17,7 +17,7 @@
 #define QUICK_NUMBERS ((size_t)400)
 
 struct sensor_figures {
-    double *figures;     /* of reduce_figures */
+    kept_figures figures;
     double *values;      /* [C][receivers] of a vector, work; those of sets that are not reduced stay 0 */
     double *off;         /* [C][receivers], by the halves of rows; likewise */
     double *rest, *mesh; /* [C][sets], what values are off by (column_view); likewise */
@@ -36,7 +36,7 @@ void sensor_figures_free(const scene *s, sensor_figures *f) {
     if (f == NULL) return;
     for (size_t k = 0; f->own != NULL && k < f->n_lights; k++) free(f->own[k]);
     sensor_columns_release(s->columns, f->table);
-    free(f->figures);
+    figures_free(&f->figures);
     free(f->values);
     free(f->off);
     free(f->rest);
@@ -94,7 +94,7 @@ static bool allocate(const scene *s, const radiosity_request *request, answer_no
                      sensor_figures *f) {
     const size_t C = s->n_channels;
     const reduce_request *r = &request->reduce;
-    f->figures = reduce_figures(&request->reduce, request->n_rhs, radiosity_request_channels(request, C));
+    if (!figures_allocate(s, request, &f->figures)) return false;
     f->values = memory_allocate(C, scene_sensors(s) * sizeof *f->values, "sensors", NULL);
     f->reduced = memory_allocate(s->sensor_sets.n_groups, sizeof *f->reduced, "sensors", NULL);
     f->own = memory_allocate(f->n_lights, sizeof *f->own, "sensors", NULL);
@@ -102,8 +102,8 @@ static bool allocate(const scene *s, const radiosity_request *request, answer_no
     f->off = memory_allocate(C, scene_sensors(s) * sizeof *f->off, "sensors", NULL);
     f->rest = memory_allocate(C, s->sensor_sets.n_groups * sizeof *f->rest, "sensors", NULL);
     f->mesh = memory_allocate(C, s->sensor_sets.n_groups * sizeof *f->mesh, "sensors", NULL);
-    if (f->off == NULL || f->rest == NULL || f->mesh == NULL || f->figures == NULL || f->values == NULL ||
-        f->own == NULL || f->reduced == NULL)
+    if (f->off == NULL || f->rest == NULL || f->mesh == NULL || f->values == NULL || f->own == NULL ||
+        f->reduced == NULL)
         return false;
     for (size_t k = 0; k < r->n_names; k++)
         for (size_t g = 0; g < r->names[k].n_groups; g++) f->reduced[r->names[k].groups[g]] = true;
@@ -125,7 +125,7 @@ bool sensor_figures_begin(call *in, radiosity_request *request, answer_notes *no
     const size_t width = sensor_column_width(s);
     *out = NULL;
     if (!request_memory_take(in->memory,
-                             bytes_plus(figures_bytes(request, s->n_channels),
+                             bytes_plus(figures_bytes(s, request),
                                         sensor_lights_count(&of) * (sizeof(uint32_t) + sizeof(bool)) +
                                             s->sensor_sets.n_groups * sizeof(bool) +
                                             width * 2 * sizeof(double)),
@@ -290,7 +290,7 @@ static bool add_vector(const scene *s, const radiosity_request *request, size_t 
     take_errors(s, request, f, notes);
     if (request->told.luminance) answer_luminance_double(1, all, f->values, NULL);
     return figures_reduce(s, request, radiosity_request_channels(request, C), v, 1,
-                          (reduce_values){.doubles = f->values}, f->figures) ||
+                          (reduce_values){.doubles = f->values}, &f->figures) ||
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce sensors");
 }
 
@@ -305,7 +305,7 @@ bool sensor_figures_step(call *in, const radiosity_request *request, sensor_figu
         good = add_vector(in->scene, request, f->vector++, f, notes, why);
     notes->solve_ms += clock_ms() - start;
     if (!good || f->vector < request->n_rhs) return good;
-    return figures_write(in->scene, request, f->figures, until, &f->text, notes, b, done, why);
+    return figures_write(in->scene, request, &f->figures, until, &f->text, notes, b, done, why);
 }
 
 /* Products of an answer. */
@@ -334,11 +334,14 @@ bool sensor_figures_quick(call *in, radiosity_request *request, answer_notes *no
         sensor_figures_free(s, f);
         return false;
     }
-    bool good = count_missing(f) == 0 && work_of(s, request, f->n_lights) <= QUICK_WORK &&
-                reduce_vectors_written(&request->reduce, request->n_rhs) * s->n_channels <= QUICK_NUMBERS;
+    bool good =
+        count_missing(f) == 0 &&
+        bytes_plus(work_of(s, request, f->n_lights), eye_figures_work(f->figures.eyes)) <= QUICK_WORK &&
+        bytes_plus(reduce_vectors_written(&request->reduce, request->n_rhs) * s->n_channels,
+                   eye_figures_numbers(f->figures.eyes)) <= QUICK_NUMBERS;
     for (size_t v = 0; good && v < request->n_rhs; v++) good = add_vector(s, request, v, f, notes, &why);
     notes->solve_ms = clock_ms() - start;
-    good = good && figures_write(s, request, f->figures, INFINITY, &f->text, notes, b, &done, &why);
+    good = good && figures_write(s, request, &f->figures, INFINITY, &f->text, notes, b, &done, &why);
     sensor_figures_free(s, f);
     return good;
 }

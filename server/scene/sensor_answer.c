@@ -36,6 +36,11 @@ bool sensor_request_check(const scene *s, const radiosity_request *request, cons
                                    "reduce: %.100s is a set of probes, whose coefficients have no figures; "
                                    "select it as probes",
                                    set.name);
+            if (r->on && set.kind != SENSOR_SET_EYES && reduce_has_ugr(r))
+                return problem_set(
+                    why, PROBLEM_NOT_IN_STORE,
+                    "reduce: %.100s is no set of eyes, which alone have a UGR; name sets whose kind is eyes",
+                    set.name);
             if (probes != request->at_probes)
                 return problem_set(why, PROBLEM_NOT_IN_STORE, "select: %.100s is a set of %s", set.name,
                                    probes ? "probes; select it as probes" : "sensors; select it as sensors");

@@ -13,7 +13,8 @@ const char *sensor_places_word(const radiosity_request *request);
 /* The unit of coefficients of probes, by that of irradiance; NULL: they have none in it. */
 const char *probe_unit(const char *unit);
 
-/* False with *why for probes among sensors, or these among probes, and for figures of probes. */
+/* False with *why for probes among sensors, or these among probes, for figures of probes, and for ratings of
+ * other sets than of eyes. */
 bool sensor_request_check(const scene *s, const radiosity_request *request, const char *unit, problem *why);
 
 /* Numbers of a vector in a channel: of those selected, or with reduce of all receivers of the scene. */

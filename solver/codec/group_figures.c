@@ -14,7 +14,8 @@ void reduce_request_free(reduce_request *r) {
 }
 
 const char *reduce_statistic_name(reduce_statistic statistic) {
-    static const char *const names[] = {"mean", "sum", "min", "max", "uniformity", "variance", "share"};
+    static const char *const names[] = {"mean",       "sum",      "min",   "max",
+                                        "uniformity", "variance", "share", "ugr"};
     return names[statistic];
 }
 
@@ -43,6 +44,17 @@ void reduce_request_shares(reduce_request *r, size_t at, size_t n_limits, const 
     }
     r->n_with += n_limits;
     r->linear = false;
+}
+
+void reduce_request_ugr(reduce_request *r) {
+    r->with[r->n_with++] = REDUCE_UGR;
+    r->linear = false;
+}
+
+bool reduce_has_ugr(const reduce_request *r) {
+    size_t s = 0;
+    while (s < r->n_with && r->with[s] != REDUCE_UGR) s++;
+    return s < r->n_with;
 }
 
 const char *reduce_text(const reduce_request *r, size_t k) {
@@ -196,6 +208,7 @@ bool reduce_vectors(const reduce_request *r, const group_index *groups, const do
                 for (size_t s = 0; s < r->n_with; s++)
                     *reduce_figure(r, k, s, n_rhs, first + v, n_channels, c, figures) =
                         r->with[s] == REDUCE_SHARE ? share_of(name, groups, area, &row, r->at_least[s])
+                        : r->with[s] == REDUCE_UGR ? (double)NAN
                                                    : of_name[r->with[s]];
             }
     free(begin);
@@ -239,23 +252,37 @@ static bool ends_shares(const reduce_request *r, size_t s) {
     return r->with[s] == REDUCE_SHARE && (s + 1 == r->n_with || r->with[s + 1] != REDUCE_SHARE);
 }
 
+reduce_place reduce_place_of(const reduce_request *r, size_t n_rhs, size_t at) {
+    return (reduce_place){at / n_rhs / r->n_with, at / n_rhs % r->n_with, at % n_rhs};
+}
+
+bool reduce_write_before(const reduce_request *r, size_t n_rhs, bool batch, size_t at, buffer *b) {
+    const reduce_place p = reduce_place_of(r, n_rhs, at);
+    bool written = true;
+    if (p.vector > 0) return buffer_append(b, ",", 1);
+    if (p.statistic == 0)
+        written = (p.name == 0 || buffer_append(b, ",", 1)) && json_write_text(b, reduce_text(r, p.name)) &&
+                  buffer_append(b, ":{", 2);
+    return written && buffer_append_text(b, p.statistic == 0 ? "" : ",") && begin_figure(r, p.statistic, b) &&
+           buffer_append_text(b, batch ? "[" : "");
+}
+
+bool reduce_write_after(const reduce_request *r, size_t n_rhs, bool batch, size_t at, buffer *b) {
+    const reduce_place p = reduce_place_of(r, n_rhs, at);
+    return p.vector + 1 < n_rhs || (buffer_append_text(b, batch ? "]" : "") &&
+                                    buffer_append_text(b, ends_shares(r, p.statistic) ? "}" : "") &&
+                                    buffer_append_text(b, p.statistic + 1 == r->n_with ? "}" : ""));
+}
+
 bool reduce_write_some(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
                        const double *figures, size_t first, size_t count, buffer *b) {
     bool written = true;
-    for (size_t at = first; written && at < first + count; at++) {
-        const size_t v = at % n_rhs, s = at / n_rhs % r->n_with, k = at / n_rhs / r->n_with;
-        if (v == 0 && s == 0)
-            written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, reduce_text(r, k)) &&
-                      buffer_append(b, ":{", 2);
-        if (v == 0)
-            written = written && buffer_append_text(b, s == 0 ? "" : ",") && begin_figure(r, s, b) &&
-                      buffer_append_text(b, batch ? "[" : "");
-        written = written && (v == 0 || buffer_append(b, ",", 1)) &&
-                  reduce_write_channels(b, figures + at * n_channels, n_channels);
-        if (v + 1 == n_rhs && batch) written = written && buffer_append(b, "]", 1);
-        if (v + 1 == n_rhs && ends_shares(r, s)) written = written && buffer_append(b, "}", 1);
-        if (v + 1 == n_rhs && s + 1 == r->n_with) written = written && buffer_append(b, "}", 1);
-    }
+    for (size_t at = first; written && at < first + count; at++)
+        written = reduce_write_before(r, n_rhs, batch, at, b) &&
+                  (r->with[reduce_place_of(r, n_rhs, at).statistic] == REDUCE_UGR
+                       ? buffer_append_text(b, "null")
+                       : reduce_write_channels(b, figures + at * n_channels, n_channels)) &&
+                  reduce_write_after(r, n_rhs, batch, at, b);
     return written;
 }
 

@@ -1,7 +1,8 @@
 /* Figures over groups of elements, in place of vectors: mean = sum A x / sum A, sum = sum A x, min, max,
  * uniformity = min / mean, variance = sum A (x - mean)^2 / sum A, share = sum A [x >= limit] / sum A. Buried
  * elements, which no light reaches, have no part in them. Over sets of sensors all A are 1, and receivers
- * without a value have no part. No I/O. */
+ * without a value have no part. Ratings of eyes (UGR), which are no numbers of a set, are found and written
+ * by who asks for them. No I/O. */
 #ifndef LAMBERT_CODEC_GROUP_FIGURES_H
 #define LAMBERT_CODEC_GROUP_FIGURES_H
 
@@ -20,8 +21,11 @@ typedef enum reduce_statistic {
     REDUCE_UNIFORMITY,
     REDUCE_VARIANCE,
     REDUCE_COUNT,
-    REDUCE_SHARE = REDUCE_COUNT /* of a limit, which those before need not */
+    REDUCE_SHARE = REDUCE_COUNT, /* of a limit, which those before need not */
+    REDUCE_UGR                   /* of each eye of a set of sensors */
 } reduce_statistic;
+
+enum { REDUCE_FIGURES_MAX = REDUCE_UGR + REDUCE_LIMITS_MAX };
 
 /* A name in a request, and the groups of the scene that it means (group_index_find). */
 typedef struct reduce_name {
@@ -37,9 +41,8 @@ typedef struct reduce_request {
     buffer texts;
     reduce_name *names;
     size_t n_names, names_capacity;
-    reduce_statistic
-        with[REDUCE_COUNT + REDUCE_LIMITS_MAX];        /* in the order asked, one share for each limit */
-    double at_least[REDUCE_COUNT + REDUCE_LIMITS_MAX]; /* of each the limit of a share, else 0 */
+    reduce_statistic with[REDUCE_FIGURES_MAX]; /* in the order asked, one share for each limit */
+    double at_least[REDUCE_FIGURES_MAX];       /* of each the limit of a share, else 0 */
     size_t n_with;
     bool of_sensors; /* names are of sets of sensors */
 } reduce_request;
@@ -55,6 +58,10 @@ bool reduce_request_with(reduce_request *r, const char *word, size_t length, pro
 /* Adds a share for each limit, n_limits of them from 1 to REDUCE_LIMITS_MAX, before statistic `at` of those
  * added. */
 void reduce_request_shares(reduce_request *r, size_t at, size_t n_limits, const double *limits);
+
+/* Adds the ratings of eyes. */
+void reduce_request_ugr(reduce_request *r);
+bool reduce_has_ugr(const reduce_request *r);
 
 /* Adds a name and the groups that it means. 422: a name given twice, or too many; 503. */
 bool reduce_request_add(reduce_request *r, const char *name, size_t length, const uint32_t *groups,
@@ -83,8 +90,8 @@ typedef struct reduce_values {
 } reduce_values;
 
 /* Fills the figures of vectors first ... first + count of n_rhs. x is [count][C][n_values]; area [n] in mesh
- * order, or NULL for 1 of each. NaN where a figure has no value: no area, or a mean of 0. False when memory
- * is short. */
+ * order, or NULL for 1 of each. NaN where a figure has no value: no area, a mean of 0, or no number. False
+ * when memory is short. */
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
                     size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures);
 
@@ -104,10 +111,20 @@ bool reduce_write_names(const reduce_request *r, size_t n_channels, size_t n_rhs
                         const double *figures, buffer *b);
 
 /* Writes a part of the text of reduce_write_names: `first` ... `first` + `count` of the figures of
- * reduce_vectors_written, each of one vector. */
+ * reduce_vectors_written, each of one vector. Ratings of eyes are null there; who has them writes them
+ * between what stands before and after a figure. */
 size_t reduce_vectors_written(const reduce_request *r, size_t n_rhs);
 bool reduce_write_some(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
                        const double *figures, size_t first, size_t count, buffer *b);
+
+bool reduce_write_before(const reduce_request *r, size_t n_rhs, bool batch, size_t at, buffer *b);
+bool reduce_write_after(const reduce_request *r, size_t n_rhs, bool batch, size_t at, buffer *b);
+
+/* The place of a figure of reduce_vectors_written. */
+typedef struct reduce_place {
+    size_t name, statistic, vector; /* statistic: of `with` */
+} reduce_place;
+reduce_place reduce_place_of(const reduce_request *r, size_t n_rhs, size_t at);
 
 /* Appends the figure of one vector: a number, or [C] of them; null for NaN. False when memory is short. */
 bool reduce_write_channels(buffer *b, const double *values, size_t n_channels);

@@ -49,9 +49,9 @@ bool parser_read_sensor_sets(parser *p) {
     return good;
 }
 
-/* The word of shares, which have limits of their own. */
-static bool is_share(const json_slice *word) {
-    const char *name = reduce_statistic_name(REDUCE_SHARE);
+/* True of the word of shares, which have limits of their own, or of ratings, which are of eyes alone. */
+static bool is_word(const json_slice *word, reduce_statistic statistic) {
+    const char *name = reduce_statistic_name(statistic);
     return word->length == strlen(name) && memcmp(word->bytes, name, word->length) == 0;
 }
 
@@ -69,20 +69,26 @@ static bool read_with(parser *p, int *share) {
         parser_point_index(p, index);
         if (!parser_expect(p, JSON_TEXT, "the name of a figure")) return false;
         if (!json_read_text(&p->r, &word)) return parser_fault(p);
-        if (is_share(&word)) {
+        if (is_word(&word, REDUCE_SHARE)) {
             if (*share != NO_SHARE)
                 return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s: \"share\" was listed before",
                                      parser_here(p));
             *share = (int)reduce->n_with;
+        } else if (is_word(&word, REDUCE_UGR)) {
+            if (reduce_has_ugr(reduce))
+                return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s: \"ugr\" was listed before", parser_here(p));
+            reduce_request_ugr(reduce);
         } else if (!reduce_request_with(reduce, word.bytes, word.length, &why)) {
-            return parser_refuse(p, why.kind, "%s: %.200s, share", parser_here(p), why.detail);
+            return parser_refuse(p, why.kind,
+                                 why.kind == PROBLEM_UNKNOWN_WORD ? "%s: %.200s, share, ugr" : "%s: %.200s",
+                                 parser_here(p), why.detail);
         }
         p->pointer_length = mark;
     }
     if (!parser_closed(p)) return false;
     return reduce->n_with > 0 || *share != NO_SHARE ||
            parser_refuse(p, PROBLEM_WRONG_LENGTH,
-                         "%s is empty, must hold mean, sum, min, max, uniformity, variance or share",
+                         "%s is empty, must hold mean, sum, min, max, uniformity, variance, share or ugr",
                          parser_here(p));
 }
 
@@ -126,6 +132,10 @@ static bool settle_reduce(parser *p, int share, size_t n_limits, const double *l
             return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
                                  "%s: a sum over sensors, which have no area, says nothing; ask for mean",
                                  parser_here(p));
+    if (!reduce->of_sensors && reduce_has_ugr(reduce))
+        return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
+                             "%s: ugr is of eyes; name sets of them by sensors in place of groups",
+                             parser_here(p));
     if (share != NO_SHARE) reduce_request_shares(reduce, (size_t)share, n_limits, limits);
     return true;
 }

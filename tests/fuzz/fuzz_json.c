@@ -34,7 +34,7 @@ static void check_luminaires(const codec_scene *scene, const radiosity_request *
 static void check_sensors(const codec_scene *scene, const radiosity_request *request) {
     const reduce_request *r = &request->reduce;
     FUZZ_CHECK(request->n_receivers == 0 || request->at_sensors);
-    FUZZ_CHECK(r->n_with <= REDUCE_COUNT + REDUCE_LIMITS_MAX);
+    FUZZ_CHECK(r->n_with <= REDUCE_FIGURES_MAX);
     if (!request->at_sensors) return;
     FUZZ_CHECK(scene->sensors != NULL && !request->select && request->quantity == LAM_RADIOSITY);
     FUZZ_CHECK(scene->n_emitters == 0 && r->of_sensors && !(r->linear && request->n_suns > 0));

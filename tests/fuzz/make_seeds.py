@@ -36,6 +36,7 @@ for e in emissions:
                                                                         "variance"]}},
                  {"emission": e, "select": {"sensors": ["room"]}},
                  {"emission": e, "reduce": {"sensors": ["room.b", "room"], "with": ["mean", "share", "min"], "at_least": [1, 300]}},
+                 {"emissions": [e, e], "reduce": {"sensors": ["room"], "with": ["ugr", "share"], "at_least": [2]}},
                  {"cotangent": {"sensors": {"room.a": {"values": [1, -2]}, "room.b": 3}}, "emission": e, "gradient": ["reflectance"]},
                  {"cotangent": e, "quantity": "radiosity", "gradient": ["emission", "reflectance"], "emission": e},
                  {"cotangent": [1] * 7, "gradient": ["luminaires", "groups"], "emission": e}):

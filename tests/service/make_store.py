@@ -246,13 +246,15 @@ class Luminaires:
 
 
 class Sensors:
-    """The sensors of a store: two sets of points, one of cylinders, one receiver of which lies in a wall."""
+    """The sensors of a store: two sets of points, one of cylinders, one receiver of which lies in a wall, and with `eyes` one of these."""
 
     NAMES, COUNTS, DARK = ("room.a", "room.b", "faces"), (5, 9, 4), 7
 
-    def __init__(self, n, channels=1, tiles=0, lights=None, seed=1):
+    def __init__(self, n, channels=1, tiles=0, lights=None, seed=1, eyes=0):
         rng = np.random.default_rng(seed)
-        self.n, self.C, self.lights = n, channels, lights
+        self.n, self.C, self.lights, self.eyes = n, channels, lights, eyes
+        if eyes:
+            self.NAMES, self.COUNTS = (*self.NAMES, "seat"), (*self.COUNTS, eyes)
         self.s = sum(self.COUNTS)
         self.first = np.concatenate([[0], np.cumsum(self.COUNTS)])
         self.weights = (rng.random((self.s, n)) * (rng.random((self.s, n)) < .6) / n).astype(np.float32)
@@ -284,11 +286,11 @@ class Sensors:
         k = len(self.NAMES)
         arrays = {
             "names": np.array([name.encode() for name in self.NAMES]),
-            "kind": np.array([0, 0, 3], np.uint32),
+            "kind": np.array([0, 0, 3, 2][:k], np.uint32),
             "first": self.first.astype(np.uint64),
             "grid": np.zeros((k, 2), np.uint32),
             "spacing": np.zeros((k, 2)),
-            "receiver": np.repeat(np.array([0, 0, 1], np.uint32), self.COUNTS),
+            "receiver": np.repeat(np.array([0, 0, 1, 0][:k], np.uint32), self.COUNTS),
             "place": self.place,
             "cell": np.full(self.s, 0xFFFFFFFF, np.uint32),
             "flags": flags,
@@ -302,6 +304,10 @@ class Sensors:
             arrays["sky"], arrays["sky_off"] = self.sky, (self.sky * 1e-2).astype(np.float32)
         if self.luminaires is not None:
             arrays["luminaires"] = self.luminaires
+        if self.eyes and self.luminaires is not None:
+            arrays["eyes"] = np.arange(self.s - self.eyes, self.s, dtype=np.uint32)
+            # cd, m2, m, the index of Guth, and the share that is seen.
+            arrays["seen"] = np.broadcast_to(np.float32([1000, .1, 5, 2, 1]), (len(self.luminaires), self.eyes, 5))
         with h5py.File(path, "r+") as f:
             for name, values in arrays.items():
                 f.create_dataset("sensors/" + name, data=values)

@@ -91,7 +91,9 @@ def each_request(n):
     yield "POST", adjoint, {"Content-Type": NPY, "Accept": NPY}, array(dense)
     lit, sets = {"luminaires": {"desk-1": 1, "row-a": .5}, "groups": {"lamp": 2}}, {"sensors": ["room", "faces"]}
     for body in ({"emission": lit, "select": sets}, {"emission": dense, "reduce": {**sets, "with": ["mean"]}},
-                 {"emission": lit, "reduce": {**sets, "with": ["mean", "share"], "at_least": [1]}}):
+                 {"emission": lit, "reduce": {**sets, "with": ["mean", "share"], "at_least": [1]}},
+                 {"emission": lit, "reduce": {"sensors": ["seat"], "with": ["mean", "ugr"]}},
+                 {"emissions": [dense, lit], "reduce": {"sensors": ["seat"], "with": ["ugr"]}}):
         yield "POST", solve, {"Content-Type": JSON}, json.dumps(body)
     yield "POST", solve, {"Content-Type": JSON, "Accept": NPY}, json.dumps({"emission": lit, "select": sets})
     yield "POST", adjoint, {"Content-Type": JSON}, json.dumps({"cotangent": {"sensors": {"room": 1}}, "gradient": ["luminaires"]})
@@ -125,7 +127,7 @@ class Faults(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
         Scene(N).write(self.folder / "grey.h5", "grey", keep_factors=True)
-        Sensors(N, lights=Luminaires(N).add_to(self.folder / "grey.h5")).add_to(self.folder / "grey.h5")
+        Sensors(N, lights=Luminaires(N).add_to(self.folder / "grey.h5"), eyes=3).add_to(self.folder / "grey.h5")
         (self.folder / "token").write_text(TOKEN)
         (self.folder / "token").chmod(0o600)
 

@@ -225,6 +225,45 @@ START_TEST(figures_have_the_shape_asked) {
 }
 END_TEST
 
+/* Ratings are written by who has them, between what stands before and after; else they are null. */
+START_TEST(ratings_stand_among_figures) {
+    group_index groups = make_groups();
+    reduce_request r = {.with = {REDUCE_MEAN, REDUCE_MAX}, .n_with = 2, .linear = true};
+    static const float x[2][N] = {{3, 6, 8, 2, 1, -1, 5}, {0}};
+    buffer b = {0};
+    ck_assert(!reduce_has_ugr(&r));
+    reduce_request_ugr(&r);
+    reduce_request_shares(&r, 1, 1, (double[]){5});
+    ck_assert(reduce_has_ugr(&r) && !r.linear);
+    add(&r, &groups, "b", true);
+    add(&r, &groups, "a.y", true);
+    double *figures = reduce_figures(&r, 2, 1);
+    ck_assert_ptr_nonnull(figures);
+    for (size_t v = 0; v < 2; v++)
+        ck_assert(reduce_vectors(&r, &groups, NULL, 1, 2, v, 1,
+                                 (reduce_values){.floats = x[v], .whole = true}, figures));
+    write_is(&r, 1, 2, true, figures,
+             "{\"b\":{\"mean\":[2,0],\"share\":{\"5\":[0.5,0]},\"max\":[5,0],\"ugr\":[null,null]},"
+             "\"a.y\":{\"mean\":[4,0],\"share\":{\"5\":[0.5,0]},\"max\":[6,0],\"ugr\":[null,null]}}");
+    for (size_t at = 0; at < reduce_vectors_written(&r, 2); at++) {
+        const reduce_place place = reduce_place_of(&r, 2, at);
+        ck_assert(at == (place.name * r.n_with + place.statistic) * 2 + place.vector);
+        if (r.with[place.statistic] != REDUCE_UGR)
+            ck_assert(reduce_write_some(&r, 1, 2, true, figures, at, 1, &b));
+        else
+            ck_assert(reduce_write_before(&r, 2, true, at, &b) && buffer_printf(&b, "[%zu]", place.vector) &&
+                      reduce_write_after(&r, 2, true, at, &b));
+    }
+    ck_assert_str_eq(b.bytes,
+                     "\"b\":{\"mean\":[2,0],\"share\":{\"5\":[0.5,0]},\"max\":[5,0],\"ugr\":[[0],[1]]},"
+                     "\"a.y\":{\"mean\":[4,0],\"share\":{\"5\":[0.5,0]},\"max\":[6,0],\"ugr\":[[0],[1]]}");
+    buffer_free(&b);
+    free(figures);
+    reduce_request_free(&r);
+    group_index_free(&groups);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("gradient");
     TCase *tcase = tcase_create("gradient");
@@ -232,6 +271,7 @@ int main(void) {
     tcase_add_test(tcase, figures_are_sums_written_out);
     tcase_add_test(tcase, figures_leave_out_what_is_buried);
     tcase_add_test(tcase, figures_have_the_shape_asked);
+    tcase_add_test(tcase, ratings_stand_among_figures);
     suite_add_tcase(suite, tcase);
     return suite_run(suite);
 }
