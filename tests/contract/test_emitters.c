@@ -2,6 +2,7 @@
  * an emission, and what a store may not be. */
 #include "solver/base/random.h"
 #include "solver/operator/emitters.h"
+#include "solver/operator/luminaire_light.h"
 #include "solver/operator/sky_light.h"
 #include "support/failing_memory.h"
 #include "support/operator_file.h"
@@ -10,6 +11,10 @@
 static lam_error error;
 
 enum { N = 61, C = 2, S = 7, M = 5, MANY = 35 };
+
+/* The last emitters are these luminaires, in the variant that has them. */
+enum { LUMINAIRES = 2, FIRST_LUMINAIRE = S - LUMINAIRES };
+static const char *const names[S] = {"a", "b", "c", "d", "tile", "both", "all"};
 
 static void setup(void) {
     operator_file_setup();
@@ -21,12 +26,17 @@ typedef struct problem {
     float rho[C * N], first_bounce[M * N], L[C * S * M], E[C * S * N];
     bool outside; /* they give direct light from outside the mesh too: */
     float direct[S * N], exitance[C];
+    bool luminaires; /* the last ones are luminaires, of these irradiances and colours: */
+    float irradiance[LUMINAIRES * N];
+    double colour[LUMINAIRES * 3];
     double T[C * S * N];
 } problem;
 
+enum { PLAIN, OUTSIDE, LIT, VARIANTS };
+
 /* Emitters 0 to 3 are elements, 4 and 5 tiles of the sky (5 with an element), 6 all elements of the others.
  */
-static problem *make_problem(void) {
+static problem *make_problem(int variant) {
     uint64_t state = 11;
     problem *p = test_allocate(1, sizeof *p);
     float *rho = random_reflectance(N, C, &state);
@@ -47,13 +57,32 @@ static problem *make_problem(void) {
     for (size_t k = 0; k < (size_t)C * S * N; k++) p->T[k] = .3 * random_lcg_unit(&state);
     for (size_t k = 0; k < S * N; k++) p->direct[k] = (float)(.1 * random_lcg_unit(&state));
     for (size_t c = 0; c < C; c++) p->exitance[c] = (float)(c + 2);
+    for (size_t k = 0; k < LUMINAIRES * N; k++) p->irradiance[k] = (float)(.1 * random_lcg_unit(&state));
+    for (size_t k = 0; k < (size_t)LUMINAIRES * 3; k++) p->colour[k] = .5 + random_lcg_unit(&state);
+    p->outside = variant == OUTSIDE;
+    p->luminaires = variant == LIT;
+    /* Luminaires are no elements and no tiles. */
+    for (size_t c = 0; p->luminaires && c < C; c++) {
+        memset(p->E + (c * S + FIRST_LUMINAIRE) * N, 0, LUMINAIRES * N * sizeof *p->E);
+        memset(p->L + (c * S + FIRST_LUMINAIRE) * M, 0, LUMINAIRES * M * sizeof *p->L);
+    }
     return p;
+}
+
+/* The irradiance that emitter k gives directly, by the sky and otherwise. */
+static double direct_light(const problem *p, size_t c, size_t k, size_t i) {
+    double H0 = p->outside ? (double)p->exitance[c] * (double)p->direct[k * N + i] : 0;
+    if (p->luminaires && k >= FIRST_LUMINAIRE)
+        H0 += p->colour[(k - FIRST_LUMINAIRE) * 3 + c] * (double)p->irradiance[(k - FIRST_LUMINAIRE) * N + i];
+    for (size_t t = 0; t < M; t++)
+        H0 += (double)p->L[(c * S + k) * M + t] * (double)p->first_bounce[t * N + i];
+    return H0;
 }
 
 /* s: how many of the emitters. */
 static lam_status make_operator(const problem *p, size_t s, lam_operator **op, lam_error *cause) {
-    static const char *const names[S] = {"a", "b", "c", "d", "tile", "both", "all"};
     lam_status status = LAM_OK;
+    double factors[C * LUMINAIRES];
     emitter_arrays a = {.s = s, .n_tiles = M};
     a.names = test_allocate(s * sizeof(char *) + 64, 1);
     char *text = (char *)(a.names + s);
@@ -85,6 +114,9 @@ static lam_status make_operator(const problem *p, size_t s, lam_operator **op, l
         memcpy(a.direct, p->direct, s * N * sizeof *a.direct);
         memcpy(a.exitance, p->exitance, sizeof p->exitance);
     }
+    for (size_t k = 0; k < (size_t)C * LUMINAIRES; k++)
+        factors[k] = p->colour[k % LUMINAIRES * 3 + k / LUMINAIRES];
+    if (p->luminaires) TRY(luminaires_create(LUMINAIRES, N, C, p->irradiance, factors, &a.luminaires, cause));
     TRY(operator_emitters_create(N, C, p->rho, &a, op, cause));
 done:
     emitter_arrays_free(&a);
@@ -101,11 +133,8 @@ static lam_operator *good_operator(const problem *p, size_t s) {
 /* d quantity_i / d w_k, in double. */
 static double derivative(const problem *p, size_t c, size_t k, size_t i, lam_quantity quantity) {
     const double T = p->T[(c * S + k) * N + i], rho = (double)p->rho[c * N + i];
-    double H0 = p->outside ? (double)p->exitance[c] * (double)p->direct[k * N + i] : 0;
-    for (size_t t = 0; t < M; t++)
-        H0 += (double)p->L[(c * S + k) * M + t] * (double)p->first_bounce[t * N + i];
     if (quantity == LAM_IRRADIANCE) return T / rho_or_one((float)rho);
-    if (quantity == LAM_INDIRECT) return rho > 0 ? T - rho * H0 : 0;
+    if (quantity == LAM_INDIRECT) return rho > 0 ? T - rho * direct_light(p, c, k, i) : 0;
     return (double)p->E[(c * S + k) * N + i] + (rho > 0 ? T : 0);
 }
 
@@ -123,8 +152,7 @@ static area work_area(const lam_operator *op, size_t n_rhs) {
 }
 
 START_TEST(answers_are_sums) {
-    problem *p = make_problem();
-    p->outside = _i > 0;
+    problem *p = make_problem(_i);
     lam_operator *op = good_operator(p, S);
     float *W = random_vectors((size_t)MANY * C * S, 3),
           *out = test_allocate((size_t)MANY * C * N, sizeof *out);
@@ -169,8 +197,7 @@ END_TEST
 
 /* The adjoint against the derivative itself. */
 START_TEST(adjoint_is_the_transpose) {
-    problem *p = make_problem();
-    p->outside = _i > 0;
+    problem *p = make_problem(_i);
     lam_operator *op = good_operator(p, S);
     float *g = random_vectors((size_t)MANY * C * N, 7), *W = test_allocate((size_t)MANY * C * S, sizeof *W);
     for (size_t k = 0; k < (size_t)MANY * C * N; k += 3) g[k] = -g[k];
@@ -203,7 +230,7 @@ END_TEST
  * alone, so it is left out here. */
 START_TEST(weights_follow_from_light) {
     enum { FEW = 6 };
-    problem *p = make_problem();
+    problem *p = make_problem(PLAIN);
     lam_operator *op = good_operator(p, FEW);
     float *W = random_vectors((size_t)MANY * C * FEW, 3), *E = test_allocate((size_t)MANY * C * N, sizeof *E);
     float *H0 = test_allocate((size_t)MANY * C * N, sizeof *H0),
@@ -266,7 +293,7 @@ START_TEST(weights_follow_from_light) {
 END_TEST
 
 START_TEST(wrong_calls_are_refused) {
-    problem *p = make_problem();
+    problem *p = make_problem(PLAIN);
     lam_operator *op = good_operator(p, S);
     float W[C * S] = {0}, out[C * N];
     const uint32_t selected[1] = {N};
@@ -292,6 +319,25 @@ START_TEST(wrong_calls_are_refused) {
 }
 END_TEST
 
+/* Writes /luminaires as a store has them; `called` are their names. */
+static lam_status save_luminaires(const problem *p, store *s, const char *const *called, lam_error *cause) {
+    lam_status status = LAM_OK;
+    const size_t many = LUMINAIRES, lit[2] = {LUMINAIRES, N};
+    const uint32_t group[LUMINAIRES] = {LUMINAIRE_NO_GROUP, LUMINAIRE_NO_GROUP};
+    const double ones[LUMINAIRES] = {1, 1}, place[LUMINAIRES * 12] = {0}, opening[LUMINAIRES * 8] = {0};
+    TRY(store_write(s, "/luminaires/irradiance", STORE_F32, 2, lit, p->irradiance, cause));
+    TRY(store_write_texts(s, "/luminaires/names", LUMINAIRES, called, cause));
+    TRY(store_write_texts(s, "/luminaires/group_names", 0, NULL, cause));
+    TRY(store_write(s, "/luminaires/group", STORE_U32, 1, &many, group, cause));
+    TRY(store_write(s, "/luminaires/dimmers", STORE_F64, 1, &many, ones, cause));
+    TRY(store_write(s, "/luminaires/lumens", STORE_F64, 1, &many, ones, cause));
+    TRY(store_write(s, "/luminaires/colour", STORE_F64, 2, (size_t[]){LUMINAIRES, 3}, p->colour, cause));
+    TRY(store_write(s, "/luminaires/place", STORE_F64, 2, (size_t[]){LUMINAIRES, 12}, place, cause));
+    TRY(store_write(s, "/luminaires/opening", STORE_F64, 2, (size_t[]){LUMINAIRES, 8}, opening, cause));
+done:
+    return status;
+}
+
 static lam_status save(const problem *p, const lam_operator *op, lam_error *cause) {
     lam_status status = LAM_OK;
     store *s = NULL;
@@ -299,6 +345,7 @@ static lam_status save(const problem *p, const lam_operator *op, lam_error *caus
     TRY(store_create(operator_file_path, &s, cause));
     TRY(store_write(s, "/mesh/reflectance", STORE_F32, 2, dims, p->rho, cause));
     TRY(store_write(s, "/sky/first_bounce", STORE_F32, 2, sky, p->first_bounce, cause));
+    if (p->luminaires) TRY(save_luminaires(p, s, names + FIRST_LUMINAIRE, cause));
     TRY(operator_save(op, s, cause));
     status = store_seal(s, cause);
     s = NULL;
@@ -308,8 +355,7 @@ done:
 }
 
 START_TEST(what_is_saved_comes_back_bit_for_bit) {
-    problem *p = make_problem();
-    p->outside = _i > 0;
+    problem *p = make_problem(_i);
     lam_operator *op = good_operator(p, S), *loaded = NULL;
     float *W = random_vectors((size_t)MANY * C * S, 3);
     float *before = test_allocate((size_t)MANY * C * N, sizeof *before),
@@ -337,11 +383,39 @@ START_TEST(what_is_saved_comes_back_bit_for_bit) {
 }
 END_TEST
 
+/* A store's luminaires and those of its operator are the same, in the same order. */
+START_TEST(luminaires_of_a_store_are_its_emitters) {
+    static const char *const turned[LUMINAIRES] = {"all", "both"};
+    problem *p = make_problem(LIT), *plain = make_problem(PLAIN);
+    lam_operator *op = good_operator(p, S), *made = NULL;
+    store *s = NULL;
+    for (int what = 0; what < 2; what++) {
+        ck_ok(save(what == 0 ? plain : p, op, &error));
+        if (what == 1) {
+            const size_t dims[2] = {C, N}, sky[2] = {M, N};
+            ck_ok(store_create(operator_file_path, &s, &error));
+            ck_ok(store_write(s, "/mesh/reflectance", STORE_F32, 2, dims, p->rho, &error));
+            ck_ok(store_write(s, "/sky/first_bounce", STORE_F32, 2, sky, p->first_bounce, &error));
+            ck_ok(save_luminaires(p, s, turned, &error));
+            ck_ok(operator_save(op, s, &error));
+            ck_ok(store_seal(s, &error));
+        }
+        ck_assert(lam_operator_open(operator_file_path, &made, &error) == LAM_ERR_FORMAT);
+        ck_assert_ptr_null(made);
+        ck_assert_msg(strstr(error.message, what == 0 ? "counts 2 luminaires among 7 emitters"
+                                                      : "emitter 5 is both, and luminaire 0 is all") != NULL,
+                      "%s", error.message);
+    }
+    lam_operator_close(op);
+    free(plain);
+    free(p);
+}
+END_TEST
+
 START_TEST(memory_that_fails_is_not_lost) {
-    problem *p = make_problem();
+    problem *p = make_problem(_i);
     lam_operator *op = good_operator(p, S);
     int failures[3] = {0};
-    p->outside = true;
     ck_ok(save(p, op, &error));
     for (int what = 0; what < 3; what++)
         for (long k = 0;; k++) {
@@ -362,11 +436,10 @@ START_TEST(memory_that_fails_is_not_lost) {
 }
 END_TEST
 
-/* Light from outside the mesh comes out as direct light, in single precision and in double, and no emission
- * shows its weight. */
+/* Light from outside the mesh comes out as direct light, in single precision and in double. No emission shows
+ * the weight of emitters outside, nor that of luminaires, whose dimmers stand beside it. */
 START_TEST(light_from_outside_is_direct) {
-    problem *p = make_problem();
-    p->outside = true;
+    problem *p = make_problem(_i);
     lam_operator *op = good_operator(p, S);
     float *W = random_vectors((size_t)C * S, 3), E[C * N], H0[C * N], L[C * M] = {0};
     double E2[C * N], H2[C * N];
@@ -375,18 +448,28 @@ START_TEST(light_from_outside_is_direct) {
     for (size_t c = 0; c < C; c++)
         for (size_t i = 0; i < N; i++) {
             double sum = 0;
-            for (size_t k = 0; k < S; k++) {
-                double one = (double)p->exitance[c] * (double)p->direct[k * N + i];
-                for (size_t t = 0; t < M; t++)
-                    one += (double)p->L[(c * S + k) * M + t] * (double)p->first_bounce[t * N + i];
-                sum += (double)W[c * S + k] * one;
-            }
+            for (size_t k = 0; k < S; k++) sum += (double)W[c * S + k] * direct_light(p, c, k, i);
             ck_assert_double_eq_tol((double)H0[c * N + i], sum, 1e-5 * fabs(sum) + 1e-6);
             ck_assert_double_eq_tol(H2[c * N + i], sum, 1e-12 * fabs(sum) + 1e-12);
             ck_assert_double_eq_tol((double)E[c * N + i], E2[c * N + i], 1e-5 * fabs(E2[c * N + i]) + 1e-6);
         }
-    ck_assert(lam_operator_weights(op, 1, E, M, L, W, &error) == LAM_ERR_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(error.message, "no part of its mesh"));
+    if (p->luminaires) {
+        float D[C * LUMINAIRES], found[C * S];
+        for (size_t k = 0; k < (size_t)C * S; k++) {
+            const size_t c = k / S, j = k % S;
+            for (size_t t = 0; t < M; t++) L[c * M + t] += W[k] * p->L[k * M + t];
+            if (j >= FIRST_LUMINAIRE) D[c * LUMINAIRES + j - FIRST_LUMINAIRE] = W[k];
+        }
+        ck_ok(lam_operator_weights(op, 1, E, M, L, found, &error));
+        for (size_t k = 0; k < (size_t)C * S; k++)
+            if (k % S >= FIRST_LUMINAIRE) ck_assert_double_eq((double)found[k], 0);
+        operator_emitters_dim(op, 1, D, found);
+        for (size_t k = 0; k < (size_t)C * S; k++)
+            ck_assert_double_le(fabs((double)found[k] - (double)W[k]), 1e-5 * fabs((double)W[k]));
+    } else {
+        ck_assert(lam_operator_weights(op, 1, E, M, L, W, &error) == LAM_ERR_ARGUMENT);
+        ck_assert_ptr_nonnull(strstr(error.message, "no part of its mesh"));
+    }
     free(W);
     lam_operator_close(op);
     free(p);
@@ -395,7 +478,7 @@ END_TEST
 
 /* Files that hold no operator of this kind. */
 START_TEST(what_does_not_fit_is_refused) {
-    problem *p = make_problem();
+    problem *p = make_problem(PLAIN);
     for (int what = 0; what < 8; what++) {
         static const char *const wanted[] = {"the value -1",
                                              "the value 0",
@@ -438,13 +521,14 @@ int main(void) {
     Suite *suite = suite_create("emitters");
     TCase *cases = tcase_create("emitters");
     tcase_add_checked_fixture(cases, setup, operator_file_teardown);
-    tcase_add_loop_test(cases, answers_are_sums, 0, 2);
-    tcase_add_loop_test(cases, adjoint_is_the_transpose, 0, 2);
+    tcase_add_loop_test(cases, answers_are_sums, 0, VARIANTS);
+    tcase_add_loop_test(cases, adjoint_is_the_transpose, 0, VARIANTS);
     tcase_add_test(cases, weights_follow_from_light);
     tcase_add_test(cases, wrong_calls_are_refused);
-    tcase_add_loop_test(cases, what_is_saved_comes_back_bit_for_bit, 0, 2);
-    tcase_add_test(cases, light_from_outside_is_direct);
-    tcase_add_test(cases, memory_that_fails_is_not_lost);
+    tcase_add_loop_test(cases, what_is_saved_comes_back_bit_for_bit, 0, VARIANTS);
+    tcase_add_loop_test(cases, light_from_outside_is_direct, OUTSIDE, VARIANTS);
+    tcase_add_test(cases, luminaires_of_a_store_are_its_emitters);
+    tcase_add_loop_test(cases, memory_that_fails_is_not_lost, OUTSIDE, VARIANTS);
     tcase_add_test(cases, what_does_not_fit_is_refused);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
