@@ -14,7 +14,7 @@ import tempfile
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "service"))
-from make_store import Luminaires
+from make_store import Luminaires, Sensors
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
 for name in ("json", "adjoint", "npy", "store", "import", "index", "head", "image", "gltf", "weather", "skies", "luminaire",
@@ -132,7 +132,13 @@ with tempfile.TemporaryDirectory() as scratch:
                              ["hierarchical", "--keep-form-factors"])):
         run("precompute", "box.obj", "--mesh", "faces", "--rays", 64, "--probes", 0, "--quiet", "-o", folder / "store" / f"{k}.h5",
             "--method", *how)
-    Luminaires(6).add_to(shutil.copy(folder / "store" / "0.h5", folder / "store" / "luminaires.h5"))
+    lit = Luminaires(6).add_to(shutil.copy(folder / "store" / "0.h5", folder / "store" / "luminaires.h5"))
+    Sensors(6, lights=lit, eyes=1).add_to(shutil.copy(folder / "store" / "luminaires.h5", folder / "store" / "eyes.h5"))
+    # Few emitters, of which the last are luminaires.
+    (pathlib.Path(scratch) / "list.json").write_text(json.dumps({"luminaires": [
+        {"name": f"row.{k}", "group": "row", "file": "made/lambertian-1000cd-1x1m.ies", "at": [.3 * k + .3, .5, .9]} for k in range(2)]}))
+    run("precompute", "box.obj", "--mesh", "faces", "--rays", 64, "--probes", 0, "--quiet", "-o", folder / "store" / "few.h5",
+        "--luminaires", "list.json", "--assets", pathlib.Path(__file__).resolve().parents[1] / "fixtures" / "luminaires", "--lights", "lm", "--sky", "grid:2x2", "--emitters", "sky")
     run("generate", "box", "--divisions", 3, "-o", "box.obj")
     run("precompute", "box.obj", "--mesh", "faces", "--probes", 0, "--quiet", "-o", folder / "store" / "blocks.h5", "--form-factors", "blocks",
         "--epsilon", .99, "--keep-form-factors")
