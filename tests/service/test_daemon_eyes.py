@@ -18,7 +18,9 @@ from test_figures import ASSETS, LUMINAIRES, SENSORS
 # Sums in single precision of numbers whose last bits differ; UGR is 3.5 times the relative error of its background.
 SAME = 1e-5
 EYES = {"eyes": [*SENSORS["eyes"], {"name": "desk.left", "at": [1, 2, 1.2], "view": [0.6, 0.8, 0]},
-                 {"name": "desk.right", "at": [5, 2, 1.2], "view": [-0.6, 0.8, 0]}]}
+                 {"name": "desk.right", "at": [5, 2, 1.2], "view": [-0.6, 0.8, 0]},
+                 {"name": "crowd", "at": [[.3 * x + .2, .1 * y + .2, 1.2] for x in range(18) for y in range(20)],
+                  "view": [[0, 1, 0]] * 360}]}
 NAMES = ["seat", "desk.left", "desk.right"]
 LIGHTS = ({"panel": 1}, {"panel": .4, "rest": 1}, {"panel": 1, "bulb": 1}, {"panel": 1, "near": .5}, {"behind": 1}, {"panel": 0}, {})
 
@@ -52,12 +54,12 @@ class Eyes(Case):
         must("precompute", cls.files["room.obj"], "--sensors", cls.files["s.json"], "--elements", 200, "--probes", 0, *method, *options,
              "-o", path or cls.files[name])
 
-    def solved(self, store, light, *options):
+    def solved(self, store, light, *options, names=None):
         """The eyes of `solve`, by set: of one light, or of a list of them."""
         path = self.path("light.json")
         with open(path, "w", encoding="utf-8") as file:
             json.dump({"emissions": light} if isinstance(light, list) else light, file)
-        told = json.loads(must("solve", self.files[store], "--sensors", ",".join(NAMES), "--emission", path, "--json", *options).stdout)
+        told = json.loads(must("solve", self.files[store], "--sensors", ",".join(names or NAMES), "--emission", path, "--json", *options).stdout)
         return {one["name"]: one["eyes"] for one in told["sensors"]}
 
     def asked(self, scene, light, **more):
@@ -122,6 +124,16 @@ class Eyes(Case):
         self.same(self.asked("room", light), wanted, "vectors")
         # The residual of the stored operator, in single precision, is what the refined answer has not.
         self.same(self.asked("room", light, tolerance=1e-7), wanted, "refined", 10 * SAME)
+
+    def test_many_eyes_take_several_steps(self):
+        """Their text is written a millisecond at a time, between the figures before and after it."""
+        light = {"luminaires": {"panel": .7, "side": 1, "behind": .5}}
+        reduce = {"sensors": ["crowd", "seat", "desk"], "with": ["mean", "ugr", "max"]}
+        got = self.daemon.radiosity("room", {"emission": light, "reduce": reduce}).json()["sensors"]
+        self.assertEqual([list(figures) for figures in got.values()], [reduce["with"]] * 3)
+        self.same({"crowd": got["crowd"]["ugr"]}, self.solved("room.h5", light, names=["crowd"]), "crowd")
+        self.assertEqual(len(got["crowd"]["ugr"]), 360)
+        self.same(got["seat"]["ugr"], self.asked("room", light)["seat"], "seat")
 
     def test_beside_other_figures(self):
         """In the order asked, of names that mean several sets."""
@@ -215,7 +227,7 @@ class Eyes(Case):
 
     def test_the_list_says_which_are_eyes(self):
         sets = self.daemon.get("/v1/scenes/room/sensors").json()["sets"]
-        self.assertEqual([one["name"] for one in sets if one["kind"] == "eyes"], NAMES)
+        self.assertEqual([one["name"] for one in sets if one["kind"] == "eyes"], [*NAMES, "crowd"])
 
     def test_refusals(self):
         lit = {"luminaires": {"panel": 1}}
