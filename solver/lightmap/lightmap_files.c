@@ -9,7 +9,7 @@
 #include <stdlib.h>
 
 /* The value that is shown white, in means of the map, and the largest irradiance that is kept, in these. */
-static const double white_in_means = 4, kept_in_whites = 2;
+static const double white_in_means = 4, kept_in_whites = 8;
 
 lam_status lightmap_write_exr(const lightmap *map, const lightmap_words *words, const char *path,
                               lam_error *error) {

@@ -19,8 +19,8 @@ lam_status lightmap_write_exr(const lightmap *map, const lightmap_words *words, 
 
 /* Writes the mesh with the map as a PNG of 16 bits: an irradiance by MOZ_lightmap, linear, beside the images
  * of the scene, a radiosity as emissive texture, sRGB. Four means of the map are shown white, as a
- * perfectly white surface under them is: an irradiance is cut at twice that, a radiosity there; *cut gets the
- * texels that are. Errors: LAM_ERR_IO, LAM_ERR_MEMORY, LAM_ERR_ARGUMENT (as gltf_write). */
+ * perfectly white surface under them is: an irradiance is cut at eight times that, a radiosity there; *cut
+ * gets the texels that are. Errors: LAM_ERR_IO, LAM_ERR_MEMORY, LAM_ERR_ARGUMENT (as gltf_write). */
 lam_status lightmap_write_glb(const mesh *m, const lightmap_charts *c, const lightmap *map,
                               const lightmap_words *words, const char *path, size_t *cut, lam_error *error);
 

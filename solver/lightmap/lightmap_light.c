@@ -97,6 +97,10 @@ static bool gather(const gathering *g, const sensor_rows *rows, size_t k, size_t
     return lit;
 }
 
+/* A texel is of a face that people see, and shows what the element there has, also where it faces the backs
+ * of thin walls: only in a body nearly all of its rays meet backs. */
+static const double backs_most = .9;
+
 /* Gathers at texels first ... first + count - 1; state [pixels]. */
 static lam_status gather_block(gathering *g, const lightmap_texel *texels, size_t first, size_t count,
                                uint8_t *state, lightmap *map, lam_error *error) {
@@ -126,7 +130,7 @@ static lam_status gather_block(gathering *g, const lightmap_texel *texels, size_
 #pragma omp parallel for schedule(static)
     for (size_t k = 0; k < count; k++) {
         const lightmap_texel *of = &texels[first + k];
-        const bool hidden = g->inside[k] || (double)rows.backs[k] > SENSOR_BACKS_MOST;
+        const bool hidden = g->inside[k] || (double)rows.backs[k] > backs_most;
         float *to = map->values + of->pixel * map->n_channels;
         const bool lit = gather(g, &rows, k, of->element, to);
         for (size_t c = 0; c < map->n_channels && hidden; c++) to[c] = 0;

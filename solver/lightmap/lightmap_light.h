@@ -37,7 +37,7 @@ typedef struct lightmap {
 } lightmap;
 
 /* Gathers at the texels and fills each chart and its border: a texel without a value gets the mean of its
- * neighbours, those near lit ones first. A texel whose rays mostly meet backs of faces, or that lies in the
+ * neighbours, those near lit ones first. A texel of whose rays .9 meet backs of faces, or that lies in the
  * opening of a luminaire, has no value of its own. One that no light at all reaches is black but within
  * LIGHTMAP_BORDER texels of lit ones: it is mostly covered by a body, whose rim would be dark. The bits do
  * not depend on threads. Freed by lightmap_free. Cost: 1,024 rays of a sensor for each texel, .5 to 3 ms.

@@ -230,6 +230,21 @@ class Lightmap(Case):
         np.testing.assert_allclose(values[values > 0], 100 * np.pi, rtol=2e-3)
         self.assertEqual((values > 0).sum(), values.size)
 
+    def test_a_floor_between_backs_of_thin_walls(self):
+        """More than half of its rays meet backs, as in a body, and the map has the light that the elements have."""
+        vertices = [(x, y, z) for z in (0, .5) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        walls = [(a + 1, b + 1, b + 5, a + 5) for a, b in ((0, 1), (1, 2), (2, 3), (3, 0))]
+        lines = [f"v {x} {y} {z}" for x, y, z in vertices] + ["g floor", "f 1 2 3 4", "g walls"] + ["f %d %d %d %d" % w for w in walls]
+        pathlib.Path(self.path("w.obj")).write_text("\n".join(lines) + "\n", encoding="ascii")
+        must("precompute", self.path("w.obj"), "--reflectance", 0, "--elements", 600, "--sky", "tregenza", "--probes", 0, "-o", self.path("w.h5"))
+        light = ("solve", self.path("w.h5"), "--sky", "even")
+        must(*light, "--at", "texels", "--texel", .03, "-o", self.path("w.glb"))
+        glb = Glb(self.path("w.glb"))
+        stated = json.loads(must(*light, "--quantity", "irradiance", "--reduce", "floor=mean", "--json").stdout)["groups"]["floor"]["mean"]
+        # The factor of two unit squares half a unit apart is .4153 (Hottel and Sarofim 1967), under 10,000 lx.
+        self.assertAlmostEqual(stated / 4153, 1, delta=.01)
+        self.assertAlmostEqual(means(glb.values, glb)["floor"][0] / 4153, 1, delta=.01)
+
     def test_threads_change_no_bit(self):
         for threads in "1", "2":
             must("solve", self.cornell, "--at", "texels", "--texel", .05, "-o", self.path(f"{threads}.exr"),
