@@ -1,7 +1,8 @@
 // A graphics context that is lost and comes back: the picture is what it was, and nothing of the lost one is touched again.
 import assert from "node:assert/strict";
+import { writeFileSync } from "node:fs";
 import { test } from "node:test";
-import { Daemon, makeStore, openPage, settled } from "./page.mjs";
+import { Daemon, inFolder, makeStore, openPage, settled } from "./page.mjs";
 
 const SKY = { model: "given", direct: 700, diffuse: 100, latitude: 20, longitude: 0, zone: 0, day: 80, hour: 14 };
 
@@ -49,7 +50,8 @@ const set = (page, view, lighting) => page.evaluate(([v, l]) => {
 }, [view, lighting]);
 
 test("after a lost graphics context the picture is the same, and no call fails", async () => {
-    const options = { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "grid:2x4", "--up", "z"] };
+    writeFileSync(inFolder("sensors.json"), JSON.stringify({ grids: [{ name: "plane", over: "floor", height: 1, spacing: 1 }] }));
+    const options = { generate: ["--elements", 300], precompute: ["--probes", 0, "--rays", 128, "--sky", "grid:2x4", "--up", "z", "--sensors", inFolder("sensors.json")] };
     const daemon = await Daemon.start([makeStore("patio", "patio", options), makeStore("cornell", "cornell", { ...options, precompute: ["--probes", 0] })]);
     const page = await openPage(daemon.address, { width: 700, height: 420 });
     const steps = {
@@ -64,6 +66,7 @@ test("after a lost graphics context the picture is the same, and no call fails",
     // Everything there is has been used before: what is lost is more than one picture takes.
     await page.evaluate(() => window.lambert.ask.open("patio", null));
     await settled(page);
+    assert.ok(await page.evaluate(() => window.lambert.scene.now.sensors.places > 3));
     await set(page, { sharpSun: true }, { sky: SKY });
     await settled(page);
     const wrong = async () => page.evaluate(() => window.wrong.splice(0));

@@ -13,6 +13,7 @@ import { viewPanel } from "./panels/view.ts";
 import { materialsPanel } from "./panels/materials.ts";
 import { trustPanel } from "./panels/trust.ts";
 import type { PanelMaker } from "./panels/panel.ts";
+import { sensorsPanel } from "./panels/sensors.ts";
 import { readingPanel } from "./panels/reading/reading.ts";
 import { skyPanel } from "./panels/sky.ts";
 import { fromFragment, toFragment } from "./state/link.ts";
@@ -25,6 +26,7 @@ const panelMakers: readonly PanelMaker[] = [
     emittersPanel,
     viewPanel,
     readingPanel,
+    sensorsPanel,
     trustPanel,
     comparePanel,
     materialsPanel,

@@ -15,9 +15,9 @@ const lighting = {
     sky: { ...skyOff, model: "clear", sun: "tile", tinted: true, hour: 9.25, day: 80, latitude: -33 },
 };
 const state = {
-    ...firstState, scene: "a@b “ü”", lighting, pins: [3, 0, 99], tolerance: 1e-5,
+    ...firstState, scene: "a@b “ü”", lighting, pins: [3, 0, 99], sensor: { set: "desks “é”", index: 12 }, tolerance: 1e-5,
     view: { ...firstView, picture: "false", quantity: "indirect", palette: "turbo", tone: "linear", unit: "lx", exposure: -3.5, range: [0, 77], isoLines: 7,
-        threshold: 300, judged: "floor", uniformity: 0.4, sharpSun: true, openings: false, camera: [1, 2, 3, 4, 5, 6, 50, 0, 1, 0] },
+        threshold: 300, judged: "floor", uniformity: 0.4, sharpSun: true, openings: false, sensors: false, hiddenSets: ["a"], required: 500, camera: [1, 2, 3, 4, 5, 6, 50, 0, 1, 0] },
     presets: [{ name: "evening", lighting }], views: [{ name: "door", camera: [1, 2, 3, 4, 5, 6] }],
     compare: { how: "difference", scene: "other", lighting, split: 0.25 },
 };
@@ -39,7 +39,7 @@ test("a link holds the weather of each light that needs it", () => {
 
 test("names and numbers that there are not are held to those that there are", () => {
     const odd = { picture: "false", quantity: "colour", palette: "constructor", tone: "toString", unit: "lumen", isoLines: 1e9, exposure: 1e9, uniformity: -1,
-        range: [5, 1], camera: [1, 2, 3], judged: 5, smooth: "yes" };
+        range: [5, 1], camera: [1, 2, 3], judged: 5, smooth: "yes", sensors: 1, hiddenSets: "all", required: -1 };
     const { view } = fromFragment(linkOf({ view: odd }));
     assert.deepEqual(view, { ...firstView, picture: "false", isoLines: 100, exposure: 60, uniformity: 0, range: [5, 1] });
     const spoilt = fromFragment(linkOf({ lighting: { sky: { model: "none", latitude: 1e9, day: "x", hour: -3 } } }));
@@ -51,6 +51,8 @@ test("names and numbers that there are not are held to those that there are", ()
         desk: { on: false, dim: 0, tint: [2, 0, 1], kelvin: null } } });
     // One of the two shines alone.
     assert.equal(fromFragment(linkOf({ lighting: { solo: "lamp", soloLuminaire: "row" } })).lighting.soloLuminaire, null);
+    for (const sensor of [5, {}, { set: "a", index: -1 }, { set: "a", index: 0.5 }, { set: 5, index: 0 }, [1]])
+        assert.deepEqual(fromFragment(linkOf({ sensor, view: { hiddenSets: ["a", 5, null] } })), { ...firstState, view: { ...firstView, hiddenSets: ["a"] } });
     assert.deepEqual(fromFragment(linkOf({ pins: [1, -1, 0.5, "x", 7], views: [{ name: "x", camera: [1] }, null], compare: { scene: 5 }, scene: {}, stranger: 1 })),
         { ...firstState, pins: [1, 7], compare: { how: "difference", scene: null, lighting: firstLighting, split: 0.5 } });
 });

@@ -5,8 +5,10 @@ import type { Api } from "../daemon/api.ts";
 import { readMesh } from "../picture/glb.ts";
 import { Openings } from "../picture/openings.ts";
 import { Picker } from "../picture/pick.ts";
+import { SensorMarks } from "../picture/sensor_marks.ts";
 import { defaultLightingOf } from "../state/default_lighting.ts";
 import { isRow, luminairesOf } from "../state/luminaires.ts";
+import { placeOfChoice, sensorsOf } from "../state/sensors.ts";
 import { firstState, type State, type View } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
 import type { OpenScene } from "./page.ts";
@@ -16,8 +18,8 @@ export class Opening {
     private turn = 0;
 
     /** `take` makes a scene the open one, of which nothing is asked yet. */
-    constructor(private readonly api: Pick<Api, "describe" | "mesh" | "luminaires">, private readonly store: Store,
-        private readonly scene: Pick<Shown, "stage" | "cameras" | "sky" | "load">,
+    constructor(private readonly api: Pick<Api, "describe" | "mesh" | "luminaires" | "sensors">,
+        private readonly store: Store, private readonly scene: Pick<Shown, "stage" | "cameras" | "sky" | "load">,
         private readonly take: (scene: OpenScene) => void)
     {}
 
@@ -27,19 +29,20 @@ export class Opening {
         const { api, store, scene: { stage, cameras, sky } } = this, turn = ++this.turn;
         this.scene.load(name);
         const described = api.describe(name);
-        const [description, file, takeIn, luminaires] = await Promise.all([described, api.mesh(name),
+        const [description, file, takeIn, luminaires, sets] = await Promise.all([described, api.mesh(name),
             described.then((d) => sky.prepare(d)),
-            described.then((d) => (d.luminaires === null ? [] : api.luminaires(name)))]);
+            described.then((d) => (d.luminaires === null ? [] : api.luminaires(name))),
+            described.then((d) => (d.sensors === null ? [] : api.sensors(name)))]);
         if (turn !== this.turn) return false;
         const mesh = readMesh(file);
         const box = new Box3().setFromBufferAttribute(new BufferAttribute(mesh.positions, 3));
-        const openings = luminaires.length === 0
-            ? null
-            : new Openings(luminaires, mesh.up, box.getSize(new Vector3()).length());
-        stage.show(mesh, description.channels, openings);
+        const diagonal = box.getSize(new Vector3()).length(), sensors = sensorsOf(sets),
+            openings = luminaires.length === 0 ? null : new Openings(luminaires, mesh.up, diagonal),
+            marks = sensors === null ? null : new SensorMarks(sensors, mesh.up, diagonal, stage.uniforms);
+        stage.show(mesh, description.channels, openings, marks);
         const picker = new Picker(stage.geometry as never, stage.drawn ?? mesh);
         const scene = { description, mesh, picker, defaultLighting: takeIn(defaultLightingOf(mesh, description)),
-            openings, luminaires: luminairesOf(luminaires, mesh.area) };
+            openings, luminaires: luminairesOf(luminaires, mesh.area), sensors, marks };
         this.take(scene);
         cameras.floorAt = (x, z) => picker.floorAt(x, z);
         cameras.setBounds(box);
@@ -65,7 +68,7 @@ export class Opening {
 
 /** The state that a scene begins with: a given one, whose lamps that it does not name are the scene's own, or that of
  * the page as it is, in the scene's own light, seen whole. Its unit is that of the store. */
-function stateOf({ description, mesh, defaultLighting, luminaires }: OpenScene, given: State | null,
+function stateOf({ description, mesh, defaultLighting, luminaires, sensors }: OpenScene, given: State | null,
     before: State): State
 {
     const base = given ?? { ...firstState, view: { ...before.view, camera: null, exposure: null, range: null } };
@@ -73,5 +76,6 @@ function stateOf({ description, mesh, defaultLighting, luminaires }: OpenScene, 
     if (base.lighting === firstState.lighting) Object.assign(lighting, defaultLighting);
     if (!isRow(luminaires, lighting.soloLuminaire)) lighting.soloLuminaire = null;
     const view: View = { ...base.view, unit: description.lights === "lm" ? "lx" : "W/m²" };
-    return { ...base, view, lighting, pins: base.pins.filter((pin) => pin < mesh.elements) };
+    return { ...base, view, lighting, pins: base.pins.filter((pin) => pin < mesh.elements),
+        sensor: placeOfChoice(sensors, base.sensor) === null ? null : base.sensor };
 }

@@ -8,8 +8,10 @@ import type { Field } from "../picture/field.ts";
 import type { SceneMesh } from "../picture/glb.ts";
 import type { Openings } from "../picture/openings.ts";
 import type { Picker } from "../picture/pick.ts";
+import type { SensorMarks } from "../picture/sensor_marks.ts";
 import type { Stage } from "../picture/stage.ts";
 import type { SceneLuminaires } from "../state/luminaires.ts";
+import type { SceneSensors } from "../state/sensors.ts";
 import type { Wanted } from "../state/request.ts";
 import type { Lighting, State } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
@@ -33,6 +35,9 @@ export interface OpenScene {
     /** Of its luminaires; null: the store has none. */
     readonly openings: Openings | null;
     readonly luminaires: SceneLuminaires | null;
+    /** The same of its sensors. */
+    readonly sensors: SceneSensors | null;
+    readonly marks: SensorMarks | null;
     /** Lighting that the scene comes with. */
     readonly defaultLighting: Lighting;
 }
@@ -50,6 +55,14 @@ export interface Certificate {
     solve: number | null;
 }
 
+/** The light at sensors, in the unit of irradiance: a value for each place, NaN where it has none. */
+export interface Sensed {
+    /** Null: none are known. */
+    values: Float32Array | null;
+    /** The line of the daemon that says why there are none; null: it has not refused them. */
+    refused: string | null;
+}
+
 export type SceneEvents = {
     /** Another scene is open. */
     scene: [];
@@ -59,6 +72,8 @@ export type SceneEvents = {
     field: [];
     timing: [Timing];
     hover: [];
+    /** Values of sensors came, or are known no more. */
+    sensed: [];
     /** A luminaire was picked in the picture. */
     picked: [string];
     /** The page around the picture became dark or light. */
@@ -77,6 +92,7 @@ export interface Scene extends Observable<SceneEvents> {
     readonly fields: readonly [Field | null, Field | null];
     /** Where the daemon has certified what is shown. */
     readonly certificate: Certificate | null;
+    readonly sensed: Sensed;
     /** The element under the pointer. */
     readonly hovered: number | null;
     /** The picture has the sun drawn sharp, or will have. */
@@ -103,6 +119,8 @@ export interface Ask {
     wanted(side?: Side): Wanted | null;
     /** Asks for what is to be shown, if that has changed, or `again`. */
     shown(again?: boolean): void;
+    /** The values of sensors are looked at, or no more: those that are drawn are asked for anyway. */
+    sense(isSeen: boolean): void;
     /** Opens a scene; the rest of the state is given (a link), or that of the scene as it comes. */
     open(name: string, given: State | null): Promise<void>;
     /** Asks which scenes there are. */

@@ -7,6 +7,7 @@ import type { Store } from "../state/store.ts";
 import { Asking, type Outcome } from "./asking.ts";
 import { Opening } from "./opening.ts";
 import type { Ask, OpenScene, Side } from "./page.ts";
+import { Sensing } from "./sensing.ts";
 import { SharpSun } from "./sharp_sun.ts";
 import type { Shown } from "./shown.ts";
 
@@ -14,6 +15,7 @@ export class Requests implements Ask {
     private readonly comparable: Comparable;
     private readonly asking: Asking;
     private readonly sharp: SharpSun;
+    private readonly sensing: Sensing;
     private readonly opening: Opening;
 
     /** `incomparable` is told why a scene cannot be compared. */
@@ -25,12 +27,13 @@ export class Requests implements Ask {
             (description) => scene.sky.prepareOther(description), (name) => api.luminaires(name));
         this.asking = new Asking(api, store, scene, this.comparable, outcome);
         this.sharp = new SharpSun(store, scene, (wanted) => this.asking.solve(wanted), fail);
+        this.sensing = new Sensing(api, store, scene, () => this.wanted(), fail);
         this.opening = new Opening(api, store, scene, (opened) => this.take(opened));
         store.listen((now, before) => this.follow(now, before));
     }
 
     get isIdle(): boolean {
-        return this.asking.isIdle && this.sharp.isIdle;
+        return this.asking.isIdle && this.sharp.isIdle && this.sensing.isIdle;
     }
 
     wanted(side: Side = 0): Wanted | null {
@@ -40,6 +43,10 @@ export class Requests implements Ask {
     shown(again = false): void {
         this.asking.ask(again);
         this.sharp.ask(again);
+    }
+
+    sense(isSeen: boolean): void {
+        this.sensing.look(isSeen);
     }
 
     async open(name: string, given: State | null): Promise<void> {
@@ -64,6 +71,7 @@ export class Requests implements Ask {
         this.asking.forget(0);
         this.asking.forget(1);
         this.sharp.forget();
+        this.sensing.forget();
     }
 
     private follow(now: State, before: State): void {

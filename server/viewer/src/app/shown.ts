@@ -5,16 +5,18 @@ import type { SceneSky } from "../daylight/scene_sky.ts";
 import { Cameras } from "../picture/cameras.ts";
 import type { Field } from "../picture/field.ts";
 import { Stage } from "../picture/stage.ts";
-import type { State } from "../state/state.ts";
+import { placeOfChoice } from "../state/sensors.ts";
+import { quantityShown, type State } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
 import { Exposure } from "./exposure.ts";
-import type { Certificate, OpenScene, Scene, SceneEvents, Side } from "./page.ts";
+import type { Certificate, OpenScene, Scene, SceneEvents, Sensed, Side } from "./page.ts";
 
 export class Shown extends Events<SceneEvents> implements Scene {
     now: OpenScene | null = null;
     all: readonly SceneLine[] = [];
     readonly fields: [Field | null, Field | null] = [null, null];
     certificate: Certificate | null = null;
+    sensed: Sensed = { values: null, refused: null };
     hovered: number | null = null;
     isSunSharp = false;
     readonly stage: Stage;
@@ -68,6 +70,13 @@ export class Shown extends Events<SceneEvents> implements Scene {
         this.tell("field");
     }
 
+    sense(sensed: Sensed): void {
+        if (sensed.values === null && sensed.refused === this.sensed.refused && this.sensed.values === null) return;
+        this.sensed = sensed;
+        this.stage.setSensors(sensed.values);
+        this.tell("sensed");
+    }
+
     hover(element: number | null): void {
         if (element === this.hovered) return;
         this.hovered = element;
@@ -88,12 +97,12 @@ export class Shown extends Events<SceneEvents> implements Scene {
         if (now.view.walk !== before.view.walk) this.cameras.setWalk(now.view.walk);
         if (now.pins !== before.pins) this.stage.mark(this.hovered ?? -1, now.pins);
         if (now.view.judged !== before.view.judged || now.scene !== before.scene) this.judge(now);
-        if (now.view !== before.view || now.compare !== before.compare) this.display();
+        if (now.view !== before.view || now.compare !== before.compare || now.sensor !== before.sensor) this.display();
     }
 
     /** Hands all that shapes the picture, but the values, to the stage. */
     private display(): void {
-        const { view, compare } = this.store.now;
+        const { view, compare, sensor } = this.store.now;
         const { low, high } = this.exposure.axis(view);
         this.stage.setDisplay({
             picture: view.picture,
@@ -107,6 +116,12 @@ export class Shown extends Events<SceneEvents> implements Scene {
             isoLines: view.isoLines,
             threshold: view.threshold,
             openings: view.openings,
+            sensors: view.sensors,
+            hiddenSets: view.hiddenSets,
+            // The palette is that of other numbers elsewhere.
+            areSensorsColoured: quantityShown(view) === "irradiance" && compare === null,
+            required: view.required,
+            sensor: placeOfChoice(this.now?.sensors ?? null, sensor),
             marked: view.judged !== null,
             compare: compare === null || this.fields[1] === null ? "none" : compare.how,
             split: compare?.split ?? 0.5,

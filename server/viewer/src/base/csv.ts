@@ -1,4 +1,4 @@
-// Values of elements as text, for spreadsheets (RFC 4180).
+// Values of elements and of sensors as text, for spreadsheets (RFC 4180).
 
 /** The shortest text that reads as this number of single precision. */
 export function floatText(value: number): string {
@@ -25,4 +25,16 @@ export function csvOf(values: Float32Array, names: readonly string[], groupOf: U
         lines.push(line);
     }
     return `${lines.join("\r\n")}\r\n`;
+}
+
+/** A line for each sensor; one without a value has an empty cell. */
+export function sensorLinesOf(
+    sensors: readonly { set: string; at: readonly number[]; axis: readonly number[]; value: number }[],
+    unit: string,
+): string {
+    const lines = sensors.map(({ set, at, axis, value }) =>
+        [csvCell(set), ...[...at, ...axis].map((x) => String(Number(x.toPrecision(9)))),
+            Number.isNaN(value) ? "" : floatText(value)].join(",")
+    );
+    return `${[`sensors,x [m],y [m],z [m],nx,ny,nz,irradiance (${unit})`, ...lines].join("\r\n")}\r\n`;
 }

@@ -42,6 +42,7 @@ export interface Description {
     sky: { tiling: string; tiles: number; ground_albedo: number } | null;
     /** Null: the store has none. */
     luminaires: { count: number; lumens: number } | null;
+    sensors: { sets: number; receivers: number } | null;
     error: { [light: string]: ErrorFigures | GroupErrors[] | number | string | boolean } & {
         [light in "single" | "lights" | "random" | "sky"]?: ErrorFigures;
     } | null;
@@ -73,6 +74,25 @@ export interface Luminaire {
     colour: Vector;
     /** The size is along C0, along C90 and against the aim. */
     opening: { shape: string; size: Vector };
+}
+
+/** Places at which light is read, in the axes of the store, metres; directions are unit vectors. */
+export interface SensorSet {
+    name: string;
+    /** points, grids, eyes, cylinders, semicylinders, spheres, cubes or probes; a number of a later daemon. */
+    kind: string | number;
+    at: Vector[];
+    /** The normals of planes and the axes of cylinders, one for all or one each; null: of spheres. */
+    axis: Vector | Vector[] | null;
+    /** The way that semi-cylinders look; null of others. */
+    look: Vector | Vector[] | null;
+    /** Of a grid alone: the number of columns, row times columns plus column of each, and metres between them. */
+    columns?: number;
+    cells?: number[];
+    spacing?: number[];
+    /** Those that have no value, from 0. */
+    in_walls: number[];
+    in_luminaires: number[];
 }
 
 /** A body for POST …/radiosity; EMISSION of the contract. */
@@ -169,6 +189,11 @@ export class Api {
     async luminaires(scene: string): Promise<Luminaire[]> {
         return ((await (await this.ask(Api.path(scene, "/luminaires"))).json()) as { luminaires: Luminaire[] })
             .luminaires;
+    }
+
+    /** In the order of their values. */
+    async sensors(scene: string): Promise<SensorSet[]> {
+        return ((await (await this.ask(Api.path(scene, "/sensors"))).json()) as { sets: SensorSet[] }).sets;
     }
 
     /** Radiances of the tiles of a scene. */

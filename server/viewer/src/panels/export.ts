@@ -1,9 +1,10 @@
 // Takes what is shown out of the page: a picture, the numbers, the request as a command or a program.
 import { button, make, tick } from "../base/dom.ts";
-import { csvOf } from "../base/csv.ts";
+import { csvOf, sensorLinesOf } from "../base/csv.ts";
 import { readNpy } from "../base/npy.ts";
 import type { Page } from "../app/page.ts";
 import { drawLegend, SIDE_MOST, snapshot, type Legend } from "../picture/snapshot.ts";
+import { vectorOf, valuesOf } from "../state/sensors.ts";
 import { curlCommand, plainRequest, pythonProgram, type PlainRequest } from "../state/snippets.ts";
 import { quantityShown, unitOf, unitShown } from "../state/state.ts";
 import type { Store } from "../state/store.ts";
@@ -15,7 +16,7 @@ const QUANTITIES = { radiosity: "Radiosity B", irradiance: "Irradiance H", indir
 class Changed extends Error {}
 
 export function exportPanel(page: Page): Panel {
-    const { tell } = page;
+    const { tell, scene } = page;
     const said = make("p", { role: "status", "aria-live": "polite" });
     const tries = (what: () => Promise<string>): void => {
         said.textContent = "Working …";
@@ -30,10 +31,16 @@ export function exportPanel(page: Page): Panel {
         make("p", { class: "hint" }, "Of every element, asked for again in single precision."),
         make("div", { class: "row" }, button("Save CSV", null, () => tries(() => saveCsv(page))),
             button("Save NPY", null, () => tries(() => saveNpy(page)))));
+    const sensors = make("div", { hidden: true },
+        make("p", { class: "hint" }, "Of every sensor: its set, place, the way that it faces, and the light there."),
+        make("div", { class: "row" }, button("Save sensors as CSV", null, () => tries(() => saveSensors(page)))));
+    scene.on("scene", () => {
+        sensors.hidden = (scene.now?.sensors?.names.length ?? 0) === 0;
+    });
     return {
         id: "export",
         title: "Export",
-        element: make("div", {}, picturePart(page, tries, said), numbers, said, requestPart(page)),
+        element: make("div", {}, picturePart(page, tries, said), numbers, sensors, said, requestPart(page)),
     };
 }
 
@@ -100,9 +107,9 @@ function request({ store, ask }: Page): PlainRequest | null {
 }
 
 /** A name that every system of files takes. */
-function fileName(store: Store): string {
-    const { scene, view } = store.now;
-    return `${scene.replace(/[^\p{L}\p{N}._@-]+/gu, "-").slice(0, 80) || "scene"}-${quantityShown(view)}`;
+function fileName(store: Store, what: string = quantityShown(store.now.view)): string {
+    const { scene } = store.now;
+    return `${scene.replace(/[^\p{L}\p{N}._@-]+/gu, "-").slice(0, 80) || "scene"}-${what}`;
 }
 
 async function values(page: Page): Promise<ArrayBuffer> {
@@ -135,6 +142,30 @@ async function saveCsv(page: Page): Promise<string> {
         `${fileName(page.store)}.csv`,
     );
     return `Saved ${mesh.elements} lines.`;
+}
+
+/** The same columns as those of `lambert solve --sensors -o FILE.csv`; of several channels the luminance or their
+ * mean. */
+async function saveSensors(page: Page): Promise<string> {
+    const sensors = page.scene.now?.sensors ?? null, what = request(page);
+    if (sensors === null) return "";
+    if (what === null) throw new Error("Nothing shines, so there are no numbers to save.");
+    const { emission } = what.body,
+        { data, shape } = readNpy(
+            (await page.ask.api.floats(what.scene, { emission, quantity: "irradiance",
+                select: { sensors: sensors.names } })).file,
+        );
+    const values = valuesOf(sensors, data, shape.length > 1 ? shape[0] : 1, 1);
+    const lines = sensors.sets.filter((of) => !of.isProbes).flatMap(({ set, first }) =>
+        set.at.map((at, k) => ({ set: set.name, at, axis: vectorOf(set.axis, k) ?? [0, 0, 0],
+            value: values[first + k] })
+        )
+    );
+    download(
+        new Blob([sensorLinesOf(lines, unitOf(page.store.now.view, "irradiance"))], { type: "text/csv;charset=utf-8" }),
+        `${fileName(page.store, "sensors")}.csv`,
+    );
+    return `Saved ${lines.length} lines.`;
 }
 
 function download(blob: Blob, name: string): void {

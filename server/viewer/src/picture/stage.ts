@@ -9,6 +9,7 @@ import { channelWeights } from "./field.ts";
 import type { SceneMesh } from "./glb.ts";
 import { findNodes } from "./nodes.ts";
 import type { Openings } from "./openings.ts";
+import type { SensorMarks } from "./sensor_marks.ts";
 import { splitEdges, type Drawn } from "./split_edges.ts";
 import { Sunlight } from "./sunlight.ts";
 import { makeUniforms, nodesMaterial, paneMaterial, sceneMaterial, type Uniforms } from "./material.ts";
@@ -31,6 +32,14 @@ export interface Display {
     threshold: number | null;
     /** Openings of luminaires are drawn where there are any. */
     openings: boolean;
+    /** The same of sensors, but for those of the hidden sets; they are coloured by their values, or alike. */
+    sensors: boolean;
+    hiddenSets: readonly string[];
+    areSensorsColoured: boolean;
+    /** In the unit of their values; null: none is required. */
+    required: number | null;
+    /** The place of a sensor that stands out. */
+    sensor: number | null;
     /** The judged elements are shown as such without a threshold, too. */
     marked: boolean;
     compare: "none" | "split" | "difference";
@@ -62,6 +71,7 @@ export class Stage {
     private nodesAreOld = false;
     private body: Mesh | null = null;
     private openings: Openings | null = null;
+    private marks: SensorMarks | null = null;
     private hasImages = false;
     private images: Texture[] = [];
     private paletteName: Palette | null = null;
@@ -101,10 +111,12 @@ export class Stage {
             || this.renderer.extensions.has("EXT_color_buffer_half_float");
     }
 
-    show(mesh: SceneMesh, channels: number, openings: Openings | null): void {
+    show(mesh: SceneMesh, channels: number, openings: Openings | null, marks: SensorMarks | null): void {
         this.clear();
         this.openings = openings;
+        this.marks = marks;
         if (openings !== null) this.scene.add(openings.lines);
+        if (marks !== null) this.scene.add(marks.mesh);
         const nodes = findNodes(mesh), drawn = splitEdges(mesh, nodes), vertices = drawn.elementOf.length,
             ids = new Uint32Array(2 * vertices);
         for (let v = 0; v < vertices; v++) {
@@ -218,7 +230,7 @@ export class Stage {
     }
 
     setDisplay(display: Display): void {
-        const u = this.uniforms;
+        const u = this.uniforms, before = this.display;
         this.display = display;
         u.picture.value = display.picture === "false" ? 1 : 0;
         u.is_smooth.value = display.smooth && this.canSmooth;
@@ -239,7 +251,20 @@ export class Stage {
             u.palette.value = paletteTexture(display.palette);
         }
         if (this.openings !== null) this.openings.lines.visible = display.openings;
+        if (this.marks !== null) this.styleMarks(this.marks, display, before);
         this.placeSplit();
+        this.invalidate();
+    }
+
+    private styleMarks(marks: SensorMarks, display: Display, before: Display | null): void {
+        marks.mesh.visible = display.sensors;
+        if (display.hiddenSets !== before?.hiddenSets) marks.hide(display.hiddenSets);
+        marks.style(display.areSensorsColoured, display.required, display.sensor);
+    }
+
+    /** A value for each sensor, NaN where it has none; null: none are known. */
+    setSensors(values: Float32Array | null): void {
+        this.marks?.setValues(values);
         this.invalidate();
     }
 
@@ -416,6 +441,7 @@ export class Stage {
         for (const one of [...materials, ...textures, geometry, nodes, nodesPlane.geometry, nodesPlane.material, white,
             ...images]) one?.dispose?.();
         this.openings?.dispose();
+        this.marks?.dispose();
         sunlight?.release();
     }
 
@@ -423,6 +449,9 @@ export class Stage {
         this.scene.clear();
         this.geometry?.dispose();
         this.openings?.dispose();
+        this.marks?.dispose();
+        // What was hidden of another scene says nothing of the next one.
+        this.display = null;
         this.values?.forEach((texture) => texture.dispose());
         this.nodes?.dispose();
         this.images.forEach((texture) => texture.dispose());

@@ -134,7 +134,7 @@ function isPlace(value: unknown): value is Place {
 }
 
 function restoreView(given: unknown): View {
-    const view = restore(firstView, given, ["exposure", "range", "threshold", "judged", "camera"]);
+    const view = restore(firstView, given, ["exposure", "range", "threshold", "judged", "camera", "required"]);
     const orNull = (
         value: unknown,
     ): number | null => (typeof value === "number" && Number.isFinite(value) ? value : null);
@@ -153,9 +153,19 @@ function restoreView(given: unknown): View {
         range,
         exposure: view.exposure === null ? null : held(view.exposure, 0, -60, 60),
         threshold: orNull(view.threshold),
+        required: typeof view.required === "number" && view.required >= 0 ? orNull(view.required) : null,
+        hiddenSets: (view.hiddenSets as unknown[]).filter((name) => typeof name === "string"),
         judged: typeof view.judged === "string" ? view.judged : null,
         camera: isPlace(view.camera) ? view.camera : null,
     };
+}
+
+function restoreSensor(given: unknown): State["sensor"] {
+    if (!isPlain(given)) return null;
+    const { set, index } = given;
+    return typeof set === "string" && Number.isInteger(index) && (index as number) >= 0
+        ? { set, index: index as number }
+        : null;
 }
 
 function toBase64Url(text: string): string {
@@ -194,7 +204,7 @@ export function fromFragment(fragment: string): State | null {
         return null;
     }
     if (!isPlain(given)) return null;
-    const state = restore(firstState, given, ["compare", "tolerance"]);
+    const state = restore(firstState, given, ["compare", "tolerance", "sensor"]);
     const compare = isPlain(state.compare) ? state.compare as unknown as Plain : null;
     return {
         ...state,
@@ -205,6 +215,7 @@ export function fromFragment(fragment: string): State | null {
         views: (state.views as unknown[]).filter(isPlain)
             .flatMap((v) => (isPlace(v.camera) ? [{ name: String(v.name), camera: v.camera }] : [])),
         pins: state.pins.filter((pin) => Number.isInteger(pin) && pin >= 0),
+        sensor: restoreSensor(state.sensor),
         tolerance: typeof state.tolerance === "number" ? state.tolerance : null,
         compare: compare === null ? null : {
             how: compare.how === "split" ? "split" : "difference",

@@ -1,6 +1,7 @@
 // The state of the page: all that a link restores. Plain data; changes make new objects.
 import type { Rgb } from "../base/colour.ts";
 import type { Quantity } from "../daemon/api.ts";
+import type { SensorChoice } from "./sensors.ts";
 
 /** Emission of a group: `power` is its luminance-weighted exitance in the store's unit, the colour has luminance 1. */
 export interface GroupLight {
@@ -124,6 +125,11 @@ export interface View {
     camera: Place | null;
     /** The openings of luminaires are drawn. */
     openings: boolean;
+    /** Sensors are drawn, but for those of these sets. */
+    sensors: boolean;
+    hiddenSets: string[];
+    /** The irradiance that sensors should have; null: none is required. */
+    required: number | null;
 }
 
 export interface Preset {
@@ -153,6 +159,8 @@ export interface State {
     presets: Preset[];
     views: KeptView[];
     pins: number[];
+    /** The sensor that is marked in the picture. */
+    sensor: SensorChoice | null;
     compare: Compare | null;
     /** Certified bound that is asked for, or null. */
     tolerance: number | null;
@@ -195,6 +203,9 @@ export const firstView: View = {
     walk: false,
     camera: null,
     openings: true,
+    sensors: true,
+    hiddenSets: [],
+    required: null,
 };
 
 export const firstLighting: Lighting = { groups: {}, dim: 1, solo: null, soloLuminaire: null, sky: skyOff, emitters: {},
@@ -207,6 +218,7 @@ export const firstState: State = {
     presets: [],
     views: [],
     pins: [],
+    sensor: null,
     compare: null,
     tolerance: null,
 };

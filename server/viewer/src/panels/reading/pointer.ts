@@ -4,8 +4,10 @@ import { clamp, numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
 import type { Luminaire } from "../../daemon/api.ts";
 import { lumensOf } from "../../state/luminaires.ts";
+import { choiceOfPlace } from "../../state/sensors.ts";
 import { pinsAfter } from "../../state/shares.ts";
 import { unitShown } from "../../state/state.ts";
+import { lightAtPlace, nameOfPlace } from "../sensor_card.ts";
 
 /** A pointer that moved less than this, in pixels, between down and up has clicked. */
 const CLICK_PX = 5;
@@ -27,6 +29,8 @@ export class Pointer {
     private isWaiting = false;
     private element: number | null = null;
     private luminaire: Luminaire | null = null;
+    /** The place of a sensor. */
+    private sensor: number | null = null;
 
     constructor(private readonly page: Page, /** True while the panel is seen: then elements are marked and pinned. */
         private readonly isReading: () => boolean)
@@ -55,7 +59,7 @@ export class Pointer {
         window.addEventListener("pointerup", (event) => this.release(event));
         // Before the camera, which listens to the canvas itself.
         this.frame.addEventListener("keydown", (event) => this.press(event), true);
-        scene.on("field", () => this.showNumber());
+        for (const event of ["field", "sensed"] as const) scene.on(event, () => this.showNumber());
         // After the camera moved by itself or by keys, another element is under the cross or the pointer.
         store.listen((now, before) => {
             if (now.view.camera !== before.view.camera && this.place !== null) this.moveTo(...this.place);
@@ -109,24 +113,29 @@ export class Pointer {
         if (down === null || event.pointerId !== down[2] || event.target !== this.canvas) return;
         if (Math.hypot(event.clientX - down[0], event.clientY - down[1]) > CLICK_PX) return;
         const { scene } = this.page;
-        if (!this.isReading() && scene.now?.openings === null) return;
+        if (!this.isReading() && scene.now?.openings === null && scene.now.marks === null) return;
         const box = this.canvas.getBoundingClientRect();
         this.place = [event.clientX - box.left, event.clientY - box.top];
         this.look();
-        if (this.isReading()) this.pin(event.shiftKey);
+        if (this.isReading() || this.sensor !== null) this.pin(event.shiftKey);
         else if (this.luminaire !== null) scene.pick(this.luminaire.name);
     }
 
+    /** Pins the element, or marks the sensor before it; a second time ends that. */
     private pin(isMore: boolean): void {
-        const { store } = this.page;
-        if (this.element !== null)
+        const { store, scene } = this.page, sensors = scene.now?.sensors ?? null;
+        if (this.sensor !== null && sensors !== null) {
+            const { of: { set: { name } }, index } = choiceOfPlace(sensors, this.sensor), { sensor } = store.now;
+            store.change({ ...store.now,
+                sensor: sensor?.set === name && sensor.index === index ? null : { set: name, index } });
+        } else if (this.element !== null)
             store.change({ ...store.now, pins: pinsAfter(store.now.pins, this.element, isMore) });
         else if (!isMore && store.now.pins.length > 0) store.change({ ...store.now, pins: [] });
     }
 
     private leave(): void {
         this.place = null;
-        this.element = this.luminaire = null;
+        this.element = this.luminaire = this.sensor = null;
         this.tip.hidden = true;
         this.page.scene.hover(null);
     }
@@ -150,6 +159,7 @@ export class Pointer {
         const [x, y] = [(2 * place[0]) / width - 1, 1 - (2 * place[1]) / height], met = scene.picker.meet(x, y, camera);
         this.element = met?.element ?? null;
         this.luminaire = view.openings ? scene.openings?.at(x, y, camera, height, met?.distance ?? null) ?? null : null;
+        this.sensor = view.sensors ? scene.marks?.at(x, y, camera, met?.distance ?? null) ?? null : null;
         this.page.scene.hover(this.isReading() || this.isByKeys ? this.element : null);
         this.showNumber();
     }
@@ -157,11 +167,12 @@ export class Pointer {
     /** The number beside the pointer: what the picture shows there. */
     private showNumber(): void {
         const { page: { scene: { now: scene, fields: [field] }, store: { now: { view, lighting } } }, place, element,
-            luminaire } = this;
+            luminaire, sensor } = this;
         if (place === null) return;
         this.cross.style.left = `${place[0]}px`;
         this.cross.style.top = `${place[1]}px`;
-        this.tip.hidden = (element === null && luminaire === null) || field === null || scene === null;
+        this.tip.hidden = (element === null && luminaire === null && sensor === null) || field === null
+            || scene === null;
         if (this.tip.hidden || field === null || scene === null) {
             if (this.isByKeys) this.told.textContent = "nothing";
             return;
@@ -174,7 +185,11 @@ export class Pointer {
             : `${numberText(field.values[element])} ${unitShown(view)} · ${
                 scene.mesh.groups[scene.mesh.groupOf[element]]?.name ?? ""
             }`;
-        const text = [lamp, surface].filter((part) => part !== "").join(" · ");
+        const sensors = scene.sensors;
+        const read = sensor === null || sensors === null
+            ? ""
+            : `${nameOfPlace(sensors, sensor)}: ${lightAtPlace(this.page, sensors, sensor)}`;
+        const text = [read, lamp, surface].filter((part) => part !== "").join(" · ");
         this.tip.textContent = text;
         if (this.isByKeys) this.told.textContent = element === null ? text : `${text}, element ${element}`;
         // It stays within the picture, and beside the pointer.

@@ -2,6 +2,7 @@
 import { choice, make } from "../../base/dom.ts";
 import type { Page } from "../../app/page.ts";
 import type { Panel } from "../panel.ts";
+import { sensorCard } from "../sensor_card.ts";
 import { Groups } from "./groups.ts";
 import { Histogram } from "./histogram.ts";
 import { Judge } from "./judge.ts";
@@ -40,8 +41,8 @@ export function readingPanel(page: Page): Panel {
     store.listen((now, before) => {
         if (now.view !== before.view) update();
     });
-    element.append(shown, make("div", { class: "row" }, pointer.keys), pins.element, shares.element, judge.element,
-        histogram.element, groups.element);
+    element.append(shown, make("div", { class: "row" }, pointer.keys), sensorCard(page), pins.element, shares.element,
+        judge.element, histogram.element, groups.element);
     new IntersectionObserver((entries) => {
         isSeen = entries[entries.length - 1].isIntersecting;
         if (!isSeen) {
