@@ -97,9 +97,13 @@ static size_t pass_bytes(const scene *s, size_t count) {
     return count * s->n_channels * (s->n + (s->n_emitters > 0 ? s->n_emitters : s->n)) * sizeof(float);
 }
 
-size_t adjoint_rows_bytes(const scene *s, const radiosity_request *request) {
-    const size_t n_names = request->reduce.n_names, count = n_names < BATCH_PASS ? n_names : BATCH_PASS;
+size_t adjoint_rows_room(const scene *s, size_t n_rows) {
+    const size_t count = n_rows < BATCH_PASS ? n_rows : BATCH_PASS;
     return count * row_bytes(s) + pass_bytes(s, count);
+}
+
+size_t adjoint_rows_bytes(const scene *s, const radiosity_request *request) {
+    return adjoint_rows_room(s, request->reduce.n_names);
 }
 
 size_t adjoint_rows_capacity(const scene *s) {
@@ -107,12 +111,13 @@ size_t adjoint_rows_capacity(const scene *s) {
     return count < ADJOINT_ROWS_OF_REQUEST ? count : ADJOINT_ROWS_OF_REQUEST;
 }
 
+/* name: of the groups; NULL: the row is of an element. */
 static adjoint_row *row_allocate(const scene *s, const reduce_name *name, lam_quantity quantity) {
     const size_t C = s->n_channels;
     adjoint_row *row = memory_allocate(1, sizeof *row, "an adjoint row", NULL);
     if (row == NULL) return NULL;
-    row->groups = name->groups;
-    row->n_groups = name->n_groups;
+    row->groups = name != NULL ? name->groups : NULL;
+    row->n_groups = name != NULL ? name->n_groups : 0;
     row->quantity = quantity;
     row->bytes = row_bytes(s);
     float **const numbers = s->n_emitters > 0 ? &row->emitters : &row->w;
@@ -216,50 +221,74 @@ static bool get_weights(const scene *s, const emitter_weights **weights) {
     return true;
 }
 
-/* Computes the rows of some names, rows[which[k]] that of names[which[k]], by one pass over the operator and
- * adds them to the cache. */
-static bool make_rows(const scene *s, const reduce_name *names, lam_quantity quantity, size_t count,
-                      const size_t *which, batch_workspace *workspace, adjoint_row **rows, problem *why) {
+/* Fills the rows of `count` cotangents g [count][C][n], behind which is as much room for w, by one pass over
+ * the operator. */
+static bool fill_rows(const scene *s, lam_quantity quantity, size_t count, float *g,
+                      batch_workspace *workspace, adjoint_row *const *rows, problem *why) {
     const size_t n = s->n, C = s->n_channels, width = s->n_emitters > 0 ? s->n_emitters : n;
     const size_t work_bytes = lam_operator_work_bytes(s->op, count);
+    float *const w = g + count * C * n;
     lam_error error;
     const emitter_weights *weights;
-    adjoint_row *made[BATCH_PASS] = {NULL};
-    double area[BATCH_PASS], buried[BATCH_PASS];
-    bool allocated, good = false;
-    float *const g = memory_allocate(1, pass_bytes(s, count), "rows", NULL);
     void *work = work_bytes > 0 ? batch_workspace_get(workspace, work_bytes) : NULL;
-    allocated = g != NULL && work != NULL && get_weights(s, &weights);
-    for (size_t k = 0; allocated && k < count; k++)
-        allocated = (made[k] = row_allocate(s, &names[which[k]], quantity)) != NULL;
-    if (!allocated) {
-        problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the adjoint rows of %zu groups", count);
-        goto done;
-    }
-    float *const w = g + count * C * n;
-    for (size_t k = 0; k < count; k++)
-        area[k] = write_cotangent(s, &names[which[k]], g + k * C * n, &buried[k]);
+    if (work == NULL || !get_weights(s, &weights))
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu adjoint rows", count);
     const lam_status status =
         s->n_emitters > 0
             ? lam_operator_adjoint_emitters(s->op, count, quantity, g, w, work, work_bytes, &error)
             : lam_operator_apply_adjoint(s->op, count, quantity, g, w, work, work_bytes, &error);
-    if (status != LAM_OK) {
-        problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
-        goto done;
-    }
-    for (size_t k = 0; k < count; k++) {
-        made[k]->area = area[k];
-        made[k]->buried = buried[k];
+    if (status != LAM_OK) return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+    for (size_t k = 0; k < count; k++)
         if (s->n_emitters > 0)
-            fill_from_emitters(s, weights, w + k * C * width, made[k]);
+            fill_from_emitters(s, weights, w + k * C * width, rows[k]);
         else
-            fill_from_elements(s, w + k * C * width, g + k * C * n, made[k]);
+            fill_from_elements(s, w + k * C * width, g + k * C * n, rows[k]);
+    return true;
+}
+
+/* Computes the rows of some names, rows[which[k]] that of names[which[k]], by one pass over the operator and
+ * adds them to the cache. */
+static bool make_rows(const scene *s, const reduce_name *names, lam_quantity quantity, size_t count,
+                      const size_t *which, batch_workspace *workspace, adjoint_row **rows, problem *why) {
+    const size_t vector = s->n_channels * s->n;
+    adjoint_row *made[BATCH_PASS] = {NULL};
+    float *const g = memory_allocate(1, pass_bytes(s, count), "rows", NULL);
+    bool good = g != NULL;
+    for (size_t k = 0; good && k < count; k++)
+        good = (made[k] = row_allocate(s, &names[which[k]], quantity)) != NULL;
+    if (!good)
+        problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the adjoint rows of %zu groups", count);
+    for (size_t k = 0; good && k < count; k++)
+        made[k]->area = write_cotangent(s, &names[which[k]], g + k * vector, &made[k]->buried);
+    good = good && fill_rows(s, quantity, count, g, workspace, made, why);
+    for (size_t k = 0; good && k < count; k++) {
         rows[which[k]] = row_cache_publish(s->rows, made[k], &names[which[k]]);
         made[k] = NULL;
     }
-    good = true;
-done:
     for (size_t k = 0; k < count; k++) adjoint_row_free(made[k]);
+    free(g);
+    return good;
+}
+
+bool adjoint_rows_of_elements(const scene *s, lam_quantity quantity, size_t count, const uint32_t *elements,
+                              batch_workspace *workspace, adjoint_row **rows, problem *why) {
+    const size_t n = s->n, C = s->n_channels;
+    float *const g = memory_allocate(1, pass_bytes(s, count), "rows", NULL);
+    bool good = g != NULL;
+    for (size_t k = 0; k < count; k++) rows[k] = NULL;
+    for (size_t k = 0; good && k < count; k++) good = (rows[k] = row_allocate(s, NULL, quantity)) != NULL;
+    if (!good)
+        problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the adjoint rows of %zu elements", count);
+    if (good) memset(g, 0, count * C * n * sizeof *g);
+    for (size_t k = 0; good && k < count; k++) {
+        rows[k]->area = s->area[elements[k]];
+        for (size_t c = 0; c < C; c++) g[(k * C + c) * n + elements[k]] = 1;
+    }
+    good = good && fill_rows(s, quantity, count, g, workspace, rows, why);
+    for (size_t k = 0; !good && k < count; k++) {
+        adjoint_row_free(rows[k]);
+        rows[k] = NULL;
+    }
     free(g);
     return good;
 }

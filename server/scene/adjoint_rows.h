@@ -20,13 +20,21 @@ size_t adjoint_rows_capacity(const scene *s);
  * adjoint_rows_release. Does not wait. */
 bool adjoint_rows_find(const scene *s, const radiosity_request *request, adjoint_row **rows);
 
-/* The most bytes that adjoint_rows_get takes for a request, with rows that the cache does not keep. */
+/* The most bytes that adjoint_rows_get takes for a request, with rows that the cache does not keep; and for
+ * rows that are found by up to BATCH_PASS at a time. */
+size_t adjoint_rows_room(const scene *s, size_t n_rows);
 size_t adjoint_rows_bytes(const scene *s, const radiosity_request *request);
 
 /* The same of names first ... first + count, in rows [count], at most BATCH_PASS; those that are missing are
  * computed by one pass over the operator. 503 when memory is short. */
 bool adjoint_rows_get(const scene *s, const radiosity_request *request, size_t first, size_t count,
                       batch_workspace *workspace, adjoint_row **rows, problem *why);
+
+/* The rows of the values of elements, at most BATCH_PASS, by one pass over the operator. The cache does not
+ * keep them: the caller frees each by adjoint_row_free. Where it fails all are NULL. 503 when memory is
+ * short. */
+bool adjoint_rows_of_elements(const scene *s, lam_quantity quantity, size_t count, const uint32_t *elements,
+                              batch_workspace *workspace, adjoint_row **rows, problem *why);
 
 void adjoint_rows_release(const scene *s, size_t count, adjoint_row **rows);
 

@@ -246,9 +246,8 @@ static bool add_errors(const scene *s, const column_work *w, const float *B, con
     return good;
 }
 
-bool sensor_columns_make(const scene *s, size_t count, const uint32_t *which, batch_workspace *workspace,
-                         float *work, float *out, problem *why) {
-    const size_t vector = s->n_channels * s->n, width = sensor_column_width(s);
+bool light_vectors_make(const scene *s, lam_quantity quantity, size_t count, const uint32_t *which,
+                        batch_workspace *workspace, float *work, const float **out, problem *why) {
     const size_t bytes = lam_operator_work_bytes(s->op, count);
     const column_work w = split_work(s, count, work);
     const float *L, *D;
@@ -257,19 +256,28 @@ bool sensor_columns_make(const scene *s, size_t count, const uint32_t *which, ba
     bool lit = room != NULL;
     for (size_t k = 0; lit && k < count; k++) lit = take_light(s, which[k], k, &w, &L, &D);
     if (!lit) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for %zu lights", count);
-    if ((s->n_emitters > 0 ? lam_operator_apply_emitters(s->op, count, LAM_RADIOSITY, w.W, s->n, NULL, w.B,
-                                                         room, bytes, &error)
-                           : lam_operator_apply_lit(s->op, count, LAM_RADIOSITY, w.E, w.H0, w.B, room, bytes,
-                                                    &error)) != LAM_OK)
-        return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+    *out = w.B;
+    return (s->n_emitters > 0 ? lam_operator_apply_emitters(s->op, count, quantity, w.W, s->n, NULL, w.B,
+                                                            room, bytes, &error)
+                              : lam_operator_apply_lit(s->op, count, quantity, w.E, w.H0, w.B, room, bytes,
+                                                       &error)) == LAM_OK ||
+           problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+}
+
+bool sensor_columns_make(const scene *s, size_t count, const uint32_t *which, batch_workspace *workspace,
+                         float *work, float *out, problem *why) {
+    const size_t vector = s->n_channels * s->n, width = sensor_column_width(s);
+    const column_work w = split_work(s, count, work);
+    const float *L, *D, *B;
+    if (!light_vectors_make(s, LAM_RADIOSITY, count, which, workspace, work, &B, why)) return false;
     for (size_t k = 0; k < count; k++) {
         if (!take_light(s, which[k], 0, &w, &L, &D))
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for %zu lights", count);
         float *column = out + k * width;
         const column_view view = sensor_column_view(s, column);
-        lam_sensors_gather(s->sensors, 1, w.B + k * vector, L, D, column);
-        sensors_gather_off(s->sensors, 1, w.B + k * vector, L, column + (view.off - column));
-        if (!add_errors(s, &w, w.B + k * vector, L, D, column))
+        lam_sensors_gather(s->sensors, 1, B + k * vector, L, D, column);
+        sensors_gather_off(s->sensors, 1, B + k * vector, L, column + (view.off - column));
+        if (!add_errors(s, &w, B + k * vector, L, D, column))
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the errors of %zu lights",
                                count);
     }

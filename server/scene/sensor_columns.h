@@ -63,6 +63,12 @@ const float *column_table_get(const column_table *table, size_t k);
 /* Keeps a copy of a column unless there is no room, or another thread has put it there. */
 void sensor_columns_put(sensor_columns *c, column_table *table, size_t k, const float *column);
 
+/* *out, in work, [count][C][n]: a quantity under each of these lights, at most BATCH_PASS, by one pass over
+ * the operator. work is sensor_columns_work(s, count) floats. Their bits do not depend on each other. False
+ * with *why. */
+bool light_vectors_make(const scene *s, lam_quantity quantity, size_t count, const uint32_t *which,
+                        batch_workspace *workspace, float *work, const float **out, problem *why);
+
 /* out [count][sensor_column_width]: the columns of these lights, at most BATCH_PASS, by one pass over the
  * operator. work is sensor_columns_work(s, count) floats. Their bits do not depend on each other. False with
  * *why. */

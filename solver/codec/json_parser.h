@@ -145,6 +145,9 @@ bool parser_read_rows(parser *p, float *rows, size_t count, size_t stride, const
 /* The weights of sensors in a cotangent. */
 bool parser_read_sensor_weights(parser *p);
 
+/* [NAME, ...] of groups, each once: the names in reduce, which stays off. */
+bool parser_read_group_names(parser *p);
+
 /* [NAME, ...] of sets of sensors, each once: their receivers, and the names in reduce, which stays off. */
 bool parser_read_sensor_sets(parser *p);
 

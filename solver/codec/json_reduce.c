@@ -32,6 +32,10 @@ static bool read_reduced(parser *p, bool sensors) {
                          sensors ? "set of sensors" : "group");
 }
 
+bool parser_read_group_names(parser *p) {
+    return read_reduced(p, false);
+}
+
 bool parser_read_sensor_sets(parser *p) {
     const group_index *sets = p->scene->sensors;
     const reduce_request *reduce = &p->request->reduce;

@@ -11,8 +11,10 @@ static void read_jacobian(const codec_scene *scene, const char *text, size_t siz
     jacobian_request request = {.n_by = 0};
     problem why = {0};
     if (codec_read_jacobian_json(scene, text, size, &request, &why)) {
-        FUZZ_CHECK(scene->sensors != NULL && request.n_by > 0 && request.n_by <= JACOBIAN_KINDS);
-        FUZZ_CHECK(request.of.n_receivers > 0 && request.of.reduce.n_names > 0);
+        FUZZ_CHECK(request.n_by > 0 && request.n_by <= JACOBIAN_KINDS && jacobian_rows(&request) > 0);
+        FUZZ_CHECK(request.kind != JACOBIAN_AT_SENSORS ||
+                   (scene->sensors != NULL && request.of.reduce.n_names > 0));
+        for (size_t k = 0; k < request.of.n_selected; k++) FUZZ_CHECK(request.of.selected[k] < scene->n);
         for (size_t k = 0; k < request.of.n_receivers; k++)
             FUZZ_CHECK(request.of.receivers[k] < FUZZ_SENSORS);
     } else {

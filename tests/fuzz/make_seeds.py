@@ -47,6 +47,8 @@ for e in emissions:
 
 for k, blank in enumerate(" \t\n\r"):
     (folder / "adjoint" / f"by{k}").write_text(json.dumps({"of": {"sensors": ["room"]}, "by": ["groups", "sky"]}) + blank)
+    for of in {"groups": ["lamp"]}, {"elements": [3, 0]}:
+        (folder / "adjoint" / f"{next(iter(of))}{k}").write_text(json.dumps({"of": of, "quantity": "indirect"}) + blank)
     (folder / "adjoint" / f"all{k}").write_text(json.dumps({"of": {"sensors": ["room.b", "room.a"]}}) + blank)
 
 # Skies, and small weather of both formats; the last byte says the format and what becomes of gaps.

@@ -285,7 +285,7 @@ class Answers(Case):
                 ("grey", "adjoint", {"cotangent": {"sensors": {"room": 1, "room.a": 1}}},
                  "cotangent/sensors/room.a: the set room.a is given twice"),
                 ("grey", "jacobian", {}, "the body does not say what the derivatives are of"),
-                ("grey", "jacobian", {"of": {}}, "of must hold sensors"),
+                ("grey", "jacobian", {"of": {}}, "of must hold sensors, groups or elements"),
                 ("grey", "jacobian", {"of": room, "by": []}, "by is empty, must hold luminaires, groups, sky or emitters"),
                 ("grey", "jacobian", {"of": room, "by": ["walls"]}, 'by/0 = "walls", must be luminaires, groups, sky or emitters'),
                 ("grey", "jacobian", {"of": room, "by": ["sky", "sky"]}, 'by/1 = "sky", which was listed before'),

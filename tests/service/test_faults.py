@@ -97,7 +97,8 @@ def each_request(n):
         yield "POST", solve, {"Content-Type": JSON}, json.dumps(body)
     yield "POST", solve, {"Content-Type": JSON, "Accept": NPY}, json.dumps({"emission": lit, "select": sets})
     yield "POST", adjoint, {"Content-Type": JSON}, json.dumps({"cotangent": {"sensors": {"room": 1}}, "gradient": ["luminaires"]})
-    yield "POST", "/v1/scenes/grey/jacobian", {"Content-Type": JSON}, json.dumps({"of": sets})
+    for of in sets, {"groups": ["lamp", "floor"]}, {"elements": [3, 1]}, {"elements": list(range(40))}:
+        yield "POST", "/v1/scenes/grey/jacobian", {"Content-Type": JSON}, json.dumps({"of": of})
     yield "GET", "/v1/scenes/grey/sensors", {}, None
     light = {"emission": {"elements": [3], "values": [1]}}
     for more in ({"tolerance": 1e-4}, {"at": "faces"}, {"at": "faces", "select": {"groups": ["floor"]}},
