@@ -66,6 +66,7 @@ codec_scene call_codec_scene(const call *in) {
                          .n_tiles = scene_tiles(s),
                          .n_luminaires = scene_luminaires(s),
                          .luminaires = &s->luminaire_names,
+                         .area = s->area,
                          .sensors = &s->sensor_sets,
                          .n_emitters = s->n_emitters,
                          .signs = s->n_emitters == 0,

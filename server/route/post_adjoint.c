@@ -1,5 +1,6 @@
 /* POST /v1/scenes/NAME/adjoint: gradients of J = g . q by emission, reflectance, sky, emitters, groups and
- * luminaires. gradient.h has the formulas. */
+ * luminaires, of a cotangent g or of a batch of them: begin reads the body, each vector of a pass is a
+ * cotangent, end writes. gradient.h has the formulas. */
 #include "server/route/routes.h"
 #include "server/route/sun_answer.h"
 #include "server/scene/direct_light.h"
@@ -13,17 +14,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Arrays [C][n], and the work area of the operator in the workspace of the thread. */
-typedef struct adjoint_memory {
-    float *w, *H, *H0, *v; /* w begins what is freed */
+/* The state from begin to end. Each vector of a pass is a cotangent. */
+typedef struct adjoint_solve {
+    adjoint_request request;
+    answer_notes notes;
+    char converted[LIGHT_CONVERSION_TEXT];
+    float *gradient[GRADIENT_COUNT]; /* [n_rhs][C][gradient_width] of those wanted */
+    float *w, *v;                    /* [BATCH_PASS][C][n], of a pass; w of the first begins what is freed */
+    float *narrow;                   /* [BATCH_PASS][C][emitters], of a store of few */
+    float *direct;                   /* [BATCH_PASS][C][m] and [C][k]: what comes to sensors directly */
+    float *H, *H0;                   /* [C][n], under the emission; H0 is NULL without direct light */
+    bool lit;                        /* H is found */
     sun_answer sun;
-    float *narrow;    /* [C][m] of tiles, or [C][s] of emitters */
-    float *of_groups; /* [C][g] */
-    float *dimmers;   /* [C][k] of luminaires */
-    float *direct;    /* [C][m] and [C][k]: what comes to sensors directly */
-    void *work;
-    size_t work_bytes;
-} adjoint_memory;
+    problem why;
+    bool failed;
+} adjoint_solve;
+
+static void solve_free(adjoint_solve *a) {
+    free(a->w);
+    sun_answer_free(&a->sun);
+    adjoint_request_free(&a->request);
+    free(a);
+}
 
 static size_t narrow_width(const scene *s) {
     return s->n_emitters > 0 ? s->n_emitters : scene_tiles(s);
@@ -42,180 +54,193 @@ static size_t answer_most(const call *in, const adjoint_request *request) {
     const scene *s = in->scene;
     size_t bytes = 0;
     for (int kind = 0; kind < GRADIENT_COUNT; kind++) {
-        const answer_shape shape = {
-            .n_channels = s->n_channels, .n_rhs = 1, .n_values = gradient_width(s, (gradient_kind)kind)};
+        const answer_shape shape = {.n_channels = s->n_channels,
+                                    .n_rhs = request->cotangent.n_rhs,
+                                    .n_values = gradient_width(s, (gradient_kind)kind)};
         if (adjoint_wants(request, (gradient_kind)kind))
             bytes = bytes_plus(bytes, answer_bytes_most(&shape, &in->accept));
     }
     return bytes;
 }
 
-static bool get_memory(call *in, const adjoint_request *request, adjoint_memory *memory, buffer *b,
-                       problem *why) {
+enum { ARRAYS = GRADIENT_COUNT + 6 };
+
+/* Takes the memory of gradients, of passes and of the answer. */
+static bool find_room(call *in, adjoint_solve *a, problem *why) {
     const scene *s = in->scene;
-    const bool by_reflectance = adjoint_wants(request, GRADIENT_REFLECTANCE),
-               direct = s->sky != NULL || s->luminaires != NULL;
-    const size_t C = s->n_channels, vector = C * s->n;
-    float **const places[] = {&memory->w,      &memory->H,         &memory->H0,      &memory->v,
-                              &memory->narrow, &memory->of_groups, &memory->dimmers, &memory->direct};
-    const size_t rows[] = {vector,
+    const adjoint_request *r = &a->request;
+    const bool by_reflectance = adjoint_wants(r, GRADIENT_REFLECTANCE),
+               direct = request_has_direct(&r->light) || r->light.n_suns > 0;
+    const size_t C = s->n_channels, vector = C * s->n, n_rhs = r->cotangent.n_rhs,
+                 pass = n_rhs < BATCH_PASS ? n_rhs : BATCH_PASS,
+                 to_sensors = r->cotangent.at_sensors ? C * (scene_tiles(s) + scene_luminaires(s)) : 0;
+    float **places[ARRAYS] = {&a->w, &a->v, &a->narrow, &a->direct, &a->H, &a->H0};
+    size_t rows[ARRAYS] = {pass * vector,
+                           pass * vector,
+                           pass * C * s->n_emitters,
+                           pass * to_sensors,
                            by_reflectance ? vector : 0,
-                           by_reflectance && direct ? vector : 0,
-                           vector,
-                           C * narrow_width(s),
-                           adjoint_wants(request, GRADIENT_GROUPS) ? C * s->groups.n_groups : 0,
-                           C * scene_luminaires(s),
-                           request->cotangent.at_sensors ? C * (scene_tiles(s) + scene_luminaires(s)) : 0},
-                 n_rows = sizeof rows / sizeof *rows;
-    const size_t most = answer_most(in, request);
+                           by_reflectance && direct ? vector : 0};
     size_t total = 0;
-    for (size_t k = 0; k < n_rows; k++) total += rows[k];
-    memory->work_bytes = lam_operator_work_bytes(s->op, 1);
-    memory->work = memory->work_bytes > 0 ? batch_workspace_get(in->workspace, memory->work_bytes) : NULL;
-    float *at = call_allocate(in, bytes_times(total, sizeof *at), "a gradient", why);
-    memory->w = at;
-    if (at == NULL || !request_memory_take(in->memory, most, why)) return false;
-    if (memory->work == NULL || !buffer_reserve(b, most))
-        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for a gradient");
-    for (size_t k = 0; k < n_rows; at += rows[k++]) *places[k] = at;
-    return true;
-}
-
-/* Irradiance H of the emission, its sky, its luminaires and its sun; *H0 is that of these three, NULL without
- * them. */
-static bool solve_irradiance(const scene *s, const radiosity_request *light, adjoint_memory *memory,
-                             const float **H0, problem *why) {
-    lam_error error;
-    *H0 = NULL;
-    if (request_has_direct(light) || light->n_suns > 0) {
-        *H0 = memory->H0;
-        direct_light_find(s, light, 0, 1, memory->H0);
+    for (int kind = 0; kind < GRADIENT_COUNT; kind++) {
+        places[ARRAYS - GRADIENT_COUNT + kind] = &a->gradient[kind];
+        rows[ARRAYS - GRADIENT_COUNT + kind] =
+            adjoint_wants(r, (gradient_kind)kind)
+                ? bytes_times(n_rhs, C * gradient_width(s, (gradient_kind)kind))
+                : 0;
     }
-    if (light->n_suns > 0) sun_answer_add(s, light, &memory->sun, 0, 1, memory->H0);
-    return lam_operator_apply_lit(s->op, 1, LAM_IRRADIANCE, light->E, *H0, memory->H, memory->work,
-                                  memory->work_bytes, &error) == LAM_OK ||
-           problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
+    for (size_t k = 0; k < ARRAYS; k++) total = bytes_plus(total, rows[k]);
+    float *at = call_allocate(in, bytes_times(total, sizeof *at), "a gradient", why);
+    if (at == NULL) return false;
+    for (size_t k = 0; k < ARRAYS; at += rows[k++]) *places[k] = at;
+    if (!by_reflectance || !direct) a->H0 = NULL;
+    return request_memory_take(in->memory, answer_most(in, r), why);
 }
 
-/* Puts the cotangent of sensors into that of elements, and the gradients by light that comes to sensors
- * directly into `direct`. Receivers without a value have no part. */
-static void take_sensors(const scene *s, adjoint_request *request, adjoint_memory *memory) {
+/* Irradiance H of the emission, its sky, its luminaires and its sun, whose direct light is H0, once. */
+static bool find_irradiance(call *in, adjoint_solve *a, void *work, size_t work_bytes) {
+    const scene *s = in->scene;
+    const radiosity_request *light = &a->request.light;
+    lam_error error;
+    if (a->lit) return true;
+    if (!sun_answer_find(in, light, 0, 1, &a->sun))
+        return problem_set(&a->why, PROBLEM_UNAVAILABLE, "nobody waits for the answer any more");
+    if (a->H0 != NULL) direct_light_find(s, light, 0, 1, a->H0);
+    if (light->n_suns > 0) sun_answer_add(s, light, &a->sun, 0, 1, a->H0);
+    metrics_pass(in->service->metrics, 1);
+    a->lit = lam_operator_apply_lit(s->op, 1, LAM_IRRADIANCE, light->E, a->H0, a->H, work, work_bytes,
+                                    &error) == LAM_OK;
+    return a->lit || problem_set(&a->why, PROBLEM_INTERNAL, "%s", error.message);
+}
+
+/* Puts the cotangents of sensors into those of elements, and the gradients by light that comes to sensors
+ * directly into `direct`, radiances first. Receivers without a value have no part. */
+static void take_sensors(const scene *s, adjoint_solve *a, size_t first, size_t count) {
     const size_t C = s->n_channels, all = scene_sensors(s);
-    float *g = request->cotangent.sensors.values;
-    for (size_t c = 0; c < C; c++)
+    radiosity_request *cotangent = &a->request.cotangent;
+    float *g = cotangent->sensors.values + first * C * all;
+    for (size_t row = 0; row < count * C; row++)
         for (size_t k = 0; k < all; k++)
-            if (!lam_sensors_has_value(s->sensors, k)) g[c * all + k] = 0;
+            if (!lam_sensors_has_value(s->sensors, k)) g[row * all + k] = 0;
     /* Sensors without rows of a sky or of luminaires leave these as they are. */
-    memset(memory->direct, 0, C * (scene_tiles(s) + scene_luminaires(s)) * sizeof *memory->direct);
-    lam_sensors_adjoint(s->sensors, 1, g, request->cotangent.E, memory->direct,
-                        memory->direct + C * scene_tiles(s));
+    memset(a->direct, 0, count * C * (scene_tiles(s) + scene_luminaires(s)) * sizeof *a->direct);
+    lam_sensors_adjoint(s->sensors, count, g, cotangent->E + first * C * s->n, a->direct,
+                        a->direct + count * C * scene_tiles(s));
 }
 
 static void add(size_t count, const float *x, float *to) {
     for (size_t k = 0; k < count; k++) to[k] += x[k];
 }
 
-/* Adds gradients by the light that comes to sensors directly, direct [C][m] and [C][k], to those by weights W
- * [C][s] of few emitters. */
-static void add_direct(const scene *s, const float *direct, float *W) {
-    operator_emitters_adjoint_radiances(s->op, 1, direct, W);
-    if (s->luminaires != NULL) operator_emitters_dim(s->op, 1, direct + s->n_channels * scene_tiles(s), W);
+/* The place of the gradients of a kind of vectors from this one on; NULL: it is not wanted. */
+static float *gradient_at(const scene *s, const adjoint_solve *a, gradient_kind kind, size_t vector) {
+    if (!adjoint_wants(&a->request, kind)) return NULL;
+    return a->gradient[kind] + vector * s->n_channels * gradient_width(s, kind);
 }
 
-/* D [C][k], those of the last of the emitters W [C][s]. */
-static void take_luminaires(const scene *s, const float *W, float *D) {
-    const size_t k = scene_luminaires(s);
-    for (size_t c = 0; c < s->n_channels; c++)
-        memcpy(D + c * k, W + (c + 1) * s->n_emitters - k, k * sizeof *D);
-}
-
-/* Computes the gradients asked for: by emission in w, by reflectance in H, by tile or emitter in narrow,
- * by group in of_groups, by luminaire in dimmers. */
-static bool solve(const scene *s, const adjoint_request *request, adjoint_memory *memory, metrics *m,
-                  problem *why) {
-    const float *g = request->cotangent.E, *H0;
-    const size_t vector = s->n_channels * s->n;
+/* Of a store of few emitters; luminaires are the last of these. */
+static bool solve_emitters(const scene *s, adjoint_solve *a, size_t first, size_t count, void *work,
+                           size_t work_bytes) {
+    const size_t C = s->n_channels, k = scene_luminaires(s), row = C * s->n_emitters;
+    float *const W = gradient_at(s, a, GRADIENT_EMITTERS, first), *const D = gradient_at(
+                                                                      s, a, GRADIENT_LUMINAIRES, first);
     lam_error error;
-    metrics_pass(m, 1);
-    if (s->n_emitters > 0) {
-        if (lam_operator_adjoint_emitters(s->op, 1, request->quantity, g, memory->narrow, memory->work,
-                                          memory->work_bytes, &error) != LAM_OK)
-            return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
-        if (request->cotangent.at_sensors) add_direct(s, memory->direct, memory->narrow);
-        take_luminaires(s, memory->narrow, memory->dimmers);
-        return true;
+    if (lam_operator_adjoint_emitters(s->op, count, a->request.quantity,
+                                      a->request.cotangent.E + first * C * s->n, a->narrow, work, work_bytes,
+                                      &error) != LAM_OK)
+        return problem_set(&a->why, PROBLEM_INTERNAL, "%s", error.message);
+    if (a->request.cotangent.at_sensors) {
+        operator_emitters_adjoint_radiances(s->op, count, a->direct, a->narrow);
+        if (s->luminaires != NULL)
+            operator_emitters_dim(s->op, count, a->direct + count * C * scene_tiles(s), a->narrow);
     }
-    if (lam_operator_apply_adjoint(s->op, 1, request->quantity, g, memory->w, memory->work,
-                                   memory->work_bytes, &error) != LAM_OK)
-        return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
-    if (adjoint_wants(request, GRADIENT_GROUPS))
-        gradient_of_groups(s->n_channels, s->n, &s->groups, memory->w, memory->of_groups);
-    if (adjoint_wants(request, GRADIENT_SKY) || adjoint_wants(request, GRADIENT_LUMINAIRES))
-        gradient_of_direct_irradiance(request->quantity, vector, s->reflectance, g, memory->w, memory->v);
-    if (adjoint_wants(request, GRADIENT_SKY))
-        lam_sky_adjoint(s->sky, s->n_channels, memory->v, memory->narrow);
-    if (adjoint_wants(request, GRADIENT_LUMINAIRES))
-        lam_luminaires_adjoint(s->luminaires, 1, memory->v, memory->dimmers);
-    if (request->cotangent.at_sensors && adjoint_wants(request, GRADIENT_SKY))
-        add(s->n_channels * scene_tiles(s), memory->direct, memory->narrow);
-    if (request->cotangent.at_sensors && adjoint_wants(request, GRADIENT_LUMINAIRES))
-        add(s->n_channels * scene_luminaires(s), memory->direct + s->n_channels * scene_tiles(s),
-            memory->dimmers);
-    if (adjoint_wants(request, GRADIENT_REFLECTANCE)) {
-        metrics_pass(m, 1);
-        if (!solve_irradiance(s, &request->light, memory, &H0, why)) return false;
-        gradient_of_reflectance(request->quantity, vector, g, memory->w, memory->H, H0, memory->H);
-    }
+    if (W != NULL) memcpy(W, a->narrow, count * row * sizeof *W);
+    for (size_t c = 0; D != NULL && c < count * C; c++)
+        memcpy(D + c * k, a->narrow + (c + 1) * s->n_emitters - k, k * sizeof *D);
     return true;
 }
 
-static const float *gradient_values(const scene *s, const adjoint_memory *memory, gradient_kind kind,
-                                    size_t *width) {
-    *width = gradient_width(s, kind);
-    switch (kind) {
-    case GRADIENT_EMISSION:
-        return memory->w;
-    case GRADIENT_REFLECTANCE:
-        return memory->H;
-    case GRADIENT_GROUPS:
-        return memory->of_groups;
-    case GRADIENT_LUMINAIRES:
-        return memory->dimmers;
-    default:
-        return memory->narrow;
+/* By the light of sky and luminaires: v of each vector is the gradient by direct irradiance. */
+static void solve_direct(const scene *s, adjoint_solve *a, size_t first, size_t count, const float *g) {
+    const size_t C = s->n_channels, vector = C * s->n, tiles = C * scene_tiles(s);
+    const bool sensors = a->request.cotangent.at_sensors;
+    float *const L = gradient_at(s, a, GRADIENT_SKY, first), *const D = gradient_at(s, a, GRADIENT_LUMINAIRES,
+                                                                                    first);
+    if (L == NULL && D == NULL) return;
+    for (size_t k = 0; k < count; k++)
+        gradient_of_direct_irradiance(a->request.quantity, vector, s->reflectance, g + k * vector,
+                                      a->w + k * vector, a->v + k * vector);
+    if (L != NULL) lam_sky_adjoint(s->sky, count * C, a->v, L);
+    if (D != NULL) lam_luminaires_adjoint(s->luminaires, count, a->v, D);
+    if (L != NULL && sensors) add(count * tiles, a->direct, L);
+    if (D != NULL && sensors) add(count * C * scene_luminaires(s), a->direct + count * tiles, D);
+}
+
+static bool solve(call *in, adjoint_solve *a, size_t first, size_t count, batch_workspace *workspace) {
+    const scene *s = in->scene;
+    const size_t vector = s->n_channels * s->n, work_bytes = lam_operator_work_bytes(s->op, count);
+    void *work = work_bytes > 0 ? batch_workspace_get(workspace, work_bytes) : NULL;
+    lam_error error;
+    if (work == NULL)
+        return problem_set(&a->why, PROBLEM_NO_MEMORY, "not enough memory to solve for a gradient");
+    metrics_pass(in->service->metrics, count);
+    if (a->request.cotangent.at_sensors) take_sensors(s, a, first, count);
+    if (s->n_emitters > 0) return solve_emitters(s, a, first, count, work, work_bytes);
+    const float *g = a->request.cotangent.E + first * vector;
+    float *const E = gradient_at(s, a, GRADIENT_EMISSION, first),
+                 *const R = gradient_at(s, a, GRADIENT_REFLECTANCE, first),
+                 *const V = gradient_at(s, a, GRADIENT_GROUPS, first);
+    if (lam_operator_apply_adjoint(s->op, count, a->request.quantity, g, a->w, work, work_bytes, &error) !=
+        LAM_OK)
+        return problem_set(&a->why, PROBLEM_INTERNAL, "%s", error.message);
+    if (E != NULL) memcpy(E, a->w, count * vector * sizeof *E);
+    for (size_t k = 0; V != NULL && k < count; k++)
+        gradient_of_groups(s->n_channels, s->n, &s->groups, a->w + k * vector,
+                           V + k * s->n_channels * s->groups.n_groups);
+    solve_direct(s, a, first, count, g);
+    if (R != NULL && !find_irradiance(in, a, work, work_bytes)) return false;
+    for (size_t k = 0; R != NULL && k < count; k++)
+        gradient_of_reflectance(a->request.quantity, vector, g + k * vector, a->w + k * vector, a->H, a->H0,
+                                R + k * vector);
+    return true;
+}
+
+/* The rows of all vectors of a kind: of a batch one level deeper. */
+static bool write_rows(const call *in, const adjoint_solve *a, gradient_kind kind, buffer *b, problem *why) {
+    const size_t C = in->scene->n_channels, width = gradient_width(in->scene, kind);
+    const bool nested = a->request.cotangent.batch && in->accept.type == MEDIA_JSON;
+    bool written = !nested || buffer_append(b, "[", 1);
+    for (size_t v = 0; written && v < a->request.cotangent.n_rhs; v++) {
+        written = !nested || v == 0 || buffer_append(b, ",", 1);
+        if (written && !answer_rows(b, &in->accept, C, width, false, a->gradient[kind] + v * C * width, why))
+            return false;
     }
+    return (written && (!nested || buffer_append(b, "]", 1))) ||
+           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
 }
 
 /* An array holds one gradient, the one that was named. */
-static bool write_npy(const call *in, const adjoint_request *request, const adjoint_memory *memory,
-                      answer_notes *notes, buffer *b, problem *why) {
+static bool write_npy(const call *in, const adjoint_solve *a, buffer *b, problem *why) {
+    const gradient_kind kind = a->request.named[0];
     const size_t C = in->scene->n_channels;
-    size_t width;
-    const float *values = gradient_values(in->scene, memory, request->named[0], &width);
-    const size_t dims[2] = {C, width};
-    const double start = clock_ms();
-    const bool good = npy_write_header(b, in->accept.npy, C > 1 ? 2 : 1, C > 1 ? dims : &dims[1])
-                          ? answer_rows(b, &in->accept, C, width, false, values, why)
-                          : problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
-    notes->encode_ms = clock_ms() - start;
-    return good;
+    size_t dims[3], rank = 0;
+    if (a->request.cotangent.batch) dims[rank++] = a->request.cotangent.n_rhs;
+    if (C > 1) dims[rank++] = C;
+    dims[rank++] = gradient_width(in->scene, kind);
+    if (!npy_write_header(b, in->accept.npy, rank, dims))
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
+    return write_rows(in, a, kind, b, why);
 }
 
-static bool write_json(const call *in, const adjoint_request *request, const adjoint_memory *memory,
-                       answer_notes *notes, buffer *b, problem *why) {
+static bool write_json(const call *in, const adjoint_solve *a, buffer *b, problem *why) {
     const scene *s = in->scene;
-    const double start = clock_ms();
-    bool written = answer_head(b, s->n, s->n_channels, notes) && buffer_append_text(b, ",\"gradient\":{");
+    bool written = answer_head(b, s->n, s->n_channels, &a->notes) && buffer_append_text(b, ",\"gradient\":{");
     for (int kind = 0, count = 0; written && kind < GRADIENT_COUNT; kind++) {
-        size_t width;
-        if (!adjoint_wants(request, (gradient_kind)kind)) continue;
+        if (!adjoint_wants(&a->request, (gradient_kind)kind)) continue;
         written = buffer_printf(b, "%s\"%s\":", count++ > 0 ? "," : "", gradient_name((gradient_kind)kind));
-        const float *values = gradient_values(s, memory, (gradient_kind)kind, &width);
-        if (written && !answer_rows(b, &in->accept, s->n_channels, width, false, values, why)) return false;
+        if (written && !write_rows(in, a, (gradient_kind)kind, b, why)) return false;
     }
-    written = written && buffer_append(b, "}", 1);
-    notes->encode_ms = clock_ms() - start;
-    return (written && answer_tail(b, notes)) ||
+    return (written && buffer_append(b, "}", 1)) ||
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
 }
 
@@ -234,39 +259,71 @@ static bool read_body(const call *in, adjoint_request *request, problem *why) {
     return true;
 }
 
-void post_adjoint(call *in, answer *out) {
-    answer_notes notes = call_notes(in);
-    char converted[LIGHT_CONVERSION_TEXT];
-    adjoint_request request = {0};
-    adjoint_memory memory = {0};
+static bool begin(call *in, answer *out) {
     problem why = {0};
-    buffer b = {0};
-    const double start = clock_ms();
-    bool good = read_body(in, &request, &why) && get_memory(in, &request, &memory, &b, &why) &&
-                sun_answer_begin(in, &request.light, &memory.sun, &why) &&
-                (sun_answer_find(in, &request.light, 0, 1, &memory.sun) ||
-                 problem_set(&why, PROBLEM_UNAVAILABLE, "nobody waits for the answer any more"));
-    const double parsed = clock_ms();
-    notes.parse_ms = parsed - start;
-    notes.quantity = request.cotangent.at_sensors ? LAM_IRRADIANCE : request.quantity;
-    notes.at = request.cotangent.at_sensors ? "sensors" : NULL;
-    notes.by_luminance = request.light.by_luminance;
-    light_conversion_text(&request.light.told, converted);
-    notes.converted_by = converted;
-    in->n_rhs = 1;
-    if (good && request.cotangent.at_sensors) take_sensors(in->scene, &request, &memory);
-    good = good && solve(in->scene, &request, &memory, in->service->metrics, &why);
-    notes.solve_ms = clock_ms() - parsed;
-    if (good && (in->accept.type == MEDIA_NPY ? write_npy(in, &request, &memory, &notes, &b, &why)
-                                              : write_json(in, &request, &memory, &notes, &b, &why))) {
-        answer_json(out, &b, true);
-        answer_set_times(out, &notes);
-        if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
-    } else {
-        answer_problem(out, &why);
+    adjoint_solve *a = calloc(1, sizeof *a);
+    if (a == NULL) {
+        answer_refuse(out, PROBLEM_NO_MEMORY, "not enough memory for the request");
+        return false;
     }
-    buffer_free(&b);
-    free(memory.w);
-    sun_answer_free(&memory.sun);
-    adjoint_request_free(&request);
+    const double start = clock_ms();
+    const bool good = read_body(in, &a->request, &why) && find_room(in, a, &why) &&
+                      sun_answer_begin(in, &a->request.light, &a->sun, &why);
+    if (!good) {
+        answer_problem(out, &why);
+        solve_free(a);
+        return false;
+    }
+    const bool sensors = a->request.cotangent.at_sensors;
+    a->notes = call_notes(in);
+    a->notes.quantity = sensors ? LAM_IRRADIANCE : a->request.quantity;
+    a->notes.at = sensors ? "sensors" : NULL;
+    a->notes.by_luminance = a->request.light.by_luminance;
+    light_conversion_text(&a->request.light.told, a->converted);
+    a->notes.converted_by = a->converted;
+    a->notes.parse_ms = clock_ms() - start;
+    in->state = a;
+    in->n_rhs = in->job.n_vectors = a->request.cotangent.n_rhs;
+    in->job.key = (const void *)in;
+    return true;
 }
+
+static void pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    for (size_t p = 0; p < n_parts; p++) {
+        call *in = call_of(parts[p].job);
+        adjoint_solve *a = in->state;
+        const double start = clock_ms();
+        if (!a->failed) a->failed = !solve(in, a, parts[p].first, parts[p].count, workspace);
+        a->notes.solve_ms += clock_ms() - start;
+    }
+}
+
+static void end(call *in, answer *out) {
+    adjoint_solve *a = in->state;
+    buffer b = {0};
+    const bool npy = in->accept.type == MEDIA_NPY;
+    const double start = clock_ms();
+    bool good = !a->failed && (buffer_reserve(&b, answer_most(in, &a->request)) ||
+                               problem_set(&a->why, PROBLEM_NO_MEMORY, "not enough memory for the answer"));
+    good = good && (npy ? write_npy : write_json)(in, a, &b, &a->why);
+    a->notes.encode_ms = clock_ms() - start;
+    good = good && (npy || answer_tail(&b, &a->notes) ||
+                    problem_set(&a->why, PROBLEM_NO_MEMORY, "not enough memory for the answer"));
+    if (good) {
+        answer_json(out, &b, true);
+        answer_set_times(out, &a->notes);
+        if (npy) out->type = "application/x-npy";
+    } else {
+        answer_problem(out, &a->why);
+        buffer_free(&b);
+    }
+    in->state = NULL;
+    solve_free(a);
+}
+
+static void drop(call *in) {
+    solve_free(in->state);
+    in->state = NULL;
+}
+
+const solve_steps post_adjoint = {.begin = begin, .pass = pass, .end = end, .drop = drop};

@@ -29,7 +29,7 @@ static const route routes[] = {
      .steps = &post_radiosity,
      .shortcut = quick_radiosity,
      .with_body = true},
-    {.method = "POST", .pattern = "/v1/scenes/{name}/adjoint", .handle = post_adjoint, .with_body = true},
+    {.method = "POST", .pattern = "/v1/scenes/{name}/adjoint", .steps = &post_adjoint, .with_body = true},
     {.method = "POST", .pattern = "/v1/scenes/{name}/jacobian", .steps = &post_jacobian, .with_body = true},
     {.method = "POST", .pattern = "/v1/scenes/{name}/skies", .handle = post_skies, .with_body = true},
     {.method = "PUT",

@@ -57,13 +57,13 @@ typedef struct route_match {
  * path of "*" is the daemon as a whole (RFC 9110, 9.3.7). */
 void route_find(const char *method, const char *path, route_match *match, answer *out);
 
-route_handler get_healthz, get_readyz, get_metrics, post_adjoint, post_skies, post_sun, post_weather,
-    put_reflectance, delete_reflectance, delete_scene, get_viewer_page, get_viewer_script, get_viewer_style,
-    get_viewer_icon, get_viewer_licences;
+route_handler get_healthz, get_readyz, get_metrics, post_skies, post_sun, post_weather, put_reflectance,
+    delete_reflectance, delete_scene, get_viewer_page, get_viewer_script, get_viewer_style, get_viewer_icon,
+    get_viewer_licences;
 route_shortcut quick_radiosity, quick_kept;
 route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_sky, keeps_luminaires, keeps_sensors, keeps_weather,
     keeps_openapi, keeps_manual;
-extern const solve_steps post_radiosity, post_jacobian, send_kept;
+extern const solve_steps post_radiosity, post_adjoint, post_jacobian, send_kept;
 
 /* The description of the routes, for service.openapi. Errors: LAM_ERR_MEMORY. */
 lam_status openapi_keep(kept_forms **out, lam_error *error);

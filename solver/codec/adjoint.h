@@ -16,9 +16,10 @@ typedef enum gradient_kind {
 
 /* Starts zeroed. */
 typedef struct adjoint_request {
-    radiosity_request cotangent; /* E is g [C][n]; at_sensors: its `sensors` are g [C][s] in place of that,
-                                    and the quantity is what they are gathered from, radiosity */
-    radiosity_request light;     /* E, sky and luminaires of `emission`; n_rhs is 0 without it */
+    radiosity_request
+        cotangent;           /* E is g [n_rhs][C][n]; at_sensors: its `sensors` are g [n_rhs][C][s] in
+                                place of that, and the quantity is what they are gathered from, radiosity */
+    radiosity_request light; /* E, sky and luminaires of `emission`; n_rhs is 0 without it */
     lam_quantity quantity;
     gradient_kind named[GRADIENT_COUNT];
     size_t n_named;
@@ -40,8 +41,8 @@ static inline bool adjoint_wants(const adjoint_request *request, gradient_kind k
 bool codec_read_adjoint_json(const codec_scene *scene, const char *text, size_t length,
                              adjoint_request *request, problem *why);
 
-/* An array is the cotangent [n] or [C][n] of radiosity, whose gradient by emission (or emitters) alone is
- * asked for. */
+/* An array is a cotangent of radiosity, or a batch of them, in the shapes of codec_read_npy, whose gradient
+ * by emission (or emitters) alone is asked for. */
 bool codec_read_adjoint_npy(const codec_scene *scene, const char *bytes, size_t length,
                             adjoint_request *request, problem *why);
 

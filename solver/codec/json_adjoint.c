@@ -88,7 +88,7 @@ static bool read_gradient(parser *p, adjoint_request *request) {
            parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s is empty, must name a gradient", parser_here(p));
 }
 
-enum { COTANGENT, QUANTITY, GRADIENT, EMISSION, N_NAMES };
+enum { COTANGENT, COTANGENTS, QUANTITY, GRADIENT, EMISSION, N_NAMES };
 
 static bool read_member(parser *p, size_t which, void *to) {
     adjoint_request *const request = to;
@@ -97,17 +97,22 @@ static bool read_member(parser *p, size_t which, void *to) {
         return parser_read_quantity(p, &request->quantity);
     }
     if (which == GRADIENT) return read_gradient(p, request);
-    p->request = which == COTANGENT ? &request->cotangent : &request->light;
-    return parser_read_emission(p);
+    p->request = which == EMISSION ? &request->light : &request->cotangent;
+    if (which != COTANGENTS) return parser_read_emission(p);
+    p->request->batch = true;
+    return parser_read_emissions(p);
 }
 
 static bool read_body(parser *p, adjoint_request *request) {
-    static const char *const names[] = {"cotangent", "quantity", "gradient", "emission"};
+    static const char *const names[] = {"cotangent", "cotangents", "quantity", "gradient", "emission"};
+    const unsigned either = 1u << COTANGENT | 1u << COTANGENTS;
     const parser_body body = {names, N_NAMES, read_member, request};
     unsigned seen;
     if (!parser_read_body(p, &body, &seen)) return false;
-    if ((seen & 1u << COTANGENT) == 0)
-        return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body holds no cotangent");
+    if ((seen & either) == 0) return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body holds no cotangent");
+    if ((seen & either) == either)
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                             "the body holds both cotangent and cotangents, must hold one of them");
     for (size_t k = 0; k < request->n_named; k++)
         if (request->named[k] == GRADIENT_REFLECTANCE && (seen & 1u << EMISSION) == 0)
             return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
@@ -139,7 +144,14 @@ static bool settle_sensors(parser *p, adjoint_request *request) {
                              codec_quantity_name(request->quantity));
     }
     request->quantity = LAM_RADIOSITY;
-    return true;
+    if (request->cotangent.n_spots > 0 || request->cotangent.n_dense > 0)
+        return parser_refuse(
+            p, PROBLEM_WRONG_MEMBERS,
+            "cotangents: those of sensors and those of elements have quantities of their own; "
+            "send two requests");
+    float *last;
+    return request->cotangent.sensors.n == request->cotangent.n_rhs ||
+           radiosity_request_sensors(&request->cotangent, p->scene, &last, p->why);
 }
 
 bool codec_read_adjoint_json(const codec_scene *scene, const char *text, size_t length,
@@ -160,8 +172,6 @@ bool codec_read_adjoint_npy(const codec_scene *scene, const char *bytes, size_t 
                             adjoint_request *request, problem *why) {
     request->cotangent.any_sign = true;
     if (!codec_read_npy(scene, bytes, length, &request->cotangent, why)) return false;
-    if (request->cotangent.batch)
-        return problem_set(why, PROBLEM_WRONG_LENGTH, "the array holds a batch, must hold one cotangent");
     settle(scene, request);
     return true;
 }

@@ -168,6 +168,30 @@ static bool refused_here(parser *p) {
     return false;
 }
 
+/* {"mean": v} or {"sum": v}: a weight of the figure of a group, whose spots are shared by *area. */
+static bool read_figure_weight(parser *p, size_t n_groups, const uint32_t *groups, double *area) {
+    static const char *const names[] = {"mean", "sum"};
+    const size_t mark = p->pointer_length;
+    unsigned seen = 0;
+    size_t which;
+    json_slice key;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        const bool first = seen == 0;
+        if (!parser_known_member(p, &key, names, 2, &seen, &which)) return false;
+        if (!first) break;
+        *area = which == 1 ? 1 : group_index_area(p->scene->groups, n_groups, groups);
+        if (!parser_read_colour(p, p->colour)) return false;
+        p->pointer_length = mark;
+    }
+    if (p->why->status != 0) return false;
+    p->pointer_length = mark;
+    if (seen != 1 && seen != 2)
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold mean or sum", parser_here(p));
+    return *area > 0 || parser_refuse(p, PROBLEM_BAD_VALUE, "%s: the group has no area that figures take in",
+                                      parser_here(p));
+}
+
 /* {"lamp": v, ...} */
 static bool read_groups(parser *p) {
     const group_index *groups = p->scene->groups;
@@ -181,8 +205,12 @@ static bool read_groups(parser *p) {
         parser_point_key(p, key.bytes, key.length);
         size_t n_found;
         if (!parser_find_group(p, &key, &found, &n_found)) return false;
-        const bool light = !p->request->any_sign && json_peek(&p->r) == JSON_TEXT;
-        if (!(light ? parser_read_light(p, n_found, found, p->colour) : parser_read_colour(p, p->colour)))
+        const bool light = !p->request->any_sign && json_peek(&p->r) == JSON_TEXT,
+                   figure = p->request->any_sign && p->scene->area != NULL && json_peek(&p->r) == JSON_OBJECT;
+        double area = 0;
+        if (!(light    ? parser_read_light(p, n_found, found, p->colour)
+              : figure ? read_figure_weight(p, n_found, found, &area)
+                       : parser_read_colour(p, p->colour)))
             return false;
         for (size_t k = 0; k < n_found; k++) {
             const index_set_result added = index_set_add(&p->seen, found[k]);
@@ -193,6 +221,7 @@ static bool read_groups(parser *p) {
                 return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
             if (!radiosity_request_spot(p->request, p->scene, found[k], true, p->colour, p->why))
                 return refused_here(p);
+            radiosity_request_share(p->request, area);
         }
         p->pointer_length = mark;
     }

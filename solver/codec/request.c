@@ -119,6 +119,17 @@ bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene
     return true;
 }
 
+void radiosity_request_share(radiosity_request *request, double area) {
+    request->spots[request->n_spots - 1].shared = area;
+}
+
+static float value_at(const codec_scene *scene, const emission_spot *spot, uint32_t element, float value) {
+    if (!(spot->shared > 0)) return value;
+    return group_index_counts(scene->groups, element)
+               ? (float)((double)value * scene->area[element] / spot->shared)
+               : 0;
+}
+
 bool radiosity_request_expand(radiosity_request *request, const codec_scene *scene, problem *why) {
     const size_t n = scene->n, C = scene->n_channels;
     if (!grow_dense(request, scene, why)) return false;
@@ -133,7 +144,7 @@ bool radiosity_request_expand(radiosity_request *request, const codec_scene *sce
         }
         for (size_t c = 0; c < C; c++) {
             float *E = request->E + (spot->vector * C + c) * n;
-            for (size_t e = 0; e < count; e++) E[elements[e]] = colour[c];
+            for (size_t e = 0; e < count; e++) E[elements[e]] = value_at(scene, spot, elements[e], colour[c]);
         }
     }
     request->n_spots = 0;

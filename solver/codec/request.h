@@ -23,6 +23,7 @@ typedef struct codec_scene {
     const group_index *emitters;       /* these by name; NULL: they have none */
     size_t n_luminaires;               /* 0: none */
     const luminaire_names *luminaires; /* these by name; not NULL where there are any */
+    const double *area;                /* [n], m^2; NULL: no cotangent is of a mean or a sum */
     const group_index *sensors;        /* sets of receivers by name; NULL or empty: none */
     size_t max_batch;                  /* vectors in a request, at most CODEC_BATCH_MOST */
     size_t max_bytes;                  /* of emission vectors in a request */
@@ -51,6 +52,8 @@ typedef struct emission_spot {
     uint32_t vector;
     uint32_t where; /* an element, or a group of the scene */
     bool whole_group;
+    double shared; /* above 0: each element of the group that figures take in has the value times its area
+                      over this one, and the others 0 */
 } emission_spot;
 
 /* Radiances, weights or dimmers beside the emissions: [n][C][width], for the first n vectors. */
@@ -142,6 +145,9 @@ bool radiosity_request_add(radiosity_request *request, const codec_scene *scene,
 
 /* Room in E for the last vector, zeroed: *E is its [C][n]; so is that of those before it that have none. */
 bool radiosity_request_dense(radiosity_request *request, const codec_scene *scene, float **E, problem *why);
+
+/* Makes the spot that was added last one of a mean, over groups of this area together, or with 1 of a sum. */
+void radiosity_request_share(radiosity_request *request, double area);
 
 /* A spot of the last vector; colour is [C]. */
 bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene, uint32_t where,

@@ -35,10 +35,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         problem why = {0};
         if (npy == 0 ? codec_read_adjoint_json(&scene, text, size, &request, &why)
                      : codec_read_adjoint_npy(&scene, text, size, &request, &why)) {
-            FUZZ_CHECK(request.cotangent.n_rhs == 1 && request.light.n_rhs <= 1 && request.wanted != 0);
-            for (size_t i = 0; i < values; i++) FUZZ_CHECK(fabsf(request.cotangent.E[i]) <= FLT_MAX);
+            const size_t n_rhs = request.cotangent.n_rhs;
+            FUZZ_CHECK(n_rhs > 0 && (n_rhs == 1 || request.cotangent.batch) && request.light.n_rhs <= 1 &&
+                       request.wanted != 0);
+            for (size_t i = 0; i < n_rhs * values; i++) FUZZ_CHECK(fabsf(request.cotangent.E[i]) <= FLT_MAX);
             const side_rows *sensors = &request.cotangent.sensors;
-            FUZZ_CHECK(request.cotangent.at_sensors == (sensors->n == 1));
+            FUZZ_CHECK(sensors->n == (request.cotangent.at_sensors ? n_rhs : 0));
             for (size_t i = 0; i < sensors->n * scene.n_channels * FUZZ_SENSORS; i++)
                 FUZZ_CHECK(fabsf(sensors->values[i]) <= FLT_MAX);
             /* Light that no gradient wants stays as it was written. */

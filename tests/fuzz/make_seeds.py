@@ -49,6 +49,7 @@ for k, blank in enumerate(" \t\n\r"):
     (folder / "adjoint" / f"by{k}").write_text(json.dumps({"of": {"sensors": ["room"]}, "by": ["groups", "sky"]}) + blank)
     for of in {"groups": ["lamp"]}, {"elements": [3, 0]}:
         (folder / "adjoint" / f"{next(iter(of))}{k}").write_text(json.dumps({"of": of, "quantity": "indirect"}) + blank)
+    (folder / "adjoint" / f"batch{k}").write_text(json.dumps({"cotangents": [[1] * 7, {"groups": {"lamp": {"mean": -1}}}]}) + blank)
     (folder / "adjoint" / f"all{k}").write_text(json.dumps({"of": {"sensors": ["room.b", "room.a"]}}) + blank)
 
 # Skies, and small weather of both formats; the last byte says the format and what becomes of gaps.

@@ -273,6 +273,46 @@ class Gradients(Both):
                 self.assertEqual(array.dtype, np.dtype("<f8"))
                 np.testing.assert_array_equal(array.astype("f4"), self.gradient(name, body)[kind].astype("f4"))
 
+    def test_a_batch_has_the_bits_of_single_answers(self):
+        """In JSON and NPY, of every gradient, longer than a pass."""
+        for name in "grey", "exact3", "low", "hierarchical":
+            scene, rng = self.scenes[name], np.random.default_rng(8)
+            G = rng.standard_normal((19, scene.C, scene.n)).round(5).astype("f4")
+            kinds = ["emission", "reflectance", "groups"]
+            more = {"gradient": kinds, "emission": {"groups": {"lamp": 2}}, "quantity": "indirect"}
+            asked = [g.tolist() if scene.C > 1 else g[0].tolist() for g in G]
+            found = self.gradient(name, {"cotangents": [*asked, {"groups": {"wall" if isinstance(scene, SmallScene) else "south": 1}}], **more})
+            for k in 0, 7, 18:
+                alone = self.gradient(name, {"cotangent": asked[k], **more})
+                self.assertEqual(set(alone), set(found))
+                for kind, values in alone.items():
+                    np.testing.assert_array_equal(found[kind][k], values, (name, kind))
+            shape = G if scene.C > 1 else G[:, 0]
+            array = np.load(io.BytesIO(self.ask(name, npy(shape), kind=NPY, accept=NPY).body))
+            self.assertEqual(array.shape, shape.shape)
+            np.testing.assert_array_equal(array[5], self.gradient(name, {"cotangent": asked[5]})["emission"].astype("f4"))
+            one = self.ask(name, {"cotangents": asked[:1]}).json()["gradient"]["emission"]
+            self.assertEqual(np.shape(one), (1, *shape.shape[1:]))
+
+    def test_figures_of_groups(self):
+        """The gradient of a mean is what `reduce` answers to single elements; of a sum, the area more."""
+        for name in "grey", "yard3", "hierarchical":
+            scene = self.scenes[name]
+            group = "floor" if name != "grey" else "wall"
+            members = scene.members(group) if name == "grey" else np.flatnonzero(scene.group == scene.groups.index(group))
+            share = np.zeros(scene.n)
+            share[members] = scene.area[members] / scene.area[members].sum()
+            for asked, factor in (({"mean": 1}, 1), ({"sum": 2}, 2 * scene.area[members].sum())):
+                found = self.gradient(name, {"cotangent": {"groups": {group: asked}}})["emission"]
+                wanted = self.gradient(name, {"cotangent": np.tile(share * factor, (scene.C, 1)).tolist() if scene.C > 1
+                                              else (share * factor).tolist()})["emission"]
+                self.close(found, wanted, np.abs(wanted).max(), (name, asked))
+            emission = {"elements": [members[0], 1], "values": [2, 3]}
+            mean = self.daemon.radiosity(name, {"emission": {key: np.asarray(v).tolist() for key, v in emission.items()}, "limit": False,
+                                                "reduce": {"groups": [group], "with": ["mean"]}}).json()["groups"][group]["mean"]
+            rows = np.reshape(self.gradient(name, {"cotangent": {"groups": {group: {"mean": 1}}}})["emission"], (scene.C, scene.n))
+            np.testing.assert_allclose(rows[:, members[0]] * 2 + rows[:, 1] * 3, np.ravel(mean), rtol=2e-6)
+
     def test_order_of_members(self):
         body = {"gradient": ["reflectance"], "emission": {"groups": {"lamp": 1}}, "cotangent": {"groups": {"wall": -1}},
                 "quantity": "indirect"}
@@ -305,7 +345,14 @@ class Gradients(Both):
         self.refuse({"cotangent": {"emitters": [1]}}, 422, "cotangent", pointer="/cotangent/emitters")
         self.refuse({"cotangent": {"elements": [60], "values": [1]}}, 422, "59", pointer="/cotangent/elements/0")
         self.refuse({"cotangent": {"groups": {"moon": 1}}}, 422, "moon", pointer="/cotangent/groups/moon")
-        self.refuse({"cotangents": [g]}, 422, "cotangents", pointer="/cotangents")
+        self.refuse({"cotangents": []}, 422, "empty", pointer="/cotangents")
+        self.refuse({"cotangents": [g, [1]]}, 422, "60", pointer="/cotangents/1")
+        self.refuse({"cotangents": [g], "cotangent": g}, 422, "both cotangent and cotangents")
+        self.refuse({"cotangent": {"groups": {"lamp": {"max": 1}}}}, 422, "max", pointer="/cotangent/groups/lamp/max")
+        self.refuse({"cotangent": {"groups": {"lamp": {"mean": 1, "sum": 1}}}}, 422, "mean or sum", pointer="/cotangent/groups/lamp")
+        self.refuse({"cotangent": {"groups": {"lamp": {}}}}, 422, "mean or sum", pointer="/cotangent/groups/lamp")
+        self.refuse({"cotangent": g, "gradient": ["reflectance"], "emission": {"groups": {"lamp": {"mean": 1}}}}, 422, "number",
+                    pointer="/emission/groups/lamp")
         self.refuse({"cotangent": g, "emissions": [g]}, 422, "emissions", pointer="/emissions")
         self.refuse('{"cotangent":[],"cotangent":[]}', 422, pointer="/cotangent")
         self.refuse({"cotangent": g, "quantity": "heat"}, 422, "heat", pointer="/quantity")
@@ -325,8 +372,8 @@ class Gradients(Both):
         self.refuse({"cotangent": [3e38] * 60}, 422, "single precision")
         self.refuse(json.dumps({"cotangent": g}), 415, "Content-Type", kind="text/plain")
         self.refuse({"cotangent": g}, 404, "no scene", name="none")
-        for array, word in ((np.ones(59), "59"), (np.ones((1, 60)), "batch"), (np.ones((2, 60)), "batch"),
-                            (np.full(60, np.nan), "NaN"), (np.full(60, -1e39), "single precision"), (np.ones(60, int), "<i8")):
+        for array, word in ((np.ones(59), "59"), (np.ones((2, 2, 60)), "shape"), (np.full(60, np.nan), "NaN"), (np.full(60, -1e39), "single precision"),
+                            (np.ones(60, int), "<i8")):
             self.refuse(npy(array), 422, word, kind=NPY)
         self.refuse(b"nothing", 400, kind=NPY)
 

@@ -86,7 +86,8 @@ def each_request(n):
     yield "POST", solve, {"Content-Type": NPY, "Accept": NPY + "; dtype=f2"}, array([dense] * 3)
     yield "POST", solve, {"Content-Type": NPY, "Accept": JSON}, array(dense)
     for body in ({"cotangent": dense}, {"cotangent": dense, "emission": dense, "gradient": ["emission", "reflectance"]},
-                 {"cotangent": {"groups": {"lamp": 1}}, "gradient": ["emission"]}):
+                 {"cotangent": {"groups": {"lamp": 1}}, "gradient": ["emission"]},
+                 {"cotangents": [dense, {"groups": {"lamp": {"mean": 1}}}], "gradient": ["emission", "groups"]}):
         yield "POST", adjoint, {"Content-Type": JSON}, json.dumps(body)
     yield "POST", adjoint, {"Content-Type": NPY, "Accept": NPY}, array(dense)
     lit, sets = {"luminaires": {"desk-1": 1, "row-a": .5}, "groups": {"lamp": 2}}, {"sensors": ["room", "faces"]}

@@ -59,7 +59,8 @@ START_TEST(linear_reductions_stay_sparse) {
         ck_assert_ptr_null(request.E);
         ck_assert_uint_eq(request.n_spots, 4);
         /* box.blue comes before box.red by name. */
-        static const emission_spot wanted[] = {{0, 3, true}, {0, 1, true}, {0, 0, true}, {1, 3, false}};
+        static const emission_spot wanted[] = {
+            {0, 3, true, 0}, {0, 1, true, 0}, {0, 0, true, 0}, {1, 3, false, 0}};
         static const float colours[] = {1, 2, 3, 1, 2, 3, 4, 4, 4, 5, 5, 5};
         for (size_t k = 0; k < 4; k++) {
             ck_assert_uint_eq(request.spots[k].vector, wanted[k].vector);
@@ -218,6 +219,32 @@ START_TEST(good_requests_are_read) {
 }
 END_TEST
 
+/* A batch of every shape; areas are 1, 2, 3, 4, 5 and element 4 is buried. */
+START_TEST(batches_hold_figures_of_groups) {
+    static const char text[] = "{\"cotangents\":[{\"groups\":{\"box\":{\"mean\":12},\"lamp\":{\"sum\":2}}},"
+                               "[1,0,0,0,-1],{\"groups\":{\"wall\":3}}]}";
+    static const float g[3][N] = {{0, 4, 6, 8, 0}, {1, 0, 0, 0, -1}, {3, 0, 0, 0, 0}};
+    static const double area[N] = {1, 2, 3, 4, 5};
+    fixture f = make_scene(1);
+    lam_error error;
+    f.groups.buried = calloc(N, sizeof *f.groups.buried);
+    ck_assert_ptr_nonnull(f.groups.buried);
+    f.groups.buried[4] = true;
+    ck_assert_int_eq(group_index_measure(&f.groups, area, &error), LAM_OK);
+    adjoint_request request = {0};
+    ck_assert_uint_eq(read_adjoint(&f, text, strlen(text), &request), 422); /* areas are not known */
+    adjoint_request_free(&request);
+    f.scene.area = area;
+    f.scene.max_batch = 3;
+    ck_assert_uint_eq(read_adjoint(&f, text, strlen(text), &request), 0);
+    ck_assert(request.cotangent.batch);
+    ck_assert_uint_eq(request.cotangent.n_rhs, 3);
+    ck_assert_mem_eq(request.cotangent.E, g, sizeof g);
+    adjoint_request_free(&request);
+    group_index_free(&f.groups);
+}
+END_TEST
+
 START_TEST(a_request_cut_anywhere_is_not_json) {
     fixture f = make_scene(1);
     for (size_t i = 0; i < N_GOOD; i++)
@@ -273,6 +300,7 @@ int main(void) {
     tcase_add_test(tcase, linear_reductions_cost_what_they_name);
     tcase_add_test(tcase, spots_have_a_limit);
     tcase_add_test(tcase, good_requests_are_read);
+    tcase_add_test(tcase, batches_hold_figures_of_groups);
     tcase_add_test(tcase, a_request_cut_anywhere_is_not_json);
     tcase_add_test(tcase, changed_requests_never_do_harm);
     suite_add_tcase(suite, tcase);
