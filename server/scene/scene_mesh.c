@@ -1,6 +1,6 @@
 #include "server/scene/scene_mesh.h"
 
-#include "server/scene/scene.h"
+#include "server/scene/scene_store.h"
 #include "solver/codec/gltf/gltf.h"
 #include "store/groups.h"
 
@@ -16,11 +16,6 @@ struct scene_mesh {
     uint64_t tag;
     kept_forms *forms;
 };
-
-/* The store of a scene or of a variant's base. */
-static const scene *root_of(const scene *s) {
-    return s->base != NULL ? s->base : s;
-}
 
 static lam_status read_up(store *s, char *up, lam_error *error) {
     lam_status status = LAM_OK;
@@ -71,7 +66,7 @@ done:
  * variant. */
 static lam_status make_tag(scene_mesh *mesh, lam_error *error) {
     char *text = NULL;
-    const int length = asprintf(&text, "%s %s %c %s", LAMBERT_VERSION, root_of(mesh->of)->identity.digest,
+    const int length = asprintf(&text, "%s %s %c %s", LAMBERT_VERSION, scene_root(mesh->of)->identity.digest,
                                 mesh->up, mesh->of->description);
     if (length < 0) return status_fail(error, LAM_ERR_MEMORY, "not enough memory for the tag of a mesh");
     mesh->tag = store_checksum(text, (size_t)length);
@@ -113,6 +108,10 @@ void scene_mesh_destroy(scene_mesh *mesh) {
 
 uint64_t scene_mesh_tag(const scene_mesh *mesh) {
     return mesh->tag;
+}
+
+size_t scene_mesh_vertices(const scene_mesh *mesh) {
+    return mesh->n_vertices;
 }
 
 kept_forms *scene_mesh_forms(scene_mesh *mesh) {
@@ -194,7 +193,7 @@ done:
 
 /* Takes the images off elements whose reflectance a variant changed: what it gave them is even. */
 static void drop_changed(const scene *of, scene_pictures *pictures) {
-    const float *before = root_of(of)->reflectance;
+    const float *before = scene_root(of)->reflectance;
     for (size_t c = 0; c < of->n_channels; c++)
         for (size_t i = 0; i < of->n; i++)
             if (of->reflectance[c * of->n + i] != before[c * of->n + i]) pictures->surface[i] = PICTURE_NONE;
@@ -202,14 +201,11 @@ static void drop_changed(const scene *of, scene_pictures *pictures) {
 
 lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const scene *of = mesh->of, *root = root_of(of);
+    const scene *of = mesh->of, *root = scene_root(of);
     store *s = NULL;
     arrays a = {.vertices = NULL};
     lam_error cause;
-    TRY(store_open(root->path, &s, error));
-    if (strcmp(store_identity_of(s)->digest, root->identity.digest) != 0)
-        FAIL(error, LAM_ERR_IO, "%s: the store is another one than was read; read it again (SIGHUP)",
-             root->path);
+    TRY(scene_store_open(of, &s, error));
     TRY(read_arrays(s, mesh, &a, error));
     if (a.pictures != NULL && of != root) drop_changed(of, a.pictures);
     const gltf_mesh m = {.name = of->name,

@@ -20,6 +20,9 @@ void scene_mesh_destroy(scene_mesh *mesh);
  * collision of 64 bits). It stays the same from one start of the daemon to the next. */
 uint64_t scene_mesh_tag(const scene_mesh *mesh);
 
+/* The vertices of its store. */
+size_t scene_mesh_vertices(const scene_mesh *mesh);
+
 /* The file, in every coding that was asked for. */
 kept_forms *scene_mesh_forms(scene_mesh *mesh);
 

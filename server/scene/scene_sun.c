@@ -1,6 +1,6 @@
 #include "server/scene/scene_sun.h"
 
-#include "server/scene/scene.h"
+#include "server/scene/scene_store.h"
 #include "server/scene/sensor_answer.h"
 #include "solver/base/parallel.h"
 #include "solver/base/scene/scene_backs.h"
@@ -164,10 +164,7 @@ static lam_status make(scene_sun *sun, lam_error *error) {
     store *s = NULL;
     shadow_tree *tree = NULL;
     arrays a = {.vertices = NULL};
-    TRY(store_open(of->path, &s, error));
-    if (strcmp(store_identity_of(s)->digest, of->identity.digest) != 0)
-        FAIL(error, LAM_ERR_IO, "%s: the store is another one than was read; read it again (SIGHUP)",
-             of->path);
+    TRY(scene_store_open(of, &s, error));
     TRY(read_arrays(s, sun, &a, error));
     if (sun->tiling.n_tiles == 0) TRY(sky_tiling_create(of->sky_tiling, of->sky_up, &sun->tiling, error));
     if (sun->tiling.n_tiles != lam_sky_tiles(of->sky))
