@@ -1,5 +1,6 @@
 #include "solver/codec/media.h"
 
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -57,12 +58,23 @@ static bool read_npy_type(const char *text, npy_type *type) {
     return false;
 }
 
-media_accept media_choose(const char *header) {
+/* A type in a header: its quality, 0 where it is not named, and its place among the types named. */
+typedef struct named_type {
+    double quality;
+    size_t place;
+} named_type;
+
+/* True if a client likes one type better than another. */
+static bool is_better(named_type one, named_type other) {
+    return one.quality > other.quality || (one.quality >= other.quality && one.place < other.place);
+}
+
+static media_accept choose(const char *header, bool with_zip) {
     media_accept chosen = {MEDIA_JSON, NPY_F4, false};
-    double json = -1.0, npy = 0.0; /* json below 0: not named */
-    bool npy_first = false;
+    named_type json = {-1.0, SIZE_MAX}, npy = {0.0, SIZE_MAX}, zip = {0.0, SIZE_MAX};
+    size_t place = 0;
     cursor c = {header == NULL ? "" : header};
-    while (*c.at != '\0') {
+    for (; *c.at != '\0'; place++) {
         char type[64];
         double q = 1.0;
         npy_type dtype = NPY_F4;
@@ -83,14 +95,24 @@ media_accept media_choose(const char *header) {
         }
         if (*c.at == ',') c.at++;
         if (strcasecmp(type, "application/json") == 0) {
-            json = q;
-        } else if (strcasecmp(type, "application/x-npy") == 0 && known && q > npy) {
-            npy = q;
+            json = (named_type){q, json.place < place ? json.place : place};
+        } else if (strcasecmp(type, "application/x-npy") == 0 && known && q > npy.quality) {
+            npy = (named_type){q, place};
             chosen.npy = dtype;
             chosen.npy_given = given;
-            npy_first = json < 0.0;
+        } else if (with_zip && strcasecmp(type, "application/zip") == 0 && q > zip.quality) {
+            zip = (named_type){q, place};
         }
     }
-    if (npy > 0.0 && (npy > json || (npy >= json && npy_first))) chosen.type = MEDIA_NPY;
+    if (npy.quality > 0.0 && is_better(npy, json)) chosen.type = MEDIA_NPY;
+    if (zip.quality > 0.0 && is_better(zip, chosen.type == MEDIA_NPY ? npy : json)) chosen.type = MEDIA_ZIP;
     return chosen;
+}
+
+media_accept media_choose(const char *header) {
+    return choose(header, false);
+}
+
+media_accept media_choose_table(const char *header) {
+    return choose(header, true);
 }

@@ -319,7 +319,8 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
 }
 
 bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape) {
-    static const char *const names[] = {[NPY_F2] = "<f2", [NPY_F4] = "<f4", [NPY_F8] = "<f8"};
+    static const char *const names[] = {
+        [NPY_F2] = "<f2", [NPY_F4] = "<f4", [NPY_F8] = "<f8", [NPY_U4] = "<u4", [NPY_I4] = "<i4"};
     char text[192];
     size_t at = (size_t)snprintf(text, sizeof text, "{'descr': '%s', 'fortran_order': False, 'shape': (",
                                  names[type]);

@@ -6,9 +6,11 @@
 
 #include <stdint.h>
 
-typedef enum npy_type { NPY_F2, NPY_F4, NPY_F8 } npy_type;
+/* Integers have a header alone: their values are appended as they are in memory. */
+typedef enum npy_type { NPY_F2, NPY_F4, NPY_F8, NPY_U4, NPY_I4 } npy_type;
 
-/* Appends the header of an array of this shape; false when memory is short. */
+/* Appends the header of an array of this shape, at most NPY_HEADER_MOST bytes; false when memory is short. */
+#define NPY_HEADER_MOST 192
 bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape);
 
 /* Appends values[0..count). */

@@ -312,6 +312,24 @@ START_TEST(media_types) {
         ck_assert_msg(chosen.type == cases[i].type, "%s", cases[i].accept);
         if (chosen.type == MEDIA_NPY) ck_assert_int_eq(chosen.npy, cases[i].npy);
     }
+    static const struct {
+        const char *accept;
+        media_type type, of_table;
+    } tables[] = {
+        {"application/zip", MEDIA_JSON, MEDIA_ZIP},
+        {"Application/ZIP;q=.1", MEDIA_JSON, MEDIA_ZIP},
+        {"application/zip;q=0", MEDIA_JSON, MEDIA_JSON},
+        {"application/json, application/zip", MEDIA_JSON, MEDIA_JSON},
+        {"application/zip, application/json", MEDIA_JSON, MEDIA_ZIP},
+        {"application/zip;q=.5, application/x-npy;q=.6", MEDIA_NPY, MEDIA_NPY},
+        {"application/x-npy;q=.5, application/zip;q=.5", MEDIA_NPY, MEDIA_NPY},
+        {"application/json;q=.9, application/x-npy;q=.5, application/zip", MEDIA_JSON, MEDIA_ZIP},
+    };
+    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++) {
+        ck_assert_msg(media_choose(tables[i].accept).type == tables[i].type, "%s", tables[i].accept);
+        ck_assert_msg(media_choose_table(tables[i].accept).type == tables[i].of_table, "%s",
+                      tables[i].accept);
+    }
     ck_assert_int_eq(media_content_type("application/x-npy; a=b"), MEDIA_NPY);
     ck_assert_int_eq(media_content_type(NULL), MEDIA_JSON);
     ck_assert_int_eq(media_content_type(";"), MEDIA_OTHER);
