@@ -129,6 +129,10 @@ static bool check_head(request *r, const char *method, const char *target, uint6
                      .accepted = r->accepted,
                      .memory = &r->memory};
     if (!check_scene(r)) return false;
+    if (r->match.route->with_query) {
+        r->call.accept = media_choose_table(http_header(r, MHD_HTTP_HEADER_ACCEPT));
+        return head_read_query(r);
+    }
     if (!r->match.route->with_body) return true;
     if (!check_type(r)) return false;
     if (length > s->config->max_body || length > request_ledger_most(&s->memory)) {
@@ -341,6 +345,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     free(r->call.changed);
     size_t label = r->match.label;
     free(r->path);
+    free(r->query);
     free(r);
     metrics_end(h->service->metrics, label, status, seconds);
 }

@@ -134,7 +134,8 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
                http_add_header(response, MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache");
     /* Also for a body that was not compressed, as another client may get it compressed. */
     if (r->coding != CODING_IDENTITY || r->etag[0] != '\0' || length >= COMPRESS_LEAST)
-        good = good && http_add_header(response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT_ENCODING);
+        good = good && http_add_header(response, MHD_HTTP_HEADER_VARY,
+                                       a->by_type ? "Accept, Accept-Encoding" : "Accept-Encoding");
     if (r->coding != CODING_IDENTITY && a->status != MHD_HTTP_NOT_MODIFIED)
         good = good && http_add_header(response, MHD_HTTP_HEADER_CONTENT_ENCODING, coding_name(r->coding));
     if (r->last || atomic_load(&r->service->state) >= SERVICE_DRAINING)

@@ -22,6 +22,7 @@ typedef struct request {
     char id[REQUEST_ID_MAX + 1];
     char method[16];
     char *path;              /* as sent, without scheme and host */
+    query_member *query;     /* of the call, with its texts behind it; or NULL */
     double start;            /* clock_seconds */
     double submitted;        /* the same, to the queue */
     double waited;           /* seconds until it was begun */

@@ -21,6 +21,11 @@ typedef struct kept_source kept_source;
  * problem, and returns false. On any thread, at once. */
 typedef bool route_keeps(const call *in, kept_source *from, answer *out);
 
+/* A member ?name=value of the target of a request, escapes resolved, as far as they are some. */
+typedef struct query_member {
+    const char *name, *value;
+} query_member;
+
 /* A request that has passed its checks, with its whole body. */
 struct call {
     batch_job job; /* of a route with a body */
@@ -32,8 +37,10 @@ struct call {
     const problem *variant_why; /* of a variant that failed */
     media_type body_type;
     media_accept accept;
-    coding_choice accepted; /* of the answer */
-    const char *body;       /* body[length] is NUL */
+    coding_choice accepted;    /* of the answer */
+    const query_member *query; /* [n_query], of a route with a query */
+    size_t n_query;
+    const char *body; /* body[length] is NUL */
     size_t length;
     request_memory *memory;     /* of this request; all that it still holds is given back after its answer */
     batch_workspace *workspace; /* of a route with a body */
@@ -83,6 +90,7 @@ struct answer {
     double parse_ms, solve_ms, encode_ms;
     char *location; /* of a 202, owned; or NULL */
     bool cacheable; /* gets an ETag */
+    bool by_type;   /* another Accept has another answer */
 };
 
 /* The call that a job is part of. */

@@ -201,6 +201,10 @@ bool coding_whole(content_coding coding, const char *bytes, size_t length, buffe
     return good;
 }
 
+uint32_t coding_crc32(const char *bytes, size_t length) {
+    return (uint32_t)crc32_z(0, (const Bytef *)bytes, length);
+}
+
 bool coding_pays(content_coding coding, const char *bytes, size_t length) {
     char out[SAMPLE];
     if (length > SAMPLE) length = SAMPLE;

@@ -4,6 +4,8 @@
 
 #include "solver/codec/buffer.h"
 
+#include <stdint.h>
+
 typedef enum content_coding { CODING_IDENTITY, CODING_GZIP, CODING_ZSTD } content_coding;
 
 typedef struct coding_choice {
@@ -33,6 +35,9 @@ bool coding_whole(content_coding coding, const char *bytes, size_t length, buffe
 
 /* Bytes of to, at most. */
 size_t coding_bytes_most(size_t length);
+
+/* The CRC-32 of bytes, as archives (ZIP) have it. */
+uint32_t coding_crc32(const char *bytes, size_t length);
 
 /* True if bytes, a sample of a longer body, shrink as much as the whole has to. O(length). */
 bool coding_pays(content_coding coding, const char *bytes, size_t length);

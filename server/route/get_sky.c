@@ -1,6 +1,7 @@
 /* GET /v1/scenes/NAME/sky: where the tiles of the sky of a store are.
  * GET /v1/scenes/NAME/luminaires: its luminaires, in the order of their dimmers.
  * GET /v1/scenes/NAME/sensors: its sensors, in the order of their values.
+ * GET /v1/scenes/NAME/groups: its groups, in their order, with areas and materials.
  * GET /v1/scenes/NAME/weather: the weather file beside the store, as it is. */
 #include "server/route/kept_answer.h"
 
@@ -37,6 +38,12 @@ bool keeps_sensors(const call *in, kept_source *from, answer *out) {
         return false;
     }
     *from = kept_text(s->texts.sensors, "application/json");
+    return true;
+}
+
+bool keeps_groups(const call *in, kept_source *from, answer *out) {
+    (void)out;
+    *from = kept_text(in->scene->texts.groups, "application/json");
     return true;
 }
 

@@ -33,7 +33,8 @@ static void answer_kept(const kept_source *from, content_coding form, kept_bytes
                     .kept = body,
                     .kept_coding = form,
                     .tag = from->tag,
-                    .cacheable = true};
+                    .cacheable = true,
+                    .by_type = from->by_type};
 }
 
 /* The form that answers a request best. */

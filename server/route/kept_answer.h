@@ -11,6 +11,7 @@ typedef struct kept_source {
     kept_forms *forms; /* a reference, until the answer is made */
     const char *type;  /* of the answer, static */
     const char *what;  /* "a mesh": for messages */
+    bool by_type;      /* of the Accept of the request */
     uint64_t tag;      /* for these bytes alone */
     double cost;       /* seconds to make and to code them, roughly */
     /* Makes form 0 where it is not kept; NULL where it always is. It takes build_bytes of memory and makes at

@@ -1,5 +1,7 @@
 #include "server/route/routes.h"
 
+#include "server/route/escapes.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -19,6 +21,8 @@ static const route routes[] = {
      .also_built = true,
      .right = TOKEN_VARY},
     {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", KEPT(keeps_mesh)},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/elements", KEPT(keeps_elements), .with_query = true},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/groups", KEPT(keeps_groups)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/sky", KEPT(keeps_sky)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/luminaires", KEPT(keeps_luminaires)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/sensors", KEPT(keeps_sensors)},
@@ -64,22 +68,14 @@ const char *route_label(size_t label) {
     return label < N_ROUTES ? routes[label].pattern : "other";
 }
 
-static int hex_digit(char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-    return -1;
-}
-
 /* Resolves %XX; "" for a name that no scene can have. */
 static void decode_name(const char *raw, size_t length, char name[ROUTE_NAME_MAX]) {
     size_t count = 0;
     for (size_t i = 0; i < length; i++) {
         char c = raw[i];
         if (c == '%') {
-            int high = i + 2 < length ? hex_digit(raw[i + 1]) : -1;
-            int low = high < 0 ? -1 : hex_digit(raw[i + 2]);
-            c = low < 0 ? '\0' : (char)(high * 16 + low);
+            const int byte = escape_byte(raw + i, length - i);
+            c = byte < 0 ? '\0' : (char)byte;
             i += 2;
         }
         if (c == '\0' || count + 1 == ROUTE_NAME_MAX) {

@@ -28,9 +28,11 @@ typedef struct route {
     const solve_steps *steps; /* of a solve that shares passes */
     route_shortcut *shortcut; /* or NULL */
     route_keeps *keeps;       /* of an answer that is kept: steps and shortcut are send_kept, quick_kept */
-    bool with_body; /* the body may have --max-body bytes; the handler runs on a thread that solves, as steps
-                       do */
-    bool open;      /* no token is needed, unless one has the right */
+    bool with_body;  /* the body may have --max-body bytes; the handler runs on a thread that solves, as steps
+                        do */
+    bool with_query; /* the call has the query of the target, which others leave unread, and accepts a table
+                        of numbers (media_choose_table) */
+    bool open;       /* no token is needed, unless one has the right */
     token_right right; /* that a token must have; 0: TOKEN_READ */
     bool any_host;     /* asked for by those that know no name of the daemon */
     bool below_any;    /* the pattern may follow any folder of a path */
@@ -61,8 +63,8 @@ route_handler get_healthz, get_readyz, get_metrics, post_skies, post_sun, post_w
     delete_reflectance, delete_scene, get_viewer_page, get_viewer_script, get_viewer_style, get_viewer_icon,
     get_viewer_licences;
 route_shortcut quick_radiosity, quick_kept;
-route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_sky, keeps_luminaires, keeps_sensors, keeps_weather,
-    keeps_openapi, keeps_manual;
+route_keeps keeps_scenes, keeps_scene, keeps_mesh, keeps_elements, keeps_sky, keeps_luminaires, keeps_sensors,
+    keeps_groups, keeps_weather, keeps_openapi, keeps_manual;
 extern const solve_steps post_radiosity, post_adjoint, post_jacobian, send_kept;
 
 /* The description of the routes, for service.openapi. Errors: LAM_ERR_MEMORY. */

@@ -5,6 +5,7 @@
 #include "server/scene/scene.h"
 
 #include "server/queue/batch.h"
+#include "server/scene/group_list.h"
 #include "server/scene/luminaire_places.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/scene_memory.h"
@@ -229,11 +230,19 @@ done:
     return status;
 }
 
+/* Once groups, areas, reflectances and emission are there. *memory: bytes of the text. */
+static lam_status keep_groups(scene *made, uint64_t *memory, lam_error *error) {
+    buffer groups = {0};
+    const lam_status status = group_list_write(made, &groups, error);
+    return status == LAM_OK ? scene_texts_add_groups(&made->texts, &groups, made->ledger, memory, error)
+                            : status;
+}
+
 /* Once the scene is described. */
 static lam_status keep_texts(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     buffer tiles = {0}, luminaires = {0}, sensors = {0};
-    uint64_t memory, of_luminaires, of_sensors;
+    uint64_t memory, of_luminaires, of_sensors, of_groups;
     TRY(scene_texts_describe(&made->texts, made->description, made->ledger, error));
     TRY(read_tiling(s, made, error));
     if (made->sky != NULL) TRY(tile_places_read(s, lam_sky_tiles(made->sky), &tiles, error));
@@ -242,7 +251,9 @@ static lam_status keep_texts(store *s, scene *made, lam_error *error) {
     TRY(scene_texts_add_luminaires(&made->texts, &luminaires, made->ledger, &of_luminaires, error));
     TRY(sensor_places_write(made->sensors, &sensors, error));
     TRY(scene_texts_add_sensors(&made->texts, &sensors, made->ledger, &of_sensors, error));
-    made->memory += memory + of_luminaires + of_sensors;
+    TRY(keep_groups(made, &of_groups, error));
+    made->memory += memory + of_luminaires + of_sensors + of_groups +
+                    made->groups.n_groups * made->n_channels * sizeof *made->group_emission;
 done:
     buffer_free(&sensors);
     buffer_free(&luminaires);
@@ -289,6 +300,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
     TRY(group_index_measure(&made->groups, made->area, error));
+    TRY(group_emission_read(s, made, &made->group_emission, error));
     TRY(scene_lights_load(s, &made->lights, error));
     TRY(read_faces(s, made, error));
     made->limiter =
@@ -303,6 +315,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(keep_texts(s, made, error));
     made->memory += strlen(made->description);
     TRY(scene_mesh_create(s, made, &made->mesh, error));
+    TRY(scene_elements_create(made, &made->elements, error));
     if (made->sky_tiling[0] != '\0' && store_has_attribute(s, STORE_SKY, "ground_albedo"))
         TRY(scene_sun_create(s, made, &made->sun, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
@@ -353,6 +366,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
                               scene **out, lam_error *error) {
     lam_status status = LAM_OK;
     operator_description of_op;
+    uint64_t of_groups;
     scene *made = memory_allocate(1, sizeof *made, name, error);
     if (made == NULL) {
         lam_operator_close(op);
@@ -370,6 +384,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->lights = base->lights;
     made->faces = base->faces;
     made->area = base->area;
+    made->group_emission = base->group_emission;
     made->limiter = base->limiter;
     made->sky = base->sky;
     made->luminaires = base->luminaires;
@@ -383,14 +398,16 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->bytes = (uint64_t)base->n_channels * of_op.rank * of_op.rank * sizeof(float);
     made->name = strdup(name);
     if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", name);
-    made->memory = made->bytes;
     made->ledger = base->ledger;
     TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
     TRY(make_columns(made, error));
     TRY(refined_create_variant(base->refined, op, &made->refined, error));
     TRY(describe_variant(made, groups, &made->description, error));
     TRY(scene_texts_describe(&made->texts, made->description, made->ledger, error));
+    TRY(keep_groups(made, &of_groups, error));
+    made->memory = made->bytes + of_groups;
     TRY(scene_mesh_create(NULL, made, &made->mesh, error));
+    TRY(scene_elements_create(made, &made->elements, error));
     *out = made;
     made = NULL;
 done:
@@ -400,14 +417,15 @@ done:
 
 uint64_t scene_grown(const scene *s) {
     return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) + sensor_columns_held(s->columns) +
-           kept_forms_held(scene_mesh_forms(s->mesh)) + scene_texts_held(&s->texts) +
-           (s->base == NULL ? scene_sun_held(s->sun) : 0);
+           kept_forms_held(scene_mesh_forms(s->mesh)) + scene_elements_held(s->elements) +
+           scene_texts_held(&s->texts) + (s->base == NULL ? scene_sun_held(s->sun) : 0);
 }
 
 void scene_drop_computed(const scene *s) {
     row_cache_clear(s->rows);
     sensor_columns_clear(s->columns);
     kept_forms_clear(scene_mesh_forms(s->mesh));
+    scene_elements_clear(s->elements);
     scene_texts_clear(&s->texts);
 }
 
@@ -423,6 +441,7 @@ void scene_release(scene *s) {
     row_cache_destroy(s->rows);
     sensor_columns_destroy(s->columns);
     scene_mesh_destroy(s->mesh);
+    scene_elements_destroy(s->elements);
     scene_texts_free(&s->texts);
     if (s->base == NULL) {
         scene_sun_destroy(s->sun);
@@ -436,6 +455,7 @@ void scene_release(scene *s) {
         group_index_free(&s->emitters);
         face_index_free(&s->faces);
         free(s->area);
+        free(s->group_emission);
         stated_errors_free(&s->errors);
         free(s->group_read);
         free(s->group_emits);

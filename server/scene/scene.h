@@ -6,6 +6,7 @@
 #include "lambert/lambert.h"
 #include "server/scene/refined.h"
 #include "server/scene/row_cache.h"
+#include "server/scene/scene_elements.h"
 #include "server/scene/scene_mesh.h"
 #include "server/scene/scene_sun.h"
 #include "server/scene/scene_texts.h"
@@ -42,6 +43,7 @@ struct scene {
     group_index emitters;            /* by name */
     face_index faces;                /* of the scene file; empty: the store does not know them */
     double *area;                    /* [n], m^2 */
+    double *group_emission;          /* [n_groups][C], the scene's own (group_emission_read) */
     lam_limiter limiter;             /* of answers below zero; it borrows groups and areas */
     lam_sky *sky;                    /* NULL: none */
     char sky_tiling[32];             /* the name of its tiles; "": not known. A variant has none of its own */
@@ -64,10 +66,11 @@ struct scene {
     bool *group_emits;     /* [n_groups]: all its elements are sources; NULL where any emission is answered */
     memory_ledger *ledger; /* of memory taken later; or NULL */
     row_cache *rows;       /* adjoint rows for linear reductions; any thread */
-    sensor_columns *columns; /* of its sensors; NULL without them */
-    refined *refined;        /* the refiner of its answers, made when first needed */
-    scene_mesh *mesh;        /* its elements as glTF, made when first asked for */
-    store_map *map;          /* held; NULL: nothing is mapped */
+    sensor_columns *columns;  /* of its sensors; NULL without them */
+    refined *refined;         /* the refiner of its answers, made when first needed */
+    scene_mesh *mesh;         /* its elements as glTF, made when first asked for */
+    scene_elements *elements; /* its elements as columns, made when first asked for */
+    store_map *map;           /* held; NULL: nothing is mapped */
     scene_health *health;
     scene *next_to_verify; /* private to verifier.c, as the next one */
     bool to_verify;

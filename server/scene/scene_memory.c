@@ -53,13 +53,16 @@ static uint64_t sensor_names_memory(const store *s) {
 lam_status scene_memory_passing(store *s, uint64_t *memory, lam_error *error) {
     lam_status status = LAM_OK;
     uint64_t receivers, sources;
+    /* Emission is read after groups are freed. */
+    const uint64_t group = store_array_bytes(s, STORE_MESH "/group"),
+                   emission = store_array_bytes(s, STORE_MESH "/emission");
     const uint64_t buried = buried_memory(s) > 0
                                 ? buried_memory(s) + store_array_bytes(s, STORE_MESH "/buried") +
                                       store_array_bytes(s, STORE_MESH "/area")
                                 : 0;
     TRY(bytes_below(s, STORE_IMPORTANCE, &receivers, error));
     TRY(bytes_below(s, STORE_SOURCES, &sources, error));
-    *memory = store_array_bytes(s, STORE_MESH "/group") + store_texts_memory(s, STORE_MESH "/group_names") +
+    *memory = (group > emission ? group : emission) + store_texts_memory(s, STORE_MESH "/group_names") +
               16 * face_parts(s) + buried + receivers + sources;
 done:
     return status;

@@ -9,9 +9,9 @@
  * store_get_text. */
 lam_status scene_memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error);
 
-/* The bytes that are read beside that and freed again before the scene is open: of groups by element, the
- * names as they are stored, parts of faces, receivers and sources; where there are buried elements, these and
- * areas, for the description. Errors: those of store_group_bytes. */
+/* The bytes that are read beside that and freed again before the scene is open: of groups by element or of
+ * emission, the names as they are stored, parts of faces, receivers and sources; where there are buried
+ * elements, these and areas, for the description. Errors: those of store_group_bytes. */
 lam_status scene_memory_passing(store *s, uint64_t *memory, lam_error *error);
 
 #endif

@@ -62,10 +62,16 @@ lam_status scene_texts_add_sensors(scene_texts *texts, buffer *sensors, memory_l
                : kept_forms_of(sensors, ledger, "the sensors of a scene", &texts->sensors, error);
 }
 
+lam_status scene_texts_add_groups(scene_texts *texts, buffer *groups, memory_ledger *ledger, uint64_t *memory,
+                                  lam_error *error) {
+    *memory = groups->length;
+    return kept_forms_of(groups, ledger, "the groups of a scene", &texts->groups, error);
+}
+
 size_t scene_texts_held(const scene_texts *texts) {
     return kept_forms_held(texts->description) + kept_forms_held(texts->sky) +
            kept_forms_held(texts->luminaires) + kept_forms_held(texts->sensors) +
-           kept_forms_held(texts->weather);
+           kept_forms_held(texts->groups) + kept_forms_held(texts->weather);
 }
 
 void scene_texts_clear(const scene_texts *texts) {
@@ -73,6 +79,7 @@ void scene_texts_clear(const scene_texts *texts) {
     kept_forms_clear(texts->sky);
     kept_forms_clear(texts->luminaires);
     kept_forms_clear(texts->sensors);
+    kept_forms_clear(texts->groups);
     kept_forms_clear(texts->weather);
 }
 
@@ -81,6 +88,7 @@ void scene_texts_free(scene_texts *texts) {
     kept_forms_release(texts->sky);
     kept_forms_release(texts->luminaires);
     kept_forms_release(texts->sensors);
+    kept_forms_release(texts->groups);
     kept_forms_release(texts->weather);
     *texts = (scene_texts){.description = NULL};
 }

@@ -11,6 +11,7 @@ typedef struct scene_texts {
     kept_forms *sky;         /* .../sky; NULL: the store states no tiles, or this is a variant */
     kept_forms *luminaires;  /* .../luminaires; NULL: the store has none, or this is a variant */
     kept_forms *sensors;     /* .../sensors; NULL: the store has none, or this is a variant */
+    kept_forms *groups;      /* .../groups */
     kept_forms *weather;     /* .../weather; NULL: there is no file, or this is a variant */
 } scene_texts;
 
@@ -30,6 +31,10 @@ lam_status scene_texts_add_luminaires(scene_texts *texts, buffer *luminaires, me
 /* The same of sensors. */
 lam_status scene_texts_add_sensors(scene_texts *texts, buffer *sensors, memory_ledger *ledger,
                                    uint64_t *memory, lam_error *error);
+
+/* The same of groups. */
+lam_status scene_texts_add_groups(scene_texts *texts, buffer *groups, memory_ledger *ledger, uint64_t *memory,
+                                  lam_error *error);
 
 /* Bytes that they have taken of the ledger since. */
 size_t scene_texts_held(const scene_texts *texts);

@@ -101,6 +101,10 @@ def each_request(n):
     for of in sets, {"groups": ["lamp", "floor"]}, {"elements": [3, 1]}, {"elements": list(range(40))}:
         yield "POST", "/v1/scenes/grey/jacobian", {"Content-Type": JSON}, json.dumps({"of": of})
     yield "GET", "/v1/scenes/grey/sensors", {}, None
+    yield "GET", "/v1/scenes/grey/groups", {}, None
+    for query, accept in (("", JSON), ("?fields=area,face", "application/zip"), ("?fields=centre", NPY), ("?fields=area,area", JSON)):
+        yield "GET", f"/v1/scenes/grey/elements{query}", {"Accept": accept}, None
+    yield "GET", "/v1/scenes/grey/elements?fields=normal", {"Accept": "application/zip", "Accept-Encoding": "zstd"}, None
     light = {"emission": {"elements": [3], "values": [1]}}
     for more in ({"tolerance": 1e-4}, {"at": "faces"}, {"at": "faces", "select": {"groups": ["floor"]}},
                  {"select": {"faces": [7, 3]}, "tolerance": 1e-4}):

@@ -211,7 +211,8 @@ class OpenApi(unittest.TestCase):
         body = [f"solver/codec/{name}.c" for name in names.split()]
         own = {"get_healthz": ["get_health.c"], "get_readyz": ["get_health.c"], "get_metrics": ["get_metrics.c"],
                **{f"keeps_{name}": ["kept_answer.c", file] for name, file in (
-                   ("scenes", "get_scenes.c"), ("scene", "get_scenes.c"), ("mesh", "get_mesh.c"), ("openapi", "get_documents.c"), ("manual", "get_documents.c"),
+                   ("scenes", "get_scenes.c"), ("scene", "get_scenes.c"), ("mesh", "get_mesh.c"), ("elements", "get_elements.c"), ("groups", "get_sky.c"),
+                   ("openapi", "get_documents.c"), ("manual", "get_documents.c"),
                    ("sky", "get_sky.c"), ("luminaires", "get_sky.c"), ("sensors", "get_sky.c"), ("weather", "get_sky.c"))},
                "post_radiosity": ["post_radiosity.c", "refined_answer.c", "radiosity_figures.c", "sensor_figures.c"],
                "post_adjoint": ["post_adjoint.c"], "post_jacobian": ["post_jacobian.c"],
