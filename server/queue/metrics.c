@@ -266,8 +266,8 @@ bool metrics_write_stores(const metrics_stores *stores, buffer *b) {
            write_gauge(b, "lambertd_verified_timestamp_seconds",
                        "Unix time when the mapped store that waits for longest was found sound; 0: not yet.",
                        (unsigned long long)stores->verified_at) &&
-           write_gauge(
-               b, "lambertd_kept_memory_bytes",
-               "Memory of stores, variants, work areas, rows, meshes and form factors (--max-memory).",
-               stores->memory);
+           write_gauge(b, "lambertd_kept_memory_bytes",
+                       "Memory of stores, variants, work areas, rows, meshes, elements and form factors "
+                       "(--max-memory).",
+                       stores->memory);
 }
