@@ -15,7 +15,7 @@ import sys
 HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 IMPORT = re.compile(r"^\s*(?:from|import) (\w+)", re.M)
 # Changes of these show in no test but those that name them.
-TEXTS = re.compile(r"README\.md|CHANGELOG\.md|LICENSE|\.github/.*|\.ci/.*|\.clang-(format|tidy)|deploy/(docs|examples)/.*|"
+TEXTS = re.compile(r"README\.md|CHANGELOG\.md|LICENSE|\.github/.*|\.ci/.*|\.clang-(format|tidy)|deploy/(docs|examples|python)/.*|"
                    r"deploy/[^/]*\.(sh|py|png)|store/FORMAT\.md|tests/(quick\.sh|layers\.py|comments\.py|reach\.py|soak/.*|bench/[^/]*\.(py|md))")
 
 
@@ -122,6 +122,7 @@ class Reach:
                 (self.programs["lambertd"] and "LAMBERTD" in text) or
                 (self.programs["lambert-bench"] and "bench" in text) or
                 any(named_in(change, name + text) for change in self.changed) or
+                ("lambert_python" in text and any(change.startswith("deploy/python/") for change in self.changed)) or
                 (name in ("service.documents", "service.install") and any(TEXTS.fullmatch(c) for c in self.changed)))
 
 

@@ -1,0 +1,340 @@
+"""Questions about light, apart from who answers them: what an emission may be, the requests for it, and their answers."""
+
+from __future__ import annotations
+
+import urllib.parse
+from dataclasses import dataclass, replace
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from .answer import Answer, Figures, Jacobian
+from .errors import LambertError, Refused, SceneChanged
+from .wire import NPY, Array, Reply, Request, server_times, shape_text, to_json, to_npy
+
+Emission = Any  # see Scene.radiosity
+Strings = Union[str, Sequence[str]]
+_MEMBERS = ("elements", "values", "groups", "sky", "sun", "luminaires", "emitters")
+QUANTITIES = ("radiosity", "irradiance", "indirect")
+BATCH, BATCH_BYTES = 64, 1 << 26  # of a request; longer batches are several of them
+
+
+@dataclass(frozen=True)
+class About:
+    """What is known of a scene before anything is asked: its name, n, C, and `facts`, the answer to GET /v1/scenes/NAME."""
+
+    name: str
+    n: int
+    channels: int
+    facts: Mapping[str, Any]
+
+    @staticmethod
+    def of(facts: Mapping[str, Any], name: Optional[str] = None) -> About:
+        return About(name or str(facts["name"]), int(facts["elements"]), int(facts["channels"]), facts)
+
+    @property
+    def path(self) -> str:
+        return "/v1/scenes/" + urllib.parse.quote(self.name, safe="@")
+
+    @property
+    def shape(self) -> Tuple[int, ...]:
+        """That of a vector in answers."""
+        return (self.n,) if self.channels == 1 else (self.channels, self.n)
+
+    def dense(self, array: Array, what: str = "emission") -> Array:
+        """An array of numbers [n] or [C, n] as floats; of another shape it is Refused."""
+        if array.dtype.kind not in "fiub":
+            raise Refused(f"{what} holds {array.dtype}, must hold real numbers")
+        if array.shape not in ((self.n,), (self.channels, self.n)):
+            raise Refused(f"{what} has the shape {shape_text(array.shape)}, must have {self.shapes()}")
+        array = array.reshape(self.n) if self.channels == 1 else array  # [1][n] is no batch of one
+        return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
+
+    def shapes(self) -> str:
+        one, more = shape_text((self.n,)), shape_text((self.channels, self.n))
+        return f"{one} or {more} as the scene {self.name} has, or one level more for a batch"
+
+    def rows(self, array: Array) -> Array:
+        """[C, n] of [n] or [C, n]."""
+        return np.broadcast_to(array, (self.channels, self.n))
+
+
+def _is_array(value: Any) -> bool:
+    return isinstance(value, np.ndarray) or (hasattr(value, "__array__") and not isinstance(value, (np.generic, Mapping)))
+
+
+def one_emission(about: About, emission: Emission, what: str = "emission") -> Union[Array, Dict[str, Any]]:
+    """An emission in one of two forms: a dense array, or the object that requests have."""
+    if not isinstance(emission, Mapping):
+        try:
+            array = np.asarray(emission)
+        except ValueError:
+            raise Refused(f"{what} is a list of lists of different lengths") from None
+        return about.dense(array, what)
+    known = [key for key in emission if key in _MEMBERS]
+    if not known:
+        return {"groups": dict(emission)}
+    if len(known) < len(emission):
+        others = ", ".join(str(key) for key in emission if key not in _MEMBERS)
+        raise Refused(f"{what} has {known[0]!r} beside {others}; put groups into {{\"groups\": {{…}}}}")
+    made = dict(emission)
+    if "elements" in made and "values" not in made:  # a dense emission beside something else
+        array = about.dense(np.asarray(made["elements"]), what)
+        made["elements"], made["values"] = list(range(about.n)), array.T.tolist()
+    for key in ("sky", "emitters"):
+        # A dense array of channels is [C, m] in NumPy, and a list of m colours in requests.
+        if _is_array(made.get(key)):
+            array = np.asarray(made[key])
+            made[key] = (array.T if array.ndim == 2 and array.shape[0] == about.channels and about.channels > 1 else array).tolist()
+    return made
+
+
+def emissions_of(about: About, emission: Emission, what: str = "emission") -> Tuple[List[Union[Array, Dict[str, Any]]], bool]:
+    """The emissions of a question, and whether it is a batch.
+
+    >>> about = About("box", 4, 1, {})
+    >>> [e.shape for e in emissions_of(about, np.ones((3, 1, 4)))[0]]
+    [(4,), (4,), (4,)]
+    >>> emissions_of(about, [{"lamp": 1}, {"groups": {"lamp": 2}}])
+    ([{'groups': {'lamp': 1}}, {'groups': {'lamp': 2}}], True)
+    """
+    if _is_array(emission) and np.ndim(emission) == 3:
+        array = np.asarray(emission)
+        if array.shape[1:] != (about.channels, about.n) or array.shape[0] == 0:
+            raise Refused(f"{what} has the shape {shape_text(array.shape)}, must have "
+                          f"{shape_text((about.channels, about.n))} behind the number of a batch")
+        return [about.dense(row, what) for row in array], True
+    if isinstance(emission, (list, tuple)) and (not emission or any(isinstance(e, Mapping) or _is_array(e) for e in emission)):
+        if not emission:
+            raise Refused(f"{what} is an empty batch")
+        return [one_emission(about, e, f"{what} {i} of the batch") for i, e in enumerate(emission)], True
+    return [one_emission(about, emission, what)], False
+
+
+def word(value: str, among: Sequence[str], what: str) -> str:
+    if value not in among:
+        raise Refused(f"{what} {value!r} is none of {', '.join(among)}")
+    return value
+
+
+@dataclass(frozen=True)
+class LightQuery:
+    """A question for the light of emissions, or for its figures."""
+
+    about: About
+    emissions: List[Union[Array, Dict[str, Any]]]
+    batch: bool
+    quantity: str = "radiosity"
+    at: Optional[str] = None
+    select: Optional[Mapping[str, Any]] = None
+    reduce: Optional[Mapping[str, Any]] = None
+    tolerance: Optional[float] = None
+    unit: Optional[str] = None
+    photometric: Optional[bool] = None
+    limit: bool = True
+    stated: Optional[bool] = None
+
+    @staticmethod
+    def of(about: About, emission: Emission, *, quantity: str = "radiosity", at: Optional[str] = None,
+           select: Optional[Mapping[str, Any]] = None, reduce: Optional[Mapping[str, Any]] = None,
+           tolerance: Optional[float] = None, unit: Optional[str] = None, photometric: Optional[bool] = None,
+           limit: bool = True, stated: Optional[bool] = None) -> LightQuery:
+        emissions, batch = emissions_of(about, emission)
+        word(quantity, QUANTITIES, "quantity")
+        if at is not None:
+            word(at, ("elements", "faces"), "at")
+        if select is not None:
+            select = {key: _listed(value) for key, value in select.items()}
+        return LightQuery(about, emissions, batch, quantity, at, select, reduce, tolerance, unit, photometric, limit, stated)
+
+    def parts(self) -> List[LightQuery]:
+        """The question in as many requests as its batch takes."""
+        size = 8 * self.about.n * self.about.channels
+        step = max(1, min(BATCH, BATCH_BYTES // size))
+        if len(self.emissions) <= step or not self.batch:
+            return [self]
+        return [replace(self, emissions=self.emissions[i:i + step]) for i in range(0, len(self.emissions), step)]
+
+    @property
+    def whole(self) -> bool:
+        """True where all elements are answered, in as many channels as the scene has."""
+        return self.select is None and self.reduce is None and self.at in (None, "elements") and self.unit in (None, "W/m2")
+
+    @property
+    def dense(self) -> bool:
+        return all(isinstance(e, np.ndarray) for e in self.emissions)
+
+    def members(self) -> Dict[str, Any]:
+        """What the request has beside its emissions."""
+        made: Dict[str, Any] = {}
+        if self.quantity != "radiosity":
+            made["quantity"] = self.quantity
+        if not self.limit:
+            made["limit"] = False
+        for name in ("at", "select", "reduce", "tolerance", "unit", "photometric"):
+            if getattr(self, name) is not None:
+                made[name] = getattr(self, name)
+        return made
+
+    def array_request(self) -> Optional[Request]:
+        """The request by NPY, which has no members; None where it would need some, but for `limit`."""
+        if not self.dense or self.stated or set(self.members()) - {"limit"}:
+            return None
+        arrays = [np.asarray(e) for e in self.emissions]
+        if self.batch:
+            kind = np.result_type(*arrays)
+            body = np.stack([self.about.rows(a) for a in arrays]).astype(kind, copy=False)
+        else:
+            body = arrays[0]
+        return Request("POST", self.about.path + "/radiosity", to_npy(body), NPY, NPY)
+
+    def request(self) -> Request:
+        body: Dict[str, Any] = self.members()
+        if self.batch:
+            body["emissions"] = self.emissions
+        else:
+            body["emission"] = self.emissions[0]
+        by_array = self.reduce is None and not self.stated and (self.stated is False or self.select is None)
+        return to_json(self.about.path + "/radiosity", body, accept=NPY if by_array else None)
+
+    def light(self, reply: Reply) -> Answer:
+        """The answer to a question without `reduce`."""
+        headers = reply.headers
+        if reply.is_npy:
+            count = headers.get("lambert-limited")
+            certificate, iterations = headers.get("lambert-certificate"), headers.get("lambert-iterations")
+            answer = Answer.of(reply.array(), unit=headers.get("lambert-unit"), times=server_times(reply),
+                               converted_by=headers.get("lambert-converted-by"),
+                               limited=None if count is None else int(count),
+                               certificate=None if certificate is None else float(certificate),
+                               iterations=None if iterations is None else int(iterations))
+        else:
+            read = reply.json()
+            values = np.array(read[read["quantity"]], np.float64 if self.tolerance is not None else np.float32)
+            answer = Answer.of(values, error=read.get("error"), unit=read.get("unit"), times=read.get("time_ms"),
+                               converted_by=read.get("converted_by"), limited=read.get("limited"),
+                               certificate=read.get("certificate"), iterations=read.get("iterations"))
+        self.check(answer.shape)
+        return answer
+
+    def check(self, shape: Tuple[int, ...]) -> None:
+        """A scene that was replaced by one of another size is noticed by its answer."""
+        if not self.whole:
+            return
+        wanted = ((len(self.emissions),) if self.batch else ()) + self.about.shape
+        luminance = wanted[:-2] + wanted[-1:] if self.about.channels > 1 else wanted
+        if shape != wanted and shape != luminance:
+            raise SceneChanged(f"the scene {self.about.name} answers the shape {shape_text(shape)} instead of {shape_text(wanted)}: "
+                               "it was replaced; open it again")
+
+    def figures(self, reply: Reply) -> Figures:
+        """The answer to a question with `reduce`."""
+        read = reply.json()
+        over = "sensors" if self.reduce is not None and "sensors" in self.reduce else "groups"
+        return Figures.of(read[over], error=read.get("error"), unit=read.get("unit"), times=read.get("time_ms"),
+                          converted_by=read.get("converted_by"), limited=read.get("limited"))
+
+
+def reduction(groups: Optional[Strings], sensors: Optional[Strings], figures: Strings,
+              at_least: Union[None, float, Sequence[float]]) -> Dict[str, Any]:
+    """The member `reduce` of a request."""
+    if (groups is None) == (sensors is None):
+        raise Refused("figures are of groups or of sensors: one of the two is given")
+    words = _listed(figures)
+    made: Dict[str, Any] = {"groups": _listed(groups)} if groups is not None else {"sensors": _listed(sensors)}
+    if at_least is not None:
+        made["at_least"] = [float(limit) for limit in np.atleast_1d(at_least)]
+        words = words if "share" in words else [*words, "share"]
+    made["with"] = words
+    return made
+
+
+def _listed(value: Any) -> List[Any]:
+    if isinstance(value, str) or np.ndim(value) == 0:
+        return [value]
+    return list(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+@dataclass(frozen=True)
+class AdjointQuery:
+    """A question for gradients of J = sum g q."""
+
+    about: About
+    cotangent: Union[Array, Dict[str, Any]]
+    gradient: Tuple[str, ...]
+    quantity: str = "radiosity"
+    emission: Union[None, Array, Dict[str, Any]] = None
+    doubles: bool = False
+
+    @staticmethod
+    def of(about: About, cotangent: Any, gradient: Strings, quantity: str, emission: Emission,
+           doubles: bool = False) -> Tuple[List[AdjointQuery], bool]:
+        """The questions of a batch of cotangents, and whether it is one."""
+        names = tuple(_listed(gradient))
+        word(quantity, QUANTITIES, "quantity")
+        if not names:
+            raise Refused("gradient names nothing; it is of emission, reflectance, sky, emitters, groups or luminaires")
+        if isinstance(cotangent, Mapping) and "sensors" in cotangent:
+            sensors = cotangent["sensors"]
+            cotangents: List[Union[Array, Dict[str, Any]]] = [
+                {"sensors": {name: {"values": np.asarray(v).tolist()} if np.ndim(v) > 0 else v for name, v in sensors.items()}}]
+            batch = False
+        else:
+            cotangents, batch = emissions_of(about, cotangent, "cotangent")
+        light = None if emission is None else one_emission(about, emission)
+        return [AdjointQuery(about, g, names, quantity, light, doubles) for g in cotangents], batch
+
+    def request(self) -> Request:
+        path = self.about.path + "/adjoint"
+        accept = NPY + ("; dtype=f8" if self.doubles else "")
+        alone = self.gradient == ("emission",) and self.quantity == "radiosity" and self.emission is None
+        if alone and isinstance(self.cotangent, np.ndarray):
+            return Request("POST", path, to_npy(self.cotangent), NPY, accept)
+        body: Dict[str, Any] = {"cotangent": self.cotangent, "gradient": list(self.gradient)}
+        if self.quantity != "radiosity":
+            body["quantity"] = self.quantity
+        if self.emission is not None:
+            body["emission"] = self.emission
+        return to_json(path, body, accept=accept if len(self.gradient) == 1 else None)
+
+    def gradients(self, reply: Reply) -> Dict[str, Array]:
+        if reply.is_npy:
+            made = {self.gradient[0]: reply.array()}
+        else:
+            kind = np.float64 if self.doubles else np.float32
+            made = {}
+            for name, values in reply.json()["gradient"].items():
+                array = np.array(values, kind)
+                # Of tiles and emitters JSON has a list of colours, NPY a row for each channel.
+                made[name] = array
+        for name in ("emission", "reflectance"):
+            if name in made and made[name].shape != self.about.shape:
+                raise SceneChanged(f"the scene {self.about.name} answers a gradient of the shape {shape_text(made[name].shape)} "
+                                   f"instead of {shape_text(self.about.shape)}: it was replaced; open it again")
+        return made
+
+
+def gradient_of(found: List[Dict[str, Array]], batch: bool, gradient: Strings) -> Any:
+    """What a caller gets: an array for one name, a dictionary for several, one level deeper for a batch."""
+    names = list(found[0])
+    made = {name: np.stack([f[name] for f in found]) if batch else found[0][name] for name in names}
+    return made[gradient] if isinstance(gradient, str) else made
+
+
+def jacobian_request(about: About, of: Mapping[str, Any], by: Optional[Strings]) -> Request:
+    body: Dict[str, Any] = {"of": {key: _listed(value) for key, value in of.items()}}
+    if by is not None:
+        body["by"] = _listed(by)
+    return to_json(about.path + "/jacobian", body)
+
+
+def jacobian_of(reply: Reply) -> Jacobian:
+    read = reply.json()
+    try:
+        return Jacobian.of(read["jacobian"], read["sensors"], read["columns"], server_times(reply))
+    except KeyError as missing:
+        raise LambertError(f"the answer has no {missing}") from None
+
+
+def skies_request(about: About, skies: Sequence[Any]) -> Request:
+    return to_json(about.path + "/skies", {"skies": list(skies)})

@@ -1,0 +1,527 @@
+"""The Python package over HTTP: what a scene consists of, its light and gradients beside those of plain requests, and how
+connections, busy daemons and replaced scenes end."""
+
+import doctest
+import http.server
+import importlib
+import os
+import pkgutil
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+import unittest.mock
+
+import numpy as np
+
+from daemon import Daemon
+from command import must
+from lambert_python import PACKAGE, TOKEN, PackageCase, lambert, random_emission
+from patience import PATIENCE
+
+try:
+    import scipy.sparse.linalg as linalg
+except ImportError:
+    linalg = None
+try:
+    import torch
+except ImportError:
+    torch = None
+
+
+def modules():
+    return sorted(m.name for m in pkgutil.iter_modules(lambert.__path__))
+
+
+class OverHttp(PackageCase):
+    def ask(self, name, route, body):
+        answer = self.daemon.post(f"/v1/scenes/{name}/{route}", body, headers={"Authorization": f"Bearer {TOKEN}"})
+        self.assertEqual(answer.status, 200, answer)
+        return answer.json()
+
+    def test_examples_of_docstrings(self):
+        """All of them, with a daemon at `address`; a store and lambertd for those that serve one."""
+        from lambert import client
+
+        begin = client.Client.__init__
+
+        def with_token(self, address, token=None, *more):
+            begin(self, address, token or TOKEN, *more)
+
+        given = {"lambert": lambert, "np": np, "address": self.address, "store": self.stores["box"]}
+        count = 0
+        with unittest.mock.patch.object(client.Client, "__init__", with_token):
+            for name in modules():
+                found = doctest.testmod(importlib.import_module(f"lambert.{name}"), extraglobs=dict(given))
+                self.assertEqual(found.failed, 0, name)
+                count += found.attempted
+        self.assertGreater(count, 50)
+
+    def test_elements_and_groups(self):
+        for name in ("box", "office", "yard"):
+            scene, mesh = self.scene(name), self.mesh(name)
+            self.assertEqual(scene.names, [text.decode() for text in mesh["group_names"]])
+            self.assertEqual(list(scene.groups), scene.names)
+            np.testing.assert_allclose(scene.areas, mesh["area"], rtol=1e-6)
+            np.testing.assert_allclose(scene.normals, mesh["normal"], atol=1e-6)
+            np.testing.assert_array_equal(scene.reflectances, np.atleast_2d(mesh["reflectance"]))
+            self.assertEqual(scene.centres.shape, (scene.n, 3))
+            for g, group in enumerate(scene.groups.values()):
+                of = mesh["group"] == g
+                np.testing.assert_array_equal(group.indices, np.flatnonzero(of))
+                self.assertAlmostEqual(group.area, mesh["area"][of].sum(), delta=1e-6 * group.area)
+                self.assertEqual((group.elements, len(group)), (of.sum(), of.sum()))
+                for means, values in ((group.reflectance, mesh["reflectance"]), (group.emission, mesh["emission"])):
+                    wanted = np.atleast_2d(values)[:, of] @ mesh["area"][of] / mesh["area"][of].sum()
+                    np.testing.assert_allclose(means, wanted, rtol=1e-5, atol=1e-9)
+            with self.assertRaisesRegex(KeyError, "no group is called lmap; there are"):
+                scene.groups["lmap"]
+            with self.assertRaises(ValueError):
+                scene.areas[0] = 1
+
+    def test_luminaires_sensors_and_sky(self):
+        office, yard = self.scene("office"), self.scene("yard")
+        self.assertEqual(list(office.luminaires), ["row.0", "row.1", "desk"])
+        self.assertEqual((office.luminaires["desk"].dim, office.luminaires["row.1"].group, office.units), (0.5, "row", "lm"))
+        self.assertEqual((office.sensors["desks"].at.shape, office.sensors["desks"].rows, office.sky), ((100, 3), 10, None))
+        self.assertEqual((yard.sky.tiles, len(yard.sky), yard.luminaires, yard.sensors), (145, 145, {}, {}))
+        self.assertAlmostEqual(yard.sky.solid_angle.sum(), 2 * np.pi, places=5)
+        with self.assertRaisesRegex(lambert.NotFound, "no luminaire is called dask; there are row.0, row.1, desk"):
+            office.luminaires["dask"]
+
+    def test_light_is_that_of_plain_requests(self):
+        box, office, yard, few = map(self.scene, ("box", "office", "yard", "few"))
+        dense = abs(random_emission(box))
+        sky = np.arange(145.0)
+        self.assertEqual(self.scene("box").radiosity(dense).dtype, np.float32)
+        for scene, emission, sent, more in (
+                (box, {"lamp": [17, 12, 4]}, {"groups": {"lamp": [17, 12, 4]}}, {}),
+                (box, {"lamp": "3600lm"}, {"groups": {"lamp": "3600lm"}}, {"quantity": "irradiance", "unit": "lx"}),
+                (box, dense, dense.tolist(), {}), (box, dense[0], dense[0].tolist(), {}),
+                (box, dense, dense.tolist(), {"quantity": "indirect", "limit": False}),
+                (box, {"lamp": 1}, {"groups": {"lamp": 1}}, {"at": "faces", "select": {"groups": ["floor", "lamp"]}}),
+                (box, {"elements": [3, 5], "values": np.ones(2)}, {"elements": [3, 5], "values": [1, 1]}, {"tolerance": 1e-6}),
+                (office, {"luminaires": {"row": 0.4}}, {"luminaires": {"row": 0.4}}, {"quantity": "irradiance", "select": {"sensors": ["desks"]}}),
+                (office, {"luminaires": {"desk": 1}, "groups": {"floor": 2}}, {"luminaires": {"desk": 1}, "groups": {"floor": 2}}, {}),
+                (yard, {"sky": sky}, {"sky": sky.tolist()}, {"quantity": "irradiance"}),
+                (yard, {"sky": sky, "elements": np.ones(yard.n)}, {"sky": sky.tolist(), "elements": list(range(yard.n)), "values": [1] * yard.n}, {}),
+                (few, {"luminaires": {"row": 0.4}}, {"luminaires": {"row": 0.4}}, {})):
+            with self.subTest(scene=scene.name, more=more):
+                plain = self.ask(scene.name, "radiosity", {"emission": sent, **more})
+                answer = scene.radiosity(emission, **more)
+                wanted = np.array(plain[plain["quantity"]], float)
+                np.testing.assert_allclose(answer.values, wanted, rtol=1e-6, atol=1e-30)
+                self.assertEqual((answer.unit, answer.limited), (plain["unit"], plain.get("limited")) if "limited" in plain
+                                 else (plain["unit"], answer.limited))
+                # A batch has the same vectors, whoever else is in it.
+                both = scene.radiosity([emission, emission], **more)
+                np.testing.assert_array_equal(both.values, np.stack([answer.values] * 2))
+                if scene is box and "tolerance" not in more:
+                    self.assertEqual(scene.radiosity(emission, stated=True, **more).error["stated"], plain["error"]["stated"])
+                if "tolerance" in more:
+                    self.assertEqual(answer.dtype, np.float64)
+                    self.assertGreater(answer.iterations, 0)
+                    self.assertLess(answer.certificate, 1e-4)
+
+    def test_short_forms(self):
+        box = self.scene("box")
+        B = box.radiosity({"lamp": 17})
+        np.testing.assert_array_equal(box.indirect({"lamp": 17}), box.radiosity({"lamp": 17}, quantity="indirect"))
+        H = box.irradiance({"lamp": 17}).values
+        np.testing.assert_allclose(B[:, box.groups["floor"].indices], (H * box.reflectances)[:, box.groups["floor"].indices], rtol=1e-5)
+        self.assertGreater(B.times["solve"], 0)
+        self.assertIsInstance(B, lambert.Answer)
+        self.assertNotIsInstance(B + 1, lambert.Answer)
+
+    def test_long_batches_are_several_requests(self):
+        box = self.scene("box")
+        E = abs(random_emission(box, 2, 70))
+        found = box.radiosity(E)
+        self.assertEqual((found.shape, len(found.limited)), ((70, 3, 400), 2))
+        np.testing.assert_array_equal(found[69], box.radiosity(E[69]).values)
+
+    def test_figures(self):
+        office, box = self.scene("office"), self.scene("box")
+        found = office.reduce({"luminaires": {"row": 1}}, sensors=["desks"], figures=("mean", "min", "uniformity"), at_least=[100, 300])
+        values = office.irradiance({"luminaires": {"row": 1}}, select={"sensors": ["desks"]}).values
+        self.assertAlmostEqual(found["desks"]["mean"], values.mean(), delta=1e-4 * values.mean())
+        self.assertAlmostEqual(found["desks"]["share"][100], (values >= 100).mean())
+        self.assertIn("stated", found.error)
+        both = box.reduce([{"lamp": 1}, {"lamp": 2}], groups=["floor", "ceiling"], figures="mean")
+        self.assertEqual(both["ceiling"]["mean"].shape, (2, 3))
+        np.testing.assert_allclose(both["floor"]["mean"][1], 2 * both["floor"]["mean"][0], rtol=1e-6)
+
+    def test_gradients(self):
+        box, office, yard = map(self.scene, ("box", "office", "yard"))
+        g = random_emission(box)
+        np.testing.assert_allclose(box.adjoint(g), self.ask("box", "adjoint", {"cotangent": g.tolist()})["gradient"]["emission"], rtol=2e-6, atol=1e-9)
+        self.assertEqual(box.adjoint(g, doubles=True).dtype, np.float64)
+        self.assertEqual(box.adjoint([g, g, {"floor": 1}]).shape, (3, 3, 400))
+        both = box.adjoint(g, ("groups", "reflectance"), emission={"lamp": 17})
+        self.assertEqual({name: array.shape for name, array in both.items()}, {"groups": (3, 8), "reflectance": (3, 400)})
+        self.assertEqual(yard.adjoint({"roof*": 1} if "roof.0" in yard.names else {yard.names[0]: 1}, "sky").shape[-1], 145)
+        J = office.jacobian({"sensors": "desks"}, by="luminaires")
+        np.testing.assert_allclose(office.adjoint({"sensors": {"desks": np.eye(100)[7]}}, "luminaires"), J["luminaires"][7], rtol=1e-4)
+        values = office.irradiance({"luminaires": {"row": 0.4, "desk": 1}}, select={"sensors": ["desks"]}, limit=False)
+        np.testing.assert_allclose(J["luminaires"] @ [0.4, 0.4, 1], values.values, rtol=1e-4)
+
+    def test_variants(self):
+        paint = self.scene("paint")
+        red = paint.variant("red", {"floor": [0.6, 0.1, 0.1]})
+        try:
+            self.assertEqual(red.name, "paint@red")
+            self.assertGreater(red.radiosity({"lamp": 1})[0].mean(), red.radiosity({"lamp": 1})[1].mean())
+        finally:
+            red.delete()
+        with self.assertRaises(lambert.NotFound):
+            red.radiosity({"lamp": 1})
+        with self.assertRaises(lambert.Refused):  # 409: it keeps no factors
+            self.scene("waves").variant("red", {"floor": 0.5})
+
+    def test_errors_say_where(self):
+        box = self.scene("box")
+        with self.assertRaisesRegex(lambert.Refused, "lmap") as caught:
+            box.radiosity({"lmap": 1})
+        error = caught.exception
+        self.assertEqual((error.status, error.kind, error.pointer), (422, "unknown-group", "/emission/groups/lmap"))
+        self.assertEqual(error.route, "POST /v1/scenes/box/radiosity")
+        for words, wrong in ((r"\[399\], must have \[400\] or \[3, 400\]", lambda: box.radiosity(np.ones(399))),
+                             (r"\[2, 3, 399\], must have \[3, 400\]", lambda: box.radiosity(np.ones((2, 3, 399)))),
+                             (r"emission 1 of the batch has the shape \[2\]", lambda: box.radiosity([np.ones(400), np.ones(2)])),
+                             (r"cotangent has the shape \[4, 400\]", lambda: box.adjoint(np.ones((4, 400)))),
+                             ("real numbers", lambda: box.radiosity(np.ones(400) * 1j)),
+                             ("quantity 'light' is none of", lambda: box.radiosity({"lamp": 1}, quantity="light")),
+                             ("beside lamp", lambda: box.radiosity({"groups": {"lamp": 1}, "lamp": 1})),
+                             ("one of the two", lambda: box.reduce({"lamp": 1})), ("empty batch", lambda: box.radiosity([])),
+                             ("not finite", lambda: box.radiosity({"lamp": float("nan")})),
+                             ("is no address", lambda: lambert.Scene("http:///box")), ("more than a scene", lambda: lambert.Scene("http://h/a/b")),
+                             (r"has 8 scenes, so that one is named: box, ", lambda: lambert.Scene(self.address, token=TOKEN))):
+            with self.assertRaisesRegex(lambert.Refused, words):
+                wrong()
+        with self.assertRaisesRegex(lambert.NotFound, "bex"):
+            self.scene("bex")
+        with self.assertRaises(lambert.Denied):
+            lambert.Scene(self.address + "/box")
+        with self.assertRaisesRegex(lambert.Disconnected, "127.0.0.1:1: "):
+            lambert.Scene("http://127.0.0.1:1/box")
+
+    def test_page(self):
+        page = self.scene("box").show()
+        self.assertIn("<iframe", page._repr_html_())
+        self.assertTrue(repr(page).startswith(self.address + "/#1."))
+
+    def test_threads_share_a_scene(self):
+        box = self.scene("box")
+        wanted, wrong = box.radiosity({"lamp": 1}).values, []
+
+        def ask():
+            for _ in range(5):
+                wrong.extend([1] * (not np.array_equal(box.radiosity({"lamp": 1}), wanted)))
+
+        threads = [threading.Thread(target=ask) for _ in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(wrong, [])
+
+    @unittest.skipIf(linalg is None, "SciPy is not installed")
+    def test_linear_algebra(self):
+        for name in ("box", "office"):
+            scene = self.scene(name)
+            M = scene @ np.eye(scene.n)[:, None].repeat(scene.channels, 1)  # [n][C][n]: columns of M~ for each channel
+            M = M.reshape(scene.n, scene.channels, scene.n)
+            A = scene.as_operator()
+            dense = np.zeros(A.shape)
+            for c in range(scene.channels):
+                dense[c * scene.n:(c + 1) * scene.n, c * scene.n:(c + 1) * scene.n] = M[:, c].T
+            X = np.random.default_rng(3).normal(size=(A.shape[1], 3))
+            np.testing.assert_allclose(A @ X, dense @ X, atol=2e-5)
+            np.testing.assert_allclose(A.H @ X, dense.T @ X, atol=2e-5)
+            np.testing.assert_allclose(linalg.svds(A, k=2, random_state=1)[1], np.linalg.svd(dense)[1][1::-1], rtol=1e-5)
+            x, info = linalg.gmres(A, dense @ X[:, 0], tol=1e-7, atol=0)
+            self.assertLess(np.linalg.norm(x - X[:, 0]) / np.linalg.norm(X[:, 0]), 1e-4)
+
+    @unittest.skipIf(torch is None, "PyTorch is not installed")
+    def test_torch(self):
+        for name in ("box", "office"):
+            scene = self.scene(name)
+            light = scene.torch("irradiance")
+            generator = torch.Generator().manual_seed(1)
+            basis, weights = (torch.rand(k, *scene.shape, dtype=torch.float64, generator=generator) for k in (3, 2))
+
+            def of(c):  # few unknowns, and a batch of two
+                E = torch.einsum("bk,k...->b...", c, basis).reshape(2, scene.channels, scene.n)
+                return torch.einsum("b...,w...->bw", light(E).reshape(2, *scene.shape), weights)
+
+            c = torch.rand(2, 3, dtype=torch.float64, generator=generator, requires_grad=True)
+            # The light is in single precision and linear, so that long steps have the smallest error: 1e-7 times sums of about 1000.
+            self.assertTrue(torch.autograd.gradcheck(of, (c,), eps=0.5, atol=2e-3, rtol=1e-4))
+            E = torch.ones(scene.n, requires_grad=True)  # alike in all channels
+            light(E).sum().backward()
+            np.testing.assert_allclose(E.grad.numpy(), scene.adjoint(np.ones(scene.shape), quantity="irradiance").reshape(-1, scene.n).sum(0), rtol=1e-5)
+
+    def test_libraries_that_are_not_there(self):
+        box = self.scene("box")
+        with unittest.mock.patch.dict(sys.modules, {"torch": None, "jax": None, "scipy.sparse.linalg": None}):
+            for ask, words in ((box.torch, "PyTorch is not installed"), (box.jax, "JAX is not installed"), (box.as_operator, "SciPy is not installed")):
+                with self.assertRaisesRegex(lambert.Unsupported, words):
+                    ask()
+
+
+class Fake(http.server.BaseHTTPRequestHandler):
+    """Answers by `server.script`, a list of functions of this handler; the last one stays."""
+
+    protocol_version = "HTTP/1.1"
+
+    def log_message(self, *words):
+        pass
+
+    def do_GET(self):
+        self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        self.server.asked.append(self)
+        script = self.server.script
+        (script.pop(0) if len(script) > 1 else script[0])(self)
+
+    do_POST = do_PUT = do_GET
+
+    def say(self, status, body=b"{}", **headers):
+        self.send_response_only(status)
+        for name, value in headers.items():
+            self.send_header(name.replace("_", "-"), value)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+
+class Connections(unittest.TestCase):
+    """A server that closes, waits and refuses as it is told."""
+
+    def serve(self, *script):
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Fake)
+        server.daemon_threads = True
+        server.script, server.asked = list(script), []
+        threading.Thread(target=server.serve_forever, args=(.01,), daemon=True).start()
+        self.addCleanup(server.server_close)
+        self.addCleanup(server.shutdown)
+        return server, lambert.connect(f"http://127.0.0.1:{server.server_port}", timeout=PATIENCE)
+
+    def test_busy_is_asked_again(self):
+        for status in (429, 503):
+            busy = lambda h, status=status: h.say(status, b'{"title":"Full","detail":"later"}', Retry_After="0.05")
+            server, daemon = self.serve(busy, busy, lambda h: h.say(200, b'{"scenes":[]}'))
+            self.assertEqual(daemon.scenes(), [])
+            self.assertEqual(len(server.asked), 3)
+        server, daemon = self.serve(busy)
+        with self.assertRaisesRegex(lambert.Unavailable, "later"):
+            daemon.scenes()
+        self.assertEqual(len(server.asked), 5)  # once and four times again
+        server, daemon = self.serve(lambda h: h.say(503, Retry_After="3600"))
+        with self.assertRaises(lambert.Unavailable):  # longer than its time limit
+            daemon.scenes()
+        self.assertEqual(len(server.asked), 1)
+        server, daemon = self.serve(lambda h: h.say(429))
+        with self.assertRaises(lambert.Busy):
+            lambert.client.Client.ask(daemon._client, lambert.wire.Request("PUT", "/"))
+        self.assertEqual(len(server.asked), 1)
+
+    def test_connection_that_was_closed_while_idle(self):
+        def last(h):
+            h.say(200, b'{"scenes":[]}')
+            h.close_connection = True  # without a word of it
+
+        server, daemon = self.serve(last)
+        for _ in range(3):
+            self.assertEqual(daemon.scenes(), [])
+        self.assertEqual(len(server.asked), 3)
+
+        def cut(h):
+            h.close_connection = True
+
+        server, daemon = self.serve(cut)
+        with self.assertRaises(lambert.Disconnected):
+            daemon.scenes()
+        self.assertEqual(len(server.asked), 1)  # a new connection that breaks is a daemon that fails
+
+    def test_one_connection_is_kept(self):
+        server, daemon = self.serve(lambda h: h.say(200, b'{"scenes":[]}'))
+        for _ in range(4):
+            daemon.scenes()
+        self.assertEqual(len({h.client_address for h in server.asked}), 1)
+
+    def test_giving_up(self):
+        entered, leave = threading.Event(), threading.Event()
+        self.addCleanup(leave.set)
+
+        def slow(h):
+            entered.set()
+            leave.wait(PATIENCE)
+
+        server, daemon = self.serve(slow)
+        request = lambert.wire.Request("GET", "/v1/scenes")
+        with self.assertRaisesRegex(lambert.TimedOut, "no answer within 0.1 s"):
+            daemon._client.ask(request, timeout=.1)
+        for give_up in ("cancel", "close"):
+            entered.clear()
+            cancel, ended = threading.Event(), []
+
+            def ask():
+                try:
+                    daemon._client.ask(request, cancel=cancel if give_up == "cancel" else None)
+                except lambert.LambertError as error:
+                    ended.append(error)
+
+            thread = threading.Thread(target=ask)
+            thread.start()
+            self.assertTrue(entered.wait(PATIENCE))
+            cancel.set() if give_up == "cancel" else daemon.close()
+            thread.join(PATIENCE)
+            self.assertIsInstance(ended[0], lambert.Cancelled, give_up)
+        leave.set()
+
+    def test_answers_that_are_none(self):
+        server, daemon = self.serve(lambda h: h.say(502, b"<html>Bad gateway</html>", Content_Type="text/html"))
+        with self.assertRaisesRegex(lambert.LambertError, "502 <html>Bad gateway"):
+            daemon.scenes()
+
+    def test_request_says_its_time_limit(self):
+        server, daemon = self.serve(lambda h: h.say(200))
+        daemon._client.ask(lambert.wire.to_json("/x", {}), timeout=7)
+        self.assertAlmostEqual(float(server.asked[0].headers["Lambert-Timeout"]), 7, delta=1)
+
+
+class Replaced(unittest.TestCase):
+    """A daemon that is killed, or reads another store, in the middle of a loop."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        for name, size, reflectance in (("a", "1,1,1", .5), ("b", "1,1,2", .5), ("c", "1,1,1", .2)):
+            must("generate", "box", "--divisions", 3, "--size", size, "-o", self.path(name + ".obj"))
+            must("precompute", self.path(name + ".obj"), "--reflectance", reflectance, "--probes", 0, "-o", self.path(name + ".h5"), "--quiet")
+        shutil.copy(self.path("a.h5"), self.path("room.h5"))
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def replace(self, daemon, name, times):
+        shutil.copy(self.path(name), self.path("new"))
+        os.replace(self.path("new"), self.path("room.h5"))
+        daemon.signal(signal.SIGHUP)
+        daemon.wait_for("serving room", times)
+
+    def test_replaced(self):
+        with Daemon(self.path("room.h5")) as daemon:
+            scene = lambert.Scene(f"http://127.0.0.1:{daemon.port}")
+            E = np.ones(scene.n)
+            first = scene.radiosity(E).values
+            self.replace(daemon, "c.h5", 2)  # other materials, the same places
+            self.assertLess(scene.radiosity(E).max(), first.max())
+            self.replace(daemon, "b.h5", 3)  # as many elements elsewhere
+            for ask in (lambda: scene.radiosity(E), lambda: scene.adjoint(E), lambda: scene.as_operator() @ E,
+                        lambda: scene.reduce(E, groups=scene.names[0])):
+                with self.assertRaisesRegex(lambert.SceneChanged, "another geometry"):
+                    ask()
+            self.assertEqual(lambert.Scene(f"http://127.0.0.1:{daemon.port}").radiosity(E).shape, (54,))
+            must("generate", "box", "--divisions", 4, "-o", self.path("d.obj"))
+            must("precompute", self.path("d.obj"), "--probes", 0, "-o", self.path("d.h5"), "--quiet")
+            blind = lambert.Scene(f"http://127.0.0.1:{daemon.port}", check=-1)
+            self.replace(daemon, "d.h5", 4)
+            with self.assertRaises(lambert.SceneChanged):  # its shape alone says so
+                blind.radiosity({blind.names[0]: 1})
+
+    def test_killed_and_started_again(self):
+        with Daemon(self.path("room.h5")) as daemon:
+            port = daemon.port
+            scene = lambert.Scene(f"http://127.0.0.1:{port}/room")
+            first = scene.radiosity(np.ones(scene.n)).values
+            daemon.kill()
+            with self.assertRaises(lambert.Disconnected):
+                scene.radiosity(np.ones(scene.n))
+        with Daemon(self.path("room.h5"), listen=f"127.0.0.1:{port}"):
+            np.testing.assert_array_equal(scene.radiosity(np.ones(scene.n)), first)
+
+    def test_full(self):
+        """More clients than may wait: each gets its answer, as all ask again."""
+        with Daemon(self.path("room.h5"), "--max-inflight", 1, "--threads", 1) as daemon:
+            scene = lambert.Scene(f"http://127.0.0.1:{daemon.port}", retries=100)
+            wrong = []
+
+            def loop():
+                try:
+                    for _ in range(5):
+                        scene.radiosity(np.ones((8, 1, scene.n)))
+                except lambert.LambertError as error:
+                    wrong.append(error)
+
+            threads = [threading.Thread(target=loop) for _ in range(4)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            self.assertEqual(wrong, [])
+
+    def test_unix_socket(self):
+        with Daemon(self.path("room.h5"), "--unix", self.path("socket"), listen=None) as daemon:
+            scene = lambert.Scene(f"unix:{self.path('socket')}")
+            self.assertEqual(scene.radiosity(np.ones(scene.n)).shape, (54,))
+            self.assertEqual(lambert.Scene(f"unix:{self.path('socket')}:room").name, "room")
+            with self.assertRaisesRegex(lambert.NotFound, "HTTP"):
+                scene.show()
+            self.assertIsNone(daemon.process.poll())
+        with self.assertRaises(lambert.Disconnected):
+            scene.radiosity(np.ones(scene.n))
+
+    def test_served(self):
+        with lambert.serve(self.path("a.h5"), self.path("b.h5")) as daemon:
+            self.assertEqual({scene["name"] for scene in daemon.scenes()}, {"a", "b"})
+            self.assertTrue(daemon.health())
+            process = daemon.process
+        self.assertEqual(process.poll(), 0)
+        self.assertFalse(daemon.health())
+        with self.assertRaisesRegex(lambert.LambertError, "gone.h5"):
+            lambert.serve(self.path("gone.h5"))
+        with self.assertRaises(lambert.NotFound):
+            lambert.serve(self.path("a.h5"), program=self.path("lambertd"))
+
+
+class Sources(unittest.TestCase):
+    """The package as it is distributed."""
+
+    @unittest.skipIf(shutil.which("mypy") is None, "mypy is not installed")
+    def test_types(self):
+        done = subprocess.run(["mypy", "--strict", "--cache-dir", os.devnull, "lambert"], cwd=PACKAGE, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+    def test_wheel_and_sdist(self):
+        """Both are built without a network, and the wheel is importable where nothing but NumPy is."""
+        with tempfile.TemporaryDirectory() as folder:
+            source = os.path.join(folder, "source")
+            shutil.copytree(PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info", "build"))
+            build = "import setuptools.build_meta as b, sys; sys.argv[1:] = []; print(b.build_sdist('..')); print(b.build_wheel('..'))"
+            run = lambda *words, **more: subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE, **more)
+            done = run("/usr/bin/python3", "-c", build, cwd=source, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            sdist, wheel = (next(os.path.join(folder, name) for name in os.listdir(folder) if name.endswith(end)) for end in (".tar.gz", ".whl"))
+            bare = os.path.join(folder, "bare")
+            self.assertEqual(run("/usr/bin/python3", "-m", "venv", "--system-site-packages", bare, check=False).returncode, 0)
+            for package in (wheel, sdist):
+                done = run(os.path.join(bare, "bin", "pip"), "install", "--no-index", "--no-build-isolation", "--no-deps", "--force-reinstall", package, check=False)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                done = run(os.path.join(bare, "bin", "python"), "-I", "-c", "import lambert, os; print(lambert.__file__, lambert.__version__, "
+                           "os.path.exists(os.path.join(os.path.dirname(lambert.__file__), 'py.typed')))", cwd=folder, check=False)
+                self.assertEqual(done.stdout.split()[1:], [lambert.__version__, "True"], done.stderr)
+                self.assertTrue(done.stdout.startswith(bare))
+
+    def test_version_is_that_of_the_programs(self):
+        version = subprocess.run([os.environ["LAMBERT"], "--version"], capture_output=True, text=True, check=True).stdout.split()[1]
+        self.assertEqual(lambert.__version__, version)
+        self.assertIn(f'version = "{version}"', (PACKAGE / "pyproject.toml").read_text())
+
+
+if __name__ == "__main__":
+    unittest.main()
