@@ -86,4 +86,5 @@ class PackageCase(unittest.TestCase):
 
 
 def random_emission(scene, seed=1, *shape):
+    """Of either sign: as answers are shaped, or of more of them."""
     return np.random.default_rng(seed).normal(size=(*shape, *scene.shape))

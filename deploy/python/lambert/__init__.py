@@ -7,6 +7,7 @@
 The manual is python.md.
 """
 
+from . import aio
 from .answer import Answer, Figures, Jacobian
 from .daemon import Daemon, Served, connect, serve
 from .errors import (Busy, Cancelled, Denied, Disconnected, LambertError, NotFound, Refused, SceneChanged, TimedOut, Unavailable,
@@ -17,4 +18,4 @@ from .scene import Scene
 __version__ = "0.3.0"
 __all__ = ["Answer", "Busy", "Cancelled", "Daemon", "Denied", "Disconnected", "Figures", "Group", "Jacobian", "LambertError",
            "Luminaire", "NotFound", "Refused", "Scene", "SceneChanged", "SensorSet", "Served", "Sky", "TimedOut", "Unavailable",
-           "Unsupported", "connect", "serve"]
+           "Unsupported", "aio", "connect", "serve"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Dict, Mapping, Optional, Tuple, Union
+from typing import TYPE_CHECKING, Any, Dict, Mapping, Optional, Union
 
 import numpy as np
 
@@ -134,6 +134,3 @@ def joined(parts: "list[Answer]") -> Answer:
     return Answer.of(np.concatenate([part.values for part in parts]), unit=first.unit, converted_by=first.converted_by,
                      error=worst, times=times, limited=all_of("limited"), certificate=all_of("certificate"),
                      iterations=all_of("iterations"))
-
-
-Shape = Tuple[int, ...]

@@ -51,8 +51,8 @@ class About:
         return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
 
     def shapes(self) -> str:
-        one, more = shape_text((self.n,)), shape_text((self.channels, self.n))
-        return f"{one} or {more} as the scene {self.name} has, or one level more for a batch"
+        one, more, m = shape_text((self.n,)), f"{self.channels}, {self.n}]", "one level more for a batch"
+        return f"{one}{'' if self.channels == 1 else f' or [{more}'} as the scene {self.name} has, or {m}"
 
     def rows(self, array: Array) -> Array:
         """[C, n] of [n] or [C, n]."""
@@ -85,7 +85,9 @@ def one_emission(about: About, emission: Emission, what: str = "emission") -> Un
         # A dense array of channels is [C, m] in NumPy, and a list of m colours in requests.
         if _is_array(made.get(key)):
             array = np.asarray(made[key])
-            made[key] = (array.T if array.ndim == 2 and array.shape[0] == about.channels and about.channels > 1 else array).tolist()
+            if array.ndim == 2 and array.shape[0] == about.channels:
+                array = array.T if about.channels > 1 else array[0]
+            made[key] = array.tolist()
     return made
 
 
@@ -98,11 +100,12 @@ def emissions_of(about: About, emission: Emission, what: str = "emission") -> Tu
     >>> emissions_of(about, [{"lamp": 1}, {"groups": {"lamp": 2}}])
     ([{'groups': {'lamp': 1}}, {'groups': {'lamp': 2}}], True)
     """
-    if _is_array(emission) and np.ndim(emission) == 3:
+    if _is_array(emission) and (np.ndim(emission) == 3 or np.ndim(emission) == 2 and about.channels == 1):
         array = np.asarray(emission)
+        array = array[:, None] if array.ndim == 2 else array  # of one channel, as answers to a batch are
         if array.shape[1:] != (about.channels, about.n) or array.shape[0] == 0:
             raise Refused(f"{what} has the shape {shape_text(array.shape)}, must have "
-                          f"{shape_text((about.channels, about.n))} behind the number of a batch")
+                          f"{shape_text((about.channels, about.n))} behind the number of a batch, m")
         return [about.dense(row, what) for row in array], True
     if isinstance(emission, (list, tuple)) and (not emission or any(isinstance(e, Mapping) or _is_array(e) for e in emission)):
         if not emission:

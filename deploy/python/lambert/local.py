@@ -1,11 +1,522 @@
-"""A scene in process, from a store."""
+"""A scene in process: the questions that a daemon answers, by an operator of this process and the arrays of its store."""
 
 from __future__ import annotations
 
-from typing import Any, Union
+from dataclasses import dataclass
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
-from .errors import Unsupported
+import numpy as np
+
+from .answer import Answer, Figures, Jacobian
+from .errors import Refused, Unsupported
+from .kinds import NumpyOperator, emitter_weights
+from .library import Library, LibraryOperator, find
+from .light import About, AdjointQuery, LightQuery, word
+from .mesh import Elements
+from .remote import How
+from .store import Names, Store
+from .units import EFFICACY, Conversion, exitance
+from .wire import Array
+
+Operator = Union[NumpyOperator, LibraryOperator]
+FIGURES = ("mean", "sum", "min", "max", "uniformity", "variance", "share", "ugr")
+GRADIENTS = ("emission", "reflectance", "sky", "emitters", "groups", "luminaires")
 
 
-def Local(path: str, library: Union[None, bool, str]) -> Any:
-    raise Unsupported(f"{path}: a store needs a daemon: with lambert.serve({path!r}) as daemon: scene = daemon.scene()")
+def _needs_daemon(what: str) -> Unsupported:
+    return Unsupported(f"{what} needs a daemon: with lambert.serve(STORE) as daemon: scene = daemon.scene()")
+
+
+@dataclass
+class Light:
+    """A batch of emissions: E [m, C, n], radiances L [m, C, tiles], dimmers D [m, C, k] and weights W [m, C, s]; None: there are none."""
+
+    E: Array
+    L: Optional[Array]
+    D: Optional[Array]
+    W: Optional[Array]
+    converted: bool = False
+    kind: str = "W"
+
+
+class Local:
+    """A store in process. Any number of threads may share it."""
+
+    def __init__(self, path: str, library: Union[None, bool, str] = None, *, store: Optional[Store] = None,
+                 operator: Optional[Operator] = None, name: Optional[str] = None) -> None:
+        self.store = Store(path) if store is None else store
+        if operator is None:
+            found = find(library)
+            if found is None and library not in (None, False):
+                raise Unsupported("liblambert was not found; set LAMBERT_LIBRARY to its path")
+            operator = NumpyOperator(self.store) if found is None else LibraryOperator(self.store, Library(found))
+        self.op = operator
+        facts = self.store.facts()
+        facts["emitters"] = operator.names or None
+        self.about = About.of(facts, name)
+        self.where = path
+
+    def elements(self) -> Elements:
+        return self.store.elements
+
+    def groups(self) -> List[Mapping[str, Any]]:
+        return self.store.group_lines()
+
+    def document(self, name: str) -> Optional[Mapping[str, Any]]:
+        return self.store.document(name)
+
+    # Emissions.
+
+    def _colour(self, value: Any, what: str) -> Array:
+        """A number for all channels, or one for each: [C]."""
+        array = np.asarray(value, float)
+        if array.shape not in ((), (1,), (self.about.channels,)) or not np.isfinite(array).all():
+            raise Refused(f"{what} = {value!r}, must be a number or one for each of {self.about.channels} channels")
+        return np.broadcast_to(array, (self.about.channels,))
+
+    def _row(self, values: Any, length: int, what: str) -> Array:
+        """A list of numbers or colours, as [C, length]."""
+        array = np.asarray(values, float)
+        if array.shape[:1] != (length,) or array.shape[1:] not in ((), (self.about.channels,)):
+            raise Refused(f"{what} has the shape {list(array.shape)}, must have [{length}] or [{length}, {self.about.channels}]",
+                          kind="wrong-length")
+        return np.broadcast_to(array if array.ndim == 1 else array.T, (self.about.channels, length))
+
+    def _spread(self, given: Union[Array, Mapping[str, Any]], what: str, signs: bool = True) -> Tuple[Array, bool]:
+        """What is given of elements and groups, as [C, n], and whether a unit was converted."""
+        about, store = self.about, self.store
+        if isinstance(given, np.ndarray):
+            made, converted = np.array(about.rows(given), float), False
+        else:
+            made, converted = np.zeros((about.channels, about.n)), False
+            if "elements" in given:
+                indices = np.asarray(given["elements"])
+                if indices.size and (indices.dtype.kind not in "iu" or indices.min() < 0 or indices.max() >= about.n):
+                    raise Refused(f"{what}/elements holds an index that is not from 0 to {about.n - 1}", kind="bad-index")
+                if len(np.unique(indices)) < len(indices):
+                    raise Refused(f"{what}/elements names an element twice", kind="given-twice")
+                if indices.size:
+                    made[:, indices.astype(int)] = np.stack([self._colour(v, f"{what}/values") for v in given["values"]], 1)
+            taken: Dict[int, str] = {}
+            for name, value in given.get("groups", {}).items():
+                found = store.groups.find(name)
+                for g in found:
+                    if g in taken:
+                        raise Refused(f"{what}/groups: {store.group_names[g]} is reached by {taken[g]} and {name}", kind="given-twice")
+                    taken[g] = name
+                of = np.isin(store.group, found)
+                if isinstance(value, str):
+                    value, other = exitance(value, float(store.area[of & store.counts].sum()), store.lights)
+                    converted = converted or other
+                made[:, of] = self._colour(value, f"{what}/groups/{name}")[:, None]
+        if not np.isfinite(made).all():
+            raise Refused(f"{what} holds a number that is not finite", kind="bad-value")
+        if not signs and (made < 0).any():
+            raise Refused(f"{what} holds a negative number, must not", kind="bad-value")
+        return made, converted
+
+    def _light(self, emissions: Sequence[Union[Array, Mapping[str, Any]]], photometric: Optional[bool], signs: bool) -> Light:
+        about, store, C = self.about, self.store, self.about.channels
+        parts: Dict[str, List[Optional[Array]]] = {"L": [], "D": [], "W": []}
+        E, converted = np.zeros((len(emissions), C, about.n)), False
+        for v, given in enumerate(emissions):
+            E[v], other = self._spread(given, "emission", signs)
+            converted = converted or other
+            more = {} if isinstance(given, np.ndarray) else given
+            if "sun" in more:
+                raise _needs_daemon("the sun itself")
+            parts["L"].append(self._sky_of(more["sky"]) if "sky" in more else None)
+            parts["D"].append(self._dimmers_of(more["luminaires"]) if "luminaires" in more else None)
+            parts["W"].append(self._weights_of(more["emitters"]) if "emitters" in more else None)
+        stacked = {}
+        for name, rows in parts.items():
+            shape = next((row.shape for row in rows if row is not None), None)
+            stacked[name] = None if shape is None else np.stack([np.zeros(shape) if row is None else row for row in rows])
+            if stacked[name] is not None and (np.asarray(stacked[name]) < 0).any():
+                raise Refused("radiances of skies, dimmers of luminaires and weights of emitters must not be negative", kind="bad-value")
+        light = Light(E, stacked["L"], stacked["D"], stacked["W"], converted, store.lights)
+        if photometric is not None and light.L is None:
+            raise Refused("photometric is of the radiances of a sky, and there is none", kind="wrong-members")
+        if light.L is not None and photometric is not None and photometric != (store.lights == "lm"):
+            if photometric:  # light of both kinds together is photometric
+                light.kind, light.E = "lm", light.E * EFFICACY
+                light.W = None if light.W is None else light.W * EFFICACY
+            else:
+                light.L = light.L * EFFICACY
+            light.converted = True
+        return self._by_weights(light) if self.op.emitters else light
+
+    def _by_weights(self, light: Light) -> Light:
+        """Of a store of few emitters all light is theirs."""
+        if any((x is not None and (x < 0).any()) for x in (light.E,)):
+            raise Refused("an emission of a store of few emitters must not be negative", kind="bad-value")
+        m, s = len(light.E), self.op.emitters
+        W = np.zeros((m, self.about.channels, s)) if light.W is None else light.W.copy()
+        for v in range(m):
+            sky = None if light.L is None else light.L[v]
+            if light.E[v].any() or (sky is not None and sky.any()):
+                W[v] += emitter_weights(self.op, light.E[v], sky) if isinstance(self.op, NumpyOperator) else self.op.weights(light.E[v], sky)
+        if light.D is not None:
+            W[:, :, s - light.D.shape[2]:] += light.D
+        light.W = W
+        return light
+
+    def _sky_of(self, values: Any) -> Array:
+        if self.store.sky is None:
+            raise Refused("the store has no sky; precompute it with --sky", kind="not-in-store")
+        tiles = len(self.store.sky["tiles"])
+        array = np.asarray(values, float)
+        if self.about.channels == 1 and array.ndim == 2 and array.shape == (tiles, 3):
+            array = array @ [0.265, 0.670, 0.065]
+        return self._row(array, tiles, "emission/sky")
+
+    def _dimmers_of(self, given: Mapping[str, Any]) -> Array:
+        made = np.zeros((self.about.channels, len(self.store.luminaires["names"]) if self.store.luminaires else 0))
+        taken: Dict[int, str] = {}
+        for name, value in given.items():
+            for k in self.store.luminaire_indices(name):
+                if k in taken:
+                    raise Refused(f"emission/luminaires: one is reached by {taken[k]} and {name}", kind="given-twice")
+                taken[k] = name
+                made[:, k] = self._colour(value, f"emission/luminaires/{name}")
+        return made
+
+    def _weights_of(self, given: Any) -> Array:
+        if not self.op.emitters:
+            raise Refused("the store answers any emission and has no emitters", kind="not-in-store")
+        if not isinstance(given, Mapping):
+            return self._row(given, self.op.emitters, "emission/emitters")
+        made, names = np.zeros((self.about.channels, self.op.emitters)), Names(self.op.names, noun="emitter")
+        for name, value in given.items():
+            made[:, names.find(name)] = self._colour(value, f"emission/emitters/{name}")[:, None]
+        return made
+
+    def _direct(self, light: Light) -> Optional[Array]:
+        """The irradiance H0 [m, C, n] of sky and luminaires; None: there is none."""
+        made: Optional[Array] = None
+        if light.L is not None and self.store.sky is not None:
+            made = light.L @ self.store.sky["first_bounce"].astype(float)
+        if light.D is not None and self.store.luminaires is not None:
+            of = (light.D * self.store.luminaires["factors"]) @ self.store.luminaires["irradiance"].astype(float)
+            made = of if made is None else made + of
+        return made
+
+    # Answers.
+
+    def _solve(self, query: LightQuery, quantity: str) -> Tuple[Light, Array, Optional[List[int]], Dict[str, Any]]:
+        """The light of all elements, [m, C, n], in the unit of the light."""
+        light = self._light(query.emissions, query.photometric, query.tolerance is None)
+        limited: Optional[List[int]] = None
+        if self.op.emitters:
+            if query.tolerance is not None:
+                raise _needs_daemon("tolerance with a store of few emitters")
+            assert light.W is not None
+            out = self.op.apply_emitters(quantity, light.W)
+            if query.limit:
+                limited = self.op.limit(quantity, None, None, light.W, out)
+            return light, out, limited, {}
+        H0 = self._direct(light)
+        if query.tolerance is not None:
+            if isinstance(self.op, NumpyOperator):
+                raise Unsupported("tolerance needs liblambert, which was not found; set LAMBERT_LIBRARY, or ask a daemon")
+            out, certificates, iterations = self.op.refine(quantity, light.E, H0, query.tolerance)
+            if not query.batch:
+                return light, out, None, {"certificate": certificates[0], "iterations": iterations[0]}
+            return light, out, None, {"certificate": certificates, "iterations": iterations}
+        out = self.op.apply(quantity, light.E, H0)
+        if query.limit:
+            limited = self.op.limit(quantity, light.E, H0, None, out)
+        return light, out, limited, {}
+
+    def light(self, query: LightQuery, how: How) -> Answer:
+        select = query.select or {}
+        if len(select) > 1:
+            raise Refused(f"select has {', '.join(select)}; must have one of elements, groups, faces, sensors and probes")
+        key = next(iter(select), None)
+        if key in ("sensors", "probes"):
+            light, values, limited, more = self._at_sensors(query, key, select[key])
+        else:
+            light, values, limited, more = self._solve(query, query.quantity)
+        convert = Conversion(light.kind, query.unit, query.quantity, self.about.channels)
+        values = convert(values)
+        if query.at == "faces" or key == "faces":
+            values = self._at_faces(values, key, select.get(key) if key else None)
+        elif key in ("elements", "groups"):
+            values = values[:, :, self._selected(key, select[key])]
+        if values.shape[1] == 1:
+            values = values[:, 0]
+        kind = np.float64 if query.tolerance is not None else np.float32
+        unit = convert.unit
+        if key == "probes":
+            unit = "cd/m2" if convert.unit != "W/m2" else "W/(m2 sr)"
+        count: Any = limited if query.batch or limited is None else limited[0]
+        if more.get("certificate") is not None:
+            more["certificate"] = np.multiply(more["certificate"], convert.factor).tolist()
+        return Answer.of((values if query.batch else values[0]).astype(kind), unit=unit, limited=count, **more)
+
+    def _selected(self, key: str, wanted: Sequence[Any]) -> Array:
+        if key == "groups":
+            return np.concatenate([np.flatnonzero(self.store.group == g) for name in wanted for g in self.store.groups.find(name)])
+        indices = np.asarray(wanted)
+        if indices.size and (indices.dtype.kind not in "iu" or indices.min() < 0 or indices.max() >= self.about.n):
+            raise Refused(f"select/elements holds an index that is not from 0 to {self.about.n - 1}", kind="bad-index")
+        return indices.astype(int)
+
+    def _at_faces(self, values: Array, key: Optional[str], wanted: Any) -> Array:
+        """Means over faces of the scene file by area, of fronts alone; NaN where a face has no element."""
+        store = self.store
+        if store.face_area is None:
+            raise Refused("the store knows no faces; precompute the scene again", kind="not-in-store")
+        face, faces, n = store.elements.face[:store.n_fronts], len(store.face_area), store.n_fronts
+        of = face >= 0
+        sums = np.zeros((*values.shape[:2], faces))
+        groups_of = np.full(faces, -1)
+        for element, f, area in [*zip(np.flatnonzero(of), face[of], store.area[:n][of]),
+                                 *zip(store.face_part[:, 0], store.face_part[:, 1], store.face_part_area)]:
+            sums[:, :, f] += area * values[:, :, element]
+            groups_of[f] = store.group[element]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sums = np.where(store.face_area > 0, sums / store.face_area, np.nan)
+        if key == "faces":
+            chosen = np.asarray(wanted, int)
+            if chosen.size and (chosen.min() < 0 or chosen.max() >= faces):
+                raise Refused(f"select/faces holds an index that is not from 0 to {faces - 1}", kind="bad-index")
+        elif key == "groups":
+            found = [g for name in wanted for g in store.groups.find(name)]
+            chosen = np.concatenate([np.flatnonzero(groups_of == g) for g in found])
+        elif key is None:
+            chosen = np.arange(faces)
+        else:
+            raise Refused("an answer at faces selects groups or faces", kind="wrong-members")
+        return sums[:, :, chosen]
+
+    def _at_sensors(self, query: LightQuery, key: str, names: Sequence[str]) -> Tuple[Light, Array, Optional[List[int]], Dict[str, Any]]:
+        if self.op.emitters:
+            raise _needs_daemon("sensors of a store of few emitters")
+        if key == "sensors" and query.quantity != "irradiance":
+            raise Refused("the light at sensors is irradiance", kind="wrong-members")
+        _, rows = self.store.sensor_rows(names, key == "probes")
+        light, B, limited, more = self._solve(query, "radiosity")
+        return light, self._gather(light, B.astype(float))[:, :, rows], limited, more
+
+    def _gather(self, light: Light, B: Array) -> Array:
+        """[m, C, receivers]: NaN where a receiver has no value."""
+        read = self.store.sensors
+        assert read is not None
+        count = len(read["receiver"])
+        i = np.repeat(np.arange(count), np.diff(read["indptr"].astype(int)))
+        j, weights = read["indices"].astype(int), read["weights"].astype(float)
+        made = np.stack([np.stack([np.bincount(i, weights * b[j], count) for b in row]) for row in B])
+        if light.L is not None and "sky" in read:
+            made += light.L @ read["sky"].astype(float)
+        if light.D is not None and "luminaires" in read and self.store.luminaires is not None:
+            made += (light.D * self.store.luminaires["factors"]) @ read["luminaires"].astype(float)
+        made[:, :, read["flags"] != 0] = np.nan
+        return made
+
+    def figures(self, query: LightQuery, how: How) -> Figures:
+        reduce = query.reduce or {}
+        words = [word(name, FIGURES, "figure") for name in reduce["with"]]
+        if "ugr" in words:
+            raise _needs_daemon("ugr")
+        over = "sensors" if "sensors" in reduce else "groups"
+        if over == "sensors":
+            if "sum" in words:
+                raise Refused("sum is of groups alone", kind="wrong-members")
+            light, values, limited, _ = self._at_sensors(query, over, reduce[over])
+            values = Conversion(light.kind, query.unit, "irradiance", self.about.channels)(values)
+            counts, _ = self.store.sensor_rows(reduce[over])
+            at, parts = 0, {}
+            for name, count in counts.items():
+                x = values[:, :, at:at + count]
+                good = ~np.isnan(x[0, 0])
+                parts[name] = (x[:, :, good], np.ones(int(good.sum())))
+                at += count
+        else:
+            light, values, limited, _ = self._solve(query, query.quantity)
+            values = Conversion(light.kind, query.unit, query.quantity, self.about.channels)(values)
+            parts = {}
+            for name in reduce[over]:
+                of = np.isin(self.store.group, self.store.groups.find(name)) & self.store.counts
+                parts[name] = (values[:, :, of], self.store.area[of])
+        unit = Conversion(light.kind, query.unit, "irradiance" if over == "sensors" else query.quantity, self.about.channels).unit
+        figures = {name: {figure: self._figure(figure, x.astype(float), A, reduce.get("at_least"), query.batch) for figure in words}
+                   for name, (x, A) in parts.items()}
+        return Figures.of(figures, unit=unit, limited=limited if query.batch or limited is None else limited[0])
+
+    @staticmethod
+    def _figure(name: str, x: Array, A: Array, limits: Optional[Sequence[float]], batch: bool) -> Any:
+        """A figure of x [m, C, values] by area, as JSON has it."""
+        def plain(values: Array) -> Any:
+            values = values[:, 0] if values.shape[1] == 1 else values
+            values = values if batch else values[0]
+            return None if values.ndim == 0 and np.isnan(values) else values.tolist()
+
+        if name == "share":
+            return {str(limit): plain((x >= limit) @ A / A.sum()) for limit in limits or ()}
+        if x.shape[2] == 0:
+            return plain(np.full(x.shape[:2], np.nan))
+        mean = x @ A / A.sum()
+        if name == "uniformity":
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return plain(np.where(mean > 0, x.min(2) / mean, np.nan))
+        if name in ("min", "max"):
+            return plain(x.min(2) if name == "min" else x.max(2))
+        return plain(mean if name == "mean" else x @ A if name == "sum" else (x - mean[:, :, None]) ** 2 @ A / A.sum())
+
+    # Gradients.
+
+    def adjoint(self, queries: Sequence[AdjointQuery], how: How) -> List[Dict[str, Array]]:
+        return [self._adjoint(query) for query in queries]
+
+    def _adjoint(self, query: AdjointQuery) -> Dict[str, Array]:
+        store, C, read = self.store, self.about.channels, self.store.sensors
+        for name in query.gradient:
+            word(name, GRADIENTS, "gradient")
+        at_sensors: Optional[Array] = None
+        if not isinstance(query.cotangent, np.ndarray) and "sensors" in query.cotangent:
+            at_sensors, g, quantity = self._sensor_cotangent(query.cotangent["sensors"])[0], np.zeros((C, self.about.n)), "radiosity"
+            assert read is not None
+            i = np.repeat(np.arange(len(read["receiver"])), np.diff(read["indptr"].astype(int)))
+            g = np.stack([np.bincount(read["indices"].astype(int), read["weights"] * row[i], self.about.n) for row in at_sensors])
+        else:
+            (g, _), quantity = self._spread(query.cotangent, "cotangent"), query.quantity
+        if self.op.emitters:
+            return self._adjoint_emitters(query, g, quantity)
+        w = self.op.adjoint(quantity, g[None])[0].astype(float)
+        # By H0: what E' = E + rho H0 makes of it, and irradiance has it directly.
+        by_direct = self.op.rho * w + (g if quantity == "irradiance" else 0)
+        made: Dict[str, Array] = {}
+        for name in query.gradient:
+            if name == "emission":
+                made[name] = w
+            elif name == "groups":
+                made[name] = np.stack([np.bincount(store.group, row, len(store.group_names)) for row in w])
+            elif name == "reflectance":
+                made[name] = self._by_reflectance(query, quantity, w, g)
+            elif name == "sky":
+                if store.sky is None:
+                    raise Refused("the store has no sky; precompute it with --sky", kind="not-in-store")
+                made[name] = by_direct @ store.sky["first_bounce"].T.astype(float)
+                if at_sensors is not None and read is not None and "sky" in read:
+                    made[name] = made[name] + at_sensors @ read["sky"].T.astype(float)
+            elif name == "luminaires":
+                if store.luminaires is None:
+                    raise Refused("the store has no luminaires; precompute it with --luminaires", kind="not-in-store")
+                found = by_direct @ store.luminaires["irradiance"].T.astype(float)
+                if at_sensors is not None and read is not None and "luminaires" in read:
+                    found = found + at_sensors @ read["luminaires"].T.astype(float)
+                made[name] = found * store.luminaires["factors"]
+            else:
+                raise Refused("the store answers any emission and has no emitters", kind="not-in-store")
+        kind = np.float64 if query.doubles else np.float32
+        return {name: (array[0] if C == 1 else array).astype(kind) for name, array in made.items()}
+
+    def _sensor_cotangent(self, given: Mapping[str, Any]) -> Tuple[Array, Array]:
+        counts, rows = self.store.sensor_rows(list(given))
+        read = self.store.sensors
+        assert read is not None
+        made, at = np.zeros((self.about.channels, len(read["receiver"]))), 0
+        for name, count in counts.items():
+            value = given[name]
+            of = rows[at:at + count]
+            if isinstance(value, Mapping):
+                array = np.asarray(value["values"], float)
+                if array.shape not in ((count,), (self.about.channels, count)):
+                    raise Refused(f"cotangent/sensors/{name} has the shape {list(array.shape)}, must have [{count}]", kind="wrong-length")
+                made[:, of] += array
+            else:
+                made[:, of] += self._colour(value, f"cotangent/sensors/{name}")[:, None]
+            at += count
+        made[:, read["flags"] != 0] = 0
+        return made, rows
+
+    def _by_reflectance(self, query: AdjointQuery, quantity: str, w: Array, g: Array) -> Array:
+        if query.emission is None:
+            raise Refused("a gradient by reflectance needs an emission", kind="wrong-members")
+        light = self._light([query.emission], None, True)
+        H0 = self._direct(light)
+        H = self.op.apply("irradiance", light.E, H0)[0].astype(float)
+        if quantity == "indirect":  # of rho (H - H0) itself
+            return np.asarray(w * H + g * (H - (0 if H0 is None else H0[0])))
+        return np.asarray(w * H)
+
+    def _adjoint_emitters(self, query: AdjointQuery, g: Array, quantity: str) -> Dict[str, Array]:
+        W = self.op.adjoint_emitters(quantity, g[None])[0]
+        made: Dict[str, Array] = {}
+        for name in query.gradient:
+            count = 0 if self.store.luminaires is None else len(self.store.luminaires["names"])
+            if name == "emitters":
+                made[name] = W
+            elif name == "luminaires" and count:
+                made[name] = W[:, self.op.emitters - count:]
+            else:
+                raise Refused(f"a store of few emitters has gradients by emitters and luminaires, not by {name}", kind="not-in-store")
+        return {name: array[0] if self.about.channels == 1 else array for name, array in made.items()}
+
+    def jacobian(self, of: Mapping[str, Any], by: Any, how: How) -> Jacobian:
+        """By the light of each column alone."""
+        if set(of) != {"sensors"}:
+            raise Refused("a jacobian is of {\"sensors\": [...]}", kind="wrong-members")
+        names = [of["sensors"]] if isinstance(of["sensors"], str) else list(of["sensors"])
+        store, about = self.store, self.about
+        counts, _ = store.sensor_rows(names)
+        kinds = [by] if isinstance(by, str) else list(by) if by is not None else \
+            [name for name in ("luminaires", "groups", "sky") if name == "groups" or getattr(store, name) is not None]
+        made: Dict[str, Array] = {}
+        columns: Dict[str, Any] = {}
+        for kind in kinds:
+            word(kind, ("luminaires", "groups", "sky", "emitters"), "by")
+            emissions: List[Mapping[str, Any]]
+            if kind == "luminaires":
+                columns[kind] = list(store.luminaires["names"]) if store.luminaires else []
+                emissions = [{"luminaires": {name: 1}} for name in columns[kind]]
+            elif kind == "groups":
+                columns[kind] = store.group_names
+                emissions = [{"elements": np.flatnonzero(store.group == g), "values": np.ones(int((store.group == g).sum()))}
+                             for g in range(len(store.group_names))]
+            elif kind == "sky" and store.sky is not None:
+                columns[kind] = len(store.sky["tiles"])
+                emissions = [{"sky": row} for row in np.eye(columns[kind])]
+            else:
+                emissions = []
+            if not emissions:
+                raise Refused(f"the store has no {kind}", kind="not-in-store")
+            found = self.light(LightQuery.of(about, emissions, quantity="irradiance", select={"sensors": names}, limit=False), how)
+            made[kind] = np.moveaxis(found.values, 0, -1)  # [rows, columns], or [C, rows, columns]
+        return Jacobian.of(made, counts, columns)
+
+    # What a process cannot do alone, and materials.
+
+    def skies(self, skies: Sequence[Any], how: How) -> List[Dict[str, Any]]:
+        raise _needs_daemon("a sky by name or weather")
+
+    def weather(self, gaps: Optional[str], how: How) -> Dict[str, Any]:
+        raise _needs_daemon("the weather beside a store")
+
+    def variant(self, name: str, reflectances: Mapping[str, Any], how: How) -> Local:
+        rho = self.store.rho.astype(float)
+        for group, value in reflectances.items():
+            colour = self._colour(value, f"groups/{group}")
+            if (colour < 0).any() or (colour >= 1).any():
+                raise Refused(f"groups/{group} = {value!r}, must be at least 0 and below 1", kind="bad-value")
+            rho[:, np.isin(self.store.group, self.store.groups.find(group))] = colour[:, None]
+        operator = NumpyOperator(self.store, rho.astype(np.float32).astype(float))
+        made = Local(self.where, store=_with_rho(self.store, rho), operator=operator, name=f"{self.about.name}@{name}")
+        return made
+
+    def delete(self, how: How) -> None:
+        if "@" not in self.about.name:
+            raise Refused(f"{self.where}: a store stays; a variant can be deleted")
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+def _with_rho(store: Store, rho: Array) -> Store:
+    made: Store = Store.__new__(Store)
+    made.__dict__.update(store.__dict__)
+    made.rho = rho.astype(np.float32)
+    arrays = {name: getattr(store.elements, name) for name in ("area", "normal", "centre", "group", "face")}
+    made.elements = Elements.of({**arrays, "reflectance": made.rho})
+    return made

@@ -32,8 +32,8 @@ def _pull_back(scene: Scene, quantity: str, g: Array) -> Array:
 
 def _whole(scene: Scene, array: Array) -> Array:
     """[m, C, n] of [n], [C, n] or [m, C, n]; other shapes are Refused."""
-    if array.ndim == 3 and array.shape[1:] == (scene.channels, scene.n):
-        return array
+    if _is_batch(scene, array.shape) and array.size % (scene.channels * scene.n) == 0 and array.shape[-1] == scene.n:
+        return array.reshape(-1, scene.channels, scene.n)
     return np.broadcast_to(scene._source.about.dense(array), (scene.channels, scene.n))[None]
 
 
@@ -116,17 +116,20 @@ def jax_function(scene: Scene, quantity: str = "radiosity") -> Any:
     return light
 
 
+def _is_batch(scene: Scene, shape: Any) -> bool:
+    """True of [m, C, n], and of [m, n] of one channel."""
+    return len(shape) == 3 or len(shape) == 2 and scene.channels == 1
+
+
 def _shape(scene: Scene, shape: Any) -> Any:
     """The shape of the light of an emission of this shape."""
-    if len(shape) == 3:
-        return (shape[0], *scene.shape)
-    return scene.shape
+    return (shape[0], *scene.shape) if _is_batch(scene, shape) else scene.shape
 
 
 def _light(scene: Scene, quantity: str, E: Array) -> Array:
     """The light of E; a batch is one also where it has one vector."""
     many = _apply(scene, quantity, _whole(scene, E))
-    return many if E.ndim == 3 else np.asarray(many[0])
+    return many if _is_batch(scene, E.shape) else np.asarray(many[0])
 
 
 def _gradient(scene: Scene, quantity: str, g: Array, shape: Optional[Any] = None) -> Array:
@@ -136,6 +139,6 @@ def _gradient(scene: Scene, quantity: str, g: Array, shape: Optional[Any] = None
     if g.size % (C * n):
         raise Refused(f"a gradient has the shape {shape_text(g.shape)}, must have that of the light")
     found = _pull_back(scene, quantity, g.reshape(-1, C, n)).reshape(-1, C, n)
-    if len(wanted) == 3:
-        return found
+    if _is_batch(scene, wanted):
+        return found.reshape(wanted)
     return np.asarray(found[0].sum(0) if len(wanted) == 1 else found[0])

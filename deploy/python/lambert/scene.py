@@ -196,7 +196,8 @@ class Scene:
 
         An emission is an array [n] (alike in all channels) or [C, n]; or a mapping of groups, {"lamp": 17} or
         {"lamp": [17, 12, 4]} or {"lamp": "3600lm"}; or an object as requests have it, with "groups", "elements" and "values",
-        "luminaires", "sky", "sun", "emitters", alone or together. A list of these, or an array [m, C, n], is a batch.
+        "luminaires", "sky", "sun", "emitters", alone or together. A list of these, or an array [m, C, n] ([m, n] of one channel), is
+        a batch.
 
         `select` answers some elements alone: {"groups": [...]}, {"elements": [...]}, {"faces": [...]}, {"sensors": [...]}
         (with quantity "irradiance") or {"probes": [...]}; `at="faces"` answers at the faces of the scene file. `tolerance`
