@@ -2,8 +2,10 @@
 
 Blocks of a document are one script, run in an empty folder. ```sh runs as it stands. ```sh slow runs on small scenes
 (--elements at most 600, suites of bench with --quick). ```sh elsewhere is run by .ci/run: the test looks the line up
-there. A ```json block is the answer that the request before it has to get, up to times and rounding.
+there. A ```json block is the answer that the request before it has to get, up to times and rounding. A ```python block is a
+program behind the first one of its page, with the package of the tree; ```python NAME runs where the module NAME is installed.
 """
+import importlib.util
 import json
 import math
 import os
@@ -33,6 +35,13 @@ CONFIGURATIONS = ("nginx", "haproxy")
 def blocks(document):
     """(language with its marks, text) of every fenced block."""
     return re.findall(r"^```([^\n]*)\n(.*?)^```", document.read_text(), re.M | re.S)
+
+
+def python_programs(document):
+    """The programs of a page by their marks and texts: its first block of Python, then each other one behind it."""
+    texts = [(mark, text) for mark, text in blocks(document) if mark.split()[:1] == ["python"]]
+    return {text: text if i == 0 else texts[0][1] + text for i, (mark, text) in enumerate(texts)
+            if all(importlib.util.find_spec(name) for name in mark.split()[1:])}
 
 
 def free_port():
@@ -68,9 +77,12 @@ class Documents(unittest.TestCase):
     def run_document(self, document):
         port = free_port()
         script, answers = ["trap 'kill $(jobs -p) 2>/dev/null || true' EXIT"], []
+        programs = python_programs(document)
         for mark, text in blocks(document):
             if mark in ("sh", "sh slow"):
                 script.append(made_small(text) if mark == "sh slow" else text)
+            elif text in programs:
+                script.append(f"PYTHONPATH={ROOT}/deploy/python PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 - <<'END'\n{programs[text]}END\n")
             elif mark == "json":
                 # The answer is the text printed since the last mark.
                 script.append(f"echo; echo '=== answer {len(answers)}'")
@@ -162,7 +174,8 @@ class Documents(unittest.TestCase):
         found = 0
         for document in DOCUMENTS:
             for mark, text in blocks(document):
-                self.assertIn(mark, ("", "sh", "sh slow", "sh elsewhere", "json", "c", "text", *CONFIGURATIONS), document.name)
+                word = "python" if mark.startswith("python ") else mark
+                self.assertIn(word, ("", "sh", "sh slow", "sh elsewhere", "json", "c", "text", "python", *CONFIGURATIONS), document.name)
                 if mark != "sh elsewhere":
                     continue
                 for line in text.splitlines():

@@ -1,9 +1,11 @@
 """The Python package over HTTP: what a scene consists of, its light and gradients beside those of plain requests, and how
 connections, busy daemons and replaced scenes end."""
 
+import contextlib
 import doctest
 import http.server
 import importlib
+import io
 import os
 import pkgutil
 import shutil
@@ -209,7 +211,12 @@ class OverHttp(PackageCase):
             lambert.Scene("http://127.0.0.1:1/box")
 
     def test_page(self):
-        page = self.scene("box").show()
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            page = self.scene("box").show()
+        self.assertEqual(printed.getvalue().strip(), page.address)
+        with unittest.mock.patch.dict(sys.modules, {"IPython": unittest.mock.Mock()}), contextlib.redirect_stdout(io.StringIO()) as printed:
+            self.scene("box").show()
+        self.assertEqual(printed.getvalue(), "")
         self.assertIn("<iframe", page._repr_html_())
         self.assertTrue(repr(page).startswith(self.address + "/#1."))
 
@@ -263,6 +270,38 @@ class OverHttp(PackageCase):
             E = torch.ones(scene.n, requires_grad=True)  # alike in all channels
             light(E).sum().backward()
             np.testing.assert_allclose(E.grad.numpy(), scene.adjoint(np.ones(scene.shape), quantity="irradiance").reshape(-1, scene.n).sum(0), rtol=1e-5)
+
+    def test_jax(self):
+        """By what the package uses of JAX, where that is not installed: a call of the host, and a function with its own gradient."""
+        scene, called = self.scene("box"), []
+
+        class OwnGradient:
+            def __init__(self, function):
+                self.function = function
+
+            def __call__(self, E):
+                return self.function(E)
+
+            def defvjp(self, forward, backward):
+                self.forward, self.backward = forward, backward
+
+        def pure_callback(host, result, array):
+            found = host(array)
+            called.append((found.shape, found.dtype) == (tuple(result.shape), result.dtype))
+            return found
+
+        fake = unittest.mock.Mock(pure_callback=pure_callback, custom_vjp=OwnGradient,
+                                  ShapeDtypeStruct=lambda shape, dtype: unittest.mock.Mock(shape=shape, dtype=np.dtype(dtype)))
+        with unittest.mock.patch.dict(sys.modules, {"jax": fake}):
+            light = scene.jax()
+            for shape in ((400,), (3, 400), (2, 3, 400)):
+                E, g = random_emission(scene, 8).ravel()[0] * np.ones(shape, np.float32), random_emission(scene, 9, *shape[:-2])
+                B, kept = light.forward(E)
+                np.testing.assert_array_equal(B, scene @ E)
+                gradient, = light.backward(kept, np.float32(g))
+                self.assertEqual(gradient.shape, shape)
+                self.assertAlmostEqual((gradient * E).sum() / (B * g).sum(), 1, places=4)
+        self.assertEqual(called, [True] * 6)
 
     def test_libraries_that_are_not_there(self):
         box = self.scene("box")

@@ -45,7 +45,7 @@ class Client:
     """Asks one daemon. Any number of threads may share it; each keeps connections of its own.
 
     The time limit `timeout` (s; None: none) is that of a whole request with all its attempts. The daemon is told, so that it
-    computes nothing that nobody waits for. What is answered 429 or 503 is asked again after the `Retry-After` of the answer,
+    computes nothing that nobody waits for. A request that is answered 429 or 503 is sent again after the `Retry-After` of the answer,
     up to `retries` times, as long as the time limit allows it.
     """
 
@@ -55,7 +55,7 @@ class Client:
         self._own = threading.local()
         self._all: weakref.WeakSet[http.client.HTTPConnection] = weakref.WeakSet()
         self._lock = threading.Lock()
-        self._closed = 0  # how often close() was called
+        self._closed = 0  # counts calls of close()
 
     def ask(self, request: Request, *, timeout: Optional[float] = None, cancel: Optional[threading.Event] = None,
             accepted: tuple[int, ...] = (200,)) -> Reply:

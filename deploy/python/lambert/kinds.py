@@ -127,7 +127,7 @@ class NumpyOperator:
     # Light of emissions.
 
     def _map(self, what: Map, x: Array) -> Array:
-        """what() of [m, C, n] in mesh order."""
+        """The map of vectors [m, C, n] in mesh order."""
         made = np.empty(x.shape)
         for c in range(self.channels):
             made[:, c, self.order] = what(c, np.ascontiguousarray(x[:, c, self.order].T)).T

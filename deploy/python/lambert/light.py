@@ -21,7 +21,7 @@ BATCH, BATCH_BYTES = 64, 1 << 26  # of a request; longer batches are several of 
 
 @dataclass(frozen=True)
 class About:
-    """What is known of a scene before anything is asked: its name, n, C, and `facts`, the answer to GET /v1/scenes/NAME."""
+    """The facts of a scene that come before any question: its name, n, C, and `facts`, the answer to GET /v1/scenes/NAME."""
 
     name: str
     n: int
@@ -168,7 +168,7 @@ class LightQuery:
         return all(isinstance(e, np.ndarray) for e in self.emissions)
 
     def members(self) -> Dict[str, Any]:
-        """What the request has beside its emissions."""
+        """The members of the request beside its emissions."""
         made: Dict[str, Any] = {}
         if self.quantity != "radiosity":
             made["quantity"] = self.quantity
@@ -318,7 +318,7 @@ class AdjointQuery:
 
 
 def gradient_of(found: List[Dict[str, Array]], batch: bool, gradient: Strings) -> Any:
-    """What a caller gets: an array for one name, a dictionary for several, one level deeper for a batch."""
+    """The gradients as a caller gets them: an array for one name, a dictionary for several, one level deeper for a batch."""
     names = list(found[0])
     made = {name: np.stack([f[name] for f in found]) if batch else found[0][name] for name in names}
     return made[gradient] if isinstance(gradient, str) else made

@@ -83,7 +83,7 @@ class Local:
         return np.broadcast_to(array if array.ndim == 1 else array.T, (self.about.channels, length))
 
     def _spread(self, given: Union[Array, Mapping[str, Any]], what: str, signs: bool = True) -> Tuple[Array, bool]:
-        """What is given of elements and groups, as [C, n], and whether a unit was converted."""
+        """The emission of elements and groups as [C, n], and whether a unit was converted."""
         about, store = self.about, self.store
         if isinstance(given, np.ndarray):
             made, converted = np.array(about.rows(given), float), False
@@ -486,7 +486,7 @@ class Local:
             made[kind] = np.moveaxis(found.values, 0, -1)  # [rows, columns], or [C, rows, columns]
         return Jacobian.of(made, counts, columns)
 
-    # What a process cannot do alone, and materials.
+    # Questions that need a daemon, and materials.
 
     def skies(self, skies: Sequence[Any], how: How) -> List[Dict[str, Any]]:
         raise _needs_daemon("a sky by name or weather")

@@ -1,4 +1,4 @@
-"""What a scene consists of: its elements and groups, luminaires, sensors and the tiles of its sky."""
+"""The parts of a scene: its elements and groups, luminaires, sensors and the tiles of its sky."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Elements:
 
     @staticmethod
     def read(reply: Reply) -> Elements:
-        """Those of an answer, an NPZ or JSON."""
+        """The elements of an answer, an NPZ or JSON."""
         if not reply.headers.get("content-type", "").startswith("application/json"):
             try:
                 with np.load(io.BytesIO(reply.body)) as arrays:
@@ -45,6 +45,7 @@ class Elements:
                 raise LambertError(f"the elements of the answer cannot be read: {error}") from None
         read = reply.json()
         kinds = {"area": "f8", "group": "u4", "face": "i4"}
+        read["face"] = [-1 if face is None else face for face in read["face"]]
         return Elements.of({name: np.array(read[name], kinds.get(name, "f4")) for name in FIELDS})
 
     def same_places(self, other: Elements) -> bool:
@@ -54,7 +55,10 @@ class Elements:
 
 @dataclass(frozen=True)
 class Group:
-    """A group of elements: area (m²), number of elements, means by area of reflectance and emission, [C], and indices."""
+    """A group of elements: area (m²), means by area of reflectance and emission [C], number of elements, and their indices.
+
+    Area and means are without the `buried` elements, which figures leave out.
+    """
 
     name: str
     area: float
@@ -62,7 +66,7 @@ class Group:
     reflectance: Array
     emission: Array
     indices: Array = field(repr=False)
-    buried: Any = None
+    buried: int = 0
 
     def __len__(self) -> int:
         return self.elements
@@ -79,8 +83,8 @@ class Groups(Mapping[str, Group]):
             indices = order[start[g]:start[g + 1]]
             indices.flags.writeable = False
             colours = [np.broadcast_to(np.asarray(line.get(key) or 0, float), (channels,)) for key in ("reflectance", "emission")]
-            self._groups[str(line["name"])] = Group(str(line["name"]), float(line["area"]), int(line["elements"]), colours[0],
-                                                    colours[1], indices, line.get("buried"))
+            self._groups[str(line["name"])] = Group(str(line["name"]), float(line["area"] or 0), int(line["elements"]), colours[0],
+                                                    colours[1], indices, int(line.get("buried") or 0))
 
     def __getitem__(self, name: str) -> Group:
         try:

@@ -173,7 +173,7 @@ class Remote:
 
 
 def geometry_of(about: About) -> Tuple[Any, ...]:
-    """What has to stay for an index to mean the same: n, C, groups and the hash of the mesh."""
+    """The things that have to stay for an index to mean the same: n, C, groups and the hash of the mesh."""
     provenance = about.facts.get("provenance") or {}
     groups = json.dumps([[line["name"], line["elements"]] for line in about.facts.get("groups", [])])
     return about.n, about.channels, groups, provenance.get("geometry_hash")

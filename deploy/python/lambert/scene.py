@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import sys
 import threading
 import urllib.parse
 from typing import Any, Dict, List, Mapping, Optional, Protocol, Sequence, Union
@@ -21,7 +22,7 @@ from .wire import Address, Array
 
 
 class Source(Protocol):
-    """Who answers for a scene: a daemon, or a store in process."""
+    """The side that answers for a scene: a daemon, or a store in process."""
 
     @property
     def about(self) -> About: ...
@@ -88,7 +89,7 @@ class Scene:
         made._begin(source)
         return made
 
-    # What it consists of.
+    # Its parts.
 
     @property
     def about(self) -> Mapping[str, Any]:
@@ -117,7 +118,7 @@ class Scene:
 
     @property
     def units(self) -> str:
-        """What the scene counts in: "W", so that light is in W/m², or "lm"."""
+        """The unit of its light: "W", so that light is in W/m², or "lm"."""
         return str(self.about.get("lights") or "W")
 
     lights = units
@@ -371,8 +372,11 @@ class Scene:
     # The rest.
 
     def show(self, width: str = "100%", height: int = 600) -> Page:
-        """The page of the daemon: a frame in a notebook; elsewhere the address is printed by its text."""
-        return Page(self._source.where, width, height)
+        """The page of the daemon: a frame in a notebook; elsewhere its address is printed."""
+        page = Page(self._source.where, width, height)
+        if "IPython" not in sys.modules and not hasattr(sys, "ps1"):  # neither would show what this gives
+            print(page.address)
+        return page
 
     def close(self) -> None:
         """Ends its connections; questions that wait in other threads end in Cancelled."""

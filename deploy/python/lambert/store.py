@@ -25,7 +25,7 @@ def _texts(dataset: Any) -> List[str]:
 
 
 class Names:
-    """Which things a name of a request means: as the daemon's rules for groups have it.
+    """The things that a name of a request means, by the daemon's rules for groups.
 
     >>> names = Names(["desk.0", "desk.1", "floor", "floor.back"], {3})
     >>> names.find("desk"), names.find("fl*"), names.find("floor.back")
@@ -125,7 +125,7 @@ class Store:
             self.sensors["names"] = _texts(group["names"])
 
     def facts(self) -> Dict[str, Any]:
-        """What GET /v1/scenes/NAME says of it, as far as it can be said without the daemon."""
+        """The answer to GET /v1/scenes/NAME, as far as it can be known without the daemon."""
         sizes = np.bincount(self.group, minlength=len(self.group_names))
         return {
             "name": self.name, "elements": self.n, "channels": self.channels, "lights": self.lights, "kind": self.operator["kind"],
@@ -137,22 +137,20 @@ class Store:
             "provenance": {"geometry_hash": self.geometry_hash}}
 
     def group_lines(self) -> List[Mapping[str, Any]]:
-        """What GET /v1/scenes/NAME/groups says of them."""
+        """The lines of GET /v1/scenes/NAME/groups."""
         lines: List[Mapping[str, Any]] = []
         for g, name in enumerate(self.group_names):
-            of = self.group == g
+            all_of = self.group == g
+            of = all_of & self.counts
             area = float(self.area[of].sum())
             mean = [(x[:, of] @ self.area[of] / area if area > 0 else np.zeros(self.channels)).tolist()
                     for x in (self.rho.astype(float), self.emission.astype(float))]
-            hidden = of & ~self.counts
-            line = {"name": name, "area": area, "elements": int(of.sum()), "reflectance": mean[0], "emission": mean[1]}
-            if hidden.any():
-                line["buried"] = {"elements": int(hidden.sum()), "area": float(self.area[hidden].sum())}
-            lines.append(line)
+            lines.append({"name": name, "area": area, "elements": int(all_of.sum()), "reflectance": mean[0], "emission": mean[1],
+                          "buried": int(all_of.sum() - of.sum())})
         return lines
 
     def document(self, name: str) -> Optional[Dict[str, Any]]:
-        """What GET /v1/scenes/NAME/sky, /luminaires or /sensors says."""
+        """The answer to GET /v1/scenes/NAME/sky, /luminaires or /sensors."""
         return {"sky": self._sky, "luminaires": self._luminaires, "sensors": self._sensors}[name]()
 
     def _sky(self) -> Optional[Dict[str, Any]]:

@@ -41,7 +41,7 @@ def exitance(text: str, area: float, lights: str) -> Tuple[List[float], bool]:
 
 
 class Conversion:
-    """What becomes of values of a kind of light ("W" or "lm") in the unit asked for."""
+    """The conversion of values of a kind of light ("W" or "lm") into the unit asked for."""
 
     def __init__(self, kind: str, unit: Optional[str], quantity: str, channels: int) -> None:
         if unit not in (None, "lx", "klx", "fc", "W/m2"):

@@ -1,4 +1,4 @@
-"""What both kinds of client share: addresses, requests and replies, NumPy arrays as bodies, and when to ask again."""
+"""The parts that both kinds of client share: addresses, requests and replies, NumPy arrays as bodies, and when to ask again."""
 
 from __future__ import annotations
 
