@@ -504,6 +504,28 @@ class Replaced(unittest.TestCase):
                 thread.join()
             self.assertEqual(wrong, [])
 
+    def test_longer_than_the_daemon_takes(self):
+        """The refusal is read, although the daemon closes before the body is sent."""
+        with Daemon(self.path("room.h5"), "--max-body", 1000) as daemon:
+            scene = lambert.Scene(f"http://127.0.0.1:{daemon.port}")
+            for _ in range(3):
+                with self.assertRaisesRegex(lambert.Refused, "longer than 1000 bytes") as caught:
+                    scene._source.client.ask(lambert.wire.Request("POST", "/v1/scenes/room/radiosity", bytes(1 << 26), lambert.wire.NPY))
+                self.assertEqual(caught.exception.kind, "too-long")
+            self.assertEqual(scene.radiosity({scene.names[0]: 1}).shape, (54,))
+
+    def test_forked_process_has_connections_of_its_own(self):
+        with Daemon(self.path("room.h5")) as daemon:
+            scene = lambert.Scene(f"http://127.0.0.1:{daemon.port}")
+            first = scene.radiosity(np.ones(scene.n)).values
+            child = os.fork()
+            if child == 0:
+                good = all(np.array_equal(scene.radiosity(np.ones(scene.n)), first) for _ in range(20))
+                os._exit(0 if good else 1)
+            for _ in range(20):
+                np.testing.assert_array_equal(scene.radiosity(np.ones(scene.n)), first)
+            self.assertEqual(os.waitpid(child, 0)[1], 0)
+
     def test_unix_socket(self):
         with Daemon(self.path("room.h5"), "--unix", self.path("socket"), listen=None) as daemon:
             scene = lambert.Scene(f"unix:{self.path('socket')}")

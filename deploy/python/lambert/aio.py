@@ -101,7 +101,11 @@ async def _exchange(stream: Stream, request: Request, host: str, headers: Mappin
     if request.body is not None or request.method != "GET":
         lines.append(f"Content-Length: {len(request.body or b'')}")
     writer.write("\r\n".join([*lines, "", ""]).encode("latin-1") + (request.body or b""))
-    await writer.drain()
+    try:
+        await writer.drain()
+    except ConnectionError:
+        if not request.body:
+            raise  # of a body that is refused by its length the answer may stand there already
     while True:
         head = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1").split("\r\n")
         version, _, rest = head[0].partition(" ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import os
 import select
 import socket
 import threading
@@ -87,11 +88,12 @@ class Client:
                     pass  # it is closed already
 
     def _connections(self) -> List[http.client.HTTPConnection]:
-        """The idle connections of this thread. Those from before close() are dropped."""
-        if getattr(self._own, "closed", None) != self._closed:
+        """The idle connections of this thread; connections from before close() are dropped."""
+        now = self._closed, os.getpid()  # a forked process must not write into its parent's connections
+        if getattr(self._own, "of", None) != now:
             for connection in getattr(self._own, "idle", ()):
                 connection.close()
-            self._own.idle, self._own.closed = [], self._closed
+            self._own.idle, self._own.of = [], now
         idle: List[http.client.HTTPConnection] = self._own.idle
         return idle
 
@@ -145,7 +147,12 @@ class Client:
         seconds = attempts.left()
         if connection.sock is not None:
             connection.sock.settimeout(seconds)
-        connection.request(request.method, request.path, request.body, request.all_headers(self.token, seconds))
+        try:
+            connection.request(request.method, request.path, request.body, request.all_headers(self.token, seconds))
+        except (BrokenPipeError, ConnectionResetError):
+            if connection.sock is None or not request.body:
+                raise
+            # A body that is refused by its length is not read to its end: the answer may stand there already.
         self._wait(connection.sock, request, attempts, cancel)
         response = connection.getresponse()
         headers: Dict[str, str] = {name.lower(): value for name, value in response.getheaders()}

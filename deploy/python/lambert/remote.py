@@ -103,7 +103,7 @@ class Remote:
 
     def light(self, query: LightQuery, how: How) -> Answer:
         answer = joined([self._light(part, how) for part in query.parts()])
-        if query.dense or (query.select is not None and not {"groups", "sensors"} & set(query.select)) or query.whole:
+        if query.select is None or not {"sensors", "probes"} & set(query.select):
             self.still_there(how)
         return answer
 

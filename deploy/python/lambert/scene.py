@@ -167,9 +167,11 @@ class Scene:
         return self._source.elements().reflectance
 
     def _document(self, name: str) -> Any:
-        if name not in self._documents:
-            self._documents[name] = self._source.document(name)
-        return self._documents[name]
+        about, found = self._documents.get(name, (None, None))
+        if about is not self._source.about:  # never asked for, or the store was read again
+            about, found = self._source.about, self._source.document(name)
+            self._documents[name] = about, found
+        return found
 
     @property
     def luminaires(self) -> Mapping[str, Luminaire]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import json
 import time
@@ -175,19 +176,26 @@ def to_npy(array: Array) -> bytes:
     return out.getvalue()
 
 
+@functools.lru_cache(64)
+def _npy_head(head: bytes) -> Tuple[Tuple[int, ...], bool, Any]:
+    """Shape, order and type of an NPY file; NumPy takes as long to read them as a daemon takes for a small scene."""
+    file = io.BytesIO(head)
+    read = _npy.read_array_header_1_0 if _npy.read_magic(file) == (1, 0) else _npy.read_array_header_2_0
+    shape, fortran, dtype = read(file)
+    return shape, fortran, dtype
+
+
 def from_npy(body: Union[bytes, bytearray]) -> Array:
     """The array of an NPY file, which shares the bytes where these may be written.
 
     >>> from_npy(to_npy(np.float32([1, 2])))
     array([1., 2.], dtype=float32)
     """
-    head = io.BytesIO(body[:4096])
     try:
-        version = _npy.read_magic(head)
-        read = _npy.read_array_header_1_0 if version == (1, 0) else _npy.read_array_header_2_0
-        shape, fortran, dtype = read(head)
-        flat = np.frombuffer(body, dtype, count=int(np.prod(shape, dtype=np.int64)), offset=head.tell())
-    except ValueError as error:
+        size = 10 + int.from_bytes(body[8:10], "little") if body[6:7] == b"\1" else 12 + int.from_bytes(body[8:12], "little")
+        shape, fortran, dtype = _npy_head(bytes(body[:size]))
+        flat = np.frombuffer(body, dtype, count=int(np.prod(shape, dtype=np.int64)), offset=size)
+    except (ValueError, EOFError) as error:
         raise LambertError(f"the answer is no NPY array: {error}") from None
     array = flat.reshape(shape, order="F" if fortran else "C")
     return array if array.flags.writeable else array.copy()
