@@ -35,13 +35,14 @@ POINTS = """{"grids":[{"name":"desks","over":"floor","height":0.85,"spacing":0.5
 
 
 def make_stores(folder):
-    """Stores by name: coloured, with factors, with luminaires and sensors, with a sky, of few emitters, and of other kinds."""
+    """Stores by name: one of each kind of operator, and of each kind of light and mesh."""
     root = pathlib.Path(folder)
     for name, text in (("spot.ies", SPOT), ("lights.json", LIGHTS), ("points.json", POINTS)):
         (root / name).write_text(text)
     must("generate", "cornell", "--elements", 400, "-o", root / "box.obj")
     must("generate", "box", "--size", "6,6,3", "-o", root / "office.obj")
     must("generate", "city", "--elements", 200, "-o", root / "yard.obj")
+    must("generate", "canopy", "--elements", 150, "-o", root / "leaves.obj")
     stores = {}
 
     def make(name, scene, *options):
@@ -56,6 +57,9 @@ def make_stores(folder):
     make("waves", "box.h5", "--method", "hierarchical", "--epsilon", 0.05)
     make("office", *office, "--sensors", root / "points.json", "--method", "low-rank")
     make("few", *office, "--method", "emitters", "--emitters", "group=ceiling")
+    make("dome", "box.obj", "--mesh", "faces", "--closed=no", "--sky", "grid:4x2", "--method", "emitters", "--emitters", "sky")
+    make("merged", "box.obj", "--mesh-error", 0.2)  # elements are parts of several faces
+    make("leaves", "leaves.obj", "--mesh", "faces", "--two-sided", "--sky", "tregenza", "--method", "exact")
     make("yard", "yard.obj", "--mesh", "faces", "--sky", "tregenza", "--method", "exact")
     return stores
 

@@ -63,7 +63,7 @@ class OverHttp(PackageCase):
         self.assertGreater(count, 50)
 
     def test_elements_and_groups(self):
-        for name in ("box", "office", "yard"):
+        for name in ("box", "office", "yard", "leaves", "merged"):
             scene, mesh = self.scene(name), self.mesh(name)
             self.assertEqual(scene.names, [text.decode() for text in mesh["group_names"]])
             self.assertEqual(list(scene.groups), scene.names)
@@ -200,7 +200,7 @@ class OverHttp(PackageCase):
                              ("one of the two", lambda: box.reduce({"lamp": 1})), ("empty batch", lambda: box.radiosity([])),
                              ("not finite", lambda: box.radiosity({"lamp": float("nan")})),
                              ("is no address", lambda: lambert.Scene("http:///box")), ("more than a scene", lambda: lambert.Scene("http://h/a/b")),
-                             (r"has 8 scenes, so that one is named: box, ", lambda: lambert.Scene(self.address, token=TOKEN))):
+                             (r"has 11 scenes, so that one is named: box, ", lambda: lambert.Scene(self.address, token=TOKEN))):
             with self.assertRaisesRegex(lambert.Refused, words):
                 wrong()
         with self.assertRaisesRegex(lambert.NotFound, "bex"):

@@ -70,7 +70,7 @@ class InProcess(PackageCase):
                 self.assertIsNone(scene.sky)
 
     def test_light_of_elements(self):
-        for remote, scene in self.each(("box", "paint", "coarse", "thin", "waves", "office", "yard")):
+        for remote, scene in self.each(("box", "paint", "coarse", "thin", "waves", "office", "yard", "leaves", "merged")):
             E = random_emission(remote, 1, 3)
             for quantity in ("radiosity", "irradiance", "indirect"):
                 self.same(scene.radiosity(E, quantity=quantity, limit=False), remote.radiosity(E, quantity=quantity, limit=False))
@@ -101,8 +101,9 @@ class InProcess(PackageCase):
         self.assertGreater(count, 50)
 
     def test_light_of_sky_luminaires_and_emitters(self):
-        for remote, scene in self.each(("office", "yard", "few")):
-            given = {"office": [{"luminaires": {"row": 0.4, "desk": 1}}, {"luminaires": {"row.0": 1}, "groups": {"floor": "300lm"}},
+        for remote, scene in self.each(("office", "yard", "few", "dome", "leaves")):
+            skies = [{"sky": np.arange(24.0).reshape(3, 8)}, {"emitters": np.ones(8)}]
+            given = {"dome": skies, "leaves": [{"sky": np.arange(145.0)}], "office": [{"luminaires": {"row": 0.4, "desk": 1}}, {"luminaires": {"row.0": 1}, "groups": {"floor": "300lm"}},
                                 {"luminaires": {"ro*": 1}}],
                      "yard": [{"sky": np.arange(145.0)}, {"sky": np.ones((remote.channels, 145)), "groups": {remote.names[0]: 5}}],
                      "few": [{"luminaires": {"row": 0.4}}, {"emitters": {"ceiling": 3}, "luminaires": {"desk": 2}}, {"ceiling": 3},
@@ -143,8 +144,8 @@ class InProcess(PackageCase):
                 self.assertAlmostEqual(found["floor"][figure] / wanted["floor"][figure], 1, places=5)
 
     def test_gradients(self):
-        for remote, scene in self.each(("box", "paint", "office", "yard", "few", "waves")):
-            names = {"office": ("emission", "groups", "luminaires", "reflectance"), "yard": ("emission", "sky", "groups"),
+        for remote, scene in self.each(("box", "paint", "office", "yard", "few", "dome", "leaves", "waves")):
+            names = {"dome": ("emitters",), "leaves": ("emission", "sky", "groups"), "office": ("emission", "groups", "luminaires", "reflectance"), "yard": ("emission", "sky", "groups"),
                      "few": ("emitters", "luminaires")}.get(remote.name, ("emission", "groups", "reflectance"))
             light = {"luminaires": {"row": 1}} if remote.name == "office" else {remote.names[0]: 1}
             for quantity in ("radiosity", "irradiance", "indirect"):
