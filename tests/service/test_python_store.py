@@ -59,7 +59,8 @@ class InProcess(PackageCase):
                 np.testing.assert_allclose([*one.at, *one.aim, *one.c0, *one.colour], [*other.at, *other.aim, *other.c0, *other.colour], atol=1e-9)
             for name, one in scene.sensors.items():
                 other = remote.sensors[name]
-                self.assertEqual((one.kind, one.weight, one.count, one.rows, one.columns), (other.kind, other.weight, other.count, other.rows, other.columns))
+                for what in ("kind", "weight", "count", "rows", "columns", "in_walls"):
+                    self.assertEqual(getattr(one, what), getattr(other, what), what)
                 np.testing.assert_allclose(one.at, other.at)
                 np.testing.assert_allclose(one.axis, other.axis)
             if remote.sky is not None:
@@ -103,7 +104,8 @@ class InProcess(PackageCase):
     def test_light_of_sky_luminaires_and_emitters(self):
         for remote, scene in self.each(("office", "yard", "few", "dome", "leaves")):
             skies = [{"sky": np.arange(24.0).reshape(3, 8)}, {"emitters": np.ones(8)}]
-            given = {"dome": skies, "leaves": [{"sky": np.arange(145.0)}], "office": [{"luminaires": {"row": 0.4, "desk": 1}}, {"luminaires": {"row.0": 1}, "groups": {"floor": "300lm"}},
+            given = {"dome": skies, "leaves": [{"sky": np.arange(145.0)}],
+                     "office": [{"luminaires": {"row": 0.4, "desk": 1}}, {"luminaires": {"row.0": 1}, "groups": {"floor": "300lm"}},
                                 {"luminaires": {"ro*": 1}}],
                      "yard": [{"sky": np.arange(145.0)}, {"sky": np.ones((remote.channels, 145)), "groups": {remote.names[0]: 5}}],
                      "few": [{"luminaires": {"row": 0.4}}, {"emitters": {"ceiling": 3}, "luminaires": {"desk": 2}}, {"ceiling": 3},
@@ -145,7 +147,8 @@ class InProcess(PackageCase):
 
     def test_gradients(self):
         for remote, scene in self.each(("box", "paint", "office", "yard", "few", "dome", "leaves", "waves")):
-            names = {"dome": ("emitters",), "leaves": ("emission", "sky", "groups"), "office": ("emission", "groups", "luminaires", "reflectance"), "yard": ("emission", "sky", "groups"),
+            names = {"dome": ("emitters",), "leaves": ("emission", "sky", "groups"), "yard": ("emission", "sky", "groups"),
+                     "office": ("emission", "groups", "luminaires", "reflectance"),
                      "few": ("emitters", "luminaires")}.get(remote.name, ("emission", "groups", "reflectance"))
             light = {"luminaires": {"row": 1}} if remote.name == "office" else {remote.names[0]: 1}
             for quantity in ("radiosity", "irradiance", "indirect"):
@@ -196,13 +199,15 @@ class InProcess(PackageCase):
     def test_words(self):
         for _, scene in self.each(("box", "office")):
             for words, wrong in (("no group is called lmap; there are", lambda: scene.radiosity({"lmap": 1})),
-                                 (r"shape \[2\], must have", lambda: scene.radiosity(np.ones(2))), ("not from 0 to", lambda: scene.radiosity({"elements": [scene.n], "values": [1]})),
+                                 (r"shape \[2\], must have", lambda: scene.radiosity(np.ones(2))),
+                                 ("not from 0 to", lambda: scene.radiosity({"elements": [scene.n], "values": [1]})),
                                  ("twice", lambda: scene.radiosity({"elements": [1, 1], "values": [1, 1]})),
                                  ("no sky", lambda: scene.radiosity({"sky": np.ones(145)})), ("3lux", lambda: scene.radiosity({scene.names[0]: "3lux"})),
                                  ("not finite", lambda: scene.radiosity(np.full(scene.n, np.nan))), ("a store stays", scene.delete)):
                 with self.assertRaisesRegex(lambert.Refused, words):
                     wrong()
-            for asked in (lambda: scene.skies("overcast"), scene.weather, lambda: scene.radiosity({"sun": {"azimuth": 1, "altitude": 2, "direct": 3}}),
+            for asked in (lambda: scene.skies("overcast"), scene.weather,
+                          lambda: scene.radiosity({"sun": {"azimuth": 1, "altitude": 2, "direct": 3}}),
                           lambda: scene.reduce({scene.names[0]: 1}, groups=scene.names[0], figures="ugr")):
                 with self.assertRaisesRegex(lambert.Unsupported, "needs a daemon"):
                     asked()
