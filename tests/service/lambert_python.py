@@ -11,7 +11,6 @@ import numpy as np
 
 from command import must
 from daemon import Daemon
-from elements_route import Front
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "deploy" / "python"
@@ -77,9 +76,6 @@ class PackageCase(unittest.TestCase):
         tokens.chmod(0o600)
         cls.daemon = cls.enterClassContext(Daemon(*cls.stores.values(), "--token-file", tokens, "--max-variants", 4))
         cls.address = f"http://127.0.0.1:{cls.daemon.port}"
-        if cls.daemon.get("/v1/scenes/box/groups", headers={"Authorization": f"Bearer {TOKEN}"}).status == 404:
-            front = cls.enterClassContext(Front(cls.daemon.port, cls.stores))
-            cls.address = f"http://127.0.0.1:{front.server_port}"
 
     def scene(self, name, **more):
         return lambert.Scene(f"{self.address}/{name}", token=TOKEN, **more)
