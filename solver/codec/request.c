@@ -2,6 +2,7 @@
 
 #include "solver/base/array_grow.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -144,7 +145,14 @@ bool radiosity_request_expand(radiosity_request *request, const codec_scene *sce
         }
         for (size_t c = 0; c < C; c++) {
             float *E = request->E + (spot->vector * C + c) * n;
-            for (size_t e = 0; e < count; e++) E[elements[e]] = value_at(scene, spot, elements[e], colour[c]);
+            for (size_t e = 0; e < count; e++) {
+                const float value = value_at(scene, spot, elements[e], colour[c]);
+                if (!isfinite(value))
+                    return problem_set(why, PROBLEM_BAD_VALUE,
+                                       "%.9g times the area of element %u, %.9g m2, passes single precision",
+                                       (double)colour[c], (unsigned)elements[e], scene->area[elements[e]]);
+                E[elements[e]] = value;
+            }
         }
     }
     request->n_spots = 0;

@@ -111,6 +111,7 @@ static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
                          .emitters = groups,
                          .n_luminaires = shape & 32 ? FUZZ_LUMINAIRES : 0,
                          .luminaires = fuzz_luminaires(),
+                         .area = area,
                          .sensors = shape & 8 ? fuzz_sensors() : NULL,
                          .max_batch = 4,
                          .max_bytes = 1 << 20,

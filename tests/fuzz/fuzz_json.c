@@ -37,7 +37,7 @@ static void check_sensors(const codec_scene *scene, const radiosity_request *req
     FUZZ_CHECK(r->n_with <= REDUCE_FIGURES_MAX);
     if (!request->at_sensors) return;
     FUZZ_CHECK(scene->sensors != NULL && !request->select && request->quantity == LAM_RADIOSITY);
-    FUZZ_CHECK(scene->n_emitters == 0 && r->of_sensors && !(r->linear && request->n_suns > 0));
+    FUZZ_CHECK(scene->no_sensors == NULL && r->of_sensors && !(r->linear && request->n_suns > 0));
     for (size_t k = 0; k < request->n_receivers; k++) FUZZ_CHECK(request->receivers[k] < FUZZ_SENSORS);
     double *figures = reduce_figures(r, request->n_rhs, scene->n_channels);
     float *x = calloc(request->n_rhs * scene->n_channels, FUZZ_SENSORS * sizeof *x);
