@@ -241,6 +241,9 @@ START_TEST(batches_hold_figures_of_groups) {
     ck_assert_uint_eq(request.cotangent.n_rhs, 3);
     ck_assert_mem_eq(request.cotangent.E, g, sizeof g);
     adjoint_request_free(&request);
+    static const char large[] = "{\"cotangent\":{\"groups\":{\"box\":{\"sum\":3e38}}}}";
+    ck_assert_uint_eq(read_adjoint(&f, large, strlen(large), &request), 422);
+    adjoint_request_free(&request);
     group_index_free(&f.groups);
 }
 END_TEST
