@@ -38,11 +38,15 @@ static double off_of(const error_by_group *e, const bin_off *off, const bin_sum 
     return sum;
 }
 
-/* sum_b R_b m_b of a receiver and channel, likewise. */
+/* (sum_b (R_b m_b)^2)^1/2 of a receiver and channel: what light and kernel have inside elements of one bin
+ * says nothing of the sign that it has in another. */
 static double mesh_of(const error_by_group *e, const bin_off *off, const bin_sum *sums) {
     double sum = 0;
-    for (size_t b = 0; b < e->n_bins; b++) sum += fabs(sums[b].reflected) * off[b].mesh;
-    return sum;
+    for (size_t b = 0; b < e->n_bins; b++) {
+        const double lack = sums[b].reflected * off[b].mesh;
+        sum += lack * lack;
+    }
+    return sqrt(sum);
 }
 
 /* Adds a receiver in all channels. */
