@@ -6,28 +6,30 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* The errors of a bin: of its mean, and by the mesh as a share of what it reflects to a point. */
+/* The errors of a bin: of its mean, and by the mesh m, s_1 and c as shares of what it reflects to a point. */
 typedef struct bin_off {
-    double mean, mesh;
+    double mean, light, single, mesh_mean;
 } bin_off;
 
 /* The sums of one receiver over a bin, in a channel. */
 typedef struct bin_sum {
-    double weight, reflected;
+    double weight, reflected, varies; /* w, R and v R */
 } bin_sum;
 
-/* Sums of the weights of a receiver by bin, and of weights times B - E; sums [n_bins] is zeroed first. */
+/* Sums of the weights of a receiver by bin, of weights times B - E, and of these times the variation of the
+ * weight inside an element; sums [n_bins] is zeroed first. */
 static void sum_row(const error_by_group *e, const sensor_answer *a, size_t n, size_t c, size_t receiver,
                     bin_sum *sums) {
     const sensor_weights rows = sensors_weights(a->sensors);
     const float *B = a->of->values + c * n, *E = a->of->E != NULL ? a->of->E + c * n : NULL;
-    for (size_t b = 0; b < e->n_bins; b++) sums[b] = (bin_sum){0, 0};
+    for (size_t b = 0; b < e->n_bins; b++) sums[b] = (bin_sum){0, 0, 0};
     for (uint64_t k = rows.start[receiver]; k < rows.start[receiver + 1]; k++) {
         const size_t j = rows.element[k];
-        const double w = (double)rows.weight[k];
+        const double w = (double)rows.weight[k], R = w * ((double)B[j] - (E != NULL ? (double)E[j] : 0));
         bin_sum *const to = &sums[e->bin[j]];
         to->weight += w;
-        to->reflected += w * ((double)B[j] - (E != NULL ? (double)E[j] : 0));
+        to->reflected += R;
+        to->varies += sqrt(2 * M_PI / 3 * fabs(w)) * R;
     }
 }
 
@@ -38,13 +40,13 @@ static double off_of(const error_by_group *e, const bin_off *off, const bin_sum 
     return sum;
 }
 
-/* (sum_b (R_b m_b)^2)^1/2 of a receiver and channel: what light and kernel have inside elements of one bin
- * says nothing of the sign that it has in another. */
+/* (sum_b (m_b sum v R)^2 + (c_b sum R)^2 / 2)^1/2 of a receiver and channel. */
 static double mesh_of(const error_by_group *e, const bin_off *off, const bin_sum *sums) {
     double sum = 0;
     for (size_t b = 0; b < e->n_bins; b++) {
-        const double lack = sums[b].reflected * off[b].mesh;
-        sum += lack * lack;
+        const double R = fabs(sums[b].reflected), varies = fmin(fabs(sums[b].varies), off[b].single * R),
+                     at_point = off[b].light * varies, of_mean = off[b].mesh_mean * R;
+        sum += at_point * at_point + .5 * of_mean * of_mean;
     }
     return sqrt(sum);
 }
@@ -73,8 +75,11 @@ static bin_off *errors_of_bins(const error_by_group *e, const error_scene *scene
         free(off);
         return NULL;
     }
-    for (size_t b = 0; b < e->n_bins; b++)
-        off[b] = (bin_off){sqrt(error_law(e, &sizes, b).mean2), sqrt(mesh_lack_of_bin(e, &sizes, b).point2)};
+    for (size_t b = 0; b < e->n_bins; b++) {
+        const mesh_lack mesh = mesh_lack_of_bin(e, &sizes, b);
+        off[b] = (bin_off){sqrt(error_law(e, &sizes, b).mean2), sqrt(mesh.sent2), sqrt(mesh.one2),
+                           sqrt(mesh.mean2)};
+    }
     whole_light_free(&sizes.whole);
     return off;
 }

@@ -257,7 +257,7 @@ static double share2(const mesh_shares *m, const mesh_light *light, size_t group
 
 /* Squares of the factors of mesh_lack_of: with these 96 % of the answers or more are off by less than twice
  * what is stated, in each of ten scenes; with 1 and 1, 94 % in an atrium (honesty.py mesh). */
-static const double factor2_of_means = 2, factor2_of_elements = .5, factor2_of_points = 1;
+static const double factor2_of_means = 2, factor2_of_elements = .5;
 
 mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t group) {
     const double *groups = m->of[MESH_OF_GROUPS], *single = m->of[MESH_OF_SINGLE];
@@ -267,5 +267,5 @@ mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t gro
                                                                          : sent2;
     const double one2 = single != NULL ? single[m->n_groups] : sent2;
     const double c2 = factor2_of_elements * sent2 * one2;
-    return (mesh_lack){own2 + c2, factor2_of_means * sent2 * whole2, factor2_of_points * sent2 * one2};
+    return (mesh_lack){own2 + c2, factor2_of_means * sent2 * whole2, sent2, one2};
 }

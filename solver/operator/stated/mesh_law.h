@@ -83,8 +83,7 @@ typedef struct mesh_light {
  * where nothing is stated; stores without s have m in its place. group n_groups is all of them together. */
 typedef struct mesh_lack {
     double elements2, mean2;
-    double
-        point2; /* of a point that gathers from the group, c^2 / (1 + m^2 / .2^2): it is no element itself */
+    double sent2, one2; /* m^2 of the light where it is sent from, and s_1^2 */
 } mesh_lack;
 mesh_lack mesh_lack_of(const mesh_shares *m, const mesh_light *light, size_t group);
 
