@@ -40,13 +40,13 @@ static double off_of(const error_by_group *e, const bin_off *off, const bin_sum 
     return sum;
 }
 
-/* (sum_b (m_b sum v R)^2 + (c_b sum R)^2 / 2)^1/2 of a receiver and channel. */
+/* (sum_b (m_b sum v R)^2 + (c_b sum R)^2)^1/2 of a receiver and channel. */
 static double mesh_of(const error_by_group *e, const bin_off *off, const bin_sum *sums) {
     double sum = 0;
     for (size_t b = 0; b < e->n_bins; b++) {
         const double R = fabs(sums[b].reflected), varies = fmin(fabs(sums[b].varies), off[b].single * R),
                      at_point = off[b].light * varies, of_mean = off[b].mesh_mean * R;
-        sum += at_point * at_point + .5 * of_mean * of_mean;
+        sum += at_point * at_point + of_mean * of_mean;
     }
     return sqrt(sum);
 }
