@@ -380,16 +380,15 @@ sensor_eyes sensors_eyes(const lam_sensors *l) {
     return (sensor_eyes){l->n_eyes, l->eyes, l->seen, l->colour};
 }
 
+static int by_receiver(const void *a, const void *b) {
+    const uint32_t p = *(const uint32_t *)a, q = *(const uint32_t *)b;
+    return (p > q) - (p < q);
+}
+
 const float *sensors_seen(const lam_sensors *l, size_t receiver) {
-    size_t low = 0, high = l->n_eyes;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (l->eyes[middle] < receiver)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < l->n_eyes && l->eyes[low] == receiver ? l->seen + low * SENSOR_SEEN : NULL;
+    const uint32_t key = (uint32_t)receiver;
+    const uint32_t *eye = l->n_eyes > 0 ? bsearch(&key, l->eyes, l->n_eyes, sizeof key, by_receiver) : NULL;
+    return eye != NULL ? l->seen + (size_t)(eye - l->eyes) * SENSOR_SEEN : NULL;
 }
 
 double sensors_direct(const lam_sensors *l, const double *dimmer, size_t receiver) {
