@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { before, test } from "node:test";
-import { Daemon, elementAt, inFolder, lambert, near, openPage, pixel, settled, toSrgb, violations } from "./page.mjs";
+import { change, Daemon, elementAt, inFolder, lambert, near, openPage, pixel, settled, toSrgb, violations } from "./page.mjs";
 
 const IES = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 4 1 1 2 .3 1.2 0\n1 1 30\n0 30 60 90\n0\n1000 850 450 0\n";
 // Three luminaires, two of them a row, in a room of 6 by 6 by 3 m.
@@ -51,14 +51,6 @@ const openRoom = async (scene, state = {}, options = {}) => {
 
 const ask = async (scene, luminaires, more = {}) =>
     (await daemon.json(`/v1/scenes/${scene}/radiosity`, { emission: { luminaires }, ...more }))[more.quantity ?? "radiosity"];
-
-const change = async (page, part, to) => {
-    await page.evaluate(([where, what]) => {
-        const { store: s } = window.lambert;
-        s.change({ ...s.now, [where]: { ...s.now[where], ...what } });
-    }, [part, to]);
-    await settled(page);
-};
 
 const rowNamed = (page, name) => page.locator(`[data-luminaire="${name}"]`);
 const field = (page, name, label = "Dimmer in ×") => rowNamed(page, name).getByLabel(label, { exact: true }).first();

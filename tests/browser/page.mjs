@@ -132,6 +132,15 @@ export async function settled(page) {
     await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 
+/** Puts members into a part of the page's state, as its panels do, and waits for the answer. */
+export async function change(page, part, to) {
+    await page.evaluate(([where, what]) => {
+        const { store: s } = window.lambert;
+        s.change({ ...s.now, [where]: { ...s.now[where], ...what } });
+    }, [part, to]);
+    await settled(page);
+}
+
 /** The colours of one picture, drawn anew, at points given in shares of its width and height, each [r, g, b] of 255. */
 export function pixels(page, places) {
     return page.evaluate((all) => {

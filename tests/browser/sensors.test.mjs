@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { before, test } from "node:test";
-import { Daemon, inFolder, lambert, near, openPage, pixels, settled, violations } from "./page.mjs";
+import { change, Daemon, inFolder, lambert, near, openPage, pixels, settled, violations } from "./page.mjs";
 import { sourceOf } from "./source.mjs";
 
 const IES = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 4 1 1 2 .3 1.2 0\n1 1 30\n0 30 60 90\n0\n1000 850 450 0\n";
@@ -44,14 +44,6 @@ const openRoom = async (scene, state = {}, options = {}) => {
     await page.getByRole("tab", { name: options.tab ?? "Sensors" }).click();
     await settled(page);
     return page;
-};
-
-const change = async (page, part, to) => {
-    await page.evaluate(([where, what]) => {
-        const { store: s } = window.lambert;
-        s.change({ ...s.now, [where]: { ...s.now[where], ...what } });
-    }, [part, to]);
-    await settled(page);
 };
 
 const ask = (scene, emission, more) => daemon.json(`/v1/scenes/${scene}/radiosity`, { emission, quantity: "irradiance", ...more });
