@@ -35,4 +35,9 @@ bool size_multiply(size_t a, size_t b, size_t *product);
  * its own (memory.c), so that a test can link a memory_allocate that fails. */
 void *memory_allocate(size_t count, size_t size, const char *what, lam_error *error);
 
+/* Asks for large pages where memory that was not touched yet has some MB: the kernel then zeroes 2 MB in one
+ * fault, where 512 faults take many times as long as what is written there. memory_allocate does so itself.
+ */
+void memory_large_pages(void *memory, size_t bytes);
+
 #endif

@@ -447,6 +447,7 @@ void *batch_workspace_get(batch_workspace *workspace, size_t size) {
     if (workspace->size < size) {
         free(workspace->bytes);
         workspace->bytes = malloc(size);
+        memory_large_pages(workspace->bytes, size);
         workspace->size = workspace->bytes == NULL ? 0 : size;
     }
     return workspace->bytes;

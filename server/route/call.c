@@ -95,6 +95,7 @@ size_t call_parse_bytes(const call *in) {
 void *call_allocate(const call *in, size_t bytes, const char *what, problem *why) {
     if (!request_memory_take(in->memory, bytes, why)) return NULL;
     void *made = malloc(bytes > 0 ? bytes : 1);
+    memory_large_pages(made, bytes);
     if (made == NULL) problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %s", what);
     return made;
 }

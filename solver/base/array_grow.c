@@ -19,6 +19,7 @@ lam_status array_resize(void *array, size_t count, size_t size, const char *what
     if (made == NULL)
         return status_fail(error, LAM_ERR_MEMORY, "%s: cannot allocate %zu x %zu bytes; use a smaller scene",
                            what, count, size);
+    memory_large_pages(made, bytes);
     memcpy(array, &made, sizeof made);
     return LAM_OK;
 }

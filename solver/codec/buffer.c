@@ -1,5 +1,7 @@
 #include "solver/codec/buffer.h"
 
+#include "store/status.h"
+
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -14,6 +16,7 @@ bool buffer_reserve(buffer *b, size_t more) {
         if (capacity < needed) capacity = needed;
         char *bytes = realloc(b->bytes, capacity);
         if (bytes == NULL) return false;
+        memory_large_pages(bytes, capacity);
         b->bytes = bytes;
         b->capacity = capacity;
     }
