@@ -183,13 +183,6 @@ static size_t vectors_of(const radiosity_solve *s) {
     return s->linear != NULL || s->columns != NULL ? 0 : s->request.n_rhs;
 }
 
-/* True if requests should have passes of their own: these take no longer than one of all, and one could not
- * use all threads. */
-static bool passes_apart(const call *in) {
-    const lam_operator *op = in->scene->op;
-    return operator_vectors_apart(op) && op->n_threads < batch_threads(in->service->queue);
-}
-
 /* Columns for a reduction of sensors; where they do not answer it, its vectors are expanded. */
 static bool begin_columns(call *in, radiosity_solve *s, problem *why) {
     const codec_scene about = call_codec_scene(in);
@@ -254,7 +247,7 @@ static bool begin(call *in, answer *out) {
      * have passes of their own. Refined answers take many times as long: one common key lets one such pass
      * run at a time, and leaves the other threads to other requests. */
     in->refines = s->refined != NULL;
-    const bool alone = vectors_of(s) == 0 || request->select || of->n_emitters > 0 || passes_apart(in);
+    const bool alone = vectors_of(s) == 0 || request->select || of->n_emitters > 0;
     in->job.key = in->refines ? (const void *)in->service->queue : alone ? (const void *)in : of->op;
     return true;
 }

@@ -1,6 +1,7 @@
 /* Y = D (sum_d 256^d Q_d) D X, with the steps D and the digits Q_d of tiles.h, is computed on rows of four
  * tiles: X is scaled by D, the planes d follow from the highest by Horner's rule, and the lanes are added in
- * one order (sum_of_lanes). tiled_kernels.inc has the loops for several vectors and for columns. */
+ * one order (sum_of_lanes). tiled_kernels.inc has the loop for columns, tiled_wide.c products for several
+ * vectors. */
 #include "solver/linalg/tiled.h"
 
 #include "solver/base/cpu.h"
@@ -14,16 +15,15 @@
 #include <immintrin.h>
 #endif
 
-/* Groups and columns that a thread takes at a time; multiplications below which one thread works; vectors
- * side by side; fours whose digits are converted at once. */
-enum { GROUPS_AT_ONCE = 64, COLUMNS_AT_ONCE = 4096, THREADS_WORTH = 100000, WIDTH = 16, CHUNK = 32 };
+/* Groups that a thread takes at a time; multiplications below which one thread works. */
+enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 100000 };
 
 /* By columns, products are added in memory, which is slower than in a register: columns are taken when they
  * hold less than 1/COLUMNS_SHARE of all tiles. */
 enum { COLUMNS_SHARE = 8 };
 
-/* Columns and steps, and fours, behind the last that a register may read. */
-enum { COLUMNS_PAST = 4, FOURS_PAST = 1 };
+/* Fours behind the last that a register may read. */
+enum { FOURS_PAST = 1 };
 
 /* Bytes from a four to the one that is asked for ahead, where the fours are more than a cache of a core
  * holds: measured at 22 MB, a fifth less time than without, 1.5 to 6 kB alike; at 4 MB 3 % more. */
@@ -33,9 +33,6 @@ static size_t bytes_ahead(const tiled_rows *t) {
     return t->begin[t->n_groups * t->n_planes] * sizeof *t->fours > CACHED ? AHEAD : 0;
 }
 
-/* From the sum of a plane to that of the next lower one. */
-static const float radix = 256;
-
 void tiled_free(tiled_rows *t) {
     free(t->first);
     free(t->group_of);
@@ -43,10 +40,6 @@ void tiled_free(tiled_rows *t) {
     free(t->begin);
     free(t->fours);
     *t = (tiled_rows){.n = 0};
-}
-
-static size_t part_of(const tiled_rows *t, size_t group, size_t plane) {
-    return (group + 1) * t->n_planes - 1 - plane;
 }
 
 /* The tiles of a plane by rows, those of the lower triangle included: of group g at[begin[g]] to
@@ -126,7 +119,7 @@ static void pack_groups(const void *job, size_t thread, size_t first, size_t las
     (void)thread;
     for (size_t g = first; g < last; g++)
         for (size_t d = 0; d < t->n_planes; d++) {
-            const size_t part = part_of(t, g, d);
+            const size_t part = tiled_part(t, g, d);
             if (p->fours != NULL)
                 pack(t, p->m, d, &p->rows[d], g, p->fours + t->begin[part]);
             else
@@ -163,7 +156,7 @@ lam_status tiled_create(const tile_matrix *upper, size_t n_groups, const tile_gr
         if (upper->count[d] > 0) made.n_planes = d + 1;
     made.first = memory_allocate(n_groups + 1, sizeof *made.first, "operator", error);
     made.group_of = memory_allocate(made.n, sizeof *made.group_of, "operator", error);
-    made.step = memory_allocate(made.n + COLUMNS_PAST, sizeof *made.step, "operator", error);
+    made.step = memory_allocate(made.n + TILED_PAST, sizeof *made.step, "operator", error);
     made.begin = memory_allocate(n_groups * made.n_planes + 1, sizeof *made.begin, "operator", error);
     if (made.first == NULL || made.group_of == NULL || made.step == NULL || made.begin == NULL)
         TRY(LAM_ERR_MEMORY);
@@ -201,7 +194,7 @@ lam_status tiled_upper(const tiled_rows *t, tile_matrix *out, lam_error *error) 
     tile_digits found;
     for (size_t d = 0; d < t->n_planes; d++)
         for (size_t g = 0; g < t->n_groups; g++) {
-            const size_t part = part_of(t, g, d);
+            const size_t part = tiled_part(t, g, d);
             for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++)
                 for (size_t k = 0; k < TILES_AT_ONCE; k++)
                     if (tile_of(t, &t->fours[f], g, k, &found) && found.column >= g)
@@ -223,14 +216,12 @@ static float sum_of_lanes(const float *lanes) {
 
 #define KERNEL(name) name##_portable
 #define TARGET
-#define LANE_FLOATS 4
-#define LANES_FMA(a, b, c) ((c) + (a) * (b))
 #include "solver/linalg/tiled_kernels.inc"
 
 static void group_portable(const tiled_rows *t, size_t g, const float *x, float *y) {
     float sums[TILE][TILE_LANES] = {{0}};
     for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
-        for (size_t l = 0; l < TILE * TILE_LANES; l++) sums[l / TILE_LANES][l % TILE_LANES] *= radix;
+        for (size_t l = 0; l < TILE * TILE_LANES; l++) sums[l / TILE_LANES][l % TILE_LANES] *= TILED_RADIX;
         for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++)
             for (size_t r = 0; r < TILE; r++)
                 for (size_t l = 0; l < TILE_LANES; l++)
@@ -244,14 +235,10 @@ static void group_portable(const tiled_rows *t, size_t g, const float *x, float 
 #ifdef CPU_AVX2_TARGET
 #define KERNEL(name) name##_avx2
 #define TARGET CPU_AVX2_TARGET
-#define LANE_FLOATS 8
-#define LANES_FMA(a, b, c) (lanes) _mm256_fmadd_ps((__m256)(a), (__m256)(b), (__m256)(c))
 #include "solver/linalg/tiled_kernels.inc"
 
 #define KERNEL(name) name##_avx512
 #define TARGET CPU_AVX512_TARGET
-#define LANE_FLOATS 16
-#define LANES_FMA(a, b, c) (lanes) _mm512_fmadd_ps((__m512)(a), (__m512)(b), (__m512)(c))
 #include "solver/linalg/tiled_kernels.inc"
 
 /* y of a group from a quarter of its lanes, [TILE][4]; the fourth row is for show. */
@@ -282,8 +269,8 @@ CPU_AVX2_TARGET static void group_avx2(const tiled_rows *t, size_t g, const floa
     __m128 high[TILE] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()};
     for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
         for (size_t r = 0; r < TILE; r++) {
-            low[r] = _mm256_mul_ps(low[r], _mm256_set1_ps(radix));
-            high[r] = _mm_mul_ps(high[r], _mm_set1_ps(radix));
+            low[r] = _mm256_mul_ps(low[r], _mm256_set1_ps(TILED_RADIX));
+            high[r] = _mm_mul_ps(high[r], _mm_set1_ps(TILED_RADIX));
         }
         for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++) {
             const tile_four *four = &t->fours[f];
@@ -318,7 +305,7 @@ CPU_AVX512_TARGET static void group_avx512(const tiled_rows *t, size_t g, const 
     const __m512i packed = _mm512_setr_epi32(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, 0, 0, 0, 0);
     __m512 lanes[TILE] = {_mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps()};
     for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
-        for (size_t r = 0; r < TILE; r++) lanes[r] = _mm512_mul_ps(lanes[r], _mm512_set1_ps(radix));
+        for (size_t r = 0; r < TILE; r++) lanes[r] = _mm512_mul_ps(lanes[r], _mm512_set1_ps(TILED_RADIX));
         for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++) {
             const tile_four *four = &t->fours[f];
             const float *from = x + four->base;
@@ -342,97 +329,78 @@ CPU_AVX512_TARGET static void group_avx512(const tiled_rows *t, size_t g, const 
 }
 #endif
 
-/* Each multiplies a group of rows with the columns times their steps: one vector x; WIDTH vectors, where side
- * is [n + COLUMNS_PAST][WIDTH], of which m are written to Y; or the transposed rows with x, added to y. */
+/* Each multiplies a group of rows with the scaled columns, or the transposed rows, added to y. */
 typedef struct kernels {
     void (*one)(const tiled_rows *t, size_t g, const float *x, float *y);
-    void (*wide)(const tiled_rows *t, size_t g, size_t m, const float *side, float *Y);
     void (*columns)(const tiled_rows *t, size_t g, const float *x, float *y);
 } kernels;
 
-#define KERNELS(name) {group_##name, wide_##name, columns_##name}
+#define KERNELS(name) {group_##name, columns_##name}
 static const kernels kernels_of[] = CPU_TABLE(KERNELS(portable), KERNELS(avx2), KERNELS(avx512));
 #undef KERNELS
 
-size_t tiled_work(size_t n, size_t m) {
-    return (n + COLUMNS_PAST) * (m > 1 ? WIDTH : 1);
-}
-
-/* A product: columns times their steps, side by side, then groups of rows. */
 typedef struct product {
     const tiled_rows *t;
     kernels run;
-    size_t m;
-    const float *X;
-    float *side, *Y;
+    const float *scaled;
+    float *y;
 } product;
-
-static void place_columns(const void *job, size_t thread, size_t first, size_t last) {
-    const product *p = job;
-    const size_t n = p->t->n, m = p->m, width = m > 1 ? WIDTH : 1;
-    (void)thread;
-    for (size_t q = first; q < last; q++)
-        for (size_t v = 0; v < width; v++)
-            p->side[q * width + v] = v < m && q < n ? p->t->step[q] * p->X[v * n + q] : 0;
-}
 
 static void multiply_groups(const void *job, size_t thread, size_t first, size_t last) {
     const product *p = job;
     (void)thread;
-    for (size_t g = first; g < last; g++) {
-        if (p->m > 1)
-            p->run.wide(p->t, g, p->m, p->side, p->Y);
-        else
-            p->run.one(p->t, g, p->side, p->Y);
-    }
+    for (size_t g = first; g < last; g++) p->run.one(p->t, g, p->scaled, p->y);
 }
 
-void tiled_multiply(const tiled_rows *t, size_t m, const float *X, float *Y, float *work, size_t n_threads) {
-    const product p = {.t = t, .run = kernels_of[cpu_best()], .m = m, .X = X, .side = work, .Y = Y};
-    const bool many = t->begin[t->n_groups * t->n_planes] * TILE * TILE_LANES * m > THREADS_WORTH;
-    const bool long_side = many && t->n * m > THREADS_WORTH;
-    parallel_share(long_side ? n_threads : 1, t->n + COLUMNS_PAST, COLUMNS_AT_ONCE, place_columns, &p);
+void tiled_multiply(const tiled_rows *t, const float *scaled, float *y, size_t n_threads) {
+    const product p = {t, kernels_of[cpu_best()], scaled, y};
+    const bool many = t->begin[t->n_groups * t->n_planes] * TILE * TILE_LANES > THREADS_WORTH;
     parallel_share(many ? n_threads : 1, t->n_groups, GROUPS_AT_ONCE, multiply_groups, &p);
 }
 
-/* work [n + COLUMNS_PAST] = the columns' steps times x. */
-static void scale_columns(const tiled_rows *t, const float *x, float *work) {
-    for (size_t p = 0; p < t->n; p++) work[p] = t->step[p] * x[p];
-    memset(work + t->n, 0, COLUMNS_PAST * sizeof *work);
-}
-
-void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *rows, const float *x, float *y,
-                         float *work) {
+void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *rows, const float *scaled,
+                         float *y) {
     const kernels run = kernels_of[cpu_best()];
-    scale_columns(t, x, work);
     for (size_t k = 0; k < count; k++)
         if (k == 0 || t->group_of[rows[k]] != t->group_of[rows[k - 1]])
-            run.one(t, t->group_of[rows[k]], work, y);
+            run.one(t, t->group_of[rows[k]], scaled, y);
 }
 
-static bool is_dark(const tiled_rows *t, size_t g, const float *x) {
+static bool is_dark(const tiled_rows *t, size_t g, const float *scaled) {
     for (size_t i = t->first[g]; i < t->first[g + 1]; i++)
-        if (x[i] != 0) return false;
+        if (scaled[i] != 0) return false;
     return true;
 }
 
-bool tiled_few_columns(const tiled_rows *t, const float *x) {
-    const uint64_t most = t->begin[t->n_groups * t->n_planes] / COLUMNS_SHARE;
+uint64_t tiled_few(const tiled_rows *t) {
+    return t->begin[t->n_groups * t->n_planes] / COLUMNS_SHARE;
+}
+
+bool tiled_few_columns(const tiled_rows *t, const float *scaled) {
+    const uint64_t most = tiled_few(t);
     uint64_t met = 0;
     for (size_t g = 0; g < t->n_groups; g++) {
-        if (is_dark(t, g, x)) continue;
+        if (is_dark(t, g, scaled)) continue;
         met += t->begin[(g + 1) * t->n_planes] - t->begin[g * t->n_planes];
         if (met > most) return false;
     }
     return true;
 }
 
-void tiled_multiply_columns(const tiled_rows *t, const float *x, float *y, float *work) {
+void tiled_add_columns(const tiled_rows *t, size_t g, const float *x, float *y) {
+    kernels_of[cpu_best()].columns(t, g, x, y);
+}
+
+void tiled_multiply_columns(const tiled_rows *t, const float *scaled, float *y) {
     const kernels run = kernels_of[cpu_best()];
-    memset(work, 0, (t->n + COLUMNS_PAST) * sizeof *work);
-    for (size_t g = 0; g < t->n_groups; g++)
-        if (!is_dark(t, g, x)) run.columns(t, g, x, work);
-    for (size_t i = 0; i < t->n; i++) y[i] = t->step[i] * work[i];
+    memset(y, 0, (t->n + TILED_PAST) * sizeof *y);
+    for (size_t g = 0; g < t->n_groups; g++) {
+        float x[TILE] = {0};
+        if (is_dark(t, g, scaled)) continue;
+        for (size_t r = 0, i = t->first[g]; i < t->first[g + 1]; r++, i++) x[r] = scaled[i];
+        run.columns(t, g, x, y);
+    }
+    for (size_t i = 0; i < t->n; i++) y[i] *= t->step[i];
 }
 
 size_t tiled_bytes(const tiled_rows *t) {

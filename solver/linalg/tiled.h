@@ -9,6 +9,10 @@
 
 enum { TILES_AT_ONCE = 4, TILE_LANES = TILE * TILES_AT_ONCE };
 
+/* Columns and steps behind the last that a register may read; vectors that lie side by side; what the sum of
+ * a plane is worth in the next lower one. */
+enum { TILED_PAST = 8, TILED_WIDE = 16, TILED_RADIX = 256 };
+
 /* Four tiles of a group of rows: tile t begins at column base + beyond[t]; row r of all four side by side. */
 typedef struct tile_four {
     uint32_t base;
@@ -35,23 +39,38 @@ void tiled_free(tiled_rows *t);
 /* The upper triangle again. Errors: LAM_ERR_MEMORY. */
 lam_status tiled_upper(const tiled_rows *t, tile_matrix *out, lam_error *error);
 
-/* Floats of work for m vectors, at most 16. */
-size_t tiled_work(size_t n, size_t m);
+/* The part of `begin` that has a plane of a group. */
+static inline size_t tiled_part(const tiled_rows *t, size_t group, size_t plane) {
+    return (group + 1) * t->n_planes - 1 - plane;
+}
 
-/* Y_v = A X_v, X_v = X + v n, Y_v = Y + v n, m at most 16. Every sum has one order, so that the bits of a
- * vector depend on neither m nor n_threads. work is aligned to a cache line. */
-void tiled_multiply(const tiled_rows *t, size_t m, const float *X, float *Y, float *work, size_t n_threads);
+/* Vectors have room for TILED_PAST numbers behind n. Of a vector X a product takes `scaled`, step_i X_i, and
+ * 0 behind them; the step of a row is in the product. */
 
-/* y_i = (A x)_i for `count` rows i, with the bits of tiled_multiply; other entries of y may change. work as
- * for one vector. */
-void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *rows, const float *x, float *y,
-                         float *work);
+/* y = A X. Every sum has one order, so that the bits do not depend on n_threads. */
+void tiled_multiply(const tiled_rows *t, const float *scaled, float *y, size_t n_threads);
 
-/* True when the columns in which x is not 0 hold so few numbers that their sum costs less than the rows. */
-bool tiled_few_columns(const tiled_rows *t, const float *x);
+/* Y = A X of `count` vectors, at most TILED_WIDE, side by side, each with the bits of tiled_multiply, or,
+ * where it has few columns, of tiled_multiply_columns: scaled and Y are [n + TILED_PAST][TILED_WIDE], as is
+ * work; all three are aligned to a cache line. */
+void tiled_multiply_lanes(const tiled_rows *t, size_t count, const float *scaled, float *Y, float *work,
+                          size_t n_threads);
 
-/* y = A x by the columns in which x is not 0, of which there may be none. work as for one vector. */
-void tiled_multiply_columns(const tiled_rows *t, const float *x, float *y, float *work);
+/* y_i = (A X)_i for `count` rows i, with the bits of tiled_multiply; other entries of y may change. */
+void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *rows, const float *scaled,
+                         float *y);
+
+/* The fours of columns up to which their sum costs less than the rows. */
+uint64_t tiled_few(const tiled_rows *t);
+
+/* True when the columns in which X is not 0 have no more fours. */
+bool tiled_few_columns(const tiled_rows *t, const float *scaled);
+
+/* y += the columns of group g, whose scaled numbers are x [TILE], 0 behind the group's: y_i lacks step_i. */
+void tiled_add_columns(const tiled_rows *t, size_t g, const float *x, float *y);
+
+/* y = A X by the columns in which X is not 0, of which there may be none. */
+void tiled_multiply_columns(const tiled_rows *t, const float *scaled, float *y);
 
 /* Bytes that a product reads. */
 size_t tiled_bytes(const tiled_rows *t);

@@ -146,7 +146,11 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
     float *P = out;
     void *rest = work_area_begin(work);
     if (in->selected == NULL && op->kind->answer != NULL) {
-        op->kind->answer(op, in->count, in->quantity, in->E, in->H0, out, rest);
+        operator_vector vectors[OPERATOR_PASS];
+        for (size_t v = 0, at = 0; v < in->count; v++, at += op->n_channels * n)
+            vectors[v] =
+                (operator_vector){in->quantity, in->E + at, in->H0 != NULL ? in->H0 + at : NULL, out + at};
+        op->kind->answer(op, in->count, vectors, rest);
         return;
     }
     if (op->order != NULL || in->H0 != NULL) {
@@ -201,31 +205,42 @@ done:
     return status;
 }
 
-/* The vectors of one pass, first ... first + count of all the parts': gathered, computed, handed out. */
-static void share_pass(const lam_operator *op, size_t n_parts, const lam_part *parts, size_t first,
-                       size_t count, void *work) {
-    const size_t n = op->n, C = op->n_channels, rows = count * C;
+/* The vectors of one pass, first ... first + count of all the parts'. */
+static void list_vectors(const lam_operator *op, const lam_part *parts, size_t first, size_t count,
+                         operator_vector *out) {
+    const size_t size = op->n_channels * op->n;
+    size_t k = 0, v = first; /* vector v of part k is next */
+    for (size_t found = 0; found < count; v++) {
+        for (; v >= parts[k].n_rhs; k++) v -= parts[k].n_rhs;
+        const lam_part *part = &parts[k];
+        out[found++] = (operator_vector){part->quantity, part->E + v * size,
+                                         part->H0 != NULL ? part->H0 + v * size : NULL, part->out + v * size};
+    }
+}
+
+/* Gathered, computed, handed out. */
+static void share_pass(const lam_operator *op, const lam_part *parts, size_t first, size_t count,
+                       void *work) {
+    const size_t n = op->n, C = op->n_channels, bytes = count * C * n * sizeof(float);
+    operator_vector vectors[OPERATOR_PASS];
     void *rest = work_area_begin(work);
-    float *lit = work_area_take(&rest, rows * n * sizeof *lit),
-          *P = work_area_take(&rest, rows * n * sizeof *P);
-    for (int handing_out = 0; handing_out < 2; handing_out++) {
-        size_t before = 0, done_rows = 0; /* vectors of the parts before; rows of this pass */
-        for (size_t k = 0; k < n_parts; before += parts[k++].n_rhs) {
-            const lam_part *part = &parts[k];
-            const size_t begin = first > before ? first - before : 0;
-            for (size_t v = begin; v < part->n_rhs && done_rows < rows; v++)
-                for (size_t c = 0; c < C; c++, done_rows++) {
-                    const size_t row = v * C + c;
-                    const float *H0 = part->H0 != NULL ? part->H0 + row * n : NULL;
-                    float *lit_row = lit + done_rows * n;
-                    if (handing_out)
-                        finish_row(op, c, part->quantity, part->E + row * n, H0, P + done_rows * n,
-                                   part->out + row * n);
-                    else
-                        light_row(op, c, part->E + row * n, H0, lit_row);
-                }
-        }
-        if (!handing_out) op->kind->apply(op, count, lit, P, rest);
+    list_vectors(op, parts, first, count, vectors);
+    if (op->kind->answer != NULL) {
+        op->kind->answer(op, count, vectors, rest);
+        return;
+    }
+    float *lit = work_area_take(&rest, bytes), *P = work_area_take(&rest, bytes);
+    for (size_t row = 0; row < count * C; row++) {
+        const operator_vector *v = &vectors[row / C];
+        const size_t at = row % C * n;
+        light_row(op, row % C, v->E + at, v->H0 != NULL ? v->H0 + at : NULL, lit + row * n);
+    }
+    op->kind->apply(op, count, lit, P, rest);
+    for (size_t row = 0; row < count * C; row++) {
+        const operator_vector *v = &vectors[row / C];
+        const size_t at = row % C * n;
+        finish_row(op, row % C, v->quantity, v->E + at, v->H0 != NULL ? v->H0 + at : NULL, P + row * n,
+                   v->out + at);
     }
 }
 
@@ -252,8 +267,7 @@ lam_status lam_operator_apply_parts(const lam_operator *op, size_t n_parts, cons
         FAIL(error, LAM_ERR_ARGUMENT, "work area of %zu bytes, %zu are needed for %zu vectors", work_bytes,
              lam_operator_work_bytes(op, total), total);
     for (size_t first = 0; first < total; first += OPERATOR_PASS)
-        share_pass(op, n_parts, parts, first, total - first < OPERATOR_PASS ? total - first : OPERATOR_PASS,
-                   work);
+        share_pass(op, parts, first, total - first < OPERATOR_PASS ? total - first : OPERATOR_PASS, work);
 done:
     return status;
 }

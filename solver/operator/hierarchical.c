@@ -2,6 +2,8 @@
  * (Gortler et al. 1993; Beylkin et al. 1991) and K sparse, as most of its coefficients lie below the
  * threshold. An answer is two transforms of O(n) and a product with K. */
 #include "solver/operator/hierarchical.h"
+
+#include "solver/operator/hierarchical_wide.h"
 #include "store/groups.h"
 
 #include <math.h>
@@ -30,6 +32,8 @@ static void hierarchical_destroy(lam_operator *op) {
     free(self->left_of_element);
     mean_correction_free(&self->even);
     wavelet_plan_free(&self->plan);
+    free(self->runs);
+    free(self->first_run);
     wavelets_free(&self->basis);
 }
 
@@ -123,6 +127,7 @@ static lam_status round_K(hierarchical *self, const csr *K, const float *step, l
                 largest = fmaxf(largest, fabsf(value));
             }
     TRY(wavelet_plan_create(&self->basis, used, &self->plan, error));
+    TRY(hierarchical_wide_prepare(self, error));
     TRY(hierarchical_groups(&self->plan, step, (float)sqrt((double)largest / most_steps), &self->n_groups,
                             &self->groups, &self->step, error));
     for (size_t c = 0; c < C; c++) {
@@ -167,6 +172,7 @@ static lam_status load_tiles(hierarchical *self, store *s, lam_error *error) {
     for (size_t g = 0; g < self->n_groups; g++)
         for (size_t r = 0; r < self->groups[g].size; r++, count++) used[self->groups[g].first + r] = true;
     TRY(wavelet_plan_create(&self->basis, used, &self->plan, error));
+    TRY(hierarchical_wide_prepare(self, error));
     if (count != self->plan.n_used)
         FAIL(error, LAM_ERR_NUMERIC,
              "groups/rows has %zu coefficients, must have all %zu of its nodes and of the root", count,
@@ -273,7 +279,6 @@ const operator_kind operator_hierarchical = {
     .apply_selected = hierarchical_apply_selected,
     .apply_adjoint = hierarchical_apply_adjoint,
     .answer = hierarchical_answer,
-    .apart = hierarchical_apart,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,
     /* Both triangles in tiles, of 12 bytes each; the store has of one triangle two bytes for a tile and one

@@ -16,6 +16,11 @@ typedef struct hierarchical_arrays {
     float *step; /* [n], by coefficient: K_ij is rounded to a multiple of step_i step_j at most */
 } hierarchical_arrays;
 
+/* Elements of a piece of the plan whose numbers in the mesh follow each other. */
+typedef struct hierarchical_run {
+    uint32_t element, count; /* the first, and how many */
+} hierarchical_run;
+
 /* A loaded operator. */
 typedef struct hierarchical {
     lam_operator base;
@@ -30,6 +35,8 @@ typedef struct hierarchical {
     float *root_area;       /* [n] A^1/2, by position */
     float *left;            /* [C][n] rho' A^-1/2, by position */
     float *left_of_element; /* [C][n], the same in mesh order */
+    hierarchical_run *runs; /* of pieces, in their order; of piece k those from first_run[k] on */
+    uint32_t *first_run;    /* [n_pieces + 1] */
     mean_correction even;
 } hierarchical;
 
@@ -39,9 +46,7 @@ void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, fl
 void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
 void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
                                  const uint32_t *selected, float *P, void *work);
-bool hierarchical_apart(const lam_operator *op);
-void hierarchical_answer(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
-                         const float *H0, float *out, void *work);
+void hierarchical_answer(const lam_operator *op, size_t n_rhs, const operator_vector *vectors, void *work);
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels);
 

@@ -1,102 +1,94 @@
-/* The products of kind "hierarchical". The order of elements, areas, reflectances and the correction of the
- * mean error are taken along piece by piece of the tree, right before the forward transform of a piece and
- * right after its inverse, while it is in the cache of the thread that transforms it; those of an answer in
- * mesh order are taken along where it is written. */
+/* The products of kind "hierarchical" with one vector, and all its products as operator.h names them; those
+ * with several vectors are in hierarchical_wide.c. The order of elements, areas, reflectances and the
+ * correction of the mean error are taken along piece by piece of the tree, right before the forward transform
+ * of a piece and right after its inverse, while it is in the cache of the thread that transforms it; those of
+ * an answer in mesh order are taken along where it is written. */
 #include "solver/base/parallel.h"
 #include "solver/base/work_area.h"
 #include "solver/operator/hierarchical.h"
+#include "solver/operator/hierarchical_wide.h"
 
 #include <string.h>
 
-/* Steps, coefficients and flags of some positions. */
-static size_t some_bytes(const wavelet_plan *plan) {
-    return 4 * WORK_AREA_ALIGN + plan->n_steps * (sizeof(uint32_t) + 1) +
-           (plan->n_used + plan->n) * sizeof(uint32_t);
+/* Vectors side by side take as long as this many of them one by one, however few they are. */
+enum { WIDE_WORTH = 4 };
+
+/* Floats of coefficients of a vector. */
+static size_t coefficients_of(const hierarchical *self) {
+    return self->plan.n_used + TILED_PAST;
+}
+
+static size_t one_work_bytes(const hierarchical *self) {
+    const wavelet_plan *plan = &self->plan;
+    const size_t parts[] = {self->base.n * sizeof(float), coefficients_of(self) * sizeof(float),
+                            coefficients_of(self) * sizeof(float), wavelet_plan_work(plan) * sizeof(float),
+                            plan->n_pieces * sizeof(double),
+                            /* of some positions: steps, coefficients, positions and flags */
+                            plan->n_steps * sizeof(uint32_t), plan->n_used * sizeof(uint32_t),
+                            plan->n * sizeof(uint32_t), plan->n_steps};
+    size_t total = WORK_AREA_ALIGN;
+    for (size_t k = 0; k < sizeof parts / sizeof *parts; k++)
+        if (!work_area_add(&total, parts[k])) return 0;
+    return total;
 }
 
 size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
     const hierarchical *self = (const hierarchical *)op;
-    const size_t used = self->plan.n_used;
-    size_t product, vectors, coefficients, slots, sums, total = WORK_AREA_ALIGN;
-    if (!size_multiply(tiled_work(used, n_rhs), sizeof(float), &product) ||
-        !size_multiply(op->n, n_rhs * sizeof(float), &vectors) ||
-        !size_multiply(used, n_rhs * sizeof(float), &coefficients) ||
-        !size_multiply(wavelet_plan_work(&self->plan), n_rhs * sizeof(float), &slots) ||
-        !size_multiply(self->plan.n_pieces, n_rhs * sizeof(double), &sums) ||
-        !work_area_add(&total, vectors) || !work_area_add(&total, coefficients) ||
-        !work_area_add(&total, coefficients) || !work_area_add(&total, slots) ||
-        !work_area_add(&total, sums) || !work_area_add(&total, some_bytes(&self->plan)) ||
-        !work_area_add(&total, product))
-        return 0;
-    return total;
+    const size_t one = one_work_bytes(self), wide = n_rhs >= WIDE_WORTH ? hierarchical_wide_bytes(self) : one;
+    return one == 0 || wide == 0 ? 0 : one > wide ? one : wide;
 }
 
-/* Vectors side by side take as long as WIDE_WORTH of them one by one, however few they are. From so many
- * elements on, several vectors do not fit into a core's caches together, and each is taken alone through all
- * of a product. */
-enum { WIDE_WORTH = 9, ALONE_FROM = 131072 };
-
-/* out_v = K_c in_v: light of few elements by its columns, other vectors together where they are many. */
-static void multiply_core(const hierarchical *self, size_t c, size_t m, const float *in, float *out,
-                          float *work) {
+/* K_c of a vector: light of few elements by its columns. */
+static void multiply_core(const hierarchical *self, size_t c, const float *in, float *out) {
     const tiled_rows *K = &self->K[self->of_channel[c]];
-    for (size_t v = 0, last; v < m; v = last) {
-        last = v;
-        while (last < m && !tiled_few_columns(K, in + last * K->n)) last++;
-        if (last == v)
-            tiled_multiply_columns(K, in + v * K->n, out + last++ * K->n, work);
-        else if (last - v >= WIDE_WORTH)
-            tiled_multiply(K, last - v, in + v * K->n, out + v * K->n, work, self->base.n_threads);
-        else
-            for (size_t u = v; u < last; u++)
-                tiled_multiply(K, 1, in + u * K->n, out + u * K->n, work, self->base.n_threads);
-    }
+    if (tiled_few_columns(K, in))
+        tiled_multiply_columns(K, in, out);
+    else
+        tiled_multiply(K, in, out, self->base.n_threads);
 }
 
 /* One channel of a product, out = left W^T K W right in with left = R' A^-1/2 and right = A^1/2, or, adjoint,
  * these two exchanged. */
 typedef struct channel {
     const hierarchical *self;
-    size_t c, stride; /* from one vector to the next of in, E, H0 and out: C n */
+    size_t c;
     bool adjoint;
     const float *in;     /* by position, or NULL: */
     const float *E, *H0; /* in mesh order, as of an answer */
     lam_quantity quantity;
-    float *X;     /* [m][n] */
-    double *sums; /* [m][n_pieces], of areas times light, or, adjoint, of lift times in */
+    float *X;     /* [n] */
+    double *sums; /* [n_pieces], of areas times light, or, adjoint, of lift times in */
     float *out;   /* by position; with E, the quantity in mesh order */
 } channel;
 
 /* X = right in, and the piece's sum of areas times light. */
-static void fill(void *context, size_t v, size_t piece, size_t first, size_t last) {
+static void fill(void *context, size_t piece, size_t first, size_t last) {
     const channel *h = context;
     const hierarchical *self = h->self;
     const size_t n = self->base.n, c = h->c;
     const float *by = h->adjoint ? self->left + c * n : self->root_area, *in = h->in;
-    float *X = h->X + v * n;
+    float *X = h->X;
     if (in != NULL) {
-        in += v * h->stride;
         for (size_t p = first; p < last; p++) X[p] = by[p] * in[p];
     } else {
-        const float *rho = self->base.reflectance + c * n, *E = h->E + v * h->stride,
-                    *H0 = h->H0 != NULL ? h->H0 + v * h->stride : NULL;
+        const float *rho = self->base.reflectance + c * n, *E = h->E, *H0 = h->H0;
         const uint32_t *order = self->base.order;
         for (size_t p = first; p < last; p++)
             X[p] = by[p] * operator_light(rho, E, H0, order != NULL ? order[p] : p);
     }
     if (self->even.missing == NULL) return;
     /* A_j x_j = A_j^1/2 X_j */
-    h->sums[v * self->plan.n_pieces + piece] =
-        h->adjoint ? mean_correction_sum(self->even.lift + c * n + first, in + first, last - first)
-                   : mean_correction_sum(self->root_area + first, X + first, last - first);
+    h->sums[piece] = h->adjoint
+                         ? mean_correction_sum(self->even.lift + c * n + first, in + first, last - first)
+                         : mean_correction_sum(self->root_area + first, X + first, last - first);
 }
 
 /* The factor of a vector's correction, from the sums of its pieces in their order. */
-static float mean_factor(const channel *h, size_t v) {
+static float mean_factor(const channel *h) {
     const hierarchical *self = h->self;
     double sum = 0;
     if (self->even.missing == NULL) return 0;
-    for (size_t k = 0; k < self->plan.n_pieces; k++) sum += h->sums[v * self->plan.n_pieces + k];
+    for (size_t k = 0; k < self->plan.n_pieces; k++) sum += h->sums[k];
     return (float)(sum / self->even.light[h->c]);
 }
 
@@ -108,57 +100,44 @@ static inline float bounced(float left, const float *lift, float factor, const f
 }
 
 /* The quantity of an element from its P. */
-static inline float answer_of(const channel *h, const float *E, const float *H0, size_t i, float P) {
-    const float *rho = h->self->base.reflectance + h->c * h->self->base.n;
-    return operator_finish(h->quantity, rho[i], operator_light(rho, E, H0, i), P, H0 != NULL ? H0[i] : 0.0f);
+static inline float answer_of(const channel *h, size_t i, float P) {
+    const float *rho = h->self->base.reflectance + h->c * h->self->base.n, *H0 = h->H0;
+    return operator_finish(h->quantity, rho[i], operator_light(rho, h->E, H0, i), P,
+                           H0 != NULL ? H0[i] : 0.0f);
 }
 
 /* Elements that a thread finishes at a time, and those below which one thread does. */
 enum { AT_ONCE = 4096, THREADS_WORTH = 65536 };
 
-/* An answer from X. */
-typedef struct ending {
-    const channel *h;
-    size_t v;
-} ending;
-
-/* This goes in mesh order, as scattered reads cost less than scattered writes. */
+/* An answer from X. This goes in mesh order, as scattered reads cost less than scattered writes. */
 static void finish_elements(const void *job, size_t thread, size_t first, size_t last) {
-    const channel *h = ((const ending *)job)->h;
+    const channel *h = job;
     const hierarchical *self = h->self;
-    const size_t v = ((const ending *)job)->v, n = self->base.n, c = h->c;
-    const float *left = self->left_of_element + c * n, *rho = self->base.reflectance + c * n,
-                *X = h->X + v * n;
+    const size_t n = self->base.n, c = h->c;
+    const float *left = self->left_of_element + c * n, *rho = self->base.reflectance + c * n, *X = h->X;
     const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
-    const float *E = h->E + v * h->stride, *H0 = h->H0 != NULL ? h->H0 + v * h->stride : NULL;
+    const float *E = h->E;
     const uint32_t *position = self->base.position;
-    const float factor = mean_factor(h, v);
-    float *out = h->out + v * h->stride;
+    const float factor = mean_factor(h);
+    float *out = h->out;
     (void)thread;
-    if (h->quantity == LAM_RADIOSITY && H0 == NULL && position != NULL) /* most answers */
+    if (h->quantity == LAM_RADIOSITY && h->H0 == NULL && position != NULL) /* most answers */
         for (size_t i = first; i < last; i++)
             out[i] = rho[i] > 0.0f ? E[i] + bounced(left[i], lift, factor, X, position[i]) : E[i];
     else
         for (size_t i = first; i < last; i++)
-            out[i] =
-                answer_of(h, E, H0, i, bounced(left[i], lift, factor, X, operator_position(&self->base, i)));
-}
-
-static void finish(const channel *h, size_t v) {
-    const size_t n = h->self->base.n;
-    const ending e = {h, v};
-    parallel_share(n >= THREADS_WORTH ? h->self->base.n_threads : 1, n, AT_ONCE, finish_elements, &e);
+            out[i] = answer_of(h, i, bounced(left[i], lift, factor, X, operator_position(&self->base, i)));
 }
 
 /* out from X. */
-static void use(void *context, size_t v, size_t piece, size_t first, size_t last) {
+static void use(void *context, size_t piece, size_t first, size_t last) {
     const channel *h = context;
     const hierarchical *self = h->self;
     const size_t n = self->base.n, c = h->c;
-    const float *left = self->left + c * n, *root = self->root_area, *X = h->X + v * n;
+    const float *left = self->left + c * n, *root = self->root_area, *X = h->X;
     const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
-    const float factor = mean_factor(h, v);
-    float *out = h->out + v * h->stride;
+    const float factor = mean_factor(h);
+    float *out = h->out;
     (void)piece;
     if (h->adjoint) {
         for (size_t p = first; p < last; p++) out[p] = root[p] * X[p] + factor * (root[p] * root[p]) + 0.0f;
@@ -167,116 +146,106 @@ static void use(void *context, size_t v, size_t piece, size_t first, size_t last
     for (size_t p = first; p < last; p++) out[p] = bounced(left[p], lift, factor, X, p);
 }
 
-/* Room for m vectors, of which `in`, E, H0, out and c are still to be set. */
+/* Room for a vector, of which `in`, E, H0, out and c are still to be set. */
 typedef struct areas {
     channel h;
     float *from, *to, *slots;
 } areas;
 
-static areas take_areas(const hierarchical *self, size_t m, void **work) {
+static areas take_areas(const hierarchical *self, void **work) {
     const wavelet_plan *plan = &self->plan;
-    areas a = {.h = {.self = self, .stride = self->base.n_channels * self->base.n}};
-    a.h.X = work_area_take(work, m * self->base.n * sizeof *a.h.X);
-    a.from = work_area_take(work, m * plan->n_used * sizeof *a.from);
-    a.to = work_area_take(work, m * plan->n_used * sizeof *a.to);
-    a.slots = work_area_take(work, m * wavelet_plan_work(plan) * sizeof *a.slots);
-    a.h.sums = work_area_take(work, m * plan->n_pieces * sizeof *a.h.sums);
+    areas a = {.h = {.self = self}};
+    a.h.X = work_area_take(work, self->base.n * sizeof *a.h.X);
+    a.from = work_area_take(work, coefficients_of(self) * sizeof *a.from);
+    a.to = work_area_take(work, coefficients_of(self) * sizeof *a.to);
+    a.slots = work_area_take(work, wavelet_plan_work(plan) * sizeof *a.slots);
+    a.h.sums = work_area_take(work, plan->n_pieces * sizeof *a.h.sums);
+    memset(a.from + plan->n_used, 0, TILED_PAST * sizeof *a.from);
     return a;
 }
 
 /* True when all light of a channel is 0, of which nothing bounces. */
-static bool is_dark(const channel *h, size_t m) {
+static bool is_dark(const channel *h) {
     const size_t n = h->self->base.n;
-    for (size_t v = 0; v < m; v++) {
-        const size_t row = v * h->stride;
-        if (!wavelet_is_dark((h->in != NULL ? h->in : h->E) + row, n) ||
-            (h->in == NULL && h->H0 != NULL && !wavelet_is_dark(h->H0 + row, n)))
-            return false;
-    }
-    return true;
+    return wavelet_is_dark(h->in != NULL ? h->in : h->E, n) &&
+           (h->in != NULL || h->H0 == NULL || wavelet_is_dark(h->H0, n));
 }
 
-/* X and its coefficients. */
-static void analyse(areas *a, size_t m) {
+/* X and its coefficients, times their steps. */
+static void analyse(areas *a) {
     const hierarchical *self = a->h.self;
-    wavelet_plan_forward(&self->plan, m, fill, &a->h, a->h.X, a->from, a->slots, self->base.n_threads);
+    const float *step = self->K[self->of_channel[a->h.c]].step;
+    wavelet_plan_forward(&self->plan, fill, &a->h, a->h.X, step, a->from, a->slots, self->base.n_threads);
 }
 
 /* Writes what a dark channel gives. */
-static void leave_dark(const channel *h, size_t m) {
+static void leave_dark(const channel *h) {
     const size_t n = h->self->base.n;
-    for (size_t v = 0; v < m; v++) {
-        const size_t row = v * h->stride;
-        if (h->in != NULL) memset(h->out + row, 0, n * sizeof *h->out);
-        for (size_t i = 0; h->in == NULL && i < n; i++)
-            h->out[row + i] = answer_of(h, h->E + row, h->H0 != NULL ? h->H0 + row : NULL, i, 0);
-    }
+    if (h->in != NULL) memset(h->out, 0, n * sizeof *h->out);
+    for (size_t i = 0; h->in == NULL && i < n; i++) h->out[i] = answer_of(h, i, 0);
 }
 
-/* m vectors of a channel, together. */
-static void apply_together(areas *a, size_t m, void *work) {
+static void apply_channel(areas *a) {
     const hierarchical *self = a->h.self;
-    if (is_dark(&a->h, m)) {
-        leave_dark(&a->h, m);
+    const size_t n = self->base.n, n_threads = self->base.n_threads;
+    if (is_dark(&a->h)) {
+        leave_dark(&a->h);
         return;
     }
-    analyse(a, m);
-    multiply_core(self, a->h.c, m, a->from, a->to, work);
-    wavelet_plan_inverse(&self->plan, m, a->to, a->h.X, a->h.in != NULL ? use : NULL, &a->h, a->slots,
-                         self->base.n_threads);
-    for (size_t v = 0; a->h.in == NULL && v < m; v++) finish(&a->h, v);
+    analyse(a);
+    multiply_core(self, a->h.c, a->from, a->to);
+    wavelet_plan_inverse(&self->plan, a->to, a->h.X, a->h.in != NULL ? use : NULL, &a->h, a->slots,
+                         n_threads);
+    if (a->h.in == NULL)
+        parallel_share(n >= THREADS_WORTH ? n_threads : 1, n, AT_ONCE, finish_elements, &a->h);
 }
 
-bool hierarchical_apart(const lam_operator *op) {
-    return op->n >= ALONE_FROM;
-}
-
-/* All m vectors of a channel. */
-static void apply_channel(const areas *a, size_t m, void *work) {
-    const bool alone = hierarchical_apart(&a->h.self->base);
-    for (size_t v = 0; v < m; v += alone ? 1 : m) {
-        areas some = *a;
-        const size_t before = v * a->h.stride;
-        if (a->h.in != NULL) some.h.in += before;
-        if (a->h.E != NULL) some.h.E += before;
-        if (a->h.H0 != NULL) some.h.H0 += before;
-        some.h.out += before;
-        apply_together(&some, alone ? 1 : m, work);
+/* The products of vectors by position, n_rhs at most OPERATOR_PASS. */
+static void apply_by_position(const lam_operator *op, bool adjoint, size_t n_rhs, const float *in, float *out,
+                              void *work) {
+    const hierarchical *self = (const hierarchical *)op;
+    const size_t n = op->n, C = op->n_channels;
+    if (n_rhs >= WIDE_WORTH) {
+        for (size_t c = 0; c < C; c++)
+            hierarchical_wide_product(self, c, adjoint, n_rhs, in + c * n, out + c * n, work);
+        return;
     }
+    areas a = take_areas(self, &work);
+    a.h.adjoint = adjoint;
+    for (size_t c = 0; c < C; c++)
+        for (size_t v = 0; v < n_rhs; v++) {
+            a.h.c = c;
+            a.h.in = in + (v * C + c) * n;
+            a.h.out = out + (v * C + c) * n;
+            apply_channel(&a);
+        }
 }
 
 void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
-    areas a = take_areas((const hierarchical *)op, n_rhs, &work);
-    for (size_t c = 0; c < op->n_channels; c++) {
-        a.h.c = c;
-        a.h.in = E + c * op->n;
-        a.h.out = P + c * op->n;
-        apply_channel(&a, n_rhs, work);
-    }
+    apply_by_position(op, false, n_rhs, E, P, work);
 }
 
 void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work) {
-    areas a = take_areas((const hierarchical *)op, n_rhs, &work);
-    a.h.adjoint = true;
-    for (size_t c = 0; c < op->n_channels; c++) {
-        a.h.c = c;
-        a.h.in = g + c * op->n;
-        a.h.out = w + c * op->n;
-        apply_channel(&a, n_rhs, work);
-    }
+    apply_by_position(op, true, n_rhs, g, w, work);
 }
 
-void hierarchical_answer(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
-                         const float *H0, float *out, void *work) {
-    areas a = take_areas((const hierarchical *)op, n_rhs, &work);
-    a.h.quantity = quantity;
-    for (size_t c = 0; c < op->n_channels; c++) {
-        a.h.c = c;
-        a.h.E = E + c * op->n;
-        a.h.H0 = H0 != NULL ? H0 + c * op->n : NULL;
-        a.h.out = out + c * op->n;
-        apply_channel(&a, n_rhs, work);
+void hierarchical_answer(const lam_operator *op, size_t n_rhs, const operator_vector *vectors, void *work) {
+    const hierarchical *self = (const hierarchical *)op;
+    const size_t n = op->n;
+    if (n_rhs >= WIDE_WORTH) {
+        for (size_t c = 0; c < op->n_channels; c++) hierarchical_wide_answer(self, c, n_rhs, vectors, work);
+        return;
     }
+    areas a = take_areas(self, &work);
+    for (size_t c = 0; c < op->n_channels; c++)
+        for (size_t v = 0; v < n_rhs; v++) {
+            a.h.c = c;
+            a.h.quantity = vectors[v].quantity;
+            a.h.E = vectors[v].E + c * n;
+            a.h.H0 = vectors[v].H0 != NULL ? vectors[v].H0 + c * n : NULL;
+            a.h.out = vectors[v].out + c * n;
+            apply_channel(&a);
+        }
 }
 
 /* Where more than one in so many steps is needed, the whole answer is as quick. */
@@ -287,13 +256,13 @@ void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const flo
                                  const uint32_t *selected, float *P, void *work) {
     const hierarchical *self = (const hierarchical *)op;
     const wavelet_plan *plan = &self->plan;
-    const size_t n = op->n, C = op->n_channels, used = plan->n_used;
-    areas a = take_areas(self, n_rhs, &work);
+    const size_t n = op->n, C = op->n_channels;
+    areas a = take_areas(self, &work);
     uint32_t *steps = work_area_take(&work, plan->n_steps * sizeof *steps);
-    uint32_t *rows = work_area_take(&work, used * sizeof *rows);
+    uint32_t *rows = work_area_take(&work, plan->n_used * sizeof *rows);
     uint32_t *positions = work_area_take(&work, n * sizeof *positions);
     uint8_t *flags = work_area_take(&work, plan->n_steps);
-    size_t n_steps = plan->n_steps, n_rows = used;
+    size_t n_steps = plan->n_steps, n_rows = plan->n_used;
     memset(flags, 0, plan->n_steps);
     const bool few = n_selected <= n;
     for (size_t r = 0; few && r < n_selected; r++)
@@ -301,32 +270,31 @@ void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const flo
     if (few) n_steps = wavelet_plan_paths(plan, n_selected, positions, flags, steps);
     const bool some = few && n_steps * SOME_STEPS < plan->n_steps;
     if (some) n_rows = wavelet_plan_coefficients(plan, n_steps, steps, rows);
-    for (size_t c = 0; c < C; c++) {
+    for (size_t row = 0; row < n_rhs * C; row++) {
+        const size_t c = row % C;
         const tiled_rows *K = &self->K[self->of_channel[c]];
         const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
+        float *to = P + row * n_selected;
         a.h.c = c;
-        a.h.in = E + c * n;
-        if (is_dark(&a.h, n_rhs)) {
-            for (size_t v = 0; v < n_rhs; v++)
-                memset(P + (v * C + c) * n_selected, 0, n_selected * sizeof *P);
+        a.h.in = E + row * n;
+        if (is_dark(&a.h)) {
+            memset(to, 0, n_selected * sizeof *to);
             continue;
         }
-        analyse(&a, n_rhs);
+        analyse(&a);
         if (!some) {
-            multiply_core(self, c, n_rhs, a.from, a.to, work);
-            wavelet_plan_inverse(plan, n_rhs, a.to, a.h.X, NULL, NULL, a.slots, op->n_threads);
+            multiply_core(self, c, a.from, a.to);
+            wavelet_plan_inverse(plan, a.to, a.h.X, NULL, NULL, a.slots, op->n_threads);
+        } else {
+            if (tiled_few_columns(K, a.from))
+                tiled_multiply_columns(K, a.from, a.to);
+            else
+                tiled_multiply_rows(K, n_rows, rows, a.from, a.to);
+            wavelet_plan_inverse_some(plan, n_steps, steps, a.to, a.h.X, a.slots);
         }
-        for (size_t v = 0; v < n_rhs; v++) {
-            const float *from = a.from + v * used, factor = mean_factor(&a.h, v);
-            float *X = a.h.X + v * n;
-            if (some && tiled_few_columns(K, from))
-                tiled_multiply_columns(K, from, a.to, work);
-            else if (some)
-                tiled_multiply_rows(K, n_rows, rows, from, a.to, work);
-            if (some) wavelet_plan_inverse_some(plan, n_steps, steps, a.to, X, a.slots);
-            for (size_t r = 0; r < n_selected; r++)
-                P[(v * C + c) * n_selected + r] = bounced(self->left_of_element[c * n + selected[r]], lift,
-                                                          factor, X, operator_position(op, selected[r]));
-        }
+        const float factor = mean_factor(&a.h);
+        for (size_t r = 0; r < n_selected; r++)
+            to[r] = bounced(self->left_of_element[c * n + selected[r]], lift, factor, a.h.X,
+                            operator_position(op, selected[r]));
     }
 }

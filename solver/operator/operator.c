@@ -210,10 +210,6 @@ void lam_operator_set_threads(lam_operator *op, size_t n_threads) {
     if (op->kind->set_threads != NULL) op->kind->set_threads(op, op->n_threads);
 }
 
-bool operator_vectors_apart(const lam_operator *op) {
-    return op->kind->apart != NULL && op->kind->apart(op);
-}
-
 bool operator_keeps_factors(const lam_operator *op) {
     operator_description description;
     operator_describe(op, &description);

@@ -28,14 +28,21 @@ typedef struct operator_description {
  * A kind may leave NULL: apply and apply_adjoint, where it answers for its own emitters only
  * (emitters_apply.c); apply_selected, the rows of apply for the n_selected elements selected
  * (operator_position says where they are), P being [n_rhs][C][n_selected] (without it all rows are computed);
- * answer, which is the quantity of E' = E + rho H0 (operator_finish), E, H0 (NULL: 0) and out being in mesh
- * order, so that an answer in position order is never in memory;
+ * answer, which is the quantity of E' = E + rho H0 (operator_finish) of each vector, so that an answer in
+ * position order is never in memory;
  * set_threads, which passes n_threads on to its arrays;
  * narrow, which makes the operator again with its large arrays in another precision, all of its own; relight,
  * which makes it again under other reflectances, its large arrays those of op; check, which compares the
  * operator with the areas of its mesh and, where they disagree, writes the reason to detail and returns
- * false; apart, which is true where several vectors together take no less time than one by one. */
+ * false. */
 #define OPERATOR_PASS 16 /* a larger batch is cut into passes */
+
+/* A vector and its answer, [C][n] each, in mesh order. */
+typedef struct operator_vector {
+    lam_quantity quantity;
+    const float *E, *H0; /* H0 NULL: 0 */
+    float *out;
+} operator_vector;
 
 typedef struct operator_kind {
     const char *name;
@@ -47,14 +54,12 @@ typedef struct operator_kind {
     void (*apply_adjoint)(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
     void (*apply_selected)(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
                            const uint32_t *selected, float *P, void *work);
-    void (*answer)(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
-                   const float *H0, float *out, void *work);
+    void (*answer)(const lam_operator *op, size_t n_rhs, const operator_vector *vectors, void *work);
     void (*set_threads)(lam_operator *op, size_t n_threads);
     lam_status (*narrow)(const lam_operator *op, panel_precision precision, lam_operator **out,
                          lam_error *error);
     lam_status (*relight)(const lam_operator *op, const float *reflectance, atomic_bool *cancelled,
                           lam_operator **out, lam_error *error);
-    bool (*apart)(const lam_operator *op);
     void (*destroy)(lam_operator *op);
     void (*describe)(const lam_operator *op, operator_description *description);
     bool (*check)(const lam_operator *op, const double *area, char *detail, size_t size);
@@ -90,9 +95,6 @@ const operator_kind *operator_kind_find(const char *name);
 /* Bytes of memory that an operator of this kind takes of so many bytes of /operator; an unknown kind, which
  * operator_load refuses, counts once. */
 uint64_t operator_unpacked_bytes(const char *kind, uint64_t stored);
-
-/* True where several vectors together take no less time than one by one. */
-bool operator_vectors_apart(const lam_operator *op);
 
 /* Fills the shared part of a zeroed operator (copies reflectance, 0 in place of values below FLT_MIN);
  * kind->destroy frees what the kind added. Errors: LAM_ERR_NUMERIC names a reflectance outside [0, 1),

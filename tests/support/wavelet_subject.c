@@ -74,9 +74,9 @@ void wavelet_subject_free(subject *s) {
 void transform(const subject *s, bool back, const float *from, float *to) {
     float *work = test_allocate(wavelet_plan_work(&s->plan), sizeof *work);
     if (back)
-        wavelet_plan_inverse(&s->plan, 1, from, to, NULL, NULL, work, 1);
+        wavelet_plan_inverse(&s->plan, from, to, NULL, NULL, work, 1);
     else
-        wavelet_plan_forward(&s->plan, 1, NULL, NULL, from, to, work, 1);
+        wavelet_plan_forward(&s->plan, NULL, NULL, from, NULL, to, work, 1);
     free(work);
 }
 

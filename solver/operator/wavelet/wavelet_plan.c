@@ -200,6 +200,12 @@ static lam_status cut_pieces(wavelet_plan *plan, lam_error *error) {
         while (plan->n_pieces > 0 && plan->pieces[plan->n_pieces - 1].first >= begin[t]) plan->n_pieces--;
         plan->pieces[plan->n_pieces++] = (wavelet_piece){begin[t], (uint32_t)t + 1};
     }
+    for (size_t k = 0; k < plan->n_pieces; k++) {
+        const size_t steps = plan->pieces[k].last - plan->pieces[k].first,
+                     count = plan->steps[plan->pieces[k].last - 1].count;
+        if (steps > plan->most_steps) plan->most_steps = steps;
+        if (count > plan->most_positions) plan->most_positions = count;
+    }
 done:
     free(begin);
     return status;
@@ -261,11 +267,13 @@ size_t wavelet_plan_bytes(const wavelet_plan *plan) {
 #include "solver/operator/wavelet/wavelet_kernels.inc"
 #endif
 
-typedef void transform(const wavelet_plan *plan, size_t first, size_t last, const uint32_t *which,
-                       const float *from, float *to, float *s);
+typedef void forward_steps(const wavelet_plan *plan, size_t first, size_t last, const uint32_t *which,
+                           const float *X, const float *scale, float *C, float *s);
+typedef void inverse_steps(const wavelet_plan *plan, size_t first, size_t last, const uint32_t *which,
+                           const float *C, float *X, float *s);
 
-static transform *const forward[] = CPU_TABLE(forward_portable, forward_avx2, forward_avx2),
-                        *const inverse[] = CPU_TABLE(inverse_portable, inverse_avx2, inverse_avx2);
+static forward_steps *const forward[] = CPU_TABLE(forward_portable, forward_avx2, forward_avx2);
+static inverse_steps *const inverse[] = CPU_TABLE(inverse_portable, inverse_avx2, inverse_avx2);
 
 bool wavelet_is_dark(const float *x, size_t count) {
     for (size_t first = 0; first < count; first += LOOKED_AT) {
@@ -290,87 +298,63 @@ static void leave_dark(const wavelet_plan *plan, const wavelet_piece *piece, flo
     memset(s + (piece->last - 1) * WAVELET_SCALING, 0, WAVELET_SCALING * sizeof *s);
 }
 
-/* The first position of a piece, and that behind its last. */
-static size_t piece_begin(const wavelet_plan *plan, const wavelet_piece *piece) {
-    return plan->steps[piece->last - 1].begin;
-}
-
-static size_t piece_end(const wavelet_plan *plan, const wavelet_piece *piece) {
-    return piece_begin(plan, piece) + plan->steps[piece->last - 1].count;
-}
-
-/* One of the two transforms of m vectors: [m][n] elements X, [m][n_used] coefficients C. */
+/* One of the two transforms: elements X [n], coefficients C [n_used]. */
 typedef struct transform_job {
     const wavelet_plan *plan;
-    transform *run;
     wavelet_visit *visit; /* before a piece forward, after it inverse; or NULL */
     void *context;
-    const float *from;
+    const float *from, *scale;
     float *to, *work;
 } transform_job;
 
 static void forward_pieces(const void *job, size_t thread, size_t first, size_t last) {
     const transform_job *t = job;
     const wavelet_plan *plan = t->plan;
-    const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
+    forward_steps *const run = forward[cpu_best()];
     (void)thread;
     for (size_t k = first; k < last; k++) {
-        const size_t v = k / n_pieces;
-        const wavelet_piece *piece = &plan->pieces[k % n_pieces];
-        const float *X = t->from + v * plan->n;
-        float *C = t->to + v * plan->n_used, *work = t->work + v * room;
+        const wavelet_piece *piece = &plan->pieces[k];
         if (t->visit != NULL)
-            t->visit(t->context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
-        if (is_dark(plan, piece, X))
-            leave_dark(plan, piece, C, work);
+            t->visit(t->context, k, wavelet_piece_begin(plan, piece), wavelet_piece_end(plan, piece));
+        if (is_dark(plan, piece, t->from))
+            leave_dark(plan, piece, t->to, t->work);
         else
-            t->run(plan, piece->first, piece->last, NULL, X, C, work);
+            run(plan, piece->first, piece->last, NULL, t->from, t->scale, t->to, t->work);
     }
 }
 
 static void inverse_pieces(const void *job, size_t thread, size_t first, size_t last) {
     const transform_job *t = job;
     const wavelet_plan *plan = t->plan;
-    const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
+    inverse_steps *const run = inverse[cpu_best()];
     (void)thread;
     for (size_t k = first; k < last; k++) {
-        const size_t v = k / n_pieces;
-        const wavelet_piece *piece = &plan->pieces[k % n_pieces];
-        t->run(plan, piece->first, piece->last, NULL, t->from + v * plan->n_used, t->to + v * plan->n,
-               t->work + v * room);
+        const wavelet_piece *piece = &plan->pieces[k];
+        run(plan, piece->first, piece->last, NULL, t->from, t->to, t->work);
         if (t->visit != NULL)
-            t->visit(t->context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
+            t->visit(t->context, k, wavelet_piece_begin(plan, piece), wavelet_piece_end(plan, piece));
     }
 }
 
-void wavelet_plan_forward(const wavelet_plan *plan, size_t m, wavelet_visit *fill, void *context,
-                          const float *X, float *C, float *work, size_t n_threads) {
-    transform *const run = forward[cpu_best()];
-    const size_t room = wavelet_plan_work(plan);
+void wavelet_plan_forward(const wavelet_plan *plan, wavelet_visit *fill, void *context, const float *X,
+                          const float *scale, float *C, float *work, size_t n_threads) {
     const plan_step *root = &plan->steps[plan->n_steps - 1];
-    const transform_job job = {plan, run, fill, context, X, C, work};
-    parallel_share(n_threads, m * plan->n_pieces, 1, forward_pieces, &job);
-    for (size_t v = 0; v < m; v++) {
-        float *c = C + v * plan->n_used;
-        const float *s = work + v * room + (plan->n_steps - 1) * WAVELET_SCALING;
-        run(plan, 0, plan->n_above, plan->above, X + v * plan->n, c, work + v * room);
-        for (size_t k = 0; k < root->scaling; k++) c[plan->n_used - root->scaling + k] = s[k];
-    }
+    const transform_job job = {plan, fill, context, X, scale, C, work};
+    const float *s = work + (plan->n_steps - 1) * WAVELET_SCALING;
+    parallel_share(n_threads, plan->n_pieces, 1, forward_pieces, &job);
+    forward[cpu_best()](plan, 0, plan->n_above, plan->above, X, scale, C, work);
+    for (size_t k = 0, i = plan->n_used - root->scaling; k < root->scaling; k++, i++)
+        C[i] = scale != NULL ? s[k] * scale[i] : s[k];
 }
 
-void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, wavelet_visit *use,
+void wavelet_plan_inverse(const wavelet_plan *plan, const float *C, float *X, wavelet_visit *use,
                           void *context, float *work, size_t n_threads) {
-    transform *const run = inverse[cpu_best()];
-    const size_t room = wavelet_plan_work(plan);
     const plan_step *root = &plan->steps[plan->n_steps - 1];
-    for (size_t v = 0; v < m; v++) {
-        const float *c = C + v * plan->n_used;
-        float *s = work + v * room + (plan->n_steps - 1) * WAVELET_SCALING;
-        for (size_t k = 0; k < root->scaling; k++) s[k] = c[plan->n_used - root->scaling + k];
-        run(plan, 0, plan->n_above, plan->above, c, X + v * plan->n, work + v * room);
-    }
-    const transform_job job = {plan, run, use, context, C, X, work};
-    parallel_share(n_threads, m * plan->n_pieces, 1, inverse_pieces, &job);
+    const transform_job job = {plan, use, context, C, NULL, X, work};
+    float *s = work + (plan->n_steps - 1) * WAVELET_SCALING;
+    for (size_t k = 0; k < root->scaling; k++) s[k] = C[plan->n_used - root->scaling + k];
+    inverse[cpu_best()](plan, 0, plan->n_above, plan->above, C, X, work);
+    parallel_share(n_threads, plan->n_pieces, 1, inverse_pieces, &job);
 }
 
 /* The leaf that takes a position. */

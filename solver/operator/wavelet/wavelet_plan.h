@@ -27,8 +27,9 @@ typedef struct wavelet_plan {
     uint32_t *coefficient; /* [n_used], its number in the basis, ascending */
     uint32_t *leaves;      /* [n_leaves], leaves and subtrees in the order of positions */
     size_t n_leaves;
-    wavelet_piece *pieces; /* [n_pieces], steps that one thread takes at a time */
-    uint32_t *above;       /* [n_above], steps outside all pieces */
+    wavelet_piece *pieces;             /* [n_pieces], steps that one thread takes at a time */
+    size_t most_steps, most_positions; /* of a piece */
+    uint32_t *above;                   /* [n_above], steps outside all pieces */
 } wavelet_plan;
 
 void wavelet_plan_free(wavelet_plan *plan);
@@ -36,7 +37,16 @@ void wavelet_plan_free(wavelet_plan *plan);
 /* used: [n] by coefficient of the basis, which must outlive the plan. Errors: LAM_ERR_MEMORY. */
 lam_status wavelet_plan_create(const wavelets *basis, const bool *used, wavelet_plan *out, lam_error *error);
 
-/* Floats of work for one vector. */
+/* The first position of a piece, and that behind its last. */
+static inline size_t wavelet_piece_begin(const wavelet_plan *plan, const wavelet_piece *piece) {
+    return plan->steps[piece->last - 1].begin;
+}
+
+static inline size_t wavelet_piece_end(const wavelet_plan *plan, const wavelet_piece *piece) {
+    return wavelet_piece_begin(plan, piece) + plan->steps[piece->last - 1].count;
+}
+
+/* Floats of work for a transform. */
 static inline size_t wavelet_plan_work(const wavelet_plan *plan) {
     return plan->n_steps * WAVELET_SCALING;
 }
@@ -44,16 +54,16 @@ static inline size_t wavelet_plan_work(const wavelet_plan *plan) {
 /* True when all of x [count] is 0. */
 bool wavelet_is_dark(const float *x, size_t count);
 
-/* Work on one piece of vector v, its positions first to last - 1, by the thread that transforms it while they
- * are in its cache: X_v gets its numbers before the forward transform, or is read after the inverse. Either
- * may be NULL. */
-typedef void wavelet_visit(void *context, size_t v, size_t piece, size_t first, size_t last);
+/* Work on one piece, its positions first to last - 1, by the thread that transforms it while they are in its
+ * cache: X gets its numbers before the forward transform, or is read after the inverse. Either may be NULL.
+ */
+typedef void wavelet_visit(void *context, size_t piece, size_t first, size_t last);
 
-/* C_v = W X_v, the used coefficients alone, and X_v = W^T C_v: X_v = X + v n, C_v = C + v n_used. The forward
- * transform skips pieces in which X_v is 0. The bits depend on neither m nor n_threads. */
-void wavelet_plan_forward(const wavelet_plan *plan, size_t m, wavelet_visit *fill, void *context,
-                          const float *X, float *C, float *work, size_t n_threads);
-void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, wavelet_visit *use,
+/* C_i = scale_i (W X)_i, the used coefficients alone, and X = W^T C. scale is [n_used], with 8 numbers more;
+ * NULL: 1. The forward transform skips pieces in which X is 0. The bits do not depend on n_threads. */
+void wavelet_plan_forward(const wavelet_plan *plan, wavelet_visit *fill, void *context, const float *X,
+                          const float *scale, float *C, float *work, size_t n_threads);
+void wavelet_plan_inverse(const wavelet_plan *plan, const float *C, float *X, wavelet_visit *use,
                           void *context, float *work, size_t n_threads);
 
 /* The steps on the paths from the root to some positions, ascending: out has room for n_steps, flags

@@ -117,6 +117,35 @@ static void check_same(const tile_matrix *a, const tile_matrix *b) {
     }
 }
 
+/* out [m][N + TILED_PAST] = the columns of X [m][N] times their steps. */
+static void scale(size_t m, const float *X, const float *step, float *out) {
+    for (size_t v = 0; v < m; v++)
+        for (size_t i = 0; i < N + TILED_PAST; i++)
+            out[v * (N + TILED_PAST) + i] = i < N ? step[i] * X[v * N + i] : 0;
+}
+
+/* Vectors side by side have the bits that each has alone: lanes has room for three arrays. */
+static void check_lanes(const tiled_rows *t, size_t count, const float *scaled, float *lanes,
+                        size_t n_threads) {
+    const size_t room = N + TILED_PAST;
+    float *Y = lanes + room * TILED_WIDE, *work = Y + room * TILED_WIDE,
+          *one = test_allocate(room, sizeof *one);
+    for (size_t i = 0; i < room; i++)
+        for (size_t v = 0; v < TILED_WIDE; v++) {
+            lanes[i * TILED_WIDE + v] = v < count ? scaled[v * room + i] : 0;
+            Y[i * TILED_WIDE + v] = NAN;
+        }
+    tiled_multiply_lanes(t, count, lanes, Y, work, n_threads);
+    for (size_t v = 0; v < count; v++) {
+        if (tiled_few_columns(t, scaled + v * room))
+            tiled_multiply_columns(t, scaled + v * room, one);
+        else
+            tiled_multiply(t, scaled + v * room, one, 1);
+        for (size_t i = 0; i < N; i++) ck_assert_mem_eq(&Y[i * TILED_WIDE + v], &one[i], sizeof *one);
+    }
+    free(one);
+}
+
 START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     const int digits = 1 + _i;
     uint64_t state = 3;
@@ -125,9 +154,11 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     tile_group groups[N];
     float step[N], row_step[N];
     uint32_t rows[40];
-    float *X = test_allocate(VECTORS * N, sizeof *X), *one = test_allocate(N, sizeof *one),
-          *Y = test_allocate(VECTORS * N, sizeof *Y);
-    float *work = aligned_alloc(64, (tiled_work(N, VECTORS) + 16) / 16 * 16 * sizeof *work);
+    float *X = test_allocate(VECTORS * N, sizeof *X), *one = test_allocate(N + TILED_PAST, sizeof *one),
+          *Y = test_allocate(VECTORS * N + TILED_PAST, sizeof *Y);
+    const size_t room = N + TILED_PAST;
+    float *scaled = test_allocate(VECTORS * room, sizeof *scaled),
+          *lanes = aligned_alloc(64, 3 * room * TILED_WIDE * sizeof *lanes);
     const size_t n_groups = random_groups(N, groups, step, row_step, &state);
     csr a = random_rows(N, row_step, digits, &state);
     ck_ok(tile_matrix_round(&a, n_groups, groups, step, &m, &error));
@@ -140,30 +171,29 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     ck_ok(tiled_upper(&t, &back, &error));
     check_same(&m, &back);
     for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)(random_lcg_unit(&state) - .4);
-    for (size_t m_at_once = 1; m_at_once <= VECTORS; m_at_once += 5)
-        for (size_t n_threads = 1; n_threads < 4; n_threads += 2) {
-            for (size_t k = 0; k < VECTORS * N; k++) Y[k] = NAN;
-            tiled_multiply(&t, m_at_once, X, Y, work, n_threads);
-            for (size_t v = 0; v < m_at_once; v++) {
-                tiled_multiply(&t, 1, X + v * N, one, work, 1);
-                ck_assert_mem_eq(one, Y + v * N, N * sizeof *one);
-            }
-        }
+    scale(VECTORS, X, t.step, scaled);
+    for (size_t count = 1; count <= VECTORS; count += 5)
+        for (size_t n_threads = 1; n_threads < 4; n_threads += 2)
+            check_lanes(&t, count, scaled, lanes, n_threads);
+    for (size_t v = 0; v < VECTORS; v++) tiled_multiply(&t, scaled + v * room, Y + v * N, 1);
     check_against_double(N, K, X, Y);
     for (size_t k = 0; k < 40; k++) rows[k] = (uint32_t)(k * 17 + 7 * (k % 3));
-    tiled_multiply(&t, 1, X, one, work, 1);
+    tiled_multiply(&t, scaled, one, 1);
     for (size_t i = 0; i < N; i++) Y[i] = NAN;
-    tiled_multiply_rows(&t, 40, rows, X, Y, work);
+    tiled_multiply_rows(&t, 40, rows, scaled, Y);
     for (size_t k = 0; k < 40; k++) ck_assert_float_eq(Y[rows[k]], one[rows[k]]);
     /* The products by columns: one of the vectors has many of them and the others few. */
     for (size_t k = 0; k < VECTORS * N; k++)
         if (k >= N && k % N % 97 != k / N) X[k] = 0;
-    ck_assert(!tiled_few_columns(&t, X) && tiled_few_columns(&t, X + N));
+    scale(VECTORS, X, t.step, scaled);
+    ck_assert(!tiled_few_columns(&t, scaled) && tiled_few_columns(&t, scaled + room));
     for (size_t v = 0; v < VECTORS; v++) {
-        for (size_t i = 0; i < N; i++) Y[v * N + i] = NAN;
-        tiled_multiply_columns(&t, X + v * N, Y + v * N, work);
+        tiled_multiply_columns(&t, scaled + v * room, one);
+        memcpy(Y + v * N, one, N * sizeof *Y);
     }
     check_against_double(N, K, X, Y);
+    check_lanes(&t, VECTORS, scaled, lanes, 3);
+    check_lanes(&t, VECTORS - 1, scaled + room, lanes, 1);
     tiled_free(&t);
     tile_matrix_free(&m);
     tile_matrix_free(&back);
@@ -172,7 +202,8 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     free(X);
     free(Y);
     free(one);
-    free(work);
+    free(scaled);
+    free(lanes);
 }
 END_TEST
 
@@ -183,8 +214,7 @@ START_TEST(tiles_may_be_far_from_each_other) {
     uint32_t indices[] = {0, 4, FAR - 1, FAR + 1}, *places = test_allocate(FAR, sizeof *places);
     float data[] = {3, -5, 7, 11}, *X = test_allocate(FAR, sizeof *X), *Y = test_allocate(FAR, sizeof *Y);
     tile_group *groups = test_allocate(FAR, sizeof *groups);
-    float *step = test_allocate(FAR, sizeof *step),
-          *work = aligned_alloc(64, (tiled_work(FAR, 1) + 16) / 16 * 16 * sizeof *work);
+    float *step = test_allocate(FAR, sizeof *step), *scaled = test_allocate(FAR + TILED_PAST, sizeof *scaled);
     tiled_rows t;
     tile_matrix m, back;
     const csr a = {.n = FAR + 2, .indptr = indptr, .indices = indices, .data = data};
@@ -201,7 +231,8 @@ START_TEST(tiles_may_be_far_from_each_other) {
     ck_assert_uint_eq(t.begin[1], 2);
     ck_ok(tiled_upper(&t, &back, &error));
     check_same(&m, &back);
-    tiled_multiply(&t, 1, X, Y, work, 1);
+    for (size_t g = 0; g < FAR; g++) scaled[g] = t.step[g] * X[g];
+    tiled_multiply(&t, scaled, Y, 1);
     ck_assert_float_eq(Y[0], 3 * X[0] - 5 * X[2] + 7 * X[FAR - 3] + 11 * X[FAR - 1]);
     ck_assert_float_eq(Y[2], -5 * X[0]);
     ck_assert_float_eq(Y[FAR - 1], 11 * X[0]);
@@ -214,7 +245,7 @@ START_TEST(tiles_may_be_far_from_each_other) {
     free(Y);
     free(groups);
     free(step);
-    free(work);
+    free(scaled);
 }
 END_TEST
 

@@ -1,5 +1,6 @@
 /* Multiwavelets of a mesh: the tree, the basis, and plans of what is used of it. */
 #include "solver/base/random.h"
+#include "solver/operator/wavelet/wavelet_wide.h"
 #include "support/wavelet_subject.h"
 
 #include <string.h>
@@ -158,27 +159,75 @@ START_TEST(grids_have_few_shapes) {
 }
 END_TEST
 
-/* Copies a piece, and counts the positions. */
+/* Copies pieces of a vector, or of vectors side by side, and counts the positions. */
 typedef struct visited {
     const float *from;
     float *X;
     size_t n, positions;
 } visited;
 
-static void visit(void *context, size_t v, size_t piece, size_t first, size_t last) {
+static void visit(void *context, size_t piece, size_t first, size_t last) {
     visited *seen = context;
     (void)piece;
-    for (size_t p = v * seen->n + first; p < v * seen->n + last; p++) seen->X[p] = seen->from[p];
+    for (size_t p = first; p < last; p++) seen->X[p] = seen->from[p];
     __atomic_fetch_add(&seen->positions, last - first, __ATOMIC_RELAXED);
+}
+
+enum { LANES = 3 };
+
+static void fill_lanes(void *context, size_t piece, size_t first, size_t last, float *X) {
+    visited *seen = context;
+    (void)piece;
+    for (size_t p = first; p < last; p++)
+        for (size_t v = 0; v < WAVELET_WIDE; v++)
+            X[(p - first) * WAVELET_WIDE + v] = v < LANES ? seen->from[v * seen->n + p] : 0;
+    __atomic_fetch_add(&seen->positions, last - first, __ATOMIC_RELAXED);
+}
+
+static void take_lanes(void *context, size_t piece, size_t first, size_t last, float *X) {
+    visited *seen = context;
+    (void)piece;
+    for (size_t p = first; p < last; p++)
+        for (size_t v = 0; v < LANES; v++) seen->X[v * seen->n + p] = X[(p - first) * WAVELET_WIDE + v];
+    __atomic_fetch_add(&seen->positions, last - first, __ATOMIC_RELAXED);
+}
+
+/* Vectors side by side have the bits that each has alone, but for the sign of a 0: X [LANES][n]. */
+static void check_lanes(const wavelet_plan *plan, const float *X, size_t n_threads) {
+    const size_t n = plan->n, n_used = plan->n_used;
+    float *scale = test_allocate(n_used + WAVELET_INPUTS, sizeof *scale),
+          *one = test_allocate(n_used, sizeof *one), *back = test_allocate(n, sizeof *back),
+          *Y = test_allocate(LANES * n, sizeof *Y),
+          *small = test_allocate(wavelet_plan_work(plan), sizeof *small);
+    float *C = aligned_alloc(64, (n_used * WAVELET_WIDE + 15) / 16 * 16 * sizeof *C);
+    float *work = aligned_alloc(64, (wavelet_wide_work(plan, n_threads) + 15) / 16 * 16 * sizeof *work);
+    visited seen = {.from = X, .X = Y, .n = n};
+    for (size_t i = 0; i < n_used; i++) scale[i] = 1 + (float)(i % 5);
+    wavelet_wide_forward(plan, fill_lanes, &seen, scale, C, work, n_threads);
+    wavelet_wide_inverse(plan, C, take_lanes, &seen, work, n_threads);
+    ck_assert_uint_eq(seen.positions, 2 * n);
+    for (size_t v = 0; v < LANES; v++) {
+        wavelet_plan_forward(plan, NULL, NULL, X + v * n, scale, one, small, 1);
+        for (size_t i = 0; i < n_used; i++) ck_assert_float_eq(C[i * WAVELET_WIDE + v], one[i]);
+        wavelet_plan_inverse(plan, one, back, NULL, NULL, small, 1);
+        for (size_t p = 0; p < n; p++) ck_assert_float_eq(Y[v * n + p], back[p]);
+    }
+    free(scale);
+    free(one);
+    free(back);
+    free(Y);
+    free(small);
+    free(C);
+    free(work);
 }
 
 /* Pieces for threads, several vectors, any number of threads, and pieces that are visited: the same bits. */
 START_TEST(bits_do_not_depend_on_threads) {
-    enum { SIDE = 120, N = SIDE * SIDE, VECTORS = 3 };
+    enum { SIDE = 120, N = SIDE * SIDE, VECTORS = LANES };
     double(*centre)[3] = test_allocate(N, sizeof *centre), *area = test_allocate(N, sizeof *area);
     float(*normal)[3] = test_allocate(N, sizeof *normal);
-    float *X = test_allocate(VECTORS * N, sizeof *X), *one = test_allocate(VECTORS * N, sizeof *one),
-          *many = test_allocate(VECTORS * N, sizeof *many), *Y = test_allocate(VECTORS * N, sizeof *Y);
+    float *X = test_allocate(VECTORS * N, sizeof *X), *one = test_allocate(N, sizeof *one),
+          *many = test_allocate(N, sizeof *many), *Y = test_allocate(N, sizeof *Y);
     plane_tree tree;
     wavelets w;
     uint64_t seed = 9;
@@ -194,37 +243,29 @@ START_TEST(bits_do_not_depend_on_threads) {
     wavelet_plan plan = plan_of_all(&w);
     ck_assert_uint_gt(plan.n_pieces, 2);
     ck_assert_uint_gt(plan.n_above, 2);
-    float *work = test_allocate(VECTORS * wavelet_plan_work(&plan), sizeof *work);
+    float *work = test_allocate(wavelet_plan_work(&plan), sizeof *work);
     for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)random_lcg_unit(&seed);
     /* Most of the second vector is dark, and all of the third but one element. */
     for (size_t p = 0; p < N; p++) {
         if (p > N / 3) X[N + p] = 0;
         if (p != N / 2) X[2 * N + p] = 0;
     }
-    for (int back = 0; back < 2; back++) {
-        visited seen = {.from = X, .X = Y, .n = N};
-        memset(Y, 0, VECTORS * N * sizeof *Y);
-        for (size_t v = 0; v < VECTORS; v++) {
-            if (back)
-                wavelet_plan_inverse(&plan, 1, X + v * N, one + v * N, NULL, NULL, work, 1);
-            else
-                wavelet_plan_forward(&plan, 1, NULL, NULL, X + v * N, one + v * N, work, 1);
-        }
-        if (back) {
-            wavelet_plan_inverse(&plan, VECTORS, X, many, NULL, NULL, work, 4);
-            ck_assert_mem_eq(one, many, VECTORS * N * sizeof *one);
-            seen.from = many;
-            wavelet_plan_inverse(&plan, VECTORS, X, many, visit, &seen, work, 4);
-            ck_assert_mem_eq(one, Y, VECTORS * N * sizeof *one);
-        } else {
-            wavelet_plan_forward(&plan, VECTORS, NULL, NULL, X, many, work, 4);
-            ck_assert_mem_eq(one, many, VECTORS * N * sizeof *one);
-            wavelet_plan_forward(&plan, VECTORS, visit, &seen, Y, many, work, 4);
-            ck_assert_mem_eq(X, Y, VECTORS * N * sizeof *one);
-        }
-        ck_assert_mem_eq(one, many, VECTORS * N * sizeof *one);
-        ck_assert_uint_eq(seen.positions, VECTORS * N);
+    for (size_t v = 0; v < VECTORS; v++) {
+        visited seen = {.from = X + v * N, .X = Y, .n = N};
+        wavelet_plan_forward(&plan, NULL, NULL, X + v * N, NULL, one, work, 1);
+        wavelet_plan_forward(&plan, visit, &seen, Y, NULL, many, work, 4);
+        ck_assert_mem_eq(one, many, N * sizeof *one);
+        ck_assert_mem_eq(X + v * N, Y, N * sizeof *one);
+        wavelet_plan_inverse(&plan, X + v * N, one, NULL, NULL, work, 1);
+        wavelet_plan_inverse(&plan, X + v * N, many, NULL, NULL, work, 4);
+        ck_assert_mem_eq(one, many, N * sizeof *one);
+        seen.from = many;
+        wavelet_plan_inverse(&plan, X + v * N, many, visit, &seen, work, 4);
+        ck_assert_mem_eq(one, Y, N * sizeof *one);
+        ck_assert_uint_eq(seen.positions, 2 * N);
     }
+    check_lanes(&plan, X, 1);
+    check_lanes(&plan, X, 4);
     wavelet_plan_free(&plan);
     wavelets_free(&w);
     plane_tree_free(&tree);
@@ -247,11 +288,12 @@ START_TEST(a_plan_leaves_out_what_is_not_used) {
     bool *used = test_allocate(n, sizeof *used);
     float *x = test_allocate(n, sizeof *x), *c = test_allocate(n, sizeof *c),
           *some = test_allocate(n, sizeof *some), *back = test_allocate(n, sizeof *back),
-          *truth = test_allocate(n, sizeof *truth);
+          *truth = test_allocate(n, sizeof *truth), *three = test_allocate(LANES * n, sizeof *three);
     uint64_t seed = 3;
     for (size_t k = 0; k < n; k++) {
         used[k] = k % every == every - 1;
         x[k] = (float)random_lcg_unit(&seed);
+        for (size_t v = 0; v < LANES; v++) three[v * n + k] = k % (v + 2) == 0 ? x[k] : 0;
     }
     ck_ok(wavelet_plan_create(&s.basis, used, &plan, &error));
     ck_assert_uint_lt(plan.n_used, every == n ? 4 : n / 2);
@@ -259,8 +301,9 @@ START_TEST(a_plan_leaves_out_what_is_not_used) {
     float *work = test_allocate(wavelet_plan_work(&plan), sizeof *work);
     transform(&s, false, x, c);
     for (size_t p = 0; p < n; p++) back[p] = NAN;
-    wavelet_plan_forward(&plan, 1, NULL, NULL, x, some, work, 1);
-    wavelet_plan_inverse(&plan, 1, some, back, NULL, NULL, work, 1);
+    wavelet_plan_forward(&plan, NULL, NULL, x, NULL, some, work, 1);
+    wavelet_plan_inverse(&plan, some, back, NULL, NULL, work, 1);
+    check_lanes(&plan, three, 2);
     for (size_t k = 0; k < plan.n_used; k++) {
         const uint32_t at = plan.coefficient[k];
         ck_assert(k == 0 || at > plan.coefficient[k - 1]);
@@ -274,6 +317,7 @@ START_TEST(a_plan_leaves_out_what_is_not_used) {
         ck_assert(fabs((double)back[p] - (double)c[p]) <= sqrt((double)n) * 2 * TRANSFORM_U);
     wavelet_plan_free(&plan);
     free(work);
+    free(three);
     free(used);
     free(x);
     free(c);
