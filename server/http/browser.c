@@ -7,7 +7,8 @@
 /* Fields of requests that a page may set, and those of answers that it may read, beside the usual ones. */
 #define ASKED "Accept, Authorization, Content-Type, If-None-Match, Lambert-Timeout, X-Request-Id"
 #define SHOWN                                                                                                \
-    "ETag, Lambert-Certificate, Lambert-Converted-By, Lambert-Iterations, Lambert-Limited, Lambert-Unit, "   \
+    "ETag, Lambert-Certificate, Lambert-Converted-By, Lambert-Iterations, Lambert-Limited, Lambert-Scene, "  \
+    "Lambert-Unit, "                                                                                         \
     "Location, Retry-After, Server-Timing, "                                                                 \
     "X-Request-Id"
 

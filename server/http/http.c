@@ -129,11 +129,11 @@ static bool check_head(request *r, const char *method, const char *target, uint6
                      .accepted = r->accepted,
                      .memory = &r->memory};
     if (!check_scene(r)) return false;
-    if (r->match.route->with_query) {
+    const route *to = r->match.route;
+    if (to->with_query && !head_read_query(r)) return false;
+    if (to->with_query && !to->with_body)
         r->call.accept = media_choose_table(http_header(r, MHD_HTTP_HEADER_ACCEPT));
-        return head_read_query(r);
-    }
-    if (!r->match.route->with_body) return true;
+    if (!to->with_body) return true;
     if (!check_type(r)) return false;
     if (length > s->config->max_body || length > request_ledger_most(&s->memory)) {
         refuse_length(r);

@@ -118,6 +118,9 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
     if (a->allow[0] != '\0') good = good && http_add_header(response, MHD_HTTP_HEADER_ALLOW, a->allow);
     if (a->location != NULL) good = good && http_add_header(response, MHD_HTTP_HEADER_LOCATION, a->location);
     if (a->policy != NULL) good = good && http_add_header(response, "Content-Security-Policy", a->policy);
+    if (r->call.scene != NULL)
+        good =
+            good && http_add_header(response, "Lambert-Scene", scene_elements_text(r->call.scene->elements));
     if (a->timed) good = good && add_times(response, a);
     if (a->refined) good = good && add_refined(response, a);
     if (a->counts_limited) good = good && add_limited(response, a);

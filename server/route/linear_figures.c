@@ -188,8 +188,8 @@ static bool answer_groups(call *in, radiosity_request *request, answer_notes *no
 
 bool quick_radiosity(call *in, answer *out) {
     static const char word[] = "\"reduce\"";
-    if (in->body_type != MEDIA_JSON || in->accept.type != MEDIA_JSON || in->length > QUICK_BODY ||
-        memmem(in->body, in->length, word, sizeof word - 1) == NULL)
+    if (in->body_type != MEDIA_JSON || in->accept.type != MEDIA_JSON || in->n_query > 0 ||
+        in->length > QUICK_BODY || memmem(in->body, in->length, word, sizeof word - 1) == NULL)
         return false;
     codec_scene about = call_codec_scene(in);
     about.only_linear = true;

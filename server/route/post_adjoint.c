@@ -1,6 +1,7 @@
 /* POST /v1/scenes/NAME/adjoint: gradients of J = g . q by emission, reflectance, sky, emitters, groups and
  * luminaires, of a cotangent g or of a batch of them: begin reads the body, each vector of a pass is a
  * cotangent, end writes. gradient.h has the formulas. */
+#include "server/route/array_members.h"
 #include "server/route/routes.h"
 #include "server/route/sun_answer.h"
 #include "server/scene/direct_light.h"
@@ -247,6 +248,7 @@ static bool write_json(const call *in, const adjoint_solve *a, buffer *b, proble
 static bool read_body(const call *in, adjoint_request *request, problem *why) {
     const codec_scene about = call_codec_scene(in);
     const size_t lists = call_parse_bytes(in);
+    if (!array_members_read(in, &request->quantity, NULL, why)) return false;
     if (!request_memory_take(in->memory, lists, why)) return false;
     if (in->body_type == MEDIA_JSON ? !codec_read_adjoint_json(&about, in->body, in->length, request, why)
                                     : !codec_read_adjoint_npy(&about, in->body, in->length, request, why))

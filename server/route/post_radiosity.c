@@ -1,6 +1,7 @@
 /* POST /v1/scenes/NAME/radiosity: emission in, radiosity out. begin reads the body, pass computes vectors
  * together with those of other clients, or goes on with figures, end writes the answer; each on any thread.
  */
+#include "server/route/array_members.h"
 #include "server/route/light_weights.h"
 #include "server/route/limited_answer.h"
 #include "server/route/linear_figures.h"
@@ -167,6 +168,9 @@ static void take_places(const call *in, radiosity_solve *s) {
 static bool read_body(const call *in, radiosity_request *request, problem *why) {
     const codec_scene about = call_codec_scene(in);
     const size_t lists = call_parse_bytes(in);
+    bool limit = true;
+    if (!array_members_read(in, &request->quantity, &limit, why)) return false;
+    request->linear_map = !limit;
     if (!request_memory_take(in->memory, lists, why)) return false;
     const bool good = in->body_type == MEDIA_NPY
                           ? codec_read_npy(&about, in->body, in->length, request, why)

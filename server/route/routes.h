@@ -30,8 +30,8 @@ typedef struct route {
     route_keeps *keeps;       /* of an answer that is kept: steps and shortcut are send_kept, quick_kept */
     bool with_body;  /* the body may have --max-body bytes; the handler runs on a thread that solves, as steps
                         do */
-    bool with_query; /* the call has the query of the target, which others leave unread, and accepts a table
-                        of numbers (media_choose_table) */
+    bool with_query; /* the call has the query of the target, which others leave unread; without a body it
+                        accepts a table of numbers (media_choose_table) */
     bool open;       /* no token is needed, unless one has the right */
     token_right right; /* that a token must have; 0: TOKEN_READ */
     bool any_host;     /* asked for by those that know no name of the daemon */

@@ -20,6 +20,7 @@ typedef struct kept_place {
 struct scene_elements {
     const scene *of;
     uint64_t tag; /* for all that determines the columns */
+    char text[SCENE_TAG_MAX];
     pthread_mutex_t lock;
     uint64_t n_asked;
     kept_place kept[ELEMENTS_KEPT];
@@ -33,6 +34,7 @@ static lam_status make_tag(scene_elements *e, lam_error *error) {
                                 scene_root(e->of)->identity.digest, e->of->description);
     if (length < 0) return status_fail(error, LAM_ERR_MEMORY, "not enough memory for the tag of elements");
     e->tag = store_checksum(text, (size_t)length);
+    snprintf(e->text, sizeof e->text, "\"%016llx\"", (unsigned long long)e->tag);
     free(text);
     return LAM_OK;
 }
@@ -56,6 +58,10 @@ void scene_elements_destroy(scene_elements *e) {
     for (size_t k = 0; k < ELEMENTS_KEPT; k++) kept_forms_release(e->kept[k].forms);
     pthread_mutex_destroy(&e->lock);
     free(e);
+}
+
+const char *scene_elements_text(const scene_elements *e) {
+    return e->text;
 }
 
 uint64_t scene_elements_tag(const scene_elements *e, unsigned which) {

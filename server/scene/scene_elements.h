@@ -51,6 +51,11 @@ void element_columns_free(element_columns *columns);
 /* Bytes that scene_elements_read takes, at most. */
 size_t scene_elements_read_bytes(const scene_elements *e, unsigned fields);
 
+/* The tag of the scene in quotes, as answers have it (Lambert-Scene): another one where any number of the
+ * store or its reflectances differs, and the same from one start of the daemon to the next. */
+#define SCENE_TAG_MAX 20
+const char *scene_elements_text(const scene_elements *e);
+
 /* A number for all that determines an answer, of which `which` tells those of one scene from each other:
  * equal answers may have two, two never have one (but for a collision of 64 bits). It stays the same from one
  * start of the daemon to the next. O(1). */

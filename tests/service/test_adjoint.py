@@ -26,8 +26,8 @@ NPY = "application/x-npy"
 class Both(unittest.TestCase):
     """Stores and checks that the classes below share."""
 
-    def ask(self, name, body, **more):
-        answer = self.daemon.post(f"/v1/scenes/{name}/adjoint", body, **more)
+    def ask(self, name, body, query="", **more):
+        answer = self.daemon.post(f"/v1/scenes/{name}/adjoint{query}", body, **more)
         self.assertEqual(answer.status, 200, (answer, str(body)[:200]))
         return answer
 
@@ -265,6 +265,12 @@ class Gradients(Both):
             array = np.load(io.BytesIO(answer.body))
             self.assertEqual((array.dtype, array.shape), (np.dtype("<f4"), g.shape))
             np.testing.assert_array_equal(array, wanted["emission"].astype("f4"))
+            for quantity in QUANTITIES:
+                array = np.load(io.BytesIO(self.ask(name, npy(g), f"?quantity={quantity}", kind=NPY, accept=NPY).body))
+                np.testing.assert_array_equal(array, self.gradient(name, {"cotangent": g.tolist(), "quantity": quantity})["emission"].astype("f4"))
+            refused = self.daemon.post(f"/v1/scenes/{name}/adjoint?limit=false", npy(g), kind=NPY)
+            self.assertEqual(refused.status, 422)
+            self.assertIn('"limit", may have quantity alone', refused.json()["detail"])
             for kind in "emission", "reflectance", "sky":
                 if kind == "sky" and name not in self.skies:
                     continue

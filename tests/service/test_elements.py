@@ -348,9 +348,23 @@ class Elements(Case):
         with Daemon(path) as daemon:
             first = self.elements(daemon, "box", accept=ZIP)
             tags, told = {first.headers["ETag"]}, {daemon.get("/v1/scenes/box/groups").headers["ETag"]}
+            posts = (("radiosity", {"emission": {"groups": {"lamp": 1}}, "reduce": {"groups": ["lamp"], "with": ["mean"]}}), ("radiosity", {"emission": {"groups": {"lamp": 1}}}),
+                     ("adjoint", {"cotangent": {"groups": {"lamp": 1}}}), ("jacobian", {"of": {"groups": ["lamp"]}}), ("radiosity", {}))
+
+            def scene_tag():
+                """That of answers of every kind, errors included, which is one."""
+                answers = [self.elements(daemon, "box", ["area"]), daemon.get("/v1/scenes/box"), *(daemon.post("/v1/scenes/box/" + route, body) for route, body in posts)]
+                self.assertEqual([answer.status for answer in answers], [200] * 6 + [422])
+                tag, = {answer.headers["Lambert-Scene"] for answer in answers}
+                self.assertRegex(tag, '^"[0-9a-f]{16}"$')
+                return tag
+
+            scenes = {scene_tag()}
+            self.assertIsNone(daemon.get("/v1/scenes").headers["Lambert-Scene"])
             daemon.signal(signal.SIGHUP)
             daemon.wait_for("reloaded: ")
             self.assertEqual(self.elements(daemon, "box", accept=ZIP).headers["ETag"], first.headers["ETag"])
+            self.assertEqual({scene_tag()}, scenes)
             for k, other in enumerate(others):
                 shutil.copy(other, self.folder / "spare")
                 os.replace(self.folder / "spare", path)
@@ -361,7 +375,8 @@ class Elements(Case):
                     self.same(field, values, columns_of(other)[field], 1)
                 tags.add(answer.headers["ETag"])
                 told.add(daemon.get("/v1/scenes/box/groups").headers["ETag"])
-            self.assertEqual((len(tags), len(told)), (4, 4))
+                scenes.add(scene_tag())
+            self.assertEqual((len(tags), len(told), len(scenes)), (4, 4, 4))
             os.replace(keep, path)
             daemon.signal(signal.SIGHUP)
             daemon.wait_for("reloaded: ", 5)

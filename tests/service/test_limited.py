@@ -187,6 +187,28 @@ class Limited(unittest.TestCase):
         plain = self.daemon.radiosity("lowrank", {"emissions": E.tolist(), "limit": False})
         self.assertNotIn("Lambert-Limited", plain.headers)
 
+    def test_queries_of_arrays(self):
+        """An array has no place for members: its request has them in the query, and the bits of one in JSON."""
+        E = self.stores["lowrank"].emissions(8)[:, 0]
+        route, as_array = "/v1/scenes/lowrank/radiosity", {"kind": "application/x-npy", "accept": "application/x-npy"}
+        for quantity in QUANTITIES:
+            for limit in True, False:
+                body = {"emissions": E.tolist(), "quantity": quantity, "limit": limit}
+                wanted = self.daemon.post(route, body, accept="application/x-npy")
+                answer = self.daemon.post(f"{route}?quantity={quantity}&limit={str(limit).lower()}", npy(E), **as_array)
+                self.assertEqual((answer.status, answer.body), (200, wanted.body), (quantity, limit))
+                self.assertEqual("Lambert-Limited" in answer.headers, limit)
+        for query, kind, words in (("limits=false", "wrong-members", '"limits", may have limit and quantity alone'), ("limit=no", "unknown-word", "limit=no must be true or false"),
+                                   ("limit", "unknown-word", "limit= must"), ("quantity=light", "unknown-word", "quantity=light must be radiosity"),
+                                   ("limit=false&limit=true", "given-twice", '"limit" a second time')):
+            answer = self.daemon.post(f"{route}?{query}", npy(E), **as_array)
+            self.assertEqual((answer.status, answer.json()["type"].split("#")[1]), (422, kind), query)
+            self.assertIn(words, answer.json()["detail"])
+        for more in {}, {"reduce": {"groups": ["floor"], "with": ["mean"]}}:
+            answer = self.daemon.post(route + "?limit=false", {"emission": {"groups": {"floor": 1}}, **more})
+            self.assertEqual(answer.status, 422)
+            self.assertIn("in JSON has its members in its body", answer.json()["detail"])
+
     def test_signed_emissions(self):
         """The answer to a difference is the difference of linear answers, whichever program and form."""
         for name in "lowrank", "hierarchical", "sparse", "colour":
