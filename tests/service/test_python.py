@@ -166,6 +166,27 @@ class OverHttp(PackageCase):
         values = office.irradiance({"luminaires": {"row": 0.4, "desk": 1}}, select={"sensors": ["desks"]}, limit=False)
         np.testing.assert_allclose(J["luminaires"] @ [0.4, 0.4, 1], values.values, rtol=1e-4)
 
+    def test_one_request_is_enough(self):
+        """A batch of cotangents, and the linear map of what falls below zero, are one request each by arrays alone."""
+        box = self.scene("box")
+        E, G, asked = random_emission(box), random_emission(box, 5, 9), []
+        wanted = [box.adjoint(g, quantity="indirect") for g in G]
+        ask = box._source.client.ask
+
+        def counted(request, **more):
+            asked.append((request.path, request.kind))
+            return ask(request, **more)
+
+        with unittest.mock.patch.object(box._source.client, "ask", counted):
+            np.testing.assert_array_equal(box.adjoint(G, quantity="indirect"), wanted)
+            linear = box.radiosity(E, quantity="indirect", limit=False)
+            mixed = box.adjoint([G[0], {"floor": 1}], ("emission", "groups"))
+        self.assertEqual(asked, [("/v1/scenes/box/adjoint?quantity=indirect", "application/x-npy"),
+                                 ("/v1/scenes/box/radiosity?quantity=indirect&limit=false", "application/x-npy"), ("/v1/scenes/box/adjoint", "application/json")])
+        self.assertLess(linear.min(), 0)
+        self.assertIsNone(linear.limited)
+        np.testing.assert_array_equal(mixed["groups"][1], box.adjoint({"floor": 1}, "groups"))
+
     def test_variants(self):
         paint = self.scene("paint")
         red = paint.variant("red", {"floor": [0.6, 0.1, 0.1]})

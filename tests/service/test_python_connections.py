@@ -7,6 +7,7 @@ import signal
 import tempfile
 import threading
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -170,13 +171,37 @@ class Replaced(unittest.TestCase):
                         lambda: scene.reduce(E, groups=scene.names[0])):
                 with self.assertRaisesRegex(lambert.SceneChanged, "another geometry"):
                     ask()
+            with self.assertRaisesRegex(lambert.SceneChanged, "another geometry"):  # no index is in it, and areas known before are another store's
+                scene.reduce({scene.names[0]: 1}, groups=scene.names[0])
             self.assertEqual(lambert.Scene(f"http://127.0.0.1:{daemon.port}").radiosity(E).shape, (54,))
             must("generate", "box", "--divisions", 4, "-o", self.path("d.obj"))
             must("precompute", self.path("d.obj"), "--probes", 0, "-o", self.path("d.h5"), "--quiet")
-            blind = lambert.Scene(f"http://127.0.0.1:{daemon.port}", check=-1)
+            blind, seeing = (lambert.Scene(f"http://127.0.0.1:{daemon.port}", check=check) for check in (-1, 0))
             self.replace(daemon, "d.h5", 4)
+            for ask in (lambda: seeing.radiosity(E), lambda: seeing.jacobian({"elements": [53]}), lambda: seeing.areas):  # a refusal is of another scene, too
+                with self.assertRaisesRegex(lambert.SceneChanged, "96 elements"):
+                    ask()
             with self.assertRaises(lambert.SceneChanged):  # its shape alone says so
                 blind.radiosity({blind.names[0]: 1})
+
+    def test_daemon_without_tags(self):
+        """One before 0.3 is asked after an answer, and gets its members in JSON, as it leaves a query unread."""
+        plain = lambert.client.Client.ask
+
+        def without(client, request, **more):
+            reply = plain(client, request, **more)
+            return lambert.wire.Reply(reply.status, {name: value for name, value in reply.headers.items() if name != "lambert-scene"}, reply.body)
+
+        with Daemon(self.path("room.h5")) as daemon, unittest.mock.patch.object(lambert.client.Client, "ask", without):
+            scene = lambert.Scene(f"http://127.0.0.1:{daemon.port}")
+            E = np.ones(scene.n)
+            query = lambert.light.LightQuery.of(scene._source.about, E, limit=False)
+            self.assertIsNone(query.array_request())
+            np.testing.assert_allclose(scene @ -E, -(scene @ E), rtol=1e-6)
+            self.replace(daemon, "b.h5", 2)
+            for ask in (lambda: scene.radiosity(E), lambda: scene.adjoint([E, E])):
+                with self.assertRaisesRegex(lambert.SceneChanged, "another geometry"):
+                    ask()
 
     def test_killed_and_started_again(self):
         with Daemon(self.path("room.h5")) as daemon:

@@ -4,22 +4,20 @@
         B, figures = await asyncio.gather(scene.radiosity({"lamp": 17}), scene.reduce({"lamp": 17}, groups="floor"))
 
 A question is given up by cancelling its task. Indices are those of the scene that was opened: one of another geometry in its
-place is noticed by the next answer, as in lambert.Scene.
+place is noticed by its answer, as in lambert.Scene.
 """
 
 from __future__ import annotations
 
 import asyncio
 import ssl
-import time
-import urllib.parse
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from .answer import Answer, Figures, Jacobian, joined
-from .errors import Disconnected, LambertError, Refused, SceneChanged
+from .errors import Disconnected, LambertError, Refused
 from .light import (About, AdjointQuery, Emission, LightQuery, Strings, gradient_of, jacobian_of, jacobian_request, reduction,
                     skies_request)
-from .remote import geometry_of
+from .remote import Watch
 from .wire import Address, Attempts, Reply, Request
 
 KEPT = 16  # idle connections
@@ -150,8 +148,12 @@ class Scene:
     ((3, 400), (3, 400))
     """
 
-    def __init__(self, client: Client, about: About, tag: Optional[str], check: float) -> None:
-        self._client, self._about, self._tag, self._check_s, self._checked = client, about, tag, check, time.monotonic()
+    def __init__(self, client: Client, watch: Watch) -> None:
+        self._client, self._watch = client, watch
+
+    @property
+    def _about(self) -> About:
+        return self._watch.about
 
     @property
     def about(self) -> Mapping[str, Any]:
@@ -183,18 +185,22 @@ class Scene:
         """The names of its groups."""
         return [str(line["name"]) for line in self.about["groups"]]
 
-    async def _still_there(self, timeout: Optional[float]) -> None:
-        if self._check_s < 0 or self._tag is None or time.monotonic() - self._checked < self._check_s:
-            return
-        request = Request("GET", self._about.path, headers={"If-None-Match": self._tag})
-        reply = await self._client.ask(request, timeout=timeout, accepted=(200, 304))
-        if reply.status == 200:
-            now = About.of(reply.json(), self.name)
-            if geometry_of(now) != geometry_of(self._about):
-                raise SceneChanged(f"the scene {self.name} was replaced by one of another geometry: {now.n} elements, {now.channels} "
-                                   f"channels, in place of {self.n} and {self.channels}; open it again")
-            self._about, self._tag = now, reply.headers.get("etag")
-        self._checked = time.monotonic()
+    async def _ask(self, request: Request, timeout: Optional[float], by_index: bool = True) -> Reply:
+        """An answer of the scene that was opened, else SceneChanged; `by_index`: elements are sent or answered."""
+        try:
+            reply = await self._client.ask(request, timeout=timeout)
+        except LambertError as error:  # a refusal may come of another scene, too
+            if error.scene_tag is not None:
+                await self._notice(error.scene_tag, timeout)
+            raise
+        if by_index or reply.scene_tag is not None:
+            await self._notice(reply.scene_tag, timeout)
+        return reply
+
+    async def _notice(self, tag: Optional[str], timeout: Optional[float]) -> None:
+        asks = self._watch.asks(tag)
+        if asks is not None:
+            self._watch.take(await self._client.ask(asks, timeout=timeout, accepted=(200, 304)), tag)
 
     async def radiosity(self, emission: Emission, at: Optional[str] = None, select: Optional[Mapping[str, Any]] = None,
                         quantity: str = "radiosity", tolerance: Optional[float] = None, unit: Optional[str] = None, limit: bool = True,
@@ -204,17 +210,12 @@ class Scene:
             quantity = "irradiance"
         query = LightQuery.of(self._about, emission, quantity=quantity, at=at, select=select, tolerance=tolerance, unit=unit,
                               photometric=photometric, limit=limit, stated=stated)
-        answer = joined(list(await asyncio.gather(*(self._light(part, timeout) for part in query.parts()))))
-        await self._still_there(timeout)
-        return answer
+        by_index = select is None or not {"sensors", "probes"} & set(select)
 
-    async def _light(self, query: LightQuery, timeout: Optional[float]) -> Answer:
-        by_array = query.array_request()
-        if by_array is not None:
-            answer = query.light(await self._client.ask(by_array, timeout=timeout))
-            if query.limit or answer.limited == 0:
-                return answer
-        return query.light(await self._client.ask(query.request(), timeout=timeout))
+        async def one(part: LightQuery) -> Answer:
+            return part.light(await self._ask(part.array_request() or part.request(), timeout, by_index))
+
+        return joined(list(await asyncio.gather(*map(one, query.parts()))))
 
     async def irradiance(self, emission: Emission, at: Optional[str] = None, select: Optional[Mapping[str, Any]] = None,
                          **more: Any) -> Answer:
@@ -233,31 +234,26 @@ class Scene:
         """As lambert.Scene.reduce."""
         query = LightQuery.of(self._about, emission, quantity=quantity or "irradiance", tolerance=tolerance, unit=unit,
                               reduce=reduction(groups, sensors, figures, at_least), photometric=photometric, limit=limit)
-        found = query.figures(await self._client.ask(query.request(), timeout=timeout))
-        if query.dense:
-            await self._still_there(timeout)
-        return found
+        return query.figures(await self._ask(query.request(), timeout, query.dense))
 
     async def adjoint(self, cotangent: Any, gradient: Strings = "emission", quantity: str = "radiosity",
                       emission: Optional[Emission] = None, *, doubles: bool = False, timeout: Optional[float] = None) -> Any:
-        """As lambert.Scene.adjoint; the requests of a batch are asked together."""
-        queries, batch = AdjointQuery.of(self._about, cotangent, gradient, quantity, emission, doubles)
+        """As lambert.Scene.adjoint; the requests of a long batch are asked together."""
+        query = AdjointQuery.of(self._about, cotangent, gradient, quantity, emission, doubles)
 
-        async def one(query: AdjointQuery) -> Dict[str, Any]:
-            return query.gradients(await self._client.ask(query.request(), timeout=timeout))
+        async def one(part: AdjointQuery) -> Dict[str, Any]:
+            return part.gradients(await self._ask(part.request(), timeout))
 
-        found = list(await asyncio.gather(*map(one, queries)))
-        await self._still_there(timeout)
-        return gradient_of(found, batch, gradient)
+        return gradient_of(list(await asyncio.gather(*map(one, query.parts()))), gradient)
 
     async def jacobian(self, of: Mapping[str, Any], by: Optional[Strings] = None, *, timeout: Optional[float] = None) -> Jacobian:
         """As lambert.Scene.jacobian."""
-        return jacobian_of(await self._client.ask(jacobian_request(self._about, of, by), timeout=timeout))
+        return jacobian_of(await self._ask(jacobian_request(self._about, of, by), timeout, "elements" in of))
 
     async def skies(self, skies: Any, *, timeout: Optional[float] = None) -> Any:
         """As lambert.Scene.skies, with radiances as lists."""
         many = isinstance(skies, (list, tuple))
-        reply = await self._client.ask(skies_request(self._about, skies if many else [skies]), timeout=timeout)
+        reply = await self._ask(skies_request(self._about, skies if many else [skies]), timeout, False)
         found = reply.json()["skies"]
         return found if many else found[0]
 
@@ -289,8 +285,7 @@ async def open(where: str, name: Optional[str] = None, *, token: Optional[str] =
             if len(names) != 1:
                 raise Refused(f"{address.base} has {len(names)} scenes, so that one is named: {', '.join(names) or 'none'}")
             asked = str(names[0])
-        reply = await client.ask(Request("GET", "/v1/scenes/" + urllib.parse.quote(asked, safe="@")))
+        return Scene(client, Watch.of(await client.ask(Watch.first(asked)), asked, check))
     except LambertError:
         await client.close()
         raise
-    return Scene(client, About.of(reply.json(), asked), reply.headers.get("etag"), check)

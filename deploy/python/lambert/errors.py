@@ -21,6 +21,7 @@ class LambertError(Exception):
                  pointer: Optional[str] = None, kind: Optional[str] = None, route: Optional[str] = None) -> None:
         self.status, self.title, self.detail = status, title, detail
         self.pointer, self.kind, self.route = pointer, kind, route
+        self.scene_tag: Optional[str] = None  # of an answer, that of the scene that gave it
         before = "" if route is None else f"{route}: " if status is None else f"{route}: {status} "
         super().__init__(before + detail + (f" ({pointer})" if pointer else ""))
 

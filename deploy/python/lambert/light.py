@@ -21,16 +21,20 @@ BATCH, BATCH_BYTES = 64, 1 << 26  # of a request; longer batches are several of 
 
 @dataclass(frozen=True)
 class About:
-    """The facts of a scene that come before any question: its name, n, C, and `facts`, the answer to GET /v1/scenes/NAME."""
+    """The facts of a scene that come before any question: its name, n, C, and `facts`, the answer to GET /v1/scenes/NAME.
+
+    `tag` is that of the scene, which a daemon sends with each answer; None: it is an older one, or the scene is in process.
+    """
 
     name: str
     n: int
     channels: int
     facts: Mapping[str, Any]
+    tag: Optional[str] = None
 
     @staticmethod
-    def of(facts: Mapping[str, Any], name: Optional[str] = None) -> About:
-        return About(name or str(facts["name"]), int(facts["elements"]), int(facts["channels"]), facts)
+    def of(facts: Mapping[str, Any], name: Optional[str] = None, tag: Optional[str] = None) -> About:
+        return About(name or str(facts["name"]), int(facts["elements"]), int(facts["channels"]), facts, tag)
 
     @property
     def path(self) -> str:
@@ -114,6 +118,30 @@ def emissions_of(about: About, emission: Emission, what: str = "emission") -> Tu
     return [one_emission(about, emission, what)], False
 
 
+def _parts(about: About, vectors: List[Any]) -> List[List[Any]]:
+    """A batch in as many requests as it takes."""
+    step = max(1, min(BATCH, BATCH_BYTES // (8 * about.n * about.channels)))
+    return [vectors[i:i + step] for i in range(0, len(vectors), step)]
+
+
+def _stacked(about: About, vectors: List[Any], batch: bool) -> Array:
+    """Dense vectors as one array: [n] or [C, n] of one, [m, C, n] of a batch."""
+    if not batch:
+        return np.asarray(vectors[0])
+    made: Array = np.stack([about.rows(np.asarray(v)) for v in vectors]).astype(np.result_type(*vectors), copy=False)
+    return made
+
+
+def _query(members: Mapping[str, Any]) -> str:
+    """Members of a request whose body is an array.
+
+    >>> _query({"quantity": "indirect", "limit": False}), _query({})
+    ('?quantity=indirect&limit=false', '')
+    """
+    words = [f"{name}={str(value).lower()}" for name, value in members.items()]
+    return "?" + "&".join(words) if words else ""
+
+
 def word(value: str, among: Sequence[str], what: str) -> str:
     if value not in among:
         raise Refused(f"{what} {value!r} is none of {', '.join(among)}")
@@ -152,11 +180,7 @@ class LightQuery:
 
     def parts(self) -> List[LightQuery]:
         """The question in as many requests as its batch takes."""
-        size = 8 * self.about.n * self.about.channels
-        step = max(1, min(BATCH, BATCH_BYTES // size))
-        if len(self.emissions) <= step or not self.batch:
-            return [self]
-        return [replace(self, emissions=self.emissions[i:i + step]) for i in range(0, len(self.emissions), step)]
+        return [replace(self, emissions=part) for part in _parts(self.about, self.emissions)] if self.batch else [self]
 
     @property
     def whole(self) -> bool:
@@ -180,16 +204,12 @@ class LightQuery:
         return made
 
     def array_request(self) -> Optional[Request]:
-        """The request by NPY, which has no members; None where it would need some, but for `limit`."""
-        if not self.dense or self.stated or set(self.members()) - {"limit"}:
+        """The request by NPY; None where it would need more members than a query may have, or a query that an older daemon leaves unread."""
+        members = self.members()
+        if not self.dense or self.stated or set(members) - {"limit", "quantity"} or (members and self.about.tag is None):
             return None
-        arrays = [np.asarray(e) for e in self.emissions]
-        if self.batch:
-            kind = np.result_type(*arrays)
-            body = np.stack([self.about.rows(a) for a in arrays]).astype(kind, copy=False)
-        else:
-            body = arrays[0]
-        return Request("POST", self.about.path + "/radiosity", to_npy(body), NPY, NPY)
+        body = _stacked(self.about, self.emissions, self.batch)
+        return Request("POST", self.about.path + "/radiosity" + _query(members), to_npy(body), NPY, NPY)
 
     def request(self) -> Request:
         body: Dict[str, Any] = self.members()
@@ -260,19 +280,18 @@ def _listed(value: Any) -> List[Any]:
 
 @dataclass(frozen=True)
 class AdjointQuery:
-    """A question for gradients of J = sum g q."""
+    """A question for gradients of J = sum g q, of one cotangent or of a batch."""
 
     about: About
-    cotangent: Union[Array, Dict[str, Any]]
+    cotangents: List[Union[Array, Dict[str, Any]]]
+    batch: bool
     gradient: Tuple[str, ...]
     quantity: str = "radiosity"
     emission: Union[None, Array, Dict[str, Any]] = None
     doubles: bool = False
 
     @staticmethod
-    def of(about: About, cotangent: Any, gradient: Strings, quantity: str, emission: Emission,
-           doubles: bool = False) -> Tuple[List[AdjointQuery], bool]:
-        """The questions of a batch of cotangents, and whether it is one."""
+    def of(about: About, cotangent: Any, gradient: Strings, quantity: str, emission: Emission, doubles: bool = False) -> AdjointQuery:
         names = tuple(_listed(gradient))
         word(quantity, QUANTITIES, "quantity")
         if not names:
@@ -285,42 +304,43 @@ class AdjointQuery:
         else:
             cotangents, batch = emissions_of(about, cotangent, "cotangent")
         light = None if emission is None else one_emission(about, emission)
-        return [AdjointQuery(about, g, names, quantity, light, doubles) for g in cotangents], batch
+        return AdjointQuery(about, cotangents, batch, names, quantity, light, doubles)
+
+    def parts(self) -> List[AdjointQuery]:
+        """The question in as many requests as its batch takes."""
+        return [replace(self, cotangents=part) for part in _parts(self.about, self.cotangents)] if self.batch else [self]
 
     def request(self) -> Request:
         path = self.about.path + "/adjoint"
         accept = NPY + ("; dtype=f8" if self.doubles else "")
-        alone = self.gradient == ("emission",) and self.quantity == "radiosity" and self.emission is None
-        if alone and isinstance(self.cotangent, np.ndarray):
-            return Request("POST", path, to_npy(self.cotangent), NPY, accept)
-        body: Dict[str, Any] = {"cotangent": self.cotangent, "gradient": list(self.gradient)}
-        if self.quantity != "radiosity":
-            body["quantity"] = self.quantity
+        members: Dict[str, Any] = {} if self.quantity == "radiosity" else {"quantity": self.quantity}
+        alone = self.gradient == ("emission",) and self.emission is None and (not members or self.about.tag is not None)
+        if alone and all(isinstance(g, np.ndarray) for g in self.cotangents):
+            return Request("POST", path + _query(members), to_npy(_stacked(self.about, self.cotangents, self.batch)), NPY, accept)
+        body: Dict[str, Any] = {"cotangents": self.cotangents} if self.batch else {"cotangent": self.cotangents[0]}
+        body.update({"gradient": list(self.gradient), **members})
         if self.emission is not None:
             body["emission"] = self.emission
         return to_json(path, body, accept=accept if len(self.gradient) == 1 else None)
 
     def gradients(self, reply: Reply) -> Dict[str, Array]:
+        """Arrays by name, one level deeper of a batch."""
         if reply.is_npy:
             made = {self.gradient[0]: reply.array()}
         else:
             kind = np.float64 if self.doubles else np.float32
-            made = {}
-            for name, values in reply.json()["gradient"].items():
-                array = np.array(values, kind)
-                # Of tiles and emitters JSON has a list of colours, NPY a row for each channel.
-                made[name] = array
+            made = {name: np.array(values, kind) for name, values in reply.json()["gradient"].items()}
+        wanted = ((len(self.cotangents),) if self.batch else ()) + self.about.shape
         for name in ("emission", "reflectance"):
-            if name in made and made[name].shape != self.about.shape:
+            if name in made and made[name].shape != wanted:
                 raise SceneChanged(f"the scene {self.about.name} answers a gradient of the shape {shape_text(made[name].shape)} "
-                                   f"instead of {shape_text(self.about.shape)}: it was replaced; open it again")
+                                   f"instead of {shape_text(wanted)}: it was replaced; open it again")
         return made
 
 
-def gradient_of(found: List[Dict[str, Array]], batch: bool, gradient: Strings) -> Any:
-    """The gradients as a caller gets them: an array for one name, a dictionary for several, one level deeper for a batch."""
-    names = list(found[0])
-    made = {name: np.stack([f[name] for f in found]) if batch else found[0][name] for name in names}
+def gradient_of(found: List[Dict[str, Array]], gradient: Strings) -> Any:
+    """The gradients of the parts of a question as a caller gets them: an array for one name, a dictionary for several."""
+    made = {name: found[0][name] if len(found) == 1 else np.concatenate([f[name] for f in found]) for name in found[0]}
     return made[gradient] if isinstance(gradient, str) else made
 
 

@@ -213,24 +213,31 @@ class Local(Emissions):
 
     # Gradients.
 
-    def adjoint(self, queries: Sequence[AdjointQuery], how: How) -> List[Dict[str, Array]]:
-        return [self._adjoint(query) for query in queries]
-
-    def _adjoint(self, query: AdjointQuery) -> Dict[str, Array]:
-        store, C, read = self.store, self.about.channels, self.store.sensors
+    def adjoint(self, query: AdjointQuery, how: How) -> List[Dict[str, Array]]:
+        """All cotangents of elements together, by one pass over the operator or a few."""
         for name in query.gradient:
             word(name, GRADIENTS, "gradient")
-        at_sensors: Optional[Array] = None
-        if not isinstance(query.cotangent, np.ndarray) and "sensors" in query.cotangent:
-            at_sensors, g, quantity = self._sensor_cotangent(query.cotangent["sensors"])[0], np.zeros((C, self.about.n)), "radiosity"
-            assert read is not None
-            i = np.repeat(np.arange(len(read["receiver"])), np.diff(read["indptr"].astype(int)))
-            g = np.stack([np.bincount(read["indices"].astype(int), read["weights"] * row[i], self.about.n) for row in at_sensors])
-        else:
-            (g, _), quantity = self._spread(query.cotangent, "cotangent"), query.quantity
+        read = [self._cotangent(given, query.quantity) for given in query.cotangents]
+        g, quantity = np.stack([one[0] for one in read]), read[0][2]
         if self.op.emitters:
-            return self._adjoint_emitters(query, g, quantity)
-        w = self.op.adjoint(quantity, g[None])[0].astype(float)
+            found = [self._adjoint_emitters(query, W) for W in self.op.adjoint_emitters(quantity, g)]
+        else:
+            w = self.op.adjoint(quantity, g)
+            found = [self._adjoint(query, quantity, one[0], row.astype(float), one[1]) for one, row in zip(read, w)]
+        return [{name: np.stack([made[name] for made in found]) for name in found[0]} if query.batch else found[0]]
+
+    def _cotangent(self, given: Union[Array, Dict[str, Any]], quantity: str) -> Tuple[Array, Optional[Array], str]:
+        """A cotangent of elements [C, n]; that of the sensors which it is of, or None; and the quantity that it is of."""
+        if isinstance(given, np.ndarray) or "sensors" not in given:
+            return self._spread(given, "cotangent")[0], None, quantity
+        at_sensors, read = self._sensor_cotangent(given["sensors"])[0], self.store.sensors
+        assert read is not None
+        i = np.repeat(np.arange(len(read["receiver"])), np.diff(read["indptr"].astype(int)))
+        g = np.stack([np.bincount(read["indices"].astype(int), read["weights"] * row[i], self.about.n) for row in at_sensors])
+        return g, at_sensors, "radiosity"
+
+    def _adjoint(self, query: AdjointQuery, quantity: str, g: Array, w: Array, at_sensors: Optional[Array]) -> Dict[str, Array]:
+        store, C, read = self.store, self.about.channels, self.store.sensors
         # By H0: what E' = E + rho H0 makes of it, and irradiance has it directly.
         by_direct = self.op.rho * w + (g if quantity == "irradiance" else 0)
         made: Dict[str, Array] = {}
@@ -288,8 +295,7 @@ class Local(Emissions):
             return np.asarray(w * H + g * (H - (0 if H0 is None else H0[0])))
         return np.asarray(w * H)
 
-    def _adjoint_emitters(self, query: AdjointQuery, g: Array, quantity: str) -> Dict[str, Array]:
-        W = self.op.adjoint_emitters(quantity, g[None])[0]
+    def _adjoint_emitters(self, query: AdjointQuery, W: Array) -> Dict[str, Array]:
         made: Dict[str, Array] = {}
         for name in query.gradient:
             count = 0 if self.store.luminaires is None else len(self.store.luminaires["names"])

@@ -33,7 +33,7 @@ class Source(Protocol):
     def document(self, name: str) -> Optional[Mapping[str, Any]]: ...
     def light(self, query: LightQuery, how: How) -> Answer: ...
     def figures(self, query: LightQuery, how: How) -> Figures: ...
-    def adjoint(self, queries: Sequence[AdjointQuery], how: How) -> List[Dict[str, Array]]: ...
+    def adjoint(self, query: AdjointQuery, how: How) -> List[Dict[str, Array]]: ...
     def jacobian(self, of: Mapping[str, Any], by: Any, how: How) -> Jacobian: ...
     def skies(self, skies: Sequence[Any], how: How) -> List[Dict[str, Any]]: ...
     def weather(self, gaps: Optional[str], how: How) -> Dict[str, Any]: ...
@@ -50,9 +50,9 @@ class Scene:
     alone, which cannot read hierarchical operators). Both have the same methods and give the same numbers.
 
     `token` is sent to the daemon, `timeout` (s) limits each request, `retries` says how often a busy daemon is asked again. Every
-    method that asks takes a `timeout` of its own, and `cancel`, a threading.Event that gives it up. Where indices of elements are
-    sent or answered, a scene that was replaced by one of another geometry is noticed before its numbers are used: by one more
-    request, at most every `check` seconds (0: after each answer; -1: never).
+    method that asks takes a `timeout` of its own, and `cancel`, a threading.Event that gives it up. A scene that was replaced by one
+    of another geometry is noticed before its numbers are used, by the tag that each answer has; of a daemon that sends none by one
+    more request, at most every `check` seconds (0: after each answer; -1: never, whoever answers).
 
     >>> scene = lambert.Scene(address + "/box")
     >>> scene.name, scene.n, scene.channels, scene.units
@@ -275,8 +275,8 @@ class Scene:
         >>> sorted(scene.adjoint({"floor": 1}, ("groups", "reflectance"), emission={"lamp": 17}))
         ['groups', 'reflectance']
         """
-        queries, batch = AdjointQuery.of(self._source.about, cotangent, gradient, quantity, emission, doubles)
-        return gradient_of(self._source.adjoint(queries, How(timeout, cancel)), batch, gradient)
+        query = AdjointQuery.of(self._source.about, cotangent, gradient, quantity, emission, doubles)
+        return gradient_of(self._source.adjoint(query, How(timeout, cancel)), gradient)
 
     def jacobian(self, of: Mapping[str, Any], by: Optional[Strings] = None, *, timeout: Optional[float] = None,
                  cancel: Optional[threading.Event] = None) -> Jacobian:

@@ -144,7 +144,14 @@ class Reply:
         if not isinstance(problem, dict):  # that of a proxy, maybe
             text = bytes(self.body[:200]).decode(errors="replace").strip()
             problem = {"detail": text or "the answer has no body"}
-        return of_answer(self.status, problem, request.route)
+        made = of_answer(self.status, problem, request.route)
+        made.scene_tag = self.scene_tag
+        return made
+
+    @property
+    def scene_tag(self) -> Optional[str]:
+        """The tag of the scene that gave it; None of other answers, and of an older daemon."""
+        return self.headers.get("lambert-scene")
 
 
 def to_json(path: str, body: Mapping[str, Any], *, method: str = "POST", accept: Optional[str] = None) -> Request:
