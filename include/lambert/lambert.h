@@ -42,6 +42,10 @@ const char *lam_status_text(lam_status status);
  * is what a sky gives directly, 0 without one. */
 typedef enum lam_quantity { LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT } lam_quantity;
 
+/* The sources of light that derivatives are by: dimmers of luminaires, emissions that all elements of a group
+ * have, radiances of sky tiles; or, of a store of few emitters, their weights. */
+typedef enum lam_by { LAM_BY_LUMINAIRES, LAM_BY_GROUPS, LAM_BY_SKY, LAM_BY_EMITTERS } lam_by;
+
 /* A transport operator: immutable once open, so any number of threads may apply it. */
 typedef struct lam_operator lam_operator;
 

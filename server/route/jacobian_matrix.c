@@ -8,14 +8,14 @@
 #include <math.h>
 #include <stdlib.h>
 
-size_t jacobian_lights(const scene *s, jacobian_by kind, size_t *first) {
+size_t jacobian_lights(const scene *s, lam_by kind, size_t *first) {
     const sensor_lights l = scene_sensor_lights(s);
-    if (kind == JACOBIAN_EMITTERS) {
+    if (kind == LAM_BY_EMITTERS) {
         *first = 0;
         return s->n_emitters;
     }
-    *first = kind == JACOBIAN_GROUPS ? 0 : kind == JACOBIAN_LUMINAIRES ? l.groups : l.groups + l.luminaires;
-    return kind == JACOBIAN_GROUPS ? l.groups : kind == JACOBIAN_LUMINAIRES ? l.luminaires : l.tiles;
+    *first = kind == LAM_BY_GROUPS ? 0 : kind == LAM_BY_LUMINAIRES ? l.groups : l.groups + l.luminaires;
+    return kind == LAM_BY_GROUPS ? l.groups : kind == LAM_BY_LUMINAIRES ? l.luminaires : l.tiles;
 }
 
 bool jacobian_matrix_begin(call *in, const jacobian_request *request, jacobian_matrix *m, problem *why) {
@@ -125,31 +125,15 @@ static bool make_columns(call *in, jacobian_matrix *m, size_t first, size_t coun
     return true;
 }
 
-static float number_of(const scene *s, const adjoint_row *row, jacobian_by kind, size_t c, size_t width,
-                       size_t k) {
-    if (!(row->area > 0)) return NAN;
-    switch (kind) {
-    case JACOBIAN_GROUPS:
-        return (float)row->of_group[c * s->groups.n_groups + k];
-    case JACOBIAN_LUMINAIRES:
-        return row->luminaires[c * width + k];
-    case JACOBIAN_EMITTERS:
-        return row->emitters[c * width + k];
-    default:
-        return row->tiles[c * width + k];
-    }
-}
-
 static void put_row(const scene *s, jacobian_matrix *m, size_t r, const adjoint_row *row) {
+    const linear_scene of = scene_linear(s);
     const size_t C = s->n_channels, R = m->n_rows;
     float *values = m->values;
     for (size_t b = 0; b < m->request->n_by; b++) {
-        size_t first;
-        const jacobian_by kind = m->request->by[b];
-        const size_t width = jacobian_lights(s, kind, &first);
+        const lam_by kind = m->request->by[b];
+        const size_t width = adjoint_row_width(&of, kind);
         for (size_t c = 0; c < C; c++)
-            for (size_t k = 0; k < width; k++)
-                values[(c * R + r) * width + k] = number_of(s, row, kind, c, width, k);
+            adjoint_row_derivatives(&of, row, kind, c, values + (c * R + r) * width);
         values += C * R * width;
     }
 }

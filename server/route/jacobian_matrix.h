@@ -32,6 +32,6 @@ bool jacobian_matrix_make(call *in, jacobian_matrix *m, size_t first, size_t cou
                           batch_workspace *workspace, problem *why);
 
 /* The first light of a kind (sensor_lights), and how many it has. */
-size_t jacobian_lights(const scene *s, jacobian_by kind, size_t *first);
+size_t jacobian_lights(const scene *s, lam_by kind, size_t *first);
 
 #endif

@@ -86,7 +86,7 @@ static bool evaluate(const scene *s, const radiosity_request *request, size_t fi
     const reduce_request *r = &request->reduce;
     for (size_t k = 0; k < count; k++) {
         const adjoint_row *row = rows[k];
-        adjoint_row_evaluate(s, row, request, f->weights, f->means);
+        adjoint_row_means(s, row, request, f->weights, f->means);
         if (row->area > 0 && !check_means(s, request, first + k, f->means, why)) return false;
         limit_means(s, request, f->means);
         if (!scene_mean_errors_add(s, request, first + k, row->buried, f->means, &f->errors, notes))
@@ -103,7 +103,7 @@ static bool find_weights(call *in, radiosity_request *request, linear_figures *f
     adjoint_row *row;
     if (in->scene->n_emitters == 0) return true;
     if (!adjoint_rows_get(in->scene, request, 0, 1, in->workspace, &row, why)) return false;
-    const bool suffices = adjoint_row_suffices(in->scene, row, request);
+    const bool suffices = adjoint_row_answers(in->scene, row, request);
     adjoint_rows_release(in->scene, 1, &row);
     return suffices || weights_of(in, request, &f->weights, why);
 }
@@ -172,7 +172,7 @@ static bool answer_groups(call *in, radiosity_request *request, answer_notes *no
         (request->luminaires.values != NULL && !scene_has_luminaire_sums(s)) || !is_short(s, request) ||
         !adjoint_rows_find(s, request, rows))
         return false;
-    bool good = adjoint_row_suffices(s, rows[0], request);
+    bool good = adjoint_row_answers(s, rows[0], request);
     if (good) {
         const double start = clock_ms();
         scene_note_error(s, request, notes);

@@ -5,12 +5,12 @@
 #include "server/route/routes.h"
 #include "server/route/sun_answer.h"
 #include "server/scene/direct_light.h"
-#include "server/scene/gradient.h"
 #include "server/scene/sensor_answer.h"
 #include "solver/base/clock.h"
 #include "solver/codec/adjoint.h"
 #include "solver/codec/answer.h"
 #include "solver/operator/emitters.h"
+#include "solver/operator/groups/gradient.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -109,18 +109,18 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     }
 }
 
-static const char *name_of(const scene *s, jacobian_by kind, size_t k) {
-    return kind == JACOBIAN_GROUPS     ? s->groups.names[k]
-           : kind == JACOBIAN_EMITTERS ? lam_operator_emitter_name(s->op, k)
-                                       : lam_luminaires_name(s->luminaires, k);
+static const char *name_of(const scene *s, lam_by kind, size_t k) {
+    return kind == LAM_BY_GROUPS     ? s->groups.names[k]
+           : kind == LAM_BY_EMITTERS ? lam_operator_emitter_name(s->op, k)
+                                     : lam_luminaires_name(s->luminaires, k);
 }
 
 /* ["desk-1", ...] of luminaires, groups and emitters; the number of tiles. */
-static bool write_columns(const scene *s, jacobian_by kind, buffer *b) {
+static bool write_columns(const scene *s, lam_by kind, buffer *b) {
     size_t first;
     const size_t count = jacobian_lights(s, kind, &first);
     bool written = buffer_printf(b, "\"%s\":", jacobian_name(kind));
-    if (kind == JACOBIAN_SKY) return written && buffer_printf(b, "%zu", count);
+    if (kind == LAM_BY_SKY) return written && buffer_printf(b, "%zu", count);
     written = written && buffer_append(b, "[", 1);
     for (size_t k = 0; written && k < count; k++)
         written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, name_of(s, kind, k));

@@ -1,7 +1,5 @@
-/* Adjoint rows: the mean of a quantity over a group is linear in the emission, mean = w^T E. One row
- *     w = (dq/dE)^T (A 1_group / sum A)
- * answers every emission by a scalar product, and its sums over the groups of the scene every emission by
- * groups. Rows are computed when first needed and kept by the scene (row_cache.h). Any thread. */
+/* The adjoint rows of a scene (solver/operator/groups/adjoint_row.h): computed when first needed, and kept
+ * (row_cache.h). Any thread. */
 #ifndef LAMBERT_SERVER_SCENE_ADJOINT_ROWS_H
 #define LAMBERT_SERVER_SCENE_ADJOINT_ROWS_H
 
@@ -43,11 +41,14 @@ size_t adjoint_row_work(const scene *s, const radiosity_request *request);
 
 /* True if a row answers the request without weights, false if a store of few emitters needs whole vectors.
  * The same for every row of a scene. */
-bool adjoint_row_suffices(const scene *s, const adjoint_row *row, const radiosity_request *request);
+bool adjoint_row_answers(const scene *s, const adjoint_row *row, const radiosity_request *request);
 
 /* means [n_rhs][C] of a request, in double. weights [n_rhs][C][s] replace all emission of a store of few
- * emitters; NULL if adjoint_row_suffices. Cost: that of the spots, and nC for a dense vector. */
-void adjoint_row_evaluate(const scene *s, const adjoint_row *row, const radiosity_request *request,
-                          const float *weights, double *means);
+ * emitters; NULL if adjoint_row_answers. Cost: that of the spots, and nC for a dense vector. */
+void adjoint_row_means(const scene *s, const adjoint_row *row, const radiosity_request *request,
+                       const float *weights, double *means);
+
+/* The parts of a scene that rows depend on. */
+linear_scene scene_linear(const scene *s);
 
 #endif

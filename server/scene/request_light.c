@@ -45,10 +45,7 @@ size_t light_of_weights_room(const scene *s) {
 }
 
 bool scene_states_errors(const scene *s, bool sky, bool luminaires) {
-    const error_by_group *e = &s->errors.by_group;
-    return e->n_bins > 0 && s->errors.emitters.figures.s == 0 &&
-           (!luminaires || luminaires_know_errors(s->luminaires, s->groups.n_groups)) &&
-           (!sky || (s->sky != NULL && e->figures.n_tiles == lam_sky_tiles(s->sky)));
+    return stated_errors_know(&s->errors, s->luminaires, scene_tiles(s), sky, luminaires);
 }
 
 bool request_has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes) {
@@ -60,12 +57,7 @@ bool request_has_own_error(const scene *s, const radiosity_request *request, con
 }
 
 emission_size request_sky_size(const scene *s, const float *L) {
-    const error_by_group *e = &s->errors.by_group;
-    const size_t C = s->n_channels, m = e->figures.n_tiles;
-    emission_size size = {.power2 = 0};
-    for (size_t c = 0; L != NULL && c < C; c++)
-        emission_size_add(&size, m, e->figures.sky_power + c * m, L + c * m);
-    return size;
+    return stated_sky_size(&s->errors, s->n_channels, L);
 }
 
 /* The light of the weights of emitters that a request has: adds the power and squares of what elements emit,

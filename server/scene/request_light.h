@@ -4,7 +4,7 @@
 #define LAMBERT_SERVER_SCENE_REQUEST_LIGHT_H
 
 #include "server/scene/scene.h"
-#include "solver/codec/answer_error.h"
+#include "solver/operator/stated/answer_error.h"
 
 /* The radiances of the sky of vector v, [C][m]; NULL: it has none. */
 const float *request_sky(const scene *s, const radiosity_request *request, size_t v);

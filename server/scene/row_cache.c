@@ -15,13 +15,6 @@ struct row_cache {
     luminaire_sums *luminaires; /* likewise */
 };
 
-void emitter_weights_free(emitter_weights *weights) {
-    if (weights == NULL) return;
-    free(weights->of_group);
-    free(weights->of_tile);
-    free(weights);
-}
-
 lam_status row_cache_create(size_t max_bytes, memory_ledger *ledger, row_cache **out, lam_error *error) {
     row_cache *rows = memory_allocate(1, sizeof *rows, "adjoint rows", error);
     if (rows == NULL) return LAM_ERR_MEMORY;
@@ -30,16 +23,6 @@ lam_status row_cache_create(size_t max_bytes, memory_ledger *ledger, row_cache *
     rows->ledger = ledger;
     *out = rows;
     return LAM_OK;
-}
-
-void adjoint_row_free(adjoint_row *row) {
-    if (row == NULL) return;
-    free(row->w);
-    free(row->of_group);
-    free(row->tiles);
-    free(row->luminaires);
-    free(row->emitters);
-    free(row);
 }
 
 static void drop_weights(memory_ledger *ledger, emitter_weights *weights) {

@@ -7,43 +7,12 @@
 #include "lambert/lambert.h"
 #include "server/scene/luminaire_sums.h"
 #include "server/scene/memory_ledger.h"
-#include "solver/codec/group_figures.h"
+#include "solver/operator/groups/adjoint_row.h"
+#include "solver/operator/groups/group_statistics.h"
 
 #include <stdint.h>
 
 typedef struct row_cache row_cache;
-
-/* w = (dq/dE)^T (A 1_group / sum A) of C channels: the mean of quantity q over a group is w^T E. Buried
- * elements are in neither. */
-typedef struct adjoint_row {
-    size_t references;
-    uint64_t used; /* number of its last use */
-    struct adjoint_row *next;
-    size_t bytes;
-    const uint32_t *groups; /* of the mean, as group_index_find gives them */
-    size_t n_groups;
-    lam_quantity quantity;
-    double area;       /* sum A; 0: the row is 0, and the mean has no value */
-    double buried;     /* share of the area of the groups that buried elements have */
-    float *w;          /* [C][n]; NULL where the store answers for its own emitters only */
-    float *emitters;   /* [C][s], by emitter, in place of w */
-    double *of_group;  /* [C][groups of the scene], sum of w over each; NaN: not determined by the emitters */
-    float *tiles;      /* [C][m], by radiance of a sky's tile; NaN likewise */
-    float *luminaires; /* [C][k], by their dimmers */
-} adjoint_row;
-
-void adjoint_row_free(adjoint_row *row);
-
-/* For a store of few emitters: the weights of emitters whose sum is one group of the scene alone, or one tile
- * of its sky. Any emission by groups and tiles is then known by its weights, without a vector. Immutable once
- * made; where no weights give a group or tile in a channel, the first weight is NaN. */
-typedef struct emitter_weights {
-    float *of_group; /* [groups][C][s] */
-    float *of_tile;  /* [m][C][s] */
-    size_t bytes;    /* taken of the ledger of the cache that it is set in */
-} emitter_weights;
-
-void emitter_weights_free(emitter_weights *weights);
 
 /* max_bytes: limit of all rows together; rows are also counted in ledger (or NULL). Errors: LAM_ERR_MEMORY.
  */

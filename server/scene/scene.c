@@ -18,6 +18,7 @@
 #include "solver/base/scene/scene_lights.h"
 #include "solver/codec/describe.h"
 #include "solver/operator/emitters.h"
+#include "solver/operator/groups/mesh_columns.h"
 #include "solver/operator/luminaire_light.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sensor_light.h"
@@ -146,24 +147,6 @@ done:
     return status;
 }
 
-static lam_status read_groups(store *s, scene *made, lam_error *error) {
-    lam_status status = LAM_OK;
-    void *group = NULL;
-    char **names = NULL;
-    size_t n_groups = 0, n_backs = 0;
-    bool two_sided;
-    lam_error cause;
-    TRY(scene_backs_load(s, made->n, &n_backs, &two_sided, error));
-    TRY(store_read(s, STORE_MESH "/group", STORE_U32, 1, (size_t[]){made->n}, &group, error));
-    TRY(store_read_texts(s, STORE_MESH "/group_names", &n_groups, &names, error));
-    status = group_index_make(made->n, n_backs, group, n_groups, names, &made->groups, &cause);
-    if (status != LAM_OK) FAIL(error, status, "%s: %s", made->path, cause.message);
-    TRY(scene_buried_load(s, made->n, &made->groups.buried, error));
-done:
-    free(group);
-    return status;
-}
-
 /* Once areas are read. */
 static lam_status read_faces(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
@@ -173,19 +156,6 @@ static lam_status read_faces(store *s, scene *made, lam_error *error) {
     TRY(scene_backs_load(s, made->n, &n_backs, &two_sided, error));
     TRY(scene_faces_load(s, made->n, made->n - n_backs, &faces, error));
     TRY(face_index_make(made->n, made->n - n_backs, made->area, &faces, &made->faces, error));
-done:
-    return status;
-}
-
-static lam_status read_area(store *s, scene *made, lam_error *error) {
-    lam_status status = LAM_OK;
-    void *area = NULL;
-    TRY(store_read(s, STORE_MESH "/area", STORE_F64, 1, (size_t[]){made->n}, &area, error));
-    made->area = area;
-    for (size_t i = 0; i < made->n; i++)
-        if (!(made->area[i] >= 0 && isfinite(made->area[i])))
-            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/area[%zu] = %g, must be at least 0", made->path, i,
-                 made->area[i]);
 done:
     return status;
 }
@@ -297,8 +267,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(sensor_names_make(made->sensors, &made->sensor_sets, error));
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
-    TRY(read_groups(s, made, error));
-    TRY(read_area(s, made, error));
+    TRY(group_index_load(s, made->n, &made->groups, error));
+    TRY(areas_load(s, made->n, &made->area, error));
     TRY(group_index_measure(&made->groups, made->area, error));
     TRY(group_emission_read(s, made, &made->group_emission, error));
     TRY(scene_lights_load(s, &made->lights, error));

@@ -11,10 +11,10 @@
 #include "server/scene/scene_sun.h"
 #include "server/scene/scene_texts.h"
 #include "server/scene/sensor_columns.h"
-#include "solver/codec/groups.h"
 #include "solver/codec/request.h"
 #include "solver/codec/sensor_names.h"
-#include "solver/codec/stated_errors.h"
+#include "solver/codec/stated_notes.h"
+#include "solver/operator/groups/groups.h"
 #include "solver/operator/limiter.h"
 #include "store/store_map.h"
 

@@ -1,14 +1,11 @@
 #include "server/scene/scene_elements.h"
 
 #include "server/scene/scene_store.h"
-#include "solver/base/vector3.h"
+#include "solver/operator/groups/mesh_columns.h"
 #include "store/groups.h"
 
-#include <math.h>
 #include <pthread.h>
 #include <stdio.h>
-
-#define NO_VERTEX UINT32_MAX
 
 /* The forms of an answer, and when they were asked for last. */
 typedef struct kept_place {
@@ -131,52 +128,12 @@ size_t scene_elements_read_bytes(const scene_elements *e, unsigned fields) {
                : SIZE_MAX;
 }
 
-static double triangle_area(const double *a, const double *b, const double *c) {
-    double ab[3], ac[3], normal[3];
-    subtract3(b, a, ab);
-    subtract3(c, a, ac);
-    cross3(ab, ac, normal);
-    return sqrt(dot3(normal, normal)) / 2;
-}
-
-/* The centroid a + (b - a + c - a) / 3 of a triangle, or that of two of these by their areas: the one that
- * `lambert` computes with (solver/scene/mesh.c). */
-static void find_centre(const double (*vertices)[3], const uint32_t corners[4], float centre[3]) {
-    const double *a = vertices[corners[0]], *b = vertices[corners[1]], *c = vertices[corners[2]];
-    const double *d = corners[3] != NO_VERTEX ? vertices[corners[3]] : c;
-    const double area_abc = triangle_area(a, b, c), area_acd = triangle_area(a, c, d);
-    const double share = area_abc + area_acd > 0 ? area_acd / (area_abc + area_acd) : 0;
-    for (int k = 0; k < 3; k++)
-        centre[k] = (float)(a[k] + ((c[k] - a[k]) + (1 - share) * (b[k] - a[k]) + share * (d[k] - a[k])) / 3);
-}
-
-static lam_status read_centres(store *s, const scene *of, float **out, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = of->n, v = scene_mesh_vertices(of->mesh);
-    void *vertices = NULL, *elements = NULL;
-    TRY(store_read(s, STORE_MESH "/vertices", STORE_F64, 2, (size_t[]){v, 3}, &vertices, error));
-    TRY(store_read(s, STORE_MESH "/elements", STORE_U32, 2, (size_t[]){n, 4}, &elements, error));
-    const uint32_t(*corners)[4] = elements;
-    for (size_t i = 0; i < n; i++)
-        for (int k = 0; k < 4; k++)
-            if (corners[i][k] >= v && !(k == 3 && corners[i][k] == NO_VERTEX))
-                FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/elements[%zu][%d] = %u, there are %zu vertices",
-                     store_path(s), i, k, corners[i][k], v);
-    *out = memory_allocate(n, 3 * sizeof **out, "centres of elements", error);
-    if (*out == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) find_centre(vertices, corners[i], *out + 3 * i);
-done:
-    free(vertices);
-    free(elements);
-    return status;
-}
-
 static lam_status read_mesh(const scene *of, unsigned fields, element_columns *out, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     void *normal = NULL;
     TRY(scene_store_open(of, &s, error));
-    if (fields & FIELD_BIT(FIELD_CENTRE)) TRY(read_centres(s, of, &out->centre, error));
+    if (fields & FIELD_BIT(FIELD_CENTRE)) TRY(centres_load(s, of->n, &out->centre, error));
     if (fields & FIELD_BIT(FIELD_NORMAL))
         TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, (size_t[]){of->n, 3}, &normal, error));
     out->normal = normal;

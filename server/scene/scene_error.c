@@ -143,7 +143,8 @@ bool scene_note_own_error(const scene *s, const radiosity_request *request, cons
         sent_light_size(s, request, v, of.E, sun, &sent, &of);
         of.sky = request_sky_size(s, light.L);
         if (reduce->on) {
-            good = name_errors_of(&s->errors.by_group, &about, &of, reduce, kept + reduce->n_names);
+            good = name_errors_of(&s->errors.by_group, &about, &of, reduce->n_names, reduce->names,
+                                  kept + reduce->n_names);
             const emission_size both = emission_size_sum(&of.size, &of.sky);
             for (size_t k = 0; good && k < reduce->n_names; k++)
                 take_name(&kept[reduce->n_names + k], emission_size_number(&both), &kept[k], &made);

@@ -4,10 +4,10 @@
 
 #include "lambert/lambert.h"
 #include "solver/base/photometry.h"
-#include "solver/codec/answer_error.h"
 #include "solver/codec/headline.h"
 #include "solver/codec/media.h"
 #include "solver/codec/problem.h"
+#include "solver/operator/stated/answer_error.h"
 
 typedef struct answer_shape {
     size_t n; /* elements of the scene */

@@ -9,7 +9,7 @@
 #include "solver/base/scene/scene_faces.h"
 #include "solver/base/scene/scene_glass.h"
 #include "solver/codec/headline.h"
-#include "solver/codec/stated_errors.h"
+#include "solver/codec/stated_notes.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/stated/error_figures.h"
 #include "store/groups.h"

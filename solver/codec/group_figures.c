@@ -119,80 +119,6 @@ double *reduce_figure(const reduce_request *r, size_t k, size_t s, size_t n_rhs,
     return figures + (((k * r->n_with + s) * n_rhs + v) * n_channels + c);
 }
 
-static double value_at(reduce_values x, size_t i) {
-    return x.doubles != NULL ? x.doubles[i] : (double)x.floats[i];
-}
-
-/* One vector and channel of values: those of group g stand from begin[g] on; where begin is NULL, they are in
- * mesh order. */
-typedef struct value_row {
-    const uint32_t *begin;
-    reduce_values x;
-    size_t first;
-} value_row;
-
-static double value_of(const value_row *row, uint32_t g, size_t e, const uint32_t *elements) {
-    return value_at(row->x, row->first + (row->begin != NULL ? row->begin[g] + e : elements[e]));
-}
-
-/* area NULL: all are 1. */
-static double area_of(const double *area, uint32_t element) {
-    return area != NULL ? area[element] : 1;
-}
-
-/* Every statistic of the elements of some groups. */
-static void figures_of(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
-                       const value_row *row, double out[REDUCE_COUNT]) {
-    double total = 0, sum = 0, squares = 0, low = INFINITY, high = -INFINITY;
-    for (size_t m = 0; m < n_named; m++) {
-        const uint32_t g = named[m], *elements = groups->elements + groups->start[g];
-        for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            const double value = value_of(row, g, e, elements), A = area_of(area, elements[e]);
-            if (!group_index_counts(groups, elements[e])) continue;
-            total += A;
-            sum += A * value;
-            low = fmin(low, value);
-            high = fmax(high, value);
-        }
-    }
-    const double mean = sum / total;
-    for (size_t m = 0; m < n_named; m++) {
-        const uint32_t g = named[m], *elements = groups->elements + groups->start[g];
-        for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            const double off = value_of(row, g, e, elements) - mean;
-            if (!group_index_counts(groups, elements[e])) continue;
-            squares += area_of(area, elements[e]) * off * off;
-        }
-    }
-    const bool any = total > 0;
-    out[REDUCE_MEAN] = any ? mean : NAN;
-    out[REDUCE_SUM] = any ? sum : NAN;
-    out[REDUCE_MIN] = any ? low : NAN;
-    out[REDUCE_MAX] = any ? high : NAN;
-    out[REDUCE_UNIFORMITY] = any && mean != 0 ? low / mean : NAN;
-    out[REDUCE_VARIANCE] = any ? squares / total : NAN;
-}
-
-/* sum A [x >= limit] / sum A. */
-static double share_of(const reduce_name *name, const group_index *groups, const double *area,
-                       const value_row *row, double limit) {
-    double total = 0, reached = 0;
-    for (size_t m = 0; m < name->n_groups; m++) {
-        const uint32_t g = name->groups[m], *elements = groups->elements + groups->start[g];
-        for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            if (!group_index_counts(groups, elements[e])) continue;
-            total += area_of(area, elements[e]);
-            if (value_of(row, g, e, elements) >= limit) reached += area_of(area, elements[e]);
-        }
-    }
-    return total > 0 ? reached / total : NAN;
-}
-
-void reduce_groups(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
-                   reduce_values x, double out[REDUCE_COUNT]) {
-    figures_of(n_named, named, groups, area, &(value_row){.x = x}, out);
-}
-
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
                     size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures) {
     size_t n_values = groups->start[groups->n_groups];
@@ -204,10 +130,11 @@ bool reduce_vectors(const reduce_request *r, const group_index *groups, const do
                 double of_name[REDUCE_COUNT];
                 const reduce_name *name = &r->names[k];
                 const value_row row = {begin, x, (v * n_channels + c) * n_values};
-                figures_of(name->n_groups, name->groups, groups, area, &row, of_name);
+                group_statistics(name->n_groups, name->groups, groups, area, &row, of_name);
                 for (size_t s = 0; s < r->n_with; s++)
                     *reduce_figure(r, k, s, n_rhs, first + v, n_channels, c, figures) =
-                        r->with[s] == REDUCE_SHARE ? share_of(name, groups, area, &row, r->at_least[s])
+                        r->with[s] == REDUCE_SHARE
+                            ? group_share(name->n_groups, name->groups, groups, area, &row, r->at_least[s])
                         : r->with[s] == REDUCE_UGR ? (double)NAN
                                                    : of_name[r->with[s]];
             }

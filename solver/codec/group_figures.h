@@ -1,38 +1,17 @@
-/* Figures over groups of elements, in place of vectors: mean = sum A x / sum A, sum = sum A x, min, max,
- * uniformity = min / mean, variance = sum A (x - mean)^2 / sum A, share = sum A [x >= limit] / sum A. Buried
- * elements, which no light reaches, have no part in them. Over sets of sensors all A are 1, and receivers
- * without a value have no part. Ratings of eyes (UGR), which are no numbers of a set, are found and written
- * by who asks for them. No I/O. */
+/* Figures over groups of elements (group_statistics.h) in place of vectors, as requests ask for them. Over
+ * sets of sensors all areas are 1, and receivers without a value have no part. Ratings of eyes (UGR), which
+ * are no numbers of a set, are found and written by who asks for them. No I/O. */
 #ifndef LAMBERT_CODEC_GROUP_FIGURES_H
 #define LAMBERT_CODEC_GROUP_FIGURES_H
 
 #include "solver/codec/buffer.h"
-#include "solver/codec/groups.h"
 #include "solver/codec/problem.h"
+#include "solver/operator/groups/group_statistics.h"
 
 #define REDUCE_NAMES_MAX 1024    /* groups in one request */
 enum { REDUCE_LIMITS_MAX = 16 }; /* of shares */
 
-typedef enum reduce_statistic {
-    REDUCE_MEAN,
-    REDUCE_SUM,
-    REDUCE_MIN,
-    REDUCE_MAX,
-    REDUCE_UNIFORMITY,
-    REDUCE_VARIANCE,
-    REDUCE_COUNT,
-    REDUCE_SHARE = REDUCE_COUNT, /* of a limit, which those before need not */
-    REDUCE_UGR                   /* of each eye of a set of sensors */
-} reduce_statistic;
-
 enum { REDUCE_FIGURES_MAX = REDUCE_UGR + REDUCE_LIMITS_MAX };
-
-/* A name in a request, and the groups of the scene that it means (group_index_find). */
-typedef struct reduce_name {
-    size_t text; /* its offset in texts; it ends with a NUL */
-    const uint32_t *groups;
-    size_t n_groups;
-} reduce_name;
 
 /* Starts zeroed; freed by reduce_request_free. */
 typedef struct reduce_request {
@@ -82,22 +61,11 @@ const char *reduce_text(const reduce_request *r, size_t k);
 double *reduce_figure(const reduce_request *r, size_t k, size_t s, size_t n_rhs, size_t v, size_t n_channels,
                       size_t c, double *figures);
 
-/* Values to reduce, in single or in double precision. */
-typedef struct reduce_values {
-    const float *floats;
-    const double *doubles;
-    bool whole; /* of every element in mesh order; else in the order of reduce_elements */
-} reduce_values;
-
 /* Fills the figures of vectors first ... first + count of n_rhs. x is [count][C][n_values]; area [n] in mesh
  * order, or NULL for 1 of each. NaN where a figure has no value: no area, a mean of 0, or no number. False
  * when memory is short. */
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
                     size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures);
-
-/* Every statistic of the elements of some groups; x is [n] in mesh order. */
-void reduce_groups(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
-                   reduce_values x, double out[REDUCE_COUNT]);
 
 /* Fills the means and sums of name k from its means [n_rhs][C]; area is that of its elements. */
 void reduce_means(const reduce_request *r, size_t k, size_t n_channels, size_t n_rhs, double area,

@@ -13,7 +13,7 @@ static const char *verb_of(const headline_part *part) {
 }
 
 double headline_stated(const headline *h) {
-    return hypot(hypot(h->parts.rest, fmax(h->parts.mesh, 0)), hypot(h->parts.sun, h->parts.rows));
+    return stated_of_parts(&h->parts);
 }
 
 bool headline_has_light(const stated_parts *parts) {

@@ -4,8 +4,8 @@
 #ifndef LAMBERT_CODEC_HEADLINE_H
 #define LAMBERT_CODEC_HEADLINE_H
 
-#include "solver/codec/answer_error.h"
 #include "solver/codec/buffer.h"
+#include "solver/operator/stated/answer_error.h"
 
 /* Zeroed: nothing is stated, and nothing is to be said of it. */
 typedef struct headline {

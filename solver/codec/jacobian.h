@@ -4,18 +4,11 @@
 
 #include "solver/codec/request.h"
 
-/* The kinds of columns: dimmers of luminaires, emissions that all elements of a group have, radiances of
- * tiles; or, of a store of few emitters, their weights, of which those of luminaires are the last. */
-typedef enum jacobian_by {
-    JACOBIAN_LUMINAIRES,
-    JACOBIAN_GROUPS,
-    JACOBIAN_SKY,
-    JACOBIAN_EMITTERS,
-    JACOBIAN_KINDS
-} jacobian_by;
+/* The kinds of columns, lam_by, are so many. */
+enum { JACOBIAN_KINDS = LAM_BY_EMITTERS + 1 };
 
 /* The word of a kind in requests and answers. */
-const char *jacobian_name(jacobian_by kind);
+const char *jacobian_name(lam_by kind);
 
 /* The kinds of rows: values of sensors, means of groups and values of elements. */
 typedef enum jacobian_of { JACOBIAN_AT_SENSORS, JACOBIAN_OF_GROUPS, JACOBIAN_OF_ELEMENTS } jacobian_of;
@@ -25,7 +18,7 @@ typedef struct jacobian_request {
     jacobian_of kind;
     radiosity_request of; /* receivers, with names of sets in the order asked in reduce; or names of groups
                              likewise; or selected elements; and the quantity */
-    jacobian_by by[JACOBIAN_KINDS]; /* in the order asked */
+    lam_by by[JACOBIAN_KINDS]; /* in the order asked */
     size_t n_by;
 } jacobian_request;
 

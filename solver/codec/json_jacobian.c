@@ -9,24 +9,24 @@ void jacobian_request_free(jacobian_request *request) {
     *request = (jacobian_request){.n_by = 0};
 }
 
-const char *jacobian_name(jacobian_by kind) {
+const char *jacobian_name(lam_by kind) {
     static const char *const names[JACOBIAN_KINDS] = {"luminaires", "groups", "sky", "emitters"};
     return names[kind];
 }
 
 /* Lights of a kind that the store has. */
-static size_t lights_of(const codec_scene *scene, jacobian_by kind) {
-    if (kind == JACOBIAN_LUMINAIRES) return scene->n_luminaires;
-    if (kind == JACOBIAN_EMITTERS) return scene->n_emitters;
+static size_t lights_of(const codec_scene *scene, lam_by kind) {
+    if (kind == LAM_BY_LUMINAIRES) return scene->n_luminaires;
+    if (kind == LAM_BY_EMITTERS) return scene->n_emitters;
     if (scene->n_emitters > 0) return 0;
-    return kind == JACOBIAN_GROUPS ? scene->groups->n_groups : scene->n_tiles;
+    return kind == LAM_BY_GROUPS ? scene->groups->n_groups : scene->n_tiles;
 }
 
-static bool refuse_kind(parser *p, jacobian_by kind) {
-    if (kind == JACOBIAN_EMITTERS)
+static bool refuse_kind(parser *p, lam_by kind) {
+    if (kind == LAM_BY_EMITTERS)
         return parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no precomputed emitters",
                              parser_here(p));
-    if (p->scene->n_emitters > 0 && kind != JACOBIAN_LUMINAIRES)
+    if (p->scene->n_emitters > 0 && kind != LAM_BY_LUMINAIRES)
         return parser_refuse(p, PROBLEM_NOT_IN_STORE,
                              "%s: a store of few emitters has derivatives by emitters and luminaires only",
                              parser_here(p));
@@ -39,14 +39,14 @@ static bool read_by_name(parser *p, jacobian_request *request) {
     if (!parser_expect(p, JSON_TEXT, "luminaires, groups, sky or emitters")) return false;
     if (!json_read_text(&p->r, &text)) return parser_fault(p);
     for (int kind = 0; kind < JACOBIAN_KINDS; kind++) {
-        const char *name = jacobian_name((jacobian_by)kind);
+        const char *name = jacobian_name((lam_by)kind);
         if (strlen(name) != text.length || memcmp(name, text.bytes, text.length) != 0) continue;
         for (size_t k = 0; k < request->n_by; k++)
-            if (request->by[k] == (jacobian_by)kind)
+            if (request->by[k] == (lam_by)kind)
                 return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s = \"%s\", which was listed before",
                                      parser_here(p), name);
-        if (lights_of(p->scene, (jacobian_by)kind) == 0) return refuse_kind(p, (jacobian_by)kind);
-        request->by[request->n_by++] = (jacobian_by)kind;
+        if (lights_of(p->scene, (lam_by)kind) == 0) return refuse_kind(p, (lam_by)kind);
+        request->by[request->n_by++] = (lam_by)kind;
         return true;
     }
     return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
@@ -160,6 +160,6 @@ bool codec_read_jacobian_json(const codec_scene *scene, const char *text, size_t
         good = parser_refuse(&p, PROBLEM_WRONG_MEMBERS, "the body does not say what the derivatives are of");
     good = good && settle_quantity(&p, request);
     for (int kind = 0; good && (seen & 1u << BY) == 0 && kind < JACOBIAN_KINDS; kind++)
-        if (lights_of(scene, (jacobian_by)kind) > 0) request->by[request->n_by++] = (jacobian_by)kind;
+        if (lights_of(scene, (lam_by)kind) > 0) request->by[request->n_by++] = (lam_by)kind;
     return parser_end(&p, good);
 }

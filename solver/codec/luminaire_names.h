@@ -2,7 +2,7 @@
 #ifndef LAMBERT_CODEC_LUMINAIRE_NAMES_H
 #define LAMBERT_CODEC_LUMINAIRE_NAMES_H
 
-#include "solver/codec/groups.h"
+#include "solver/operator/groups/groups.h"
 
 /* Starts zeroed; freed by luminaire_names_free. Zeroed it has no names. */
 typedef struct luminaire_names {

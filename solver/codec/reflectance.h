@@ -2,8 +2,8 @@
 #ifndef LAMBERT_CODEC_REFLECTANCE_H
 #define LAMBERT_CODEC_REFLECTANCE_H
 
-#include "solver/codec/groups.h"
 #include "solver/codec/problem.h"
+#include "solver/operator/groups/groups.h"
 
 /* Once, before any thread uses jansson: lets the readers below tell short memory from a wrong text. */
 void reflectance_watch_memory(void);

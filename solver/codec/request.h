@@ -7,9 +7,10 @@
 #include "solver/base/photometry.h"
 #include "solver/codec/face_means.h"
 #include "solver/codec/group_figures.h"
-#include "solver/codec/groups.h"
 #include "solver/codec/luminaire_names.h"
 #include "solver/codec/problem.h"
+#include "solver/operator/groups/adjoint_row.h"
+#include "solver/operator/groups/groups.h"
 
 /* The scene that a request is about, and the limits of one request. */
 typedef struct codec_scene {
@@ -46,15 +47,6 @@ typedef struct codec_scene {
 
 /* The word for the bytes in messages. */
 const char *codec_source(const codec_scene *scene);
-
-/* An entry of a sparse vector: an element, or every element of a group. */
-typedef struct emission_spot {
-    uint32_t vector;
-    uint32_t where; /* an element, or a group of the scene */
-    bool whole_group;
-    double shared; /* above 0: each element of the group that figures take in has the value times its area
-                      over this one, and the others 0 */
-} emission_spot;
 
 /* Radiances, weights or dimmers beside the emissions: [n][C][width], for the first n vectors. */
 typedef struct side_rows {

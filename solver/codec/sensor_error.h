@@ -16,7 +16,7 @@
 #ifndef LAMBERT_CODEC_SENSOR_ERROR_H
 #define LAMBERT_CODEC_SENSOR_ERROR_H
 
-#include "solver/codec/answer_error.h"
+#include "solver/operator/stated/answer_error.h"
 
 /* Squares of a set, sums over its receivers that have a value, and over channels. */
 typedef struct sensor_squares {

@@ -3,7 +3,7 @@
 #ifndef LAMBERT_CODEC_SENSOR_NAMES_H
 #define LAMBERT_CODEC_SENSOR_NAMES_H
 
-#include "solver/codec/groups.h"
+#include "solver/operator/groups/groups.h"
 
 /* Set k of a store is group k, whose elements are its receivers; receivers without a value are left out of
  * figures. NULL: the store has none, and *out is empty. The index need not outlive the sensors. Freed by

@@ -6,8 +6,8 @@
 #include "lambert/lambert.h"
 #include "solver/base/options/options.h"
 #include "solver/base/photometry.h"
-#include "solver/codec/groups.h"
 #include "solver/codec/luminaire_names.h"
+#include "solver/operator/groups/groups.h"
 #include "solver/scene/mesh.h"
 
 /* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2 or lm/m^2; NULL: W or D is all there is.

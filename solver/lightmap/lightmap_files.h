@@ -2,8 +2,8 @@
 #ifndef LAMBERT_LIGHTMAP_FILES_H
 #define LAMBERT_LIGHTMAP_FILES_H
 
-#include "solver/codec/groups.h"
 #include "solver/lightmap/lightmap_light.h"
+#include "solver/operator/groups/groups.h"
 
 /* The words of a map and of its scene. */
 typedef struct lightmap_words {

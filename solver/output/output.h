@@ -4,10 +4,10 @@
 #define LAMBERT_OUTPUT_OUTPUT_H
 
 #include "lambert/lambert.h"
-#include "solver/codec/answer_error.h"
 #include "solver/codec/face_means.h"
 #include "solver/codec/group_figures.h"
 #include "solver/codec/headline.h"
+#include "solver/operator/stated/answer_error.h"
 #include "solver/scene/mesh.h"
 
 #include <stdio.h>

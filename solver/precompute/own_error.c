@@ -1,8 +1,8 @@
 #include "solver/precompute/own_error.h"
 
-#include "solver/codec/answer_error.h"
 #include "solver/light/emission.h"
 #include "solver/operator/emitters.h"
+#include "solver/operator/stated/answer_error.h"
 #include "solver/precompute/stages.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 #include "solver/base/atomic_file.h"
 #include "solver/base/terminal.h"
 #include "solver/codec/request.h"
-#include "solver/codec/stated_errors.h"
+#include "solver/codec/stated_notes.h"
 #include "solver/light/emission_refine.h"
 #include "solver/output/output.h"
 #include "solver/render/smooth.h"

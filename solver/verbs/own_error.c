@@ -42,7 +42,8 @@ static lam_status add_own_error(const stated_errors *stated, const error_scene *
     if (out->n_reductions == 0) good = answer_error_of(&stated->by_group, scene, of, &one);
     for (size_t r = 0; good && r < out->n_reductions; r++) {
         name_error name;
-        good = name_errors_of(&stated->by_group, scene, of, &out->reductions[r].request, &name);
+        good = name_errors_of(&stated->by_group, scene, of, out->reductions[r].request.n_names,
+                              out->reductions[r].request.names, &name);
         if (!good) break;
         raise_name(&names[r], &name);
         raise_vector(&one, &name, &any_lit);

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_VERBS_OWN_ERROR_H
 #define LAMBERT_VERBS_OWN_ERROR_H
 
-#include "solver/codec/stated_errors.h"
+#include "solver/operator/stated/stated_errors.h"
 #include "solver/output/output.h"
 #include "solver/verbs/light_options.h"
 

@@ -4,7 +4,7 @@
 #ifndef LAMBERT_VERBS_OWN_LIGHT_H
 #define LAMBERT_VERBS_OWN_LIGHT_H
 
-#include "solver/codec/answer_error.h"
+#include "solver/operator/stated/answer_error.h"
 #include "solver/verbs/light_options.h"
 
 typedef struct own_light {

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_VERBS_SENSOR_OWN_ERROR_H
 #define LAMBERT_VERBS_SENSOR_OWN_ERROR_H
 
-#include "solver/codec/stated_errors.h"
+#include "solver/operator/stated/stated_errors.h"
 #include "solver/verbs/light_options.h"
 #include "solver/verbs/solve_sensors.h"
 
@@ -11,7 +11,7 @@
 enum { SENSOR_ERROR_VECTORS = 64 };
 
 /* Sets the headline of out, that of all sets chosen together, and c->stated by set, of a batch the largest of
- * its vectors; out has the error of the store (codec stated_errors_note). Where the store states no errors of
+ * its vectors; out has the error of the store (codec stated_notes.h). Where the store states no errors of
  * the light, the headline says so. Errors: LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
 lam_status sensor_error_take(const stated_errors *stated, const error_scene *scene, const lit_store *lit,
                              sensor_choice *c, solution *out, lam_error *error);

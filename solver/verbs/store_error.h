@@ -3,7 +3,7 @@
 #define LAMBERT_VERBS_STORE_ERROR_H
 
 #include "solver/base/terminal.h"
-#include "solver/codec/stated_errors.h"
+#include "solver/codec/stated_notes.h"
 #include "solver/light/emission.h"
 #include "solver/output/output.h"
 

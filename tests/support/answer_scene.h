@@ -3,7 +3,7 @@
 #ifndef LAMBERT_TESTS_ANSWER_SCENE_H
 #define LAMBERT_TESTS_ANSWER_SCENE_H
 
-#include "solver/codec/answer_error.h"
+#include "solver/operator/stated/answer_error.h"
 
 enum { N = 3, C = 2, G = 2, TILES = 2 };
 extern const double answer_area[N];

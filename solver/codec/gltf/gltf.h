@@ -6,7 +6,7 @@
 #include "solver/base/scene/scene_glass.h"
 #include "solver/base/scene/scene_pictures.h"
 #include "solver/codec/buffer.h"
-#include "solver/codec/groups.h"
+#include "solver/operator/groups/groups.h"
 
 /* More elements have numbers that a float does not hold. */
 #define GLTF_ELEMENTS_MOST ((size_t)1 << 24)

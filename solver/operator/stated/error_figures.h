@@ -162,8 +162,8 @@ typedef struct mesh_figures {
 void mesh_figures_free(mesh_figures *m);
 
 /* The error of the answer for the scene's own lights and luminaires, as dim as these are listed, by the laws
- * of all other figures: members of answer_error and its parts (solver/codec/answer_error.h). Stated of scenes
- * with luminaires, whose light no probe is. */
+ * of all other figures: members of answer_error and its parts (solver/operator/stated/answer_error.h). Stated
+ * of scenes with luminaires, whose light no probe is. */
 typedef struct own_figures {
     bool known;
     double relative, indirect;

@@ -74,12 +74,11 @@ START_TEST(names_have_errors_of_their_means) {
     const lam_quantity quantity = (lam_quantity[]){LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT}[_i];
     const uint32_t desk[] = {0}, both[] = {0, 1};
     reduce_name list[] = {{.groups = desk, .n_groups = 1}, {.groups = both, .n_groups = 2}};
-    const reduce_request request = {.on = true, .names = list, .n_names = 2};
     float values[C * N];
     name_error found[2] = {{.name = "kept"}};
     answer_fill(quantity, false, values);
     const error_answer of = answer_of(quantity, values);
-    ck_assert(name_errors_of(&answer_stated, &answer_scene, &of, &request, found));
+    ck_assert(name_errors_of(&answer_stated, &answer_scene, &of, 2, list, found));
     const bool white = quantity == LAM_IRRADIANCE;
     const double desk_rho2 = white ? .25 : 1, lamp_rho2 = white ? .3125 : 1, rho0 = white ? .25 : 1,
                  rho1 = white ? .75 : 1, desk_rho = white ? .5 : 1;
@@ -116,14 +115,13 @@ START_TEST(buried_elements_have_no_part) {
     static const bool buried[N] = {false, true, false};
     const uint32_t desk[] = {0};
     reduce_name list[] = {{.groups = desk, .n_groups = 1}};
-    const reduce_request request = {.on = true, .names = list, .n_names = 1};
     float values[C * N];
     name_error found;
     error_scene standing = answer_scene;
     standing.buried = buried;
     answer_fill(LAM_INDIRECT, false, values);
     const error_answer of = answer_of(LAM_INDIRECT, values);
-    ck_assert(name_errors_of(&answer_stated, &standing, &of, &request, &found));
+    ck_assert(name_errors_of(&answer_stated, &standing, &of, 1, list, &found));
     const double number = answer_P2 / answer_A2E2, reflected = answer_reflected[0] * answer_reflected[0] +
                                                                answer_reflected[N] * answer_reflected[N];
     ck_assert_double_eq_tol(found.mean,
@@ -190,7 +188,6 @@ START_TEST(faces_that_count_twice_are_off_by_their_light) {
     double overlap[G] = {.5, 0};
     const uint32_t desk[] = {0}, both[] = {0, 1};
     reduce_name list[] = {{.groups = desk, .n_groups = 1}, {.groups = both, .n_groups = 2}};
-    const reduce_request request = {.on = true, .names = list, .n_names = 2};
     error_by_group off = answer_stated;
     float values[C * N];
     answer_error before, found;
@@ -210,8 +207,8 @@ START_TEST(faces_that_count_twice_are_off_by_their_light) {
     /* x = e^2 / (l^2 - e^2), so that e^2 = l^2 x / (1 + x). */
     const double square = before.indirect * before.indirect, own = light2 * square / (1 + square) + added;
     ck_assert_double_eq_tol(found.indirect, answer_ratio(own, light2), 1e-6);
-    ck_assert(name_errors_of(&answer_stated, &answer_scene, &of, &request, means_before));
-    ck_assert(name_errors_of(&off, &answer_scene, &of, &request, means_found));
+    ck_assert(name_errors_of(&answer_stated, &answer_scene, &of, 2, list, means_before));
+    ck_assert(name_errors_of(&off, &answer_scene, &of, 2, list, means_found));
     const double r0[C] = {(.5 + 2 * .25) / 3, (1 + 2 * .5) / 3}, r1[C] = {.125, .25};
     for (int name = 0; name < 2; name++) {
         double mean2 = 0, more = 0;

@@ -86,7 +86,6 @@ START_TEST(luminaires_have_errors_of_their_own) {
                  D_mean = sees ? (white ? 1 : .25) * (.001 + .003 + 20.25 * .003) : 0, rho2 = white ? .25 : 1;
     const uint32_t desk[] = {0};
     reduce_name list[] = {{.groups = desk, .n_groups = 1}};
-    const reduce_request request = {.on = true, .names = list, .n_names = 1};
     float values[C * N];
     name_error found = {.name = "desk"};
     answer_error all;
@@ -98,7 +97,7 @@ START_TEST(luminaires_have_errors_of_their_own) {
                  rms = answer_law(answer_P2, number, .03, .04, .01) / rho2 + D,
                  mean = answer_law(answer_P2, number, .03, .02, .001) / rho2 + D_mean;
     const double r0 = (.5 + 2 * .25) / 3 / sqrt(rho2), r1 = (1 + 2 * .5) / 3 / sqrt(rho2);
-    ck_assert(name_errors_of(&answer_stated, &answer_scene, &of, &request, &found));
+    ck_assert(name_errors_of(&answer_stated, &answer_scene, &of, 1, list, &found));
     ck_assert_double_eq_tol(found.mean, answer_ratio(mean, r0 * r0 + r1 * r1), 1e-5);
     ck_assert_double_eq_tol(found.elements, answer_ratio(rms, r0 * r0 + r1 * r1), 1e-4);
     /* The same of the mean alone, and of all elements selected. */
@@ -140,7 +139,6 @@ START_TEST(reflected_light_is_no_whole_group) {
     const float lamp[C * N] = {0, 0, 2, 0, 0, 0}, reflected[C * N] = {.5f, .25f, .75f, .25f, 0, 0};
     const uint32_t desk[] = {0};
     reduce_name list[] = {{.groups = desk, .n_groups = 1}};
-    const reduce_request request = {.on = true, .names = list, .n_names = 1};
     float values[C * N];
     name_error found = {.name = "desk"};
     error_by_group whole = answer_stated;
@@ -152,7 +150,7 @@ START_TEST(reflected_light_is_no_whole_group) {
     answer_fill(LAM_INDIRECT, false, values);
     error_answer of = {.quantity = LAM_INDIRECT, .E = lamp, .count = N, .values = values};
     for (size_t c = 0; c < C; c++) emission_size_add(&of.reflected, N, answer_area, reflected + c * N);
-    ck_assert(name_errors_of(&whole, &answer_scene, &of, &request, &found));
+    ck_assert(name_errors_of(&whole, &answer_scene, &of, 1, list, &found));
     /* P_c is .5 + .5 + 3 and .25; 2^2 / C of what the lamp alone is off by. */
     const double power2 = 16 + .0625, number = power2 / (.25 + .25 + 9 + .0625);
     const double rms = .0004 * 4 / C + answer_law(power2, number, .03, .04, .01);
@@ -220,7 +218,6 @@ START_TEST(the_mesh_is_a_part) {
     double of_lamps[] = {.01, .09, .04};
     const uint32_t selected[] = {2}, desk[] = {0}, both[] = {0, 1};
     reduce_name list[] = {{.groups = desk, .n_groups = 1}, {.groups = both, .n_groups = 2}};
-    const reduce_request request = {.on = true, .names = list, .n_names = 2};
     error_by_group with = answer_stated;
     with.mesh = (mesh_shares){.n_groups = G, .of = {[MESH_OF_LAMPS] = of_lamps}};
     float values[C * N];
@@ -245,7 +242,7 @@ START_TEST(the_mesh_is_a_part) {
     ck_assert(answer_error_of(&with, &answer_scene, &of, &found));
     ck_assert_double_eq_tol(found.parts.mesh, sqrt(.09 + c[1] * c[1] / 2), 1e-6);
     of = answer_of(LAM_RADIOSITY, values);
-    ck_assert(name_errors_of(&with, &answer_scene, &of, &request, names));
+    ck_assert(name_errors_of(&with, &answer_scene, &of, 2, list, names));
     ck_assert_double_eq_tol(names[0].parts.mesh, sqrt(2) * c[0], 1e-6);
     ck_assert_double_eq_tol(names[1].parts.mesh, sqrt(2) * (3 * c[0] + 4 * c[1]) / 7, 1e-6);
 }

@@ -1,7 +1,7 @@
 /* The parts of the codec that hold no request: sets of indices, names of groups, classes of problems. */
-#include "solver/codec/groups.h"
 #include "solver/codec/json_parser.h"
 #include "solver/codec/problem.h"
+#include "solver/operator/groups/groups.h"
 #include "support/request_text.h"
 #include "support/suite.h"
 

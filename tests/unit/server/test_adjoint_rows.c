@@ -106,8 +106,8 @@ static double mean_of(const fixture *f, size_t g, lam_quantity quantity, size_t 
 /* True where the row answers as it should. */
 static void judge(const fixture *f, const adjoint_row *row, const radiosity_request *request, size_t g) {
     double means[2 * C];
-    ck_assert(adjoint_row_suffices(&f->s, row, request));
-    adjoint_row_evaluate(&f->s, row, request, NULL, means);
+    ck_assert(adjoint_row_answers(&f->s, row, request));
+    adjoint_row_means(&f->s, row, request, NULL, means);
     ck_assert_uint_eq(adjoint_row_work(&f->s, request), C * (2 + 2));
     for (size_t c = 0; c < C; c++) {
         ck_assert(means[c] == 0);
@@ -251,7 +251,7 @@ static void *ask_often(void *context) {
         double means[2 * C];
         if (adjoint_rows_find(&f->s, &request, &row) ||
             adjoint_rows_get(&f->s, &request, 0, 1, &workspace, &row, &why)) {
-            adjoint_row_evaluate(&f->s, row, &request, NULL, means);
+            adjoint_row_means(&f->s, row, &request, NULL, means);
             memcpy(me->means[k], means + C, sizeof me->means[k]);
             adjoint_rows_release(&f->s, 1, &row);
         }

@@ -1,7 +1,7 @@
 /* Gradients by reflectance and by the sky's irradiance, against central differences of B = E + rho H,
  * H = H0 + F B, converged in double; and figures over groups, against sums written out. */
-#include "server/scene/gradient.h"
 #include "solver/codec/group_figures.h"
+#include "solver/operator/groups/gradient.h"
 #include "support/request_text.h"
 #include "support/suite.h"
 

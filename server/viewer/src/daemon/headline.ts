@@ -11,7 +11,7 @@ export interface Headline {
 }
 
 /** The root of the sum of the squares of the parts, which are independent. As the daemon states it of a store:
- * solver/codec/stated_errors.c; of an answer it is `error.stated`. */
+ * solver/codec/stated_notes.c; of an answer it is `error.stated`. */
 export function headlineOf(error: Description["error"], emission: Emission | null): Headline | null {
     const hasLuminaires = emission !== null && "luminaires" in emission;
     const isSky = emission !== null && Object.keys(emission).join() === "sky" && error?.sky !== undefined;

@@ -1,7 +1,8 @@
-#include "solver/codec/groups.h"
+#include "solver/operator/groups/groups.h"
 
 #include "solver/base/nearest.h"
 #include "solver/base/scene/scene_backs.h"
+#include "solver/base/scene/scene_buried.h"
 #include "store/groups.h"
 
 #include <stdio.h>
@@ -56,6 +57,28 @@ lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, siz
     *out = index;
 done:
     if (status != LAM_OK) group_index_free(&index);
+    return status;
+}
+
+lam_status group_index_load(store *s, size_t n, group_index *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *group = NULL;
+    char **names = NULL;
+    size_t n_groups = 0, n_backs = 0;
+    bool two_sided;
+    lam_error cause;
+    group_index made = {.n_groups = 0};
+    TRY(scene_backs_load(s, n, &n_backs, &two_sided, error));
+    TRY(store_read(s, STORE_MESH "/group", STORE_U32, 1, (size_t[]){n}, &group, error));
+    TRY(store_read_texts(s, STORE_MESH "/group_names", &n_groups, &names, error));
+    status = group_index_make(n, n_backs, group, n_groups, names, &made, &cause);
+    if (status != LAM_OK) FAIL(error, status, "%s: %s", store_path(s), cause.message);
+    TRY(scene_buried_load(s, n, &made.buried, error));
+    *out = made;
+    made = (group_index){.n_groups = 0};
+done:
+    group_index_free(&made);
+    free(group);
     return status;
 }
 

@@ -1,8 +1,9 @@
 /* The groups of a scene by name, and the elements of each: group names mean the same in both programs. */
-#ifndef LAMBERT_CODEC_GROUPS_H
-#define LAMBERT_CODEC_GROUPS_H
+#ifndef LAMBERT_OPERATOR_GROUPS_GROUPS_H
+#define LAMBERT_OPERATOR_GROUPS_GROUPS_H
 
 #include "store/status.h"
+#include "store/store.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -23,6 +24,10 @@ typedef struct group_index {
  * others. Errors: LAM_ERR_FORMAT (a group that has no name). */
 lam_status group_index_make(size_t n, size_t n_backs, const uint32_t *group, size_t n_groups, char **names,
                             group_index *out, lam_error *error);
+
+/* Loads the groups of a store of n elements, buried ones included. Errors: LAM_ERR_FORMAT, LAM_ERR_DAMAGED,
+ * LAM_ERR_MEMORY; each names the path. */
+lam_status group_index_load(store *s, size_t n, group_index *out, lam_error *error);
 
 /* Sums up the areas of the elements that figures take in, of area [n], by group. Errors: LAM_ERR_MEMORY. */
 lam_status group_index_measure(group_index *index, const double *area, lam_error *error);

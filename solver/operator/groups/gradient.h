@@ -14,11 +14,11 @@
  * (I - R F~)^-1 for some F~ free of reflectance (low_rank, two_mesh: F~ = U V^T) this is the gradient of what
  * it answers when it is made again from that F~; of a sparse one, whose entries are dropped by their size, it
  * is the formula and no more. */
-#ifndef LAMBERT_SERVER_SCENE_GRADIENT_H
-#define LAMBERT_SERVER_SCENE_GRADIENT_H
+#ifndef LAMBERT_OPERATOR_GROUPS_GRADIENT_H
+#define LAMBERT_OPERATOR_GROUPS_GRADIENT_H
 
 #include "lambert/lambert.h"
-#include "solver/codec/groups.h"
+#include "solver/operator/groups/groups.h"
 
 /* dJ/drho [C][n]: H is the irradiance, H0 the direct one of sky, luminaires and sun (NULL: 0). out may be any
  * of the inputs. */

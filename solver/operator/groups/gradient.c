@@ -1,4 +1,4 @@
-#include "server/scene/gradient.h"
+#include "solver/operator/groups/gradient.h"
 
 void gradient_of_reflectance(lam_quantity quantity, size_t count, const float *g, const float *w,
                              const float *H, const float *H0, float *out) {

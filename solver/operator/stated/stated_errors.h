@@ -1,10 +1,9 @@
 /* The errors that a store states for answers, and the elements that they hold for. */
-#ifndef LAMBERT_CODEC_STATED_ERRORS_H
-#define LAMBERT_CODEC_STATED_ERRORS_H
+#ifndef LAMBERT_OPERATOR_STATED_STATED_ERRORS_H
+#define LAMBERT_OPERATOR_STATED_STATED_ERRORS_H
 
-#include "solver/codec/answer.h"
-#include "solver/codec/answer_error.h"
-#include "solver/codec/headline.h"
+#include "solver/operator/stated/emitters_law.h"
+#include "solver/operator/stated/error_law.h"
 #include "store/store.h"
 
 /* The error for the scene's own lights, else for single elements, against the independent sample. */
@@ -56,21 +55,21 @@ size_t stated_errors_strangers(const stated_errors *e, size_t count, const uint3
  * the store was built for any emission. */
 bool stated_errors_is_strange(const stated_errors *e, size_t n_rows, const float *E);
 
-/* The elements of an answer, beside those that a store was built for. */
-typedef struct answer_scope {
-    bool receivers_only; /* nothing but the light of receivers is in the answer */
-    bool strange;        /* an element emits that is no source, or a sky, or luminaires where they are none */
-    bool sky;            /* a sky alone shines */
-} answer_scope;
+/* True where the laws by group hold of light with a sky, of so many tiles, or with luminaires. */
+bool stated_errors_know(const stated_errors *e, const lam_luminaires *luminaires, size_t n_tiles, bool sky,
+                        bool lamps);
 
-/* Puts the error of an answer, the elements that it is of, and those that emit, into notes. The error of
- * receivers stands in no other answer, and no error in a strange one. */
-void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes *notes);
+/* The size of a sky of radiances L [C][m], as that of an emission is; NULL: there is none. */
+emission_size stated_sky_size(const stated_errors *e, size_t n_channels, const float *L);
 
-/* The headline of a store, of the scene's own lights and luminaires, else of a sky, else of one group that is
- * lit alone, else, of a scene of one group, of light that all elements emit: *light is "lights", "sky",
- * "groups" or "random". Not known where nothing was measured. */
-headline stated_headline(const error_report *report, const mesh_figures *mesh, const own_figures *own,
-                         const char **light);
+/* These find what a store holds: the error of a group of probes; that of the scene's own lights, or else of
+ * single elements; that of skies; and the shares that constants on elements leave of the light of lamps, else
+ * of all elements, and of skies, the larger of an even and a cloudy one: negative where they are not stated.
+ */
+stated_error stated_error_of_group(const error_group *g, bool of_receivers, const char *light);
+stated_error stated_error_of(const error_report *report, bool of_receivers);
+stated_error stated_error_of_sky(const error_report *report);
+double stated_mesh_of_lights(const mesh_figures *m);
+double stated_mesh_of_skies(const mesh_figures *m);
 
 #endif

@@ -1,9 +1,13 @@
-#include "solver/codec/answer_error.h"
+#include "solver/operator/stated/answer_error.h"
 
 #include "solver/operator/stated/whole_law.h"
 
 #include <math.h>
 #include <stdlib.h>
+
+double stated_of_parts(const stated_parts *parts) {
+    return hypot(hypot(parts->rest, fmax(parts->mesh, 0)), hypot(parts->sun, parts->rows));
+}
 
 void error_answer_add_channel(error_answer *of, const error_scene *scene, size_t c, const float *E,
                               const float *H, const float *lamps, float *work) {
@@ -219,8 +223,8 @@ static name_error finish_name(const error_by_group *e, const name_sums *s, doubl
     return made;
 }
 
-bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
-                    const reduce_request *names, name_error *errors) {
+bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of, size_t n_names,
+                    const reduce_name *names, name_error *errors) {
     const size_t n_rows = e->n_bins / e->figures.n_groups;
     light_sizes sizes;
     value_sums *sums = answer_sizes_of(e, scene, of, &sizes) ? sum_values(e, scene, of, true) : NULL;
@@ -228,8 +232,8 @@ bool name_errors_of(const error_by_group *e, const error_scene *scene, const err
         whole_light_free(&sizes.whole);
         return false;
     }
-    for (size_t k = 0; k < names->n_names; k++) {
-        const reduce_name *name = &names->names[k];
+    for (size_t k = 0; k < n_names; k++) {
+        const reduce_name *name = &names[k];
         name_sums s = {.area = 0};
         double reflected2 = 0, radiosity2 = 0, light2 = 0, all = 0;
         for (size_t g = 0; g < name->n_groups; g++)

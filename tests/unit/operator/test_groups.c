@@ -1,6 +1,6 @@
 #include "support/suite.h"
 
-#include "solver/codec/groups.h"
+#include "solver/operator/groups/groups.h"
 
 #include <stdlib.h>
 #include <string.h>

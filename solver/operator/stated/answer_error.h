@@ -1,9 +1,9 @@
 /* The error of an answer for its own emission, by the laws of what a store states (operator/stated). No I/O.
  */
-#ifndef LAMBERT_CODEC_ANSWER_ERROR_H
-#define LAMBERT_CODEC_ANSWER_ERROR_H
+#ifndef LAMBERT_OPERATOR_STATED_ANSWER_ERROR_H
+#define LAMBERT_OPERATOR_STATED_ANSWER_ERROR_H
 
-#include "solver/codec/group_figures.h"
+#include "solver/operator/groups/group_statistics.h"
 #include "solver/operator/stated/emitters_law.h"
 #include "solver/operator/stated/error_law.h"
 
@@ -41,6 +41,9 @@ typedef struct stated_parts {
     double rows; /* of the sampling of the rows of sensors; 0: of elements */
 } stated_parts;
 
+/* The root of the sum of their squares: the headline. */
+double stated_of_parts(const stated_parts *parts);
+
 /* The root of the mean squared error over the light that is left where that error is taken out of the light
  * of the answer, in squares; not finite where none is. */
 typedef struct answer_error {
@@ -69,9 +72,9 @@ typedef struct name_error {
     stated_parts parts; /* of its mean */
 } name_error;
 
-/* errors [n_names], the names of which are left. Cost: O(C count). False when memory is short. */
-bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
-                    const reduce_request *names, name_error *errors);
+/* names, errors [n_names]; the texts of errors are left. Cost: O(C count). False when memory is short. */
+bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of, size_t n_names,
+                    const reduce_name *names, name_error *errors);
 
 /* The same of one name, by its means, [C] each, of the quantity, of the emission, and of the direct light of
  * sky and luminaires, of which the last two are over all elements. Cost: O(C groups of the name), and under a
