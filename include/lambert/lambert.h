@@ -315,6 +315,132 @@ void lam_sensors_adjoint(const lam_sensors *sensors, size_t n_rhs, const float *
 void lam_sensors_variance(const lam_sensors *sensors, size_t n_rhs, const float *B, const float *L,
                           float *variance);
 
+/* A store as a whole: its operator, sky and luminaires, the names, groups, areas and reflectances of its
+ * elements, and the errors that it states; immutable once open, so any number of threads may ask it. */
+typedef struct lam_scene lam_scene;
+
+/* Opens the store at path and loads all that the functions below need; the caller closes it with
+ * lam_scene_close. Errors and threads as lam_operator_open. */
+lam_status lam_scene_open(const char *path, lam_scene **scene, lam_error *error);
+
+/* Frees a scene with all that it has given; NULL is allowed. */
+void lam_scene_close(lam_scene *scene);
+
+/* As lam_operator_set_threads: before the scene is shared. */
+void lam_scene_set_threads(lam_scene *scene, size_t n_threads);
+
+/* Its parts, owned by the scene; sky and luminaires are NULL where the store has none. */
+const lam_operator *lam_scene_operator(const lam_scene *scene);
+const lam_limiter *lam_scene_limiter(const lam_scene *scene);
+const lam_sky *lam_scene_sky(const lam_scene *scene);
+const lam_luminaires *lam_scene_luminaires(const lam_scene *scene);
+
+/* The unit of its light, "W" or "lm", static: emissions are W/m^2 or lm/m^2. */
+const char *lam_scene_lights(const lam_scene *scene);
+
+/* Of elements in mesh order, owned by the scene: areas [n], m^2; reflectances [C][n]; unit normals towards
+ * the front and area centroids, m, [n][3], in the axes of the scene. */
+const double *lam_scene_areas(const lam_scene *scene);
+const float *lam_scene_reflectances(const lam_scene *scene);
+const float *lam_scene_normals(const lam_scene *scene);
+const float *lam_scene_centres(const lam_scene *scene);
+
+/* The number of groups; the name of one, owned by the scene; the area of those of its elements that figures
+ * take in, m^2, which is without elements that lie below a body; and all its elements in mesh order. */
+size_t lam_scene_groups(const lam_scene *scene);
+const char *lam_scene_group(const lam_scene *scene, size_t group);
+double lam_scene_group_area(const lam_scene *scene, size_t group);
+const uint32_t *lam_scene_group_elements(const lam_scene *scene, size_t group, size_t *count);
+
+/* The groups that a name means, as requests to the daemon have names: that of a group, of an object of
+ * several materials, or "desk*". Returns how many, 0 for an unknown name; *groups is owned by the scene. */
+size_t lam_scene_find(const lam_scene *scene, const char *name, const uint32_t **groups);
+
+/* The light of one vector; what is NULL or 0 is dark, and all parts add up. In a store of few emitters it has
+ * to be one that weights give (lam_operator_weights). */
+typedef struct lam_light {
+    const float *E;         /* [C][n], emissions of elements */
+    const uint32_t *groups; /* [n_groups], groups whose elements all emit alike */
+    const float *exitances; /* [n_groups][C], of these */
+    size_t n_groups;
+    const float *L; /* [C][m], radiances of sky tiles */
+    const float *D; /* [C][k], dimmers of luminaires */
+    const float *W; /* [C][s], weights of emitters, of a store of few */
+} lam_light;
+
+/* out [n_lights][C][n] = the quantity under each light. limited [n_lights] gets the number of elements that
+ * were below zero before the limiter took that away (lam_limiter_apply); NULL: the linear map is wanted.
+ * Allocates; a vector's bits do not depend on its batch. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
+lam_status lam_scene_answer(const lam_scene *scene, lam_quantity quantity, size_t n_lights,
+                            const lam_light *lights, float *out, size_t *limited, lam_error *error);
+
+/* Figures of groups: sum A x / sum A, sum A x, min, max, min / mean and sum A (x - mean)^2 / sum A. */
+typedef enum lam_figure {
+    LAM_MEAN,
+    LAM_SUM,
+    LAM_MIN,
+    LAM_MAX,
+    LAM_UNIFORMITY,
+    LAM_VARIANCE,
+    LAM_FIGURES
+} lam_figure;
+
+/* figures [n_rhs][C][LAM_FIGURES] of the elements of some groups together, of values [n_rhs][C][n] in mesh
+ * order. NaN where a figure has no value: of groups without area, and of a mean of 0. Cost: that of the
+ * elements of the groups. Errors: LAM_ERR_ARGUMENT. */
+lam_status lam_scene_reduce(const lam_scene *scene, size_t n_groups, const uint32_t *groups, size_t n_rhs,
+                            const float *values, double *figures, lam_error *error);
+
+/* The stated error of an answer: stated = sqrt(rest^2 + mesh^2), relative to the light that surfaces reflect,
+ * of operator and form factors and of constants on elements (negative: not stated). own is 0 where it is that
+ * of the scene's lights, or of single elements, as the store states none by group. */
+typedef struct lam_stated {
+    double stated, rest, mesh;
+    int own;
+} lam_stated;
+
+/* *out = the stated error of an answer, values [C][n] of the quantity under the light: of the mean over some
+ * groups together, or of all elements where n_groups is 0. Not finite where no light is reflected. Allocates;
+ * cost: O(C n). Errors: LAM_ERR_UNSUPPORTED where the store states nothing of such an answer;
+ * LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
+lam_status lam_scene_stated(const lam_scene *scene, lam_quantity quantity, const lam_light *light,
+                            const float *values, size_t n_groups, const uint32_t *groups, lam_stated *out,
+                            lam_error *error);
+
+/* The number of sources of a kind: columns of derivatives by them. */
+size_t lam_scene_sources(const lam_scene *scene, lam_by by);
+
+/* Derivatives of values of elements by all sources of a kind, out [C][n_elements][lam_scene_sources]: times
+ * what the sources give they are the answer of the linear map. Allocates. Cost: as many answers as there are
+ * elements or sources, whichever are fewer. NaN where a store of few emitters has no weights for a source.
+ * Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
+lam_status lam_scene_jacobian(const lam_scene *scene, lam_quantity quantity, size_t n_elements,
+                              const uint32_t *elements, lam_by by, float *out, lam_error *error);
+
+/* Rows of the means of groups, which are linear in the light; immutable once made. */
+typedef struct lam_rows lam_rows;
+
+/* Makes rows [n_names] of the means over what each name means (lam_scene_find). The caller closes them with
+ * lam_rows_close before the scene. Cost: an answer each, once; C n floats of memory each. Errors:
+ * LAM_ERR_ARGUMENT names an unknown name and the nearest one; LAM_ERR_MEMORY. */
+lam_status lam_rows_create(const lam_scene *scene, lam_quantity quantity, size_t n_names,
+                           const char *const *names, lam_rows **rows, lam_error *error);
+void lam_rows_close(lam_rows *rows);
+
+/* The area that the mean of row k is over, m^2; times the mean it is the sum. */
+double lam_rows_area(const lam_rows *rows, size_t k);
+
+/* means [n_lights][rows][C] of the linear map; NaN of a row without area. A limited mean is this or 0, where
+ * it is negative and no light is. Cost: rows times lit sources, whatever n is; C n more for E. Errors:
+ * LAM_ERR_ARGUMENT; of a store of few emitters also for light that no weights are known for; LAM_ERR_MEMORY.
+ */
+lam_status lam_rows_means(const lam_rows *rows, size_t n_lights, const lam_light *lights, double *means,
+                          lam_error *error);
+
+/* The derivatives of the means by all sources of a kind, out [C][rows][lam_scene_sources]. NaN as in
+ * lam_scene_jacobian, and of a row without area. */
+void lam_rows_jacobian(const lam_rows *rows, lam_by by, float *out);
+
 #pragma GCC visibility pop
 #ifdef __cplusplus
 }

@@ -100,7 +100,10 @@ class Install(unittest.TestCase):
         exported = {}
         for name, options in (("liblambert.so", ["-D"]), ("liblambert.a", ["-g"])):
             lines = run("nm", *options, "--defined-only", self.libraries / name).splitlines()
-            exported[name] = {line.split()[2] for line in lines if len(line.split()) == 3}
+            words = [line.split() for line in lines]
+            exported[name] = {word[2].partition("@")[0] for word in words if len(word) == 3 and not word[2].startswith("LAMBERT_")}
+            versions = {word[2].partition("@@")[2] for word in words if len(word) == 3 and not word[2].startswith("LAMBERT_")}
+            self.assertEqual(versions, {"LAMBERT_0.3"} if name.endswith(".so") else {""})
             self.assertGreater(len(exported[name]), 25)
             for symbol in exported[name]:
                 self.assertIn(f"{symbol}(", header)
@@ -124,6 +127,28 @@ class Install(unittest.TestCase):
             B = self.numbers("apply_skies", static, self.open)
             self.assertGreater(B.max(), 0)
             np.testing.assert_array_equal(B.T.astype("f4"), solved.reshape(4, -1)[:, : len(B)])
+
+    def test_reduce_one(self):
+        """Names, areas and means are those of the store; each group has its stated error, which is that of the daemon."""
+        with h5py.File(self.closed, "r") as f:
+            names = [name.decode() for name in f["mesh/group_names"][()]]
+            group, area = f["mesh/group"][()], f["mesh/area"][()]
+        command = [self.prefix / "bin" / "lambertd", self.closed, "--listen", "127.0.0.1:0"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as daemon:
+            try:
+                address = next(found[1] for found in (re.search(r"listening on (http:\S+)", line) for line in daemon.stdout) if found)
+                body = {"emission": {"groups": {names[0]: 1}}, "quantity": "irradiance", "reduce": {"groups": names, "with": ["mean", "min"]}}
+                wanted = json.loads(run("curl", "-sS", "-H", "Content-Type: application/json", "-d", json.dumps(body), f"{address}/v1/scenes/closed/radiosity"))
+            finally:
+                daemon.terminate()
+        for static in (False, True):
+            environment = dict(os.environ, LD_LIBRARY_PATH="" if static else str(self.libraries))
+            lines = [line.split() for line in run(self.compile("reduce_one", static), self.closed, env=environment).splitlines()]
+            self.assertEqual([line[0] for line in lines], names)
+            for g, (name, of, mean, stated) in enumerate(lines):
+                self.assertAlmostEqual(float(of), area[group == g].sum(), places=6)
+                np.testing.assert_allclose(float(mean), wanted["groups"][name]["mean"], rtol=1e-5)
+                np.testing.assert_allclose(float(stated), wanted["error"]["groups"][name]["stated"], rtol=1e-3)
 
     def test_ask_daemon(self):
         """A lamp of twice the watts gives twice the light; the daemon is the installed one."""

@@ -1,0 +1,157 @@
+/* The light of a vector of lam_light, its answer, and the figures of answers. */
+#include "solver/operator/emitters.h"
+#include "solver/operator/groups/group_statistics.h"
+#include "solver/operator/scene/lam_scene.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+lam_status lam_groups_check(const lam_scene *s, size_t n_groups, const uint32_t *groups, lam_error *error) {
+    if (n_groups > 0 && groups == NULL)
+        return status_fail(error, LAM_ERR_ARGUMENT, "%zu groups are at no place", n_groups);
+    for (size_t k = 0; k < n_groups; k++)
+        if (groups[k] >= s->groups.n_groups)
+            return status_fail(error, LAM_ERR_ARGUMENT, "groups[%zu] = %u, must be below %zu", k, groups[k],
+                               s->groups.n_groups);
+    return LAM_OK;
+}
+
+lam_status lam_light_check(const lam_scene *s, const lam_light *light, lam_error *error) {
+    if (light->n_groups > 0 && light->exitances == NULL)
+        return status_fail(error, LAM_ERR_ARGUMENT, "the light has %zu groups without exitances",
+                           light->n_groups);
+    if (light->L != NULL && s->sky == NULL)
+        return status_fail(error, LAM_ERR_ARGUMENT, "the light has a sky, the store has none");
+    if (light->D != NULL && s->luminaires == NULL)
+        return status_fail(error, LAM_ERR_ARGUMENT, "the light has dimmers, the store has no luminaires");
+    if (light->W != NULL && s->linear.n_emitters == 0)
+        return status_fail(error, LAM_ERR_ARGUMENT, "the light has weights, the store answers any emission");
+    return lam_groups_check(s, light->n_groups, light->groups, error);
+}
+
+/* E is zeroed. */
+static void add_emission(const lam_scene *s, const lam_light *light, float *E) {
+    const size_t n = s->n, C = s->n_channels;
+    if (light->E != NULL) memcpy(E, light->E, C * n * sizeof *E);
+    for (size_t k = 0; k < light->n_groups; k++)
+        for (size_t c = 0; c < C; c++)
+            for (uint32_t e = s->groups.start[light->groups[k]]; e < s->groups.start[light->groups[k] + 1];
+                 e++)
+                E[c * n + s->groups.elements[e]] += light->exitances[k * C + c];
+}
+
+/* Of a store of few emitters: the weights of all its light, and what elements and the sky give by these. */
+static lam_status take_weights(const lam_scene *s, const lam_light *light, bool with_emission,
+                               full_light *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t row = s->n_channels * s->linear.n_emitters, k = linear_scene_luminaires(&s->linear);
+    if (light->E != NULL || light->n_groups > 0 || light->L != NULL)
+        TRY(lam_operator_weights(s->op, 1, out->E, linear_scene_tiles(&s->linear), light->L, out->W, error));
+    for (size_t w = 0; light->W != NULL && w < row; w++) out->W[w] += light->W[w];
+    if (light->D != NULL) operator_emitters_dim(s->op, 1, light->D, out->W);
+    out->L = out->D = NULL;
+    if (!with_emission) goto done;
+    TRY(operator_emitters_light(s->op, 1, out->W, out->E, out->H0, error));
+    if (operator_emitters_of(s->op)->a.L != NULL) {
+        float *radiances = out->W + row + s->n_channels * k;
+        operator_emitters_radiances(s->op, 1, out->W, radiances);
+        out->L = radiances;
+    }
+    /* Luminaires are the last emitters, and their weights dimmers. */
+    bool lit = false;
+    float *const dimmers = out->W + row;
+    for (size_t c = 0; c < s->n_channels; c++)
+        for (size_t l = 0; l < k; l++) {
+            dimmers[c * k + l] = out->W[(c + 1) * s->linear.n_emitters - k + l];
+            lit |= dimmers[c * k + l] != 0;
+        }
+    if (lit) out->D = dimmers;
+done:
+    return status;
+}
+
+lam_status full_light_make(const lam_scene *s, const lam_light *light, bool with_emission, full_light *out,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t vector = s->n_channels * s->n, n_emitters = s->linear.n_emitters;
+    const size_t tiles = n_emitters > 0 && operator_emitters_of(s->op)->a.L != NULL
+                             ? operator_emitters_of(s->op)->a.n_tiles
+                             : 0;
+    *out = (full_light){.L = light->L, .D = light->D};
+    TRY(lam_light_check(s, light, error));
+    out->E = memory_allocate(2 * vector +
+                                 s->n_channels * (n_emitters + linear_scene_luminaires(&s->linear) + tiles),
+                             sizeof *out->E, "light", error);
+    if (out->E == NULL) TRY(LAM_ERR_MEMORY);
+    add_emission(s, light, out->E);
+    float *const direct = out->E + vector;
+    if (n_emitters > 0) {
+        out->H0 = direct;
+        out->W = out->E + 2 * vector;
+        TRY(take_weights(s, light, with_emission, out, error));
+    } else if (light->L != NULL || light->D != NULL) {
+        out->H0 = direct;
+        if (light->L != NULL) lam_sky_irradiance(s->sky, s->n_channels, light->L, out->H0);
+        if (light->D != NULL) lam_luminaires_irradiance(s->luminaires, 1, light->D, out->H0);
+    }
+done:
+    return status;
+}
+
+void full_light_free(full_light *l) {
+    free(l->E);
+    *l = (full_light){.E = NULL};
+}
+
+/* One vector; work has room for its operator and its limiter. */
+static lam_status answer_one(const lam_scene *s, lam_quantity quantity, const lam_light *light, float *out,
+                             size_t *limited, void *work, size_t work_bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    full_light full = {.E = NULL};
+    TRY(full_light_make(s, light, false, &full, error));
+    if (full.W != NULL)
+        TRY(lam_operator_apply_emitters(s->op, 1, quantity, full.W, s->n, NULL, out, work, work_bytes,
+                                        error));
+    else
+        TRY(lam_operator_apply_lit(s->op, 1, quantity, full.E, full.H0, out, work, work_bytes, error));
+    if (limited != NULL)
+        TRY(lam_limiter_apply(&s->limiter, s->op, 1, quantity, full.W != NULL ? NULL : full.E,
+                              full.W != NULL ? NULL : full.H0, full.W, out, limited, work, work_bytes,
+                              error));
+done:
+    full_light_free(&full);
+    return status;
+}
+
+lam_status lam_scene_answer(const lam_scene *scene, lam_quantity quantity, size_t n_lights,
+                            const lam_light *lights, float *out, size_t *limited, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t solving = lam_operator_work_bytes(scene->op, 1),
+                 limiting = lam_limiter_work_bytes(&scene->limiter),
+                 bytes = solving > limiting ? solving : limiting;
+    void *work = memory_allocate(1, bytes, "an answer", error);
+    if (work == NULL) return LAM_ERR_MEMORY;
+    for (size_t v = 0; v < n_lights; v++)
+        TRY(answer_one(scene, quantity, &lights[v], out + v * scene->n_channels * scene->n,
+                       limited != NULL ? &limited[v] : NULL, work, bytes, error));
+done:
+    free(work);
+    return status;
+}
+
+lam_status lam_scene_reduce(const lam_scene *scene, size_t n_groups, const uint32_t *groups, size_t n_rhs,
+                            const float *values, double *figures, lam_error *error) {
+    lam_status status = LAM_OK;
+    static const reduce_statistic order[LAM_FIGURES] = {
+        [LAM_MEAN] = REDUCE_MEAN, [LAM_SUM] = REDUCE_SUM,           [LAM_MIN] = REDUCE_MIN,
+        [LAM_MAX] = REDUCE_MAX,   [LAM_VARIANCE] = REDUCE_VARIANCE, [LAM_UNIFORMITY] = REDUCE_UNIFORMITY};
+    TRY(lam_groups_check(scene, n_groups, groups, error));
+    for (size_t row = 0; row < n_rhs * scene->n_channels; row++) {
+        double all[REDUCE_COUNT];
+        reduce_groups(n_groups, groups, &scene->groups, scene->area,
+                      (reduce_values){.floats = values + row * scene->n, .whole = true}, all);
+        for (int f = 0; f < LAM_FIGURES; f++) figures[row * LAM_FIGURES + f] = all[order[f]];
+    }
+done:
+    return status;
+}
