@@ -254,7 +254,8 @@ class OverHttp(PackageCase):
 
     @unittest.skipIf(linalg is None, "SciPy is not installed")
     def test_linear_algebra(self):
-        for name in ("box", "office"):
+        self.assertEqual(len({self.scene(name).about["kind"] for name in ("box", "office", "waves")}), 3)
+        for name in ("box", "office", "waves"):
             scene = self.scene(name)
             M = scene @ np.eye(scene.n)[:, None].repeat(scene.channels, 1)  # [n][C][n]: columns of M~ for each channel
             M = M.reshape(scene.n, scene.channels, scene.n)
@@ -271,7 +272,7 @@ class OverHttp(PackageCase):
 
     @unittest.skipIf(torch is None, "PyTorch is not installed")
     def test_torch(self):
-        for name in ("box", "office"):
+        for name in ("box", "office", "waves"):
             scene = self.scene(name)
             light = scene.torch("irradiance")
             generator = torch.Generator().manual_seed(1)

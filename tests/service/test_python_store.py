@@ -170,6 +170,76 @@ class InProcess(PackageCase):
                 for name in ("emission", "luminaires", "groups"):
                     self.same(scene.adjoint(g, name), remote.adjoint(g, name), 5)
 
+    def test_means_and_their_errors(self):
+        """Means by rows, of all forms of light, limited or not, and the errors that are stated of them."""
+        count = 0
+        for remote, scene in self.each(("box", "paint", "waves", "office", "yard", "few", "dome")):
+            some = random_emission(remote, 8)
+            given = {"office": [{"luminaires": {"row": 0.4, "desk": 1}}, {"luminaires": {"desk": 1}, "groups": {"floor": 3}}, some],
+                     "yard": [{"sky": np.arange(145.0)}, {remote.names[0]: 2}, some], "few": [{"luminaires": {"row": 0.4}}, {"ceiling": 3}],
+                     "dome": [{"sky": np.arange(24.0).reshape(3, 8)}, {"emitters": np.ones(8)}]}.get(
+                         remote.name, [{remote.names[0]: 1 if remote.channels == 1 else [1, 2, 3]}, {remote.names[0]: -1, remote.names[1]: 3}, some])
+            names = remote.names[:2]
+            for emission in [*given, given[:2]]:
+                for more in ({}, {"quantity": "indirect"}, {"quantity": "radiosity", "limit": False}, {"unit": "lx"}):
+                    wanted, found = (s.reduce(emission, groups=names, figures=("sum", "mean"), **more) for s in (remote, scene))
+                    self.assertEqual(found.unit, wanted.unit)
+                    for name in names:
+                        for figure in ("mean", "sum"):
+                            # A mean is off by single precision of its largest contribution: of light of either sign that is more than the mean.
+                            most = max(np.abs(np.asarray(wanted[other][figure], float)).max() for other in names)
+                            np.testing.assert_allclose(found[name][figure], wanted[name][figure], rtol=1e-5, atol=1e-5 * most, err_msg=self.which)
+                    # With min the daemon has whole answers, too; of means alone its law takes the light as even over a group.
+                    stated = remote.reduce(emission, groups=names, figures=("mean", "min"), **more).error
+                    if "library" in self.which and stated.get("light") == "own":
+                        for name in names:
+                            one, other = stated["groups"][name]["stated"], found.error["groups"][name]["stated"]
+                            np.testing.assert_allclose(other or 0, one or 0, rtol=1e-3, err_msg=f"{self.which} {more}")
+                            count += 1
+                    elif "numpy" in self.which:
+                        self.assertIsNone(found.error)
+            whole, other = (s.radiosity(given[0], stated=True) for s in (remote, scene))
+            if "library" in self.which:
+                self.assertAlmostEqual(other.error["stated"] / whole.error["stated"], 1, places=3)
+        self.assertTrue(count > 50 or not LIBRARY)
+
+    def test_derivatives(self):
+        """Of groups and elements by all that there is; times what the sources give they are the linear answer."""
+        for remote, scene in self.each(("box", "waves", "office", "yard", "few")):
+            names, elements = remote.names[:2], [0, remote.n - 1, 3]
+            for of in ({"groups": names}, {"elements": elements}, {"elements": elements * 60}):
+                for quantity in (None, "irradiance"):
+                    wanted, found = (s.jacobian(of, None, quantity) for s in (remote, scene))
+                    self.assertEqual((set(found), found.rows), (set(wanted), wanted.rows))
+                    for kind, matrix in wanted.items():
+                        self.assertEqual(found.columns[kind], wanted.columns[kind], kind)
+                        self.same(found[kind], matrix, 5)
+            again = scene.jacobian({"groups": names}, None, "irradiance")
+            kind = next(iter(again))
+            np.testing.assert_array_equal(again[kind], scene.jacobian({"groups": names}, kind, "irradiance")[kind])
+        scene = lambert.Scene(self.stores["box"], library=LIBRARY or False)
+        for words, wrong in (("sensors, groups or elements", lambda: scene.jacobian({"faces": [1]})), ("no luminaires", lambda: scene.jacobian({"groups": ["floor"]}, "luminaires")),
+                             ("no group is called lmap", lambda: scene.jacobian({"groups": ["lmap"]})), ("not from 0 to", lambda: scene.jacobian({"elements": [scene.n]}))):
+            with self.assertRaisesRegex(lambert.Refused, words):
+                wrong()
+
+    def test_older_library(self):
+        """One without lam_scene: the same numbers by whole answers."""
+        if not LIBRARY:
+            self.skipTest("this build has no shared library")
+        from lambert import library
+
+        with unittest.mock.patch.dict(library.SCENE_FUNCTIONS, {"lam_scene_of_the_future": (None, [])}):
+            old = lambert.Scene(self.stores["office"], library=LIBRARY)
+        self.assertIsNone(old._source.op.scene)
+        new, light = lambert.Scene(self.stores["office"], library=LIBRARY), {"luminaires": {"row": 1}}
+        self.which = "older"
+        wanted, found = (s.reduce(light, groups=["floor"]) for s in (new, old))
+        self.assertAlmostEqual(found["floor"]["mean"] / wanted["floor"]["mean"], 1, places=5)
+        self.assertIsNone(found.error)
+        for of in ({"groups": ["floor"]}, {"elements": [1, 5]}):
+            self.same(old.jacobian(of, "luminaires")["luminaires"], new.jacobian(of, "luminaires")["luminaires"], 5)
+
     def test_variants(self):
         for remote, scene in self.each(("paint",)):
             red, other = (s.variant("red", {"floor": [0.6, 0.1, 0.1], "back*": 0.3}) for s in (remote, scene))
@@ -228,8 +298,8 @@ class InProcess(PackageCase):
 
     @unittest.skipIf(linalg is None, "SciPy is not installed")
     def test_linear_algebra_is_the_same(self):
-        """Singular values, solutions and finite differences: within 1e-5 of each other."""
-        for remote, scene in self.each(("box", "office")):
+        """Singular values, solutions and finite differences of three kinds of operators: within 1e-5 of each other."""
+        for remote, scene in self.each(("box", "office", "waves")):
             found = []
             for s in (remote, scene):
                 A = s.as_operator()

@@ -246,9 +246,10 @@ class Scene:
 
         return gradient_of(list(await asyncio.gather(*map(one, query.parts()))), gradient)
 
-    async def jacobian(self, of: Mapping[str, Any], by: Optional[Strings] = None, *, timeout: Optional[float] = None) -> Jacobian:
+    async def jacobian(self, of: Mapping[str, Any], by: Optional[Strings] = None, quantity: Optional[str] = None, *,
+                       timeout: Optional[float] = None) -> Jacobian:
         """As lambert.Scene.jacobian."""
-        return jacobian_of(await self._ask(jacobian_request(self._about, of, by), timeout, "elements" in of))
+        return jacobian_of(await self._ask(jacobian_request(self._about, of, by, quantity), timeout, "elements" in of))
 
     async def skies(self, skies: Any, *, timeout: Optional[float] = None) -> Any:
         """As lambert.Scene.skies, with radiances as lists."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Dict, Mapping, Optional, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, Mapping, Optional, Union
 
 import numpy as np
 
@@ -67,19 +67,26 @@ class Figures(Dict[str, Dict[str, Any]]):
     (2.5, 0.5, 'lx')
     """
 
-    error: Optional[Mapping[str, Any]] = None
     unit: Optional[str] = None
     converted_by: Optional[str] = None
     times: Mapping[str, float] = {}
     limited: Any = None
+    _error: Union[None, Mapping[str, Any], Callable[[], Optional[Mapping[str, Any]]]] = None
+
+    @property
+    def error(self) -> Optional[Mapping[str, Any]]:
+        """The stated error, also of each name in `groups`. In process it is found when it is first looked at, which takes a whole answer."""
+        if callable(self._error):
+            self._error = self._error()
+        return self._error
 
     @classmethod
-    def of(cls, read: Mapping[str, Mapping[str, Any]], *, error: Optional[Mapping[str, Any]] = None,
+    def of(cls, read: Mapping[str, Mapping[str, Any]], *, error: Union[None, Mapping[str, Any], Callable[[], Optional[Mapping[str, Any]]]] = None,
            unit: Optional[str] = None, converted_by: Optional[str] = None, times: Optional[Mapping[str, float]] = None,
            limited: Any = None) -> Figures:
         made = cls({name: {figure: _figure(figure, value) for figure, value in figures.items()}
                     for name, figures in read.items()})
-        made.error, made.unit, made.converted_by = error, unit, converted_by
+        made._error, made.unit, made.converted_by = error, unit, converted_by
         made.times, made.limited = times or {}, limited
         return made
 
@@ -97,7 +104,7 @@ def _figure(name: str, value: Any) -> Figure:
 class Jacobian(Dict[str, np.ndarray[Any, np.dtype[Any]]]):
     """Matrices by what they derive by: [rows, columns], or [C, rows, columns] for more than one channel.
 
-    `rows` has the slice of each set of sensors, `columns` the names of the columns of each matrix, or the number of tiles.
+    `rows` has the slice of each set of sensors, or of each group, `columns` the names of the columns of each matrix, or the number of tiles.
     """
 
     rows: Mapping[str, slice] = {}

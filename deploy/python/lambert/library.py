@@ -7,7 +7,8 @@ import ctypes.util
 import glob
 import os
 import shutil
-from typing import Any, Dict, List, Optional, Tuple
+import threading
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -34,10 +35,28 @@ FUNCTIONS: Dict[str, Tuple[Any, List[Any]]] = {
     "lam_form_factors_open": (INT, [ctypes.c_char_p, P, P]), "lam_form_factors_close": (None, [P]),
     "lam_refiner_create": (INT, [P, P, P, P]), "lam_refiner_free": (None, [P]),
     "lam_refine": (INT, [P, Z, INT, P, P, P, ctypes.c_double, P, P, P, P])}
+# The same of functions that libraries of before 0.3 have not.
+SCENE_FUNCTIONS: Dict[str, Tuple[Any, List[Any]]] = {
+    "lam_scene_open": (INT, [ctypes.c_char_p, P, P]), "lam_scene_close": (None, [P]), "lam_scene_operator": (P, [P]),
+    "lam_scene_limiter": (P, [P]), "lam_scene_sources": (Z, [P, INT]), "lam_scene_stated": (INT, [P, INT, P, P, Z, P, P, P]),
+    "lam_scene_jacobian": (INT, [P, INT, Z, P, INT, P, P]), "lam_rows_create": (INT, [P, INT, Z, P, P, P]), "lam_rows_close": (None, [P]),
+    "lam_rows_area": (ctypes.c_double, [P, Z]), "lam_rows_means": (INT, [P, Z, P, P, P]), "lam_rows_jacobian": (None, [P, INT, P])}
+BY = {"luminaires": 0, "groups": 1, "sky": 2, "emitters": 3}
+ROWS_KEPT = 64  # sets of rows of one operator
 
 
 class _Error(ctypes.Structure):
     _fields_ = [("status", INT), ("message", ctypes.c_char * 480)]
+
+
+class _Light(ctypes.Structure):
+    """lam_light, whose arrays are kept by whoever makes it."""
+
+    _fields_ = [("E", P), ("groups", P), ("exitances", P), ("n_groups", Z), ("L", P), ("D", P), ("W", P)]
+
+
+class _Stated(ctypes.Structure):
+    _fields_ = [("stated", ctypes.c_double), ("rest", ctypes.c_double), ("mesh", ctypes.c_double), ("own", INT)]
 
 
 def find(library: Any = None) -> Optional[str]:
@@ -70,6 +89,10 @@ class Library:
                 function.restype, function.argtypes = result, arguments
         except (OSError, AttributeError) as error:
             raise Unsupported(f"{path}: is no liblambert that can be used: {error}") from None
+        self.has_scenes = all(hasattr(self.functions, name) for name in SCENE_FUNCTIONS)
+        for name, (result, arguments) in SCENE_FUNCTIONS.items() if self.has_scenes else ():
+            function = getattr(self.functions, name)
+            function.restype, function.argtypes = result, arguments
 
     def call(self, name: str, *arguments: Any) -> None:
         """Calls a function that may fail."""
@@ -99,8 +122,15 @@ class LibraryOperator:
     def __init__(self, store: Store, library: Library) -> None:
         self._handles: List[Tuple[str, Any]] = []
         self.store, self.library = store, library
-        self.op = self._open("lam_operator", store.path)
-        self.limiter = self._open("lam_limiter", store.path)
+        self.scene = self._open("lam_scene", store.path) if library.has_scenes else None
+        if self.scene is None:
+            self.op = self._open("lam_operator", store.path)
+            self.limiter = self._open("lam_limiter", store.path)
+        else:
+            self.op = ctypes.c_void_p(library.functions.lam_scene_operator(self.scene))
+            self.limiter = ctypes.c_void_p(library.functions.lam_scene_limiter(self.scene))
+        self._rows: Dict[Tuple[str, Tuple[str, ...]], Rows] = {}
+        self._lock = threading.Lock()
         self.n, self.channels, self.rho = store.n, store.channels, store.rho.astype(float)
         self.emitters = int(library.functions.lam_operator_emitters(self.op))
         self.names = [library.functions.lam_operator_emitter_name(self.op, k).decode() for k in range(self.emitters)]
@@ -154,6 +184,45 @@ class LibraryOperator:
                           _pointer(weights), _pointer(out), _pointer(limited), _pointer(work), size)
         return [int(count) for count in limited]
 
+    def rows(self, quantity: str, names: Tuple[str, ...]) -> Optional[Rows]:
+        """The rows of means of groups, made when first asked for; None: the library has none."""
+        if self.scene is None:
+            return None
+        with self._lock:
+            found = self._rows.get((quantity, names))
+        if found is None:
+            found = Rows(self, quantity, names)
+            with self._lock:
+                while len(self._rows) >= ROWS_KEPT:
+                    self._rows.pop(next(iter(self._rows)))
+                self._rows[quantity, names] = found
+        return found
+
+    def jacobian(self, quantity: str, elements: Array, by: str) -> Optional[Array]:
+        """[C, elements, sources of a kind]; None: the library has none."""
+        if self.scene is None:
+            return None
+        chosen = np.ascontiguousarray(elements, np.uint32)
+        width = int(self.library.functions.lam_scene_sources(self.scene, BY[by]))
+        made = np.empty((self.channels, len(chosen), width), np.float32)
+        self.library.call("lam_scene_jacobian", self.scene, QUANTITY[quantity], len(chosen), _pointer(chosen), BY[by], _pointer(made))
+        return made
+
+    def stated(self, quantity: str, light: Mapping[str, Optional[Array]], values: Array, groups: Sequence[int]) -> Optional[Dict[str, Any]]:
+        """The stated error of values [C, n]: of the mean over some groups together, or of all; None: nothing is stated."""
+        if self.scene is None:
+            return None
+        kept, of, made = _floats(values), np.array(groups, np.uint32), _Stated()
+        arrays, sources = _sources(light)
+        try:
+            self.library.call("lam_scene_stated", self.scene, QUANTITY[quantity], ctypes.byref(sources), _pointer(kept), len(of), _pointer(of),
+                              ctypes.byref(made))
+        except Unsupported:
+            return None
+        del arrays
+        parts = {"rest": made.rest, **({"mesh": made.mesh} if made.mesh >= 0 else {})}
+        return {"stated": made.stated if np.isfinite(made.stated) else None, "parts": parts, "light": "own" if made.own else "lights"}
+
     def refine(self, quantity: str, E: Array, H0: Optional[Array], tolerance: float) -> Tuple[Array, List[float], List[int]]:
         """The refined quantity in doubles, its certificates and iterations."""
         if self._refiner is None:
@@ -172,3 +241,48 @@ class LibraryOperator:
         self.library.call("lam_refine", self._refiner, len(E), QUANTITY[quantity], _pointer(E), _pointer(lit), None, tolerance,
                           _pointer(out), _pointer(certificates), _pointer(iterations))
         return out, certificates.tolist(), [int(count) for count in iterations]
+
+
+def _sources(light: Mapping[str, Optional[Array]]) -> Tuple[List[Array], _Light]:
+    """A lam_light of arrays by its members' names, and the arrays that it points into."""
+    made, arrays = _Light(), []
+    for name, given in light.items():
+        if given is None:
+            continue
+        array = np.ascontiguousarray(given, np.uint32 if name == "groups" else np.float32)
+        arrays.append(array)
+        setattr(made, name, array.ctypes.data)
+        if name == "groups":
+            made.n_groups = len(array)
+    return arrays, made
+
+
+class Rows:
+    """Rows of the means of groups by the library (lam_rows); they keep the operator that they are of."""
+
+    def __init__(self, of: LibraryOperator, quantity: str, names: Tuple[str, ...]) -> None:
+        self.of, self.count, self.handle = of, len(names), None
+        texts = (ctypes.c_char_p * len(names))(*(name.encode() for name in names))
+        handle = ctypes.c_void_p()
+        of.library.call("lam_rows_create", of.scene, QUANTITY[quantity], len(names), texts, ctypes.byref(handle))
+        self.handle = handle
+        self.areas = np.array([of.library.functions.lam_rows_area(handle, k) for k in range(len(names))])
+
+    def __del__(self) -> None:
+        if self.handle is not None:
+            self.of.library.functions.lam_rows_close(self.handle)
+
+    def means(self, lights: Sequence[Mapping[str, Optional[Array]]]) -> Array:
+        """[m, rows, C] of the linear map, in doubles."""
+        kept = [_sources(light) for light in lights]
+        sources = (_Light * len(kept))(*(light for _, light in kept))
+        made = np.empty((len(kept), self.count, self.of.channels))
+        self.of.library.call("lam_rows_means", self.handle, len(kept), sources, made.ctypes.data)
+        return made
+
+    def jacobian(self, by: str) -> Array:
+        """[C, rows, sources of a kind]."""
+        width = int(self.of.library.functions.lam_scene_sources(self.of.scene, BY[by]))
+        made = np.empty((self.of.channels, self.count, width), np.float32)
+        self.of.library.functions.lam_rows_jacobian(self.handle, BY[by], made.ctypes.data)
+        return made

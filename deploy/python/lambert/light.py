@@ -344,17 +344,20 @@ def gradient_of(found: List[Dict[str, Array]], gradient: Strings) -> Any:
     return made[gradient] if isinstance(gradient, str) else made
 
 
-def jacobian_request(about: About, of: Mapping[str, Any], by: Optional[Strings]) -> Request:
+def jacobian_request(about: About, of: Mapping[str, Any], by: Optional[Strings], quantity: Optional[str] = None) -> Request:
     body: Dict[str, Any] = {"of": {key: _listed(value) for key, value in of.items()}}
     if by is not None:
         body["by"] = _listed(by)
+    if quantity is not None:
+        body["quantity"] = word(quantity, QUANTITIES, "quantity")
     return to_json(about.path + "/jacobian", body)
 
 
 def jacobian_of(reply: Reply) -> Jacobian:
     read = reply.json()
     try:
-        return Jacobian.of(read["jacobian"], read["sensors"], read["columns"], server_times(reply))
+        rows = read.get("sensors") or {name: 1 for name in read.get("groups", ())}
+        return Jacobian.of(read["jacobian"], rows, read["columns"], server_times(reply))
     except KeyError as missing:
         raise LambertError(f"the answer has no {missing}") from None
 

@@ -11,7 +11,7 @@ from .emissions import Emissions, Light, Operator, needs_daemon
 from .errors import Refused, Unsupported
 from .kinds import NumpyOperator
 from .library import Library, LibraryOperator, find
-from .light import About, AdjointQuery, LightQuery, word
+from .light import QUANTITIES, About, AdjointQuery, LightQuery, word
 from .mesh import Elements
 from .remote import How
 from .store import Store
@@ -84,6 +84,8 @@ class Local(Emissions):
             light, values, limited, more = self._at_sensors(query, key, select[key])
         else:
             light, values, limited, more = self._solve(query, query.quantity)
+        if query.stated and key is None and query.at in (None, "elements") and query.tolerance is None and isinstance(self.op, LibraryOperator):
+            more["error"] = self._stated(light, values, query.quantity, ())
         convert = Conversion(light.kind, query.unit, query.quantity, self.about.channels)
         values = convert(values)
         if query.at == "faces" or key == "faces":
@@ -167,6 +169,10 @@ class Local(Emissions):
         if "ugr" in words:
             raise needs_daemon("ugr")
         over = "sensors" if "sensors" in reduce else "groups"
+        if over == "groups" and set(words) <= {"mean", "sum"}:
+            found = self._by_rows(query, words)
+            if found is not None:
+                return found
         if over == "sensors":
             if "sum" in words:
                 raise Refused("sum is of groups alone", kind="wrong-members")
@@ -189,7 +195,93 @@ class Local(Emissions):
         unit = Conversion(light.kind, query.unit, "irradiance" if over == "sensors" else query.quantity, self.about.channels).unit
         figures = {name: {figure: self._figure(figure, x.astype(float), A, reduce.get("at_least"), query.batch) for figure in words}
                    for name, (x, A) in parts.items()}
-        return Figures.of(figures, unit=unit, limited=limited if query.batch or limited is None else limited[0])
+        return Figures.of(figures, unit=unit, limited=limited if query.batch or limited is None else limited[0],
+                          error=(lambda: self._stated_of(query)) if over == "groups" and query.tolerance is None else None)
+
+    def _sources(self, given: Union[Array, Mapping[str, Any]]) -> Optional[Dict[str, Optional[Array]]]:
+        """An emission as rows read it, whatever n is; None: it is to be expanded, or refused."""
+        if isinstance(given, np.ndarray):
+            return {"E": self.about.rows(given)} if np.isfinite(given).all() and not self.op.emitters else None
+        if set(given) - {"groups", "luminaires", "sky", "emitters"}:
+            return None
+        groups: List[int] = []
+        colours: List[Array] = []
+        for name, value in given.get("groups", {}).items():
+            found = self.store.groups.find(name)
+            if isinstance(value, str) or not set(found).isdisjoint(groups):
+                return None
+            groups += found
+            colours += [self._colour(value, f"emission/groups/{name}")] * len(found)
+        made: Dict[str, Optional[Array]] = {"groups": np.array(groups, np.uint32), "exitances": np.array(colours, np.float32)} if groups else {}
+        if "luminaires" in given:
+            made["D"] = self._dimmers_of(given["luminaires"])
+        if "sky" in given:
+            made["L"] = self._sky_of(given["sky"])
+        if "emitters" in given:
+            made["W"] = self._weights_of(given["emitters"])
+        return None if any(made[name].min(initial=0) < 0 for name in ("D", "L", "W") if name in made) else made  # type: ignore[union-attr]
+
+    def _by_rows(self, query: LightQuery, words: Sequence[str]) -> Optional[Figures]:
+        """Means and sums by the rows of the library, which cost nothing that grows with n; None: they do not answer this."""
+        if not isinstance(self.op, LibraryOperator) or self.op.scene is None or query.tolerance is not None or query.photometric is not None:
+            return None
+        assert query.reduce is not None
+        lights = []
+        for emission in query.emissions:
+            light = self._sources(emission)
+            if light is None:
+                return None
+            lights.append(light)
+        names = tuple(query.reduce["groups"])
+        for name in names:
+            self.store.groups.find(name)  # its words for one that is unknown
+        rows = self.op.rows(query.quantity, names)
+        assert rows is not None
+        try:
+            means = rows.means(lights).swapaxes(1, 2)  # [m, C, rows]
+        except Refused:  # of few emitters, whose weights must be found
+            return None
+        if query.limit and (means < 0).any():
+            signs = np.array([[any((light[key][..., c, :] if key == "E" else light[key][:, c]).min(initial=0) < 0  # type: ignore[index]
+                                   for key in ("E", "exitances") if key in light) for c in range(means.shape[1])] for light in lights])
+            means = np.where((means < 0) & ~signs[:, :, None], 0, means)
+        convert = Conversion(self.store.lights, query.unit, query.quantity, self.about.channels)
+        means = convert(means)
+        means = means[:, 0] if means.shape[1] == 1 else means
+        means = means if query.batch else means[0]
+        figures = {}
+        for k, name in enumerate(names):
+            mean = means[..., k]
+            figures[name] = {figure: None if mean.ndim == 0 and np.isnan(mean) else (mean if figure == "mean" else mean * rows.areas[k]).tolist()
+                             for figure in words}
+        return Figures.of(figures, unit=convert.unit, error=lambda: self._stated_of(query))
+
+    def _stated_of(self, query: LightQuery) -> Optional[Dict[str, Any]]:
+        """The stated errors of means of groups, of a batch the largest, as an answer to `reduce` has them."""
+        if not isinstance(self.op, LibraryOperator) or query.reduce is None:
+            return None
+        light, out, _, _ = self._solve(query, query.quantity)
+        groups: Dict[str, Dict[str, Any]] = {}
+        for name in query.reduce["groups"]:
+            found = self._stated(light, out, query.quantity, self.store.groups.find(name))
+            if found is None:
+                return None
+            groups[name] = found
+        worst = max(groups.values(), key=lambda error: error["stated"] or 0)
+        return {**worst, "groups": groups}
+
+    def _stated(self, light: Light, out: Array, quantity: str, groups: Sequence[int]) -> Optional[Dict[str, Any]]:
+        """The largest of a batch; None: nothing is stated."""
+        assert isinstance(self.op, LibraryOperator)
+        found = []
+        for v in range(len(out)):
+            sources = {"W": light.W[v]} if self.op.emitters and light.W is not None else {
+                "E": light.E[v], "L": None if light.L is None else light.L[v], "D": None if light.D is None else light.D[v]}
+            one = self.op.stated(quantity, sources, out[v], groups)
+            if one is None:
+                return None
+            found.append(one)
+        return max(found, key=lambda error: error["stated"] or 0)
 
     @staticmethod
     def _figure(name: str, x: Array, A: Array, limits: Optional[Sequence[float]], batch: bool) -> Any:
@@ -307,10 +399,14 @@ class Local(Emissions):
                 raise Refused(f"a store of few emitters has gradients by emitters and luminaires, not by {name}", kind="not-in-store")
         return {name: array[0] if self.about.channels == 1 else array for name, array in made.items()}
 
-    def jacobian(self, of: Mapping[str, Any], by: Any, how: How) -> Jacobian:
-        """By the light of each column alone."""
-        if set(of) != {"sensors"}:
-            raise Refused("a jacobian is of {\"sensors\": [...]}", kind="wrong-members")
+    def jacobian(self, of: Mapping[str, Any], by: Any, quantity: Optional[str], how: How) -> Jacobian:
+        """Of sensors by the light of each column alone, of groups and elements by adjoints."""
+        if set(of) not in ({"sensors"}, {"groups"}, {"elements"}):
+            raise Refused(f"a jacobian is of sensors, groups or elements, one of them; it is of {', '.join(of) or 'none'}", kind="wrong-members")
+        if "sensors" not in of:
+            return self._jacobian(of, by, word(quantity or "radiosity", QUANTITIES, "quantity"))
+        if quantity not in (None, "irradiance"):
+            raise Refused("the light at sensors is irradiance", kind="wrong-members")
         names = [of["sensors"]] if isinstance(of["sensors"], str) else list(of["sensors"])
         store, about = self.store, self.about
         counts, _ = store.sensor_rows(names)
@@ -338,6 +434,48 @@ class Local(Emissions):
             found = self.light(LightQuery.of(about, emissions, quantity="irradiance", select={"sensors": names}, limit=False), how)
             made[kind] = np.moveaxis(found.values, 0, -1)  # [rows, columns], or [C, rows, columns]
         return Jacobian.of(made, counts, columns)
+
+    def _columns_of(self, by: Any) -> Dict[str, Any]:
+        """The names of the columns of each kind, or their number."""
+        store = self.store
+        there = {"luminaires": list(store.luminaires["names"]) if store.luminaires else [],
+                 "groups": [] if self.op.emitters else store.group_names,
+                 "sky": len(store.sky["tiles"]) if store.sky is not None and not self.op.emitters else 0, "emitters": self.op.names}
+        kinds = [by] if isinstance(by, str) else list(by) if by is not None else [name for name, columns in there.items() if columns]
+        for kind in kinds:
+            if not there[word(kind, tuple(there), "by")]:
+                raise Refused(f"the store has no {kind} to derive by", kind="not-in-store")
+        return {kind: there[kind] for kind in kinds}
+
+    def _jacobian(self, of: Mapping[str, Any], by: Any, quantity: str) -> Jacobian:
+        """Of means of groups, or of values of elements."""
+        (key, wanted), = of.items()
+        columns = self._columns_of(by)
+        names = [wanted] if isinstance(wanted, str) else list(np.atleast_1d(wanted).tolist())
+        found: Dict[str, Array] = {}
+        if key == "elements":
+            chosen = self._selected("elements", names)
+        else:
+            groups = [self.store.groups.find(name) for name in names]
+        if isinstance(self.op, LibraryOperator) and self.op.scene is not None:
+            rows = self.op.rows(quantity, tuple(names)) if key == "groups" else None
+            for kind in columns:
+                matrix = rows.jacobian(kind) if rows is not None else self.op.jacobian(quantity, chosen, kind)
+                assert matrix is not None
+                found[kind] = matrix
+        else:
+            g = np.zeros((len(names), self.about.channels, self.about.n))
+            for k in range(len(names)):
+                if key == "elements":
+                    g[k, :, chosen[k]] = 1
+                else:
+                    inside = np.isin(self.store.group, groups[k]) & self.store.counts
+                    g[k, :, inside] = (self.store.area[inside] / self.store.area[inside].sum())[:, None]
+            query = AdjointQuery(self.about, list(g), True, tuple(columns), quantity)
+            for kind, array in self.adjoint(query, How())[0].items():  # [rows, C, columns]
+                found[kind] = np.moveaxis(array.reshape(len(names), self.about.channels, -1), 0, 1)
+        return Jacobian.of({kind: matrix[0] if self.about.channels == 1 else matrix for kind, matrix in found.items()},
+                           {name: 1 for name in names} if key == "groups" else {}, columns)
 
     # Questions that need a daemon, and materials.
 

@@ -152,8 +152,8 @@ class Remote:
     def adjoint(self, query: AdjointQuery, how: How) -> List[Dict[str, Array]]:
         return [part.gradients(self._ask(part.request(), how)) for part in query.parts()]
 
-    def jacobian(self, of: Mapping[str, Any], by: Any, how: How) -> Jacobian:
-        return jacobian_of(self._ask(jacobian_request(self.about, of, by), how, by_index="elements" in of))
+    def jacobian(self, of: Mapping[str, Any], by: Any, quantity: Optional[str], how: How) -> Jacobian:
+        return jacobian_of(self._ask(jacobian_request(self.about, of, by, quantity), how, by_index="elements" in of))
 
     def skies(self, skies: Sequence[Any], how: How) -> List[Dict[str, Any]]:
         found: List[Dict[str, Any]] = self._ask(skies_request(self.about, skies), how).json()["skies"]

@@ -34,7 +34,7 @@ class Source(Protocol):
     def light(self, query: LightQuery, how: How) -> Answer: ...
     def figures(self, query: LightQuery, how: How) -> Figures: ...
     def adjoint(self, query: AdjointQuery, how: How) -> List[Dict[str, Array]]: ...
-    def jacobian(self, of: Mapping[str, Any], by: Any, how: How) -> Jacobian: ...
+    def jacobian(self, of: Mapping[str, Any], by: Any, quantity: Optional[str], how: How) -> Jacobian: ...
     def skies(self, skies: Sequence[Any], how: How) -> List[Dict[str, Any]]: ...
     def weather(self, gaps: Optional[str], how: How) -> Dict[str, Any]: ...
     def variant(self, name: str, reflectances: Mapping[str, Any], how: How) -> Source: ...
@@ -278,16 +278,22 @@ class Scene:
         query = AdjointQuery.of(self._source.about, cotangent, gradient, quantity, emission, doubles)
         return gradient_of(self._source.adjoint(query, How(timeout, cancel)), gradient)
 
-    def jacobian(self, of: Mapping[str, Any], by: Optional[Strings] = None, *, timeout: Optional[float] = None,
-                 cancel: Optional[threading.Event] = None) -> Jacobian:
-        """Derivatives of the irradiance at sensors, of={"sensors": [...]}, by "luminaires", "groups", "sky" or "emitters".
+    def jacobian(self, of: Mapping[str, Any], by: Optional[Strings] = None, quantity: Optional[str] = None, *,
+                 timeout: Optional[float] = None, cancel: Optional[threading.Event] = None) -> Jacobian:
+        """Derivatives of the irradiance at sensors, of={"sensors": [...]}, of the means of groups, {"groups": [...]}, or of the values of
+        {"elements": [...]}, by "luminaires", "groups", "sky" or "emitters". They are of radiosity unless the quantity is given,
+        but for sensors. Times what the sources give they are the linear answer.
 
         >>> office = lambert.Scene(address + "/office")
         >>> J = office.jacobian({"sensors": ["desks"]}, by=["luminaires"])
         >>> J["luminaires"].shape, J.columns["luminaires"], J.rows["desks"]
         ((100, 3), ['row.0', 'row.1', 'desk'], slice(0, 100, None))
+        >>> J = office.jacobian({"groups": ["floor", "ceiling"]}, "luminaires", "irradiance")
+        >>> means = office.reduce({"luminaires": {"row": 1, "desk": 0.5}}, groups=["floor", "ceiling"], limit=False)
+        >>> bool(abs(J["luminaires"] @ [1, 1, 0.5] - [means[name]["mean"] for name in J.rows]).max() < 1e-3)
+        True
         """
-        return self._source.jacobian(of, by, How(timeout, cancel))
+        return self._source.jacobian(of, by, quantity, How(timeout, cancel))
 
     # Skies and materials.
 
