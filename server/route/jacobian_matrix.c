@@ -18,6 +18,20 @@ size_t jacobian_lights(const scene *s, lam_by kind, size_t *first) {
     return kind == LAM_BY_GROUPS ? l.groups : kind == LAM_BY_LUMINAIRES ? l.luminaires : l.tiles;
 }
 
+static matrix_question question_of(const jacobian_request *request) {
+    return (matrix_question){.quantity = request->of.quantity,
+                             .n_by = request->n_by,
+                             .n_elements = request->of.n_selected,
+                             .by = request->by,
+                             .elements = request->of.selected};
+}
+
+void jacobian_matrix_keep(const scene *s, const jacobian_matrix *m) {
+    if (m->request->kind != JACOBIAN_OF_ELEMENTS || m->known) return;
+    const matrix_question asked = question_of(m->request);
+    matrix_cache_put(s->matrices, &asked, s->n_channels * m->n_rows * m->n_columns, m->values);
+}
+
 bool jacobian_matrix_begin(call *in, const jacobian_request *request, jacobian_matrix *m, problem *why) {
     const scene *s = in->scene;
     size_t first;
@@ -29,6 +43,11 @@ bool jacobian_matrix_begin(call *in, const jacobian_request *request, jacobian_m
     const size_t numbers = bytes_times(bytes_times(s->n_channels, m->n_rows), m->n_columns);
     m->values = call_allocate(in, bytes_times(numbers, sizeof *m->values), "a matrix of derivatives", why);
     if (m->values == NULL) return false;
+    if (request->kind == JACOBIAN_OF_ELEMENTS) {
+        const matrix_question asked = question_of(request);
+        m->known = matrix_cache_find(s->matrices, &asked, numbers, m->values);
+        if (m->known) return true;
+    }
     if (m->by_rows) return request_memory_take(in->memory, adjoint_rows_room(s, m->n_rows), why);
     m->work = call_allocate(in, sensor_columns_work(s, pass) * sizeof *m->work, "solving for lights", why);
     if (m->work == NULL || request->kind != JACOBIAN_AT_SENSORS) return m->work != NULL;
@@ -158,6 +177,7 @@ static bool make_rows(call *in, jacobian_matrix *m, size_t first, size_t count, 
 
 bool jacobian_matrix_make(call *in, jacobian_matrix *m, size_t first, size_t count,
                           batch_workspace *workspace, problem *why) {
+    if (m->known) return true;
     if (m->by_rows) return make_rows(in, m, first, count, workspace, why);
     return (m->request->kind == JACOBIAN_AT_SENSORS ? make_sensors : make_columns)(in, m, first, count,
                                                                                    workspace, why);

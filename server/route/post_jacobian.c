@@ -195,6 +195,7 @@ static void end(call *in, answer *out) {
     const size_t count = in->scene->n_channels * s->matrix.n_rows * s->matrix.n_columns;
     bool good = !s->failed && answer_check_as(s->matrix.values, count, true, &in->accept, &s->why);
     if (good) {
+        jacobian_matrix_keep(in->scene, &s->matrix);
         const bool npy = in->accept.type == MEDIA_NPY;
         good = (npy ? write_npy(in, s, &b) : write_json(in->scene, s, &b)) ||
                problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the answer");

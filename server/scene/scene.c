@@ -231,10 +231,11 @@ done:
     return status;
 }
 
-/* Room for the columns of sensors. */
+/* Room for the columns of sensors, and for matrices of elements. */
 static lam_status make_columns(scene *made, lam_error *error) {
     const sensor_lights lights = scene_sensor_lights(made);
-    if (made->sensors == NULL) return LAM_OK;
+    const lam_status status = matrix_cache_create(made->ledger, &made->matrices, error);
+    if (status != LAM_OK || made->sensors == NULL) return status;
     return sensor_columns_create(sensor_lights_count(&lights), sensor_column_width(made),
                                  SENSOR_COLUMNS_BYTES, made->ledger, &made->columns, error);
 }
@@ -388,12 +389,14 @@ done:
 uint64_t scene_grown(const scene *s) {
     return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) + sensor_columns_held(s->columns) +
            kept_forms_held(scene_mesh_forms(s->mesh)) + scene_elements_held(s->elements) +
-           scene_texts_held(&s->texts) + (s->base == NULL ? scene_sun_held(s->sun) : 0);
+           matrix_cache_held(s->matrices) + scene_texts_held(&s->texts) +
+           (s->base == NULL ? scene_sun_held(s->sun) : 0);
 }
 
 void scene_drop_computed(const scene *s) {
     row_cache_clear(s->rows);
     sensor_columns_clear(s->columns);
+    matrix_cache_clear(s->matrices);
     kept_forms_clear(scene_mesh_forms(s->mesh));
     scene_elements_clear(s->elements);
     scene_texts_clear(&s->texts);
@@ -410,6 +413,7 @@ void scene_release(scene *s) {
     lam_operator_close(s->op);
     row_cache_destroy(s->rows);
     sensor_columns_destroy(s->columns);
+    matrix_cache_destroy(s->matrices);
     scene_mesh_destroy(s->mesh);
     scene_elements_destroy(s->elements);
     scene_texts_free(&s->texts);

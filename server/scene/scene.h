@@ -4,6 +4,7 @@
 #define LAMBERT_SERVER_SCENE_SCENE_H
 
 #include "lambert/lambert.h"
+#include "server/scene/matrix_cache.h"
 #include "server/scene/refined.h"
 #include "server/scene/row_cache.h"
 #include "server/scene/scene_elements.h"
@@ -67,6 +68,7 @@ struct scene {
     memory_ledger *ledger; /* of memory taken later; or NULL */
     row_cache *rows;       /* adjoint rows for linear reductions; any thread */
     sensor_columns *columns;  /* of its sensors; NULL without them */
+    matrix_cache *matrices;   /* of derivatives of elements */
     refined *refined;         /* the refiner of its answers, made when first needed */
     scene_mesh *mesh;         /* its elements as glTF, made when first asked for */
     scene_elements *elements; /* its elements as columns, made when first asked for */

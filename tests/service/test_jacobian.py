@@ -57,6 +57,26 @@ class Jacobian(unittest.TestCase):
                        enumerate(range(names) if kind == "sky" else names)]
                 for kind, names in got["columns"].items() if kind != "emitters"}
 
+    def passes(self):
+        found = next(line for line in self.daemon.get("/metrics").body.decode().splitlines() if line.startswith("lambertd_batch_size_sum"))
+        return float(found.split()[1])
+
+    def test_matrices_of_elements_are_kept(self):
+        """Asked again a matrix has the same bytes and takes no vector, unless another quantity, order or kind is asked for; nine drop the first."""
+        of = {"elements": [3, 0, 9]}
+        asked = [{"of": of}, {"of": {"elements": [0, 3, 9]}}, {"of": of, "quantity": "irradiance"}, {"of": of, "by": ["groups"]}]
+        first = [self.ask("low", body)["jacobian"] for body in asked]
+        self.assertEqual(len({json.dumps(matrix) for matrix in first}), 4)
+        before = self.passes()
+        for _ in range(2):
+            self.assertEqual([self.ask("low", body)["jacobian"] for body in asked], first)
+        self.assertEqual(self.passes(), before)
+        for k in range(9):
+            self.ask("low", {"of": {"elements": [k]}})
+        before = self.passes()
+        self.assertEqual(self.ask("low", asked[0])["jacobian"], first[0])
+        self.assertGreater(self.passes(), before)
+
     def test_each_column_is_the_answer_to_its_light(self):
         for name in OF:
             n, C = self.truth[name].n, self.truth[name].C
