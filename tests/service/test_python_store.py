@@ -223,6 +223,29 @@ class InProcess(PackageCase):
             with self.assertRaisesRegex(lambert.Refused, words):
                 wrong()
 
+    def test_library_refuses_by_name(self):
+        """The words of lam_scene and lam_rows for questions that the package would not ask."""
+        if not LIBRARY:
+            self.skipTest("this build has no shared library")
+        op = lambert.Scene(self.stores["box"], library=LIBRARY)._source.op
+        few = lambert.Scene(self.stores["few"], library=LIBRARY)._source.op
+        E, values = np.ones((3, op.n)), np.ones((3, op.n))
+        for words, wrong in (('the store has no group "flor"; did you mean "floor"', lambda: op.rows("radiosity", ("flor",))),
+                             (r"elements\[1\] = 400, must be below 400", lambda: op.jacobian("radiosity", np.array([0, 400]), "groups")),
+                             ("has a sky, the store has none", lambda: op.rows("radiosity", ("floor",)).means([{"L": np.ones((3, 145))}])),
+                             ("the store has no luminaires", lambda: op.stated("radiosity", {"E": E, "D": np.ones((3, 1))}, values, ())),
+                             ("weights, the store answers any emission", lambda: op.stated("radiosity", {"W": E}, values, ())),
+                             (r"groups\[0\] = 8, must be below 8", lambda: op.rows("radiosity", ("floor",)).means([{"groups": np.array([8]), "exitances": np.ones((1, 3))}])),
+                             (r"groups\[1\] = 99", lambda: op.stated("radiosity", {"E": E}, values, (0, 99))),
+                             ("give its weights", lambda: few.rows("radiosity", ("floor",)).means([{"E": np.ones((few.channels, few.n))}]))):
+            with self.assertRaisesRegex(lambert.Refused, words):
+                wrong()
+        self.assertEqual(op.rows("radiosity", ()).means([{}]).shape, (1, 0, 3))
+        dark = op.rows("radiosity", ("floor",)).means([{}, {"E": E}])
+        self.assertEqual(dark[0].max(), 0)
+        self.assertGreater(dark[1].min(), 0)
+        self.assertEqual(op.stated("radiosity", {}, 0 * values, (0,))["stated"], 0)  # of no light nothing is off
+
     def test_older_library(self):
         """One without lam_scene: the same numbers by whole answers."""
         if not LIBRARY:
