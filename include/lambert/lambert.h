@@ -400,9 +400,9 @@ typedef struct lam_stated {
 } lam_stated;
 
 /* *out = the stated error of an answer, values [C][n] of the quantity under the light: of the mean over some
- * groups together, or of all elements where n_groups is 0. Not finite where no light is reflected. Allocates;
- * cost: O(C n). Errors: LAM_ERR_UNSUPPORTED where the store states nothing of such an answer;
- * LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
+ * groups together, or of all elements where n_groups is 0. Not finite where something shines and nothing is
+ * reflected. Allocates; cost: O(C n). Errors: LAM_ERR_UNSUPPORTED where the store states nothing of such an
+ * answer; LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
 lam_status lam_scene_stated(const lam_scene *scene, lam_quantity quantity, const lam_light *light,
                             const float *values, size_t n_groups, const uint32_t *groups, lam_stated *out,
                             lam_error *error);
