@@ -15,7 +15,7 @@ import sys
 HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 IMPORT = re.compile(r"^\s*(?:from|import) (\w+)", re.M)
 # Changes of these show in no test but those that name them.
-TEXTS = re.compile(r"README\.md|CHANGELOG\.md|LICENSE|\.github/.*|\.ci/.*|\.clang-(format|tidy)|deploy/(docs|examples|python)/.*|"
+TEXTS = re.compile(r"README\.md|CHANGELOG\.md|LICENSE|\.github/.*|\.ci/.*|\.clang-(format|tidy)|deploy/(docs|examples|python|js)/.*|"
                    r"deploy/[^/]*\.(sh|py|png)|store/FORMAT\.md|tests/(quick\.sh|layers\.py|comments\.py|reach\.py|soak/.*|bench/[^/]*\.(py|md))")
 
 
@@ -97,14 +97,14 @@ class Reach:
         self.changed = changed
         self.programs = {name: self.graph.reached(name, changed) for name in ("lambert", "lambertd", "lambert-bench")}
         self.graph.inputs("all")
-        # The page and openapi.json are parts of the daemon.
-        self.page = any(name.startswith("server/") and not name.endswith((".c", ".h")) for name in changed)
+        # The page, its client and openapi.json are parts of the daemon.
+        self.page = any(name.startswith(("server/", "deploy/js/")) and not name.endswith((".c", ".h")) for name in changed)
         self.programs["lambertd"] |= self.page
         self.unknown = sorted(name for name in changed if not self.knows(name))
 
     def knows(self, name):
         return (name in self.graph.known or TEXTS.fullmatch(name) is not None or name.startswith("server/viewer/") or
-                name == "server/route/openapi.json" or re.fullmatch(r"tests/(service|browser)/[^/]*", name) is not None)
+                name == "server/route/openapi.json" or re.fullmatch(r"tests/(service(/javascript)?|browser)/[^/]*", name) is not None)
 
     def test(self, folder, name, command):
         """True where the change can reach a test of a build folder."""
@@ -123,6 +123,7 @@ class Reach:
                 (self.programs["lambert-bench"] and "bench" in text) or
                 any(named_in(change, name + text) for change in self.changed) or
                 ("lambert_python" in text and any(change.startswith("deploy/python/") for change in self.changed)) or
+                (name == "service.javascript" and any(change.startswith("tests/service/javascript/") for change in self.changed)) or
                 (name in ("service.documents", "service.install") and any(TEXTS.fullmatch(c) for c in self.changed)))
 
 

@@ -33,8 +33,8 @@ LIGHTS = """{"luminaires":[{"name":"row","file":"spot.ies","from":[1.5,1.5,2.8],
 POINTS = """{"grids":[{"name":"desks","over":"floor","height":0.85,"spacing":0.5,"border":0.5}]}"""
 
 
-def make_stores(folder):
-    """Stores by name: one of each kind of operator, and of each kind of light and mesh."""
+def make_stores(folder, names=None):
+    """Stores by name, all or those named: one of each kind of operator, and of each kind of light and mesh."""
     root = pathlib.Path(folder)
     for name, text in (("spot.ies", SPOT), ("lights.json", LIGHTS), ("points.json", POINTS)):
         (root / name).write_text(text)
@@ -45,6 +45,8 @@ def make_stores(folder):
     stores = {}
 
     def make(name, scene, *options):
+        if names is not None and name not in names:
+            return
         stores[name] = str(root / f"{name}.h5")
         must("precompute", root / scene, "-o", stores[name], "--probes", 4, "--quiet", *options)
 

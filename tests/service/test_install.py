@@ -76,7 +76,8 @@ class Install(unittest.TestCase):
                      "share/doc/lambert/README.md", "share/doc/lambert/FORMAT.md", "share/doc/lambert/examples/apply_one.c",
                      "share/lambert/bench/service.py", "share/lambert/bench/honesty.py", "share/lambert/bench/cie171.py",
                      "share/lambert/bench/cie171_cases.py", "share/lambert/bench/plots.py",
-                     "share/lambert/python/pyproject.toml", "share/lambert/python/lambert/scene.py", "share/lambert/python/lambert/py.typed"):
+                     "share/lambert/python/pyproject.toml", "share/lambert/python/lambert/scene.py", "share/lambert/python/lambert/py.typed",
+                     "share/lambert/js/package.json", "share/lambert/js/lambert.js", "share/lambert/js/lambert.d.ts"):
             self.assertTrue((self.prefix / name).is_file(), name)
         version = run(self.prefix / "bin" / "lambert", "--version").split()[1]
         self.assertEqual(self.flags("--modversion"), [version])
