@@ -22,6 +22,7 @@ const result = await esbuild.build({
     metafile: true,
     legalComments: "none",
     nodePaths: [modules],
+    alias: { "lambert-light": join(sources, "../../deploy/js/lambert.js") },
     absWorkingDir: sources,
     logLevel: "warning",
 });

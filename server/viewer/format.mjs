@@ -1,8 +1,8 @@
-// Layout of the viewer's sources: node format.mjs MODULES [--write]
+// Layout of the sources of the viewer and of Lambert's client: node format.mjs MODULES [--write]
 //   MODULES  the node_modules that `npm ci` made, with the packages for development
 // Names the files that dprint would lay out otherwise, and with --write lays them out. It breaks no comments: files
 // with long ones are named, too.
-import { readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { existsSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -23,8 +23,11 @@ formatter.setConfig({ lineWidth: WIDTH, indentWidth: 4 }, {
 /** What is laid out once may still be laid out otherwise. */
 const PASSES_MOST = 4;
 
+// Lambert's client stands elsewhere in the tree, and beside the copy of these sources that is checked.
+const client = ["js", "../../deploy/js"].find((name) => existsSync(join(folder, name))) ?? "js";
 const files = [...readdirSync(join(folder, "src"), { recursive: true }).map((name) => join("src", name)),
-    ...readdirSync(folder)].filter((name) => /\.(ts|mjs)$/.test(name));
+    ...readdirSync(folder), ...["lambert.js", "lambert.d.ts"].map((name) => join(client, name))]
+    .filter((name) => /\.(ts|mjs|js)$/.test(name));
 for (const name of files) {
     const filePath = join(folder, name), text = readFileSync(filePath, "utf8");
     let laid = text;

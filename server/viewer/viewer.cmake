@@ -70,7 +70,7 @@ else()
   file(GLOB_RECURSE viewer_sources CONFIGURE_DEPENDS ${viewer_source}/src/*)
   add_custom_command(OUTPUT ${viewer_build}/out/viewer_files.c COMMENT "Bundling the viewer"
                      COMMAND ${LAMBERT_NODE} ${viewer_source}/build.mjs ${viewer_source} ${viewer_build}/node_modules ${viewer_build}/out
-                     DEPENDS ${viewer_sources} ${viewer_source}/build.mjs ${viewer_source}/page.html ${viewer_source}/icon.svg
+                     DEPENDS ${viewer_sources} ${viewer_source}/../../deploy/js/lambert.js ${viewer_source}/build.mjs ${viewer_source}/page.html ${viewer_source}/icon.svg
                              ${viewer_build}/installed)
   target_sources(lambert_service PRIVATE ${viewer_build}/out/viewer_files.c)
 endif()

@@ -8,6 +8,7 @@ export function sourceOf(module) {
     const { buildSync } = createRequire(join(process.env.MODULES, "of-the-test.js"))("esbuild");
     const { outputFiles: [{ text }] } = buildSync({
         entryPoints: [join(process.env.VIEWER, "src", `${module}.ts`)], bundle: true, format: "esm", write: false, nodePaths: [process.env.MODULES],
+        alias: { "lambert-light": join(process.env.VIEWER, "../../deploy/js/lambert.js") },
     });
     return import(`data:text/javascript;base64,${Buffer.from(text).toString("base64")}`);
 }

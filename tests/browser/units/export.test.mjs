@@ -1,27 +1,12 @@
-// What leaves the page: halves, numbers as text, commands and programs; differences, and names of variants.
+// What leaves the page: numbers as text, commands and programs; differences, and names of variants.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { test } from "node:test";
 import { sourceOf } from "../source.mjs";
 
-const [half, csv, snippets, changes, variants, request, state] = await Promise.all(
-    ["base/half", "base/csv", "state/snippets", "picture/changes", "state/variants", "state/request", "state/state"].map(sourceOf));
+const [csv, snippets, changes, variants, request, state] = await Promise.all(
+    ["base/csv", "state/snippets", "picture/changes", "state/variants", "state/request", "state/state"].map(sourceOf));
 const run = (program, args, options = {}) => execFileSync(program, args, { encoding: "utf8", ...options });
-
-test("a number has the nearest half", () => {
-    // Every half is its own nearest; between two neighbours the nearer one is taken, the even one in the middle.
-    for (let bits = 0; bits < 0x7c00; bits++) {
-        const value = half.halfToNumber(bits), next = half.halfToNumber(bits + 1);
-        for (const sign of [1, -1]) assert.equal(half.numberToHalf(sign * value) & 0x7fff, bits);
-        if (bits === 0x7bff) continue;
-        const middle = (value + next) / 2;
-        assert.equal(half.numberToHalf(middle), bits + (bits & 1));
-        assert.equal(half.numberToHalf(value + 0.4375 * (next - value)), bits);
-        assert.equal(half.numberToHalf(value + 0.5625 * (next - value)), bits + 1);
-    }
-    assert.deepEqual([65519, 65520, 1e9, -1e9, Infinity].map(half.numberToHalf), [0x7bff, 0x7c00, 0x7c00, 0xfc00, 0x7c00]);
-    assert.ok(Number.isNaN(half.halfToNumber(half.numberToHalf(NaN))));
-});
 
 test("a number in text reads as the same", () => {
     for (const value of [0, 1, 0.1, 1 / 3, 16777217, 1e-38, 3.4e38, 17, 1e-45].map(Math.fround))

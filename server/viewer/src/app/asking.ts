@@ -1,7 +1,7 @@
 // Asks the daemon for the values that the state wants, for both sides of a comparison, and has the answers shown.
+import { Newest } from "lambert-light";
 import type { Api, Description, Quantity } from "../daemon/api.ts";
 import type { SkyShare } from "../daylight/scene_sky.ts";
-import { Newest } from "../daemon/newest.ts";
 import { Field } from "../picture/field.ts";
 import type { Comparable } from "../state/comparable.ts";
 import type { SceneLuminaires } from "../state/luminaires.ts";

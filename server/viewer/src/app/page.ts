@@ -1,7 +1,8 @@
 // What the parts of the page know of each other: each is given a Page, and takes of it what it needs. Only app.ts knows
 // who does it.
+import type { SceneLine } from "lambert-light";
 import type { Observable } from "../base/events.ts";
-import type { Api, Description, SceneLine } from "../daemon/api.ts";
+import type { Api, Description } from "../daemon/api.ts";
 import type { SceneSky } from "../daylight/scene_sky.ts";
 import type { Cameras } from "../picture/cameras.ts";
 import type { Field } from "../picture/field.ts";

@@ -1,7 +1,7 @@
 // Goes on after what went wrong: a daemon that is away or busy, a token that is missing, a store that was replaced or
 // is gone.
 import { Events } from "../base/events.ts";
-import { Lost, Problem, type Description } from "../daemon/api.ts";
+import { isLost, isProblem, wordsOf, type Description } from "../daemon/api.ts";
 import { Watch } from "../daemon/watch.ts";
 import type { Store } from "../state/store.ts";
 import { Replaced } from "./asking.ts";
@@ -51,21 +51,21 @@ export class Recovery extends Events<News> implements Tell {
         if (reason instanceof DOMException && reason.name === "AbortError") return;
         const { scene, scene: { loading } } = this;
         scene.load(null);
-        if (reason instanceof Lost) {
+        if (isLost(reason)) {
             if (loading !== null && loading !== "" && scene.now !== null) this.missed = loading;
             this.watch.lose("The daemon does not answer. This page asks again each second and goes on by itself.");
             return;
         }
-        if (reason instanceof Problem && reason.status === 401) {
+        if (isProblem(reason) && reason.status === 401) {
             this.tell("token");
             return;
         }
-        if (reason instanceof Problem && reason.status === 503) {
-            this.watch.lose(`The daemon is busy: ${reason.message}. This page goes on by itself.`);
+        if (isProblem(reason) && reason.status === 503) {
+            this.watch.lose(`The daemon is busy: ${reason.detail}. This page goes on by itself.`);
             return;
         }
         if (reason instanceof Replaced
-            || (reason instanceof Problem && UNFIT.includes(reason.status) && loading === null))
+            || (isProblem(reason) && UNFIT.includes(reason.status) && loading === null))
         {
             this.renew().then((is) => {
                 if (!is) this.complain(reason);
@@ -92,18 +92,16 @@ export class Recovery extends Events<News> implements Tell {
 
     /** `isShown`: the request was for the scene that is shown. */
     private complain(reason: unknown, isShown = true): void {
-        if (reason instanceof Lost) return this.fail(reason);
+        if (isLost(reason)) return this.fail(reason);
         const name = this.scene.now?.description.name ?? "";
-        if (reason instanceof Problem && reason.status === 404 && isShown && name !== "") {
+        if (isProblem(reason) && reason.status === 404 && isShown && name !== "") {
             this.problem = `The daemon serves ${name} no more; the picture is its last. Choose another scene above.`;
             void this.ask.scenes().catch(() => undefined);
             return this.tell("problem", this.problem);
         }
-        this.problem = reason instanceof Problem
-            ? `The daemon did not do what this page asked for (${reason.status}): ${reason.message}`
-            : reason instanceof Error
-            ? reason.message
-            : String(reason);
+        this.problem = isProblem(reason)
+            ? `The daemon did not do what this page asked for (${reason.status}): ${reason.detail}`
+            : wordsOf(reason);
         this.tell("problem", this.problem);
         this.scene.tell("scenes");
     }

@@ -1,8 +1,7 @@
 // Asks for the light at sensors, after each answer that the picture shows: one request at a time, and of those that
 // wait the newest.
-import { readNpy } from "../base/npy.ts";
-import { Problem, type Api } from "../daemon/api.ts";
-import { Newest } from "../daemon/newest.ts";
+import { Newest, readNpy } from "lambert-light";
+import { isProblem, type Api } from "../daemon/api.ts";
 import { darkValuesOf, valuesOf, type SceneSensors } from "../state/sensors.ts";
 import type { Wanted } from "../state/request.ts";
 import type { Store } from "../state/store.ts";
@@ -28,8 +27,8 @@ export class Sensing {
             (reason) => {
                 this.key = "";
                 // The store may have no values at sensors, or none under such light; the picture goes on.
-                const isRefused = reason instanceof Problem && reason.status === 422;
-                scene.sense({ values: null, refused: isRefused ? reason.message : null });
+                const isRefused = isProblem(reason) && reason.status === 422;
+                scene.sense({ values: null, refused: isRefused ? reason.detail : null });
                 if (!isRefused) fail(reason);
             }, 1);
         scene.on("field", () => this.ask());

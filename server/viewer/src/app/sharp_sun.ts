@@ -1,7 +1,6 @@
 // The sun drawn sharp: from its true direction, with shadows by the mesh, in place of the tiles that the store's
 // numbers have for it. The light that the sun's own light casts further, and all other light, stay the daemon's.
-import { floatsToHalves, halfToNumber } from "../base/half.ts";
-import { Newest } from "../daemon/newest.ts";
+import { floatsToHalves, halfToNumber, Newest } from "lambert-light";
 import type { Description } from "../daemon/api.ts";
 import type { SunParts } from "../daylight/made_sky.ts";
 import { Field } from "../picture/field.ts";

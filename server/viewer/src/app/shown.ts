@@ -1,6 +1,6 @@
 // What is loaded of the scene and shown: the picture follows the state and the answers.
+import type { SceneLine } from "lambert-light";
 import { Events } from "../base/events.ts";
-import type { SceneLine } from "../daemon/api.ts";
 import type { SceneSky } from "../daylight/scene_sky.ts";
 import { Cameras } from "../picture/cameras.ts";
 import type { Field } from "../picture/field.ts";

@@ -1,14 +1,6 @@
-// Asks the daemon. Knows its routes and their JSON, and nothing of pictures.
-import { readNpy, type Npy } from "../base/npy.ts";
+// Asks the daemon, by Lambert's client of deploy/js. Knows the routes and their JSON, and nothing of pictures.
+import { connect, LambertError, type Daemon, type Npy, type Request, type SceneLine } from "lambert-light";
 import type { Gaps, Place, SkyMade, SkyRequest, SkyTiles, SunPositions, WeatherRows } from "./daylight.ts";
-
-export interface SceneLine {
-    name: string;
-    elements: number;
-    channels: number;
-    kind: string;
-    bytes: number;
-}
 
 export type ErrorFigures = { [name: string]: number };
 
@@ -101,21 +93,22 @@ export type Emission = { [member: string]: unknown };
 export const QUANTITIES = ["radiosity", "irradiance", "indirect"] as const;
 export type Quantity = (typeof QUANTITIES)[number];
 
-/** An answer that is no success: what the problem document says. */
-export class Problem extends Error {
-    constructor(readonly status: number, detail: string, readonly retryAfter: number) {
-        super(detail);
-    }
-}
-
-/** The daemon did not answer. */
-export class Lost extends Error {}
-
 const TOKEN_KEY = "lambert-token";
 
 export class Api {
+    /** The page waits for what it asks, and goes on by itself after a daemon that is busy. */
+    private readonly connected = connect(new URL(".", document.baseURI), { timeout: null, retries: 0 });
+
+    /** With the token of now. */
+    private get daemon(): Daemon {
+        this.connected.token = this.token;
+        return this.connected;
+    }
+
     /** Requests so far, for the tests and the curious. */
-    asked = 0;
+    get asked(): number {
+        return this.connected.asked;
+    }
 
     get token(): string | null {
         return sessionStorage.getItem(TOKEN_KEY);
@@ -126,36 +119,13 @@ export class Api {
         else sessionStorage.setItem(TOKEN_KEY, value);
     }
 
-    async ask(path: string, init: RequestInit = {}, accept = "application/json"): Promise<Response> {
-        const headers = new Headers(init.headers);
-        headers.set("Accept", accept);
-        if (this.token !== null) headers.set("Authorization", `Bearer ${this.token}`);
-        this.asked += 1;
-        let response: Response;
-        try {
-            response = await fetch(path, { ...init, headers, credentials: "omit" });
-        } catch (reason) {
-            if (reason instanceof DOMException && reason.name === "AbortError") throw reason;
-            throw new Lost("the daemon does not answer");
-        }
-        if (response.ok) return response;
-        const text = await response.text();
-        let detail = `${response.status} ${response.statusText}`;
-        try {
-            detail = (JSON.parse(text) as { detail?: string }).detail ?? detail;
-        } catch {
-            // A proxy may have answered in words of its own.
-        }
-        throw new Problem(response.status, detail, Number(response.headers.get("Retry-After") ?? 0));
+    /** The JSON of an answer. */
+    private async get(path: string): Promise<unknown> {
+        return (await this.daemon.ask("GET", path)).json();
     }
 
-    private post(path: string, body: unknown, accept: string, signal?: AbortSignal): Promise<Response> {
-        return this.ask(path, {
-            method: "POST",
-            body: JSON.stringify(body),
-            headers: { "Content-Type": "application/json" },
-            ...(signal === undefined ? {} : { signal }),
-        }, accept);
+    private async post(path: string, body: object, signal?: AbortSignal): Promise<unknown> {
+        return (await this.daemon.post(path, body, signalled(signal))).json();
     }
 
     /** Relative to the page, which may stand below any path of a proxy. */
@@ -163,103 +133,91 @@ export class Api {
         return `v1/scenes/${encodeURIComponent(scene)}${what}`;
     }
 
-    async isReady(): Promise<boolean> {
-        try {
-            return (await fetch("readyz", { cache: "no-store" })).ok;
-        } catch {
-            return false;
-        }
+    isReady(): Promise<boolean> {
+        return this.daemon.health();
     }
 
-    async scenes(): Promise<SceneLine[]> {
-        return ((await (await this.ask("v1/scenes")).json()) as { scenes: SceneLine[] }).scenes;
+    scenes(): Promise<SceneLine[]> {
+        return this.daemon.scenes();
     }
 
     async describe(scene: string): Promise<Description> {
-        const answer = await this.ask(Api.path(scene));
-        if (answer.status === 202) throw new Problem(202, `${scene} is being built; open it again in a while.`, 1);
-        return (await answer.json()) as Description;
+        const answer = await this.daemon.ask("GET", Api.path(scene), { accepted: [200, 202] });
+        if (answer.status === 200) return answer.json() as Description;
+        throw new LambertError(`${scene} is being built; open it again in a while.`, { status: 202, kind: "building" });
+    }
+
+    /** True when a variant that is being made is served. */
+    async isServed(path: string): Promise<boolean> {
+        return (await this.daemon.ask("GET", path, { accepted: [200, 202] })).status === 200;
     }
 
     async sky(scene: string): Promise<SkyTiles> {
-        return (await (await this.ask(Api.path(scene, "/sky"))).json()) as SkyTiles;
+        return (await this.get(Api.path(scene, "/sky"))) as SkyTiles;
     }
 
     /** In the order of their gradients. */
     async luminaires(scene: string): Promise<Luminaire[]> {
-        return ((await (await this.ask(Api.path(scene, "/luminaires"))).json()) as { luminaires: Luminaire[] })
-            .luminaires;
+        return ((await this.get(Api.path(scene, "/luminaires"))) as { luminaires: Luminaire[] }).luminaires;
     }
 
     /** In the order of their values. */
     async sensors(scene: string): Promise<SensorSet[]> {
-        return ((await (await this.ask(Api.path(scene, "/sensors"))).json()) as { sets: SensorSet[] }).sets;
+        return ((await this.get(Api.path(scene, "/sensors"))) as { sets: SensorSet[] }).sets;
     }
 
     /** Radiances of the tiles of a scene. */
     async makeSky(scene: string, sky: SkyRequest): Promise<SkyMade> {
-        const answer = await this.post(Api.path(scene, "/skies"), { sky }, "application/json");
-        return ((await answer.json()) as { skies: SkyMade[] }).skies[0];
+        return ((await this.post(Api.path(scene, "/skies"), { sky })) as { skies: SkyMade[] }).skies[0];
     }
 
     /** At hours of a year of 365 days. */
-    async sunPositions(place: Place, hours: readonly number[]): Promise<SunPositions> {
-        return (await (await this.post("v1/sun", { place, hours }, "application/json")).json()) as SunPositions;
+    sunPositions(place: Place, hours: readonly number[]): Promise<SunPositions> {
+        return this.daemon.sun(place, hours);
     }
 
     /** The rows of a weather file, of which the daemon keeps nothing. */
     async readWeather(text: string, gaps: Gaps): Promise<WeatherRows> {
-        return (await (await this.post("v1/weather", { text, gaps }, "application/json")).json()) as WeatherRows;
+        return (await this.post("v1/weather", { text, gaps })) as WeatherRows;
     }
 
     /** Those of the weather file beside the store. */
     async weatherBeside(scene: string, gaps: Gaps): Promise<WeatherRows> {
-        return (await (await this.post(Api.path(scene, "/weather"), { gaps }, "application/json"))
-            .json()) as WeatherRows;
+        return (await this.post(Api.path(scene, "/weather"), { gaps })) as WeatherRows;
     }
 
     async mesh(scene: string): Promise<ArrayBuffer> {
-        return (await this.ask(Api.path(scene, "/mesh"), {}, "model/gltf-binary")).arrayBuffer();
+        return (await this.daemon.ask("GET", Api.path(scene, "/mesh"), { accept: "model/gltf-binary" })).body;
     }
 
     /** [C][n] values, or [n] of one channel, in half precision; `request` has the emission and the quantity. */
     async radiosity(scene: string, request: object,
         signal?: AbortSignal): Promise<{ values: Npy; solveMs: number | null }>
     {
-        const response = await this.post(Api.path(scene, "/radiosity"), request, "application/x-npy; dtype=f2", signal);
-        return { values: readNpy(await response.arrayBuffer()), solveMs: Api.solveMs(response) };
+        const reply = await this.daemon.post(Api.path(scene, "/radiosity"), request, {
+            accept: "application/x-npy; dtype=f2",
+            ...signalled(signal),
+        });
+        return { values: reply.npy(), solveMs: reply.times.solve ?? null };
     }
 
     /** The same in single precision, as an NPY file. A request with a tolerance has a certificate. */
     async floats(scene: string, request: object, signal?: AbortSignal): Promise<Floats> {
-        const response = await this.post(Api.path(scene, "/radiosity"), request, "application/x-npy; dtype=f4", signal);
-        const number = (
-            name: string,
-        ): number | null => (response.headers.has(name) ? Number(response.headers.get(name)) : null);
-        return {
-            file: await response.arrayBuffer(),
-            certificate: number("Lambert-Certificate"),
-            iterations: number("Lambert-Iterations"),
-            solveMs: Api.solveMs(response),
-        };
-    }
-
-    private static solveMs(response: Response): number | null {
-        const solve = /solve;dur=([\d.]+)/.exec(response.headers.get("Server-Timing") ?? "");
-        return solve === null ? null : Number(solve[1]);
+        const reply = await this.daemon.post(Api.path(scene, "/radiosity"), request, {
+            accept: "application/x-npy; dtype=f4",
+            ...signalled(signal),
+        });
+        return { file: reply.body, certificate: reply.number("Lambert-Certificate"),
+            iterations: reply.number("Lambert-Iterations"), solveMs: reply.times.solve ?? null };
     }
 
     /** The same as JSON, with its error, for selected elements, reductions and refinements. */
     async answer(scene: string, request: object, signal?: AbortSignal): Promise<{ [member: string]: unknown }> {
-        return (await (await this.post(Api.path(scene, "/radiosity"), request, "application/json", signal)).json()) as {
-            [member: string]: unknown;
-        };
+        return (await this.post(Api.path(scene, "/radiosity"), request, signal)) as { [member: string]: unknown };
     }
 
     async adjoint(scene: string, request: object, signal?: AbortSignal): Promise<{ [member: string]: unknown }> {
-        return (await (await this.post(Api.path(scene, "/adjoint"), request, "application/json", signal)).json()) as {
-            [member: string]: unknown;
-        };
+        return (await this.post(Api.path(scene, "/adjoint"), request, signal)) as { [member: string]: unknown };
     }
 
     /** Makes a variant of reflectances, or removes it (groups null); its name is NAME@variant. The path of one that is
@@ -267,12 +225,27 @@ export class Api {
     async vary(scene: string, variant: string,
         groups: { [name: string]: number | readonly number[] } | null): Promise<string | null>
     {
-        const response = await this.ask(Api.path(scene, "/reflectance"), {
-            method: groups === null ? "DELETE" : "PUT",
-            headers: { "Content-Type": "application/json" },
-            body: JSON.stringify(groups === null ? { variant } : { variant, groups }),
-        });
-        const location = response.headers.get("Location");
-        return location === null ? null : new URL(location, response.url).href;
+        const path = Api.path(scene, "/reflectance"), isMade = groups !== null;
+        const reply = await this.daemon.post(path, isMade ? { variant, groups } : { variant },
+            isMade ? { method: "PUT", accepted: [202] } : { method: "DELETE", accepted: [204] });
+        const location = reply.header("Location");
+        return location === null ? null : new URL(location, new URL(path, document.baseURI)).href;
     }
+}
+
+const signalled = (signal: AbortSignal | undefined): Request => (signal === undefined ? {} : { signal });
+
+/** The daemon answered that it does not do what it was asked for. */
+export function isProblem(reason: unknown): reason is LambertError & { status: number } {
+    return reason instanceof LambertError && reason.status !== null;
+}
+
+/** The daemon did not answer. */
+export function isLost(reason: unknown): boolean {
+    return reason instanceof LambertError && reason.kind === "disconnected";
+}
+
+/** What went wrong, without the request that it was about. */
+export function wordsOf(reason: unknown): string {
+    return reason instanceof LambertError ? reason.detail : reason instanceof Error ? reason.message : String(reason);
 }

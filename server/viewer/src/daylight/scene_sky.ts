@@ -1,6 +1,6 @@
 // The sky of the scene that is open, by the daemon, from the weather beside its store or a file that was picked, and
 // those of scenes that it is compared with.
-import { Problem, type Api, type Description } from "../daemon/api.ts";
+import { isProblem, type Api, type Description } from "../daemon/api.ts";
 import type { Gaps, SkyTiles, WeatherRows } from "../daemon/daylight.ts";
 import type { ExactSun } from "../state/request.ts";
 import { isSolo, type Lighting, type SkyLight } from "../state/state.ts";
@@ -87,8 +87,8 @@ export class SceneSky {
             if (open === this.open) source.takeWeather(rows, file === null && gaps === "refuse");
             return open === this.open;
         } catch (reason) {
-            if (!(reason instanceof Problem) || reason.status !== 422) throw reason;
-            source.problem = `${file === null ? BESIDE : file.name} is not taken: ${reason.message}.`;
+            if (!isProblem(reason) || reason.status !== 422) throw reason;
+            source.problem = `${file === null ? BESIDE : file.name} is not taken: ${reason.detail}.`;
             return false;
         }
     }
@@ -130,8 +130,8 @@ export class SceneSky {
             fetched.answer = await this.api.sky(name);
             if (fetched.answer.weather !== null) fetched.weather = await this.api.weatherBeside(name, "refuse");
         } catch (reason) {
-            if (fetched.answer !== null && reason instanceof Problem && reason.status === 422)
-                fetched.problem = `${BESIDE} is not taken: ${reason.message}.`;
+            if (fetched.answer !== null && isProblem(reason) && reason.status === 422)
+                fetched.problem = `${BESIDE} is not taken: ${reason.detail}.`;
             else fetched.reason = reason;
         }
         return fetched;

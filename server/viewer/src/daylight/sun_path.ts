@@ -1,8 +1,8 @@
 // Where the sun stands during the day of a lighting, whether it shines or not: asked of the daemon once a day and
 // place.
+import { Newest } from "lambert-light";
 import type { Api } from "../daemon/api.ts";
 import type { SunPositions } from "../daemon/daylight.ts";
-import { Newest } from "../daemon/newest.ts";
 import type { SkyLight } from "../state/state.ts";
 import { hourOfYear } from "./dates.ts";
 import { placeOf } from "./sky_request.ts";

@@ -1,7 +1,6 @@
 // Two scenes or two lightings of one scene, side by side or as their difference, with the numbers of that.
+import { halvesToFloats, readNpy } from "lambert-light";
 import { button, choice, fill, make } from "../base/dom.ts";
-import { halvesToFloats } from "../base/half.ts";
-import { readNpy } from "../base/npy.ts";
 import { count, percent, numberText } from "../base/numbers.ts";
 import type { Page } from "../app/page.ts";
 import { changesOf, roundUp, type Changes } from "../picture/changes.ts";

@@ -1,7 +1,7 @@
 // Takes what is shown out of the page: a picture, the numbers, the request as a command or a program.
+import { readNpy } from "lambert-light";
 import { button, make, tick } from "../base/dom.ts";
 import { csvOf, sensorLinesOf } from "../base/csv.ts";
-import { readNpy } from "../base/npy.ts";
 import type { Page } from "../app/page.ts";
 import { drawLegend, SIDE_MOST, snapshot, type Legend } from "../picture/snapshot.ts";
 import { vectorOf, valuesOf } from "../state/sensors.ts";

@@ -1,8 +1,9 @@
 // Reflectances of groups, which make a variant of the scene where the daemon allows it; and the variants that there
 // are.
+import type { LambertError } from "lambert-light";
 import { fromHex, toHex } from "../base/colour.ts";
 import { button, fill, make } from "../base/dom.ts";
-import { Problem, type Api } from "../daemon/api.ts";
+import { isProblem, type Api } from "../daemon/api.ts";
 import type { OpenScene, Page } from "../app/page.ts";
 import type { MeshGroup } from "../picture/glb.ts";
 import { baseOf, checkReflectances, type Reflectances } from "../state/variants.ts";
@@ -30,7 +31,7 @@ function plain(all: Reflectances): { [group: string]: number | number[] } {
 async function isServed(api: Api, path: string): Promise<boolean> {
     const start = performance.now();
     for (let wait = 100;; wait = Math.min(2000, 1.5 * wait)) {
-        if ((await api.ask(path)).status === 200) return true;
+        if (await api.isServed(path)) return true;
         if (performance.now() - start > PATIENCE_MS) return false;
         await pause(wait);
     }
@@ -60,8 +61,8 @@ export function materialsPanel({ store, scene, ask, tell }: Page): Panel {
         try {
             await what();
         } catch (reason) {
-            said.textContent = reason instanceof Problem ? inWords(reason) : "";
-            if (!(reason instanceof Problem) || reason.status === 401) tell.fail(reason);
+            said.textContent = isProblem(reason) ? inWords(reason) : "";
+            if (!isProblem(reason) || reason.status === 401) tell.fail(reason);
         } finally {
             isBusy = false;
         }
@@ -136,7 +137,7 @@ export function materialsPanel({ store, scene, ask, tell }: Page): Panel {
 }
 
 /** A refusal in plain words; the daemon's own say which option it lacks. */
-function inWords(problem: Problem): string {
+function inWords(problem: LambertError & { status: number }): string {
     const lead: { [status: number]: string } = {
         403: "This daemon does not allow that",
         404: "It is not there any more",
@@ -146,7 +147,7 @@ function inWords(problem: Problem): string {
         501: "This daemon cannot do that yet",
     };
     const start = lead[problem.status];
-    return start === undefined ? problem.message : `${start}: ${problem.message}.`;
+    return start === undefined ? problem.detail : `${start}: ${problem.detail}.`;
 }
 
 /** One number for stores of one channel, red, green and blue with a swatch for three. */

@@ -1,9 +1,9 @@
 // The sky of a store that has one: its model, place and time, a day that goes by, and the weather file.
+import { Newest } from "lambert-light";
 import type { Page } from "../app/page.ts";
 import { button, choice, fill, make, tick } from "../base/dom.ts";
 import { count, numberText } from "../base/numbers.ts";
 import type { Gaps } from "../daemon/daylight.ts";
-import { Newest } from "../daemon/newest.ts";
 import { dateOf, dayOf } from "../daylight/dates.ts";
 import { placeOf } from "../daylight/sky_request.ts";
 import type { Sky } from "../daylight/made_sky.ts";

@@ -1,11 +1,9 @@
 // How far the numbers can be trusted: the error of this lighting and of the store, how it was made, a certificate on
 // request.
+import { floatsToHalves, Newest, readNpy } from "lambert-light";
 import { fill, make, button } from "../base/dom.ts";
-import { floatsToHalves } from "../base/half.ts";
-import { readNpy } from "../base/npy.ts";
 import { count, percent, numberText } from "../base/numbers.ts";
-import { Problem, type Description, type ErrorFigures, type GroupErrors } from "../daemon/api.ts";
-import { Newest } from "../daemon/newest.ts";
+import { isProblem, wordsOf, type Description, type ErrorFigures, type GroupErrors } from "../daemon/api.ts";
 import type { OpenScene, Page } from "../app/page.ts";
 import { Field } from "../picture/field.ts";
 import type { Wanted } from "../state/request.ts";
@@ -56,7 +54,7 @@ export function trustPanel(page: Page): Panel {
         (error) => fill(own, ...ownError(error)),
         (reason) => {
             asked = "";
-            fill(own, make("p", { class: "hint" }, reason instanceof Error ? reason.message : String(reason)));
+            fill(own, make("p", { class: "hint" }, wordsOf(reason)));
         },
         1,
     );
@@ -239,12 +237,10 @@ function certifier({ store, scene, ask, tell }: Page): { element: HTMLElement; r
             }, (reason: unknown) => {
                 if (mine.signal.aborted) return;
                 store.settle({ ...store.now, tolerance: null });
-                said.textContent = reason instanceof Problem && reason.status === 422
-                    ? `Not certified: ${reason.message}.`
-                    : reason instanceof Error
-                    ? reason.message
-                    : String(reason);
-                if (!(reason instanceof Problem) || reason.status === 401) tell.fail(reason);
+                said.textContent = isProblem(reason) && reason.status === 422
+                    ? `Not certified: ${reason.detail}.`
+                    : wordsOf(reason);
+                if (!isProblem(reason) || reason.status === 401) tell.fail(reason);
             }).finally(() => {
                 if (onItsWay === mine) onItsWay = null;
             });

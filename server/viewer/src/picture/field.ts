@@ -1,7 +1,6 @@
 // The values of all elements as one answer brought them: half precision as it came, planar by channel, times a scale.
+import { halfToNumber, halvesToFloats, type Npy } from "lambert-light";
 import { LUMINANCE } from "../base/colour.ts";
-import { halfToNumber, halvesToFloats } from "../base/half.ts";
-import type { Npy } from "../base/npy.ts";
 
 export class Field {
     readonly elements: number;

@@ -1,7 +1,7 @@
 // The scenes that can be compared with the open one: those that take the same lighting on as many elements. Nothing is
 // asked of any other.
 import { count } from "../base/numbers.ts";
-import { Problem, type Description, type Luminaire } from "../daemon/api.ts";
+import { isProblem, type Description, type Luminaire } from "../daemon/api.ts";
 
 const namesOf = (list: readonly { name: string }[]): string => JSON.stringify(list.map((group) => group.name).sort());
 
@@ -77,8 +77,8 @@ export class Comparable {
             if (open === this.open) this.admitted.set(name, there);
             return null;
         } catch (reason) {
-            if (!(reason instanceof Problem) || reason.status === 401 || reason.status === 503) throw reason;
-            return `${name} cannot be compared: ${reason.message}.`;
+            if (!isProblem(reason) || reason.status === 401 || reason.status === 503) throw reason;
+            return `${name} cannot be compared: ${reason.detail}.`;
         }
     }
 }

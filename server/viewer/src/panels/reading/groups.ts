@@ -1,10 +1,10 @@
 // The quantity shown, by group. The mean is the daemon's, by `reduce`: linear, so that its adjoint rows answer it
 // whatever the number of elements. Least, largest and uniformity are of the luminance of each element, which the
 // picture has.
+import { Newest } from "lambert-light";
 import { button, fill, make } from "../../base/dom.ts";
 import { numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
-import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { glassText } from "../../picture/glb.ts";
 import { figuresOf, type Figures } from "../../picture/scale.ts";

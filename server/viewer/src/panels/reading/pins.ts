@@ -1,10 +1,10 @@
 // The elements that are pinned, and the one under the pointer, with all that is known of them. What the picture shows
 // follows each answer at once; radiosity and irradiance come exactly, by JSON of these elements alone.
+import { Newest } from "lambert-light";
 import { button, fill, make } from "../../base/dom.ts";
 import { count, numberText } from "../../base/numbers.ts";
 import type { Page } from "../../app/page.ts";
 import type { Quantity } from "../../daemon/api.ts";
-import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { glassText } from "../../picture/glb.ts";
 import { emissionOf, quantityShown, unitOf } from "../../state/state.ts";

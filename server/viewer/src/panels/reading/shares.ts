@@ -1,9 +1,9 @@
 // Which lamp lights this point: one adjoint request for an element, then every lighting is read off it without another.
+import { Newest } from "lambert-light";
 import { fill, make } from "../../base/dom.ts";
 import { count, percent, numberText } from "../../base/numbers.ts";
 import type { OpenScene, Page } from "../../app/page.ts";
 import { emittersOf, type Quantity } from "../../daemon/api.ts";
-import { Newest } from "../../daemon/newest.ts";
 import { channelWeights } from "../../picture/field.ts";
 import { partsOf, type Gradient } from "../../state/shares.ts";
 import { quantityShown, unitOf } from "../../state/state.ts";
