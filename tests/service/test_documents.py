@@ -44,6 +44,12 @@ def python_programs(document):
             if all(importlib.util.find_spec(name) for name in mark.split()[1:])}
 
 
+def node_programs(document):
+    """The same of JavaScript, where Node.js is installed."""
+    texts = [text for mark, text in blocks(document) if mark == "js"] if shutil.which("node") else []
+    return {text: text if i == 0 else texts[0] + text for i, text in enumerate(texts)}
+
+
 def free_port():
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
@@ -77,12 +83,14 @@ class Documents(unittest.TestCase):
     def run_document(self, document):
         port = free_port()
         script, answers = ["trap 'kill $(jobs -p) 2>/dev/null || true' EXIT"], []
-        programs = python_programs(document)
+        programs, scripts = python_programs(document), node_programs(document)
         for mark, text in blocks(document):
             if mark in ("sh", "sh slow"):
                 script.append(made_small(text) if mark == "sh slow" else text)
             elif text in programs:
                 script.append(f"PYTHONPATH={ROOT}/deploy/python PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 - <<'END'\n{programs[text]}END\n")
+            elif text in scripts:
+                script.append(f"node --input-type=module - <<'END'\n{scripts[text]}END\n")
             elif mark == "json":
                 # The answer is the text printed since the last mark.
                 script.append(f"echo; echo '=== answer {len(answers)}'")
@@ -96,6 +104,8 @@ class Documents(unittest.TestCase):
             (tools / "lambertd").write_text(f'#!/bin/sh\nexec "{LAMBERTD}" --listen 127.0.0.1:{port} "$@"\n')
             (tools / "lambertd").chmod(0o755)
             (work / "examples").symlink_to(ROOT / "deploy" / "examples")
+            (work / "node_modules").mkdir()
+            (work / "node_modules" / "lambert-light").symlink_to(ROOT / "deploy" / "js")
             (work / "oakland.epw").write_text(weather.epw(weather.a_year()))
             path = f"{tools}:{pathlib.Path(LAMBERT).parent}:/usr/bin:{os.environ['PATH']}"
             text = "\n".join(script).replace(PORT_IN_DOCUMENTS, f"127.0.0.1:{port}")
@@ -175,7 +185,7 @@ class Documents(unittest.TestCase):
         for document in DOCUMENTS:
             for mark, text in blocks(document):
                 word = "python" if mark.startswith("python ") else mark
-                self.assertIn(word, ("", "sh", "sh slow", "sh elsewhere", "json", "c", "text", "python", *CONFIGURATIONS), document.name)
+                self.assertIn(word, ("", "sh", "sh slow", "sh elsewhere", "json", "c", "text", "python", "js", *CONFIGURATIONS), document.name)
                 if mark != "sh elsewhere":
                     continue
                 for line in text.splitlines():
