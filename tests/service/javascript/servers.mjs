@@ -17,6 +17,7 @@ export async function startDaemon(...options) {
         heard();
     });
     const gone = new Promise((resolve) => child.once("exit", resolve));
+    /** Until it has said the words so often. */
     const said = async (words, times = 1) => {
         while (text.split(words).length <= times) {
             const more = new Promise((resolve) => (heard = resolve));

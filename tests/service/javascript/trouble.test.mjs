@@ -88,11 +88,11 @@ test("a store that is replaced is noticed before its numbers are used", async ()
     };
     place("a");
     const daemon = await startDaemon(join(FOLDER, "room.h5"));
-    let times = 1;
+    let times = 0;
     const replace = async (name) => {
         place(name);
         daemon.signal("SIGHUP");
-        await daemon.said("serving room", ++times);
+        await daemon.said("reloaded: 1 scene", ++times); // which is said once requests get it
     };
     const scene = await open(`${daemon.address}/room`), seldom = await open(`${daemon.address}/room`, { check: 3600 });
     const before = await scene.radiosity(new Float32Array(scene.n).fill(1)), { reflectance } = await scene.elements("reflectance");
