@@ -37,6 +37,7 @@ ALLOWED = {
     "solver/operator": f"{BELOW_OPERATOR} solver/operator/wavelet/",
     "solver/operator/wavelet": f"{BELOW_OPERATOR}",
     "solver/operator/blocks": f"{BELOW_OPERATOR}",
+    "solver/operator/corners": f"{BELOW_LINALG}",
     "solver/operator/refine": f"{OPERATOR}",
     "solver/operator/groups": f"{OPERATOR}",
     "solver/operator/stated": f"{OPERATOR}",

@@ -49,7 +49,7 @@ static bool is_joined(const smooth_nodes *nodes, uint32_t a, uint32_t b) {
     if (a == VISIBILITY_NOTHING || b == VISIBILITY_NOTHING) return false;
     for (size_t i = 0; i < 4; i++)
         for (size_t j = 0; j < 4; j++)
-            if (nodes->corner[a][i] == nodes->corner[b][j]) return true;
+            if (nodes->corner[a][i] != CORNER_NONE && nodes->corner[a][i] == nodes->corner[b][j]) return true;
     return false;
 }
 

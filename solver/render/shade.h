@@ -2,7 +2,7 @@
 #ifndef LAMBERT_RENDER_SHADE_H
 #define LAMBERT_RENDER_SHADE_H
 
-#include "solver/render/smooth_nodes.h"
+#include "solver/render/smooth.h"
 
 typedef struct shade shade;
 

@@ -2,19 +2,26 @@
 #ifndef LAMBERT_RENDER_SMOOTH_H
 #define LAMBERT_RENDER_SMOOTH_H
 
-#include "solver/render/smooth_nodes.h"
+#include "solver/operator/corners/corner_plan.h"
+#include "solver/scene/mesh.h"
+
+/* The corners that elements share (corner_nodes.h), and the weights of light there. */
+typedef struct smooth_nodes {
+    uint32_t (
+        *corner)[4]; /* [n]: the node of each corner of an element; of a triangle CORNER_NONE is the 4th */
+    corner_plan plan;
+} smooth_nodes;
+
+/* Cost: O(n log n). Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT (corner_weights_find). */
+lam_status smooth_nodes_create(const mesh *m, smooth_nodes *out, lam_error *error);
+void smooth_nodes_free(smooth_nodes *nodes);
 
 /* The values at the corners of elements, corners [C][n][4], of answers with the means values [C][n]. The 4th
  * of a triangle is NaN.
  *
- * E [C][n], NULL for none, is a part of the values that does not vary within elements: emission. The rest, R,
- * has in each element the gradient g that fits its neighbours best, min sum_j |R_j - R_i - g (c_j - c_i)|^2 /
- * |c_j - c_i|^2 with centroids c. A node has the mean over its elements, by their angles there, of
- * R_i + g_i (x - c_i), and at least 0; a node inside another element's edge has the value of that edge, so
- * that no crack shows. So linear light is reproduced. g is reduced where it would change R_i by more than
- * twice the largest step to a neighbour. Where elements resolve the shadows, the error against a finer mesh
- * falls faster than that of constant values (`lambert bench hierarchical`, table smooth). Source: gradients
- * by least squares as in Barth and Jespersen 1989 (AIAA 89-0366). Cost: O(C n). Errors: LAM_ERR_MEMORY. */
+ * E [C][n], NULL for none, is a part of the values that does not vary within elements: emission. The rest is
+ * linear between corners by corner_plan_apply, as the daemon's answers at corners are. Cost: O(C n). Errors:
+ * LAM_ERR_MEMORY. */
 lam_status smooth_corners(const smooth_nodes *nodes, const mesh *m, size_t n_channels, const float *values,
                           const float *E, float *corners, lam_error *error);
 

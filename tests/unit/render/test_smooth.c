@@ -158,13 +158,13 @@ START_TEST(surfaces_end_at_bends) {
         mesh_finish(&m, .5f);
         const float values[2] = {4, 6};
         float *corners = corners_of(&m, 1, values, NULL);
-        /* At the bend half a tile lies on either side of the mean; the projection of the step is .5 (1 + c).
-         */
-        const float line = (float)(4 + 2 * .5 / (.5 * (1 + c)));
-        const float other = (float)(6 - 2 * .5 / (.5 * (1 + c)));
-        ck_assert_float_eq_tol(corners[1], sharp ? 4 : .5f * (line + other), 1e-5f);
-        ck_assert_float_eq_tol(corners[4], sharp ? 6 : .5f * (line + other), 1e-5f);
-        ck_assert_float_eq_tol(corners[0], sharp ? 4 : 8 - line, 1e-5f);
+        /* At the bend both lines meet in the middle. At the far end the line falls by the step times .5 over
+         * the projection of the step, .5 (1 + c); then half of what the mean of 4 is off by is added. */
+        const double share = 1 / (1 + c), off = 4 - ((4 - 2 * share) + 5) / 2;
+        const double end = 4 + off - (2 - 2 * off) * share;
+        ck_assert_float_eq_tol(corners[1], sharp ? 4 : 5, 1e-5f);
+        ck_assert_float_eq_tol(corners[4], sharp ? 6 : 5, 1e-5f);
+        ck_assert_float_eq_tol(corners[0], sharp ? 4 : (float)end, 1e-5f);
         free(corners);
         mesh_free(&m);
     }
