@@ -43,7 +43,7 @@ ALLOWED = {
     "solver/operator/stated": f"{OPERATOR}",
     "solver/operator/scene": f"{OPERATOR}",
     "solver/codec": f"{BELOW_LINALG} solver/operator/operator.h solver/operator/luminaire_light.h solver/operator/sensor_light.h solver/operator/blocks/importance.h solver/operator/groups/ solver/operator/stated/",
-    "solver/codec/gltf": "lambert/ store/ solver/base/ solver/codec/ solver/operator/groups/groups.h",
+    "solver/codec/gltf": "lambert/ store/ solver/base/ solver/codec/ solver/operator/groups/groups.h solver/operator/corners/",
     "solver/daylight": f"{BELOW_LINALG}",
     "solver/luminaire": f"{BELOW_LINALG}",
     "solver/shadow": f"{BELOW_LINALG} solver/daylight/sky_tiles.h solver/scene/plane.h",

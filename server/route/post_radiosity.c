@@ -2,6 +2,7 @@
  * together with those of other clients, or goes on with figures, end writes the answer; each on any thread.
  */
 #include "server/route/array_members.h"
+#include "server/route/corner_answer.h"
 #include "server/route/light_weights.h"
 #include "server/route/limited_answer.h"
 #include "server/route/linear_figures.h"
@@ -28,16 +29,17 @@ typedef struct radiosity_solve {
     answer_shape shape;
     size_t n_computed; /* elements that passes compute: all, those selected, or those of faces */
     buffer answer;
-    float *out;            /* [n_rhs][C][n_computed]: inside `answer` if its encoding allows, else own */
-    float *own;            /* or NULL */
-    float *places;         /* [n_rhs][C][n_values] of faces or sensors, a part of `answer` or allocated; of a
-                              reduction of sensors that of a pass; else NULL */
-    bool placed;           /* they are inside `answer` */
+    float *out;    /* [n_rhs][C][n_computed]: inside `answer` if its encoding allows, else own */
+    float *own;    /* or NULL */
+    float *places; /* [n_rhs][C][n_values] of faces, corners or sensors, a part of `answer` or allocated; of a
+                      reduction of sensors that of a pass; else NULL */
+    bool placed;   /* they are inside `answer` */
     float *gathered;       /* [C][receivers], work; else NULL */
     answer_stream *stream; /* of these, until the answer has it */
     bool streams;          /* the values are encoded while the answer is sent */
     float *H0; /* [n_rhs][C][n], direct irradiance of sky, luminaires and sun; NULL if no vector has any */
     sun_answer sun;
+    corner_answer corners;
     kept_figures figures; /* of reduce, in place of values */
     float *W;             /* [n_rhs][C][s], weights of a store of emitters; else NULL */
     float *one;           /* [C][n_computed], work: a vector that is reduced by its luminance; else NULL */
@@ -62,6 +64,7 @@ static void solve_free(const scene *of, radiosity_solve *s) {
     sensor_figures_free(of, s->columns);
     limited_free(&s->limit);
     sun_answer_free(&s->sun);
+    corner_answer_free(&s->corners);
     free(s->own);
     if (!s->placed) free(s->places);
     free(s->gathered);
@@ -140,7 +143,7 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
     const bool inside = values != NULL;
     if (!inside) values = allocate_rows(in, s, s->shape.n_values, "values", why);
     if (values == NULL) return false;
-    if (!s->request.at_faces && !s->request.at_sensors) {
+    if (!s->request.at_faces && !s->request.at_sensors && !s->request.at_corners) {
         s->out = values;
         s->own = inside ? NULL : values;
         return true;
@@ -149,10 +152,11 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
     s->placed = inside;
     s->out = s->own = allocate_rows(in, s, s->n_computed,
                                     s->request.at_faces ? "the elements of faces" : "radiosities", why);
-    return s->own != NULL && find_gathered(in, s, why);
+    return s->own != NULL && find_gathered(in, s, why) &&
+           (in->accept.type != MEDIA_JSON || corner_answer_keep(in, &s->corners, why));
 }
 
-/* Puts the means of faces, or the values of sensors, in the place of the values of elements. */
+/* Puts the means of faces, or the values of corners or sensors, in the place of the values of elements. */
 static void take_places(const call *in, radiosity_solve *s) {
     const face_index *faces = &in->scene->faces;
     const face_choice chosen = radiosity_request_faces(&s->request, faces);
@@ -222,10 +226,14 @@ static bool begin(call *in, answer *out) {
     s->notes = call_notes(in);
     s->notes.quantity = radiosity_request_told(request);
     s->notes.by_luminance = request->by_luminance;
-    s->notes.at = request->at_sensors ? sensor_places_word(request) : request->at_faces ? "faces" : NULL;
+    s->notes.at = request->at_sensors   ? sensor_places_word(request)
+                  : request->at_corners ? "corners"
+                  : request->at_faces   ? "faces"
+                                        : NULL;
     answer_note_unit(&request->told, s->notes.quantity, s->converted, &s->notes);
     good = good && sensor_request_check(of, request, s->notes.unit, &why);
     if (good && request->at_probes) s->notes.unit = probe_unit(s->notes.unit);
+    good = good && corner_answer_begin(in, &s->request, &s->corners, &why);
     s->notes.parse_ms = clock_ms() - start;
     s->shape = (answer_shape){.n = of->n,
                               .n_channels = radiosity_request_channels(request, of->n_channels),
@@ -392,6 +400,7 @@ static void pass_vectors(const batch_part *parts, size_t n_parts, batch_workspac
             limited_finish(s, &solve->limit, &solve->request, parts[p].first, parts[p].count, solve->H0,
                            solve->W, shared[p].out, work);
             gather(s, call_of(parts[p].job)->state, &parts[p]);
+            corner_answer_find(s, &solve->corners, parts[p].first, parts[p].count, solve->out, solve->places);
         }
     }
     metrics_pass(first->service->metrics, count);

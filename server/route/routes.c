@@ -20,7 +20,7 @@ static const route routes[] = {
      .handle = delete_scene,
      .also_built = true,
      .right = TOKEN_VARY},
-    {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", KEPT(keeps_mesh)},
+    {.method = "GET", .pattern = "/v1/scenes/{name}/mesh", KEPT(keeps_mesh), .with_query = true},
     {.method = "GET", .pattern = "/v1/scenes/{name}/elements", KEPT(keeps_elements), .with_query = true},
     {.method = "GET", .pattern = "/v1/scenes/{name}/groups", KEPT(keeps_groups)},
     {.method = "GET", .pattern = "/v1/scenes/{name}/sky", KEPT(keeps_sky)},

@@ -1,6 +1,6 @@
 /* The memory that --max-memory leaves for what scenes load or compute while they are served: form factors for
  * a tolerance, adjoint rows for reductions, meshes,
- * elements. Any thread. */
+ * elements, corners. Any thread. */
 #ifndef LAMBERT_SERVER_SCENE_MEMORY_LEDGER_H
 #define LAMBERT_SERVER_SCENE_MEMORY_LEDGER_H
 

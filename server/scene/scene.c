@@ -287,6 +287,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     made->memory += strlen(made->description);
     TRY(scene_mesh_create(s, made, &made->mesh, error));
     TRY(scene_elements_create(made, &made->elements, error));
+    TRY(scene_corners_create(made, made->ledger, &made->corners, error));
     if (made->sky_tiling[0] != '\0' && store_has_attribute(s, STORE_SKY, "ground_albedo"))
         TRY(scene_sun_create(s, made, &made->sun, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
@@ -388,7 +389,7 @@ done:
 
 uint64_t scene_grown(const scene *s) {
     return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows) + sensor_columns_held(s->columns) +
-           kept_forms_held(scene_mesh_forms(s->mesh)) + scene_elements_held(s->elements) +
+           scene_mesh_held(s->mesh) + scene_elements_held(s->elements) + scene_corners_held(s->corners) +
            matrix_cache_held(s->matrices) + scene_texts_held(&s->texts) +
            (s->base == NULL ? scene_sun_held(s->sun) : 0);
 }
@@ -397,7 +398,7 @@ void scene_drop_computed(const scene *s) {
     row_cache_clear(s->rows);
     sensor_columns_clear(s->columns);
     matrix_cache_clear(s->matrices);
-    kept_forms_clear(scene_mesh_forms(s->mesh));
+    scene_mesh_clear(s->mesh);
     scene_elements_clear(s->elements);
     scene_texts_clear(&s->texts);
 }
@@ -416,6 +417,7 @@ void scene_release(scene *s) {
     matrix_cache_destroy(s->matrices);
     scene_mesh_destroy(s->mesh);
     scene_elements_destroy(s->elements);
+    scene_corners_destroy(s->corners);
     scene_texts_free(&s->texts);
     if (s->base == NULL) {
         scene_sun_destroy(s->sun);

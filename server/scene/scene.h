@@ -7,6 +7,7 @@
 #include "server/scene/matrix_cache.h"
 #include "server/scene/refined.h"
 #include "server/scene/row_cache.h"
+#include "server/scene/scene_corners.h"
 #include "server/scene/scene_elements.h"
 #include "server/scene/scene_mesh.h"
 #include "server/scene/scene_sun.h"
@@ -72,6 +73,7 @@ struct scene {
     refined *refined;         /* the refiner of its answers, made when first needed */
     scene_mesh *mesh;         /* its elements as glTF, made when first asked for */
     scene_elements *elements; /* its elements as columns, made when first asked for */
+    scene_corners *corners;   /* that its elements share, found when first asked for. A variant has none */
     store_map *map;           /* held; NULL: nothing is mapped */
     scene_health *health;
     scene *next_to_verify; /* private to verifier.c, as the next one */
@@ -99,7 +101,7 @@ lam_status scene_open(const scene_options *options, scene **out, lam_error *erro
 /* Bytes that the scene has taken of its ledger since it was opened. Any thread. */
 uint64_t scene_grown(const scene *s);
 
-/* Drops what it computed and can compute again but for a refiner. Any thread. */
+/* Drops what it computed and can compute again but for a refiner and the plan of corners. Any thread. */
 void scene_drop_computed(const scene *s);
 
 /* Bytes of the work areas of n_threads threads. */

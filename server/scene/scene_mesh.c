@@ -1,7 +1,9 @@
 #include "server/scene/scene_mesh.h"
 
+#include "server/scene/scene_corners.h"
 #include "server/scene/scene_store.h"
 #include "solver/codec/gltf/gltf.h"
+#include "solver/operator/corners/corner_hanging.h"
 #include "store/groups.h"
 
 #include <math.h>
@@ -14,7 +16,7 @@ struct scene_mesh {
     size_t n_vertices;
     size_t n_textured, n_textures, image_bytes; /* of gltf_sizes; 0 where no image is shown */
     uint64_t tag;
-    kept_forms *forms;
+    kept_forms *forms[MESH_FORMS];
 };
 
 static lam_status read_up(store *s, char *up, lam_error *error) {
@@ -79,7 +81,8 @@ lam_status scene_mesh_create(store *s, const scene *of, scene_mesh **out, lam_er
     scene_mesh *made = memory_allocate(1, sizeof *made, "the mesh of a scene", error);
     if (made == NULL) return LAM_ERR_MEMORY;
     made->of = of;
-    TRY(kept_forms_create(of->ledger, "the mesh of a scene", &made->forms, error));
+    for (mesh_form f = 0; f < MESH_FORMS; f++)
+        TRY(kept_forms_create(of->ledger, "the mesh of a scene", &made->forms[f], error));
     if (of->base != NULL) {
         const scene_mesh *base = of->base->mesh;
         made->up = base->up;
@@ -102,21 +105,37 @@ done:
 
 void scene_mesh_destroy(scene_mesh *mesh) {
     if (mesh == NULL) return;
-    kept_forms_release(mesh->forms);
+    for (mesh_form f = 0; f < MESH_FORMS; f++) kept_forms_release(mesh->forms[f]);
     free(mesh);
 }
 
-uint64_t scene_mesh_tag(const scene_mesh *mesh) {
-    return mesh->tag;
+uint64_t scene_mesh_tag(const scene_mesh *mesh, mesh_form form) {
+    const uint64_t both[2] = {mesh->tag, form};
+    return form == MESH_ELEMENTS ? mesh->tag : store_checksum(both, sizeof both);
 }
 
 size_t scene_mesh_vertices(const scene_mesh *mesh) {
     return mesh->n_vertices;
 }
 
-kept_forms *scene_mesh_forms(scene_mesh *mesh) {
-    return mesh->forms;
+kept_forms *scene_mesh_forms(scene_mesh *mesh, mesh_form form) {
+    return mesh->forms[form];
 }
+
+size_t scene_mesh_held(scene_mesh *mesh) {
+    size_t held = 0;
+    for (mesh_form f = 0; f < MESH_FORMS; f++) held += kept_forms_held(mesh->forms[f]);
+    return held;
+}
+
+void scene_mesh_clear(scene_mesh *mesh) {
+    for (mesh_form f = 0; f < MESH_FORMS; f++) kept_forms_clear(mesh->forms[f]);
+}
+
+/* Corners inside edges, and weights of corners, that an element has at most in the mean: even meshes have
+ * none and 16. */
+#define INSIDE_OF_ELEMENT INSIDE_MOST
+#define WEIGHTS_OF_ELEMENT ((size_t)64)
 
 static size_t sum(size_t a, size_t b) {
     size_t both;
@@ -128,7 +147,7 @@ static size_t times(size_t a, size_t b) {
     return __builtin_mul_overflow(a, b, &product) ? SIZE_MAX : product;
 }
 
-static gltf_sizes sizes_of(const scene_mesh *mesh) {
+static gltf_sizes sizes_of(const scene_mesh *mesh, mesh_form form) {
     const scene *s = mesh->of;
     gltf_sizes sizes = {.n = s->n,
                         .n_vertices = mesh->n_vertices,
@@ -136,19 +155,26 @@ static gltf_sizes sizes_of(const scene_mesh *mesh) {
                         .n_textured = mesh->n_textured,
                         .n_textures = mesh->n_textures,
                         .image_bytes = mesh->image_bytes};
+    if (form == MESH_CORNERS) sizes.n_textured = sizes.n_textures = sizes.image_bytes = 0;
+    sizes.corners = form != MESH_ELEMENTS;
+    if (sizes.corners) sizes.n_inside = times(s->n, INSIDE_OF_ELEMENT);
+    if (form == MESH_ELEMENTS_CORNERS) sizes.n_weights = times(s->n, WEIGHTS_OF_ELEMENT);
     sizes.n_texts = strlen(s->name);
     for (size_t i = 0; i < s->n; i++) sizes.n_buried += !group_index_counts(&s->groups, i);
     for (size_t g = 0; g < s->groups.n_groups; g++) sizes.n_texts += strlen(s->groups.names[g]);
     return sizes;
 }
 
-size_t scene_mesh_bytes_most(const scene_mesh *mesh) {
-    const gltf_sizes sizes = sizes_of(mesh);
+size_t scene_mesh_bytes_most(const scene_mesh *mesh, mesh_form form) {
+    const gltf_sizes sizes = sizes_of(mesh, form);
     return gltf_bytes_most(&sizes);
 }
 
-size_t scene_mesh_build_bytes(const scene_mesh *mesh) {
-    const gltf_sizes sizes = sizes_of(mesh);
+size_t scene_mesh_build_bytes(const scene_mesh *mesh, mesh_form form) {
+    const gltf_sizes sizes = sizes_of(mesh, form);
+    const size_t corners =
+        form == MESH_ELEMENTS ? 0
+                              : sum(corner_work_bytes(sizes.n, sizes.n_vertices), times(sizes.n_weights, 12));
     const size_t element = 4 * sizeof(uint32_t) + (3 + mesh->of->n_channels) * sizeof(float);
     const size_t on_element = sizeof(uint32_t) + 8 * sizeof(float), of_texture = 4 * sizeof(uint64_t) * 3;
     const size_t images =
@@ -156,7 +182,7 @@ size_t scene_mesh_build_bytes(const scene_mesh *mesh) {
     const size_t panes = times(sizes.n_groups, sizeof(struct group_glass));
     return sum(
         sum(times(mesh->n_vertices, 3 * sizeof(double)), sum(times(sizes.n, element), sum(images, panes))),
-        sum(gltf_bytes_most(&sizes), gltf_work_bytes(&sizes)));
+        sum(corners, sum(gltf_bytes_most(&sizes), gltf_work_bytes(&sizes))));
 }
 
 /* Arrays of /mesh that a scene does not hold. */
@@ -166,7 +192,7 @@ typedef struct arrays {
     scene_glass glass;
 } arrays;
 
-static lam_status read_arrays(store *s, const scene_mesh *mesh, arrays *a, lam_error *error) {
+static lam_status read_arrays(store *s, const scene_mesh *mesh, mesh_form form, arrays *a, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = mesh->of->n, C = mesh->of->n_channels;
     TRY(store_read(s, STORE_MESH "/vertices", STORE_F64, 2, (size_t[]){mesh->n_vertices, 3}, &a->vertices,
@@ -174,7 +200,7 @@ static lam_status read_arrays(store *s, const scene_mesh *mesh, arrays *a, lam_e
     TRY(store_read(s, STORE_MESH "/elements", STORE_U32, 2, (size_t[]){n, 4}, &a->elements, error));
     TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, (size_t[]){n, 3}, &a->normal, error));
     TRY(store_read(s, STORE_MESH "/emission", STORE_F32, 2, (size_t[]){C, n}, &a->emission, error));
-    if (mesh->n_textured > 0) TRY(scene_pictures_load(s, n, &a->pictures, error));
+    if (form != MESH_CORNERS && mesh->n_textured > 0) TRY(scene_pictures_load(s, n, &a->pictures, error));
     TRY(scene_glass_load(s, mesh->of->groups.n_groups, &a->glass, error));
     const uint32_t(*elements)[4] = a->elements;
     for (size_t i = 0; i < n; i++)
@@ -199,14 +225,50 @@ static void drop_changed(const scene *of, scene_pictures *pictures) {
             if (of->reflectance[c * of->n + i] != before[c * of->n + i]) pictures->surface[i] = PICTURE_NONE;
 }
 
-lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *error) {
+/* The corners of the mesh, and their weights. */
+typedef struct mesh_corners {
+    corner_arrays arrays;
+    corner_nodes nodes;
+    corner_rows rows;
+    gltf_corners of;
+} mesh_corners;
+
+static lam_status find_corners(store *s, const scene *root, mesh_form form, mesh_corners *c,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    const corner_plan *plan;
+    TRY(corner_arrays_read(s, root, &c->arrays, error));
+    const corner_mesh m = corner_arrays_mesh(&c->arrays);
+    TRY(corner_nodes_create(&m, &c->nodes, error));
+    if (c->nodes.n_nodes > GLTF_ELEMENTS_MOST)
+        FAIL(error, LAM_ERR_ARGUMENT, "%zu corners, at most %zu have a number in glTF", c->nodes.n_nodes,
+             GLTF_ELEMENTS_MOST);
+    c->of = (gltf_corners){.nodes = &c->nodes, .shared = form == MESH_CORNERS};
+    if (form == MESH_ELEMENTS_CORNERS) {
+        TRY(scene_corners_get(root->corners, &plan, error));
+        TRY(corner_plan_expand(plan, times(root->n, WEIGHTS_OF_ELEMENT), &c->rows, error));
+        c->of.rows = &c->rows;
+    }
+done:
+    return status;
+}
+
+static void mesh_corners_free(mesh_corners *c) {
+    corner_arrays_free(&c->arrays);
+    corner_nodes_free(&c->nodes);
+    corner_rows_free(&c->rows);
+}
+
+lam_status scene_mesh_build(const scene_mesh *mesh, mesh_form form, buffer *out, lam_error *error) {
     lam_status status = LAM_OK;
     const scene *of = mesh->of, *root = scene_root(of);
     store *s = NULL;
     arrays a = {.vertices = NULL};
+    mesh_corners corners = {.nodes = {.n_nodes = 0}};
     lam_error cause;
     TRY(scene_store_open(of, &s, error));
-    TRY(read_arrays(s, mesh, &a, error));
+    TRY(read_arrays(s, mesh, form, &a, error));
+    if (form != MESH_ELEMENTS) TRY(find_corners(s, root, form, &corners, error));
     if (a.pictures != NULL && of != root) drop_changed(of, a.pictures);
     const gltf_mesh m = {.name = of->name,
                          .kind = lam_operator_kind(of->op),
@@ -223,11 +285,13 @@ lam_status scene_mesh_build(const scene_mesh *mesh, buffer *out, lam_error *erro
                          .groups = &root->groups,
                          .glass = a.glass.of != NULL ? &a.glass : NULL,
                          .pictures = a.pictures,
+                         .corners = form != MESH_ELEMENTS ? &corners.of : NULL,
                          .up = mesh->up};
     status = gltf_write(&m, out, &cause);
     if (status != LAM_OK) FAIL(error, status, "%s: %s", root->path, cause.message);
 done:
     store_close(s);
+    mesh_corners_free(&corners);
     if (a.pictures != NULL) scene_pictures_free(a.pictures);
     free(a.pictures);
     free(a.vertices);

@@ -39,8 +39,8 @@ typedef struct answer_notes {
                              for receivers; NULL: it was built for all */
     const char *error_from; /* "sources" where a store was built for these and they alone emit; "others": not
                                they alone, and no error is stated; NULL: it was built for any emission */
-    const char
-        *at; /* the word for the places of numbers, "faces" of the scene file or "sensors"; NULL: elements */
+    const char *at; /* the word for the places of numbers, "faces" of the scene file, "corners" or "sensors";
+                       NULL: elements */
     bool by_luminance; /* a coloured sky lights a store of one channel by its luminance */
     bool has_time;
     double parse_ms, solve_ms, encode_ms;

@@ -86,6 +86,10 @@ static bool read_body(parser *p) {
             return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
                                  "the body holds both reduce, whose figures are not of faces, and at faces; "
                                  "leave one of them out");
+        if (p->request->reduce.on && p->at == AT_CORNERS)
+            return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                                 "the body holds both reduce, whose figures are of elements, and at corners; "
+                                 "leave one of them out");
     }
     if (p->why->status != 0) return false;
     if (!json_finish(&p->r)) return parser_fault(p);

@@ -31,7 +31,7 @@ typedef struct index_list {
 } index_list;
 
 /* The word of `at`, and the member of `select`. */
-typedef enum place_word { AT_UNSAID, AT_ELEMENTS, AT_FACES } place_word;
+typedef enum place_word { AT_UNSAID, AT_ELEMENTS, AT_FACES, AT_CORNERS } place_word;
 typedef enum select_word {
     SELECT_ELEMENTS,
     SELECT_GROUPS,

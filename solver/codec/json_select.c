@@ -86,18 +86,18 @@ bool parser_read_select(parser *p) {
 }
 
 bool parser_read_at(parser *p) {
+    static const char *const words[] = {
+        [AT_ELEMENTS] = "elements", [AT_FACES] = "faces", [AT_CORNERS] = "corners"};
     json_slice text;
-    if (!parser_expect(p, JSON_TEXT, "\"elements\" or \"faces\"")) return false;
+    if (!parser_expect(p, JSON_TEXT, "\"elements\", \"faces\" or \"corners\"")) return false;
     if (!json_read_text(&p->r, &text)) return parser_fault(p);
-    if (text.length == 8 && memcmp(text.bytes, "elements", 8) == 0) {
-        p->at = AT_ELEMENTS;
-        return true;
-    }
-    if (text.length != 5 || memcmp(text.bytes, "faces", 5) != 0)
-        return parser_refuse(p, PROBLEM_UNKNOWN_WORD, "%s = \"%.*s\", must be elements or faces",
+    for (place_word at = AT_ELEMENTS; at <= AT_CORNERS; at++)
+        if (text.length == strlen(words[at]) && memcmp(text.bytes, words[at], text.length) == 0) p->at = at;
+    if (p->at == AT_UNSAID)
+        return parser_refuse(p, PROBLEM_UNKNOWN_WORD, "%s = \"%.*s\", must be elements, faces or corners",
                              parser_here(p), text.length > 80 ? 80 : (int)text.length, text.bytes);
-    p->at = AT_FACES;
-    return p->scene->only_linear ? parser_not_linear(p) : knows_faces(p);
+    if (p->at != AT_ELEMENTS && p->scene->only_linear) return parser_not_linear(p);
+    return p->at != AT_FACES || knows_faces(p);
 }
 
 /* The faces of the groups that are selected, group by group. */
@@ -151,11 +151,33 @@ static bool settle_sensors(parser *p) {
     return true;
 }
 
+/* Light at corners comes from all elements around them. */
+static bool settle_corners(parser *p) {
+    radiosity_request *request = p->request;
+    parser_point_key(p, "at", 2);
+    request->at_corners = p->at == AT_CORNERS;
+    if (!request->at_corners) return true;
+    if (request->select)
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                             "%s is corners, which select does not name: leave select out; the corners of a "
+                             "group are those of its part of mesh?corners",
+                             parser_here(p));
+    if (request->tolerance > 0)
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                             "%s is corners, and a tolerance certifies values of elements: leave one of them "
+                             "out",
+                             parser_here(p));
+    p->pointer_length = 0;
+    return true;
+}
+
 bool parser_settle_places(parser *p) {
     radiosity_request *request = p->request;
     const bool selects = request->select && p->selects == SELECT_FACES;
     p->pointer_length = 0;
     if (request->reduce.of_sensors) return settle_sensors(p);
+    if (!settle_corners(p)) return false;
+    p->pointer_length = 0;
     parser_point_key(p, "select", 6);
     if (selects && p->at == AT_ELEMENTS)
         return parser_refuse(p, PROBLEM_WRONG_MEMBERS,

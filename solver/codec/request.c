@@ -35,6 +35,7 @@ face_choice radiosity_request_faces(const radiosity_request *request, const face
 
 size_t radiosity_request_values(const radiosity_request *request, size_t n, const face_index *faces) {
     if (request->at_sensors) return request->n_receivers;
+    if (request->at_corners) return request->n_corners;
     if (request->at_faces) return radiosity_request_faces(request, faces).n;
     return request->select ? request->n_selected : n;
 }

@@ -76,6 +76,8 @@ typedef struct radiosity_request {
     bool at_faces;   /* the answer is of faces, with select of some, of which `selected` has the elements */
     uint32_t *faces; /* [n_faces], these; NULL: all */
     size_t n_faces;
+    bool at_corners;  /* the answer is of the corners that elements share, without select and reduce */
+    size_t n_corners; /* of these, set by the caller once it knows them */
     /* Numbers or figures of receivers, which have irradiance: `quantity` is what is gathered from, radiosity,
      * and `select` is off. */
     bool at_sensors;

@@ -36,12 +36,11 @@ lam_status smooth_corners(const smooth_nodes *nodes, const mesh *m, size_t n_cha
     lam_status status = LAM_OK;
     float *rest = memory_allocate(m->n, sizeof *rest, "smoothing", error);
     float *at_node = memory_allocate(nodes->plan.n_nodes, sizeof *at_node, "smoothing", error);
-    float *work = memory_allocate(m->n, sizeof *work, "smoothing", error);
-    if (rest == NULL || at_node == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    if (rest == NULL || at_node == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < n_channels; c++) {
         const float *emitted = E != NULL ? E + c * m->n : NULL;
         for (size_t i = 0; i < m->n; i++) rest[i] = values[c * m->n + i] - (emitted != NULL ? emitted[i] : 0);
-        corner_plan_apply(&nodes->plan, 1, rest, at_node, work);
+        corner_plan_apply(&nodes->plan, 1, rest, at_node);
         for (size_t i = 0; i < m->n; i++) {
             float *out = corners + 4 * (c * m->n + i);
             out[3] = NAN;
@@ -52,7 +51,6 @@ lam_status smooth_corners(const smooth_nodes *nodes, const mesh *m, size_t n_cha
 done:
     free(rest);
     free(at_node);
-    free(work);
     return status;
 }
 

@@ -8,7 +8,7 @@ import numpy as np
 
 NO_VERTEX = 0xFFFFFFFF
 TYPES = {5126: "<f4", 5125: "<u4"}
-WIDTHS = {"SCALAR": 1, "VEC3": 3}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
 
 class Glb:
@@ -46,6 +46,7 @@ class Group:
         self.attributes = primitive["attributes"]
         self.position, self.normal, self.element, self.face = (file.array(self.attributes[k])
                                                                for k in ("POSITION", "NORMAL", "_ELEMENT", "_FACE"))
+        self.corner = file.array(self.attributes["_CORNER"]) if "_CORNER" in self.attributes else None
         self.triangles = file.array(primitive["indices"]).reshape(-1, 3)
         self.material = file.json["materials"][primitive["material"]]
 

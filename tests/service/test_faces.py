@@ -407,8 +407,8 @@ class Refusals(FacesCase):
         cases = [
             ("older", {**backs, "at": "faces"}, "not-in-store", "/at", "precompute the scene again"),
             ("older", {**backs, "select": {"faces": [0]}}, "not-in-store", "/select/faces", "precompute the scene again"),
-            ("new", {**light, "at": "corners"}, "unknown-word", "/at", 'at = "corners", must be elements or faces'),
-            ("new", {**light, "at": 3}, "wrong-kind", "/at", 'at must be "elements" or "faces"'),
+            ("new", {**light, "at": "corner"}, "unknown-word", "/at", 'at = "corner", must be elements, faces or corners'),
+            ("new", {**light, "at": 3}, "wrong-kind", "/at", 'at must be "elements", "faces" or "corners"'),
             ("new", {**light, "at": "faces", "at ": 1}, "wrong-members", "/at ", "not a member"),
             ("new", {**light, "at": "faces", "reduce": {"groups": ["floor"], "with": ["mean"]}}, "wrong-members", "", "both reduce"),
             ("new", {**light, "reduce": {"groups": ["floor"], "with": ["max"]}, "at": "faces"}, "wrong-members", "", "both reduce"),

@@ -58,16 +58,17 @@ static void measure_part(gltf_writer *w, gltf_part *p) {
         p->high[d] = -INFINITY;
     }
     for (size_t j = 0; j < p->n_elements; j++) {
-        const size_t corners = gltf_corners_of(m, elements[j]);
+        const size_t corners = gltf_ring_count(m, elements[j]);
         p->n_vertices += corners;
         p->n_indices += 3 * (corners - 2);
         for (size_t k = 0; k < corners; k++)
             for (int d = 0; d < 3; d++) {
-                const float x = w->s.position[m->elements[elements[j]][k]][d];
+                const float x = w->s.position[gltf_ring_vertex(m, elements[j], k)][d];
                 p->low[d] = fminf(p->low[d], x);
                 p->high[d] = fmaxf(p->high[d], x);
             }
     }
+    if (m->corners != NULL && m->corners->shared) p->n_vertices = gltf_count_shared(m, p);
     mean_colour(m, p->group, m->reflectance, p->reflectance);
     mean_colour(m, p->group, m->emission, p->emission);
 }
@@ -75,7 +76,7 @@ static void measure_part(gltf_writer *w, gltf_part *p) {
 /* Numbers of an item of a view. */
 static size_t count_of(const gltf_writer *w, size_t view) {
     if (view == GLTF_VIEW_POSITION || view == GLTF_VIEW_NORMAL) return 3;
-    if (view == w->map_view) return 2;
+    if (view == w->map_view) return w->m->lightmap != NULL ? 2 : 1;
     if (w->pictures != NULL) return view == GLTF_VIEW_TEXCOORD ? 2 : view == GLTF_VIEW_REFLECTANCE ? 3 : 1;
     return view == GLTF_VIEW_COLOUR ? 3 : 1;
 }
@@ -126,7 +127,11 @@ static lam_status plan_views(gltf_writer *w, lam_error *error) {
         w->map_view = w->n_views++;
         w->n_images++;
     }
-    w->view = memory_allocate(w->n_views + w->n_images + 1, sizeof *w->view, "glTF", error);
+    if (m->corners != NULL) {
+        w->map_view = w->n_views++;
+        w->n_blobs = m->corners->rows != NULL ? 3 : 0;
+    }
+    w->view = memory_allocate(w->n_views + w->n_images + w->n_blobs + 1, sizeof *w->view, "glTF", error);
     if (w->view == NULL) return LAM_ERR_MEMORY;
     for (size_t v = 0; v < w->n_views; v++) w->view[v + 1] = w->view[v] + width_of(w, v) * items_of(w, v);
     for (size_t k = 0; k < w->n_images; k++) {
@@ -134,6 +139,9 @@ static lam_status plan_views(gltf_writer *w, lam_error *error) {
         gltf_image_of(w, k, &bytes);
         w->view[w->n_views + k + 1] = w->view[w->n_views + k] + padded(bytes);
     }
+    const size_t blobs = w->n_views + w->n_images;
+    for (size_t k = 0; k < w->n_blobs; k++)
+        w->view[blobs + k + 1] = w->view[blobs + k] + gltf_blob_bytes(w, k);
     return LAM_OK;
 }
 
@@ -147,6 +155,8 @@ static lam_status plan(gltf_writer *w, lam_error *error) {
     w->normals = memory_allocate(gltf_largest_group(m->groups), 4 * sizeof *w->normals, "normals", error);
     w->parts = memory_allocate(m->groups->n_groups, sizeof *w->parts, "glTF", error);
     assert(m->lightmap == NULL || (m->light == NULL && (m->pictures == NULL || !m->lightmap->emissive)));
+    assert(m->corners == NULL || (m->light == NULL && m->lightmap == NULL));
+    assert(m->corners == NULL || !m->corners->shared || m->pictures == NULL);
     assert(m->pictures == NULL || (m->light == NULL && (m->n_channels == 1 || m->n_channels == 3)));
     if (w->normals == NULL || w->parts == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t g = 0; g < m->groups->n_groups; g++) {
@@ -185,6 +195,12 @@ static bool say_extras(const gltf_writer *w, buffer *b) {
     if (w->m->lightmap != NULL) good = good && gltf_say_lightmap(w->m->lightmap, b);
     if (w->m->glass != NULL)
         good = good && buffer_printf(b, ",\"glass_law\":\"%s\"", glass_law_word(w->m->glass));
+    if (w->m->corners != NULL)
+        good = good && buffer_printf(b, ",\"corners\":{\"count\":%zu", w->m->corners->nodes->n_nodes) &&
+               (w->n_blobs == 0 ||
+                buffer_printf(b, ",\"first\":%zu,\"elements\":%zu,\"weights\":%zu", w->n_views + w->n_images,
+                              w->n_views + w->n_images + 1, w->n_views + w->n_images + 2)) &&
+               buffer_append_text(b, "}");
     if (w->m->kind != NULL)
         good = good && buffer_append_text(b, ",\"kind\":") && json_write_text(b, w->m->kind);
     return good && buffer_append_text(b, "}}");
@@ -252,6 +268,7 @@ static bool say_attributes(const gltf_writer *w, const gltf_part *p, size_t firs
     if (w->m->lightmap != NULL && p->surface == PICTURE_NONE)
         good = good && buffer_printf(b, ",\"TEXCOORD_0\":%zu", map_accessor(w, p));
     if (w->m->lightmap != NULL) good = good && buffer_printf(b, ",\"TEXCOORD_1\":%zu", map_accessor(w, p));
+    if (w->m->corners != NULL) good = good && buffer_printf(b, ",\"_CORNER\":%zu", map_accessor(w, p));
     if (light == NULL) return good;
     good = good && buffer_printf(b, ",\"COLOR_0\":%zu", first + GLTF_VIEW_COLOUR);
     for (size_t k = 0; k < light->n_columns; k++)
@@ -347,13 +364,13 @@ static bool say_accessors(const gltf_writer *w, buffer *b) {
     for (size_t k = 0; k < w->n_parts && w->pictures != NULL; k++)
         for (size_t v = GLTF_VIEW_TEXCOORD; v < GLTF_VIEW_IMAGE && w->parts[k].surface != PICTURE_NONE; v++)
             good = good && buffer_append_text(b, ",") && say_accessor(w, &w->parts[k], v, b);
-    for (size_t k = 0; k < w->n_parts && w->m->lightmap != NULL; k++)
+    for (size_t k = 0; k < w->n_parts && w->map_view != SIZE_MAX; k++)
         good = good && buffer_append_text(b, ",") && say_accessor(w, &w->parts[k], w->map_view, b);
     return good && buffer_append_text(b, "]");
 }
 
 static size_t binary_bytes(const gltf_writer *w) {
-    return w->view[w->n_views + w->n_images];
+    return w->view[w->n_views + w->n_images + w->n_blobs];
 }
 
 static bool say_views(const gltf_writer *w, buffer *b) {
@@ -371,6 +388,9 @@ static bool say_views(const gltf_writer *w, buffer *b) {
         good = good && buffer_printf(b, ",{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu}",
                                      w->view[w->n_views + k], bytes);
     }
+    for (size_t k = w->n_views + w->n_images; k < w->n_views + w->n_images + w->n_blobs; k++)
+        good = good && buffer_printf(b, ",{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu}", w->view[k],
+                                     w->view[k + 1] - w->view[k]);
     return good && buffer_printf(b, "],\"buffers\":[{\"byteLength\":%zu}]", binary_bytes(w));
 }
 
@@ -404,6 +424,7 @@ lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error) {
     at = gltf_put(gltf_put(at + w.json.length, (uint32_t)binary_bytes(&w)), chunk_binary);
     for (size_t k = 0; k < w.n_parts; k++) TRY(gltf_put_part(&w, &w.parts[k], at, error));
     gltf_put_images(&w, at);
+    gltf_put_blobs(&w, at);
     *out = made;
     made = (buffer){0};
 done:

@@ -6,6 +6,8 @@
 #include "solver/base/scene/scene_glass.h"
 #include "solver/base/scene/scene_pictures.h"
 #include "solver/codec/buffer.h"
+#include "solver/operator/corners/corner_nodes.h"
+#include "solver/operator/corners/corner_rows.h"
 #include "solver/operator/groups/groups.h"
 
 /* More elements have numbers that a float does not hold. */
@@ -39,6 +41,13 @@ typedef struct gltf_lightmap {
     const char *unit; /* "lx" */
 } gltf_lightmap;
 
+/* Corners that elements share, of which elements have polygons with those inside their edges. */
+typedef struct gltf_corners {
+    const corner_nodes *nodes; /* of the mesh, whose numbers ascend by group */
+    bool shared;               /* a vertex is a corner; else elements have vertices of their own */
+    const corner_rows *rows;   /* the weights of corners over elements; or NULL */
+} gltf_corners;
+
 /* A scene as it is stored (store/FORMAT.md, /mesh). Every index is below its bound, every number finite. */
 typedef struct gltf_mesh {
     const char *name, *kind; /* of the scene and of its operator; kind NULL: it is left out */
@@ -55,6 +64,7 @@ typedef struct gltf_mesh {
     const gltf_light *light;        /* or NULL */
     const scene_pictures *pictures; /* or NULL; not beside light, of 1 channel (grey images) or 3 */
     const gltf_lightmap *lightmap;  /* or NULL; not beside light, emissive not beside pictures */
+    const gltf_corners *corners;    /* or NULL; not beside light or a lightmap, shared not beside pictures */
     char up;                        /* 'x', 'y' or 'z' */
 } gltf_mesh;
 
@@ -71,6 +81,11 @@ typedef struct gltf_mesh {
  *     divided by pi, as emissive factor and KHR_materials_emissive_strength, which are a luminance. Of 1
  *     channel these are grey, of 3 red, green and blue, of others the grey of their mean. That of a pane is
  *     blended (gltf_surface.h), and shows no image.
+ *   - With corners vertices have _CORNER, the number of the corner, and elements are polygons of all corners
+ * on their edges. Shared ones ascend over all groups, vertex v of the file being corner v; _ELEMENT, _FACE
+ * and NORMAL are those of the first element that has it. With rows extras say "corners": {"count", "first",
+ *     "elements", "weights"}, the last three numbers of views: corner j is the sum of weights[k] times the
+ * light of elements[k] (u32) for k from first[j] (u32, [count + 1]) to first[j + 1] - 1.
  *   - With light each column is one more attribute (a float), and COLOR_0 its colour, cut to [0, 1].
  * Materials are then white and unlit (KHR_materials_unlit), and extras say "white".
  *   - A group whose elements all have one image (pictures) has TEXCOORD_0, _REFLECTANCE (three floats, that
@@ -91,6 +106,8 @@ lam_status gltf_write(const gltf_mesh *m, buffer *out, lam_error *error);
 typedef struct gltf_sizes {
     size_t n, n_vertices, n_groups, n_texts;
     size_t n_buried;                /* elements */
+    bool corners;                   /* gltf_corners */
+    size_t n_inside, n_weights;     /* corners inside edges, and entries of rows, at most; 0: none */
     size_t n_textured;              /* elements that may have an image: n or 0 */
     size_t n_textures, image_bytes; /* surfaces and images together */
 } gltf_sizes;

@@ -22,14 +22,14 @@ char *gltf_put(char *at, uint32_t value) {
     return at + sizeof value;
 }
 
-static char *put_float(char *at, float value) {
+char *gltf_put_float(char *at, float value) {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
     return gltf_put(at, bits);
 }
 
-static char *put_vector(char *at, const float v[3]) {
-    return put_float(put_float(put_float(at, v[0]), v[1]), v[2]);
+char *gltf_put_vector(char *at, const float v[3]) {
+    return gltf_put_float(gltf_put_float(gltf_put_float(at, v[0]), v[1]), v[2]);
 }
 
 /* Writes the light of the part's vertices; to is the binary chunk. */
@@ -42,7 +42,7 @@ static void put_light(const gltf_writer *w, const gltf_part *p, char *to) {
         char *at = to + w->view[GLTF_VIEW_COLUMN + k] + 4 * p->vertex;
         for (size_t j = 0; j < p->n_elements; j++)
             for (size_t corner = 0; corner < gltf_corners_of(w->m, elements[j]); corner++)
-                at = put_float(at, light->value(light->context, k, elements[j], corner));
+                at = gltf_put_float(at, light->value(light->context, k, elements[j], corner));
     }
     for (size_t j = 0; j < p->n_elements; j++)
         for (size_t corner = 0; corner < gltf_corners_of(w->m, elements[j]); corner++) {
@@ -55,7 +55,7 @@ static void put_light(const gltf_writer *w, const gltf_part *p, char *to) {
             }
             if (C != 3) of[0] = of[1] = of[2] = grey;
             for (int d = 0; d < 3; d++) shown[d] = (float)fmin(fmax(of[d] / light->white, 0), 1);
-            colour = put_vector(colour, shown);
+            colour = gltf_put_vector(colour, shown);
         }
 }
 
@@ -68,10 +68,11 @@ static void put_textured(const gltf_writer *w, const gltf_part *p, char *to) {
     for (size_t j = 0; j < p->n_elements; j++) {
         const size_t i = elements[j];
         for (size_t k = 0; k < gltf_corners_of(m, i); k++) {
-            place =
-                put_float(put_float(place, w->pictures->texcoord[i][k][0]), w->pictures->texcoord[i][k][1]);
+            place = gltf_put_float(gltf_put_float(place, w->pictures->texcoord[i][k][0]),
+                                   w->pictures->texcoord[i][k][1]);
             for (size_t c = 0; c < 3; c++)
-                reflectance = put_float(reflectance, m->reflectance[(m->n_channels == 3 ? c * m->n : 0) + i]);
+                reflectance =
+                    gltf_put_float(reflectance, m->reflectance[(m->n_channels == 3 ? c * m->n : 0) + i]);
         }
     }
 }
@@ -83,7 +84,7 @@ static void put_map(const gltf_writer *w, const gltf_part *p, char *to) {
     for (size_t j = 0; j < p->n_elements; j++)
         for (size_t k = 0; k < gltf_corners_of(w->m, elements[j]); k++) {
             const float *at = w->m->lightmap->texcoord[elements[j]][k];
-            place = put_float(put_float(place, at[0]), at[1]);
+            place = gltf_put_float(gltf_put_float(place, at[0]), at[1]);
         }
 }
 
@@ -97,8 +98,7 @@ void gltf_put_images(const gltf_writer *w, char *to) {
     }
 }
 
-/* The number of an element's face as glTF has it: -1 of none, of several, or where it is no float. */
-static float face_number(const gltf_mesh *m, size_t element) {
+float gltf_face_number(const gltf_mesh *m, size_t element) {
     if (m->face == NULL || m->face[element] > GLTF_FACES_MOST) return -1;
     return (float)m->face[element];
 }
@@ -107,6 +107,7 @@ lam_status gltf_put_part(gltf_writer *w, const gltf_part *p, char *to, lam_error
     lam_status status = LAM_OK;
     const gltf_mesh *m = w->m;
     const uint32_t *elements = gltf_elements_of(m, p->group);
+    if (m->corners != NULL) return gltf_put_corners(w, p, to, error);
     char *position = to + w->view[GLTF_VIEW_POSITION] + 12 * p->vertex,
          *normal = to + w->view[GLTF_VIEW_NORMAL] + 12 * p->vertex,
          *element = to + w->view[GLTF_VIEW_ELEMENT] + 4 * p->vertex,
@@ -117,10 +118,10 @@ lam_status gltf_put_part(gltf_writer *w, const gltf_part *p, char *to, lam_error
     for (size_t j = 0; j < p->n_elements; j++) {
         const uint32_t corners = (uint32_t)gltf_corners_of(m, elements[j]);
         for (uint32_t k = 0; k < corners; k++) {
-            position = put_vector(position, w->s.position[m->elements[elements[j]][k]]);
-            normal = put_vector(normal, w->normals[4 * j + k]);
-            element = put_float(element, (float)elements[j]);
-            face = put_float(face, face_number(m, elements[j]));
+            position = gltf_put_vector(position, w->s.position[m->elements[elements[j]][k]]);
+            normal = gltf_put_vector(normal, w->normals[4 * j + k]);
+            element = gltf_put_float(element, (float)elements[j]);
+            face = gltf_put_float(face, gltf_face_number(m, elements[j]));
         }
         for (uint32_t k = 2; k < corners; k++)
             index = gltf_put(gltf_put(gltf_put(index, vertex), vertex + k - 1), vertex + k);

@@ -40,9 +40,10 @@ typedef struct gltf_writer {
     float (*normals)[3]; /* [4 elements of the largest group] */
     gltf_part *parts;    /* [n_parts]: the groups that have elements */
     size_t n_parts, n_vertices, n_indices, n_textured_vertices;
-    size_t n_views;                 /* with accessors */
-    size_t n_common;                /* of them, in which each group has one */
-    size_t map_view;                /* places in the lightmap; SIZE_MAX without one */
+    size_t n_views;  /* with accessors */
+    size_t n_common; /* of them, in which each group has one */
+    size_t map_view; /* places in the lightmap, or numbers of corners; SIZE_MAX without these */
+    size_t n_blobs;  /* views of the rows of corners, behind images */
     const scene_pictures *pictures; /* NULL where no group has an image */
     size_t n_textured, n_images;
     size_t *view; /* [n_views + n_images + 1]: offsets in the binary chunk, and its length */
@@ -51,6 +52,18 @@ typedef struct gltf_writer {
 
 static inline size_t gltf_corners_of(const gltf_mesh *m, size_t element) {
     return m->elements[element][3] == GLTF_NO_VERTEX ? 3 : 4;
+}
+
+/* Places of an element's polygon, and their vertices: its corners, and those inside its edges. */
+static inline size_t gltf_ring_count(const gltf_mesh *m, size_t i) {
+    return m->corners == NULL ? gltf_corners_of(m, i)
+                              : m->corners->nodes->ring_start[i + 1] - m->corners->nodes->ring_start[i];
+}
+
+static inline uint32_t gltf_ring_vertex(const gltf_mesh *m, size_t i, size_t k) {
+    return m->corners == NULL
+               ? m->elements[i][k]
+               : m->corners->nodes->vertex[m->corners->nodes->ring[m->corners->nodes->ring_start[i] + k]];
 }
 
 static inline const uint32_t *gltf_elements_of(const gltf_mesh *m, size_t g) {
@@ -65,6 +78,21 @@ char *gltf_put(char *at, uint32_t value);
 
 /* Writes the part's vertices and triangles; to is the binary chunk. Errors: LAM_ERR_MEMORY. */
 lam_status gltf_put_part(gltf_writer *w, const gltf_part *p, char *to, lam_error *error);
+
+/* The same of a part with corners, and the vertices of a part with shared ones. */
+lam_status gltf_put_corners(gltf_writer *w, const gltf_part *p, char *to, lam_error *error);
+size_t gltf_count_shared(const gltf_mesh *m, const gltf_part *p);
+
+/* The bytes of blob k, and writing all of them. */
+size_t gltf_blob_bytes(const gltf_writer *w, size_t k);
+void gltf_put_blobs(const gltf_writer *w, char *to);
+
+/* Writes vectors and numbers, and gives the place behind them. */
+char *gltf_put_float(char *at, float value);
+char *gltf_put_vector(char *at, const float v[3]);
+
+/* The number of an element's face as glTF has it: -1 of none, of several, or where it is no float. */
+float gltf_face_number(const gltf_mesh *m, size_t element);
 
 /* Writes the images. */
 void gltf_put_images(const gltf_writer *w, char *to);

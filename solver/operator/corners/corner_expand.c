@@ -92,7 +92,7 @@ static lam_status add_row(expansion *e, uint32_t node, corner_rows *out, lam_err
     return corner_rows_add(out, count, e->columns, e->weights, error);
 }
 
-lam_status corner_plan_expand(const corner_plan *plan, corner_rows *out, lam_error *error) {
+lam_status corner_plan_expand(const corner_plan *plan, size_t most, corner_rows *out, lam_error *error) {
     lam_status status = LAM_OK;
     expansion e = {.plan = plan};
     corner_rows made = {.n_rows = 0};
@@ -104,7 +104,11 @@ lam_status corner_plan_expand(const corner_plan *plan, corner_rows *out, lam_err
     TRY(sums_create(&e.whole, plan->n, error));
     for (size_t k = 0; k < plan->n_links; k++) e.link[plan->links[k].node] = (uint32_t)k + 1;
     TRY(corner_rows_begin(&made, plan->n_nodes, error));
-    for (uint32_t j = 0; j < plan->n_nodes; j++) TRY(add_row(&e, j, &made, error));
+    for (uint32_t j = 0; j < plan->n_nodes; j++) {
+        TRY(add_row(&e, j, &made, error));
+        if (made.first[j + 1] > most)
+            FAIL(error, LAM_ERR_ARGUMENT, "corners have more than %zu weights", most);
+    }
     TRY(corner_rows_end(&made, error));
     *out = made;
     made = (corner_rows){.n_rows = 0};

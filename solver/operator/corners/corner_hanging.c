@@ -124,7 +124,7 @@ static int compare_insides(const void *left, const void *right) {
 static void walk(hang_query *q, const point_grid *grid) {
     const double *from = q->d->m->vertices[q->from], *to = q->d->m->vertices[q->to];
     if (!(q->length > q->d->tolerance)) return;
-    const size_t steps = (size_t)(q->length / grid->cell) + 1;
+    const size_t steps = (size_t)fmin(q->length / grid->cell, 4096) + 1;
     for (size_t step = 0; step <= steps; step++) {
         double place[3];
         const double t = (double)step / (double)steps;
@@ -141,7 +141,7 @@ lam_status corner_hanging_find(const corner_draft *draft, corner_inside **out, s
     edge *edges = NULL;
     size_t n_edges = 0;
     double total = 0, longest = 0;
-    hang_query q = {.d = draft, .error = error, .most = INSIDE_MOST * draft->n_nodes};
+    hang_query q = {.d = draft, .error = error, .most = INSIDE_MOST * m->n};
     TRY(lone_edges(draft, &edges, &n_edges, error));
     q.seen = memory_allocate(m->n_vertices, sizeof *q.seen, "corners", error);
     if (q.seen == NULL) TRY(LAM_ERR_MEMORY);

@@ -26,9 +26,9 @@ typedef struct corner_inside {
 
 /* *out [*count], by element, edge and t, freed by the caller. Only edges that one element of a surface has
  * alone are looked at, and only the ends of such edges hang. Meshes in which one edge holds more corners than
- * INSIDE_MOST times all there are keep cracks. Cost: O(n log n) where edges meet whole edges or few parts of
+ * INSIDE_MOST times the elements keep cracks. Cost: O(n log n) where edges meet whole edges or few parts of
  * them. Errors: LAM_ERR_MEMORY. */
-#define INSIDE_MOST 8
+#define INSIDE_MOST 4
 lam_status corner_hanging_find(const corner_draft *draft, corner_inside **out, size_t *count,
                                lam_error *error);
 

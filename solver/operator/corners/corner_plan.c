@@ -156,21 +156,22 @@ static void link_ends(const corner_plan *plan, float *out) {
     }
 }
 
+/* 0, or the least number of a row. */
+static float least_of(size_t n, const float *x) {
+    float least = 0;
+    for (size_t i = 0; i < n; i++) least = x[i] < least ? x[i] : least;
+    return least;
+}
+
 /* Some rows at once. */
-static void apply_some(const corner_plan *plan, size_t count, const float *x, float *out, float *work) {
+static void apply_some(const corner_plan *plan, size_t count, float *x, float *out) {
     const size_t n = plan->n, n_nodes = plan->n_nodes;
     float least[CORNER_ROWS_TOGETHER];
+    for (size_t r = 0; r < count; r++) least[r] = least_of(n, x + r * n);
     corner_rows_apply(&plan->rows, count, n, x, out);
     for (size_t r = 0; r < count; r++) link_ends(plan, out + r * n_nodes);
-    corner_rows_apply(&plan->means, count, n_nodes, out, work);
-    for (size_t r = 0; r < count; r++) {
-        least[r] = 0;
-        for (size_t i = r * n; i < (r + 1) * n; i++) {
-            least[r] = x[i] < least[r] ? x[i] : least[r];
-            work[i] = 2 * x[i] - work[i];
-        }
-    }
-    corner_rows_apply(&plan->rows, count, n, work, out);
+    corner_rows_reflect(&plan->means, count, n_nodes, out, x);
+    corner_rows_apply(&plan->rows, count, n, x, out);
     for (size_t r = 0; r < count; r++) {
         for (size_t j = r * n_nodes; j < (r + 1) * n_nodes; j++)
             out[j] = out[j] > least[r] ? out[j] : least[r];
@@ -178,10 +179,10 @@ static void apply_some(const corner_plan *plan, size_t count, const float *x, fl
     }
 }
 
-void corner_plan_apply(const corner_plan *plan, size_t n_rows, const float *x, float *out, float *work) {
+void corner_plan_apply(const corner_plan *plan, size_t n_rows, float *x, float *out) {
     for (size_t r = 0; r < n_rows; r += CORNER_ROWS_TOGETHER)
         apply_some(plan, n_rows - r < CORNER_ROWS_TOGETHER ? n_rows - r : CORNER_ROWS_TOGETHER,
-                   x + r * plan->n, out + r * plan->n_nodes, work);
+                   x + r * plan->n, out + r * plan->n_nodes);
 }
 
 /* x += factor S^T g, in which the ends of edges take over the part of nodes inside. */

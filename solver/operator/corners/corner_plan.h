@@ -31,18 +31,18 @@ void corner_plan_free(corner_plan *plan);
 /* Bytes that it holds. */
 size_t corner_plan_bytes(const corner_plan *plan);
 
-/* out [n_rows][n_nodes] = v for rows x [n_rows][n], of which v is nowhere below 0 and the least number.
- * Linear light is reproduced. work [min(n_rows, CORNER_ROWS_TOGETHER)][n] is lost. Allocates nothing; a row's
- * bits do not depend on its neighbours. Cost: 12 products an element of an even mesh. */
+/* out [n_rows][n_nodes] = v for rows x [n_rows][n], which are lost; v is nowhere below 0 and the least number
+ * of x. Linear light is reproduced. Allocates nothing; a row's bits do not depend on its neighbours. Cost: 12
+ * products an element of an even mesh. */
 #define CORNER_ROWS_TOGETHER 4
-void corner_plan_apply(const corner_plan *plan, size_t n_rows, const float *x, float *out, float *work);
+void corner_plan_apply(const corner_plan *plan, size_t n_rows, float *x, float *out);
 
 /* w [n_rows][n] += the transpose of g [n_rows][n_nodes], which is lost, but for the bound at 0. work
  * [n + n_nodes] is lost. */
 void corner_plan_transpose(const corner_plan *plan, size_t n_rows, float *g, float *w, float *work);
 
 /* The matrix as a whole, rows of all nodes, freed by corner_rows_free; weights below 1e-6 are left out.
- * Errors: as corner_weights_find. */
-lam_status corner_plan_expand(const corner_plan *plan, corner_rows *out, lam_error *error);
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT (more than `most` weights). */
+lam_status corner_plan_expand(const corner_plan *plan, size_t most, corner_rows *out, lam_error *error);
 
 #endif

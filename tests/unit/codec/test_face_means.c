@@ -184,8 +184,8 @@ START_TEST(wrong_requests_for_faces_are_refused) {
         problem_kind kind;
         const char *pointer, *says;
     } cases[] = {
-        {"\"at\":\"corners\"", PROBLEM_UNKNOWN_WORD, "/at", "must be elements or faces"},
-        {"\"at\":[]", PROBLEM_WRONG_KIND, "/at", "must be \"elements\" or \"faces\""},
+        {"\"at\":\"corner\"", PROBLEM_UNKNOWN_WORD, "/at", "must be elements, faces or corners"},
+        {"\"at\":[]", PROBLEM_WRONG_KIND, "/at", "must be \"elements\", \"faces\" or \"corners\""},
         {"\"at\":\"faces\",\"select\":{\"elements\":[1]}", PROBLEM_WRONG_MEMBERS, "/select", "select faces"},
         {"\"select\":{\"faces\":[1]},\"at\":\"elements\"", PROBLEM_WRONG_MEMBERS, "/select",
          "at is elements"},
