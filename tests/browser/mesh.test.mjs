@@ -15,8 +15,8 @@ async function reportOn(bytes, name) {
 }
 
 /** That of a mesh, whose elements and groups are counted. */
-async function validated(daemon, name) {
-    const response = await fetch(`${daemon.address}/v1/scenes/${encodeURIComponent(name)}/mesh`);
+async function validated(daemon, name, query = "") {
+    const response = await fetch(`${daemon.address}/v1/scenes/${encodeURIComponent(name)}/mesh${query}`);
     assert.equal(response.status, 200, name);
     const report = await reportOn(new Uint8Array(await response.arrayBuffer()), name);
     const about = await daemon.json(`/v1/scenes/${encodeURIComponent(name)}`);
@@ -35,7 +35,8 @@ test("meshes of generated scenes are valid glTF", async () => {
         makeStore("canopy", "canopy", { generate: ["--elements", 1000], precompute: [...draft, "--up", "x"] }),
     ];
     const daemon = await Daemon.start(stores);
-    for (const name of ["cornell", "sides", "city", "rooms", "canopy"]) await validated(daemon, name);
+    for (const name of ["cornell", "sides", "city", "rooms", "canopy"])
+        for (const query of ["", "?corners", "?corners=elements"]) await validated(daemon, name, query);
     const emissive = await validated(daemon, "cornell");
     assert.deepEqual(emissive.info.extensionsUsed, ["KHR_materials_emissive_strength"]);
     await daemon.stop();

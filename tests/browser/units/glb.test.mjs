@@ -21,13 +21,18 @@ function squares(groups, lambert = {}) {
         const each = (make) => Array.from({ length: count }, (_, k) => make(k)).flat();
         const attributes = { POSITION: put(Float32Array.from(each((k) => [k, 0, 0, k, 0, 1, k + 1, 0, 1, k + 1, 0, 0])), "VEC3", 3),
             NORMAL: put(Float32Array.from(each(() => [0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0])), "VEC3", 3),
-            _ELEMENT: put(Float32Array.from(each((k) => Array(4).fill(element + k))), "SCALAR", 1) };
+            _ELEMENT: put(Float32Array.from(each((k) => Array(4).fill(element + k))), "SCALAR", 1),
+            _CORNER: put(Float32Array.from(each((k) => [0, 1, 2, 3].map((i) => 4 * (element + k) + i))), "SCALAR", 1) };
         const indices = put(Uint32Array.from(each((k) => [0, 1, 2, 0, 2, 3].map((i) => 4 * k + i))), "SCALAR", 1);
         gltf.nodes.push({ name, mesh: gltf.meshes.length, extras: { buried, glass } });
         if (colour !== undefined) gltf.materials.push({ pbrMetallicRoughness: { baseColorFactor: colour } });
         gltf.meshes.push({ primitives: [{ attributes, indices, ...(colour === undefined ? {} : { material: gltf.materials.length - 1 }) }] });
         element += count;
     }
+    // No corner is shared: each has the light of its element.
+    const view = (values) => gltf.accessors[put(values, "SCALAR", 1)].bufferView, corners = Array.from({ length: 4 * element }, (_, k) => k);
+    lambert.corners = { count: corners.length, first: view(Uint32Array.from([...corners, corners.length])),
+        elements: view(Uint32Array.from(corners, (k) => k >> 2)), weights: view(Float32Array.from(corners, () => 1)) };
     let text = JSON.stringify(gltf);
     text += " ".repeat((4 - text.length % 4) % 4);
     const file = Buffer.concat([Buffer.alloc(20), Buffer.from(text), Buffer.alloc(8), ...parts]);
@@ -55,4 +60,12 @@ test("panes have their part of the index, what they let pass and what they refle
     assert.deepEqual(near, [[0.5, 0.4, 0.3], [0.06, 0.06, 0.03]]);
     assert.equal(readMesh(squares([{ name: "floor", count: 1 }])).glassByAngle, true);
     assert.deepEqual([glassText(glass), glassText({ transmittance: 0.7812, faces: 1 })], ["pane, T = 0.49 of 2 faces together", "pane, T = 0.781"]);
+});
+
+test("corners have the weights of elements", () => {
+    const { corners, cornerOf, elementOf } = readMesh(squares([{ name: "floor", count: 2 }, { name: "lamp", count: 1 }]));
+    assert.equal(corners.count, 12);
+    assert.deepEqual([...cornerOf], Array.from({ length: 12 }, (_, v) => v));
+    for (let v = 0; v < 12; v++) assert.deepEqual([...corners.elements.subarray(corners.first[v], corners.first[v + 1])], [elementOf[v]]);
+    assert.deepEqual([...corners.weights], Array(12).fill(1));
 });

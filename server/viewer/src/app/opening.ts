@@ -40,7 +40,7 @@ export class Opening {
             openings = luminaires.length === 0 ? null : new Openings(luminaires, mesh.up, diagonal),
             marks = sensors === null ? null : new SensorMarks(sensors, mesh.up, diagonal, stage.uniforms);
         stage.show(mesh, description.channels, openings, marks);
-        const picker = new Picker(stage.geometry as never, stage.drawn ?? mesh);
+        const picker = new Picker(stage.geometry as never, mesh);
         const scene = { description, mesh, picker, defaultLighting: takeIn(defaultLightingOf(mesh, description)),
             openings, luminaires: luminairesOf(luminaires, mesh.area), sensors, marks };
         this.take(scene);

@@ -186,8 +186,10 @@ export class Api {
         return (await this.post(Api.path(scene, "/weather"), { gaps })) as WeatherRows;
     }
 
+    /** With the corners that elements share. */
     async mesh(scene: string): Promise<ArrayBuffer> {
-        return (await this.daemon.ask("GET", Api.path(scene, "/mesh"), { accept: "model/gltf-binary" })).body;
+        const path = `${Api.path(scene, "/mesh")}?corners=elements`;
+        return (await this.daemon.ask("GET", path, { accept: "model/gltf-binary" })).body;
     }
 
     /** [C][n] values, or [n] of one channel, in half precision; `request` has the emission and the quantity. */

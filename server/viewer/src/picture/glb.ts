@@ -1,5 +1,5 @@
-// Reads the mesh of a scene: the binary glTF of GET /v1/scenes/NAME/mesh, in the layout that the daemon writes
-// (one node per group, POSITION, NORMAL, _ELEMENT, indices; an element's corners are its own).
+// Reads the mesh of a scene: the binary glTF of GET /v1/scenes/NAME/mesh?corners=elements, in the layout that the
+// daemon writes (one node per group, POSITION, NORMAL, _ELEMENT, _CORNER, indices; an element's vertices are its own).
 import type { Rgb } from "../base/colour.ts";
 
 /** The light that a pane lets pass: its part at normal incidence, by all faces that a ray crosses together. */
@@ -49,12 +49,23 @@ export interface MeshImage {
     wrap: [number, number];
 }
 
+/** Corners that elements share, at which smooth light is the sum of weights[k] times that of elements[k] for k from
+ * first[i] to first[i + 1] − 1. */
+export interface MeshCorners {
+    count: number;
+    first: Uint32Array;
+    elements: Uint32Array;
+    weights: Float32Array;
+}
+
 export interface SceneMesh {
     elements: number;
     positions: Float32Array;
     normals: Float32Array;
-    /** Of each vertex, its element. */
+    /** Of each vertex, its element and its corner. */
     elementOf: Uint32Array;
+    cornerOf: Uint32Array;
+    corners: MeshCorners;
     index: Uint32Array;
     /** Of each element, its group and its area in m². */
     groupOf: Uint32Array;
@@ -94,7 +105,13 @@ interface Gltf {
     textures?: { sampler?: number; source: number }[];
     samplers?: { wrapS?: number; wrapT?: number }[];
     images?: { bufferView?: number }[];
-    extras?: { lambert?: { up?: string; glass_law?: string } };
+    extras?: {
+        lambert?: {
+            up?: string;
+            glass_law?: string;
+            corners?: { count: number; first: number; elements: number; weights: number };
+        };
+    };
 }
 
 const WIDTHS: { [type: string]: number } = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
@@ -139,8 +156,8 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
         vertices += gltf.accessors[primitive.attributes.POSITION].count;
         indices += gltf.accessors[primitive.indices].count;
     }
-    const positions = new Float32Array(3 * vertices), normals = new Float32Array(3 * vertices);
-    const elementOf = new Uint32Array(vertices), index = new Uint32Array(indices);
+    const positions = new Float32Array(3 * vertices), normals = new Float32Array(3 * vertices),
+        elementOf = new Uint32Array(vertices), cornerOf = new Uint32Array(vertices), index = new Uint32Array(indices);
     const ranges: { name: string; vertices: [number, number]; material: number | undefined; glass: Glass | null }[] =
         [];
     const panes: MeshPane[] = [];
@@ -150,6 +167,7 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
         for (const element of hidden) buried.add(element);
         positions.set(floats(gltf.accessors[primitive.attributes.POSITION]), 3 * atVertex);
         normals.set(floats(gltf.accessors[primitive.attributes.NORMAL]), 3 * atVertex);
+        cornerOf.set(floats(gltf.accessors[primitive.attributes._CORNER]), atVertex);
         const ids = floats(gltf.accessors[primitive.attributes._ELEMENT]);
         for (let v = 0; v < ids.length; v++) {
             elementOf[atVertex + v] = ids[v];
@@ -192,6 +210,8 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
         positions,
         normals,
         elementOf,
+        cornerOf,
+        corners: cornersOf(gltf, file, start),
         index,
         groupOf,
         area,
@@ -206,6 +226,17 @@ export function readMesh(file: ArrayBuffer): SceneMesh {
     };
     addImages(mesh, file, start, gltf, parts.map(({ primitive }) => primitive));
     return mesh;
+}
+
+function cornersOf(gltf: Gltf, file: ArrayBuffer, start: number): MeshCorners {
+    const about = gltf.extras?.lambert?.corners;
+    if (about === undefined) throw new Error("the mesh has no corners");
+    const part = (view: number): [ArrayBuffer, number, number] => {
+        const { byteOffset, byteLength } = gltf.bufferViews[view];
+        return [file, start + (byteOffset ?? 0), byteLength / 4];
+    };
+    return { count: about.count, first: new Uint32Array(...part(about.first)),
+        elements: new Uint32Array(...part(about.elements)), weights: new Float32Array(...part(about.weights)) };
 }
 
 type Primitive = Gltf["meshes"][number]["primitives"][number];

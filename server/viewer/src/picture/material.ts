@@ -1,5 +1,5 @@
 // The shaders. One texel per element and channel, half precision as the daemon sent it; a vertex looks up the texel of
-// its element (flat) or of its node (smooth, whose means a pass over the nodes makes). Tone curve, exposure, palette,
+// its element (flat) or of its node (smooth, whose light a pass over the nodes makes). Tone curve, exposure, palette,
 // iso-lines, threshold and the comparison are in the fragment shader: none of them costs a request.
 import { CustomBlending, GLSL3, Matrix4, OneFactor, OneMinusSrcAlphaFactor, RawShaderMaterial, ShaderChunk, Vector2,
     Vector3, Vector4, type IUniform, type Texture } from "three";
@@ -35,7 +35,7 @@ vec3 element_colour(highp sampler2D values, int i) {
 }
 `;
 
-/** Fills the texture of nodes: each is the mean of the elements at it, or their sum by weights. */
+/** Fills the texture of nodes: each is the sum of elements by weights, nowhere below 0 and the least of them. */
 const nodesFragment = `
 precision highp float;
 precision highp int;
@@ -44,9 +44,8 @@ ${fetchElement}
 uniform usampler2D node_first, node_elements;
 uniform highp sampler2D node_weights;
 uniform int node_count;
-uniform bool is_weighted;
-layout(location = 0) out vec4 mean_a;
-layout(location = 1) out vec4 mean_b;
+layout(location = 0) out vec4 sum_a;
+layout(location = 1) out vec4 sum_b;
 
 uint entry(usampler2D list, int i) {
     int width = textureSize(list, 0).x;
@@ -58,15 +57,18 @@ void main() {
     int node = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
     if (node >= node_count) discard;
     int first = int(entry(node_first, node)), end = int(entry(node_first, node + 1));
-    vec3 a = vec3(0.0), b = vec3(0.0);
+    vec3 a = vec3(0.0), b = vec3(0.0), least_a = vec3(0.0), least_b = vec3(0.0);
     for (int k = first; k < end; k++) {
         int element = int(entry(node_elements, k));
-        float weight = is_weighted ? texel(node_weights, k) : 1.0 / float(end - first);
-        a += weight * element_colour(values_a, element);
-        b += weight * element_colour(values_b, element);
+        float weight = texel(node_weights, k);
+        vec3 own_a = element_colour(values_a, element), own_b = element_colour(values_b, element);
+        a += weight * own_a;
+        b += weight * own_b;
+        least_a = min(least_a, own_a);
+        least_b = min(least_b, own_b);
     }
-    mean_a = vec4(a, 1.0);
-    mean_b = vec4(b, 1.0);
+    sum_a = vec4(max(a, least_a), 1.0);
+    sum_b = vec4(max(b, least_b), 1.0);
 }
 `;
 
@@ -268,7 +270,6 @@ export function makeUniforms(nothing: Texture): Uniforms {
         node_elements: of(null),
         node_weights: of(nothing),
         node_count: of(0),
-        is_weighted: of(false),
         elements: of(1),
         channels: of(1),
         weights: of(new Vector3(1, 0, 0)),

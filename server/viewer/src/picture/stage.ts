@@ -7,10 +7,8 @@ import type { Palette, Tone } from "../state/state.ts";
 import type { Field } from "./field.ts";
 import { channelWeights } from "./field.ts";
 import type { SceneMesh } from "./glb.ts";
-import { findNodes } from "./nodes.ts";
 import type { Openings } from "./openings.ts";
 import type { SensorMarks } from "./sensor_marks.ts";
-import { splitEdges, type Drawn } from "./split_edges.ts";
 import { Sunlight } from "./sunlight.ts";
 import { makeUniforms, nodesMaterial, paneMaterial, sceneMaterial, type Uniforms } from "./material.ts";
 import { emptyTexture, floatTexture, HalfTexture, imageTexture, integerTexture, maskTexture, paletteTexture, rowsFor,
@@ -57,7 +55,6 @@ export class Stage {
     readonly uniforms: Uniforms;
     mesh: SceneMesh | null = null;
     geometry: BufferGeometry | null = null;
-    drawn: Drawn | null = null;
     /** Pictures drawn so far. */
     frames = 0;
     private readonly nothing = emptyTexture();
@@ -117,20 +114,18 @@ export class Stage {
         this.marks = marks;
         if (openings !== null) this.scene.add(openings.lines);
         if (marks !== null) this.scene.add(marks.mesh);
-        const nodes = findNodes(mesh), drawn = splitEdges(mesh, nodes), vertices = drawn.elementOf.length,
-            ids = new Uint32Array(2 * vertices);
+        const nodes = mesh.corners, vertices = mesh.elementOf.length, ids = new Uint32Array(2 * vertices);
         for (let v = 0; v < vertices; v++) {
-            ids[2 * v] = drawn.elementOf[v];
-            ids[2 * v + 1] = drawn.nodeOf[v];
+            ids[2 * v] = mesh.elementOf[v];
+            ids[2 * v + 1] = mesh.cornerOf[v];
         }
         const geometry = new BufferGeometry();
-        geometry.setAttribute("position", new BufferAttribute(drawn.positions, 3));
+        geometry.setAttribute("position", new BufferAttribute(mesh.positions, 3));
         geometry.setAttribute("ids", new BufferAttribute(ids, 2));
-        geometry.setIndex(new BufferAttribute(drawn.index, 1));
-        this.drawn = drawn;
+        geometry.setIndex(new BufferAttribute(mesh.index, 1));
         this.geometry = geometry;
         this.mesh = mesh;
-        const materials = this.addParts(geometry, mesh, drawn);
+        const materials = this.addParts(geometry, mesh);
         const body = new Mesh(geometry, materials);
         body.name = "scene";
         // Until the first answer all of it is black.
@@ -153,8 +148,7 @@ export class Stage {
         u.values_b.value = this.values[1].texture;
         u.node_first.value = integerTexture(nodes.first);
         u.node_elements.value = integerTexture(nodes.elements);
-        u.is_weighted.value = nodes.weights !== null;
-        u.node_weights.value = nodes.weights === null ? this.nothing : floatTexture(nodes.weights);
+        u.node_weights.value = floatTexture(nodes.weights);
         u.node_count.value = nodes.count;
         u.nodes_a.value = this.nodes.textures[0];
         u.nodes_b.value = this.nodes.textures[1];
@@ -167,12 +161,12 @@ export class Stage {
 
     /** The materials of the parts of the geometry: the first is that of all opaque ones without an image, the last are
      * those of panes. */
-    private addParts(geometry: BufferGeometry, mesh: SceneMesh, drawn: Drawn): RawShaderMaterial[] {
+    private addParts(geometry: BufferGeometry, mesh: SceneMesh): RawShaderMaterial[] {
         const { white, uniforms } = this;
         const materials = [sceneMaterial(uniforms, white, [1, 1, 1]),
-            ...drawn.images.map(({ factor }) => sceneMaterial(uniforms, white, factor)),
-            ...drawn.panes.map((pane) => paneMaterial(uniforms, white, pane, mesh.glassByAngle))];
-        const parts = [...drawn.images, ...drawn.panes].map((part, k) => ({ ...part, material: k + 1 }))
+            ...mesh.images.map(({ factor }) => sceneMaterial(uniforms, white, factor)),
+            ...mesh.panes.map((pane) => paneMaterial(uniforms, white, pane, mesh.glassByAngle))];
+        const parts = [...mesh.images, ...mesh.panes].map((part, k) => ({ ...part, material: k + 1 }))
             .sort((one, other) => one.first - other.first);
         this.hasImages = false;
         let first = 0;
@@ -181,9 +175,9 @@ export class Stage {
             geometry.addGroup(part.first, part.count, part.material);
             first = part.first + part.count;
         }
-        if (first < drawn.index.length) geometry.addGroup(first, drawn.index.length - first, 0);
-        if (drawn.uv === null || mesh.reflectance === null) return materials;
-        geometry.setAttribute("uv", new BufferAttribute(drawn.uv, 2));
+        if (first < mesh.index.length) geometry.addGroup(first, mesh.index.length - first, 0);
+        if (mesh.uv === null || mesh.reflectance === null) return materials;
+        geometry.setAttribute("uv", new BufferAttribute(mesh.uv, 2));
         this.uniforms.reflectance.value = floatTexture(mesh.reflectance);
         const anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
         // Until all are decoded, groups have their means; images that no browser can decode leave it at that.
@@ -378,7 +372,7 @@ export class Stage {
         return this.renderer.getContext().isContextLost();
     }
 
-    /** The light of the sun, where it is drawn. */
+    /** The light of the sun, where it is mesh. */
     private get sun(): Sunlight | null {
         return this.uniforms.is_sunny.value === true ? this.sunlight : null;
     }
@@ -463,7 +457,6 @@ export class Stage {
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
         this.uniforms.reflectance.value = this.nothing;
         this.geometry =
-            this.drawn =
             this.mesh =
             this.values =
             this.nodes =
