@@ -441,6 +441,40 @@ lam_status lam_rows_means(const lam_rows *rows, size_t n_lights, const lam_light
  * lam_scene_jacobian, and of a row without area. */
 void lam_rows_jacobian(const lam_rows *rows, lam_by by, float *out);
 
+/* The corners that elements of a store share, of which pictures of light are smooth: elements of one group
+ * that meet at less than 20 degrees share them, so that light spreads neither around edges nor into other
+ * groups; where a corner lies inside an edge of a larger element, it has the light of that edge. Immutable
+ * once open. */
+typedef struct lam_corners lam_corners;
+
+/* Opens the store at path and finds its corners, some 3 us an element; the caller closes them with
+ * lam_corners_close. Errors: as lam_operator_open, LAM_ERR_ARGUMENT (more than 2^32 weights). Any thread. */
+lam_status lam_corners_open(const char *path, lam_corners **corners, lam_error *error);
+
+/* Frees corners; NULL is allowed. */
+void lam_corners_close(lam_corners *corners);
+
+/* Elements n and corners k. */
+size_t lam_corners_elements(const lam_corners *corners);
+size_t lam_corners_count(const lam_corners *corners);
+
+/* Their places [k][3], m, in the axes of the store; owned by corners. */
+const double *lam_corners_positions(const lam_corners *corners);
+
+/* The corners of an element's polygon, counter-clockwise, those inside its edges among them: *list, owned by
+ * corners; returns their number, 3 or more. element is below n. */
+size_t lam_corners_of(const lam_corners *corners, size_t element, const uint32_t **list);
+
+/* Light at corners of light at elements, x [n_rows][n], rows being vectors times channels: out is
+ * [n_rows][k], bit for bit what lambertd answers at corners. Linear light is reproduced; nothing falls below
+ * 0, nor below the least of x where that is negative. work [n] is lost. Allocates nothing; a row's bits do
+ * not depend on its neighbours. Cost: O(n). */
+void lam_corners_apply(const lam_corners *corners, size_t n_rows, const float *x, float *out, float *work);
+
+/* The transpose, the gradient of <g, out> by x where no value was bounded: g is [n_rows][k], x [n_rows][n].
+ * work [n + 2 k] is lost. */
+void lam_corners_adjoint(const lam_corners *corners, size_t n_rows, const float *g, float *x, float *work);
+
 #pragma GCC visibility pop
 #ifdef __cplusplus
 }

@@ -1,9 +1,7 @@
 #include "server/scene/scene_corners.h"
 
 #include "server/scene/scene_store.h"
-#include "store/groups.h"
 
-#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 
@@ -53,65 +51,13 @@ size_t corner_work_bytes(size_t n, size_t n_vertices) {
                : SIZE_MAX;
 }
 
-static lam_status check_arrays(const store *s, const corner_arrays *a, lam_error *error) {
-    lam_status status = LAM_OK;
-    const uint32_t(*elements)[4] = a->elements;
-    const double *vertices = a->vertices;
-    for (size_t i = 0; i < a->n; i++)
-        for (int k = 0; k < 4; k++)
-            if (elements[i][k] >= a->n_vertices && !(k == 3 && elements[i][k] == CORNER_NONE))
-                FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/elements[%zu][%d] = %u, there are %zu vertices",
-                     store_path(s), i, k, elements[i][k], a->n_vertices);
-    for (size_t k = 0; k < 3 * a->n_vertices; k++)
-        if (!isfinite(vertices[k]))
-            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/vertices[%zu][%zu] = %g, must be finite", store_path(s),
-                 k / 3, k % 3, vertices[k]);
-done:
-    return status;
-}
-
-lam_status corner_arrays_read(store *s, const scene *of, corner_arrays *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    const group_index *groups = &of->groups;
-    const size_t n = of->n, v = scene_mesh_vertices(of->mesh);
-    *out = (corner_arrays){.n = n, .n_vertices = v};
-    TRY(store_read(s, STORE_MESH "/vertices", STORE_F64, 2, (size_t[]){v, 3}, &out->vertices, error));
-    TRY(store_read(s, STORE_MESH "/elements", STORE_U32, 2, (size_t[]){n, 4}, &out->elements, error));
-    TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, (size_t[]){n, 3}, &out->normal, error));
-    out->group = memory_allocate(n, sizeof *out->group, "groups of elements", error);
-    if (out->group == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t g = 0; g < groups->n_groups; g++)
-        for (uint32_t at = groups->start[g]; at < groups->start[g + 1]; at++)
-            out->group[groups->elements[at]] = (uint32_t)g;
-    TRY(check_arrays(s, out, error));
-done:
-    return status;
-}
-
-void corner_arrays_free(corner_arrays *a) {
-    free(a->vertices);
-    free(a->elements);
-    free(a->normal);
-    free(a->group);
-    *a = (corner_arrays){.n = 0};
-}
-
-corner_mesh corner_arrays_mesh(const corner_arrays *a) {
-    return (corner_mesh){.n_vertices = a->n_vertices,
-                         .n = a->n,
-                         .vertices = a->vertices,
-                         .elements = a->elements,
-                         .normal = a->normal,
-                         .group = a->group};
-}
-
 static lam_status make_plan(scene_corners *c, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     corner_arrays arrays = {.n = 0};
     corner_nodes nodes = {.n_nodes = 0};
     TRY(scene_store_open(c->of, &s, error));
-    TRY(corner_arrays_read(s, c->of, &arrays, error));
+    TRY(corner_arrays_read(s, c->of->n, &arrays, error));
     const corner_mesh m = corner_arrays_mesh(&arrays);
     TRY(corner_nodes_create(&m, &nodes, error));
     TRY(corner_plan_create(&m, &nodes, &c->plan, error));

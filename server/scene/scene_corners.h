@@ -5,7 +5,7 @@
 
 #include "server/scene/memory_ledger.h"
 #include "solver/operator/corners/corner_plan.h"
-#include "store/store.h"
+#include "solver/operator/corners/corner_store.h"
 
 typedef struct scene scene;
 typedef struct scene_corners scene_corners;
@@ -26,19 +26,7 @@ lam_status scene_corners_get(scene_corners *c, const corner_plan **plan, lam_err
 /* Bytes taken of the ledger; does not wait. NULL is allowed. */
 size_t scene_corners_held(scene_corners *c);
 
-/* The arrays of a mesh that corners are found in; freed by corner_arrays_free. */
-typedef struct corner_arrays {
-    void *vertices, *elements, *normal; /* as in /mesh */
-    uint32_t *group;                    /* [n] */
-    size_t n_vertices, n;
-} corner_arrays;
-
-/* Reads them of the open store of a scene. Errors: LAM_ERR_FORMAT, LAM_ERR_MEMORY, those of store_read. */
-lam_status corner_arrays_read(store *s, const scene *of, corner_arrays *out, lam_error *error);
-void corner_arrays_free(corner_arrays *a);
-corner_mesh corner_arrays_mesh(const corner_arrays *a);
-
-/* Bytes that reading them and finding corners take of a mesh, at most, all together. */
+/* Bytes that reading a mesh and finding its corners take at most, all together. */
 size_t corner_work_bytes(size_t n, size_t n_vertices);
 
 #endif

@@ -237,7 +237,7 @@ static lam_status find_corners(store *s, const scene *root, mesh_form form, mesh
                                lam_error *error) {
     lam_status status = LAM_OK;
     const corner_plan *plan;
-    TRY(corner_arrays_read(s, root, &c->arrays, error));
+    TRY(corner_arrays_read(s, root->n, &c->arrays, error));
     const corner_mesh m = corner_arrays_mesh(&c->arrays);
     TRY(corner_nodes_create(&m, &c->nodes, error));
     if (c->nodes.n_nodes > GLTF_ELEMENTS_MOST)
