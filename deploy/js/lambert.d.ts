@@ -149,6 +149,18 @@ export interface Elements {
     reflectance: Float32Array;
 }
 
+/** Metres, y up, front faces counter-clockwise, as three.js has them. */
+export interface Corners {
+    count: number;
+    /** [count, 3]. */
+    positions: Float32Array;
+    normals: Float32Array;
+    /** [count], the first element that has the corner. */
+    element: Uint32Array;
+    /** Three corners for each triangle. */
+    index: Uint32Array;
+}
+
 export interface Group {
     name: string;
     /** m², without buried elements, as the means by it. */
@@ -194,6 +206,8 @@ export class Scene {
     sky(options?: Asking): Promise<Sky | null>;
     /** Its elements as a GLB file (api.md). */
     mesh(options?: Asking): Promise<ArrayBuffer>;
+    /** The mesh of an answer `at: "corners"`: vertex v has value v. */
+    corners(options?: Asking): Promise<Corners>;
     /** B = E + rho H of all surfaces, with all bounces. */
     radiosity(emission: Emissions, options?: RadiosityOptions): Promise<Answer>;
     irradiance(emission: Emissions, options?: Omit<RadiosityOptions, "quantity">): Promise<Answer>;

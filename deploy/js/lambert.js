@@ -149,6 +149,37 @@ function flat(nested, kind) {
     return { shape, data: kind.from(nested.flat(shape.length - 1), (value) => value ?? NaN) };
 }
 
+/** The primitives of a binary glTF one after the other, as a mesh: GET …/mesh?corners has a corner for each vertex. */
+function readCorners(file) {
+    const length = new DataView(file).getUint32(12, true), start = 28 + length;
+    const { meshes, accessors, bufferViews } = JSON.parse(new TextDecoder().decode(new Uint8Array(file, 20, length)));
+    const primitives = meshes.flatMap((mesh) => mesh.primitives);
+    const read = (which) => {
+        const { bufferView, byteOffset = 0, componentType, count, type } = accessors[which];
+        const from = start + (bufferViews[bufferView].byteOffset ?? 0) + byteOffset,
+            kind = componentType === 5125 ? Uint32Array : Float32Array;
+        return new kind(file.slice(from, from + 4 * count * { SCALAR: 1, VEC2: 2, VEC3: 3 }[type]));
+    };
+    const joined = (kind, parts) => {
+        const all = new kind(parts.reduce((sum, part) => sum + part.length, 0));
+        let at = 0;
+        for (const part of parts) {
+            all.set(part, at);
+            at += part.length;
+        }
+        return all;
+    };
+    const of = (name) => primitives.map((primitive) => read(primitive.attributes[name]));
+    let first = 0;
+    const index = primitives.map((primitive) => {
+        const before = first;
+        first += accessors[primitive.attributes.POSITION].count;
+        return read(primitive.indices).map((vertex) => vertex + before);
+    });
+    return { count: first, positions: joined(Float32Array, of("POSITION")), normals: joined(Float32Array, of("NORMAL")),
+        element: joined(Uint32Array, of("_ELEMENT")), index: joined(Uint32Array, index) };
+}
+
 // Requests.
 
 /** An answer of the daemon, whole. */
@@ -616,6 +647,19 @@ export class Scene {
         return (await this.daemon.ask("GET", this.path("/mesh"), { ...options, accept: "model/gltf-binary" })).body;
     }
 
+    /** The mesh of an answer `at: "corners"`: vertex v has value v. */
+    async corners(options = {}) {
+        const seen = [];
+        const made = await this.#kept("corners", async () => {
+            seen.push(
+                await this.daemon.ask("GET", this.path("/mesh?corners"), { ...options, accept: "model/gltf-binary" }),
+            );
+            return readCorners(seen[0].body);
+        });
+        if (seen.length > 0) await this.#stillThere(seen, options);
+        return made;
+    }
+
     /** B = E + rho H of all surfaces, with all bounces, or of a batch of emissions: see lambert.d.ts for what an
      * emission may be. */
     async radiosity(emission, { format, stated, variant, signal, timeout, ...members } = {}) {
@@ -644,6 +688,14 @@ export class Scene {
         }
         const answer = Answer.joined(parts), isWhole = select === undefined && (at ?? "elements") === "elements";
         if (isWhole) this.#fits(answer.shape, isBatch ? [emissions.length] : [], "");
+        const count = at === "corners" ? this.#known.get("corners")?.count ?? answer.shape.at(-1) : answer.shape.at(-1);
+        if (count !== answer.shape.at(-1)) {
+            refuse(
+                `the scene ${this.name} answers ${answer.shape.at(-1)} corners instead of ${count}: it was replaced; `
+                    + "open it again",
+                "scene-changed",
+            );
+        }
         if (select?.sensors === undefined && select?.probes === undefined)
             await this.#stillThere(seen, { signal, timeout, variant });
         return answer;

@@ -96,7 +96,7 @@ const DRAWING = process.env.CARD === undefined ? ["--use-angle=swiftshader", "--
     : [`--use-angle=${process.env.CARD}`, "--enable-gpu", ...(process.env.CARD === "vulkan" ? ["--enable-features=Vulkan", "--disable-vulkan-surface"] : [])];
 
 /** A page of the viewer, which has shown its first answer. Its `faults` are errors and requests to other origins. */
-export async function openPage(address, { width = 1000, height = 600, hash = "", touch = false, wait = true, before, storage } = {}) {
+export async function openPage(address, { width = 1000, height = 600, query = "?inspect", hash = "", touch = false, wait = true, before, storage } = {}) {
     if (browser === null) {
         browser = await chromium.launch({
             executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
@@ -121,7 +121,7 @@ export async function openPage(address, { width = 1000, height = 600, hash = "",
         if (message.type() === "error" && !/Failed to load resource/.test(message.text())) page.faults.push(message.text());
     });
     if (before !== undefined) await before(page);
-    await page.goto(`${address}/?inspect${hash}`);
+    await page.goto(`${address}/${query}${hash}`);
     if (wait) await settled(page);
     return page;
 }

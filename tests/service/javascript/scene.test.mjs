@@ -108,6 +108,29 @@ test("precision, places and units", async () => {
     same(sensors, (await plain("scenes/office/radiosity", { emission: { luminaires: { row: 1 } }, select: { sensors: ["desks"] } })).irradiance, [(await office.sensors()).get("desks").count]);
 });
 
+test("light at corners has a mesh that fits", async () => {
+    const { count, positions, normals, index, element } = await box.corners(), light = { groups: { lamp: 17 } };
+    const B = await box.radiosity({ lamp: 17 }, { at: "corners" }), H = await box.irradiance(some(box.n), { at: "corners", limit: false });
+    same(B, (await plain("scenes/box/radiosity", { emission: light, at: "corners" })).radiosity, [3, count]);
+    assert.deepEqual([H.shape, positions.length, normals.length, element.length], [[3, count], 3 * count, 3 * count, count]);
+    assert.equal(new Set(index).size, count);
+    // Corners of an element are nearer to its centre than its perimeter is long; y of a mesh is z of the scene, z is -y.
+    const { centre, normal, area } = await box.elements(["centre", "normal", "area"]);
+    element.forEach((e, v) => {
+        const at = [positions[3 * v], -positions[3 * v + 2], positions[3 * v + 1]], n = [normals[3 * v], -normals[3 * v + 2], normals[3 * v + 1]];
+        assert.ok(at.reduce((sum, x, d) => sum + (x - centre[3 * e + d]) * normal[3 * e + d], 0) ** 2 < 1e-9, "it is in the plane of its element");
+        assert.ok(n.reduce((sum, x, d) => sum + x * normal[3 * e + d], 0) > 0.8, "its normal is that of a surface of less than 30 degrees");
+    });
+    let total = 0; // front faces run counter-clockwise
+    for (let t = 0; t < index.length; t += 3) {
+        const [a, b, c] = [0, 1, 2].map((k) => positions.subarray(3 * index[t + k], 3 * index[t + k] + 3)), ab = b.map((x, d) => x - a[d]), ac = c.map((x, d) => x - a[d]);
+        const cross = [ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]];
+        total += Math.hypot(...cross) / 2;
+        assert.ok(cross.reduce((sum, x, d) => sum + x * normals[3 * index[t] + d], 0) > -1e-9);
+    }
+    assert.ok(Math.abs(total - area.reduce((sum, m2) => sum + m2, 0)) < 1e-5 * total);
+});
+
 test("figures of groups and of sensors", async () => {
     const emission = { luminaires: { row: 0.4, desk: 1 } };
     const found = await office.reduce(emission, { sensors: "desks", figures: ["mean", "min"], atLeast: [10, 100] });
