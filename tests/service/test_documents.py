@@ -25,6 +25,7 @@ MANUAL = ROOT / "deploy" / "docs"
 DOCUMENTS = [path.resolve() for path in (ROOT / "README.md", *sorted(MANUAL.glob("*.md")))]
 LAMBERT, LAMBERTD = os.environ["LAMBERT"], os.environ["LAMBERTD"]
 PORT_IN_DOCUMENTS = "127.0.0.1:8317"
+PACKAGE = {"PYTHONPATH": str(ROOT / "deploy" / "python"), "PYTHONDONTWRITEBYTECODE": "1"}  # as if it were installed
 # Options of other programs that the documents name.
 FOREIGN = {"--once", "--all", "--data-binary", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static", "--test-dir"}
 
@@ -88,7 +89,7 @@ class Documents(unittest.TestCase):
             if mark in ("sh", "sh slow"):
                 script.append(made_small(text) if mark == "sh slow" else text)
             elif text in programs:
-                script.append(f"PYTHONPATH={ROOT}/deploy/python PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 - <<'END'\n{programs[text]}END\n")
+                script.append(f"/usr/bin/python3 - <<'END'\n{programs[text]}END\n")
             elif text in scripts:
                 script.append(f"node --input-type=module - <<'END'\n{scripts[text]}END\n")
             elif mark == "json":
@@ -110,7 +111,7 @@ class Documents(unittest.TestCase):
             path = f"{tools}:{pathlib.Path(LAMBERT).parent}:/usr/bin:{os.environ['PATH']}"
             text = "\n".join(script).replace(PORT_IN_DOCUMENTS, f"127.0.0.1:{port}")
             done = subprocess.run(["bash", "-eu", "-o", "pipefail", "-c", text], cwd=work, capture_output=True, text=True,
-                                  timeout=2 * PATIENCE, check=False, env={**os.environ, "PATH": path})
+                                  timeout=2 * PATIENCE, check=False, env={**os.environ, "PATH": path, **PACKAGE})
             self.assertEqual(done.returncode, 0, f"{document.name}: {done.stderr[-2000:]}\n{done.stdout[-2000:]}")
         for i, expected in enumerate(answers):
             printed = done.stdout.split(f"=== answer {i}\n")[0].strip().splitlines()
@@ -156,8 +157,9 @@ class Documents(unittest.TestCase):
             named = set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", text))
             # Scripts of the tree that a document names say at their beginning which options they have.
             for script in set(re.findall(r"[\w./-]+\.(?:py|sh|mjs)", text)):
-                if (ROOT / script).is_file():
-                    named -= set(re.findall(r"--[a-z]+", "".join((ROOT / script).read_text().splitlines(True)[:25])))
+                for path in (ROOT / script, document.parent / script):
+                    if path.is_file():
+                        named -= set(re.findall(r"--[a-z]+", "".join(path.read_text().splitlines(True)[:25])))
             self.assertEqual(sorted(named - known), [], f"{document.name} names options that no program has")
 
     def test_links_lead_somewhere(self):
