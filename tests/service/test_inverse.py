@@ -24,6 +24,8 @@ LIBRARY = next(iter(sorted(glob.glob(str(pathlib.Path(os.environ["LAMBERT"]).par
 sys.path.insert(0, str(INVERSE))
 
 import catalogue  # noqa: E402
+import enclosures  # noqa: E402
+import heat  # noqa: E402
 
 
 def run(program, *arguments):
@@ -132,6 +134,67 @@ class Office(InverseCase):
         self.refused("there is no such store", "lamps.py", self.root / "none.h5")
         self.refused("Connection refused", "lamps.py", "http://127.0.0.1:1/office")
         self.refused("no configuration found", "catalogue.py", self.stores[1], "--rounds", 1)
+
+
+# Form factors of closed forms: opposed (C-11) and perpendicular (C-14) rectangles, with the sizes of a box, of a cube and a room.
+FACTORS = {(1, 1, 1): {("floor", "ceiling"): 0.199824895698, ("floor", "north"): 0.200043776075, ("floor", "east"): 0.200043776075},
+           (10, 6, 3): {("floor", "ceiling"): 0.488700936440, ("floor", "north"): 0.162387354927, ("floor", "east"): 0.093262176853}}
+
+
+class Heat(InverseCase):
+    """Enclosures beside what is known of them."""
+
+    def precompute(self, name, faces, eps, *more):
+        root = self.folder()
+        enclosures.write(root / f"{name}.obj", faces, eps)
+        must("precompute", root / f"{name}.obj", "-o", root / f"{name}.h5", "--method", "exact", "--quality", "high", "--probes", 0, "--closed",
+             "--quiet", *more)
+        return root / f"{name}.h5"
+
+    def test_closed_forms(self):
+        for name, faces, eps, temperatures, heats, truth in enclosures.cases(0):
+            scene = lambert.Scene(self.precompute(name, faces, eps), library=False)
+            T, q = heat.steady_state(scene, temperatures, heats)
+            for key, value in truth.items():
+                found = T[key[:-2]] if key.endswith(" K") else q[key]
+                self.assertLess(abs(found / value - 1), 1e-4, (name, key))
+            # The heat that is put in leaves elsewhere, to the single precision of the largest part of it.
+            total = [q[g] * scene.groups[g].area for g in q]
+            self.assertLess(abs(sum(total)), 1e-5 * max(map(abs, total)), name)
+
+    def test_black_surfaces_exchange_by_form_factors(self):
+        """Of black surfaces K is F: that of the tables of view factors."""
+        for size, table in FACTORS.items():
+            faces = enclosures.box(*size)
+            walls = faces.pop("walls")
+            faces |= {name: [wall] for name, wall in zip(("west", "north", "east", "south"), walls)}
+            scene = lambert.Scene(self.precompute("black", faces, dict.fromkeys(faces, 1)), library=False)
+            K = heat.responses(scene, list(faces))
+            for (a, b), F in table.items():
+                self.assertLess(abs(K[list(faces).index(a), list(faces).index(b)] / F - 1), 1e-4, (size, a, b))
+
+    def test_a_finer_mesh_keeps_what_needs_no_mesh(self):
+        """Walls that are all as warm are as warm everywhere inside, and no heat flows: to the error of row sums that are made 1."""
+        eps = {"floor": 0.8, "ceiling": 0.6, "walls": 0.3}
+        scene = lambert.Scene(self.precompute("even", enclosures.box(1, 1, 1), eps, "--elements", 150), library=False)
+        self.assertGreater(scene.n, 100)
+        T, q = heat.steady_state(scene, {"floor": 300, "ceiling": 300}, {"walls": 0})
+        self.assertAlmostEqual(T["walls"], 300, delta=1e-3)
+        self.assertLess(max(map(abs, q.values())), 1e-5 * heat.SIGMA * 300**4)
+
+    def test_program(self):
+        store = self.precompute("room", enclosures.box(10, 6, 3), {"floor": 0.8, "ceiling": 0.6, "walls": 0.3})
+        address = self.serve(store)
+        T = (100 / enclosures.insulated(1, 0, 0.8, 0.6, enclosures.ROOM) + 290**4) ** 0.25
+        for where in (store, address + "/room"):
+            lines = self.printed("heat.py", where, "floor=100W/m2", "ceiling=290K", "walls=0W/m2").splitlines()
+            self.assertEqual([line.split()[0] for line in lines[:3]], ["floor", "ceiling", "walls"])
+            self.assertAlmostEqual(float(lines[0].split()[3]), T, delta=1e-4 * T)
+        self.refused("walls: each surface needs a temperature or a heat", "heat.py", store, "floor=300K", "ceiling=290K")
+        self.refused("no group is called walz; there are floor, ceiling, walls", "heat.py", store, "walz=300K")
+        self.refused("floor would have to emit less than nothing", "heat.py", store, "floor=-1000W/m2", "ceiling=290K", "walls=0W/m2")
+        self.refused("one surface at least needs a temperature", "heat.py", store, "floor=1W/m2", "ceiling=0W/m2", "walls=0W/m2")
+        self.assertIn("must be GROUP=TEMPERATUREK or GROUP=HEATW/m2", run("heat.py", store, "floor=300").stderr)
 
 
 if __name__ == "__main__":
