@@ -18,6 +18,7 @@ from command import EXAMPLES, ENVIRONMENT, must
 from daemon import Daemon
 from lambert_python import PACKAGE, lambert
 from patience import PATIENCE
+import weather
 
 INVERSE = EXAMPLES / "inverse"
 LIBRARY = next(iter(sorted(glob.glob(str(pathlib.Path(os.environ["LAMBERT"]).parent / "liblambert.so*")))), "")
@@ -26,6 +27,8 @@ sys.path.insert(0, str(INVERSE))
 import catalogue  # noqa: E402
 import enclosures  # noqa: E402
 import heat  # noqa: E402
+import materials  # noqa: E402
+import openings  # noqa: E402
 
 
 def run(program, *arguments):
@@ -195,6 +198,107 @@ class Heat(InverseCase):
         self.refused("floor would have to emit less than nothing", "heat.py", store, "floor=-1000W/m2", "ceiling=290K", "walls=0W/m2")
         self.refused("one surface at least needs a temperature", "heat.py", store, "floor=1W/m2", "ceiling=0W/m2", "walls=0W/m2")
         self.assertIn("must be GROUP=TEMPERATUREK or GROUP=HEATW/m2", run("heat.py", store, "floor=300").stderr)
+
+
+PAINT = {"floor": (0.35, 0.2, 0.1), "ceiling": (0.85, 0.85, 0.8), "back-wall": (0.3, 0.4, 0.6), "left-wall": (0.2, 0.5, 0.3),
+         "right-wall": (0.7, 0.6, 0.2)}
+
+
+class Materials(InverseCase):
+    """A room is painted as in a picture, whose paint is known."""
+
+    @classmethod
+    def setUpClass(cls):
+        root = cls.folder()
+        must("generate", "cornell", "--elements", 150, "-o", root / "box.obj")
+        with open(root / "box.mtl", "a", encoding="ascii") as out:
+            out.write("".join(f"newmtl {name}\nKd {r} {g} {b}\n" for name, (r, g, b) in PAINT.items()))
+        painted = re.sub(rf"^o ({'|'.join(PAINT)})\nusemtl \w+$", r"o \1\nusemtl \1", (root / "box.obj").read_text(), flags=re.M)
+        (root / "painted.obj").write_text(painted)
+        must("precompute", root / "painted.obj", "-o", root / "painted.h5", "--method", "exact", "--probes", 0, "--quiet")
+        must("solve", root / "painted.h5", "-o", root / "wanted.npy")
+        cls.store, cls.wanted = root / "box.h5", root / "wanted.npy"
+        must("precompute", root / "box.obj", "-o", cls.store, "--method", "low-rank", "--epsilon", 0.002, "--keep-factors", "--probes", 0, "--quiet")
+        (root / "token").write_text("secret")
+        (root / "token").chmod(0o600)
+        cls.address = cls.serve(cls.store, "--token-file", root / "token", "--max-variants", 4) + "/box"
+
+    def test_paint_is_found(self):
+        for where in (self.store, self.address):
+            lines = self.printed("materials.py", where, self.wanted, *PAINT, "--token", "secret").splitlines()
+            found = {line.split()[0]: np.array(line.split()[1:], float) for line in lines[:-1]}
+            self.assertEqual(list(found), list(PAINT))
+            for name, paint in PAINT.items():
+                # Reflectances move light by as much as themselves; the operators differ by 0.002 in the norm.
+                self.assertLess(abs(found[name] - paint).max(), 0.002, name)
+
+    def test_slopes_are_those_of_the_goal(self):
+        painter = materials.Painter(lambert.Scene(self.address, token="secret"), list(PAINT), np.load(self.wanted))
+        x = np.random.default_rng(3).uniform(0.2, 0.8, 15)
+        value, slopes = painter.goal(x)
+        way = slopes / np.linalg.norm(slopes)
+        h = 0.02
+        difference = (painter.goal(x + h * way)[0] - painter.goal(x - h * way)[0]) / (2 * h)
+        # A central difference is off by h^2 / 6 of the third derivative: some h^2 of the slope.
+        self.assertLess(abs(difference / np.linalg.norm(slopes) - 1), 10 * h**2)
+        self.assertGreater(value, 0.01)
+        self.assertEqual([scene["name"] for scene in lambert.connect(self.address.rpartition("/")[0], token="secret").scenes()], ["box"])
+
+    def test_words(self):
+        np.save(self.store.parent / "short.npy", np.ones((3, 10)))
+        self.refused("the picture has the shape [3, 10], must have [3, ", "materials.py", self.store, self.store.parent / "short.npy", "floor")
+        self.refused("no group is called flor; there are floor", "materials.py", self.store, self.wanted, "flor")
+        self.refused("401", "materials.py", self.address, self.wanted, "floor")
+
+
+class Skylights(InverseCase):
+    """A roof of 16 patches, of which at most two open: all choices are tried."""
+
+    @classmethod
+    def setUpClass(cls):
+        root = cls.folder()
+        done = run("hall.py", root, "--divisions", 4)
+        assert done.returncode == 0, done.stderr
+        must("precompute", root / "site.obj", "-o", root / "site.h5", "--elements", 150, "--sky", "grid:8x4", "--method", "exact", "--probes", 0, "--quiet")
+        must("precompute", root / "hall.obj", "-o", root / "hall.h5", "--elements", 150, "--emitters", root / "emitters.json", "--probes", 0, "--quiet")
+        (root / "year.epw").write_text(weather.epw(weather.a_year()))
+        must("sky", root / "year.epw", "--tiles", "grid:8x4", "--photometric", "-o", root / "year.npy")
+        np.save(root / "some.npy", np.load(root / "year.npy").reshape(365, 24, -1)[::20].reshape(-1, 32))
+        cls.root = root
+        cls.address = cls.serve(root / "site.h5", root / "hall.h5")
+
+    def test_no_choice_is_better(self):
+        with unittest.mock.patch.object(openings, "PASSES", 0.1):
+            p = openings.Openings(lambert.Scene(self.root / "site.h5", library=False), lambert.Scene(self.root / "hall.h5", library=False),
+                                  np.load(self.root / "some.npy"), 0.05)
+        every = {frozenset(c): p.useful(frozenset(c)) for k in range(3) for c in itertools.combinations(range(16), k)}
+        best = max(every.values())
+        self.assertGreater(best, sorted(every.values())[len(every) // 2] + 0.1)
+        greedy = p.greedy(2)
+        self.assertAlmostEqual(greedy[1], every[greedy[0]], delta=1e-3)
+        p.tried = 0
+        found, value = p.search(2, 1000, 1)
+        # One element in an hour that is at a limit to single precision may count or not.
+        self.assertAlmostEqual(value, best, delta=1e-3)
+        self.assertAlmostEqual(every[found], best, delta=1e-3)
+        self.assertGreaterEqual(p.bound(2), best)
+        self.assertGreaterEqual(best + 1e-3, greedy[1])
+        self.assertAlmostEqual(p.bound(16), float(p.share @ (p.light(range(16)) >= openings.LOW).sum(0)) / p.hours, delta=1e-3)
+
+    def test_program(self):
+        for where in ((self.root / "site.h5", self.root / "hall.h5"), (self.address + "/site", self.address + "/hall")):
+            text = self.printed("openings.py", *where, self.root / "some.npy", "--most", 2, "--tries", 200, "--cap", 0.6)
+            self.assertRegex(text, r"open: roof-\d-\d")
+            value, greedy, bound = map(float, re.search(r"useful in ([\d.-]+) % .*; greedy ([\d.-]+) %, bound ([\d.]+) %", text).groups())
+            self.assertTrue(greedy <= value <= bound, text)
+            # The sum of patches by NumPy and by the scene: single precision.
+            self.assertLess(float(re.search(r"the scene differs by (\S+)", text)[1]), 1e-5)
+
+    def test_words(self):
+        np.save(self.root / "odd.npy", np.ones((25, 32)))
+        self.refused("the year has the shape [25, 32], must have [24 days, 32]", "openings.py", self.root / "site.h5", self.root / "hall.h5",
+                     self.root / "odd.npy")
+        self.refused("hall.py writes both", "openings.py", self.root / "hall.h5", self.root / "site.h5", self.root / "some.npy")
 
 
 if __name__ == "__main__":

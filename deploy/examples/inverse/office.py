@@ -39,12 +39,13 @@ class Room:
         if bottom:
             self.quad(bottom, (x, y, z), (x, Y, z), (X, Y, z), (X, y, z))
 
-    def write(self, path):
+    def write(self, path, colours):
+        """The groups as OBJ; a group desk-1 has the reflectance of desk."""
         with open(path, "w", encoding="ascii") as out:
-            out.write("mtllib office.mtl\n" + "".join("v %g %g %g\n" % v for v in self.vertices))
+            out.write(f"mtllib {path.stem}.mtl\n" + "".join("v %g %g %g\n" % v for v in self.vertices))
             for group, faces in self.faces.items():
                 out.write(f"g {group}\nusemtl {group.split('-')[0]}\n" + "".join("f %d %d %d %d\n" % tuple(f) for f in faces))
-        path.with_suffix(".mtl").write_text("".join(f"newmtl {m}\nKd {rho} {rho} {rho}\n" for m, rho in COLOURS.items()))
+        path.with_suffix(".mtl").write_text("".join(f"newmtl {m}\nKd {rho} {rho} {rho}\n" for m, rho in colours.items()))
 
 
 def office(columns, rows):
@@ -86,7 +87,7 @@ def main():
         parser.error(f"--desks {options.desks} --lamps {options.lamps}: both must be numbers of at least 1 with an x between")
     options.folder.mkdir(parents=True, exist_ok=True)
     room, desks = office(columns, rows)
-    room.write(options.folder / "office.obj")
+    room.write(options.folder / "office.obj", COLOURS)
     dx, dy = SIZE[0] / a, SIZE[1] / b
     lights = [{"name": name, "file": name + ".ies", "flux": LUMENS, "from": [dx / 2, dy / 2, HANGING],
                "steps": [[dx, 0, 0], [0, dy, 0]], "counts": [a, b]} for name in CATALOGUE]
