@@ -128,7 +128,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1, help="of the random starts (preset 1)")
     parser.add_argument("-o", "--output", help="write the dimmers as an emission, for lambert solve and render")
     options = parser.parse_args()
-    scene = lambert.Scene(options.scene)
+    scene = lambert.Scene(options.scene, check=1)
     catalogue = Catalogue(scene, options.by)
     best = catalogue.search(options.rounds, options.seed)
     tried, seconds = catalogue.tried, catalogue.seconds

@@ -13,7 +13,7 @@ import pathlib
 
 from office import Room
 
-SIZE, HEIGHT = 20.0, 6.0
+SIZE, HEIGHT, TOWER = 20.0, 6.0, ((-14, -22), (4, -8))
 COLOURS = {"roof": 0.7, "floor": 0.3, "walls": 0.6, "ground": 0.2, "tower": 0.4}
 
 
@@ -28,8 +28,12 @@ def patches(room, divisions, seen_from_below):
 
 def site(divisions):
     room = Room()
-    room.quad("ground", (-40, -40, 0), (60, -40, 0), (60, 60, 0), (-40, 60, 0))
-    room.box((-14, -22, 0), (4, -8, 40), "tower")
+    room.box((*TOWER[0], 0), (*TOWER[1], 40), "tower")
+    xs, ys = ([-40, low, 0, high, SIZE, 60] for low, high in zip(*TOWER))
+    for x, X in zip(xs, xs[1:]):
+        for y, Y in zip(sorted(ys), sorted(ys)[1:]):
+            if not any(a <= x < A and b <= y < B for (a, b), (A, B) in (TOWER, ((0, 0), (SIZE, SIZE)))):  # nothing lies below them
+                room.quad("ground", (x, y, 0), (X, y, 0), (X, Y, 0), (x, Y, 0))
     for (x, y), (u, v) in (((0, 0), (SIZE, 0)), ((SIZE, 0), (SIZE, SIZE)), ((SIZE, SIZE), (0, SIZE)), ((0, SIZE), (0, 0))):
         room.quad("walls", (x, y, 0), (u, v, 0), (u, v, HEIGHT), (x, y, HEIGHT))
     patches(room, divisions, False)

@@ -132,7 +132,7 @@ def main():
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), help="those that are tried (preset: all)")
     parser.add_argument("-o", "--output", help="write the dimmers of the first method as an emission, for lambert solve and render")
     options = parser.parse_args()
-    scene = lambert.Scene(options.scene)
+    scene = lambert.Scene(options.scene, check=1)
     p = Desks(scene, options.lamps, [name for name in scene.sensors if name.startswith("desk-")])
     print(f"{scene.n} elements, {len(p.lamps)} lamps of {p.watts.sum():.0f} W, {len(p.desks)} desks with {len(p.of)} sensors")
     optimum = None
