@@ -11,7 +11,7 @@
 #include <string.h>
 
 /* Vectors side by side take as long as this many of them one by one, however few they are. */
-enum { WIDE_WORTH = 4 };
+enum { WIDE_WORTH = 8 };
 
 /* Floats of coefficients of a vector. */
 static size_t coefficients_of(const hierarchical *self) {

@@ -176,7 +176,7 @@ lam_status corner_hanging_find(const corner_draft *draft, corner_inside **out, s
         walk(&q, &grid);
         TRY(q.status);
     }
-    qsort(q.found, q.count, sizeof *q.found, compare_insides);
+    if (q.count > 0) qsort(q.found, q.count, sizeof *q.found, compare_insides);
     *out = q.found;
     *count = q.count;
     q.found = NULL;
