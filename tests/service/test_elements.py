@@ -198,7 +198,7 @@ class Elements(Case):
     def test_other_routes_go_on_without_a_query(self):
         path, _ = self.store()
         with Daemon(path) as daemon:
-            for route in "/v1/scenes", "/v1/scenes/box", "/v1/scenes/box/mesh", "/v1/scenes/box/groups", "/healthz":
+            for route in "/v1/scenes", "/v1/scenes/box", "/v1/scenes/box/sky", "/v1/scenes/box/groups", "/healthz":
                 self.assertEqual(daemon.get(route + "?fields=colour&x").body, daemon.get(route).body, route)
             self.assertEqual(daemon.get("/v1/scenes/none/elements?x=1").status, 404)
             self.assertEqual(daemon.ask("OPTIONS", "/v1/scenes/box/elements?x=1").status, 204)

@@ -85,8 +85,7 @@ START_TEST(texts_as_people_write_them) {
     static const char *const ends[] = {"\r\n", "\r", "\r\r\n", " \t\n"};
     for (int k = 0; k < 4; k++) {
         other[0] = '\0';
-        for (const char *c = text; *c != '\0'; c++)
-            snprintf(other + strlen(other), 8, "%.*s", *c == '\n' ? 8 : 1, *c == '\n' ? ends[k] : c);
+        for (const char *c = text; *c != '\0'; c++) strcat(other, *c == '\n' ? ends[k] : (char[]){*c, '\0'});
         is_usual(other);
     }
     snprintf(other, sizeof other, "\xef\xbb\xbf%s\n\n \r\n\x1a", text);
