@@ -108,8 +108,8 @@ test("a store that is replaced is noticed before its numbers are used", async ()
     for (const ask of [() => scene.irradiance(group, { select: { elements: [0] } }), () => scene.elements("area"), () => scene.jacobian({ elements: [0] }, { by: "groups" })])
         await assert.rejects(ask(), { kind: "scene-changed", message: new RegExp(`room (was replaced by one of another geometry|has ${n} elements instead of ${scene.n})`) });
     await assert.rejects(seldom.radiosity(group), { kind: "scene-changed", message: `the scene room answers the shape [${n}] instead of [${scene.n}]: it was replaced; open it again` });
-    await assert.rejects(seldom.radiosity(group, { at: "corners" }), { kind: "scene-changed", message: new RegExp(`corners instead of ${corners.count}:`) });
-    await assert.rejects(seldom.adjoint(group), { kind: "scene-changed", message: /answers a gradient of \[/ });
+    await assert.rejects(seldom.radiosity(group, { at: "corners" }), { kind: "scene-changed", message: new RegExp(`corners instead of ${corners.count}:|of another geometry: ${n} elements`) });
+    await assert.rejects(seldom.adjoint(group), { kind: "scene-changed", message: /answers a gradient of \[|of another geometry: / });
     const again = await open(`${daemon.address}/room`);
     assert.deepEqual((await again.radiosity(group)).shape, [n]);
 });
