@@ -204,10 +204,10 @@ export interface components {
             emissions?: components["schemas"]["Emission"][];
             select?: components["schemas"]["Select"];
             /**
-             * @description `faces`: means by area over the elements of each face of the scene file, in its order, of fronts alone; null (NPY: NaN) for a face without an element. `select` is then of groups, whose faces are meant, or of faces, which alone ask for it. Not with `reduce`.
+             * @description `corners`: light at the corners that elements share, which vertices of `mesh?corners` are: value v belongs to vertex v. Without `select`, `reduce` and `tolerance`; `error` is that of the elements. `faces`: means by area over the elements of each face of the scene file, in its order, of fronts alone; null (NPY: NaN) for a face without an element. `select` is then of groups, whose faces are meant, or of faces, which alone ask for it. Not with `reduce`.
              * @default elements
              */
-            at?: "elements" | "faces";
+            at?: "elements" | "faces" | "corners";
             /** @default radiosity */
             quantity?: components["schemas"]["Quantity"];
             /**
@@ -250,9 +250,9 @@ export interface components {
             /** @description The factors and weights by which lights or values were converted, such as `179 lm/W; luminance 0.2126 R + 0.7152 G + 0.0722 B`; absent where none was. */
             converted_by?: string;
             /**
-             * @description The values are of faces of the scene file, of sensors or of probes; absent where they are of elements.
+             * @description The values are of faces of the scene file, of corners that elements share, of sensors or of probes; absent where they are of elements.
              */
-            at?: "faces" | "sensors" | "probes";
+            at?: "faces" | "corners" | "sensors" | "probes";
             radiance?: components["schemas"]["Light"];
             radiosity?: components["schemas"]["Light"];
             irradiance?: components["schemas"]["Light"];
