@@ -100,6 +100,12 @@ void *call_allocate(const call *in, size_t bytes, const char *what, problem *why
     return made;
 }
 
+bool call_refuse_store(const scene *s, lam_status status, const lam_error *error, problem *why) {
+    const problem_kind as =
+        status == LAM_ERR_MEMORY || status == LAM_ERR_IO ? PROBLEM_NO_MEMORY : PROBLEM_UNAVAILABLE;
+    return problem_set(why, as, "%.100s: %s", s->name, scene_message(s, error->message));
+}
+
 void answer_set_times(answer *out, const answer_notes *notes) {
     out->timed = true;
     out->parse_ms = notes->parse_ms;

@@ -125,6 +125,10 @@ size_t call_parse_bytes(const call *in);
 /* malloc of bytes taken of the memory of the request; NULL with *why if there is no room (422, 503) or no
  * memory (503, `what` names it). */
 void *call_allocate(const call *in, size_t bytes, const char *what, problem *why);
+/* Refuses what needs the store again, which could not be read or has no room: false with *why. A store that
+ * cannot be read any more is no fault of the daemon's, and its next version may be right. */
+bool call_refuse_store(const scene *s, lam_status status, const lam_error *error, problem *why);
+
 answer_notes call_notes(const call *in);
 
 #endif

@@ -5,16 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A store that cannot be read any more is no fault of the daemon's, and its next version may be right. */
 bool corner_answer_begin(const call *in, radiosity_request *request, corner_answer *out, problem *why) {
     const scene *s = in->scene;
     lam_error error;
     if (!request->at_corners) return true;
     const lam_status status = scene_corners_get(scene_root(s)->corners, &out->plan, &error);
-    if (status != LAM_OK)
-        return problem_set(
-            why, status == LAM_ERR_MEMORY || status == LAM_ERR_IO ? PROBLEM_NO_MEMORY : PROBLEM_UNAVAILABLE,
-            "%.100s: %s", s->name, scene_message(s, error.message));
+    if (status != LAM_OK) return call_refuse_store(s, status, &error, why);
     request->n_corners = out->plan->n_nodes;
     return true;
 }

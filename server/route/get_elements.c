@@ -100,10 +100,7 @@ static bool build(const call *in, buffer *out, problem *why) {
     lam_error error;
     if (!read_question(in, &table, why)) return false;
     const lam_status status = scene_elements_read(s->elements, table.fields, &table.columns, &error);
-    const problem_kind as =
-        status == LAM_ERR_MEMORY || status == LAM_ERR_IO ? PROBLEM_NO_MEMORY : PROBLEM_UNAVAILABLE;
-    bool good =
-        status == LAM_OK || problem_set(why, as, "%.100s: %s", s->name, scene_message(s, error.message));
+    bool good = status == LAM_OK || call_refuse_store(s, status, &error, why);
     if (good && !element_table_write(&table, out))
         good = problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for elements");
     element_columns_free(&table.columns);

@@ -12,10 +12,7 @@ bool sun_answer_begin(const call *in, const radiosity_request *request, sun_answ
     lam_error error;
     if (request->n_suns == 0) return true;
     const lam_status status = scene_sun_make(s->sun, &error);
-    if (status != LAM_OK)
-        return problem_set(
-            why, status == LAM_ERR_MEMORY || status == LAM_ERR_IO ? PROBLEM_NO_MEMORY : PROBLEM_UNAVAILABLE,
-            "%.100s: %s", s->name, scene_message(s, error.message));
+    if (status != LAM_OK) return call_refuse_store(s, status, &error, why);
     out->shares = call_allocate(in, bytes_times(request->n_suns, bytes_times(s->n, sizeof *out->shares)),
                                 "the sun", why);
     if (out->shares == NULL || !request->at_sensors) return out->shares != NULL;
