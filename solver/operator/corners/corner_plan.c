@@ -82,21 +82,24 @@ static void settle_waiting(link_order *o) {
     }
 }
 
+/* The end that a waiting node waits for. */
+static uint32_t awaited(const link_order *o, uint32_t j) {
+    const corner_tie *tie = &o->nodes->ties[j];
+    return o->waits[tie->a] > 0 ? tie->a : tie->b;
+}
+
 /* A node that still waits leads into a cycle; returns the node of the shortest edge in it. */
 static uint32_t shortest_of_cycle(const link_order *o, uint32_t j) {
     const corner_tie *ties = o->nodes->ties;
     uint32_t slow = j, fast = j, found;
-#define END_OF(k) (o->waits[ties[k].a] > 0 ? ties[k].a : ties[k].b)
     do {
-        slow = END_OF(slow);
-        fast = END_OF(fast);
-        fast = END_OF(fast);
+        slow = awaited(o, slow);
+        fast = awaited(o, awaited(o, fast));
     } while (slow != fast);
     found = slow;
-    for (uint32_t k = END_OF(slow); k != slow; k = END_OF(k))
+    for (uint32_t k = awaited(o, slow); k != slow; k = awaited(o, k))
         if (ties[k].length < ties[found].length || (ties[k].length == ties[found].length && k < found))
             found = k;
-#undef END_OF
     return found;
 }
 

@@ -97,6 +97,14 @@ START_TEST(constant_light_is_kept) {
 }
 END_TEST
 
+/* Linear light has its value at every corner. */
+static void check_linear(const made *s, const patchwork *p, const float *out) {
+    for (size_t j = 0; j < s->plan.n_nodes; j++) {
+        const double want = linear(p->vertices[s->nodes.vertex[j]]);
+        ck_assert_double_eq_tol((double)out[j], want, 1e-5 * want);
+    }
+}
+
 /* The largest value is 52, of which singles hold 4e-6; sums of up to 96 weights of magnitude 4 in all. */
 START_TEST(linear_light_is_reproduced) {
     patchwork p = {.m = {.n = 0}};
@@ -105,10 +113,7 @@ START_TEST(linear_light_is_reproduced) {
     float x[MOST], out[4 * MOST];
     for (size_t i = 0; i < p.m.n; i++) x[i] = (float)linear(p.centre[i]);
     apply(&s, x, out);
-    for (size_t j = 0; j < s.plan.n_nodes; j++) {
-        const double want = linear(p.vertices[s.nodes.vertex[j]]);
-        ck_assert_double_eq_tol((double)out[j], want, 1e-5 * want);
-    }
+    check_linear(&s, &p, out);
     made_free(&s);
 }
 END_TEST
@@ -207,10 +212,7 @@ START_TEST(cycles_of_hanging_corners_end) {
     ck_assert_uint_gt(s.plan.n_links, 2);
     apply(&s, x, out);
     check_links(&s, out);
-    for (size_t j = 0; j < s.plan.n_nodes; j++) {
-        const double want = linear(p.vertices[s.nodes.vertex[j]]);
-        ck_assert_double_eq_tol((double)out[j], want, 1e-5 * want);
-    }
+    check_linear(&s, &p, out);
     made_free(&s);
 }
 END_TEST
