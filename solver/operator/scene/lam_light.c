@@ -103,37 +103,48 @@ void full_light_free(full_light *l) {
     *l = (full_light){.E = NULL};
 }
 
-/* One vector; work has room for its operator and its limiter. */
-static lam_status answer_one(const lam_scene *s, lam_quantity quantity, const lam_light *light, float *out,
-                             size_t *limited, void *work, size_t work_bytes, lam_error *error) {
+/* The vectors of a pass, at most OPERATOR_PASS; work has room for its operator and its limiter. */
+static lam_status answer_pass(const lam_scene *s, lam_quantity quantity, size_t count,
+                              const lam_light *lights, float *out, size_t *limited, void *work,
+                              size_t work_bytes, lam_error *error) {
     lam_status status = LAM_OK;
-    full_light full = {.E = NULL};
-    TRY(full_light_make(s, light, false, &full, error));
-    if (full.W != NULL)
-        TRY(lam_operator_apply_emitters(s->op, 1, quantity, full.W, s->n, NULL, out, work, work_bytes,
-                                        error));
-    else
-        TRY(lam_operator_apply_lit(s->op, 1, quantity, full.E, full.H0, out, work, work_bytes, error));
-    if (limited != NULL)
-        TRY(lam_limiter_apply(&s->limiter, s->op, 1, quantity, full.W != NULL ? NULL : full.E,
-                              full.W != NULL ? NULL : full.H0, full.W, out, limited, work, work_bytes,
-                              error));
+    const size_t vector = s->n_channels * s->n;
+    full_light full[OPERATOR_PASS] = {{.E = NULL}};
+    lam_part parts[OPERATOR_PASS];
+    for (size_t v = 0; v < count; v++) {
+        TRY(full_light_make(s, &lights[v], false, &full[v], error));
+        parts[v] = (lam_part){1, quantity, full[v].E, full[v].H0, out + v * vector};
+        if (full[v].W != NULL)
+            TRY(lam_operator_apply_emitters(s->op, 1, quantity, full[v].W, s->n, NULL, out + v * vector, work,
+                                            work_bytes, error));
+    }
+    if (s->linear.n_emitters == 0)
+        TRY(lam_operator_apply_parts(s->op, count, parts, work, work_bytes, error));
+    for (size_t v = 0; limited != NULL && v < count; v++)
+        TRY(lam_limiter_apply(&s->limiter, s->op, 1, quantity, full[v].W != NULL ? NULL : full[v].E,
+                              full[v].W != NULL ? NULL : full[v].H0, full[v].W, out + v * vector, &limited[v],
+                              work, work_bytes, error));
 done:
-    full_light_free(&full);
+    for (size_t v = 0; v < count; v++) full_light_free(&full[v]);
     return status;
 }
 
 lam_status lam_scene_answer(const lam_scene *scene, lam_quantity quantity, size_t n_lights,
                             const lam_light *lights, float *out, size_t *limited, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t solving = lam_operator_work_bytes(scene->op, 1),
+    const size_t most = n_lights < OPERATOR_PASS ? n_lights : OPERATOR_PASS,
+                 solving = lam_operator_work_bytes(scene->op, most),
                  limiting = lam_limiter_work_bytes(&scene->limiter),
                  bytes = solving > limiting ? solving : limiting;
     void *work = memory_allocate(1, bytes, "an answer", error);
     if (work == NULL) return LAM_ERR_MEMORY;
-    for (size_t v = 0; v < n_lights; v++)
-        TRY(answer_one(scene, quantity, &lights[v], out + v * scene->n_channels * scene->n,
-                       limited != NULL ? &limited[v] : NULL, work, bytes, error));
+    for (size_t v = 0; v < n_lights; v++) TRY(lam_light_check(scene, &lights[v], error));
+    for (size_t v = 0; v < n_lights; v += OPERATOR_PASS) {
+        const size_t left = n_lights - v;
+        TRY(answer_pass(scene, quantity, left < OPERATOR_PASS ? left : OPERATOR_PASS, lights + v,
+                        out + v * scene->n_channels * scene->n, limited != NULL ? limited + v : NULL, work,
+                        bytes, error));
+    }
 done:
     free(work);
     return status;
