@@ -70,27 +70,31 @@ done:
     return status;
 }
 
-lam_status full_light_make(const lam_scene *s, const lam_light *light, bool with_emission, full_light *out,
-                           lam_error *error) {
+static size_t emitter_tiles(const lam_scene *s) {
+    if (s->linear.n_emitters == 0) return 0;
+    const emitter_arrays *a = &operator_emitters_of(s->op)->a;
+    return a->L != NULL ? a->n_tiles : 0;
+}
+
+size_t full_light_room(const lam_scene *s) {
+    return s->n_channels *
+           (2 * s->n + s->linear.n_emitters + linear_scene_luminaires(&s->linear) + emitter_tiles(s));
+}
+
+lam_status full_light_make(const lam_scene *s, const lam_light *light, bool with_emission, float *room,
+                           full_light *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t vector = s->n_channels * s->n, n_emitters = s->linear.n_emitters;
-    const size_t tiles = n_emitters > 0 && operator_emitters_of(s->op)->a.L != NULL
-                             ? operator_emitters_of(s->op)->a.n_tiles
-                             : 0;
-    *out = (full_light){.L = light->L, .D = light->D};
+    const size_t vector = s->n_channels * s->n;
+    const bool few = s->linear.n_emitters > 0, lit = light->L != NULL || light->D != NULL;
+    *out = (full_light){.E = room, .L = light->L, .D = light->D};
     TRY(lam_light_check(s, light, error));
-    out->E = memory_allocate(2 * vector +
-                                 s->n_channels * (n_emitters + linear_scene_luminaires(&s->linear) + tiles),
-                             sizeof *out->E, "light", error);
-    if (out->E == NULL) TRY(LAM_ERR_MEMORY);
+    memset(room, 0, (few ? full_light_room(s) : lit ? 2 * vector : vector) * sizeof *room);
     add_emission(s, light, out->E);
-    float *const direct = out->E + vector;
-    if (n_emitters > 0) {
-        out->H0 = direct;
-        out->W = out->E + 2 * vector;
+    if (few || lit) out->H0 = room + vector;
+    if (few) {
+        out->W = room + 2 * vector;
         TRY(take_weights(s, light, with_emission, out, error));
-    } else if (light->L != NULL || light->D != NULL) {
-        out->H0 = direct;
+    } else {
         if (light->L != NULL) lam_sky_irradiance(s->sky, s->n_channels, light->L, out->H0);
         if (light->D != NULL) lam_luminaires_irradiance(s->luminaires, 1, light->D, out->H0);
     }
@@ -98,34 +102,35 @@ done:
     return status;
 }
 
-void full_light_free(full_light *l) {
-    free(l->E);
-    *l = (full_light){.E = NULL};
-}
+/* Room of a pass: the light of its vectors, and work for its operator and its limiter. */
+typedef struct pass_room {
+    float *light;
+    void *work;
+    size_t work_bytes;
+} pass_room;
 
-/* The vectors of a pass, at most OPERATOR_PASS; work has room for its operator and its limiter. */
+/* The vectors of a pass, at most OPERATOR_PASS. */
 static lam_status answer_pass(const lam_scene *s, lam_quantity quantity, size_t count,
-                              const lam_light *lights, float *out, size_t *limited, void *work,
-                              size_t work_bytes, lam_error *error) {
+                              const lam_light *lights, float *out, size_t *limited, const pass_room *room,
+                              lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t vector = s->n_channels * s->n;
-    full_light full[OPERATOR_PASS] = {{.E = NULL}};
+    const size_t vector = s->n_channels * s->n, each = full_light_room(s);
+    full_light full[OPERATOR_PASS];
     lam_part parts[OPERATOR_PASS];
     for (size_t v = 0; v < count; v++) {
-        TRY(full_light_make(s, &lights[v], false, &full[v], error));
+        TRY(full_light_make(s, &lights[v], false, room->light + v * each, &full[v], error));
         parts[v] = (lam_part){1, quantity, full[v].E, full[v].H0, out + v * vector};
         if (full[v].W != NULL)
-            TRY(lam_operator_apply_emitters(s->op, 1, quantity, full[v].W, s->n, NULL, out + v * vector, work,
-                                            work_bytes, error));
+            TRY(lam_operator_apply_emitters(s->op, 1, quantity, full[v].W, s->n, NULL, out + v * vector,
+                                            room->work, room->work_bytes, error));
     }
     if (s->linear.n_emitters == 0)
-        TRY(lam_operator_apply_parts(s->op, count, parts, work, work_bytes, error));
+        TRY(lam_operator_apply_parts(s->op, count, parts, room->work, room->work_bytes, error));
     for (size_t v = 0; limited != NULL && v < count; v++)
         TRY(lam_limiter_apply(&s->limiter, s->op, 1, quantity, full[v].W != NULL ? NULL : full[v].E,
                               full[v].W != NULL ? NULL : full[v].H0, full[v].W, out + v * vector, &limited[v],
-                              work, work_bytes, error));
+                              room->work, room->work_bytes, error));
 done:
-    for (size_t v = 0; v < count; v++) full_light_free(&full[v]);
     return status;
 }
 
@@ -134,19 +139,21 @@ lam_status lam_scene_answer(const lam_scene *scene, lam_quantity quantity, size_
     lam_status status = LAM_OK;
     const size_t most = n_lights < OPERATOR_PASS ? n_lights : OPERATOR_PASS,
                  solving = lam_operator_work_bytes(scene->op, most),
-                 limiting = lam_limiter_work_bytes(&scene->limiter),
-                 bytes = solving > limiting ? solving : limiting;
-    void *work = memory_allocate(1, bytes, "an answer", error);
-    if (work == NULL) return LAM_ERR_MEMORY;
+                 limiting = lam_limiter_work_bytes(&scene->limiter);
+    pass_room room = {.work_bytes = solving > limiting ? solving : limiting};
+    room.light = memory_allocate(most, full_light_room(scene) * sizeof *room.light, "light", error);
+    room.work = memory_allocate(1, room.work_bytes, "an answer", error);
+    if (room.light == NULL || room.work == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < n_lights; v++) TRY(lam_light_check(scene, &lights[v], error));
     for (size_t v = 0; v < n_lights; v += OPERATOR_PASS) {
         const size_t left = n_lights - v;
         TRY(answer_pass(scene, quantity, left < OPERATOR_PASS ? left : OPERATOR_PASS, lights + v,
-                        out + v * scene->n_channels * scene->n, limited != NULL ? limited + v : NULL, work,
-                        bytes, error));
+                        out + v * scene->n_channels * scene->n, limited != NULL ? limited + v : NULL, &room,
+                        error));
     }
 done:
-    free(work);
+    free(room.light);
+    free(room.work);
     return status;
 }
 

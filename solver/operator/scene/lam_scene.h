@@ -25,8 +25,7 @@ struct lam_scene {
     emitter_weights *weights;
 };
 
-/* The light of one vector, expanded: of a store of few emitters all by its weights W. Parts that it owns are
- * in one block. */
+/* The light of one vector, expanded: of a store of few emitters all by its weights W. */
 typedef struct full_light {
     float *E;       /* [C][n] */
     float *H0;      /* [C][n]; NULL: none */
@@ -39,12 +38,14 @@ typedef struct full_light {
  */
 lam_status lam_light_check(const lam_scene *s, const lam_light *light, lam_error *error);
 
-/* Freed with full_light_free, also after an error, which is one of lam_light_check, or of
- * lam_operator_weights. with_emission: E and H0 are wanted of a store of few emitters, too. O(C n), and that
- * of direct light. */
-lam_status full_light_make(const lam_scene *s, const lam_light *light, bool with_emission, full_light *out,
-                           lam_error *error);
-void full_light_free(full_light *l);
+/* Floats of room for the light of a vector. */
+size_t full_light_room(const lam_scene *s);
+
+/* In room, of full_light_room floats, whose content is lost and which must outlive out. with_emission: E and
+ * H0 are wanted of a store of few emitters, too. Errors: those of lam_light_check and lam_operator_weights.
+ * O(C n), and that of direct light. */
+lam_status full_light_make(const lam_scene *s, const lam_light *light, bool with_emission, float *room,
+                           full_light *out, lam_error *error);
 
 /* LAM_ERR_ARGUMENT unless all are below their number. */
 lam_status lam_groups_check(const lam_scene *s, size_t n_groups, const uint32_t *groups, lam_error *error);

@@ -121,9 +121,11 @@ lam_status lam_scene_stated(const lam_scene *scene, lam_quantity quantity, const
                             lam_error *error) {
     lam_status status = LAM_OK;
     const stated_errors *e = &scene->errors;
-    full_light full = {.E = NULL};
+    full_light full;
+    float *room = memory_allocate(full_light_room(scene), sizeof *room, "light", error);
+    if (room == NULL) TRY(LAM_ERR_MEMORY);
     TRY(lam_groups_check(scene, n_groups, groups, error));
-    TRY(full_light_make(scene, light, true, &full, error));
+    TRY(full_light_make(scene, light, true, room, &full, error));
     const stated_error *all = asks_receivers(scene, n_groups, groups) ? &e->receivers : &e->all;
     if (is_strange(scene, &full))
         FAIL(error, LAM_ERR_UNSUPPORTED,
@@ -140,6 +142,6 @@ lam_status lam_scene_stated(const lam_scene *scene, lam_quantity quantity, const
     else
         take_parts(&(stated_parts){.rest = all->indirect, .mesh = e->mesh}, 0, out);
 done:
-    full_light_free(&full);
+    free(room);
     return status;
 }
