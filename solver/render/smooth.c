@@ -11,7 +11,8 @@ lam_status smooth_nodes_create(const mesh *m, smooth_nodes *out, lam_error *erro
                                  .vertices = (const double(*)[3])m->vertices,
                                  .elements = (const uint32_t(*)[4])m->elements,
                                  .normal = (const float(*)[3])m->normal,
-                                 .group = m->group};
+                                 .group = m->group,
+                                 .buried = m->buried};
     smooth_nodes made = {.corner = NULL};
     corner_nodes nodes = {.n_nodes = 0};
     TRY(corner_nodes_create(&surface, &nodes, error));

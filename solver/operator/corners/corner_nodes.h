@@ -5,6 +5,7 @@
 
 #include "store/status.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #define CORNER_NONE 0xFFFFFFFFu
@@ -16,6 +17,7 @@ typedef struct corner_mesh {
     const uint32_t (*elements)[4]; /* [n]; CORNER_NONE as the 4th vertex of a triangle */
     const float (*normal)[3];      /* [n] */
     const uint32_t *group;         /* [n] */
+    const bool *buried;            /* [n]: between a body and the face that it stands on; NULL: none */
 } corner_mesh;
 
 static inline size_t corner_mesh_count(const corner_mesh *m, size_t element) {
@@ -29,10 +31,10 @@ typedef struct corner_tie {
     double length; /* of that edge, m; 0: the node is in no edge */
 } corner_tie;
 
-/* A node is a vertex of one surface, elements of one group that meet there at less than 20 degrees. Vertices
- * closer than a millionth of the scene count as one. Where a corner of another surface lies inside an edge of
- * an element that no other shares, the element has a node of its own there. Nodes ascend by group, within one
- * by the first element that has them. */
+/* A node is a vertex of one surface, elements of one group that meet there at less than 20 degrees, none or
+ * all of them buried. Vertices closer than a millionth of the scene count as one. Where a corner of another
+ * surface lies inside an edge of an element that no other shares, the element has a node of its own there.
+ * Nodes ascend by group, within one by the first element that has them. */
 typedef struct corner_nodes {
     size_t n_nodes;
     uint32_t (
@@ -51,10 +53,12 @@ typedef struct corner_nodes {
 lam_status corner_nodes_create(const corner_mesh *m, corner_nodes *out, lam_error *error);
 void corner_nodes_free(corner_nodes *nodes);
 
-/* Elements at less than this angle are one surface: the cosine of 20 degrees. */
+/* Elements at less than this angle are one surface: the cosine of 20 degrees. Buried ones are dark, and no
+ * part of what is seen around them. */
 static inline bool corner_same_surface(const corner_mesh *m, uint32_t i, uint32_t j) {
     const float *a = m->normal[i], *b = m->normal[j];
-    return m->group[i] == m->group[j] && (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) > 0.93969262;
+    return m->group[i] == m->group[j] && (m->buried == NULL || m->buried[i] == m->buried[j]) &&
+           (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) > 0.93969262;
 }
 
 #endif

@@ -1,5 +1,6 @@
 #include "solver/operator/corners/corner_store.h"
 
+#include "solver/base/scene/scene_buried.h"
 #include "solver/operator/corners/corner_plan.h"
 #include "store/groups.h"
 
@@ -38,6 +39,7 @@ lam_status corner_arrays_read(store *s, size_t n, corner_arrays *out, lam_error 
     TRY(store_read(s, STORE_MESH "/elements", STORE_U32, 2, (size_t[]){n, 4}, &out->elements, error));
     TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, (size_t[]){n, 3}, &out->normal, error));
     TRY(store_read(s, STORE_MESH "/group", STORE_U32, 1, (size_t[]){n}, &out->group, error));
+    TRY(scene_buried_load(s, n, &out->buried, error));
     TRY(check_arrays(s, out, error));
 done:
     return status;
@@ -48,6 +50,7 @@ void corner_arrays_free(corner_arrays *a) {
     free(a->elements);
     free(a->normal);
     free(a->group);
+    free(a->buried);
     *a = (corner_arrays){.n = 0};
 }
 
@@ -57,7 +60,8 @@ corner_mesh corner_arrays_mesh(const corner_arrays *a) {
                          .vertices = a->vertices,
                          .elements = a->elements,
                          .normal = a->normal,
-                         .group = a->group};
+                         .group = a->group,
+                         .buried = a->buried};
 }
 
 struct lam_corners {

@@ -8,6 +8,7 @@
 /* The arrays of a mesh that corners are found in; freed by corner_arrays_free, also after an error. */
 typedef struct corner_arrays {
     void *vertices, *elements, *normal, *group; /* as in /mesh */
+    bool *buried;                               /* [n]; NULL: none */
     size_t n_vertices, n;
 } corner_arrays;
 

@@ -164,6 +164,28 @@ static void check_links(const made *s, const float *out) {
     }
 }
 
+/* The dark floor below a leg, in a corner of its tile, darkens no corner of what is seen. */
+START_TEST(buried_elements_stay_apart) {
+    patchwork p = {.m = {.n = 0}};
+    bool buried[MOST] = {false};
+    make_floor(&p, 0);
+    const size_t n_seen = p.m.n;
+    add_flat(&p, 0, 4, 0, .1, .1);
+    add_flat(&p, 0, 4.1, 0, 1.9, .1);
+    add_flat(&p, 0, 4, .1, 2, 1.9);
+    buried[n_seen] = true;
+    p.m.buried = buried;
+    made s = make(&p);
+    float x[MOST], out[4 * MOST];
+    for (size_t i = 0; i < p.m.n; i++) x[i] = buried[i] ? 0 : 7;
+    apply(&s, x, out);
+    for (size_t i = 0; i < p.m.n; i++)
+        for (int k = 0; k < 4; k++)
+            ck_assert_double_eq_tol((double)out[s.nodes.corner[i][k]], (double)x[i], 7e-6);
+    made_free(&s);
+}
+END_TEST
+
 /* Corners that hang are on the line of the edge, also of light that jumps, and polygons have them. */
 START_TEST(hanging_corners_are_on_their_edge) {
     patchwork p = {.m = {.n = 0}};
@@ -301,6 +323,7 @@ int main(void) {
     tcase_add_test(tests, linear_light_is_reproduced);
     tcase_add_test(tests, means_are_kept);
     tcase_add_test(tests, surfaces_and_groups_do_not_mix);
+    tcase_add_test(tests, buried_elements_stay_apart);
     tcase_add_test(tests, hanging_corners_are_on_their_edge);
     tcase_add_test(tests, corners_of_other_surfaces_are_in_polygons);
     tcase_add_test(tests, cycles_of_hanging_corners_end);
